@@ -1,0 +1,198 @@
+"""Every error the engine raises.
+
+    EngineError
+    ├── InvalidInputError (also a ValueError)
+    │   ├── InvalidArrayError         invalid_array            wrong type or shape
+    │   ├── WrongDimensionError       wrong_dimension          2D and 3D mixed, or a dimension the operation lacks
+    │   ├── NotFiniteError            not_finite               NaN or infinity
+    │   ├── EmptyGeometryError        empty_geometry           nothing to work on
+    │   ├── IndexOutOfRangeError      index_out_of_range       a face names a vertex that is not there
+    │   ├── RepeatedIndexError        repeated_index           a face names one vertex twice
+    │   ├── NotClosedError            not_closed               an edge has a face on one side only
+    │   ├── InconsistentOrientationError inconsistent_orientation  an edge is used unequally in its two directions
+    │   ├── FaceNotSimpleError        face_not_simple          a polygonal face cannot be cut into triangles
+    │   ├── RingTooShortError         ring_too_short           a ring of fewer than three vertices
+    │   ├── MinAboveMaxError          min_above_max            a box with min > max on an axis
+    │   ├── NegativeRadiusError       negative_radius
+    │   ├── ZeroNormalError           zero_normal              a plane without direction
+    │   ├── InvalidPolynomialError    invalid_polynomial       powers or degree out of bounds
+    │   ├── InvalidOperationError     invalid_operation        an unknown Boolean or output mode
+    │   ├── NotRigidError             not_rigid                a pose that is no rotation
+    │   └── TooDeepError              too_deep                 a CSG tree deeper than the limit
+    ├── UnsupportedSolidError         unsupported_solid        this operation does not take this solid
+    ├── UnsupportedPairError          unsupported_pair         collision of these two is not defined
+    ├── NotRepresentableError         not_representable        the exact result is no float64
+    ├── TooComplexError               too_complex              a stated cap on exact work was reached
+    ├── DeadlineExceededError         deadline_exceeded        (also a TimeoutError)
+    └── CancelledError                cancelled
+
+`code` is stable and part of the API. `where` is the path to the element that broke the rule, relative to the argument
+named first, for example ``("solid", "faces", 3)``. The message alone is enough to reproduce the problem.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+
+class EngineError(Exception):
+    """Base of every error the engine raises on purpose."""
+
+    code: ClassVar[str] = "engine_error"
+
+    def __init__(self, message: str, where: tuple[str | int, ...] = ()) -> None:
+        super().__init__(message)
+        self.message = message
+        self.where = tuple(where)
+
+    def at(self, *prefix: str | int) -> EngineError:
+        """Return this error with `prefix` put before its path, for the caller that knows the outer name."""
+        self.where = (*prefix, *self.where)
+        return self
+
+    def __reduce__(self) -> tuple[type[EngineError], tuple[str, tuple[str | int, ...]]]:
+        return type(self), (self.message, self.where)
+
+
+class InvalidInputError(EngineError, ValueError):
+    """An argument breaks an invariant; `where` names the element."""
+
+    code: ClassVar[str] = "invalid_input"
+
+
+class InvalidArrayError(InvalidInputError):
+    """Wrong type or shape."""
+
+    code: ClassVar[str] = "invalid_array"
+
+
+class WrongDimensionError(InvalidInputError):
+    """2D and 3D mixed, or a dimension the operation does not have."""
+
+    code: ClassVar[str] = "wrong_dimension"
+
+
+class NotFiniteError(InvalidInputError):
+    """NaN or infinity."""
+
+    code: ClassVar[str] = "not_finite"
+
+
+class EmptyGeometryError(InvalidInputError):
+    """A solid without vertices, faces, planes, rings, terms or operands."""
+
+    code: ClassVar[str] = "empty_geometry"
+
+
+class IndexOutOfRangeError(InvalidInputError):
+    """A face names a vertex that is not there."""
+
+    code: ClassVar[str] = "index_out_of_range"
+
+
+class RepeatedIndexError(InvalidInputError):
+    """A face names one vertex twice."""
+
+    code: ClassVar[str] = "repeated_index"
+
+
+class NotClosedError(InvalidInputError):
+    """An edge has a face on one side only."""
+
+    code: ClassVar[str] = "not_closed"
+
+
+class InconsistentOrientationError(InvalidInputError):
+    """An edge is not used equally often in both directions."""
+
+    code: ClassVar[str] = "inconsistent_orientation"
+
+
+class FaceNotSimpleError(InvalidInputError):
+    """A polygonal face has no triangulation by the stated rule."""
+
+    code: ClassVar[str] = "face_not_simple"
+
+
+class RingTooShortError(InvalidInputError):
+    """A ring of fewer than three vertices."""
+
+    code: ClassVar[str] = "ring_too_short"
+
+
+class MinAboveMaxError(InvalidInputError):
+    """A box with min > max on an axis."""
+
+    code: ClassVar[str] = "min_above_max"
+
+
+class NegativeRadiusError(InvalidInputError):
+    """A sphere with a negative radius."""
+
+    code: ClassVar[str] = "negative_radius"
+
+
+class ZeroNormalError(InvalidInputError):
+    """A plane whose normal is zero."""
+
+    code: ClassVar[str] = "zero_normal"
+
+
+class InvalidPolynomialError(InvalidInputError):
+    """Powers, degree or number of terms out of bounds."""
+
+    code: ClassVar[str] = "invalid_polynomial"
+
+
+class InvalidOperationError(InvalidInputError):
+    """An unknown Boolean operation or output mode."""
+
+    code: ClassVar[str] = "invalid_operation"
+
+
+class NotRigidError(InvalidInputError):
+    """A pose whose matrix is no rotation."""
+
+    code: ClassVar[str] = "not_rigid"
+
+
+class TooDeepError(InvalidInputError):
+    """A CSG tree deeper than the limit."""
+
+    code: ClassVar[str] = "too_deep"
+
+
+class UnsupportedSolidError(EngineError):
+    """This operation does not take this solid; the message names those it takes."""
+
+    code: ClassVar[str] = "unsupported_solid"
+
+
+class UnsupportedPairError(EngineError):
+    """Collision of these two is not defined; the message names what is."""
+
+    code: ClassVar[str] = "unsupported_pair"
+
+
+class NotRepresentableError(EngineError):
+    """The exact result is no float64."""
+
+    code: ClassVar[str] = "not_representable"
+
+
+class TooComplexError(EngineError):
+    """A stated cap on exact work was reached."""
+
+    code: ClassVar[str] = "too_complex"
+
+
+class DeadlineExceededError(EngineError, TimeoutError):
+    """The call ran past its deadline; there is no partial answer."""
+
+    code: ClassVar[str] = "deadline_exceeded"
+
+
+class CancelledError(EngineError):
+    """The caller gave up on the call."""
+
+    code: ClassVar[str] = "cancelled"

@@ -1,0 +1,132 @@
+"""The only file that spells compiler options, and where compiled code is kept.
+
+Two decorators. `kernel`: an outer loop over arrays, called from Python, releases the interpreter lock, cached on disk.
+`inline`: a small function that compiled code calls. Arithmetic is strict IEEE double: `fastmath` is off everywhere,
+and nothing is fused unless `fma` (error_free.py) is called by name.
+
+**The cache.** numba looks at the file of the kernel only, so a cached kernel would not notice that a helper in another
+file changed. Each module therefore caches into a folder named by a hash of its own source and of every engine module
+it imports, directly or not. The folder is taken from the first of these that can be written:
+
+1. ``ENGINE_CACHE_DIR``;
+2. ``XDG_CACHE_HOME`` or ``~/.cache``, then ``exact-geometry``;
+3. a private folder of this user under the system's temporary folder.
+
+Where none can be written, kernels are compiled anew in each process. ``ENGINE_CACHE_SEED`` names a filled, possibly
+read-only folder (an image's) that is copied there first.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import os
+import re
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba import config as numba_config
+
+_ROOT = Path(__file__).resolve().parent
+_IMPORT = re.compile(
+    r"^\s*(?:from\s+engine([.\w]*)\s+import\s+(\([^)]*\)|[^\n]*)|import\s+engine([.\w]+))", re.MULTILINE
+)
+
+
+@functools.cache
+def _source(module: str) -> str | None:
+    """Return the source text of the dotted engine `module`, None if there is no such file."""
+    base = _ROOT.joinpath(*module.split(".")[1:])
+    for path in (base.with_suffix(".py"), base / "__init__.py"):
+        if module != "engine" and path.is_file():
+            return path.read_text("utf-8")
+    return None
+
+
+def imported_modules(module: str) -> set[str]:
+    """Return the engine modules that `module` names in its import lines (``engine/__init__`` is left out)."""
+    found: set[str] = set()
+    for match in _IMPORT.finditer(_source(module) or ""):
+        package = "engine" + (match[1] or match[3] or "")
+        names = re.findall(r"\w+", re.sub(r"#.*|\bas\s+\w+", "", match[2] or ""))
+        candidates = [package, *(f"{package}.{name}" for name in names)]
+        found.update(name for name in candidates if _source(name) is not None)
+    return found
+
+
+@functools.cache
+def source_digest(module: str) -> str:
+    """Return a hash of `module`, of all engine modules below it, of this file and of numba's version."""
+    reached, waiting = set(), {module, "engine.jit"}
+    while waiting:
+        name = waiting.pop()
+        reached.add(name)
+        waiting |= imported_modules(name) - reached
+    digest = hashlib.sha256(numba.__version__.encode())
+    for name in sorted(reached):
+        digest.update(f"\0{name}\0{_source(name)}".encode())
+    return digest.hexdigest()[:20]
+
+
+def _is_writable(folder: Path) -> bool:
+    """Tell whether `folder` belongs to this user and a file can be made in it; make the folder if it is missing."""
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        if hasattr(os, "getuid") and folder.stat().st_uid != os.getuid():
+            return False  # compiled code is run as found: never from another user's folder
+        with tempfile.TemporaryFile(dir=folder):
+            return True
+    except (OSError, RuntimeError):
+        return False
+
+
+def _candidates() -> Iterator[Path]:
+    if named := os.environ.get("ENGINE_CACHE_DIR"):
+        yield Path(named)
+    with suppress(RuntimeError):  # no home folder at all
+        yield Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "exact-geometry"
+    user = os.getuid() if hasattr(os, "getuid") else "user"
+    yield Path(tempfile.gettempdir()) / f"exact-geometry-{user}"
+
+
+@functools.cache
+def cache_folder() -> Path | None:
+    """Return the folder that holds compiled code, None where nothing can be written."""
+    folder = next((folder for folder in _candidates() if _is_writable(folder)), None)
+    seed = os.environ.get("ENGINE_CACHE_SEED")
+    if folder is not None and seed and Path(seed).is_dir():
+        for filled in Path(seed).iterdir():
+            if not (folder / filled.name).exists():
+                shutil.copytree(filled, folder / filled.name, dirs_exist_ok=True)
+    return folder
+
+
+@contextmanager
+def _cache_at(folder: Path) -> Iterator[None]:
+    """numba settles a function's cache folder when it decorates it: set the folder for that moment only."""
+    before = numba_config.CACHE_DIR
+    numba_config.CACHE_DIR = str(folder)
+    try:
+        yield
+    finally:
+        numba_config.CACHE_DIR = before
+
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """Compile an outer loop: called from Python, releases the interpreter lock, cached on disk."""
+    folder = cache_folder()
+    options = {"nogil": True, "fastmath": False, "error_model": "numpy"}
+    if folder is None or numba_config.DISABLE_JIT:
+        return numba.njit(**options)(function)
+    with _cache_at(folder / source_digest(function.__module__)):
+        return numba.njit(cache=True, **options)(function)
+
+
+def inline(function: Callable[..., Any]) -> Any:
+    """Compile a small function that kernels call; it lives in the caller's cached code."""
+    return numba.njit(nogil=True, fastmath=False, error_model="numpy")(function)

@@ -1,0 +1,215 @@
+"""Splits a batch into chunks of 1-3 ms over a thread pool, with a deadline, a cancel flag and progress.
+
+Kernels are serial and release the interpreter lock, so plain threads run them side by side; two kernels that each start
+threads of their own would abort the process under numba's workqueue layer. Between chunks there is room for other
+requests. Inside a chunk, a kernel whose work per item is not small polls `Budget.flag` (at least every 10 ms) and
+returns early when it is set; slow Python loops call `Budget.check`.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from engine.errors import CancelledError, DeadlineExceededError
+
+Progress = Callable[[int], object]
+"""Called with the number of items just finished, so that ``tqdm(total=n).update`` fits."""
+
+CHUNK_SECONDS: Final = 0.002
+"""What one chunk should take: short enough for fairness between requests, long against 20 us of hand-over."""
+
+
+class Cancel:
+    """A switch that another thread may throw: every call given it ends soon with `CancelledError`."""
+
+    __slots__ = ("_flags", "_lock", "is_set")
+
+    def __init__(self) -> None:
+        self.is_set = False
+        self._flags: list[npt.NDArray[np.uint8]] = []
+        self._lock = threading.Lock()
+
+    def set(self) -> None:
+        """Throw the switch; it stays thrown."""
+        with self._lock:
+            self.is_set = True
+            for flag in self._flags:
+                flag[0] = 1
+
+    def attach(self, flag: npt.NDArray[np.uint8]) -> None:
+        """Have `flag` raised when the switch is thrown."""
+        with self._lock:
+            self._flags.append(flag)
+            if self.is_set:
+                flag[0] = 1
+
+    def detach(self, flag: npt.NDArray[np.uint8]) -> None:
+        """Forget `flag`."""
+        with self._lock:
+            self._flags = [kept for kept in self._flags if kept is not flag]
+
+
+class Budget:
+    """Deadline and cancel switch of one call; use as a context manager.
+
+    deadline: seconds from now, None for no limit. cancel: a switch shared with other threads, or None.
+    `flag` is the one-element uint8 array that kernels poll.
+    """
+
+    def __init__(self, deadline: float | None = None, cancel: Cancel | None = None) -> None:
+        self.deadline = deadline
+        self.flag: npt.NDArray[np.uint8] = np.zeros(1, np.uint8)
+        self._cancel = cancel
+        self._end = None if deadline is None else time.monotonic() + deadline
+        self._timer: threading.Timer | None = None
+
+    def __enter__(self) -> Budget:
+        if self._cancel is not None:
+            self._cancel.attach(self.flag)
+        if self.deadline is not None:
+            self._timer = threading.Timer(max(self.deadline, 0.0), self._raise_flag)
+            self._timer.daemon = True
+            self._timer.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+        if self._cancel is not None:
+            self._cancel.detach(self.flag)
+
+    def _raise_flag(self) -> None:
+        self.flag[0] = 1
+
+    def check(self) -> None:
+        """Raise `CancelledError` or `DeadlineExceededError` if the call must end; cheap enough for inner loops."""
+        if self._cancel is not None and self._cancel.is_set:
+            raise CancelledError("the call was cancelled by its caller")
+        if self._end is not None and time.monotonic() >= self._end:
+            raise DeadlineExceededError(
+                f"the deadline of {self.deadline!r} s passed before the call was done; "
+                "ask for less in one call or give it more time"
+            )
+
+
+def default_workers() -> int:
+    """Return the number of cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+_pool: ThreadPoolExecutor | None = None
+_pool_lock = threading.Lock()
+
+
+def _forget_pool() -> None:
+    """A forked child has the pool's object but none of its threads."""
+    global _pool, _pool_lock
+    _pool, _pool_lock = None, threading.Lock()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forget_pool)
+
+
+def _shared_pool() -> ThreadPoolExecutor:
+    global _pool
+    with _pool_lock:
+        if _pool is None:
+            _pool = ThreadPoolExecutor(default_workers(), thread_name_prefix="engine")
+        return _pool
+
+
+def run_chunks(
+    task: Callable[[int, int], object],
+    n_items: int,
+    *,
+    budget: Budget,
+    first_chunk: int = 1024,
+    workers: int | None = None,
+    progress: Progress | None = None,
+) -> None:
+    """Call ``task(start, stop)`` until the ranges cover ``0 .. n_items``, each item once.
+
+    The first chunk runs in the calling thread and is timed; later ones are sized to take `CHUNK_SECONDS`. With one
+    worker, or when the first chunk was all, no thread is involved. Tasks write to disjoint slices, so the result does
+    not depend on `workers` or on the sizes chosen.
+
+    task: must not call `run_chunks` with more than one worker (the pool is shared and could wait on itself).
+    workers: threads at once; None for one per core, 1 for the calling thread only.
+    Raises: what `task` raises (the earliest range first), `DeadlineExceededError`, `CancelledError`.
+    """
+    if workers is not None and workers < 1:
+        raise ValueError(f"workers must be at least 1, got {workers!r}; leave it out for one per core")
+    n_workers = default_workers() if workers is None else workers
+    done, chunk = 0, max(1, first_chunk)
+    while done < n_items:
+        budget.check()
+        if done and n_workers > 1 and n_items - done > chunk:
+            _run_threaded(task, done, n_items, chunk, n_workers, budget, progress)
+            break
+        stop = min(n_items, done + chunk)
+        before = time.perf_counter()
+        task(done, stop)
+        seconds = time.perf_counter() - before
+        if progress is not None:
+            progress(stop - done)
+        chunk = _next_chunk(stop - done, seconds)
+        done = stop
+    budget.check()
+
+
+def _next_chunk(n_items: int, seconds: float) -> int:
+    """Return the chunk that should take `CHUNK_SECONDS`, at most eight times the last (the first may be untypical)."""
+    return max(1, int(n_items * min(8.0, CHUNK_SECONDS / max(seconds, 1e-9))))
+
+
+def _run_threaded(
+    task: Callable[[int, int], object],
+    start: int,
+    n_items: int,
+    chunk: int,
+    n_workers: int,
+    budget: Budget,
+    progress: Progress | None,
+) -> None:
+    """Keep `n_workers` chunks in flight; on the first error raise the flag, wait for those in flight, re-raise."""
+    pool, failure = _shared_pool(), None
+    in_flight: dict[Future[float], tuple[int, int]] = {}
+    while start < n_items or in_flight:
+        while start < n_items and len(in_flight) < n_workers and failure is None:
+            stop = min(n_items, start + chunk)
+            in_flight[pool.submit(_timed, task, start, stop)] = (start, stop)
+            start = stop
+        if not in_flight:
+            break
+        finished, _ = wait(in_flight, return_when=FIRST_COMPLETED)
+        for future in sorted(finished, key=lambda item: in_flight[item]):
+            first, stop = in_flight.pop(future)
+            if (error := future.exception()) is not None:
+                failure = failure or error
+                budget.flag[0] = 1
+                continue
+            chunk = _next_chunk(stop - first, future.result())
+            if progress is not None and failure is None:
+                progress(stop - first)
+        try:
+            budget.check()
+        except (CancelledError, DeadlineExceededError) as error:
+            failure = failure or error
+            budget.flag[0] = 1
+    if failure is not None:
+        raise failure
+
+
+def _timed(task: Callable[[int, int], object], start: int, stop: int) -> float:
+    before = time.perf_counter()
+    task(start, stop)
+    return time.perf_counter() - before

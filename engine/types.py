@@ -1,0 +1,90 @@
+"""Small shared types: points and planes as named tuples, three-valued locations, five relations, signs, the report.
+
+Named tuples carry one item through compiled code (a `Point3` is loaded from a row of an array at the head of a loop);
+many items are flat arrays. Nothing here computes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Final, Literal, NamedTuple
+
+
+class Point2(NamedTuple):
+    """A point of the plane."""
+
+    x: float
+    y: float
+
+
+class Point3(NamedTuple):
+    """A point of space."""
+
+    x: float
+    y: float
+    z: float
+
+
+class HalfSpace2(NamedTuple):
+    """The half-plane a x + b y + c >= 0; (a, b) points inward."""
+
+    a: float
+    b: float
+    c: float
+
+
+class HalfSpace3(NamedTuple):
+    """The half-space a x + b y + c z + d >= 0; (a, b, c) points inward."""
+
+    a: float
+    b: float
+    c: float
+    d: float
+
+
+UNDECIDED: Final = 2
+"""What a predicate returns beside -1, 0, 1 when an exponent leaves the range in which expansions are exact."""
+
+
+class Location(IntEnum):
+    """Where a point lies with respect to a solid, a closed set: BOUNDARY counts as contained."""
+
+    OUTSIDE = -1
+    BOUNDARY = 0
+    INSIDE = 1
+
+
+class Relation(IntEnum):
+    """How two bodies lie to each other; the first line that is true decides. Batches hold these as int8."""
+
+    DISJOINT = 0
+    FIRST_INSIDE_SECOND = 1
+    SECOND_INSIDE_FIRST = 2
+    OVERLAPPING = 3
+    TOUCHING = 4
+
+    @property
+    def label(self) -> str:
+        """The name used in JSON, for example ``first_inside_second``."""
+        return self.name.lower()
+
+
+@dataclass(frozen=True, slots=True)
+class Accuracy:
+    """What one call can say of its own accuracy and cost.
+
+    decisions: "exact", or "float64" where a caller's own callable decides.
+    coordinates_ulp: bound on each constructed coordinate in units in the last place; None where none is constructed.
+    n_items: items asked for (points, segments, poses, pairs, contours).
+    n_beyond_filter: items that the floating-point filter left open (an upper bound where a kernel counts by stages).
+    n_rational: items of those that needed rational arithmetic.
+    method: the method chosen, a stable short name.
+    """
+
+    decisions: Literal["exact", "float64"]
+    coordinates_ulp: float | None
+    n_items: int
+    n_beyond_filter: int
+    n_rational: int
+    method: str
