@@ -1,0 +1,96 @@
+"""The chunking pool: every item once, whatever the workers; deadline, cancel, errors, forked children."""
+
+from __future__ import annotations
+
+import multiprocessing
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from engine.errors import CancelledError, DeadlineExceededError
+from engine.parallel import Budget, Cancel, run_chunks
+
+
+@pytest.mark.parametrize("workers", [1, 2, 5, None])
+@pytest.mark.parametrize("n_items", [0, 1, 7, 100_000])
+def test_every_item_is_done_once(workers: int | None, n_items: int) -> None:
+    times_done, reported = np.zeros(n_items, np.int64), []
+
+    def task(start: int, stop: int) -> None:
+        times_done[start:stop] += 1
+
+    with Budget() as budget:
+        run_chunks(task, n_items, budget=budget, first_chunk=10, workers=workers, progress=reported.append)
+    assert (times_done == 1).all()
+    assert sum(reported) == n_items
+
+
+def test_a_chunk_that_waits_for_the_flag_ends_at_the_deadline() -> None:
+    def task(_start: int, _stop: int) -> None:
+        while not budget.flag[0]:
+            time.sleep(0.001)
+
+    with Budget(deadline=0.05) as budget, pytest.raises(DeadlineExceededError, match=r"0\.05"):
+        run_chunks(task, 10, budget=budget, first_chunk=1)
+    assert budget.flag[0] == 1
+
+
+def test_a_deadline_of_zero_does_no_work() -> None:
+    with Budget(deadline=0.0) as budget, pytest.raises(DeadlineExceededError):
+        run_chunks(lambda *_: pytest.fail("worked"), 10, budget=budget)
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_another_thread_can_cancel(workers: int) -> None:
+    cancel = Cancel()
+
+    def task(_start: int, _stop: int) -> None:
+        while not budget.flag[0]:
+            time.sleep(0.001)
+
+    threading.Timer(0.02, cancel.set).start()
+    with Budget(cancel=cancel) as budget, pytest.raises(CancelledError):
+        run_chunks(task, 10, budget=budget, first_chunk=1, workers=workers)
+
+
+def test_a_cancel_thrown_before_the_call_counts() -> None:
+    cancel = Cancel()
+    cancel.set()
+    with Budget(cancel=cancel) as budget, pytest.raises(CancelledError):
+        run_chunks(lambda *_: None, 10, budget=budget)
+    assert budget.flag[0] == 1
+
+
+@pytest.mark.parametrize("workers", [1, 3])
+def test_an_error_in_a_chunk_reaches_the_caller(workers: int) -> None:
+    def task(start: int, _stop: int) -> None:
+        if start >= 50:
+            raise ZeroDivisionError(start)
+
+    with Budget() as budget, pytest.raises(ZeroDivisionError):
+        run_chunks(task, 100_000, budget=budget, first_chunk=10, workers=workers)
+
+
+def test_workers_must_be_positive() -> None:
+    with Budget() as budget, pytest.raises(ValueError, match="at least 1"):
+        run_chunks(lambda *_: None, 1, budget=budget, workers=0)
+
+
+def _sum_in_chunks(n_items: int) -> int:
+    out = np.zeros(n_items, np.int64)
+
+    def task(start: int, stop: int) -> None:
+        out[start:stop] = np.arange(start, stop)
+
+    with Budget() as budget:
+        run_chunks(task, n_items, budget=budget, first_chunk=10, workers=2)
+    return int(out.sum())
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")  # Python 3.12 warns of every fork beside threads
+def test_a_forked_child_gets_a_pool_of_its_own() -> None:
+    expected = _sum_in_chunks(50_000)
+    with multiprocessing.get_context("fork").Pool(1) as pool:
+        assert pool.apply_async(_sum_in_chunks, (50_000,)).get(timeout=20) == expected
