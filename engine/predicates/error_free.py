@@ -1,0 +1,121 @@
+"""Sums and products of two doubles without loss: each returns the rounded result and its exact rounding error.
+
+The only file of the engine with tricks that need the compiler: `fma` (one instruction where the CPU has it, the C
+library's correct function elsewhere) and `workspace` (a few doubles on the stack, so that exact stages allocate
+nothing). Each has a plain twin with the same results, used when the compiler is disabled.
+
+Preconditions. Sums are exact whenever the result does not overflow: an addition never underflows. A product a b is
+exact when it does not overflow and ulp(a) ulp(b) >= 2^-1074; |a b| >= 2^-967 is enough, and so is a = 0 or b = 0.
+
+Source: T. J. Dekker, A floating-point technique for extending the available precision, 1971; D. E. Knuth, The Art of
+Computer Programming 2, section 4.2.2; J. R. Shewchuk, Adaptive precision floating-point arithmetic and fast robust
+geometric predicates, 1997, section 2.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from llvmlite import ir
+from numba import config as numba_config
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+from numba.np.arrayobj import make_array, populate_array
+
+from engine.jit import inline
+
+
+def plain_fma(a: float, b: float, c: float) -> float:
+    """Return a b + c rounded once, in plain Python: the twin of `fma`, right for every input."""
+    if not (math.isfinite(a) and math.isfinite(b)):
+        return a * b + c
+    if not math.isfinite(c):
+        return c  # case: a * b alone could overflow to the opposite infinity
+    (a_top, a_bottom), (b_top, b_bottom) = float(a).as_integer_ratio(), float(b).as_integer_ratio()
+    c_top, c_bottom = float(c).as_integer_ratio()
+    top, bottom = a_top * b_top * c_bottom + c_top * a_bottom * b_bottom, a_bottom * b_bottom * c_bottom
+    if top == 0:
+        return a * b + c if a_top * b_top == 0 else 0.0  # signs of zero as IEEE 754 has them
+    try:
+        return top / bottom  # Python rounds a quotient of integers correctly
+    except OverflowError:
+        return math.inf if top > 0 else -math.inf
+
+
+def plain_workspace(size: int) -> list[float]:
+    """Return a list of `size` zeros: the twin of `workspace`."""
+    return [0.0] * size
+
+
+def _fma_intrinsic(typing_context: Any, a: Any, b: Any, c: Any) -> Any:
+    """Return a b + c rounded once (llvm.fma.f64)."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        double = ir.DoubleType()
+        function = cgutils.get_or_insert_function(builder.module, ir.FunctionType(double, [double] * 3), "llvm.fma.f64")
+        return builder.call(function, arguments)
+
+    if (a, b, c) != (types.float64,) * 3:
+        return None
+    return types.float64(types.float64, types.float64, types.float64), generate
+
+
+def _workspace_intrinsic(typing_context: Any, size: Any) -> Any:
+    """Return an uninitialised float64 array of a literal size on the caller's stack; it must not be returned."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        word = context.get_value_type(types.intp)
+        array_type = signature.return_type
+        data = cgutils.alloca_once(builder, ir.DoubleType(), size=word(size.literal_value))
+        array = make_array(array_type)(context, builder)
+        populate_array(
+            array,
+            data=data,
+            shape=(word(size.literal_value),),
+            strides=(word(8),),
+            itemsize=word(8),
+            meminfo=None,
+        )
+        return array._getvalue()
+
+    if not isinstance(size, types.IntegerLiteral):
+        return None
+    return types.Array(types.float64, 1, "C")(size), generate
+
+
+fma: Any = plain_fma if numba_config.DISABLE_JIT else intrinsic(_fma_intrinsic)
+workspace: Any = plain_workspace if numba_config.DISABLE_JIT else intrinsic(prefer_literal=True)(_workspace_intrinsic)
+
+
+@inline
+def two_sum(a: float, b: float) -> tuple[float, float]:
+    """Return (s, e) with s = fl(a + b) and s + e = a + b exactly."""
+    s = a + b
+    b_part = s - a
+    a_part = s - b_part
+    return s, (a - a_part) + (b - b_part)
+
+
+@inline
+def fast_two_sum(a: float, b: float) -> tuple[float, float]:
+    """Return (s, e) with s + e = a + b exactly; caller guarantees |a| >= |b| or a = 0."""
+    s = a + b
+    return s, b - (s - a)
+
+
+@inline
+def two_diff(a: float, b: float) -> tuple[float, float]:
+    """Return (s, e) with s = fl(a - b) and s + e = a - b exactly."""
+    s = a - b
+    b_part = a - s
+    a_part = s + b_part
+    return s, (a - a_part) + (b_part - b)
+
+
+@inline
+def two_prod(a: float, b: float) -> tuple[float, float]:
+    """Return (p, e) with p = fl(a b) and p + e = a b exactly (precondition: see the module)."""
+    p = a * b
+    return p, fma(a, b, -p)

@@ -1,0 +1,260 @@
+"""orient2d and orient3d: on which side of a line or plane a point lies, exact for every float64 input.
+
+Three stages. A float filter, whose bound is proven below. Then the determinant as an expansion, exact, without
+allocation, with the coordinates of an axis scaled by a power of two where that widens the range (the sign does not
+change). Where even that leaves the range in which expansions are exact, UNDECIDED: the caller settles the item with
+`rational.py`. A whole scene at 1e300 or 1e-300 is decided here; undecided are only sets of points with coordinates of
+one axis more than 2^636 (2D: 2^985) apart, which the filter did not settle either.
+
+**The filter.** Let u = 2^-53, h = 2^-1075 (half the smallest subnormal), and * a rounded product:
+|x * y - x y| <= u |x y| + h. Differences of doubles carry a relative error u only. So in 2D, with l and r the products,
+|det - exact| <= (3u + 16u^2)(|l| + |r|) + 2h (1 + 4u) (Shewchuk 1997, section 4, for the first part; 2h for the two
+products). The threshold used is 4u (|l| + |r|) + 8h: the spare u and 6h pay for rounding the threshold itself. In 3D
+likewise (7u + 56u^2) P for the permanent P of the rounded differences, plus 2h |z| for the two products under each of
+the three differences z and h for their product with it; the threshold is 8u P + 16h (1 + sum |z|). Infinite
+intermediates make the threshold infinite or NaN, and both comparisons false: UNDECIDED.
+
+Source: J. R. Shewchuk, Adaptive precision floating-point arithmetic and fast robust geometric predicates, 1997.
+Changed: the sign of orient3d is opposite, underflow and overflow are covered, the exact stage drops zeros and scales.
+"""
+
+from __future__ import annotations
+
+from math import frexp, ldexp
+from typing import Any
+
+from engine.jit import inline, kernel
+from engine.predicates.error_free import two_diff, workspace
+from engine.predicates.expansion import Components, add_scaled, grow_product, sign
+from engine.predicates.loading import as_point2, as_point3
+from engine.types import UNDECIDED, Point2, Point3
+
+BOUND_2D = 2.0**-51  # 4u
+BOUND_3D = 2.0**-50  # 8u
+GUARD_2D = 2.0**-1072  # 8h
+GUARD_3D = 2.0**-1071  # 16h
+
+# Exact stage, per axis: |v| <= 2^TOP keeps sums of products finite, and nonzero |v| >= 2^BOTTOM makes every v a
+# multiple of 2^(BOTTOM - 52), so that a product of 2 (3) of them, and of their differences, is a multiple of 2^-1074.
+TOP_2D = 500  # 12 products below 2^1000
+BOTTOM_2D = -485  # 2 (-485 - 52) = -1074
+TOP_3D = 330  # differences < 2^331, 6 products below 2^993
+BOTTOM_3D = -306  # 3 (-306 - 52) = -1074
+OUT_OF_RANGE = 1 << 20  # no power of two brings this axis into the range
+
+
+@inline
+def orient2d_filter(a: Point2, b: Point2, c: Point2) -> int:
+    """Return the sign of orient2d where rounding cannot have changed it, else UNDECIDED."""
+    left = (a.x - c.x) * (b.y - c.y)
+    right = (a.y - c.y) * (b.x - c.x)
+    det = left - right
+    threshold = BOUND_2D * (abs(left) + abs(right)) + GUARD_2D
+    if det > threshold:
+        return 1
+    if -det > threshold:
+        return -1
+    return UNDECIDED
+
+
+@inline
+def orient2d(a: Point2, b: Point2, c: Point2) -> int:
+    """Return 1 for a left turn at b on the way a, b, c, -1 for a right turn, 0 on a line, or UNDECIDED."""
+    side = orient2d_filter(a, b, c)
+    if side != UNDECIDED:
+        return side
+    return orient2d_exact(a, b, c)
+
+
+@inline
+def orient3d_filter(a: Point3, b: Point3, c: Point3, d: Point3) -> int:
+    """Return the sign of orient3d where rounding cannot have changed it, else UNDECIDED."""
+    ax, ay, az = a.x - d.x, a.y - d.y, a.z - d.z
+    bx, by, bz = b.x - d.x, b.y - d.y, b.z - d.z
+    cx, cy, cz = c.x - d.x, c.y - d.y, c.z - d.z
+    bx_cy, cx_by = bx * cy, cx * by
+    cx_ay, ax_cy = cx * ay, ax * cy
+    ax_by, bx_ay = ax * by, bx * ay
+    det = az * (cx_by - bx_cy) + bz * (ax_cy - cx_ay) + cz * (bx_ay - ax_by)
+    permanent = (
+        (abs(bx_cy) + abs(cx_by)) * abs(az) + (abs(cx_ay) + abs(ax_cy)) * abs(bz) + (abs(ax_by) + abs(bx_ay)) * abs(cz)
+    )
+    threshold = BOUND_3D * permanent + GUARD_3D * (1.0 + (abs(az) + abs(bz) + abs(cz)))
+    if det > threshold:
+        return 1
+    if -det > threshold:
+        return -1
+    return UNDECIDED
+
+
+@inline
+def orient3d(a: Point3, b: Point3, c: Point3, d: Point3) -> int:
+    """Return 1 if d is on the side the normal (b - a) x (c - a) points to, -1 opposite, 0 coplanar, or UNDECIDED."""
+    side = orient3d_filter(a, b, c, d)
+    if side != UNDECIDED:
+        return side
+    return orient3d_exact(a, b, c, d)
+
+
+@inline
+def axis_shift(smallest: float, largest: float, bottom: int, top: int) -> int:
+    """Return k so that values between the two magnitudes, times 2^k, lie in [2^bottom, 2^top], or OUT_OF_RANGE.
+
+    smallest: of the nonzero magnitudes (infinity if there is none); largest: of all.
+    """
+    if largest == 0.0:
+        return 0
+    high = frexp(largest)[1]
+    low = frexp(smallest)[1] - 1
+    if high <= top and low >= bottom:
+        return 0
+    if low + (top - high) >= bottom:
+        return top - high
+    return OUT_OF_RANGE
+
+
+@inline
+def _lower(smallest: float, value: float) -> float:
+    """Return the smaller of `smallest` and |value|, zero left out."""
+    return min(smallest, abs(value)) if value != 0.0 else smallest
+
+
+@inline
+def axis_shift_2d(a: float, b: float, c: float) -> int:
+    """Return the shift that makes products of two such axes exact, or OUT_OF_RANGE."""
+    smallest = _lower(_lower(_lower(float("inf"), a), b), c)
+    return axis_shift(smallest, max(abs(a), abs(b), abs(c)), BOTTOM_2D, TOP_2D)
+
+
+@inline
+def axis_shift_3d(a: float, b: float, c: float, d: float) -> int:
+    """Return the shift that makes products of three such axes exact, or OUT_OF_RANGE."""
+    smallest = _lower(_lower(_lower(_lower(float("inf"), a), b), c), d)
+    return axis_shift(smallest, max(abs(a), abs(b), abs(c), abs(d)), BOTTOM_3D, TOP_3D)
+
+
+@inline
+def orient2d_exact(a: Point2, b: Point2, c: Point2) -> int:
+    """Return the sign of orient2d from an expansion, or UNDECIDED."""
+    # case: on one axis-parallel line, or two equal points; whatever the exponents
+    if (a.x == c.x and b.x == c.x) or (a.y == c.y and b.y == c.y):
+        return 0
+    if (a.x == c.x and a.y == c.y) or (b.x == c.x and b.y == c.y) or (a.x == b.x and a.y == b.y):
+        return 0
+    shift_x, shift_y = axis_shift_2d(a.x, b.x, c.x), axis_shift_2d(a.y, b.y, c.y)
+    if shift_x == OUT_OF_RANGE or shift_y == OUT_OF_RANGE:
+        return UNDECIDED
+    if shift_x != 0 or shift_y != 0:
+        a = Point2(ldexp(a.x, shift_x), ldexp(a.y, shift_y))
+        b = Point2(ldexp(b.x, shift_x), ldexp(b.y, shift_y))
+        c = Point2(ldexp(c.x, shift_x), ldexp(c.y, shift_y))
+    ax, ax_tail = two_diff(a.x, c.x)
+    ay, ay_tail = two_diff(a.y, c.y)
+    bx, bx_tail = two_diff(b.x, c.x)
+    by, by_tail = two_diff(b.y, c.y)
+    e = workspace(16)
+    return sign(e, minor(e, ax, ax_tail, ay, ay_tail, bx, bx_tail, by, by_tail))
+
+
+@inline
+def minor(
+    e: Components,
+    ax: float,
+    ax_tail: float,
+    ay: float,
+    ay_tail: float,
+    bx: float,
+    bx_tail: float,
+    by: float,
+    by_tail: float,
+) -> int:
+    """Set e to (ax + ax_tail)(by + by_tail) - (ay + ay_tail)(bx + bx_tail); return its length, at most 16."""
+    n = grow_product(e, 0, ax, by)
+    n = grow_product(e, n, -ay, bx)
+    if ax_tail != 0.0:
+        n = grow_product(e, n, ax_tail, by)
+        n = grow_product(e, n, ax_tail, by_tail)
+    if ay_tail != 0.0:
+        n = grow_product(e, n, -ay_tail, bx)
+        n = grow_product(e, n, -ay_tail, bx_tail)
+    if bx_tail != 0.0:
+        n = grow_product(e, n, -ay, bx_tail)
+    if by_tail != 0.0:
+        n = grow_product(e, n, ax, by_tail)
+    return n
+
+
+@inline
+def orient3d_exact(a: Point3, b: Point3, c: Point3, d: Point3) -> int:
+    """Return the sign of orient3d from an expansion, or UNDECIDED."""
+    # case: all four in one axis-parallel plane (flush boxes, lattices), whatever the exponents
+    if (
+        (a.x == d.x and b.x == d.x and c.x == d.x)
+        or (a.y == d.y and b.y == d.y and c.y == d.y)
+        or (a.z == d.z and b.z == d.z and c.z == d.z)
+    ):
+        return 0
+    shift_x = axis_shift_3d(a.x, b.x, c.x, d.x)
+    shift_y = axis_shift_3d(a.y, b.y, c.y, d.y)
+    shift_z = axis_shift_3d(a.z, b.z, c.z, d.z)
+    if shift_x == OUT_OF_RANGE or shift_y == OUT_OF_RANGE or shift_z == OUT_OF_RANGE:
+        return UNDECIDED
+    if shift_x != 0 or shift_y != 0 or shift_z != 0:
+        a = Point3(ldexp(a.x, shift_x), ldexp(a.y, shift_y), ldexp(a.z, shift_z))
+        b = Point3(ldexp(b.x, shift_x), ldexp(b.y, shift_y), ldexp(b.z, shift_z))
+        c = Point3(ldexp(c.x, shift_x), ldexp(c.y, shift_y), ldexp(c.z, shift_z))
+        d = Point3(ldexp(d.x, shift_x), ldexp(d.y, shift_y), ldexp(d.z, shift_z))
+    ax, ax_tail = two_diff(a.x, d.x)
+    ay, ay_tail = two_diff(a.y, d.y)
+    az, az_tail = two_diff(a.z, d.z)
+    bx, bx_tail = two_diff(b.x, d.x)
+    by, by_tail = two_diff(b.y, d.y)
+    bz, bz_tail = two_diff(b.z, d.z)
+    cx, cx_tail = two_diff(c.x, d.x)
+    cy, cy_tail = two_diff(c.y, d.y)
+    cz, cz_tail = two_diff(c.z, d.z)
+    e, m = workspace(192), workspace(16)  # 3 minors of 16 components, times 2, as 2 products each
+    n = 0
+    if az != 0.0:
+        n = _add_times(e, n, m, minor(m, cx, cx_tail, cy, cy_tail, bx, bx_tail, by, by_tail), az, az_tail)
+    if bz != 0.0:
+        n = _add_times(e, n, m, minor(m, ax, ax_tail, ay, ay_tail, cx, cx_tail, cy, cy_tail), bz, bz_tail)
+    if cz != 0.0:
+        n = _add_times(e, n, m, minor(m, bx, bx_tail, by, by_tail, ax, ax_tail, ay, ay_tail), cz, cz_tail)
+    return sign(e, n)
+
+
+@inline
+def _add_times(e: Components, n: int, m: Components, length: int, z: float, z_tail: float) -> int:
+    """Add (z + z_tail) times the minor m to e; return the new length of e."""
+    if z_tail != 0.0:
+        n = add_scaled(e, n, m, length, z_tail)
+    return add_scaled(e, n, m, length, z)
+
+
+@kernel
+def orient2d_batch(a: Any, b: Any, c: Any, sides: Any) -> None:
+    """Fill sides (n,) int8 with orient2d of the rows of a, b, c (n, 2) float64."""
+    for item in range(sides.shape[0]):
+        sides[item] = orient2d(as_point2(a, item), as_point2(b, item), as_point2(c, item))
+
+
+@kernel
+def orient3d_batch(a: Any, b: Any, c: Any, d: Any, sides: Any) -> None:
+    """Fill sides (n,) int8 with orient3d of the rows of a, b, c, d (n, 3) float64."""
+    for item in range(sides.shape[0]):
+        sides[item] = orient3d(as_point3(a, item), as_point3(b, item), as_point3(c, item), as_point3(d, item))
+
+
+@kernel
+def orient2d_filter_batch(a: Any, b: Any, c: Any, sides: Any) -> None:
+    """Fill sides (n,) int8 with orient2d_filter of the rows of a, b, c (n, 2) float64."""
+    for item in range(sides.shape[0]):
+        sides[item] = orient2d_filter(as_point2(a, item), as_point2(b, item), as_point2(c, item))
+
+
+@kernel
+def orient3d_filter_batch(a: Any, b: Any, c: Any, d: Any, sides: Any) -> None:
+    """Fill sides (n,) int8 with orient3d_filter of the rows of a, b, c, d (n, 3) float64."""
+    for item in range(sides.shape[0]):
+        sides[item] = orient3d_filter(as_point3(a, item), as_point3(b, item), as_point3(c, item), as_point3(d, item))

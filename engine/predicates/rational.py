@@ -1,0 +1,93 @@
+"""The predicates in Python's unlimited integers: right for any finite floats, integers and Fractions, and slow.
+
+Kernels answer UNDECIDED where an exponent leaves their range; public functions settle such an item here. The sign of a
+determinant does not change when the numbers of one axis are multiplied by a common positive factor, so each axis is
+first brought to integers: no greatest common divisors are taken in the arithmetic.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from decimal import Decimal
+from fractions import Fraction
+
+from engine.errors import NotRepresentableError
+
+Number = float | int | Fraction
+"""Any finite number; numpy scalars of float64 are floats."""
+
+
+def sign_of(value: Number) -> int:
+    """Return -1, 0 or 1."""
+    return (value > 0) - (value < 0)
+
+
+def fractions(point: Iterable[Number]) -> tuple[Fraction, ...]:
+    """Return the coordinates of a point as Fractions, each the exact value."""
+    return tuple(Fraction(value) for value in point)
+
+
+def scaled_integers(values: Sequence[Number]) -> list[int]:
+    """Return the values times their common positive factor that makes all of them integers (not the least one)."""
+    ratios = [value.as_integer_ratio() for value in values]
+    common = math.lcm(*(bottom for _, bottom in ratios))
+    return [top * (common // bottom) for top, bottom in ratios]
+
+
+def orient2d_rational(a: Sequence[Number], b: Sequence[Number], c: Sequence[Number]) -> int:
+    """Return the sign of (b - a) x (c - a): 1 for a left turn, -1 for a right turn, 0 on a line."""
+    ax, bx, cx = scaled_integers((a[0], b[0], c[0]))
+    ay, by, cy = scaled_integers((a[1], b[1], c[1]))
+    return sign_of((bx - ax) * (cy - ay) - (by - ay) * (cx - ax))
+
+
+def orient3d_rational(a: Sequence[Number], b: Sequence[Number], c: Sequence[Number], d: Sequence[Number]) -> int:
+    """Return 1 if d lies on the side the normal (b - a) x (c - a) points to, -1 opposite, 0 on the plane."""
+    ax, bx, cx, dx = scaled_integers((a[0], b[0], c[0], d[0]))
+    ay, by, cy, dy = scaled_integers((a[1], b[1], c[1], d[1]))
+    az, bz, cz, dz = scaled_integers((a[2], b[2], c[2], d[2]))
+    bx, by, bz, cx, cy, cz, dx, dy, dz = bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az, dx - ax, dy - ay, dz - az
+    return sign_of(dx * (by * cz - bz * cy) + dy * (bz * cx - bx * cz) + dz * (bx * cy - by * cx))
+
+
+def side_rational(row: Sequence[Number], point: Sequence[Number]) -> int:
+    """Return the sign of dot(row, (point, 1)), for a row of one number more than the point, in any dimension."""
+    *normal, offset = scaled_integers(row)
+    *scaled_point, one = scaled_integers((*point, 1))
+    return sign_of(sum(n * p for n, p in zip(normal, scaled_point)) + offset * one)
+
+
+def polynomial_sign_rational(
+    powers: Sequence[Sequence[int]], coefficients: Sequence[Number], point: Sequence[Number]
+) -> int:
+    """Return the sign of the sum of coefficient * prod(point[k] ** powers[k]) over the terms.
+
+    The point is written as P / w with integers P and w; every term is multiplied by w^degree, so that only integer
+    powers remain.
+    """
+    *tops, w = scaled_integers((*point, 1))
+    exponents = [[int(power) for power in term] for term in powers]
+    degree = max((sum(term) for term in exponents), default=0)
+    total = 0
+    for term, coefficient in zip(exponents, scaled_integers(coefficients)):
+        value = coefficient * w ** (degree - sum(term))
+        for top, power in zip(tops, term):
+            value *= top**power
+        total += value
+    return sign_of(total)
+
+
+def nearest_float(value: Number) -> float:
+    """Return the double nearest to `value`, ties to even; what rounds to zero is +0.0.
+
+    Raises: `NotRepresentableError` where the nearest double would be infinite.
+    """
+    top, bottom = value.as_integer_ratio()
+    try:
+        return top / bottom + 0.0  # Python rounds a quotient of integers correctly, subnormals included
+    except OverflowError:
+        raise NotRepresentableError(
+            f"an exact coordinate, {Decimal(top) / Decimal(bottom):.17g}, is beyond the largest float64, "
+            "1.7976931348623157e+308; scale the input down"
+        ) from None
