@@ -1,0 +1,43 @@
+"""The axis-aligned bounding box ``min <= p <= max`` on each axis."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from engine.errors import MinAboveMaxError
+from engine.solids.base import FloatArray, Solid
+from engine.solids.checks import as_vector, digits
+
+
+class Aabb(Solid):
+    """All points with ``min <= p <= max`` on each axis, in 2D or 3D.
+
+    Parameters: min, max, 2 or 3 numbers each. Boundary: the points with some coordinate equal to its bound.
+    Degenerate: min = max on an axis gives a flat box, all boundary.
+    Raises: InvalidArrayError, WrongDimensionError, NotFiniteError, MinAboveMaxError.
+
+    >>> Aabb(min=[0, 0, 0], max=[1, 2, 3])
+    Aabb(min=[0.0, 0.0, 0.0], max=[1.0, 2.0, 3.0])
+    """
+
+    __slots__ = ("max", "min")
+
+    type: ClassVar[str] = "aabb"
+    min: FloatArray
+    max: FloatArray
+
+    def __init__(self, min: object, max: object) -> None:
+        low = as_vector(min, None, ("min",))
+        high = as_vector(max, len(low), ("max",))
+        if (low > high).any():
+            axis = int(np.argmax(low > high))
+            raise MinAboveMaxError(
+                f"min[{axis}] = {float(low[axis])!r} is above max[{axis}] = {float(high[axis])!r}; swap them",
+                ("min", axis),
+            )
+        self._set(dimension=len(low), min=low, max=high)
+
+    def __repr__(self) -> str:
+        return f"Aabb(min={digits(self.min)}, max={digits(self.max)})"

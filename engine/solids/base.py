@@ -1,0 +1,120 @@
+"""What every solid has in common: immutable fields, a place for prepared structures, pickling, memory.
+
+A solid is checked once, in its constructor, and never changes; it is compared by identity and may be shared between
+threads. Structures that speed up queries are built lazily by `Solid.prepared` and are left out of pickles.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import fields, is_dataclass
+from typing import Any, ClassVar, TypeVar, cast
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+T = TypeVar("T")
+
+_RUNTIME = ("__weakref__", "_lock", "_prepared")  # slots that are no part of a solid's value
+
+
+class Solid:
+    """Base of the ten solids. `type` is the name used in JSON, `dimension` is 2 or 3."""
+
+    __slots__ = (*_RUNTIME, "dimension")
+
+    type: ClassVar[str]
+    dimension: int
+    _lock: Any
+    _prepared: dict[str, Any]
+
+    def _set(self, **values: object) -> None:
+        """Fill the fields, once; called at the end of each constructor, when every check has passed."""
+        if hasattr(self, "_prepared"):
+            raise AttributeError(f"a {self.type} is immutable: make a new one instead of calling __init__ again")
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+        object.__setattr__(self, "_lock", threading.RLock())
+        object.__setattr__(self, "_prepared", {})
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise AttributeError(f"a {self.type} is immutable: make a new one instead of setting {name!r}")
+
+    def __delattr__(self, name: str) -> None:
+        raise AttributeError(f"a {self.type} is immutable: {name!r} cannot be deleted")
+
+    def prepared(self, key: str, build: Callable[[], T]) -> T:
+        """Return the structure kept under `key`; the first caller builds it, others wait for that one build.
+
+        build: called without arguments, at most once unless it raises (then nothing is kept and the next caller tries
+        again). It may ask this solid for other keys. What it returns must not be changed afterwards.
+        """
+        try:
+            return cast(T, self._prepared[key])
+        except KeyError:
+            pass
+        with self._lock:
+            if key not in self._prepared:
+                self._prepared[key] = build()
+            return cast(T, self._prepared[key])
+
+    @property
+    def memory(self) -> int:
+        """Bytes of the arrays held: fields and prepared structures, shared arrays counted once."""
+        found: dict[int, int] = {}
+        _collect_arrays(self, found, set())
+        return sum(found.values())
+
+    @classmethod
+    def _fields(cls) -> list[str]:
+        """Return the names of the fields that make up the value of this class."""
+        names = [name for owner in cls.__mro__ for name in getattr(owner, "__slots__", ())]
+        return [name for name in names if name not in _RUNTIME]
+
+    def __reduce__(self) -> tuple[Callable[..., Solid], tuple[Any, dict[str, Any]]]:
+        return _restored, (self.__class__, {name: getattr(self, name) for name in self._fields()})
+
+    def __copy__(self) -> Solid:
+        return self
+
+    def __deepcopy__(self, _memo: object) -> Solid:
+        return self
+
+
+def _restored(kind: Any, values: dict[str, Any]) -> Solid:
+    """Return the solid that was pickled: its checks passed when it was made, so they are not repeated."""
+    for value in values.values():
+        if isinstance(value, np.ndarray):
+            value.setflags(write=False)
+    solid: Solid = object.__new__(kind)
+    solid._set(**values)
+    return solid
+
+
+def _collect_arrays(start: object, found: dict[int, int], seen: set[int]) -> None:
+    """Add the bytes of every array that `start` holds to `found`, by the identity of its memory. No recursion."""
+    waiting = [start]
+    while waiting:  # bound: each object enters once, by its id
+        value = waiting.pop()
+        if id(value) in seen:
+            continue
+        seen.add(id(value))
+        if isinstance(value, np.ndarray):
+            owner = value
+            while isinstance(owner.base, np.ndarray):
+                owner = owner.base
+            found[id(owner)] = owner.nbytes
+        elif isinstance(value, Solid):
+            waiting += [getattr(value, name) for name in value._fields()]
+            waiting += list(value._prepared.values())
+        elif isinstance(value, dict):
+            waiting += list(value.values())
+        elif isinstance(value, (tuple, list)):
+            waiting += [item for item in value if not isinstance(item, (int, float, str))]
+        elif is_dataclass(value) and not isinstance(value, type):
+            waiting += [getattr(value, field.name) for field in fields(value)]
+        elif isinstance(own := getattr(value, "memory", None), int):
+            found[id(value)] = own

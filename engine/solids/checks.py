@@ -1,0 +1,204 @@
+"""One function per invariant; each says which element broke it, with all digits, and what to do.
+
+`as_*` functions turn what a caller may pass (arrays of floats or integers, nested lists) into C-contiguous float64
+arrays and refuse what is no number: bool, str, object, complex, NaN, infinity, ragged lists, and integers that no
+float64 equals. `check_*` functions only raise. `where` is the path of the argument, ``("points",)`` for example; an
+error's path goes on to the element: ``("points", 3, 1)``.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final, cast
+
+import numpy as np
+import numpy.typing as npt
+
+from engine.errors import (
+    EmptyGeometryError,
+    InvalidArrayError,
+    NotFiniteError,
+    WrongDimensionError,
+)
+from engine.solids.base import FloatArray
+
+Where = tuple[str | int, ...]
+
+DIMENSIONS: Final = (2, 3)
+_FLOAT_INTEGERS: Final = 2**53  # every integer up to this size is a float64
+
+
+def spell(where: Where) -> str:
+    """Return the path as it is written in Python: ``points[3][1]``, ``operands[0].faces``."""
+    text = ""
+    for part in where:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
+    return text or "the argument"
+
+
+def digits(point: npt.ArrayLike) -> str:
+    """Return the coordinates with all their digits: ``[0.1, 2.0, -3.5]``."""
+    return repr(np.asarray(point, np.float64).tolist())
+
+
+def _kind(value: object) -> str:
+    if isinstance(value, np.ndarray):
+        return f"an array of dtype {value.dtype} and shape {value.shape}"
+    text = repr(value)
+    return f"{text if len(text) <= 60 else text[:57] + '...'} ({type(value).__name__})"
+
+
+def as_number(value: object, where: Where) -> float:
+    """Return `value`, a finite float or an integer that a float64 equals, as a float."""
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value[()]
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (float, int, np.floating, np.integer)):
+        raise InvalidArrayError(f"{spell(where)} must be a number (float or int), got {_kind(value)}", where)
+    if isinstance(value, (int, np.integer)):
+        try:
+            number = float(int(value))
+        except OverflowError:
+            number = math.inf
+        if math.isinf(number) or int(number) != int(value):
+            raise InvalidArrayError(f"{spell(where)} is {_kind(value)}, which no float64 equals; round it", where)
+        return number
+    number = float(value)
+    if not math.isfinite(number):
+        raise NotFiniteError(f"{spell(where)} is {number!r}; only finite numbers have a place", where)
+    if number != value:
+        raise InvalidArrayError(f"{spell(where)} is {_kind(value)}, which no float64 equals; round it", where)
+    return number
+
+
+def as_floats(values: object, depth: int, where: Where) -> FloatArray:
+    """Return `values` as a finite C-contiguous float64 array of `depth` axes; borrowed where nothing had to change."""
+    if isinstance(values, np.ma.MaskedArray):
+        raise InvalidArrayError(f"{spell(where)} is a masked array; fill or drop the masked items first", where)
+    if isinstance(values, (list, tuple)):
+        return _from_lists(values, depth, where)
+    array = values if isinstance(values, np.ndarray) else np.asarray(values)
+    if array.dtype.kind not in "fiu":
+        what = _kind(values)
+        raise InvalidArrayError(f"{spell(where)} must be an array of floats or integers, got {what}", where)
+    if array.ndim == 1 and array.size == 0:
+        array = array.reshape((0,) * depth)  # case: np.array([]) stands for no points
+    if array.ndim != depth:
+        raise InvalidArrayError(
+            f"{spell(where)} must have {depth} axes, got {_kind(array)}; a single item still needs its outer axis",
+            where,
+        )
+    with np.errstate(over="ignore", under="ignore"):  # wider floats: judged below
+        result: FloatArray = np.ascontiguousarray(array, np.float64)
+    if array.dtype.kind != "f" or array.dtype.itemsize > 8:
+        _check_converted(array, result, where)
+    check_finite(result, where)
+    return result
+
+
+def _check_converted(array: npt.NDArray[Any], result: FloatArray, where: Where) -> None:
+    """Raise unless every item of `result` equals the integer or wider float in `array` that it came from."""
+    if array.dtype.kind == "f":
+        suspects = np.flatnonzero((result != array) & ~np.isnan(array))
+    else:
+        suspects = np.flatnonzero(np.abs(result) >= _FLOAT_INTEGERS)
+    for index in suspects:
+        path = np.unravel_index(index, array.shape)
+        as_number(array[path], (*where, *map(int, path)))
+
+
+def _from_lists(values: list[Any] | tuple[Any, ...], depth: int, where: Where) -> FloatArray:
+    """Flatten nested lists level by level, each level checked for equal lengths, then the leaves for their type."""
+    shape, items = [len(values)], list(values)
+    for level in range(1, depth):
+        rows = [item.tolist() if isinstance(item, np.ndarray) else item for item in items]
+        n_columns = len(rows[0]) if rows and isinstance(rows[0], (list, tuple)) else 0
+        for i_row, row in enumerate(rows):
+            if not isinstance(row, (list, tuple)):
+                path = _path(i_row, shape, where)
+                raise InvalidArrayError(f"{spell(path)} must be a list, got {_kind(row)}", path)
+            if len(row) != n_columns:
+                path, last = _path(i_row, shape, where), level == depth - 1
+                mixed = last and {len(row), n_columns} <= {2, 3}
+                kind = WrongDimensionError if mixed else InvalidArrayError
+                raise kind(f"{spell(path)} has {len(row)} items where those before it have {n_columns}", path)
+        shape.append(n_columns)
+        items = [item for row in rows for item in row]
+    if not set(map(type, items)) <= {float}:
+        items = [as_number(item, _path(i_item, shape, where)) for i_item, item in enumerate(items)]
+    result = np.array(items, np.float64).reshape(shape)
+    check_finite(result, where)
+    return result
+
+
+def _path(index: int, shape: list[int], where: Where) -> Where:
+    return (*where, *map(int, np.unravel_index(index, shape)))
+
+
+def check_finite(array: FloatArray, where: Where) -> None:
+    """Raise on the first NaN or infinity."""
+    finite = np.isfinite(array)
+    if not finite.all():
+        path = _path(int(finite.argmin()), list(array.shape), where)
+        value = float(array.flat[int(finite.argmin())])
+        raise NotFiniteError(f"{spell(path)} is {value!r}; only finite numbers have a place", path)
+
+
+def check_dimension(n_columns: int, dimension: int | None, where: Where, what: str = "positions of") -> None:
+    """Raise unless a position of `n_columns` numbers has the `dimension` asked for (None: 2 or 3)."""
+    allowed = DIMENSIONS if dimension is None else (dimension,)
+    if n_columns not in allowed:
+        wanted = " or ".join(map(str, allowed))
+        raise WrongDimensionError(f"{spell(where)} must hold {what} {wanted} numbers each, got {n_columns}", where)
+
+
+def check_not_empty(count: int, what: str, where: Where) -> None:
+    """Raise if there is nothing."""
+    if count == 0:
+        raise EmptyGeometryError(f"{spell(where)} is empty; at least one {what} is needed", where)
+
+
+def as_points(points: object, dimension: int | None, where: Where = ("points",)) -> FloatArray:
+    """Return `points` as a finite C-contiguous float64 array ``(n, dimension)``; no points at all are welcome.
+
+    points: array of floats or integers, or nested lists; borrowed where it is float64 and contiguous already.
+    dimension: 2 or 3, or None to take either (no points: 2).
+    Raises: InvalidArrayError, WrongDimensionError, NotFiniteError.
+    """
+    array = as_floats(points, 2, where)
+    if array.size == 0 and array.shape[0] == 0 and array.shape[1] in (0, dimension or 0):
+        return array.reshape((0, dimension or 2))
+    check_dimension(array.shape[1], dimension, where)
+    return array
+
+
+def as_point_groups(groups: object, size: int | None, dimension: int | None, where: Where) -> FloatArray:
+    """Return segments, triangles or quads as a finite float64 array ``(n, size, dimension)``; none are welcome."""
+    array = as_floats(groups, 3, where)
+    if array.shape[0] == 0 and array.size == 0 and (array.shape[2] == 0 or dimension in (None, array.shape[2])):
+        return np.zeros((0, size or 0, dimension or array.shape[2] or 2), np.float64)
+    check_dimension(array.shape[2], dimension, where)
+    if size is not None and array.shape[1] != size:
+        raise InvalidArrayError(f"{spell(where)} must hold {size} points in each item, got {array.shape[1]}", where)
+    return array
+
+
+def as_vector(vector: object, dimension: int | None, where: Where) -> FloatArray:
+    """Return one position or direction as a read-only float64 array ``(dimension,)``, -0.0 made 0.0."""
+    array = as_floats(vector, 1, where)
+    check_dimension(array.shape[0], dimension, where)
+    return frozen(array)
+
+
+def frozen(array: FloatArray) -> FloatArray:
+    """Return a read-only C-contiguous copy in which -0.0 is 0.0."""
+    copy = cast(FloatArray, np.array(array, np.float64, order="C"))
+    copy += 0.0  # -0.0 + 0.0 = +0.0; every other value stays
+    copy.setflags(write=False)
+    return copy
+
+
+def frozen_integers(array: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
+    """Return a read-only C-contiguous int64 copy."""
+    copy = np.array(array, np.int64, order="C")
+    copy.setflags(write=False)
+    return copy

@@ -1,0 +1,44 @@
+"""The intersection of half-spaces, given by the rows of their planes."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from engine.errors import ZeroNormalError
+from engine.solids.base import FloatArray, Solid
+from engine.solids.checks import as_floats, check_dimension, check_not_empty, digits, frozen
+
+
+class Convex(Solid):
+    """All points on the inner side of every plane, in 2D or 3D; may be unbounded, flat or empty.
+
+    Parameters: planes, rows ``[a, b, c, d]`` with a x + b y + c z + d >= 0 inside (2D: ``[a, b, c]``), at least one.
+    Boundary: the points of the solid where some row is exactly zero.
+    Raises: InvalidArrayError, WrongDimensionError, NotFiniteError, EmptyGeometryError (no rows), ZeroNormalError.
+
+    >>> Convex([[1, 0, 0], [0, 1, 0], [-1, -1, 1]])  # the triangle (0, 0), (1, 0), (0, 1)
+    Convex(3 planes, 2D)
+    """
+
+    __slots__ = ("planes",)
+
+    type: ClassVar[str] = "convex"
+    planes: FloatArray
+
+    def __init__(self, planes: object) -> None:
+        rows = as_floats(planes, 2, ("planes",))
+        check_not_empty(rows.shape[0], "row", ("planes",))
+        check_dimension(rows.shape[1] - 1, None, ("planes",), "rows of a normal and an offset, the normal of")
+        is_zero = ~rows[:, :-1].any(axis=1)
+        if is_zero.any():
+            i_row = int(np.argmax(is_zero))
+            raise ZeroNormalError(
+                f"planes[{i_row}] = {digits(rows[i_row])} has a zero normal; leave the row out or give its direction",
+                ("planes", i_row),
+            )
+        self._set(dimension=rows.shape[1] - 1, planes=frozen(rows))
+
+    def __repr__(self) -> str:
+        return f"Convex({len(self.planes)} planes, {self.dimension}D)"

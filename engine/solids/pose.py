@@ -1,0 +1,146 @@
+"""A rigid motion: rotation, then translation."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any, Final
+
+import numpy as np
+
+from engine.errors import InvalidArrayError, NotRigidError, WrongDimensionError
+from engine.solids.base import FloatArray
+from engine.solids.checks import DIMENSIONS, as_floats, as_vector, check_dimension, digits, frozen, spell
+
+TOLERANCE: Final = Fraction(1, 10**12)
+"""Largest entry of ``R^T R - I`` that is still taken for a rotation; part of the contract, compared exactly."""
+
+_UNSURE: Final = 2.0**-45  # more than 8 roundings of sums of three products of numbers below 1.01
+
+
+class Pose:
+    """A rigid motion ``p -> rotation @ p + translation`` of one body; the map is exact in these float64 numbers.
+
+    Parameters: rotation, ``(d, d)`` row-major, d 2 or 3, with det > 0 and ``max|R^T R - I| <= 1e-12`` (both decided
+    exactly); translation, d numbers. A rotation of floats is not quite orthogonal: the image is that of the matrix as
+    given. Immutable, picklable, compared by value.
+    Raises: InvalidArrayError, WrongDimensionError, NotFiniteError, NotRigidError.
+
+    >>> Pose([[0, -1], [1, 0]], [5, 0])  # a quarter turn, then a step along x
+    Pose(rotation=[[0.0, -1.0], [1.0, 0.0]], translation=[5.0, 0.0])
+    """
+
+    __slots__ = ("rotation", "translation")
+
+    rotation: FloatArray
+    translation: FloatArray
+
+    def __init__(self, rotation: object, translation: object) -> None:
+        matrix = as_floats(rotation, 2, ("rotation",))
+        check_dimension(matrix.shape[0], None, ("rotation",), "rows of")
+        if matrix.shape[0] != matrix.shape[1]:
+            raise WrongDimensionError(f"rotation must be square, got shape {matrix.shape}", ("rotation",))
+        check_rotations(matrix[None], ("rotation",), one=True)
+        self._set(frozen(matrix), as_vector(translation, len(matrix), ("translation",)))
+
+    def _set(self, rotation: FloatArray, translation: FloatArray) -> None:
+        object.__setattr__(self, "rotation", rotation)
+        object.__setattr__(self, "translation", translation)
+
+    @classmethod
+    def identity(cls, dimension: int = 3) -> Pose:
+        """Return the motion that leaves everything where it is."""
+        if isinstance(dimension, bool) or dimension not in DIMENSIONS:
+            raise WrongDimensionError(f"dimension must be 2 or 3, got {dimension!r}", ("dimension",))
+        return cls(np.eye(dimension), np.zeros(dimension))
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3."""
+        return len(self.translation)
+
+    @property
+    def is_identity(self) -> bool:
+        """Whether the motion leaves everything where it is."""
+        return not self.translation.any() and bool((self.rotation == np.eye(self.dimension)).all())
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise AttributeError(f"a pose is immutable: make a new one instead of setting {name!r}")
+
+    def __delattr__(self, name: str) -> None:
+        raise AttributeError(f"a pose is immutable: {name!r} cannot be deleted")
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Pose) or self.dimension != other.dimension:
+            return False
+        return bool((self.rotation == other.rotation).all() and (self.translation == other.translation).all())
+
+    def __hash__(self) -> int:
+        return hash((self.rotation.tobytes(), self.translation.tobytes()))  # no -0.0: equal values, equal bytes
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _restored, (self.rotation, self.translation)
+
+    def __repr__(self) -> str:
+        return f"Pose(rotation={digits(self.rotation)}, translation={digits(self.translation)})"
+
+
+def _restored(rotation: FloatArray, translation: FloatArray) -> Pose:
+    """Return the pose that was pickled, its arrays read-only again."""
+    pose = object.__new__(Pose)
+    pose._set(frozen(rotation), frozen(translation))
+    return pose
+
+
+def check_rotations(rotations: FloatArray, where: tuple[str | int, ...] = ("rotations",), *, one: bool = False) -> None:
+    """Raise on the first matrix of ``(n, d, d)`` finite float64 that is no rotation.
+
+    Decided exactly: entries of ``R^T R - I`` are computed in float64 for all matrices, and in rationals for those
+    within rounding of the limit. Once they pass, det is within 1e-11 of 1 or -1, so that its float64 sign is right.
+
+    one: `rotations` holds a single matrix and `where` is its own path.
+    """
+    if rotations.ndim != 3 or rotations.shape[1] != rotations.shape[2]:
+        raise InvalidArrayError(f"{spell(where)} must have shape (n, d, d), got {rotations.shape}", where)
+    dimension = rotations.shape[2]
+    with np.errstate(all="ignore"):  # huge entries overflow, and are far from orthogonal
+        defects = np.abs(rotations.transpose(0, 2, 1) @ rotations - np.eye(dimension)).max(axis=(1, 2), initial=0.0)
+        is_far = ~(defects <= float(TOLERANCE) - _UNSURE)
+        determinants = np.linalg.det(np.where(is_far[:, None, None], np.eye(dimension), rotations))
+    for index in np.flatnonzero(is_far | (determinants <= 0.0)):
+        matrix = rotations[index]
+        path = where if one else (*where, int(index))
+        defect = _exact_defect(matrix)
+        if defect > TOLERANCE:
+            raise NotRigidError(
+                f"{spell(path)} = {digits(matrix)} is no rotation: max|R^T R - I| is {_decimal(defect)}, "
+                "the limit 1e-12; make it orthogonal (from a unit quaternion, say)",
+                path,
+            )
+        if _exact_determinant(matrix) <= 0:
+            raise NotRigidError(
+                f"{spell(path)} = {digits(matrix)} is a reflection: its determinant is negative; "
+                "change the sign of one row, or mirror the solid itself",
+                path,
+            )
+
+
+def _exact_defect(matrix: FloatArray) -> Fraction:
+    columns = [[Fraction(value) for value in column] for column in matrix.T.tolist()]
+    return max(
+        abs(sum((a * b for a, b in zip(first, second)), Fraction(-int(i == j))))
+        for i, first in enumerate(columns)
+        for j, second in enumerate(columns)
+    )
+
+
+def _exact_determinant(matrix: FloatArray) -> Fraction:
+    rows = [[Fraction(value) for value in row] for row in matrix.tolist()]
+    if len(rows) == 2:
+        return rows[0][0] * rows[1][1] - rows[0][1] * rows[1][0]
+    (a, b, c), (d, e, f), (g, h, i) = rows
+    return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
+
+
+def _decimal(value: Fraction) -> str:
+    """Return a few digits of a fraction that may be beyond float64."""
+    return repr(float(value)) if value < 10**300 else "above 1e300"
