@@ -1,0 +1,1 @@
+"""Exact planar arrangements of segments: nodes, edges, faces, labels, rings."""

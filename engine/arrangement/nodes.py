@@ -1,0 +1,146 @@
+"""Exact points of the plane as integers, each known once.
+
+A point is three integers (x, y, w) with w > 0 and gcd 1: it stands for (x / w, y / w) times a power of two that all
+points of one table share. Every finite float64 is an integer times a power of two, so points given as floats have
+w = 1; a crossing of two segments has w > 1. Equal points are equal tuples, so a dict unites them, and no exponent is
+out of range: 1e300 beside a denormal makes long integers, not wrong ones.
+
+Each point also carries the doubles nearest to its coordinates. Rounding to nearest is monotone, so a strict order of
+these doubles is the order of the exact values, and boxes of them are conservative; ties are settled by the integers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from fractions import Fraction
+from math import gcd, lcm
+
+import numpy as np
+import numpy.typing as npt
+
+from engine.errors import NotRepresentableError
+
+Homogeneous = tuple[int, int, int]
+"""(x, y, w), w > 0, without a common factor."""
+
+
+def nearest_quotient(numerator: int, denominator: int) -> float:
+    """Return the double nearest to ``numerator / denominator``, ties to even, zero as +0.0.
+
+    CPython divides integers with one correct rounding, subnormal results included.
+    Raises: `NotRepresentableError` where the quotient rounds beyond the largest double.
+    """
+    try:
+        return numerator / denominator + 0.0
+    except OverflowError:
+        raise NotRepresentableError(
+            f"the exact value is about 2**{numerator.bit_length() - denominator.bit_length()}, beyond the largest "
+            "float64; scale the input down"
+        ) from None
+
+
+def reduced(x: int, y: int, w: int) -> Homogeneous:
+    """Return the point (x, y, w), w not 0, without common factor and with w > 0."""
+    divisor = gcd(x, y, w)
+    if w < 0:
+        divisor = -divisor
+    return x // divisor, y // divisor, w // divisor
+
+
+class NodeTable:
+    """Exact points without repetition, numbered in order of arrival.
+
+    points[i]: the point as integers. xs[i], ys[i]: the doubles nearest to its coordinates.
+    exponent: a coordinate is ``x / w * 2**exponent``.
+    all_floats: every point so far is given by `xs` and `ys` exactly (w = 1, made from floats).
+    """
+
+    __slots__ = ("_down", "_index", "_up", "all_floats", "exponent", "points", "xs", "ys")
+
+    def __init__(self, exponent: int) -> None:
+        self.exponent = exponent
+        self.points: list[Homogeneous] = []
+        self.xs: list[float] = []
+        self.ys: list[float] = []
+        self.all_floats = True
+        self._index: dict[Homogeneous, int] = {}
+        self._up, self._down = max(exponent, 0), max(-exponent, 0)
+
+    def add(self, point: Homogeneous) -> int:
+        """Return the number of `point`, which must be `reduced`; a new point gets the next number."""
+        number = self._index.get(point)
+        if number is None:
+            x, y, w = point
+            w <<= self._down
+            number = self._new(point, nearest_quotient(x << self._up, w), nearest_quotient(y << self._up, w))
+            self.all_floats = False
+        return number
+
+    def add_float(self, point: Homogeneous, x: float, y: float) -> int:
+        """Like `add`, for a point whose coordinates are exactly the doubles `x` and `y`."""
+        number = self._index.get(point)
+        return self._new(point, x + 0.0, y + 0.0) if number is None else number
+
+    def _new(self, point: Homogeneous, x: float, y: float) -> int:
+        number = self._index[point] = len(self.points)
+        self.points.append(point)
+        self.xs.append(x)
+        self.ys.append(y)
+        return number
+
+    def compare(self, first: int, second: int) -> int:
+        """Return -1, 0 or 1 as `first` lies before, at or after `second` in the order by x, then by y."""
+        a, b = self.xs[first], self.xs[second]
+        if a != b:
+            return -1 if a < b else 1
+        p, q = self.points[first], self.points[second]
+        c, d = p[0] * q[2], q[0] * p[2]
+        if c == d:
+            c, d = p[1] * q[2], q[1] * p[2]
+        return (c > d) - (c < d)
+
+    def exact(self, number: int) -> tuple[Fraction, Fraction]:
+        """Return the coordinates of a point as fractions."""
+        x, y, w = self.points[number]
+        return Fraction(x << self._up, w << self._down), Fraction(y << self._up, w << self._down)
+
+    def is_float(self, number: int) -> bool:
+        """Tell whether both coordinates are exactly the doubles in `xs` and `ys`."""
+        x, y, w = self.points[number]
+        for value, double in ((x, self.xs[number]), (y, self.ys[number])):
+            numerator, denominator = double.as_integer_ratio()
+            if (value << self._up) * denominator != numerator * (w << self._down):
+                return False
+        return True
+
+
+def float_nodes(coordinates: npt.NDArray[np.float64]) -> tuple[NodeTable, list[int]]:
+    """Return a table holding the rows of `coordinates`, (n, 2) float64, finite, and the number of each row."""
+    doubles = [value for row in coordinates.tolist() for value in row]
+    ratios = [value.as_integer_ratio() for value in doubles]
+    # Denominators are powers of two: the largest is common to all.
+    denominator = max((ratio[1] for ratio in ratios), default=1)
+    integers = [ratio[0] * (denominator // ratio[1]) for ratio in ratios]
+    every_bit = 0
+    for value in integers:
+        every_bit |= abs(value)
+    shift = max((every_bit & -every_bit).bit_length() - 1, 0)
+    nodes = NodeTable(shift - denominator.bit_length() + 1)
+    numbers = [
+        nodes.add_float((integers[k] >> shift, integers[k + 1] >> shift, 1), doubles[k], doubles[k + 1])
+        for k in range(0, len(doubles), 2)
+    ]
+    return nodes, numbers
+
+
+Rational = int | float | Fraction
+
+
+def rational_nodes(coordinates: Iterable[Sequence[Rational]]) -> tuple[NodeTable, list[int]]:
+    """Return a table holding the points `coordinates`, (x, y) of ints, floats or fractions, and the number of each."""
+    nodes, numbers = NodeTable(0), []
+    for x, y in coordinates:
+        (p, q), (r, s) = Fraction(x).as_integer_ratio(), Fraction(y).as_integer_ratio()
+        w = lcm(q, s)
+        numbers.append(nodes.add(reduced(p * (w // q), r * (w // s), w)))
+    return nodes, numbers

@@ -1,0 +1,148 @@
+"""Faces of an arrangement: half-edges in exact angular order, boundary cycles, components located in faces.
+
+Edge e has two half-edges: 2 e runs from tail to head (to the right, or straight up), 2 e + 1 back; ``h ^ 1`` is the
+twin. The face of a half-edge lies to its left. Around a node the outgoing half-edges stand in counter-clockwise order;
+the cycle of a face goes on with the outgoing one next clockwise from the twin of the one that arrived.
+
+A face has one cycle for each connected component of its boundary. Which cycles belong together is found by one exact
+stab per component: from its first node (leftmost, then lowest) straight down to the next edge below.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cmp_to_key
+
+from engine.arrangement.arrange import Arrangement, Line
+from engine.arrangement.edge_below import EdgesBelow
+from engine.arrangement.union_find import UnionFind
+from engine.parallel import Budget
+
+
+@dataclass(frozen=True, slots=True)
+class Subdivision:
+    """The faces that the edges of an arrangement leave.
+
+    around: for each node its outgoing half-edges, counter-clockwise, beginning after straight down.
+    faces: for each half-edge the face to its left; face 0 is the unbounded one.
+    n_faces: how many there are.
+    """
+
+    arrangement: Arrangement
+    around: list[list[int]]
+    faces: list[int]
+    n_faces: int
+
+
+def turn_of(first: Line, second: Line) -> int:
+    """Return the sign of the turn from the direction of `first` to that of `second`; 0 for parallel lines."""
+    # The direction of (a, b, .) is (b, -a); the cross product of two of them is a q - b p with its sign.
+    value = second[1] * first[0] - first[1] * second[0]
+    return (value > 0) - (value < 0)
+
+
+def half_edges_around(arrangement: Arrangement) -> list[list[int]]:
+    """Return for each node its outgoing half-edges, counter-clockwise, beginning after straight down."""
+    lines = arrangement.lines
+    # Lines run right or straight up, so all outgoing half-edges of even number lie within one half turn, the odd ones
+    # (which run against their line) within the other: inside each the turn between the lines gives the order.
+    by_angle = cmp_to_key(lambda first, second: -turn_of(lines[first >> 1], lines[second >> 1]))
+    rightward: list[list[int]] = [[] for _ in arrangement.nodes.points]
+    leftward: list[list[int]] = [[] for _ in arrangement.nodes.points]
+    for edge, (tail, head) in enumerate(zip(arrangement.tails, arrangement.heads)):
+        rightward[tail].append(2 * edge)
+        leftward[head].append(2 * edge + 1)
+    for fans in (rightward, leftward):
+        for fan in fans:
+            if len(fan) > 1:
+                fan.sort(key=by_angle)
+    return [right + left for right, left in zip(rightward, leftward)]
+
+
+def next_half_edges(around: Sequence[Sequence[int]], n_half_edges: int) -> list[int]:
+    """Return for each half-edge the one that follows it around the face to its left (-1 for those not in `around`)."""
+    following = [-1] * n_half_edges
+    for fan in around:
+        before = fan[-1] if fan else -1
+        for half_edge in fan:
+            following[half_edge ^ 1] = before
+            before = half_edge
+    return following
+
+
+def cycles_of(following: Sequence[int]) -> tuple[list[int], int]:
+    """Return for each half-edge the number of its cycle under `following`, and how many cycles there are."""
+    cycle = [-1] * len(following)
+    n_cycles = 0
+    for start in range(len(following)):
+        if cycle[start] < 0:
+            half_edge = start
+            while cycle[half_edge] < 0:  # bound: each turn numbers one half-edge
+                cycle[half_edge] = n_cycles
+                half_edge = following[half_edge]
+            n_cycles += 1
+    return cycle, n_cycles
+
+
+def subdivide(arrangement: Arrangement, budget: Budget | None = None) -> Subdivision:
+    """Return the faces of `arrangement`; cost: linear, plus one stab for each connected component of the edges."""
+    budget = budget or Budget()
+    around = half_edges_around(arrangement)
+    budget.check()
+    cycle, n_cycles = cycles_of(next_half_edges(around, 2 * len(arrangement.tails)))
+    budget.check()
+    # Cycle n_cycles stands for the boundary at infinity; joined to it, a cycle bounds the unbounded face.
+    joined = UnionFind(n_cycles + 1)
+    below = EdgesBelow(arrangement)
+    for first in _first_nodes(arrangement):
+        budget.check()
+        edge = below.find(first)
+        # The lowest half-edge that leaves the first node has the outer side of its component to its right.
+        joined.unite(cycle[around[first][0] ^ 1], n_cycles if edge < 0 else cycle[2 * edge])
+    unbounded = joined.find(n_cycles)
+    numbers = {unbounded: 0}
+    faces = [numbers.setdefault(joined.find(number), len(numbers)) for number in cycle]
+    return Subdivision(arrangement, around, faces, len(numbers))
+
+
+def _first_nodes(arrangement: Arrangement) -> list[int]:
+    """Return the first node, by x, then by y, of each connected component of the edges."""
+    compare = arrangement.nodes.compare
+    joined = UnionFind(len(arrangement.nodes.points))
+    for tail, head in zip(arrangement.tails, arrangement.heads):
+        joined.unite(tail, head)
+    first: dict[int, int] = {}
+    for node in arrangement.tails:  # the first node of a component is the tail of its edges
+        root = joined.find(node)
+        known = first.setdefault(root, node)
+        if known != node and compare(node, known) < 0:
+            first[root] = node
+    return list(first.values())
+
+
+def label_faces(subdivision: Subdivision, masks: Sequence[int] | None = None) -> list[int]:
+    """Return for each face the exclusive or of the masks of the edges between it and infinity.
+
+    masks: one for each edge; left out, those of the arrangement. Bit k of a label tells whether the face lies in source
+    k under the even-odd rule. The labels are well defined where each source is a set of closed rings.
+    """
+    masks = subdivision.arrangement.masks if masks is None else masks
+    faces = subdivision.faces
+    neighbours: list[list[tuple[int, int]]] = [[] for _ in range(subdivision.n_faces)]
+    for edge, mask in enumerate(masks):
+        left, right = faces[2 * edge], faces[2 * edge + 1]
+        if left != right:
+            neighbours[left].append((right, mask))
+            neighbours[right].append((left, mask))
+    labels = [0] * subdivision.n_faces
+    reached = [False] * subdivision.n_faces
+    reached[0], waiting = True, [0]
+    while waiting:  # bound: each face is entered once; all are reached, since no face is enclosed by nothing
+        face = waiting.pop()
+        for other, mask in neighbours[face]:
+            if not reached[other]:
+                reached[other] = True
+                labels[other] = labels[face] ^ mask
+                waiting.append(other)
+    return labels
