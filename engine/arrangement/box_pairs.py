@@ -6,6 +6,8 @@ a common point (closed boxes), no pair twice. Cost: n log n plus the pairs that 
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
@@ -17,7 +19,7 @@ _POLL = 4096  # box tests between two looks at the cancel flag: about 10 us
 
 
 @kernel
-def _sweep(x_min, x_max, y_min, y_max, order, pairs, flag):
+def _sweep(x_min: Any, x_max: Any, y_min: Any, y_max: Any, order: Any, pairs: Any, flag: Any) -> int:
     """Write the pairs that meet into `pairs`, (capacity, 2) int64, as far as they fit; return how many there are.
 
     order: the boxes sorted by `x_min`. Returns -1 when `flag` was raised.

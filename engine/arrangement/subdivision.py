@@ -45,9 +45,13 @@ def turn_of(first: Line, second: Line) -> int:
 def half_edges_around(arrangement: Arrangement) -> list[list[int]]:
     """Return for each node its outgoing half-edges, counter-clockwise, beginning after straight down."""
     lines = arrangement.lines
+
     # Lines run right or straight up, so all outgoing half-edges of even number lie within one half turn, the odd ones
     # (which run against their line) within the other: inside each the turn between the lines gives the order.
-    by_angle = cmp_to_key(lambda first, second: -turn_of(lines[first >> 1], lines[second >> 1]))
+    def order(first: int, second: int) -> int:
+        return -turn_of(lines[first >> 1], lines[second >> 1])
+
+    by_angle = cmp_to_key(order)
     rightward: list[list[int]] = [[] for _ in arrangement.nodes.points]
     leftward: list[list[int]] = [[] for _ in arrangement.nodes.points]
     for edge, (tail, head) in enumerate(zip(arrangement.tails, arrangement.heads)):
