@@ -1,5 +1,33 @@
 """Exact answers to four questions about a scene: containment, collision, segment clipping, polygon clipping."""
 
+from engine.errors import (
+    CancelledError,
+    DeadlineExceededError,
+    EmptyGeometryError,
+    EngineError,
+    FaceNotSimpleError,
+    InconsistentOrientationError,
+    IndexOutOfRangeError,
+    InvalidArrayError,
+    InvalidInputError,
+    InvalidOperationError,
+    InvalidPolynomialError,
+    MinAboveMaxError,
+    NegativeRadiusError,
+    NotClosedError,
+    NotFiniteError,
+    NotRepresentableError,
+    NotRigidError,
+    RepeatedIndexError,
+    RingTooShortError,
+    TooComplexError,
+    TooDeepError,
+    UnsupportedPairError,
+    UnsupportedSolidError,
+    WrongDimensionError,
+    ZeroNormalError,
+)
+from engine.parallel import Cancel
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.convex import Convex
@@ -12,20 +40,50 @@ from engine.solids.pose import Pose
 from engine.solids.sphere import Sphere
 from engine.solids.surface import Surface
 from engine.solids.triangle import Triangle
+from engine.types import Accuracy, Location, Relation
 from engine.version import __version__
 
 __all__ = [
     "Aabb",
+    "Accuracy",
+    "Cancel",
+    "CancelledError",
     "Convex",
     "Csg",
+    "DeadlineExceededError",
+    "EmptyGeometryError",
+    "EngineError",
+    "FaceNotSimpleError",
     "HalfSpace",
     "Implicit",
+    "InconsistentOrientationError",
+    "IndexOutOfRangeError",
+    "InvalidArrayError",
+    "InvalidInputError",
+    "InvalidOperationError",
+    "InvalidPolynomialError",
+    "Location",
+    "MinAboveMaxError",
+    "NegativeRadiusError",
+    "NotClosedError",
+    "NotFiniteError",
+    "NotRepresentableError",
+    "NotRigidError",
     "Polygon",
     "Polyhedron",
     "Pose",
+    "Relation",
+    "RepeatedIndexError",
+    "RingTooShortError",
     "Solid",
     "Sphere",
     "Surface",
+    "TooComplexError",
+    "TooDeepError",
     "Triangle",
+    "UnsupportedPairError",
+    "UnsupportedSolidError",
+    "WrongDimensionError",
+    "ZeroNormalError",
     "__version__",
 ]
