@@ -1,0 +1,112 @@
+"""Comparison of two segment parameters: at which of two planes does a segment p q arrive first?
+
+With plane values s_p and s_q of opposite sign (one may be zero), the segment meets the plane at
+t = s_p / (s_p - s_q), which grows with |s_p| / |s_q|. So two planes i and j compare as the products
+
+    |s_p(i)| |s_q(j)|   against   |s_p(j)| |s_q(i)|
+
+and for planes of a box, where the differences n = c - p and d = q - p are to hand, t = n / d compares the same way:
+n_i d_j against n_j d_i. One core serves both: the sign of a b - c d for four numbers that are known roughly with a
+bound each (the filter), or exactly as expansions.
+
+Precondition of the exact form: components are zero or so large that products of four components' lowest bits stay
+above 2^-1074, and nothing overflows; callers look at the range of their input.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from engine.jit import inline
+from engine.predicates.error_free import two_diff, two_prod
+from engine.predicates.expansion import Components, add_scaled, grow_product, sign
+from engine.types import UNDECIDED
+
+ROUNDED_DIFFERENCES: Final = 8.0 * 2.0**-53
+"""Bound of the filter when each factor is a difference of two doubles rounded once.
+
+Each product carries (1 + u)^3, its comparison one more rounding of the difference and of the sum: below 5 u in all;
+8 u leaves room for the rounding of the bound itself.
+"""
+
+TINY: Final = 2.0**-1000
+"""Added to the bound: covers products that underflow, so that the filter is safe for every finite input."""
+
+
+@inline
+def compare_differences_filter(a: float, b: float, c: float, d: float) -> int:
+    """Return the sign of a b - c d for differences rounded once each; UNDECIDED when unsure (NaN, infinity too)."""
+    left, right = a * b, c * d
+    gap = left - right
+    bound = ROUNDED_DIFFERENCES * (abs(left) + abs(right)) + TINY
+    if gap > bound:
+        return 1
+    if -gap > bound:
+        return -1
+    return UNDECIDED
+
+
+@inline
+def compare_ratios_filter(
+    a: float, a_bound: float, b: float, b_bound: float, c: float, c_bound: float, d: float, d_bound: float
+) -> int:
+    """Return the sign of |a b| - |c d| for numbers known within a bound each; UNDECIDED when unsure.
+
+    The true |a b| lies within |a| b_bound + |b| a_bound + a_bound b_bound of |a b|; 2^-50 of each product covers
+    every rounding here.
+    """
+    a, b, c, d = abs(a), abs(b), abs(c), abs(d)
+    left, right = a * b, c * d
+    slack = a * b_bound + (b + b_bound) * a_bound + c * d_bound + (d + d_bound) * c_bound
+    bound = 1.01 * slack + 2.0**-50 * (left + right) + TINY
+    gap = left - right
+    if gap > bound:
+        return 1
+    if -gap > bound:
+        return -1
+    return UNDECIDED
+
+
+@inline
+def compare_differences(
+    a0: float, a1: float, b0: float, b1: float, c0: float, c1: float, d0: float, d1: float, e: Components
+) -> int:
+    """Return the exact sign of (a0 - a1) (b0 - b1) - (c0 - c1) (d0 - d1); `e` is a workspace of 16 places."""
+    ah, al = two_diff(a0, a1)
+    bh, bl = two_diff(b0, b1)
+    ch, cl = two_diff(c0, c1)
+    dh, dl = two_diff(d0, d1)
+    if al == 0.0 and bl == 0.0 and cl == 0.0 and dl == 0.0:  # case: lattices and offsets, differences without error
+        left, left_tail = two_prod(ah, bh)
+        right, right_tail = two_prod(ch, dh)
+        if left != right:
+            return 1 if left > right else -1
+        return 0 if left_tail == right_tail else (1 if left_tail > right_tail else -1)
+    n = grow_product(e, 0, al, bl)
+    n = grow_product(e, n, -cl, dl)
+    n = grow_product(e, n, ah, bl)
+    n = grow_product(e, n, al, bh)
+    n = grow_product(e, n, -ch, dl)
+    n = grow_product(e, n, -cl, dh)
+    n = grow_product(e, n, ah, bh)
+    n = grow_product(e, n, -ch, dh)
+    return sign(e, n)
+
+
+@inline
+def add_absolute_product(e: Components, n: int, a: Components, na: int, b: Components, nb: int, factor: int) -> int:
+    """Add factor |a b| (factor is 1 or -1) to the expansion e in place, for expansions a and b; 2 na nb places."""
+    flip = float(factor * sign(a, na) * sign(b, nb))
+    for i in range(na):
+        n = add_scaled(e, n, b, nb, flip * a[i])
+    return n
+
+
+@inline
+def compare_products(
+    a: Components, na: int, b: Components, nb: int, c: Components, nc: int, d: Components, nd: int, e: Components
+) -> int:
+    """Return the exact sign of |a b| - |c d| for expansions; `e` is a workspace of 2 (na nb + nc nd) places."""
+    n = add_absolute_product(e, 0, a, na, b, nb, 1)
+    n = add_absolute_product(e, n, c, nc, d, nd, -1)
+    return sign(e, n)
