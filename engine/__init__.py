@@ -1,5 +1,6 @@
 """Exact answers to four questions about a scene: containment, collision, segment clipping, polygon clipping."""
 
+from engine.clipping.segments import SegmentPieces, clip_segments
 from engine.errors import (
     CancelledError,
     DeadlineExceededError,
@@ -75,6 +76,7 @@ __all__ = [
     "Relation",
     "RepeatedIndexError",
     "RingTooShortError",
+    "SegmentPieces",
     "Solid",
     "Sphere",
     "Surface",
@@ -86,4 +88,5 @@ __all__ = [
     "WrongDimensionError",
     "ZeroNormalError",
     "__version__",
+    "clip_segments",
 ]

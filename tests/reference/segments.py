@@ -141,9 +141,9 @@ def _clip_on_sphere(p: Vector, r: Vector, region: Solid) -> list[Piece]:
     start, face_start = (Root(Q(0)), own) if keeps_p else (low, frozenset([0]))
     end, face_end = (Root(Q(1)), own) if keeps_r else (high, frozenset([0]))
     if keeps_p and not keeps_r and at_p == 0 and half_b >= 0:
-        end, face_end = start, face_start  # leaves at once: only the first end touches
+        end = start  # leaves at once: only the first end touches; it is left through the sphere, at t = 0
     if keeps_r and not keeps_p and at_r == 0 and half_b + a <= 0:
-        start, face_start = end, face_end
+        start = end
     ends = tuple(tuple(Root(x + t.a * d, t.b * d, t.radicand) for x, d in zip(p, u, strict=True)) for t in (start, end))
     return [Piece((start, end), (ends[0], ends[1]), (face_start, face_end))]
 

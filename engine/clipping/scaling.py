@@ -1,0 +1,60 @@
+"""Brings a whole scene by one exact power of two into the range in which kernels are exact.
+
+Points are multiplied by 2^-e, offsets of planes too, and each plane row by a power of two of its own: signs, orders and
+parameters do not change, coordinates of the result are multiplied by 2^e. A scaling that would round any number is not
+done; the kernels then leave items outside of their range open. Results that are subnormal after scaling back would be
+rounded twice, so they are settled again by rational arithmetic.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+
+COMFORTABLE: Final = 64
+"""Scenes whose largest coordinate lies within 2^-64 .. 2^64 stay as they are; kernels are exact to 2^-120 .. 2^120."""
+SMALLEST_NORMAL: Final = 2.0**-1022
+
+
+def exponent_of(*arrays: FloatArray) -> int:
+    """Return e such that the largest coordinate is below 2^e, and 0 where no scaling is needed."""
+    largest = max((max(float(array.max()), -float(array.min())) for array in arrays if array.size), default=0.0)
+    exponent = int(np.frexp(largest)[1])
+    return 0 if largest == 0.0 or abs(exponent) <= COMFORTABLE else exponent
+
+
+def shifted(array: FloatArray, exponent: int | npt.NDArray[np.int64]) -> FloatArray | None:
+    """Return array 2^exponent if that is exact for every number, else None."""
+    with np.errstate(all="ignore"):
+        result: FloatArray = np.ldexp(array, exponent)
+        return result if bool((np.ldexp(result, -exponent) == array).all()) else None
+
+
+def balanced_rows(rows: FloatArray, exponent: int) -> FloatArray | None:
+    """Return plane rows for points multiplied by 2^-exponent, each times a power of two; None if that is not exact."""
+    offsets = shifted(rows[:, -1], -exponent)
+    if offsets is None:
+        return None
+    result = rows.copy()
+    result[:, -1] = offsets
+    own = np.frexp(np.abs(rows[:, :-1]).max(axis=1))[1].astype(np.int64)
+    own[np.abs(own) <= COMFORTABLE] = 0
+    if not own.any():
+        return result
+    for i_row in np.flatnonzero(own):
+        better = shifted(result[i_row], -int(own[i_row]))
+        if better is not None:  # else: the row stays outside of the kernels' range
+            result[i_row] = better
+    return result
+
+
+def scaled_back(points: FloatArray, exponent: int) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
+    """Return points 2^exponent and which of them may have been rounded twice."""
+    with np.errstate(all="ignore"):
+        result: FloatArray = np.ldexp(points, exponent)
+    doubtful = (np.abs(result) < SMALLEST_NORMAL) & (points != 0.0)
+    return result, doubtful.any(axis=1)

@@ -1,0 +1,278 @@
+"""Public: what remains of segments on a region."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from engine.clipping.cohen_sutherland import BEYOND_FILTER, KEPT, OPEN, clip_on_boxes_2d, clip_on_boxes_3d
+from engine.clipping.cyrus_beck import clip_on_rows_2d, clip_on_rows_3d
+from engine.clipping.exact_segments import Piece, clip_by_planes, clip_by_sphere
+from engine.clipping.scaling import FloatArray, balanced_rows, exponent_of, scaled_back, shifted
+from engine.clipping.sphere_interval import clip_on_sphere
+from engine.errors import UnsupportedSolidError
+from engine.parallel import Budget, Cancel, Progress, run_chunks
+from engine.solids.aabb import Aabb
+from engine.solids.base import Solid
+from engine.solids.checks import as_point_groups
+from engine.solids.convex import Convex
+from engine.solids.half_space import HalfSpace
+from engine.solids.sphere import Sphere
+from engine.types import Accuracy
+
+Settle = Callable[[list[float], list[float]], Piece | None]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SegmentPieces:
+    """The pieces of a batch of segments within a region, by source and then by t.
+
+    source: (m,) int64, the segment each piece is a part of.
+    start, end: (m, dim) float64, each coordinate the double nearest to the exact one.
+    t: (m, 2) float64, the parameters of both ends, each the nearest double.
+    faces: (m, 2) int64, the plane or face crossed at either end, -1 where the end is the segment's own.
+    """
+
+    source: npt.NDArray[np.int64]
+    start: FloatArray
+    end: FloatArray
+    t: FloatArray
+    faces: npt.NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.source)
+
+
+@overload
+def clip_segments(
+    segments: npt.ArrayLike,
+    region: Solid,
+    *,
+    workers: int | None = None,
+    deadline: float | None = None,
+    cancel: Cancel | None = None,
+    progress: Progress | None = None,
+    report: Literal[False] = False,
+) -> SegmentPieces: ...
+
+
+@overload
+def clip_segments(
+    segments: npt.ArrayLike,
+    region: Solid,
+    *,
+    workers: int | None = None,
+    deadline: float | None = None,
+    cancel: Cancel | None = None,
+    progress: Progress | None = None,
+    report: Literal[True],
+) -> tuple[SegmentPieces, Accuracy]: ...
+
+
+def clip_segments(
+    segments: npt.ArrayLike,
+    region: Solid,
+    *,
+    workers: int | None = None,
+    deadline: float | None = None,
+    cancel: Cancel | None = None,
+    progress: Progress | None = None,
+    report: bool = False,
+) -> SegmentPieces | tuple[SegmentPieces, Accuracy]:
+    """Return the pieces of segments that lie in a region, a closed set.
+
+    A piece is a maximal connected part of a segment within the region or on its boundary. Boxes are clipped by
+    Cohen-Sutherland outcodes, convex regions by their generalisation, spheres by the roots of a quadratic, all with
+    exact decisions on the original end points.
+
+    Parameters
+        segments: (n, 2, dim) numbers, two points each; none at all are welcome.
+        region: half_space, aabb, convex (may be empty or unbounded) or sphere of the same dimension.
+        workers, deadline (seconds), cancel, progress: see `engine.parallel`.
+        report: return ``(pieces, Accuracy)``.
+    Returns
+        `SegmentPieces`; the parts of [0, 1] that no piece covers are outside of the region.
+    Boundary
+        Counts as in: a segment in a face is kept, one that touches in a single point gives that point (t0 = t1).
+        `faces` at the start is -1 exactly where t0 = 0, at the end where t1 = 1; else the plane crossed there, of
+        several at one point the smallest. Indices: half_space 0; aabb xmin, xmax, ymin, ymax, zmin, zmax; convex the
+        row; sphere 0.
+    Degenerate input
+        A segment of no length is a point: kept as a whole (t = (0, 1), faces -1) or dropped.
+    Accuracy
+        Decisions exact for every finite input. Coordinates and t are the doubles nearest to the exact values, each on
+        its own, zero as +0.0; so a piece may stick out of a slanted plane by half an ulp, and the ends of a tiny piece
+        may be equal. On an aabb a coordinate cut by a plane is the plane's. No result overflows.
+    Cost
+        O(n planes); allocates the outputs.
+    Raises
+        UnsupportedSolidError, InvalidArrayError, WrongDimensionError, NotFiniteError, DeadlineExceededError,
+        CancelledError.
+
+    >>> from engine.solids.aabb import Aabb
+    >>> pieces = clip_segments([[[-1.0, 1.0], [3.0, 1.0]]], Aabb(min=[0.0, 0.0], max=[2.0, 2.0]))
+    >>> pieces.start.tolist(), pieces.end.tolist(), pieces.t.tolist(), pieces.faces.tolist()
+    ([[0.0, 1.0]], [[2.0, 1.0]], [[0.25, 0.75]], [[0, 1]])
+    """
+    task, method = _method(region)
+    array = as_point_groups(segments, 2, region.dimension, ("segments",))
+    with Budget(deadline, cancel) as budget:
+        pieces, n_beyond, n_rational = task(array, budget, workers, progress)
+    if not report:
+        return pieces
+    return pieces, Accuracy("exact", 0.5, len(array), n_beyond, n_rational, method)
+
+
+Task = Callable[[FloatArray, Budget, int | None, Progress | None], tuple[SegmentPieces, int, int]]
+
+
+def _method(region: Solid) -> tuple[Task, str]:
+    """Return what clips on this solid, and its name: the one table from type to method."""
+    match region:
+        case HalfSpace():
+            return _on_rows(region.row[None, :]), "cyrus_beck"
+        case Convex():
+            return _on_rows(region.planes), "cyrus_beck"
+        case Aabb():
+            return _on_box(region), "cohen_sutherland"
+        case Sphere():
+            return _on_ball(region), "sphere_interval"
+    kind = getattr(region, "type", type(region).__name__)
+    raise UnsupportedSolidError(
+        f"clip_segments does not take a {kind}; give a half_space, aabb, convex, sphere, polygon or polyhedron",
+        ("region",),
+    )
+
+
+def _on_box(region: Aabb) -> Task:
+    kernel = clip_on_boxes_2d if region.dimension == 2 else clip_on_boxes_3d
+
+    def task(
+        segments: FloatArray, budget: Budget, workers: int | None, progress: Progress | None
+    ) -> tuple[SegmentPieces, int, int]:
+        exponent = exponent_of(segments, region.min, region.max)
+        scaled = [shifted(array, -exponent) if exponent else array for array in (segments, region.min, region.max)]
+        if any(array is None for array in scaled):
+            exponent, scaled = 0, [segments, region.min, region.max]
+        # a box's rows are those of its planes with unit normals, so one exact routine settles both
+        unit = np.eye(region.dimension)
+        rows = np.empty((2 * region.dimension, region.dimension + 1))
+        rows[0::2, :-1], rows[1::2, :-1], rows[0::2, -1], rows[1::2, -1] = unit, -unit, -region.min, region.max
+        planes = rows.tolist()
+        return _clip_convex(
+            kernel,
+            (np.ascontiguousarray(scaled[1]), np.ascontiguousarray(scaled[2])),
+            lambda p, q: clip_by_planes(p, q, planes),
+            segments,
+            scaled[0],
+            exponent,
+            budget,
+            workers,
+            progress,
+        )
+
+    return task
+
+
+def _on_rows(rows: FloatArray) -> Task:
+    kernel = clip_on_rows_2d if rows.shape[1] == 3 else clip_on_rows_3d
+    planes = rows.tolist()
+
+    def task(
+        segments: FloatArray, budget: Budget, workers: int | None, progress: Progress | None
+    ) -> tuple[SegmentPieces, int, int]:
+        exponent = exponent_of(segments)
+        points = shifted(segments, -exponent) if exponent else segments
+        balanced = balanced_rows(rows, exponent) if points is not None else None
+        if balanced is None:
+            exponent, points, balanced = 0, segments, balanced_rows(rows, 0)
+        return _clip_convex(
+            kernel,
+            (rows if balanced is None else balanced,),
+            lambda p, q: clip_by_planes(p, q, planes),
+            segments,
+            points,
+            exponent,
+            budget,
+            workers,
+            progress,
+        )
+
+    return task
+
+
+def _on_ball(region: Sphere) -> Task:
+    center, radius = region.center.tolist(), region.radius
+
+    def task(
+        segments: FloatArray, budget: Budget, workers: int | None, progress: Progress | None
+    ) -> tuple[SegmentPieces, int, int]:
+        ball = np.append(region.center, radius)
+        exponent = exponent_of(segments, ball)
+        points = shifted(segments, -exponent) if exponent else segments
+        scaled = shifted(ball, -exponent) if exponent else ball
+        if points is None or scaled is None:
+            exponent, points, scaled = 0, segments, ball
+        return _clip_convex(
+            clip_on_sphere,
+            (np.ascontiguousarray(scaled[:-1]), float(scaled[-1])),
+            lambda p, q: clip_by_sphere(p, q, center, radius),
+            segments,
+            points,
+            exponent,
+            budget,
+            workers,
+            progress,
+        )
+
+    return task
+
+
+def _clip_convex(
+    kernel: Any,
+    region: tuple[Any, ...],
+    settle: Settle,
+    segments: FloatArray,
+    points: FloatArray | None,
+    exponent: int,
+    budget: Budget,
+    workers: int | None,
+    progress: Progress | None,
+) -> tuple[SegmentPieces, int, int]:
+    """Run `kernel` over chunks of `points` = segments 2^-exponent and settle what it leaves open.
+
+    Each segment has one piece at most. Returns the pieces, how many items needed more than the filter, and how many
+    rational arithmetic.
+    """
+    assert points is not None
+    n, _, dimension = segments.shape
+    start, end = np.empty((n, dimension)), np.empty((n, dimension))
+    t, faces, state = np.empty((n, 2)), np.empty((n, 2), np.int64), np.empty(n, np.uint8)
+
+    def task(first: int, last: int) -> None:
+        with np.errstate(all="ignore"):  # uncompiled kernels: overflow is looked at by their filters
+            kernel(points, *region, first, last, start, end, t, faces, state)
+        part = slice(first, last)
+        if exponent:
+            is_kept = (state[part] & KEPT) != 0
+            for ends in (start, end):
+                ends[part][~is_kept] = 0.0
+                ends[part], doubtful = scaled_back(ends[part], exponent)
+                state[part][doubtful & is_kept & (faces[part] >= 0).any(axis=1)] = OPEN | BEYOND_FILTER
+        for item in first + np.flatnonzero(state[part] & OPEN):
+            budget.check()
+            piece = settle(segments[item, 0].tolist(), segments[item, 1].tolist())
+            if piece is None:
+                state[item] &= ~np.uint8(KEPT)
+            else:
+                state[item] |= KEPT
+                t[item], start[item], end[item], faces[item] = piece
+
+    run_chunks(task, n, budget=budget, workers=workers, progress=progress)
+    kept = np.flatnonzero(state & KEPT)
+    pieces = SegmentPieces(kept, start[kept] + 0.0, end[kept] + 0.0, t[kept] + 0.0, faces[kept])
+    return pieces, int((state & BEYOND_FILTER != 0).sum()), int((state & OPEN != 0).sum())
