@@ -1,0 +1,145 @@
+"""The exact sign of a polynomial with float64 coefficients at a float64 point, in the plane or in space.
+
+**The filter.** u = 2^-53. A term takes at most `degree` rounded products and t terms take t - 1 sums, so the value is
+off by at most (degree + t + small) u times the sum of magnitudes. Underflow: powers of |x| < 1 are each off by at
+most 16 times 2^-1075, later products by 2^-1075 times the factors that follow. Both are covered by adding the floor
+2^-1010 to every magnitude on the way, because even u 2^-1010 = 2^-1063 is more than 16 times 2^-1075.
+
+**The exact stage** multiplies significands (in [1/2, 1)) as expansions, so that every term of degree D is a multiple of
+2^(-53 (D + 1)), and shifts it by its exponent relative to the largest term. A term that would lose bits (more than
+2^1173 below the largest for degree 16, 2^1915 for degree 2) is left out; if the rest then is not clearly larger than
+such terms can be, the answer is UNDECIDED; `rational.py` settles it.
+"""
+
+from __future__ import annotations
+
+from math import frexp, ldexp
+from typing import Any
+
+from engine.jit import inline, kernel
+from engine.predicates.error_free import workspace
+from engine.predicates.expansion import Components, compress, grow, scale, sign
+from engine.types import UNDECIDED
+
+MAX_DEGREE = 16  # total degree; the caller guarantees it
+MAX_TERMS = 1000
+N_POWERS = MAX_DEGREE + 1
+N_TABLE = 3 * N_POWERS
+
+UNIT_ROUNDOFF = 2.0**-53
+SPARE_ROUNDINGS = 16.0  # for the sums of magnitudes and the threshold itself
+FLOOR = 2.0**-1010
+
+SIGNIFICAND_BITS = 53
+LOWEST_BIT = -1074
+COMMON_TOP = 1000  # 1000 terms below 2^1000 add up below the overflow
+CLEAR = 2.0**-160  # more than 1000 left-out terms, each below 2^(53 (16 + 1) - 1074) = 2^-173, add up to
+N_TOTAL = 1100  # non-adjacent components between 2^-1074 and 2^1010: at most 1043
+N_TERM = 1024  # components of one term: fewer than its bits, 53 (16 + 1) = 901, doubled only before compression
+
+
+@inline
+def _fill_powers(points: Any, row: int, powers: Components) -> None:
+    """Set powers[axis * N_POWERS + k] to the rounded k-th power of the coordinate, for every axis of the point."""
+    for axis in range(points.shape[1]):
+        value = float(points[row, axis])
+        power = 1.0
+        for k in range(N_POWERS):
+            powers[axis * N_POWERS + k] = power
+            power *= value
+
+
+@inline
+def sign_of_polynomial_filter(powers: Any, coefficients: Any, degree: int, points: Any, row: int) -> int:
+    """Return the sign at a point where rounding cannot have changed it, else UNDECIDED; arguments as below."""
+    table = workspace(N_TABLE)
+    _fill_powers(points, row, table)
+    value, magnitude = 0.0, 0.0
+    for i_term in range(coefficients.shape[0]):
+        term = float(coefficients[i_term])
+        size = abs(term)
+        for axis in range(powers.shape[1]):
+            factor = table[axis * N_POWERS + powers[i_term, axis]]
+            term *= factor
+            size = size * (abs(factor) + FLOOR) + FLOOR
+        value += term
+        magnitude += size
+    threshold = (degree + coefficients.shape[0] + SPARE_ROUNDINGS) * UNIT_ROUNDOFF * magnitude
+    if value > threshold:
+        return 1
+    if -value > threshold:
+        return -1
+    return UNDECIDED
+
+
+@inline
+def sign_of_polynomial(powers: Any, coefficients: Any, degree: int, points: Any, row: int) -> int:
+    """Return the sign of the sum of coefficient * prod(p[k] ** powers[k]) at p = points[row], or UNDECIDED.
+
+    powers (t, dim) int64, coefficients (t,) float64, points (n, dim) float64, dim 2 or 3. Caller guarantees finite
+    numbers, powers >= 0 with row sums <= degree <= MAX_DEGREE, and t <= MAX_TERMS.
+    """
+    side = sign_of_polynomial_filter(powers, coefficients, degree, points, row)
+    if side != UNDECIDED:
+        return side
+    return sign_of_polynomial_exact(powers, coefficients, points, row)
+
+
+@inline
+def _term_exponent(powers: Any, coefficients: Any, points: Any, row: int, i_term: int) -> int:
+    """Return k with |term| < 2^k; caller guarantees that the term is not zero."""
+    exponent = frexp(float(coefficients[i_term]))[1]
+    for axis in range(powers.shape[1]):
+        exponent += powers[i_term, axis] * frexp(float(points[row, axis]))[1]
+    return exponent
+
+
+@inline
+def _is_zero_term(powers: Any, coefficients: Any, points: Any, row: int, i_term: int) -> bool:
+    """Tell whether the coefficient or a coordinate with a positive power is zero."""
+    is_zero = coefficients[i_term] == 0.0
+    for axis in range(powers.shape[1]):
+        is_zero = is_zero or (powers[i_term, axis] > 0 and points[row, axis] == 0.0)
+    return is_zero
+
+
+@inline
+def sign_of_polynomial_exact(powers: Any, coefficients: Any, points: Any, row: int) -> int:
+    """Return the sign from an expansion, or UNDECIDED; arguments as for `sign_of_polynomial`."""
+    top, n_terms = 0, 0
+    for i_term in range(coefficients.shape[0]):
+        if not _is_zero_term(powers, coefficients, points, row, i_term):
+            exponent = _term_exponent(powers, coefficients, points, row, i_term)
+            top = exponent if n_terms == 0 else max(top, exponent)
+            n_terms += 1
+    total, f, g = workspace(N_TOTAL), workspace(N_TERM), workspace(N_TERM)
+    n, is_incomplete = 0, False
+    for i_term in range(coefficients.shape[0]):
+        if _is_zero_term(powers, coefficients, points, row, i_term):
+            continue
+        shift = _term_exponent(powers, coefficients, points, row, i_term) - top + COMMON_TOP
+        n_factors = 1
+        for axis in range(powers.shape[1]):
+            n_factors += powers[i_term, axis]
+        if shift - SIGNIFICAND_BITS * n_factors < LOWEST_BIT:
+            is_incomplete = True
+            continue
+        f[0] = frexp(float(coefficients[i_term]))[0]
+        m = 1
+        for axis in range(powers.shape[1]):
+            significand = frexp(float(points[row, axis]))[0]
+            for _ in range(powers[i_term, axis]):
+                m = compress(g, scale(f, m, significand, g))
+                f, g = g, f
+        for i in range(m):
+            n = grow(total, n, ldexp(f[i], shift))
+    if is_incomplete and (n == 0 or abs(total[n - 1]) < CLEAR):
+        return UNDECIDED
+    return sign(total, n)
+
+
+@kernel
+def sign_of_polynomial_batch(powers: Any, coefficients: Any, degree: int, points: Any, sides: Any) -> None:
+    """Fill sides (n,) int8 with sign_of_polynomial at the rows of points (n, dim) float64."""
+    for item in range(sides.shape[0]):
+        sides[item] = sign_of_polynomial(powers, coefficients, degree, points, item)

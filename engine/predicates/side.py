@@ -1,0 +1,158 @@
+"""side_of_line and side_of_plane: the sign of dot(row, (p, 1)), exact for every float64 input.
+
+**The filter.** With u = 2^-53 and h = 2^-1075, a rounded product carries u |a x| + h and each sum u of its result, so
+the rounded sum of k products and an offset is off by at most (k + 1)(u + 2u^2) S + k h, S the sum of magnitudes. The
+thresholds 4u S + 8h (k = 2) and 8u S + 8h (k = 3) also pay for their own rounding. An infinity or NaN on the way makes
+both comparisons false.
+
+**The exact stage** adds the products to an expansion. Where a product is too large or too small for that, each factor
+is split into significand and exponent and the terms are brought to a common exponent. Terms more than 2^1968 below the
+largest are left out; if the rest then is not clearly larger than they are, the answer is UNDECIDED (`rational.py`
+settles it).
+"""
+
+from __future__ import annotations
+
+from math import frexp, ldexp
+from typing import Any
+
+from engine.jit import inline, kernel
+from engine.predicates.error_free import two_prod, workspace
+from engine.predicates.expansion import Components, grow, grow_product, sign
+from engine.predicates.loading import as_half_space2, as_half_space3, as_point2, as_point3
+from engine.types import UNDECIDED, HalfSpace2, HalfSpace3, Point2, Point3
+
+BOUND_LINE = 2.0**-51  # 4u
+BOUND_PLANE = 2.0**-50  # 8u
+GUARD = 2.0**-1072  # 8h
+
+SMALLEST_PRODUCT = 2.0**-967  # error_free.py: two_prod is exact from here
+LARGEST_PRODUCT = 2.0**1000  # a few of them add up below the overflow
+COMMON_TOP = 1000  # exponent given to the largest term when terms are brought to a common exponent
+LOWEST_SHIFT = -968  # a product of significands has its lowest bit at 2^-106; -106 - 968 = -1074
+CLEAR = 2.0**-960  # more than three left-out terms, each below 2^LOWEST_SHIFT, add up to
+NO_TERM = -(1 << 20)  # exponent of a zero term
+
+
+@inline
+def side_of_line_filter(h: HalfSpace2, p: Point2) -> int:
+    """Return the sign of a x + b y + c where rounding cannot have changed it, else UNDECIDED."""
+    ax, by = h.a * p.x, h.b * p.y
+    value = ax + by + h.c
+    threshold = BOUND_LINE * (abs(ax) + abs(by) + abs(h.c)) + GUARD
+    if value > threshold:
+        return 1
+    if -value > threshold:
+        return -1
+    return UNDECIDED
+
+
+@inline
+def side_of_line(h: HalfSpace2, p: Point2) -> int:
+    """Return 1 if p is inside the half-plane h, 0 on its line, -1 outside, or UNDECIDED."""
+    side = side_of_line_filter(h, p)
+    if side != UNDECIDED:
+        return side
+    e = workspace(6)
+    if is_exact_product(h.a, p.x) and is_exact_product(h.b, p.y) and is_exact_product(h.c, 1.0):
+        n = grow_product(e, grow_product(e, 0, h.a, p.x), h.b, p.y)
+        return sign(e, grow(e, n, h.c))
+    ax, by, c = product_exponent(h.a, p.x), product_exponent(h.b, p.y), product_exponent(h.c, 1.0)
+    shift = COMMON_TOP - max(ax, by, c)
+    n = grow_shifted_product(e, 0, h.a, p.x, ax + shift)
+    n = grow_shifted_product(e, n, h.b, p.y, by + shift)
+    n = grow_shifted_product(e, n, h.c, 1.0, c + shift)
+    return clear_sign(e, n, is_left_out(ax, shift) or is_left_out(by, shift) or is_left_out(c, shift))
+
+
+@inline
+def side_of_plane_filter(h: HalfSpace3, p: Point3) -> int:
+    """Return the sign of a x + b y + c z + d where rounding cannot have changed it, else UNDECIDED."""
+    ax, by, cz = h.a * p.x, h.b * p.y, h.c * p.z
+    value = ax + by + cz + h.d
+    threshold = BOUND_PLANE * (abs(ax) + abs(by) + abs(cz) + abs(h.d)) + GUARD
+    if value > threshold:
+        return 1
+    if -value > threshold:
+        return -1
+    return UNDECIDED
+
+
+@inline
+def side_of_plane(h: HalfSpace3, p: Point3) -> int:
+    """Return 1 if p is inside the half-space h, 0 on its plane, -1 outside, or UNDECIDED."""
+    side = side_of_plane_filter(h, p)
+    if side != UNDECIDED:
+        return side
+    e = workspace(8)
+    if (
+        is_exact_product(h.a, p.x)
+        and is_exact_product(h.b, p.y)
+        and is_exact_product(h.c, p.z)
+        and is_exact_product(h.d, 1.0)
+    ):
+        n = grow_product(e, grow_product(e, 0, h.a, p.x), h.b, p.y)
+        return sign(e, grow(e, grow_product(e, n, h.c, p.z), h.d))
+    ax, by = product_exponent(h.a, p.x), product_exponent(h.b, p.y)
+    cz, d = product_exponent(h.c, p.z), product_exponent(h.d, 1.0)
+    shift = COMMON_TOP - max(ax, by, cz, d)
+    n = grow_shifted_product(e, 0, h.a, p.x, ax + shift)
+    n = grow_shifted_product(e, n, h.b, p.y, by + shift)
+    n = grow_shifted_product(e, n, h.c, p.z, cz + shift)
+    n = grow_shifted_product(e, n, h.d, 1.0, d + shift)
+    is_incomplete = is_left_out(ax, shift) or is_left_out(by, shift) or is_left_out(cz, shift) or is_left_out(d, shift)
+    return clear_sign(e, n, is_incomplete)
+
+
+@inline
+def is_exact_product(a: float, b: float) -> bool:
+    """Tell whether `two_prod` of a and b is exact and a few such products cannot overflow in a sum."""
+    magnitude = abs(a * b)
+    return SMALLEST_PRODUCT <= magnitude <= LARGEST_PRODUCT or a == 0.0 or b == 0.0
+
+
+@inline
+def product_exponent(a: float, b: float) -> int:
+    """Return k with |a b| < 2^k, NO_TERM for a zero product."""
+    if a == 0.0 or b == 0.0:
+        return NO_TERM
+    return frexp(a)[1] + frexp(b)[1]
+
+
+@inline
+def is_left_out(exponent: int, shift: int) -> bool:
+    """Tell whether a term of this exponent, shifted so, would lose bits below the smallest subnormal."""
+    return exponent != NO_TERM and exponent + shift < LOWEST_SHIFT
+
+
+@inline
+def clear_sign(e: Components, n: int, is_incomplete: bool) -> int:
+    """Return the sign of e, or UNDECIDED if terms were left out that could change it."""
+    if is_incomplete and (n == 0 or abs(e[n - 1]) < CLEAR):
+        return UNDECIDED
+    return sign(e, n)
+
+
+@inline
+def grow_shifted_product(e: Components, n: int, a: float, b: float, exponent: int) -> int:
+    """Add the significands of a and b, multiplied, times 2^exponent to e, unless zero or left out (two places)."""
+    if a == 0.0 or b == 0.0 or exponent < LOWEST_SHIFT:
+        return n
+    p, tail = two_prod(frexp(a)[0], frexp(b)[0])
+    if tail != 0.0:
+        n = grow(e, n, ldexp(tail, exponent))
+    return grow(e, n, ldexp(p, exponent))
+
+
+@kernel
+def side_of_line_batch(rows: Any, points: Any, sides: Any) -> None:
+    """Fill sides (n,) int8 with side_of_line of the rows (n, 3) and the points (n, 2) float64."""
+    for item in range(sides.shape[0]):
+        sides[item] = side_of_line(as_half_space2(rows, item), as_point2(points, item))
+
+
+@kernel
+def side_of_plane_batch(rows: Any, points: Any, sides: Any) -> None:
+    """Fill sides (n,) int8 with side_of_plane of the rows (n, 4) and the points (n, 3) float64."""
+    for item in range(sides.shape[0]):
+        sides[item] = side_of_plane(as_half_space3(rows, item), as_point3(points, item))
