@@ -1,0 +1,135 @@
+"""The corners of an intersection of half-spaces, exact: the double description method in integers.
+
+The half-spaces ``row . (p, 1) >= 0`` are constraints on a cone one dimension higher; points (p, 1) of the solid are its
+generators with a positive last number, directions in which it has no end those with 0. Starting from all of space (its
+axes as lines), one constraint after the other is added: a line that is not parallel to the constraint becomes a ray;
+otherwise rays behind it go and each pair of neighbouring rays, one before and one behind, leaves a ray on it.
+
+Two rays are neighbours if no other ray lies on all constraints they have in common. Numbers stay as small as the
+determinants they are, since common factors are taken out.
+
+Source: T. S. Motzkin et al., "The double description method", 1953; K. Fukuda, A. Prodon, "Double description method
+revisited", 1996 (lines kept apart, combinatorial neighbours).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+from engine.errors import TooComplexError
+from engine.parallel import Budget
+from engine.predicates.rational import scaled_integers
+
+Vector = tuple[int, ...]
+MAX_RAYS = 20_000
+"""Most corners and directions kept at a time."""
+
+
+@dataclass(frozen=True, slots=True)
+class Corners:
+    """What an intersection of half-spaces is spanned by."""
+
+    points: list[tuple[Fraction, ...]]  # its corners; none if it is empty or holds a whole line
+    is_empty: bool  # no point at all
+    is_bounded: bool  # no direction leads out of it for ever; True when empty
+
+
+@dataclass(frozen=True, slots=True)
+class _Ray:
+    vector: Vector
+    zeros: int  # bit i: constraint i is zero on it
+
+
+def corners_of_half_spaces(rows: Sequence[Sequence[float]], budget: Budget | None = None) -> Corners:
+    """Return the corners of the points with ``row . (p, 1) >= 0`` for all rows.
+
+    Rows of finite floats, one number more than a point has; redundant and parallel rows are welcome.
+    Cost: rows times corners in integer arithmetic, pairs of rays a new row parts; milliseconds for tens of rows.
+    Raises: TooComplexError beyond 20,000 corners, DeadlineExceededError, CancelledError.
+
+    >>> triangle = corners_of_half_spaces([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-2.0, -2.0, 1.0]])
+    >>> sorted((float(x), float(y)) for x, y in triangle.points), triangle.is_bounded
+    ([(0.0, 0.0), (0.0, 0.5), (0.5, 0.0)], True)
+    """
+    budget = budget or Budget()
+    size = len(rows[0])
+    constraints = [(*([0] * (size - 1)), 1), *(_reduced(scaled_integers(row)) for row in rows)]
+    lines: list[Vector] = [tuple(int(i == axis) for i in range(size)) for axis in range(size)]
+    rays: list[_Ray] = []
+    for number, constraint in enumerate(constraints):
+        budget.check()
+        lines, rays = _add(constraint, number, lines, rays, budget)
+        if len(rays) > MAX_RAYS:
+            raise TooComplexError(f"an intersection of {len(rows)} half-spaces has more than {MAX_RAYS} corners")
+    ends = [ray.vector for ray in rays if ray.vector[-1] > 0]
+    if not ends:
+        return Corners([], True, True)
+    is_bounded = not lines and len(ends) == len(rays)
+    points = [] if lines else [tuple(Fraction(x, end[-1]) for x in end[:-1]) for end in ends]
+    return Corners(points, False, is_bounded)
+
+
+def _add(
+    constraint: Vector, number: int, lines: list[Vector], rays: list[_Ray], budget: Budget
+) -> tuple[list[Vector], list[_Ray]]:
+    """Return the generators of the part of their cone where the constraint is not negative."""
+    bit = 1 << number
+    slopes = [_dot(constraint, line) for line in lines]
+    i_line = next((i for i, slope in enumerate(slopes) if slope != 0), None)
+    if i_line is None:
+        return lines, _cut(constraint, bit, rays, len(constraint) - len(lines) - 2, budget)
+    line, slope = lines[i_line], slopes[i_line]
+    if slope < 0:
+        line, slope = tuple(-x for x in line), -slope
+    kept = [_onto(constraint, other, line, slope) for other in lines[:i_line] + lines[i_line + 1 :]]
+    moved = [_Ray(_onto(constraint, ray.vector, line, slope), ray.zeros | bit) for ray in rays]
+    return kept, [*moved, _Ray(line, bit - 1)]  # the line was zero on all constraints before this one
+
+
+def _cut(constraint: Vector, bit: int, rays: list[_Ray], n_common: int, budget: Budget) -> list[_Ray]:
+    """Return the rays of a cone without a line across the constraint, cut by it.
+
+    n_common: neighbours lie on a face of dimension 2, which at least this many constraints hold to it.
+    """
+    before: list[tuple[_Ray, int]] = []
+    behind: list[tuple[_Ray, int]] = []
+    kept: list[_Ray] = []
+    for ray in rays:
+        value = _dot(constraint, ray.vector)
+        if value > 0:
+            before.append((ray, value))
+            kept.append(ray)
+        elif value < 0:
+            behind.append((ray, value))
+        else:
+            kept.append(_Ray(ray.vector, ray.zeros | bit))
+    zeros = [ray.zeros for ray in rays]
+    for first, up in before:
+        budget.check()
+        for second, down in behind:
+            common = first.zeros & second.zeros
+            if common.bit_count() < n_common:
+                continue
+            if sum(common & other == common for other in zeros) == 2:  # only these two: neighbours
+                vector = _reduced([up * y - down * x for x, y in zip(first.vector, second.vector)])
+                kept.append(_Ray(vector, common | bit))
+    return kept
+
+
+def _onto(constraint: Vector, vector: Vector, line: Vector, slope: int) -> Vector:
+    """Return `vector` moved along the line until the constraint is zero, times a positive number."""
+    value = _dot(constraint, vector)
+    return _reduced([slope * x - value * y for x, y in zip(vector, line)])
+
+
+def _dot(a: Sequence[int], b: Sequence[int]) -> int:
+    return sum(x * y for x, y in zip(a, b))
+
+
+def _reduced(vector: Sequence[int]) -> Vector:
+    """Return the vector without the common factor of its numbers."""
+    common = math.gcd(*vector)
+    return tuple(x // common for x in vector) if common > 1 else tuple(vector)

@@ -1,0 +1,261 @@
+"""The smallest sphere around points, exact: float64 proposes the farthest point, integers decide.
+
+The walk: take the smallest ball of a few points (`engine.bounding.support_ball`, exact). Find the point farthest from
+its centre. If it is outside, take the smallest ball of the support and that point, which is strictly larger, and look
+again; there are finitely many supports, so the walk ends, in practice after 5 to 20 turns. Only points within rounding
+of the sphere are looked at in integers, first thinned out by double-double arithmetic where they are many (a finely
+tessellated sphere has all of its vertices there).
+
+Centre: each coordinate the double nearest to the exact one. Radius: the smallest double whose closed ball about that
+rounded centre holds every point.
+
+Source: the active-set walk of B. Gaertner, "Fast and robust smallest enclosing balls", 1999 (farthest-point pivot).
+Changed: the ball of the support is exact, the float distances only choose whom to ask.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from engine.bounding.support_ball import smallest_ball
+from engine.errors import NotRepresentableError
+from engine.parallel import Budget
+from engine.predicates.rational import nearest_float
+
+FloatArray = npt.NDArray[np.float64]
+Rational = tuple[Fraction, ...]
+
+_UNIT: Final = 2.0**-53
+_TINY: Final = 2.0**-900  # above all that scaling to the unit ball can lose to underflow
+_FEW: Final = 64  # candidates that are not worth a double-double pass
+
+
+@dataclass(frozen=True, slots=True)
+class MinimalSphere:
+    """The smallest sphere around points and how it was found."""
+
+    center: FloatArray  # (dimension,): each coordinate the double nearest to the exact one
+    radius: float  # the smallest double whose closed ball about `center` holds every point
+    exact_center: Rational  # before rounding
+    exact_square: Fraction  # the squared radius of the exact ball
+    support: tuple[int, ...]  # points on the exact sphere that have the exact centre in their convex hull
+    n_candidates: int  # largest number of points in one turn that float64 left open
+    n_rational: int  # largest number of those that integers had to settle
+
+
+def minimal_sphere(points: FloatArray, budget: Budget | None = None) -> MinimalSphere:
+    """Return the smallest sphere around points ``(n, dimension)`` of finite float64, n at least 1.
+
+    Degenerate: one point, or all at one place, give radius 0. Accuracy: exact as stated in the module. Cost: a few
+    passes over the points, O(n) memory. Raises: NotRepresentableError if the radius is beyond float64,
+    DeadlineExceededError, CancelledError.
+
+    >>> ball = minimal_sphere(np.array([[0.0, 0.0], [4.0, 0.0], [1.0, 1.0]]))
+    >>> ball.center.tolist(), ball.radius, ball.support
+    ([2.0, 0.0], 2.0, (0, 1))
+    """
+    rows = points.tolist() if len(points) <= 8 else None
+
+    def exact(index: int) -> Rational:
+        row = points[index].tolist() if rows is None else rows[index]
+        return tuple(map(Fraction, row))
+
+    return _Walk(points, exact, 0.0, budget or Budget()).sphere()
+
+
+def minimal_sphere_of_rationals(points: list[Rational], budget: Budget | None = None) -> MinimalSphere:
+    """Return the smallest sphere around points with rational coordinates, at least one."""
+    rounded = np.array([[nearest_float(x) for x in point] for point in points])
+    slack = math.sqrt(rounded.shape[1]) * float(np.spacing(np.abs(rounded)).max())
+    return _Walk(rounded, points.__getitem__, slack, budget or Budget()).sphere()
+
+
+class _Walk:
+    """State of one search: points in float64, their exact coordinates on demand, the distance between the two."""
+
+    def __init__(self, points: FloatArray, exact: Callable[[int], Rational], slack: float, budget: Budget) -> None:
+        self.points = points
+        self.exact = exact
+        self.slack = slack  # bound on the distance of a float64 point from its exact place
+        self.budget = budget
+        self.n_candidates = self.n_rational = 0
+
+    def sphere(self) -> MinimalSphere:
+        first = int(self._distances(self.points[0])[0].argmax())
+        support: tuple[int, ...] = (first,)
+        center, square = self.exact(first), Fraction(0)
+        while True:  # bound: `square` grows strictly, and a support determines it
+            self.budget.check()
+            outside = self._farthest_outside(center, square)
+            if outside is None:
+                break
+            support, center, square = self._ball_of((outside, *support))
+        rounded = np.array([nearest_float(x) for x in center])
+        radius = self._radius_about(rounded)
+        return MinimalSphere(
+            rounded, radius, center, square, tuple(sorted(support)), self.n_candidates, self.n_rational
+        )
+
+    def _ball_of(self, indices: tuple[int, ...]) -> tuple[tuple[int, ...], Rational, Fraction]:
+        """Return support, centre and squared radius of the smallest ball of a few points, the first on its surface."""
+        places = [self.exact(index) for index in indices]
+        common = math.lcm(*(x.denominator for place in places for x in place))
+        integers = [tuple(x.numerator * (common // x.denominator) for x in place) for place in places]
+        ball = smallest_ball(integers, 0)
+        scale = ball.scale * common
+        center = tuple(Fraction(x, scale) for x in ball.center)
+        return tuple(indices[i] for i in ball.support), center, Fraction(ball.square, scale * scale)
+
+    def _distances(self, center: FloatArray) -> tuple[FloatArray, Fraction]:
+        """Return the squared distances from `center` in the square of a unit, and that unit, a power of two.
+
+        bound: a difference, a square and a sum of at most three terms: each size is within ``8 _UNIT size + _TINY`` of
+        the exact one, in this unit, in which the largest component of a vector is between 1/2 and 1.
+        """
+        with np.errstate(over="ignore", under="ignore"):
+            vectors, unit = self.points - center, Fraction(1)
+            largest = float(np.abs(vectors).max())
+            if not math.isfinite(largest):
+                vectors, unit = self.points * 0.25 - center * 0.25, Fraction(4)
+                largest = float(np.abs(vectors).max())
+            exponent = math.frexp(largest)[1]
+            vectors = np.ldexp(vectors, -exponent)
+            return (vectors * vectors).sum(axis=1), unit * Fraction(2) ** exponent
+
+    def _farthest_outside(self, center: Rational, square: Fraction) -> int | None:
+        """Return a point outside the exact ball, the farthest as far as float64 can tell; None if there is none."""
+        rounded = np.array([nearest_float(x) for x in center])
+        sizes, unit = self._distances(rounded)
+        shift = [(x - Fraction(y)) / unit for x, y in zip(center, rounded.tolist())]
+        radius = math.sqrt(square / unit**2)
+        gap = _up(sum(map(abs, shift), Fraction(self.slack) / unit))  # what may lie between |vector| and the distance
+        farthest = int(sizes.argmax())
+        if sizes[farthest] > _above((radius * (1.0 + 4.0 * _UNIT) + gap) ** 2):
+            return farthest
+        inner = radius * (1.0 - 4.0 * _UNIT) - gap
+        candidates = np.flatnonzero(sizes > (_below(inner * inner) if inner > 0.0 else -1.0))
+        self.n_candidates = max(self.n_candidates, len(candidates))
+        if len(candidates) > _FEW and self.slack == 0.0:
+            excess, bound = excess_double_double(self.points[candidates], rounded, shift, square / unit**2, unit)
+            if excess.max() > bound:
+                return int(candidates[excess.argmax()])
+            candidates = candidates[excess >= -bound]
+        self.n_rational = max(self.n_rational, len(candidates))
+        return self._exactly_farthest(candidates.tolist(), center, square)
+
+    def _exactly_farthest(self, candidates: list[int], center: Rational, square: Fraction) -> int | None:
+        """Return the farthest of the candidates that lie outside the ball, None if none does; in integers."""
+        common = math.lcm(*(x.denominator for x in center))
+        tops = [x.numerator * (common // x.denominator) for x in center]
+        found, largest = None, square
+        for turn, index in enumerate(candidates):
+            if turn % 256 == 0:
+                self.budget.check()
+            place = self.exact(index)
+            own = math.lcm(*(x.denominator for x in place))
+            scaled = (x.numerator * (own // x.denominator) * common - own * top for x, top in zip(place, tops))
+            distance, scale = sum(x * x for x in scaled), own * common
+            if distance * largest.denominator > largest.numerator * scale * scale:
+                found, largest = index, Fraction(distance, scale * scale)
+        return found
+
+    def _radius_about(self, center: FloatArray) -> float:
+        """Return the smallest double whose closed ball about `center` holds every point.
+
+        bound: each turn takes the distance of a point that the last radius left outside, so radii grow strictly.
+        """
+        place = tuple(map(Fraction, center.tolist()))
+        outside: int | None = int(self._distances(center)[0].argmax())
+        radius = 0.0
+        while outside is not None:
+            self.budget.check()
+            steps = [x - y for x, y in zip(self.exact(outside), place)]
+            radius = root_up(sum((step * step for step in steps), Fraction(0)))
+            outside = self._farthest_outside(place, Fraction(radius) ** 2)
+        return radius
+
+
+def _up(value: Fraction) -> float:
+    """Return a double not below `value`, capped where anything larger means the same."""
+    return float(min(value, Fraction(10) ** 100)) * (1.0 + 4.0 * _UNIT) + _TINY
+
+
+def _above(size: float) -> float:
+    """Return what a computed squared distance must exceed to be certainly above `size`."""
+    return size * (1.0 + 16.0 * _UNIT) + _TINY
+
+
+def _below(size: float) -> float:
+    """Return what a computed squared distance must not exceed to be certainly below `size`."""
+    return size * (1.0 - 16.0 * _UNIT) - _TINY
+
+
+def excess_double_double(
+    points: FloatArray, center: FloatArray, shift: list[Fraction], square: Fraction, unit: Fraction
+) -> tuple[FloatArray, float]:
+    """Return squared distance minus `square` for each point, and the bound on its error; both in `unit` squared.
+
+    center, shift: the exact centre is ``center + unit * shift``; the shift is below an ulp of the centre. unit: a power
+    of two in which no vector has a component above 1.
+    bound: the vector is a double-double from the exact difference, its square and the sum lose less than 2^-98 each
+    (components at most 1, three terms); what the rounded shift loses enters twice per axis.
+    """
+    factor = 0.25 if unit >= 2**1020 else 1.0  # differences must not overflow; what underflow takes is below 2^-2000
+    exponent = math.frexp(unit * Fraction(factor))[1] - 1
+    high, low = np.zeros((2, len(points)))
+    lost = Fraction(0)
+    for axis, step in enumerate(shift):
+        rounded_step = float(step)
+        lost += abs(step - Fraction(rounded_step))
+        a, b = points[:, axis] * factor, center[axis] * factor
+        difference, tail = _two_sum(a, -b)
+        d, e = np.ldexp(difference, -exponent), np.ldexp(tail, -exponent)
+        d, e_more = _two_sum(d, -rounded_step)
+        d, e = _two_sum(d, e + e_more)
+        product, rest = _two_square(d)
+        high, carry = _two_sum(high, product)
+        low += carry + (rest + 2.0 * d * e)
+    target = float(square)
+    target_low = float(square - Fraction(target))
+    excess = (high - target) + (low - target_low)
+    return excess, 2.0**-90 + 8.0 * _up(lost)
+
+
+def _two_sum(a: npt.ArrayLike, b: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Return the rounded sums and their exact errors (Knuth)."""
+    first, second = np.asarray(a, np.float64), np.asarray(b, np.float64)
+    total = first + second
+    virtual = total - first
+    return total, (first - (total - virtual)) + (second - virtual)
+
+
+def _two_square(a: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the rounded squares and their exact errors (Dekker's splitting; sizes at most 1)."""
+    product, wide = a * a, a * 134217729.0  # 2^27 + 1
+    top = wide - (wide - a)
+    rest = a - top
+    return product, ((top * top - product) + 2.0 * top * rest) + rest * rest
+
+
+def root_up(square: Fraction) -> float:
+    """Return the smallest double whose square is at least `square`, which is not negative.
+
+    Raises: NotRepresentableError if that is beyond float64.
+    """
+    top, bottom = square.numerator, square.denominator
+    shift = max(0, 128 - top.bit_length() + bottom.bit_length()) // 2 + 1  # 64 bits and more in the root
+    root = nearest_float(Fraction(math.isqrt((top << 2 * shift) // bottom), 1 << shift))
+    while Fraction(root) ** 2 < square:  # bound: the guess is within an ulp or two
+        root = math.nextafter(root, math.inf)
+        if root == math.inf:
+            raise NotRepresentableError("a radius is beyond the largest float64; scale the input down")
+    while root > 0.0 and Fraction(math.nextafter(root, 0.0)) ** 2 >= square:
+        root = math.nextafter(root, 0.0)
+    return root
