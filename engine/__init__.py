@@ -31,6 +31,7 @@ from engine.errors import (
 from engine.parallel import Cancel
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
+from engine.solids.bounds import Bounds, bounds
 from engine.solids.convex import Convex
 from engine.solids.csg import Csg
 from engine.solids.half_space import HalfSpace
@@ -47,6 +48,7 @@ from engine.version import __version__
 __all__ = [
     "Aabb",
     "Accuracy",
+    "Bounds",
     "Cancel",
     "CancelledError",
     "Convex",
@@ -88,5 +90,6 @@ __all__ = [
     "WrongDimensionError",
     "ZeroNormalError",
     "__version__",
+    "bounds",
     "clip_segments",
 ]
