@@ -1,5 +1,7 @@
 """Exact answers to four questions about a scene: containment, collision, segment clipping, polygon clipping."""
 
+from engine.clipping.overlay import OverlayBatch, overlay, overlay_batch
+from engine.clipping.overlay_result import Collapse, Overlay, OverlayPiece
 from engine.clipping.segments import SegmentPieces, clip_segments
 from engine.errors import (
     CancelledError,
@@ -51,6 +53,7 @@ __all__ = [
     "Bounds",
     "Cancel",
     "CancelledError",
+    "Collapse",
     "Convex",
     "Csg",
     "DeadlineExceededError",
@@ -72,6 +75,9 @@ __all__ = [
     "NotFiniteError",
     "NotRepresentableError",
     "NotRigidError",
+    "Overlay",
+    "OverlayBatch",
+    "OverlayPiece",
     "Polygon",
     "Polyhedron",
     "Pose",
@@ -92,4 +98,6 @@ __all__ = [
     "__version__",
     "bounds",
     "clip_segments",
+    "overlay",
+    "overlay_batch",
 ]

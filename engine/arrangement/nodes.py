@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
-from math import gcd, lcm
+from math import gcd, hypot, inf, lcm, nextafter
 
 import numpy as np
 import numpy.typing as npt
@@ -52,17 +52,16 @@ class NodeTable:
 
     points[i]: the point as integers. xs[i], ys[i]: the doubles nearest to its coordinates.
     exponent: a coordinate is ``x / w * 2**exponent``.
-    all_floats: every point so far is given by `xs` and `ys` exactly (w = 1, made from floats).
     """
 
-    __slots__ = ("_down", "_index", "_up", "all_floats", "exponent", "points", "xs", "ys")
+    __slots__ = ("_down", "_index", "_n_floats", "_up", "exponent", "points", "xs", "ys")
 
     def __init__(self, exponent: int) -> None:
         self.exponent = exponent
         self.points: list[Homogeneous] = []
         self.xs: list[float] = []
         self.ys: list[float] = []
-        self.all_floats = True
+        self._n_floats = 0  # invariant: the points before this number were given as floats
         self._index: dict[Homogeneous, int] = {}
         self._up, self._down = max(exponent, 0), max(-exponent, 0)
 
@@ -73,13 +72,21 @@ class NodeTable:
             x, y, w = point
             w <<= self._down
             number = self._new(point, nearest_quotient(x << self._up, w), nearest_quotient(y << self._up, w))
-            self.all_floats = False
         return number
 
     def add_float(self, point: Homogeneous, x: float, y: float) -> int:
         """Like `add`, for a point whose coordinates are exactly the doubles `x` and `y`."""
         number = self._index.get(point)
-        return self._new(point, x + 0.0, y + 0.0) if number is None else number
+        if number is None:
+            is_first = self._n_floats == len(self.points)
+            number = self._new(point, x + 0.0, y + 0.0)
+            self._n_floats += is_first
+        return number
+
+    @property
+    def all_floats(self) -> bool:
+        """Tell whether every point so far was given as floats."""
+        return self._n_floats == len(self.points)
 
     def _new(self, point: Homogeneous, x: float, y: float) -> int:
         number = self._index[point] = len(self.points)
@@ -104,14 +111,21 @@ class NodeTable:
         x, y, w = self.points[number]
         return Fraction(x << self._up, w << self._down), Fraction(y << self._up, w << self._down)
 
-    def is_float(self, number: int) -> bool:
-        """Tell whether both coordinates are exactly the doubles in `xs` and `ys`."""
+    def displacement(self, number: int) -> float:
+        """Return the distance between a point and the doubles in `xs` and `ys`, rounded up; 0 where it is none."""
+        if number < self._n_floats:
+            return 0.0
         x, y, w = self.points[number]
-        for value, double in ((x, self.xs[number]), (y, self.ys[number])):
+        w <<= self._down
+        errors = []
+        for value, double in ((x << self._up, self.xs[number]), (y << self._up, self.ys[number])):
             numerator, denominator = double.as_integer_ratio()
-            if (value << self._up) * denominator != numerator * (w << self._down):
-                return False
-        return True
+            errors.append((abs(value * denominator - numerator * w), w * denominator))
+        if errors[0][0] == errors[1][0] == 0:
+            return 0.0
+        # Two quotients and hypot are each off by less than one unit in the last place.
+        distance = hypot(*(nearest_quotient(*error) for error in errors))
+        return nextafter(nextafter(nextafter(distance, inf), inf), inf)
 
 
 def float_nodes(coordinates: npt.NDArray[np.float64]) -> tuple[NodeTable, list[int]]:

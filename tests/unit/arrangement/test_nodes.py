@@ -21,7 +21,7 @@ def test_float_nodes_hold_the_floats_exactly(rows: list[tuple[float, float]]) ->
     for row, number in zip(rows, numbers, strict=True):
         assert nodes.exact(number) == (Fraction(row[0]), Fraction(row[1]))
         assert (nodes.xs[number], nodes.ys[number]) == row
-        assert nodes.is_float(number)
+        assert nodes.displacement(number) == 0.0
     assert nodes.all_floats
 
 
@@ -31,7 +31,7 @@ def test_equal_points_are_one_node() -> None:
     nodes, numbers = rational_nodes([(Fraction(1, 3), 2), (Fraction(2, 6), 2.0)])
     assert numbers == [0, 0]
     assert not nodes.all_floats
-    assert not nodes.is_float(0)
+    assert 0.0 < nodes.displacement(0) <= 2.0**-55
 
 
 def test_order_is_exact_where_the_doubles_tie() -> None:
@@ -53,6 +53,14 @@ def test_points_stay_within_their_table_at_any_exponent() -> None:
             Fraction(2, 3) * Fraction(2) ** exponent,
             Fraction(-1, 3) * Fraction(2) ** exponent,
         )
+
+
+def test_displacement_is_a_tight_bound() -> None:
+    nodes, (third, tiny, whole) = rational_nodes([(Fraction(1, 3), 1), (Fraction(1, 10**400), 0), (2, 3)])
+    error = abs(Fraction(1, 3) - Fraction(1 / 3))
+    assert error <= nodes.displacement(third) <= error * (1 + Fraction(1, 2**50))
+    assert 0.0 < nodes.displacement(tiny) <= 4 * TINY
+    assert nodes.displacement(whole) == 0.0
 
 
 def test_nearest_quotient_rounds_once_and_refuses_overflow() -> None:

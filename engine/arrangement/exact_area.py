@@ -1,0 +1,73 @@
+"""Area of rings with exact vertices: as a fraction, and as the nearest double without making the fraction.
+
+Twice the area of a ring is the sum of (x_i y_j - x_j y_i) / (w_i w_j) over its edges. As one fraction the denominators
+of all crossings multiply, so its length grows with their number; the nearest double is found from sums in fixed point,
+whose error is below one unit per term, and the fraction is made only where those cannot settle the rounding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+from engine.arrangement.nodes import Homogeneous, nearest_quotient
+
+_PRECISIONS = (160, 640)  # bits of the largest term that are kept; the second for sums that nearly cancel
+
+
+@dataclass(frozen=True, slots=True)
+class ExactRings:
+    """Rings of exact vertices; a coordinate is ``x / w * 2**exponent``. Clockwise rings count as negative."""
+
+    rings: tuple[tuple[Homogeneous, ...], ...]
+    exponent: int
+
+    def _terms(self) -> list[tuple[int, int]]:
+        """Return numerators and denominators that add up to twice the area in units of ``4**exponent``."""
+        whole = 0
+        rest: list[tuple[int, int]] = []
+        for ring in self.rings:
+            for (ax, ay, aw), (bx, by, bw) in zip(ring, ring[1:] + ring[:1]):
+                numerator, denominator = ax * by - bx * ay, aw * bw
+                if denominator == 1:
+                    whole += numerator
+                else:
+                    rest.append((numerator, denominator))
+        return [(whole, 1), *rest]
+
+    def area(self) -> Fraction:
+        """Return the exact area; its length grows with the number of crossings."""
+        numerator, denominator = _sum(self._terms())
+        return Fraction(numerator, 2 * denominator) * Fraction(4) ** self.exponent
+
+    def nearest_area(self) -> float:
+        """Return the double nearest to the exact area. Raises `NotRepresentableError` beyond the largest double."""
+        terms = self._terms()
+        longest = max(abs(numerator).bit_length() - denominator.bit_length() for numerator, denominator in terms)
+        for precision in _PRECISIONS:
+            shift = precision - longest
+            low = sum(_floor(numerator, denominator, shift) for numerator, denominator in terms)
+            ends = {_nearest(end, 1, 2 * self.exponent - 1 - shift) for end in (low, low + len(terms))}
+            if len(ends) == 1:
+                return ends.pop()
+        return _nearest(*_sum(terms), 2 * self.exponent - 1)
+
+
+def _floor(numerator: int, denominator: int, shift: int) -> int:
+    """Return floor(numerator / denominator * 2**shift)."""
+    return (numerator << shift) // denominator if shift >= 0 else numerator // (denominator << -shift)
+
+
+def _nearest(numerator: int, denominator: int, exponent: int) -> float:
+    """Return the double nearest to numerator / denominator * 2**exponent."""
+    return nearest_quotient(numerator << max(exponent, 0), denominator << max(-exponent, 0))
+
+
+def _sum(terms: Iterable[tuple[int, int]]) -> tuple[int, int]:
+    """Return the sum of fractions as one, not reduced; halves are added first, so that long numbers meet long ones."""
+    level: Sequence[tuple[int, int]] = list(terms)
+    while len(level) > 1:  # bound: each turn halves the list
+        odd = level[-1:] if len(level) % 2 else []
+        level = [(a * d + c * b, b * d) for (a, b), (c, d) in zip(level[0::2], level[1::2])] + list(odd)
+    return level[0]

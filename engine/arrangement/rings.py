@@ -1,0 +1,150 @@
+r"""Boundary rings of the open regions that a choice of faces makes.
+
+    An edge bounds the result where the faces on its two sides differ. Faces that meet in an edge which does not are one
+    region: its open interior is connected. At a node of four boundary edges the walk keeps to its own region, so parts
+    that meet in one point stay apart:
+
+          \  in /           The walk around a region may pass a node twice, where a hole touches its shell or another
+       out \   / out        hole. It is cut there into simple rings. Of those of one region exactly one runs
+            \ /             counter-clockwise, its shell: the region lies inside each such ring, and of two of them
+       ------x------        each would lie inside the other. All others run clockwise: holes.
+            / \
+       out /   \ out        A ring lists the nodes where the boundary turns and those where rings meet. Whether the
+          /  in \           input had a vertex on a straight stretch leaves no trace: equal point sets give equal rings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cmp_to_key
+
+from engine.arrangement.arrange import Arrangement
+from engine.arrangement.subdivision import Subdivision, next_half_edges, turn_of
+from engine.arrangement.union_find import UnionFind
+from engine.parallel import Budget
+
+
+@dataclass(slots=True)
+class Piece:
+    """One region: a shell and the holes in it, as nodes. The first node of a ring is its leftmost, then lowest.
+
+    evidence: the inclusive or of the evidence of the region's faces; hole_evidence: the same for each hole, of the
+    regions on the other side of its ring.
+    """
+
+    shell: list[int] = field(default_factory=list)
+    holes: list[list[int]] = field(default_factory=list)
+    evidence: int = 0
+    hole_evidence: list[int] = field(default_factory=list)
+
+
+def trace_pieces(
+    subdivision: Subdivision, inside: Sequence[bool], evidence: Sequence[int], budget: Budget | None = None
+) -> list[Piece]:
+    """Return the regions that the faces marked `inside` make, in the order of their shells.
+
+    inside, evidence: one for each face; face 0 must be outside. Shells run counter-clockwise, holes clockwise; pieces
+    are in lexicographic order of their shells' nodes, holes likewise: the order does not depend on that of the input.
+    """
+    budget = budget or Budget()
+    arrangement, faces = subdivision.arrangement, subdivision.faces
+    bounds = [inside[left] != inside[right] for left, right in zip(faces[0::2], faces[1::2])]
+    regions = UnionFind(subdivision.n_faces)
+    for edge, is_boundary in enumerate(bounds):
+        if not is_boundary:
+            regions.unite(faces[2 * edge], faces[2 * edge + 1])
+    region_of = [regions.find(face) for face in range(subdivision.n_faces)]
+    gathered = [0] * subdivision.n_faces
+    for face, region in enumerate(region_of):
+        gathered[region] |= evidence[face]
+    fans = [[half_edge for half_edge in fan if bounds[half_edge >> 1]] for fan in subdivision.around]
+    starts = [2 * e if inside[faces[2 * e]] else 2 * e + 1 for e, is_boundary in enumerate(bounds) if is_boundary]
+    budget.check()
+    rank = _ranks(arrangement, fans)
+    pieces: dict[int, Piece] = {}
+    for ring in _simple_rings(arrangement, next_half_edges(fans, len(faces)), starts):
+        budget.check()
+        region = region_of[faces[ring[0]]]
+        piece = pieces.setdefault(region, Piece(evidence=gathered[region]))
+        nodes, is_shell = _corners(arrangement, fans, rank, ring)
+        if is_shell:
+            piece.shell = nodes
+        else:
+            piece.holes.append(nodes)
+            beyond = 0
+            for other in {region_of[faces[half_edge ^ 1]] for half_edge in ring}:
+                beyond |= gathered[other]
+            piece.hole_evidence.append(beyond)
+
+    def place(ring: list[int]) -> list[int]:
+        return [rank[node] for node in ring]
+
+    for piece in pieces.values():
+        if len(piece.holes) > 1:
+            both = sorted(zip(piece.holes, piece.hole_evidence), key=lambda hole: place(hole[0]))
+            piece.holes, piece.hole_evidence = [ring for ring, _ in both], [bits for _, bits in both]
+    return sorted(pieces.values(), key=lambda piece: place(piece.shell))
+
+
+def _ranks(arrangement: Arrangement, fans: Sequence[Sequence[int]]) -> dict[int, int]:
+    """Return the place of each node that has boundary edges in the order by x, then by y."""
+    nodes = arrangement.nodes
+    used = sorted((node for node, fan in enumerate(fans) if fan), key=nodes.xs.__getitem__)
+    in_order: list[int] = []
+    run: list[int] = []
+    for node in used:  # only runs of equal rounded x need the exact comparison
+        if run and nodes.xs[run[0]] != nodes.xs[node]:
+            in_order += sorted(run, key=cmp_to_key(nodes.compare)) if len(run) > 1 else run
+            run = []
+        run.append(node)
+    in_order += sorted(run, key=cmp_to_key(nodes.compare))
+    return {node: place for place, node in enumerate(in_order)}
+
+
+def _simple_rings(arrangement: Arrangement, following: Sequence[int], starts: Sequence[int]) -> list[list[int]]:
+    """Return the cycles of `following` through `starts`, cut where they pass a node twice, as half-edges."""
+    ends = (arrangement.tails, arrangement.heads)
+    seen = [False] * len(following)
+    rings: list[list[int]] = []
+    for start in starts:
+        if seen[start]:
+            continue
+        path: list[int] = []
+        place: dict[int, int] = {}  # invariant: the node where path[k] begins is at place k, and no other is there
+        half_edge = start
+        while not seen[half_edge]:  # bound: each turn marks one half-edge
+            seen[half_edge] = True
+            node = ends[half_edge & 1][half_edge >> 1]
+            first = place.get(node)
+            if first is not None:
+                loop = path[first:]
+                del path[first:]
+                for other in loop:
+                    del place[ends[other & 1][other >> 1]]
+                rings.append(loop)
+            place[node] = len(path)
+            path.append(half_edge)
+            half_edge = following[half_edge]
+        rings.append(path)
+    return rings
+
+
+def _corners(
+    arrangement: Arrangement, fans: Sequence[Sequence[int]], rank: dict[int, int], ring: list[int]
+) -> tuple[list[int], bool]:
+    """Return the nodes of a simple ring, straight ones left out, from its first one on; and whether it is a shell."""
+    lines, ends = arrangement.lines, (arrangement.tails, arrangement.heads)
+    nodes: list[int] = []
+    first, is_shell = -1, False
+    before = ring[-1]
+    for half_edge in ring:
+        node = ends[half_edge & 1][half_edge >> 1]
+        arriving, leaving = lines[before >> 1], lines[half_edge >> 1]
+        if len(fans[node]) > 2 or turn_of(arriving, leaving) != 0:
+            if first < 0 or rank[node] < rank[nodes[first]]:
+                # At the leftmost node the ring arrives against its line and leaves along it: the sign is reversed.
+                first, is_shell = len(nodes), turn_of(arriving, leaving) < 0
+            nodes.append(node)
+        before = half_edge
+    return nodes[first:] + nodes[:first], is_shell
