@@ -3,6 +3,7 @@
 from engine.clipping.overlay import OverlayBatch, overlay, overlay_batch
 from engine.clipping.overlay_result import Collapse, Overlay, OverlayPiece
 from engine.clipping.segments import SegmentPieces, clip_segments
+from engine.containment.locate import contains, locate
 from engine.errors import (
     CancelledError,
     DeadlineExceededError,
@@ -98,6 +99,8 @@ __all__ = [
     "__version__",
     "bounds",
     "clip_segments",
+    "contains",
+    "locate",
     "overlay",
     "overlay_batch",
 ]

@@ -130,11 +130,13 @@ def _parity_in_space(p: Vector, u: Vector, faces: list[tuple[Vector, Vector, Vec
     for a, b, c in faces:
         pa, pb, pc = sub(a, p), sub(b, p), sub(c, p)
         normal = cross(sub(b, a), sub(c, a))
+        if square(normal) == 0:
+            continue  # no area: a generic half-line misses it, and p on it was found before
         slope, height = dot(normal, u), dot(normal, pa)
         # the three volumes of the line with the edges: one sign for a crossing, a zero for meeting an edge's line
         volumes = [dot(u, cross(pa, pb)), dot(u, cross(pb, pc)), dot(u, cross(pc, pa))]
         if min(volumes) >= 0 or max(volumes) <= 0:
-            if slope == 0 and height != 0 and square(normal) != 0:
+            if slope == 0 and height != 0:
                 continue  # parallel to the plane and beside it
             if slope == 0 or 0 in volumes:
                 if slope == 0 or height / slope > 0:

@@ -65,3 +65,9 @@ def test_posed() -> None:
     plane = half_space((1, 0, 0), -1)
     for solid in (UNIT, aabb((0, 0, 0), (1, 1, 1)), sphere((0.5, 0.5, 0.5), 0.5), plane):
         assert locate((9.5, 1, 0.5), solid, turn) == 0
+
+
+def test_faces_without_area_count_for_boundary_only() -> None:
+    needle = [[0, 0, 0], [0, 0, 3], [0, 0, 1]]
+    solid = {"type": "polyhedron", "vertices": needle, "faces": [[0, 1, 2], [2, 1, 0]]}
+    assert locate_many([[0, 0, 2], [0, 0, 4], [1, 0, 0]], solid) == [0, -1, -1]

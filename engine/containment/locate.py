@@ -1,0 +1,146 @@
+"""Public: where points lie with respect to one solid.
+
+The table of methods is locators.py. Here the arguments are checked, the batch is cut into chunks, and the report made.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from engine.containment.locators import locator_of
+from engine.parallel import Budget, Cancel, Progress, run_chunks
+from engine.solids.base import Solid
+from engine.solids.checks import as_points
+from engine.types import Accuracy
+
+Locations = npt.NDArray[np.int8]
+
+
+@overload
+def locate(
+    points: object,
+    solid: Solid,
+    *,
+    workers: int | None = ...,
+    deadline: float | None = ...,
+    cancel: Cancel | None = ...,
+    progress: Progress | None = ...,
+    report: Literal[False] = ...,
+) -> Locations: ...
+@overload
+def locate(
+    points: object,
+    solid: Solid,
+    *,
+    workers: int | None = ...,
+    deadline: float | None = ...,
+    cancel: Cancel | None = ...,
+    progress: Progress | None = ...,
+    report: Literal[True],
+) -> tuple[Locations, Accuracy]: ...
+def locate(
+    points: object,
+    solid: Solid,
+    *,
+    workers: int | None = None,
+    deadline: float | None = None,
+    cancel: Cancel | None = None,
+    progress: Progress | None = None,
+    report: bool = False,
+) -> Locations | tuple[Locations, Accuracy]:
+    """Locate points in a solid: `Location` INSIDE 1, BOUNDARY 0 or OUTSIDE -1 for each.
+
+    Polygons and polyhedra by ray and parity, convex solids by their planes, spheres by squared distance, implicit
+    solids by the sign of their polynomial, Boolean trees by max, min and min(A, -B) of their leaves. For many solids
+    at once use `locate_scene`.
+
+    Parameters
+        points: ``(n_points, dimension)`` floats or integers, or nested lists; borrowed. None at all are welcome.
+        solid: any but a surface, of the same dimension.
+        workers: threads; None for one per core. deadline: seconds; cancel: a switch; progress: called with counts.
+        report: True to get an `Accuracy` as well.
+    Returns
+        ``(n_points,)`` int8; with report=True a pair of it and an `Accuracy`.
+    Boundary: BOUNDARY on any face or edge, even on one that another cancels under even-odd; on the on-on case of a
+        Boolean combination.
+    Degenerate input: zero-area faces and zero-length edges count for BOUNDARY only. A box with min = max and a sphere
+        of radius 0 have only boundary, and so has a plane triangle without area; the prism over a triangle of space
+        without area is all of space, all of it BOUNDARY, as the formula gives it.
+    Accuracy: exact for every finite input; an implicit solid made from a callable is decided by that callable.
+    Cost: the first call prepares lists linear in the solid's size; then a point costs the faces over it.
+    Raises: InvalidArrayError, WrongDimensionError, NotFiniteError, UnsupportedSolidError, DeadlineExceededError,
+        CancelledError.
+    Source: the textbook's section on containment; see the modules of the methods.
+
+    >>> from engine import Aabb, locate
+    >>> locate([[0.5, 0.5], [1.0, 0.2], [2.0, 2.0]], Aabb([0, 0], [1, 1])).tolist()
+    [1, 0, -1]
+    """
+    locator = locator_of(solid)
+    array = as_points(points, solid.dimension)
+    locations = np.empty(len(array), np.int8)
+    beyond, rational = [], []
+    with Budget(deadline, cancel) as budget:
+
+        def task(start: int, stop: int) -> None:
+            counts = locator.fill(array[start:stop], locations[start:stop], budget)
+            beyond.append(counts.beyond)
+            rational.append(counts.rational)
+
+        run_chunks(task, len(array), budget=budget, workers=workers, progress=progress)
+    if not report:
+        return locations
+    return locations, Accuracy(locator.decisions, None, len(array), sum(beyond), sum(rational), locator.method)
+
+
+@overload
+def contains(
+    points: object,
+    solid: Solid,
+    *,
+    workers: int | None = ...,
+    deadline: float | None = ...,
+    cancel: Cancel | None = ...,
+    progress: Progress | None = ...,
+    report: Literal[False] = ...,
+) -> npt.NDArray[np.bool_]: ...
+@overload
+def contains(
+    points: object,
+    solid: Solid,
+    *,
+    workers: int | None = ...,
+    deadline: float | None = ...,
+    cancel: Cancel | None = ...,
+    progress: Progress | None = ...,
+    report: Literal[True],
+) -> tuple[npt.NDArray[np.bool_], Accuracy]: ...
+def contains(
+    points: object,
+    solid: Solid,
+    *,
+    workers: int | None = None,
+    deadline: float | None = None,
+    cancel: Cancel | None = None,
+    progress: Progress | None = None,
+    report: bool = False,
+) -> npt.NDArray[np.bool_] | tuple[npt.NDArray[np.bool_], Accuracy]:
+    """Tell for each point whether a solid, a closed set, holds it: `locate` is INSIDE or BOUNDARY.
+
+    Parameters, cost, accuracy and errors are those of `locate`.
+
+    Returns
+        ``(n_points,)`` bool; with report=True a pair of it and an `Accuracy`.
+
+    >>> from engine import Sphere, contains
+    >>> contains([[3.0, 4.0], [3.1, 4.0]], Sphere([0, 0], 5)).tolist()
+    [True, False]
+    """
+    locations, accuracy = locate(
+        points, solid, workers=workers, deadline=deadline, cancel=cancel, progress=progress, report=True
+    )
+    held = locations >= 0
+    return (held, accuracy) if report else held

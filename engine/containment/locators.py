@@ -1,0 +1,251 @@
+"""One explicit table from solid type to method: how the points of a batch are located in each solid.
+
+A `Locator` has a compiled half, which fills in an int8 location for each point of a chunk and leaves UNDECIDED what is
+out of its range, and a rational half, which settles one such point. Structures are prepared once a solid.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from engine.containment.balls import locate_in_ball
+from engine.containment.boxes import locate_in_box
+from engine.containment.half_spaces import locate_in_half_planes, locate_in_half_spaces
+from engine.containment.polynomials import locate_by_polynomial
+from engine.containment.prepared import Columns, Rings, columns_of, rings_of, rounded_rows
+from engine.containment.rational_locate import Check, combine, prism_walls, rational_location, unsupported
+from engine.containment.ray_parity import locate_by_columns
+from engine.containment.ring_crossing import locate_in_rings
+from engine.containment.triangles import locate_in_triangle
+from engine.errors import InvalidArrayError, NotFiniteError
+from engine.parallel import Budget
+from engine.solids.aabb import Aabb
+from engine.solids.base import FloatArray, Solid
+from engine.solids.convex import Convex
+from engine.solids.csg import Csg
+from engine.solids.half_space import HalfSpace
+from engine.solids.implicit import Implicit
+from engine.solids.polygon import Polygon
+from engine.solids.polyhedron import Polyhedron
+from engine.solids.sphere import Sphere
+from engine.solids.triangle import Triangle
+from engine.types import UNDECIDED
+
+Locations = npt.NDArray[np.int8]
+Flag = npt.NDArray[np.uint8]
+Fill = Callable[[FloatArray, Locations, Budget], "Counts"]
+
+
+@dataclass(frozen=True, slots=True)
+class Counts:
+    """How many points of a chunk needed more than the filter, and how many rational arithmetic."""
+
+    beyond: int
+    rational: int
+
+
+@dataclass(frozen=True, slots=True)
+class Locator:
+    """How to locate points in one solid."""
+
+    method: str
+    """Stable short name, for `Accuracy.method`."""
+    fill: Fill
+    """Locates the points (n, dim) of a chunk into int8 (n,)."""
+    decisions: Literal["exact", "float64"] = "exact"
+
+
+def settled(
+    kernel: Callable[[FloatArray, Locations, Flag], int], settle: Callable[[Sequence[float], Check], int]
+) -> Fill:
+    """Return the fill that runs `kernel` over a chunk and settles what it leaves UNDECIDED one by one.
+
+    Raises what `Budget.check` raises, also when the kernel stopped early.
+    """
+
+    def fill(points: FloatArray, locations: Locations, budget: Budget) -> Counts:
+        with np.errstate(all="ignore"):  # uncompiled, numpy scalars warn where the filter means to overflow
+            n_beyond = int(kernel(points, locations, budget.flag))
+        budget.check()
+        undecided = np.flatnonzero(locations == UNDECIDED)
+        for item in undecided:
+            locations[item] = settle(points[item].tolist(), budget.check)
+        return Counts(n_beyond, len(undecided))
+
+    return fill
+
+
+def locator_of(solid: Solid) -> Locator:
+    """Return how points are located in `solid`; prepares nothing yet.
+
+    Raises: UnsupportedSolidError.
+    """
+    maker = _MAKERS.get(type(solid))
+    if maker is None:
+        raise unsupported(solid)
+    return maker(solid)
+
+
+def _rational(solid: Solid) -> Callable[[Sequence[float], Check], int]:
+    return lambda point, check: rational_location(point, solid, None, check)
+
+
+def _in_rows(solid: HalfSpace | Convex) -> Locator:
+    rows = solid.row[None] if isinstance(solid, HalfSpace) else solid.planes
+    is_exact = np.ones(len(rows), np.bool_)
+    kernel = locate_in_half_planes if solid.dimension == 2 else locate_in_half_spaces
+
+    def run(points: FloatArray, locations: Locations, flag: Flag) -> int:
+        return int(kernel(points, rows, is_exact, locations, flag))
+
+    return Locator("half_spaces", settled(run, _rational(solid)))
+
+
+def _in_sphere(solid: Sphere) -> Locator:
+    def run(points: FloatArray, locations: Locations, flag: Flag) -> int:
+        return int(locate_in_ball(points, solid.center, 0.0, solid.radius, np.empty(8), locations, flag))
+
+    return Locator("squared_distance", settled(run, _rational(solid)))
+
+
+def _in_aabb(solid: Aabb) -> Locator:
+    def run(points: FloatArray, locations: Locations, flag: Flag) -> int:
+        return int(locate_in_box(points, solid.min, solid.max, locations, flag))
+
+    return Locator("comparison", settled(run, _rational(solid)))
+
+
+def _in_triangle(solid: Triangle) -> Locator:
+    if solid.dimension == 3:
+        return _in_prism(solid)
+    low, high = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
+
+    def run(points: FloatArray, locations: Locations, flag: Flag) -> int:
+        return int(locate_in_triangle(points, solid.vertices, low, high, locations, flag))
+
+    return Locator("same_side", settled(run, _rational(solid)))
+
+
+def _in_prism(solid: Triangle) -> Locator:
+    walls = prism_walls(solid)
+    if not any(any(wall) for wall in walls):  # no area: every product of the formula is zero
+
+        def fill(points: FloatArray, locations: Locations, budget: Budget) -> Counts:
+            locations[:] = 0
+            return Counts(0, 0)
+
+        return Locator("prism", fill)
+    rows, is_exact = rounded_rows(walls)
+
+    def run(points: FloatArray, locations: Locations, flag: Flag) -> int:
+        return int(locate_in_half_spaces(points, rows, is_exact, locations, flag))
+
+    return Locator("prism", settled(run, _rational(solid)))
+
+
+def _in_polygon(solid: Polygon) -> Locator:
+    def run(points: FloatArray, locations: Locations, flag: Flag) -> int:
+        rings: Rings = rings_of(solid)
+        return int(locate_in_rings(points, *rings, locations, flag))
+
+    return Locator("ring_crossing", settled(run, _rational(solid)))
+
+
+def _in_polyhedron(solid: Polyhedron) -> Locator:
+    def run(points: FloatArray, locations: Locations, flag: Flag) -> int:
+        columns: Columns = columns_of(solid)
+        return int(locate_by_columns(points, *columns, locations, flag))
+
+    return Locator("ray_parity", settled(run, _rational(solid)))
+
+
+def _in_implicit(solid: Implicit) -> Locator:
+    if solid.function is not None:
+        return Locator("callable", _call(solid), "float64")
+    degree = int(solid.powers.sum(axis=1).max())
+
+    def run(points: FloatArray, locations: Locations, flag: Flag) -> int:
+        return int(locate_by_polynomial(points, solid.powers, solid.coefficients, degree, locations, flag))
+
+    return Locator("polynomial", settled(run, _rational(solid)))
+
+
+def _call(solid: Implicit) -> Fill:
+    """Return the fill that takes the sign of the caller's own function."""
+    function = solid.function
+    assert function is not None
+
+    def fill(points: FloatArray, locations: Locations, budget: Budget) -> Counts:
+        values = np.asarray(function(points), np.float64)
+        if values.shape != (len(points),):
+            raise InvalidArrayError(
+                f"function must return one number for each of {len(points)} points, got shape {values.shape}",
+                ("solid", "function"),
+            )
+        if np.isnan(values).any():
+            index = int(np.isnan(values).argmax())
+            raise NotFiniteError(f"function returned NaN at {points[index].tolist()}", ("solid", "function"))
+        locations[:] = np.sign(values)
+        return Counts(0, 0)
+
+    return fill
+
+
+def _in_csg(solid: Csg) -> Locator:
+    leaves: dict[int, Locator] = {}
+
+    def gather(node: Solid) -> None:
+        if id(node) not in leaves:
+            if isinstance(node, Csg):
+                leaves[id(node)] = _NODE
+                for operand in node.operands:
+                    gather(operand)
+            else:
+                leaves[id(node)] = locator_of(node)
+
+    gather(solid)
+
+    def fill(points: FloatArray, locations: Locations, budget: Budget) -> Counts:
+        located: dict[int, Locations] = {}
+        n_beyond = n_rational = 0
+
+        def visit(node: Solid) -> Locations:
+            nonlocal n_beyond, n_rational
+            if id(node) not in located:
+                if isinstance(node, Csg):
+                    found = combine(node.operation, [visit(operand) for operand in node.operands])
+                else:
+                    found = np.empty(len(points), np.int8)
+                    counts = leaves[id(node)].fill(points, found, budget)
+                    n_beyond, n_rational = n_beyond + counts.beyond, n_rational + counts.rational
+                located[id(node)] = found
+            return located[id(node)]
+
+        locations[:] = visit(solid)
+        return Counts(min(n_beyond, len(points)), min(n_rational, len(points)))
+
+    is_exact = all(leaf.decisions == "exact" for leaf in leaves.values())
+    return Locator("csg_tree", fill, "exact" if is_exact else "float64")
+
+
+def _nothing(points: FloatArray, locations: Locations, budget: Budget) -> Counts:
+    return Counts(0, 0)
+
+
+_NODE = Locator("csg_tree", _nothing)
+_MAKERS: dict[type[Solid], Callable[..., Locator]] = {
+    HalfSpace: _in_rows,
+    Convex: _in_rows,
+    Sphere: _in_sphere,
+    Aabb: _in_aabb,
+    Triangle: _in_triangle,
+    Polygon: _in_polygon,
+    Polyhedron: _in_polyhedron,
+    Implicit: _in_implicit,
+    Csg: _in_csg,
+}

@@ -1,0 +1,325 @@
+"""Locates one point of any rational coordinates in any solid, posed or not, in integer arithmetic.
+
+Plain Python: what the compiled kernels leave undecided comes here one point at a time, and so do points that are no
+float64 (exact images under a pose, sample points of an arrangement). Signs do not change when all coordinates are
+multiplied by a common positive denominator, so every decision is a polynomial over Python integers.
+
+Source: the sign rules are those of ray_parity.py and ring_crossing.py; here they have no filter in front.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from engine.errors import UnsupportedSolidError
+from engine.predicates.rational import Number, polynomial_sign_rational, scaled_integers, side_rational, sign_of
+from engine.solids.aabb import Aabb
+from engine.solids.base import Solid
+from engine.solids.convex import Convex
+from engine.solids.csg import Csg
+from engine.solids.half_space import HalfSpace
+from engine.solids.implicit import Implicit
+from engine.solids.polygon import Polygon
+from engine.solids.polyhedron import Polyhedron
+from engine.solids.pose import Pose
+from engine.solids.sphere import Sphere
+from engine.solids.triangle import Triangle
+
+Check: TypeAlias = Callable[[], object]
+Integers: TypeAlias = tuple[int, ...]
+
+OUTSIDE, BOUNDARY, INSIDE = -1, 0, 1
+MISSED, CROSSED, ON_FACE = 0, 1, 2
+_CHECK_EVERY = 64
+
+
+def _no_check() -> None:
+    """Stand in for `Budget.check` where there is no budget."""
+
+
+def _orient2d(a: Sequence[int], b: Sequence[int], c: Sequence[int]) -> int:
+    """Return 1 for a left turn a, b, c in the plane, -1 for a right turn, 0 on one line."""
+    return sign_of((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+
+
+def _cross(u: Sequence[int], v: Sequence[int]) -> Integers:
+    """Return u x v."""
+    return (u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0])
+
+
+def _orient3d(a: Sequence[int], b: Sequence[int], c: Sequence[int], d: Sequence[int]) -> int:
+    """Return 1 when d lies on the side that the normal of (a, b, c) points to, -1 on the other, 0 in the plane."""
+    normal = _cross(_minus(b, a), _minus(c, a))
+    return sign_of(sum(n * (d[k] - a[k]) for k, n in enumerate(normal)))
+
+
+def _minus(a: Sequence[int], b: Sequence[int]) -> Integers:
+    return tuple(left - right for left, right in zip(a, b))
+
+
+def _is_on_closed_triangle(a: Integers, b: Integers, c: Integers, q: Integers) -> bool:
+    """Tell whether q lies on the closed triangle a, b, c of space, which may be a segment or a point.
+
+    In the plane of a proper triangle q is inside when no projection sees it on both sides of the three edges; beside
+    the line of a degenerate one some projection does, because the three signed areas add up to zero.
+    """
+    if any(not min(a[k], b[k], c[k]) <= q[k] <= max(a[k], b[k], c[k]) for k in range(3)):
+        return False
+    if _orient3d(a, b, c, q) != 0:
+        return False
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        flat = [(p[i], p[j]) for p in (a, b, c, q)]
+        turns = {_orient2d(flat[e], flat[(e + 1) % 3], flat[3]) for e in range(3)}
+        if 1 in turns and -1 in turns:
+            return False
+    return True
+
+
+def _cross_upwards(a: Integers, b: Integers, c: Integers, q: Integers) -> int:
+    """Return ON_FACE, or whether the ray from q moved by (eps, eps^2, 0) straight up meets the triangle."""
+    area = _orient2d(a, b, c)
+    if area != 0:
+        turns = [_orient2d(p, r, q) for p, r in ((a, b), (b, c), (c, a))]
+        if -area in turns:
+            return MISSED
+        side = _orient3d(a, b, c, q) * area
+        if side == 0:
+            return ON_FACE
+        for turn, (p, r) in zip(turns, ((a, b), (b, c), (c, a))):
+            if turn == 0 and (sign_of(p[1] - r[1]) or sign_of(r[0] - p[0])) != area:
+                return MISSED
+        return CROSSED if side < 0 else MISSED
+    return ON_FACE if _is_on_closed_triangle(a, b, c, q) else MISSED
+
+
+def _around(value: Number) -> tuple[float, float]:
+    """Return floats (low, high) with low <= value <= high, both equal to it where it is a float."""
+    try:
+        near = float(value)
+    except OverflowError:
+        return (1.7976931348623157e308, math.inf) if value > 0 else (-math.inf, -1.7976931348623157e308)
+    if near == value:
+        return near, near
+    return math.nextafter(near, -math.inf), math.nextafter(near, math.inf)
+
+
+def triangle_boxes(solid: Polyhedron) -> npt.NDArray[np.float64]:
+    """Return the six rows xmin, xmax, ymin, ymax, zmin, zmax over the triangles of `solid`, prepared once."""
+
+    def build() -> npt.NDArray[np.float64]:
+        corners = solid.vertices[solid.triangles]
+        low, high = corners.min(axis=1), corners.max(axis=1)
+        return np.ascontiguousarray(np.stack([low, high], axis=2).reshape(len(low), 6).T)
+
+    return solid.prepared("triangle_boxes", build)
+
+
+def _in_polyhedron(point: Sequence[Number], solid: Polyhedron, check: Check) -> int:
+    boxes = triangle_boxes(solid)
+    near = [_around(value) for value in point]
+    held = (boxes[0] <= near[0][1]) & (boxes[1] >= near[0][0]) & (boxes[2] <= near[1][1])
+    held &= (boxes[3] >= near[1][0]) & (boxes[5] >= near[2][0])
+    odd = False
+    for turn, index in enumerate(np.flatnonzero(held)):
+        if turn % _CHECK_EVERY == 0:
+            check()
+        corners = solid.vertices[solid.triangles[index]].ravel().tolist()
+        v = scaled_integers((*corners, *point))
+        met = _cross_upwards(tuple(v[0:3]), tuple(v[3:6]), tuple(v[6:9]), tuple(v[9:12]))
+        if met == ON_FACE:
+            return BOUNDARY
+        odd ^= met == CROSSED
+    return INSIDE if odd else OUTSIDE
+
+
+def next_in_ring(polygon: Polygon) -> npt.NDArray[np.int64]:
+    """Return for each vertex of `polygon` the index of the one after it in its ring, prepared once."""
+
+    def build() -> npt.NDArray[np.int64]:
+        following = np.arange(1, len(polygon.vertices) + 1, dtype=np.int64)
+        following[polygon.ring_offsets[1:] - 1] = polygon.ring_offsets[:-1]
+        return following
+
+    return polygon.prepared("next_in_ring", build)
+
+
+def _in_polygon(point: Sequence[Number], solid: Polygon, check: Check) -> int:
+    starts, ends = solid.vertices, solid.vertices[next_in_ring(solid)]
+    (x_low, _), (y_low, y_high) = _around(point[0]), _around(point[1])
+    held = (np.minimum(starts[:, 1], ends[:, 1]) <= y_high) & (np.maximum(starts[:, 1], ends[:, 1]) >= y_low)
+    held &= np.maximum(starts[:, 0], ends[:, 0]) >= x_low
+    odd = False
+    for turn, index in enumerate(np.flatnonzero(held)):
+        if turn % _CHECK_EVERY == 0:
+            check()
+        v = scaled_integers((*starts[index].tolist(), *ends[index].tolist(), *point))
+        a, b, q = v[0:2], v[2:4], v[4:6]
+        turned = _orient2d(a, b, q)
+        if turned == 0 and all(min(a[k], b[k]) <= q[k] <= max(a[k], b[k]) for k in (0, 1)):
+            return BOUNDARY
+        if (a[1] <= q[1]) != (b[1] <= q[1]):  # the ray to the right, moved up by eps, passes the edge's height
+            odd ^= (turned > 0) == (a[1] < b[1])
+    return INSIDE if odd else OUTSIDE
+
+
+def prism_walls(solid: Triangle) -> list[list[int]]:
+    """Return the three rows of the prism over a triangle of space, as integers; all zero for a triangle without area.
+
+    Wall e of the edge from p to r is {x : dot((n x (r - p)), x - p) >= 0} with n = (b - a) x (c - a), which is the
+    textbook's comparison of cross products by their dot product.
+    """
+
+    def build() -> list[list[int]]:
+        flat = scaled_integers((*solid.vertices.ravel().tolist(), 1))
+        a, b, c = (tuple(flat[k : k + 3]) for k in (0, 3, 6))
+        normal = _cross(_minus(b, a), _minus(c, a))
+        walls = []
+        for p, r in ((a, b), (b, c), (c, a)):
+            inward = _cross(normal, _minus(r, p))
+            # in coordinates scaled by flat[9]: dot(inward, flat[9] x - p)
+            walls.append([*(n * flat[9] for n in inward), -sum(n * x for n, x in zip(inward, p))])
+        return walls
+
+    return solid.prepared("prism_walls", build)
+
+
+def _in_triangle(solid: Triangle, point: Sequence[Number]) -> int:
+    if solid.dimension == 3:
+        return min(side_rational(wall, point) for wall in prism_walls(solid))
+    flat = scaled_integers((*solid.vertices.ravel().tolist(), *point))
+    a, b, c, q = (tuple(flat[k : k + 2]) for k in (0, 2, 4, 6))
+    turns = [_orient2d(p, r, q) for p, r in ((a, b), (b, c), (c, a))]
+    if any(not min(a[k], b[k], c[k]) <= q[k] <= max(a[k], b[k], c[k]) for k in range(2)):
+        return OUTSIDE
+    if 1 in turns and -1 in turns:
+        return OUTSIDE
+    return BOUNDARY if 0 in turns else INSIDE
+
+
+def _in_sphere(center: Sequence[Number], radius: float, point: Sequence[Number]) -> int:
+    *flat, r = scaled_integers((*center, *point, radius))
+    dimension = len(point)
+    return sign_of(r * r - sum((flat[k] - flat[k + dimension]) ** 2 for k in range(dimension)))
+
+
+def _in_aabb(solid: Aabb, point: Sequence[Number]) -> int:
+    return min(
+        [sign_of(Fraction(value) - Fraction(low)) for value, low in zip(point, solid.min.tolist())]
+        + [sign_of(Fraction(high) - Fraction(value)) for value, high in zip(point, solid.max.tolist())]
+    )
+
+
+def _in_implicit(solid: Implicit, point: Sequence[Number]) -> int:
+    if solid.function is not None:
+        value = np.asarray(solid.function(np.array([[float(x) for x in point]])), dtype=np.float64).ravel()[0]
+        return sign_of(float(value))
+    return polynomial_sign_rational(solid.powers.tolist(), solid.coefficients.tolist(), point)
+
+
+def to_body_frame(point: Sequence[Number], pose: Pose) -> list[Fraction]:
+    """Return R^-1 (point - t), the exact preimage of `point` under `pose`."""
+    moved = [Fraction(value) - Fraction(shift) for value, shift in zip(point, pose.translation.tolist())]
+    r = [[Fraction(entry) for entry in row] for row in pose.rotation.tolist()]
+    if len(moved) == 2:
+        determinant = r[0][0] * r[1][1] - r[0][1] * r[1][0]
+        adjugate = [[r[1][1], -r[0][1]], [-r[1][0], r[0][0]]]
+    else:
+
+        def cofactor(i: int, j: int) -> Fraction:
+            (i1, i2), (j1, j2) = ((i + 1) % 3, (i + 2) % 3), ((j + 1) % 3, (j + 2) % 3)
+            return r[i1][j1] * r[i2][j2] - r[i1][j2] * r[i2][j1]
+
+        adjugate = [[cofactor(j, i) for j in range(3)] for i in range(3)]
+        determinant = sum((r[0][k] * adjugate[k][0] for k in range(3)), Fraction(0))
+    return [sum((a * x for a, x in zip(row, moved)), Fraction(0)) / determinant for row in adjugate]
+
+
+def to_world_frame(point: Sequence[Number], pose: Pose) -> list[Fraction]:
+    """Return R point + t, exactly."""
+    return [
+        sum((Fraction(entry) * Fraction(value) for entry, value in zip(row, point)), Fraction(shift))
+        for row, shift in zip(pose.rotation.tolist(), pose.translation.tolist())
+    ]
+
+
+def rational_location(point: Sequence[Number], solid: Solid, pose: Pose | None = None, check: Check = _no_check) -> int:
+    """Locate one point exactly: 1 inside, 0 on the boundary, -1 outside.
+
+    point: numbers of any exact kind, one per dimension of `solid`.
+    pose: the solid's; vertices, half-spaces and boxes are mapped exactly; a sphere keeps its radius.
+    check: called now and then in long work; whatever it raises ends the call.
+
+    >>> from fractions import Fraction
+    >>> from engine.solids.aabb import Aabb
+    >>> rational_location([Fraction(1, 3), 0, 0], Aabb([0, 0, 0], [1, 1, 1]))
+    0
+    """
+    check()
+    match solid:
+        case Csg():
+            return _in_csg(point, solid, pose, check)
+        case Sphere():
+            center: Sequence[Number] = solid.center.tolist()
+            return _in_sphere(center if pose is None else to_world_frame(center, pose), solid.radius, point)
+    if pose is not None:
+        point = to_body_frame(point, pose)
+    match solid:
+        case Polyhedron():
+            return _in_polyhedron(point, solid, check)
+        case Polygon():
+            return _in_polygon(point, solid, check)
+        case Triangle():
+            return _in_triangle(solid, point)
+        case Aabb():
+            return _in_aabb(solid, point)
+        case HalfSpace():
+            return side_rational(solid.row.tolist(), point)
+        case Convex():
+            return min([side_rational(row, point) for row in solid.planes.tolist()])
+        case Implicit():
+            return _in_implicit(solid, point)
+    raise unsupported(solid)
+
+
+def combine(operation: str, located: Sequence[Any]) -> Any:
+    """Return the three-valued union (max), intersection (min) or difference min(A, -B) of locations.
+
+    located: numbers, or int8 arrays of one shape.
+    """
+    if operation == "difference":
+        first, second = located
+        return np.minimum(first, -second)
+    return functools.reduce(np.maximum if operation == "union" else np.minimum, located)
+
+
+def _in_csg(point: Sequence[Number], solid: Csg, pose: Pose | None, check: Check) -> int:
+    """Locate in every distinct node once, operands first; the depth is bounded by the constructor."""
+    known: dict[int, int] = {}
+
+    def visit(node: Solid) -> int:
+        if id(node) not in known:
+            if isinstance(node, Csg):
+                known[id(node)] = int(combine(node.operation, [visit(operand) for operand in node.operands]))
+            else:
+                known[id(node)] = rational_location(point, node, pose, check)
+        return known[id(node)]
+
+    return visit(solid)
+
+
+def unsupported(solid: Solid) -> UnsupportedSolidError:
+    """Return the error for a solid that has no inside."""
+    return UnsupportedSolidError(
+        f"nothing is inside a {solid.type}; a point can be located in a half_space, sphere, aabb, convex, polyhedron, "
+        "triangle, polygon, implicit or csg. A closed triangle mesh is a polyhedron; a planar 3D polygon can be asked "
+        "as triangles",
+        ("solid",),
+    )

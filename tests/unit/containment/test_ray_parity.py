@@ -1,0 +1,99 @@
+"""Polyhedron by ray and parity: degeneracies by hand, the hard sets, invariance."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from engine import Polyhedron, locate
+from tests.reference.containment import locate_many
+from tests.unit.containment.scenes import box_mesh, lattice_points, made, merged
+
+HARD = (
+    "c3d_spot",
+    "c3d_spot_off1e6",
+    "syn_bracket",
+    "syn_bracket_off1e9",
+    "syn_gear_off1e9",
+    "syn_menger2",
+    "syn_sliver_uv",
+    "syn_voxrand",
+)
+
+
+@pytest.mark.data
+@pytest.mark.parametrize("name", HARD)
+def test_hard_sets(data: Path, name: str) -> None:
+    case = np.load(data / "hard_containment" / f"{name}.npz")
+    found = locate(case["points"], Polyhedron(case["vertices"], case["faces"]))
+    assert (found == case["location"]).all()
+
+
+@pytest.mark.data
+@pytest.mark.parametrize("scale", [2.0**990, 2.0**-1000])
+def test_hard_sets_at_the_ends_of_the_range(data: Path, scale: float) -> None:
+    case = np.load(data / "hard_containment" / "syn_menger2.npz")
+    points = case["points"] * scale
+    exact = (points / scale == case["points"]).all(axis=1)
+    found = locate(points[exact], Polyhedron(case["vertices"] * scale, case["faces"]))
+    assert (found == case["location"][exact]).all()
+
+
+def assert_equals_reference(solid: dict, points: np.ndarray) -> None:  # type: ignore[type-arg]
+    assert locate(points, made(solid)).tolist() == locate_many(points.tolist(), solid)
+
+
+def test_every_place_of_a_box() -> None:
+    points = lattice_points(3)[::3]
+    assert_equals_reference(box_mesh([0, 0, 0], [4, 4, 4]), points)
+
+
+@pytest.mark.parametrize(
+    "pair",
+    [
+        ([0, 0, 0], [2, 2, 2], [2, 0, 0], [4, 2, 2]),  # a shared wall cancels, and is still boundary
+        ([0, 0, 0], [2, 2, 2], [2, 2, 0], [4, 4, 2]),  # an edge in common
+        ([0, 0, 0], [4, 4, 4], [1, 1, 1], [3, 3, 3]),  # nested: a void by even-odd
+        ([0, 0, 0], [3, 3, 3], [1, 1, 1], [4, 4, 4]),  # crossing itself
+        ([0, 0, 0], [2, 2, 2], [0, 0, 0], [2, 2, 2]),  # twice the same: nothing inside, all of it boundary
+        ([0, 0, 0], [3, 3, 0], [1, 1, 0], [2, 2, 2]),  # one of no height
+        ([0, 0, 0], [0, 0, 3], [0, 0, 1], [0, 0, 2]),  # needles of no width
+    ],
+)
+def test_pairs_of_boxes_as_one_solid(pair: tuple[list[float], ...]) -> None:
+    solid = merged(box_mesh(pair[0], pair[1]), box_mesh(pair[2], pair[3]))
+    assert_equals_reference(solid, lattice_points(3)[::4])
+
+
+def test_slanted_mesh_with_random_and_surface_points() -> None:
+    random = np.random.default_rng(7)
+    vertices = random.uniform(-1, 1, (6, 3))
+    faces = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
+    solid = merged(
+        {"vertices": vertices[:4].tolist(), "faces": faces}, {"vertices": vertices[2:].tolist(), "faces": faces}
+    )
+    weights = random.dirichlet([1, 1, 1], 40)
+    on_faces = np.concatenate([weights @ vertices[[0, 2, 1]], (vertices[:3] + vertices[1:4]) / 2, vertices])
+    assert_equals_reference(solid, np.concatenate([random.uniform(-1, 1, (80, 3)), on_faces]))
+
+
+def test_zero_area_faces_count_for_boundary_only() -> None:
+    mesh = box_mesh([0, 0, 0], [2, 2, 2])
+    mesh["vertices"] += [[1.0, 0.0, 1.0], [3.0, 0.0, 1.0], [5.0, 0.0, 1.0]]
+    mesh["faces"] += [[8, 9, 10], [10, 9, 8]]  # a double face without area, sticking out
+    found = locate([[4, 0, 1], [1, 0, 1], [4, 0.5, 1], [1, 1, 1], [4, 0, 0]], made(mesh))
+    assert found.tolist() == [0, 0, -1, 1, -1]
+
+
+def test_order_of_faces_and_translation_change_nothing() -> None:
+    mesh = merged(box_mesh([0, 0, 0], [3, 3, 3]), box_mesh([1, 1, 1], [4, 4, 2]))
+    points = lattice_points(3)
+    points = points[(points * 2 == np.round(points * 2)).all(axis=1)]  # those that translate exactly
+    found = locate(points, made(mesh))
+    random = np.random.default_rng(3)
+    faces = [mesh["faces"][i] for i in random.permutation(len(mesh["faces"]))]
+    turned = [face[k:] + face[:k] for face, k in zip(faces, random.integers(0, 3, len(faces)))]
+    assert (locate(points, Polyhedron(mesh["vertices"], turned)) == found).all()
+    assert (locate(points + 2.0**40, Polyhedron(np.array(mesh["vertices"]) + 2.0**40, turned)) == found).all()
