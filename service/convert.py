@@ -1,0 +1,171 @@
+"""The only file that knows both the schemas and the engine: JSON models to solids, results to answer models."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final
+
+import numpy as np
+
+import engine
+from engine import EngineError, Solid
+from service.errors import ServiceError
+from service.schemas import segments, solids
+from service.schemas.problem import Accuracy
+from service.work import Call, Where
+
+_LIGHT_SOLIDS: Final = ("half_space", "sphere", "aabb", "convex", "triangle")
+
+
+# ---------------------------------------------------------------------------------------------------------- solids
+
+
+def to_solid(model: solids.Solid, call: Call, where: Where) -> Solid:
+    """Return the engine's solid for `model`, which stands at `where` in the request."""
+    with call.phase("prepare"):
+        return _Builder(call).build(model, where, 1)
+
+
+class _Builder:
+    """Builds one solid; counts the members of CSG trees on the way."""
+
+    def __init__(self, call: Call) -> None:
+        self._call = call
+        self._n_nodes = 0
+
+    def build(self, model: solids.Solid, where: Where, depth: int) -> Solid:
+        settings, member = self._call.settings, model.root
+        self._n_nodes += 1
+        if self._n_nodes > settings.max_csg_nodes:
+            detail = (
+                f"the tree has more than {settings.max_csg_nodes} solids; split it, or raise GEOMETRY_MAX_CSG_NODES"
+            )
+            raise ServiceError("limit_exceeded", detail, where)
+        if depth > settings.max_csg_depth + 1:
+            detail = (
+                f"the tree is more than {settings.max_csg_depth} levels deep; flatten it (union and intersection take "
+                "many operands), or raise GEOMETRY_MAX_CSG_DEPTH"
+            )
+            raise ServiceError("too_deep", detail, where)
+        if isinstance(member, solids.StoredSolid):
+            try:
+                return self._call.store.get(member.id)
+            except ServiceError as error:
+                error.where = (*where, "id")
+                raise
+        if isinstance(member, solids.CsgSolid):
+            operands = [
+                self.build(operand, (*where, "operands", i_operand), depth + 1)
+                for i_operand, operand in enumerate(member.operands)
+            ]
+            return _checked(where, lambda: engine.Csg(member.operation, operands))
+        return _checked(where, lambda: _BUILDERS[member.type](member))
+
+
+def _checked(where: Where, build: Callable[[], Solid]) -> Solid:
+    try:
+        return build()
+    except EngineError as error:
+        raise error.at(*where) from None
+
+
+_BUILDERS: Final[dict[str, Callable[[Any], Solid]]] = {
+    "half_space": lambda m: engine.HalfSpace(m.normal, m.offset),
+    "sphere": lambda m: engine.Sphere(m.center, m.radius),
+    "aabb": lambda m: engine.Aabb(m.min, m.max),
+    "convex": lambda m: engine.Convex(m.planes),
+    "polyhedron": lambda m: engine.Polyhedron(m.vertices, m.faces),
+    "surface": lambda m: engine.Surface(m.vertices, m.faces),
+    "triangle": lambda m: engine.Triangle(m.vertices),
+    "polygon": lambda m: engine.Polygon(m.rings),
+    "implicit": lambda m: engine.Implicit(
+        [{"powers": t.powers.tolist(), "coefficient": t.coefficient} for t in m.terms]
+    ),
+}
+"""Every `type` of the union but csg and stored, which need the builder."""
+
+
+def to_bodies(models: list[solids.Body], call: Call) -> tuple[list[Solid], list[engine.Pose] | None]:
+    """Return the solids of a scene and their poses (None where no body has one)."""
+    found = [to_solid(body.solid, call, ("bodies", i_body, "solid")) for i_body, body in enumerate(models)]
+    if all(body.pose is None for body in models):
+        return found, None
+    poses = [
+        to_pose(body.pose, ("bodies", i_body, "pose"))
+        if body.pose is not None
+        else engine.Pose.identity(solid.dimension)
+        for i_body, (body, solid) in enumerate(zip(models, found))
+    ]
+    return found, poses
+
+
+def to_pose(model: solids.RigidPose, where: Where) -> engine.Pose:
+    """Return the engine's pose for `model`, which stands at `where` in the request."""
+    try:
+        return engine.Pose(model.rotation, model.translation)
+    except EngineError as error:
+        raise error.at(*where) from None
+
+
+def to_items(array: Any, dimension: int) -> Any:
+    """Return `array`; an empty list has no dimension of its own in JSON, so it takes the solid's."""
+    return array if array.size else np.empty((0, *array.shape[1:-1], dimension))
+
+
+def where_in_scene(where: Where) -> Where:
+    """Turn the engine's path into a scene's: solids and poses stand together in `bodies`."""
+    names = {"solids": "solid", "poses": "pose"}
+    if len(where) >= 2 and where[0] in names:
+        return ("bodies", where[1], names[str(where[0])], *where[2:])
+    return ("bodies",) if where[:1] in (("solids",), ("poses",)) else where
+
+
+def is_light(question: Any) -> bool:
+    """Tell whether a small `question` is sure to be answered in less time than a change of threads takes."""
+    if isinstance(question, segments.ClipSegmentsRequest):
+        return question.region.root.type in ("half_space", "aabb", "sphere")
+    return False
+
+
+# --------------------------------------------------------------------------------------------------------- answers
+
+
+def from_accuracy(accuracy: engine.Accuracy) -> Accuracy:
+    """Return the accuracy object of an answer."""
+    return Accuracy.model_construct(
+        decisions=accuracy.decisions,
+        coordinates_ulp=accuracy.coordinates_ulp,
+        items=accuracy.n_items,
+        beyond_filter=accuracy.n_beyond_filter,
+        rational=accuracy.n_rational,
+        method=accuracy.method,
+    )
+
+
+def from_stored(name: str, solid: Solid) -> solids.StoredSolidSummary:
+    """Return what the store says of a solid."""
+    counts = {field: len(getattr(solid, field)) for field in ("planes", "powers", "operands") if hasattr(solid, field)}
+    if hasattr(solid, "ring_offsets"):
+        counts["rings"] = len(solid.ring_offsets) - 1
+    if hasattr(solid, "face_offsets"):
+        counts["faces"] = len(solid.face_offsets) - 1
+    return solids.StoredSolidSummary.model_construct(
+        id=name,
+        type=solid.type,
+        dimension=solid.dimension,
+        vertices=len(solid.vertices) if hasattr(solid, "vertices") else None,
+        faces=next(iter(counts.values()), None),
+        memory=solid.memory,
+    )
+
+
+def from_pieces(pieces: engine.SegmentPieces, accuracy: engine.Accuracy) -> segments.ClipSegmentsResponse:
+    """Return the answer of `clip/segments`."""
+    columns = (pieces.source, pieces.start, pieces.end, pieces.t, pieces.faces)
+    return segments.ClipSegmentsResponse.model_construct(
+        pieces=[
+            {"segment": source, "start": start, "end": end, "t": t, "faces": faces}
+            for source, start, end, t, faces in zip(*(column.tolist() for column in columns))
+        ],
+        accuracy=from_accuracy(accuracy),
+    )

@@ -1,0 +1,204 @@
+"""One table from error codes to HTTP statuses, and how any error becomes problem+json.
+
+Codes of the engine's errors are passed on unchanged; those that only HTTP knows are added here. The table is part of
+the API: `docs` lists it, the tests hold it against the engine's tree of errors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from http import HTTPStatus
+from typing import Any, Final
+
+import orjson
+from pydantic import ValidationError
+from starlette.responses import Response
+
+from engine import EngineError
+from service.schemas.arrays import MAX_ERRORS, Fault, Path
+
+PROBLEM_TYPE: Final = "urn:exact-geometry:problem:"
+MEDIA_TYPE: Final = "application/problem+json"
+
+ENGINE_STATUS: Final[dict[str, int]] = {
+    "engine_error": 422,
+    "invalid_input": 422,
+    "invalid_array": 422,
+    "wrong_dimension": 422,
+    "not_finite": 422,
+    "empty_geometry": 422,
+    "index_out_of_range": 422,
+    "repeated_index": 422,
+    "not_closed": 422,
+    "inconsistent_orientation": 422,
+    "face_not_simple": 422,
+    "ring_too_short": 422,
+    "min_above_max": 422,
+    "negative_radius": 422,
+    "zero_normal": 422,
+    "invalid_polynomial": 422,
+    "invalid_operation": 422,
+    "not_rigid": 422,
+    "too_deep": 422,
+    "unsupported_solid": 422,
+    "unsupported_pair": 422,
+    "not_representable": 422,
+    "too_complex": 422,
+    "deadline_exceeded": 504,
+    "cancelled": 503,
+}
+SERVICE_STATUS: Final[dict[str, int]] = {
+    "not_json": 400,
+    "bad_request": 400,
+    "not_found": 404,
+    "unknown_solid": 404,
+    "method_not_allowed": 405,
+    "slow_body": 408,
+    "body_too_large": 413,
+    "unsupported_media_type": 415,
+    "invalid_request": 422,
+    "missing_field": 422,
+    "unknown_field": 422,
+    "unknown_type": 422,
+    "limit_exceeded": 422,
+    "queue_full": 503,
+    "not_ready": 503,
+    "out_of_memory": 503,
+    "internal": 500,
+}
+STATUS: Final = {**ENGINE_STATUS, **SERVICE_STATUS}
+
+_RETRY_AFTER: Final = {"Retry-After": "1"}
+_HEADERS: Final[dict[str, dict[str, str]]] = {
+    "queue_full": _RETRY_AFTER,
+    "not_ready": _RETRY_AFTER,
+    "cancelled": _RETRY_AFTER,
+    "out_of_memory": _RETRY_AFTER,
+    "slow_body": {"Connection": "close"},
+    "body_too_large": {"Connection": "close"},
+    "unsupported_media_type": {"Accept-Post": "application/json"},
+}
+_PYDANTIC_CODES: Final = {
+    "missing": "missing_field",
+    "extra_forbidden": "unknown_field",
+    "union_tag_invalid": "unknown_type",
+    "union_tag_not_found": "unknown_type",
+    "recursion_loop": "too_deep",
+}
+_HTTP_CODES: Final = {404: "not_found", 405: "method_not_allowed", 413: "body_too_large", 415: "unsupported_media_type"}
+
+
+class ServiceError(Exception):
+    """An error that only the service knows: what HTTP asks for, limits, the store, the queue."""
+
+    def __init__(self, code: str, detail: str, where: Path = ()) -> None:
+        super().__init__(detail)
+        self.code = code
+        self.detail = detail
+        self.where = where
+
+
+def pointer(path: Iterable[str | int]) -> str:
+    """Return `path` as a JSON pointer (RFC 6901).
+
+    >>> pointer(("solid", "faces", 3, "a/b~c"))
+    '/solid/faces/3/a~1b~0c'
+    """
+    return "".join(f"/{str(part).replace('~', '~0').replace('/', '~1')}" for part in path)
+
+
+def faults_of(error: Exception) -> list[Fault]:
+    """Return what is wrong and where, for any error; at least one entry."""
+    if isinstance(error, EngineError):
+        code = error.code if error.code in ENGINE_STATUS else EngineError.code
+        return [Fault(error.where, code, error.message)]
+    if isinstance(error, ServiceError):
+        return [Fault(error.where, error.code, error.detail)]
+    if isinstance(error, MemoryError):
+        return [Fault((), "out_of_memory", "this request needs more memory than there is now; ask for less at once")]
+    return [Fault((), "internal", "the service failed on this request; it is logged, please report it")]
+
+
+def problem(faults: list[Fault], headers: Mapping[str, str] = {}) -> Response:
+    """Return the answer for `faults`; its code and status are those of the first."""
+    first = faults[0]
+    status = STATUS[first.code]
+    body = {
+        "type": PROBLEM_TYPE + first.code,
+        "title": HTTPStatus(status).phrase,
+        "status": status,
+        "detail": _encodable(first.detail),
+        "code": first.code,
+        "errors": [
+            {"pointer": _encodable(pointer(fault.path)), "detail": _encodable(fault.detail)}
+            for fault in faults[:MAX_ERRORS]
+            if status == 422 or fault.path
+        ],
+    }
+    return Response(orjson.dumps(body), status, {**_HEADERS.get(first.code, {}), **headers}, MEDIA_TYPE)
+
+
+def http_fault(status: int, path: str, method: str) -> Fault:
+    """Return what is said where the framework itself found no route."""
+    code = _HTTP_CODES.get(status, "bad_request")
+    detail = {
+        "not_found": f"there is nothing at {path[:200]}; /docs lists what there is",
+        "method_not_allowed": f"{method} is not possible at {path[:200]}; the header Allow names what is",
+    }.get(code, f"the request cannot be answered ({status})")
+    return Fault((), code, detail)
+
+
+def faults_of_validation(error: ValidationError, document: Any) -> list[Fault]:
+    """Return what is wrong with `document`, the request as decoded, and where; at most `MAX_ERRORS` entries."""
+    faults: list[Fault] = []
+    for item in error.errors(include_url=False, include_input=False):
+        path = _path_in(document, item["loc"])
+        if item["type"] == "numbers":
+            faults += [Fault((*path, *fault.path), fault.code, fault.detail) for fault in item["ctx"]["faults"]]
+        else:
+            code = _PYDANTIC_CODES.get(item["type"], "invalid_request")
+            faults.append(Fault(path, code, _sentence(item)))
+        if len(faults) >= MAX_ERRORS:
+            break
+    return faults[:MAX_ERRORS]
+
+
+def _sentence(item: Any) -> str:
+    """Return what pydantic found as a sentence that says what to do."""
+    name = item["loc"][-1] if item["loc"] else "the body"
+    if item["type"] == "missing":
+        return f"the field {name!r} is missing; add it"
+    if item["type"] == "extra_forbidden":
+        return f"the field {name!r} is not known here; leave it out"
+    if item["type"] == "union_tag_invalid":
+        return f"there is no solid of type {item['ctx']['tag']!r:.60}; the types are {item['ctx']['expected_tags']}"
+    if item["type"] == "union_tag_not_found":
+        return "a solid is an object with a field 'type' that names what it is, for example 'sphere'"
+    if item["type"] in ("model_type", "model_attributes_type"):
+        return "expected a JSON object"
+    return str(item["msg"]).replace("Input should be", "expected")
+
+
+def _path_in(document: Any, loc: tuple[int | str, ...]) -> Path:
+    """Return pydantic's path without the tags it adds where a union was entered (each stands once, before a field)."""
+    path: list[int | str] = []
+    value, may_be_tag = document, True
+    for part in loc:
+        if may_be_tag and isinstance(value, dict) and value.get("type") == part:
+            may_be_tag = False
+            continue
+        path.append(part)
+        value, may_be_tag = _child(value, part), True
+    return tuple(path)
+
+
+def _child(value: Any, part: int | str) -> Any:
+    try:
+        return value[part]
+    except (KeyError, IndexError, TypeError):
+        return None
+
+
+def _encodable(text: str) -> str:
+    """Return `text` as valid UTF-8: a message may quote half a surrogate pair from the request."""
+    return text.encode("utf-8", "replace").decode("utf-8")

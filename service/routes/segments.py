@@ -1,0 +1,19 @@
+"""What remains of segments within a region?"""
+
+from __future__ import annotations
+
+import engine
+from service import convert
+from service.routes.base import router_of
+from service.schemas.segments import ClipSegmentsRequest, ClipSegmentsResponse
+from service.work import CallOf
+
+router = router_of("clipping")
+
+
+@router.post("/v1/clip/segments", operation_id="clip_segments")
+def clip_segments(question: ClipSegmentsRequest, call: CallOf) -> ClipSegmentsResponse:
+    """Return the parts of each segment that lie in the region, boundary included: none, one or several."""
+    region = convert.to_solid(question.region, call, ("region",))
+    segments = convert.to_items(question.segments, region.dimension)
+    return convert.from_pieces(*call.compute(engine.clip_segments, segments, region))

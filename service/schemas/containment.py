@@ -1,0 +1,47 @@
+"""Questions and answers of containment."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from service.schemas.arrays import DIMENSION, POINTS, Array, Axis, Numbers
+from service.schemas.limits import AtMost
+from service.schemas.problem import Accuracy, Schema
+from service.schemas.solids import Body, Solid
+
+Points = Annotated[Array, Numbers(POINTS, DIMENSION)]
+Booleans = Annotated[Array, Numbers(Axis(0, None), kind="boolean")]
+Indices = Annotated[Array, Numbers(Axis(0, None), kind="integer", minimum=0)]
+IndexLists = Annotated[list[list[int]], Numbers(Axis(0, None), Axis(0, None), kind="integer", ragged=True, minimum=0)]
+
+
+class ContainsRequest(Schema):
+    """Which of these points lie in this solid?"""
+
+    solid: Solid
+    points: Points
+
+
+class ContainsResponse(Schema):
+    """One answer for each point."""
+
+    contained: Booleans = Field(description="For each point whether the solid holds it; its boundary counts.")
+    boundary: Indices = Field(description="Indices of the points exactly on the boundary, ascending.")
+    accuracy: Accuracy
+
+
+class ContainsSceneRequest(Schema):
+    """Which of these bodies hold each of these points?"""
+
+    bodies: Annotated[list[Body], AtMost("max_bodies", low=1)]
+    points: Points
+
+
+class ContainsSceneResponse(Schema):
+    """For each point the bodies that hold it."""
+
+    bodies: IndexLists = Field(description="For each point the indices of the bodies that hold it, ascending.")
+    boundary: IndexLists = Field(description="For each point those of them on whose boundary it lies.")
+    accuracy: Accuracy

@@ -1,0 +1,51 @@
+"""Fields that are left out rather than null, and lists whose longest length is a setting."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic_core import PydanticCustomError, core_schema
+
+from service.schemas.arrays import LIMIT, Fault, limit_sentence
+
+
+class AtMost:
+    """Annotation of a list of models: no longer than the setting of this name, counted before any item is looked at."""
+
+    def __init__(self, name: str, low: int = 0) -> None:
+        self.name = name
+        self.low = low
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+        return core_schema.with_info_before_validator_function(self._validate, handler(source))
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        document = handler(schema)
+        if self.low:
+            document["minItems"] = self.low
+        document[LIMIT] = self.name
+        return document
+
+    def _validate(self, value: Any, info: core_schema.ValidationInfo) -> Any:
+        if not isinstance(value, list):
+            return value
+        limit = None if info.context is None else getattr(info.context, self.name)
+        if limit is not None and len(value) > limit:
+            fault = Fault((), "limit_exceeded", limit_sentence(self.name, limit, len(value)))
+        elif len(value) < self.low:
+            fault = Fault((), "empty_geometry", f"the list holds {len(value)} items; at least {self.low} are needed")
+        else:
+            return value
+        raise PydanticCustomError("numbers", "{detail}", {"detail": fault.detail, "faults": [fault]})
+
+
+def _without_default(schema: dict[str, Any]) -> None:
+    schema.pop("default", None)
+
+
+def left_out(description: str | None = None) -> Any:
+    """Return a field that may be left out and is then None; JSON ``null`` is refused, and the schema has no default."""
+    return Field(default=None, description=description, json_schema_extra=_without_default)

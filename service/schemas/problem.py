@@ -1,0 +1,49 @@
+"""What every error answer looks like (RFC 9457), and what every answer says of its own accuracy."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from service.schemas.arrays import Numbers
+from service.schemas.limits import left_out
+
+Count = Annotated[int, Numbers(kind="integer", minimum=0)]
+
+
+class Schema(BaseModel):
+    """Base of all models: nothing is converted (``"1.5"`` and ``true`` are no numbers), unknown fields are refused."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+
+class ProblemItem(Schema):
+    """One place in the request and what is wrong with it."""
+
+    pointer: str = Field(description="JSON pointer (RFC 6901) into the request body; empty for the body as a whole.")
+    detail: str
+
+
+class Problem(Schema):
+    """An error (RFC 9457, `application/problem+json`)."""
+
+    type: str = Field(description="URI of this kind of problem.")
+    title: str = Field(description="The status in words.")
+    status: Annotated[int, Numbers(kind="integer", minimum=400)]
+    detail: str = Field(description="What was expected, what came, where, and what to do.")
+    code: str = Field(description="Stable name of the rule that was broken.")
+    errors: list[ProblemItem] = Field(description="The places at fault, at most 20.", max_length=20)
+
+
+class Accuracy(Schema):
+    """What this answer can say of its own accuracy."""
+
+    decisions: Literal["exact", "float64"]
+    coordinates_ulp: Annotated[float, Numbers()] = left_out(
+        "Bound on each constructed coordinate in units in the last place; left out where none is constructed."
+    )
+    items: Count = Field(description="Items asked for.")
+    beyond_filter: Count = Field(description="Items that the floating-point filter left open.")
+    rational: Count = Field(description="Items of those that needed rational arithmetic.")
+    method: str = Field(description="The method chosen.")

@@ -1,0 +1,164 @@
+"""Solids as JSON: one model each, a union told apart by `type`, and poses and bodies made of them."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Union
+
+from pydantic import Field, RootModel
+
+from service.schemas.arrays import DIMENSION, Array, Axis, Numbers
+from service.schemas.limits import AtMost, left_out
+from service.schemas.problem import Count, Schema
+
+Number = Annotated[float, Numbers()]
+Position = Annotated[Array, Numbers(DIMENSION)]
+Vertices2 = Annotated[Array, Numbers(Axis(1, "max_points"), Axis(2, 2))]
+Vertices3 = Annotated[Array, Numbers(Axis(1, "max_points"), Axis(3, 3))]
+Faces = Annotated[Any, Numbers(Axis(1, "max_faces"), Axis(3, "max_points"), kind="integer", ragged=True, minimum=0)]
+SolidId = Annotated[
+    str, Field(pattern=r"^[0-9a-f]{64}$", description="Name of a stored solid, from `POST /v1/solids`.")
+]
+
+
+class HalfSpaceSolid(Schema):
+    """All points p with dot(normal, p) + offset >= 0; the normal points inward."""
+
+    type: Literal["half_space"]
+    normal: Position
+    offset: Number
+
+
+class SphereSolid(Schema):
+    """All points at most `radius` away from `center` (a disc in 2D)."""
+
+    type: Literal["sphere"]
+    center: Position
+    radius: Number
+
+
+class AabbSolid(Schema):
+    """All points with min <= p <= max on each axis."""
+
+    type: Literal["aabb"]
+    min: Position
+    max: Position
+
+
+class ConvexSolid(Schema):
+    """All points with a x + b y + c z + d >= 0 for every row [a, b, c, d] (2D: [a, b, c]); may be unbounded
+    or empty."""
+
+    type: Literal["convex"]
+    planes: Annotated[Array, Numbers(Axis(1, "max_planes"), Axis(3, 4))]
+
+
+class PolyhedronSolid(Schema):
+    """Everything within a closed, consistently oriented mesh (even-odd rule); faces by index, counter-clockwise seen
+    from outside, triangles or simple polygons."""
+
+    type: Literal["polyhedron"]
+    vertices: Vertices3
+    faces: Faces
+
+
+class SurfaceSolid(Schema):
+    """A mesh that encloses nothing, open or closed; for collision only."""
+
+    type: Literal["surface"]
+    vertices: Vertices3
+    faces: Faces
+
+
+class TriangleSolid(Schema):
+    """2D: a triangle. 3D: for `contains` the prism over it, unbounded both ways; flat for bounds."""
+
+    type: Literal["triangle"]
+    vertices: Annotated[Array, Numbers(Axis(3, 3), DIMENSION)]
+
+
+class PolygonSolid(Schema):
+    """Everything within the rings (even-odd rule over all of them, any orientation); a repeated last vertex is
+    dropped."""
+
+    type: Literal["polygon"]
+    rings: Annotated[list[Vertices2], AtMost("max_rings", low=1)]
+
+
+class Term(Schema):
+    """coefficient * x**powers[0] * y**powers[1] (* z**powers[2])."""
+
+    powers: Annotated[Array, Numbers(DIMENSION, kind="integer", minimum=0)]
+    coefficient: Number
+
+
+class ImplicitSolid(Schema):
+    """All points where the sum of the terms is >= 0; total degree at most 16."""
+
+    type: Literal["implicit"]
+    terms: Annotated[list[Term], AtMost("max_terms", low=1)]
+
+
+class CsgSolid(Schema):
+    """A Boolean of solids: union, intersection, or the first minus the second."""
+
+    type: Literal["csg"]
+    operation: Literal["union", "intersection", "difference"]
+    operands: Annotated[list[Solid], AtMost("max_operands", low=1)]
+
+
+class StoredSolid(Schema):
+    """A solid put into the store before; usable wherever a solid is."""
+
+    type: Literal["stored"]
+    id: SolidId
+
+
+class Solid(
+    RootModel[
+        Annotated[
+            Union[  # noqa: UP007 (a named union is what code generators need)
+                HalfSpaceSolid,
+                SphereSolid,
+                AabbSolid,
+                ConvexSolid,
+                PolyhedronSolid,
+                SurfaceSolid,
+                TriangleSolid,
+                PolygonSolid,
+                ImplicitSolid,
+                CsgSolid,
+                StoredSolid,
+            ],
+            Field(discriminator="type"),
+        ]
+    ]
+):
+    """A set of points in the plane or in space, boundary included, told apart by `type`."""
+
+
+class RigidPose(Schema):
+    """Moves a point p to R p + t; R is a rotation, row by row, of the solid's dimension."""
+
+    rotation: Annotated[Array, Numbers(DIMENSION, DIMENSION)]
+    translation: Position
+
+
+class Body(Schema):
+    """A solid in its place; without a pose, where it stands."""
+
+    solid: Solid
+    pose: RigidPose = left_out()
+
+
+class StoredSolidSummary(Schema):
+    """What the store holds under an id."""
+
+    id: SolidId
+    type: str = Field(description="Type of the solid.")
+    dimension: Annotated[int, Numbers(kind="integer", minimum=2)]
+    vertices: Count = left_out("Number of vertices, for solids that have them.")
+    faces: Count = left_out("Number of faces, planes, rings, terms or operands, for solids that have them.")
+    memory: Count = Field(description="Bytes its arrays hold.")
+
+
+CsgSolid.model_rebuild()

@@ -1,0 +1,83 @@
+"""Every limit of the service, from the environment, each with its reason.
+
+A name is set as an environment variable with the prefix ``GEOMETRY_``, for example ``GEOMETRY_MAX_POINTS=50000``.
+Limits on counts stand in the OpenAPI document too (openapi.py puts them there by name).
+"""
+
+from __future__ import annotations
+
+import os
+from typing import Annotated
+
+from pydantic import Field
+from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
+
+Count = Annotated[int, Field(ge=1)]
+Seconds = Annotated[float, Field(gt=0)]
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+class Settings(BaseSettings):
+    """Limits and addresses; the defaults serve one machine with a few GB of memory."""
+
+    model_config = SettingsConfigDict(env_prefix="GEOMETRY_", frozen=True, extra="forbid")
+
+    host: str = "127.0.0.1"
+    """Loopback: nobody else's machine calls a service that its owner did not open on purpose."""
+    port: Annotated[int, Field(ge=0, le=65535)] = 8000
+    """0 takes a free port (it is printed)."""
+    workers: Count = 1
+    """Processes; one uses all cores already, more of them help JSON decoding, and each keeps its own store."""
+    log_level: str = "info"
+    cors_origins: Annotated[tuple[str, ...], NoDecode] = ()
+    """Origins that browsers may call from, separated by commas; none by default."""
+
+    max_body_bytes: Count = 64 * 2**20
+    """JSON takes about 60 bytes a 3D point: this is a million points, or a mesh of half a million faces."""
+    max_points: Count = 2_000_000
+    """Points, vertices or segments in one list; decoding holds about 200 bytes for each."""
+    max_faces: Count = 4_000_000
+    """Faces of one polyhedron or surface: a closed triangle mesh has twice as many as vertices."""
+    max_planes: Count = 10_000
+    """Rows of one convex solid: each point is compared with each row."""
+    max_rings: Count = 100_000
+    """Rings of one polygon."""
+    max_terms: Count = 1_000
+    """Terms of one polynomial, the engine's own limit."""
+    max_operands: Count = 1_000
+    """Operands of one CSG node."""
+    max_csg_depth: Annotated[int, Field(ge=1, le=64)] = 32
+    """Levels of a CSG tree; JSON itself is refused beyond 200 levels, and a CSG level takes two to three of them."""
+    max_csg_nodes: Count = 1_000
+    """Solids of one CSG tree, leaves and nodes together: each point visits each of them."""
+    max_bodies: Count = 10_000
+    """Bodies of one scene."""
+    max_pairs: Count = 1_000_000
+    """Pairs named in `skip` or `only`."""
+    max_poses: Count = 100_000
+    """Poses of one collision request."""
+    max_polygons: Count = 100_000
+    """Polygons of one clipping request."""
+
+    deadline_seconds: Seconds = 30.0
+    """Time from the last byte of the request to the answer; common proxies give up after 60 s."""
+    body_seconds: Seconds = 60.0
+    """Time for a body to arrive: a slow sender must not hold its memory for ever."""
+    drain_seconds: Seconds = 30.0
+    """Time for running requests after SIGTERM; Kubernetes kills 30 s after it by default, so lower it there."""
+    concurrency: Count = Field(default_factory=lambda: 4 * _cores())
+    """Requests computed at once. More than cores: long calls run in chunks of 1-3 ms, so short ones slip between."""
+    queue_length: Count = 64
+    """Requests that may wait for their turn; beyond it the answer is 503 with Retry-After."""
+    inline_bytes: Annotated[int, Field(ge=0)] = 2048
+    """Bodies up to this size on simple solids are answered without a thread: a hand-over costs as much as the work."""
+    store_bytes: Count = 512 * 2**20
+    """Memory for stored solids; the least recently used leave first."""
+
+    @classmethod
+    def settings_customise_sources(cls, settings_cls, init_settings, env_settings, *_, **__):  # type: ignore[no-untyped-def]
+        """Arguments, then the environment; no files."""
+        return init_settings, env_settings

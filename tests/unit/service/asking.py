@@ -1,0 +1,43 @@
+"""Asking the service in this process, and what every error answer must look like."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Any
+
+import httpx
+from fastapi import FastAPI
+
+SPHERE = {"type": "sphere", "center": [0.0, 0.0, 0.0], "radius": 1.0}
+
+
+@asynccontextmanager
+async def client_of(app: FastAPI) -> AsyncIterator[httpx.AsyncClient]:
+    """Start the app, wait until it is warm, and return a client for it."""
+    async with app.router.lifespan_context(app):
+        app.state.warm.wait(60)
+        transport = httpx.ASGITransport(app=app, raise_app_exceptions=False)
+        async with httpx.AsyncClient(transport=transport, base_url="http://test") as client:
+            yield client
+
+
+def resolve(document: Any, pointer: str) -> Any:
+    """Return what `pointer` (RFC 6901) names in `document`; raises if there is nothing."""
+    for part in pointer.split("/")[1:]:
+        key = part.replace("~1", "/").replace("~0", "~")
+        document = document[int(key)] if isinstance(document, list) else document[key]
+    return document
+
+
+def check_problem(answer: httpx.Response, status: int, code: str) -> dict[str, Any]:
+    """Assert that `answer` is a problem of RFC 9457 with this status and code, and return it."""
+    assert (answer.status_code, answer.headers["content-type"]) == (status, "application/problem+json"), answer.text
+    problem: dict[str, Any] = answer.json()
+    assert set(problem) == {"type", "title", "status", "detail", "code", "errors"}
+    assert (problem["status"], problem["code"]) == (status, code), problem
+    assert problem["type"].endswith(code)
+    assert problem["detail"]
+    assert len(problem["errors"]) <= 20
+    assert all(set(item) == {"pointer", "detail"} for item in problem["errors"])
+    return problem

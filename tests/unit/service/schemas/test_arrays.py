@@ -1,0 +1,88 @@
+"""The array type: what it takes, what it refuses and where it says the fault is, its JSON schema."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import numpy as np
+import pytest
+from pydantic import TypeAdapter, ValidationError
+
+from service.schemas.arrays import DIMENSION, POINTS, Array, Axis, Numbers
+from service.schemas.solids import Faces
+from service.settings import Settings
+
+POSITIONS: TypeAdapter[Any] = TypeAdapter(Annotated[Array, Numbers(POINTS, DIMENSION)])
+NUMBER: TypeAdapter[Any] = TypeAdapter(Annotated[float, Numbers()])
+FACES: TypeAdapter[Any] = TypeAdapter(Faces)
+SETTINGS = Settings(max_points=5, max_faces=5)
+
+
+def faults(adapter: TypeAdapter[Any], value: object) -> list[tuple[tuple[int, ...], str]]:
+    with pytest.raises(ValidationError) as caught:
+        adapter.validate_python(value, context=SETTINGS)
+    (error,) = caught.value.errors()
+    return [(fault.path, fault.code) for fault in error["ctx"]["faults"]]
+
+
+def test_lists_become_one_contiguous_array() -> None:
+    array = POSITIONS.validate_python([[1, 2.5, -0.0], [2**53, 1e300, 5e-324]], context=SETTINGS)
+    assert array.dtype == np.float64
+    assert array.flags.c_contiguous
+    assert array.tolist() == [[1.0, 2.5, 0.0], [2.0**53, 1e300, 5e-324]]
+    assert POSITIONS.validate_python([], context=SETTINGS).shape == (0, 2)
+    assert NUMBER.validate_python(3, context=SETTINGS) == 3.0
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [
+        ([[1, "2"]], [((0, 1), "invalid_array")]),
+        ([[1, True], [None, 2]], [((0, 1), "invalid_array"), ((1, 0), "invalid_array")]),
+        ([[1, float("inf")]], [((0, 1), "not_finite")]),
+        ([[float("nan"), 1]], [((0, 0), "not_finite")]),
+        ([[1, 2**53 + 1]], [((0, 1), "invalid_array")]),
+        ([[1, 10**400]], [((0, 1), "invalid_array")]),
+        ([[1, 2], [1, 2, 3]], [((1,), "invalid_array")]),
+        ([[1]], [((0,), "invalid_array")]),
+        ([1, 2], [((0,), "invalid_array"), ((1,), "invalid_array")]),
+        ([[[1, 2]]], [((0,), "invalid_array")]),
+        ([[1, [2]]], [((0, 1), "invalid_array")]),
+        ({"x": 1}, [((), "invalid_array")]),
+        ("12", [((), "invalid_array")]),
+        (None, [((), "invalid_array")]),
+        ([[0, 0]] * 6, [((), "limit_exceeded")]),
+        ([[0, 0]] * 4 + [[]], [((4,), "empty_geometry")]),
+    ],
+)
+def test_each_fault_has_its_place(value: object, expected: list[tuple[tuple[int, ...], str]]) -> None:
+    assert faults(POSITIONS, value) == expected
+
+
+def test_at_most_twenty_faults_are_named() -> None:
+    assert len(faults(TypeAdapter(Annotated[Array, Numbers(Axis(0, None))]), ["x"] * 100)) == 20
+
+
+@pytest.mark.parametrize("value", ["1.5", True, None, [], [1], 1e400, 2**60 + 1])
+def test_a_number_is_a_number(value: object) -> None:
+    assert faults(NUMBER, value)[0][0] == ()
+
+
+def test_faces_are_triangles_or_lists() -> None:
+    triangles = FACES.validate_python([[0, 1, 2], [2, 1, 3]], context=SETTINGS)
+    assert (triangles.dtype, triangles.shape) == (np.int64, (2, 3))
+    assert FACES.validate_python([[0, 1, 2], [2, 1, 3, 4]], context=SETTINGS) == [[0, 1, 2], [2, 1, 3, 4]]
+    assert faults(FACES, [[0, 1, 2.0]]) == [((0, 2), "invalid_array")]
+    assert faults(FACES, [[0, 1, 2], [0, -1, 2]]) == [((1, 1), "index_out_of_range")]
+    assert faults(FACES, [[0, 1, 2**63]]) == [((0, 2), "index_out_of_range")]
+    assert faults(FACES, [[0, 1, 2], [0, 1]]) == [((1,), "invalid_array")]
+    assert faults(FACES, [[0, 1, 2]] * 6) == [((), "limit_exceeded")]
+    assert faults(FACES, []) == [((), "empty_geometry")]
+
+
+def test_schema_is_an_array_of_arrays_of_doubles() -> None:
+    assert POSITIONS.json_schema() == {
+        "type": "array",
+        "x-limit": "max_points",
+        "items": {"type": "array", "minItems": 2, "maxItems": 3, "items": {"type": "number", "format": "double"}},
+    }

@@ -1,0 +1,238 @@
+"""What HTTP asks for: media types, sizes, slow and vanished clients, deadlines, a full queue; each row of the table."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import AsyncIterator
+from typing import Any
+
+import anyio
+import httpx
+import pytest
+from fastapi import FastAPI
+
+import engine
+from service.routes.base import router_of
+from service.schemas.problem import Schema
+from service.work import CallOf
+from tests.unit.service.asking import SPHERE, check_problem, client_of, resolve
+
+pytestmark = pytest.mark.anyio
+JSON = {"Content-Type": "application/json"}
+
+
+class Nap(Schema):
+    """How long to sleep."""
+
+    seconds: float
+
+
+class Broken(Schema):
+    """Nothing."""
+
+
+def add_slow_routes(app: FastAPI) -> list[str]:
+    """Add a route that works until it is cancelled or its time is over, and one that fails; return what happened."""
+    router, log = router_of("test"), []
+
+    def work(seconds: float, *, deadline: float, cancel: engine.Cancel, report: bool) -> tuple[None, None]:
+        end = time.monotonic() + min(seconds, deadline)
+        while time.monotonic() < end:
+            if cancel.is_set:
+                log.append("cancelled")
+                raise engine.CancelledError("cancelled")
+            time.sleep(0.005)
+        if seconds > deadline:
+            raise engine.DeadlineExceededError("too late")
+        log.append("done")
+        return None, None
+
+    @router.post("/nap")
+    def nap(question: Nap, call: CallOf) -> Broken:
+        call.compute(work, question.seconds)
+        return Broken()
+
+    @router.post("/broken")
+    def broken(question: Broken, call: CallOf) -> Broken:
+        raise ZeroDivisionError("a secret")
+
+    app.include_router(router)
+    return log
+
+
+async def test_answer_has_its_timing(client: httpx.AsyncClient) -> None:
+    answer = await client.post("/v1/solids", json=SPHERE)
+    assert answer.status_code == 201
+    names = [item.partition(";dur=")[0] for item in answer.headers["server-timing"].split(", ")]
+    assert names == ["decode", "prepare", "compute", "encode"]
+    assert all(float(item.partition(";dur=")[2]) >= 0 for item in answer.headers["server-timing"].split(", "))
+
+
+@pytest.mark.parametrize("body", [b"", b"{", b'{"type": "sphere", "cen', b"\xff\xfe", b"[" * 10_000, b"nonsense"])
+async def test_not_json(client: httpx.AsyncClient, body: bytes) -> None:
+    check_problem(await client.post("/v1/solids", content=body, headers=JSON), 400, "not_json")
+
+
+@pytest.mark.parametrize("kind", [None, "", "text/plain", "application/x-www-form-urlencoded", "json", "a/b/json"])
+async def test_wrong_media_type(client: httpx.AsyncClient, kind: str | None) -> None:
+    headers = {} if kind is None else {"Content-Type": kind}
+    answer = await client.post("/v1/solids", content=b"{}", headers=headers)
+    check_problem(answer, 415, "unsupported_media_type")
+    assert answer.headers["accept-post"] == "application/json"
+
+
+@pytest.mark.parametrize("kind", ["application/json; charset=utf-8", "APPLICATION/JSON", "application/geo+json"])
+async def test_right_media_type(client: httpx.AsyncClient, kind: str) -> None:
+    content = b'{"type":"sphere","center":[0,0],"radius":1}'
+    answer = await client.post("/v1/solids", content=content, headers={"Content-Type": kind})
+    assert answer.status_code == 201
+
+
+async def test_too_large_whether_or_not_the_length_was_declared(client: httpx.AsyncClient) -> None:
+    async def chunks() -> AsyncIterator[bytes]:
+        for _ in range(20):
+            yield b" " * 2**16
+
+    for content in (b" " * (2**20 + 1), chunks()):
+        answer = await client.post("/v1/solids", content=content, headers=JSON)
+        problem = check_problem(answer, 413, "body_too_large")
+        assert "GEOMETRY_MAX_BODY_BYTES" in problem["detail"]
+
+
+async def test_largest_body_is_taken(client: httpx.AsyncClient) -> None:
+    body = b'{"type":"sphere","center":[0,0],"radius":1}'
+    answer = await client.post("/v1/solids", content=body + b" " * (2**20 - len(body)), headers=JSON)
+    assert answer.status_code == 201
+
+
+async def test_unknown_paths_and_methods(client: httpx.AsyncClient) -> None:
+    check_problem(await client.get("/nothing"), 404, "not_found")
+    check_problem(await client.post("/v1/solids/", json=SPHERE), 404, "not_found")
+    answer = await client.get("/v1/solids")
+    check_problem(answer, 405, "method_not_allowed")
+    assert answer.headers["allow"] == "POST"
+    check_problem(await client.delete(f"/v1/solids/{'0' * 64}"), 405, "method_not_allowed")
+
+
+async def test_a_slow_body_is_given_up(app: FastAPI, anyio_backend: str) -> None:
+    async def drip() -> AsyncIterator[bytes]:
+        yield b"{"
+        await anyio.sleep(30)
+        yield b"}"
+
+    app.state.settings = app.state.settings.model_copy(update={"body_seconds": 0.1})
+    async with client_of(app) as client:
+        check_problem(await client.post("/v1/solids", content=drip(), headers=JSON), 408, "slow_body")
+
+
+async def test_deadline_passes_in_the_engine_and_in_the_queue(app: FastAPI, anyio_backend: str) -> None:
+    add_slow_routes(app)
+    changes = {"deadline_seconds": 0.2, "concurrency": 1}
+    app.state.settings = app.state.settings.model_copy(update=changes)
+    async with client_of(app) as client, anyio.create_task_group() as group:
+        for _ in range(2):
+            group.start_soon(ask_and_check, client, 30.0, 504, "deadline_exceeded")
+
+
+async def ask_and_check(client: httpx.AsyncClient, seconds: float, status: int, code: str) -> None:
+    check_problem(await client.post("/nap", json={"seconds": seconds}), status, code)
+
+
+async def test_a_full_queue_answers_at_once(app: FastAPI, anyio_backend: str) -> None:
+    add_slow_routes(app)
+    app.state.settings = app.state.settings.model_copy(update={"concurrency": 1, "queue_length": 1})
+    async with client_of(app) as client, anyio.create_task_group() as group:
+        for _ in range(2):
+            group.start_soon(nap, client, 0.3)
+        await anyio.sleep(0.1)
+        answer = await client.post("/nap", json={"seconds": 0.0})
+        check_problem(answer, 503, "queue_full")
+        assert answer.headers["retry-after"] == "1"
+    async with client_of(app) as client:
+        assert (await client.post("/nap", json={"seconds": 0.0})).status_code == 200
+
+
+async def nap(client: httpx.AsyncClient, seconds: float) -> None:
+    assert (await client.post("/nap", json={"seconds": seconds})).status_code == 200
+
+
+async def test_a_vanished_client_cancels_its_call(app: FastAPI, anyio_backend: str) -> None:
+    log = add_slow_routes(app)
+    messages: list[dict[str, Any]] = [{"type": "http.request", "body": b'{"seconds":20}', "more_body": False}]
+    sent = []
+
+    async def receive() -> dict[str, Any]:
+        if messages:
+            return messages.pop()
+        await asyncio.sleep(0.05)
+        return {"type": "http.disconnect"}
+
+    async def send(message: Any) -> None:
+        sent.append(message)
+
+    scope = {
+        "type": "http",
+        "method": "POST",
+        "path": "/nap",
+        "raw_path": b"/nap",
+        "query_string": b"",
+        "headers": [(b"content-type", b"application/json")],
+        "app": app,
+    }
+    async with client_of(app):
+        before = time.monotonic()
+        await app(scope, receive, send)
+    assert log == ["cancelled"]
+    assert time.monotonic() - before < 5
+
+
+async def test_shutdown_cancels_what_runs(app: FastAPI, anyio_backend: str) -> None:
+    log = add_slow_routes(app)
+    async with anyio.create_task_group() as group, client_of(app) as client:
+        group.start_soon(ask_and_check, client, 20.0, 503, "cancelled")
+        await anyio.sleep(0.1)
+        app.state.pool.close()
+        await anyio.sleep(0.1)
+    assert log == ["cancelled"]
+
+
+async def test_what_nobody_expected_is_a_problem_too(
+    app: FastAPI, anyio_backend: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    add_slow_routes(app)
+    async with client_of(app) as client:
+        answer = await client.post("/broken", json={})
+    check_problem(answer, 500, "internal")
+    assert "secret" not in answer.text
+    assert any(record.exc_info for record in caplog.records)
+    caplog.clear()
+
+
+async def test_requests_before_the_kernels_are_warm_are_answered(app: FastAPI, anyio_backend: str) -> None:
+    async with client_of(app) as client:
+        app.state.warm.clear()
+        check_problem(await client.get("/readyz"), 503, "not_ready")
+        assert (await client.get("/healthz")).json() == {"status": "ok"}
+        assert (await client.post("/v1/solids", json=SPHERE)).status_code == 201
+        app.state.warm.set()
+        assert (await client.get("/readyz")).json() == {"status": "ok"}
+
+
+async def test_cors_is_off_unless_set(client: httpx.AsyncClient) -> None:
+    answer = await client.get("/healthz", headers={"Origin": "https://example.org"})
+    assert "access-control-allow-origin" not in answer.headers
+
+
+async def test_pointers_lead_into_the_request(client: httpx.AsyncClient) -> None:
+    body = {
+        "type": "csg",
+        "operation": "union",
+        "operands": [
+            SPHERE,
+            {"type": "csg", "operation": "difference", "operands": [SPHERE, {**SPHERE, "radius": "1"}]},
+        ],
+    }
+    (error,) = check_problem(await client.post("/v1/solids", json=body), 422, "invalid_array")["errors"]
+    assert error["pointer"] == "/operands/1/operands/1/radius"
+    assert resolve(body, error["pointer"]) == "1"
