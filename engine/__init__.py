@@ -4,6 +4,7 @@ from engine.clipping.overlay import OverlayBatch, overlay, overlay_batch
 from engine.clipping.overlay_result import Collapse, Overlay, OverlayPiece
 from engine.clipping.segments import SegmentPieces, clip_segments
 from engine.containment.locate import contains, locate
+from engine.containment.locate_scene import SceneLocations, locate_scene
 from engine.errors import (
     CancelledError,
     DeadlineExceededError,
@@ -85,6 +86,7 @@ __all__ = [
     "Relation",
     "RepeatedIndexError",
     "RingTooShortError",
+    "SceneLocations",
     "SegmentPieces",
     "Solid",
     "Sphere",
@@ -101,6 +103,7 @@ __all__ = [
     "clip_segments",
     "contains",
     "locate",
+    "locate_scene",
     "overlay",
     "overlay_batch",
 ]
