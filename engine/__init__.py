@@ -2,9 +2,9 @@
 
 from engine.clipping.overlay import OverlayBatch, overlay, overlay_batch
 from engine.clipping.overlay_result import Collapse, Overlay, OverlayPiece
+from engine.clipping.polygons import ClippedPolygons, PolygonStatus, clip_polygons
 from engine.clipping.segments import SegmentPieces, clip_segments
 from engine.containment.locate import contains, locate
-from engine.containment.locate_scene import SceneLocations, locate_scene
 from engine.errors import (
     CancelledError,
     DeadlineExceededError,
@@ -55,6 +55,7 @@ __all__ = [
     "Bounds",
     "Cancel",
     "CancelledError",
+    "ClippedPolygons",
     "Collapse",
     "Convex",
     "Csg",
@@ -81,12 +82,12 @@ __all__ = [
     "OverlayBatch",
     "OverlayPiece",
     "Polygon",
+    "PolygonStatus",
     "Polyhedron",
     "Pose",
     "Relation",
     "RepeatedIndexError",
     "RingTooShortError",
-    "SceneLocations",
     "SegmentPieces",
     "Solid",
     "Sphere",
@@ -100,10 +101,10 @@ __all__ = [
     "ZeroNormalError",
     "__version__",
     "bounds",
+    "clip_polygons",
     "clip_segments",
     "contains",
     "locate",
-    "locate_scene",
     "overlay",
     "overlay_batch",
 ]

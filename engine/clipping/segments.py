@@ -9,7 +9,9 @@ from typing import Any, Literal, overload
 import numpy as np
 import numpy.typing as npt
 
+from engine.clipping.box_planes import box_rows
 from engine.clipping.cohen_sutherland import BEYOND_FILTER, KEPT, OPEN, clip_on_boxes_2d, clip_on_boxes_3d
+from engine.clipping.concave import PieceRows, clip_chunk
 from engine.clipping.cyrus_beck import clip_on_rows_2d, clip_on_rows_3d
 from engine.clipping.exact_segments import Piece, clip_by_planes, clip_by_sphere
 from engine.clipping.scaling import FloatArray, balanced_rows, exponent_of, scaled_back, shifted
@@ -21,6 +23,8 @@ from engine.solids.base import Solid
 from engine.solids.checks import as_point_groups
 from engine.solids.convex import Convex
 from engine.solids.half_space import HalfSpace
+from engine.solids.polygon import Polygon
+from engine.solids.polyhedron import Polyhedron
 from engine.solids.sphere import Sphere
 from engine.types import Accuracy
 
@@ -86,12 +90,13 @@ def clip_segments(
     """Return the pieces of segments that lie in a region, a closed set.
 
     A piece is a maximal connected part of a segment within the region or on its boundary. Boxes are clipped by
-    Cohen-Sutherland outcodes, convex regions by their generalisation, spheres by the roots of a quadratic, all with
-    exact decisions on the original end points.
+    Cohen-Sutherland outcodes, convex regions by their generalisation, spheres by the roots of a quadratic, polygons and
+    polyhedra by the elements of their boundary that a box tree finds; all with exact decisions on the original ends.
 
     Parameters
         segments: (n, 2, dim) numbers, two points each; none at all are welcome.
-        region: half_space, aabb, convex (may be empty or unbounded) or sphere of the same dimension.
+        region: half_space, aabb, convex (may be empty or unbounded), sphere, polygon or polyhedron of the same
+            dimension. On the last two a segment may have several pieces.
         workers, deadline (seconds), cancel, progress: see `engine.parallel`.
         report: return ``(pieces, Accuracy)``.
     Returns
@@ -99,8 +104,9 @@ def clip_segments(
     Boundary
         Counts as in: a segment in a face is kept, one that touches in a single point gives that point (t0 = t1).
         `faces` at the start is -1 exactly where t0 = 0, at the end where t1 = 1; else the plane crossed there, of
-        several at one point the smallest. Indices: half_space 0; aabb xmin, xmax, ymin, ymax, zmin, zmax; convex the
-        row; sphere 0.
+        several at one point the smallest, those that the segment runs along last. Indices: half_space 0; aabb xmin,
+        xmax, ymin, ymax, zmin, zmax; convex the row; sphere 0; polyhedron the face as given; polygon the edge, named by
+        the index of its first vertex over all rings.
     Degenerate input
         A segment of no length is a point: kept as a whole (t = (0, 1), faces -1) or dropped.
     Accuracy
@@ -108,7 +114,7 @@ def clip_segments(
         its own, zero as +0.0; so a piece may stick out of a slanted plane by half an ulp, and the ends of a tiny piece
         may be equal. On an aabb a coordinate cut by a plane is the plane's. No result overflows.
     Cost
-        O(n planes); allocates the outputs.
+        O(n planes), or O(n (log faces + contacts)) after one preparation; allocates the outputs.
     Raises
         UnsupportedSolidError, InvalidArrayError, WrongDimensionError, NotFiniteError, DeadlineExceededError,
         CancelledError.
@@ -141,6 +147,8 @@ def _method(region: Solid) -> tuple[Task, str]:
             return _on_box(region), "cohen_sutherland"
         case Sphere():
             return _on_ball(region), "sphere_interval"
+        case Polygon() | Polyhedron():
+            return _on_boundary(region), "box_tree"
     kind = getattr(region, "type", type(region).__name__)
     raise UnsupportedSolidError(
         f"clip_segments does not take a {kind}; give a half_space, aabb, convex, sphere, polygon or polyhedron",
@@ -158,11 +166,7 @@ def _on_box(region: Aabb) -> Task:
         scaled = [shifted(array, -exponent) if exponent else array for array in (segments, region.min, region.max)]
         if any(array is None for array in scaled):
             exponent, scaled = 0, [segments, region.min, region.max]
-        # a box's rows are those of its planes with unit normals, so one exact routine settles both
-        unit = np.eye(region.dimension)
-        rows = np.empty((2 * region.dimension, region.dimension + 1))
-        rows[0::2, :-1], rows[1::2, :-1], rows[0::2, -1], rows[1::2, -1] = unit, -unit, -region.min, region.max
-        planes = rows.tolist()
+        planes = box_rows(region).tolist()
         return _clip_convex(
             kernel,
             (np.ascontiguousarray(scaled[1]), np.ascontiguousarray(scaled[2])),
@@ -228,6 +232,29 @@ def _on_ball(region: Sphere) -> Task:
             workers,
             progress,
         )
+
+    return task
+
+
+def _on_boundary(region: Polygon | Polyhedron) -> Task:
+    def task(
+        segments: FloatArray, budget: Budget, workers: int | None, progress: Progress | None
+    ) -> tuple[SegmentPieces, int, int]:
+        chunks: dict[int, PieceRows] = {}
+
+        def chunk(first: int, last: int) -> None:
+            chunks[first] = clip_chunk(segments, first, last, region, budget)
+
+        run_chunks(chunk, len(segments), budget=budget, workers=workers, progress=progress, first_chunk=16)
+        parts = [chunks[first] for first in sorted(chunks)] or [clip_chunk(segments, 0, 0, region, budget)]
+        pieces = SegmentPieces(
+            np.concatenate([part.source for part in parts]),
+            np.concatenate([part.start for part in parts]),
+            np.concatenate([part.end for part in parts]),
+            np.concatenate([part.t for part in parts]),
+            np.concatenate([part.faces for part in parts]),
+        )
+        return pieces, sum(part.n_beyond for part in parts), sum(part.n_rational for part in parts)
 
     return task
 

@@ -1,0 +1,181 @@
+"""Segments on polygons and polyhedra: contacts by a box tree, pieces between them; several for each segment.
+
+Segments without any contact lie on one side: the location of their first end decides, in batches. The others are cut in
+exact arithmetic (exact_pieces.py). Zero-length segments are points.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from engine.clipping.box_tree import BoxTree, build_box_tree
+from engine.clipping.contacts import PROPER, find_contacts_2d, find_contacts_3d
+from engine.clipping.exact_pieces import pieces_of
+from engine.clipping.exact_segments import Piece
+from engine.containment.locators import locator_of
+from engine.containment.rational_locate import rational_location
+from engine.parallel import Budget
+from engine.solids.base import FloatArray, IntArray
+from engine.solids.polygon import Polygon
+from engine.solids.polyhedron import Polyhedron
+
+_LEAST_ROOM = 1 << 12  # contacts looked for at once; doubled where one segment has more
+
+
+@dataclass(frozen=True, slots=True)
+class Boundary:
+    """elements: (k, 2 or 3) int64 into vertices (m, dim); faces: (k,) int64, the face or edge each is reported as."""
+
+    vertices: FloatArray
+    elements: IntArray
+    faces: IntArray
+    tree: BoxTree
+
+
+def boundary_of(region: Polygon | Polyhedron) -> Boundary:
+    """Return the prepared boundary of a region: triangles, or the edges of all rings by their first vertex."""
+
+    def build() -> Boundary:
+        if isinstance(region, Polyhedron):
+            elements, faces = region.triangles, region.triangle_faces
+        else:
+            following = np.arange(1, len(region.vertices) + 1, dtype=np.int64)
+            following[region.ring_offsets[1:] - 1] = region.ring_offsets[:-1]
+            faces = np.arange(len(following), dtype=np.int64)
+            elements = np.stack([faces, following], axis=1)
+        corners = region.vertices[elements]
+        tree = build_box_tree(corners.min(axis=1), corners.max(axis=1))
+        return Boundary(region.vertices, np.ascontiguousarray(elements), faces, tree)
+
+    return region.prepared("clipping_boundary", build)
+
+
+@dataclass(frozen=True, slots=True)
+class PieceRows:
+    """The pieces of one chunk, in order; see `SegmentPieces`."""
+
+    source: IntArray
+    start: FloatArray
+    end: FloatArray
+    t: FloatArray
+    faces: IntArray
+    n_beyond: int
+    n_rational: int
+
+
+def clip_chunk(segments: FloatArray, first: int, last: int, region: Polygon | Polyhedron, budget: Budget) -> PieceRows:
+    """Return the pieces of ``segments[first:last]``, (n, 2, dim) float64, in order of source and t."""
+    boundary = boundary_of(region)
+    part = segments[first:last]
+    locations = np.empty(len(part), np.int8)
+    counts = locator_of(region).fill(np.ascontiguousarray(part[:, 0]), locations, budget)
+    offsets, elements, kinds = _contacts(segments, first, last, boundary, budget)
+    n_contacts = np.diff(offsets)
+    n_contacts[(part[:, 0] == part[:, 1]).all(axis=1)] = 0  # points: their location says it all
+    whole = np.flatnonzero((n_contacts == 0) & (locations >= 0))
+    cut = np.flatnonzero(n_contacts)
+    sources, pieces = [], []
+    for i in cut:
+        budget.check()
+        found = _pieces(
+            part[i],
+            elements[offsets[i] : offsets[i + 1]],
+            kinds[offsets[i] : offsets[i + 1]],
+            int(locations[i]),
+            region,
+            boundary,
+            budget,
+        )
+        sources += [i] * len(found)
+        pieces += found
+    n = len(whole)
+    rows = PieceRows(
+        np.concatenate([whole, np.array(sources, np.int64)]) + first,
+        np.concatenate([part[whole, 0] + 0.0, _points(pieces, 1, part.shape[2])]),
+        np.concatenate([part[whole, 1] + 0.0, _points(pieces, 2, part.shape[2])]),
+        np.concatenate([np.tile([0.0, 1.0], (n, 1)), _points(pieces, 0, 2)]),
+        np.concatenate([np.full((n, 2), -1, np.int64), np.array([p.faces for p in pieces], np.int64).reshape(-1, 2)]),
+        min(len(part), len(cut) + counts.beyond),
+        len(cut),
+    )
+    order = np.argsort(rows.source, kind="stable")  # pieces of one segment stay in order of t
+    return PieceRows(
+        rows.source[order],
+        rows.start[order],
+        rows.end[order],
+        rows.t[order],
+        rows.faces[order],
+        rows.n_beyond,
+        rows.n_rational,
+    )
+
+
+def _points(pieces: list[Piece], field: int, width: int) -> FloatArray:
+    return np.array([piece[field] for piece in pieces], np.float64).reshape(-1, width)
+
+
+def _contacts(
+    segments: FloatArray, first: int, last: int, boundary: Boundary, budget: Budget
+) -> tuple[IntArray, IntArray, npt.NDArray[np.uint8]]:
+    """Return the offsets (last - first + 1,) of each segment's contacts, their elements, and their kinds."""
+    kernel: Any = find_contacts_2d if segments.shape[2] == 2 else find_contacts_3d
+    room, done = max(_LEAST_ROOM, 8 * (last - first)), first
+    ends, elements, kinds = [np.zeros(1, np.int64)], [], []
+    while done < last:
+        met, kind = np.empty(room, np.int64), np.empty(room, np.uint8)
+        offsets = np.empty(last - done + 1, np.int64)
+        with np.errstate(all="ignore"):
+            reached = kernel(
+                segments,
+                done,
+                last,
+                boundary.vertices,
+                boundary.elements,
+                boundary.tree.order,
+                boundary.tree.boxes,
+                budget.flag,
+                met,
+                kind,
+                offsets,
+            )
+        budget.check()
+        if reached == done:
+            room *= 2
+            continue
+        found = int(offsets[reached - done])
+        ends.append(ends[-1][-1] + offsets[1 : reached - done + 1])
+        elements.append(met[:found])
+        kinds.append(kind[:found])
+        done = reached
+    if not elements:
+        return ends[0], np.zeros(0, np.int64), np.zeros(0, np.uint8)
+    return np.concatenate(ends), np.concatenate(elements), np.concatenate(kinds)
+
+
+def _pieces(
+    segment: FloatArray,
+    elements: IntArray,
+    kinds: npt.NDArray[np.uint8],
+    location: int,
+    region: Polygon | Polyhedron,
+    boundary: Boundary,
+    budget: Budget,
+) -> list[Piece]:
+    corners = boundary.vertices[boundary.elements[elements]].tolist()
+
+    def locate(point: list[Fraction]) -> int:
+        return rational_location(point, region, None, budget.check)
+
+    return pieces_of(
+        segment[0].tolist(),
+        segment[1].tolist(),
+        list(zip(boundary.faces[elements].tolist(), corners)),
+        bool((kinds == PROPER).all()),
+        location,
+        locate,
+    )
