@@ -79,7 +79,9 @@ def arrange(
     """
     budget = budget or Budget()
     merged: dict[tuple[int, int], list[int]] = {}
-    for (start, end), mask in zip(segments, masks):
+    for count, ((start, end), mask) in enumerate(zip(segments, masks)):
+        if count % _POLL == 0:
+            budget.check()
         if start != end:
             key = (start, end) if nodes.compare(start, end) < 0 else (end, start)
             both = merged.setdefault(key, [0, 0])
@@ -88,7 +90,7 @@ def arrange(
     ends = list(merged)
     lines = [line_through(nodes.points[tail], nodes.points[head]) for tail, head in ends]
     on_segment, n_exact = _meet_all(nodes, ends, lines, budget)
-    return _split(nodes, ends, lines, list(merged.values()), on_segment, n_exact)
+    return _split(nodes, ends, lines, list(merged.values()), on_segment, n_exact, budget)
 
 
 def _meet_all(
@@ -104,7 +106,7 @@ def _meet_all(
     pairs = box_pairs(np.minimum(first, second), np.maximum(first, second), budget)
     budget.check()
     if nodes.all_floats:
-        verdicts = classify_pairs(coordinates, array, pairs)
+        verdicts = classify_pairs(coordinates, array, pairs, budget)
         kept = verdicts != MISS
         pairs, verdicts = pairs[kept], verdicts[kept]
     else:
@@ -161,12 +163,15 @@ def _split(
     merged: list[list[int]],
     on_segment: dict[int, set[int]],
     n_exact: int,
+    budget: Budget,
 ) -> Arrangement:
     """Cut every segment at its nodes and unite the edges that several segments share."""
     by_place = cmp_to_key(nodes.compare)
     edges: dict[tuple[int, int], list[int]] = {}
     carriers: list[Line] = []
     for segment, (tail, head) in enumerate(ends):
+        if segment % _POLL == 0:
+            budget.check()
         inside = on_segment.get(segment)
         stops = [tail, *(sorted(inside, key=by_place) if inside else ()), head]
         mask, cover = merged[segment]

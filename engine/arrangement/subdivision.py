@@ -19,6 +19,8 @@ from engine.arrangement.edge_below import EdgesBelow
 from engine.arrangement.union_find import UnionFind
 from engine.parallel import Budget
 
+_POLL = 512  # nodes, some microseconds each, between two looks at the clock
+
 
 @dataclass(frozen=True, slots=True)
 class Subdivision:
@@ -42,7 +44,7 @@ def turn_of(first: Line, second: Line) -> int:
     return (value > 0) - (value < 0)
 
 
-def half_edges_around(arrangement: Arrangement) -> list[list[int]]:
+def half_edges_around(arrangement: Arrangement, budget: Budget) -> list[list[int]]:
     """Return for each node its outgoing half-edges, counter-clockwise, beginning after straight down."""
     lines = arrangement.lines
 
@@ -58,7 +60,9 @@ def half_edges_around(arrangement: Arrangement) -> list[list[int]]:
         rightward[tail].append(2 * edge)
         leftward[head].append(2 * edge + 1)
     for fans in (rightward, leftward):
-        for fan in fans:
+        for node, fan in enumerate(fans):
+            if node % _POLL == 0:
+                budget.check()
             if len(fan) > 1:
                 fan.sort(key=by_angle)
     return [right + left for right, left in zip(rightward, leftward)]
@@ -92,8 +96,7 @@ def cycles_of(following: Sequence[int]) -> tuple[list[int], int]:
 def subdivide(arrangement: Arrangement, budget: Budget | None = None) -> Subdivision:
     """Return the faces of `arrangement`; cost: linear, plus one stab for each connected component of the edges."""
     budget = budget or Budget()
-    around = half_edges_around(arrangement)
-    budget.check()
+    around = half_edges_around(arrangement, budget)
     cycle, n_cycles = cycles_of(next_half_edges(around, 2 * len(arrangement.tails)))
     budget.check()
     # Cycle n_cycles stands for the boundary at infinity; joined to it, a cycle bounds the unbounded face.

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from engine.arrangement.float_filter import CROSS, MISS, UNSURE, classify_pairs
+from engine.parallel import Budget
 
 
 def exact_turn(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> int:
@@ -24,7 +25,7 @@ def test_sure_verdicts_are_right(scale: float) -> None:
     segments = np.arange(400).reshape(-1, 2)
     pairs = random.integers(0, 200, (3000, 2))
     pairs = pairs[pairs[:, 0] != pairs[:, 1]]
-    verdicts = classify_pairs(points, segments, pairs)
+    verdicts = classify_pairs(points, segments, pairs, Budget())
     for (i, j), verdict in zip(pairs, verdicts, strict=True):
         (a, b), (c, d) = points[segments[i]], points[segments[j]]
         first = exact_turn(a, b, c) * exact_turn(a, b, d)
@@ -40,9 +41,9 @@ def test_sure_verdicts_are_right(scale: float) -> None:
 def test_segments_that_share_an_end_miss_unless_collinear() -> None:
     points = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (2.0, 0.0)])
     segments = np.array([(0, 1), (0, 2), (0, 3)])
-    assert classify_pairs(points, segments, np.array([(0, 1), (0, 2)])).tolist() == [MISS, UNSURE]
+    assert classify_pairs(points, segments, np.array([(0, 1), (0, 2)]), Budget()).tolist() == [MISS, UNSURE]
 
 
 def test_overflow_is_unsure() -> None:
     points = np.array([(-1e300, 0.0), (1e300, 1.0), (0.0, -1e300), (0.0, 1e300)])
-    assert classify_pairs(points, np.array([(0, 1), (2, 3)]), np.array([(0, 1)])).tolist() == [UNSURE]
+    assert classify_pairs(points, np.array([(0, 1), (2, 3)]), np.array([(0, 1)]), Budget()).tolist() == [UNSURE]
