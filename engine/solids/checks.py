@@ -87,9 +87,11 @@ def as_floats(values: object, depth: int, where: Where) -> FloatArray:
             f"{spell(where)} must have {depth} axes, got {_kind(array)}; a single item still needs its outer axis",
             where,
         )
-    with np.errstate(over="ignore", under="ignore"):  # wider floats: judged below
+    if array.dtype.kind == "f" and array.dtype.itemsize <= 8:
         result: FloatArray = np.ascontiguousarray(array, np.float64)
-    if array.dtype.kind != "f" or array.dtype.itemsize > 8:
+    else:
+        with np.errstate(over="ignore", under="ignore"):  # wider floats: judged by the check
+            result = np.ascontiguousarray(array, np.float64)
         _check_converted(array, result, where)
     check_finite(result, where)
     return result
@@ -136,7 +138,7 @@ def _path(index: int, shape: list[int], where: Where) -> Where:
 
 def check_finite(array: FloatArray, where: Where) -> None:
     """Raise on the first NaN or infinity."""
-    finite = np.isfinite(array)
+    finite: npt.NDArray[np.bool_] = np.isfinite(array)
     if not finite.all():
         path = _path(int(finite.argmin()), list(array.shape), where)
         value = float(array.flat[int(finite.argmin())])
