@@ -90,7 +90,7 @@ def _term_exponent(powers: Any, coefficients: Any, points: Any, row: int, i_term
     """Return k with |term| < 2^k; caller guarantees that the term is not zero."""
     exponent = frexp(float(coefficients[i_term]))[1]
     for axis in range(powers.shape[1]):
-        exponent += powers[i_term, axis] * frexp(float(points[row, axis]))[1]
+        exponent += int(powers[i_term, axis]) * frexp(float(points[row, axis]))[1]
     return exponent
 
 
@@ -120,7 +120,7 @@ def sign_of_polynomial_exact(powers: Any, coefficients: Any, points: Any, row: i
         shift = _term_exponent(powers, coefficients, points, row, i_term) - top + COMMON_TOP
         n_factors = 1
         for axis in range(powers.shape[1]):
-            n_factors += powers[i_term, axis]
+            n_factors += int(powers[i_term, axis])
         if shift - SIGNIFICAND_BITS * n_factors < LOWEST_BIT:
             is_incomplete = True
             continue
@@ -128,7 +128,7 @@ def sign_of_polynomial_exact(powers: Any, coefficients: Any, points: Any, row: i
         m = 1
         for axis in range(powers.shape[1]):
             significand = frexp(float(points[row, axis]))[0]
-            for _ in range(powers[i_term, axis]):
+            for _ in range(int(powers[i_term, axis])):
                 m = compress(g, scale(f, m, significand, g))
                 f, g = g, f
         for i in range(m):
