@@ -31,7 +31,9 @@ from typing import Any
 
 import numba
 from numba import config as numba_config
+from numba.core.registry import CPUDispatcher
 
+_OPTIONS: dict[str, Any] = {"nogil": True, "fastmath": False, "error_model": "numpy"}
 _ROOT = Path(__file__).resolve().parent
 _IMPORT = re.compile(
     r"^\s*(?:from\s+engine([.\w]*)\s+import\s+(\([^)]*\)|[^\n]*)|import\s+engine([.\w]+))", re.MULTILINE
@@ -120,13 +122,27 @@ def _cache_at(folder: Path) -> Iterator[None]:
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile an outer loop: called from Python, releases the interpreter lock, cached on disk."""
     folder = cache_folder()
-    options = {"nogil": True, "fastmath": False, "error_model": "numpy"}
     if folder is None or numba_config.DISABLE_JIT:
-        return numba.njit(**options)(function)
+        return numba.njit(**_OPTIONS)(function)
     with _cache_at(folder / source_digest(function.__module__)):
-        return numba.njit(cache=True, **options)(function)
+        return numba.njit(cache=True, **_OPTIONS)(function)
+
+
+class _Inline(CPUDispatcher):  # type: ignore[misc] # numba carries no types
+    """A function for compiled callers only; the wrappers that let Python call it are a third of all compile time.
+
+    A call from Python (a test, a debugger) compiles it a second time, with them.
+    """
+
+    def __call__(self, *arguments: Any) -> Any:
+        if not hasattr(self, "_from_python"):
+            self._from_python = numba.njit(**_OPTIONS)(self.py_func)
+        return self._from_python(*arguments)
 
 
 def inline(function: Callable[..., Any]) -> Any:
     """Compile a small function that kernels call; it lives in the caller's cached code."""
-    return numba.njit(nogil=True, fastmath=False, error_model="numpy")(function)
+    if numba_config.DISABLE_JIT:
+        return function
+    options = _OPTIONS | {"nopython": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    return _Inline(py_func=function, targetoptions=options)

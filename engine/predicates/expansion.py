@@ -41,11 +41,9 @@ def grow(e: Components, n: int, b: float) -> int:
 @inline
 def grow_product(e: Components, n: int, a: float, b: float) -> int:
     """Add a b to e in place; two places."""
-    p, tail = two_prod(a, b)
-    if tail != 0.0:
-        n = grow(e, n, tail)
-    if p != 0.0:
-        n = grow(e, n, p)
+    for part in two_prod(a, b)[::-1]:  # the tail first; a loop, because two calls compile twice as long
+        if part != 0.0:
+            n = grow(e, n, part)
     return n
 
 
