@@ -1,0 +1,258 @@
+"""orient3d of points under rigid poses: exact for the map p -> R p + t in the float64 numbers given.
+
+A posed coordinate is a sum of three products and a number, an expansion of at most seven components; it is never
+rounded before a decision. Four points of one pose have the sign they have unposed, since det R > 0.
+
+**The filter** works on rounded posed coordinates, each off by at most `error`. A difference of two is then off by
+d = 2 error beside its rounding, and the determinant, one column after the other, by at most d (Y Z + X Z + X Y) with
+X, Y, Z the sums of magnitudes of the columns plus 3 d: a column of errors d meets every product of entries of the two
+other columns from two different rows, each once. The threshold adds this, with d enlarged by an eighth for its own
+rounding, to that of `orient3d_filter`; its guard 16h (1 + sum |z|) has room for the four underflows more.
+
+**error.** The rounded coordinate ((r x + s y) + q z) + t is off by at most 4u (1 + 4u) S + 3h, S the sum of magnitudes
+|r x| + |s y| + |q z| + |t|. With |x|, |y|, |z| <= reach, the bound used is twice that: 2^-50 (row sum * reach + |t|)
++ 2^-1070.
+
+**The exact stage** needs expansions of differences (14 components), 2 x 2 minors and the determinant. Nonadjacent
+components between 2^-1074 and 2^1024 number at most 1050, whatever was added.
+"""
+
+from __future__ import annotations
+
+from math import frexp, ldexp
+from typing import Any, NamedTuple
+
+from engine.jit import inline, kernel
+from engine.predicates.error_free import workspace
+from engine.predicates.expansion import Components, add_scaled, compress, grow_product, sign
+from engine.predicates.loading import as_point3
+from engine.predicates.orientation import (
+    BOUND_3D,
+    GUARD_3D,
+    OUT_OF_RANGE,
+    axis_shift,
+    orient3d_exact,
+)
+from engine.types import UNDECIDED, Point3
+
+UNPOSED = -1
+"""Number of the pose that leaves a point where it is."""
+
+ERROR_SHARE = 2.0**-50
+ERROR_FLOOR = 2.0**-1070
+ENLARGED_TWO = 2.25  # both ends of a difference, enlarged by an eighth
+
+TOP = 327  # |posed coordinate| <= 3.01 |p| + |t| < 2^(327 + 3), the top of `orient3d_exact`
+BOTTOM = -254  # a coordinate is a multiple of 2^(low R - 52 + low p - 52), which must be at least 2^-358: 104 - 358
+
+N_DIFFERENCE = 16  # two places for each of 8 products
+N_DIFFERENCES = 9 * N_DIFFERENCE
+N_MINOR = 784  # 2 products of 14 x 14 components, 2 places each
+N_TOTAL = 1100
+
+
+class PosedPoint3(NamedTuple):
+    """A point before its pose, and the row of its pose in an array of poses, or UNPOSED."""
+
+    x: float
+    y: float
+    z: float
+    pose: int
+
+
+@inline
+def posed_error(poses: Any, pose: int, reach: float) -> float:
+    """Return a bound on the rounding of each posed coordinate, for points whose coordinates are at most `reach`."""
+    if pose == UNPOSED:
+        return 0.0
+    largest = 0.0
+    for axis in range(3):
+        row_sum = 0.0
+        for k in range(3):
+            row_sum += abs(float(poses[pose, 3 * axis + k]))
+        largest = max(largest, row_sum * reach + abs(float(poses[pose, 9 + axis])))
+    return ERROR_SHARE * largest + ERROR_FLOOR
+
+
+@inline
+def posed_point(poses: Any, p: PosedPoint3) -> Point3:
+    """Return the posed point, each coordinate within `posed_error` of the exact one."""
+    if p.pose == UNPOSED:
+        return Point3(p.x, p.y, p.z)
+    return Point3(_rounded(poses, p, 0), _rounded(poses, p, 1), _rounded(poses, p, 2))
+
+
+@inline
+def _rounded(poses: Any, p: PosedPoint3, axis: int) -> float:
+    r, i = p.pose, 3 * axis
+    x, y, z = float(poses[r, i]) * p.x, float(poses[r, i + 1]) * p.y, float(poses[r, i + 2]) * p.z
+    return x + y + z + float(poses[r, 9 + axis])
+
+
+@inline
+def orient3d_rounded(a: Point3, b: Point3, c: Point3, d: Point3, error: float) -> int:
+    """Return orient3d of the exact points behind a, b, c, d, each coordinate off by at most `error`, or UNDECIDED."""
+    ax, ay, az = a.x - d.x, a.y - d.y, a.z - d.z
+    bx, by, bz = b.x - d.x, b.y - d.y, b.z - d.z
+    cx, cy, cz = c.x - d.x, c.y - d.y, c.z - d.z
+    bx_cy, cx_by = bx * cy, cx * by
+    cx_ay, ax_cy = cx * ay, ax * cy
+    ax_by, bx_ay = ax * by, bx * ay
+    det = az * (cx_by - bx_cy) + bz * (ax_cy - cx_ay) + cz * (bx_ay - ax_by)
+    permanent = (
+        (abs(bx_cy) + abs(cx_by)) * abs(az) + (abs(cx_ay) + abs(ax_cy)) * abs(bz) + (abs(ax_by) + abs(bx_ay)) * abs(cz)
+    )
+    moved = ENLARGED_TWO * error
+    x = abs(ax) + abs(bx) + abs(cx) + 3.0 * moved
+    y = abs(ay) + abs(by) + abs(cy) + 3.0 * moved
+    z = abs(az) + abs(bz) + abs(cz) + 3.0 * moved
+    threshold = BOUND_3D * permanent + GUARD_3D * (1.0 + z) + moved * (y * z + x * z + x * y)
+    if det > threshold:
+        return 1
+    if -det > threshold:
+        return -1
+    return UNDECIDED
+
+
+@inline
+def orient3d_posed(poses: Any, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d: PosedPoint3, error: float) -> int:
+    """Return orient3d of four posed points, or UNDECIDED.
+
+    poses (n, 12) float64: R by rows, then t; caller guarantees det R > 0 and entries of R of at most 1.01.
+    error: the largest `posed_error` of the points.
+    """
+    side = orient3d_rounded(
+        posed_point(poses, a), posed_point(poses, b), posed_point(poses, c), posed_point(poses, d), error
+    )
+    if side != UNDECIDED:
+        return side
+    return orient3d_posed_exact(poses, a, b, c, d)
+
+
+@inline
+def orient3d_posed_exact(poses: Any, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d: PosedPoint3) -> int:
+    """Return orient3d of four posed points from an expansion, or UNDECIDED; arguments as for `orient3d_posed`."""
+    if a.pose == d.pose and b.pose == d.pose and c.pose == d.pose:
+        return orient3d_exact(
+            Point3(a.x, a.y, a.z), Point3(b.x, b.y, b.z), Point3(c.x, c.y, c.z), Point3(d.x, d.y, d.z)
+        )
+    shift = _common_shift(poses, a, b, c, d)
+    if shift == OUT_OF_RANGE:
+        return UNDECIDED
+    w, lengths = workspace(N_DIFFERENCES), workspace(9)
+    for slot in range(9):  # slot 3 k + axis: the difference from d of a, b, c, the first factor of its column first
+        p = a if slot < 3 else (b if slot < 6 else c)
+        lengths[slot] = float(_set_difference(w, slot * N_DIFFERENCE, poses, p, d, slot % 3, shift))
+    e, m = workspace(N_TOTAL), workspace(N_MINOR)
+    n = 0
+    for k in range(3):  # z of a, b, c, times the minor of x and y of the two others: (next, last) so that 1 is above
+        following, last = 3 * ((k + 1) % 3), 3 * ((k + 2) % 3)
+        n_m = _add_product_of(m, 0, w, lengths, last, following + 1, 1.0)
+        n_m = compress(m, _add_product_of(m, n_m, w, lengths, last + 1, following, -1.0))
+        slot = 3 * k + 2
+        for i in range(int(lengths[slot])):
+            n = add_scaled(e, n, m, n_m, w[slot * N_DIFFERENCE + i])
+    return sign(e, n)
+
+
+@inline
+def _add_product_of(m: Components, n: int, w: Components, lengths: Components, f: int, g: int, factor: float) -> int:
+    """Add factor (1 or -1) times the product of the differences in slots f and g of w to m."""
+    for i in range(int(lengths[f])):
+        for k in range(int(lengths[g])):
+            n = grow_product(m, n, factor * w[f * N_DIFFERENCE + i], w[g * N_DIFFERENCE + k])
+    return n
+
+
+@inline
+def _set_difference(
+    w: Components, start: int, poses: Any, p: PosedPoint3, q: PosedPoint3, axis: int, shift: int
+) -> int:
+    """Set w[start:] to 2^shift times the exact difference of a posed coordinate of p and q; return its length."""
+    e = workspace(N_DIFFERENCE)
+    n = 0
+    for end in range(2):
+        point, factor = (p, 1.0) if end == 0 else (q, -1.0)
+        for k in range(4):
+            entry, value = _factors(poses, point, axis, k, shift, factor)
+            n = grow_product(e, n, entry, value)
+    n = compress(e, n)
+    for i in range(n):
+        w[start + i] = e[i]
+    return n
+
+
+@inline
+def _factors(poses: Any, p: PosedPoint3, axis: int, k: int, shift: int, factor: float) -> tuple[float, float]:
+    """Return the two factors of term k (x, y, z, translation) of factor * 2^shift times a posed coordinate."""
+    value = factor * (p.x if k == 0 else (p.y if k == 1 else p.z))
+    if p.pose == UNPOSED:
+        entry = 1.0 if k == axis else 0.0
+    elif k == 3:
+        entry, value = 1.0, factor * float(poses[p.pose, 9 + axis])
+    else:
+        entry = float(poses[p.pose, 3 * axis + k])
+    return entry, ldexp(value, shift)
+
+
+class _Extent(NamedTuple):
+    """Largest magnitude, smallest nonzero magnitude, smallest nonzero magnitude of a matrix entry (at most 1)."""
+
+    largest: float
+    smallest: float
+    entry: float
+
+
+@inline
+def _widened_by_point(extent: _Extent, poses: Any, p: PosedPoint3) -> _Extent:
+    """Return the extent with one more point and its pose."""
+    largest, smallest, entry = extent
+    for k in range(3):
+        size = abs(p.x if k == 0 else (p.y if k == 1 else p.z))
+        largest = max(largest, size)
+        smallest = smallest if size == 0.0 else min(smallest, size)
+    if p.pose == UNPOSED:
+        return _Extent(largest, smallest, entry)
+    for i in range(9):
+        size = abs(float(poses[p.pose, i]))
+        entry = entry if size == 0.0 else min(entry, size)
+    for i in range(9, 12):
+        size = abs(float(poses[p.pose, i]))
+        largest = max(largest, size)
+        smallest = smallest if size == 0.0 else min(smallest, size)
+    return _Extent(largest, smallest, entry)
+
+
+@inline
+def _common_shift(poses: Any, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d: PosedPoint3) -> int:
+    """Return the power of two that brings all coordinates into the range of the exact stage, or OUT_OF_RANGE."""
+    extent = _Extent(0.0, float("inf"), 1.0)
+    for k in range(4):
+        extent = _widened_by_point(extent, poses, a if k == 0 else (b if k == 1 else (c if k == 2 else d)))
+    # a multiple of the lowest bit of the smallest entry: as if the smallest coordinate were smaller by that factor
+    return axis_shift(extent.smallest, extent.largest, BOTTOM - exponent_of(extent.entry), TOP)
+
+
+@inline
+def exponent_of(magnitude: float) -> int:
+    """Return k with 2^k <= magnitude < 2^(k + 1), for a positive magnitude."""
+    return frexp(magnitude)[1] - 1
+
+
+@kernel
+def orient3d_posed_batch(poses: Any, points: Any, bodies: Any, error: float, is_exact: bool, sides: Any) -> None:
+    """Fill sides (n,) int8 for points (4, n, 3) float64 with poses bodies (4, n) int64; is_exact: skip the filter."""
+    for item in range(sides.shape[0]):
+        a, b = posed_row(points[0], bodies[0], item), posed_row(points[1], bodies[1], item)
+        c, d = posed_row(points[2], bodies[2], item), posed_row(points[3], bodies[3], item)
+        if is_exact:
+            sides[item] = orient3d_posed_exact(poses, a, b, c, d)
+        else:
+            sides[item] = orient3d_posed(poses, a, b, c, d, error)
+
+
+@inline
+def posed_row(points: Any, bodies: Any, row: int) -> PosedPoint3:
+    """Return row `row` of points (n, 3) with its pose bodies[row]."""
+    p = as_point3(points, row)
+    return PosedPoint3(p.x, p.y, p.z, int(bodies[row]))
