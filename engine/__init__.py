@@ -5,6 +5,7 @@ from engine.clipping.overlay_result import Collapse, Overlay, OverlayPiece
 from engine.clipping.polygons import ClippedPolygons, PolygonStatus, clip_polygons
 from engine.clipping.segments import SegmentPieces, clip_segments
 from engine.containment.locate import contains, locate
+from engine.containment.locate_scene import SceneLocations, locate_scene
 from engine.errors import (
     CancelledError,
     DeadlineExceededError,
@@ -88,6 +89,7 @@ __all__ = [
     "Relation",
     "RepeatedIndexError",
     "RingTooShortError",
+    "SceneLocations",
     "SegmentPieces",
     "Solid",
     "Sphere",
@@ -105,6 +107,7 @@ __all__ = [
     "clip_segments",
     "contains",
     "locate",
+    "locate_scene",
     "overlay",
     "overlay_batch",
 ]

@@ -32,6 +32,7 @@ from engine.solids.half_space import HalfSpace
 from engine.solids.implicit import Implicit
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
+from engine.solids.pose import Pose
 from engine.solids.sphere import Sphere
 from engine.solids.triangle import Triangle
 from engine.types import UNDECIDED
@@ -91,8 +92,9 @@ def locator_of(solid: Solid) -> Locator:
     return maker(solid)
 
 
-def _rational(solid: Solid) -> Callable[[Sequence[float], Check], int]:
-    return lambda point, check: rational_location(point, solid, None, check)
+def rational_half(solid: Solid, pose: Pose | None = None) -> Callable[[Sequence[float], Check], int]:
+    """Return what settles one point of a chunk."""
+    return lambda point, check: rational_location(point, solid, pose, check)
 
 
 def _in_rows(solid: HalfSpace | Convex) -> Locator:
@@ -103,21 +105,21 @@ def _in_rows(solid: HalfSpace | Convex) -> Locator:
     def run(points: FloatArray, locations: Locations, flag: Flag) -> int:
         return int(kernel(points, rows, is_exact, locations, flag))
 
-    return Locator("half_spaces", settled(run, _rational(solid)))
+    return Locator("half_spaces", settled(run, rational_half(solid)))
 
 
 def _in_sphere(solid: Sphere) -> Locator:
     def run(points: FloatArray, locations: Locations, flag: Flag) -> int:
         return int(locate_in_ball(points, solid.center, 0.0, solid.radius, np.empty(8), locations, flag))
 
-    return Locator("squared_distance", settled(run, _rational(solid)))
+    return Locator("squared_distance", settled(run, rational_half(solid)))
 
 
 def _in_aabb(solid: Aabb) -> Locator:
     def run(points: FloatArray, locations: Locations, flag: Flag) -> int:
         return int(locate_in_box(points, solid.min, solid.max, locations, flag))
 
-    return Locator("comparison", settled(run, _rational(solid)))
+    return Locator("comparison", settled(run, rational_half(solid)))
 
 
 def _in_triangle(solid: Triangle) -> Locator:
@@ -128,7 +130,7 @@ def _in_triangle(solid: Triangle) -> Locator:
     def run(points: FloatArray, locations: Locations, flag: Flag) -> int:
         return int(locate_in_triangle(points, solid.vertices, low, high, locations, flag))
 
-    return Locator("same_side", settled(run, _rational(solid)))
+    return Locator("same_side", settled(run, rational_half(solid)))
 
 
 def _in_prism(solid: Triangle) -> Locator:
@@ -145,7 +147,7 @@ def _in_prism(solid: Triangle) -> Locator:
     def run(points: FloatArray, locations: Locations, flag: Flag) -> int:
         return int(locate_in_half_spaces(points, rows, is_exact, locations, flag))
 
-    return Locator("prism", settled(run, _rational(solid)))
+    return Locator("prism", settled(run, rational_half(solid)))
 
 
 def _in_polygon(solid: Polygon) -> Locator:
@@ -153,7 +155,7 @@ def _in_polygon(solid: Polygon) -> Locator:
         rings: Rings = rings_of(solid)
         return int(locate_in_rings(points, *rings, locations, flag))
 
-    return Locator("ring_crossing", settled(run, _rational(solid)))
+    return Locator("ring_crossing", settled(run, rational_half(solid)))
 
 
 def _in_polyhedron(solid: Polyhedron) -> Locator:
@@ -161,7 +163,7 @@ def _in_polyhedron(solid: Polyhedron) -> Locator:
         columns: Columns = columns_of(solid)
         return int(locate_by_columns(points, *columns, locations, flag))
 
-    return Locator("ray_parity", settled(run, _rational(solid)))
+    return Locator("ray_parity", settled(run, rational_half(solid)))
 
 
 def _in_implicit(solid: Implicit) -> Locator:
@@ -172,7 +174,7 @@ def _in_implicit(solid: Implicit) -> Locator:
     def run(points: FloatArray, locations: Locations, flag: Flag) -> int:
         return int(locate_by_polynomial(points, solid.powers, solid.coefficients, degree, locations, flag))
 
-    return Locator("polynomial", settled(run, _rational(solid)))
+    return Locator("polynomial", settled(run, rational_half(solid)))
 
 
 def _call(solid: Implicit) -> Fill:
@@ -197,16 +199,23 @@ def _call(solid: Implicit) -> Fill:
 
 
 def _in_csg(solid: Csg) -> Locator:
+    return csg_locator(solid, locator_of)
+
+
+def csg_locator(solid: Csg, leaf_locator: Callable[[Solid], Locator]) -> Locator:
+    """Return the locator of a tree: every distinct node is located once a chunk, its operands first."""
     leaves: dict[int, Locator] = {}
+    seen: set[int] = set()
 
     def gather(node: Solid) -> None:
-        if id(node) not in leaves:
-            if isinstance(node, Csg):
-                leaves[id(node)] = _NODE
-                for operand in node.operands:
-                    gather(operand)
-            else:
-                leaves[id(node)] = locator_of(node)
+        if id(node) in seen:
+            return
+        seen.add(id(node))
+        if isinstance(node, Csg):
+            for operand in node.operands:
+                gather(operand)
+        else:
+            leaves[id(node)] = leaf_locator(node)
 
     gather(solid)
 
@@ -233,11 +242,6 @@ def _in_csg(solid: Csg) -> Locator:
     return Locator("csg_tree", fill, "exact" if is_exact else "float64")
 
 
-def _nothing(points: FloatArray, locations: Locations, budget: Budget) -> Counts:
-    return Counts(0, 0)
-
-
-_NODE = Locator("csg_tree", _nothing)
 _MAKERS: dict[type[Solid], Callable[..., Locator]] = {
     HalfSpace: _in_rows,
     Convex: _in_rows,

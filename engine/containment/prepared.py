@@ -16,6 +16,7 @@ from engine.predicates.rational import orient2d_rational
 from engine.solids.base import FloatArray
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
+from engine.solids.triangle import Triangle
 from engine.types import UNDECIDED
 
 
@@ -71,13 +72,18 @@ def _build_columns(solid: Polyhedron) -> Columns:
     return Columns(vertices, triangles, boxes, areas, grid, float(low[:, 2].min()))
 
 
-def rings_of(solid: Polygon) -> Rings:
-    """Return the slabs of `solid`, prepared once."""
-    return solid.prepared("slabs", lambda: _build_rings(solid))
+def rings_of(solid: Polygon | Triangle) -> Rings:
+    """Return the slabs of a polygon, or of a plane triangle as one ring, prepared once."""
+
+    def build() -> Rings:
+        if isinstance(solid, Triangle):
+            return _build_rings(solid.vertices, solid.vertices[[1, 2, 0]])
+        return _build_rings(solid.vertices, solid.vertices[next_in_ring(solid)])
+
+    return solid.prepared("slabs", build)
 
 
-def _build_rings(solid: Polygon) -> Rings:
-    starts, ends = solid.vertices, solid.vertices[next_in_ring(solid)]
+def _build_rings(starts: FloatArray, ends: FloatArray) -> Rings:
     order = np.argsort(-np.maximum(starts[:, 0], ends[:, 0]), kind="stable")
     starts, ends = np.ascontiguousarray(starts[order]), np.ascontiguousarray(ends[order])
     low, high = np.minimum(starts, ends), np.maximum(starts, ends)

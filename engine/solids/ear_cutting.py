@@ -25,16 +25,19 @@ from __future__ import annotations
 
 import heapq
 from itertools import pairwise
-from typing import Final
+from typing import Final, cast
 
 import numpy as np
 import numpy.typing as npt
 
-from engine.errors import FaceNotSimpleError
+from engine.errors import FaceNotSimpleError, TooComplexError
 from engine.solids.base import FloatArray, IntArray
 from engine.solids.checks import digits
 
 IntPoint = tuple[int, int]
+
+MAX_LOOKS: Final = 100
+"""Most looks for an ear, times the number of corners of a face; real faces need 2 to 5."""
 
 _TINY: Final = 1e-300  # far above what underflow takes from a sum of products (a few times 2^-1075)
 _ROUNDOFF: Final = 2.0**-53
@@ -71,37 +74,46 @@ def cut_faces(
 def _certify_convex(rings: FloatArray) -> npt.NDArray[np.bool_]:
     """Tell for each ring ``(m, k, 3)`` whether it is certainly strictly convex in its projection; False: unsure or not.
 
-    Convex is: the sign of every corner is that of the area, and the direction of the sides turns around once (the first
-    coordinate rises and falls once; comparisons of floats are exact).
+    Where rounding leaves open along which axis the area is largest, it must be convex along each that may be: the fan
+    is the same.
     """
     n_corners = rings.shape[1]
-    with np.errstate(all="ignore"):  # overflow ends as "unsure"
-        edges = rings[:, 1:] - rings[:, :1]
-        area, bound = np.empty((2, len(rings), 3))
-        for axis in range(3):
-            u, v = edges[:, :, (axis + 1) % 3], edges[:, :, (axis + 2) % 3]
-            first, second = u[:, :-1] * v[:, 1:], u[:, 1:] * v[:, :-1]
-            area[:, axis] = (first - second).sum(axis=1)
-            # bound: 4 roundings a term and at most k in the sum, each below the sum of sizes; doubled
-            sizes = (np.abs(first) + np.abs(second)).sum(axis=1)
-            bound[:, axis] = 2.0 * (n_corners + 4) * _ROUNDOFF * sizes + _TINY
-        largest = np.abs(area).argmax(axis=1)
-        rows = np.arange(len(rings))
-        others = np.abs(area) + bound
-        others[rows, largest] = 0.0
-        is_sure = np.abs(area[rows, largest]) - bound[rows, largest] > others.max(axis=1)
-        u = np.take_along_axis(rings, ((largest + 1) % 3)[:, None, None], axis=2)[:, :, 0]
-        v = np.take_along_axis(rings, ((largest + 2) % 3)[:, None, None], axis=2)[:, :, 0]
-        du, dv = np.roll(u, -1, axis=1) - u, np.roll(v, -1, axis=1) - v
-        first, second = du * np.roll(dv, -1, axis=1), np.roll(du, -1, axis=1) * dv
-        turns = (first - second) * np.sign(area[rows, largest])[:, None]
-        # bound: two differences, a product each, one difference: (1 + eps)^4 - 1 < 4.1 eps; 8 eps is taken
-        is_sure &= (turns > 8.0 * _ROUNDOFF * (np.abs(first) + np.abs(second)) + _TINY).all(axis=1)
+    # bound: brought to size 1 by a power of two; what that takes from tiny coordinates, 2^-1075, is far below _TINY
+    rings = np.ldexp(rings, -np.frexp(np.abs(rings).max())[1])
+    area, bound = np.empty((2, 3, len(rings)))
+    result: npt.NDArray[np.bool_] = np.ones(len(rings), np.bool_)
+    spokes = rings[:, 1:] - rings[:, :1]
+    for axis in range(3):
+        u, v = spokes[:, :, (axis + 1) % 3], spokes[:, :, (axis + 2) % 3]
+        first, second = u[:, :-1] * v[:, 1:], u[:, 1:] * v[:, :-1]
+        area[axis] = (first - second).sum(axis=1)
+        # bound: 4 roundings a term and at most k in the sum, each below the sum of sizes; doubled
+        sizes = (np.abs(first) + np.abs(second)).sum(axis=1)
+        bound[axis] = 2.0 * (n_corners + 4) * _ROUNDOFF * sizes + _TINY
+    least = (np.abs(area) - bound).max(axis=0)
+    for axis in range(3):
+        is_smaller = np.abs(area[axis]) + bound[axis] < least
+        u, v = rings[:, :, (axis + 1) % 3], rings[:, :, (axis + 2) % 3]
+        result &= is_smaller | _turns_once(u, v, np.sign(area[axis]))
+    return result
+
+
+def _turns_once(u: FloatArray, v: FloatArray, way: FloatArray) -> npt.NDArray[np.bool_]:
+    """Tell whether each plane ring certainly turns strictly one way at every corner, and around once.
+
+    way: 1 for left turns, -1 for right turns. Around once: the first coordinate rises and falls once (comparisons of
+    floats are exact).
+    """
+    du, dv = np.roll(u, -1, axis=1) - u, np.roll(v, -1, axis=1) - v
+    first, second = du * np.roll(dv, -1, axis=1), np.roll(du, -1, axis=1) * dv
+    # bound: two differences, a product each, one difference: (1 + eps)^4 - 1 < 4.1 eps; 8 eps is taken
+    bound = 8.0 * _ROUNDOFF * (np.abs(first) + np.abs(second)) + _TINY
+    is_strict = ((first - second) * way[:, None] > bound).all(axis=1)
     rises = np.sign(du)  # exact: a difference of floats is zero or has the right sign
-    for i_corner in range(1, n_corners):  # a vertical side goes on as the one before it did
-        rises[:, i_corner] = np.where(rises[:, i_corner] == 0, rises[:, i_corner - 1], rises[:, i_corner])
-    rises = np.where(rises == 0, rises[:, -1:], rises)  # vertical sides at the start follow the last one
-    result: npt.NDArray[np.bool_] = is_sure & ((rises != np.roll(rises, 1, axis=1)).sum(axis=1) == 2)
+    for i_corner in range(1, u.shape[1]):  # a vertical side goes on as the one before it did
+        rises[:, i_corner] = np.where(rises[:, i_corner] == 0.0, rises[:, i_corner - 1], rises[:, i_corner])
+    rises = np.where(rises == 0.0, rises[:, -1:], rises)  # vertical sides at the start follow the last one
+    result: npt.NDArray[np.bool_] = is_strict & ((rises != np.roll(rises, 1, axis=1)).sum(axis=1) == 2)
     return result
 
 
@@ -110,15 +122,24 @@ def cut_ring(points: FloatArray, face: int, names: IntArray) -> list[tuple[int, 
 
     face, names: the number of the face and the caller's indices of its corners, for the message.
     """
-    ring = _project(_integers(points))
-    problem = "has no area in any projection" if ring is None else _not_simple(ring, names)
-    if ring is None or problem is not None:
+    axes = _axes_of_largest_area(_integers(points))
+    problem = "has no area in any projection" if axes is None else None
+    if axes is not None:
+        ring = _Ring(points[:, axes])
+        problem = ring.not_simple(names)
+    if problem is not None:
         raise FaceNotSimpleError(
             f"faces[{face}] = {names[:12].tolist()}{'...' if len(names) > 12 else ''} {problem}; "
             f"its first vertex is {digits(points[0])}; cut it into triangles",
             ("faces", face),
         )
-    return _cut_ears(ring)
+    ears = ring.ears()
+    if ears is None:
+        raise TooComplexError(
+            f"faces[{face}] has {len(points)} vertices and winds too much to be cut here; cut it into triangles",
+            ("faces", face),
+        )
+    return ears
 
 
 def _integers(points: FloatArray) -> list[tuple[int, ...]]:
@@ -128,8 +149,8 @@ def _integers(points: FloatArray) -> list[tuple[int, ...]]:
     return [tuple(numerator * (scale // denominator) for numerator, denominator in row) for row in ratios]
 
 
-def _project(points: list[tuple[int, ...]]) -> list[IntPoint] | None:
-    """Return the ring in the projection of largest area, turned to run counter-clockwise; None if it has no area."""
+def _axes_of_largest_area(points: list[tuple[int, ...]]) -> list[int] | None:
+    """Return the two axes to keep, in the order in which the ring runs counter-clockwise; None if it has no area."""
     area = [0, 0, 0]
     x0, y0, z0 = points[0]
     for (ax, ay, az), (bx, by, bz) in pairwise(points[1:]):
@@ -141,101 +162,102 @@ def _project(points: list[tuple[int, ...]]) -> list[IntPoint] | None:
     if area[axis] == 0:
         return None
     u, v = (axis + 1) % 3, (axis + 2) % 3
-    if area[axis] < 0:
-        u, v = v, u
-    return [(point[u], point[v]) for point in points]
+    return [u, v] if area[axis] > 0 else [v, u]
 
 
 def _turn(a: IntPoint, b: IntPoint, c: IntPoint) -> int:
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
-def _not_simple(ring: list[IntPoint], names: IntArray) -> str | None:
-    """Return what keeps the ring from being simple, None if nothing does."""
-    n = len(ring)
-    for i_corner in range(n):
-        a, b, c = ring[i_corner - 1], ring[i_corner], ring[(i_corner + 1) % n]
-        ahead = (a[0] - b[0]) * (c[0] - b[0]) + (a[1] - b[1]) * (c[1] - b[1])
-        if b == c or (_turn(a, b, c) == 0 and ahead > 0):
-            return f"turns back on itself or stands still at vertex {names[i_corner]}"
-    order = sorted(range(n), key=lambda i: min(ring[i][0], ring[(i + 1) % n][0]))
-    for position, i in enumerate(order):
-        a, b = ring[i], ring[(i + 1) % n]
-        right = max(a[0], b[0])
-        for j in order[position + 1 :]:
-            c, d = ring[j], ring[(j + 1) % n]
-            if min(c[0], d[0]) > right:
-                break
-            if (i + 1) % n == j or (j + 1) % n == i:
+class _Ring:
+    """One counter-clockwise ring of area > 0: integers for signs, the same points as floats for culling by boxes."""
+
+    def __init__(self, flat: FloatArray) -> None:
+        self.flat = np.ascontiguousarray(flat.T)
+        self.points = cast(list[IntPoint], _integers(flat))
+
+    def not_simple(self, names: IntArray) -> str | None:
+        """Return what keeps the ring from being simple, None if nothing does."""
+        points, n = self.points, len(self.points)
+        for i in range(n):
+            a, b, c = points[i - 1], points[i], points[(i + 1) % n]
+            ahead = (a[0] - b[0]) * (c[0] - b[0]) + (a[1] - b[1]) * (c[1] - b[1])
+            if b == c or (_turn(a, b, c) == 0 and ahead > 0):
+                return f"stands still or turns back on itself at vertex {names[i]}"
+        ends = np.roll(self.flat, -1, axis=1)
+        low, high = np.minimum(self.flat, ends), np.maximum(self.flat, ends)
+        for i in range(n - 2):
+            others = slice(i + 2, n - 1 if i == 0 else n)  # sides that share no corner with side i
+            near = (low[:, others] <= high[:, i : i + 1]) & (high[:, others] >= low[:, i : i + 1])
+            for j in (np.flatnonzero(near[0] & near[1]) + i + 2).tolist():
+                if _boxed_segments_meet(points[i], points[i + 1], points[j], points[(j + 1) % n]):
+                    return (
+                        f"is not simple in the projection of largest area: side {names[i]}-{names[i + 1]} "
+                        f"meets side {names[j]}-{names[(j + 1) % n]}"
+                    )
+        return None
+
+    def ears(self) -> list[tuple[int, int, int]] | None:
+        """Cut a simple ring; None if that takes more than `MAX_LOOKS` looks for each corner.
+
+        invariant: a corner outside the heap is no ear: it is not strictly convex, or its `blocker` is still there.
+        bound: every turn of the loop takes a corner from the heap; a cut, of which there are n - 3, puts back its two
+        neighbours and those it blocked; the cap ends rings made to block each other again and again.
+        """
+        points, n = self.points, len(self.points)
+        before, after = [(i - 1) % n for i in range(n)], [(i + 1) % n for i in range(n)]
+        is_blunt = np.array([_turn(points[i - 1], points[i], points[(i + 1) % n]) <= 0 for i in range(n)])
+        blocked_by: dict[int, list[int]] = {}
+        is_there, waiting = [True] * n, list(range(n))
+        ears: list[tuple[int, int, int]] = []
+        n_looks = 0
+        while len(ears) < n - 3:
+            tip = heapq.heappop(waiting)
+            if not is_there[tip] or is_blunt[tip]:
                 continue
-            if _segments_meet(a, b, c, d):
-                return (
-                    f"is not simple in the projection of largest area: side {names[i]}-{names[(i + 1) % n]} "
-                    f"meets side {names[j]}-{names[(j + 1) % n]}"
-                )
-    return None
+            n_looks += 1
+            if n_looks > MAX_LOOKS * n:
+                return None
+            left, right = before[tip], after[tip]
+            blocker = self._blocker(left, tip, right, is_blunt)
+            if blocker is not None:
+                blocked_by.setdefault(blocker, []).append(tip)
+                continue
+            ears.append((left, tip, right))
+            is_there[tip] = False
+            after[left], before[right] = right, left
+            changed = [left, right]
+            for corner in (left, right):
+                if is_blunt[corner] and _turn(points[before[corner]], points[corner], points[after[corner]]) > 0:
+                    is_blunt[corner] = False
+                    changed += blocked_by.pop(corner, [])
+            for corner in changed:
+                heapq.heappush(waiting, corner)
+        first = is_there.index(True)
+        return [*ears, (before[first], first, after[first])]
+
+    def _blocker(self, left: int, tip: int, right: int, is_blunt: npt.NDArray[np.bool_]) -> int | None:
+        """Return a vertex in the closed triangle of a strictly convex corner, None if there is none.
+
+        Only corners that are not strictly convex need a look: of the vertices in the triangle the one nearest the tip
+        has an inner angle of 180 degrees or more. No blunt corner is ever cut, so that none of them is gone.
+        """
+        corners = self.flat[:, [left, tip, right]]
+        (low_u, low_v), (high_u, high_v) = corners.min(axis=1), corners.max(axis=1)
+        u, v = self.flat
+        near = is_blunt & (u >= low_u) & (u <= high_u) & (v >= low_v) & (v <= high_v)
+        a, b, c = self.points[left], self.points[tip], self.points[right]
+        for corner in np.flatnonzero(near).tolist():
+            if corner != left and corner != right:
+                p = self.points[corner]
+                if _turn(a, b, p) >= 0 and _turn(b, c, p) >= 0 and _turn(c, a, p) >= 0:
+                    return corner
+        return None
 
 
-def _segments_meet(a: IntPoint, b: IntPoint, c: IntPoint, d: IntPoint) -> bool:
-    """Tell whether two closed segments have a common point."""
-    if max(c[1], d[1]) < min(a[1], b[1]) or max(a[1], b[1]) < min(c[1], d[1]):
-        return False
-    if max(c[0], d[0]) < min(a[0], b[0]) or max(a[0], b[0]) < min(c[0], d[0]):
-        return False
+def _boxed_segments_meet(a: IntPoint, b: IntPoint, c: IntPoint, d: IntPoint) -> bool:
+    """Tell whether two closed segments whose boxes overlap have a common point."""
     abc, abd, cda, cdb = _turn(a, b, c), _turn(a, b, d), _turn(c, d, a), _turn(c, d, b)
     apart_on_ab = (abc > 0 and abd > 0) or (abc < 0 and abd < 0)
     apart_on_cd = (cda > 0 and cdb > 0) or (cda < 0 and cdb < 0)
-    return not (apart_on_ab or apart_on_cd)  # all four zero: collinear, and the boxes overlap
-
-
-def _cut_ears(ring: list[IntPoint]) -> list[tuple[int, int, int]]:
-    """Cut a simple counter-clockwise ring. A heap holds the corners to look at, those known as no ears stand by.
-
-    invariant: a corner outside the heap is no ear, because it is not strictly convex or its `blocker` is still there.
-    bound: every turn of the loop takes a corner from the heap; a cut, of which there are n - 3, puts back its two
-    neighbours and those it blocked.
-    """
-    n = len(ring)
-    before, after = [(i - 1) % n for i in range(n)], [(i + 1) % n for i in range(n)]
-    blunt = {i for i in range(n) if _turn(ring[i - 1], ring[i], ring[(i + 1) % n]) <= 0}
-    blocked_by: dict[int, list[int]] = {}
-    is_there, waiting = [True] * n, list(range(n))
-    ears: list[tuple[int, int, int]] = []
-    while len(ears) < n - 3:
-        tip = heapq.heappop(waiting)
-        if not is_there[tip] or tip in blunt:
-            continue
-        left, right = before[tip], after[tip]
-        blocker = _blocker(ring, left, tip, right, blunt)
-        if blocker is not None:
-            blocked_by.setdefault(blocker, []).append(tip)
-            continue
-        ears.append((left, tip, right))
-        is_there[tip] = False
-        after[left], before[right] = right, left
-        changed = blocked_by.pop(tip, [])
-        for corner in (left, right):
-            if corner in blunt and _turn(ring[before[corner]], ring[corner], ring[after[corner]]) > 0:
-                blunt.remove(corner)
-                changed += blocked_by.pop(corner, [])
-            changed.append(corner)
-        for corner in changed:
-            heapq.heappush(waiting, corner)
-    first = is_there.index(True)
-    ears.append((before[first], first, after[first]))
-    return ears
-
-
-def _blocker(ring: list[IntPoint], left: int, tip: int, right: int, blunt: set[int]) -> int | None:
-    """Return a vertex in the closed triangle of a strictly convex corner, None if there is none.
-
-    Only corners that are not strictly convex need a look: of the vertices in the triangle the one nearest the tip has
-    an inner angle of 180 degrees or more.
-    """
-    a, b, c = ring[left], ring[tip], ring[right]
-    for corner in blunt:
-        if corner != left and corner != right:
-            p = ring[corner]
-            if _turn(a, b, p) >= 0 and _turn(b, c, p) >= 0 and _turn(c, a, p) >= 0:
-                return corner
-    return None
+    return not (apart_on_ab or apart_on_cd)  # all four zero: collinear, and their boxes overlap

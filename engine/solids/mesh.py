@@ -199,10 +199,7 @@ def first_equal_points(points: FloatArray) -> IntArray | None:
     neighbours in full; should two different points ever mix to one value, all coordinates are sorted instead.
     """
     bits = points.view(np.uint64)
-    mixed = bits[:, 0] * np.uint64(0x9E3779B97F4A7C15)  # odd constants of splitmix64; products wrap around
-    for column in range(1, bits.shape[1]):
-        mixed ^= mixed >> np.uint64(29)
-        mixed = (mixed + bits[:, column]) * np.uint64(0xBF58476D1CE4E5B9)
+    mixed = _mix(bits)
     order = np.argsort(mixed, kind="stable")
     is_same = mixed[order][1:] == mixed[order][:-1]
     if not is_same.any():
@@ -215,3 +212,12 @@ def first_equal_points(points: FloatArray) -> IntArray | None:
     first = np.empty(len(points), np.int64)
     first[order] = np.repeat(order[starts], np.diff(np.append(starts, len(points))))
     return first
+
+
+def _mix(bits: npt.NDArray[np.uint64]) -> npt.NDArray[np.uint64]:
+    """Return one number for each row ``(n, 3)``, seldom the same for two different rows."""
+    mixed = bits[:, 0] * np.uint64(0x9E3779B97F4A7C15)  # odd constants of splitmix64; products wrap around
+    for column in range(1, bits.shape[1]):
+        mixed ^= mixed >> np.uint64(29)
+        mixed = (mixed + bits[:, column]) * np.uint64(0xBF58476D1CE4E5B9)
+    return mixed

@@ -15,7 +15,7 @@ class Surface(Mesh):
     IndexOutOfRangeError, RepeatedIndexError, FaceNotSimpleError.
 
     >>> Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]]).triangles.tolist()
-    [[3, 0, 1], [1, 2, 3]]
+    [[3, 0, 1], [3, 1, 2]]
     """
 
     __slots__ = ()

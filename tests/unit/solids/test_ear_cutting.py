@@ -1,0 +1,155 @@
+"""Polygonal faces: the rule against a plain second implementation, refusals, extremes."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import engine
+from engine.solids import ear_cutting
+from engine.solids.ear_cutting import cut_faces, cut_ring
+from tests.reference.exact import vector
+from tests.reference.solids import cut_face
+
+QUAD = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]]
+
+
+def cut(points: object) -> list[tuple[int, int, int]]:
+    """Cut one face through the public way and return its triangles as they are stored."""
+    array = np.asarray(points, np.float64)
+    surface = engine.Surface(array, [list(range(len(array)))])
+    assert surface.triangle_faces.tolist() == [0] * (len(array) - 2)
+    return [tuple(row) for row in surface.triangles.tolist()]
+
+
+def rotated_to_first(triangles: list[tuple[int, int, int]]) -> list[tuple[int, int, int]]:
+    """Return each triangle from its smallest index on, orientation kept."""
+    turned = []
+    for triangle in triangles:
+        start = triangle.index(min(triangle))
+        turned.append((*triangle[start:], *triangle[:start]))
+    return turned  # type: ignore[return-value]
+
+
+def star(n: int, seed: int, lift: float) -> np.ndarray:
+    """Return a star-shaped ring around the z axis, tilted, its vertices `lift` off their plane."""
+    rng = np.random.default_rng(seed)
+    angles, radii = 2.0 * np.pi * np.arange(n) / n, rng.uniform(0.2, 1.0, n)
+    ring = np.stack([radii * np.cos(angles), radii * np.sin(angles), lift * rng.normal(size=n)], axis=1)
+    rotation, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    return np.roll(ring @ rotation, int(rng.integers(n)), axis=0)
+
+
+def test_a_convex_face_becomes_a_fan_about_its_last_vertex() -> None:
+    assert cut(QUAD) == [(3, 0, 1), (3, 1, 2)]
+    hexagon = [[math.cos(a), math.sin(a), 0.0] for a in np.arange(6) * math.pi / 3]
+    assert cut(hexagon) == [(5, 0, 1), (5, 1, 2), (5, 2, 3), (5, 3, 4)]
+    assert cut(hexagon[::-1]) == [(5, 0, 1), (5, 1, 2), (5, 2, 3), (5, 3, 4)]
+
+
+@pytest.mark.parametrize("n", [4, 5, 6, 9, 20])
+@pytest.mark.parametrize("lift", [0.0, 0.01])
+def test_agrees_with_the_plain_rule(n: int, lift: float) -> None:
+    for seed in range(12):
+        ring = star(n, seed, lift)
+        expected = cut_face([vector(point) for point in ring], list(range(n)))
+        assert rotated_to_first(cut(ring)) == rotated_to_first(expected)
+
+
+@pytest.mark.parametrize("exponent", [-1070, -600, 600, 1020])
+def test_scale_does_not_matter(exponent: int) -> None:
+    ring = np.round(star(9, 3, 0.1) * 16.0)  # whole numbers: scaling is exact even down to denormals
+    assert cut(np.ldexp(ring, exponent)) == cut(ring)
+    assert cut(np.ldexp(np.array(QUAD), exponent)) == cut(QUAD)
+
+
+def test_vertices_on_straight_sides_are_kept() -> None:
+    ring = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0], [2, 2, 0], [1, 2, 0], [0, 2, 0], [0, 1, 0]]
+    for shift in range(8):
+        turned = ring[shift:] + ring[:shift]
+        triangles = cut(turned)
+        area = 0
+        for a, b, c in triangles:
+            (ax, ay, _), (bx, by, _), (cx, cy, _) = turned[a], turned[b], turned[c]
+            twice = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+            assert twice > 0
+            area += twice
+        assert area == 8
+        assert {index for triangle in triangles for index in triangle} == set(range(8))
+        expected = cut_face([vector(point) for point in turned], list(range(8)))
+        assert rotated_to_first(triangles) == rotated_to_first(expected)
+
+
+def test_a_tie_of_areas_takes_the_first_axis() -> None:
+    # not plane: along x the corner at vertex 0 is reflex, along y it is convex; the areas are equal
+    ring = np.array([[2.0, 2.0, 1.0], [0.0, 0.0, 0.0], [4.0, 4.0, 1.0], [0.0, 0.0, 4.0]])
+    expected = cut_face([vector(point) for point in ring], [0, 1, 2, 3])
+    assert rotated_to_first(cut(ring)) == rotated_to_first(expected)
+    for seed in range(60):
+        ring = np.random.default_rng(seed).integers(-2, 3, (5, 3)).astype(float)
+        try:
+            expected = cut_face([vector(point) for point in ring], list(range(5)))
+            found = cut(ring)
+        except (ValueError, engine.FaceNotSimpleError):
+            continue
+        assert rotated_to_first(found) == rotated_to_first(expected)
+
+
+def test_the_certificate_for_many_faces_changes_nothing() -> None:
+    rings = [star(6, seed, 0.05) for seed in range(30)] + [np.array(QUAD) + i for i in range(5)]
+    vertices = np.concatenate(rings)
+    offsets = np.append(0, np.cumsum([len(ring) for ring in rings]))
+    indices = np.arange(len(vertices))
+    together, faces = cut_faces(vertices, offsets, indices, indices)
+    one_by_one = []
+    for i_ring, ring in enumerate(rings):
+        ears = cut_ring(ring, i_ring, np.arange(len(ring)))
+        one_by_one += [[offsets[i_ring] + corner for corner in ear] for ear in ears]
+    assert together.reshape(-1, 3).tolist() == one_by_one
+    assert faces.tolist() == [i_ring for i_ring, ring in enumerate(rings) for _ in range(len(ring) - 2)]
+
+
+def test_a_pentagram_is_not_taken_for_convex() -> None:
+    order = [0, 2, 4, 1, 3]  # turns left at every corner, twice around
+    ring = [[math.cos(2 * math.pi * i / 5), math.sin(2 * math.pi * i / 5), 0.0] for i in order]
+    with pytest.raises(engine.FaceNotSimpleError, match="side 0-1 meets side"):
+        cut(ring)
+
+
+@pytest.mark.parametrize(
+    ("ring", "words"),
+    [
+        ([[0, 0, 0], [2, 2, 0], [2, 0, 0], [0, 1, 0]], "side 4-5 meets side 6-7"),
+        ([[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]], "no area"),
+        ([[0, 0, 0], [4, 0, 0], [4, 4, 0], [2, 0, 0], [0, 4, 0]], "meets side"),  # a vertex on a side
+        ([[0, 0, 0], [4, 0, 0], [4, 4, 0], [4, 2, 0], [0, 2, 0]], "turns back on itself"),  # a spike
+        ([[0, 0, 0], [4, 0, 0], [4, 0, 0], [4, 4, 0]], "stands still"),  # two indices, one position
+        ([[0, 0, 0], [2, 0, 0], [4, 2, 0], [2, 0, 0], [2, 4, 0], [0, 4, 0]], "turns back|meets"),
+    ],
+)
+def test_faces_that_are_not_simple_are_refused(ring: list[list[int]], words: str) -> None:
+    with pytest.raises(engine.FaceNotSimpleError, match=words) as info:
+        engine.Surface([*QUAD, *ring], [[0, 1, 2], list(range(4, 4 + len(ring)))])
+    assert info.value.where == ("faces", 1)
+    assert "faces[1]" in str(info.value)
+    assert "cut it into triangles" in str(info.value)
+
+
+def test_a_ring_that_winds_without_end_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ear_cutting, "MAX_LOOKS", 0)
+    with pytest.raises(engine.TooComplexError, match=r"faces\[0\] has 20 vertices"):
+        cut(star(20, 1, 0.0))
+
+
+def test_a_box_of_quads_is_the_box_of_triangles() -> None:
+    corners = [[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]
+    faces = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    box = engine.Polyhedron(corners, faces)
+    assert box.n_faces == 6
+    assert box.triangles.shape == (12, 3)
+    assert box.triangle_faces.tolist() == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5]
+    assert box.face_offsets.tolist() == [0, 4, 8, 12, 16, 20, 24]
+    mixed = engine.Polyhedron(corners, [*faces[:5], [1, 5, 7], [7, 3, 1]])
+    assert mixed.triangle_faces.tolist() == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 6]

@@ -1,0 +1,124 @@
+"""Poses: what is a rotation, decided exactly; immutability and value equality."""
+
+from __future__ import annotations
+
+import math
+import pickle
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+
+import engine
+from engine.solids.pose import check_rotations
+
+
+def random_rotations(n: int, dimension: int = 3) -> np.ndarray:
+    matrices, _ = np.linalg.qr(np.random.default_rng(dimension).normal(size=(n, dimension, dimension)))
+    matrices[np.linalg.det(matrices) < 0, 0] *= -1.0
+    return matrices
+
+
+def exact_defect(matrix: np.ndarray) -> Fraction:
+    rows = [[Fraction(value) for value in row] for row in matrix.tolist()]
+    n = len(rows)
+    return max(
+        abs(sum((rows[k][i] * rows[k][j] for k in range(n)), Fraction(0)) - int(i == j))
+        for i in range(n)
+        for j in range(n)
+    )
+
+
+def test_pose() -> None:
+    pose = engine.Pose([[0, -1], [1, 0]], np.array([5, -0.0]))
+    assert pose.dimension == 2
+    assert pose.rotation.tolist() == [[0.0, -1.0], [1.0, 0.0]]
+    assert "-0.0" not in repr(pose)
+    assert not pose.is_identity
+    assert engine.Pose.identity().is_identity
+    assert engine.Pose.identity(2) == engine.Pose(np.eye(2), [0, 0])
+    assert engine.Pose.identity(2) != engine.Pose.identity(3)
+    assert engine.Pose.identity(2) != 5
+    assert not engine.Pose(np.eye(3), [0, 0, 5e-324]).is_identity
+
+
+def test_is_immutable_hashable_and_pickles() -> None:
+    pose = engine.Pose(random_rotations(1)[0], [1, 2, 3])
+    with pytest.raises(AttributeError, match="immutable"):
+        pose.rotation = np.eye(3)
+    with pytest.raises(AttributeError, match="immutable"):
+        del pose.translation
+    with pytest.raises(ValueError, match="read-only"):
+        pose.rotation[0, 0] = 5.0
+    again = pickle.loads(pickle.dumps(pose))
+    assert again == pose
+    assert hash(again) == hash(pose)
+    assert not again.rotation.flags.writeable
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_float_rotations_are_accepted(dimension: int) -> None:
+    for matrix in random_rotations(50, dimension):
+        assert engine.Pose(matrix, np.zeros(dimension)).dimension == dimension
+
+
+def test_the_limit_is_exact() -> None:
+    """One step of the last place decides: the diagonal entry s gives s^2 - 1 against 1e-12."""
+    s = math.sqrt(1.0 + 1e-12)
+    for _ in range(4):
+        s = math.nextafter(s, 2.0)
+    seen = set()
+    for _ in range(9):
+        matrix = np.diag([s, 1.0, 1.0])
+        is_rotation = exact_defect(matrix) <= Fraction(1, 10**12)
+        seen.add(is_rotation)
+        if is_rotation:
+            engine.Pose(matrix, [0, 0, 0])
+        else:
+            with pytest.raises(engine.NotRigidError):
+                engine.Pose(matrix, [0, 0, 0])
+        s = math.nextafter(s, 0.0)
+    assert seen == {True, False}
+
+
+@pytest.mark.parametrize(
+    ("rotation", "translation", "error", "where", "words"),
+    [
+        ([[1, 0], [0, -1]], [0, 0], engine.NotRigidError, ("rotation",), "reflection"),
+        (-np.eye(3), [0, 0, 0], engine.NotRigidError, ("rotation",), "reflection"),
+        (np.zeros((3, 3)), [0, 0, 0], engine.NotRigidError, ("rotation",), "max|R^T R - I| is 1.0"),
+        (np.eye(3) * 1e300, [0, 0, 0], engine.NotRigidError, ("rotation",), "above 1e300"),
+        (np.eye(3) * (1 + 1e-11), [0, 0, 0], engine.NotRigidError, ("rotation",), "limit 1e-12"),
+        ([[1, 1e-11], [0, 1]], [0, 0], engine.NotRigidError, ("rotation",), "[[1.0, 1e-11], [0.0, 1.0]]"),
+        (np.eye(2), [0, 0, 0], engine.WrongDimensionError, ("translation",), "got 3"),
+        (np.eye(4), [0, 0, 0, 0], engine.WrongDimensionError, ("rotation",), "got 4"),
+        (np.zeros((2, 3)), [0, 0], engine.WrongDimensionError, ("rotation",), "square"),
+        ([[1, 0], [0, float("nan")]], [0, 0], engine.NotFiniteError, ("rotation", 1, 1), "nan"),
+        (np.eye(2), [0, float("inf")], engine.NotFiniteError, ("translation", 1), "inf"),
+        (np.eye(2), [0, True], engine.InvalidArrayError, ("translation", 1), "True"),
+        ([1, 0, 0, 1], [0, 0], engine.InvalidArrayError, ("rotation", 0), "must be a list"),
+        (None, [0, 0], engine.InvalidArrayError, ("rotation",), "rotation"),
+    ],
+)
+def test_refusals(rotation: Any, translation: Any, error: Any, where: tuple[Any, ...], words: str) -> None:
+    with pytest.raises(error) as info:
+        engine.Pose(rotation, translation)
+    assert info.value.where == where
+    assert words in str(info.value)
+    for dimension in (1, 4, True, "3"):
+        with pytest.raises(engine.WrongDimensionError):
+            engine.Pose.identity(dimension)  # type: ignore[arg-type]
+
+
+def test_many_rotations_at_once() -> None:
+    matrices = random_rotations(1000)
+    check_rotations(matrices)
+    check_rotations(matrices[:0])
+    matrices[700, 0] *= -1.0
+    matrices[900] *= 2.0
+    with pytest.raises(engine.NotRigidError, match=r"rotations\[700\]") as info:
+        check_rotations(matrices)
+    assert info.value.where == ("rotations", 700)
+    with pytest.raises(engine.InvalidArrayError):
+        check_rotations(np.zeros((4, 3, 2)))
