@@ -88,7 +88,11 @@ def arrange(
             both[0] ^= mask
             both[1] |= mask
     ends = list(merged)
-    lines = [line_through(nodes.points[tail], nodes.points[head]) for tail, head in ends]
+    lines: list[Line] = []
+    for count, (tail, head) in enumerate(ends):
+        if count % _POLL == 0:
+            budget.check()
+        lines.append(line_through(nodes.points[tail], nodes.points[head]))
     on_segment, n_exact = _meet_all(nodes, ends, lines, budget)
     return _split(nodes, ends, lines, list(merged.values()), on_segment, n_exact, budget)
 
@@ -223,7 +227,7 @@ def arrange_rings(
     coordinates: (n_vertices, 2) float64, all rings one after another, none repeating its first vertex at its end.
     ring_offsets: n_rings + 1 numbers, where each ring begins. ring_masks: the mask of each ring's edges.
     """
-    nodes, numbers = float_nodes(coordinates)
+    nodes, numbers = float_nodes(coordinates, budget)
     segments: list[tuple[int, int]] = []
     masks: list[int] = []
     for start, stop, mask in zip(ring_offsets, ring_offsets[1:], ring_masks):

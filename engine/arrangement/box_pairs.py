@@ -40,14 +40,14 @@ def _sweep(x_min: Any, x_max: Any, y_min: Any, y_max: Any, order: Any, pairs: An
                     return -1
             if y_min[other] <= y_max[box] and y_min[box] <= y_max[other]:
                 if found < pairs.shape[0]:
-                    pairs[found, 0] = box
-                    pairs[found, 1] = other
+                    pairs[found, 0] = min(box, other)
+                    pairs[found, 1] = max(box, other)
                 found += 1
     return found
 
 
 def box_pairs(low: npt.NDArray[np.float64], high: npt.NDArray[np.float64], budget: Budget) -> npt.NDArray[np.int64]:
-    """Return the pairs of boxes that have a common point, (n_pairs, 2) int64, smaller index first, sorted.
+    """Return the pairs of boxes that have a common point, (n_pairs, 2) int64, smaller index first.
 
     low, high: (n, 2) float64, the corners of closed boxes.
     """
@@ -69,5 +69,4 @@ def box_pairs(low: npt.NDArray[np.float64], high: npt.NDArray[np.float64], budge
         if found <= capacity:
             break
         capacity = found
-    pairs = np.sort(pairs[:found], axis=1)
-    return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+    return pairs[:found]

@@ -19,9 +19,12 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.errors import NotRepresentableError
+from engine.parallel import Budget
 
 Homogeneous = tuple[int, int, int]
 """(x, y, w), w > 0, without a common factor."""
+
+_POLL = 1024  # points, a microsecond each, between two looks at the clock
 
 
 def nearest_quotient(numerator: int, denominator: int) -> float:
@@ -128,7 +131,7 @@ class NodeTable:
         return nextafter(nextafter(nextafter(distance, inf), inf), inf)
 
 
-def float_nodes(coordinates: npt.NDArray[np.float64]) -> tuple[NodeTable, list[int]]:
+def float_nodes(coordinates: npt.NDArray[np.float64], budget: Budget | None = None) -> tuple[NodeTable, list[int]]:
     """Return a table holding the rows of `coordinates`, (n, 2) float64, finite, and the number of each row."""
     doubles = [value for row in coordinates.tolist() for value in row]
     ratios = [value.as_integer_ratio() for value in doubles]
@@ -140,10 +143,12 @@ def float_nodes(coordinates: npt.NDArray[np.float64]) -> tuple[NodeTable, list[i
         every_bit |= abs(value)
     shift = max((every_bit & -every_bit).bit_length() - 1, 0)
     nodes = NodeTable(shift - denominator.bit_length() + 1)
-    numbers = [
-        nodes.add_float((integers[k] >> shift, integers[k + 1] >> shift, 1), doubles[k], doubles[k + 1])
-        for k in range(0, len(doubles), 2)
-    ]
+    numbers = []
+    for k in range(0, len(doubles), 2):
+        if budget is not None and k % _POLL == 0:
+            budget.check()
+        point = (integers[k] >> shift, integers[k + 1] >> shift, 1)
+        numbers.append(nodes.add_float(point, doubles[k], doubles[k + 1]))
     return nodes, numbers
 
 
