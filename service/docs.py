@@ -44,7 +44,7 @@ def _page(document: dict[str, Any]) -> str:
     ]
     for path, item in document["paths"].items():
         for method, operation in item.items():
-            parts.append(_operation(method.upper(), path, operation))
+            parts.append(_operation(method.upper(), path, operation, document["components"]["schemas"]))
     parts.append("<h2 id=models>Models</h2>")
     for name, schema in document["components"]["schemas"].items():
         parts.append(_model(name, schema))
@@ -53,16 +53,17 @@ def _page(document: dict[str, Any]) -> str:
     return "\n".join([*parts, "</table>"])
 
 
-def _operation(method: str, path: str, operation: dict[str, Any]) -> str:
+def _operation(method: str, path: str, operation: dict[str, Any], schemas: dict[str, Any]) -> str:
     lines = [f"<h3 id={operation['operationId']}><code>{method} {escape(path)}</code></h3>"]
     lines.append(f"<p>{_text(operation.get('description', ''))}")
+    examples = []
     for media, content in operation.get("requestBody", {}).get("content", {}).items():
         lines.append(f"<br>Takes {escape(media)}: {_type(content['schema'])}.")
+        examples = schemas[content["schema"]["$ref"].rpartition("/")[2]].get("examples", [])
     for status, response in operation["responses"].items():
         kinds = ", ".join(_type(content.get("schema", {})) for content in response.get("content", {}).values())
         lines.append(f"<br><code>{status}</code> {kinds} {_text(response['description'])}")
-    example = operation.get("x-example")
-    if example is not None:
+    for example in examples:
         call = f"curl localhost:8000{path} -H 'Content-Type: application/json' -d '{json.dumps(example)}'"
         lines.append(f"<pre>{escape(call)}</pre>")
     return "\n".join(lines)

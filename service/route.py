@@ -18,8 +18,9 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response
 from starlette.types import Receive
 
+from engine import EngineError
 from service import wire
-from service.convert import is_light
+from service.convert.questions import existing, is_light
 from service.errors import STATUS, ServiceError, faults_of, faults_of_validation, problem
 from service.settings import Settings
 from service.work import Call, Pool
@@ -99,7 +100,11 @@ class _Job:
         self.call.remaining()  # it may have waited past its deadline
         self.decode()
         arguments = self.path if self.adapter is None else {**self.path, "question": self.question}
-        answer = self.endpoint(**arguments, call=self.call)
+        try:
+            answer = self.endpoint(**arguments, call=self.call)
+        except (EngineError, ServiceError) as error:
+            error.where = existing(self.question, error.where)
+            raise
         with self.call.phase("encode"):
             return b"" if answer is None else wire.encode(answer)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import Field, field_validator
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 Count = Annotated[int, Field(ge=1)]
@@ -76,6 +76,13 @@ class Settings(BaseSettings):
     """Bodies up to this size on simple solids are answered without a thread: a hand-over costs as much as the work."""
     store_bytes: Count = 512 * 2**20
     """Memory for stored solids; the least recently used leave first."""
+
+    @field_validator("cors_origins", mode="before")
+    @classmethod
+    def _split_origins(cls, value: object) -> object:
+        if isinstance(value, str):
+            return tuple(origin.strip() for origin in value.split(",") if origin.strip())
+        return value
 
     @classmethod
     def settings_customise_sources(cls, settings_cls, init_settings, env_settings, *_, **__):  # type: ignore[no-untyped-def]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import engine
-from service import convert
+from service.convert import answers, questions
 from service.routes.base import router_of
 from service.schemas.segments import ClipSegmentsRequest, ClipSegmentsResponse
 from service.work import CallOf
@@ -14,6 +14,6 @@ router = router_of("clipping")
 @router.post("/v1/clip/segments", operation_id="clip_segments")
 def clip_segments(question: ClipSegmentsRequest, call: CallOf) -> ClipSegmentsResponse:
     """Return the parts of each segment that lie in the region, boundary included: none, one or several."""
-    region = convert.to_solid(question.region, call, ("region",))
-    segments = convert.to_items(question.segments, region.dimension)
-    return convert.from_pieces(*call.compute(engine.clip_segments, segments, region))
+    region = questions.to_solid(question.region, call, ("region",))
+    segments = questions.to_items(question.segments, region.dimension)
+    return answers.from_pieces(*call.compute(engine.clip_segments, segments, region))

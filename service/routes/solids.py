@@ -7,7 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, Path
 from starlette.responses import Response
 
-from service import convert
+from service.convert import answers, questions
 from service.route import GeometryRoute
 from service.routes.base import responses, router_of
 from service.schemas.solids import Solid, StoredSolidSummary
@@ -28,18 +28,18 @@ Id = Annotated[str, Path(description="Name of a stored solid, from `POST /v1/sol
 def put_solid(question: Solid, call: CallOf) -> StoredSolidSummary:
     """Keep a solid, so that later requests can name it: `{"type": "stored", "id": ...}`. The same solid has the same
     id everywhere; it may leave the store when others need the room."""
-    solid = convert.to_solid(question, call, ())
+    solid = questions.to_solid(question, call, ())
     name, is_new = call.store.put(solid)
     call.status = 201 if is_new else 200
     call.headers.update({"Location": f"/v1/solids/{name}", "ETag": f'"{name}"'})
-    return convert.from_stored(name, solid)
+    return answers.from_stored(name, solid)
 
 
 @lookup.get("/v1/solids/{solid_id}", operation_id="get_solid")
 def get_solid(solid_id: Id, call: CallOf) -> StoredSolidSummary:
     """Return what the store holds under an id."""
     call.headers["ETag"] = f'"{solid_id}"'
-    return convert.from_stored(solid_id, call.store.get(solid_id))
+    return answers.from_stored(solid_id, call.store.get(solid_id))
 
 
 @lookup.head("/v1/solids/{solid_id}", operation_id="has_solid", response_class=Response)

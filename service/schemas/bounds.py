@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from service.schemas.problem import Accuracy, Schema
+from service.schemas.problem import Accuracy, Schema, with_example
 from service.schemas.solids import Number, Position, Solid
 
 
 class BoundsRequest(Schema):
     """What is the smallest box, and the smallest sphere, that holds this solid?"""
+
+    model_config = with_example({"solid": {"type": "triangle", "vertices": [[0, 0], [4, 0], [4, 3]]}})
 
     solid: Solid
 

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from service.schemas.arrays import DIMENSION, POINTS, Array, Axis, Numbers
 from service.schemas.limits import AtMost
-from service.schemas.problem import Accuracy, Schema
+from service.schemas.problem import Accuracy, Schema, with_example
 from service.schemas.solids import Body, Solid
 
 Points = Annotated[Array, Numbers(POINTS, DIMENSION)]
@@ -19,6 +19,13 @@ IndexLists = Annotated[list[list[int]], Numbers(Axis(0, None), Axis(0, None), ki
 
 class ContainsRequest(Schema):
     """Which of these points lie in this solid?"""
+
+    model_config = with_example(
+        {
+            "solid": {"type": "sphere", "center": [0, 0, 0], "radius": 5},
+            "points": [[3, 4, 0], [3, 4, 1e-300], [0, 0, 0]],
+        }
+    )
 
     solid: Solid
     points: Points
@@ -34,6 +41,19 @@ class ContainsResponse(Schema):
 
 class ContainsSceneRequest(Schema):
     """Which of these bodies hold each of these points?"""
+
+    model_config = with_example(
+        {
+            "bodies": [
+                {"solid": {"type": "aabb", "min": [0, 0], "max": [1, 1]}},
+                {
+                    "solid": {"type": "aabb", "min": [0, 0], "max": [1, 1]},
+                    "pose": {"rotation": [[0, -1], [1, 0]], "translation": [2, 0]},
+                },
+            ],
+            "points": [[0.5, 0.5], [1, 0.5], [9, 9]],
+        }
+    )
 
     bodies: Annotated[list[Body], AtMost("max_bodies", low=1)]
     points: Points

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -16,6 +16,11 @@ class Schema(BaseModel):
     """Base of all models: nothing is converted (``"1.5"`` and ``true`` are no numbers), unknown fields are refused."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
+
+
+def with_example(example: dict[str, Any]) -> ConfigDict:
+    """Return the configuration of a request model that shows `example`; a test sends each of them."""
+    return ConfigDict(json_schema_extra={"examples": [example]})
 
 
 class ProblemItem(Schema):

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
 from service.schemas.arrays import DIMENSION, POINTS, Array, Axis, Numbers
-from service.schemas.problem import Accuracy, Count, Schema
+from service.schemas.problem import Accuracy, Count, Schema, with_example
 from service.schemas.solids import Position, Solid
 
 PAIR = Axis(2, 2)
@@ -16,14 +16,10 @@ PAIR = Axis(2, 2)
 class ClipSegmentsRequest(Schema):
     """What remains of these segments within this region?"""
 
-    model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [
-                {
-                    "region": {"type": "aabb", "min": [0, 0], "max": [2, 2]},
-                    "segments": [[[-1, 1], [3, 1]], [[5, 5], [6, 6]]],
-                }
-            ]
+    model_config = with_example(
+        {
+            "region": {"type": "aabb", "min": [0, 0], "max": [2, 2]},
+            "segments": [[[-1, 1], [3, 1]], [[5, 5], [6, 6]]],
         }
     )
 

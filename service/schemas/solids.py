@@ -8,7 +8,7 @@ from pydantic import Field, RootModel
 
 from service.schemas.arrays import DIMENSION, Array, Axis, Numbers
 from service.schemas.limits import AtMost, left_out
-from service.schemas.problem import Count, Schema
+from service.schemas.problem import Count, Schema, with_example
 
 Number = Annotated[float, Numbers()]
 Position = Annotated[Array, Numbers(DIMENSION)]
@@ -134,6 +134,14 @@ class Solid(
     ]
 ):
     """A set of points in the plane or in space, boundary included, told apart by `type`."""
+
+    model_config = with_example(
+        {
+            "type": "polyhedron",
+            "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]],
+            "faces": [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]],
+        }
+    )
 
 
 class RigidPose(Schema):

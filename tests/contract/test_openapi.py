@@ -17,6 +17,10 @@ from service.settings import Settings
 
 STORED = Path(__file__).with_name("openapi.json")
 OPERATIONS = {
+    ("post", "/v1/contains"): "contains",
+    ("post", "/v1/contains/scene"): "contains_scene",
+    ("post", "/v1/overlay"): "overlay",
+    ("post", "/v1/bounds"): "bounds",
     ("post", "/v1/clip/segments"): "clip_segments",
     ("post", "/v1/solids"): "put_solid",
     ("get", "/v1/solids/{solid_id}"): "get_solid",

@@ -1,4 +1,4 @@
-"""The only file that knows both the schemas and the engine: JSON models to solids, results to answer models."""
+"""Questions: JSON models to the engine's solids, poses and arrays, and its paths back into the request."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ from collections.abc import Callable
 from typing import Any, Final
 
 import numpy as np
+from pydantic import BaseModel, RootModel
 
 import engine
 from engine import EngineError, Solid
 from service.errors import ServiceError
-from service.schemas import segments, solids
-from service.schemas.problem import Accuracy
+from service.schemas import solids
+from service.schemas.bounds import BoundsRequest
+from service.schemas.containment import ContainsRequest
+from service.schemas.segments import ClipSegmentsRequest
 from service.work import Call, Where
 
 _LIGHT_SOLIDS: Final = ("half_space", "sphere", "aabb", "convex", "triangle")
-
-
-# ---------------------------------------------------------------------------------------------------------- solids
 
 
 def to_solid(model: solids.Solid, call: Call, where: Where) -> Solid:
@@ -107,6 +107,19 @@ def to_pose(model: solids.RigidPose, where: Where) -> engine.Pose:
         raise error.at(*where) from None
 
 
+def to_poses(models: list[solids.RigidPose], dimension: int) -> tuple[Any, Any]:
+    """Return rotations ``(n, d, d)`` and translations ``(n, d)``; the engine checks that they are rigid."""
+    for i_pose, pose in enumerate(models):
+        if pose.rotation.shape != (dimension, dimension) or pose.translation.shape != (dimension,):
+            raise engine.WrongDimensionError(
+                f"pose {i_pose} has a rotation of shape {pose.rotation.shape} and a translation of "
+                f"{len(pose.translation)}; the bodies are {dimension}D",
+                ("poses", i_pose),
+            )
+    rotations = np.array([pose.rotation for pose in models]).reshape(-1, dimension, dimension)
+    return rotations, np.array([pose.translation for pose in models]).reshape(-1, dimension)
+
+
 def to_items(array: Any, dimension: int) -> Any:
     """Return `array`; an empty list has no dimension of its own in JSON, so it takes the solid's."""
     return array if array.size else np.empty((0, *array.shape[1:-1], dimension))
@@ -120,52 +133,31 @@ def where_in_scene(where: Where) -> Where:
     return ("bodies",) if where[:1] in (("solids",), ("poses",)) else where
 
 
+def where_in_poses(where: Where) -> Where:
+    """Turn the engine's path into that of a list of poses, each of a rotation and a translation."""
+    names = {"rotations": "rotation", "translations": "translation"}
+    if len(where) >= 2 and where[0] in names:
+        return ("poses", where[1], names[str(where[0])], *where[2:])
+    return ("poses",) if where[:1] in (("rotations",), ("translations",)) else where
+
+
+def existing(question: Any, where: Where) -> Where:
+    """Return `where` as far as the request has it: an engine's error may lead into a solid that is only named there."""
+    value, path = question, []
+    for part in where:
+        value = value.root if isinstance(value, RootModel) else value
+        try:
+            value = getattr(value, str(part)) if isinstance(value, BaseModel) else value[part]
+        except (AttributeError, IndexError, KeyError, TypeError):
+            break
+        path.append(part)
+    return tuple(path)
+
+
 def is_light(question: Any) -> bool:
     """Tell whether a small `question` is sure to be answered in less time than a change of threads takes."""
-    if isinstance(question, segments.ClipSegmentsRequest):
+    if isinstance(question, (ContainsRequest, BoundsRequest)):
+        return question.solid.root.type in _LIGHT_SOLIDS
+    if isinstance(question, ClipSegmentsRequest):
         return question.region.root.type in ("half_space", "aabb", "sphere")
     return False
-
-
-# --------------------------------------------------------------------------------------------------------- answers
-
-
-def from_accuracy(accuracy: engine.Accuracy) -> Accuracy:
-    """Return the accuracy object of an answer."""
-    return Accuracy.model_construct(
-        decisions=accuracy.decisions,
-        coordinates_ulp=accuracy.coordinates_ulp,
-        items=accuracy.n_items,
-        beyond_filter=accuracy.n_beyond_filter,
-        rational=accuracy.n_rational,
-        method=accuracy.method,
-    )
-
-
-def from_stored(name: str, solid: Solid) -> solids.StoredSolidSummary:
-    """Return what the store says of a solid."""
-    counts = {field: len(getattr(solid, field)) for field in ("planes", "powers", "operands") if hasattr(solid, field)}
-    if hasattr(solid, "ring_offsets"):
-        counts["rings"] = len(solid.ring_offsets) - 1
-    if hasattr(solid, "face_offsets"):
-        counts["faces"] = len(solid.face_offsets) - 1
-    return solids.StoredSolidSummary.model_construct(
-        id=name,
-        type=solid.type,
-        dimension=solid.dimension,
-        vertices=len(solid.vertices) if hasattr(solid, "vertices") else None,
-        faces=next(iter(counts.values()), None),
-        memory=solid.memory,
-    )
-
-
-def from_pieces(pieces: engine.SegmentPieces, accuracy: engine.Accuracy) -> segments.ClipSegmentsResponse:
-    """Return the answer of `clip/segments`."""
-    columns = (pieces.source, pieces.start, pieces.end, pieces.t, pieces.faces)
-    return segments.ClipSegmentsResponse.model_construct(
-        pieces=[
-            {"segment": source, "start": start, "end": end, "t": t, "faces": faces}
-            for source, start, end, t, faces in zip(*(column.tolist() for column in columns))
-        ],
-        accuracy=from_accuracy(accuracy),
-    )

@@ -1,0 +1,131 @@
+"""Answers: the engine's results to answer models. They hold arrays as they are; `wire.encode` writes them."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+import engine
+from engine import Solid
+from service.schemas import bounds, containment, overlay, segments, solids
+from service.schemas.problem import Accuracy
+
+
+def from_accuracy(accuracy: engine.Accuracy) -> Accuracy:
+    """Return the accuracy object of an answer."""
+    return Accuracy.model_construct(
+        decisions=accuracy.decisions,
+        coordinates_ulp=accuracy.coordinates_ulp,
+        items=accuracy.n_items,
+        beyond_filter=accuracy.n_beyond_filter,
+        rational=accuracy.n_rational,
+        method=accuracy.method,
+    )
+
+
+def from_stored(name: str, solid: Solid) -> solids.StoredSolidSummary:
+    """Return what the store says of a solid."""
+    counts = {field: len(getattr(solid, field)) for field in ("planes", "powers", "operands") if hasattr(solid, field)}
+    if hasattr(solid, "ring_offsets"):
+        counts["rings"] = len(solid.ring_offsets) - 1
+    if hasattr(solid, "face_offsets"):
+        counts["faces"] = len(solid.face_offsets) - 1
+    return solids.StoredSolidSummary.model_construct(
+        id=name,
+        type=solid.type,
+        dimension=solid.dimension,
+        vertices=len(solid.vertices) if hasattr(solid, "vertices") else None,
+        faces=next(iter(counts.values()), None),
+        memory=solid.memory,
+    )
+
+
+def from_locations(locations: Any, accuracy: engine.Accuracy) -> containment.ContainsResponse:
+    """Return the answer of `contains`."""
+    return containment.ContainsResponse.model_construct(
+        contained=locations >= engine.Location.BOUNDARY,
+        boundary=np.flatnonzero(locations == engine.Location.BOUNDARY),
+        accuracy=from_accuracy(accuracy),
+    )
+
+
+def from_scene_locations(found: engine.SceneLocations, accuracy: engine.Accuracy) -> containment.ContainsSceneResponse:
+    """Return the answer of `contains/scene`: ragged arrays as lists of lists."""
+    on_boundary = np.asarray(found.on_boundary, bool)
+    before = np.concatenate([[0], np.cumsum(on_boundary)])
+    return containment.ContainsSceneResponse.model_construct(
+        bodies=_split(found.indices, found.offsets),
+        boundary=_split(found.indices[on_boundary], before[found.offsets]),
+        accuracy=from_accuracy(accuracy),
+    )
+
+
+def _split(items: Any, offsets: Any) -> list[list[int]]:
+    flat, ends = items.tolist(), offsets.tolist()
+    return [flat[start:stop] for start, stop in pairwise(ends)]
+
+
+def from_bounds(found: engine.Bounds, accuracy: engine.Accuracy) -> bounds.BoundsResponse:
+    """Return the answer of `bounds`."""
+    return bounds.BoundsResponse.model_construct(
+        aabb=bounds.AabbBounds.model_construct(min=found.aabb.min, max=found.aabb.max),
+        sphere=bounds.SphereBounds.model_construct(center=found.sphere.center, radius=found.sphere.radius),
+        accuracy=from_accuracy(accuracy),
+    )
+
+
+def from_pieces(pieces: engine.SegmentPieces, accuracy: engine.Accuracy) -> segments.ClipSegmentsResponse:
+    """Return the answer of `clip/segments`."""
+    columns = (pieces.source, pieces.start, pieces.end, pieces.t, pieces.faces)
+    return segments.ClipSegmentsResponse.model_construct(
+        pieces=[
+            {"segment": source, "start": start, "end": end, "t": t, "faces": faces}
+            for source, start, end, t, faces in zip(*(column.tolist() for column in columns))
+        ],
+        accuracy=from_accuracy(accuracy),
+    )
+
+
+def from_overlay(result: engine.Overlay, accuracy: engine.Accuracy) -> overlay.OverlayResponse:
+    """Return the answer of `overlay`."""
+    return overlay.OverlayResponse.model_construct(
+        pieces=[
+            overlay.OverlayPiece.model_construct(
+                shell=_closed(piece.shell), holes=[_closed(hole) for hole in piece.holes]
+            )
+            for piece in result.pieces
+        ],
+        area=_area(result),
+        collapsed=[
+            overlay.OverlayCollapse.model_construct(kind=part.kind, area=float(part.area), near=part.near)
+            for part in result.collapsed
+        ],
+        rounding=overlay.OverlayRounding.model_construct(
+            may_be_invalid=result.may_be_invalid,
+            rounds=result.rounds,
+            snapped=result.snapped,
+            vertices_moved=result.vertices_moved,
+            largest_displacement=result.largest_displacement,
+            pieces_exact=result.n_pieces_exact,
+            holes_exact=result.n_holes_exact,
+            pieces_joined=result.pieces_joined,
+            pieces_parted=result.pieces_parted,
+            holes_joined=result.holes_joined,
+            holes_parted=result.holes_parted,
+        ),
+        accuracy=from_accuracy(accuracy),
+    )
+
+
+def _closed(ring: Any) -> Any:
+    """Return `ring` as GeoJSON has it: the first position again at its end."""
+    return np.concatenate([ring, ring[:1]])
+
+
+def _area(result: engine.Overlay) -> float | None:
+    try:
+        return result.area
+    except (engine.NotRepresentableError, OverflowError):
+        return None

@@ -1,0 +1,79 @@
+"""POST /v1/overlay."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import httpx
+import pytest
+
+from service.schemas.overlay import OverlayResponse
+from service.settings import Settings
+from tests.unit.service.asking import SPHERE, check_problem
+
+pytestmark = pytest.mark.anyio
+
+
+def square(low: float, high: float) -> list[list[float]]:
+    return [[low, low], [high, low], [high, high], [low, high]]
+
+
+def polygon(*rings: list[list[float]]) -> dict[str, Any]:
+    return {"type": "polygon", "rings": list(rings)}
+
+
+async def ask(client: httpx.AsyncClient, **change: object) -> httpx.Response:
+    body = {"subject": polygon(square(0, 4)), "clip": polygon(square(1, 2)), "operation": "difference", **change}
+    return await client.post("/v1/overlay", json=body)
+
+
+async def test_pieces_are_the_coordinates_of_a_multipolygon(client: httpx.AsyncClient) -> None:
+    answer = await ask(client)
+    assert answer.status_code == 200, answer.text
+    assert answer.json()["pieces"] == [
+        {
+            "shell": [[0, 0], [4, 0], [4, 4], [0, 4], [0, 0]],
+            "holes": [[[1, 1], [1, 2], [2, 2], [2, 1], [1, 1]]],
+        }
+    ]
+    assert (answer.json()["area"], answer.json()["collapsed"]) == (15.0, [])
+    rounding = answer.json()["rounding"]
+    assert (rounding["pieces_exact"], rounding["holes_exact"], rounding["may_be_invalid"]) == (1, 1, False)
+    OverlayResponse.model_validate_json(answer.content, context=Settings())
+
+
+async def test_output_can_be_clipped_again(client: httpx.AsyncClient) -> None:
+    first = (await ask(client)).json()["pieces"][0]
+    answer = await ask(client, subject=polygon(first["shell"], *first["holes"]), operation="union")
+    assert answer.json()["area"] == 16.0
+
+
+async def test_nothing_left_is_no_piece(client: httpx.AsyncClient) -> None:
+    answer = await ask(client, clip=polygon(square(5, 6)), operation="intersection")
+    assert (answer.json()["pieces"], answer.json()["area"]) == ([], 0.0)
+
+
+async def test_area_beyond_float64_is_left_out(client: httpx.AsyncClient) -> None:
+    answer = await ask(client, subject=polygon(square(-1e300, 1e300)), operation="union", output="nearest")
+    assert answer.status_code == 200, answer.text
+    assert "area" not in answer.json()
+    assert answer.json()["pieces"][0]["shell"][0] == [-1e300, -1e300]
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "pointer"),
+    [
+        ({"operation": "xor"}, "invalid_request", "/operation"),
+        ({"output": "fast"}, "invalid_request", "/output"),
+        ({"output": None}, "invalid_request", "/output"),
+        ({"subject": SPHERE}, "unsupported_solid", "/subject"),
+        ({"clip": SPHERE}, "unsupported_solid", "/clip"),
+        ({"clip": polygon([[0, 0], [1, 1]])}, "ring_too_short", "/clip/rings/0"),
+        ({"clip": polygon(square(0, 1), [[0, 0, 0]] * 3)}, "invalid_array", "/clip/rings/1/0"),
+    ],
+)
+async def test_what_is_wrong_is_named(
+    client: httpx.AsyncClient, change: dict[str, object], code: str, pointer: str
+) -> None:
+    problem = check_problem(await ask(client, **change), 422, code)
+    assert problem["errors"][0]["pointer"] == pointer
