@@ -9,7 +9,7 @@ import numpy as np
 
 import engine
 from engine import Solid
-from service.schemas import bounds, containment, overlay, segments, solids
+from service.schemas import bounds, containment, overlay, polygons, segments, solids
 from service.schemas.problem import Accuracy
 
 
@@ -129,3 +129,20 @@ def _area(result: engine.Overlay) -> float | None:
         return result.area
     except (engine.NotRepresentableError, OverflowError):
         return None
+
+
+def from_clipped(clipped: engine.ClippedPolygons, accuracy: engine.Accuracy) -> polygons.ClipPolygonsResponse:
+    """Return the answer of `clip/polygons`."""
+    offsets = clipped.polygon_offsets.tolist()
+    return polygons.ClipPolygonsResponse.model_construct(
+        polygons=[
+            polygons.ClippedPolygon.model_construct(
+                rings=clipped.rings(i_polygon),
+                contours=clipped.contours[start:stop],
+                status=engine.PolygonStatus(clipped.status[i_polygon]).name.lower(),
+                may_have_bridges=bool(clipped.may_have_bridges[i_polygon]),
+            )
+            for i_polygon, (start, stop) in enumerate(pairwise(offsets))
+        ],
+        accuracy=from_accuracy(accuracy),
+    )

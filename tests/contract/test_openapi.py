@@ -19,6 +19,7 @@ STORED = Path(__file__).with_name("openapi.json")
 OPERATIONS = {
     ("post", "/v1/contains"): "contains",
     ("post", "/v1/contains/scene"): "contains_scene",
+    ("post", "/v1/clip/polygons"): "clip_polygons",
     ("post", "/v1/overlay"): "overlay",
     ("post", "/v1/bounds"): "bounds",
     ("post", "/v1/clip/segments"): "clip_segments",
