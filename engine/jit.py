@@ -24,6 +24,7 @@ import os
 import re
 import shutil
 import tempfile
+import uuid
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -31,6 +32,7 @@ from typing import Any
 
 import numba
 from numba import config as numba_config
+from numba.core.caching import IndexDataCacheFile
 from numba.core.registry import CPUDispatcher
 
 _OPTIONS: dict[str, Any] = {"nogil": True, "fastmath": False, "error_model": "numpy"}
@@ -101,11 +103,21 @@ def cache_folder() -> Path | None:
     """Return the folder that holds compiled code, None where nothing can be written."""
     folder = next((folder for folder in _candidates() if _is_writable(folder)), None)
     seed = os.environ.get("ENGINE_CACHE_SEED")
-    if folder is not None and seed and Path(seed).is_dir():
-        for filled in Path(seed).iterdir():
-            if not (folder / filled.name).exists():
-                shutil.copytree(filled, folder / filled.name, dirs_exist_ok=True)
+    if folder is not None and seed:
+        with suppress(OSError):  # a disk that is full: what is missing gets compiled
+            _copy_seed(Path(seed), folder)
     return folder
+
+
+def _copy_seed(seed: Path, folder: Path) -> None:
+    """Copy what `folder` lacks, data files (.nbc) before the indexes (.nbi) that name them, each file in one step."""
+    for source in sorted(seed.rglob("*.nb[ci]"), key=lambda file: (file.suffix, file)):
+        target = folder / source.relative_to(seed)
+        if not target.exists():
+            target.parent.mkdir(parents=True, exist_ok=True)
+            part = target.with_name(f"{target.name}.{uuid.uuid4().hex}")
+            shutil.copyfile(source, part)  # not its mode: a seed may be read-only
+            part.replace(target)
 
 
 @contextmanager
@@ -119,13 +131,46 @@ def _cache_at(folder: Path) -> Iterator[None]:
         numba_config.CACHE_DIR = before
 
 
+class _CacheFile(IndexDataCacheFile):  # type: ignore[misc] # numba carries no types
+    """numba's cache file, made safe between processes and for trouble with the disk.
+
+    numba numbers the data files of a function and writes the index first: two processes that compile two signatures at
+    once may end with an index that names the other's code, and a process killed in between leaves an index that names
+    old code. Here every data file has a name of its own and is complete before an index names it; what two processes
+    can lose is an entry of the index, which costs one more compilation. The folder is named by the sources, so the
+    time stamp of the file, which a copied checkout changes, is left out.
+    """
+
+    def save(self, key: object, data: object) -> None:
+        with suppress(OSError):  # disk full or read-only by now: the kernel is compiled, the call must not fail
+            name = self._data_name_pattern.format(number=uuid.uuid4().int)
+            self._save_data(name, data)
+            self._save_index({**self._load_index(), key: name})
+
+    def load(self, key: object) -> Any:
+        try:
+            return super().load(key)
+        except Exception:  # damaged in any way: compile anew
+            return None
+
+    def _load_index(self) -> dict[object, str]:
+        try:
+            index: dict[object, str] = super()._load_index()
+        except Exception:
+            return {}
+        return index
+
+
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile an outer loop: called from Python, releases the interpreter lock, cached on disk."""
     folder = cache_folder()
     if folder is None or numba_config.DISABLE_JIT:
         return numba.njit(**_OPTIONS)(function)
     with _cache_at(folder / source_digest(function.__module__)):
-        return numba.njit(cache=True, **_OPTIONS)(function)
+        compiled = numba.njit(cache=True, **_OPTIONS)(function)
+    cache = compiled._cache
+    cache._cache_file = _CacheFile(cache._cache_path, cache._impl.filename_base, source_stamp=None)
+    return compiled
 
 
 class _Inline(CPUDispatcher):  # type: ignore[misc] # numba carries no types
