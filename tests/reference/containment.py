@@ -61,9 +61,7 @@ def _locate_smooth(p: Vector, solid: Solid, pose: Solid | None) -> int:
 def _locate_in_prism(p: Vector, solid: Solid) -> int:
     """Return the location in the infinite prism over a triangle of space, by its three side planes."""
     a, b, c = (vector(v) for v in solid["vertices"])
-    normal = cross(sub(b, a), sub(c, a))
-    if square(normal) == 0:
-        raise ValueError("a triangle of no area has no prism")
+    normal = cross(sub(b, a), sub(c, a))  # zero without area: then the formula says BOUNDARY everywhere
     return min(sign(dot(cross(sub(e, s), sub(p, s)), normal)) for s, e in ((a, b), (b, c), (c, a)))
 
 

@@ -27,11 +27,11 @@ class Root(NamedTuple):
 
 
 class Piece(NamedTuple):
-    """One piece: parameters, coordinates of both ends, and the faces that hold each end (-1 for an own end)."""
+    """One piece: parameters, coordinates of both ends, and the face crossed at each end (-1: an own end)."""
 
     t: tuple[Root, Root]
     ends: tuple[tuple[Root, ...], tuple[Root, ...]]
-    faces: tuple[frozenset[int], frozenset[int]]
+    faces: tuple[int, int]
 
     def rounded(self) -> tuple[list[float], list[float], list[float]]:
         """Return start, end and (t0, t1) as nearest doubles."""
@@ -44,9 +44,8 @@ def clip_segment(segment: Any, region: Solid) -> list[Piece]:
     p, r = vector(segment[0]), vector(segment[1])
     if p == r:
         kept = _keeps(p, region)
-        own = frozenset([-1])
         point = tuple(Root(x) for x in p)
-        return [Piece((Root(Q(0)), Root(Q(1))), (point, point), (own, own))] if kept else []
+        return [Piece((Root(Q(0)), Root(Q(1))), (point, point), (-1, -1))] if kept else []
     if region["type"] == "sphere":
         return _clip_on_sphere(p, r, region)
     cuts = sorted({Q(0), Q(1)} | {t for t in _crossings(p, r, region) if 0 <= t <= 1})
@@ -64,12 +63,12 @@ def clip_segment(segment: Any, region: Solid) -> list[Piece]:
 
 def _piece(p: Vector, r: Vector, low: Q, high: Q, region: Solid) -> Piece:
     points = [along(p, r, t) for t in (low, high)]
-    faces = [
-        frozenset([-1]) if t == own else _faces_at(point, region)
-        for t, own, point in zip((low, high), (0, 1), points, strict=True)
-    ]
+    faces = (
+        -1 if low == 0 else _face_at(points[0], sub(r, p), region),
+        -1 if high == 1 else _face_at(points[1], sub(p, r), region),
+    )
     ends = tuple(tuple(Root(x) for x in point) for point in points)
-    return Piece((Root(low), Root(high)), ends, (faces[0], faces[1]))  # type: ignore[arg-type]
+    return Piece((Root(low), Root(high)), ends, faces)  # type: ignore[arg-type]
 
 
 def _keeps(point: Vector, region: Solid) -> bool:
@@ -114,14 +113,30 @@ def _crossings_of_edge(p: Vector, r: Vector, a: Vector, b: Vector) -> list[Q]:
     return [dot(sub(e, p), u) / square(u) for e in (a, b) if all(x == 0 for x in cross(u, sub(e, p)))]
 
 
-def _faces_at(point: Vector, region: Solid) -> frozenset[int]:
-    """Return the index of every plane, face or edge that holds the point."""
+def _face_at(point: Vector, inward: Vector, region: Solid) -> int:
+    """Return the face crossed at an end from which the piece goes `inward`: the first of those that hold the point.
+
+    Of planes those count that the segment enters through; of faces and edges that hold the point, the ones that the
+    segment runs along come last.
+    """
     kind = region["type"]
     if kind == "polyhedron":
-        return frozenset(i for face, i in triangles_with_faces(region) if on_triangle(point, *face))
-    if kind in ("polygon", "triangle"):
-        return frozenset(i for i, edge in enumerate(edges(region)) if on_segment(point, *edge))
-    return frozenset(i for i, row in enumerate(rows(region)) if value(row, point) == 0)
+        holding = [
+            (_runs_along(inward, face), i) for face, i in triangles_with_faces(region) if on_triangle(point, *face)
+        ]
+    elif kind in ("polygon", "triangle"):
+        holding = [(_runs_along(inward, edge), i) for i, edge in enumerate(edges(region)) if on_segment(point, *edge)]
+    else:
+        planes = enumerate(rows(region))
+        holding = [(False, i) for i, row in planes if value(row, point) == 0 and dot(row[:-1], inward) > 0]
+    return min(holding)[1]
+
+
+def _runs_along(direction: Vector, face: tuple[Vector, ...]) -> bool:
+    """Tell whether a direction lies in the plane of a face or on the line of an edge."""
+    if len(face) == 2:
+        return all(x == 0 for x in cross(direction, sub(face[1], face[0])))
+    return dot(direction, cross(sub(face[1], face[0]), sub(face[2], face[0]))) == 0
 
 
 def _clip_on_sphere(p: Vector, r: Vector, region: Solid) -> list[Piece]:
@@ -136,10 +151,9 @@ def _clip_on_sphere(p: Vector, r: Vector, region: Solid) -> list[Piece]:
     at_p, at_r = c, a + 2 * half_b + c
     if (at_p > 0 and half_b > 0) or (at_r > 0 and half_b + a < 0):
         return []  # past both roots, or not yet at them
-    own = frozenset([-1])
     keeps_p, keeps_r = at_p <= 0, at_r <= 0
-    start, face_start = (Root(Q(0)), own) if keeps_p else (low, frozenset([0]))
-    end, face_end = (Root(Q(1)), own) if keeps_r else (high, frozenset([0]))
+    start, face_start = (Root(Q(0)), -1) if keeps_p else (low, 0)
+    end, face_end = (Root(Q(1)), -1) if keeps_r else (high, 0)
     if keeps_p and not keeps_r and at_p == 0 and half_b >= 0:
         end = start  # leaves at once: only the first end touches; it is left through the sphere, at t = 0
     if keeps_r and not keeps_p and at_r == 0 and half_b + a <= 0:

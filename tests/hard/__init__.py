@@ -1,0 +1,1 @@
+"""Hard cases: data, the transformations that multiply them, and the one runner."""
