@@ -79,11 +79,13 @@ def locate(
     >>> locate([[0.5, 0.5], [1.0, 0.2], [2.0, 2.0]], Aabb([0, 0], [1, 1])).tolist()
     [1, 0, -1]
     """
-    locator = locator_of(solid)
+    choice = locator_of(solid)
     array = as_points(points, solid.dimension)
     locations = np.empty(len(array), np.int8)
     beyond, rational = [], []
     with Budget(deadline, cancel) as budget:
+        budget.check()
+        locator = choice.chosen(len(array), budget)
 
         def task(start: int, stop: int) -> None:
             counts = locator.fill(array[start:stop], locations[start:stop], budget)

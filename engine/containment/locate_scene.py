@@ -260,7 +260,8 @@ def _locate_pairs(
         for body, begin, end in groups[start:stop]:
             places = order[begin:end]
             found = np.empty(end - begin, np.int8)
-            found_counts.append(scene.locators[body].fill(points[owners[places]], found, budget))
+            locator = scene.locators[body].chosen(end - begin, budget)
+            found_counts.append(locator.fill(points[owners[places]], found, budget))
             located[places] = found
 
     run_chunks(locate_groups, len(groups), budget=budget, first_chunk=1, workers=workers)

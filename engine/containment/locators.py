@@ -15,12 +15,14 @@ import numpy.typing as npt
 
 from engine.containment.balls import locate_in_ball
 from engine.containment.boxes import locate_in_box
+from engine.containment.build_cells import Cells, cells_if_they_pay
 from engine.containment.half_spaces import locate_in_half_planes, locate_in_half_spaces
 from engine.containment.polynomials import locate_by_polynomial
 from engine.containment.prepared import Columns, Rings, columns_of, rings_of, rounded_rows
 from engine.containment.rational_locate import Check, combine, prism_walls, rational_location, unsupported
 from engine.containment.ray_parity import locate_by_columns
 from engine.containment.ring_crossing import locate_in_rings
+from engine.containment.segment_parity import locate_by_cells
 from engine.containment.triangles import locate_in_triangle
 from engine.errors import InvalidArrayError, NotFiniteError
 from engine.parallel import Budget
@@ -59,6 +61,12 @@ class Locator:
     fill: Fill
     """Locates the points (n, dim) of a chunk into int8 (n,)."""
     decisions: Literal["exact", "float64"] = "exact"
+    for_batch: Callable[[int, Budget], Locator] | None = None
+    """Returns the locator to use for so many points, where that depends: it may build a structure that pays."""
+
+    def chosen(self, n_points: int, budget: Budget) -> Locator:
+        """Return the locator for a batch of `n_points`."""
+        return self if self.for_batch is None else self.for_batch(n_points, budget)
 
 
 def settled(
@@ -163,7 +171,32 @@ def _in_polyhedron(solid: Polyhedron) -> Locator:
         columns: Columns = columns_of(solid)
         return int(locate_by_columns(points, *columns, locations, flag))
 
-    return Locator("ray_parity", settled(run, rational_half(solid)))
+    by_rays = settled(run, rational_half(solid))
+
+    def choose(n_points: int, budget: Budget) -> Locator:
+        cells = cells_if_they_pay(solid, n_points, budget)
+        return plain if cells is None else Locator("segment_parity", _in_cells(cells, by_rays))
+
+    plain = Locator("ray_parity", by_rays, for_batch=choose)
+    return plain
+
+
+def _in_cells(cells: Cells, by_rays: Fill) -> Fill:
+    """Return the fill that asks the cells, and casts rays for the points that are too close to a plane for them."""
+
+    def fill(points: FloatArray, locations: Locations, budget: Budget) -> Counts:
+        with np.errstate(all="ignore"):
+            n_open = int(locate_by_cells(points, cells, locations, budget.flag))
+        if n_open == 0:
+            return Counts(0, 0)
+        budget.check()
+        still_open = np.flatnonzero(locations == UNDECIDED)
+        found = np.empty(len(still_open), np.int8)
+        counts = by_rays(points[still_open], found, budget)
+        locations[still_open] = found
+        return Counts(n_open, counts.rational)
+
+    return fill
 
 
 def _in_implicit(solid: Implicit) -> Locator:
@@ -230,7 +263,7 @@ def csg_locator(solid: Csg, leaf_locator: Callable[[Solid], Locator]) -> Locator
                     found = combine(node.operation, [visit(operand) for operand in node.operands])
                 else:
                     found = np.empty(len(points), np.int8)
-                    counts = leaves[id(node)].fill(points, found, budget)
+                    counts = leaves[id(node)].chosen(len(points), budget).fill(points, found, budget)
                     n_beyond, n_rational = n_beyond + counts.beyond, n_rational + counts.rational
                 located[id(node)] = found
             return located[id(node)]

@@ -1,0 +1,194 @@
+"""Which side of the surface cells without triangles and reference points of the others lie on.
+
+Two cells without triangles that share a wall lie on one side, so only the first of each such group, in scanning
+order, is asked about; the others copy. Parts of a cell are asked by their parent's own segment test; level 0, and
+what that test leaves open, by vertical rays.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+
+from engine.containment.cell_entries import LAST, crossing, set_entry
+from engine.containment.cells import (
+    LEVELS,
+    PARTS,
+    PLACE,
+    SPLIT,
+    corner,
+    finest,
+    parts_of,
+    reference_coordinate,
+    scaled_difference,
+)
+from engine.jit import inline, kernel
+from engine.types import UNDECIDED
+
+OPEN: Final = 0
+"""Status of a cell that is not known, or whose reference point lies on the surface or in another cell."""
+
+
+@kernel
+def label_empty(counts: Any, nx: int, ny: int, nz: int, labels: Any) -> int:
+    """Fill labels (nz * ny * nx,) int64 with the cell that each empty cell copies from, itself for one that is asked.
+
+    Cells with a list label themselves. Returns how many empty cells are asked.
+    """
+    n_asked = 0
+    for z in range(nz):
+        for y in range(ny):
+            for x in range(nx):
+                cell = (z * ny + y) * nx + x
+                labels[cell] = cell
+                if counts[cell] > 0:
+                    continue
+                if x > 0 and counts[cell - 1] == 0:
+                    labels[cell] = labels[cell - 1]
+                elif y > 0 and counts[cell - nx] == 0:
+                    labels[cell] = labels[cell - nx]
+                elif z > 0 and counts[cell - nx * ny] == 0:
+                    labels[cell] = labels[cell - nx * ny]
+                else:
+                    n_asked += 1
+    return n_asked
+
+
+@inline
+def reference_point(lattice: Any, x: int, y: int, z: int, parts: float) -> Any:
+    """Return the reference point of a cell by its indices on the level with `parts` cells to one of level 0."""
+    low, size = lattice.low, lattice.size
+    return (
+        reference_coordinate(low[0], size[0] / parts, x, PLACE[0]),
+        reference_coordinate(low[1], size[1] / parts, y, PLACE[1]),
+        reference_coordinate(low[2], size[2] / parts, z, PLACE[2]),
+    )
+
+
+@inline
+def _is_in_cell(lattice: Any, point: Any, x: int, y: int, z: int, shift: int) -> bool:
+    low, scale = lattice.low, lattice.scale
+    return (
+        finest(point[0], low[0], scale[0]) >> shift == x
+        and finest(point[1], low[1], scale[1]) >> shift == y
+        and finest(point[2], low[2], scale[2]) >> shift == z
+    )
+
+
+@kernel
+def reference_points(lattice: Any, places: Any, level: int, points: Any, is_valid: Any) -> None:
+    """Fill points (n, 3) and is_valid (n,) with the reference points of cells and whether they lie in them."""
+    for item in range(len(places)):
+        x, y, z = places[item, 0], places[item, 1], places[item, 2]
+        point = reference_point(lattice, x, y, z, parts_of(level))
+        points[item, 0], points[item, 1], points[item, 2] = point
+        is_valid[item] = _is_in_cell(lattice, point, x, y, z, 2 * (LEVELS - 1 - level))
+
+
+@inline
+def fill_entry(
+    row: Any, vertices: Any, triangles: Any, triangle: int, lattice: Any, reference: Any, parts: float
+) -> None:
+    """Write the entry of a triangle about a reference point, in units of the cells of a level."""
+    a = corner(vertices, triangles[triangle, 0])
+    b = corner(vertices, triangles[triangle, 1])
+    c = corner(vertices, triangles[triangle, 2])
+    scale = lattice.scale
+    set_entry(
+        row,
+        scaled_difference(a, reference, scale, parts),
+        scaled_difference(b, reference, scale, parts),
+        scaled_difference(c, reference, scale, parts),
+        scaled_difference(b, a, scale, parts),
+        scaled_difference(c, a, scale, parts),
+    )
+
+
+@kernel
+def locate_parts(
+    vertices: Any,
+    triangles: Any,
+    lattice: Any,
+    parents: Any,
+    places: Any,
+    statuses: Any,
+    firsts: Any,
+    lists: Any,
+    level: int,
+    counts: Any,
+    entries: Any,
+    found: Any,
+    flag: Any,
+) -> None:
+    """Fill found (p * 64,) int8 with the status of each part: of its reference point, or of all of it if it is empty.
+
+    parents, places, firsts, lists, level: as for `list_parts`; statuses: (cells,) int8; counts: (p * 64,) lengths of
+    the parts' lists; entries: workspace (longest list, 14) float32.
+    """
+    scale = lattice.scale
+    parts = parts_of(level - 1)
+    shift = 2 * (LEVELS - 1 - level)
+    for parent in range(len(parents)):
+        if flag[0]:
+            break
+        cell = parents[parent]
+        x0, y0, z0 = places[cell, 0], places[cell, 1], places[cell, 2]
+        reference = reference_point(lattice, x0, y0, z0, parts)
+        n_entries = firsts[cell + 1] - firsts[cell]
+        for entry in range(n_entries):
+            fill_entry(entries[entry], vertices, triangles, lists[firsts[cell] + entry], lattice, reference, parts)
+        for part in range(PARTS):
+            place = parent * PARTS + part
+            x, y, z = part % SPLIT, part // SPLIT % SPLIT, part // (SPLIT * SPLIT)
+            if counts[place] == 0:
+                if x > 0 and counts[place - 1] == 0:
+                    found[place] = found[place - 1]
+                    continue
+                if y > 0 and counts[place - SPLIT] == 0:
+                    found[place] = found[place - SPLIT]
+                    continue
+                if z > 0 and counts[place - SPLIT * SPLIT] == 0:
+                    found[place] = found[place - SPLIT * SPLIT]
+                    continue
+            x, y, z = x0 * SPLIT + x, y0 * SPLIT + y, z0 * SPLIT + z
+            point = reference_point(lattice, x, y, z, parts_of(level))
+            status = statuses[cell] if _is_in_cell(lattice, point, x, y, z, shift) else OPEN
+            if status != OPEN:
+                w = scaled_difference(point, reference, scale, parts)
+                wx, wy, wz = np.float32(w[0]), np.float32(w[1]), np.float32(w[2])
+                for entry in range(n_entries):
+                    crossed = crossing(entries, entry, wx, wy, wz)
+                    if crossed == UNDECIDED:
+                        status = OPEN
+                        break
+                    if crossed == 1:
+                        status = -status
+            found[place] = status
+
+
+@kernel
+def fill_entries(
+    vertices: Any,
+    triangles: Any,
+    lattice: Any,
+    cells: Any,
+    places: Any,
+    firsts: Any,
+    lists: Any,
+    level: int,
+    entries: Any,
+    flag: Any,
+) -> None:
+    """Fill entries (n, 14) float32 with the lists of `cells`, one after another."""
+    parts = parts_of(level)
+    place = 0
+    for item in range(len(cells)):
+        if flag[0]:
+            break
+        cell = cells[item]
+        reference = reference_point(lattice, places[cell, 0], places[cell, 1], places[cell, 2], parts)
+        for entry in range(firsts[cell], firsts[cell + 1]):
+            fill_entry(entries[place], vertices, triangles, lists[entry], lattice, reference, parts)
+            entries[place, LAST] = 1.0 if entry == firsts[cell + 1] - 1 else 0.0
+            place += 1

@@ -1,0 +1,187 @@
+"""Cells: certified answers equal the ray's, on hard sets and on what cells could get wrong; when they are built."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from engine import Cancel, CancelledError, Csg, Polyhedron, locate
+from engine.containment import build_cells as building
+from engine.containment.build_cells import build_cells
+from engine.containment.cell_entries import ENTRY, crossing, set_entry
+from engine.containment.cells import misses_cell
+from engine.containment.segment_parity import locate_by_cells
+from engine.parallel import Budget
+from engine.types import UNDECIDED
+from tests.unit.containment.scenes import box_mesh, lattice_points, made, merged
+from tests.unit.containment.test_ray_parity import HARD
+
+MESHES = ("tm_rabbit", "tm_quadknot", "tm_cycloidal", "syn_sliver_uv", "c3d_fandisk", "syn_menger2", "tm_unit_cube")
+
+
+def by_cells(points: Any, solid: Polyhedron) -> np.ndarray[Any, Any]:
+    """Return what the cells answer by themselves, UNDECIDED where they leave it to the ray."""
+    found = np.empty(len(points), np.int8)
+    with Budget() as budget:
+        cells = build_cells(solid, budget)
+    n_open = locate_by_cells(np.ascontiguousarray(points), cells, found, np.zeros(1, np.uint8))
+    assert n_open == (found == UNDECIDED).sum()
+    return found
+
+
+def assert_certified(points: Any, solid: Polyhedron, most_open: float = 1.0) -> None:
+    found, expected = by_cells(points, solid), locate(points, solid)
+    sure = found != UNDECIDED
+    assert (found[sure] == expected[sure]).all()
+    assert (~sure).mean() <= most_open
+
+
+def around(vertices: Any, faces: Any, n: int, spread: float, seed: int = 0) -> Any:
+    """Return points close to the faces."""
+    random = np.random.default_rng(seed)
+    corners = vertices[faces[random.integers(0, len(faces), n)]]
+    points = (corners * random.dirichlet([1, 1, 1], n)[:, :, None]).sum(axis=1)
+    return points + random.normal(size=points.shape) * spread * np.ptp(vertices, axis=0).max()
+
+
+@pytest.mark.data
+@pytest.mark.parametrize("name", HARD)
+def test_hard_sets(data: Path, name: str) -> None:
+    case = np.load(data / "hard_containment" / f"{name}.npz")
+    found = by_cells(case["points"], Polyhedron(case["vertices"], case["faces"]))
+    sure = found != UNDECIDED
+    assert (found[sure] == case["location"][sure]).all()
+    assert not (case["location"][sure] == 0).any()
+
+
+@pytest.mark.data
+@pytest.mark.parametrize("name", MESHES)
+def test_meshes_equal_the_ray(data: Path, name: str) -> None:
+    mesh = np.load(data / "meshes" / f"{name}.npz")
+    vertices, faces = mesh["vertices"], mesh["faces"]
+    solid = Polyhedron(vertices, faces)
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    assert_certified(np.random.default_rng(1).uniform(low - 0.1, high + 0.1, (20_000, 3)), solid, 1e-3)
+    for spread in (1e-2, 1e-4, 1e-7):
+        assert_certified(around(vertices, faces, 5000, spread), solid)
+    middles = (vertices[faces] + vertices[np.roll(faces, 1, axis=1)]).reshape(-1, 3) / 2
+    assert_certified(np.concatenate([vertices, middles])[:20_000], solid)
+
+
+@pytest.mark.parametrize("offset", [0.0, 1e9, -3e5])
+@pytest.mark.parametrize("scale", [1.0, 2.0**300, 2.0**-300])
+def test_lattice_solids(offset: float, scale: float) -> None:
+    boxes = [box_mesh([0, 0, 0], [3, 3, 3]), box_mesh([1, 1, 1], [4, 4, 2]), box_mesh([0, 0, 3], [1, 4, 4])]
+    mesh = merged(*boxes)
+    solid = Polyhedron((np.array(mesh["vertices"]) + offset) * scale, mesh["faces"])
+    points = np.concatenate([lattice_points(3), np.random.default_rng(2).uniform(-1, 5, (2000, 3))])
+    assert_certified((points + offset) * scale, solid)
+
+
+@pytest.mark.parametrize("stretch", [(1, 1, 1e-6), (1e-12, 1, 1), (1, 1e-3, 1e3)])
+def test_flat_and_long_solids(stretch: tuple[float, float, float]) -> None:
+    random = np.random.default_rng(3)
+    faces = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
+    parts = [{"vertices": random.uniform(0, 1, (4, 3)).tolist(), "faces": faces} for _ in range(40)]
+    mesh = merged(*parts)
+    vertices = np.array(mesh["vertices"]) * stretch
+    solid = Polyhedron(vertices, mesh["faces"])
+    assert_certified(random.uniform(0, 1, (5000, 3)) * stretch, solid)
+    assert_certified(around(vertices, np.array(mesh["faces"]), 2000, 1e-9), solid)
+
+
+def test_faces_without_area_leave_their_points_to_the_ray() -> None:
+    mesh = box_mesh([0, 0, 0], [2, 2, 2])
+    mesh["vertices"] += [[1.0, 0.0, 1.0], [3.0, 0.0, 1.0], [5.0, 0.0, 1.0]]
+    mesh["faces"] += [[8, 9, 10], [10, 9, 8]]
+    points = np.concatenate([[[4, 0, 1], [1, 0, 1], [4.5, 0, 1]], np.random.default_rng(4).uniform(0, 5, (500, 3))])
+    assert_certified(points, made(mesh))
+
+
+def test_cells_are_built_only_when_they_pay(monkeypatch: pytest.MonkeyPatch) -> None:
+    solid = made(box_mesh([0, 0, 0], [1, 1, 1]))
+    points = np.random.default_rng(5).uniform(-0.1, 1.1, (5000, 3))
+    first, accuracy = locate(points, solid, report=True)
+    assert accuracy.method == "ray_parity"
+    for _ in range(3):
+        again, accuracy = locate(points, solid, report=True)
+        assert (again == first).all()
+    assert accuracy.method == "segment_parity"
+    monkeypatch.setattr(building, "_PAYS_FROM", 0)
+    huge = Polyhedron(np.array(box_mesh([0, 0, 0], [1, 1, 1])["vertices"]) * 1e300, box_mesh([0] * 3, [1] * 3)["faces"])
+    assert locate(points * 1e300, huge, report=True)[1].method == "ray_parity"
+    tree = Csg("union", [solid, made(box_mesh([1, 0, 0], [2, 1, 1]))])
+    assert (locate(points, tree) >= first).all()
+
+
+def test_a_cancelled_build_keeps_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(building, "_PAYS_FROM", 0)
+    solid = made(box_mesh([0, 0, 0], [1, 1, 1]))
+    cancel = Cancel()
+    cancel.set()
+    with pytest.raises(CancelledError):
+        locate(np.zeros((100, 3)), solid, cancel=cancel)
+    with pytest.raises(CancelledError), Budget(None, cancel) as budget:
+        build_cells(solid, budget)
+    assert locate([[0.5, 0.5, 0.5]] * 100, solid).tolist() == [1] * 100
+
+
+def exact_crossing(a: Any, b: Any, c: Any, x: Any) -> int | None:
+    """Return whether the segment from 0 to x crosses the triangle, None where anything is degenerate; in integers."""
+    from fractions import Fraction
+
+    p = [[Fraction(float(value)) for value in point] for point in (a, b, c, x)]
+
+    def volume(u: Any, v: Any, w: Any) -> Fraction:
+        crossed = [u[(k + 1) % 3] * v[(k + 2) % 3] - u[(k + 2) % 3] * v[(k + 1) % 3] for k in range(3)]
+        return sum((m * n for m, n in zip(crossed, w)), Fraction(0))
+
+    def less(u: Any, v: Any) -> Any:
+        return [m - n for m, n in zip(u, v)]
+
+    edges = [volume(p[k], p[(k + 1) % 3], p[3]) for k in range(3)]
+    of_r = volume(less(p[1], p[0]), less(p[2], p[0]), less([Fraction(0)] * 3, p[0]))
+    of_x = volume(less(p[1], p[0]), less(p[2], p[0]), less(p[3], p[0]))
+    if of_r == 0 or of_x == 0 or 0 in edges:
+        return None
+    return int(of_r * of_x < 0 and (min(edges) > 0 or max(edges) < 0))
+
+
+def test_entries_are_right_beyond_their_band() -> None:
+    random = np.random.default_rng(6)
+    n_sure = n_crossed = 0
+    for case in range(1500):
+        a, b, c = random.uniform(-1, 1, (3, 3)) * random.choice([1.0, 30.0, 1e-3]) + random.uniform(-0.3, 0.3, 3)
+        if case % 3 == 0:
+            c = a + (b - a) * random.uniform(-1, 2) + random.normal(size=3) * 10.0 ** -random.integers(1, 12)
+        weights = random.dirichlet([1, 1, 1])
+        x = weights[0] * a + weights[1] * b + weights[2] * c
+        x = x * (1 + random.choice([0, 1e-7, 1e-6, 1e-5, -1e-5, 0.3])) + random.normal(size=3) * 1e-7
+        if np.abs(x).max() > 0.6:
+            x = random.uniform(-0.6, 0.6, 3)
+        entries = np.zeros((1, ENTRY), np.float32)
+        with np.errstate(all="ignore"):
+            set_entry(entries[0], tuple(a), tuple(b), tuple(c), tuple(b - a), tuple(c - a))
+            found = crossing(entries, 0, *x.astype(np.float32))
+        if found != UNDECIDED:
+            n_sure += 1
+            n_crossed += found
+            assert found == exact_crossing(a, b, c, x)
+    assert n_sure > 500
+    assert n_crossed > 50
+
+
+def test_cells_are_only_missed_where_no_point_is() -> None:
+    random = np.random.default_rng(7)
+    n_missed = 0
+    for _ in range(2000):
+        a, b, c = random.uniform(-2, 2, (3, 3)) * random.choice([1.0, 5.0])
+        missed = misses_cell(tuple(b - a), tuple(c - a), tuple(-a))
+        n_missed += missed
+        weights = random.dirichlet([0.5, 0.5, 0.5], 200)
+        points = weights @ np.array([a, b, c])
+        assert not (missed and (np.abs(points) <= 0.5).all(axis=1).any())
+    assert n_missed > 500
