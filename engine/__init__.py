@@ -4,6 +4,9 @@ from engine.clipping.overlay import OverlayBatch, overlay, overlay_batch
 from engine.clipping.overlay_result import Collapse, Overlay, OverlayPiece
 from engine.clipping.polygons import ClippedPolygons, PolygonStatus, clip_polygons
 from engine.clipping.segments import SegmentPieces, clip_segments
+from engine.collision.collide import collide
+from engine.collision.collide_poses import collide_poses
+from engine.collision.result import Collision, Witness
 from engine.containment.locate import contains, locate
 from engine.containment.locate_scene import SceneLocations, locate_scene
 from engine.errors import (
@@ -58,6 +61,7 @@ __all__ = [
     "CancelledError",
     "ClippedPolygons",
     "Collapse",
+    "Collision",
     "Convex",
     "Csg",
     "DeadlineExceededError",
@@ -99,12 +103,15 @@ __all__ = [
     "Triangle",
     "UnsupportedPairError",
     "UnsupportedSolidError",
+    "Witness",
     "WrongDimensionError",
     "ZeroNormalError",
     "__version__",
     "bounds",
     "clip_polygons",
     "clip_segments",
+    "collide",
+    "collide_poses",
     "contains",
     "locate",
     "locate_scene",

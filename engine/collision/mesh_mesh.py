@@ -1,0 +1,322 @@
+"""Polyhedra, surfaces and boxes against each other in 3D: the relation, by contacts, then locations, then cells.
+
+1. **Contacts**: every pair of faces with a common point. A strict crossing that `face_state.py` accepts proves that
+the open
+   interiors meet, and ends the search.
+2. **Patches**: faces without contact, connected through vertices, lie wholly inside or wholly outside the other body,
+so
+   one vertex tells. Without any contact the patches are the components of the surfaces, and disjoint or inside follow.
+   A patch inside the other body proves overlapping, if some face of it has an inside of its own body beside it.
+3. **Cells**: what is left are weak contacts (a vertex on a face, flush faces, edges that touch). If the open interiors
+   meet, the border of their intersection has a piece with area on some face of either body; on patches that is settled,
+   so look at every cell that the two bodies cut from each face in contact (`exact_cells.py`).
+
+Faces that cancel under even-odd (stacked) have nothing to show for themselves; their patches go through step 3 too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from engine.collision.dual_traversal import (
+    SEEK_CONTACT,
+    SEEK_OVERLAP,
+    SEEK_PIERCING_BY_FIRST,
+    SEEK_PIERCING_BY_SECOND,
+    find_contacts,
+)
+from engine.collision.exact_body import ExactBody, exact_pair
+from engine.collision.exact_cells import cells_of, is_inside_exact, pieces_of_segment, sides_at
+from engine.collision.exact_triangles import as_simplex, classify_exact, kind_of_contact
+from engine.collision.face_state import find_states
+from engine.collision.parity import INSIDE, locate_vertices
+from engine.collision.result import Collision, Kind, Witness, Work
+from engine.collision.shell import STATE_CLEAN, STATE_CROSSED, STATE_STACKED, Shell, join_vertices, shell_of
+from engine.collision.triangle_triangle import APART, COPLANAR, CROSSING
+from engine.solids.base import IntArray, Solid
+from engine.solids.pose import Pose
+from engine.types import UNDECIDED, Relation
+
+_FIRST_ROOM = 1024
+_BLOCK = 64
+_NAMED = 32
+STRENGTH: tuple[Kind, ...] = ("face_face", "edge_face", "vertex_face", "edge_edge", "vertex_edge", "vertex_vertex")
+"""Of several contacts the witness is the one of the kind that stands first here; at most `_NAMED` are looked at."""
+
+
+def mesh_mesh(first: Solid, second: Solid, first_pose: Pose | None, second_pose: Pose | None, work: Work) -> Collision:
+    """Return the relation of two polyhedra, surfaces or 3D boxes."""
+    return relate(shell_of(first), first_pose, shell_of(second), second_pose, work)
+
+
+def relate(first: Shell, first_pose: Pose | None, second: Shell, second_pose: Pose | None, work: Work) -> Collision:
+    """Return the relation of two placed shells.
+
+    Two equal poses are left out: an invertible affine map, applied to both, changes no relation.
+    """
+    if first_pose is not None and first_pose.is_identity:
+        first_pose = None
+    if second_pose is not None and second_pose.is_identity:
+        second_pose = None
+    if first_pose is not None and first_pose == second_pose:
+        first_pose = second_pose = None
+    with np.errstate(all="ignore"):  # kernels, where they run uncompiled
+        return _Pair(first, first_pose, second, second_pose, work).relation()
+
+
+def what_to_seek(first: Shell, second: Shell, work: Work) -> int:
+    """Return what ends the search for contacts early."""
+    if work.boolean or not (first.has_inside or second.has_inside):
+        return SEEK_CONTACT
+    if first.has_inside and second.has_inside:
+        return SEEK_OVERLAP
+    if not work.witness:
+        return SEEK_CONTACT
+    return SEEK_PIERCING_BY_SECOND if first.has_inside else SEEK_PIERCING_BY_FIRST
+
+
+@dataclass(frozen=True, slots=True)
+class _Patch:
+    """Faces connected through vertices, none in contact with the other body, all inside it."""
+
+    faces: IntArray
+
+
+class _Pair:
+    """One question, and the exact coordinates computed for it so far."""
+
+    def __init__(
+        self, first: Shell, first_pose: Pose | None, second: Shell, second_pose: Pose | None, work: Work
+    ) -> None:
+        self.shells = (first, second)
+        self.poses = (first_pose, second_pose)
+        self.work = work
+        self.seek = what_to_seek(first, second, work)
+        self._exact: tuple[ExactBody, ExactBody] | None = None
+
+    @property
+    def exact(self) -> tuple[ExactBody, ExactBody]:
+        """Both bodies in exact coordinates."""
+        if self._exact is None:
+            self._exact = exact_pair(self.shells[0], self.poses[0], self.shells[1], self.poses[1])
+        return self._exact
+
+    def relation(self) -> Collision:
+        """Return the answer."""
+        contacts, is_settled = self._contacts()
+        if is_settled:
+            if self.seek == SEEK_OVERLAP:
+                return self._touch(Relation.OVERLAPPING, contacts)
+            return self._touch(Relation.TOUCHING, contacts, piercing=self.seek != SEEK_CONTACT)
+        patches = [self._patches_inside(own, contacts[:, own]) for own in (0, 1)]
+        if not len(contacts):
+            n_inside = [sum(len(patch.faces) for patch in found) for found in patches]
+            if n_inside == [0, 0]:
+                return Collision(Relation.DISJOINT)
+            for own in (0, 1):
+                if n_inside[own] == len(self.shells[own].faces) and n_inside[1 - own] == 0:
+                    relation = (Relation.FIRST_INSIDE_SECOND, Relation.SECOND_INSIDE_FIRST)[own]
+                    return self._contain(relation, own, patches[own][0])
+        return self._overlap_or_touch(contacts, patches)
+
+    def _contacts(self) -> tuple[IntArray, bool]:
+        """Return the pairs of faces (n, 2) with a common point, ascending, or the one pair that settles the
+        question."""
+        (first, second), flag = self.shells, self.work.budget.flag
+        first_pose, second_pose = first.posed(self.poses[0]), second.posed(self.poses[1])
+        room = _FIRST_ROOM
+        while True:  # bound: the second turn has the room that the first one counted
+            pairs, kinds = np.empty((room, 2), np.int64), np.empty(room, np.int8)
+            n_pairs, is_settled = find_contacts(
+                first.arrays, first_pose, second.arrays, second_pose, self.seek, pairs, kinds, flag
+            )
+            self.work.budget.check()
+            if n_pairs <= room:
+                break
+            room = n_pairs
+        pairs, kinds = pairs[:n_pairs], kinds[:n_pairs]
+        if is_settled:
+            return pairs, True
+        pairs, kinds = self._in_order(pairs, kinds)
+        open_ones = np.flatnonzero(kinds == UNDECIDED)
+        self.work.n_beyond_filter += n_pairs
+        self.work.n_rational += len(open_ones)
+        for index in open_ones:
+            self.work.budget.check()
+            i, j = int(pairs[index, 0]), int(pairs[index, 1])
+            kinds[index] = classify_exact(self.exact[0].corners(i), self.exact[1].corners(j))
+            if kinds[index] != APART and self._is_settled_by(int(kinds[index]), i, j):
+                return pairs[index : index + 1], True
+        meet = np.concatenate(
+            [np.flatnonzero(kinds == COPLANAR), np.flatnonzero((kinds != APART) & (kinds != COPLANAR))]
+        )
+        return pairs[meet], False
+
+    def _in_order(self, pairs: IntArray, kinds: npt.NDArray[np.int8]) -> tuple[IntArray, npt.NDArray[np.int8]]:
+        """Sort pairs by the caller's faces, then by triangle."""
+        faces = [self.shells[own].faces[pairs[:, own]] for own in (0, 1)]
+        order = np.lexsort((pairs[:, 1], pairs[:, 0], faces[1], faces[0]))
+        return pairs[order], kinds[order]
+
+    def _is_settled_by(self, kind: int, i: int, j: int) -> bool:
+        """The rule of `dual_traversal.settles` for a class found exactly."""
+        if self.seek == SEEK_CONTACT:
+            return True
+        if kind != CROSSING:
+            return False
+        first, second = self._state(0, i), self._state(1, j)
+        if self.seek == SEEK_PIERCING_BY_FIRST:
+            return second == STATE_CLEAN
+        if self.seek == SEEK_PIERCING_BY_SECOND:
+            return first == STATE_CLEAN
+        return max(first, second) <= STATE_CROSSED and min(first, second) == STATE_CLEAN
+
+    def _states(self, own: int, faces: IntArray) -> npt.NDArray[np.int8]:
+        states = np.empty(len(faces), np.int8)
+        find_states(self.shells[own].arrays, faces, states)
+        return states
+
+    def _state(self, own: int, face: int) -> int:
+        return int(self._states(own, np.array([face]))[0])
+
+    def _patches_inside(self, own: int, in_contact: IntArray) -> list[_Patch]:
+        """Return the patches of one body, away from its faces in contact, that lie inside the other body."""
+        shell, other = self.shells[own], self.shells[1 - own]
+        if not other.has_inside:
+            return []
+        triangles = shell.arrays.triangles
+        if len(in_contact):
+            left_out = np.zeros(len(triangles), np.bool_)
+            left_out[in_contact] = True
+            parent = np.empty(len(shell.arrays.vertices), np.int64)
+            join_vertices(triangles, left_out, parent)
+            kept = np.flatnonzero(~left_out)
+            roots = parent[triangles[kept, 0]]
+            vertices = np.unique(roots)
+        else:
+            vertices = triangles[shell.components, 0]
+        found = np.empty(len(vertices), np.int8)
+        locate_vertices(
+            shell.arrays,
+            shell.posed(self.poses[own]),
+            vertices,
+            other.arrays,
+            other.posed(self.poses[1 - own]),
+            found,
+            self.work.budget.flag,
+        )
+        self.work.budget.check()
+        for index in np.flatnonzero(found == UNDECIDED):
+            self.work.budget.check()
+            self.work.n_beyond_filter += 1
+            self.work.n_rational += 1
+            point = self.exact[own].vertex(int(vertices[index]))
+            found[index] = INSIDE if sides_at(self.exact[1 - own], (*point, 1), 2).at else -INSIDE
+        inside = vertices[found == INSIDE]
+        if not len(inside):
+            return []
+        if not len(in_contact):
+            parent = np.empty(len(shell.arrays.vertices), np.int64)
+            join_vertices(triangles, np.zeros(len(triangles), np.bool_), parent)
+            kept, roots = np.arange(len(triangles)), parent[triangles[:, 0]]
+        return [_Patch(kept[roots == parent[vertex]]) for vertex in inside]
+
+    def _overlap_or_touch(self, contacts: IntArray, patches: list[list[_Patch]]) -> Collision:
+        """Return overlapping or touching, where no crossing has proven the first."""
+        piercing = bool(patches[0] or patches[1])
+        both = self.shells[0].has_inside and self.shells[1].has_inside
+        for own in (0, 1):
+            for patch in patches[own]:
+                if both and self._has_inside_beside(own, patch):
+                    if len(contacts):
+                        return self._touch(Relation.OVERLAPPING, contacts)
+                    return self._contain(Relation.OVERLAPPING, own, patch)
+        for own in (0, 1):
+            if not both and (piercing or not self.work.witness or not self.shells[1 - own].has_inside):
+                continue
+            for face in np.unique(contacts[:, own]).tolist():
+                overlaps, pierces = self._look_at_cells(own, face)
+                if overlaps:
+                    return self._touch(Relation.OVERLAPPING, contacts)
+                piercing = piercing or pierces
+        if self.work.witness and not piercing:
+            piercing = any(
+                self._pierces_without_area(own, face) for own in (0, 1) for face in np.unique(contacts[:, own]).tolist()
+            )
+        if len(contacts):
+            return self._touch(Relation.TOUCHING, contacts, piercing=piercing)
+        own = 0 if patches[0] else 1
+        return self._contain(Relation.TOUCHING, own, patches[own][0], piercing=piercing)
+
+    def _has_inside_beside(self, own: int, patch: _Patch) -> bool:
+        """Tell whether the body's own inside comes up to some face of a patch."""
+        shell, body = self.shells[own], None
+        with_area = patch.faces[shell.arrays.axis[patch.faces] != -1]
+        for start in range(0, len(with_area), _BLOCK):
+            self.work.budget.check()
+            if (self._states(own, with_area[start : start + _BLOCK]) != STATE_STACKED).any():
+                return True
+        for face in with_area.tolist():
+            body = self.exact[own]
+            for q in cells_of(body, face, [body], self.work.budget):
+                sides = sides_at(body, q, body.axis(face))
+                if sides.above or sides.below:
+                    return True
+        return False
+
+    def _look_at_cells(self, own: int, face: int) -> tuple[bool, bool]:
+        """Tell whether both insides come up to one side of some cell of a face, and whether a cell lies inside the
+        other."""
+        body, other = self.exact[own], self.exact[1 - own]
+        axis = body.axis(face)
+        if axis < 0:
+            return False, False
+        cutters = [other]
+        if body.shell.has_inside and self._state(own, face) != STATE_CLEAN:
+            cutters.append(body)
+        pierces = False
+        for q in cells_of(body, face, cutters, self.work.budget):
+            theirs = sides_at(other, q, axis)
+            if theirs.above or theirs.below:
+                ours = sides_at(body, q, axis)
+                if (ours.above and theirs.above) or (ours.below and theirs.below):
+                    return True, False
+            pierces = pierces or theirs.at
+        return False, pierces
+
+    def _pierces_without_area(self, own: int, face: int) -> bool:
+        """Tell whether a face that is only a segment has a point in the other body's open interior."""
+        body, other = self.exact[own], self.exact[1 - own]
+        if body.axis(face) >= 0 or not other.shell.has_inside:
+            return False
+        ends = as_simplex(body.corners(face))
+        if len(ends) < 2:
+            return False
+        pieces = pieces_of_segment(body, (ends[0], ends[1]), other, self.work.budget)
+        return any(is_inside_exact(other, q) for q in pieces)
+
+    def _touch(self, relation: Relation, contacts: IntArray, *, piercing: bool = False) -> Collision:
+        """Return a relation with two faces as its witness: the strongest kind among the first contacts."""
+        if not self.work.witness:
+            return Collision(relation)
+        named = []
+        for i, j in contacts[:_NAMED].tolist():
+            self.work.budget.check()
+            kind = kind_of_contact(self.exact[0].corners(i), self.exact[1].corners(j))
+            named.append((STRENGTH.index(kind), int(self.shells[0].faces[i]), int(self.shells[1].faces[j])))
+        strength, first_face, second_face = min(named)
+        return Collision(relation, Witness(STRENGTH[strength], first_face, second_face, "", piercing))
+
+    def _contain(self, relation: Relation, own: int, patch: _Patch, *, piercing: bool = False) -> Collision:
+        """Return a relation with a part of body `own` inside the other one as its witness."""
+        if not self.work.witness:
+            return Collision(relation)
+        face = int(self.shells[own].faces[patch.faces].min())
+        containing: Literal["first", "second"] = "second" if own == 0 else "first"
+        return Collision(
+            relation, Witness("containment", face if own == 0 else -1, face if own == 1 else -1, containing, piercing)
+        )

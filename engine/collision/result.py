@@ -1,0 +1,87 @@
+"""What a collision call answers, and what one pair of solids is asked with.
+
+Every pair of types has one function ``(first, second, first_pose, second_pose, work) -> Collision``; the table in
+`collide.py` finds it. `Work` carries what such a function may spend and what it should report.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+from engine.parallel import Budget
+from engine.solids.base import Solid
+from engine.solids.pose import Pose
+from engine.types import Relation
+
+Kind = Literal[
+    "vertex_vertex", "vertex_edge", "vertex_face", "edge_edge", "edge_face", "face_face", "containment", "surface"
+]
+"""The features of the two faces that meet; `containment` where a body, or a part of it, lies inside the other without
+contact. Edges are those of the triangles that a face was cut into; `surface` where a body without faces (sphere,
+half-space) takes part in the contact."""
+
+
+@dataclass(frozen=True, slots=True)
+class Witness:
+    """One reason why two bodies have a common point.
+
+    kind: how the two faces meet, or `containment`.
+    first_face, second_face: the caller's face of each body (aabb: 0..5 = xmin, xmax, ymin, ymax, zmin, zmax), -1 where
+        the body has no faces or the witness is a containment and this body is the one that contains.
+    containing: for `containment` the body that contains, else "".
+    piercing: touching only: some point of one body lies in the open interior of the other, although the open interiors
+        do not meet (a surface, a flat body, or a wall that cancels).
+    """
+
+    kind: Kind
+    first_face: int = -1
+    second_face: int = -1
+    containing: Literal["", "first", "second"] = ""
+    piercing: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Collision:
+    """How two bodies lie to each other; `witness` is None when they are disjoint, or where none was asked for."""
+
+    relation: Relation
+    witness: Witness | None = None
+
+    def swapped(self) -> Collision:
+        """Return the answer for the two bodies in the other order."""
+        swap: dict[Relation, Relation] = {
+            Relation.FIRST_INSIDE_SECOND: Relation.SECOND_INSIDE_FIRST,
+            Relation.SECOND_INSIDE_FIRST: Relation.FIRST_INSIDE_SECOND,
+        }
+        witness = self.witness
+        if witness is not None:
+            containing: Literal["", "first", "second"] = ""
+            if witness.containing:
+                containing = "second" if witness.containing == "first" else "first"
+            witness = replace(
+                witness, first_face=witness.second_face, second_face=witness.first_face, containing=containing
+            )
+        return Collision(swap.get(self.relation, self.relation), witness)
+
+
+@dataclass(slots=True)
+class Work:
+    """What one pair may spend, what it must find out, and what it counts.
+
+    budget: poll `budget.check()` in slow loops; kernels poll `budget.flag`.
+    witness: False where only the relation is wanted.
+    boolean: True where disjoint or not is all that is wanted: any relation but disjoint may then be answered as
+    touching. n_beyond_filter, n_rational: decisions (faces pairs, points) that the filter, and the compiled exact
+    stage, left open.
+    """
+
+    budget: Budget = field(default_factory=Budget)
+    witness: bool = True
+    boolean: bool = False
+    n_beyond_filter: int = 0
+    n_rational: int = 0
+
+
+PairFunction = Callable[[Solid, Solid, Pose | None, Pose | None, Work], Collision]
