@@ -13,6 +13,7 @@ import numpy.typing as npt
 from engine.clipping.box_planes import box_rows
 from engine.clipping.convex_planes import convex_planes
 from engine.clipping.exact_contours import Row, clip_polygon, integer_row, reduced
+from engine.clipping.polygon_batches import clip_chunk, kernel_scene
 from engine.errors import EmptyGeometryError, InvalidArrayError, TooComplexError, UnsupportedSolidError
 from engine.parallel import Budget, Cancel, Progress, run_chunks
 from engine.solids.aabb import Aabb
@@ -231,21 +232,36 @@ def _clip(
     sizes = np.zeros(len(ring_offsets) - 1, np.int64)
     parts: dict[int, FloatArray] = {}
 
-    def task(first: int, last: int) -> None:
-        found: list[Any] = []
-        for i in range(first, last):
-            rings = range(polygon_offsets[i], polygon_offsets[i + 1])
-            points = [vertices[ring_offsets[j] : ring_offsets[j + 1]].tolist() for j in rings]
-            try:
-                contours, may_have_bridges[i] = clip_polygon(points, planes, budget.check)
-            except TooComplexError:
-                status[i] = PolygonStatus.TOO_COMPLEX
-                continue
-            sizes[rings.start : rings.stop] = [len(contour) for contour in contours]
-            found += [vertex for contour in contours for vertex in contour]
-        parts[first] = np.array(found, np.float64).reshape(-1, dimension)
+    scene = kernel_scene(vertices, planes)
+    is_open = np.ones(n, np.uint8)
 
-    run_chunks(task, n, budget=budget, workers=workers, progress=progress, first_chunk=16)
+    def settle(i: int) -> FloatArray:
+        rings = range(polygon_offsets[i], polygon_offsets[i + 1])
+        points = [vertices[ring_offsets[j] : ring_offsets[j + 1]].tolist() for j in rings]
+        try:
+            contours, may_have_bridges[i] = clip_polygon(points, planes, budget.check)
+        except TooComplexError:
+            status[i] = PolygonStatus.TOO_COMPLEX
+            return np.zeros((0, dimension))
+        sizes[rings.start : rings.stop] = [len(contour) for contour in contours]
+        return np.array([vertex for contour in contours for vertex in contour], np.float64).reshape(-1, dimension)
+
+    def task(first: int, last: int) -> None:
+        settled = np.zeros((0, dimension))
+        if scene is not None:
+            settled = clip_chunk(
+                scene, ring_offsets, polygon_offsets, first, last, budget, sizes, is_open, may_have_bridges
+            )
+        found, taken = [], 0
+        counts = np.add.reduceat(np.append(sizes, 0), polygon_offsets[first : last + 1]) if last > first else sizes
+        before = _offsets(counts[: last - first])
+        for i in first + np.flatnonzero(is_open[first:last]):
+            budget.check()
+            found += [settled[taken : before[i - first]], settle(int(i))]
+            taken = int(before[i - first])
+        parts[first] = np.concatenate([*found, settled[taken:]])
+
+    run_chunks(task, n, budget=budget, workers=workers, progress=progress, first_chunk=64)
     left = np.flatnonzero(sizes)
     counted = np.concatenate([[0], np.cumsum(sizes > 0)])
     owners = np.repeat(polygon_offsets[:-1], np.diff(polygon_offsets))
@@ -257,4 +273,5 @@ def _clip(
         status,
         may_have_bridges,
     )
-    return clipped, n, n
+    n_open = int(is_open.sum())
+    return clipped, n_open, n_open

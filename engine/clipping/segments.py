@@ -126,6 +126,8 @@ def clip_segments(
     """
     task, method = _method(region)
     array = as_point_groups(segments, 2, region.dimension, ("segments",))
+    if not array.flags.writeable:
+        array = array.copy()  # one type of array for the kernels, compiled once
     with Budget(deadline, cancel) as budget:
         pieces, n_beyond, n_rational = task(array, budget, workers, progress)
     if not report:
@@ -164,15 +166,16 @@ def _on_box(region: Aabb) -> Task:
     ) -> tuple[SegmentPieces, int, int]:
         exponent = exponent_of(segments, region.min, region.max)
         scaled = [shifted(array, -exponent) if exponent else array for array in (segments, region.min, region.max)]
-        if any(array is None for array in scaled):
-            exponent, scaled = 0, [segments, region.min, region.max]
+        points, low, high = scaled
+        if points is None or low is None or high is None:
+            exponent, points, low, high = 0, segments, region.min, region.max
         planes = box_rows(region).tolist()
         return _clip_convex(
             kernel,
-            (np.ascontiguousarray(scaled[1]), np.ascontiguousarray(scaled[2])),
+            (low.copy(), high.copy()),
             lambda p, q: clip_by_planes(p, q, planes),
             segments,
-            scaled[0],
+            points,
             exponent,
             budget,
             workers,

@@ -131,7 +131,7 @@ def test_menger_sponge(data: Path, pytestconfig: pytest.Config) -> None:
     mesh = np.load(data / "meshes" / "syn_menger2.npz")
     sponge = Polyhedron(mesh["vertices"], mesh["faces"])
     rng = np.random.default_rng(2)
-    n = 200 if pytestconfig.getoption("--full") else 3
+    n = 200 if pytestconfig.getoption("--full") else 1
     low, high = sponge.vertices.min(axis=0), sponge.vertices.max(axis=0)
     free = rng.uniform(low - 1, high + 1, (n, 2, 3))
     lattice = rng.integers(low - 1, high + 2, (n, 2, 3)).astype(float)

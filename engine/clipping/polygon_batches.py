@@ -1,0 +1,123 @@
+"""Runs the Sutherland-Hodgman kernel over chunks: planes as double-doubles, scenes brought into its range."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from engine.clipping.cut_point import LARGEST, SMALLEST
+from engine.clipping.exact_contours import Row
+from engine.clipping.exact_segments import nearest
+from engine.clipping.scaling import exponent_of, scaled_back, shifted
+from engine.clipping.sutherland_hodgman import OPEN, clip_rings
+from engine.parallel import Budget
+from engine.solids.base import FloatArray, IntArray
+
+_DEEPEST: Final = -900
+"""Scenes below 2^-900 have subnormal results, which the kernel would round twice."""
+
+
+@dataclass(frozen=True, slots=True)
+class KernelScene:
+    """vertices: (m, dim) float64 times 2^-exponent; high, low: (planes, dim + 1) float64 for them; axes: (planes,)
+    int64, the axis that a plane cuts across in one known double `at`, else -1."""
+
+    vertices: FloatArray
+    exponent: int
+    high: FloatArray
+    low: FloatArray
+    axes: IntArray
+    at: FloatArray
+
+
+def kernel_scene(vertices: FloatArray, planes: list[Row]) -> KernelScene | None:
+    """Return the scene as the kernel takes it, None where numbers lie too far apart for it."""
+    exponent = exponent_of(vertices)
+    points = shifted(vertices, -exponent) if exponent else vertices
+    if points is None or exponent < _DEEPEST or not planes:
+        return None
+    high, low = np.zeros((len(planes), len(planes[0]))), np.zeros((len(planes), len(planes[0])))
+    axes, at = np.full(len(planes), -1, np.int64), np.zeros(len(planes))
+    for i, row in enumerate(planes):
+        *normal, offset = [x << exponent for x in row[:-1]] + [row[-1]] if exponent > 0 else row
+        offset = offset << -exponent if exponent < 0 else offset
+        shift = max(map(int.bit_length, normal))  # the row is divided by 2^shift: its largest number is about 1
+        try:
+            for k, number in enumerate([*normal, offset]):
+                high[i, k], low[i, k] = _double_double(number, shift)
+            across = [k for k, number in enumerate(normal) if number]
+            if len(across) == 1:
+                place, rest = _double_double_quotient(-offset, normal[across[0]])
+                axes[i], at[i] = (across[0], place) if rest == 0 else (-1, 0.0)
+        except OverflowError:
+            return None
+    sizes = np.abs(np.concatenate([high.ravel(), low.ravel()]))
+    if ((sizes != 0.0) & ((sizes < SMALLEST) | (sizes > LARGEST))).any():
+        return None
+    return KernelScene(points, exponent, high, low, axes, at)
+
+
+def _double_double(number: int, shift: int) -> tuple[float, float]:
+    """Return number / 2^shift as a double-double."""
+    high = nearest(number, 1 << shift)
+    return high, _double_double_quotient(number, 1 << shift)[1]
+
+
+def _double_double_quotient(top: int, bottom: int) -> tuple[float, float]:
+    """Return the double nearest to a quotient of integers, and the double nearest to what is left."""
+    high = nearest(top, bottom)
+    numerator, denominator = high.as_integer_ratio()
+    return high, nearest(top * denominator - numerator * bottom, bottom * denominator)
+
+
+def clip_chunk(
+    scene: KernelScene,
+    ring_offsets: IntArray,
+    polygon_offsets: IntArray,
+    first: int,
+    last: int,
+    budget: Budget,
+    sizes: IntArray,
+    state: npt.NDArray[np.uint8],
+    may_have_bridges: npt.NDArray[np.bool_],
+) -> FloatArray:
+    """Clip polygons first .. last - 1 as far as the kernel can; return the vertices of those it settled, in order.
+
+    Fills sizes (of rings), state and may_have_bridges (of polygons); see `clip_rings`.
+    """
+    n_vertices = int(ring_offsets[polygon_offsets[last]] - ring_offsets[polygon_offsets[first]])
+    room, done, parts = n_vertices + 4 * len(scene.high) + 64, first, []
+    while done < last:
+        out = np.empty((room, scene.vertices.shape[1]))
+        with np.errstate(all="ignore"):
+            reached, written = clip_rings(
+                scene.vertices,
+                ring_offsets,
+                polygon_offsets,
+                scene.high,
+                scene.low,
+                scene.axes,
+                scene.at,
+                done,
+                last,
+                budget.flag,
+                out,
+                sizes,
+                state,
+                may_have_bridges,
+            )
+        budget.check()
+        parts.append(out[:written])
+        room = room if reached > done else 2 * room
+        done = reached
+    vertices = np.concatenate(parts) if parts else np.zeros((0, scene.vertices.shape[1]))
+    if scene.exponent:
+        vertices, doubtful = scaled_back(vertices, scene.exponent)
+        if doubtful.any():
+            state[first:last] = OPEN
+            sizes[polygon_offsets[first] : polygon_offsets[last]] = 0
+            return vertices[:0]
+    return vertices
