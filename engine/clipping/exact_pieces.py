@@ -46,7 +46,7 @@ def _cross(u: Integers, v: Integers) -> list[int]:
 
 
 def edge_stretch(p: Integers, q: Integers, a: Integers, b: Integers) -> tuple[Fraction, Fraction, bool] | None:
-    """Return where the segment p q meets the edge a b (which may be a point), and whether it runs along it."""
+    """Return where p q meets the edge a b, and whether it runs along it (so it does where a = b)."""
     u, v, w = _minus(q, p), _minus(b, a), _minus(a, p)
     normal = _cross(u, v)
     size = _dot(normal, normal)
@@ -60,20 +60,20 @@ def edge_stretch(p: Integers, q: Integers, a: Integers, b: Integers) -> tuple[Fr
     length = _dot(u, u)
     ends = sorted(Fraction(_dot(_minus(end, p), u), length) for end in (a, b))
     first, last = max(ends[0], ZERO), min(ends[1], ONE)
-    return (first, last, a != b) if first <= last else None
+    return (first, last, True) if first <= last else None
 
 
 def triangle_stretch(
     p: Integers, q: Integers, a: Integers, b: Integers, c: Integers
 ) -> tuple[Fraction, Fraction, bool] | None:
-    """Return where the segment p q meets the closed triangle a b c, and whether it runs in its plane."""
+    """Return where the segment p q meets the closed triangle a b c, and whether it runs in its plane (no area: yes)."""
     normal = _cross(_minus(b, a), _minus(c, a))
     if not any(normal):  # case: no area; the triangle is its edges
         found = [edge_stretch(p, q, *edge) for edge in ((a, b), (b, c), (c, a))]
         met = [stretch for stretch in found if stretch is not None]
         if not met:
             return None
-        return min(s[0] for s in met), max(s[1] for s in met), any(s[2] for s in met)
+        return min(s[0] for s in met), max(s[1] for s in met), True
     s_p, s_q = _dot(normal, _minus(p, a)), _dot(normal, _minus(q, a))
     first, last = ZERO, ONE
     if s_p != s_q:

@@ -104,7 +104,8 @@ def clip_segments(
     Boundary
         Counts as in: a segment in a face is kept, one that touches in a single point gives that point (t0 = t1).
         `faces` at the start is -1 exactly where t0 = 0, at the end where t1 = 1; else the plane crossed there, of
-        several at one point the smallest, those that the segment runs along last. Indices: half_space 0; aabb xmin,
+        several at one point the smallest, those that the segment runs along, or that have no
+        area, last. Indices: half_space 0; aabb xmin,
         xmax, ymin, ymax, zmin, zmax; convex the row; sphere 0; polyhedron the face as given; polygon the edge, named by
         the index of its first vertex over all rings.
     Degenerate input

@@ -40,8 +40,8 @@ def as_json(solid: Solid) -> dict[str, Any]:
     raise TypeError(solid.type)
 
 
-def assert_exact(pieces: SegmentPieces, segments: Floats, region: Solid, decides_faces: bool = True) -> None:
-    """Assert that `pieces` are the reference's: every source, every double, every face one that holds the end."""
+def assert_exact(pieces: SegmentPieces, segments: Floats, region: Solid) -> None:
+    """Assert that `pieces` are the reference's: every source, every double, every face."""
     expected = reference_pieces(segments.tolist(), as_json(region))
     found = [
         (int(s), a.tolist(), b.tolist(), t.tolist())
@@ -49,10 +49,7 @@ def assert_exact(pieces: SegmentPieces, segments: Floats, region: Solid, decides
     ]
     assert found == [(source, *piece.rounded()) for source, piece in expected]
     assert not any(np.signbit(array[array == 0.0]).any() for array in (pieces.start, pieces.end, pieces.t))
-    if decides_faces:
-        for (first, last), (_, piece) in zip(pieces.faces.tolist(), expected):
-            assert first in piece.faces[0]
-            assert last in piece.faces[1]
+    assert [tuple(faces) for faces in pieces.faces.tolist()] == [piece.faces for _, piece in expected]
 
 
 def check(segments: Floats, region: Solid) -> None:
