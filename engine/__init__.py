@@ -7,6 +7,8 @@ from engine.clipping.segments import SegmentPieces, clip_segments
 from engine.collision.collide import collide
 from engine.collision.collide_poses import collide_poses
 from engine.collision.result import Collision, Witness
+from engine.collision.scene import ScenePairs, collide_scene
+from engine.collision.triangles import collide_triangles
 from engine.containment.locate import contains, locate
 from engine.containment.locate_scene import SceneLocations, locate_scene
 from engine.errors import (
@@ -94,6 +96,7 @@ __all__ = [
     "RepeatedIndexError",
     "RingTooShortError",
     "SceneLocations",
+    "ScenePairs",
     "SegmentPieces",
     "Solid",
     "Sphere",
@@ -112,6 +115,8 @@ __all__ = [
     "clip_segments",
     "collide",
     "collide_poses",
+    "collide_scene",
+    "collide_triangles",
     "contains",
     "locate",
     "locate_scene",

@@ -4,20 +4,13 @@ from __future__ import annotations
 
 from typing import Literal, overload
 
-from engine.collision.mesh_mesh import mesh_mesh
+from engine.collision.pairs import PAIRS
 from engine.collision.result import Collision, PairFunction, Work
 from engine.errors import InvalidArrayError, UnsupportedPairError, UnsupportedSolidError, WrongDimensionError
 from engine.parallel import Budget, Cancel, Progress
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
 from engine.types import Accuracy
-
-PAIRS: dict[tuple[int, str, str], PairFunction] = {
-    (3, first, second): mesh_mesh
-    for first in ("polyhedron", "surface", "aabb")
-    for second in ("polyhedron", "surface", "aabb")
-}
-"""Dimension and the two types to the function of that pair; a pair may stand in one order only."""
 
 TAKEN = {
     2: "polygon, triangle, aabb, sphere, half_space",

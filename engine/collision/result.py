@@ -8,10 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Any, Literal
 
 from engine.parallel import Budget
-from engine.solids.base import Solid
 from engine.solids.pose import Pose
 from engine.types import Relation
 
@@ -73,7 +72,8 @@ class Work:
     budget: poll `budget.check()` in slow loops; kernels poll `budget.flag`.
     witness: False where only the relation is wanted.
     boolean: True where disjoint or not is all that is wanted: any relation but disjoint may then be answered as
-    touching. n_beyond_filter, n_rational: decisions (faces pairs, points) that the filter, and the compiled exact
+    touching.
+    n_beyond_filter, n_rational: decisions (faces pairs, points) that the filter, and the compiled exact
     stage, left open.
     """
 
@@ -84,4 +84,5 @@ class Work:
     n_rational: int = 0
 
 
-PairFunction = Callable[[Solid, Solid, Pose | None, Pose | None, Work], Collision]
+PairFunction = Callable[[Any, Any, Pose | None, Pose | None, Work], Collision]
+"""The two solids are of the types that the table in `pairs.py` names."""

@@ -23,6 +23,7 @@ from engine.solids.base import FloatArray, IntArray, Solid
 from engine.solids.mesh import Mesh
 from engine.solids.polyhedron import Polyhedron
 from engine.solids.pose import Pose
+from engine.types import Point3
 
 NO_AREA = -1
 UNKNOWN_AXIS = -2
@@ -144,26 +145,33 @@ def _box_triangles(box: Aabb) -> tuple[FloatArray, IntArray, IntArray]:
     return corners, first[merged.reshape(-1)][triangles], np.repeat(np.array(face_numbers), 2)
 
 
+@inline
+def axis_of(p: Point3, q: Point3, r: Point3) -> int:
+    """Return an axis along which the projection of a triangle has an area, NO_AREA or UNKNOWN_AXIS."""
+    ux, uy, uz = q.x - p.x, q.y - p.y, q.z - p.z
+    vx, vy, vz = r.x - p.x, r.y - p.y, r.z - p.z
+    nx, ny, nz = abs(uy * vz - uz * vy), abs(uz * vx - ux * vz), abs(ux * vy - uy * vx)
+    best = 0 if (nx >= ny and nx >= nz) else (1 if ny >= nz else 2)
+    found = NO_AREA
+    for turn in range(3):
+        axis = (best + turn) % 3
+        side = orient2d(projected(p, axis), projected(q, axis), projected(r, axis))
+        if side == 1 or side == -1:
+            return axis
+        if side != 0:
+            found = UNKNOWN_AXIS
+    return found
+
+
 @kernel
 def _find_axes(vertices: Any, triangles: Any, axes: Any) -> None:
-    """Fill axes (n,) with an axis along which each triangle's projection has an area, NO_AREA or UNKNOWN_AXIS."""
+    """Fill axes (n,) with the axis of each triangle."""
     for item in range(triangles.shape[0]):
-        p = as_point3(vertices, triangles[item, 0])
-        q = as_point3(vertices, triangles[item, 1])
-        r = as_point3(vertices, triangles[item, 2])
-        ux, uy, uz = q.x - p.x, q.y - p.y, q.z - p.z
-        vx, vy, vz = r.x - p.x, r.y - p.y, r.z - p.z
-        nx, ny, nz = abs(uy * vz - uz * vy), abs(uz * vx - ux * vz), abs(ux * vy - uy * vx)
-        best = 0 if (nx >= ny and nx >= nz) else (1 if ny >= nz else 2)
-        axes[item] = NO_AREA
-        for turn in range(3):
-            axis = (best + turn) % 3
-            side = orient2d(projected(p, axis), projected(q, axis), projected(r, axis))
-            if side == 1 or side == -1:
-                axes[item] = axis
-                break
-            if side != 0:
-                axes[item] = UNKNOWN_AXIS
+        axes[item] = axis_of(
+            as_point3(vertices, triangles[item, 0]),
+            as_point3(vertices, triangles[item, 1]),
+            as_point3(vertices, triangles[item, 2]),
+        )
 
 
 @inline

@@ -1,0 +1,113 @@
+"""Scenes: the pairs of the sweep are those of asking every pair, for every mix of bodies and poses."""
+
+from __future__ import annotations
+
+import random
+
+import numpy as np
+import pytest
+
+from engine import (
+    Aabb,
+    DeadlineExceededError,
+    HalfSpace,
+    IndexOutOfRangeError,
+    InvalidArrayError,
+    Polygon,
+    Pose,
+    Relation,
+    Sphere,
+    Triangle,
+    UnsupportedSolidError,
+    WrongDimensionError,
+)
+from engine.collision.collide import collide
+from engine.collision.scene import collide_scene
+
+EYE = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+TURN = [[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]]
+
+
+def every_pair(solids: list, poses: list) -> list[tuple[int, int, int]]:
+    found = []
+    for i in range(len(solids)):
+        for j in range(i + 1, len(solids)):
+            relation = collide(solids[i], solids[j], first_pose=poses[i], second_pose=poses[j]).relation
+            if relation != Relation.DISJOINT:
+                found.append((i, j, int(relation)))
+    return found
+
+
+def as_list(pairs) -> list[tuple[int, int, int]]:
+    return list(zip(pairs.first.tolist(), pairs.second.tolist(), pairs.relation.tolist()))
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_scene_is_every_pair(dimension: int) -> None:
+    rng = random.Random(dimension)
+    solids, poses = [], []
+    for k in range(24):
+        at = np.array([rng.randint(0, 8) for _ in range(dimension)], float)
+        kind = k % 4
+        if kind == 0:
+            solids.append(Aabb(at, at + rng.randint(0, 3)))
+        elif kind == 1:
+            solids.append(Sphere(at, rng.choice([0.0, 1.0, 2.0])))
+        elif kind == 2:
+            solids.append(HalfSpace([1.0] * dimension, -float(rng.randint(16, 40))) if k == 2 else Aabb(at, at + 1))
+        elif dimension == 2:
+            solids.append(Triangle(at + np.array([[0, 0], [2, 0], [0, 2]])))
+        else:
+            solids.append(Aabb(at, at + 2))
+        turn = [row[:dimension] for row in TURN[:dimension]]
+        poses.append(Pose(turn, [1.0] * dimension) if k % 5 == 4 else None)
+    assert as_list(collide_scene(solids, poses)) == every_pair(solids, poses)
+    assert as_list(collide_scene(solids, poses, workers=1)) == as_list(collide_scene(solids, poses, workers=3))
+
+
+def test_pairs_can_be_left_out_or_looked_at_alone() -> None:
+    cubes = [Aabb([k, 0, 0], [k + 1, 1, 1]) for k in range(4)]
+    assert as_list(collide_scene(cubes)) == [(0, 1, 4), (1, 2, 4), (2, 3, 4)]
+    assert as_list(collide_scene(cubes, skip=[(2, 1)])) == [(0, 1, 4), (2, 3, 4)]
+    assert as_list(collide_scene(cubes, only=[(2, 1), (0, 3)])) == [(1, 2, 4)]
+    assert as_list(collide_scene(cubes, only=[])) == []
+
+
+def test_ten_thousand_boxes_in_a_lattice_touch_their_neighbours() -> None:
+    n = 22
+    at = np.stack(np.meshgrid(*[np.arange(n)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    cubes = [Aabb(corner, corner + 1) for corner in at.astype(float)]
+    pairs, report = collide_scene(cubes, report=True)
+    neighbours = sum((n - (dx != 0)) * (n - (dy != 0)) * (n - (dz != 0)) for dx, dy, dz in np.ndindex(3, 3, 3)) - n**3
+    assert len(pairs.first) == neighbours // 2 == report.n_items
+    assert (pairs.relation == Relation.TOUCHING).all()
+
+
+def test_an_empty_scene_and_a_single_body_have_no_pairs() -> None:
+    assert as_list(collide_scene([])) == []
+    assert as_list(collide_scene([Sphere([0, 0], 1)])) == []
+
+
+def test_bad_scenes_are_named() -> None:
+    square = Polygon([[[0, 0], [1, 0], [1, 1]]])
+    cube = Aabb([0, 0, 0], [1, 1, 1])
+    with pytest.raises(WrongDimensionError) as caught:
+        collide_scene([cube, square])
+    assert caught.value.where == ("solids", 1)
+    with pytest.raises(UnsupportedSolidError) as unsupported:
+        collide_scene([cube, "cube"])
+    assert unsupported.value.where == ("solids", 1)
+    with pytest.raises(InvalidArrayError, match="as many"):
+        collide_scene([cube], [None, None])
+    with pytest.raises(IndexOutOfRangeError) as index:
+        collide_scene([cube], skip=[(0, 5)])
+    assert index.value.where == ("skip", 0)
+    with pytest.raises(DeadlineExceededError):
+        collide_scene([cube, cube], deadline=0.0)
+
+
+def test_witnesses_come_with_the_pairs_when_asked_for() -> None:
+    pairs = collide_scene([Sphere([0, 0, 0], 2), Sphere([0, 0, 0], 1)], witnesses=True)
+    assert pairs.witnesses is not None
+    assert pairs.witnesses[0] is not None
+    assert (pairs.witnesses[0].kind, pairs.witnesses[0].containing) == ("containment", "first")
