@@ -1,0 +1,40 @@
+# The service as a small image: no root, no shell tools needed, kernels compiled at build.
+# tests/unit/test_dockerfile.py runs the same steps in a temporary folder, since no image is built in its tests.
+#
+#   docker build -t exact-geometry .
+#   docker run --read-only --tmpfs /tmp -p 8000:8000 exact-geometry
+
+FROM python:3.12-slim AS build
+
+# Code compiled for one family of CPUs runs on all of them; the run-time stage names the same, else it would compile
+# anew. x86-64-v3: Haswell (2013) and later, AMD Excavator and later. For ARM: --build-arg CPU=generic
+ARG CPU=x86-64-v3
+ENV NUMBA_CPU_NAME=$CPU NUMBA_CPU_FEATURES=
+
+WORKDIR /src
+COPY pyproject.toml README.md LICENSE ./
+COPY engine engine
+COPY service service
+
+RUN python -m venv /opt/exact-geometry
+RUN /opt/exact-geometry/bin/pip install --no-cache-dir . httptools uvloop
+# the cache remembers when a source changed, and layers keep whole seconds only
+RUN find /opt/exact-geometry/lib -path "*/site-packages/engine/*.py" -exec touch -d "2020-01-01 00:00:00 UTC" {} +
+RUN ENGINE_CACHE_DIR=/opt/exact-geometry/kernels /opt/exact-geometry/bin/python -c "import engine; engine.warm()"
+
+FROM python:3.12-slim
+
+ARG CPU=x86-64-v3
+ENV NUMBA_CPU_NAME=$CPU NUMBA_CPU_FEATURES=
+# numba writes next to what it reads, so the kernels are copied to a place that can be written: a tmpfs will do
+ENV ENGINE_CACHE_SEED=/opt/exact-geometry/kernels ENGINE_CACHE_DIR=/tmp/kernels HOME=/tmp
+ENV PYTHONDONTWRITEBYTECODE=1 PYTHONUNBUFFERED=1
+ENV GEOMETRY_HOST=0.0.0.0 GEOMETRY_PORT=8000
+
+COPY --from=build /opt/exact-geometry /opt/exact-geometry
+
+USER 10001:10001
+EXPOSE 8000
+STOPSIGNAL SIGTERM
+HEALTHCHECK --interval=10s --timeout=3s --start-period=60s CMD ["/opt/exact-geometry/bin/python", "-c", "import urllib.request as r; r.urlopen('http://127.0.0.1:8000/readyz', timeout=2)"]
+CMD ["/opt/exact-geometry/bin/python", "-m", "service"]

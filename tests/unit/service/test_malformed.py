@@ -1,0 +1,94 @@
+"""Bodies that are broken in random ways get 4xx or an answer, never 5xx, never a hang."""
+
+from __future__ import annotations
+
+import json
+import random
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import httpx
+import pytest
+
+from tests.unit.service.asking import check_problem
+
+pytestmark = pytest.mark.anyio
+
+ODD_VALUES: list[Any] = [
+    None, True, False, "", "1.5", "x" * 300, "\x00", 0, -1, 1, 2, 3, -0.0, 0.5, 1e300, -1e300, 1.7976931348623157e308,
+    5e-324, 2**53 + 1, 2**63, -(2**63) - 1, 10**400, [], {}, [[]], [[[]]], [{}], {"type": "sphere"}, [0, 0], [0, 0, 0],
+    [[0, 0, 0]], [[0, 0], [0, 0, 0]], {"a": {"b": []}}, float("inf"), float("nan"),
+]  # fmt: skip
+
+
+def places(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    """Yield the path of everything within `value`."""
+    yield path
+    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, item in items:
+        yield from places(item, (*path, key))
+
+
+def with_odd_value(source: random.Random, body: Any) -> bytes:
+    """Put something odd into one or two places of `body`, or take something out."""
+    copy = json.loads(json.dumps(body))
+    for _ in range(source.choice([1, 1, 2])):
+        *path, last = source.choice([path for path in places(copy) if path] or [(0,)])
+        parent = copy
+        for key in path:
+            parent = parent[key]
+        if source.random() < 0.15:
+            del parent[last]
+        elif source.random() < 0.1 and isinstance(parent, dict):
+            parent[source.choice(["type", "extra", "a/b", ""])] = source.choice(ODD_VALUES)
+        else:
+            parent[last] = source.choice(ODD_VALUES)
+    return json.dumps(copy).encode()
+
+
+def with_odd_bytes(source: random.Random, body: Any) -> bytes:
+    """Cut the text, or change, repeat or take out some of its bytes."""
+    text = bytearray(json.dumps(body).encode())
+    at, size = source.randrange(len(text)), source.randrange(1, 8)
+    kind = source.randrange(4)
+    if kind == 0:
+        return bytes(text[:at])
+    if kind == 1:
+        text[at : at + size] = source.randbytes(size)
+    elif kind == 2:
+        text[at:at] = text[at : at + size] * source.choice([1, 2, 500])
+    else:
+        del text[at : at + size]
+    return bytes(text)
+
+
+BREAK: list[Callable[[random.Random, Any], bytes]] = [with_odd_value, with_odd_value, with_odd_bytes]
+
+
+async def break_bodies(client: httpx.AsyncClient, count: int) -> set[int]:
+    """Send `count` broken bodies and return the statuses seen; assert that each is answered as it should be."""
+    document = (await client.get("/openapi.json")).json()
+    source, seen = random.Random(8), set()
+    requests = []
+    for path, item in document["paths"].items():
+        if "post" in item:
+            name = item["post"]["requestBody"]["content"]["application/json"]["schema"]["$ref"].rpartition("/")[2]
+            requests += [(path, example) for example in document["components"]["schemas"][name]["examples"]]
+    for _ in range(count):
+        path, example = source.choice(requests)
+        body = source.choice(BREAK)(source, example)
+        answer = await client.post(path, content=body, headers={"Content-Type": "application/json"})
+        seen.add(answer.status_code)
+        assert answer.status_code in (200, 201, 400, 404, 422), (path, body, answer.text)
+        if answer.status_code >= 400:
+            check_problem(answer, answer.status_code, answer.json()["code"])
+    return seen
+
+
+async def test_broken_bodies_are_refused(client: httpx.AsyncClient) -> None:
+    assert await break_bodies(client, 1000) >= {200, 400, 422}
+
+
+@pytest.mark.full
+async def test_many_broken_bodies_are_refused(client: httpx.AsyncClient) -> None:
+    await break_bodies(client, 100_000)
