@@ -14,6 +14,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from itertools import chain, islice
+from math import isfinite
 from typing import Any, Final, NamedTuple, cast
 
 import numpy as np
@@ -28,6 +29,8 @@ MAX_ERRORS: Final = 20
 """Entries of `errors` in one answer: enough to see the pattern."""
 EXACT_INTEGERS: Final = 2**53
 """All integers up to this are float64 values; of those beyond only some are."""
+SHORT: Final = 64
+"""Numbers that Python checks sooner than numpy."""
 LIMIT: Final = "x-limit"
 """Holds a setting's name in a schema; openapi.py puts `maxItems` with its value in the place."""
 
@@ -94,6 +97,8 @@ class Numbers:
 
     def _decode(self, value: Any, settings: Any) -> Any:
         """Return `value` as an array, or None if anything about it is wrong; at C speed."""
+        if not self.axes and type(value) is float and isfinite(value) and self.kind == "number":
+            return value
         dtype, types, _ = _KINDS[self.kind]
         level = [value]
         shape: list[int] = []
@@ -110,26 +115,30 @@ class Numbers:
                 return None
             shape.append(lengths.pop() if len(lengths) == 1 else (-1 if lengths else low))
             level = list(chain.from_iterable(level))
-        if not set(map(type, level)) <= types:
+        found = set(map(type, level))
+        if not found <= types:
             return None
         try:
             flat = np.array(level, dtype)
         except OverflowError:
             return None
-        if not self._holds_all(flat, level):
+        if not self._holds_all(flat, level, found):
             return None
         if -1 in shape:  # rows of several lengths: the engine takes lists of lists
             return value
         return flat.reshape(shape) if shape else flat.item()
 
-    def _holds_all(self, flat: Array, level: list[Any]) -> bool:
+    def _holds_all(self, flat: Array, level: list[Any], found: set[type]) -> bool:
         """Tell whether every number of `level` is finite, large integers unchanged, none below the minimum."""
-        if self.kind == "number":
-            if not np.isfinite(flat).all():
-                return False
+        if self.kind != "number":
+            return self.minimum is None or not level or min(level) >= self.minimum
+        if int in found:
             large = np.flatnonzero(np.abs(flat) >= EXACT_INTEGERS)
-            return all(int(flat[i]) == level[i] for i in large if type(level[i]) is int)
-        return self.minimum is None or not flat.size or int(flat.min()) >= self.minimum
+            if not all(int(flat[i]) == level[i] for i in large if type(level[i]) is int):
+                return False
+        # a finite sum has finite terms; most lists are short, and numpy takes longer to begin than to add
+        is_short = len(level) <= SHORT and int not in found
+        return (is_short and isfinite(sum(level))) or bool(np.isfinite(flat).all())
 
     def _faults(self, value: Any, path: Path, seen: dict[int, int], settings: Any) -> Iterator[Fault]:
         """Walk a list that failed and name each element at fault; `seen`: length of the first list by depth."""

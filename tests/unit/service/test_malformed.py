@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import random
 from collections.abc import Callable, Iterator
+from copy import deepcopy
 from typing import Any
 
 import httpx
@@ -33,16 +34,19 @@ def with_odd_value(source: random.Random, body: Any) -> bytes:
     """Put something odd into one or two places of `body`, or take something out."""
     copy = json.loads(json.dumps(body))
     for _ in range(source.choice([1, 1, 2])):
-        *path, last = source.choice([path for path in places(copy) if path] or [(0,)])
+        found = [path for path in places(copy) if path]
+        if not found:
+            break
+        *path, last = source.choice(found)
         parent = copy
         for key in path:
             parent = parent[key]
         if source.random() < 0.15:
             del parent[last]
         elif source.random() < 0.1 and isinstance(parent, dict):
-            parent[source.choice(["type", "extra", "a/b", ""])] = source.choice(ODD_VALUES)
+            parent[source.choice(["type", "extra", "a/b", ""])] = deepcopy(source.choice(ODD_VALUES))
         else:
-            parent[last] = source.choice(ODD_VALUES)
+            parent[last] = deepcopy(source.choice(ODD_VALUES))
     return json.dumps(copy).encode()
 
 

@@ -32,6 +32,10 @@ def test_lists_become_one_contiguous_array() -> None:
     assert array.tolist() == [[1.0, 2.5, 0.0], [2.0**53, 1e300, 5e-324]]
     assert POSITIONS.validate_python([], context=SETTINGS).shape == (0, 2)
     assert NUMBER.validate_python(3, context=SETTINGS) == 3.0
+    huge = int(1.7e308)
+    assert (
+        POSITIONS.validate_python([[huge, huge], [1.7e308, 1.7e308]], context=SETTINGS).tolist() == [[1.7e308] * 2] * 2
+    )
 
 
 @pytest.mark.parametrize(
