@@ -30,13 +30,14 @@ from engine.solids.polyhedron import Polyhedron
 
 Int8Array = npt.NDArray[np.int8]
 
-_LONG: Final = (4, 6)
+_LONG: Final = (3, 12)
 """Lists longer than this are cut into parts, on levels 0 and 1."""
 _MOST_ENTRIES: Final = 24
 """Entries a face (and 2^14 more) above which a level is not cut further."""
 _RANGE: Final = 2.0**400
 """Largest extent, and 1 / smallest, of a solid that gets cells: products of three stay far from its ends."""
 _AT_ONCE: Final = 4096
+_WANTED: Final = 2.0
 _PAYS_FROM: Final = 1 << 14
 _PAYS_PER_FACE: Final = 5
 
@@ -152,7 +153,7 @@ def _make_lattice(solid: Polyhedron, n_triangles: int) -> Lattice:
     low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
     extent = high - low
     largest = float(extent.max())
-    wanted = min(96.0, max(8.0, 1.0 * n_triangles ** (1.0 / 3.0)))
+    wanted = min(96.0, max(8.0, _WANTED * n_triangles ** (1.0 / 3.0)))
     size = _power_of_two(largest / wanted)
     sizes = [size if float(e) >= size else _power_of_two(max(float(e), largest * 2.0**-40)) for e in extent]
     lows = tuple(float(low[k]) - sizes[k] * (95.0 / 256.0) for k in range(3))

@@ -92,8 +92,6 @@ def crossing(entries: Any, entry: int, x: Any, y: Any, z: Any) -> int:
     third = entries[entry, 10] * x + entries[entry, 11] * y + entries[entry, 12] * z
     least, most = min(first, second, third), max(first, second, third)
     side = entries[entry, 0] * x + entries[entry, 1] * y + entries[entry, 2] * z - entries[entry, 3]
-    if side > BAND or (least < -BAND and most > BAND):
-        return 0
-    if side < -BAND and (least > BAND or most < -BAND):
-        return 1
-    return UNDECIDED
+    is_apart = (side > BAND) | ((least < -BAND) & (most > BAND))
+    is_crossed = (side < -BAND) & ((least > BAND) | (most < -BAND))
+    return 0 if is_apart else 1 if is_crossed else UNDECIDED

@@ -22,6 +22,7 @@ from engine.containment.cells import (
     parts_of,
     reference_coordinate,
     scaled_difference,
+    share_of,
 )
 from engine.jit import inline, kernel
 from engine.types import UNDECIDED
@@ -56,13 +57,13 @@ def label_empty(counts: Any, nx: int, ny: int, nz: int, labels: Any) -> int:
 
 
 @inline
-def reference_point(lattice: Any, x: int, y: int, z: int, parts: float) -> Any:
-    """Return the reference point of a cell by its indices on the level with `parts` cells to one of level 0."""
+def reference_point(lattice: Any, x: int, y: int, z: int, share: float) -> Any:
+    """Return the reference point of a cell by its indices on a level whose cells are `share` of one of level 0."""
     low, size = lattice.low, lattice.size
     return (
-        reference_coordinate(low[0], size[0] / parts, x, PLACE[0]),
-        reference_coordinate(low[1], size[1] / parts, y, PLACE[1]),
-        reference_coordinate(low[2], size[2] / parts, z, PLACE[2]),
+        reference_coordinate(low[0], size[0] * share, x, PLACE[0]),
+        reference_coordinate(low[1], size[1] * share, y, PLACE[1]),
+        reference_coordinate(low[2], size[2] * share, z, PLACE[2]),
     )
 
 
@@ -81,7 +82,7 @@ def reference_points(lattice: Any, places: Any, level: int, points: Any, is_vali
     """Fill points (n, 3) and is_valid (n,) with the reference points of cells and whether they lie in them."""
     for item in range(len(places)):
         x, y, z = places[item, 0], places[item, 1], places[item, 2]
-        point = reference_point(lattice, x, y, z, parts_of(level))
+        point = reference_point(lattice, x, y, z, share_of(level))
         points[item, 0], points[item, 1], points[item, 2] = point
         is_valid[item] = _is_in_cell(lattice, point, x, y, z, 2 * (LEVELS - 1 - level))
 
@@ -134,7 +135,7 @@ def locate_parts(
             break
         cell = parents[parent]
         x0, y0, z0 = places[cell, 0], places[cell, 1], places[cell, 2]
-        reference = reference_point(lattice, x0, y0, z0, parts)
+        reference = reference_point(lattice, x0, y0, z0, share_of(level - 1))
         n_entries = firsts[cell + 1] - firsts[cell]
         for entry in range(n_entries):
             fill_entry(entries[entry], vertices, triangles, lists[firsts[cell] + entry], lattice, reference, parts)
@@ -152,7 +153,7 @@ def locate_parts(
                     found[place] = found[place - SPLIT * SPLIT]
                     continue
             x, y, z = x0 * SPLIT + x, y0 * SPLIT + y, z0 * SPLIT + z
-            point = reference_point(lattice, x, y, z, parts_of(level))
+            point = reference_point(lattice, x, y, z, share_of(level))
             status = statuses[cell] if _is_in_cell(lattice, point, x, y, z, shift) else OPEN
             if status != OPEN:
                 w = scaled_difference(point, reference, scale, parts)
@@ -187,7 +188,7 @@ def fill_entries(
         if flag[0]:
             break
         cell = cells[item]
-        reference = reference_point(lattice, places[cell, 0], places[cell, 1], places[cell, 2], parts)
+        reference = reference_point(lattice, places[cell, 0], places[cell, 1], places[cell, 2], share_of(level))
         for entry in range(firsts[cell], firsts[cell + 1]):
             fill_entry(entries[place], vertices, triangles, lists[entry], lattice, reference, parts)
             entries[place, LAST] = 1.0 if entry == firsts[cell + 1] - 1 else 0.0

@@ -57,6 +57,12 @@ def parts_of(level: int) -> float:
 
 
 @inline
+def share_of(level: int) -> float:
+    """Return 1 / parts_of(level)."""
+    return 1.0 if level == 0 else 0.25 if level == 1 else 0.0625
+
+
+@inline
 def reference_coordinate(low: float, size: float, index: int, place: float) -> float:
     """Return a coordinate of the reference point of cell `index` of a level with cells of `size`."""
     return low + (index + place) * size

@@ -15,12 +15,14 @@ import numpy.typing as npt
 
 from engine.containment.balls import locate_in_ball
 from engine.containment.boxes import locate_in_box
-from engine.containment.build_cells import Cells, cells_if_they_pay
+from engine.containment.build_cells import cells_if_they_pay
+from engine.containment.build_ring_cells import ring_cells_if_they_pay
 from engine.containment.half_spaces import locate_in_half_planes, locate_in_half_spaces
 from engine.containment.polynomials import locate_by_polynomial
 from engine.containment.prepared import Columns, Rings, columns_of, rings_of, rounded_rows
 from engine.containment.rational_locate import Check, combine, prism_walls, rational_location, unsupported
 from engine.containment.ray_parity import locate_by_columns
+from engine.containment.ring_cells import locate_by_ring_cells
 from engine.containment.ring_crossing import locate_in_rings
 from engine.containment.segment_parity import locate_by_cells
 from engine.containment.triangles import locate_in_triangle
@@ -163,7 +165,18 @@ def _in_polygon(solid: Polygon) -> Locator:
         rings: Rings = rings_of(solid)
         return int(locate_in_rings(points, *rings, locations, flag))
 
-    return Locator("ring_crossing", settled(run, rational_half(solid)))
+    by_rays = settled(run, rational_half(solid))
+
+    def choose(n_points: int, budget: Budget) -> Locator:
+        cells = ring_cells_if_they_pay(solid, n_points, budget)
+        if cells is None:
+            return plain
+        return Locator(
+            "ring_cells", _in_cells(lambda *rest: int(locate_by_ring_cells(rest[0], cells, *rest[1:])), by_rays)
+        )
+
+    plain = Locator("ring_crossing", by_rays, for_batch=choose)
+    return plain
 
 
 def _in_polyhedron(solid: Polyhedron) -> Locator:
@@ -175,18 +188,22 @@ def _in_polyhedron(solid: Polyhedron) -> Locator:
 
     def choose(n_points: int, budget: Budget) -> Locator:
         cells = cells_if_they_pay(solid, n_points, budget)
-        return plain if cells is None else Locator("segment_parity", _in_cells(cells, by_rays))
+        if cells is None:
+            return plain
+        return Locator(
+            "segment_parity", _in_cells(lambda *rest: int(locate_by_cells(rest[0], cells, *rest[1:])), by_rays)
+        )
 
     plain = Locator("ray_parity", by_rays, for_batch=choose)
     return plain
 
 
-def _in_cells(cells: Cells, by_rays: Fill) -> Fill:
+def _in_cells(by_cells: Callable[[FloatArray, Locations, Flag], int], by_rays: Fill) -> Fill:
     """Return the fill that asks the cells, and casts rays for the points that are too close to a plane for them."""
 
     def fill(points: FloatArray, locations: Locations, budget: Budget) -> Counts:
         with np.errstate(all="ignore"):
-            n_open = int(locate_by_cells(points, cells, locations, budget.flag))
+            n_open = by_cells(points, locations, budget.flag)
         if n_open == 0:
             return Counts(0, 0)
         budget.check()
