@@ -18,7 +18,7 @@ import engine
 from service.docs import router as docs_router
 from service.errors import faults_of, http_fault, problem
 from service.openapi import openapi_of
-from service.routes import bounds, containment, health, overlay, polygons, segments, solids
+from service.routes import bounds, collision, containment, health, overlay, polygons, segments, solids
 from service.settings import Settings
 from service.store import Store
 from service.work import Pool
@@ -49,7 +49,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.state.store = Store(settings.store_bytes)
     app.state.warm, app.state.warm_error = threading.Event(), None
     app.openapi = openapi_of(app, settings)  # type: ignore[method-assign]
-    for module in (containment, segments, polygons, overlay, bounds, solids, health):
+    for module in (containment, collision, segments, polygons, overlay, bounds, solids, health):
         app.include_router(module.router)
     app.include_router(solids.lookup)
     app.include_router(docs_router)

@@ -54,9 +54,15 @@ class Call:
         """Return the seconds left; `deadline_exceeded` if there are none."""
         left = self.end - time.monotonic()
         if left <= 0:
-            seconds = self.settings.deadline_seconds
-            raise DeadlineExceededError(f"the deadline of {seconds} s passed before the call was done; ask for less")
+            raise self._too_late()
         return left
+
+    def _too_late(self) -> DeadlineExceededError:
+        seconds = self.settings.deadline_seconds
+        return DeadlineExceededError(
+            f"the deadline of {seconds} s passed before the answer was there; ask for less at once, or raise "
+            "GEOMETRY_DEADLINE_SECONDS"
+        )
 
     def compute(
         self,
@@ -74,6 +80,8 @@ class Call:
         with self.phase("compute"):
             try:
                 result, accuracy = function(*arguments, report=True, **options)
+            except DeadlineExceededError:
+                raise self._too_late() from None
             except EngineError as error:
                 if where is not None:
                     error.where = where(error.where)

@@ -9,7 +9,7 @@ import numpy as np
 
 import engine
 from engine import Solid
-from service.schemas import bounds, containment, overlay, polygons, segments, solids
+from service.schemas import bounds, collision, containment, overlay, polygons, segments, solids
 from service.schemas.problem import Accuracy
 
 
@@ -144,5 +144,49 @@ def from_clipped(clipped: engine.ClippedPolygons, accuracy: engine.Accuracy) -> 
             )
             for i_polygon, (start, stop) in enumerate(pairwise(offsets))
         ],
+        accuracy=from_accuracy(accuracy),
+    )
+
+
+def from_collision(collision_: engine.Collision, accuracy: engine.Accuracy) -> collision.CollideResponse:
+    """Return the answer of `collide` for one pose."""
+    return collision.CollideResponse.model_construct(
+        collisions=[_collision_answer(collision_.relation, collision_.witness)], accuracy=from_accuracy(accuracy)
+    )
+
+
+def from_pose_collisions(found: Any, accuracy: engine.Accuracy) -> collision.CollideResponse:
+    """Return the answer of `collide` for many poses."""
+    relations, witnesses = found
+    return collision.CollideResponse.model_construct(
+        collisions=[
+            _collision_answer(engine.Relation(relation), witness)
+            for relation, witness in zip(relations.tolist(), witnesses)
+        ],
+        accuracy=from_accuracy(accuracy),
+    )
+
+
+def _collision_answer(relation: engine.Relation, witness: engine.Witness | None) -> collision.CollisionAnswer:
+    if witness is None:
+        return collision.CollisionAnswer.model_construct(relation=relation.label)
+    return collision.CollisionAnswer.model_construct(
+        relation=relation.label,
+        witness=collision.CollisionWitness.model_construct(
+            kind=witness.kind,
+            first_face=None if witness.first_face < 0 else witness.first_face,
+            second_face=None if witness.second_face < 0 else witness.second_face,
+            containing=witness.containing or None,
+            piercing=witness.piercing,
+        ),
+    )
+
+
+def from_scene_pairs(pairs: engine.ScenePairs, accuracy: engine.Accuracy) -> collision.CollideSceneResponse:
+    """Return the answer of `collide/scene`."""
+    labels = [relation.label for relation in engine.Relation]
+    columns = zip(pairs.first.tolist(), pairs.second.tolist(), pairs.relation.tolist())
+    return collision.CollideSceneResponse.model_construct(
+        pairs=[{"first": first, "second": second, "relation": labels[code]} for first, second, code in columns],
         accuracy=from_accuracy(accuracy),
     )

@@ -22,6 +22,8 @@ OPERATIONS = {
     ("post", "/v1/clip/polygons"): "clip_polygons",
     ("post", "/v1/overlay"): "overlay",
     ("post", "/v1/bounds"): "bounds",
+    ("post", "/v1/collide"): "collide",
+    ("post", "/v1/collide/scene"): "collide_scene",
     ("post", "/v1/clip/segments"): "clip_segments",
     ("post", "/v1/solids"): "put_solid",
     ("get", "/v1/solids/{solid_id}"): "get_solid",

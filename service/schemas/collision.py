@@ -1,0 +1,96 @@
+"""Questions and answers of collision."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from service.schemas.arrays import Array, Axis, Numbers
+from service.schemas.limits import AtMost, left_out
+from service.schemas.problem import Accuracy, Count, Schema, with_example
+from service.schemas.solids import Body, RigidPose, Solid
+
+CollisionRelation = Literal["disjoint", "first_inside_second", "second_inside_first", "overlapping", "touching"]
+Pairs = Annotated[Array, Numbers(Axis(0, "max_pairs"), Axis(2, 2), kind="integer", minimum=0)]
+
+_CUBE = {"type": "aabb", "min": [0, 0, 0], "max": [1, 1, 1]}
+_BALL = {"type": "sphere", "center": [2, 0.5, 0.5], "radius": 1}
+
+
+class CollideRequest(Schema):
+    """How does the first body lie to the second, for each pose of the second?"""
+
+    model_config = with_example({"first": _CUBE, "second": _BALL})
+
+    first: Solid = Field(description="3D: polyhedron, surface, aabb, sphere, half_space. 2D: polygon, triangle, ...")
+    second: Solid
+    poses: Annotated[list[RigidPose], AtMost("max_poses")] = left_out(
+        "Poses of `second`, one answer each; without them one answer for where it stands. Time is discrete: two poses "
+        "may be free while a motion between them collides."
+    )
+
+
+class CollisionWitness(Schema):
+    """One reason why two bodies have a common point."""
+
+    kind: Literal[
+        "vertex_vertex", "vertex_edge", "vertex_face", "edge_edge", "edge_face", "face_face", "containment", "surface"
+    ] = Field(
+        description="How two faces meet; containment: one body lies in the other; surface: of a body without any."
+    )
+    first_face: Count = left_out("Face of the first body, if it has faces.")
+    second_face: Count = left_out("Face of the second body, if it has faces.")
+    containing: Literal["first", "second"] = left_out("For containment the body that contains.")
+    piercing: bool = Field(description="Touching only: a point of one body lies in the open interior of the other.")
+
+
+class CollisionAnswer(Schema):
+    """The first true line decides: no common point, disjoint; within the other's open interior, inside; the open
+    interiors meet, overlapping; else touching."""
+
+    relation: CollisionRelation
+    witness: CollisionWitness = left_out("Left out when disjoint.")
+
+
+class CollideResponse(Schema):
+    """One answer for each pose, or a single one."""
+
+    collisions: list[CollisionAnswer]
+    accuracy: Accuracy
+
+
+class CollideSceneRequest(Schema):
+    """Which of these bodies collide?"""
+
+    model_config = with_example(
+        {
+            "bodies": [
+                {"solid": _CUBE},
+                {"solid": _BALL},
+                {
+                    "solid": _CUBE,
+                    "pose": {"rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "translation": [1, 0, 0]},
+                },
+            ]
+        }
+    )
+
+    bodies: Annotated[list[Body], AtMost("max_bodies")]
+    skip: Pairs = left_out("Pairs of bodies to leave out.")
+    only: Pairs = left_out("The only pairs to look at.")
+
+
+class CollidingPair(Schema):
+    """Two bodies with a common point."""
+
+    first: Count
+    second: Count
+    relation: CollisionRelation
+
+
+class CollideSceneResponse(Schema):
+    """Every colliding pair, by first, then second."""
+
+    pairs: list[CollidingPair]
+    accuracy: Accuracy

@@ -1,0 +1,119 @@
+"""POST /v1/collide and /v1/collide/scene."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import httpx
+import pytest
+
+from service.schemas.collision import CollideResponse, CollideSceneResponse
+from service.settings import Settings
+from tests.unit.service.asking import SPHERE, check_problem
+
+pytestmark = pytest.mark.anyio
+CUBE = {"type": "aabb", "min": [0, 0, 0], "max": [1, 1, 1]}
+SQUARE = {"type": "aabb", "min": [0, 0], "max": [1, 1]}
+TETRAHEDRON = {
+    "type": "polyhedron",
+    "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]],
+    "faces": [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]],
+}
+
+
+def moved(*translation: float) -> dict[str, Any]:
+    return {"rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "translation": list(translation)}
+
+
+async def collide(client: httpx.AsyncClient, **body: Any) -> dict[str, Any]:
+    answer = await client.post("/v1/collide", json=body)
+    assert answer.status_code == 200, answer.text
+    CollideResponse.model_validate_json(answer.content, context=Settings())
+    found: dict[str, Any] = answer.json()
+    return found
+
+
+async def test_one_pair_has_one_answer_with_its_witness(client: httpx.AsyncClient) -> None:
+    found = await collide(client, first=CUBE, second={**CUBE, "min": [1, 0, 0], "max": [2, 1, 1]})
+    (answer,) = found["collisions"]
+    assert answer["relation"] == "touching"
+    assert answer["witness"]["piercing"] is False
+    assert found["accuracy"]["decisions"] == "exact"
+
+
+async def test_every_pose_has_its_answer(client: httpx.AsyncClient) -> None:
+    poses = [moved(2, 0, 0), moved(1, 0, 0), moved(0.5, 0, 0), moved(0, 0, 0)]
+    found = await collide(client, first=CUBE, second=TETRAHEDRON, poses=poses)
+    relations = [answer["relation"] for answer in found["collisions"]]
+    assert relations == ["disjoint", "touching", "overlapping", "overlapping"]
+    assert ["witness" in answer for answer in found["collisions"]] == [False, True, True, True]
+    assert (await collide(client, first=CUBE, second=TETRAHEDRON, poses=[]))["collisions"] == []
+
+
+async def test_a_body_within_the_other_is_named(client: httpx.AsyncClient) -> None:
+    small = {**CUBE, "min": [0.25, 0.25, 0.25], "max": [0.5, 0.5, 0.5]}
+    (answer,) = (await collide(client, first=small, second=CUBE))["collisions"]
+    assert answer["relation"] == "first_inside_second"
+    assert (answer["witness"]["kind"], answer["witness"]["containing"]) == ("containment", "second")
+
+
+async def test_scene_lists_colliding_pairs(client: httpx.AsyncClient) -> None:
+    bodies = [{"solid": CUBE}, {"solid": CUBE, "pose": moved(1, 0, 0)}, {"solid": CUBE, "pose": moved(0, 0.5, 0)}]
+    answer = await client.post("/v1/collide/scene", json={"bodies": bodies})
+    assert answer.status_code == 200, answer.text
+    assert answer.json()["pairs"] == [
+        {"first": 0, "second": 1, "relation": "touching"},
+        {"first": 0, "second": 2, "relation": "overlapping"},
+        {"first": 1, "second": 2, "relation": "touching"},
+    ]
+    CollideSceneResponse.model_validate_json(answer.content, context=Settings())
+    answer = await client.post("/v1/collide/scene", json={"bodies": bodies, "skip": [[0, 1]]})
+    assert [(pair["first"], pair["second"]) for pair in answer.json()["pairs"]] == [(0, 2), (1, 2)]
+    answer = await client.post("/v1/collide/scene", json={"bodies": bodies, "only": [[2, 0]]})
+    assert [(pair["first"], pair["second"]) for pair in answer.json()["pairs"]] == [(0, 2)]
+    assert (await client.post("/v1/collide/scene", json={"bodies": []})).json()["pairs"] == []
+
+
+SCALED = {"rotation": [[2, 0, 0], [0, 1, 0], [0, 0, 1]], "translation": [0, 0, 0]}
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "pointer"),
+    [
+        ({"second": SQUARE}, "wrong_dimension", "/second"),
+        ({"first": {"type": "convex", "planes": [[1, 0, 0, 0]]}}, "unsupported_pair", "/second"),
+        ({"second": {"type": "surface", "vertices": [[0, 0, 0]], "faces": [[0, 0, 0]]}}, "repeated_index",
+         "/second/faces/0"),
+        ({"poses": [moved(0, 0, 0), SCALED]}, "not_rigid", "/poses/1/rotation"),
+        ({"poses": [moved(0, 0)]}, "wrong_dimension", "/poses/0"),
+        ({"poses": [{"rotation": [[1, 0], [0, 1]], "translation": [0, 0]}]}, "wrong_dimension", "/poses/0"),
+        ({"poses": [{"rotation": [[1, 0, 0], [0, 1, 0]], "translation": [0, 0, 0]}]}, "wrong_dimension", "/poses/0"),
+        ({"poses": [{"rotation": [[1, 0, 0], [0, 1], [0, 0, 1]], "translation": [0, 0, 0]}]}, "invalid_array",
+         "/poses/0/rotation/1"),
+        ({"poses": None}, "invalid_request", "/poses"),
+        ({"poses": {}}, "invalid_request", "/poses"),
+    ],
+)  # fmt: skip
+async def test_what_is_wrong_is_named(
+    client: httpx.AsyncClient, change: dict[str, Any], code: str, pointer: str
+) -> None:
+    answer = await client.post("/v1/collide", json={"first": CUBE, "second": SPHERE, **change})
+    assert check_problem(answer, 422, code)["errors"][0]["pointer"] == pointer
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "pointer"),
+    [
+        ({"bodies": [{"solid": CUBE}, {"solid": SQUARE}]}, "wrong_dimension", "/bodies/1/solid"),
+        ({"bodies": [{"solid": CUBE, "pose": SCALED}]}, "not_rigid", "/bodies/0/pose/rotation"),
+        ({"only": [[0, 2]]}, "index_out_of_range", "/only/0"),
+        ({"skip": [[0, -1]]}, "index_out_of_range", "/skip/0/1"),
+        ({"skip": [[0]]}, "invalid_array", "/skip/0"),
+        ({"skip": [[0, 1.0]]}, "invalid_array", "/skip/0/1"),
+    ],
+)
+async def test_what_is_wrong_in_a_scene_is_named(
+    client: httpx.AsyncClient, change: dict[str, Any], code: str, pointer: str
+) -> None:
+    answer = await client.post("/v1/collide/scene", json={"bodies": [{"solid": CUBE}, {"solid": CUBE}], **change})
+    assert check_problem(answer, 422, code)["errors"][0]["pointer"].startswith(pointer)
