@@ -1,7 +1,8 @@
 """Segments on polygons and polyhedra: contacts by a box tree, pieces between them; several for each segment.
 
-Segments without any contact lie on one side: the location of their first end decides, in batches. The others are cut in
-exact arithmetic (exact_pieces.py). Zero-length segments are points.
+Segments without any contact lie on one side: the location of their first end decides, in batches. Those with proper
+crossings only are cut by a kernel (proper_pieces.py), the others in exact arithmetic (exact_pieces.py). Zero-length
+segments are points.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from engine.clipping.box_tree import BoxTree, build_box_tree
 from engine.clipping.contacts import PROPER, find_contacts_2d, find_contacts_3d
 from engine.clipping.exact_pieces import pieces_of
 from engine.clipping.exact_segments import Piece
+from engine.clipping.proper_pieces import SETTLED, clip_properly_2d, clip_properly_3d
 from engine.containment.locators import locator_of
 from engine.containment.rational_locate import rational_location
 from engine.parallel import Budget
@@ -78,41 +80,72 @@ def clip_chunk(segments: FloatArray, first: int, last: int, region: Polygon | Po
     n_contacts = np.diff(offsets)
     n_contacts[(part[:, 0] == part[:, 1]).all(axis=1)] = 0  # points: their location says it all
     whole = np.flatnonzero((n_contacts == 0) & (locations >= 0))
-    cut = np.flatnonzero(n_contacts)
+    n_improper = np.diff(np.append(0, np.cumsum(kinds != PROPER))[offsets])
+    proper = np.flatnonzero((n_contacts > 0) & (n_improper == 0) & (np.abs(locations) == 1))
+    rows, settled = _proper_pieces(part, proper, locations, offsets, elements, boundary, budget)
+    is_open = n_contacts > 0
+    is_open[settled] = False
     sources, pieces = [], []
+    cut = np.flatnonzero(is_open)
     for i in cut:
         budget.check()
-        found = _pieces(
-            part[i],
-            elements[offsets[i] : offsets[i + 1]],
-            kinds[offsets[i] : offsets[i + 1]],
-            int(locations[i]),
-            region,
-            boundary,
-            budget,
-        )
+        mine = slice(offsets[i], offsets[i + 1])
+        found = _pieces(part[i], elements[mine], kinds[mine], int(locations[i]), region, boundary, budget)
         sources += [i] * len(found)
         pieces += found
     n = len(whole)
-    rows = PieceRows(
-        np.concatenate([whole, np.array(sources, np.int64)]) + first,
-        np.concatenate([part[whole, 0] + 0.0, _points(pieces, 1, part.shape[2])]),
-        np.concatenate([part[whole, 1] + 0.0, _points(pieces, 2, part.shape[2])]),
-        np.concatenate([np.tile([0.0, 1.0], (n, 1)), _points(pieces, 0, 2)]),
-        np.concatenate([np.full((n, 2), -1, np.int64), np.array([p.faces for p in pieces], np.int64).reshape(-1, 2)]),
+    ends = np.tile([0.0, 1.0], (n, 1)), np.full((n, 2), -1, np.int64)
+    source = np.concatenate([whole, rows.source, np.array(sources, np.int64)])
+    order = np.argsort(source, kind="stable")  # pieces of one segment stay in order of t
+    return PieceRows(
+        source[order] + first,
+        np.concatenate([part[whole, 0], rows.start, _points(pieces, 1, part.shape[2])])[order] + 0.0,
+        np.concatenate([part[whole, 1], rows.end, _points(pieces, 2, part.shape[2])])[order] + 0.0,
+        np.concatenate([ends[0], rows.t, _points(pieces, 0, 2)])[order],
+        np.concatenate([ends[1], rows.faces, np.array([p.faces for p in pieces], np.int64).reshape(-1, 2)])[order],
         min(len(part), len(cut) + counts.beyond),
         len(cut),
     )
-    order = np.argsort(rows.source, kind="stable")  # pieces of one segment stay in order of t
-    return PieceRows(
-        rows.source[order],
-        rows.start[order],
-        rows.end[order],
-        rows.t[order],
-        rows.faces[order],
-        rows.n_beyond,
-        rows.n_rational,
-    )
+
+
+def _proper_pieces(
+    segments: FloatArray,
+    proper: IntArray,
+    locations: npt.NDArray[np.int8],
+    offsets: IntArray,
+    elements: IntArray,
+    boundary: Boundary,
+    budget: Budget,
+) -> tuple[PieceRows, IntArray]:
+    """Return the pieces of those `proper` segments that the kernel settles, and which these are."""
+    counts = (np.diff(offsets)[proper] + (locations[proper] > 0) + 1) // 2
+    rows = np.cumsum(counts) - counts
+    m, dimension = int(counts.sum()), segments.shape[2]
+    start, end, t = np.empty((m, dimension)), np.empty((m, dimension)), np.empty((m, 2))
+    faces, state = np.empty((m, 2), np.int64), np.empty(len(proper), np.uint8)
+    kernel: Any = clip_properly_2d if dimension == 2 else clip_properly_3d
+    with np.errstate(all="ignore"):
+        kernel(
+            segments,
+            proper,
+            locations,
+            offsets,
+            elements,
+            boundary.vertices,
+            boundary.elements,
+            boundary.faces,
+            rows,
+            budget.flag,
+            start,
+            end,
+            t,
+            faces,
+            state,
+        )
+    budget.check()
+    kept = np.repeat(state == SETTLED, counts)
+    source = np.repeat(proper, counts)[kept]
+    return PieceRows(source, start[kept], end[kept], t[kept], faces[kept], 0, 0), proper[state == SETTLED]
 
 
 def _points(pieces: list[Piece], field: int, width: int) -> FloatArray:

@@ -158,6 +158,20 @@ def test_large_meshes_agree_with_point_location(data: Path) -> None:
     assert (inside.ravel() == (locate(points.reshape(-1, 3), spot) >= 0)).all()
 
 
+def test_kernel_and_exact_integers_agree(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Proper crossings cut by the kernel are what exact integers give, bit by bit."""
+    for dimension, regions in REGIONS.items():
+        rng = np.random.default_rng(dimension)
+        for region in regions():
+            segments = np.concatenate([random_segments(rng, 40, dimension), through(rng, vertices_of(region), 40)])
+            both = [clip_segments(segments, region)]
+            with monkeypatch.context() as patch:
+                patch.setattr("engine.clipping.concave.PROPER", 99)  # no contact counts as proper
+                both.append(clip_segments(segments, region))
+            for name in ("source", "start", "end", "t", "faces"):
+                np.testing.assert_array_equal(getattr(both[0], name), getattr(both[1], name))
+
+
 def test_box_tree_holds_every_element() -> None:
     rng = np.random.default_rng(4)
     for n in (1, 2, LEAF_SIZE, LEAF_SIZE + 1, 100):
