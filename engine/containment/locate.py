@@ -10,6 +10,7 @@ from typing import Literal, overload
 import numpy as np
 import numpy.typing as npt
 
+from engine.containment.cell_order import gather_points
 from engine.containment.locators import locator_of
 from engine.parallel import Budget, Cancel, Progress, run_chunks
 from engine.solids.base import Solid
@@ -86,9 +87,17 @@ def locate(
     with Budget(deadline, cancel) as budget:
         budget.check()
         locator = choice.chosen(len(array), budget)
+        order = None if locator.order is None else locator.order(array, budget)
 
         def task(start: int, stop: int) -> None:
-            counts = locator.fill(array[start:stop], locations[start:stop], budget)
+            if order is None:
+                counts = locator.fill(array[start:stop], locations[start:stop], budget)
+            else:
+                places = order[start:stop]
+                gathered, found = np.empty((stop - start, 3)), np.empty(stop - start, np.int8)
+                gather_points(array, places, gathered)
+                counts = locator.fill(gathered, found, budget)
+                locations[places] = found
             beyond.append(counts.beyond)
             rational.append(counts.rational)
 

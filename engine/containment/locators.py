@@ -17,6 +17,7 @@ from engine.containment.balls import locate_in_ball
 from engine.containment.boxes import locate_in_box
 from engine.containment.build_cells import cells_if_they_pay
 from engine.containment.build_ring_cells import ring_cells_if_they_pay
+from engine.containment.cell_order import order_if_it_pays
 from engine.containment.half_spaces import locate_in_half_planes, locate_in_half_spaces
 from engine.containment.polynomials import locate_by_polynomial
 from engine.containment.prepared import Columns, Rings, columns_of, rings_of, rounded_rows
@@ -65,6 +66,9 @@ class Locator:
     decisions: Literal["exact", "float64"] = "exact"
     for_batch: Callable[[int, Budget], Locator] | None = None
     """Returns the locator to use for so many points, where that depends: it may build a structure that pays."""
+
+    order: Callable[[FloatArray, Budget], npt.NDArray[np.int64] | None] | None = None
+    """Returns the order in which a large batch is best asked, None for as it is."""
 
     def chosen(self, n_points: int, budget: Budget) -> Locator:
         """Return the locator for a batch of `n_points`."""
@@ -191,7 +195,9 @@ def _in_polyhedron(solid: Polyhedron) -> Locator:
         if cells is None:
             return plain
         return Locator(
-            "segment_parity", _in_cells(lambda *rest: int(locate_by_cells(rest[0], cells, *rest[1:])), by_rays)
+            "segment_parity",
+            _in_cells(lambda *rest: int(locate_by_cells(rest[0], cells, *rest[1:])), by_rays),
+            order=lambda points, budget: order_if_it_pays(points, cells, budget),
         )
 
     plain = Locator("ray_parity", by_rays, for_batch=choose)

@@ -10,6 +10,7 @@ import pytest
 
 from engine import Cancel, CancelledError, Csg, Polyhedron, locate
 from engine.containment import build_cells as building
+from engine.containment import cell_order
 from engine.containment.build_cells import build_cells
 from engine.containment.cell_entries import ENTRY, crossing, set_entry
 from engine.containment.cells import misses_cell
@@ -185,3 +186,20 @@ def test_cells_are_only_missed_where_no_point_is() -> None:
         points = weights @ np.array([a, b, c])
         assert not (missed and (np.abs(points) <= 0.5).all(axis=1).any())
     assert n_missed > 500
+
+
+def test_ordered_points_get_the_same_answers(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(building, "_PAYS_FROM", 0)
+    solid = made(merged(box_mesh([0, 0, 0], [3, 3, 3]), box_mesh([1, 1, 1], [4, 4, 2])))
+    points = np.random.default_rng(8).uniform(-0.5, 4.5, (20_000, 3))
+    points[::5, 2] = 3.0  # on a face
+    plain = locate(points, solid)
+    monkeypatch.setattr(cell_order, "_FEWEST_POINTS", 1)
+    monkeypatch.setattr(cell_order, "_FEWEST_ENTRIES", 1)
+    monkeypatch.setattr(cell_order, "_SHARE", 0.0)
+    with Budget() as budget:
+        order = cell_order.order_if_it_pays(points, build_cells(solid, budget), budget)
+    assert order is not None
+    assert (np.sort(order) == np.arange(len(points))).all()
+    assert (locate(points, solid) == plain).all()
+    assert (locate(points, solid, workers=1) == plain).all()
