@@ -54,6 +54,7 @@ from engine.solids.surface import Surface
 from engine.solids.triangle import Triangle
 from engine.types import Accuracy, Location, Relation
 from engine.version import __version__
+from engine.warmup import warm
 
 __all__ = [
     "Aabb",
@@ -122,4 +123,5 @@ __all__ = [
     "locate_scene",
     "overlay",
     "overlay_batch",
+    "warm",
 ]

@@ -35,6 +35,9 @@ from numba import config as numba_config
 from numba.core.caching import IndexDataCacheFile
 from numba.core.registry import CPUDispatcher
 
+KERNELS: list[Any] = []
+"""Every kernel of the modules imported so far, for the tests of `engine.warm`."""
+
 _OPTIONS: dict[str, Any] = {"nogil": True, "fastmath": False, "error_model": "numpy"}
 _ROOT = Path(__file__).resolve().parent
 _IMPORT = re.compile(
@@ -165,11 +168,13 @@ def kernel(function: Callable[..., Any]) -> Any:
     """Compile an outer loop: called from Python, releases the interpreter lock, cached on disk."""
     folder = cache_folder()
     if folder is None or numba_config.DISABLE_JIT:
-        return numba.njit(**_OPTIONS)(function)
-    with _cache_at(folder / source_digest(function.__module__)):
-        compiled = numba.njit(cache=True, **_OPTIONS)(function)
-    cache = compiled._cache
-    cache._cache_file = _CacheFile(cache._cache_path, cache._impl.filename_base, source_stamp=None)
+        compiled = numba.njit(**_OPTIONS)(function)
+    else:
+        with _cache_at(folder / source_digest(function.__module__)):
+            compiled = numba.njit(cache=True, **_OPTIONS)(function)
+        cache = compiled._cache
+        cache._cache_file = _CacheFile(cache._cache_path, cache._impl.filename_base, source_stamp=None)
+    KERNELS.append(compiled)
     return compiled
 
 

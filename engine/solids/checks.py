@@ -71,7 +71,17 @@ def as_number(value: object, where: Where) -> float:
 
 
 def as_floats(values: object, depth: int, where: Where) -> FloatArray:
-    """Return `values` as a finite C-contiguous float64 array of `depth` axes; borrowed where nothing had to change."""
+    """Return `values` as a finite float64 array of `depth` axes, C-contiguous and read-only.
+
+    Borrowed (a view) where nothing had to change. Always of one kind for the compiler, whatever the caller's array is
+    (writable or not, aligned or not, a subclass), so that no kernel is compiled a second time.
+    """
+    result = _as_floats(values, depth, where).view()
+    result.setflags(write=False)
+    return result
+
+
+def _as_floats(values: object, depth: int, where: Where) -> FloatArray:
     if isinstance(values, np.ma.MaskedArray):
         raise InvalidArrayError(f"{spell(where)} is a masked array; fill or drop the masked items first", where)
     if isinstance(values, (list, tuple)):
@@ -88,10 +98,10 @@ def as_floats(values: object, depth: int, where: Where) -> FloatArray:
             where,
         )
     if array.dtype.kind == "f" and array.dtype.itemsize <= 8:
-        result: FloatArray = np.ascontiguousarray(array, np.float64)
+        result: FloatArray = np.require(array, np.float64, ["C", "A", "E"])
     else:
         with np.errstate(over="ignore", under="ignore"):  # wider floats: judged by the check
-            result = np.ascontiguousarray(array, np.float64)
+            result = np.require(array, np.float64, ["C", "A", "E"])
         _check_converted(array, result, where)
     check_finite(result, where)
     return result

@@ -54,8 +54,11 @@ def test_arrays_and_lists_of_numbers_are_taken(points: object) -> None:
 
 def test_a_good_array_is_borrowed() -> None:
     array = np.zeros((5, 3))
-    assert as_points(array, 3) is array
-    assert as_points(array, None) is array
+    for dimension in (3, None):
+        borrowed = as_points(array, dimension)
+        assert np.shares_memory(borrowed, array)
+        assert not borrowed.flags.writeable
+    assert array.flags.writeable
 
 
 @pytest.mark.parametrize("points", [[], (), np.zeros((0, 3)), np.zeros((0, 0)), np.array([])], ids=repr)

@@ -1,0 +1,146 @@
+"""Compiles or loads every kernel that the public functions reach, by asking each a small question.
+
+Whatever calls the public functions later finds the same argument types, so that nothing is compiled while a client
+waits; a test compares the kernels reached here with those the engine has.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections.abc import Callable
+
+import numpy as np
+
+from engine.clipping.overlay import overlay
+from engine.clipping.polygons import clip_polygons
+from engine.clipping.segments import clip_segments
+from engine.collision.collide import collide
+from engine.collision.collide_poses import collide_poses
+from engine.collision.scene import collide_scene
+from engine.collision.triangles import collide_triangles
+from engine.containment.locate import locate
+from engine.containment.locate_scene import locate_scene
+from engine.solids.aabb import Aabb
+from engine.solids.base import Solid
+from engine.solids.bounds import bounds
+from engine.solids.convex import Convex
+from engine.solids.half_space import HalfSpace
+from engine.solids.implicit import Implicit
+from engine.solids.polygon import Polygon
+from engine.solids.polyhedron import Polyhedron
+from engine.solids.pose import Pose
+from engine.solids.sphere import Sphere
+from engine.solids.surface import Surface
+from engine.solids.triangle import Triangle
+
+_MANY = 50_000  # points: some milliseconds of work, and above what makes cells pay for solids this small
+
+_is_warm = threading.Event()
+_lock = threading.Lock()
+
+
+def warm(progress: Callable[[int], object] | None = None) -> None:
+    """Compile or load every kernel; the second call returns at once.
+
+    Takes a minute or so where nothing is cached, else a second. Safe to call from several threads (the others wait) and
+    processes (each compiles what it does not find). progress: called with 1 after each of `STEPS` steps.
+    """
+    with _lock:
+        if _is_warm.is_set():
+            return
+        for step in STEPS:
+            step()
+            if progress is not None:
+                progress(1)
+        _is_warm.set()
+
+
+def _cube(at: float = 0.0) -> Polyhedron:
+    corners = [[at + (i & 1), float(i >> 1 & 1), float(i >> 2 & 1)] for i in range(8)]
+    faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]]
+    return Polyhedron(corners, faces)
+
+
+def _regions(dimension: int) -> list[Solid]:
+    """Return one solid of every type of a dimension, those that only some operations take left out."""
+    first = np.eye(dimension)[0]
+    simple: list[Solid] = [
+        HalfSpace(first, 0.5),
+        Sphere(first, 1.0),
+        Aabb(np.zeros(dimension), np.ones(dimension)),
+        Convex(np.column_stack([np.eye(dimension), np.ones(dimension)])),
+    ]
+    return [*simple, Polygon([[[0, 0], [4, 0], [1, 1], [0, 4]]]) if dimension == 2 else _cube()]
+
+
+def _warm_containment() -> None:
+    for dimension in (2, 3):
+        points = np.linspace(-0.5, 1.5, 12 * dimension).reshape(-1, dimension)
+        corners = np.vstack([np.zeros(dimension), np.eye(dimension)])[:3]
+        terms = Implicit([{"powers": [2] * dimension, "coefficient": 1.0}])
+        solids = [*_regions(dimension), Triangle(corners), terms]
+        poses: list[Pose | None] = [Pose(np.eye(dimension), np.full(dimension, 0.25))] * len(solids)
+        for solid in solids:
+            locate(points, solid)
+        locate_scene(points, solids, poses)
+        locate_scene(points, solids)
+    _warm_cells()
+
+
+def _warm_cells() -> None:
+    """Ask a ball of 560 faces and a ring of 300 edges about so many points that cells pay, and lists get long."""
+    turn, rise = np.linspace(0, 2 * np.pi, 20, endpoint=False), np.linspace(-1, 1, 15)
+    belts = np.array([[r * np.cos(turn), r * np.sin(turn), 0 * turn + z] for r, z in zip(1.1 - rise**2, rise)])
+    vertices = np.concatenate([belts.transpose(0, 2, 1).reshape(-1, 3), [[0, 0, -1.0], [0, 0, 1.0]]])
+    faces = []
+    for k in range(20):
+        a, b = k, (k + 1) % 20
+        for belt in range(0, 20 * 14, 20):
+            faces += [[belt + a, belt + b, belt + 20 + b], [belt + a, belt + 20 + b, belt + 20 + a]]
+        faces += [[300, b, a], [301, 280 + a, 280 + b]]
+    many = np.random.default_rng(0).uniform(-1.2, 1.2, (_MANY, 3))
+    locate(many, Polyhedron(vertices, faces))
+    around = np.linspace(0, 2 * np.pi, 300, endpoint=False)
+    locate(np.ascontiguousarray(many[:, :2]), Polygon([np.column_stack([np.cos(around), np.sin(around)])]))
+
+
+def _warm_collision() -> None:
+    turns, moves = np.broadcast_to(np.eye(3), (3, 3, 3)), [[0.5, 0, 0], [1, 0, 0], [5, 0, 0]]
+    sheet = Surface([[0, 0, 0.5], [2, 0, 0.5], [0, 2, 0.5]], [[0, 1, 2]])
+    bodies: list[Solid] = [_cube(), sheet, Aabb([0, 0, 0], [1, 1, 1])]
+    for first in bodies:
+        collide_poses(first, bodies[0], turns, moves, witnesses=True)
+        for other in (_cube(1.0), _cube(0.5), HalfSpace([1, 0, 0], -0.5), Sphere([0, 0, 0], 1)):
+            collide(first, other)
+    collide_scene(bodies)
+    flat: list[Solid] = [Polygon([[[0, 0], [4, 0], [1, 1], [0, 4]]]), Triangle([[0, 0], [1, 0], [0, 1]])]
+    collide_scene(flat)
+    for dimension in (2, 3):
+        corners = np.vstack([np.zeros(dimension), np.eye(dimension)])[None, :3]
+        collide_triangles(corners, corners + 0.25)
+
+
+def _warm_clipping() -> None:
+    for dimension in (2, 3):
+        segments = np.linspace(-1.0, 2.0, 8 * dimension).reshape(4, 2, dimension)
+        contour = np.array([[-1.0, -1.0, 0.5], [2.0, 0.0, 0.5], [0.0, 2.0, 0.5]])[:, :dimension]
+        for region in _regions(dimension):
+            clip_segments(segments, region)
+            if region.type not in ("sphere", "polygon"):
+                clip_polygons([[contour]], region)
+
+
+def _warm_overlay() -> None:
+    first = Polygon([[[0, 0], [4, 0], [1, 1], [0, 4]]])
+    overlay(first, Polygon([[[0.5, 0.3], [5, 1], [1, 5]]]))
+
+
+def _warm_bounds() -> None:
+    for dimension in (2, 3):
+        for solid in _regions(dimension):
+            with contextlib.suppress(Exception):  # unbounded ones are refused
+                bounds(solid)
+
+
+STEPS = (_warm_containment, _warm_clipping, _warm_overlay, _warm_bounds, _warm_collision)

@@ -1,0 +1,69 @@
+"""warm(): afterwards the public functions compile nothing, whatever arrays they are given."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+PROBE = """
+import importlib, pkgutil
+import numpy as np
+import engine
+from engine.jit import KERNELS
+
+for module in pkgutil.walk_packages(engine.__path__, "engine."):
+    importlib.import_module(module.name)
+done = []
+engine.warm(done.append)
+left = [f"{k.py_func.__module__}.{k.py_func.__name__}" for k in KERNELS if not k.signatures]
+left = [name for name in left if ".textbook." not in name and not name.endswith("_batch")]
+assert not left, f"not compiled by warm(): {left}"
+known = {k: list(k.signatures) for k in KERNELS}
+
+
+def layouts(array):
+    array = np.asarray(array, float)
+    frozen = array.copy()
+    frozen.flags.writeable = False
+    strided = np.repeat(array, 2, 0)[::2]
+    return [array, frozen, np.asfortranarray(array), strided, array.astype(np.float32), array.tolist()]
+
+
+cube = engine.Polyhedron(
+    [[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)],
+    [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]],
+)
+solids = {
+    3: [cube, engine.Aabb([0, 0, 0], [1, 1, 1]), engine.Sphere([0, 0, 0], 1), engine.HalfSpace([1, 0, 0], 0),
+        engine.Convex([[1, 0, 0, 0]])],
+    2: [engine.Polygon([[[0, 0], [1, 0], [0, 1]]]), engine.Aabb([0, 0], [1, 1]), engine.Sphere([0, 0], 1),
+        engine.HalfSpace([1, 0], 0), engine.Convex([[1, 0, 0]])],
+}
+for dimension in (2, 3):
+    for points in layouts(np.linspace(0, 1, 30 * dimension).reshape(-1, dimension)):
+        for solid in solids[dimension]:
+            engine.locate(points, solid)
+        engine.locate_scene(points, solids[dimension])
+    for segments in layouts(np.linspace(-1, 2, 6 * dimension).reshape(-1, 2, dimension)):
+        for solid in solids[dimension]:
+            engine.clip_segments(segments, solid)
+    for triangles in layouts(np.linspace(-1, 2, 6 * dimension).reshape(-1, 3, dimension)):
+        engine.collide_triangles(triangles, triangles)
+for turns, moves in zip(layouts(np.broadcast_to(np.eye(3), (4, 3, 3))), layouts(np.eye(3)[[0, 1, 2, 0]])):
+    engine.collide_poses(cube, cube, turns, moves)
+engine.collide(cube, engine.Polyhedron(cube.vertices + 0.5, np.asarray(cube.triangles)))
+new = {k.py_func.__name__: k.signatures for k in KERNELS if list(k.signatures) != known[k]}
+assert not new, f"compiled after warm(): {new}"
+before = len(done)
+engine.warm(done.append)
+assert len(done) == before > 0
+"""
+
+
+@pytest.mark.skipif(os.environ.get("NUMBA_DISABLE_JIT") == "1", reason="nothing is compiled")
+def test_nothing_is_compiled_after_warm() -> None:
+    found = subprocess.run([sys.executable, "-c", PROBE], capture_output=True, text=True, timeout=600)
+    assert found.returncode == 0, found.stderr[-3000:]
