@@ -9,9 +9,10 @@ import numpy.typing as npt
 
 from engine.collision.collide import collide_pair, pair_function
 from engine.collision.mesh_mesh import mesh_mesh, what_to_seek
+from engine.collision.placement import PoseArrays
 from engine.collision.pose_batch import UNSETTLED, relate_poses
 from engine.collision.result import Witness, Work
-from engine.collision.shell import PoseArrays, shell_of
+from engine.collision.shell import shell_of
 from engine.errors import InvalidArrayError, WrongDimensionError
 from engine.parallel import Budget, Cancel, Progress, run_chunks
 from engine.solids.base import FloatArray, Solid
@@ -129,7 +130,7 @@ def _mesh_task(
 
     def batch(start: int, stop: int) -> None:
         pairs, kinds = np.empty((1, 2), np.int64), np.empty(1, np.int8)
-        poses = PoseArrays(turns[start:stop], moves[start:stop], True, b.reach)
+        poses = PoseArrays(turns[start:stop], moves[start:stop], True, False, b.reach)
         with np.errstate(all="ignore"):
             relate_poses(
                 a.arrays,

@@ -12,8 +12,17 @@ import numpy as np
 
 from engine.bounding.bvh import MAX_DEPTH
 from engine.collision.face_state import proves_overlap, state_of
-from engine.collision.placement import Placement, are_apart, as_placement, placed_box, placed_point, size_of
-from engine.collision.shell import STATE_CLEAN, PoseArrays, ShellArrays
+from engine.collision.placement import (
+    Placement,
+    PoseArrays,
+    are_apart,
+    placed_axis,
+    placed_box,
+    placed_point,
+    placement_of,
+    size_of,
+)
+from engine.collision.shell import STATE_CLEAN, ShellArrays
 from engine.collision.triangle_triangle import APART, CROSSING, Triangle3, classify_pair
 from engine.jit import inline, kernel
 from engine.types import UNDECIDED
@@ -48,7 +57,7 @@ def classify_faces(
     first: ShellArrays, i: int, first_place: Placement, second: ShellArrays, j: int, second_place: Placement
 ) -> int:
     """Return the class of two faces, UNDECIDED where one has no area or rounding could matter."""
-    axis = int(first.axis[i])
+    axis = placed_axis(int(first.axis[i]), first_place)
     if axis < 0 or second.axis[j] < 0:
         return UNDECIDED
     error = max(first_place.error, second_place.error)
@@ -76,14 +85,16 @@ def search(
     second: ShellArrays,
     second_place: Placement,
     seek: int,
+    stop_when_full: bool,
     pairs: Any,
     kinds: Any,
     flag: Any,
 ) -> tuple[int, bool]:
     """Write the pairs (i, j) that are not apart and their classes; return their number and whether the last settles.
 
-    Pairs beyond the room in `pairs` are counted, not written. When a pair settles what is sought it stands at row 0 and
-    the search ends. Returns INTERRUPTED when the flag is raised.
+    Pairs beyond the room in `pairs` are counted, not written; with `stop_when_full` the search ends at the first.
+    When a pair settles what is sought it stands at row 0 and the search ends. Returns INTERRUPTED when the flag is
+    raised.
     """
     stack = np.empty((4 * MAX_DEPTH, 2), np.int64)
     stack[0, 0], stack[0, 1] = 0, 0
@@ -109,6 +120,8 @@ def search(
             if n_pairs < kinds.shape[0]:
                 pairs[n_pairs, 0], pairs[n_pairs, 1], kinds[n_pairs] = i_face, j_face, kind
             n_pairs += 1
+            if stop_when_full and n_pairs > kinds.shape[0]:
+                return n_pairs, False
         elif j_child < 0 or (i_child >= 0 and size_of(a) >= size_of(b)):
             stack[n_stack, 0], stack[n_stack, 1] = i_child, j
             stack[n_stack + 1, 0], stack[n_stack + 1, 1] = i_child + 1, j
@@ -127,11 +140,12 @@ def find_contacts(
     second: ShellArrays,
     second_pose: PoseArrays,
     seek: int,
+    stop_when_full: bool,
     pairs: Any,
     kinds: Any,
     flag: Any,
 ) -> tuple[int, bool]:
     """Run `search` for one pose of each body. pairs (room, 2) int64, kinds (room,) int8, room >= 1."""
-    a = as_placement(first_pose.rotations, first_pose.translations, 0, first_pose.is_posed, first_pose.reach)
-    b = as_placement(second_pose.rotations, second_pose.translations, 0, second_pose.is_posed, second_pose.reach)
-    return search(first, a, second, b, seek, pairs, kinds, flag)
+    a = placement_of(first_pose)
+    b = placement_of(second_pose)
+    return search(first, a, second, b, seek, stop_when_full, pairs, kinds, flag)

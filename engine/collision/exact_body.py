@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from engine.bounding.bvh import MAX_DEPTH
-from engine.collision.placement import Box, are_apart, as_placement, placed_box
-from engine.collision.shell import PoseArrays, Shell, ShellArrays, lattice_shift
+from engine.collision.placement import Box, PoseArrays, are_apart, placed_box, placement_of
+from engine.collision.shell import Shell, ShellArrays, lattice_shift
 from engine.jit import kernel
 from engine.solids.pose import Pose
 
@@ -149,7 +149,7 @@ def rounded_outward(numerator: int, denominator: int) -> tuple[float, float]:
 @kernel
 def _faces_in_box(shell: ShellArrays, pose: PoseArrays, bounds: Any, found: Any) -> int:
     """Write the triangles whose placed boxes may meet bounds (6,) into found (room,); return their number."""
-    place = as_placement(pose.rotations, pose.translations, 0, pose.is_posed, pose.reach)
+    place = placement_of(pose)
     wanted = Box(bounds[0], bounds[1], bounds[2], bounds[3], bounds[4], bounds[5])
     stack = np.empty(MAX_DEPTH + 2, np.int64)
     stack[0] = 0

@@ -111,8 +111,7 @@ def cells_of(body: ExactBody, face: int, cutters: list[ExactBody], budget: Budge
     """Yield a point in each cell that the faces of `cutters` cut from a face with area; none lies on a trace."""
     corners, plane = body.corners(face), body.plane(face)
     axis = largest_axis(plane[:3])
-    segments = _traces(body, face, corners, plane, axis, cutters)
-    budget.check()
+    segments = _traces(body, face, corners, plane, axis, cutters, budget)
     own = [_segment(_flat(corners[i], axis), _flat(corners[i - 2], axis)) for i in range(3)]
     for x, y in _samples(own, segments, budget):
         yield _lifted(x, y, plane, axis)
@@ -141,7 +140,7 @@ def _segment(p: Rational2, q: Rational2) -> tuple[Rational2, Rational2]:
 
 
 def _traces(
-    body: ExactBody, face: int, corners: Corners, plane: Plane, axis: int, cutters: list[ExactBody]
+    body: ExactBody, face: int, corners: Corners, plane: Plane, axis: int, cutters: list[ExactBody], budget: Budget
 ) -> list[tuple[Rational2, Rational2]]:
     """Return the segments in which other faces meet the plane of a face, near the face, projected along `axis`."""
     scale = 1 << body.shift
@@ -150,6 +149,7 @@ def _traces(
     found = set()
     for cutter in cutters:
         for other in cutter.faces_in(low, high):
+            budget.check()
             if cutter is body and other == face:
                 continue
             if not any(cutter.plane(other)[:3]):

@@ -111,12 +111,10 @@ def simplices_meet(s: tuple[Vector, ...], t: tuple[Vector, ...]) -> bool:
     return segment_meets_triangle(s[0], s[1], corners, plane_through(corners))
 
 
-def classify_exact(t1: Corners, t2: Corners) -> int:
-    """Return APART, CROSSING, CONTACT or COPLANAR for any two faces; never undecided."""
-    s1, s2 = as_simplex(t1), as_simplex(t2)
-    if len(s1) < 3 or len(s2) < 3:
-        return CONTACT if simplices_meet(s1, s2) else APART
-    plane1, plane2 = plane_through(t1), plane_through(t2)
+def classify_exact(t1: Corners, t2: Corners, plane1: Plane, plane2: Plane) -> int:
+    """Return APART, CROSSING, CONTACT or COPLANAR for any two faces with their planes; never undecided."""
+    if not any(plane1) or not any(plane2):
+        return CONTACT if simplices_meet(as_simplex(t1), as_simplex(t2)) else APART
     sides2 = [sign(value_at(plane1, p)) for p in t2]
     if abs(sum(sides2)) == 3:
         return APART

@@ -35,7 +35,7 @@ from engine.jit import inline, kernel
 from engine.predicates.loading import as_point3
 from engine.types import UNDECIDED, Point3
 
-_NO_PLACE = Placement(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0)
+_NO_PLACE = Placement(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, False, 0.0, 0.0)
 
 
 @inline

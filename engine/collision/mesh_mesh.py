@@ -35,14 +35,24 @@ from engine.collision.exact_triangles import as_simplex, classify_exact, kind_of
 from engine.collision.face_state import find_states
 from engine.collision.parity import INSIDE, locate_vertices
 from engine.collision.result import Collision, Kind, Witness, Work
-from engine.collision.shell import STATE_CLEAN, STATE_CROSSED, STATE_STACKED, Shell, join_vertices, shell_of
+from engine.collision.shell import (
+    STATE_CLEAN,
+    STATE_CROSSED,
+    STATE_STACKED,
+    Shell,
+    join_vertices,
+    shell_of,
+    shell_of_triangles,
+)
 from engine.collision.triangle_triangle import APART, COPLANAR, CROSSING
 from engine.solids.base import IntArray, Solid
 from engine.solids.pose import Pose
 from engine.types import UNDECIDED, Relation
 
 _FIRST_ROOM = 1024
+_SAFE_POWER = 300
 _BLOCK = 64
+_PROBED = 8
 _NAMED = 32
 STRENGTH: tuple[Kind, ...] = ("face_face", "edge_face", "vertex_face", "edge_edge", "vertex_edge", "vertex_vertex")
 """Of several contacts the witness is the one of the kind that stands first here; at most `_NAMED` are looked at."""
@@ -64,8 +74,36 @@ def relate(first: Shell, first_pose: Pose | None, second: Shell, second_pose: Po
         second_pose = None
     if first_pose is not None and first_pose == second_pose:
         first_pose = second_pose = None
+    first, first_pose, second, second_pose = in_range(first, first_pose, second, second_pose)
     with np.errstate(all="ignore"):  # kernels, where they run uncompiled
         return _Pair(first, first_pose, second, second_pose, work).relation()
+
+
+def in_range(
+    first: Shell, first_pose: Pose | None, second: Shell, second_pose: Pose | None
+) -> tuple[Shell, Pose | None, Shell, Pose | None]:
+    """Return posed bodies near the ends of the exponent range scaled by a power of two, where that is exact.
+
+    Without poses the predicates scale by themselves; the filter for rounded posed coordinates does not.
+    """
+    poses = [pose for pose in (first_pose, second_pose) if pose is not None]
+    largest = max(first.reach, second.reach, *(float(np.abs(pose.translation).max()) for pose in poses), 0.0)
+    power = int(np.frexp(largest)[1])
+    if not poses or abs(power) <= _SAFE_POWER or largest == 0.0:
+        return first, first_pose, second, second_pose
+    arrays = [first.arrays.vertices, second.arrays.vertices, *(pose.translation for pose in poses)]
+    scaled = [np.ldexp(array, -power) for array in arrays]
+    if any((np.ldexp(small, power) != array).any() for small, array in zip(scaled, arrays)):
+        return first, first_pose, second, second_pose
+    shells = [
+        shell_of_triangles(vertices, shell.arrays.triangles, shell.faces, shell.has_inside)
+        for vertices, shell in zip(scaled, (first, second))
+    ]
+    moved = [
+        None if pose is None else Pose(pose.rotation, np.ldexp(pose.translation, -power))
+        for pose in (first_pose, second_pose)
+    ]
+    return shells[0], moved[0], shells[1], moved[1]
 
 
 def what_to_seek(first: Shell, second: Shell, work: Work) -> int:
@@ -129,15 +167,18 @@ class _Pair:
         (first, second), flag = self.shells, self.work.budget.flag
         first_pose, second_pose = first.posed(self.poses[0]), second.posed(self.poses[1])
         room = _FIRST_ROOM
-        while True:  # bound: the second turn has the room that the first one counted
+        stop = self.seek == SEEK_OVERLAP  # many weak contacts: look at some before all are listed
+        while True:  # bound: at most three turns; the third has the room that the second one counted
             pairs, kinds = np.empty((room, 2), np.int64), np.empty(room, np.int8)
             n_pairs, is_settled = find_contacts(
-                first.arrays, first_pose, second.arrays, second_pose, self.seek, pairs, kinds, flag
+                first.arrays, first_pose, second.arrays, second_pose, self.seek, stop, pairs, kinds, flag
             )
             self.work.budget.check()
             if n_pairs <= room:
                 break
-            room = n_pairs
+            if stop and self._is_overlap_near(pairs, kinds):
+                return pairs[:1], True
+            room, stop = max(n_pairs, 16 * _FIRST_ROOM if stop else 0), False
         pairs, kinds = pairs[:n_pairs], kinds[:n_pairs]
         if is_settled:
             return pairs, True
@@ -148,13 +189,24 @@ class _Pair:
         for index in open_ones:
             self.work.budget.check()
             i, j = int(pairs[index, 0]), int(pairs[index, 1])
-            kinds[index] = classify_exact(self.exact[0].corners(i), self.exact[1].corners(j))
+            kinds[index] = classify_exact(
+                self.exact[0].corners(i), self.exact[1].corners(j), self.exact[0].plane(i), self.exact[1].plane(j)
+            )
             if kinds[index] != APART and self._is_settled_by(int(kinds[index]), i, j):
                 return pairs[index : index + 1], True
         meet = np.concatenate(
             [np.flatnonzero(kinds == COPLANAR), np.flatnonzero((kinds != APART) & (kinds != COPLANAR))]
         )
         return pairs[meet], False
+
+    def _is_overlap_near(self, pairs: IntArray, kinds: npt.NDArray[np.int8]) -> bool:
+        """Tell whether the cells of a few faces in contact prove overlapping; such a pair is put first."""
+        sure = np.flatnonzero(kinds != UNDECIDED)
+        for index in sure[:: max(1, len(sure) // _PROBED)].tolist():
+            if self._look_at_cells(0, int(pairs[index, 0]))[0]:
+                pairs[0] = pairs[index]
+                return True
+        return False
 
     def _in_order(self, pairs: IntArray, kinds: npt.NDArray[np.int8]) -> tuple[IntArray, npt.NDArray[np.int8]]:
         """Sort pairs by the caller's faces, then by triangle."""

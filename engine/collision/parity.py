@@ -17,13 +17,14 @@ from engine.bounding.bvh import MAX_DEPTH
 from engine.collision.dual_traversal import placed_triangle
 from engine.collision.placement import (
     Placement,
-    as_placement,
+    PoseArrays,
     orient2d_near,
     orient3d_near,
     placed_box,
     placed_point,
+    placement_of,
 )
-from engine.collision.shell import PoseArrays, ShellArrays
+from engine.collision.shell import ShellArrays
 from engine.collision.triangle_triangle import Triangle3
 from engine.jit import inline, kernel
 from engine.types import UNDECIDED, Point2, Point3
@@ -124,8 +125,8 @@ def locate_vertices(
     flag: Any,
 ) -> None:
     """Fill found (n,) int8 for the vertices (n,) of `source` against `shell`, each under its one pose."""
-    a = as_placement(source_pose.rotations, source_pose.translations, 0, source_pose.is_posed, source_pose.reach)
-    b = as_placement(pose.rotations, pose.translations, 0, pose.is_posed, pose.reach)
+    a = placement_of(source_pose)
+    b = placement_of(pose)
     for item in range(vertices.shape[0]):
         if flag[0] != 0:
             return

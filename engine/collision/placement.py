@@ -19,6 +19,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from engine.jit import inline
 from engine.predicates.orientation import orient2d, orient3d
@@ -28,8 +29,19 @@ BOX_MARGIN = 8.0
 """A posed box is widened by this many times `error`: centre and half width, their images and the sums stay below 2."""
 
 
+class PoseArrays(NamedTuple):
+    """One or many poses of one body for kernels: rotations (n, 3, 3), translations (n, 3), are there any, do they round
+    no coordinate of the body, and the largest coordinate of the body."""
+
+    rotations: npt.NDArray[np.float64]
+    translations: npt.NDArray[np.float64]
+    is_posed: bool
+    is_exact: bool
+    reach: float
+
+
 class Placement(NamedTuple):
-    """Rotation (rows), translation and the error of a rounded posed coordinate; `error` 0.0 means no pose at all."""
+    """Rotation (rows), translation, the error of a rounded posed coordinate (0.0: exact), how far boxes are widened."""
 
     xx: float
     xy: float
@@ -43,7 +55,9 @@ class Placement(NamedTuple):
     x: float
     y: float
     z: float
+    is_posed: bool
     error: float
+    margin: float
 
 
 class Box(NamedTuple):
@@ -58,23 +72,51 @@ class Box(NamedTuple):
 
 
 @inline
-def as_placement(rotations: Any, translations: Any, item: int, is_posed: bool, reach: float) -> Placement:
-    """Load pose `item` for a body whose coordinates are at most `reach` in magnitude."""
+def as_placement(
+    rotations: Any, translations: Any, item: int, is_posed: bool, is_exact: bool, reach: float
+) -> Placement:
+    """Load pose `item` for a body whose coordinates are at most `reach` in magnitude.
+
+    is_exact: caller guarantees that every rounded posed coordinate of the body is exact.
+    """
     r, t = rotations[item], translations[item]
     error = 0.0
     if is_posed:
         shift = max(abs(t[0]), abs(t[1]), abs(t[2]))
         error = 2.0**-50 * (3.0 * reach + shift) + 2.0**-1060
+    margin = BOX_MARGIN * error
+    if is_exact:
+        error = 0.0
     return Placement(
-        r[0, 0], r[0, 1], r[0, 2], r[1, 0], r[1, 1], r[1, 2], r[2, 0], r[2, 1], r[2, 2], t[0], t[1], t[2], error
+        r[0, 0],
+        r[0, 1],
+        r[0, 2],
+        r[1, 0],
+        r[1, 1],
+        r[1, 2],
+        r[2, 0],
+        r[2, 1],
+        r[2, 2],
+        t[0],
+        t[1],
+        t[2],
+        is_posed,
+        error,
+        margin,
     )
+
+
+@inline
+def placement_of(pose: PoseArrays) -> Placement:
+    """Load the one pose of a body."""
+    return as_placement(pose.rotations, pose.translations, 0, pose.is_posed, pose.is_exact, pose.reach)
 
 
 @inline
 def placed_point(points: Any, item: int, place: Placement) -> Point3:
     """Return the rounded posed point, the point itself where there is no pose."""
     x, y, z = points[item, 0], points[item, 1], points[item, 2]
-    if place.error == 0.0:
+    if not place.is_posed:
         return Point3(x, y, z)
     return Point3(
         place.xx * x + place.xy * y + place.xz * z + place.x,
@@ -88,11 +130,11 @@ def placed_box(boxes: Any, node: int, place: Placement) -> Box:
     """Return a box that holds the exact image of a tree's box (components may be NaN where numbers overflow)."""
     x0, y0, z0 = boxes[node, 0], boxes[node, 1], boxes[node, 2]
     x1, y1, z1 = boxes[node, 3], boxes[node, 4], boxes[node, 5]
-    if place.error == 0.0:
+    if not place.is_posed:
         return Box(x0, y0, z0, x1, y1, z1)
     cx, cy, cz = 0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.5 * (z0 + z1)
     hx, hy, hz = 0.5 * (x1 - x0), 0.5 * (y1 - y0), 0.5 * (z1 - z0)
-    margin = BOX_MARGIN * place.error
+    margin = place.margin
     x = place.xx * cx + place.xy * cy + place.xz * cz + place.x
     y = place.yx * cx + place.yy * cy + place.yz * cz + place.y
     z = place.zx * cx + place.zy * cy + place.zz * cz + place.z
@@ -159,6 +201,19 @@ def orient2d_near(a: Point2, b: Point2, c: Point2, error: float) -> int:
     if -det > threshold:
         return -1
     return UNDECIDED
+
+
+@inline
+def placed_axis(axis: int, place: Placement) -> int:
+    """Return where the pose turns a coordinate axis to; caller guarantees a pose that permutes axes, or none."""
+    if not place.is_posed or axis < 0:
+        return axis
+    x, y = place.xx, place.yx
+    if axis == 1:
+        x, y = place.xy, place.yy
+    elif axis == 2:
+        x, y = place.xz, place.yz
+    return 0 if x != 0.0 else (1 if y != 0.0 else 2)
 
 
 NO_ROTATION = np.eye(3).reshape(1, 3, 3)

@@ -6,8 +6,8 @@ from typing import Any
 
 from engine.collision.dual_traversal import INTERRUPTED, SEEK_OVERLAP, search
 from engine.collision.parity import INSIDE, OUTSIDE, locate_point
-from engine.collision.placement import Placement, as_placement, placed_point
-from engine.collision.shell import PoseArrays, ShellArrays
+from engine.collision.placement import Placement, PoseArrays, as_placement, placed_point
+from engine.collision.shell import ShellArrays
 from engine.jit import inline, kernel
 
 UNSETTLED = -1
@@ -59,10 +59,10 @@ def relate_poses(
     flag: Any,
 ) -> None:
     """Fill relations (n,) int8 for the poses (n) of the second body; `pairs` and `kinds` hold one row of work space."""
-    still = as_placement(poses.rotations, poses.translations, 0, False, 0.0)
+    still = as_placement(poses.rotations, poses.translations, 0, False, True, 0.0)
     for item in range(relations.shape[0]):
-        place = as_placement(poses.rotations, poses.translations, item, True, poses.reach)
-        n_pairs, is_settled = search(first, still, second, place, seek, pairs, kinds, flag)
+        place = as_placement(poses.rotations, poses.translations, item, True, False, poses.reach)
+        n_pairs, is_settled = search(first, still, second, place, seek, False, pairs, kinds, flag)
         if n_pairs == INTERRUPTED:
             return
         if is_settled:

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.bounding.bvh import build_bvh
-from engine.collision.placement import NO_ROTATION, NO_TRANSLATION
+from engine.collision.placement import NO_ROTATION, NO_TRANSLATION, PoseArrays
 from engine.collision.triangle_triangle import projected
 from engine.jit import inline, kernel
 from engine.predicates.loading import as_point3
@@ -48,16 +48,6 @@ class ShellArrays(NamedTuple):
     child: IntArray
 
 
-class PoseArrays(NamedTuple):
-    """One or many poses of one body for kernels: rotations (n, 3, 3), translations (n, 3), are there any, and the
-    largest coordinate of the body."""
-
-    rotations: FloatArray
-    translations: FloatArray
-    is_posed: bool
-    reach: float
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Shell:
     """Triangles of one body.
@@ -77,9 +67,23 @@ class Shell:
     def posed(self, pose: Pose | None) -> PoseArrays:
         """Return the pose as kernels take it."""
         if pose is None:
-            return PoseArrays(NO_ROTATION, NO_TRANSLATION, False, self.reach)
+            return PoseArrays(NO_ROTATION, NO_TRANSLATION, False, True, self.reach)
         rotations = np.ascontiguousarray(pose.rotation).reshape(1, 3, 3)
-        return PoseArrays(rotations, np.ascontiguousarray(pose.translation).reshape(1, 3), True, self.reach)
+        translations = np.ascontiguousarray(pose.translation).reshape(1, 3)
+        is_exact = is_exact_pose(self.arrays.vertices, pose)
+        return PoseArrays(rotations, translations, True, is_exact, self.reach)
+
+
+def is_exact_pose(points: FloatArray, pose: Pose) -> bool:
+    """Tell whether a pose only permutes axes, turns signs and adds without rounding: a lattice moved along itself."""
+    if not np.isin(pose.rotation, (-1.0, 0.0, 1.0)).all():
+        return False
+    with np.errstate(all="ignore"):
+        turned = points @ pose.rotation.T
+        moved = turned + pose.translation
+        back = moved - turned
+        lost = (turned - (moved - back)) + (pose.translation - back)
+        return bool((lost == 0.0).all())  # overflow: NaN is not zero
 
 
 def shell_of(solid: Solid) -> Shell:
