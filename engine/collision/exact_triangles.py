@@ -111,8 +111,9 @@ def simplices_meet(s: tuple[Vector, ...], t: tuple[Vector, ...]) -> bool:
     return segment_meets_triangle(s[0], s[1], corners, plane_through(corners))
 
 
-def classify_exact(t1: Corners, t2: Corners, plane1: Plane, plane2: Plane) -> int:
-    """Return APART, CROSSING, CONTACT or COPLANAR for any two faces with their planes; never undecided."""
+def classify_exact(t1: Corners, t2: Corners, plane1: Plane | None = None, plane2: Plane | None = None) -> int:
+    """Return APART, CROSSING, CONTACT or COPLANAR for any two faces; never undecided. Planes: theirs, if known."""
+    plane1, plane2 = plane1 or plane_through(t1), plane2 or plane_through(t2)
     if not any(plane1) or not any(plane2):
         return CONTACT if simplices_meet(as_simplex(t1), as_simplex(t2)) else APART
     sides2 = [sign(value_at(plane1, p)) for p in t2]

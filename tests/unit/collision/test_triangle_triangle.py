@@ -8,9 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.collision import exact_triangles
-from engine.collision.exact_body import plane_through
-from engine.collision.exact_triangles import kind_of_contact
+from engine.collision.exact_triangles import classify_exact, kind_of_contact
 from engine.collision.placement import orient3d_near
 from engine.collision.triangle_triangle import APART, CONTACT, COPLANAR, CROSSING, Triangle3, classify_pair
 from engine.jit import kernel
@@ -20,10 +18,6 @@ from tests.reference.contact import triangles_meet
 from tests.reference.exact import Vector, vector
 
 Corners = tuple[tuple[int, int, int], ...]
-
-
-def classify_exact(t1: Corners, t2: Corners) -> int:
-    return exact_triangles.classify_exact(t1, t2, plane_through(t1), plane_through(t2))
 
 
 @kernel
