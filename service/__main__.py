@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import importlib.util
-import logging
+import logging.config
 import signal
 import sys
+from copy import deepcopy
 from typing import Any
 
 import uvicorn
 from pydantic import ValidationError
+from uvicorn.config import LOGGING_CONFIG
 
 from service.settings import Settings
 
@@ -23,11 +25,19 @@ def main() -> None:
     except ValidationError as error:
         lines = [f"GEOMETRY_{'_'.join(map(str, item['loc'])).upper()}: {item['msg']}" for item in error.errors()]
         sys.exit("a setting is wrong\n" + "\n".join(lines))
-    logging.basicConfig(level=settings.log_level.upper(), format="%(asctime)s %(levelname)s %(name)s: %(message)s")
+    logs = _log_config(settings)
+    logging.config.dictConfig(logs)
     # uvicorn drains, restores these handlers and raises the signal again: that must end in 0, not in a kill
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     signal.signal(signal.SIGINT, lambda *_: sys.exit(0))
-    log.info("starting on http://%s:%d (documentation at /docs)", settings.host, settings.port)
+    log.info(
+        "starting on http://%s:%d, documentation at /docs, %d process(es), bodies up to %d bytes, deadline %g s",
+        settings.host,
+        settings.port,
+        settings.workers,
+        settings.max_body_bytes,
+        settings.deadline_seconds,
+    )
     uvicorn.run(
         "service.app:create_app",
         factory=True,
@@ -36,10 +46,19 @@ def main() -> None:
         workers=settings.workers,
         http=_http_protocol(),
         ws="none",
+        log_config=logs,
         log_level=settings.log_level,
         timeout_graceful_shutdown=round(settings.drain_seconds),
         server_header=False,
     )
+
+
+def _log_config(settings: Settings) -> dict[str, Any]:
+    """Return uvicorn's way to log, with the service's own lines in it; worker processes set it up anew."""
+    config: dict[str, Any] = deepcopy(LOGGING_CONFIG)
+    config["formatters"]["default"]["fmt"] = "%(asctime)s %(levelprefix)s %(name)s: %(message)s"
+    config["loggers"]["service"] = {"handlers": ["default"], "level": settings.log_level.upper(), "propagate": False}
+    return config
 
 
 def _http_protocol() -> Any:

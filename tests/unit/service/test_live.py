@@ -88,6 +88,8 @@ def service() -> Iterator[Service]:
 
 def test_it_becomes_ready_and_answers(service: Service) -> None:
     service.wait_until_ready()
+    assert any("service: starting on" in line for line in service.log)
+    assert any("service: ready: kernels warm" in line for line in service.log)
     answer = httpx.post(f"{service.url}/v1/solids", json=SPHERE)
     assert answer.status_code == 201
     head = httpx.head(service.url + answer.headers["location"])
