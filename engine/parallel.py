@@ -18,7 +18,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from engine.errors import CancelledError, DeadlineExceededError
+from engine.errors import CancelledError, DeadlineExceededError, InvalidInputError
 
 Progress = Callable[[int], object]
 """Called with the number of items just finished, so that ``tqdm(total=n).update`` fits."""
@@ -65,10 +65,19 @@ class Budget:
     """
 
     def __init__(self, deadline: float | None = None, cancel: Cancel | None = None) -> None:
-        self.deadline = deadline
+        if deadline is not None and (
+            isinstance(deadline, bool) or not isinstance(deadline, (int, float)) or deadline != deadline  # NaN
+        ):
+            raise InvalidInputError(
+                f"deadline must be a number of seconds or None, got {_shown(deadline)}", ("deadline",)
+            )
+        if cancel is not None and not isinstance(cancel, Cancel):
+            raise InvalidInputError(f"cancel must be an engine.Cancel or None, got {_shown(cancel)}", ("cancel",))
+        longest = threading.TIMEOUT_MAX  # of the timer, some centuries: more than that is no limit
+        self.deadline = None if deadline is None or deadline > longest else float(max(deadline, -longest))
         self.flag: npt.NDArray[np.uint8] = np.zeros(1, np.uint8)
         self._cancel = cancel
-        self._end = None if deadline is None else time.monotonic() + deadline
+        self._end = None if self.deadline is None else time.monotonic() + self.deadline
         self._timer: threading.Timer | None = None
 
     def __enter__(self) -> Budget:
@@ -90,14 +99,36 @@ class Budget:
         self.flag[0] = 1
 
     def check(self) -> None:
-        """Raise `CancelledError` or `DeadlineExceededError` if the call must end; cheap enough for inner loops."""
+        """Raise `CancelledError` or `DeadlineExceededError` if the call must end; cheap enough for inner loops.
+
+        A raised `flag` counts by itself: a kernel may have seen it and left its answers incomplete.
+        """
         if self._cancel is not None and self._cancel.is_set:
             raise CancelledError("the call was cancelled by its caller")
-        if self._end is not None and time.monotonic() >= self._end:
+        if self._end is not None and (self.flag[0] or time.monotonic() >= self._end):
             raise DeadlineExceededError(
                 f"the deadline of {self.deadline!r} s passed before the call was done; "
                 "ask for less in one call or give it more time"
             )
+
+
+def check_options(workers: object, progress: object) -> None:
+    """Raise unless `workers` is a whole number from 1 or None, and `progress` callable or None.
+
+    Functions that use the pool get this from `run_chunks`; those that do not call it themselves.
+    """
+    if workers is not None and (isinstance(workers, bool) or not isinstance(workers, (int, np.integer)) or workers < 1):
+        raise InvalidInputError(
+            f"workers must be at least 1, got {_shown(workers)}; leave it out for one per core", ("workers",)
+        )
+    if progress is not None and not callable(progress):
+        raise InvalidInputError(f"progress must be callable or None, got {_shown(progress)}", ("progress",))
+
+
+def _shown(value: object) -> str:
+    """Return a number as it is, of anything else its type: its text could be endless."""
+    is_short = isinstance(value, float) or (isinstance(value, int) and abs(value) < 10**20)
+    return repr(value) if is_short else f"a value of type {type(value).__name__}"
 
 
 def default_workers() -> int:
@@ -146,8 +177,7 @@ def run_chunks(
     workers: threads at once; None for one per core, 1 for the calling thread only.
     Raises: what `task` raises (the earliest range first), `DeadlineExceededError`, `CancelledError`.
     """
-    if workers is not None and workers < 1:
-        raise ValueError(f"workers must be at least 1, got {workers!r}; leave it out for one per core")
+    check_options(workers, progress)
     n_workers = default_workers() if workers is None else workers
     done, chunk = 0, max(1, first_chunk)
     while done < n_items:

@@ -29,8 +29,9 @@ from engine.arrangement.subdivision import label_faces, subdivide
 from engine.clipping.overlay_result import Collapse, Overlay
 from engine.clipping.overlay_rounding import Rounded, count_changes, round_to_nearest, round_to_valid
 from engine.errors import InvalidArrayError, InvalidOperationError, UnsupportedSolidError
-from engine.parallel import Budget, Cancel, Progress, run_chunks
+from engine.parallel import Budget, Cancel, Progress, check_options, run_chunks
 from engine.solids.base import Solid
+from engine.solids.checks import shown
 from engine.solids.polygon import Polygon
 from engine.types import Accuracy
 
@@ -128,6 +129,7 @@ def overlay(
     """
     _check_options(operation, output)
     rings = [_rings_of(solid, name) for solid, name in ((subject, "subject"), (clip, "clip"))]
+    check_options(workers, progress)
     with Budget(deadline, cancel) as budget:
         budget.check()
         result, n_exact = overlay_rings(rings[0], rings[1], operation, output, budget)
@@ -195,8 +197,8 @@ def overlay_batch(
 
 def _check_options(operation: str, output: str) -> None:
     for value, known, name in ((operation, _KEPT, "operation"), (output, _OUTPUTS, "output")):
-        if value not in known:
-            raise InvalidOperationError(f"{name} must be one of {', '.join(known)}; got {value!r}", (name,))
+        if not isinstance(value, str) or value not in known:
+            raise InvalidOperationError(f"{name} must be one of {', '.join(known)}; got {shown(value)}", (name,))
 
 
 def _rings_of(solid: object, *where: str | int) -> RingArrays:

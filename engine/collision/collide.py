@@ -7,7 +7,7 @@ from typing import Literal, overload
 from engine.collision.pairs import PAIRS
 from engine.collision.result import Collision, PairFunction, Work
 from engine.errors import InvalidArrayError, UnsupportedPairError, UnsupportedSolidError, WrongDimensionError
-from engine.parallel import Budget, Cancel, Progress
+from engine.parallel import Budget, Cancel, Progress, check_options
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
 from engine.types import Accuracy
@@ -139,6 +139,7 @@ def collide(
     pair_function(first, second)
     check_pose(first_pose, first, "first_pose")
     check_pose(second_pose, second, "second_pose")
+    check_options(workers, progress)
     with Budget(deadline, cancel) as budget:
         budget.check()
         work = Work(budget, boolean=boolean)

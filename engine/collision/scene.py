@@ -99,6 +99,9 @@ def collide_scene(
 
 def _checked(solids: Sequence[Solid], poses: Sequence[Pose | None] | None) -> tuple[list[Solid], list[Pose | None]]:
     """Return bodies and poses as lists of one length; raise with the index of the body that is wrong."""
+    for name, given in (("solids", solids), ("poses", () if poses is None else poses)):
+        if not isinstance(given, (list, tuple)):
+            raise InvalidArrayError(f"{name} must be a list, got {type(given).__name__}", (name,))
     bodies = list(solids)
     placed: list[Pose | None] = [None] * len(bodies) if poses is None else list(poses)
     if len(placed) != len(bodies):
@@ -144,7 +147,12 @@ def _named(pairs: IntArray, n_bodies: int, skip: object, only: object) -> IntArr
 
 
 def _keys(named: Any, n_bodies: int, name: str) -> IntArray:
-    array = np.asarray(named)
+    try:
+        array = np.asarray(named)
+    except ValueError:
+        raise InvalidArrayError(
+            f"{name} must be pairs of indices (n, 2), got rows of several lengths", (name,)
+        ) from None
     if array.size == 0:
         return np.empty(0, np.int64)
     if array.ndim != 2 or array.shape[1] != 2 or array.dtype.kind not in "iu":

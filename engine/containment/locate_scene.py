@@ -19,7 +19,7 @@ from engine.containment.locators import Locator
 from engine.containment.posed import posed_locator
 from engine.containment.scene_pairs import count_candidates, group_by_body, list_candidates
 from engine.errors import EngineError, InvalidArrayError, WrongDimensionError
-from engine.parallel import Budget, Cancel, Progress, run_chunks
+from engine.parallel import Budget, Cancel, Progress, check_options, run_chunks
 from engine.solids.base import FloatArray, IntArray, Solid
 from engine.solids.checks import as_points
 from engine.solids.pose import Pose
@@ -119,6 +119,7 @@ def locate_scene(
     ([0, 1, 3, 3], [0, 0, 1], [False, True, True])
     """
     _check_solids(solids, poses)
+    check_options(workers, progress)
     array = as_points(points, solids[0].dimension if len(solids) else None)
     held_counts = np.zeros(len(array) + 1, np.int64)
     portions: list[tuple[IntArray, npt.NDArray[np.bool_]]] = []

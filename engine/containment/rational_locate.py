@@ -315,10 +315,11 @@ def _in_csg(point: Sequence[Number], solid: Csg, pose: Pose | None, check: Check
     return visit(solid)
 
 
-def unsupported(solid: Solid) -> UnsupportedSolidError:
-    """Return the error for a solid that has no inside."""
+def unsupported(solid: object) -> UnsupportedSolidError:
+    """Return the error for a solid that has no inside, or for what is no solid at all."""
+    kind = solid.type if isinstance(solid, Solid) else f"{type(solid).__name__}, which is no solid"
     return UnsupportedSolidError(
-        f"nothing is inside a {solid.type}; a point can be located in a half_space, sphere, aabb, convex, polyhedron, "
+        f"nothing is inside a {kind}; a point can be located in a half_space, sphere, aabb, convex, polyhedron, "
         "triangle, polygon, implicit or csg. A closed triangle mesh is a polyhedron; a planar 3D polygon can be asked "
         "as triangles",
         ("solid",),

@@ -11,7 +11,7 @@ from engine.bounding.aabb import box_of_points, corners_of_box
 from engine.bounding.double_description import corners_of_half_spaces
 from engine.bounding.minimal_sphere import MinimalSphere, minimal_sphere, minimal_sphere_of_rationals
 from engine.errors import EmptyGeometryError, NotRepresentableError, UnsupportedSolidError
-from engine.parallel import Budget, Cancel, Progress
+from engine.parallel import Budget, Cancel, Progress, check_options
 from engine.predicates.rational import nearest_float
 from engine.solids.aabb import Aabb
 from engine.solids.base import FloatArray, Solid
@@ -87,6 +87,7 @@ def bounds(
         raise UnsupportedSolidError(
             f"bounds takes a solid, got {type(solid).__name__}; make one of {_TAKEN}", ("solid",)
         )
+    check_options(workers, progress)
     with Budget(deadline, cancel) as budget:
         budget.check()
         result, accuracy = solid.prepared("bounds", lambda: _bounds_of(solid, budget))

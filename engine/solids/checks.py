@@ -9,6 +9,7 @@ error's path goes on to the element: ``("points", 3, 1)``.
 from __future__ import annotations
 
 import math
+import reprlib
 from typing import Any, Final, cast
 
 import numpy as np
@@ -44,8 +45,21 @@ def digits(point: npt.ArrayLike) -> str:
 def _kind(value: object) -> str:
     if isinstance(value, np.ndarray):
         return f"an array of dtype {value.dtype} and shape {value.shape}"
-    text = repr(value)
-    return f"{text if len(text) <= 60 else text[:57] + '...'} ({type(value).__name__})"
+    return f"{shown(value)} ({type(value).__name__})"
+
+
+_SHORT = reprlib.Repr()
+_SHORT.maxlist = _SHORT.maxtuple = _SHORT.maxdict = 12
+_SHORT.maxstring = _SHORT.maxlong = _SHORT.maxother = 80
+
+
+def shown(value: object, limit: int = 60) -> str:
+    """Return a short text of what a caller passed, whatever it is: also a list of millions or one nested too deep."""
+    try:
+        text = _SHORT.repr(value)
+    except Exception:  # an integer beyond Python's own limit of digits, a broken __repr__
+        text = f"a {type(value).__name__} that cannot be printed"
+    return text if len(text) <= limit else text[: limit - 3] + "..."
 
 
 def as_number(value: object, where: Where) -> float:
@@ -161,6 +175,12 @@ def check_dimension(n_columns: int, dimension: int | None, where: Where, what: s
     if n_columns not in allowed:
         wanted = " or ".join(map(str, allowed))
         raise WrongDimensionError(f"{spell(where)} must hold {what} {wanted} numbers each, got {n_columns}", where)
+
+
+def check_given_dimension(dimension: object) -> None:
+    """Raise unless `dimension`, named by the caller, is the whole number 2 or 3."""
+    if isinstance(dimension, bool) or not isinstance(dimension, (int, np.integer)) or dimension not in DIMENSIONS:
+        raise WrongDimensionError(f"dimension must be 2 or 3, got {shown(dimension)}", ("dimension",))
 
 
 def check_not_empty(count: int, what: str, where: Where) -> None:

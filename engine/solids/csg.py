@@ -13,7 +13,7 @@ from engine.errors import (
     WrongDimensionError,
 )
 from engine.solids.base import Solid
-from engine.solids.checks import check_not_empty
+from engine.solids.checks import check_not_empty, shown
 
 OPERATIONS: Final = ("union", "intersection", "difference")
 MAX_DEPTH: Final = 100
@@ -51,7 +51,7 @@ class Csg(Solid):
     def __init__(self, operation: str, operands: object) -> None:
         if not isinstance(operation, str) or operation not in OPERATIONS:
             raise InvalidOperationError(
-                f"operation must be one of {', '.join(OPERATIONS)}, got {operation!r}", ("operation",)
+                f"operation must be one of {', '.join(OPERATIONS)}, got {shown(operation)}", ("operation",)
             )
         if not isinstance(operands, (list, tuple)):
             raise InvalidArrayError(f"operands must be a list of solids, got {type(operands).__name__}", ("operands",))

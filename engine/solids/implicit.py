@@ -10,7 +10,17 @@ import numpy.typing as npt
 
 from engine.errors import InvalidArrayError, InvalidPolynomialError, WrongDimensionError
 from engine.solids.base import FloatArray, IntArray, Solid
-from engine.solids.checks import DIMENSIONS, as_floats, as_number, check_not_empty, frozen, frozen_integers, spell
+from engine.solids.checks import (
+    DIMENSIONS,
+    as_floats,
+    as_number,
+    check_given_dimension,
+    check_not_empty,
+    frozen,
+    frozen_integers,
+    shown,
+    spell,
+)
 
 MAX_DEGREE: Final = 16
 """Largest total degree of a term."""
@@ -78,8 +88,7 @@ class Implicit(Solid):
         """
         if not callable(function):
             raise InvalidArrayError(f"function must be callable, got {type(function).__name__}", ("function",))
-        if isinstance(dimension, bool) or dimension not in DIMENSIONS:
-            raise WrongDimensionError(f"dimension must be 2 or 3, got {dimension!r}", ("dimension",))
+        check_given_dimension(dimension)
         solid = object.__new__(cls)
         powers, coefficients = frozen_integers(np.zeros((0, dimension))), frozen(np.zeros(0))
         solid._set(dimension=int(dimension), powers=powers, coefficients=coefficients, function=function)
@@ -100,7 +109,7 @@ def _from_terms(terms: object) -> tuple[npt.NDArray[Any], FloatArray]:
     for i_term, term in enumerate(terms):
         if not isinstance(term, Mapping) or set(term) != {"powers", "coefficient"}:
             raise InvalidArrayError(
-                f'terms[{i_term}] must be {{"powers": [...], "coefficient": number}}, got {term!r:.80}',
+                f'terms[{i_term}] must be {{"powers": [...], "coefficient": number}}, got {shown(term, 80)}',
                 ("terms", i_term),
             )
         row = _as_powers([term["powers"]], ("terms", i_term, "powers"), one=True)[0]
@@ -120,10 +129,12 @@ def _as_powers(powers: object, where: tuple[str | int, ...], *, one: bool = Fals
         array = np.asarray(powers)
     except ValueError:  # ragged
         array = np.zeros(0, object)
-    if array.ndim != 2 or array.dtype.kind not in "iu" or _holds_bool(powers):
+    is_masked = isinstance(powers, np.ma.MaskedArray)
+    if array.ndim != 2 or array.dtype.kind not in "iu" or is_masked or _holds_bool(powers):
         shape = "a row" if one else "rows"
         raise InvalidPolynomialError(
-            f"{spell(where)} must be {shape} of 2 or 3 whole numbers from 0 to {MAX_DEGREE}, got {powers!r:.80}", where
+            f"{spell(where)} must be {shape} of 2 or 3 whole numbers from 0 to {MAX_DEGREE}, got {shown(powers, 80)}",
+            where,
         )
     if array.shape[1] not in DIMENSIONS:
         raise WrongDimensionError(f"{spell(where)} must have 2 or 3 powers, got {array.shape[1]}", where)

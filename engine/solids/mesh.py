@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from engine.errors import IndexOutOfRangeError, InvalidArrayError, RepeatedIndexError, RingTooShortError
 from engine.solids.base import FloatArray, IntArray, Solid
-from engine.solids.checks import as_points, check_not_empty, frozen
+from engine.solids.checks import as_points, check_not_empty, frozen, shown
 from engine.solids.ear_cutting import cut_faces
 
 
@@ -104,6 +104,8 @@ def as_faces(faces: object, n_vertices: int) -> tuple[IntArray | None, IntArray]
         counts, flat = _flatten(faces)
     else:
         array = faces if isinstance(faces, np.ndarray) else np.asarray(faces)
+        if isinstance(array, np.ma.MaskedArray):
+            raise InvalidArrayError("faces is a masked array; drop the masked faces first", ("faces",))
         if array.dtype.kind not in "iu" or array.ndim != 2:
             raise InvalidArrayError(
                 "faces must be an array (n_faces, n) of an integer dtype or a list of lists of whole numbers, "
@@ -123,7 +125,7 @@ def as_faces(faces: object, n_vertices: int) -> tuple[IntArray | None, IntArray]
         position = int(np.argmax(is_outside))
         i_face, i_corner = _place(offsets, position)
         raise IndexOutOfRangeError(
-            f"faces[{i_face}][{i_corner}] is {int(flat[position])}, "
+            f"faces[{i_face}][{i_corner}] is {shown(int(flat[position]))}, "
             f"but the vertices are numbered 0 to {n_vertices - 1}",
             ("faces", i_face, i_corner),
         )
@@ -136,7 +138,7 @@ def _flatten(faces: Sequence[Any]) -> tuple[IntArray, npt.NDArray[Any]]:
     for i_face, face in enumerate(rows):
         if not isinstance(face, (list, tuple)):
             raise InvalidArrayError(
-                f"faces[{i_face}] must be a list of vertex indices, got {face!r:.60}", ("faces", i_face)
+                f"faces[{i_face}] must be a list of vertex indices, got {shown(face)}", ("faces", i_face)
             )
     counts = np.array([len(face) for face in rows], np.int64)
     items = [index for face in rows for index in face]
@@ -145,7 +147,7 @@ def _flatten(faces: Sequence[Any]) -> tuple[IntArray, npt.NDArray[Any]]:
             for i_corner, index in enumerate(face):
                 if isinstance(index, (bool, np.bool_)) or not isinstance(index, (int, np.integer)):
                     raise InvalidArrayError(
-                        f"faces[{i_face}][{i_corner}] must be a whole number, got {index!r:.60} "
+                        f"faces[{i_face}][{i_corner}] must be a whole number, got {shown(index)} "
                         f"({type(index).__name__})",
                         ("faces", i_face, i_corner),
                     )

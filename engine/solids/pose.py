@@ -9,7 +9,7 @@ import numpy as np
 
 from engine.errors import InvalidArrayError, NotRigidError, WrongDimensionError
 from engine.solids.base import FloatArray
-from engine.solids.checks import DIMENSIONS, as_floats, as_vector, check_dimension, digits, frozen, spell
+from engine.solids.checks import as_floats, as_vector, check_dimension, check_given_dimension, digits, frozen, spell
 
 TOLERANCE: Final = Fraction(1, 10**12)
 """Largest entry of ``R^T R - I`` that is still taken for a rotation; part of the contract, compared exactly."""
@@ -49,8 +49,7 @@ class Pose:
     @classmethod
     def identity(cls, dimension: int = 3) -> Pose:
         """Return the motion that leaves everything where it is."""
-        if isinstance(dimension, bool) or dimension not in DIMENSIONS:
-            raise WrongDimensionError(f"dimension must be 2 or 3, got {dimension!r}", ("dimension",))
+        check_given_dimension(dimension)
         return cls(np.eye(dimension), np.zeros(dimension))
 
     @property

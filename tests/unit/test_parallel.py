@@ -9,8 +9,8 @@ import time
 import numpy as np
 import pytest
 
-from engine.errors import CancelledError, DeadlineExceededError
-from engine.parallel import Budget, Cancel, run_chunks
+from engine.errors import CancelledError, DeadlineExceededError, InvalidInputError
+from engine.parallel import Budget, Cancel, check_options, run_chunks
 
 
 @pytest.mark.parametrize("workers", [1, 2, 5, None])
@@ -94,3 +94,34 @@ def test_a_forked_child_gets_a_pool_of_its_own() -> None:
     expected = _sum_in_chunks(50_000)
     with multiprocessing.get_context("fork").Pool(1) as pool:
         assert pool.apply_async(_sum_in_chunks, (50_000,)).get(timeout=20) == expected
+
+
+@pytest.mark.parametrize("deadline", [float("nan"), "1", True, [1.0], np.zeros(2)])
+def test_a_deadline_that_is_no_time_is_refused(deadline: object) -> None:
+    with pytest.raises(InvalidInputError, match="deadline must be a number of seconds"):
+        Budget(deadline)  # type: ignore[arg-type] # the case
+
+
+@pytest.mark.parametrize("deadline", [float("inf"), 1e300, None])
+def test_a_deadline_beyond_all_clocks_is_none(deadline: float | None) -> None:
+    with Budget(deadline) as budget:
+        budget.check()
+        assert budget.deadline is None
+
+
+def test_other_options_of_the_wrong_type_are_refused() -> None:
+    with pytest.raises(InvalidInputError, match="cancel must be"):
+        Budget(cancel=threading.Event())  # type: ignore[arg-type] # the case
+    for workers in (0, -1, True, 1.5, "2", float("nan")):
+        with pytest.raises(InvalidInputError, match="workers must be at least 1"):
+            check_options(workers, None)
+    with pytest.raises(InvalidInputError, match="progress must be callable"):
+        check_options(None, 3)
+
+
+def test_a_raised_flag_never_passes_for_a_finished_call() -> None:
+    """A clock that steps back must not let answers through that kernels left incomplete."""
+    with Budget(deadline=100.0) as budget:
+        budget.flag[0] = 1
+        with pytest.raises(DeadlineExceededError):
+            budget.check()

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from engine.errors import EngineError, InvalidArrayError, NotFiniteError, WrongDimensionError
-from engine.solids.checks import as_number, as_point_groups, as_points, as_vector, digits, frozen, spell
+from engine.solids.checks import as_number, as_point_groups, as_points, as_vector, digits, frozen, shown, spell
 
 
 def refused(error: type[EngineError], function: Any, *arguments: Any) -> EngineError:
@@ -168,3 +168,14 @@ def test_frozen_copies_and_drops_minus_zero() -> None:
     assert not np.shares_memory(array, copy)
     for axis, order in itertools.product((0, 1), "CF"):
         assert frozen(np.asarray(np.flip(array, axis), order=order)).flags.c_contiguous
+
+
+def test_what_cannot_be_printed_is_still_refused_by_name() -> None:
+    deep: list[object] = []
+    for _ in range(5000):
+        deep = [deep]
+    for item in (deep, 10**6000, [10**6000], np.zeros(3, object)):
+        refused(InvalidArrayError, as_points, [[item, 0.0]], 2)
+        assert len(shown(item)) <= 60
+    assert shown([0.5, "a"]) == "[0.5, 'a']"
+    assert len(shown([1.5] * 10**6)) <= 60

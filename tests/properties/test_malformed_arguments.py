@@ -1,0 +1,172 @@
+"""Whatever is passed for an argument: an answer or an `EngineError` with a message, never another exception."""
+
+from __future__ import annotations
+
+import contextlib
+import datetime
+from collections.abc import Callable
+from decimal import Decimal
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+
+import engine
+
+VERTICES = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+FACES = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
+BOX = engine.Aabb([0, 0, 0], [1, 1, 1])
+POLYHEDRON = engine.Polyhedron(VERTICES, FACES)
+POLYGON = engine.Polygon([[[0, 0], [4, 0], [4, 3]]])
+POINT = [[0.1, 0.1, 0.1]]
+SEGMENT = [[[0, 0, 0], [1, 1, 1]]]
+
+
+def nested(depth: int) -> list[Any]:
+    found: list[Any] = []
+    for _ in range(depth):
+        found = [found]
+    return found
+
+
+MALFORMED: dict[str, Any] = {
+    "none": None,
+    "text": "abc",
+    "bytes": b"abc",
+    "true": True,
+    "negative": -1,
+    "fraction of one": 1.5,
+    "nan": float("nan"),
+    "infinity": float("inf"),
+    "endless integer": 10**6000,
+    "mapping": {"a": 1},
+    "set": {1, 2},
+    "range": range(3),
+    "type": int,
+    "ragged": [[0, 0, 0], [1, 1]],
+    "no items": [],
+    "empty rows": [[], []],
+    "nested too deep": nested(5000),
+    "deep beside a number": [[nested(5000), 0, 0]],
+    "objects": np.array([[0, None, 1]], object),
+    "no axes": np.array(1.0),
+    "no columns": np.zeros((3, 0)),
+    "five axes": np.zeros((1, 1, 1, 1, 1)),
+    "complex": np.zeros((2, 3), complex),
+    "times": np.zeros((2, 3), "M8[s]"),
+    "time": [[datetime.date(2026, 1, 1), 1, 2]],
+    "masked": np.ma.masked_array(np.zeros((2, 3)), mask=True),
+    "masked integers": np.ma.masked_array(np.array([[0, 1, 2]]), mask=[[0, 1, 0]]),
+    "booleans": np.zeros((3, 3), bool),
+    "list of booleans": [[True, False, True]],
+    "list of nan": [[float("nan")] * 3],
+    "list of infinity": [[float("inf"), 0, 0]],
+    "integer beyond float64": [[10**400, 0, 0]],
+    "endless integer in a list": [[10**6000, 0, 0]],
+    "integer between floats": [[2**53 + 1, 0, 0]],
+    "decimals": [[Decimal(1)] * 3],
+    "fractions": [[Fraction(1, 3)] * 3],
+    "numbers as text": [["1", "2", "3"]],
+    "negative index": [[-1, 0, 1]],
+    "huge index": [[0, 1, 10**9]],
+    "index as float": [[0.0, 1.0, 2.0]],
+    "unsigned overflow": np.array([[2**64 - 1, 0, 1]], np.uint64),
+    "structured": np.zeros(3, [("a", "f8")]),
+    "solid": BOX,
+}
+
+CALLS: dict[str, Callable[[Any], object]] = {
+    "HalfSpace(normal)": lambda x: engine.HalfSpace(x, 1),
+    "HalfSpace(offset)": lambda x: engine.HalfSpace([1, 0, 0], x),
+    "Sphere(center)": lambda x: engine.Sphere(x, 1),
+    "Sphere(radius)": lambda x: engine.Sphere([0, 0, 0], x),
+    "Aabb(min)": lambda x: engine.Aabb(x, [1, 1, 1]),
+    "Convex": engine.Convex,
+    "Triangle": engine.Triangle,
+    "Polyhedron(vertices)": lambda x: engine.Polyhedron(x, FACES),
+    "Polyhedron(faces)": lambda x: engine.Polyhedron(VERTICES, x),
+    "Surface(faces)": lambda x: engine.Surface(VERTICES, x),
+    "Polygon": engine.Polygon,
+    "Polygon(one ring)": lambda x: engine.Polygon([x]),
+    "Implicit": engine.Implicit,
+    "Implicit(one term)": lambda x: engine.Implicit([x]),
+    "Implicit(powers of a term)": lambda x: engine.Implicit([{"powers": x, "coefficient": 1}]),
+    "Implicit(coefficient)": lambda x: engine.Implicit([{"powers": [1, 0], "coefficient": x}]),
+    "Implicit(powers)": lambda x: engine.Implicit(powers=x, coefficients=[1]),
+    "Implicit(coefficients)": lambda x: engine.Implicit(powers=[[1, 0]], coefficients=x),
+    "Implicit.from_callable(function)": lambda x: engine.Implicit.from_callable(x, 3),
+    "Implicit.from_callable(dimension)": lambda x: engine.Implicit.from_callable(len, x),
+    "Csg(operation)": lambda x: engine.Csg(x, [BOX, BOX]),
+    "Csg(operands)": lambda x: engine.Csg("union", x),
+    "Csg(one operand)": lambda x: engine.Csg("union", [BOX, x]),
+    "Pose(rotation)": lambda x: engine.Pose(x, [0, 0, 0]),
+    "Pose(translation)": lambda x: engine.Pose(np.eye(3), x),
+    "Pose.identity": engine.Pose.identity,
+    "locate(points)": lambda x: engine.locate(x, BOX),
+    "locate(solid)": lambda x: engine.locate(POINT, x),
+    "contains(points)": lambda x: engine.contains(x, BOX),
+    "contains(solid)": lambda x: engine.contains(POINT, x),
+    "locate_scene(solids)": lambda x: engine.locate_scene(POINT, x),
+    "locate_scene(one solid)": lambda x: engine.locate_scene([], [BOX, x]),
+    "locate_scene(poses)": lambda x: engine.locate_scene([], [BOX], x),
+    "locate_scene(one pose)": lambda x: engine.locate_scene([], [BOX], [x]),
+    "bounds": engine.bounds,
+    "clip_segments(segments)": lambda x: engine.clip_segments(x, BOX),
+    "clip_segments(region)": lambda x: engine.clip_segments(np.zeros((0, 2, 3)), x),
+    "clip_polygons(polygons)": lambda x: engine.clip_polygons(x, BOX),
+    "clip_polygons(one polygon)": lambda x: engine.clip_polygons([x], BOX),
+    "clip_polygons(region)": lambda x: engine.clip_polygons([], x),
+    "overlay(subject)": lambda x: engine.overlay(x, POLYGON),
+    "overlay(clip)": lambda x: engine.overlay(POLYGON, x),
+    "overlay(operation)": lambda x: engine.overlay(POLYGON, POLYGON, x),
+    "overlay(output)": lambda x: engine.overlay(POLYGON, POLYGON, output=x),
+    "collide(second)": lambda x: engine.collide(engine.Surface(VERTICES, FACES), x),
+    "collide(first_pose)": lambda x: engine.collide(BOX, BOX, first_pose=x),
+    "collide_poses(rotations)": lambda x: engine.collide_poses(BOX, BOX, x, np.zeros((0, 3))),
+    "collide_poses(translations)": lambda x: engine.collide_poses(BOX, BOX, np.zeros((0, 3, 3)), x),
+    "collide_scene(solids)": engine.collide_scene,
+    "collide_scene(poses)": lambda x: engine.collide_scene([BOX], x),
+    "collide_scene(skip)": lambda x: engine.collide_scene([BOX, BOX], skip=x),
+    "collide_scene(only)": lambda x: engine.collide_scene([BOX, BOX], only=x),
+    "collide_triangles(first)": lambda x: engine.collide_triangles(x, [VERTICES[:3]]),
+}
+
+OPTIONS: dict[str, Callable[..., object]] = {
+    "locate": lambda **given: engine.locate([], BOX, **given),
+    "contains": lambda **given: engine.contains([], BOX, **given),
+    "locate_scene": lambda **given: engine.locate_scene([], [BOX], **given),
+    "bounds": lambda **given: engine.bounds(BOX, **given),
+    "clip_segments": lambda **given: engine.clip_segments([], BOX, **given),
+    "clip_polygons": lambda **given: engine.clip_polygons([], BOX, **given),
+    "overlay": lambda **given: engine.overlay(POLYGON, POLYGON, **given),
+    "collide": lambda **given: engine.collide(BOX, BOX, **given),
+    "collide_scene": lambda **given: engine.collide_scene([BOX], **given),
+    "collide_triangles": lambda **given: engine.collide_triangles([], [], **given),
+}
+
+
+@pytest.mark.parametrize("call", CALLS.values(), ids=CALLS.keys())
+def test_an_argument_is_taken_or_refused_with_a_short_message(call: Callable[[Any], object]) -> None:
+    for name, value in MALFORMED.items():
+        message = "taken"
+        try:
+            call(value)
+        except engine.EngineError as error:
+            message = str(error)
+        except Exception as error:
+            raise AssertionError(f"{name}: {type(error).__name__}: {error}") from error
+        assert 0 < len(message) < 700, name
+
+
+@pytest.mark.parametrize("option", ["workers", "deadline", "cancel", "progress"])
+@pytest.mark.parametrize("call", OPTIONS.values(), ids=OPTIONS.keys())
+def test_an_option_is_taken_or_refused(call: Callable[..., object], option: str) -> None:
+    for name, value in MALFORMED.items():
+        if option == "progress" and callable(value):
+            continue  # called, and then its own errors are the caller's
+        try:
+            with contextlib.suppress(engine.EngineError):
+                call(**{option: value})
+        except Exception as error:
+            raise AssertionError(f"{name}: {type(error).__name__}: {error}") from error
