@@ -136,14 +136,23 @@ def first_least(ring: list[Any]) -> list[Any]:
     return min(ring[i:] + ring[:i] for i in range(len(ring)))
 
 
+def hexadecimal(number: Any) -> str:
+    """Return a rational as text, quick and without limit."""
+    return f"{int(number.numerator):x}/{int(number.denominator):x}"
+
+
 def _overlay_exact(data: Dict) -> Dict:
     found = overlay.overlay(data["subject"], data["clip"], data["operation"])
-    return {"area": str(found.area), "pieces": len(found.pieces), "holes": sum(holes for _, holes in found.pieces)}
+    return {
+        "area": hexadecimal(found.area),
+        "pieces": len(found.pieces),
+        "holes": sum(holes for _, holes in found.pieces),
+    }
 
 
 def _overlay(data: Dict) -> Dict:
     found = engine.overlay(build.solid(data["subject"]), build.solid(data["clip"]), data["operation"])
-    return {"area": str(found.area_exact), "pieces": found.n_pieces_exact, "holes": found.n_holes_exact}
+    return {"area": hexadecimal(found.area_exact), "pieces": found.n_pieces_exact, "holes": found.n_holes_exact}
 
 
 def _bounds_exact(data: Dict) -> Dict:

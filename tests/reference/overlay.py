@@ -40,6 +40,8 @@ class Trapezoid(NamedTuple):
 def trapezoids(subject: list[Segment], clip: list[Segment]) -> list[Trapezoid]:
     """Return the cells of the common subdivision with both parities, a frame around it included."""
     every = [edge for edge in subject + clip if edge[0] != edge[1]]
+    if not every:
+        return []
     cuts = {p[0] for edge in every for p in edge}
     for one, other in combinations(every, 2):
         point = crossing_of_lines(one, other)
