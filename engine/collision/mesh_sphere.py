@@ -64,6 +64,7 @@ def collide_outline_sphere(
     return _relation(_outline_features(body, body_pose, center, work), body, body_pose, center, sphere.radius, work)
 
 
+@np.errstate(over="ignore", invalid="ignore")  # an infinite bound only sends a face to the exact test
 def _relation(
     features: Features, body: Solid, pose: Pose | None, center: Vector, radius: float, work: Work
 ) -> Collision:

@@ -269,6 +269,8 @@ COLLIDE = {
     "huge_and_tiny": [
         pair("subnormal boxes", "touching in the smallest numbers", box((0, 0, 0), (TINY,) * 3), box((TINY, 0, 0), (2 * TINY,) * 3)),
         pair("huge boxes", "differences overflow", box((-HUGE,) * 3, (0, HUGE, HUGE)), box((0, -HUGE, -HUGE), (HUGE,) * 3)),
+        pair("point disc on a huge needle", "a bound of a box overflows",
+             sphere((0, 0), 0), {"type": "triangle", "vertices": [[0, 0], [0, 0], [0, math.nextafter(HUGE, 0)]]}),
         pair("tiny in huge", "", box((TINY,) * 3, (2 * TINY,) * 3), box((-1e300,) * 3, (1e300,) * 3)),
     ],
 }  # fmt: skip
