@@ -34,19 +34,13 @@ DIMENSIONS = st.sampled_from([2, 3])
 
 def check(operation: str, data: dict[str, Any]) -> None:
     """Assert that engine and reference agree, on the error too where a coordinate is beyond the doubles."""
-    if not hasattr(engine, operation):
-        pytest.skip("the engine does not have this operation yet")
     try:
         expected = OPERATIONS[operation].exact(data)
     except OverflowError:
         with pytest.raises(engine.NotRepresentableError):
             OPERATIONS[operation].by_engine(data)
         return
-    try:
-        found = OPERATIONS[operation].by_engine(data)
-    except engine.UnsupportedPairError:
-        return  # a pair the engine does not have yet
-    assert found == expected
+    assert OPERATIONS[operation].by_engine(data) == expected
 
 
 @examples(150)
@@ -115,7 +109,7 @@ def test_collide_in_the_plane(data: st.DataObject, kind: str) -> None:
     check_collision({"first": data.draw(body(kind, 2)), "second": data.draw(body(kind, 2))})
 
 
-@examples(40)
+@examples(20)
 @given(st.data(), SCALES)
 def test_collide_in_space(data: st.DataObject, kind: str) -> None:
     check_collision({"first": data.draw(body(kind, 3)), "second": data.draw(body(kind, 3))})
@@ -146,7 +140,7 @@ def pose(draw: st.DrawFn, kind: str) -> dict[str, Any] | None:
     return {"rotation": draw(ROTATIONS), "translation": draw(point(kind, 3))}
 
 
-@examples(40)
+@examples(25)
 @given(st.data(), TAME)
 def test_collide_posed(data: st.DataObject, kind: str) -> None:
     bodies = {"first": data.draw(body(kind, 3)), "second": data.draw(body(kind, 3))}
