@@ -75,7 +75,7 @@ def clip_chunk(segments: FloatArray, first: int, last: int, region: Polygon | Po
     boundary = boundary_of(region)
     part = segments[first:last]
     locations = np.empty(len(part), np.int8)
-    counts = locator_of(region).fill(np.ascontiguousarray(part[:, 0]), locations, budget)
+    counts = locator_of(region).fill(part[:, 0].copy(), locations, budget)
     offsets, elements, kinds = _contacts(segments, first, last, boundary, budget)
     n_contacts = np.diff(offsets)
     n_contacts[(part[:, 0] == part[:, 1]).all(axis=1)] = 0  # points: their location says it all

@@ -232,6 +232,7 @@ def _clip(
     sizes = np.zeros(len(ring_offsets) - 1, np.int64)
     parts: dict[int, FloatArray] = {}
 
+    vertices.setflags(write=False)
     scene = kernel_scene(vertices, planes)
     is_open = np.ones(n, np.uint8)
 

@@ -28,9 +28,10 @@ def exponent_of(*arrays: FloatArray) -> int:
 
 
 def shifted(array: FloatArray, exponent: int | npt.NDArray[np.int64]) -> FloatArray | None:
-    """Return array 2^exponent if that is exact for every number, else None."""
+    """Return array 2^exponent, read-only as the arrays of callers are, if that is exact for every number, else None."""
     with np.errstate(all="ignore"):
         result: FloatArray = np.ldexp(array, exponent)
+        result.setflags(write=False)
         return result if bool((np.ldexp(result, -exponent) == array).all()) else None
 
 

@@ -127,8 +127,6 @@ def clip_segments(
     """
     task, method = _method(region)
     array = as_point_groups(segments, 2, region.dimension, ("segments",))
-    if not array.flags.writeable:
-        array = array.copy()  # one type of array for the kernels, compiled once
     with Budget(deadline, cancel) as budget:
         pieces, n_beyond, n_rational = task(array, budget, workers, progress)
     if not report:
@@ -227,7 +225,7 @@ def _on_ball(region: Sphere) -> Task:
             exponent, points, scaled = 0, segments, ball
         return _clip_convex(
             clip_on_sphere,
-            (np.ascontiguousarray(scaled[:-1]), float(scaled[-1])),
+            (scaled[:-1].copy(), float(scaled[-1])),
             lambda p, q: clip_by_sphere(p, q, center, radius),
             segments,
             points,
