@@ -18,9 +18,8 @@ COPY service service
 
 RUN python -m venv /opt/exact-geometry
 RUN /opt/exact-geometry/bin/pip install --no-cache-dir . httptools uvloop
-# the cache remembers when a source changed, and layers keep whole seconds only
-RUN find /opt/exact-geometry/lib -path "*/site-packages/engine/*.py" -exec touch -d "2020-01-01 00:00:00 UTC" {} +
-RUN ENGINE_CACHE_DIR=/opt/exact-geometry/kernels /opt/exact-geometry/bin/python -c "import engine; engine.warm()"
+# -P: the engine that was installed, not the one in this folder, since the cache knows a kernel by the path of its file
+RUN ENGINE_CACHE_DIR=/opt/exact-geometry/kernels /opt/exact-geometry/bin/python -P -c "import engine; engine.warm()"
 
 FROM python:3.12-slim
 
