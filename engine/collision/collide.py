@@ -60,7 +60,13 @@ def check_pose(pose: object, solid: Solid, name: str) -> None:
 def collide_pair(
     first: Solid, second: Solid, first_pose: Pose | None, second_pose: Pose | None, work: Work
 ) -> Collision:
-    """Return the relation of two checked solids under checked poses, within the budget of `work`."""
+    """Return the relation of two checked solids under checked poses, within the budget of `work`.
+
+    Two equal poses are left out: what moves together keeps its relation, although a rotation of floats is not quite
+    orthogonal and a ball's radius is kept under it.
+    """
+    if first_pose is not None and first_pose == second_pose:
+        first_pose = second_pose = None
     function, is_swapped = pair_function(first, second)
     if is_swapped:
         return function(second, first, second_pose, first_pose, work).swapped()

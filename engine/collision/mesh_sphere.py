@@ -8,6 +8,7 @@ bounds allow a contact are measured, in rationals, nearest first.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from fractions import Fraction
@@ -99,7 +100,23 @@ def _relation(
     if radius > 0.0 and features.has_inside:
         if location == Location.INSIDE or (entered and features.reaches_inside(entered, limit)):
             return Collision(Relation.OVERLAPPING, witness)
+        if location == Location.BOUNDARY and _is_within_walls(body, pose, center, radius, work):
+            return Collision(Relation.OVERLAPPING, witness)
     return Collision(Relation.TOUCHING, Witness("surface", first_face=face, piercing=bool(entered)))
+
+
+def _is_within_walls(body: Solid, pose: Pose | None, center: Vector, radius: float, work: Work) -> bool:
+    """Tell whether a ball whose centre lies on walls that cancel, and into which nothing live reaches, is inside else.
+
+    Off those walls the ball is all inside or all outside, so any point of it will do. The points tried lie on the curve
+    (t, t^2, t^3) from the centre, which meets no plane more than three times: one of them is on no wall.
+    """
+    for k in itertools.count(2):  # bound: three turns a face
+        q = tuple(c + Fraction(radius) / 2 / k**power for power, c in enumerate(center, 1))
+        location = rational_location(q, body, pose, work.budget.check)
+        if location != Location.BOUNDARY:
+            return location == Location.INSIDE
+    raise AssertionError("unreachable")
 
 
 def _all_vertices_within(

@@ -19,7 +19,8 @@ def world_box(body: Solid, pose: Pose | None) -> tuple[FloatArray, FloatArray]:
 
     With u = 2^-53, centre c and half widths h of the body's own box, and m its largest coordinate, the image is
     R c + t, plus or minus |R| h: d + 2 roundings of terms below 2 m + |t|. The margin 2^-49 (3 m + |t|) + 2^-1060
-    covers them, the rounding of c and h, and its own.
+    covers them, the rounding of c and h, and its own. A posed ball is widened by 2^-38 of its radius: bodies under one
+    pose count as unposed, and a rotation may stretch lengths by up to 1.5e-12 (`engine.solids.pose.TOLERANCE`).
     """
     if isinstance(body, HalfSpace):
         return np.full(body.dimension, -np.inf), np.full(body.dimension, np.inf)
@@ -28,8 +29,9 @@ def world_box(body: Solid, pose: Pose | None) -> tuple[FloatArray, FloatArray]:
         low, high = _placed(low, high, pose)
     if isinstance(body, Sphere):
         with np.errstate(over="ignore"):
-            low = np.nextafter(low - body.radius, -np.inf)
-            high = np.nextafter(high + body.radius, np.inf)
+            radius = body.radius if pose is None else body.radius * (1.0 + 2.0**-38)
+            low = np.nextafter(low - radius, -np.inf)
+            high = np.nextafter(high + radius, np.inf)
     return low, high
 
 

@@ -23,7 +23,9 @@ SWAPPED = (DISJOINT, SECOND_INSIDE_FIRST, FIRST_INSIDE_SECOND, OVERLAPPING, TOUC
 
 
 def relation(first: Solid, second: Solid, first_pose: Solid | None = None, second_pose: Solid | None = None) -> int:
-    """Return the relation of two bodies, each with its pose or None."""
+    """Return the relation of two bodies, each with its pose or None; two equal poses count as none."""
+    if first_pose == second_pose:
+        first_pose = second_pose = None
     order = ("half_space", "sphere")
     kinds = [order.index(s["type"]) if s["type"] in order else 2 for s in (first, second)]
     if kinds[0] > kinds[1]:
@@ -185,6 +187,12 @@ def _sphere_body(center: Vector, radius: Q, solid: Solid, pose: Solid | None) ->
     walls = _odd_pieces(faces) if planar else _walls(faces)
     if walls and min(distance(center, *face) for face in walls) < radius * radius:
         return OVERLAPPING
+    if location == 0:  # on a wall that cancels, so deep that nothing else is near: any point off that wall decides
+        for k in range(2, 3 * len(faces) + 3):
+            step = radius / 2 / k
+            near = _locate(tuple(x + step / k**i for i, x in enumerate(center)), faces, is_surface)
+            if near != 0:
+                return OVERLAPPING if near > 0 else TOUCHING
     return TOUCHING
 
 

@@ -6,12 +6,14 @@ import random
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import pytest
 
 import engine
 from engine import Pose, Relation
 from engine.collision.collide import collide
 from tests.reference.collision import SWAPPED, relation
+from tests.reference.shapes import box, union_of
 
 Json = dict[str, Any]
 TURNS = {2: [[0.6, -0.8], [0.8, 0.6]], 3: [[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]]}
@@ -112,3 +114,33 @@ def test_agrees_with_the_reference(d: int, first: Any, second: Any, n: int) -> N
         assert (found.witness is None) == (expected == Relation.DISJOINT)
         mirrored = collide(solid(b), solid(a), first_pose=placed[1], second_pose=placed[0])
         assert mirrored.relation == SWAPPED[expected], (a, b, p, q)
+
+
+BLOCK = box((0, 0, 0), (6, 6, 6))
+WALLED = union_of(BLOCK, box((1, 1, 3), (5, 5, 3)))  # the box in the middle has no thickness: its walls cancel
+HALVES = {"type": "polygon", "rings": [[[0, 0], [6, 0], [6, 6], [0, 6]], [[1, 3], [5, 3], [4, 3]]]}
+
+
+@pytest.mark.parametrize(("radius", "expected"), [(1.0, "overlapping"), (0.0, "touching"), (3.0, "overlapping")])
+def test_a_ball_centred_on_a_wall_that_cancels(radius: float, expected: str) -> None:
+    for body, center in ((WALLED, [3.0, 3.0, 3.0]), (HALVES, [3.0, 3.0])):
+        ball = {"type": "sphere", "center": center, "radius": radius}
+        assert collide(solid(body), solid(ball)).relation.label == expected
+
+
+def test_a_ball_centred_on_a_cancelled_wall_outside_only_touches() -> None:
+    beside = engine.Polygon([[[0, 0], [2, 0], [2, 2], [0, 2]], [[4, 3], [8, 3], [7, 3]]])
+    assert collide(beside, engine.Sphere([6, 3], 1)).relation == Relation.TOUCHING
+
+
+@pytest.mark.parametrize("other", [engine.Sphere([3, 0, 0], 2), engine.Aabb([1, -1, -1], [2, 1, 1])])
+def test_a_ball_keeps_its_relation_under_a_common_pose(other: engine.Solid) -> None:
+    ball, plane = engine.Sphere([0, 0, 0], 1), engine.HalfSpace([1, 0, 0], -1)
+    random_ = np.random.default_rng(4)
+    for _ in range(8):
+        turn, _ = np.linalg.qr(random_.normal(size=(3, 3)))
+        pose = Pose(turn * np.sign(np.linalg.det(turn)), random_.normal(size=3))
+        for body in (other, plane):
+            assert collide(ball, body, first_pose=pose, second_pose=pose).relation == Relation.TOUCHING
+        pairs = engine.collide_scene([ball, other], [pose, pose])
+        assert pairs.relation.tolist() == [Relation.TOUCHING]
