@@ -1,0 +1,65 @@
+"""Open3D's `RaycastingScene.compute_occupancy` (Embree): float32, one ray a point, parity of the hits.
+
+For a scene of bodies it is given one raycasting scene a body, each asked about the points in the body's box. The boxes
+are found as a careful user would: points sorted along x once, a binary search for each body, then y and z.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import open3d
+from open3d.core import Tensor
+from open3d.t.geometry import RaycastingScene
+
+from benchmarks.contenders import Prepared
+from benchmarks.workloads import Bodies, Mesh
+
+NAME, PACKAGE = "Open3D", "open3d"
+open3d.utility.set_verbosity_level(open3d.utility.VerbosityLevel.Error)
+
+
+def _scene_of(mesh: Mesh, threads: int) -> RaycastingScene:
+    scene = RaycastingScene(nthreads=threads)
+    scene.add_triangles(Tensor(mesh.vertices.astype(np.float32)), Tensor(mesh.faces.astype(np.uint32)))
+    # Embree builds its tree at the first question
+    scene.compute_occupancy(Tensor(mesh.vertices[:1].astype(np.float32)), nthreads=threads)
+    return scene
+
+
+def _polyhedron(mesh: Mesh, threads: int) -> Prepared:
+    scene = _scene_of(mesh, threads)
+    return Prepared(
+        lambda points: Tensor(points.astype(np.float32)),
+        lambda points: scene.compute_occupancy(points, nthreads=threads),
+        lambda found: found.numpy() > 0.5,
+    )
+
+
+def _scene_polyhedra(bodies: Bodies, threads: int) -> Prepared:
+    scenes = [_scene_of(body, threads) for body in bodies.bodies]
+    lows = np.array([body.vertices.min(axis=0) for body in bodies.bodies], np.float32)
+    highs = np.array([body.vertices.max(axis=0) for body in bodies.bodies], np.float32)
+
+    def ask(points: np.ndarray) -> list[np.ndarray]:
+        order = np.argsort(points[:, 0])
+        along = points[order]
+        starts = np.searchsorted(along[:, 0], lows[:, 0])
+        stops = np.searchsorted(along[:, 0], highs[:, 0], side="right")
+        found = []
+        for i_body, scene in enumerate(scenes):
+            slab = along[starts[i_body] : stops[i_body]]
+            y, z = slab[:, 1], slab[:, 2]
+            low, high = lows[i_body], highs[i_body]
+            near = np.flatnonzero((y >= low[1]) & (y <= high[1]) & (z >= low[2]) & (z <= high[2]))
+            if len(near):
+                held = scene.compute_occupancy(Tensor(slab[near]), nthreads=threads).numpy() > 0.5
+                found.append(order[starts[i_body] + near[held]] * len(scenes) + i_body)
+        return found
+
+    def answer(found: list[np.ndarray]) -> np.ndarray:
+        return np.sort(np.concatenate(found))
+
+    return Prepared(lambda points: points.astype(np.float32), ask, answer)
+
+
+MAKERS = {"polyhedron": _polyhedron, "scene_polyhedra": _scene_polyhedra}

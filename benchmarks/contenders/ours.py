@@ -1,0 +1,67 @@
+"""The engine: float64 points, exact three-valued answers, `contained` is inside or on the boundary."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+import engine
+from benchmarks.contenders import Prepared
+from benchmarks.workloads import Bodies, Mesh, Planes, Rings
+
+NAME, PACKAGE = "ours", None
+
+
+def _one_solid(solid: engine.Solid, threads: int) -> Prepared:
+    used: list[str] = []
+
+    def method() -> str:
+        return used[-1] if used else ""
+
+    def ask(points: np.ndarray) -> np.ndarray:
+        locations, accuracy = engine.locate(points, solid, workers=threads, report=True)
+        used[:] = [accuracy.method]
+        return locations
+
+    return Prepared(lambda points: points, ask, lambda found: found >= 0, lambda: solid.memory, method)
+
+
+def _polyhedron(mesh: Mesh, threads: int) -> Prepared:
+    return _one_solid(engine.Polyhedron(mesh.vertices, mesh.faces), threads)
+
+
+def _polygon(rings: Rings, threads: int) -> Prepared:
+    return _one_solid(engine.Polygon(rings.rings), threads)
+
+
+def _convex(planes: Planes, threads: int) -> Prepared:
+    return _one_solid(engine.Convex(planes.rows), threads)
+
+
+def _scene(solids: list[Any], threads: int) -> Prepared:
+    def ask(points: np.ndarray) -> engine.SceneLocations:
+        return engine.locate_scene(points, solids, workers=threads)
+
+    def answer(found: engine.SceneLocations) -> np.ndarray:
+        owners = np.repeat(np.arange(len(found.offsets) - 1), np.diff(found.offsets))
+        return owners * len(solids) + found.indices
+
+    return Prepared(lambda points: points, ask, answer, lambda: sum(solid.memory for solid in solids))
+
+
+def _scene_polygons(bodies: Bodies, threads: int) -> Prepared:
+    return _scene([engine.Polygon(body.rings) for body in bodies.bodies], threads)
+
+
+def _scene_polyhedra(bodies: Bodies, threads: int) -> Prepared:
+    return _scene([engine.Polyhedron(body.vertices, body.faces) for body in bodies.bodies], threads)
+
+
+MAKERS = {
+    "polyhedron": _polyhedron,
+    "polygon": _polygon,
+    "convex": _convex,
+    "scene_polygons": _scene_polygons,
+    "scene_polyhedra": _scene_polyhedra,
+}

@@ -1,0 +1,213 @@
+"""Named, seeded inputs. The same name and seed give the same bits.
+
+Real meshes are read from the shared data folder beside the repository; where it is absent, a generated mesh of the same
+size stands in, under its own name. Nothing is fetched.
+"""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
+NEAR = 1e-4
+"""Standard deviation of points near a surface, as part of the largest extent."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mesh:
+    """A closed triangle mesh."""
+
+    name: str
+    vertices: np.ndarray
+    faces: np.ndarray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rings:
+    """A polygon."""
+
+    name: str
+    rings: list[np.ndarray]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Planes:
+    """A convex solid by rows (normal, offset), normals inward."""
+
+    name: str
+    rows: np.ndarray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Bodies:
+    """Many bodies of one kind."""
+
+    name: str
+    bodies: list
+
+
+class MissingDataError(Exception):
+    """A workload needs the shared data folder."""
+
+
+def generator(name: str, seed: int) -> np.random.Generator:
+    """Return the random numbers of a workload: they depend on its name and the seed only."""
+    return np.random.default_rng([seed, zlib.crc32(name.encode())])
+
+
+def stored_mesh(name: str) -> Mesh:
+    """Return a mesh of the shared data folder."""
+    path = DATA / "meshes" / f"{name}.npz"
+    if not path.is_file():
+        raise MissingDataError(f"{name} is in the shared data folder, which is not here")
+    arrays = np.load(path)
+    return Mesh(name, arrays["vertices"], arrays["faces"].astype(np.int64))
+
+
+def hard_sets() -> list[Path]:
+    """Return the files of hard points with exact locations."""
+    found = sorted((DATA / "hard_containment").glob("*.npz"))
+    if not found:
+        raise MissingDataError("the hard sets are in the shared data folder, which is not here")
+    return found
+
+
+def subdivided(mesh: Mesh, times: int) -> Mesh:
+    """Return the mesh with each triangle cut into four at the middles of its edges, so many times."""
+    vertices, faces = mesh.vertices, mesh.faces
+    for _ in range(times):
+        edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+        keys, of_edge = np.unique(edges[:, 0] * len(vertices) + edges[:, 1], return_inverse=True)
+        middles = len(vertices) + of_edge.reshape(-1, 3)
+        a, b = keys // len(vertices), keys % len(vertices)
+        vertices = np.concatenate([vertices, 0.5 * vertices[a] + 0.5 * vertices[b]])
+        (p, q, r), (x, y, z) = faces.T, middles.T
+        corners = [(p, x, z), (x, q, y), (z, y, r), (x, y, z)]
+        faces = np.concatenate([np.stack(corner, axis=1) for corner in corners])
+    return Mesh(f"{mesh.name}_subdivided{times}" if times else mesh.name, vertices, faces)
+
+
+def bumpy_sphere(name: str, seed: int, times: int) -> Mesh:
+    """Return a sphere of 20 * 4**times triangles with bumps, star-shaped."""
+    g = (1 + 5**0.5) / 2
+    vertices = np.array(
+        [[-1, g, 0], [1, g, 0], [-1, -g, 0], [1, -g, 0], [0, -1, g], [0, 1, g],
+         [0, -1, -g], [0, 1, -g], [g, 0, -1], [g, 0, 1], [-g, 0, -1], [-g, 0, 1]]
+    )  # fmt: skip
+    faces = np.array(
+        [[0, 11, 5], [0, 5, 1], [0, 1, 7], [0, 7, 10], [0, 10, 11], [1, 5, 9], [5, 11, 4], [11, 10, 2], [10, 7, 6],
+         [7, 1, 8], [3, 9, 4], [3, 4, 2], [3, 2, 6], [3, 6, 8], [3, 8, 9], [4, 9, 5], [2, 4, 11], [6, 2, 10],
+         [8, 6, 7], [9, 8, 1]]
+    )  # fmt: skip
+    mesh = subdivided(Mesh("icosahedron", vertices, faces), times)
+    unit = mesh.vertices / np.linalg.norm(mesh.vertices, axis=1)[:, None]
+    waves = generator(name, seed).normal(size=(12, 3)) * 3.0
+    radii = 1.0 + 0.03 * np.sin(unit @ waves.T).sum(axis=1)
+    return Mesh(name, np.ascontiguousarray(unit * radii[:, None]), mesh.faces)
+
+
+@cache
+def mesh_of_size(size: str, seed: int) -> Mesh:
+    """Return the mesh of `1k`, `86k` or `1.38M` faces: knight, armadillo, armadillo subdivided, or stand-ins."""
+    times = {"1k": 3, "86k": 6, "1.38M": 8}[size]
+    try:
+        if size == "1k":
+            return stored_mesh("igl_decimated-knight")
+        return subdivided(stored_mesh("igl_armadillo"), 0 if size == "86k" else 2)
+    except MissingDataError:
+        return bumpy_sphere(f"bumpy_sphere_{20 * 4**times}", seed, times)
+
+
+def star_polygon(n_vertices: int, seed: int) -> Rings:
+    """Return a polygon around the origin with a rough outline: radii of many wavelengths, random angles."""
+    name = f"star_{n_vertices}"
+    random = generator(name, seed)
+    angles = np.sort(random.uniform(0.0, 2.0 * np.pi, n_vertices))
+    if np.diff(angles).max() > np.pi / 2:  # few vertices: a gap would leave the origin out
+        angles = (np.arange(n_vertices) + random.uniform(0.0, 0.9, n_vertices)) * (2.0 * np.pi / n_vertices)
+    radii = random.uniform(0.8, 1.0, n_vertices)
+    for wave in range(2, 9):
+        radii += np.sin(wave * angles + random.uniform(0.0, 7.0)) / (3.0 * wave)
+    return Rings(name, [np.stack([radii * np.cos(angles), radii * np.sin(angles)], axis=1)])
+
+
+def convex_planes(n_planes: int, seed: int) -> Planes:
+    """Return planes that touch the unit sphere from outside; six of them are the cube."""
+    name = f"convex_{n_planes}"
+    if n_planes == 6:
+        normals = np.concatenate([np.eye(3), -np.eye(3)])
+    else:
+        normals = generator(name, seed).normal(size=(n_planes, 3))
+        normals /= np.linalg.norm(normals, axis=1)[:, None]
+    return Planes(name, np.ascontiguousarray(np.column_stack([-normals, np.ones(n_planes)])))
+
+
+def polygon_scene(n_bodies: int, seed: int) -> Bodies:
+    """Return polygons of 8 to 24 vertices on a jittered square lattice of spacing 1; neighbours overlap a little."""
+    name = f"polygons_{n_bodies}"
+    random = generator(name, seed)
+    side = int(np.ceil(n_bodies**0.5))
+    bodies = []
+    for i_body in range(n_bodies):
+        n = int(random.integers(8, 25))
+        angles = (np.arange(n) + random.uniform(0.0, 0.9, n)) * (2.0 * np.pi / n)
+        radii = random.uniform(0.35, 0.65, n)
+        centre = np.array([i_body % side, i_body // side]) + random.uniform(-0.1, 0.1, 2)
+        bodies.append(Rings("", [centre + np.stack([radii * np.cos(angles), radii * np.sin(angles)], axis=1)]))
+    return Bodies(name, bodies)
+
+
+def polyhedron_scene(n_bodies: int, seed: int) -> Bodies:
+    """Return bumpy spheres of 1,280 faces, each of its own shape, on a jittered cubic lattice; neighbours overlap."""
+    name = f"polyhedra_{n_bodies}"
+    random = generator(name, seed)
+    side = int(np.ceil(n_bodies ** (1 / 3)))
+    bodies = []
+    for i_body in range(n_bodies):
+        mesh = bumpy_sphere(f"{name}_{i_body}", seed, 3)
+        place = np.array([i_body % side, i_body // side % side, i_body // side**2]) + random.uniform(-0.1, 0.1, 3)
+        bodies.append(Mesh("", mesh.vertices * 0.5 + place, mesh.faces))
+    return Bodies(name, bodies)
+
+
+def extent_of(subject: Mesh | Rings | Planes | Bodies) -> tuple[np.ndarray, np.ndarray]:
+    """Return low and high of the box that points are drawn from."""
+    match subject:
+        case Mesh(vertices=vertices):
+            return vertices.min(axis=0), vertices.max(axis=0)
+        case Rings(rings=rings):
+            return np.concatenate(rings).min(axis=0), np.concatenate(rings).max(axis=0)
+        case Planes():
+            return np.full(3, -1.2), np.full(3, 1.2)
+        case Bodies(bodies=bodies):
+            boxes = np.array([extent_of(body) for body in bodies])
+            return boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+
+
+def uniform_points(subject: Mesh | Rings | Planes | Bodies, n_points: int, seed: int) -> np.ndarray:
+    """Return points uniform in the subject's box, in random order."""
+    low, high = extent_of(subject)
+    return generator(f"{subject.name}/uniform", seed).uniform(low, high, (n_points, len(low)))
+
+
+def near_points(subject: Mesh | Rings, n_points: int, seed: int) -> np.ndarray:
+    """Return points at a normal distribution of `NEAR` of the size about random places of the boundary."""
+    random = generator(f"{subject.name}/near", seed)
+    if isinstance(subject, Mesh):
+        corners = subject.vertices[subject.faces]
+        sizes = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    else:
+        starts = np.concatenate(subject.rings)
+        ends = np.concatenate([np.roll(ring, -1, axis=0) for ring in subject.rings])
+        corners = np.stack([starts, ends], axis=1)
+        sizes = np.linalg.norm(ends - starts, axis=1)
+    chosen = random.choice(len(sizes), n_points, p=sizes / sizes.sum())
+    weights = random.dirichlet(np.ones(corners.shape[1]), n_points)
+    points = (corners[chosen] * weights[:, :, None]).sum(axis=1)
+    low, high = extent_of(subject)
+    return points + random.normal(size=points.shape) * (NEAR * (high - low).max())
