@@ -1,6 +1,6 @@
 """Builds the cells of a polyhedron, level by level, with the budget of the call that pays for it.
 
-Cost: linear in the faces and the entries, about 5 us a face on one thread; some 300 to 500 bytes a face.
+Cost: linear in the faces and the entries, about 3 us a face on one thread; some 900 bytes a face.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from engine.containment.cell_entries import ENTRY
+from engine.containment.cell_lanes import LANES, groups_of
 from engine.containment.cell_status import (
     OPEN,
-    fill_entries,
+    fill_leaves,
     label_empty,
     locate_parts,
     reference_points,
@@ -30,14 +30,16 @@ from engine.solids.polyhedron import Polyhedron
 
 Int8Array = npt.NDArray[np.int8]
 
-_LONG: Final = (3, 12)
-"""Lists longer than this are cut into parts, on levels 0 and 1."""
+_LONG: Final = (8, 16)
+"""Lists longer than this are cut into parts, on levels 0 and 1: more than one group, or two."""
 _MOST_ENTRIES: Final = 24
 """Entries a face (and 2^14 more) above which a level is not cut further."""
 _RANGE: Final = 2.0**400
 """Largest extent, and 1 / smallest, of a solid that gets cells: products of three stay far from its ends."""
 _AT_ONCE: Final = 4096
-_WANTED: Final = 2.0
+_WANTED: Final = 4.0
+_MOST_CELLS: Final = 96.0
+"""Along the longest axis on level 0."""
 _PAYS_FROM: Final = 1 << 14
 _PAYS_PER_FACE: Final = 5
 
@@ -51,7 +53,8 @@ class Cells(NamedTuple):
     """The solid's box: beyond it all is outside."""
     codes: Int32Array
     """Level 0, then 64 a brick."""
-    entries: npt.NDArray[np.float32]
+    groups: npt.NDArray[np.float32]
+    """(n, 14, 8): what leaves keep of their triangles (cell_lanes.py)."""
 
 
 @dataclass
@@ -98,8 +101,8 @@ def build_cells(solid: Polyhedron, budget: Budget) -> Cells:
     lattice = _make_lattice(solid, len(triangles))
     level = _top_level(columns, lattice, budget)
     n_top = lattice.n[0] * lattice.n[1] * lattice.n[2]
-    codes, entries = [], []
-    n_entries = n_bricks = 0
+    codes, groups = [], []
+    n_groups = n_bricks = 0
     for depth in range(LEVELS):
         lengths = np.diff(level.firsts)
         is_cut = np.zeros(len(lengths), np.bool_)
@@ -113,13 +116,14 @@ def build_cells(solid: Polyhedron, budget: Budget) -> Cells:
         code[level.all_statuses == -1] = OUTSIDE_CELL
         code[level.all_statuses == 1] = INSIDE_CELL
         code[level.index] = OPEN_CELL
-        starts = n_entries + np.cumsum(lengths[kept]) - lengths[kept]
+        sizes = (lengths[kept] + LANES - 1) // LANES
+        starts = n_groups + np.cumsum(sizes) - sizes
         code[level.index[kept]] = 4 * starts + 2 * (level.statuses[kept] > 0)
         code[level.index[parents]] = 2 * (n_bricks + np.arange(len(parents))) + 1
-        n_entries, n_bricks = n_entries + int(lengths[kept].sum()), n_bricks + len(parents)
+        n_groups, n_bricks = n_groups + int(sizes.sum()), n_bricks + len(parents)
         codes.append(code)
-        rows = np.empty((int(lengths[kept].sum()), ENTRY), np.float32)
-        fill_entries(
+        of_level = groups_of(int(sizes.sum()))
+        fill_leaves(
             columns.vertices,
             triangles,
             lattice,
@@ -128,11 +132,11 @@ def build_cells(solid: Polyhedron, budget: Budget) -> Cells:
             level.firsts,
             level.lists,
             depth,
-            rows,
+            of_level,
             budget.flag,
         )
         budget.check()
-        entries.append(rows)
+        groups.append(of_level)
         if not len(parents):
             break
         level = _next_level(columns, lattice, level, parents, depth + 1, budget)
@@ -143,7 +147,7 @@ def build_cells(solid: Polyhedron, budget: Budget) -> Cells:
         (float(low[0]), float(low[1]), float(low[2])),
         (float(high[0]), float(high[1]), float(high[2])),
         np.concatenate(codes),
-        np.concatenate(entries),
+        np.concatenate(groups, out=groups_of(n_groups)),
     )
 
 
@@ -153,7 +157,7 @@ def _make_lattice(solid: Polyhedron, n_triangles: int) -> Lattice:
     low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
     extent = high - low
     largest = float(extent.max())
-    wanted = min(96.0, max(8.0, _WANTED * n_triangles ** (1.0 / 3.0)))
+    wanted = min(_MOST_CELLS, max(8.0, _WANTED * n_triangles ** (1.0 / 3.0)))
     size = _power_of_two(largest / wanted)
     sizes = [size if float(e) >= size else _power_of_two(max(float(e), largest * 2.0**-40)) for e in extent]
     lows = tuple(float(low[k]) - sizes[k] * (95.0 / 256.0) for k in range(3))
@@ -232,7 +236,7 @@ def _next_level(
     list_parts(*mesh, *of_parents, ends - counts, lists, True, budget.flag)
     budget.check()
     found = np.empty(len(counts), np.int8)
-    work = np.empty((int(np.diff(above.firsts)[parents].max()), ENTRY), np.float32)
+    work = groups_of(int(np.diff(above.firsts)[parents].max() + LANES - 1) // LANES)
     locate_parts(
         *mesh,
         parents,

@@ -26,12 +26,10 @@ from typing import Any, Final
 import numpy as np
 
 from engine.jit import inline
-from engine.types import UNDECIDED
 
 BAND: Final = np.float32(2.0**-18)
-ENTRY: Final = 14
-"""Numbers an entry: n and d, the three m, and 1.0 for the last entry of a leaf, else 0.0."""
-LAST: Final = 13
+ENTRY: Final = 13
+"""Numbers an entry: n and d, the three m."""
 _UNSURE: Final = 2.0**-24
 _ROUNDING: Final = 16.0 * 2.0**-53
 """A component of u x v is off by less than this part of the sizes of its two products: 2 u for the two factors, each a
@@ -57,8 +55,16 @@ def _set_normal(row: Any, place: int, u: Any, v: Any) -> float:
 
 
 @inline
+def set_nothing(row: Any) -> None:
+    """Write the entry of a triangle that no segment in the cell crosses."""
+    for k in range(ENTRY):
+        row[k] = 0.0
+    row[3] = -_FAR
+
+
+@inline
 def set_entry(row: Any, a: Any, b: Any, c: Any, u: Any, v: Any) -> None:
-    """Write the entry of a triangle to row (14,), but for the last number.
+    """Write the entry of a triangle to row (13,) or longer.
 
     a, b, c: corners less R; u, v: b - a and c - a; all of them differences of the given numbers, each rounded once, in
     units of the cell.
@@ -68,9 +74,7 @@ def set_entry(row: Any, a: Any, b: Any, c: Any, u: Any, v: Any) -> None:
     reach = max(abs(a[0]), abs(a[1]), abs(a[2]))
     is_sure = normal_error < _UNSURE and (3.0 * normal_error + _ROUNDING) * reach < _UNSURE
     if is_sure and abs(distance) > _FAR:  # the plane does not reach the cell: on R's side everywhere
-        for k in range(LAST):
-            row[k] = 0.0
-        row[3] = -_FAR
+        set_nothing(row)
         return
     is_sure = is_sure and abs(distance) > 2.0**-16  # R is clearly on one side
     if distance > 0.0:
@@ -80,18 +84,5 @@ def set_entry(row: Any, a: Any, b: Any, c: Any, u: Any, v: Any) -> None:
     is_sure = is_sure and _set_normal(row, 7, b, c) < _UNSURE
     is_sure = is_sure and _set_normal(row, 10, c, a) < _UNSURE
     if not is_sure:
-        for k in range(LAST):
+        for k in range(ENTRY):
             row[k] = np.nan
-
-
-@inline
-def crossing(entries: Any, entry: int, x: Any, y: Any, z: Any) -> int:
-    """Return 1 if the segment from R to x crosses the triangle, 0 if they are apart, UNDECIDED within the band."""
-    first = entries[entry, 4] * x + entries[entry, 5] * y + entries[entry, 6] * z
-    second = entries[entry, 7] * x + entries[entry, 8] * y + entries[entry, 9] * z
-    third = entries[entry, 10] * x + entries[entry, 11] * y + entries[entry, 12] * z
-    least, most = min(first, second, third), max(first, second, third)
-    side = entries[entry, 0] * x + entries[entry, 1] * y + entries[entry, 2] * z - entries[entry, 3]
-    is_apart = (side > BAND) | ((least < -BAND) & (most > BAND))
-    is_crossed = (side < -BAND) & ((least > BAND) | (most < -BAND))
-    return 0 if is_apart else 1 if is_crossed else UNDECIDED

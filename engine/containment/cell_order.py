@@ -18,8 +18,8 @@ from engine.parallel import Budget
 from engine.solids.base import FloatArray
 
 _FEWEST_POINTS: Final = 1 << 17
-_FEWEST_ENTRIES: Final = 1 << 17
-"""Of 56 bytes each: 7 MB, more than a core's cache."""
+_FEWEST_GROUPS: Final = 1 << 14
+"""Of 448 bytes each: 7 MB, more than a core's cache."""
 _SAMPLE: Final = 2048
 _SHARE: Final = 0.4
 """Share of points in cells with lists from which ordering pays."""
@@ -74,7 +74,7 @@ def gather_points(points: Any, order: Any, gathered: Any) -> None:
 
 def order_if_it_pays(points: FloatArray, cells: Cells, budget: Budget) -> npt.NDArray[np.int64] | None:
     """Return an order of the points that keeps memory near, None where it would cost more than it saves."""
-    if len(points) < _FEWEST_POINTS or len(cells.entries) < _FEWEST_ENTRIES:
+    if len(points) < _FEWEST_POINTS or len(cells.groups) < _FEWEST_GROUPS:
         return None
     sample = np.ascontiguousarray(points[:: len(points) // _SAMPLE])
     if top_cells(sample, cells, np.empty(len(sample), np.int32), budget.flag) < _SHARE * len(sample):

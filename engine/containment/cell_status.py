@@ -11,7 +11,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.containment.cell_entries import LAST, crossing, set_entry
+from engine.containment.cell_entries import set_entry, set_nothing
+from engine.containment.cell_lanes import LANES, ROWS, UNSURE, group_parity
 from engine.containment.cells import (
     LEVELS,
     PARTS,
@@ -25,7 +26,6 @@ from engine.containment.cells import (
     share_of,
 )
 from engine.jit import inline, kernel
-from engine.types import UNDECIDED
 
 OPEN: Final = 0
 """Status of a cell that is not known, or whose reference point lies on the surface or in another cell."""
@@ -88,22 +88,43 @@ def reference_points(lattice: Any, places: Any, level: int, points: Any, is_vali
 
 
 @inline
-def fill_entry(
-    row: Any, vertices: Any, triangles: Any, triangle: int, lattice: Any, reference: Any, parts: float
-) -> None:
-    """Write the entry of a triangle about a reference point, in units of the cells of a level."""
-    a = corner(vertices, triangles[triangle, 0])
-    b = corner(vertices, triangles[triangle, 1])
-    c = corner(vertices, triangles[triangle, 2])
+def fill_groups(
+    groups: Any,
+    first_group: int,
+    vertices: Any,
+    triangles: Any,
+    lists: Any,
+    first: int,
+    last: int,
+    lattice: Any,
+    reference: Any,
+    parts: float,
+) -> int:
+    """Write the groups of the triangles lists[first:last] about a reference point, in units of the cells of a level.
+
+    Returns the group after the last one written.
+    """
     scale = lattice.scale
-    set_entry(
-        row,
-        scaled_difference(a, reference, scale, parts),
-        scaled_difference(b, reference, scale, parts),
-        scaled_difference(c, reference, scale, parts),
-        scaled_difference(b, a, scale, parts),
-        scaled_difference(c, a, scale, parts),
-    )
+    n_groups = (last - first + LANES - 1) // LANES
+    for place in range(n_groups * LANES):
+        row = groups[first_group + place // LANES, :, place % LANES]
+        row[ROWS - 1] = 1.0 if place >= (n_groups - 1) * LANES else 0.0
+        if first + place >= last:
+            set_nothing(row)
+            continue
+        triangle = lists[first + place]
+        a = corner(vertices, triangles[triangle, 0])
+        b = corner(vertices, triangles[triangle, 1])
+        c = corner(vertices, triangles[triangle, 2])
+        set_entry(
+            row,
+            scaled_difference(a, reference, scale, parts),
+            scaled_difference(b, reference, scale, parts),
+            scaled_difference(c, reference, scale, parts),
+            scaled_difference(b, a, scale, parts),
+            scaled_difference(c, a, scale, parts),
+        )
+    return first_group + n_groups
 
 
 @kernel
@@ -118,14 +139,15 @@ def locate_parts(
     lists: Any,
     level: int,
     counts: Any,
-    entries: Any,
+    groups: Any,
     found: Any,
     flag: Any,
 ) -> None:
     """Fill found (p * 64,) int8 with the status of each part: of its reference point, or of all of it if it is empty.
 
     parents, places, firsts, lists, level: as for `list_parts`; statuses: (cells,) int8; counts: (p * 64,) lengths of
-    the parts' lists; entries: workspace (longest list, 14) float32.
+    the parts' lists; groups: workspace for the longest
+    list of a parent.
     """
     scale = lattice.scale
     parts = parts_of(level - 1)
@@ -136,9 +158,9 @@ def locate_parts(
         cell = parents[parent]
         x0, y0, z0 = places[cell, 0], places[cell, 1], places[cell, 2]
         reference = reference_point(lattice, x0, y0, z0, share_of(level - 1))
-        n_entries = firsts[cell + 1] - firsts[cell]
-        for entry in range(n_entries):
-            fill_entry(entries[entry], vertices, triangles, lists[firsts[cell] + entry], lattice, reference, parts)
+        n_groups = fill_groups(
+            groups, 0, vertices, triangles, lists, firsts[cell], firsts[cell + 1], lattice, reference, parts
+        )
         for part in range(PARTS):
             place = parent * PARTS + part
             x, y, z = part % SPLIT, part // SPLIT % SPLIT, part // (SPLIT * SPLIT)
@@ -158,18 +180,19 @@ def locate_parts(
             if status != OPEN:
                 w = scaled_difference(point, reference, scale, parts)
                 wx, wy, wz = np.float32(w[0]), np.float32(w[1]), np.float32(w[2])
-                for entry in range(n_entries):
-                    crossed = crossing(entries, entry, wx, wy, wz)
-                    if crossed == UNDECIDED:
+                parity = 0
+                for group in range(n_groups):
+                    parity ^= group_parity(groups, group, wx, wy, wz)
+                    if parity & UNSURE:
                         status = OPEN
                         break
-                    if crossed == 1:
-                        status = -status
+                if parity & 1:
+                    status = -status
             found[place] = status
 
 
 @kernel
-def fill_entries(
+def fill_leaves(
     vertices: Any,
     triangles: Any,
     lattice: Any,
@@ -178,10 +201,10 @@ def fill_entries(
     firsts: Any,
     lists: Any,
     level: int,
-    entries: Any,
+    groups: Any,
     flag: Any,
 ) -> None:
-    """Fill entries (n, 14) float32 with the lists of `cells`, one after another."""
+    """Fill groups (n, 14, 8) float32 with the lists of `cells`, one after another."""
     parts = parts_of(level)
     place = 0
     for item in range(len(cells)):
@@ -189,7 +212,6 @@ def fill_entries(
             break
         cell = cells[item]
         reference = reference_point(lattice, places[cell, 0], places[cell, 1], places[cell, 2], share_of(level))
-        for entry in range(firsts[cell], firsts[cell + 1]):
-            fill_entry(entries[place], vertices, triangles, lists[entry], lattice, reference, parts)
-            entries[place, LAST] = 1.0 if entry == firsts[cell + 1] - 1 else 0.0
-            place += 1
+        place = fill_groups(
+            groups, place, vertices, triangles, lists, firsts[cell], firsts[cell + 1], lattice, reference, parts
+        )

@@ -13,10 +13,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.containment.cell_entries import LAST, crossing
-from engine.containment.cell_status import reference_point
-from engine.containment.cells import LEVELS, PARTS, finest, parts_of, share_of
-from engine.jit import inline, kernel
+from engine.containment.cell_lanes import ROWS, UNSURE, group_parity, prefetch_group
+from engine.containment.cells import LEVELS, PARTS, PLACE, finest, parts_of, reference_coordinate, share_of
+from engine.jit import kernel
 from engine.types import UNDECIDED
 
 OUTSIDE_CELL: Final = -4
@@ -27,27 +26,8 @@ the lowest bit set, or the place of a leaf's first entry; one bit above is the s
 _CODE_SHIFT: Final = 3
 _BLOCK: Final = 256
 """Points that pass through the stages together: their scratch fits the first-level cache."""
-
-
-@inline
-def _parity(point: Any, x: int, y: int, z: int, level: int, code: int, cells: Any) -> int:
-    """Return the location of a point in a leaf, or UNDECIDED."""
-    parts = parts_of(level)
-    scale, entries = cells.lattice.scale, cells.entries
-    reference = reference_point(cells.lattice, x, y, z, share_of(level))
-    wx = np.float32((point[0] - reference[0]) * (scale[0] * parts))
-    wy = np.float32((point[1] - reference[1]) * (scale[1] * parts))
-    wz = np.float32((point[2] - reference[2]) * (scale[2] * parts))
-    n_crossed, is_unsure = 0, False
-    for entry in range(code >> 2, len(entries)):  # bound: the last entry of each leaf says so
-        crossed = crossing(entries, entry, wx, wy, wz)
-        is_unsure |= crossed == UNDECIDED
-        n_crossed += crossed
-        if entries[entry, LAST] != 0.0:
-            break
-    if is_unsure:
-        return UNDECIDED
-    return ((code ^ (n_crossed << 1)) & 2) - 1
+_AHEAD: Final = 6
+"""Points between asking for a leaf's group and reading it: some 100 ns."""
 
 
 @kernel
@@ -57,14 +37,13 @@ def locate_by_cells(points: Any, cells: Any, locations: Any, flag: Any) -> int:
     A block of points goes through one stage after another, so that the loads of a stage do not wait for each other:
     code on level 0, codes in bricks, first entry of the leaf, parity.
     """
-    low, scale, n = cells.lattice.low, cells.lattice.scale, cells.lattice.n
-    codes, entries, box_low, box_high = cells.codes, cells.entries, cells.low, cells.high
+    low, scale, size, n = cells.lattice.low, cells.lattice.scale, cells.lattice.size, cells.lattice.n
+    codes, groups, box_low, box_high = cells.codes, cells.groups, cells.low, cells.high
     n_top = n[0] * n[1] * n[2]
     shift = 2 * (LEVELS - 1)
     places = np.empty((_BLOCK, 3), np.int32)
     code_of, level_of = np.empty(_BLOCK, np.int32), np.empty(_BLOCK, np.int32)
     waiting = np.empty(_BLOCK + 1, np.int32)
-    touched = np.empty(_BLOCK, np.float32)
     n_open = 0
     for start in range(0, len(points), _BLOCK):
         if flag[0]:
@@ -107,16 +86,28 @@ def locate_by_cells(points: Any, cells: Any, locations: Any, flag: Any) -> int:
                 waiting[n_left] = item
                 n_left += code >= 0
             n_waiting = n_left
+        for turn in range(min(n_waiting, _AHEAD)):
+            prefetch_group(groups, code_of[waiting[turn]] >> 2)
         for turn in range(n_waiting):
-            first = code_of[waiting[turn]] >> 2
-            touched[turn] = entries[first, 0] + entries[first, LAST]  # brings both ends of the entry near
-        for turn in range(n_waiting):
+            if turn + _AHEAD < n_waiting:
+                prefetch_group(groups, code_of[waiting[turn + _AHEAD]] >> 2)
             item = waiting[turn]
-            level = level_of[item]
-            part_shift = 2 * (LEVELS - 1 - level)
-            point = (points[start + item, 0], points[start + item, 1], points[start + item, 2])
+            level, code = level_of[item], code_of[item]
+            parts, share, part_shift = parts_of(level), share_of(level), 2 * (LEVELS - 1 - level)
             x, y, z = places[item, 0] >> part_shift, places[item, 1] >> part_shift, places[item, 2] >> part_shift
-            locations[start + item] = _parity(point, x, y, z, level, code_of[item], cells)
+            rx = reference_coordinate(low[0], size[0] * share, x, PLACE[0])
+            ry = reference_coordinate(low[1], size[1] * share, y, PLACE[1])
+            rz = reference_coordinate(low[2], size[2] * share, z, PLACE[2])
+            wx = np.float32((points[start + item, 0] - rx) * (scale[0] * parts))
+            wy = np.float32((points[start + item, 1] - ry) * (scale[1] * parts))
+            wz = np.float32((points[start + item, 2] - rz) * (scale[2] * parts))
+            group = code >> 2
+            parity = group_parity(groups, group, wx, wy, wz)
+            while groups[group, ROWS - 1, 0] == 0.0:  # bound: the last group of each leaf says so
+                group += 1
+                found = group_parity(groups, group, wx, wy, wz)
+                parity = ((parity ^ found) & 1) | ((parity | found) & UNSURE)
+            locations[start + item] = UNDECIDED if parity & UNSURE else ((code ^ (parity << 1)) & 2) - 1
         for item in range(start, min(start + _BLOCK, len(points))):
             n_open += locations[item] == UNDECIDED
     return n_open

@@ -12,9 +12,11 @@ from engine import Cancel, CancelledError, Csg, Polyhedron, locate
 from engine.containment import build_cells as building
 from engine.containment import cell_order
 from engine.containment.build_cells import build_cells
-from engine.containment.cell_entries import ENTRY, crossing, set_entry
+from engine.containment.cell_entries import set_entry, set_nothing
+from engine.containment.cell_lanes import LANES, UNSURE, group_parity, groups_of, plain_parity, prefetch_group
 from engine.containment.cells import misses_cell
 from engine.containment.segment_parity import locate_by_cells
+from engine.jit import kernel
 from engine.parallel import Budget
 from engine.types import UNDECIDED
 from tests.unit.containment.scenes import box_mesh, lattice_points, made, merged
@@ -163,16 +165,51 @@ def test_entries_are_right_beyond_their_band() -> None:
         x = x * (1 + random.choice([0, 1e-7, 1e-6, 1e-5, -1e-5, 0.3])) + random.normal(size=3) * 1e-7
         if np.abs(x).max() > 0.6:
             x = random.uniform(-0.6, 0.6, 3)
-        entries = np.zeros((1, ENTRY), np.float32)
+        groups, lane = groups_of(1), case % LANES
         with np.errstate(all="ignore"):
-            set_entry(entries[0], tuple(a), tuple(b), tuple(c), tuple(b - a), tuple(c - a))
-            found = crossing(entries, 0, *x.astype(np.float32))
-        if found != UNDECIDED:
+            for other in range(LANES):
+                set_nothing(groups[0, :, other])
+            set_entry(groups[0, :, lane], tuple(a), tuple(b), tuple(c), tuple(b - a), tuple(c - a))
+            found = plain_parity(groups, 0, *x.astype(np.float32))
+        if found < UNSURE:
             n_sure += 1
             n_crossed += found
             assert found == exact_crossing(a, b, c, x)
     assert n_sure > 500
     assert n_crossed > 50
+
+
+@kernel
+def parities(groups: Any, points: Any, found: Any) -> None:
+    for item in range(len(groups)):
+        prefetch_group(groups, item)
+        found[item] = group_parity(groups, item, points[item, 0], points[item, 1], points[item, 2])
+
+
+def test_lanes_answer_as_their_plain_twin() -> None:
+    random = np.random.default_rng(10)
+    n = 3000
+    groups = groups_of(n)
+    groups[:] = random.uniform(-1, 1, groups.shape)
+    groups[:, 3] = random.choice([-4.0, -0.1, -1e-4], (n, LANES))
+    groups[::2, :, 1:] = groups[::2, :, :1]  # eight times one triangle: crossed by all or none, never odd
+    groups[::7, :, 3] = np.nan  # one lane
+    points = random.uniform(-0.6, 0.6, (n, 3)).astype(np.float32)
+    points[::5] *= np.float32(1e-5)  # within the band of the edges
+    found = np.empty(n, np.int64)
+    parities(groups, points, found)
+    expected = [plain_parity(groups, item, *points[item]) for item in range(n)]
+    assert found.tolist() == expected
+    assert {0, 1, UNSURE} <= set(expected)
+    assert not (found[2::14] & 1).any()
+    assert (found[::7] & UNSURE).all()
+
+
+def test_groups_begin_with_a_line_of_the_cache() -> None:
+    for n in (0, 1, 5):
+        assert groups_of(n).shape == (n, 14, LANES)
+        assert groups_of(n).flags.c_contiguous
+        assert n == 0 or groups_of(n).ctypes.data % 64 == 0
 
 
 def test_cells_are_only_missed_where_no_point_is() -> None:
@@ -195,7 +232,7 @@ def test_ordered_points_get_the_same_answers(monkeypatch: pytest.MonkeyPatch) ->
     points[::5, 2] = 3.0  # on a face
     plain = locate(points, solid)
     monkeypatch.setattr(cell_order, "_FEWEST_POINTS", 1)
-    monkeypatch.setattr(cell_order, "_FEWEST_ENTRIES", 1)
+    monkeypatch.setattr(cell_order, "_FEWEST_GROUPS", 1)
     monkeypatch.setattr(cell_order, "_SHARE", 0.0)
     with Budget() as budget:
         order = cell_order.order_if_it_pays(points, build_cells(solid, budget), budget)
