@@ -93,6 +93,8 @@ def build_box_grid(
     Cost: linear in the boxes and the entries; cells are halved, the longer row of them first, until the entries are at
     most four for each box and cell together, so long boxes cannot fill the memory.
     """
+    u_low, u_high = np.ascontiguousarray(u_low), np.ascontiguousarray(u_high)  # columns of a table: one signature
+    v_low, v_high = np.ascontiguousarray(v_low), np.ascontiguousarray(v_high)
     limit = 4 * (len(u_low) + u_cells * v_cells) + 64
     while True:  # bound: every turn halves a number of cells, and one cell lists each box once
         u = make_axis(float(u_low.min()), float(u_high.max()), u_cells)

@@ -32,7 +32,7 @@ def body_box(solid: Solid, pose: Pose | None) -> Box:
         center, blur = (solid.center, 0.0) if pose is None else posed_center(solid, pose)
         with np.errstate(over="ignore"):
             low, high = center - (solid.radius + blur), center + (solid.radius + blur)
-        return np.nextafter(np.nextafter(low, -np.inf), -np.inf), np.nextafter(np.nextafter(high, np.inf), np.inf)
+            return np.nextafter(np.nextafter(low, -np.inf), -np.inf), np.nextafter(np.nextafter(high, np.inf), np.inf)
     low, high = _own_box(solid)
     return (low, high) if pose is None else _posed_box(low, high, pose)
 

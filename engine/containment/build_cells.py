@@ -25,7 +25,7 @@ from engine.containment.prepared import Columns, columns_of
 from engine.containment.ray_parity import locate_by_columns
 from engine.containment.segment_parity import INSIDE_CELL, OPEN_CELL, OUTSIDE_CELL
 from engine.parallel import Budget
-from engine.solids.base import IntArray
+from engine.solids.base import IntArray, as_read_only
 from engine.solids.polyhedron import Polyhedron
 
 Int8Array = npt.NDArray[np.int8]
@@ -181,7 +181,7 @@ def _by_rays(columns: Columns, points: FloatArray, budget: Budget) -> Int8Array:
     found = np.empty(len(points), np.int8)
     for start in range(0, len(points), _AT_ONCE):
         stop = start + _AT_ONCE
-        locate_by_columns(points[start:stop], *columns, found[start:stop], budget.flag)
+        locate_by_columns(as_read_only(points[start:stop]), *columns, found[start:stop], budget.flag)
         budget.check()
     found[np.abs(found) != 1] = OPEN
     return found

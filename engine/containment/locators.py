@@ -30,7 +30,7 @@ from engine.containment.triangles import locate_in_triangle
 from engine.errors import InvalidArrayError, NotFiniteError
 from engine.parallel import Budget
 from engine.solids.aabb import Aabb
-from engine.solids.base import FloatArray, Solid
+from engine.solids.base import FloatArray, Solid, as_read_only
 from engine.solids.convex import Convex
 from engine.solids.csg import Csg
 from engine.solids.half_space import HalfSpace
@@ -85,7 +85,7 @@ def settled(
 
     def fill(points: FloatArray, locations: Locations, budget: Budget) -> Counts:
         with np.errstate(all="ignore"):  # uncompiled, numpy scalars warn where the filter means to overflow
-            n_beyond = int(kernel(points, locations, budget.flag))
+            n_beyond = int(kernel(as_read_only(points), locations, budget.flag))
         budget.check()
         undecided = np.flatnonzero(locations == UNDECIDED)
         for item in undecided:
@@ -209,7 +209,7 @@ def _in_cells(by_cells: Callable[[FloatArray, Locations, Flag], int], by_rays: F
 
     def fill(points: FloatArray, locations: Locations, budget: Budget) -> Counts:
         with np.errstate(all="ignore"):
-            n_open = by_cells(points, locations, budget.flag)
+            n_open = by_cells(as_read_only(points), locations, budget.flag)
         if n_open == 0:
             return Counts(0, 0)
         budget.check()

@@ -38,7 +38,7 @@ from engine.containment.prepared import columns_of, rings_of, rounded_rows
 from engine.containment.rational_locate import prism_walls, to_world_frame
 from engine.parallel import Budget
 from engine.solids.aabb import Aabb
-from engine.solids.base import FloatArray, Solid
+from engine.solids.base import FloatArray, Solid, as_read_only
 from engine.solids.convex import Convex
 from engine.solids.csg import Csg
 from engine.solids.half_space import HalfSpace
@@ -165,7 +165,7 @@ def posed_center(solid: Sphere, pose: Pose) -> tuple[npt.NDArray[np.float64], fl
     except OverflowError:
         return np.zeros(solid.dimension), np.inf
     blur = 0.0 if center.tolist() == exact else float(np.spacing(np.abs(center).max()))
-    return center, blur
+    return as_read_only(center), blur
 
 
 def _in_posed_sphere(solid: Sphere, pose: Pose) -> Locator:

@@ -13,7 +13,7 @@ from engine.bounding.grid import BoxGrid, build_box_grid
 from engine.containment.rational_locate import next_in_ring
 from engine.containment.ray_parity import projected_area_signs
 from engine.predicates.rational import orient2d_rational
-from engine.solids.base import FloatArray
+from engine.solids.base import FloatArray, as_read_only
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
 from engine.solids.triangle import Triangle
@@ -109,4 +109,4 @@ def rounded_rows(rows: Sequence[Sequence[int | Fraction]]) -> tuple[FloatArray, 
         if any(value != 0 and abs(value) < Fraction(1, 1 << 900) for value in scaled):
             rounded[i_row] = np.nan
         is_exact[i_row] = all(Fraction(float(value)) == value for value in scaled)
-    return rounded, is_exact & ~np.isnan(rounded[:, 0])
+    return as_read_only(rounded), is_exact & ~np.isnan(rounded[:, 0])

@@ -84,6 +84,13 @@ class Solid:
         return self
 
 
+def as_read_only(array: FloatArray) -> FloatArray:
+    """Return a read-only view: a kernel is compiled once for what callers pass, whether it may be written to or not."""
+    view = array.view()
+    view.setflags(write=False)
+    return view
+
+
 def _restored(kind: Any, values: dict[str, Any]) -> Solid:
     """Return the solid that was pickled: its checks passed when it was made, so they are not repeated."""
     for value in values.values():

@@ -1,0 +1,52 @@
+"""Each kernel is compiled once per dimension, whatever kind of array the caller passes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numba import config as numba_config
+
+import engine
+from engine.bounding.grid import count_boxes, fill_boxes
+from engine.containment.balls import locate_in_ball
+from engine.containment.boxes import locate_in_box
+from engine.containment.half_spaces import locate_in_half_planes, locate_in_half_spaces
+from engine.containment.polynomials import locate_by_polynomial
+from engine.containment.ray_parity import locate_by_columns
+from engine.containment.ring_crossing import locate_in_rings
+from engine.containment.triangles import locate_in_triangle
+
+VERTICES = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+TURN = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+
+SOLIDS = [
+    (engine.Polyhedron(VERTICES, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]), [locate_by_columns]),
+    (engine.Triangle(VERTICES[:3]), [locate_in_half_spaces]),
+    (engine.Convex([[1, 0, 0, 0]]), [locate_in_half_spaces]),
+    (engine.Sphere([0, 0, 0], 1), [locate_in_ball]),
+    (engine.Aabb([0, 0], [1, 1]), [locate_in_box]),
+    (engine.HalfSpace([1, 0], 0), [locate_in_half_planes]),
+    (engine.Polygon([[[0, 0], [1, 0], [0, 1]]]), [locate_in_rings]),
+    (engine.Triangle([[0, 0], [1, 0], [0, 1]]), [locate_in_triangle]),
+    (engine.Implicit([{"powers": [1, 0], "coefficient": 1}]), [locate_by_polynomial]),
+]
+
+
+@pytest.mark.skipif(bool(numba_config.DISABLE_JIT), reason="about compiled code")
+@pytest.mark.parametrize(("solid", "kernels"), SOLIDS)
+def test_a_kernel_sees_one_kind_of_array(solid: engine.Solid, kernels: list[Any]) -> None:
+    points = np.random.default_rng(0).random((6, solid.dimension))
+    frozen = points.copy()
+    frozen.setflags(write=False)
+    turn = engine.Pose([row[: solid.dimension] for row in TURN[: solid.dimension]], [0.25] * solid.dimension)
+    for given in (points, frozen, points[::2], np.asfortranarray(points), points.astype(np.float32), points.tolist()):
+        engine.locate(given, solid)
+        engine.locate_scene(given, [solid, solid], [turn, None])
+    for kernel in (*kernels, count_boxes, fill_boxes):
+        layouts = {
+            tuple((each.ndim, each.layout, each.mutable) for each in signature if hasattr(each, "layout"))
+            for signature in kernel.signatures
+        }
+        assert len(layouts) == 1, kernel.py_func.__name__
