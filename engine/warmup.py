@@ -19,11 +19,15 @@ from engine.collision.collide import collide
 from engine.collision.collide_poses import collide_poses
 from engine.collision.scene import collide_scene
 from engine.collision.triangles import collide_triangles
+from engine.containment.build_cells import cells_if_they_pay
+from engine.containment.cell_order import gathered, order_by_cell
 from engine.containment.locate import locate
 from engine.containment.locate_scene import locate_scene
+from engine.parallel import Budget
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.bounds import bounds
+from engine.solids.checks import as_points
 from engine.solids.convex import Convex
 from engine.solids.half_space import HalfSpace
 from engine.solids.implicit import Implicit
@@ -100,7 +104,13 @@ def _warm_cells() -> None:
             faces += [[belt + a, belt + b, belt + 20 + b], [belt + a, belt + 20 + b, belt + 20 + a]]
         faces += [[300, b, a], [301, 280 + a, 280 + b]]
     many = np.random.default_rng(0).uniform(-1.2, 1.2, (_MANY, 3))
-    locate(many, Polyhedron(vertices, faces))
+    ball = Polyhedron(vertices, faces)
+    locate(many, ball)
+    points = as_points(many, 3)
+    with Budget() as budget:  # large batches near large meshes are asked in the order of their cells
+        cells = cells_if_they_pay(ball, len(points), budget)
+        assert cells is not None
+        gathered(points, order_by_cell(points, cells, budget))
     around = np.linspace(0, 2 * np.pi, 300, endpoint=False)
     locate(np.ascontiguousarray(many[:, :2]), Polygon([np.column_stack([np.cos(around), np.sin(around)])]))
 

@@ -81,7 +81,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
 def _warm(app: FastAPI) -> None:
     before = time.perf_counter()
     try:
-        getattr(engine, "warm", lambda: None)()
+        engine.warm()
     except Exception as error:
         app.state.warm_error = f"warm-up failed: {error}; restart the service"
         log.exception("warm-up failed")

@@ -65,7 +65,7 @@ def counting_sort(keys: Any, ends: Any, order: Any, flag: Any) -> None:
 
 
 @kernel
-def gather_points(points: Any, order: Any, gathered: Any) -> None:
+def _gather(points: Any, order: Any, gathered: Any) -> None:
     """Fill gathered (n, 3) with the rows of points that `order` names."""
     for item in range(len(order)):
         row = order[item]
@@ -76,9 +76,15 @@ def order_if_it_pays(points: FloatArray, cells: Cells, budget: Budget) -> npt.ND
     """Return an order of the points that keeps memory near, None where it would cost more than it saves."""
     if len(points) < _FEWEST_POINTS or len(cells.groups) < _FEWEST_GROUPS:
         return None
-    sample = np.ascontiguousarray(points[:: len(points) // _SAMPLE])
+    sample = points[:: len(points) // _SAMPLE].copy()
+    sample.setflags(write=False)  # as the points themselves: one kind of array for the compiler
     if top_cells(sample, cells, np.empty(len(sample), np.int32), budget.flag) < _SHARE * len(sample):
         return None
+    return order_by_cell(points, cells, budget)
+
+
+def order_by_cell(points: FloatArray, cells: Cells, budget: Budget) -> npt.NDArray[np.int64]:
+    """Return the order of points (n, 3), read-only, by their cells of level 0, equal ones as they stand."""
     nx, ny, nz = cells.lattice.n
     keys, order = np.empty(len(points), np.int32), np.empty(len(points), np.int64)
     top_cells(points, cells, keys, budget.flag)
@@ -87,3 +93,11 @@ def order_if_it_pays(points: FloatArray, cells: Cells, budget: Budget) -> npt.ND
     counting_sort(keys, np.cumsum(counts) - counts, order, budget.flag)
     budget.check()
     return order
+
+
+def gathered(points: FloatArray, places: npt.NDArray[np.int64]) -> FloatArray:
+    """Return the rows of points (n, 3) at `places`, read-only."""
+    rows = np.empty((len(places), 3))
+    _gather(points, places, rows)
+    rows.setflags(write=False)
+    return rows

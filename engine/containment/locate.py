@@ -10,7 +10,7 @@ from typing import Literal, overload
 import numpy as np
 import numpy.typing as npt
 
-from engine.containment.cell_order import gather_points
+from engine.containment.cell_order import gathered
 from engine.containment.locators import locator_of
 from engine.parallel import Budget, Cancel, Progress, run_chunks
 from engine.solids.base import Solid
@@ -94,9 +94,8 @@ def locate(
                 counts = locator.fill(array[start:stop], locations[start:stop], budget)
             else:
                 places = order[start:stop]
-                gathered, found = np.empty((stop - start, 3)), np.empty(stop - start, np.int8)
-                gather_points(array, places, gathered)
-                counts = locator.fill(gathered, found, budget)
+                found = np.empty(stop - start, np.int8)
+                counts = locator.fill(gathered(array, places), found, budget)
                 locations[places] = found
             beyond.append(counts.beyond)
             rational.append(counts.rational)

@@ -13,6 +13,7 @@ import pytest
 
 import engine
 from service.app import create_app
+from service.settings import Settings
 from tests.unit.service.asking import client_of
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -37,7 +38,7 @@ def test_a_call_has_the_answer_shown(number: int, monkeypatch: pytest.MonkeyPatc
     path, body = re.search(r"localhost:8000(\S+).*?-d '(.*?)'", CALLS[number], re.DOTALL).groups()  # type: ignore[union-attr]
 
     async def ask() -> Any:
-        async with client_of(create_app()) as client:
+        async with client_of(create_app(Settings(deadline_seconds=300))) as client:
             return (await client.post(path, content=body, headers={"content-type": "application/json"})).json()
 
     assert anyio.run(ask) == json.loads(blocks("json")[number])
