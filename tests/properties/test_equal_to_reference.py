@@ -103,13 +103,13 @@ def check_collision(data: dict[str, Any]) -> None:
     check("collide", data)
 
 
-@examples(100)
+@examples(60)
 @given(st.data(), SCALES)
 def test_collide_in_the_plane(data: st.DataObject, kind: str) -> None:
     check_collision({"first": data.draw(body(kind, 2)), "second": data.draw(body(kind, 2))})
 
 
-@examples(20)
+@examples(12)
 @given(st.data(), SCALES)
 def test_collide_in_space(data: st.DataObject, kind: str) -> None:
     check_collision({"first": data.draw(body(kind, 3)), "second": data.draw(body(kind, 3))})

@@ -101,16 +101,21 @@ def nearest_double_with_root(a: mpq, b: mpq, radicand: mpq) -> float:
     root = Q(isqrt(product << (2 * bits)), radicand.denominator << bits)
     guess = nearest_double(a + b * root)
     for candidate in (guess, math.nextafter(guess, math.inf), math.nextafter(guess, -math.inf)):
-        if _is_nearest(candidate, a, b, radicand):
+        if math.isfinite(candidate) and _is_nearest(candidate, a, b, radicand):
             return candidate + 0.0
     raise AssertionError(f"no nearest double beside {guess!r}")
 
 
 def _is_nearest(candidate: float, a: mpq, b: mpq, radicand: mpq) -> bool:
     """Tell whether a + b sqrt(radicand) lies between the midpoints on either side of `candidate`."""
-    below = (q(math.nextafter(candidate, -math.inf)) + q(candidate)) / 2
-    above = (q(math.nextafter(candidate, math.inf)) + q(candidate)) / 2
+    below, above = ((_neighbour(candidate, way) + q(candidate)) / 2 for way in (-1, 1))
     return sign_with_root(a - below, b, radicand) > 0 > sign_with_root(a - above, b, radicand)
+
+
+def _neighbour(x: float, way: int) -> mpq:
+    """Return the next double down or up; beyond the largest, the power of two that would follow."""
+    beside = math.nextafter(x, way * math.inf)
+    return q(beside) if math.isfinite(beside) else Q(way * 2**1024)
 
 
 def smallest_double_with_square_at_least(number: mpq) -> float:

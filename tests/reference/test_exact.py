@@ -44,6 +44,12 @@ def test_root_that_is_rational_ties_to_even() -> None:
     assert nearest_double_with_root(Q(2**53 - 2), Q(1), Q(9)) == 2.0**53
 
 
+def test_root_at_the_end_of_the_range() -> None:
+    largest = 1.7976931348623157e308
+    assert nearest_double_with_root(q(largest), Q(1, 2), Q(2)) == largest
+    assert nearest_double_with_root(-q(largest), Q(-1, 2), Q(2)) == -largest
+
+
 def test_smallest_radius() -> None:
     assert smallest_double_with_square_at_least(Q(4)) == 2.0
     r = smallest_double_with_square_at_least(Q(2))
