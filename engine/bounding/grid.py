@@ -10,6 +10,7 @@ Items of a cell keep the order in which the boxes were given.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -86,12 +87,20 @@ def fill_boxes(u_low: Any, u_high: Any, u: Any, v_low: Any, v_high: Any, v: Any,
 
 
 def build_box_grid(
-    u_low: FloatArray, u_high: FloatArray, v_low: FloatArray, v_high: FloatArray, u_cells: int, v_cells: int
+    u_low: FloatArray,
+    u_high: FloatArray,
+    v_low: FloatArray,
+    v_high: FloatArray,
+    u_cells: int,
+    v_cells: int,
+    check: Callable[[], object] = lambda: None,
 ) -> BoxGrid:
     """List boxes, given by their four sides (n,), in a grid of about u_cells x v_cells cells over all of them.
 
     Cost: linear in the boxes and the entries; cells are halved, the longer row of them first, until the entries are at
     most four for each box and cell together, so long boxes cannot fill the memory.
+
+    check: called between the steps; what it raises ends the building.
     """
     u_low, u_high = np.ascontiguousarray(u_low), np.ascontiguousarray(u_high)  # columns of a table: one signature
     v_low, v_high = np.ascontiguousarray(v_low), np.ascontiguousarray(v_high)
@@ -102,11 +111,14 @@ def build_box_grid(
         counts = np.zeros(u.n_cells * v.n_cells, np.int64)
         if u_cells * v_cells == 1 or _estimate(u_low, u_high, u, v_low, v_high, v) <= limit:
             break
+        check()
         if u_cells >= v_cells:
             u_cells = (u_cells + 1) // 2
         else:
             v_cells = (v_cells + 1) // 2
+    check()
     count_boxes(u_low, u_high, u, v_low, v_high, v, counts)
+    check()
     offsets = np.zeros(len(counts) + 1, np.int64)
     np.cumsum(counts, out=offsets[1:])
     items = np.empty(offsets[-1], np.int32)

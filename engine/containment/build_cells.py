@@ -96,7 +96,7 @@ def cells_if_they_pay(solid: Polyhedron, n_points: int, budget: Budget) -> Cells
 
 def build_cells(solid: Polyhedron, budget: Budget) -> Cells:
     """Return the cells of `solid`. Raises what `Budget.check` raises."""
-    columns = columns_of(solid)
+    columns = columns_of(solid, budget.check)
     triangles = columns.triangles
     lattice = _make_lattice(solid, len(triangles))
     level = _top_level(columns, lattice, budget)

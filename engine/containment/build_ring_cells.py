@@ -50,7 +50,7 @@ def ring_cells_if_they_pay(solid: Polygon, n_points: int, budget: Budget) -> Rin
 
 def build_ring_cells(solid: Polygon, budget: Budget) -> RingCells:
     """Return the cells of `solid`. Raises what `Budget.check` raises."""
-    rings = rings_of(solid)
+    rings = rings_of(solid, budget.check)
     starts, ends = rings.starts, rings.ends
     low, high = np.minimum(starts, ends), np.maximum(starts, ends)
     side = int(min(1024.0, max(32.0, 4.0 * len(starts) ** 0.5)))

@@ -76,14 +76,19 @@ class Locator:
 
 
 def settled(
-    kernel: Callable[[FloatArray, Locations, Flag], int], settle: Callable[[Sequence[float], Check], int]
+    kernel: Callable[[FloatArray, Locations, Flag], int],
+    settle: Callable[[Sequence[float], Check], int],
+    prepare: Callable[[Check], object] | None = None,
 ) -> Fill:
     """Return the fill that runs `kernel` over a chunk and settles what it leaves UNDECIDED one by one.
 
+    prepare: builds what `kernel` reads, where that takes time and is not there yet.
     Raises what `Budget.check` raises, also when the kernel stopped early.
     """
 
     def fill(points: FloatArray, locations: Locations, budget: Budget) -> Counts:
+        if prepare is not None:
+            prepare(budget.check)
         with np.errstate(all="ignore"):  # uncompiled, numpy scalars warn where the filter means to overflow
             n_beyond = int(kernel(as_read_only(points), locations, budget.flag))
         budget.check()
@@ -148,17 +153,12 @@ def _in_triangle(solid: Triangle) -> Locator:
 
 
 def _in_prism(solid: Triangle) -> Locator:
-    walls = prism_walls(solid)
-    if not any(any(wall) for wall in walls):  # no area: every product of the formula is zero
-
-        def fill(points: FloatArray, locations: Locations, budget: Budget) -> Counts:
-            locations[:] = 0
-            return Counts(0, 0)
-
-        return Locator("prism", fill)
-    rows, is_exact = rounded_rows(walls)
-
     def run(points: FloatArray, locations: Locations, flag: Flag) -> int:
+        walls = prism_walls(solid)
+        if not any(any(wall) for wall in walls):  # no area: every product of the formula is zero
+            locations[:] = 0
+            return 0
+        rows, is_exact = solid.prepared("rounded_walls", lambda: rounded_rows(walls))
         return int(locate_in_half_spaces(points, rows, is_exact, locations, flag))
 
     return Locator("prism", settled(run, rational_half(solid)))
@@ -169,7 +169,7 @@ def _in_polygon(solid: Polygon) -> Locator:
         rings: Rings = rings_of(solid)
         return int(locate_in_rings(points, *rings, locations, flag))
 
-    by_rays = settled(run, rational_half(solid))
+    by_rays = settled(run, rational_half(solid), lambda check: rings_of(solid, check))
 
     def choose(n_points: int, budget: Budget) -> Locator:
         cells = ring_cells_if_they_pay(solid, n_points, budget)
@@ -188,7 +188,7 @@ def _in_polyhedron(solid: Polyhedron) -> Locator:
         columns: Columns = columns_of(solid)
         return int(locate_by_columns(points, *columns, locations, flag))
 
-    by_rays = settled(run, rational_half(solid))
+    by_rays = settled(run, rational_half(solid), lambda check: columns_of(solid, check))
 
     def choose(n_points: int, budget: Budget) -> Locator:
         cells = cells_if_they_pay(solid, n_points, budget)

@@ -109,6 +109,10 @@ def _filtered(solid: Solid, pose: Pose, unposed: Locator, inverse: FloatArray, i
 
     def fill(points: FloatArray, locations: Locations, budget: Budget) -> Counts:
         moved, blurs = _moved(points, inverse, pose, is_turn)
+        if isinstance(solid, Polyhedron):
+            columns_of(solid, budget.check)
+        elif isinstance(solid, Polygon):
+            rings_of(solid, budget.check)
         with np.errstate(all="ignore"):
             n_beyond = int(blurred(moved, blurs, locations, budget.flag))
         budget.check()

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from engine.bounding.grid import BoxGrid, build_box_grid
-from engine.containment.rational_locate import next_in_ring
+from engine.containment.rational_locate import Check, next_in_ring, no_check
 from engine.containment.ray_parity import projected_area_signs
 from engine.predicates.rational import orient2d_rational
 from engine.solids.base import FloatArray, as_read_only
@@ -18,6 +18,8 @@ from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
 from engine.solids.triangle import Triangle
 from engine.types import UNDECIDED
+
+_AT_ONCE: Final = 1 << 16
 
 
 class Columns(NamedTuple):
@@ -49,46 +51,62 @@ class Rings(NamedTuple):
     """xmin, xmax, ymin, ymax."""
 
 
-def columns_of(solid: Polyhedron) -> Columns:
-    """Return the columns of `solid`, prepared once: about two triangles to a column if they are evenly spread."""
-    return solid.prepared("columns", lambda: _build_columns(solid))
+def columns_of(solid: Polyhedron, check: Check = no_check) -> Columns:
+    """Return the columns of `solid`, prepared once: about two triangles to a column if they are evenly spread.
+
+    check: called between the steps, a second's work for a million triangles; what it raises ends the building.
+    """
+    return solid.prepared("columns", lambda: _build_columns(solid, check))
 
 
-def _build_columns(solid: Polyhedron) -> Columns:
+def _build_columns(solid: Polyhedron, check: Check) -> Columns:
+    check()
     vertices = solid.vertices
-    corners = vertices[solid.triangles]
-    low, high = corners.min(axis=1), corners.max(axis=1)
+    low, high = np.empty((len(solid.triangles), 3)), np.empty((len(solid.triangles), 3))
+    for start in range(0, len(low), _AT_ONCE):
+        corners = vertices[solid.triangles[start : start + _AT_ONCE]]
+        corners.min(axis=1, out=low[start : start + _AT_ONCE])
+        corners.max(axis=1, out=high[start : start + _AT_ONCE])
+        check()
     order = np.argsort(-high[:, 2], kind="stable")
+    check()
     triangles = np.ascontiguousarray(solid.triangles[order], np.int32)
+    check()
     low, high = low[order], high[order]
     boxes = np.ascontiguousarray(np.stack([low, high], axis=2).reshape(len(order), 6))
     areas = np.empty(len(order), np.int8)
-    with np.errstate(all="ignore"):
-        projected_area_signs(vertices, triangles, areas)
+    for start in range(0, len(areas), _AT_ONCE):
+        check()
+        with np.errstate(all="ignore"):
+            projected_area_signs(vertices, triangles[start : start + _AT_ONCE], areas[start : start + _AT_ONCE])
     for index in np.flatnonzero(areas == UNDECIDED):
+        check()
         areas[index] = orient2d_rational(*vertices[triangles[index], :2].tolist())
     side = max(1, min(2048, int(len(order) ** 0.5)))
-    grid = build_box_grid(low[:, 0], high[:, 0], low[:, 1], high[:, 1], side, side)
+    grid = build_box_grid(low[:, 0], high[:, 0], low[:, 1], high[:, 1], side, side, check)
     return Columns(vertices, triangles, boxes, areas, grid, float(low[:, 2].min()))
 
 
-def rings_of(solid: Polygon | Triangle) -> Rings:
-    """Return the slabs of a polygon, or of a plane triangle as one ring, prepared once."""
+def rings_of(solid: Polygon | Triangle, check: Check = no_check) -> Rings:
+    """Return the slabs of a polygon, or of a plane triangle as one ring, prepared once; check as in `columns_of`."""
 
     def build() -> Rings:
+        check()
         if isinstance(solid, Triangle):
-            return _build_rings(solid.vertices, solid.vertices[[1, 2, 0]])
-        return _build_rings(solid.vertices, solid.vertices[next_in_ring(solid)])
+            return _build_rings(solid.vertices, solid.vertices[[1, 2, 0]], check)
+        return _build_rings(solid.vertices, solid.vertices[next_in_ring(solid)], check)
 
     return solid.prepared("slabs", build)
 
 
-def _build_rings(starts: FloatArray, ends: FloatArray) -> Rings:
+def _build_rings(starts: FloatArray, ends: FloatArray, check: Check) -> Rings:
     order = np.argsort(-np.maximum(starts[:, 0], ends[:, 0]), kind="stable")
+    check()
     starts, ends = np.ascontiguousarray(starts[order]), np.ascontiguousarray(ends[order])
+    check()
     low, high = np.minimum(starts, ends), np.maximum(starts, ends)
     flat = np.zeros(len(order))
-    slabs = build_box_grid(low[:, 1], high[:, 1], flat, flat, max(1, min(1 << 20, len(order))), 1)
+    slabs = build_box_grid(low[:, 1], high[:, 1], flat, flat, max(1, min(1 << 20, len(order))), 1, check)
     box = (float(low[:, 0].min()), float(high[:, 0].max()), float(low[:, 1].min()), float(high[:, 1].max()))
     return Rings(starts, ends, np.ascontiguousarray(high[:, 0]), slabs, box)
 

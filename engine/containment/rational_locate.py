@@ -40,7 +40,7 @@ MISSED, CROSSED, ON_FACE = 0, 1, 2
 _CHECK_EVERY = 64
 
 
-def _no_check() -> None:
+def no_check() -> None:
     """Stand in for `Budget.check` where there is no budget."""
 
 
@@ -250,7 +250,7 @@ def to_world_frame(point: Sequence[Number], pose: Pose) -> list[Fraction]:
     ]
 
 
-def rational_location(point: Sequence[Number], solid: Solid, pose: Pose | None = None, check: Check = _no_check) -> int:
+def rational_location(point: Sequence[Number], solid: Solid, pose: Pose | None = None, check: Check = no_check) -> int:
     """Locate one point exactly: 1 inside, 0 on the boundary, -1 outside.
 
     point: numbers of any exact kind, one per dimension of `solid`.

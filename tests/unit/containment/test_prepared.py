@@ -1,0 +1,50 @@
+"""Building what queries share stops when the call must end, and leaves nothing half built."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from engine.containment.locators import locator_of
+from engine.containment.prepared import columns_of, rings_of
+from engine.errors import DeadlineExceededError
+from engine.solids.base import Solid
+from engine.solids.polygon import Polygon
+from engine.solids.polyhedron import Polyhedron
+from engine.solids.triangle import Triangle
+
+TETRAHEDRON = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
+
+
+@pytest.mark.parametrize(
+    ("solid", "build", "least_checks"),
+    [(Polyhedron(*TETRAHEDRON), columns_of, 7), (Polygon([[[0, 0], [1, 0], [0, 1]]]), rings_of, 5)],
+)
+def test_every_step_can_be_the_last(solid: Solid, build: Callable[..., object], least_checks: int) -> None:
+    n_checks = 0
+    while True:
+        n_left = n_checks
+
+        def check() -> None:
+            nonlocal n_left
+            if n_left == 0:
+                raise DeadlineExceededError("the deadline of the test")
+            n_left -= 1
+
+        try:
+            built = build(solid, check)
+        except DeadlineExceededError:
+            n_checks += 1
+            continue
+        break
+    assert n_checks >= least_checks
+    assert build(solid) is built
+
+
+def test_choosing_a_method_prepares_nothing() -> None:
+    """A tree of many prisms would otherwise spend minutes in rational arithmetic before the first look at the clock."""
+    prism = Triangle(np.eye(3))
+    locator_of(prism)
+    assert prism.memory == prism.vertices.nbytes
