@@ -9,35 +9,43 @@ Source: D. Baraff, Dynamic simulation of non-penetrating rigid bodies, 1992 (swe
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from engine.jit import kernel
+from engine.jit import inline, kernel
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
-_ROOM = 1024
+BLOCK = 1 << 18
+"""Pairs given out at once: a scene in which all meet all has n^2 / 2, which need not fit into memory. Sorting one block
+takes some 20 ms."""
 
 
-def meeting_boxes(low: FloatArray, high: FloatArray, flag: Any) -> IntArray:
-    """Return ``(n_pairs, 2)`` pairs first < second, sorted, of closed boxes ``(n, d)`` with a common point.
+def meeting_boxes(low: FloatArray, high: FloatArray, flag: Any, block: int = BLOCK) -> Iterator[IntArray]:
+    """Yield ``(n_pairs, 2)`` pairs first < second of closed boxes ``(n, d)`` with a common point, block by block.
 
-    Cost: n log n for the sort, then one comparison for each pair that meets on the axis swept. Polls `flag` (1,) uint8
-    and returns early when it is set. Allocates the result, grown by doubling.
+    All pairs together are sorted by first, then second; a block has `block` pairs, or those of one first box if these
+    are more. Cost: n log n for the sort, then for each block one comparison for each pair that meets on the axis swept.
+    Polls `flag` (1,) uint8 and ends early, with wrong blocks, when it is set: the caller looks at it after each.
     """
-    axis = sweep_axis(low, high)
+    axis, n_boxes = sweep_axis(low, high), len(low)
     order = np.argsort(low[:, axis], kind="stable")
     low, high = np.ascontiguousarray(low[order]), np.ascontiguousarray(high[order])
-    found = np.empty((_ROOM, 2), np.int64)
-    n_found = _sweep(low, high, axis, found, flag)
-    if n_found > len(found):
-        found = np.empty((n_found, 2), np.int64)
-        n_found = min(_sweep(low, high, axis, found, flag), len(found))
-    pairs = np.sort(order[found[:n_found]], axis=1)
-    return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+    counts = np.zeros(n_boxes, np.int64)
+    _count(low, high, order, axis, counts, flag)
+    ends = np.cumsum(counts)
+    start = done = 0
+    while done < ends[-1]:  # bound: start grows
+        stop = max(start + 1, int(np.searchsorted(ends, done + block, side="right")))
+        keys = np.empty(int(ends[stop - 1]) - done, np.int64)
+        _collect(low, high, order, axis, start, stop, keys, flag)
+        keys.sort()
+        yield np.stack([keys // n_boxes, keys % n_boxes], axis=1)
+        start, done = stop, int(ends[stop - 1])
 
 
 def sweep_axis(low: FloatArray, high: FloatArray) -> int:
@@ -49,24 +57,41 @@ def sweep_axis(low: FloatArray, high: FloatArray) -> int:
     return int(np.argmin(np.where(np.isfinite(share), share, np.inf)))
 
 
+@inline
+def _meet(low: Any, high: Any, box: int, other: int) -> bool:
+    """Tell whether two closed boxes have a common point."""
+    meets = True
+    for k in range(low.shape[1]):
+        meets &= low[other, k] <= high[box, k] and low[box, k] <= high[other, k]
+    return meets
+
+
 @kernel
-def _sweep(low: Any, high: Any, axis: int, found: Any, flag: Any) -> int:
-    """Write meeting pairs into found (room, 2), boxes sorted by low on `axis`; return how many there are."""
-    n_found = 0
-    n_boxes, n_axes = low.shape
+def _count(low: Any, high: Any, order: Any, axis: int, counts: Any, flag: Any) -> None:
+    """Count into counts (n,) the pairs of which each box is the first by number; boxes sorted by low on `axis`."""
+    n_boxes = low.shape[0]
     for box in range(n_boxes):
         if flag[0] != 0:
-            break
-        end = high[box, axis]
+            return
         for other in range(box + 1, n_boxes):
-            if low[other, axis] > end:
+            if low[other, axis] > high[box, axis]:
                 break
-            meets = True
-            for k in range(n_axes):
-                meets &= low[other, k] <= high[box, k] and low[box, k] <= high[other, k]
-            if meets:
-                if n_found < found.shape[0]:
-                    found[n_found, 0] = box
-                    found[n_found, 1] = other
+            if _meet(low, high, box, other):
+                counts[min(order[box], order[other])] += 1
+
+
+@kernel
+def _collect(low: Any, high: Any, order: Any, axis: int, start: int, stop: int, keys: Any, flag: Any) -> None:
+    """Write first * n + second of the pairs with start <= first < stop into `keys`, which has room for just those."""
+    n_boxes, n_found = low.shape[0], 0
+    keys[:] = 0
+    for box in range(n_boxes):
+        if flag[0] != 0:
+            return
+        for other in range(box + 1, n_boxes):
+            if low[other, axis] > high[box, axis]:
+                break
+            first, second = min(order[box], order[other]), max(order[box], order[other])
+            if start <= first < stop and n_found < keys.shape[0] and _meet(low, high, box, other):
+                keys[n_found] = first * n_boxes + second
                 n_found += 1
-    return n_found

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from engine.bounding.sweep import meeting_boxes
+from engine.bounding.sweep import BLOCK, meeting_boxes
 from engine.collision.collide import check_pose, collide_pair, pair_function
 from engine.collision.result import Witness, Work
 from engine.collision.world_box import world_box
@@ -18,6 +18,8 @@ from engine.parallel import Budget, Cancel, Progress, run_chunks
 from engine.solids.base import IntArray, Solid
 from engine.solids.pose import Pose
 from engine.types import Accuracy, Relation
+
+Relations = npt.NDArray[np.int8]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,29 +74,53 @@ def collide_scene(
     bodies, placed = _checked(solids, poses)
     with Budget(deadline, cancel) as budget:
         budget.check()
-        pairs = _candidates(bodies, placed, budget)
-        pairs = _named(pairs, len(bodies), skip, only)
-        relations = np.zeros(len(pairs), np.int8)
-        found: list[Witness | None] = [None] * len(pairs)
+        skipped = None if skip is None else _keys(skip, len(bodies), "skip")
+        wanted = None if only is None else _keys(only, len(bodies), "only")
+        parts: list[tuple[IntArray, Relations, list[Witness | None]]] = []
         works: list[Work] = []
+        n_candidates = 0
+        for pairs in _candidates(bodies, placed, wanted, budget):
+            budget.check()
+            if skipped is not None:
+                pairs = pairs[~np.isin(pairs[:, 0] * len(bodies) + pairs[:, 1], skipped)]
+            n_candidates += len(pairs)
+            relations = np.zeros(len(pairs), np.int8)
+            found: list[Witness | None] = [None] * len(pairs) if witnesses else []
 
-        def task(start: int, stop: int) -> None:
-            work = Work(budget, witness=witnesses)
-            works.append(work)
-            for item in range(start, stop):
-                budget.check()
-                i, j = pairs[item].tolist()
-                answer = collide_pair(bodies[i], bodies[j], placed[i], placed[j], work)
-                relations[item], found[item] = answer.relation, answer.witness
+            def task(
+                start: int,
+                stop: int,
+                pairs: IntArray = pairs,
+                relations: Relations = relations,
+                found: list[Witness | None] = found,
+            ) -> None:
+                work = Work(budget, witness=witnesses)
+                works.append(work)
+                for item in range(start, stop):
+                    budget.check()
+                    i, j = pairs[item].tolist()
+                    answer = collide_pair(bodies[i], bodies[j], placed[i], placed[j], work)
+                    relations[item] = answer.relation
+                    if witnesses:
+                        found[item] = answer.witness
 
-        run_chunks(task, len(pairs), budget=budget, first_chunk=4, workers=workers, progress=progress)
-    kept = np.flatnonzero(relations != Relation.DISJOINT)
-    named = tuple(found[item] for item in kept.tolist()) if witnesses else None
-    result = ScenePairs(pairs[kept, 0], pairs[kept, 1], relations[kept], named)
+            run_chunks(task, len(pairs), budget=budget, first_chunk=4, workers=workers, progress=progress)
+            kept = np.flatnonzero(relations != Relation.DISJOINT)
+            parts.append((pairs[kept], relations[kept], [found[item] for item in kept.tolist()] if witnesses else []))
+        budget.check()
+    result = _joined(parts, witnesses)
     if not report:
         return result
     beyond, rational = sum(work.n_beyond_filter for work in works), sum(work.n_rational for work in works)
-    return result, Accuracy("exact", None, len(pairs), beyond, rational, "sweep")
+    return result, Accuracy("exact", None, n_candidates, beyond, rational, "sweep" if only is None else "named pairs")
+
+
+def _joined(parts: list[tuple[IntArray, Relations, list[Witness | None]]], witnesses: bool) -> ScenePairs:
+    """Return the colliding pairs of all blocks as one."""
+    pairs = np.concatenate([np.empty((0, 2), np.int64), *(part[0] for part in parts)])
+    relations = np.concatenate([np.empty(0, np.int8), *(part[1] for part in parts)])
+    named = tuple(witness for part in parts for witness in part[2]) if witnesses else None
+    return ScenePairs(pairs[:, 0].copy(), pairs[:, 1].copy(), relations, named)
 
 
 def _checked(solids: Sequence[Solid], poses: Sequence[Pose | None] | None) -> tuple[list[Solid], list[Pose | None]]:
@@ -121,29 +147,27 @@ def _checked(solids: Sequence[Solid], poses: Sequence[Pose | None] | None) -> tu
     return bodies, placed
 
 
-def _candidates(bodies: list[Solid], placed: list[Pose | None], budget: Budget) -> IntArray:
-    """Return the pairs whose boxes meet."""
-    if len(bodies) < 2:
-        return np.empty((0, 2), np.int64)
-    boxes = []
-    for count, (body, pose) in enumerate(zip(bodies, placed)):
-        if count % 256 == 0:
+def _candidates(
+    bodies: list[Solid], placed: list[Pose | None], wanted: IntArray | None, budget: Budget
+) -> Iterator[IntArray]:
+    """Yield the pairs whose boxes meet, of those wanted (keys first * n + second), in blocks, sorted."""
+    if len(bodies) < 2 or (wanted is not None and not len(wanted)):
+        return
+    low = np.empty((len(bodies), bodies[0].dimension))
+    high = np.empty_like(low)
+    for index, (body, pose) in enumerate(zip(bodies, placed)):
+        if index % 256 == 0:
             budget.check()
-        boxes.append(world_box(body, pose))
-    pairs = meeting_boxes(np.array([low for low, _ in boxes]), np.array([high for _, high in boxes]), budget.flag)
-    budget.check()
-    return pairs
-
-
-def _named(pairs: IntArray, n_bodies: int, skip: object, only: object) -> IntArray:
-    """Return the pairs without those named in `skip`, and only those named in `only`."""
-    keys = pairs[:, 0] * n_bodies + pairs[:, 1]
-    kept = np.ones(len(pairs), np.bool_)
-    if skip is not None:
-        kept &= ~np.isin(keys, _keys(skip, n_bodies, "skip"))
-    if only is not None:
-        kept &= np.isin(keys, _keys(only, n_bodies, "only"))
-    return pairs[kept]
+        low[index], high[index] = world_box(body, pose)
+    if wanted is None:
+        yield from meeting_boxes(low, high, budget.flag)
+        return
+    pairs = np.stack(np.divmod(np.unique(wanted), len(bodies)), axis=1)
+    pairs = pairs[pairs[:, 0] < pairs[:, 1]]
+    for start in range(0, len(pairs), BLOCK):
+        first, second = pairs[start : start + BLOCK].T
+        meet = ((low[first] <= high[second]) & (low[second] <= high[first])).all(axis=1)
+        yield pairs[start : start + BLOCK][meet]
 
 
 def _keys(named: Any, n_bodies: int, name: str) -> IntArray:

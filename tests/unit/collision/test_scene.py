@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import time
 
 import numpy as np
 import pytest
@@ -111,3 +112,12 @@ def test_witnesses_come_with_the_pairs_when_asked_for() -> None:
     assert pairs.witnesses is not None
     assert pairs.witnesses[0] is not None
     assert (pairs.witnesses[0].kind, pairs.witnesses[0].containing) == ("containment", "first")
+
+
+def test_a_scene_in_which_all_meet_all_ends_at_its_deadline() -> None:
+    solids = [Aabb([0, 0, 0], [1 + k, 1, 1]) for k in range(4000)]  # eight million pairs
+    collide_scene(solids[:3])  # compiles
+    before = time.monotonic()
+    with pytest.raises(DeadlineExceededError):
+        collide_scene(solids, deadline=0.5)
+    assert time.monotonic() - before < 2.0
