@@ -106,12 +106,13 @@ def fill_groups(
     """
     scale = lattice.scale
     n_groups = (last - first + LANES - 1) // LANES
-    for place in range(n_groups * LANES):
+    for group in range(first_group, first_group + n_groups):
+        for lane in range(LANES):
+            groups[group, ROWS - 1, lane] = 1.0 if group == first_group + n_groups - 1 else 0.0
+    for place in range(last - first, n_groups * LANES):
+        set_nothing(groups[first_group + place // LANES, :, place % LANES])
+    for place in range(last - first):
         row = groups[first_group + place // LANES, :, place % LANES]
-        row[ROWS - 1] = 1.0 if place >= (n_groups - 1) * LANES else 0.0
-        if first + place >= last:
-            set_nothing(row)
-            continue
         triangle = lists[first + place]
         a = corner(vertices, triangles[triangle, 0])
         b = corner(vertices, triangles[triangle, 1])
@@ -201,17 +202,17 @@ def fill_leaves(
     firsts: Any,
     lists: Any,
     level: int,
+    starts: Any,
     groups: Any,
     flag: Any,
 ) -> None:
-    """Fill groups (n, 14, 8) float32 with the lists of `cells`, one after another."""
+    """Fill groups (n, 14, 8) float32 with the lists of `cells`, each from the group in starts."""
     parts = parts_of(level)
-    place = 0
     for item in range(len(cells)):
         if flag[0]:
             break
         cell = cells[item]
         reference = reference_point(lattice, places[cell, 0], places[cell, 1], places[cell, 2], share_of(level))
-        place = fill_groups(
-            groups, place, vertices, triangles, lists, firsts[cell], firsts[cell + 1], lattice, reference, parts
+        fill_groups(
+            groups, starts[item], vertices, triangles, lists, firsts[cell], firsts[cell + 1], lattice, reference, parts
         )
