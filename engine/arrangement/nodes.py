@@ -155,10 +155,14 @@ def float_nodes(coordinates: npt.NDArray[np.float64], budget: Budget | None = No
 Rational = int | float | Fraction
 
 
-def rational_nodes(coordinates: Iterable[Sequence[Rational]]) -> tuple[NodeTable, list[int]]:
+def rational_nodes(
+    coordinates: Iterable[Sequence[Rational]], budget: Budget | None = None
+) -> tuple[NodeTable, list[int]]:
     """Return a table holding the points `coordinates`, (x, y) of ints, floats or fractions, and the number of each."""
     nodes, numbers = NodeTable(0), []
-    for x, y in coordinates:
+    for k, (x, y) in enumerate(coordinates):
+        if budget is not None and k % _POLL == 0:
+            budget.check()
         (p, q), (r, s) = Fraction(x).as_integer_ratio(), Fraction(y).as_integer_ratio()
         w = lcm(q, s)
         numbers.append(nodes.add(reduced(p * (w // q), r * (w // s), w)))

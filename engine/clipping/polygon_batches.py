@@ -33,7 +33,7 @@ class KernelScene:
     at: FloatArray
 
 
-def kernel_scene(vertices: FloatArray, planes: list[Row]) -> KernelScene | None:
+def kernel_scene(vertices: FloatArray, planes: list[Row], budget: Budget) -> KernelScene | None:
     """Return the scene as the kernel takes it, None where numbers lie too far apart for it."""
     exponent = exponent_of(vertices)
     points = shifted(vertices, -exponent) if exponent else vertices
@@ -42,6 +42,8 @@ def kernel_scene(vertices: FloatArray, planes: list[Row]) -> KernelScene | None:
     high, low = np.zeros((len(planes), len(planes[0]))), np.zeros((len(planes), len(planes[0])))
     axes, at = np.full(len(planes), -1, np.int64), np.zeros(len(planes))
     for i, row in enumerate(planes):
+        if i % 256 == 0:
+            budget.check()
         *normal, offset = [x << exponent for x in row[:-1]] + [row[-1]] if exponent > 0 else row
         offset = offset << -exponent if exponent < 0 else offset
         shift = max(map(int.bit_length, normal))  # the row is divided by 2^shift: its largest number is about 1

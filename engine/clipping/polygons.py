@@ -169,7 +169,12 @@ def _planes(region: Solid, budget: Budget) -> list[Row]:
                 "aabb, convex or convex polyhedron, or use overlay for polygons in the plane",
                 ("region",),
             )
-    return list(dict.fromkeys(reduced(integer_row(row)) for row in rows.tolist()))
+    found: dict[Row, None] = {}
+    for index, row in enumerate(rows.tolist()):
+        if index % 256 == 0:
+            budget.check()
+        found[reduced(integer_row(row))] = None
+    return list(found)
 
 
 def as_contours(polygons: Any, dimension: int) -> tuple[FloatArray, IntArray, IntArray]:
@@ -233,7 +238,7 @@ def _clip(
     parts: dict[int, FloatArray] = {}
 
     vertices.setflags(write=False)
-    scene = kernel_scene(vertices, planes)
+    scene = kernel_scene(vertices, planes, budget)
     is_open = np.ones(n, np.uint8)
 
     def settle(i: int) -> FloatArray:

@@ -54,7 +54,7 @@ def collide_half_space_outline(
     half_space: HalfSpace, body: Solid, half_space_pose: Pose | None, body_pose: Pose | None, work: Work
 ) -> Collision:
     """Return the relation of a half-plane (first) and a polygon, triangle or 2D box (second), exact."""
-    outline = outline_of(body, body_pose)
+    outline = outline_of(body, body_pose, work.budget)
     plane = image_half_space(half_space.normal, half_space.offset, half_space_pose)
     signs = np.array([sign_of(dot(plane[0], point) + plane[1]) for point in outline.points], np.int8)
 

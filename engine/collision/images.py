@@ -7,13 +7,14 @@ half-space n . p + d >= 0 is that of the affine map: with A the adjugate of R, R
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from fractions import Fraction
 
 from engine.solids.base import FloatArray
 from engine.solids.pose import Pose
 
 Vector = tuple[Fraction, ...]
+_CHECK_EVERY = 64
 
 
 def as_vector(numbers: Iterable[float]) -> Vector:
@@ -45,14 +46,22 @@ def image_point(point: Iterable[float], pose: Pose | None) -> Vector:
     return tuple(dot(as_vector(row), p) + shift for row, shift in zip(pose.rotation, t))
 
 
-def image_points(points: FloatArray, pose: Pose | None) -> list[Vector]:
-    """Return the exact images of the rows of ``(n, d)`` points."""
+def image_points(points: FloatArray, pose: Pose | None, check: Callable[[], object]) -> list[Vector]:
+    """Return the exact images of the rows of ``(n, d)`` points; `check` is called now and then."""
+    check()
     if pose is None:
-        return [as_vector(point) for point in points.tolist()]
+        return [as_vector(point) for point in _watched(points, check)]
     rows = [as_vector(row) for row in pose.rotation.tolist()]
     shifts = as_vector(pose.translation)
-    vectors = (as_vector(point) for point in points.tolist())
+    vectors = (as_vector(point) for point in _watched(points, check))
     return [tuple(dot(row, p) + shift for row, shift in zip(rows, shifts)) for p in vectors]
+
+
+def _watched(points: FloatArray, check: Callable[[], object]) -> Iterator[list[float]]:
+    for index, point in enumerate(points.tolist()):
+        if index % _CHECK_EVERY == 0:
+            check()
+        yield point
 
 
 def image_half_space(normal: FloatArray, offset: float, pose: Pose | None) -> tuple[Vector, Fraction]:

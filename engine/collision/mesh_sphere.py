@@ -195,7 +195,7 @@ def _placed(vertices: FloatArray, pose: Pose | None, reach: float) -> tuple[Floa
 
 
 def _outline_features(body: Solid, pose: Pose | None, center: Vector, work: Work) -> Features:
-    outline = outline_of(body, pose)
+    outline = outline_of(body, pose, work.budget)
     vertices = np.array([[rounded(value) for value in point] for point in outline.points])
 
     def reaches_inside(candidates: list[int], limit: Fraction) -> bool:

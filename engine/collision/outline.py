@@ -52,14 +52,14 @@ class Outline:
         return self.points[start], self.points[end]
 
 
-def outline_of(body: Solid, pose: Pose | None) -> Outline:
+def outline_of(body: Solid, pose: Pose | None, budget: Budget) -> Outline:
     """Return the edges of a polygon, a triangle or a box of the plane under `pose`."""
     vertices, offsets = _rings_of(body)
     ends = np.empty((len(vertices), 2), np.int64)
     ends[:, 0] = np.arange(len(vertices))
     ends[:, 1] = ends[:, 0] + 1
     ends[offsets[1:] - 1, 1] = offsets[:-1]
-    points: list[Point] = [(p[0], p[1]) for p in image_points(vertices, pose)]
+    points: list[Point] = [(p[0], p[1]) for p in image_points(vertices, pose, budget.check)]
     floats = vertices if pose is None else np.array([[rounded(x), rounded(y)] for x, y in points])
     low, high = np.minimum(floats[ends[:, 0]], floats[ends[:, 1]]), np.maximum(floats[ends[:, 0]], floats[ends[:, 1]])
     return Outline(points, ends, low, high, vertices if pose is None else None)
@@ -85,7 +85,7 @@ def _rings_of(body: Solid) -> tuple[FloatArray, IntArray]:
 
 def arrange_outlines(outlines: list[Outline], budget: Budget) -> tuple[Arrangement, list[list[int]]]:
     """Return the arrangement of all edges (bit k of a mask: outline k), and the nodes of each outline's vertices."""
-    nodes, numbers = _nodes_of(outlines)
+    nodes, numbers = _nodes_of(outlines, budget)
     segments: list[tuple[int, int]] = []
     masks: list[int] = []
     for k, (outline, own) in enumerate(zip(outlines, numbers)):
@@ -94,12 +94,12 @@ def arrange_outlines(outlines: list[Outline], budget: Budget) -> tuple[Arrangeme
     return arrange(nodes, segments, masks, budget), numbers
 
 
-def _nodes_of(outlines: list[Outline]) -> tuple[NodeTable, list[list[int]]]:
+def _nodes_of(outlines: list[Outline], budget: Budget) -> tuple[NodeTable, list[list[int]]]:
     floats = [outline.floats for outline in outlines if outline.floats is not None]
     if len(floats) == len(outlines):
-        nodes, flat = float_nodes(np.concatenate(floats))
+        nodes, flat = float_nodes(np.concatenate(floats), budget)
     else:
-        nodes, flat = rational_nodes([point for outline in outlines for point in outline.points])
+        nodes, flat = rational_nodes([point for outline in outlines for point in outline.points], budget)
     numbers, start = [], 0
     for outline in outlines:
         numbers.append(flat[start : start + len(outline.points)])

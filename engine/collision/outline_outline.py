@@ -15,6 +15,7 @@ from engine.arrangement.subdivision import label_faces, subdivide
 from engine.collision.outline import Outline, arrange_outlines, outline_of, single_points
 from engine.collision.result import Collision, Kind, Witness, Work
 from engine.containment.rational_locate import rational_location
+from engine.parallel import Budget
 from engine.predicates.rational import orient2d_rational
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
@@ -31,7 +32,7 @@ def collide_outline_outline(
     Bodies are closed sets under even-odd; an edge that cancels is boundary still, but no interior lies beside it. Where
     nothing is left of the interior (zero area, doubled rings) a body never overlaps.
     """
-    a, b = outline_of(first, first_pose), outline_of(second, second_pose)
+    a, b = outline_of(first, first_pose, work.budget), outline_of(second, second_pose, work.budget)
     if (a.low.min(0) > b.high.max(0)).any() or (b.low.min(0) > a.high.max(0)).any():
         return Collision(Relation.DISJOINT)
     arrangement, _ = arrange_outlines([a, b], work.budget)
@@ -55,7 +56,9 @@ def collide_outline_outline(
             return Collision(Relation.SECOND_INSIDE_FIRST, Witness("containment", containing="first"))
     overlapping = BOTH in labels
     pierces = not overlapping and (any(first_parts) or any(second_parts))
-    witness = _witness(a, b, pierces, "second" if any(first_parts) else "first")
+    witness = None
+    if work.witness:
+        witness = _witness(a, b, pierces, "second" if any(first_parts) else "first", work.budget)
     return Collision(Relation.OVERLAPPING if overlapping else Relation.TOUCHING, witness)
 
 
@@ -70,9 +73,10 @@ def _boundaries_meet(arrangement: Arrangement) -> bool:
     return BOTH in at_node
 
 
-def _witness(a: Outline, b: Outline, pierces: bool, containing: str) -> Witness:
+def _witness(a: Outline, b: Outline, pierces: bool, containing: str, budget: Budget) -> Witness:
     """Return the first pair of edges, by their numbers, that meet; a containment where no two edges do."""
     for i in range(a.n_edges):
+        budget.check()
         near = (b.low <= a.high[i]).all(axis=1) & (b.high >= a.low[i]).all(axis=1)
         for j in np.flatnonzero(near).tolist():
             kind = _meeting(*a.edge(i), *b.edge(j))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -144,3 +145,16 @@ def test_a_ball_keeps_its_relation_under_a_common_pose(other: engine.Solid) -> N
             assert collide(ball, body, first_pose=pose, second_pose=pose).relation == Relation.TOUCHING
         pairs = engine.collide_scene([ball, other], [pose, pose])
         assert pairs.relation.tolist() == [Relation.TOUCHING]
+
+
+def test_large_outlines_end_at_their_deadline() -> None:
+    t = np.linspace(0, 2 * np.pi, 30_000, endpoint=False)
+    ring = np.stack([np.cos(t), np.sin(t)], axis=1) * (1 + 0.1 * np.sin(999 * t))[:, None]
+    body, step = engine.Polygon([ring]), Pose(np.eye(2), [0.001, 0.0])
+    small = engine.Polygon([ring[::3000]])
+    for pose_ in (None, step):
+        collide(small, small, second_pose=pose_)  # compiles
+        before = time.monotonic()
+        with pytest.raises(engine.DeadlineExceededError):
+            collide(body, body, second_pose=pose_, deadline=0.05)
+        assert time.monotonic() - before < 0.5
