@@ -1,0 +1,40 @@
+"""Rows in blocks: answers do not depend on what else is in a block, near rows, far points or the ends of the range."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+
+from engine import Convex, locate
+
+
+def exact(points: Any, rows: Any) -> list[int]:
+    """Return the least sign of all rows at each point."""
+    found = []
+    for point in points.tolist():
+        values = [sum(Fraction(c) * Fraction(x) for c, x in zip(row, [*point, 1.0], strict=True)) for row in rows]
+        found.append(min((v > 0) - (v < 0) for v in values))
+    return found
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("scales", [(1.0, 1.0), (1.0, 1e12), (2.0**-1000, 1.0), (1.0, 1e304), (5e-324, 1e-300)])
+def test_lattice_points_on_many_rows(dimension: int, scales: tuple[float, float]) -> None:
+    random = np.random.default_rng(dimension)
+    rows = random.integers(-3, 4, (6, dimension + 1)).astype(np.float64)
+    rows[:, 0] += (rows[:, :-1] == 0).all(axis=1)
+    rows[:, -1] += 4.0
+    rows[::2] *= scales[0]
+    rows[1::2] *= scales[1]
+    points = random.integers(-2, 3, (600, dimension)).astype(np.float64)
+    points[300] = 1e200  # spoils the bound of its block only
+    points[301] = 1e-320
+    points[599] = -1e308
+    found = locate(points, Convex(rows))
+    assert found.tolist() == exact(points, rows.tolist())
+    assert {-1, 1} <= set(found.tolist())
+    alone = np.concatenate([locate(points[item : item + 1], Convex(rows)) for item in range(290, 310)])
+    assert np.array_equal(alone, found[290:310])
