@@ -172,6 +172,9 @@ def overlay_batch(
     overlaid.
     """
     _check_options(operation, output)
+    for solids, name in ((subjects, "subjects"), (clips, "clips")):
+        if not isinstance(solids, (list, tuple)):
+            raise InvalidArrayError(f"{name} must be a list of polygons, got {type(solids).__name__}", (name,))
     if len(subjects) != len(clips):
         raise InvalidArrayError(
             f"subjects and clips must be of equal length, got {len(subjects)} and {len(clips)}", ("clips",)

@@ -257,3 +257,11 @@ def test_refusals() -> None:
     cancel.set()
     with pytest.raises(CancelledError):
         overlay(square, square, cancel=cancel)
+
+
+@pytest.mark.parametrize("wrong", [None, 3, Polygon([[(0, 0), (1, 0), (0, 1)]]), "ab"])
+def test_a_batch_that_is_no_list_is_refused(wrong: Any) -> None:
+    with pytest.raises(InvalidArrayError, match="subjects must be a list of polygons"):
+        overlay_batch(wrong, [])
+    with pytest.raises(InvalidArrayError, match="clips must be a list of polygons"):
+        overlay_batch([], wrong)
