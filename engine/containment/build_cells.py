@@ -90,7 +90,9 @@ def cells_if_they_pay(solid: Polyhedron, n_points: int, budget: Budget) -> Cells
     """
     seen = solid.prepared("points_seen", lambda: [0])
     seen[0] += n_points
-    if seen[0] < _PAYS_FROM + _PAYS_PER_FACE * len(solid.triangles) or not can_have_cells(solid):
+    if seen[0] < _PAYS_FROM + _PAYS_PER_FACE * len(solid.triangles):
+        return None
+    if not solid.prepared("can_have_cells", lambda: can_have_cells(solid)):
         return None
     return solid.prepared("cells", lambda: build_cells(solid, budget))
 
