@@ -124,15 +124,16 @@ def mesh_of_size(size: str, seed: int) -> Mesh:
 
 
 def star_polygon(n_vertices: int, seed: int) -> Rings:
-    """Return a polygon around the origin with a rough outline: radii of many wavelengths, random angles."""
+    """Return a polygon around the origin like a coast: radii of many wavelengths, random angles."""
     name = f"star_{n_vertices}"
     random = generator(name, seed)
     angles = np.sort(random.uniform(0.0, 2.0 * np.pi, n_vertices))
     if np.diff(angles).max() > np.pi / 2:  # few vertices: a gap would leave the origin out
         angles = (np.arange(n_vertices) + random.uniform(0.0, 0.9, n_vertices)) * (2.0 * np.pi / n_vertices)
-    radii = random.uniform(0.8, 1.0, n_vertices)
-    for wave in range(2, 9):
-        radii += np.sin(wave * angles + random.uniform(0.0, 7.0)) / (3.0 * wave)
+    # roughness of about the spacing: more, and every horizontal line would meet thousands of edges
+    radii = 1.0 + random.uniform(-1.0, 1.0, n_vertices) * min(0.1, 6.0 / n_vertices)
+    for wave in range(2, max(3, min(40, n_vertices // 4))):
+        radii += np.sin(wave * angles + random.uniform(0.0, 7.0)) / (2.0 * wave**1.5)
     return Rings(name, [np.stack([radii * np.cos(angles), radii * np.sin(angles)], axis=1)])
 
 
