@@ -17,6 +17,7 @@ from starlette.responses import Response
 import engine
 from service.docs import router as docs_router
 from service.errors import faults_of, http_fault, problem
+from service.metrics import Metrics
 from service.openapi import openapi_of
 from service.routes import bounds, collision, containment, health, overlay, polygons, segments, solids
 from service.settings import Settings
@@ -47,6 +48,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     )
     app.state.settings = settings
     app.state.store = Store(settings.store_bytes)
+    app.state.metrics = Metrics()
     app.state.warm, app.state.warm_error = threading.Event(), None
     app.openapi = openapi_of(app, settings)  # type: ignore[method-assign]
     for module in (containment, collision, segments, polygons, overlay, bounds, solids, health):

@@ -38,8 +38,13 @@ class GeometryRoute(APIRoute):
         adapter = None if model is None else TypeAdapter(model)
 
         async def handle(request: Request) -> Response:
+            call = Call(request.app.state.settings, request.app.state.store)
+            response = await answer(request, call)
+            request.app.state.metrics.count(self.operation_id or self.name, response.status_code, call.seconds)
+            return response
+
+        async def answer(request: Request, call: Call) -> Response:
             state = request.app.state
-            call = Call(state.settings, state.store)
             try:
                 body = b""
                 if adapter is not None:

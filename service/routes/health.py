@@ -1,4 +1,4 @@
-"""Is the service alive, and is it ready?"""
+"""Is the service alive, is it ready, and what has it done?"""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Literal
 
 from fastapi import APIRouter
 from starlette.requests import Request
-from starlette.responses import Response
+from starlette.responses import PlainTextResponse, Response
 
 from service.errors import problem
 from service.routes.base import responses
@@ -35,6 +35,12 @@ async def readyz(request: Request) -> Response:
         return _ok()
     reason = request.app.state.warm_error or "kernels are being compiled or loaded; ask again in a second"
     return problem([Fault((), "not_ready", reason)])
+
+
+@router.get("/metrics", operation_id="metrics", response_class=PlainTextResponse)
+async def metrics(request: Request) -> Response:
+    """Requests and phases counted by this process, in the text format of Prometheus."""
+    return PlainTextResponse(request.app.state.metrics.text(), media_type="text/plain; version=0.0.4")
 
 
 def _ok() -> Response:

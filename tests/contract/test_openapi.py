@@ -30,6 +30,7 @@ OPERATIONS = {
     ("head", "/v1/solids/{solid_id}"): "has_solid",
     ("get", "/healthz"): "healthz",
     ("get", "/readyz"): "readyz",
+    ("get", "/metrics"): "metrics",
 }
 
 
@@ -75,13 +76,14 @@ def test_operations_have_names_of_their_own(made: dict[str, Any]) -> None:
 
 
 def test_one_media_type_for_each_operation_and_direction(made: dict[str, Any]) -> None:
-    for item in made["paths"].values():
+    for path, item in made["paths"].items():
         for operation in item.values():
             if "requestBody" in operation:
                 assert list(operation["requestBody"]["content"]) == ["application/json"]
                 assert operation["requestBody"]["required"] is True
             for status, response in operation["responses"].items():
-                expected = "application/json" if status < "300" else "application/problem+json"
+                answer = "text/plain" if path == "/metrics" else "application/json"
+                expected = answer if status < "300" else "application/problem+json"
                 assert list(response.get("content", {expected: 0})) == [expected]
 
 

@@ -237,7 +237,7 @@ COLLIDE = {
         pair("turned box on a box", "a rounded rotation is no rotation: exact on its numbers", UNIT, UNIT, first_pose=None,
              second_pose={"rotation": [[0.6, -0.8, 0], [0.8, 0.6, 0], [0, 0, 1]], "translation": [1.8, 0, 0]}),
         pair("turned half-space", "the exact image of a plane", half_space((1, 0, 0), -1), UNIT, first_pose=TURN, second_pose=TURN),
-        pair("turned box and sphere", "a sphere's centre moves, its radius does not", sphere((2, 0.5, 0.5), 1), aabb((0, 0, 0), (1, 1, 1)),
+        pair("turned box and sphere", "two bodies given the same pose have the relation they have unposed", sphere((2, 0.5, 0.5), 1), aabb((0, 0, 0), (1, 1, 1)),
              first_pose=TURN, second_pose=TURN),
     ],
     "spheres_and_half_spaces": [
