@@ -12,7 +12,7 @@ from engine.containment.prepared import Rings, rings_of
 from engine.containment.ring_cells import walk_rows
 from engine.containment.ring_crossing import locate_in_rings
 from engine.parallel import Budget
-from engine.solids.base import FloatArray
+from engine.solids.base import FloatArray, as_read_only
 from engine.solids.polygon import Polygon
 
 _PAYS_FROM: Final = 1 << 12
@@ -101,7 +101,7 @@ def _ask(
     cells, points = cells[is_valid], np.ascontiguousarray(points[is_valid])
     for start in range(0, len(cells), _AT_ONCE):
         found = np.empty(len(points[start : start + _AT_ONCE]), np.int8)
-        locate_in_rings(points[start : start + _AT_ONCE], *rings, found, budget.flag)
+        locate_in_rings(as_read_only(points[start : start + _AT_ONCE]), *rings, found, budget.flag)
         budget.check()
         found[np.abs(found) != 1] = 0
         heads[cells[start : start + _AT_ONCE]] = found
