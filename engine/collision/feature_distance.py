@@ -1,14 +1,10 @@
-"""Squared distances from a point to segments and triangles: exact in rationals, and float64 bounds for many at once.
+"""Squared distances from a point to segments and triangles: exact in rationals, and float64 bounds for many boxes.
 
-The bounds come first: with M the largest difference of coordinates and u = 2^-53, each squared distance computed below
-is within 2^-40 M^2 of the exact one for the rounded differences that go into it, whatever the shape of the triangle,
-because it is a minimum over the distances to points of the triangle itself (an upper bound, each evaluated with a few
-roundings) and, for the lower bound, the triangle's box alone. What the bounds leave open is settled exactly.
+The bounds come first, from boxes alone; the faces whose boxes leave a contact open are measured exactly.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from fractions import Fraction
 
 import numpy as np
@@ -63,8 +59,3 @@ def box_distance_bounds(point: FloatArray, low: FloatArray, high: FloatArray) ->
     lower[np.isnan(lower) | np.isinf(lower)] = 0.0
     upper[np.isnan(upper)] = np.inf
     return lower, upper
-
-
-def nearest_of(distances: Sequence[Fraction]) -> int:
-    """Return the index of the smallest distance, the first of equals."""
-    return min(range(len(distances)), key=distances.__getitem__)

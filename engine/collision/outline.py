@@ -132,11 +132,6 @@ def is_clean(outline: Outline, number: int) -> bool:
     return True
 
 
-def has_single_points(outline: Outline) -> bool:
-    """Tell whether some ring has one position only (it bounds nothing, yet it is boundary)."""
-    return bool(single_points(outline))
-
-
 def single_points(outline: Outline) -> list[int]:
     """Return one vertex of each ring that has one position only."""
     starts = np.flatnonzero(outline.ends[:, 1] != outline.ends[:, 0] + 1)  # the last edge of each ring
