@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-PEERS = ("numpy_planes", "open3d_occupancy", "shapely_polygons")
+PEERS = ("coal_calls", "fcl_calls", "numpy_planes", "open3d_occupancy", "shapely_polygons")
 
 
 @dataclass(frozen=True, slots=True)

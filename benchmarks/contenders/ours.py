@@ -8,6 +8,7 @@ import numpy as np
 
 import engine
 from benchmarks.contenders import Prepared
+from benchmarks.poses import Pair
 from benchmarks.workloads import Bodies, Mesh, Planes, Rings
 
 NAME, PACKAGE = "ours", None
@@ -58,8 +59,21 @@ def _scene_polyhedra(bodies: Bodies, threads: int) -> Prepared:
     return _scene([engine.Polyhedron(body.vertices, body.faces) for body in bodies.bodies], threads)
 
 
+def _mesh_pair(pair: Pair, threads: int) -> Prepared:
+    first, second = pair.solids()
+
+    def native(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return pair.rotations[rows], pair.translations[rows]
+
+    def ask(poses: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+        return engine.collide_poses(first, second, *poses, workers=threads)
+
+    return Prepared(native, ask, lambda found: found, lambda: first.memory + second.memory)
+
+
 MAKERS = {
     "polyhedron": _polyhedron,
+    "mesh_pair": _mesh_pair,
     "polygon": _polygon,
     "convex": _convex,
     "scene_polygons": _scene_polygons,
