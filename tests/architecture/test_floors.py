@@ -22,6 +22,7 @@ FLOORS = {
     "engine.clipping": 5,
     "engine.collision": 5,
     "engine.textbook": 5,
+    "engine.distributed": 6,
     "engine.warmup": 6,
     "engine": 7,
 }

@@ -1,0 +1,159 @@
+"""Batches over Dask: `locate`, `collide_poses`, `clip_segments` and `overlay_batch` on more than one machine.
+
+Each function splits its batch into parts, sends the solids once to every worker, keeps a few parts per thread in flight
+and puts the answers in order, so that the result is that of the function of the same name in `engine`, bit for bit. A
+part whose worker is lost is given to another; the answer of a part has its own place, so nothing is lost or counted
+twice. Dask gives a part up after some lost workers (its setting `distributed.scheduler.allowed-failures`) and raises
+`KilledWorker`. Needs the extra ``distributed`` and, on each worker, this package.
+
+client: a `distributed.Client`, its threads are used. part: items sent at a time. progress: called with the number of
+items just finished. All other parameters, results and errors are those of the function in `engine`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from typing import Any
+
+import dask.config
+import numpy as np
+import numpy.typing as npt
+from distributed import Client, Future, as_completed
+
+from engine.clipping import segments as clipping
+from engine.clipping.overlay import Operation, Output, OverlayBatch
+from engine.clipping.overlay import overlay_batch as overlay_pairs
+from engine.collision import collide_poses as poses
+from engine.containment import locate as containment
+from engine.errors import InvalidArrayError, InvalidInputError
+from engine.parallel import Progress, check_options
+from engine.solids.base import Solid
+from engine.solids.checks import as_point_groups, as_points
+
+PARTS_PER_THREAD = 3
+"""Parts in flight: so many that no thread waits for the network, so few that a batch may be larger than a worker."""
+
+Function = Callable[..., Any]
+
+
+def locate(
+    client: Client, points: object, solid: Solid, *, part: int = 200_000, progress: Progress | None = None
+) -> npt.NDArray[np.int8]:
+    """Locate points in a solid, see `engine.locate`."""
+    rows = as_points(points, solid.dimension)
+    result = np.empty(len(rows), np.int8)
+    for start, answer in _answers(client, _locate, (solid,), (rows,), part, progress):
+        result[start : start + len(answer)] = answer
+    return result
+
+
+def collide_poses(
+    client: Client,
+    first: Solid,
+    second: Solid,
+    rotations: object,
+    translations: object,
+    *,
+    part: int = 2_000,
+    progress: Progress | None = None,
+) -> npt.NDArray[np.int8]:
+    """Decide how `first` lies to `second` under many poses, see `engine.collide_poses`."""
+    turns, moves = poses.as_poses(rotations, translations, first.dimension)
+    result = np.empty(len(turns), np.int8)
+    for start, answer in _answers(client, _collide_poses, (first, second), (turns, moves), part, progress):
+        result[start : start + len(answer)] = answer
+    return result
+
+
+def clip_segments(
+    client: Client, segments: object, region: Solid, *, part: int = 100_000, progress: Progress | None = None
+) -> clipping.SegmentPieces:
+    """Clip segments on a region, see `engine.clip_segments`."""
+    rows = as_point_groups(segments, 2, region.dimension, ("segments",))
+    found = sorted(_answers(client, _clip_segments, (region,), (rows,), part, progress), key=lambda each: each[0])
+    if not found:
+        return _clip_segments((region,), rows)
+    source = np.concatenate([start + pieces.source for start, pieces in found])
+    start, end, t, faces = (
+        np.concatenate([getattr(pieces, name) for _, pieces in found]) for name in ("start", "end", "t", "faces")
+    )
+    return clipping.SegmentPieces(source, start, end, t, faces)
+
+
+def overlay_batch(
+    client: Client,
+    subjects: Sequence[Solid],
+    clips: Sequence[Solid],
+    operation: Operation = "intersection",
+    *,
+    output: Output = "valid",
+    part: int = 1_000,
+    progress: Progress | None = None,
+) -> OverlayBatch:
+    """Combine pairs of polygons, see `engine.overlay_batch`."""
+    overlay_pairs(subjects[:0], clips[:0], operation, output=output)  # checks the options here, not on a worker
+    if len(subjects) != len(clips):
+        raise InvalidArrayError(
+            f"subjects and clips must be of equal length, got {len(subjects)} and {len(clips)}", ("clips",)
+        )
+    function = partial(_overlay_batch, operation=operation, output=output)
+    found = sorted(_answers(client, function, (), (subjects, clips), part, progress), key=lambda each: each[0])
+    status = np.concatenate([np.zeros(0, np.int8), *(batch.status for _, batch in found)])
+    return OverlayBatch(tuple(overlay for _, batch in found for overlay in batch.overlays), status)
+
+
+def _locate(solids: tuple[Solid, ...], points: Any) -> Any:
+    return containment.locate(points, solids[0], workers=1)
+
+
+def _collide_poses(solids: tuple[Solid, ...], turns: Any, moves: Any) -> Any:
+    return poses.collide_poses(solids[0], solids[1], turns, moves, workers=1)
+
+
+def _clip_segments(solids: tuple[Solid, ...], segments: Any) -> clipping.SegmentPieces:
+    return clipping.clip_segments(segments, solids[0], workers=1)
+
+
+def _overlay_batch(_: tuple[Solid, ...], subjects: Any, clips: Any, **options: Any) -> Any:
+    return overlay_pairs(subjects, clips, workers=1, **options)
+
+
+def _answers(
+    client: Client,
+    function: Function,
+    solids: tuple[Solid, ...],
+    arrays: tuple[Any, ...],
+    part: int,
+    progress: Progress | None,
+) -> Iterator[tuple[int, Any]]:
+    """Yield the start of each part and its answer as they arrive; on an error cancel what is under way."""
+    check_options(None, progress)
+    if isinstance(part, bool) or not isinstance(part, int) or part < 1:
+        raise InvalidInputError(f"part must be a whole number from 1, got {part!r}", ("part",))
+    starts = list(range(0, len(arrays[0]), part))[::-1]
+    waiting: dict[Future, int] = {}
+
+    def submit(queue: as_completed) -> None:
+        start = starts.pop()
+        rows = [array[start : start + part] for array in arrays]
+        future = client.submit(function, held, *rows, pure=False)
+        waiting[future] = start
+        queue.add(future)
+
+    with dask.config.set({"distributed.admin.large-graph-warning-threshold": "1 PiB"}):
+        # The solids are the result of a task, not scattered: Dask makes them again when all that held them are gone.
+        held = client.submit(tuple, solids, pure=False)
+        queue = as_completed()
+        try:
+            for _ in range(min(len(starts), PARTS_PER_THREAD * max(1, sum(client.nthreads().values())))):
+                submit(queue)
+            for future in queue:
+                start = waiting.pop(future)
+                yield start, future.result()
+                if progress is not None:
+                    progress(min(part, len(arrays[0]) - start))
+                if starts:
+                    submit(queue)
+        finally:
+            client.cancel([held, *waiting])

@@ -1,0 +1,101 @@
+"""Batches over Dask equal the batches of one process, also when a worker is killed in mid-run."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+import engine
+
+pytest.importorskip("distributed", reason="the extra `distributed` is not installed")
+from distributed import Client, LocalCluster
+
+from engine import distributed
+
+N_POINTS = 20_000
+
+
+@pytest.fixture(scope="module")
+def client() -> Iterator[Client]:
+    with (
+        LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs="CRITICAL") as cluster,
+        Client(cluster) as client,
+    ):
+        yield client
+
+
+@pytest.fixture(scope="module")
+def solid() -> engine.Polyhedron:
+    """An octahedron."""
+    corners = [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)]
+    faces = [(x, y, z) if (x + y + z) % 2 == 0 else (x, z, y) for x in (0, 1) for y in (2, 3) for z in (4, 5)]
+    return engine.Polyhedron(corners, faces)
+
+
+@pytest.fixture(scope="module")
+def points() -> np.ndarray:
+    points = np.random.default_rng(20).uniform(-1.2, 1.2, (N_POINTS, 3))
+    points[::5] = np.round(points[::5] * 4) / 4  # many on the boundary
+    return points
+
+
+def test_nothing_is_lost_or_doubled_when_a_worker_is_killed(
+    client: Client, solid: engine.Polyhedron, points: np.ndarray
+) -> None:
+    done, killed = [], []
+
+    def kill_one_then_count(n_items: int) -> None:
+        done.append(n_items)
+        if len(done) == 5:
+            killed.append(next(iter(client.run(os.getpid).values())))
+            os.kill(killed[0], signal.SIGKILL)
+
+    answer = distributed.locate(client, points, solid, part=300, progress=kill_one_then_count)
+    assert killed
+    assert killed[0] not in client.run(os.getpid).values()
+    assert sum(done) == N_POINTS
+    assert len(done) == -(-N_POINTS // 300)
+    np.testing.assert_array_equal(answer, engine.locate(points, solid))
+    assert {-1, 0, 1} == set(answer.tolist())
+
+
+def test_poses_equal_one_process(client: Client, solid: engine.Polyhedron, points: np.ndarray) -> None:
+    turns, moves = np.broadcast_to(np.eye(3), (60, 3, 3)), points[:60] * 2
+    answer = distributed.collide_poses(client, solid, solid, turns, moves, part=7)
+    np.testing.assert_array_equal(answer, engine.collide_poses(solid, solid, turns, moves))
+
+
+def test_segments_equal_one_process(client: Client, solid: engine.Polyhedron, points: np.ndarray) -> None:
+    segments = points[:400].reshape(-1, 2, 3)
+    answer, here = distributed.clip_segments(client, segments, solid, part=33), engine.clip_segments(segments, solid)
+    for name in ("source", "start", "end", "t", "faces"):
+        np.testing.assert_array_equal(getattr(answer, name), getattr(here, name))
+
+
+def test_overlays_equal_one_process(client: Client, points: np.ndarray) -> None:
+    subjects = [engine.Polygon([corners]) for corners in points[:240, :2].reshape(-1, 4, 2)]
+    clips = subjects[::-1]
+    answer = distributed.overlay_batch(client, subjects, clips, "difference", part=9)
+    here = engine.overlay_batch(subjects, clips, "difference")
+    np.testing.assert_array_equal(answer.status, here.status)
+    assert [each.area_exact for each in answer.overlays] == [each.area_exact for each in here.overlays]
+    for ours, theirs in zip(answer.overlays, here.overlays, strict=True):
+        np.testing.assert_array_equal(ours.vertices, theirs.vertices)
+
+
+def test_no_items(client: Client, solid: engine.Polyhedron) -> None:
+    assert distributed.locate(client, [], solid).shape == (0,)
+    assert len(distributed.clip_segments(client, [], solid)) == 0
+
+
+def test_errors_are_those_of_the_engine(client: Client, solid: engine.Polyhedron, points: np.ndarray) -> None:
+    with pytest.raises(engine.UnsupportedSolidError, match="nothing is inside a surface"):
+        distributed.locate(client, points, engine.Surface(solid.vertices, solid.triangles), part=5_000)
+    with pytest.raises(engine.NotFiniteError, match="1234"):
+        distributed.locate(client, np.where(np.arange(N_POINTS)[:, None] == 1234, np.nan, points), solid)
+    with pytest.raises(engine.InvalidInputError, match="part must be"):
+        distributed.locate(client, points, solid, part=0)
