@@ -71,7 +71,8 @@ def locate(
         of radius 0 have only boundary, and so has a plane triangle without area; the prism over a triangle of space
         without area is all of space, all of it BOUNDARY, as the formula gives it.
     Accuracy: exact for every finite input; an implicit solid made from a callable is decided by that callable.
-    Cost: the first call prepares lists linear in the solid's size; then a point costs the faces over it.
+    Cost: few points pass once over the faces, with nothing prepared; many have lists built, linear in the solid's
+        size, after which a point costs some of the faces near it or over it.
     Raises: InvalidArrayError, WrongDimensionError, NotFiniteError, UnsupportedSolidError, DeadlineExceededError,
         CancelledError.
     Source: the textbook's section on containment; see the modules of the methods.

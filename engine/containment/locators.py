@@ -20,12 +20,13 @@ from engine.containment.build_ring_cells import ring_cells_if_they_pay
 from engine.containment.cell_order import order_if_it_pays
 from engine.containment.half_spaces import locate_in_half_planes, locate_in_half_spaces
 from engine.containment.polynomials import locate_by_polynomial
-from engine.containment.prepared import Columns, Rings, columns_of, rings_of, rounded_rows
+from engine.containment.prepared import Columns, Rings, columns_of, columns_pay, rings_of, rounded_rows
 from engine.containment.rational_locate import Check, combine, prism_walls, rational_location, unsupported
 from engine.containment.ray_parity import locate_by_columns
 from engine.containment.ring_cells import locate_by_ring_cells
 from engine.containment.ring_crossing import locate_in_rings
 from engine.containment.segment_parity import locate_by_cells
+from engine.containment.triangle_pass import locate_few
 from engine.containment.triangles import locate_in_triangle
 from engine.errors import InvalidArrayError, NotFiniteError
 from engine.parallel import Budget
@@ -188,18 +189,22 @@ def _in_polyhedron(solid: Polyhedron) -> Locator:
         columns: Columns = columns_of(solid)
         return int(locate_by_columns(points, *columns, locations, flag))
 
+    def run_once(points: FloatArray, locations: Locations, flag: Flag) -> int:
+        return locate_few(points, solid.vertices, solid.triangles, locations, flag)
+
     by_rays = settled(run, rational_half(solid), lambda check: columns_of(solid, check))
 
     def choose(n_points: int, budget: Budget) -> Locator:
         cells = cells_if_they_pay(solid, n_points, budget)
         if cells is None:
-            return plain
+            return plain if columns_pay(solid, n_points) else at_once
         return Locator(
             "segment_parity",
             _in_cells(lambda *rest: int(locate_by_cells(rest[0], cells, *rest[1:])), by_rays),
             order=lambda points, budget: order_if_it_pays(points, cells, budget),
         )
 
+    at_once = Locator("ray_parity", settled(run_once, rational_half(solid)))
     plain = Locator("ray_parity", by_rays, for_batch=choose)
     return plain
 

@@ -20,6 +20,9 @@ from engine.solids.triangle import Triangle
 from engine.types import UNDECIDED
 
 _AT_ONCE: Final = 1 << 16
+_PASSES: Final = 16
+_POINTS_A_PASS: Final = 1024
+"""As `run_chunks` begins with."""
 
 
 class Columns(NamedTuple):
@@ -57,6 +60,13 @@ def columns_of(solid: Polyhedron, check: Check = no_check) -> Columns:
     check: called between the steps, a second's work for a million triangles; what it raises ends the building.
     """
     return solid.prepared("columns", lambda: _build_columns(solid, check))
+
+
+def columns_pay(solid: Polyhedron, n_points: int) -> bool:
+    """Tell whether the points asked so far would have taken as long, in passes over all triangles, as columns take."""
+    passes = solid.prepared("passes", lambda: [0])
+    passes[0] += 1 + (n_points - 1) // _POINTS_A_PASS
+    return passes[0] > _PASSES
 
 
 def _build_columns(solid: Polyhedron, check: Check) -> Columns:

@@ -1,4 +1,4 @@
-"""Polyhedron by ray and parity: degeneracies by hand, the hard sets, invariance."""
+"""Polyhedron by ray and parity, in a pass and by columns: degeneracies by hand, the hard sets, invariance."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from engine import Polyhedron, locate
+from engine.containment import prepared
 from tests.reference.containment import locate_many
 from tests.unit.containment.scenes import box_mesh, lattice_points, made, merged
 
@@ -21,6 +22,12 @@ HARD = (
     "syn_sliver_uv",
     "syn_voxrand",
 )
+
+
+@pytest.fixture(autouse=True, params=[0, 1 << 60], ids=["columns", "pass"])
+def _method(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every test twice: columns from the first point on, and never."""
+    monkeypatch.setattr(prepared, "_PASSES", request.param)
 
 
 @pytest.mark.data

@@ -16,13 +16,17 @@ from engine.containment.half_spaces import locate_in_half_planes, locate_in_half
 from engine.containment.polynomials import locate_by_polynomial
 from engine.containment.ray_parity import locate_by_columns
 from engine.containment.ring_crossing import locate_in_rings
+from engine.containment.triangle_pass import locate_by_pass, sort_into_cells
 from engine.containment.triangles import locate_in_triangle
 
 VERTICES = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
 TURN = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
 
 SOLIDS = [
-    (engine.Polyhedron(VERTICES, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]), [locate_by_columns]),
+    (
+        engine.Polyhedron(VERTICES, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]),
+        [locate_by_columns, sort_into_cells, locate_by_pass],
+    ),
     (engine.Triangle(VERTICES[:3]), [locate_in_half_spaces]),
     (engine.Convex([[1, 0, 0, 0]]), [locate_in_half_spaces]),
     (engine.Sphere([0, 0, 0], 1), [locate_in_ball]),
@@ -44,6 +48,8 @@ def test_a_kernel_sees_one_kind_of_array(solid: engine.Solid, kernels: list[Any]
     for given in (points, frozen, points[::2], np.asfortranarray(points), points.astype(np.float32), points.tolist()):
         engine.locate(given, solid)
         engine.locate_scene(given, [solid, solid], [turn, None])
+    if isinstance(solid, engine.Polyhedron):
+        engine.locate(np.random.default_rng(1).random((1 << 15, 3)), solid)  # more than a few passes
     for kernel in (*kernels, count_boxes, fill_boxes):
         layouts = {
             tuple((each.ndim, each.layout, each.mutable) for each in signature if hasattr(each, "layout"))
