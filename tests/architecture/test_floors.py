@@ -23,8 +23,10 @@ FLOORS = {
     "engine.collision": 5,
     "engine.textbook": 5,
     "engine.distributed": 6,
+    "engine.files": 6,
     "engine.warmup": 6,
     "engine": 7,
+    "engine.__main__": 8,
 }
 SAME_FLOOR_ALLOWED = {("engine.parallel", "engine.errors")}
 SERVICE_LIBRARIES = {"fastapi", "httpx", "pydantic", "pydantic_core", "pydantic_settings", "starlette", "uvicorn"}

@@ -1,0 +1,100 @@
+"""Solids from files: meshes, GeoJSON polygons, and the JSON of the HTTP interface."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from engine.errors import InvalidInputError
+from engine.files.meshes import FORMATS, read_polyhedron
+from engine.solids.aabb import Aabb
+from engine.solids.base import Solid
+from engine.solids.convex import Convex
+from engine.solids.csg import Csg
+from engine.solids.half_space import HalfSpace
+from engine.solids.implicit import Implicit
+from engine.solids.polygon import Polygon
+from engine.solids.polyhedron import Polyhedron
+from engine.solids.sphere import Sphere
+from engine.solids.surface import Surface
+from engine.solids.triangle import Triangle
+
+CLASSES: Final[dict[str, Callable[..., Solid]]] = {
+    "half_space": HalfSpace, "sphere": Sphere, "aabb": Aabb, "convex": Convex, "polyhedron": Polyhedron,
+    "surface": Surface, "triangle": Triangle, "polygon": Polygon, "implicit": Implicit, "csg": Csg,
+}  # fmt: skip
+
+
+def read_solid(source: str) -> Solid:
+    """Return the one solid that `source` names.
+
+    source: a mesh file (.stl, .obj, .ply, .off, .glb), an .npz file of `vertices` and `faces`, a .json file with a
+    solid as the HTTP interface writes it, a .geojson file with one polygon, or the JSON of a solid itself.
+    """
+    solids = read_solids(source)
+    if len(solids) != 1:
+        raise InvalidInputError(f"{source} holds {len(solids)} polygons; this command takes one solid", ("file",))
+    return solids[0]
+
+
+def read_solids(source: str) -> list[Solid]:
+    """Return all solids of `source`: several only where it is a GeoJSON collection."""
+    if source.lstrip().startswith("{"):
+        return from_json(_parsed(source, "the argument"))
+    path = Path(source)
+    suffix = path.suffix.lower().removeprefix(".")
+    if suffix in FORMATS:
+        with path.open("rb") as file:
+            return [read_polyhedron(file, suffix)]
+    if suffix == "npz":
+        with np.load(path, allow_pickle=False) as arrays:
+            missing = {"vertices", "faces"} - set(arrays.files)
+            if missing:
+                raise InvalidInputError(f"{source} has no array named {sorted(missing)[0]!r}", ("file",))
+            return [Polyhedron(arrays["vertices"], arrays["faces"])]
+    if suffix in ("json", "geojson"):
+        return from_json(_parsed(path.read_text("utf-8"), source))
+    raise InvalidInputError(
+        f"{source}: a solid is read from {', '.join('.' + name for name in FORMATS)}, .npz, .json or .geojson",
+        ("file",),
+    )
+
+
+def from_json(value: Any) -> list[Solid]:
+    """Return the solids of a parsed JSON or GeoJSON value; a multipolygon is one polygon of all its rings."""
+    kind = value.get("type") if isinstance(value, dict) else None
+    try:
+        if kind == "FeatureCollection":
+            return [solid for feature in value["features"] for solid in from_json(feature)]
+        if kind == "GeometryCollection":
+            return [solid for geometry in value["geometries"] for solid in from_json(geometry)]
+        if kind == "Feature":
+            return from_json(value["geometry"])
+        if kind == "Polygon":
+            return [Polygon(value["coordinates"])]
+        if kind == "MultiPolygon":
+            return [Polygon([ring for rings in value["coordinates"] for ring in rings])]
+        if kind in CLASSES:
+            fields = {name: field for name, field in value.items() if name != "type"}
+            if kind == "csg":
+                fields["operands"] = [solid for operand in fields["operands"] for solid in from_json(operand)]
+            return [CLASSES[kind](**fields)]
+    except (KeyError, TypeError) as error:
+        raise InvalidInputError(f"a {kind} lacks a field or has one too many: {error}", ("type",)) from None
+    raise InvalidInputError(
+        f"type must be Polygon, MultiPolygon, Feature, FeatureCollection or one of {', '.join(CLASSES)}; got {kind!r}",
+        ("type",),
+    )
+
+
+def _parsed(text: str, name: str) -> Any:
+    try:
+        return json.loads(text)
+    except ValueError as error:
+        raise InvalidInputError(f"{name} is not JSON: {error}", ("file",)) from None
+    except RecursionError:
+        raise InvalidInputError(f"{name} is nested too deeply", ("file",)) from None

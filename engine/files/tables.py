@@ -1,0 +1,118 @@
+"""Arrays of numbers from and to .npy, .csv and GeoJSON files."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from engine.errors import InvalidArrayError, InvalidInputError
+
+POSITIONS: Final = {
+    "Point": lambda at: [at], "MultiPoint": list, "LineString": lambda at: [at], "MultiLineString": list,
+}  # fmt: skip
+"""What makes a list of items of the coordinates of a GeoJSON geometry."""
+
+
+def read_rows(source: str, shape: tuple[int, ...]) -> npt.NDArray[np.float64]:
+    """Return an array ``(n, *shape)``; in `shape` a -1 stands for the dimension that the file tells.
+
+    .npy: any array of that many numbers a row. .csv: a row a line, a header is skipped. .geojson: points, or line
+    strings of two positions.
+    """
+    path = Path(source)
+    suffix = path.suffix.lower()
+    if suffix == ".npy":
+        array = np.load(path, allow_pickle=False)
+    elif suffix == ".csv":
+        array = _read_csv(path)
+    elif suffix in (".json", ".geojson"):
+        array = np.array(_positions(json.loads(path.read_text("utf-8"))))
+    else:
+        raise InvalidInputError(f"{source}: numbers are read from .npy, .csv or .geojson", ("file",))
+    try:
+        return array.reshape((len(array), *shape)) if array.ndim else array.reshape(shape)
+    except ValueError:
+        wanted = " x ".join("dimension" if size < 0 else str(size) for size in shape)
+        raise InvalidArrayError(
+            f"{source}: rows of {wanted} numbers expected, the shape is {array.shape}", ()
+        ) from None
+
+
+def _read_csv(path: Path) -> npt.NDArray[np.float64]:
+    with path.open(encoding="utf-8") as file:
+        try:
+            [float(cell) for cell in file.readline().split(",")]
+            header = 0
+        except ValueError:
+            header = 1
+    try:
+        return np.loadtxt(path, delimiter=",", skiprows=header, ndmin=2, encoding="utf-8")
+    except ValueError as error:
+        raise InvalidArrayError(f"{path}: {error}", ("file",)) from None
+
+
+def _positions(value: Any) -> list[Any]:
+    kind = value.get("type") if isinstance(value, dict) else None
+    if kind == "FeatureCollection":
+        return [item for feature in value["features"] for item in _positions(feature)]
+    if kind == "Feature":
+        return _positions(value["geometry"])
+    if kind in POSITIONS:
+        return POSITIONS[kind](value["coordinates"])
+    raise InvalidInputError(f"points and line strings are read from GeoJSON, got {kind!r}", ("type",))
+
+
+def write_table(target: str | None, columns: dict[str, npt.NDArray[Any]]) -> None:
+    """Write columns of equal length, ``(n,)`` or ``(n, k)`` each: .npz by name, .npy if there is one column, else .csv.
+
+    target: a path; None writes .csv to the standard output. Doubles are written so that they read back the same.
+    """
+    suffix = "" if target is None else Path(target).suffix.lower()
+    if suffix == ".npy" and len(columns) == 1:
+        np.save(str(target), next(iter(columns.values())))
+    elif suffix == ".npz":
+        np.savez(str(target), **columns)  # type: ignore[arg-type]
+    elif suffix in ("", ".csv"):
+        text = _csv(columns)
+        if target is None:
+            sys.stdout.write(text)
+        else:
+            Path(target).write_text(text, "utf-8")
+    else:
+        several = "" if len(columns) == 1 else " (one .npy array cannot hold several columns)"
+        raise InvalidInputError(f"{target}: this answer is written to .csv, .npy or .npz{several}", ("output",))
+
+
+def _csv(columns: dict[str, npt.NDArray[Any]]) -> str:
+    names, lists = [], []
+    for name, column in columns.items():
+        flat = column.reshape(len(column), -1)
+        names += [name] if flat.shape[1] == 1 else [f"{name}_{i}" for i in range(flat.shape[1])]
+        lists += [map(repr, flat[:, i].tolist()) if column.dtype.kind != "U" else flat[:, i].tolist()
+                  for i in range(flat.shape[1])]  # fmt: skip
+    return "\n".join([",".join(names), *map(",".join, zip(*lists, strict=True))]) + "\n"
+
+
+def write_geojson(target: str | None, multipolygons: Sequence[Sequence[Sequence[Any]]]) -> None:
+    """Write one feature for each item: a MultiPolygon of polygons, each a list of rings (without a repeated end)."""
+    features = []
+    for item, polygons in enumerate(multipolygons):
+        coordinates = [[_closed(ring) for ring in rings] for rings in polygons]
+        geometry = {"type": "MultiPolygon", "coordinates": coordinates}
+        features.append({"type": "Feature", "properties": {"item": item}, "geometry": geometry})
+    text = json.dumps({"type": "FeatureCollection", "features": features}) + "\n"
+    if target is None:
+        sys.stdout.write(text)
+    else:
+        Path(target).write_text(text, "utf-8")
+
+
+def _closed(ring: Any) -> list[list[float]]:
+    positions: list[list[float]] = np.asarray(ring).tolist()
+    return [*positions, positions[0]]

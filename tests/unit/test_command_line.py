@@ -1,0 +1,178 @@
+"""The command line gives the answers of the functions, reads what it writes, and refuses bad files by name."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import engine
+from engine.__main__ import main
+
+SPHERE = '{"type": "sphere", "center": [0, 0, 0], "radius": 1}'
+BOX = '{"type": "aabb", "min": [0, 0, 0], "max": [1, 1, 1]}'
+CUBE_OFF = """OFF
+8 6 0
+0 0 0
+1 0 0
+1 1 0
+0 1 0
+0 0 1
+1 0 1
+1 1 1
+0 1 1
+4 0 3 2 1
+4 4 5 6 7
+4 0 1 5 4
+4 2 3 7 6
+4 0 4 7 3
+4 1 2 6 5
+"""
+SQUARE = {"type": "Polygon", "coordinates": [[[0, 0], [4, 0], [4, 4], [0, 4], [0, 0]]]}
+HOLED = {
+    "type": "Polygon",
+    "coordinates": [[[2, 2], [6, 2], [6, 6], [2, 6], [2, 2]], [[3, 3], [3, 5], [5, 5], [5, 3], [3, 3]]],
+}
+
+
+@pytest.fixture
+def cube(tmp_path: Path) -> str:
+    pytest.importorskip("trimesh", reason="the extra `formats` is not installed")
+    path = tmp_path / "cube.off"
+    path.write_text(CUBE_OFF)
+    return str(path)
+
+
+def written(tmp_path: Path, name: str, value: object) -> str:
+    path = tmp_path / name
+    if name.endswith(".npy"):
+        np.save(path, value)
+    else:
+        path.write_text(value if isinstance(value, str) else json.dumps(value))
+    return str(path)
+
+
+def test_contains_prints_labels(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    points = written(tmp_path, "points.csv", "x,y,z\n0,0,0\n1,0,0\n0.6,0.8,1e-300\n2,0,0\n")
+    assert main(["contains", SPHERE, points]) == 0
+    assert capsys.readouterr().out.split() == ["location", "inside", "boundary", "outside", "outside"]
+
+
+def test_contains_writes_what_locate_returns(cube: str, tmp_path: Path) -> None:
+    points = np.random.default_rng(3).integers(-2, 6, (500, 3)) / 4
+    target = tmp_path / "out.npy"
+    assert main(["contains", cube, written(tmp_path, "points.npy", points), "-o", str(target)]) == 0
+    np.testing.assert_array_equal(np.load(target), engine.locate(points, engine.Aabb((0, 0, 0), (1, 1, 1))))
+
+
+def test_collide_with_and_without_poses(cube: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["collide", cube, BOX]) == 0
+    assert capsys.readouterr().out.split() == ["relation", "overlapping"]
+    poses = np.zeros((3, 3, 4))
+    poses[:, :, :3] = np.eye(3)
+    poses[:, 0, 3] = (0.5, 1.0, 1.5)
+    assert main(["collide", cube, BOX, "--poses", written(tmp_path, "poses.npy", poses.reshape(3, 12))]) == 0
+    assert capsys.readouterr().out.split() == ["relation", "overlapping", "touching", "disjoint"]
+
+
+def test_clip_segments_reads_back_the_same_doubles(cube: str, tmp_path: Path) -> None:
+    segments = np.random.default_rng(4).uniform(-1, 2, (200, 2, 3))
+    source, target = written(tmp_path, "segments.npy", segments), tmp_path / "pieces.csv"
+    assert main(["clip", cube, source, "-o", str(target)]) == 0
+    header, *rows = target.read_text().split()
+    assert header == "source,start_0,start_1,start_2,end_0,end_1,end_2,t_0,t_1,faces_0,faces_1"
+    table = np.array([[float(cell) for cell in row.split(",")] for row in rows])
+    pieces = engine.clip_segments(segments, engine.Aabb((0, 0, 0), (1, 1, 1)))
+    np.testing.assert_array_equal(table[:, 0], pieces.source)
+    np.testing.assert_array_equal(table[:, 1:7], np.hstack([pieces.start, pieces.end]))
+    np.testing.assert_array_equal(table[:, 7:9], pieces.t)
+
+
+def test_clip_line_strings_and_polygons_of_geojson(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    region = written(tmp_path, "region.geojson", SQUARE)
+    line = written(tmp_path, "line.geojson", {"type": "LineString", "coordinates": [[-1, 1], [7, 1]]})
+    assert main(["clip", region, line]) == 0
+    assert capsys.readouterr().out.split()[1] == "0,0.0,1.0,4.0,1.0,0.125,0.625,3,1"
+    box = '{"type": "aabb", "min": [0, 0], "max": [4, 4]}'
+    assert main(["clip", box, written(tmp_path, "holed.geojson", HOLED), "--polygons"]) == 0
+    (feature,) = json.loads(capsys.readouterr().out)["features"]
+    clipped = engine.Polygon(feature["geometry"]["coordinates"][0])
+    assert engine.overlay(clipped, engine.Polygon(SQUARE["coordinates"])).area_exact == 3
+
+
+def test_overlay_writes_geojson_that_it_reads(tmp_path: Path) -> None:
+    left, right = written(tmp_path, "left.geojson", SQUARE), written(tmp_path, "right.geojson", HOLED)
+    target = tmp_path / "out.geojson"
+    assert main(["overlay", left, right, "--operation", "union", "-o", str(target)]) == 0
+    (feature,) = json.loads(target.read_text())["features"]
+    rings = [ring for polygon in feature["geometry"]["coordinates"] for ring in polygon]
+    assert all(ring[0] == ring[-1] for ring in rings)
+    union = engine.overlay(engine.Polygon(SQUARE["coordinates"]), engine.Polygon(HOLED["coordinates"]), "union")
+    assert len(rings) == len(union.rings)
+    again = tmp_path / "again.geojson"
+    assert main(["overlay", str(target), str(target), "-o", str(again)]) == 0
+    assert json.loads(again.read_text()) == json.loads(target.read_text())
+
+
+def test_bounds(cube: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bounds", cube]) == 0
+    header, row = capsys.readouterr().out.split()
+    assert header == "min_0,min_1,min_2,max_0,max_1,max_2,center_0,center_1,center_2,radius"
+    assert (
+        row == f"0.0,0.0,0.0,1.0,1.0,1.0,0.5,0.5,0.5,{engine.bounds(engine.Aabb((0,) * 3, (1,) * 3)).sphere.radius!r}"
+    )
+
+
+@pytest.mark.parametrize("suffix", ["stl", "obj", "ply", "off", "glb"])
+def test_every_mesh_format(suffix: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    trimesh = pytest.importorskip("trimesh", reason="the extra `formats` is not installed")
+    path = tmp_path / f"box.{suffix}"
+    trimesh.creation.box((2, 2, 2)).export(path)
+    assert main(["contains", str(path), written(tmp_path, "p.csv", "0,0,0\n1,1,1\n1.5,0,0\n")]) == 0
+    assert capsys.readouterr().out.split() == ["location", "inside", "boundary", "outside"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["contains", "missing.off", "p.csv"], "missing.off"),
+        (["contains", "solid.txt", "p.csv"], "a solid is read from"),
+        (["contains", '{"type": "sphere"', "p.csv"], "is not JSON"),
+        (["contains", '{"type": "ball"}', "p.csv"], "got 'ball'"),
+        (["contains", '{"type": "sphere", "centre": 1}', "p.csv"], "sphere lacks a field or has one too many"),
+        (["contains", '{"type": "sphere", "center": [0, 0, 0], "radius": -1}', "p.csv"], "negative_radius at radius"),
+        (["contains", SPHERE, "p.csv"], "rows of 3 numbers expected, the shape is (2, 2)"),
+        (["contains", SPHERE, "bad.csv"], "could not convert string 'x' to float64 at row 1"),
+        (["contains", SPHERE, "nan.csv"], "not_finite at points.1.0"),
+        (["contains", "empty.stl", "p.csv"], "the stl file holds no faces"),
+        (["contains", "broken.glb", "p.csv"], "cannot be read as glb"),
+        (["contains", "open.off", "p.csv"], "not_closed"),
+        (["clip", SPHERE, "p.csv"], "rows of 2 x 3 numbers expected"),
+        (["overlay", "square.geojson", SPHERE], "unsupported_solid at clips.0"),
+        (["contains", BOX, "ok.csv", "-o", "out.xml"], "this answer is written to"),
+    ],
+)
+def test_refusals_name_what_is_wrong(
+    arguments: list[str],
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    pytest.importorskip("trimesh", reason="the extra `formats` is not installed")
+    monkeypatch.chdir(tmp_path)
+    written(tmp_path, "p.csv", "0,0\n1,1\n")
+    written(tmp_path, "ok.csv", "0,0,0\n")
+    written(tmp_path, "bad.csv", "0,0,0\n0,x,0\n")
+    written(tmp_path, "nan.csv", "0,0,0\nnan,0,0\n")
+    written(tmp_path, "empty.stl", "solid nothing")
+    written(tmp_path, "broken.glb", "solid nothing")
+    written(tmp_path, "open.off", CUBE_OFF.replace("8 6 0", "8 5 0").replace("4 1 2 6 5\n", ""))
+    written(tmp_path, "square.geojson", SQUARE)
+    assert main(arguments) == 2
+    errors = capsys.readouterr().err
+    assert errors.startswith("error: ")
+    assert message in errors
+    assert "Traceback" not in errors
