@@ -19,10 +19,10 @@ from service.docs import router as docs_router
 from service.errors import faults_of, http_fault, problem
 from service.metrics import Metrics
 from service.openapi import openapi_of
-from service.routes import bounds, collision, containment, health, overlay, polygons, segments, solids
+from service.routes import binary, bounds, collision, containment, health, overlay, polygons, segments, solids
 from service.settings import Settings
 from service.store import Store
-from service.work import Pool
+from service.work import Memory, Pool
 
 log = logging.getLogger("service")
 
@@ -48,10 +48,11 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     )
     app.state.settings = settings
     app.state.store = Store(settings.store_bytes)
+    app.state.memory = Memory(settings.request_bytes)
     app.state.metrics = Metrics()
     app.state.warm, app.state.warm_error = threading.Event(), None
     app.openapi = openapi_of(app, settings)  # type: ignore[method-assign]
-    for module in (containment, collision, segments, polygons, overlay, bounds, solids, health):
+    for module in (containment, collision, segments, polygons, overlay, bounds, solids, binary, health):
         app.include_router(module.router)
     app.include_router(solids.lookup)
     app.include_router(docs_router)

@@ -59,7 +59,7 @@ def _operation(method: str, path: str, operation: dict[str, Any], schemas: dict[
     examples = []
     for media, content in operation.get("requestBody", {}).get("content", {}).items():
         lines.append(f"<br>Takes {escape(media)}: {_type(content['schema'])}.")
-        examples = schemas[content["schema"]["$ref"].rpartition("/")[2]].get("examples", [])
+        examples = schemas.get(content["schema"].get("$ref", "").rpartition("/")[2], {}).get("examples", [])
     for status, response in operation["responses"].items():
         kinds = ", ".join(_type(content.get("schema", {})) for content in response.get("content", {}).values())
         lines.append(f"<br><code>{status}</code> {kinds} {_text(response['description'])}")

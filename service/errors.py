@@ -50,10 +50,13 @@ ENGINE_STATUS: Final[dict[str, int]] = {
 SERVICE_STATUS: Final[dict[str, int]] = {
     "not_json": 400,
     "bad_request": 400,
+    "missing_key": 401,
+    "wrong_key": 403,
     "not_found": 404,
     "unknown_solid": 404,
     "method_not_allowed": 405,
     "slow_body": 408,
+    "slow_headers": 408,
     "body_too_large": 413,
     "unsupported_media_type": 415,
     "invalid_request": 422,
@@ -61,6 +64,7 @@ SERVICE_STATUS: Final[dict[str, int]] = {
     "unknown_field": 422,
     "unknown_type": 422,
     "limit_exceeded": 422,
+    "invalid_mesh": 422,
     "queue_full": 503,
     "not_ready": 503,
     "out_of_memory": 503,
@@ -74,9 +78,9 @@ _HEADERS: Final[dict[str, dict[str, str]]] = {
     "not_ready": _RETRY_AFTER,
     "cancelled": _RETRY_AFTER,
     "out_of_memory": _RETRY_AFTER,
+    "missing_key": {"WWW-Authenticate": "Bearer"},
     "slow_body": {"Connection": "close"},
     "body_too_large": {"Connection": "close"},
-    "unsupported_media_type": {"Accept-Post": "application/json"},
 }
 _PYDANTIC_CODES: Final = {
     "missing": "missing_field",
@@ -96,6 +100,7 @@ class ServiceError(Exception):
         self.code = code
         self.detail = detail
         self.where = where
+        self.headers: dict[str, str] = {}
 
 
 def pointer(path: Iterable[str | int]) -> str:

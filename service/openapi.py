@@ -49,7 +49,7 @@ def _drop_foreign_errors(made: dict[str, Any]) -> None:
 
 
 def _finished(node: Any, settings: Settings) -> Any:
-    """Put limits in the place of their settings' names, and drop titles that only repeat a field's name."""
+    """Put limits in the place of their settings' names, drop titles that only repeat a field's name, and defaults."""
     if isinstance(node, list):
         return [_finished(item, settings) for item in node]
     if not isinstance(node, dict):
@@ -60,5 +60,7 @@ def _finished(node: Any, settings: Settings) -> Any:
             key, value = "maxItems", getattr(settings, value)
         if key == "title" and isinstance(value, str) and "openapi" not in node and "version" not in node:
             continue
+        if key == "default" and "type" in node:
+            continue  # generators make a value of it that is always sent; the description says it
         done[key] = _finished(value, settings)
     return done

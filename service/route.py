@@ -1,5 +1,8 @@
 """The route class: reads a body within its limits, decodes and checks it, calls the endpoint, encodes its answer.
 
+A body is JSON for the endpoint's model, or octets that the endpoint takes as they are (the binary lane). Either is
+received into one buffer of the declared length.
+
 FastAPI describes the routes (parameters, models, the OpenAPI document); this class answers them. FastAPI's own handler
 would decode and check on the event loop, where one large body holds up everybody else's small ones. An endpoint is a
 plain function ``(question, call) -> answer``: it runs inline where body and solid are small, else in the pool.
@@ -10,8 +13,9 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable, Coroutine
-from typing import Any
+from typing import Any, Final
 
+import numpy as np
 from fastapi.routing import APIRoute
 from pydantic import TypeAdapter, ValidationError
 from starlette.requests import ClientDisconnect, Request
@@ -22,10 +26,13 @@ from engine import EngineError
 from service import wire
 from service.convert.questions import existing, is_light
 from service.errors import STATUS, ServiceError, faults_of, faults_of_validation, problem
-from service.settings import Settings
 from service.work import Call, Pool
 
 log = logging.getLogger("service")
+
+JSON: Final = "application/json"
+OCTETS: Final = "application/octet-stream"
+Query = dict[str, tuple[TypeAdapter[Any], bool]]
 
 
 class GeometryRoute(APIRoute):
@@ -34,11 +41,16 @@ class GeometryRoute(APIRoute):
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
         """Return the coroutine that answers a request."""
         endpoint, status = self.endpoint, self.status_code or 200
-        model = self.body_field.field_info.annotation if self.body_field is not None else None
-        adapter = None if model is None else TypeAdapter(model)
+        body_field: Any = None if self.body_field is None else self.body_field.field_info
+        media_type = None if body_field is None else getattr(body_field, "media_type", JSON)
+        adapter = TypeAdapter(body_field.annotation) if body_field is not None and media_type == JSON else None
+        query: Query = {
+            item.name: (TypeAdapter[Any](item.field_info.annotation or Any), item.field_info.is_required())
+            for item in self.dependant.query_params
+        }
 
         async def handle(request: Request) -> Response:
-            call = Call(request.app.state.settings, request.app.state.store)
+            call = Call(request.app.state.settings, request.app.state.store, request.app.state.memory)
             response = await answer(request, call)
             request.app.state.metrics.count(self.operation_id or self.name, response.status_code, call.seconds)
             return response
@@ -46,15 +58,18 @@ class GeometryRoute(APIRoute):
         async def answer(request: Request, call: Call) -> Response:
             state = request.app.state
             try:
-                body = b""
-                if adapter is not None:
-                    _check_media_type(request)
+                arguments = {**request.path_params, **_queried(request, query)}
+                body = bytearray()
+                if media_type is not None:
+                    _check_media_type(request, media_type)
                     state.pool.check_room()
-                    body = await _read(request, call.settings)
-                job = _Job(endpoint, adapter, body, dict(request.path_params), call)
+                    body = await _read(request, call)
+                job = _Job(endpoint, adapter, body, arguments, call)
+                if adapter is None and media_type is not None:
+                    job.question = body
                 if len(body) <= call.settings.inline_bytes and state.warm.is_set():
                     job.decode()
-                    if job.question is not None and is_light(job.question):
+                    if is_light(job.question):
                         call.is_light = True
                         payload = job.answer()
                     else:
@@ -65,8 +80,10 @@ class GeometryRoute(APIRoute):
                 return Response(status_code=STATUS["bad_request"])  # nobody reads it
             except Exception as error:
                 return _failed(error, request)
+            finally:
+                call.free()
             headers = {"Server-Timing": call.timing(), **call.headers}
-            return Response(payload, call.status or status, headers, "application/json" if payload else None)
+            return Response(payload, call.status or status, headers, call.media_type if payload else None)
 
         return handle
 
@@ -78,14 +95,14 @@ class _Job:
         self,
         endpoint: Callable[..., Any],
         adapter: TypeAdapter[Any] | None,
-        body: bytes,
-        path: dict[str, Any],
+        body: bytearray,
+        arguments: dict[str, Any],
         call: Call,
     ) -> None:
         self.endpoint = endpoint
         self.adapter = adapter
         self.body = body
-        self.path = path
+        self.arguments = arguments
         self.call = call
         self.question: Any = None
 
@@ -94,23 +111,34 @@ class _Job:
         if self.adapter is None or self.question is not None:
             return
         with self.call.phase("decode"):
+            document = wire.decode_fast(self.body)
+            if document is not None:
+                try:
+                    self.question = self.adapter.validate_python(document, context=self.call.settings)
+                    return
+                except ValidationError:  # the other decoder keeps what pointers need
+                    del document
             document = wire.decode(self.body)
             try:
                 self.question = self.adapter.validate_python(document, context=self.call.settings)
             except ValidationError as error:
                 raise _InvalidBody(error, document) from None
 
-    def answer(self) -> bytes:
+    def answer(self) -> bytes | memoryview:
         """Return the encoded answer."""
         self.call.remaining()  # it may have waited past its deadline
         self.decode()
-        arguments = self.path if self.adapter is None else {**self.path, "question": self.question}
+        if self.question is not None:
+            self.arguments["question"] = self.question
         try:
-            answer = self.endpoint(**arguments, call=self.call)
+            answer = self.endpoint(**self.arguments, call=self.call)
         except (EngineError, ServiceError) as error:
             error.where = existing(self.question, error.where)
             raise
         with self.call.phase("encode"):
+            if isinstance(answer, np.ndarray):
+                self.call.media_type = OCTETS
+                return wire.octets(answer)
             return b"" if answer is None else wire.encode(answer)
 
 
@@ -127,35 +155,59 @@ def _failed(error: Exception, request: Request) -> Response:
     faults = error.faults if isinstance(error, _InvalidBody) else faults_of(error)
     if faults[0].code == "internal":
         log.error("%s %s failed", request.method, request.url.path, exc_info=error)
-    return problem(faults)
+    return problem(faults, getattr(error, "headers", None) or {})
 
 
-def _check_media_type(request: Request) -> None:
+def _check_media_type(request: Request, expected: str) -> None:
     given = request.headers.get("content-type", "")
     kind = given.partition(";")[0].strip().lower()
-    if kind != "application/json" and not (kind.startswith("application/") and kind.endswith("+json")):
+    is_json = expected == JSON and kind.startswith("application/") and kind.endswith("+json")
+    if kind != expected and not is_json:
         got = f"got {given[:100]!r}" if given else "got none"
-        raise ServiceError("unsupported_media_type", f"expected the header Content-Type: application/json, {got}")
+        error = ServiceError("unsupported_media_type", f"expected the header Content-Type: {expected}, {got}")
+        error.headers = {"Accept-Post": expected}
+        raise error
 
 
-async def _read(request: Request, settings: Settings) -> bytes:
+def _queried(request: Request, query: Query) -> dict[str, Any]:
+    """Return the query's parameters as declared; what is left out is the endpoint's own default."""
+    found = {}
+    for name, (adapter, is_required) in query.items():
+        value = request.query_params.get(name)
+        if value is None and not is_required:
+            continue
+        try:
+            found[name] = adapter.validate_python(value)
+        except ValidationError as error:
+            expected = str(error.errors()[0]["msg"]).replace("Input should be", "expected")
+            got = "nothing" if value is None else f"{value!r:.100}"
+            raise ServiceError("invalid_request", f"query parameter {name!r}: {expected}, got {got}") from None
+    return found
+
+
+async def _read(request: Request, call: Call) -> bytearray:
     """Return the body, refused as soon as it is known to be too long, declared or not, or too slow."""
-    limit = settings.max_body_bytes
-    declared = request.headers.get("content-length", "0")
-    if declared.isdigit() and int(declared) > limit:
+    limit, seconds = call.settings.max_body_bytes, call.settings.body_seconds
+    header = request.headers.get("content-length", "0")
+    declared = int(header) if header.isdigit() else 0
+    if declared > limit:
         raise _too_large(limit)
-    chunks, size = [], 0
+    call.take(declared)
+    body, size = bytearray(declared), 0  # untouched pages take no memory
     try:
-        async with asyncio.timeout(settings.body_seconds):
+        async with asyncio.timeout(seconds):
             async for chunk in request.stream():
-                size += len(chunk)
-                if size > limit:
+                end = size + len(chunk)
+                if end > limit:
                     raise _too_large(limit)
-                chunks.append(chunk)
+                if end > len(body):
+                    call.take(end - len(body))
+                body[size:end] = chunk
+                size = end
     except TimeoutError:
-        seconds = settings.body_seconds
         raise ServiceError("slow_body", f"the body did not arrive within {seconds} s; send it faster") from None
-    return b"".join(chunks)
+    del body[size:]
+    return body
 
 
 def _too_large(limit: int) -> ServiceError:
@@ -163,7 +215,7 @@ def _too_large(limit: int) -> ServiceError:
     return ServiceError("body_too_large", detail)
 
 
-async def _run(pool: Pool, call: Call, job: Callable[[], bytes], receive: Receive) -> bytes:
+async def _run(pool: Pool, call: Call, job: Callable[[], bytes | memoryview], receive: Receive) -> bytes | memoryview:
     """Run `job` in the pool and throw the call's cancel switch if the client goes away meanwhile."""
     watcher = asyncio.create_task(_watch(call, receive))
     try:

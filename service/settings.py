@@ -74,6 +74,8 @@ class Settings(BaseSettings):
     """Requests that may wait for their turn; beyond it the answer is 503 with Retry-After."""
     inline_bytes: Annotated[int, Field(ge=0)] = 2048
     """Bodies up to this size on simple solids are answered without a thread: a hand-over costs as much as the work."""
+    request_bytes: Count = 2**30
+    """Memory for requests under way, four bytes for each byte of a body; beyond it the answer is 503."""
     store_bytes: Count = 512 * 2**20
     """Memory for stored solids; the least recently used leave first."""
 

@@ -23,17 +23,43 @@ from service.store import Store
 
 T = TypeVar("T")
 Where = tuple[str | int, ...]
+FOOTPRINT: Final = 4
+"""Bytes held for each byte of a body, at most: itself, its numbers, a solid of them, the answer."""
 PHASES: Final = ("decode", "prepare", "compute", "encode")
+
+
+class Memory:
+    """Bytes of bodies under way, each counted with what is made of it; touched on the event loop only."""
+
+    def __init__(self, limit: int) -> None:
+        self._limit = limit
+        self.taken = 0
+
+    def take(self, size: int) -> None:
+        """Count `size` more bytes (fewer if negative); `out_of_memory` beyond the limit, with nothing counted."""
+        if size > 0 and FOOTPRINT * (self.taken + size) > self._limit:
+            raise ServiceError(
+                "out_of_memory",
+                f"{self.taken} bytes of bodies are under way, and {size} more would need too much memory; try again, "
+                "send less at once, or raise GEOMETRY_REQUEST_BYTES",
+            )
+        self.taken += size
 
 
 class Call:
     """One request under way: its limits, the store, its deadline and cancel switch, the time each phase took."""
 
-    __slots__ = ("cancel", "end", "headers", "is_light", "seconds", "settings", "status", "store")
+    __slots__ = (
+        "_memory", "_taken", "cancel", "end", "headers", "is_light", "media_type", "seconds", "settings", "status",
+        "store",
+    )  # fmt: skip
 
-    def __init__(self, settings: Settings, store: Store) -> None:
+    def __init__(self, settings: Settings, store: Store, memory: Memory) -> None:
         self.settings = settings
         self.store = store
+        self._memory = memory
+        self._taken = 0
+        self.media_type = "application/json"
         self.cancel = Cancel()
         self.is_light = False  # then it ends before a deadline's timer could be started
         self.end = time.monotonic() + settings.deadline_seconds
@@ -49,6 +75,16 @@ class Call:
             yield
         finally:
             self.seconds[name] += time.perf_counter() - before
+
+    def take(self, size: int) -> None:
+        """Account for so many more bytes of a body; `out_of_memory` if there are too many under way."""
+        self._memory.take(size)
+        self._taken += size
+
+    def free(self) -> None:
+        """Account for the end of the request."""
+        self._memory.take(-self._taken)
+        self._taken = 0
 
     def remaining(self) -> float:
         """Return the seconds left; `deadline_exceeded` if there are none."""

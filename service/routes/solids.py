@@ -7,11 +7,12 @@ from typing import Annotated
 from fastapi import APIRouter, Path
 from starlette.responses import Response
 
+import engine
 from service.convert import answers, questions
 from service.route import GeometryRoute
 from service.routes.base import responses, router_of
 from service.schemas.solids import Solid, StoredSolidSummary
-from service.work import CallOf
+from service.work import Call, CallOf
 
 router = router_of("solids")
 lookup = APIRouter(route_class=GeometryRoute, tags=["solids"], responses=responses(404, 503))
@@ -28,7 +29,11 @@ Id = Annotated[str, Path(description="Name of a stored solid, from `POST /v1/sol
 def put_solid(question: Solid, call: CallOf) -> StoredSolidSummary:
     """Keep a solid, so that later requests can name it: `{"type": "stored", "id": ...}`. The same solid has the same
     id everywhere; it may leave the store when others need the room."""
-    solid = questions.to_solid(question, call, ())
+    return keep(questions.to_solid(question, call, ()), call)
+
+
+def keep(solid: engine.Solid, call: Call) -> StoredSolidSummary:
+    """Put `solid` into the store and say so."""
     name, is_new = call.store.put(solid)
     call.status = 201 if is_new else 200
     call.headers.update({"Location": f"/v1/solids/{name}", "ETag": f'"{name}"'})

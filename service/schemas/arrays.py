@@ -99,6 +99,8 @@ class Numbers:
         """Return `value` as an array, or None if anything about it is wrong; at C speed."""
         if not self.axes and type(value) is float and isfinite(value) and self.kind == "number":
             return value
+        if isinstance(value, np.ndarray):
+            return self._taken(value, settings)
         dtype, types, _ = _KINDS[self.kind]
         level = [value]
         shape: list[int] = []
@@ -127,6 +129,22 @@ class Numbers:
         if -1 in shape:  # rows of several lengths: the engine takes lists of lists
             return value
         return flat.reshape(shape) if shape else flat.item()
+
+    def _taken(self, array: Array, settings: Any) -> Any:
+        """Return `array`, which the fast decoder made of a list without a fault in it, if this field takes it."""
+        if array.ndim != len(self.axes):
+            return None
+        for axis, length in zip(self.axes, array.shape):
+            high = _limit(axis, settings)
+            if length < axis.low or (high is not None and length > high):
+                return None
+        if self.kind == "number":
+            if array.dtype.kind == "i" and not -EXACT_INTEGERS <= array.min() <= array.max() <= EXACT_INTEGERS:
+                return None
+            return array.astype(np.float64, copy=False)
+        if self.kind == "integer" and array.dtype.kind == "i":
+            return array if self.minimum is None or array.min() >= self.minimum else None
+        return None
 
     def _holds_all(self, flat: Array, level: list[Any], found: set[type]) -> bool:
         """Tell whether every number of `level` is finite, large integers unchanged, none below the minimum."""
@@ -216,7 +234,7 @@ def _is_exact(value: int) -> bool:
 
 def _show(value: Any) -> str:
     """Return a short JSON-like text of `value`: enough to find it, never the whole body."""
-    if isinstance(value, list):
+    if isinstance(value, (list, np.ndarray)):
         return f"a list of {len(value)}"
     if isinstance(value, dict):
         return "an object"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import PydanticCustomError, core_schema
 
@@ -30,6 +31,8 @@ class AtMost:
         return document
 
     def _validate(self, value: Any, info: core_schema.ValidationInfo) -> Any:
+        if isinstance(value, np.ndarray):
+            value = list(value)
         if not isinstance(value, list):
             return value
         limit = None if info.context is None else getattr(info.context, self.name)

@@ -41,3 +41,14 @@ def check_problem(answer: httpx.Response, status: int, code: str) -> dict[str, A
     assert len(problem["errors"]) <= 20
     assert all(set(item) == {"pointer", "detail"} for item in problem["errors"])
     return problem
+
+
+def examples(document: dict[str, Any]) -> list[tuple[str, Any]]:
+    """Return path and body of every example of a JSON request in the OpenAPI document."""
+    schemas, found = document["components"]["schemas"], []
+    for path, item in document["paths"].items():
+        content = item.get("post", {}).get("requestBody", {}).get("content", {})
+        if "application/json" in content:
+            name = content["application/json"]["schema"]["$ref"].rpartition("/")[2]
+            found += [(path, example) for example in schemas[name]["examples"]]
+    return found

@@ -1,0 +1,56 @@
+"""Raw float64 of the binary lane to arrays, and answers and their accuracy to raw numbers and a header."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+import numpy as np
+from starlette import responses
+
+import engine
+from service.convert.answers import from_accuracy
+from service.work import Call
+
+_CONVEX: Final = ("half_space", "aabb", "convex", "sphere")
+
+
+class Response(responses.Response):
+    """Names the media type in the OpenAPI document."""
+
+    media_type = "application/octet-stream"
+
+
+def to_rows(octets: Any, shape: tuple[int, ...]) -> Any:
+    """Return `octets` as float64 of shape ``(n, *shape)``; a view where the machine is little-endian."""
+    width = 8 * math.prod(shape)
+    if len(octets) % width:
+        raise engine.InvalidArrayError(
+            f"the body has {len(octets)} bytes; expected a multiple of {width}: rows of {math.prod(shape)} float64"
+        )
+    return np.frombuffer(octets, "<f8").astype(np.float64, copy=False).reshape(-1, *shape)
+
+
+def answer(call: Call, array: Any, accuracy: engine.Accuracy) -> Any:
+    """Return `array`, with its accuracy in the header: a dictionary of structured fields (RFC 8941)."""
+    members = {name: value for name, value in vars(from_accuracy(accuracy)).items() if value is not None}
+    call.headers["Geometry-Accuracy"] = ", ".join(f"{name}={value}" for name, value in members.items())
+    return array
+
+
+def check_is_convex(region: engine.Solid) -> engine.Solid:
+    """Return `region` if it leaves at most one piece of a segment for certain."""
+    if region.type not in _CONVEX:
+        raise engine.UnsupportedSolidError(
+            f"a {region.type} may leave several pieces of a segment; here are taken: {', '.join(_CONVEX)}; "
+            "POST /v1/clip/segments takes the others"
+        )
+    return region
+
+
+def from_pieces(pieces: engine.SegmentPieces, n_segments: int, dimension: int) -> Any:
+    """Return both ends of what remains of each segment, NaN where nothing does."""
+    ends = np.full((n_segments, 2, dimension), np.nan)
+    ends[pieces.source, 0] = pieces.start
+    ends[pieces.source, 1] = pieces.end
+    return ends

@@ -1,0 +1,123 @@
+"""The binary lane gives what the engine gives, refuses what it must; files of meshes become solids."""
+
+from __future__ import annotations
+
+import random
+from typing import Any
+
+import httpx
+import numpy as np
+import pytest
+
+import engine
+from tests.unit.service.asking import SPHERE, check_problem
+
+pytestmark = pytest.mark.anyio
+OCTETS = {"Content-Type": "application/octet-stream"}
+CUBE = {"type": "aabb", "min": [-1.0, -1.0, -1.0], "max": [1.0, 1.0, 1.0]}
+FORMATS = ("stl", "obj", "ply", "off", "glb")
+
+
+async def stored(client: httpx.AsyncClient, solid: dict[str, Any]) -> str:
+    answer = await client.post("/v1/solids", json=solid)
+    return f"/v1/solids/{answer.json()['id']}"
+
+
+async def send(client: httpx.AsyncClient, path: str, content: Any) -> httpx.Response:
+    return await client.post(path, content=bytes(content), headers=OCTETS)
+
+
+async def test_contains_answers_with_locations_and_their_accuracy(client: httpx.AsyncClient) -> None:
+    path = await stored(client, SPHERE)
+    points = np.vstack([np.random.default_rng(0).normal(size=(999, 3)), [[1.0, 0.0, 0.0]]])
+    answer = await send(client, f"{path}/contains", points)
+    locations = np.frombuffer(answer.content, np.int8)
+    assert locations.tolist() == engine.locate(points, engine.Sphere([0, 0, 0], 1)).tolist()
+    assert locations[-1] == engine.Location.BOUNDARY
+    assert answer.headers["content-type"] == "application/octet-stream"
+    assert answer.headers["geometry-accuracy"].startswith("decisions=exact, items=1000, ")
+    assert "compute;dur=" in answer.headers["server-timing"]
+    empty = await send(client, f"{path}/contains", b"")
+    assert (empty.status_code, empty.content) == (200, b"")
+
+
+async def test_clip_segments_answers_with_ends_and_nan(client: httpx.AsyncClient) -> None:
+    path = await stored(client, CUBE)
+    segments = np.random.default_rng(1).normal(size=(500, 2, 3)) * 2
+    answer = await send(client, f"{path}/clip/segments", segments)
+    ends = np.frombuffer(answer.content).reshape(-1, 2, 3)
+    pieces = engine.clip_segments(segments, engine.Aabb((-1, -1, -1), (1, 1, 1)))
+    assert 0 < len(pieces.source) < len(ends)
+    assert np.array_equal(ends[pieces.source], np.stack([pieces.start, pieces.end], 1))
+    assert np.isnan(np.delete(ends, pieces.source, 0)).all()
+    assert "coordinates_ulp=0.5" in answer.headers["geometry-accuracy"]
+
+
+async def test_what_is_refused(client: httpx.AsyncClient) -> None:
+    path = await stored(client, SPHERE)
+    check_problem(await send(client, f"{path}/contains", b"1234567"), 422, "invalid_array")
+    check_problem(await send(client, f"{path}/clip/segments", b"1" * 24), 422, "invalid_array")
+    problem = check_problem(
+        await send(client, f"{path}/contains", np.array([0.0, 0, 0, 0, np.inf, 0])), 422, "not_finite"
+    )
+    assert "points[1][1] is inf" in problem["detail"]
+    check_problem(await send(client, f"/v1/solids/{'0' * 64}/contains", b""), 404, "unknown_solid")
+    answer = await client.post(f"{path}/contains", json={})
+    check_problem(answer, 415, "unsupported_media_type")
+    assert answer.headers["accept-post"] == "application/octet-stream"
+    check_problem(await send(client, f"{path}/contains", bytes(2**20 + 1)), 413, "body_too_large")
+    polygon = await stored(client, {"type": "polygon", "rings": [[[0, 0], [1, 0], [0, 1]]]})
+    problem = check_problem(await send(client, f"{polygon}/clip/segments", b""), 422, "unsupported_solid")
+    assert "POST /v1/clip/segments" in problem["detail"]
+
+
+async def test_every_format_of_a_mesh_is_the_same_solid(client: httpx.AsyncClient) -> None:
+    trimesh = pytest.importorskip("trimesh", reason="the extra 'formats' is not installed")
+    box = trimesh.creation.box((1, 2, 4))
+    names = set()
+    for kind in (*FORMATS, "stl_ascii"):
+        content = box.export(file_type=kind)
+        body = content.encode() if isinstance(content, str) else content
+        answer = await send(client, f"/v1/solids/import?format={kind.partition('_')[0]}", body)
+        assert answer.status_code in (200, 201), answer.text
+        assert answer.headers["location"] == f"/v1/solids/{answer.json()['id']}"
+        assert (answer.json()["type"], answer.json()["vertices"], answer.json()["faces"]) == ("polyhedron", 8, 12)
+        found = await send(
+            client, f"{answer.headers['location']}/contains", np.array([[0.5, 1, 2], [0, 0, 0], [9, 0, 0]], float)
+        )
+        assert np.frombuffer(found.content, np.int8).tolist() == [0, 1, -1]
+        if "stl" not in kind:
+            names.add(answer.json()["id"])
+    assert len(names) == 1
+
+
+async def test_meshes_are_checked(client: httpx.AsyncClient) -> None:
+    trimesh = pytest.importorskip("trimesh", reason="the extra 'formats' is not installed")
+    box = trimesh.creation.box()
+    box.update_faces(np.arange(12) != 3)
+    body = box.export(file_type="off").encode()
+    check_problem(await send(client, "/v1/solids/import?format=off", body), 422, "not_closed")
+    answer = await send(client, "/v1/solids/import?format=off&type=surface", body)
+    assert (answer.status_code, answer.json()["type"]) == (201, "surface")
+    for query in ("", "?format=fbx", "?format=", "?format=off&type=aabb"):
+        check_problem(await send(client, f"/v1/solids/import{query}", body), 422, "invalid_request")
+    assert (await client.get("/v1/solids/import")).status_code == 404
+
+
+async def test_broken_files_are_refused(client: httpx.AsyncClient) -> None:
+    trimesh = pytest.importorskip("trimesh", reason="the extra 'formats' is not installed")
+    source, box = random.Random(1), trimesh.creation.box()
+    seen = set()
+    for turn in range(150):
+        kind = FORMATS[turn % 5]
+        content = box.export(file_type=kind)
+        body = bytearray(content.encode() if isinstance(content, str) else content)
+        at = source.randrange(len(body))
+        if turn % 3 == 0:
+            del body[at:]
+        else:
+            body[at : at + 4] = source.randbytes(4)
+        answer = await send(client, f"/v1/solids/import?format={kind}", body)
+        seen.add(answer.status_code)
+        assert answer.status_code in (200, 201, 422), (kind, bytes(body), answer.text)
+    assert 422 in seen
