@@ -1,107 +1,153 @@
-"""Builds the cells of a polygon, with the budget of the call that pays for it."""
+"""Builds the cells of a polygon, with the budget of the call that pays for it: level by level, crowded cells cut again.
+
+The topmost cells are up to 64 an edge, cut along the axis where that lengthens the lists least (a comb gets columns
+only). Lists longer than `_CROWDED` are cut again in the same way, up to 128 by 128, as long as the lists of all
+levels together stay within a budget: edges that are long and close together would fill any memory.
+"""
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
-from engine.bounding.grid import Axis, BoxGrid, build_box_grid
-from engine.containment.prepared import Rings, rings_of
-from engine.containment.ring_cells import walk_rows
-from engine.containment.ring_crossing import locate_in_rings
+from engine.containment.rational_locate import next_in_ring
+from engine.containment.ring_cell_lists import choose_cuts, count_level, fill_level, place_edges
+from engine.containment.ring_cells import FINE_BITS, LAST, SPLIT_BITS, Integers, RingCells
 from engine.parallel import Budget
-from engine.solids.base import FloatArray, as_read_only
+from engine.solids.base import FloatArray, IntArray, as_read_only
 from engine.solids.polygon import Polygon
 
 _PAYS_FROM: Final = 1 << 12
 _PAYS_PER_EDGE: Final = 1
-_PLACE: Final = (0.5 + 287.0 / 4096.0, 0.5 - 413.0 / 4096.0)
-"""Where the reference point lies in its cell: no symmetry that edges might share."""
+_MOST: Final = 1 << 27
+"""Edges whose numbers fit an item."""
 _RANGE: Final = 2.0**500
-_AT_ONCE: Final = 1024
-_ROUNDS: Final = 4
-"""How often cells that the walk left open are asked by rays, in rising numbers; the last ones stay open."""
-
-
-class RingCells(NamedTuple):
-    """What `locate_by_ring_cells` reads."""
-
-    starts: FloatArray
-    ends: FloatArray
-    grid: BoxGrid
-    columns: FloatArray
-    """x of the reference points."""
-    rows: FloatArray
-    """y of the reference points."""
-    sides: npt.NDArray[np.int8]
-    """Side of each cell's reference point, 0 where it is not known."""
+"""Largest coordinate: products of the filter stay finite."""
+_FASTEST: Final = 1e300
+"""Most fine cells per unit: keeps products finite where all values of an axis lie within some subnormals."""
+_NORMAL: Final = 2.0**-960
+"""Extent from which places are off by no more than rounding, not by underflow."""
+_CROWDED: Final = 3
+"""Longest list of a topmost cell; twice as long on each level below, where cutting gains less."""
+_TOP_BITS: Final = 20
+_TOP_CELLS: Final = (1 << 12, 1 << 20, 64)
+"""Cells of the topmost grid: least, most, for each edge."""
+_CUT_BITS: Final = (1 << SPLIT_BITS) - 1
+_CUT_CELLS: Final = (4, 1 << 12, 16)
+_ENTRIES: Final = 32
+"""Entries an edge, of all lists ever made, after which no cell is cut any more."""
+_WORDS: Final = 1 << 24
 
 
 def ring_cells_if_they_pay(solid: Polygon, n_points: int, budget: Budget) -> RingCells | None:
     """Return the cells of `solid` if they are there, or if the points asked so far would have paid for them."""
     seen = solid.prepared("points_seen", lambda: [0])
     seen[0] += n_points
-    if seen[0] < _PAYS_FROM + _PAYS_PER_EDGE * len(solid.vertices) or np.abs(solid.vertices).max() > _RANGE:
+    if seen[0] < _PAYS_FROM + _PAYS_PER_EDGE * len(solid.vertices):
+        return None
+    if len(solid.vertices) > _MOST or not solid.prepared("is_in_range", lambda: [_is_in_range(solid)])[0]:
         return None
     return solid.prepared("ring_cells", lambda: build_ring_cells(solid, budget))
 
 
+def _is_in_range(solid: Polygon) -> bool:
+    return bool(np.abs(solid.vertices).max() <= _RANGE)
+
+
 def build_ring_cells(solid: Polygon, budget: Budget) -> RingCells:
-    """Return the cells of `solid`. Raises what `Budget.check` raises."""
-    rings = rings_of(solid, budget.check)
-    starts, ends = rings.starts, rings.ends
-    low, high = np.minimum(starts, ends), np.maximum(starts, ends)
-    side = int(min(1024.0, max(32.0, 4.0 * len(starts) ** 0.5)))
-    sides_of_boxes = (np.ascontiguousarray(s[:, k]) for k in (0, 1) for s in (low, high))
-    x_low, x_high, y_low, y_high = sides_of_boxes
-    grid = build_box_grid(x_low, x_high, y_low, y_high, side, side)
+    """Return the cells of `solid`, whose coordinates are at most `_RANGE`. Raises what `Budget.check` raises."""
+    starts = solid.vertices
+    low, high = starts.min(axis=0), starts.max(axis=0)
+    halves = high * 0.5 - low * 0.5
+    with np.errstate(all="ignore"):
+        scales = np.where(halves > 0.0, np.minimum((2.0**FINE_BITS - 2.0) / halves, _FASTEST), 0.0)
+    edges, places = np.empty(4 * len(starts) + 4), np.zeros((len(starts) + 1, 4))
+    edges[:4] = 0.0, -np.inf, np.inf, np.nan
+    ends = as_read_only(np.ascontiguousarray(starts[next_in_ring(solid)]))
+    with np.errstate(all="ignore"):
+        place_edges(starts, ends, low * 0.5, scales, edges, places)
     budget.check()
-    columns, rows = _references(grid.u, _PLACE[0]), _references(grid.v, _PLACE[1])
-    heads = np.zeros(grid.u.n_cells * grid.v.n_cells, np.int8)
-    sides = np.empty_like(heads)
-    asked = np.arange(grid.v.n_cells) * grid.u.n_cells
-    for _ in range(_ROUNDS):
-        _ask(rings, asked, grid, columns, rows, heads, budget)
-        with np.errstate(all="ignore"):
-            walk_rows(starts, ends, grid, columns, rows, heads, sides, budget.flag)
+    words, items, bits = _cut(edges, places, halves, budget)
+    width, height = (high - low).tolist()
+    box = (float(low[0]), float(high[0]), float(low[1]), float(high[1]))
+    band = 2.0**-48 * width + 2.0**-1070 * (height + 2.0)
+    return RingCells(edges, words, items, box, float(scales[0]), float(scales[1]), bits[0], bits[1], band)
+
+
+def _cut(
+    edges: FloatArray, places: FloatArray, halves: FloatArray, budget: Budget
+) -> tuple[Integers, Integers, tuple[int, int]]:
+    """Return words, items and the bits of the topmost columns and rows."""
+    n_edges, flag = len(places) - 1, budget.flag
+    is_tight = bool(((halves == 0.0) | (halves >= _NORMAL)).all())
+    nodes = np.array([[0, 0, FINE_BITS, FINE_BITS, 0, 0, n_edges]])
+    edges_of = np.arange(1, n_edges + 1, dtype=np.int32)
+    most, cells = np.where(halves > 0.0, _TOP_BITS, 0), _TOP_CELLS
+    top, above, owners = np.zeros(2, np.int64), np.zeros(1, np.int64), np.zeros(1, np.int64)
+    levels: list[IntArray] = []
+    lists = [np.array([0, LAST], np.int32)]
+    n_words, n_items, n_entries = 0, 2, 0
+    while len(nodes):  # bound: every level takes a bit at least, of 60
+        cuts = np.zeros((len(nodes), 2), np.int64)
+        choose_cuts(nodes, edges_of, places, most, np.array(cells), is_tight, cuts, flag)
+        sizes = 1 << cuts.sum(axis=1)
+        bases = np.cumsum(sizes) - sizes
+        counts, sides = np.zeros(sizes.sum(), np.int64), np.zeros(sizes.sum(), np.int8)
+        count_level(nodes, cuts, bases, edges_of, edges, places, is_tight, counts, sides, flag)
         budget.check()
-        is_head = (sides == 0) & (heads == 0)
-        is_head[1:] &= sides[:-1] != 0  # the first that is open, in each run
-        asked = np.flatnonzero(is_head)
-        if not len(asked):
-            break
-    return RingCells(starts, ends, grid, columns, rows, sides)
-
-
-def _references(axis: Axis, place: float) -> FloatArray:
-    """Return a coordinate of the reference points along an axis, NaN where rounding puts it into another cell."""
-    index = np.arange(axis.n_cells)
-    if axis.cells_per_unit == 0.0:
-        return np.full(1, np.nan)
-    values = np.asarray(axis.low + 2.0 * (index + place) / axis.cells_per_unit, np.float64)
-    found = np.minimum((values * 0.5 - axis.low * 0.5) * axis.cells_per_unit, axis.n_cells - 1.0)
-    values[(found.astype(np.int64) != index) | (values < axis.low)] = np.nan
-    return values
-
-
-def _ask(
-    rings: Rings,
-    cells: npt.NDArray[np.int64],
-    grid: BoxGrid,
-    columns: FloatArray,
-    rows: FloatArray,
-    heads: npt.NDArray[np.int8],
-    budget: Budget,
-) -> None:
-    """Write the sides of the reference points of `cells` to `heads`, by the exact ray."""
-    points = np.stack([columns[cells % grid.u.n_cells], rows[cells // grid.u.n_cells]], axis=1)
-    is_valid = ~np.isnan(points).any(axis=1)
-    cells, points = cells[is_valid], np.ascontiguousarray(points[is_valid])
-    for start in range(0, len(cells), _AT_ONCE):
-        found = np.empty(len(points[start : start + _AT_ONCE]), np.int8)
-        locate_in_rings(as_read_only(points[start : start + _AT_ONCE]), *rings, found, budget.flag)
+        n_entries += int(counts.sum())
+        is_crowded = (counts > _CROWDED << len(levels)) & np.repeat(sizes > 1, sizes)
+        is_crowded &= n_entries < _ENTRIES * n_edges + _TOP_CELLS[0] and n_words + len(counts) < _WORDS
+        kept, passed = np.where(is_crowded, 0, counts), np.where(is_crowded, counts, 0)
+        firsts = np.where(is_crowded, np.cumsum(passed) - passed, np.cumsum(kept) - kept)
+        stops = firsts.copy()
+        items, next_edges = np.empty(kept.sum(), np.int32), np.empty(passed.sum(), np.int32)
+        fill_level(nodes, cuts, bases, edges_of, edges, places, is_tight, is_crowded, stops, items, next_edges, flag)
         budget.check()
-        found[np.abs(found) != 1] = 0
-        heads[cells[start : start + _AT_ONCE]] = found
+        items[stops[kept > 0] - 1] |= LAST
+        words = np.where(kept > 0, (firsts + n_items) << 1, 0).astype(np.int64) + sides
+        if levels:
+            above[owners] = ~((bases + n_words) << 2 * SPLIT_BITS | cuts[:, 1] << SPLIT_BITS | cuts[:, 0])
+        else:
+            top, words = cuts[0], np.append(words, 0)  # the last for points out of the box
+        levels.append(words)
+        lists.append(items)
+        n_words, n_items = n_words + len(words), n_items + len(items)
+        above, owners = words, np.flatnonzero(is_crowded)
+        nodes = _crowded_nodes(nodes, cuts, bases, owners, sides, firsts, stops)
+        edges_of, most, cells = next_edges, np.full(2, _CUT_BITS), _CUT_CELLS
+    return (
+        np.concatenate(levels).astype(np.int32),
+        np.concatenate(lists),
+        (int(top[0]), int(top[1])),
+    )
+
+
+def _crowded_nodes(
+    nodes: IntArray,
+    cuts: IntArray,
+    bases: IntArray,
+    owners: IntArray,
+    sides: npt.NDArray[np.int8],
+    firsts: IntArray,
+    stops: IntArray,
+) -> IntArray:
+    """Return the nodes of the next level, which are the cells `owners` of this one."""
+    parent = np.searchsorted(bases, owners, side="right") - 1
+    a, b = cuts[parent].T
+    place = owners - bases[parent]
+    columns, rows, u_shifts, v_shifts = nodes[parent, :4].T
+    return np.stack(
+        [
+            (columns << a) + (place & (1 << a) - 1),
+            (rows << b) + (place >> a),
+            u_shifts - a,
+            v_shifts - b,
+            sides[owners].astype(np.int64),
+            firsts[owners],
+            stops[owners],
+        ],
+        axis=1,
+    )
