@@ -19,6 +19,7 @@ from service.docs import router as docs_router
 from service.errors import faults_of, http_fault, problem
 from service.metrics import Metrics
 from service.openapi import openapi_of
+from service.playground import add_playground
 from service.routes import binary, bounds, collision, containment, health, overlay, polygons, segments, solids
 from service.settings import Settings
 from service.store import Store
@@ -56,6 +57,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         app.include_router(module.router)
     app.include_router(solids.lookup)
     app.include_router(docs_router)
+    add_playground(app)
     app.add_exception_handler(HTTPException, _answer_http_exception)
     app.add_exception_handler(Exception, _answer_anything)
     if settings.cors_origins:

@@ -1,0 +1,168 @@
+// The five questions: which solids they take, the request they send, the figures and the picture of its answer.
+
+import { outlines, posed, ring3d, solid2d, solid3d } from "./drawing.js";
+
+const random = (seed) => () => {  // mulberry32: the same items every time, so that a picture can be shown to others
+  seed = (seed + 0x6d2b79f5) | 0;
+  let t = Math.imul(seed ^ (seed >>> 15), 1 | seed);
+  t = (t + Math.imul(t ^ (t >>> 7), 61 | t)) ^ t;
+  return ((t ^ (t >>> 14)) >>> 0) / 4294967296;
+};
+
+const snapped = (state, position) => (state.snap ? position.map((v) => Math.round(v * 4) / 4) : position);
+const moved = (state, position) => snapped(state, position.map((v, k) => v + state.offset[k]));
+
+function randomPosition(next, dimension, size) {
+  return Array.from({ length: dimension }, () => (2 * next() - 1) * size);
+}
+
+function points(state) {
+  const next = random(1);
+  return Array.from({ length: state.n }, () => moved(state, randomPosition(next, state.dimension, 1.8)));
+}
+
+function segments(state) {
+  const next = random(2);
+  return Array.from({ length: state.n }, () => {
+    const middle = randomPosition(next, state.dimension, 1), half = randomPosition(next, state.dimension, 1.6);
+    return [-1, 1].map((sign) => moved(state, middle.map((v, k) => v + sign * half[k])));
+  });
+}
+
+function stars(state) {
+  const next = random(3);
+  return Array.from({ length: state.n }, () => {
+    const middle = randomPosition(next, state.dimension, 0.9), n = 5 + Math.floor(next() * 6), phase = 6.3 * next();
+    const u = unit(randomPosition(next, state.dimension, 1)), v = state.dimension === 2 ? [-u[1], u[0]] : unit(across(u, randomPosition(next, 3, 1)));
+    return [Array.from({ length: 2 * n }, (_, i) => {
+      const radius = i % 2 ? 0.45 : 1, [c, s] = [Math.cos(phase + (Math.PI * i) / n), Math.sin(phase + (Math.PI * i) / n)];
+      return moved(state, middle.map((m, k) => m + radius * (c * u[k] + s * v[k])));
+    })];
+  });
+}
+
+const unit = (a) => a.map((v) => v / Math.hypot(...a));
+const across = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+const counted = (n, thing) => `${n.toLocaleString("en")} ${thing}${n === 1 ? "" : "s"}`;
+const firstItems = (state) => (state.dimension === 3 ? solid3d(state.first, "first", 0.3) : solid2d(state.first, "first"));
+
+export const QUESTIONS = {
+  contains: {
+    hint: "Blue points are inside, orange ones exactly on the boundary, grey ones outside. The cloud is what you move; snapped to quarters, points meet faces, edges and corners.",
+    firsts: () => true,
+    counts: [1, 5, 3.5],
+    ask(state) {
+      const list = points(state);
+      return { path: "/v1/contains", body: { solid: state.first.asked, points: list }, items: list.length };
+    },
+    figures(state, { contained, boundary }) {
+      const inside = contained.filter(Boolean).length - boundary.length;
+      return { inside, boundary: boundary.length, outside: contained.length - inside - boundary.length };
+    },
+    verdict: (state, answer, { inside, boundary }) => `${inside.toLocaleString("en")} inside, ${boundary.toLocaleString("en")} on the boundary`,
+    draw(state, { contained, boundary }, { points: list }) {
+      const groups = { outside: [], inside: [], boundary: [] }, on = new Set(boundary);
+      list.forEach((point, i) => groups[on.has(i) ? "boundary" : contained[i] ? "inside" : "outside"].push(point));
+      const size = state.n > 20000 ? 0.6 : 1;
+      return [...firstItems(state), ...Object.entries(groups).map(([color, group]) => ({
+        kind: "points", points: group, color, width: { outside: 2.5, inside: 5, boundary: 7 }[color] * size, alpha: color === "outside" ? 0.5 : 1,
+      }))];
+    },
+  },
+
+  collide: {
+    hint: "Move the second body; the faces of the witness are orange. Try the same solid twice, snapped: touching is told from overlapping exactly.",
+    firsts: () => true,
+    seconds: () => true,
+    ask(state) {
+      const pose = { rotation: state.rotation, translation: moved(state, Array(state.dimension).fill(0)) };
+      return { path: "/v1/collide", body: { first: state.first.asked, second: state.second.asked, poses: [pose] }, items: 1 };
+    },
+    figures(state, { collisions: [{ relation, witness }] }) {
+      const faces = ["first_face", "second_face"].filter((name) => name in (witness ?? {})).map((name) => witness[name]);
+      return { relation: relation.replaceAll("_", " "), witness: witness ? `${witness.kind.replace("_", "-")}${faces.length ? ` (faces ${faces.join(", ")})` : ""}` : "none" };
+    },
+    verdict: (state, answer, { relation }) => relation,
+    draw(state, { collisions: [{ witness }] }, { poses: [pose] }) {
+      const second = posed(state.second, pose), draw = state.dimension === 3 ? solid3d : solid2d;
+      const items = [...draw(state.first, "first", 0.45), ...draw(second, "second", 0.45)];
+      for (const [solid, name] of [[state.first, "first_face"], [second, "second_face"]]) {
+        const face = solid.mesh?.faces[witness?.[name]];
+        if (face) items.push(...ring3d(face.map((i) => solid.mesh.vertices[i]), "boundary"));
+        else if (witness?.[name] >= 0 && solid.rings) items.push({ kind: "lines", lines: [edge(solid.rings, witness[name])], color: "boundary", width: 4 });
+      }
+      return items;
+    },
+  },
+
+  segments: {
+    hint: "What remains of each segment is green. In a concave solid a segment may fall into several pieces; all their ends are correctly rounded.",
+    firsts: () => true,
+    counts: [0, 4, 1.75],
+    ask(state) {
+      const list = segments(state);
+      return { path: "/v1/clip/segments", body: { region: state.first.asked, segments: list }, items: list.length };
+    },
+    figures: (state, { pieces }) => ({ pieces: pieces.length, "of segments": state.n }),
+    verdict: (state, { pieces }) => `${counted(pieces.length, "piece")} of ${counted(state.n, "segment")}`,
+    draw(state, { pieces }, { segments: list }) {
+      const width = state.n > 1000 ? 1 : 2.5;
+      return [
+        ...firstItems(state),
+        { kind: "lines", lines: list, color: "outside", width: width / 2 },
+        { kind: "lines", lines: pieces.map(({ start, end }) => [start, end]), color: "kept", width },
+        { kind: "points", points: state.n > 1000 ? [] : pieces.flatMap(({ start, end }) => [start, end]), color: "kept", width: 5 },
+      ];
+    },
+  },
+
+  polygons: {
+    hint: "Sutherland-Hodgman on a convex region, in the plane and in space: green is what remains of the grey stars.",
+    firsts: (solid) => solid.convex,
+    counts: [0, 2.5, 0.75],
+    ask(state) {
+      const list = stars(state);
+      return { path: "/v1/clip/polygons", body: { region: state.first.asked, polygons: list }, items: list.length };
+    },
+    figures: (state, { polygons }) => ({
+      "rings left": polygons.reduce((sum, { rings }) => sum + rings.length, 0), "of polygons": polygons.length,
+      "with bridges possible": polygons.filter((polygon) => polygon.may_have_bridges).length,
+    }),
+    verdict: (state, answer, figures) => `${counted(figures["rings left"], "ring")} left of ${counted(state.n, "polygon")}`,
+    draw(state, { polygons }, { polygons: list }) {
+      return [...firstItems(state), ...outlines(list.flat(), "outside", 1, 0), ...outlines(polygons.flatMap(({ rings }) => rings), "kept", 2.5, 0.25)];
+    },
+  },
+
+  overlay: {
+    hint: "Move the second polygon, or drag a corner of the first. Separate pieces with holes, valid after rounding, the exact area beside them.",
+    dimensions: [2],
+    firsts: (solid) => solid.polygon,
+    seconds: (solid) => solid.polygon,
+    operations: true,
+    ask(state) {
+      const pose = { rotation: state.rotation, translation: state.offset.slice(0, 2) };
+      const rings = posed(state.second, pose).rings.map((ring) => ring.map((position) => snapped(state, position)));
+      return { path: "/v1/overlay", body: { subject: state.first.json, clip: { type: "polygon", rings }, operation: state.operation }, items: 1 };
+    },
+    figures: (state, { pieces, area, rounding, collapsed }) => ({
+      pieces: pieces.length, holes: pieces.reduce((sum, { holes }) => sum + holes.length, 0), "exact area": area,
+      "vertices moved for validity": rounding.vertices_moved, "lost to rounding": collapsed.length,
+    }),
+    verdict: (state, { pieces, area }) => `${counted(pieces.length, "piece")}, area ${area?.toPrecision(9)}`,
+    draw(state, { pieces }, { clip }) {
+      return [
+        ...solid2d(state.first, "first"), { kind: "rings", rings: clip.rings, color: "second", fill: 0.12 },
+        ...pieces.map(({ shell, holes }) => ({ kind: "rings", rings: [shell, ...holes], color: "kept", fill: 0.45, width: 2.5 })),
+      ];
+    },
+  },
+};
+
+function edge(rings, first) {
+  for (const ring of rings) {
+    if (first < ring.length) return [ring[first], ring[(first + 1) % ring.length]];
+    first -= ring.length;
+  }
+  return [];
+}
