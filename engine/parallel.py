@@ -26,6 +26,9 @@ Progress = Callable[[int], object]
 CHUNK_SECONDS: Final = 0.002
 """What one chunk should take: short enough for fairness between requests, long against 20 us of hand-over."""
 
+_SMALLEST: Final = 8
+"""The last chunks are not smaller than this part of a full one."""
+
 
 class Cancel:
     """A switch that another thread may throw: every call given it ends soon with `CancelledError`."""
@@ -210,12 +213,18 @@ def _run_threaded(
     budget: Budget,
     progress: Progress | None,
 ) -> None:
-    """Keep `n_workers` chunks in flight; on the first error raise the flag, wait for those in flight, re-raise."""
+    """Keep `n_workers` chunks in flight; on the first error raise the flag, wait for those in flight, re-raise.
+
+    Where that is every thread of the pool, one more chunk waits in its queue, so that none is idle while this thread
+    wakes up. Towards the end chunks get smaller, so that all threads end together.
+    """
     pool, failure = _shared_pool(), None
+    n_submitted = n_workers + (n_workers >= default_workers())
     in_flight: dict[Future[float], tuple[int, int]] = {}
     while start < n_items or in_flight:
-        while start < n_items and len(in_flight) < n_workers and failure is None:
-            stop = min(n_items, start + chunk)
+        while start < n_items and len(in_flight) < n_submitted and failure is None:
+            share = max(1, chunk // _SMALLEST, (n_items - start) // (2 * n_workers))
+            stop = min(n_items, start + min(chunk, share))
             in_flight[pool.submit(_timed, task, start, stop)] = (start, stop)
             start = stop
         if not in_flight:

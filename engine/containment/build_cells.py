@@ -23,7 +23,7 @@ from engine.containment.cell_status import (
 from engine.containment.cells import LEVELS, PARTS, SPLIT, FloatArray, Int32Array, Lattice, list_parts, list_top
 from engine.containment.prepared import Columns, columns_of
 from engine.containment.ray_parity import locate_by_columns
-from engine.containment.segment_parity import INSIDE_CELL, OPEN_CELL, OUTSIDE_CELL
+from engine.containment.segment_parity import CODE_SHIFT, INSIDE_CELL, OPEN_CELL, OUTSIDE_CELL
 from engine.parallel import Budget
 from engine.solids.base import IntArray, as_read_only
 from engine.solids.polyhedron import Polyhedron
@@ -52,6 +52,9 @@ class Cells(NamedTuple):
     low: tuple[float, float, float]
     high: tuple[float, float, float]
     """The solid's box: beyond it all is outside."""
+    statuses: Int8Array
+    """(n,) of level 0: the location of all points of a cell, UNDECIDED where its code says more; small enough to stay
+    in the cache."""
     codes: Int32Array
     """Level 0, then 64 a brick."""
     groups: npt.NDArray[np.float32]
@@ -139,6 +142,7 @@ def build_cells(solid: Polyhedron, budget: Budget) -> Cells:
         lattice,
         (float(low[0]), float(low[1]), float(low[2])),
         (float(high[0]), float(high[1]), float(high[2])),
+        (np.minimum(codes[0], OPEN_CELL) + CODE_SHIFT).astype(np.int8),
         np.concatenate(codes),
         groups,
     )

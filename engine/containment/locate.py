@@ -12,9 +12,10 @@ import numpy.typing as npt
 
 from engine.containment.cell_order import gathered
 from engine.containment.locators import locator_of
+from engine.errors import NotFiniteError
 from engine.parallel import Budget, Cancel, Progress, run_chunks
 from engine.solids.base import Solid
-from engine.solids.checks import as_points
+from engine.solids.checks import as_points, check_finite
 from engine.types import Accuracy
 
 Locations = npt.NDArray[np.int8]
@@ -82,12 +83,14 @@ def locate(
     [1, 0, -1]
     """
     choice = locator_of(solid)
-    array = as_points(points, solid.dimension)
+    array = as_points(points, solid.dimension, must_be_finite=False)
     locations = np.empty(len(array), np.int8)
     beyond, rational = [], []
     with Budget(deadline, cancel) as budget:
         budget.check()
         locator = choice.chosen(len(array), budget)
+        if not locator.sees_not_finite:
+            check_finite(array, ("points",))
         order = None if locator.order is None else locator.order(array, budget)
 
         def task(start: int, stop: int) -> None:
@@ -101,7 +104,11 @@ def locate(
             beyond.append(counts.beyond)
             rational.append(counts.rational)
 
-        run_chunks(task, len(array), budget=budget, workers=workers, progress=progress)
+        try:
+            run_chunks(task, len(array), budget=budget, workers=workers, progress=progress)
+        except NotFiniteError:
+            check_finite(array, ("points",))  # names the first of all, not of a chunk
+            raise
     if not report:
         return locations
     return locations, Accuracy(locator.decisions, None, len(array), sum(beyond), sum(rational), locator.method)

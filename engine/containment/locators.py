@@ -25,7 +25,7 @@ from engine.containment.rational_locate import Check, combine, prism_walls, rati
 from engine.containment.ray_parity import locate_by_columns
 from engine.containment.ring_cells import locate_by_ring_cells
 from engine.containment.ring_crossing import locate_in_rings
-from engine.containment.segment_parity import locate_by_cells
+from engine.containment.segment_parity import NOT_FINITE, locate_by_cells
 from engine.containment.triangle_pass import locate_few
 from engine.containment.triangles import locate_in_triangle
 from engine.errors import InvalidArrayError, NotFiniteError
@@ -70,6 +70,8 @@ class Locator:
 
     order: Callable[[FloatArray, Budget], npt.NDArray[np.int64] | None] | None = None
     """Returns the order in which a large batch is best asked, None for as it is."""
+    sees_not_finite: bool = False
+    """Whether `fill` raises NotFiniteError for points that are not finite; otherwise the caller guarantees them."""
 
     def chosen(self, n_points: int, budget: Budget) -> Locator:
         """Return the locator for a batch of `n_points`."""
@@ -202,6 +204,7 @@ def _in_polyhedron(solid: Polyhedron) -> Locator:
             "segment_parity",
             _in_cells(lambda *rest: int(locate_by_cells(rest[0], cells, *rest[1:])), by_rays),
             order=lambda points, budget: order_if_it_pays(points, cells, budget),
+            sees_not_finite=True,
         )
 
     at_once = Locator("ray_parity", settled(run_once, rational_half(solid)))
@@ -215,6 +218,8 @@ def _in_cells(by_cells: Callable[[FloatArray, Locations, Flag], int], by_rays: F
     def fill(points: FloatArray, locations: Locations, budget: Budget) -> Counts:
         with np.errstate(all="ignore"):
             n_open = by_cells(as_read_only(points), locations, budget.flag)
+        if n_open == NOT_FINITE:
+            raise NotFiniteError("a point is not finite", ("points",))
         if n_open == 0:
             return Counts(0, 0)
         budget.check()

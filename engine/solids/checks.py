@@ -84,18 +84,19 @@ def as_number(value: object, where: Where) -> float:
     return number
 
 
-def as_floats(values: object, depth: int, where: Where) -> FloatArray:
+def as_floats(values: object, depth: int, where: Where, must_be_finite: bool = True) -> FloatArray:
     """Return `values` as a finite float64 array of `depth` axes, C-contiguous and read-only.
 
+    must_be_finite: False where the caller looks for NaN and infinity later, with `check_finite`.
     Borrowed (a view) where nothing had to change. Always of one kind for the compiler, whatever the caller's array is
     (writable or not, aligned or not, a subclass), so that no kernel is compiled a second time.
     """
-    result = _as_floats(values, depth, where).view()
+    result = _as_floats(values, depth, where, must_be_finite).view()
     result.setflags(write=False)
     return result
 
 
-def _as_floats(values: object, depth: int, where: Where) -> FloatArray:
+def _as_floats(values: object, depth: int, where: Where, must_be_finite: bool) -> FloatArray:
     if isinstance(values, np.ma.MaskedArray):
         raise InvalidArrayError(f"{spell(where)} is a masked array; fill or drop the masked items first", where)
     if isinstance(values, (list, tuple)):
@@ -117,7 +118,8 @@ def _as_floats(values: object, depth: int, where: Where) -> FloatArray:
         with np.errstate(over="ignore", under="ignore"):  # wider floats: judged by the check
             result = np.require(array, np.float64, ["C", "A", "E"])
         _check_converted(array, result, where)
-    check_finite(result, where)
+    if must_be_finite:
+        check_finite(result, where)
     return result
 
 
@@ -189,14 +191,16 @@ def check_not_empty(count: int, what: str, where: Where) -> None:
         raise EmptyGeometryError(f"{spell(where)} is empty; at least one {what} is needed", where)
 
 
-def as_points(points: object, dimension: int | None, where: Where = ("points",)) -> FloatArray:
+def as_points(
+    points: object, dimension: int | None, where: Where = ("points",), must_be_finite: bool = True
+) -> FloatArray:
     """Return `points` as a finite C-contiguous float64 array ``(n, dimension)``; no points at all are welcome.
 
     points: array of floats or integers, or nested lists; borrowed where it is float64 and contiguous already.
-    dimension: 2 or 3, or None to take either (no points: 2).
+    dimension: 2 or 3, or None to take either (no points: 2). must_be_finite: as in `as_floats`.
     Raises: InvalidArrayError, WrongDimensionError, NotFiniteError.
     """
-    array = as_floats(points, 2, where)
+    array = as_floats(points, 2, where, must_be_finite)
     if array.size == 0 and array.shape[0] == 0 and array.shape[1] in (0, dimension or 0):
         return array.reshape((0, dimension or 2))
     check_dimension(array.shape[1], dimension, where)

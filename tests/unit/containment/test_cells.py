@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine import Cancel, CancelledError, Csg, Polyhedron, locate
+from engine import Cancel, CancelledError, Csg, NotFiniteError, Polyhedron, locate
 from engine.containment import build_cells as building
 from engine.containment import cell_order
 from engine.containment.build_cells import build_cells
@@ -118,6 +118,20 @@ def test_cells_are_built_only_when_they_pay(monkeypatch: pytest.MonkeyPatch) -> 
     assert locate(points * 1e300, huge, report=True)[1].method == "ray_parity"
     tree = Csg("union", [solid, made(box_mesh([1, 0, 0], [2, 1, 1]))])
     assert (locate(points, tree) >= first).all()
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("workers", [1, 2])
+def test_the_first_of_the_points_that_are_not_finite_is_named(bad: float, workers: int) -> None:
+    """The cells themselves look for them; chunks may end in any order."""
+    solid = made(box_mesh([0, 0, 0], [1, 1, 1]))
+    points = np.random.default_rng(9).uniform(-0.1, 1.1, (60_000, 3))
+    assert locate(points, solid, report=True)[1].method == "segment_parity"
+    points[41_234, 2] = points[55_555] = bad
+    with pytest.raises(NotFiniteError, match=r"points\[41234\]\[2\]"):
+        locate(points, solid, workers=workers)
+    far = np.array([[1e308, -1e308, 1e308], [0.5, 0.5, 0.5]] * 300)  # finite, though their sum is not
+    assert locate(far, solid).tolist() == [-1, 1] * 300
 
 
 def test_a_cancelled_build_keeps_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
