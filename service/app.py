@@ -48,7 +48,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         redirect_slashes=False,
     )
     app.state.settings = settings
-    app.state.store = Store(settings.store_bytes)
+    app.state.store = Store(settings.store_bytes, settings.store_folder, settings.store_folder_bytes)
     app.state.memory = Memory(settings.request_bytes)
     app.state.metrics = Metrics()
     app.state.warm, app.state.warm_error = threading.Event(), None

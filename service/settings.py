@@ -7,6 +7,7 @@ Limits on counts stand in the OpenAPI document too (openapi.py puts them there b
 from __future__ import annotations
 
 import os
+from pathlib import Path
 from typing import Annotated
 
 from pydantic import Field, field_validator
@@ -30,7 +31,8 @@ class Settings(BaseSettings):
     port: Annotated[int, Field(ge=0, le=65535)] = 8000
     """0 takes a free port (it is printed)."""
     workers: Count = 1
-    """Processes; one uses all cores already, more of them help JSON decoding, and each keeps its own store."""
+    """Processes; one uses all cores already, more of them help JSON decoding. Each has a memory of its own: without a
+    store folder they share a temporary one."""
     log_level: str = "info"
     cors_origins: Annotated[tuple[str, ...], NoDecode] = ()
     """Origins that browsers may call from, separated by commas; none by default."""
@@ -78,6 +80,10 @@ class Settings(BaseSettings):
     """Memory for requests under way, four bytes for each byte of a body; beyond it the answer is 503."""
     store_bytes: Count = 512 * 2**20
     """Memory for stored solids; the least recently used leave first."""
+    store_folder: Path | None = None
+    """Folder for stored solids, kept over a restart and shared by all that are given it; none by default."""
+    store_folder_bytes: Count = 10 * 2**30
+    """Size of that folder; the files used longest ago leave first."""
 
     @field_validator("cors_origins", mode="before")
     @classmethod

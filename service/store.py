@@ -4,6 +4,8 @@ The store holds engine objects, so structures prepared for one request serve the
 over a version tag, its type and its arrays as little-endian bytes, each with its shape: equal input has equal names in
 every process, so replicas agree without talking. -0.0 is 0.0 (the engine made it so), a CSG tree hashes the names of
 its operands.
+
+With a folder (disk.py) the memory holds what was used last, and the folder more, for other processes and after a start.
 """
 
 from __future__ import annotations
@@ -12,27 +14,17 @@ import hashlib
 import threading
 from collections import OrderedDict
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
 from engine import Solid
+from service.disk import FIELDS, Folder
 from service.errors import ServiceError
 
 VERSION: Final = b"exact-geometry/1"
 """Changes when the meaning of any stored field does."""
-
-_FIELDS: Final[dict[str, tuple[str, ...]]] = {
-    "half_space": ("normal", "offset"),
-    "sphere": ("center", "radius"),
-    "aabb": ("min", "max"),
-    "convex": ("planes",),
-    "triangle": ("vertices",),
-    "polygon": ("vertices", "ring_offsets"),
-    "polyhedron": ("vertices", "face_offsets", "face_indices"),
-    "surface": ("vertices", "face_offsets", "face_indices"),
-    "implicit": ("powers", "coefficients"),
-}
 
 
 def solid_id(solid: Solid) -> str:
@@ -51,7 +43,7 @@ def _parts(solid: Any) -> Iterator[Any]:
         yield solid.operation.encode()
         yield from (solid_id(operand).encode() for operand in solid.operands)  # depth: capped by the engine
         return
-    for name in _FIELDS[solid.type]:
+    for name in FIELDS[solid.type]:
         array = np.asarray(getattr(solid, name))
         little = np.ascontiguousarray(array, "<f8" if array.dtype.kind == "f" else "<i8")
         yield f"{name}:{little.dtype.str}:{array.shape}".encode()
@@ -61,8 +53,9 @@ def _parts(solid: Any) -> Iterator[Any]:
 class Store:
     """A dictionary of solids by name with a budget of bytes; safe to share between threads."""
 
-    def __init__(self, budget: int) -> None:
+    def __init__(self, budget: int, folder: Path | None = None, folder_budget: int = 2**40) -> None:
         self._budget = budget
+        self._folder = None if folder is None else Folder(folder, folder_budget, solid_id)
         self._solids: OrderedDict[str, Solid] = OrderedDict()
         self._sizes: dict[str, int] = {}
         self._total = 0
@@ -76,23 +69,29 @@ class Store:
                 "limit_exceeded",
                 f"the solid takes {size} bytes and the whole store {self._budget}; raise GEOMETRY_STORE_BYTES",
             )
-        with self._lock:
-            is_new = name not in self._solids
-            if is_new:
-                self._solids[name] = solid
-            self._use(name, size)
-        return name, is_new
+        is_new_file = self._folder is not None and self._folder.put(name, solid)
+        _, is_new_here = self._keep(name, solid)
+        return name, is_new_here if self._folder is None else is_new_file
 
     def get(self, name: str) -> Solid:
         """Return the solid called `name`; `unknown_solid` if it is not here (any more)."""
         with self._lock:
-            solid = self._solids.get(name)
-            if solid is None:
-                raise ServiceError(
-                    "unknown_solid", f"no solid {name[:64]!r} is stored here; put it again: POST /v1/solids"
-                )
-            self._use(name, solid.memory)  # structures may have been prepared since
-            return solid
+            found = self._solids.get(name)
+            if found is not None:
+                self._use(name, found.memory)  # structures may have been prepared since
+                return found
+        found = None if self._folder is None else self._folder.get(name)
+        if found is None:
+            raise ServiceError("unknown_solid", f"no solid {name[:64]!r} is stored here; put it again: POST /v1/solids")
+        return self._keep(name, found)[0]
+
+    def _keep(self, name: str, solid: Solid) -> tuple[Solid, bool]:
+        """Return the one object called `name` that all threads share, and whether it is `solid`, new here."""
+        with self._lock:
+            is_new = name not in self._solids
+            kept = self._solids.setdefault(name, solid)
+            self._use(name, kept.memory)
+            return kept, is_new
 
     def _use(self, name: str, size: int) -> None:
         """Count `size` for `name`, make it the last to leave, and let others go while there are too many bytes."""

@@ -1,0 +1,203 @@
+"""Solids as files in a folder, which replicas may share over a common volume.
+
+A file is named by its solid and written under another name first, so that a name never leads to half a file. Since a
+name is a hash of the content, a file that was damaged all the same is found out when it is read: it is not served, and
+taken away. Files used longest ago leave when the folder grows beyond its budget.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import logging
+import os
+import re
+import tempfile
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+import engine
+from engine import Solid
+
+log = logging.getLogger("service")
+
+FIELDS: Final[dict[str, tuple[str, ...]]] = {
+    "half_space": ("normal", "offset"),
+    "sphere": ("center", "radius"),
+    "aabb": ("min", "max"),
+    "convex": ("planes",),
+    "triangle": ("vertices",),
+    "polygon": ("vertices", "ring_offsets"),
+    "polyhedron": ("vertices", "face_offsets", "face_indices"),
+    "surface": ("vertices", "face_offsets", "face_indices"),
+    "implicit": ("powers", "coefficients"),
+}
+"""What a solid is made of, by type; csg is made of solids."""
+
+_NAME: Final = re.compile(r"[0-9a-f]{64}")
+_PARTIAL: Final = ".part"
+_STALE_SECONDS: Final = 3600.0
+"""Age at which a partial file has no writer any more."""
+
+
+class Folder:
+    """Writes, reads and forgets files of solids; safe to share between threads and processes."""
+
+    def __init__(self, path: Path, budget: int, name_of: Callable[[Solid], str]) -> None:
+        self._path = path
+        self._budget = budget
+        self._name_of = name_of
+        self._written = 0  # bytes since the folder was last looked through
+        self._lock = threading.Lock()
+        path.mkdir(parents=True, exist_ok=True)
+        self._shrink()
+
+    def put(self, name: str, solid: Solid) -> bool:
+        """Write `solid` unless it is there; return whether it is new. It is on the disk when this returns."""
+        final = self._path / name
+        if self._touch(final):
+            return False
+        octets = to_octets(solid)
+        handle, partial = tempfile.mkstemp(_PARTIAL, name[:8], self._path)
+        try:
+            with os.fdopen(handle, "wb") as file:
+                file.write(octets)
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(partial, final)
+        except BaseException:
+            with contextlib.suppress(OSError):
+                os.unlink(partial)
+            raise
+        self._sync()
+        with self._lock:
+            self._written += len(octets)
+            is_time = self._written > self._budget // 16
+        if is_time:
+            self._shrink()
+        return True
+
+    def get(self, name: str) -> Solid | None:
+        """Return the solid called `name`, or None if there is no file that holds it."""
+        if _NAME.fullmatch(name) is None:
+            return None
+        path = self._path / name
+        try:
+            octets = path.read_bytes()
+        except FileNotFoundError:
+            return None
+        try:
+            solid = from_octets(octets)
+        except Exception as error:  # whatever damaged bytes lead to
+            solid, reason = None, f"{type(error).__name__}: {error}"
+        if solid is None or self._name_of(solid) != name:
+            log.warning(
+                "the file %s is damaged (%s) and taken away", path, reason if solid is None else "another solid"
+            )
+            path.unlink(missing_ok=True)
+            return None
+        self._touch(path)
+        return solid
+
+    def _touch(self, path: Path) -> bool:
+        """Mark the file as used now; return whether it is there."""
+        try:
+            os.utime(path)
+        except FileNotFoundError:
+            return False
+        except PermissionError:  # another user's file on a shared volume
+            return path.exists()
+        return True
+
+    def _sync(self) -> None:
+        """Make the new name last, where a folder can be opened (not on Windows)."""
+        with contextlib.suppress(OSError):
+            handle = os.open(self._path, os.O_RDONLY)
+            try:
+                os.fsync(handle)
+            finally:
+                os.close(handle)
+
+    def _shrink(self) -> None:
+        """Take away partial files whose writer is gone, and the files used longest ago while there are too many."""
+        with self._lock:
+            self._written = 0
+        found = []
+        for entry in os.scandir(self._path):
+            with contextlib.suppress(OSError):  # another process took it away
+                status = entry.stat()
+                if entry.name.endswith(_PARTIAL) and time.time() - status.st_mtime > _STALE_SECONDS:
+                    os.unlink(entry.path)
+                elif _NAME.fullmatch(entry.name):
+                    found.append((status.st_mtime, status.st_size, entry.path))
+        total = sum(size for _, size, _ in found)
+        for _, size, path in sorted(found):
+            if total <= self._budget:
+                break
+            with contextlib.suppress(OSError):
+                os.unlink(path)
+            total -= size
+
+
+def to_octets(solid: Solid) -> bytes:
+    """Return the file of `solid`: an npz archive of its arrays and of the tree they stand in."""
+    arrays: dict[str, Any] = {}
+    tree = json.dumps(_to_tree(solid, arrays)).encode()
+    file = io.BytesIO()
+    np.savez(file, tree=np.frombuffer(tree, np.uint8), **arrays)
+    return file.getvalue()
+
+
+def _to_tree(solid: Any, arrays: dict[str, Any]) -> dict[str, Any]:
+    if solid.type == "csg":  # depth: capped by the engine
+        operands = [_to_tree(operand, arrays) for operand in solid.operands]
+        return {"type": "csg", "operation": solid.operation, "operands": operands}
+    tree = {"type": solid.type}
+    for field in FIELDS[solid.type]:
+        tree[field] = f"array_{len(arrays)}"
+        arrays[tree[field]] = np.asarray(getattr(solid, field))
+    return tree
+
+
+def from_octets(octets: bytes) -> Solid:
+    """Return the solid in a file; raises whatever comes up if it is damaged."""
+    with np.load(io.BytesIO(octets), allow_pickle=False) as arrays:
+        return _from_tree(json.loads(arrays["tree"].tobytes()), arrays)
+
+
+def _from_tree(tree: dict[str, Any], arrays: Any) -> Solid:
+    if tree["type"] == "csg":
+        return engine.Csg(tree["operation"], [_from_tree(operand, arrays) for operand in tree["operands"]])
+    return _MAKERS[tree["type"]](*(arrays[tree[field]] for field in FIELDS[tree["type"]]))
+
+
+def _split(items: Any, offsets: Any) -> Any:
+    return np.split(items, offsets[1:-1])
+
+
+def _faces(offsets: Any, indices: Any) -> Any:
+    """Return faces as the constructors take them: an array where all are triangles."""
+    if (np.diff(offsets) == 3).all():
+        return indices.reshape(-1, 3)
+    return [face.tolist() for face in _split(indices, offsets)]
+
+
+_MAKERS: Final[dict[str, Callable[..., Solid]]] = {
+    "half_space": lambda normal, offset: engine.HalfSpace(normal, float(offset)),
+    "sphere": lambda center, radius: engine.Sphere(center, float(radius)),
+    "aabb": engine.Aabb,
+    "convex": engine.Convex,
+    "triangle": engine.Triangle,
+    "polygon": lambda vertices, offsets: engine.Polygon(_split(vertices, offsets)),
+    "polyhedron": lambda vertices, offsets, indices: engine.Polyhedron(vertices, _faces(offsets, indices)),
+    "surface": lambda vertices, offsets, indices: engine.Surface(vertices, _faces(offsets, indices)),
+    "implicit": lambda powers, coefficients: engine.Implicit(
+        [{"powers": p, "coefficient": c} for p, c in zip(powers.tolist(), coefficients.tolist())]
+    ),
+}

@@ -1,0 +1,148 @@
+"""The folder of solids: what was written is read again, what is damaged is never served, and writers may be killed."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import multiprocessing
+import os
+import random
+import sys
+import threading
+import time
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import engine
+from service.disk import Folder
+from service.errors import ServiceError
+from service.store import Store, solid_id
+from tests.unit.service.test_store import SOLIDS, sphere
+
+
+@pytest.mark.parametrize("solid", SOLIDS, ids=lambda solid: solid.type)
+def test_another_process_finds_the_same_solid(tmp_path: Path, solid: engine.Solid) -> None:
+    name, is_new = Store(10**6, tmp_path).put(solid)
+    assert is_new
+    other = Store(10**6, tmp_path)
+    found = other.get(name)
+    assert (found.type, solid_id(found)) == (solid.type, name)
+    assert other.get(name) is found
+    assert other.put(solid) == (name, False)
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
+def test_what_left_the_memory_is_in_the_folder(tmp_path: Path) -> None:
+    store = Store(2 * sphere(0).memory, tmp_path)
+    names = [store.put(sphere(x))[0] for x in range(5)]
+    assert [solid_id(store.get(name)) for name in names] == names
+
+
+def test_damaged_files_are_never_served(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.CRITICAL, "service")
+    source, solid = random.Random(5), SOLIDS[10]
+    name, _ = Store(10**6, tmp_path).put(solid)
+    whole = (tmp_path / name).read_bytes()
+    served = 0
+    for turn in range(300):
+        octets = bytearray(whole)
+        if turn % 3 == 0:
+            del octets[source.randrange(len(octets)) :]
+        else:
+            at = source.randrange(len(octets))
+            octets[at : at + 4] = source.randbytes(4)
+        (tmp_path / name).write_bytes(octets)
+        found = Folder(tmp_path, 2**30, solid_id).get(name)
+        assert (found is None) != (tmp_path / name).exists()
+        if found is not None:
+            served += 1  # bytes that mean nothing, such as times in the archive
+            assert solid_id(found) == name
+    assert served < 150
+
+
+def test_a_file_under_another_name_is_not_served(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.CRITICAL, "service")
+    name, _ = Store(10**6, tmp_path).put(sphere(1))
+    wrong = "0" * 64
+    os.replace(tmp_path / name, tmp_path / wrong)
+    with pytest.raises(ServiceError):
+        Store(10**6, tmp_path).get(wrong)
+    for odd in ("../secret", "", "A" * 64, f"{name}/x"):
+        with pytest.raises(ServiceError):
+            Store(10**6, tmp_path).get(odd)
+
+
+def test_the_files_used_longest_ago_leave(tmp_path: Path) -> None:
+    folder = Folder(tmp_path, 2**40, solid_id)
+    names = [solid_id(sphere(x)) for x in range(6)]
+    for x, name in enumerate(names):
+        folder.put(name, sphere(x))
+        os.utime(tmp_path / name, (x, x))
+    stale = tmp_path / "abc.part"
+    stale.write_bytes(b"half")
+    os.utime(stale, (1, 1))
+    assert folder.get(names[0])
+    size = (tmp_path / names[0]).stat().st_size
+    Folder(tmp_path, 3 * size, solid_id)
+    assert {path.name for path in tmp_path.iterdir()} == {names[0], names[4], names[5]}
+
+
+def test_threads_share_one_object(tmp_path: Path) -> None:
+    name, _ = Store(10**6, tmp_path).put(SOLIDS[10])
+    store, found, start = Store(10**6, tmp_path), [], threading.Barrier(4)
+
+    def work() -> None:
+        start.wait()
+        found.append(store.get(name))
+
+    threads = [threading.Thread(target=work) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len({id(solid) for solid in found}) == 1
+
+
+def write_on(folder: Path, seed: int, told: Connection) -> None:
+    """Store one solid after another and tell each that is stored."""
+    source, store = np.random.default_rng(seed), Store(2**30, folder)
+    while True:
+        told.send_bytes(store.put(engine.Convex(source.normal(size=(20_000, 4))))[0].encode())
+
+
+def kill_writers(folder: Path, times: int) -> None:
+    """Kill processes that write to `folder` at random moments; all files must be whole, all that was told there."""
+    source, told = random.Random(6), set()
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["service.store"])
+    for turn in range(times):
+        ours, theirs = context.Pipe(duplex=False)
+        writer = context.Process(target=write_on, args=(folder, turn, theirs))
+        writer.start()
+        theirs.close()
+        told.add(ours.recv_bytes())
+        time.sleep(source.random() * 0.02)
+        writer.kill()
+        writer.join()
+        with contextlib.suppress(EOFError):
+            while True:
+                told.add(ours.recv_bytes())
+        ours.close()
+        writer.close()
+    names = {path.name for path in folder.iterdir() if not path.name.endswith(".part")}
+    assert {name.decode() for name in told} <= names
+    store = Store(2**30, folder)
+    assert all(solid_id(store.get(name)) == name for name in names)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+def test_killed_writers_leave_nothing_torn(tmp_path: Path) -> None:
+    kill_writers(tmp_path, 10)
+
+
+@pytest.mark.full
+def test_many_killed_writers_leave_nothing_torn(tmp_path: Path) -> None:
+    kill_writers(tmp_path, 200)
