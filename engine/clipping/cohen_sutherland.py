@@ -11,8 +11,11 @@ The textbook cuts the outside end at one plane after another until the codes say
 
 1. Its loop can run for ever by rounding, (1, 1)-(-1, -1) on the box [1e-9, 3]^2. Here each plane is looked at once:
    the last plane entered and the first one left bound the piece, if in this order.
-2. It decides from rounded points. Here parameters n_i / d_i of two planes compare as n_i d_j against n_j d_i on the
-   original end points: a filter, then sixteen exact terms. The cut coordinate is the plane's own value.
+2. It decides from rounded points. Here the parameters of the planes, quotients of differences of original coordinates,
+   are compared in doubles beyond their bound, else exactly: n_i / d_i against n_j / d_j as n_i d_j against n_j d_i.
+   The cut coordinate is the plane's own value.
+
+Two kernels: `decide_*` says which planes bound each piece, `fill_*` makes the points of the pieces that there are.
 
 Source: Cohen and Sutherland in W. M. Newman, R. F. Sproull, Principles of Interactive Computer Graphics, 1979; the
 textbook's section on clipping segments on an AABB.
@@ -22,8 +25,9 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from engine.clipping.cut_point import cut_coordinate, cut_parameter, is_safe
+from engine.clipping.cut_point import is_safe, parameter_and_point, point_at
 from engine.jit import inline, kernel
+from engine.predicates.double_double import U2, dd_div
 from engine.predicates.error_free import two_diff, workspace
 from engine.predicates.parameters import compare_differences, compare_differences_filter
 from engine.types import UNDECIDED
@@ -32,8 +36,16 @@ DROPPED: Final = 0
 KEPT: Final = 1
 OPEN: Final = 2
 """The kernel could not settle the item: rational arithmetic must."""
-BEYOND_FILTER: Final = 4
-"""A bit beside the three states: the item needed more than the floating-point filter."""
+LARGE: Final = 2.0**1000
+"""Items whose absolute coordinates add up to more, or to nothing (NaN, infinity), are left open."""
+T_GAP: Final = 16.0 * 2.0**-53
+"""Parameters t are quotients of two differences, within 3 u (1 + u)^2 of themselves; two of them and this test: 8 u."""
+T_TINY: Final = 2.0**-1060
+"""Parameters that underflow."""
+T_BOUND: Final = 24.0 * U2
+"""Of t in double-double, relative: a quotient of two differences without error, and the test of its rounding."""
+AFTER: Final = (1, 2, 0, 1)
+"""The two axes that follow an axis: AFTER[axis], AFTER[axis + 1]."""
 
 
 @inline
@@ -61,118 +73,314 @@ def compare_planes(segment: Any, low: Any, high: Any, i: int, j: int) -> tuple[i
     order = compare_differences_filter(abs(c_i - p_i), abs(q_j - p_j), abs(c_j - p_j), abs(q_i - p_i))
     if order != UNDECIDED:
         return order, True
+    if not (is_safe(p_i) and is_safe(q_i) and is_safe(c_i) and is_safe(p_j) and is_safe(q_j) and is_safe(c_j)):
+        return UNDECIDED, False
     e = workspace(16)
     order = compare_differences(c_i, p_i, q_j, p_j, c_j, p_j, q_i, p_i, e)
     return order if (q_i > p_i) == (q_j > p_j) else -order, False
 
 
 @inline
-def cut(segment: Any, low: Any, high: Any, plane: int, point: Any) -> tuple[float, bool]:
-    """Set `point` to where `segment` meets `plane`; return t and whether all numbers are surely the nearest doubles."""
-    axis, c = plane >> 1, plane_value(low, high, plane)
-    p, q = segment[0, axis], segment[1, axis]
-    wp_h, wp_l = two_diff(c, p)
-    wq_h, wq_l = two_diff(q, c)
-    sum_h, sum_l = two_diff(q, p)
-    t, sure = cut_parameter(wp_h, wp_l, wq_h, wq_l, sum_h, sum_l, 0.0)
-    for k in range(low.size):
-        if k == axis:
-            point[k] = c
-        else:
-            point[k], is_sure = cut_coordinate(segment[0, k], segment[1, k], wp_h, wp_l, wq_h, wq_l, sum_h, sum_l, 0.0)
-            sure = sure and is_sure
-    return t, sure
-
-
-@inline
-def clip_crossing(segment: Any, low: Any, high: Any, start: Any, end: Any, t: Any, faces: Any) -> int:
-    """Clip a segment whose outcodes do not settle it; `start` and `end` hold its end points. Return its state."""
-    for k in range(low.size):
-        if not (is_safe(segment[0, k]) and is_safe(segment[1, k]) and is_safe(low[k]) and is_safe(high[k])):
-            return OPEN | BEYOND_FILTER
+def decide_crossing(segment: Any, low: Any, high: Any) -> tuple[int, int, int, bool]:
+    """Decide on a segment whose outcodes share no bit: state, plane entered, plane left, whether filters sufficed."""
     entered = left = -1
     filtered = True
     for axis in range(low.size):
         plane = plane_outside(segment[0, axis], low[axis], high[axis], axis)
         if plane >= 0:
-            if entered < 0:
-                entered = plane
-            else:
+            order, by_filter = 1, True
+            if entered >= 0:
                 order, by_filter = compare_planes(segment, low, high, plane, entered)
-                filtered = filtered and by_filter
-                if order > 0:  # equal: the smaller plane stays
-                    entered = plane
+            if order == UNDECIDED:
+                return OPEN, -1, -1, False
+            filtered = filtered and by_filter
+            if order > 0:  # equal: the smaller plane stays
+                entered = plane
         plane = plane_outside(segment[1, axis], low[axis], high[axis], axis)
         if plane >= 0:
-            if left < 0:
-                left = plane
-            else:
+            order, by_filter = -1, True
+            if left >= 0:
                 order, by_filter = compare_planes(segment, low, high, plane, left)
-                filtered = filtered and by_filter
-                if order < 0:
-                    left = plane
+            if order == UNDECIDED:
+                return OPEN, -1, -1, False
+            filtered = filtered and by_filter
+            if order < 0:
+                left = plane
     if entered >= 0 and left >= 0:
         order, by_filter = compare_planes(segment, low, high, entered, left)
+        if order == UNDECIDED:
+            return OPEN, -1, -1, False
         filtered = filtered and by_filter
         if order > 0:
-            return DROPPED if filtered else DROPPED | BEYOND_FILTER
-    sure = True
-    if entered >= 0:
-        faces[0] = entered
-        t[0], is_sure = cut(segment, low, high, entered, start)
-        sure = sure and is_sure
-    if left >= 0:
-        faces[1] = left
-        t[1], is_sure = cut(segment, low, high, left, end)
-        sure = sure and is_sure
-    if not sure:
-        return OPEN | BEYOND_FILTER
-    return KEPT if filtered else KEPT | BEYOND_FILTER
+            return DROPPED, -1, -1, filtered
+    return KEPT, entered, left, filtered
+
+
+@inline
+def parameters(p: float, q: float, low: float, high: float) -> tuple[float, float]:
+    """Return where a segment enters and leaves the slab low .. high of one axis: -1 and 2 where it does not.
+
+    Written without branches, which no processor could foretell.
+    """
+    d = q - p
+    enters, leaves = (low if p < low else high) - p, (low if q < low else high) - p
+    t_enter, t_leave = enters / d, leaves / d
+    return (t_enter if (p < low) | (p > high) else -1.0), (t_leave if (q < low) | (q > high) else 2.0)
 
 
 @kernel
-def clip_on_boxes_2d(
-    segments: Any, low: Any, high: Any, first: int, last: int, start: Any, end: Any, t: Any, faces: Any, state: Any
+def decide_on_boxes_2d(
+    segments: Any, low: Any, high: Any, first: int, last: int, stop: Any, items: Any, planes: Any, still: Any, n: Any
 ) -> None:
-    """Clip ``segments[first:last]`` ((n, 2, 2) float64) on the box `low`, `high`; fill the rows of the outputs.
+    """Decide on ``segments[first:last]`` ((n, 2, 2) float64) and the box `low`, `high`.
 
-    start, end: (n, 2) float64. t: (n, 2) float64. faces: (n, 2) int64. state: (n,) uint8. Rows not kept are undefined.
+    items: from ``items[first]`` on the segments that are kept, in order, in planes (n, 2) the planes entered and left,
+    -1 for an end of the segment. still: likewise the segments left open. n: how many are kept, open, and went beyond
+    the filter. stop: one uint8, polled.
     """
     x0, x1, y0, y1 = low[0], high[0], low[1], high[1]
+    kept, n_open, beyond = first, first, 0
     for i in range(first, last):
+        if stop[0]:
+            return
         px, py, qx, qy = segments[i, 0, 0], segments[i, 0, 1], segments[i, 1, 0], segments[i, 1, 1]
-        if (px < x0 and qx < x0) or (px > x1 and qx > x1) or (py < y0 and qy < y0) or (py > y1 and qy > y1):
-            state[i] = DROPPED  # the outcodes share a bit
+        if not (abs(px) + abs(py) + abs(qx) + abs(qy) < LARGE):
+            still[n_open] = i
+            n_open += 1
             continue
-        start[i, 0], start[i, 1], end[i, 0], end[i, 1] = px, py, qx, qy
-        t[i, 0], t[i, 1], faces[i, 0], faces[i, 1] = 0.0, 1.0, -1, -1
-        p_in = x0 <= px <= x1 and y0 <= py <= y1
-        if p_in and x0 <= qx <= x1 and y0 <= qy <= y1:
-            state[i] = KEPT  # both outcodes are zero
-            continue
-        state[i] = clip_crossing(segments[i], low, high, start[i], end[i], t[i], faces[i])
+        if (max(px, qx) < x0) | (min(px, qx) > x1) | (max(py, qy) < y0) | (min(py, qy) > y1):
+            continue  # the outcodes share a bit
+        a, c = parameters(px, qx, x0, x1)
+        b, d = parameters(py, qy, y0, y1)
+        start, end = max(a, b), min(c, d)
+        entered = left = -1
+        if start > end:
+            if start - end > T_GAP * start + T_TINY:
+                continue
+            sure = False
+        else:
+            sure = end - start > T_GAP * end + T_TINY
+            if start >= 0.0:
+                sure = sure and abs(a - b) > T_GAP * start + T_TINY
+                entered = (0 + (px > x1)) if a == start else 2 + (py > y1)
+            if end <= 1.5:
+                sure = sure and abs(c - d) > T_GAP * end + T_TINY
+                left = (0 + (qx > x1)) if c == end else 2 + (qy > y1)
+        if not sure:
+            state, entered, left, filtered = decide_crossing(segments[i], low, high)
+            if not filtered:
+                beyond += 1
+            if state == OPEN:
+                still[n_open] = i
+                n_open += 1
+            if state != KEPT:
+                continue
+        items[kept], planes[kept, 0], planes[kept, 1] = i, entered, left
+        kept += 1
+    n[0], n[1], n[2] = kept - first, n_open - first, beyond
 
 
 @kernel
-def clip_on_boxes_3d(
-    segments: Any, low: Any, high: Any, first: int, last: int, start: Any, end: Any, t: Any, faces: Any, state: Any
+def decide_on_boxes_3d(
+    segments: Any, low: Any, high: Any, first: int, last: int, stop: Any, items: Any, planes: Any, still: Any, n: Any
 ) -> None:
-    """Clip ``segments[first:last]`` ((n, 2, 3) float64) on the box `low`, `high`: see `clip_on_boxes_2d`."""
+    """Decide on ``segments[first:last]`` ((n, 2, 3) float64) and the box `low`, `high`: see `decide_on_boxes_2d`."""
     x0, x1, y0, y1, z0, z1 = low[0], high[0], low[1], high[1], low[2], high[2]
+    kept, n_open, beyond = first, first, 0
     for i in range(first, last):
+        if stop[0]:
+            return
         px, py, pz = segments[i, 0, 0], segments[i, 0, 1], segments[i, 0, 2]
         qx, qy, qz = segments[i, 1, 0], segments[i, 1, 1], segments[i, 1, 2]
-        if (px < x0 and qx < x0) or (px > x1 and qx > x1) or (py < y0 and qy < y0) or (py > y1 and qy > y1):
-            state[i] = DROPPED
+        if not (abs(px) + abs(py) + abs(pz) + abs(qx) + abs(qy) + abs(qz) < LARGE):
+            still[n_open] = i
+            n_open += 1
             continue
-        if (pz < z0 and qz < z0) or (pz > z1 and qz > z1):
-            state[i] = DROPPED
+        misses = (max(px, qx) < x0) | (min(px, qx) > x1) | (max(py, qy) < y0) | (min(py, qy) > y1)
+        if misses | (max(pz, qz) < z0) | (min(pz, qz) > z1):
             continue
-        start[i, 0], start[i, 1], start[i, 2] = px, py, pz
-        end[i, 0], end[i, 1], end[i, 2] = qx, qy, qz
-        t[i, 0], t[i, 1], faces[i, 0], faces[i, 1] = 0.0, 1.0, -1, -1
-        p_in = x0 <= px <= x1 and y0 <= py <= y1 and z0 <= pz <= z1
-        if p_in and x0 <= qx <= x1 and y0 <= qy <= y1 and z0 <= qz <= z1:
-            state[i] = KEPT
-            continue
-        state[i] = clip_crossing(segments[i], low, high, start[i], end[i], t[i], faces[i])
+        a, d = parameters(px, qx, x0, x1)
+        b, e = parameters(py, qy, y0, y1)
+        c, f = parameters(pz, qz, z0, z1)
+        start, end = max(a, max(b, c)), min(d, min(e, f))
+        entered = left = -1
+        if start > end:
+            if start - end > T_GAP * start + T_TINY:
+                continue
+            sure = False
+        else:
+            sure = end - start > T_GAP * end + T_TINY
+            if start >= 0.0:
+                # the second largest of three, without branches
+                second = max(min(a, b), min(max(a, b), c))
+                sure = sure and start - second > T_GAP * start + T_TINY
+                entered = (0 + (px > x1)) if a == start else ((2 + (py > y1)) if b == start else 4 + (pz > z1))
+            if end <= 1.5:
+                second = min(max(d, e), max(min(d, e), f))
+                sure = sure and second - end > T_GAP * end + T_TINY
+                left = (0 + (qx > x1)) if d == end else ((2 + (qy > y1)) if e == end else 4 + (qz > z1))
+        if not sure:
+            state, entered, left, filtered = decide_crossing(segments[i], low, high)
+            if not filtered:
+                beyond += 1
+            if state == OPEN:
+                still[n_open] = i
+                n_open += 1
+            if state != KEPT:
+                continue
+        items[kept], planes[kept, 0], planes[kept, 1] = i, entered, left
+        kept += 1
+    n[0], n[1], n[2] = kept - first, n_open - first, beyond
+
+
+@inline
+def cut_roughly(p: float, q: float, at: float) -> tuple[float, float, bool]:
+    """Return the parameter at which one coordinate from p to q is `at`, and whether it is within T_BOUND of itself."""
+    wh, wl = two_diff(at, p)
+    sh, sl = two_diff(q, p)
+    th, tl = dd_div(wh, wl, sh, sl)
+    return th, tl, abs(wh) >= 2.0**-500 and 2.0**-400 <= abs(sh) <= 2.0**400
+
+
+@inline
+def cut_by_signs(segment: Any, low: Any, high: Any, plane: int, point: Any) -> tuple[float, bool]:
+    """Set `point` to where `segment` crosses `plane`, settled by exact signs; return t and whether all is sure."""
+    axis, at = plane >> 1, plane_value(low, high, plane)
+    p, q = segment[0, axis], segment[1, axis]
+    if not (is_safe(p) and is_safe(q) and is_safe(at)):
+        return 0.0, False
+    wp, wq, e = workspace(2), workspace(2), workspace(24)
+    flip = 1.0 if q > p else -1.0
+    n_wp, n_wq = difference(flip * at, flip * p, wp), difference(flip * q, flip * at, wq)
+    return parameter_and_point(segment, wp, n_wp, wq, n_wq, axis, at, point, e)
+
+
+@inline
+def difference(a: float, b: float, e: Any) -> int:
+    """Set e to a - b as an expansion; two places."""
+    h, low = two_diff(a, b)
+    n = 0
+    for part in (low, h):
+        if part != 0.0:
+            e[n] = part
+            n += 1
+    return n
+
+
+@kernel
+def fill_on_boxes_2d(
+    segments: Any,
+    low: Any,
+    high: Any,
+    items: Any,
+    planes: Any,
+    first: int,
+    last: int,
+    stop: Any,
+    source: Any,
+    ends: Any,
+    t: Any,
+    faces: Any,
+    still: Any,
+    n: Any,
+) -> None:
+    """Fill rows first .. last - 1 of the pieces of ``segments`` ((n, 2, 2) float64) on the box `low`, `high`.
+
+    items: (m,) int32, planes: (m, 2) int32, as decided. source: (m,) int64. ends: start and end, (m, 2) float64 each.
+    t, faces: (m, 2) float64 and int64. still: from ``still[first]`` on the rows that are not surely rounded. n: how
+    many of them, and how many needed more than the first try. stop: one uint8, polled.
+    """
+    n_open = beyond = 0
+    for row in range(first, last):
+        if stop[0]:
+            return
+        i = items[row]
+        source[row] = i
+        px, py, qx, qy = segments[i, 0, 0], segments[i, 0, 1], segments[i, 1, 0], segments[i, 1, 1]
+        all_sure = tried = True
+        for side in range(2):
+            plane = planes[row, side]
+            faces[row, side] = plane
+            point = ends[side]
+            if plane < 0:
+                t[row, side] = side
+                point[row, 0], point[row, 1] = segments[i, side, 0] + 0.0, segments[i, side, 1] + 0.0
+                continue
+            at = plane_value(low, high, plane)
+            if plane < 2:
+                th, tl, sure = cut_roughly(px, qx, at)
+                x, y, is_x = at, at, True
+                y, is_y = point_at(py, qy, th, tl, 0.0)
+            else:
+                th, tl, sure = cut_roughly(py, qy, at)
+                x, is_x = point_at(px, qx, th, tl, 0.0)
+                y, is_y = at, True
+            bound = T_BOUND * th
+            if sure & is_x & is_y & (th + (tl - bound) == th + (tl + bound)):
+                t[row, side] = th + tl
+                point[row, 0], point[row, 1] = x + 0.0, y + 0.0
+            else:
+                tried = False
+                t[row, side], sure = cut_by_signs(segments[i], low, high, plane, point[row])
+                all_sure = all_sure and sure
+        if not tried:
+            beyond += 1
+        if not all_sure:
+            still[first + n_open] = row
+            n_open += 1
+    n[0], n[1] = n_open, beyond
+
+
+@kernel
+def fill_on_boxes_3d(
+    segments: Any,
+    low: Any,
+    high: Any,
+    items: Any,
+    planes: Any,
+    first: int,
+    last: int,
+    stop: Any,
+    source: Any,
+    ends: Any,
+    t: Any,
+    faces: Any,
+    still: Any,
+    n: Any,
+) -> None:
+    """Fill rows first .. last - 1 of the pieces of ``segments`` ((n, 2, 3) float64): see `fill_on_boxes_2d`."""
+    n_open = beyond = 0
+    for row in range(first, last):
+        if stop[0]:
+            return
+        i = items[row]
+        source[row] = i
+        all_sure = tried = True
+        for side in range(2):
+            plane = planes[row, side]
+            faces[row, side] = plane
+            point = ends[side]
+            if plane < 0:
+                t[row, side] = side
+                point[row, 0], point[row, 1] = segments[i, side, 0] + 0.0, segments[i, side, 1] + 0.0
+                point[row, 2] = segments[i, side, 2] + 0.0
+                continue
+            axis, at = plane >> 1, plane_value(low, high, plane)
+            j, k = AFTER[axis], AFTER[axis + 1]
+            th, tl, sure = cut_roughly(segments[i, 0, axis], segments[i, 1, axis], at)
+            x, is_x = point_at(segments[i, 0, j], segments[i, 1, j], th, tl, 0.0)
+            y, is_y = point_at(segments[i, 0, k], segments[i, 1, k], th, tl, 0.0)
+            bound = T_BOUND * th
+            if sure & is_x & is_y & (th + (tl - bound) == th + (tl + bound)):
+                t[row, side] = th + tl
+                point[row, axis], point[row, j], point[row, k] = at, x + 0.0, y + 0.0
+            else:
+                tried = False
+                t[row, side], sure = cut_by_signs(segments[i], low, high, plane, point[row])
+                all_sure = all_sure and sure
+        if not tried:
+            beyond += 1
+        if not all_sure:
+            still[first + n_open] = row
+            n_open += 1
+    n[0], n[1] = n_open, beyond

@@ -19,6 +19,7 @@ from engine.clipping.contacts import PROPER, find_contacts_2d, find_contacts_3d
 from engine.clipping.exact_pieces import pieces_of
 from engine.clipping.exact_segments import Piece
 from engine.clipping.proper_pieces import SETTLED, clip_properly_2d, clip_properly_3d
+from engine.clipping.single_pieces import PieceRows
 from engine.containment.locators import locator_of
 from engine.containment.rational_locate import rational_location
 from engine.parallel import Budget
@@ -55,19 +56,6 @@ def boundary_of(region: Polygon | Polyhedron) -> Boundary:
         return Boundary(region.vertices, np.ascontiguousarray(elements), faces, tree)
 
     return region.prepared("clipping_boundary", build)
-
-
-@dataclass(frozen=True, slots=True)
-class PieceRows:
-    """The pieces of one chunk, in order; see `SegmentPieces`."""
-
-    source: IntArray
-    start: FloatArray
-    end: FloatArray
-    t: FloatArray
-    faces: IntArray
-    n_beyond: int
-    n_rational: int
 
 
 def clip_chunk(segments: FloatArray, first: int, last: int, region: Polygon | Polyhedron, budget: Budget) -> PieceRows:

@@ -6,6 +6,9 @@ t = s_p / (s_p - s_q); the last plane entered and the first one left bound the p
 looked at once, so the loop ends; all signs and all comparisons are exact and about the original end points: a filter,
 then expansions, then "open" (where exponents leave the range in which expansions are exact).
 
+Plane values are taken for a block of planes at once, from columns, so that the compiler uses vectors; only planes that
+an end is not surely inside of are looked at one by one. Kernels: `decide_*` and `fill_*`, as in cohen_sutherland.py.
+
 Source: M. Cyrus, J. Beck, Generalized two- and three-dimensional clipping, 1978; the textbook's exercise:
 Cohen-Sutherland generalised to a convex polyhedron. Changed: exact signs of s, exact order of t, cut points from the
 original ends.
@@ -17,11 +20,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.clipping.cohen_sutherland import BEYOND_FILTER, DROPPED, KEPT, OPEN
-from engine.clipping.cut_point import cut_coordinate, cut_parameter, is_safe
+from engine.clipping.cohen_sutherland import DROPPED, KEPT, LARGE, OPEN, T_BOUND
+from engine.clipping.cut_point import cut_coordinate, cut_parameter, is_safe, parameter_and_point, point_at
+from engine.clipping.scaling import FloatArray
 from engine.jit import inline, kernel
-from engine.predicates.double_double import U2, dd_add
-from engine.predicates.error_free import two_prod, workspace
+from engine.predicates.double_double import U2, dd_add, dd_div
+from engine.predicates.error_free import two_prod, two_sum, workspace
 from engine.predicates.expansion import Components, compress, grow, grow_product, sign
 from engine.predicates.parameters import compare_products, compare_ratios_filter
 from engine.types import UNDECIDED
@@ -33,8 +37,20 @@ Each term carries at most (1 + u)^4, the sum of absolute terms the same; 8 u cov
 """
 VALUE_TINY: Final = 2.0**-1070
 """Products that underflow lose at most 2^-1074 each."""
-DD_VALUE_BOUND: Final = 16.0 * U2
-"""Bound of a plane value in double-double: exact products, three sums of 4 u^2 relative to the partial sums."""
+DD_VALUE_BOUND: Final = 32.0 * U2
+"""Bound of a plane value in double-double: exact products and sums, whose tails, together below 4 u of the sum of
+absolute terms, are added up with six roundings."""
+BLOCK: Final = 64
+"""Planes whose values are taken before any is looked at."""
+T_ROUNDINGS: Final = 8.0 * 2.0**-53
+"""Of a parameter in doubles, beside the bounds of its plane values."""
+
+
+def as_columns(rows: FloatArray) -> FloatArray:
+    """Return plane rows (m, dim + 1) as columns (dim + 2, m), the last one the sum of absolute normal components."""
+    columns = np.ascontiguousarray(np.vstack([rows.T, np.abs(rows[:, :-1]).sum(axis=1)]))
+    columns.setflags(write=False)
+    return columns
 
 
 @inline
@@ -73,27 +89,29 @@ def exact_order(row_i: Any, row_j: Any, segment: Any) -> int:
 
 
 @inline
-def dd_value(row: Any, point: Any) -> tuple[float, float, float]:
-    """Return the value of `row` at `point` as a double-double and a bound of its error."""
-    d = row.size - 1
-    h, low, magnitude = row[d], 0.0, abs(row[d])
-    for k in range(d):
-        ph, pl = two_prod(row[k], point[k])
-        h, low = dd_add(h, low, ph, pl)
-        magnitude += abs(ph)
-    return h, low, DD_VALUE_BOUND * magnitude
+def dd_value_2d(row: Any, x: float, y: float) -> tuple[float, float, float]:
+    """Return the value of a row at a point as an unevaluated sum of two doubles and a bound of its error."""
+    ah, al = two_prod(row[0], x)
+    bh, bl = two_prod(row[1], y)
+    h, first = two_sum(ah, bh)
+    h, second = two_sum(h, row[2])
+    bound = DD_VALUE_BOUND * (abs(ah) + abs(bh) + abs(row[2])) + VALUE_TINY
+    h, low = two_sum(h, (al + bl) + (first + second))
+    return h, low, bound
 
 
 @inline
-def leading_value(row: Any, point: Any) -> tuple[float, float, float]:
-    """Return the value of `row` at `point` as a double-double from its expansion, and a bound: zero if exact."""
-    e = workspace(8)
-    n = expand_value(row, point, e)
-    if n == 0:
-        return 0.0, 0.0, 0.0
-    if n == 1:
-        return e[0], 0.0, 0.0
-    return e[n - 1], e[n - 2], 0.0 if n == 2 else 4.0 * U2 * abs(e[n - 1])
+def dd_value_3d(row: Any, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Return the value of a row at a point: see `dd_value_2d`."""
+    ah, al = two_prod(row[0], x)
+    bh, bl = two_prod(row[1], y)
+    ch, cl = two_prod(row[2], z)
+    h, first = two_sum(ah, bh)
+    h, second = two_sum(h, ch)
+    h, third = two_sum(h, row[3])
+    bound = DD_VALUE_BOUND * (abs(ah) + abs(bh) + abs(ch) + abs(row[3])) + VALUE_TINY
+    h, low = two_sum(h, (al + bl) + (cl + first) + (second + third))
+    return h, low, bound
 
 
 @inline
@@ -123,15 +141,6 @@ def cut_with(
 
 
 @inline
-def cut(row: Any, segment: Any, point: Any) -> tuple[float, bool]:
-    """Set `point` to where `segment` crosses the plane of `row`; return t and whether all is surely nearest."""
-    t, sure = cut_with(segment, point, dd_value(row, segment[0]), dd_value(row, segment[1]))
-    if not sure:  # case: a value close to zero loses its digits to cancellation, its expansion does not
-        t, sure = cut_with(segment, point, leading_value(row, segment[0]), leading_value(row, segment[1]))
-    return t, sure
-
-
-@inline
 def is_segment_safe(segment: Any) -> bool:
     """Tell whether every coordinate is zero or of a size for which expansions are exact."""
     safe = True
@@ -141,148 +150,345 @@ def is_segment_safe(segment: Any) -> bool:
 
 
 @inline
-def store(segment: Any, rows: Any, entered: int, left: int, start: Any, end: Any, t: Any, faces: Any) -> bool:
-    """Write the piece between planes `entered` and `left` (-1: the end itself); False where not surely rounded."""
-    t[0], t[1], faces[0], faces[1] = 0.0, 1.0, entered, left
-    for k in range(start.size):
-        start[k], end[k] = segment[0, k], segment[1, k]
-    sure = True
-    if entered >= 0:
-        t[0], sure = cut(rows[entered], segment, start)
-    if left >= 0:
-        t[1], is_sure = cut(rows[left], segment, end)
-        sure = sure and is_sure
-    return sure
+def decide_by_rows(
+    segment: Any, columns: Any, s_p: Any, s_q: Any, bounds: Any, chosen: Any, n: int
+) -> tuple[int, int, int, int]:
+    """Decide on one segment by the n `chosen` planes: state, plane entered, plane left, 1 where filters did not do.
 
-
-@inline
-def clip_by_rows(
-    segment: Any,
-    rows: Any,
-    is_safe_row: Any,
-    s_p: Any,
-    s_q: Any,
-    b_p: Any,
-    b_q: Any,
-    start: Any,
-    end: Any,
-    t: Any,
-    faces: Any,
-) -> int:
-    """Clip one segment; s and b hold each row's value and bound at either end. Return the item's state.
-
-    The core knows no dimension: the kernels fill s and b. An item with an open sign or order outside of the safe range
-    is returned as open.
+    s_p, s_q, bounds: of each plane the values at both ends and their bound. An item with an
+    open sign or order outside of the safe range is left open.
     """
-    n = rows.shape[0]
     entered = left = -1
     beyond, checked = 0, False
-    for i in range(n):
-        sign_p = 1 if s_p[i] > b_p[i] else (-1 if -s_p[i] > b_p[i] else UNDECIDED)
-        sign_q = 1 if s_q[i] > b_q[i] else (-1 if -s_q[i] > b_q[i] else UNDECIDED)
+    for i_chosen in range(n):
+        i = chosen[i_chosen]
+        sign_p = 1 if s_p[i] > bounds[i] else (-1 if -s_p[i] > bounds[i] else UNDECIDED)
+        sign_q = 1 if s_q[i] > bounds[i] else (-1 if -s_q[i] > bounds[i] else UNDECIDED)
         if sign_p == UNDECIDED or sign_q == UNDECIDED:
-            beyond = BEYOND_FILTER
+            beyond = 1
             checked = checked or is_segment_safe(segment)
-            if not (checked and is_safe_row[i]):
-                return OPEN | BEYOND_FILTER
+            row = columns[:-1, i]
+            if not (checked and is_row_safe(row)):
+                return OPEN, -1, -1, 1
             if sign_p == UNDECIDED:
-                sign_p = exact_sign(rows[i], segment[0])
+                sign_p = exact_sign(row, segment[0])
             if sign_q == UNDECIDED:
-                sign_q = exact_sign(rows[i], segment[1])
+                sign_q = exact_sign(row, segment[1])
         if sign_p >= 0 and sign_q >= 0:
             continue
         if sign_p < 0 and sign_q < 0:
-            return DROPPED | beyond
+            return DROPPED, -1, -1, beyond
         other = entered if sign_p < 0 else left
-        order = -1 if other < 0 else UNDECIDED
         if other >= 0:
-            order = compare_ratios_filter(
-                s_p[i], b_p[i], s_q[other], b_q[other], s_p[other], b_p[other], s_q[i], b_q[i]
-            )
+            order, by_filter = compare_rows(segment, columns, s_p, s_q, bounds, i, other)
+            beyond = beyond if by_filter else 1
             if order == UNDECIDED:
-                beyond = BEYOND_FILTER
-                checked = checked or is_segment_safe(segment)
-                if not (checked and is_safe_row[i] and is_safe_row[other]):
-                    return OPEN | BEYOND_FILTER
-                order = exact_order(rows[i], rows[other], segment)
+                return OPEN, -1, -1, 1
         if sign_p < 0 and (other < 0 or order > 0):
             entered = i
-        elif sign_p >= 0 and order < 0:
+        elif sign_p >= 0 and (other < 0 or order < 0):
             left = i
     if entered >= 0 and left >= 0:
-        order = compare_ratios_filter(
-            s_p[entered], b_p[entered], s_q[left], b_q[left], s_p[left], b_p[left], s_q[entered], b_q[entered]
-        )
+        order, by_filter = compare_rows(segment, columns, s_p, s_q, bounds, entered, left)
+        beyond = beyond if by_filter else 1
         if order == UNDECIDED:
-            beyond = BEYOND_FILTER
-            checked = checked or is_segment_safe(segment)
-            if not (checked and is_safe_row[entered] and is_safe_row[left]):
-                return OPEN | BEYOND_FILTER
-            order = exact_order(rows[entered], rows[left], segment)
+            return OPEN, -1, -1, 1
         if order > 0:
-            return DROPPED | beyond
-    if entered < 0 and left < 0:
-        return (KEPT if store(segment, rows, -1, -1, start, end, t, faces) else OPEN) | beyond
-    checked = checked or is_segment_safe(segment)
-    for plane in (entered, left):
-        if plane >= 0 and not is_safe_row[plane]:
-            checked = False
-    if not (checked and store(segment, rows, entered, left, start, end, t, faces)):
-        return OPEN | BEYOND_FILTER
-    return KEPT | beyond
+            return DROPPED, -1, -1, beyond
+    return KEPT, entered, left, beyond
 
 
 @inline
-def value_2d(a: float, b: float, d: float, x: float, y: float) -> tuple[float, float]:
-    """Return a x + b y + d and a bound of its error; infinities and NaN make the bound useless, never wrong."""
-    ax, by = a * x, b * y
-    return ax + by + d, VALUE_BOUND * (abs(ax) + abs(by) + abs(d)) + VALUE_TINY
+def compare_rows(segment: Any, columns: Any, s_p: Any, s_q: Any, bounds: Any, i: int, j: int) -> tuple[int, bool]:
+    """Return the sign of t_i - t_j for two planes that `segment` crosses, and whether the filter sufficed."""
+    order = compare_ratios_filter(s_p[i], bounds[i], s_q[j], bounds[j], s_p[j], bounds[j], s_q[i], bounds[i])
+    if order != UNDECIDED:
+        return order, True
+    row_i, row_j = columns[:-1, i], columns[:-1, j]
+    if not (is_segment_safe(segment) and is_row_safe(row_i) and is_row_safe(row_j)):
+        return UNDECIDED, False
+    return exact_order(row_i, row_j, segment), False
 
 
 @inline
-def value_3d(a: float, b: float, c: float, d: float, x: float, y: float, z: float) -> tuple[float, float]:
-    """Return a x + b y + c z + d and a bound of its error: see `value_2d`."""
-    ax, by, cz = a * x, b * y, c * z
-    return ax + by + cz + d, VALUE_BOUND * (abs(ax) + abs(by) + abs(cz) + abs(d)) + VALUE_TINY
+def decide_by_parameters(s_p: Any, s_q: Any, bounds: Any, chosen: Any, n: int) -> tuple[int, int, int]:
+    """Decide on one segment by the n `chosen` planes from doubles: state, plane entered, plane left; OPEN: unsure.
 
-
-@kernel
-def clip_on_rows_2d(
-    segments: Any, rows: Any, first: int, last: int, start: Any, end: Any, t: Any, faces: Any, state: Any
-) -> None:
-    """Clip ``segments[first:last]`` ((n, 2, 2) float64) where ``rows`` ((m, 3) float64) are all >= 0.
-
-    start, end: (n, 2) float64. t: (n, 2) float64. faces: (n, 2) int64. state: (n,) uint8. Rows not kept are undefined.
+    t = s_p / (s_p - s_q) moves by at most bound / (|s_p| + |s_q|) when both values move by a bound.
     """
-    m = rows.shape[0]
-    s_p, s_q, b_p, b_q = np.empty(m), np.empty(m), np.empty(m), np.empty(m)
-    safe = np.empty(m, np.bool_)
-    for j in range(m):
-        safe[j] = is_row_safe(rows[j])
-    for i in range(first, last):
-        px, py, qx, qy = segments[i, 0, 0], segments[i, 0, 1], segments[i, 1, 0], segments[i, 1, 1]
-        for j in range(m):
-            a, b, d = rows[j, 0], rows[j, 1], rows[j, 2]
-            s_p[j], b_p[j] = value_2d(a, b, d, px, py)
-            s_q[j], b_q[j] = value_2d(a, b, d, qx, qy)
-        state[i] = clip_by_rows(segments[i], rows, safe, s_p, s_q, b_p, b_q, start[i], end[i], t[i], faces[i])
+    entered = left = -1
+    start, start_slack, start_rival = -1.0, 0.0, -1.0  # the last plane entered, the next to last at its latest
+    end, end_slack, end_rival = 2.0, 0.0, 2.0  # the first plane left, the second at its earliest
+    for i_chosen in range(n):
+        i = chosen[i_chosen]
+        p, q, bound = s_p[i], s_q[i], bounds[i]
+        if not (abs(p) > bound and abs(q) > bound):
+            return OPEN, -1, -1
+        if p > 0.0 and q > 0.0:
+            continue
+        t = p / (p - q)
+        slack = 1.01 * bound / abs(p - q) + T_ROUNDINGS
+        if p < 0.0:
+            if t > start:
+                start_rival = max(start_rival, start + start_slack)
+                start, start_slack, entered = t, slack, i
+            else:
+                start_rival = max(start_rival, t + slack)
+        elif t < end:
+            end_rival = min(end_rival, end - end_slack)
+            end, end_slack, left = t, slack, i
+        else:
+            end_rival = min(end_rival, t - slack)
+    if start - start_slack > end + end_slack:
+        return DROPPED, -1, -1
+    is_sure = max(start + start_slack, start_rival) < min(end - end_slack, end_rival)
+    is_sure = is_sure and (entered < 0 or start_rival < start - start_slack)
+    is_sure = is_sure and (left < 0 or end_rival > end + end_slack)
+    return (KEPT, entered, left) if is_sure else (OPEN, -1, -1)
 
 
 @kernel
-def clip_on_rows_3d(
-    segments: Any, rows: Any, first: int, last: int, start: Any, end: Any, t: Any, faces: Any, state: Any
+def decide_on_rows_2d(
+    segments: Any, columns: Any, first: int, last: int, stop: Any, items: Any, planes: Any, still: Any, n: Any
 ) -> None:
-    """Clip ``segments[first:last]`` ((n, 2, 3) float64) where ``rows`` ((m, 4) float64) are all >= 0."""
-    m = rows.shape[0]
-    s_p, s_q, b_p, b_q = np.empty(m), np.empty(m), np.empty(m), np.empty(m)
-    safe = np.empty(m, np.bool_)
-    for j in range(m):
-        safe[j] = is_row_safe(rows[j])
+    """Decide on ``segments[first:last]`` ((n, 2, 2) float64) where all planes (`as_columns`) are >= 0.
+
+    Outputs: see `decide_on_boxes_2d`.
+    """
+    a, b, d, size = columns[0], columns[1], columns[2], columns[3]
+    m = d.size
+    s_p, s_q, bounds, chosen = np.empty(m), np.empty(m), np.empty(m), np.empty(m, np.int64)
+    kept, n_open, beyond = first, first, 0
+    for i in range(first, last):
+        px, py = segments[i, 0, 0], segments[i, 0, 1]
+        qx, qy = segments[i, 1, 0], segments[i, 1, 1]
+        if not (abs(px) + abs(py) + abs(qx) + abs(qy) < LARGE):
+            still[n_open] = i
+            n_open += 1
+            continue
+        most = max(abs(px), abs(py), abs(qx), abs(qy))
+        n_chosen, is_out = 0, False
+        for begin in range(0, m, BLOCK):
+            if stop[0]:
+                return
+            n_out, until = 0, min(m, begin + BLOCK)
+            for j in range(begin, until):
+                p = a[j] * px + b[j] * py + d[j]
+                q = a[j] * qx + b[j] * qy + d[j]
+                bound = VALUE_BOUND * (size[j] * most + abs(d[j])) + VALUE_TINY
+                s_p[j], s_q[j], bounds[j] = p, q, bound
+                n_out += (p < -bound) & (q < -bound)
+            if n_out:
+                is_out = True
+                break
+            for j in range(begin, until):
+                chosen[n_chosen] = j
+                n_chosen += not ((s_p[j] > bounds[j]) & (s_q[j] > bounds[j]))
+        if is_out:
+            continue
+        state, entered, left = decide_by_parameters(s_p, s_q, bounds, chosen, n_chosen)
+        if state == OPEN:
+            state, entered, left, more = decide_by_rows(segments[i], columns, s_p, s_q, bounds, chosen, n_chosen)
+            beyond += more
+        if state == OPEN:
+            still[n_open] = i
+            n_open += 1
+        if state != KEPT:
+            continue
+        items[kept], planes[kept, 0], planes[kept, 1] = i, entered, left
+        kept += 1
+    n[0], n[1], n[2] = kept - first, n_open - first, beyond
+
+
+@kernel
+def decide_on_rows_3d(
+    segments: Any, columns: Any, first: int, last: int, stop: Any, items: Any, planes: Any, still: Any, n: Any
+) -> None:
+    """Decide on ``segments[first:last]`` ((n, 2, 3) float64) where all planes (`as_columns`) are >= 0.
+
+    Outputs: see `decide_on_boxes_2d`.
+    """
+    a, b, c, d, size = columns[0], columns[1], columns[2], columns[3], columns[4]
+    m = d.size
+    s_p, s_q, bounds, chosen = np.empty(m), np.empty(m), np.empty(m), np.empty(m, np.int64)
+    kept, n_open, beyond = first, first, 0
     for i in range(first, last):
         px, py, pz = segments[i, 0, 0], segments[i, 0, 1], segments[i, 0, 2]
         qx, qy, qz = segments[i, 1, 0], segments[i, 1, 1], segments[i, 1, 2]
-        for j in range(m):
-            a, b, c, d = rows[j, 0], rows[j, 1], rows[j, 2], rows[j, 3]
-            s_p[j], b_p[j] = value_3d(a, b, c, d, px, py, pz)
-            s_q[j], b_q[j] = value_3d(a, b, c, d, qx, qy, qz)
-        state[i] = clip_by_rows(segments[i], rows, safe, s_p, s_q, b_p, b_q, start[i], end[i], t[i], faces[i])
+        if not (abs(px) + abs(py) + abs(pz) + abs(qx) + abs(qy) + abs(qz) < LARGE):
+            still[n_open] = i
+            n_open += 1
+            continue
+        most = max(abs(px), abs(py), abs(pz), abs(qx), abs(qy), abs(qz))
+        n_chosen, is_out = 0, False
+        for begin in range(0, m, BLOCK):
+            if stop[0]:
+                return
+            n_out, until = 0, min(m, begin + BLOCK)
+            for j in range(begin, until):
+                p = a[j] * px + b[j] * py + c[j] * pz + d[j]
+                q = a[j] * qx + b[j] * qy + c[j] * qz + d[j]
+                bound = VALUE_BOUND * (size[j] * most + abs(d[j])) + VALUE_TINY
+                s_p[j], s_q[j], bounds[j] = p, q, bound
+                n_out += (p < -bound) & (q < -bound)
+            if n_out:
+                is_out = True
+                break
+            for j in range(begin, until):
+                chosen[n_chosen] = j
+                n_chosen += not ((s_p[j] > bounds[j]) & (s_q[j] > bounds[j]))
+        if is_out:
+            continue
+        state, entered, left = decide_by_parameters(s_p, s_q, bounds, chosen, n_chosen)
+        if state == OPEN:
+            state, entered, left, more = decide_by_rows(segments[i], columns, s_p, s_q, bounds, chosen, n_chosen)
+            beyond += more
+        if state == OPEN:
+            still[n_open] = i
+            n_open += 1
+        if state != KEPT:
+            continue
+        items[kept], planes[kept, 0], planes[kept, 1] = i, entered, left
+        kept += 1
+    n[0], n[1], n[2] = kept - first, n_open - first, beyond
+
+
+@inline
+def parameter_of(sp: tuple[float, float, float], sq: tuple[float, float, float]) -> tuple[float, float, float, bool]:
+    """Return t = s_p / (s_p - s_q) as a double-double, how far relative to itself it may be off, and if that holds."""
+    sp_h, sp_l, sp_bound = sp
+    sq_h, sq_l, sq_bound = sq
+    sum_h, sum_l = dd_add(sp_h, sp_l, -sq_h, -sq_l)
+    th, tl = dd_div(sp_h, sp_l, sum_h, sum_l)
+    r = 1.01 * (sp_bound / abs(sp_h) + sq_bound / abs(sq_h))
+    return th, tl, r, (r < 0.001) & (abs(sum_h) >= 2.0**-400) & (abs(sum_h) <= 2.0**400) & (abs(sp_h) >= 2.0**-500)
+
+
+@inline
+def cut_by_signs(row: Any, segment: Any, point: Any) -> tuple[float, bool]:
+    """Set `point` to where `segment` crosses the plane of `row`, by exact signs; return t and whether all is sure."""
+    if not (is_row_safe(row) and is_segment_safe(segment)):
+        return 0.0, False
+    wp, wq, e = workspace(8), workspace(8), workspace(96)
+    n_wp, n_wq = expand_value(row, segment[0], wp), expand_value(row, segment[1], wq)
+    for e_w, n_w in ((wp, n_wp), (wq, n_wq)):
+        if sign(e_w, n_w) < 0:
+            for i in range(n_w):
+                e_w[i] = -e_w[i]
+    return parameter_and_point(segment, wp, n_wp, wq, n_wq, -1, 0.0, point, e)
+
+
+@kernel
+def fill_on_rows_2d(
+    segments: Any,
+    columns: Any,
+    items: Any,
+    planes: Any,
+    first: int,
+    last: int,
+    stop: Any,
+    source: Any,
+    ends: Any,
+    t: Any,
+    faces: Any,
+    still: Any,
+    n: Any,
+) -> None:
+    """Fill rows first .. last - 1 of the pieces of ``segments`` ((n, 2, 2) float64): see `fill_on_boxes_2d`."""
+    n_open = beyond = 0
+    for row in range(first, last):
+        if stop[0]:
+            return
+        i = items[row]
+        source[row] = i
+        all_sure = tried = True
+        px, py = segments[i, 0, 0], segments[i, 0, 1]
+        qx, qy = segments[i, 1, 0], segments[i, 1, 1]
+        for side in range(2):
+            plane = planes[row, side]
+            faces[row, side] = plane
+            point = ends[side]
+            if plane < 0:
+                t[row, side] = side
+                point[row, 0], point[row, 1] = (
+                    segments[i, side, 0] + 0.0,
+                    segments[i, side, 1] + 0.0,
+                )
+                continue
+            at = columns[:-1, plane]
+            th, tl, slack, sure = parameter_of(dd_value_2d(at, px, py), dd_value_2d(at, qx, qy))
+            x, is_x = point_at(px, qx, th, tl, slack)
+            y, is_y = point_at(py, qy, th, tl, slack)
+            bound = (T_BOUND + slack) * th
+            if sure & is_x & is_y & (th + (tl - bound) == th + (tl + bound)):
+                t[row, side] = th + tl
+                point[row, 0], point[row, 1] = x + 0.0, y + 0.0
+            else:
+                tried = False
+                t[row, side], sure = cut_by_signs(at, segments[i], point[row])
+                all_sure = all_sure and sure
+        if not tried:
+            beyond += 1
+        if not all_sure:
+            still[first + n_open] = row
+            n_open += 1
+    n[0], n[1] = n_open, beyond
+
+
+@kernel
+def fill_on_rows_3d(
+    segments: Any,
+    columns: Any,
+    items: Any,
+    planes: Any,
+    first: int,
+    last: int,
+    stop: Any,
+    source: Any,
+    ends: Any,
+    t: Any,
+    faces: Any,
+    still: Any,
+    n: Any,
+) -> None:
+    """Fill rows first .. last - 1 of the pieces of ``segments`` ((n, 2, 3) float64): see `fill_on_boxes_2d`."""
+    n_open = beyond = 0
+    for row in range(first, last):
+        if stop[0]:
+            return
+        i = items[row]
+        source[row] = i
+        all_sure = tried = True
+        px, py, pz = segments[i, 0, 0], segments[i, 0, 1], segments[i, 0, 2]
+        qx, qy, qz = segments[i, 1, 0], segments[i, 1, 1], segments[i, 1, 2]
+        for side in range(2):
+            plane = planes[row, side]
+            faces[row, side] = plane
+            point = ends[side]
+            if plane < 0:
+                t[row, side] = side
+                point[row, 0], point[row, 1], point[row, 2] = (
+                    segments[i, side, 0] + 0.0,
+                    segments[i, side, 1] + 0.0,
+                    segments[i, side, 2] + 0.0,
+                )
+                continue
+            at = columns[:-1, plane]
+            th, tl, slack, sure = parameter_of(dd_value_3d(at, px, py, pz), dd_value_3d(at, qx, qy, qz))
+            x, is_x = point_at(px, qx, th, tl, slack)
+            y, is_y = point_at(py, qy, th, tl, slack)
+            z, is_z = point_at(pz, qz, th, tl, slack)
+            bound = (T_BOUND + slack) * th
+            if sure & is_x & is_y & is_z & (th + (tl - bound) == th + (tl + bound)):
+                t[row, side] = th + tl
+                point[row, 0], point[row, 1], point[row, 2] = x + 0.0, y + 0.0, z + 0.0
+            else:
+                tried = False
+                t[row, side], sure = cut_by_signs(at, segments[i], point[row])
+                all_sure = all_sure and sure
+        if not tried:
+            beyond += 1
+        if not all_sure:
+            still[first + n_open] = row
+            n_open += 1
+    n[0], n[1] = n_open, beyond

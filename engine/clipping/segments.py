@@ -4,31 +4,46 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal, overload
+from typing import Literal, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from engine.clipping.box_planes import box_rows
-from engine.clipping.cohen_sutherland import BEYOND_FILTER, KEPT, OPEN, clip_on_boxes_2d, clip_on_boxes_3d
-from engine.clipping.concave import PieceRows, clip_chunk
-from engine.clipping.cyrus_beck import clip_on_rows_2d, clip_on_rows_3d
-from engine.clipping.exact_segments import Piece, clip_by_planes, clip_by_sphere
-from engine.clipping.scaling import FloatArray, balanced_rows, exponent_of, scaled_back, shifted
-from engine.clipping.sphere_interval import clip_on_sphere
+from engine.clipping.cohen_sutherland import (
+    decide_on_boxes_2d,
+    decide_on_boxes_3d,
+    fill_on_boxes_2d,
+    fill_on_boxes_3d,
+)
+from engine.clipping.concave import clip_chunk
+from engine.clipping.cyrus_beck import (
+    as_columns,
+    decide_on_rows_2d,
+    decide_on_rows_3d,
+    fill_on_rows_2d,
+    fill_on_rows_3d,
+)
+from engine.clipping.exact_segments import clip_by_planes, clip_by_sphere
+from engine.clipping.scaling import FloatArray, balanced_rows, exponent_of, shifted
+from engine.clipping.single_pieces import Method, PieceRows, Scaled, clip_on_convex
+from engine.clipping.sphere_interval import (
+    decide_on_sphere_2d,
+    decide_on_sphere_3d,
+    fill_on_sphere_2d,
+    fill_on_sphere_3d,
+)
 from engine.errors import UnsupportedSolidError
 from engine.parallel import Budget, Cancel, Progress, run_chunks
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
-from engine.solids.checks import as_point_groups
+from engine.solids.checks import as_point_groups, check_finite
 from engine.solids.convex import Convex
 from engine.solids.half_space import HalfSpace
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
 from engine.solids.sphere import Sphere
 from engine.types import Accuracy
-
-Settle = Callable[[list[float], list[float]], Piece | None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -126,7 +141,7 @@ def clip_segments(
     ([[0.0, 1.0]], [[2.0, 1.0]], [[0.25, 0.75]], [[0, 1]])
     """
     task, method = _method(region)
-    array = as_point_groups(segments, 2, region.dimension, ("segments",))
+    array = as_point_groups(segments, 2, region.dimension, ("segments",), must_be_finite=False)  # kernels look at it
     with Budget(deadline, cancel) as budget:
         pieces, n_beyond, n_rational = task(array, budget, workers, progress)
     if not report:
@@ -158,82 +173,79 @@ def _method(region: Solid) -> tuple[Task, str]:
 
 
 def _on_box(region: Aabb) -> Task:
-    kernel = clip_on_boxes_2d if region.dimension == 2 else clip_on_boxes_3d
+    planes = box_rows(region).tolist()
+    is_flat = region.dimension == 2
 
-    def task(
-        segments: FloatArray, budget: Budget, workers: int | None, progress: Progress | None
-    ) -> tuple[SegmentPieces, int, int]:
+    def scale(segments: FloatArray) -> Scaled | None:
         exponent = exponent_of(segments, region.min, region.max)
-        scaled = [shifted(array, -exponent) if exponent else array for array in (segments, region.min, region.max)]
-        points, low, high = scaled
-        if points is None or low is None or high is None:
-            exponent, points, low, high = 0, segments, region.min, region.max
-        planes = box_rows(region).tolist()
-        return _clip_convex(
-            kernel,
-            (low.copy(), high.copy()),
-            lambda p, q: clip_by_planes(p, q, planes),
-            segments,
-            points,
-            exponent,
-            budget,
-            workers,
-            progress,
-        )
+        points, low, high = (shifted(array, -exponent) for array in (segments, region.min, region.max))
+        if exponent == 0 or points is None or low is None or high is None:
+            return None
+        return Scaled(points, (low, high), exponent)
 
-    return task
+    return _one_piece(
+        Method(
+            decide_on_boxes_2d if is_flat else decide_on_boxes_3d,
+            fill_on_boxes_2d if is_flat else fill_on_boxes_3d,
+            (region.min, region.max),
+            lambda p, q: clip_by_planes(p, q, planes),
+            scale,
+        )
+    )
 
 
 def _on_rows(rows: FloatArray) -> Task:
-    kernel = clip_on_rows_2d if rows.shape[1] == 3 else clip_on_rows_3d
     planes = rows.tolist()
+    is_flat = rows.shape[1] == 3
+    plain = balanced_rows(rows, 0)
 
-    def task(
-        segments: FloatArray, budget: Budget, workers: int | None, progress: Progress | None
-    ) -> tuple[SegmentPieces, int, int]:
+    def scale(segments: FloatArray) -> Scaled | None:
         exponent = exponent_of(segments)
-        points = shifted(segments, -exponent) if exponent else segments
-        balanced = balanced_rows(rows, exponent) if points is not None else None
-        if balanced is None:
-            exponent, points, balanced = 0, segments, balanced_rows(rows, 0)
-        return _clip_convex(
-            kernel,
-            (rows if balanced is None else balanced,),
-            lambda p, q: clip_by_planes(p, q, planes),
-            segments,
-            points,
-            exponent,
-            budget,
-            workers,
-            progress,
-        )
+        points, balanced = shifted(segments, -exponent), balanced_rows(rows, exponent)
+        if exponent == 0 or points is None or balanced is None:
+            return None
+        return Scaled(points, (as_columns(balanced),), exponent)
 
-    return task
+    return _one_piece(
+        Method(
+            decide_on_rows_2d if is_flat else decide_on_rows_3d,
+            fill_on_rows_2d if is_flat else fill_on_rows_3d,
+            (as_columns(rows if plain is None else plain),),
+            lambda p, q: clip_by_planes(p, q, planes),
+            scale,
+        )
+    )
 
 
 def _on_ball(region: Sphere) -> Task:
     center, radius = region.center.tolist(), region.radius
 
+    def scale(segments: FloatArray) -> Scaled | None:
+        ball = np.append(region.center, radius)
+        exponent = exponent_of(segments, ball)
+        points, scaled = shifted(segments, -exponent), shifted(ball, -exponent)
+        if exponent == 0 or points is None or scaled is None:
+            return None
+        return Scaled(points, (scaled[:-1], float(scaled[-1])), exponent)
+
+    return _one_piece(
+        Method(
+            decide_on_sphere_2d if region.dimension == 2 else decide_on_sphere_3d,
+            fill_on_sphere_2d if region.dimension == 2 else fill_on_sphere_3d,
+            (region.center, float(radius)),
+            lambda p, q: clip_by_sphere(p, q, center, radius),
+            scale,
+        )
+    )
+
+
+def _one_piece(method: Method) -> Task:
     def task(
         segments: FloatArray, budget: Budget, workers: int | None, progress: Progress | None
     ) -> tuple[SegmentPieces, int, int]:
-        ball = np.append(region.center, radius)
-        exponent = exponent_of(segments, ball)
-        points = shifted(segments, -exponent) if exponent else segments
-        scaled = shifted(ball, -exponent) if exponent else ball
-        if points is None or scaled is None:
-            exponent, points, scaled = 0, segments, ball
-        return _clip_convex(
-            clip_on_sphere,
-            (scaled[:-1].copy(), float(scaled[-1])),
-            lambda p, q: clip_by_sphere(p, q, center, radius),
-            segments,
-            points,
-            exponent,
-            budget,
-            workers,
-            progress,
-        )
+        rows = clip_on_convex(segments, method, budget, workers, progress)
+        pieces = SegmentPieces(rows.source, rows.start, rows.end, rows.t, rows.faces)
+        return pieces, rows.n_beyond, rows.n_rational
 
     return task
 
@@ -242,6 +254,7 @@ def _on_boundary(region: Polygon | Polyhedron) -> Task:
     def task(
         segments: FloatArray, budget: Budget, workers: int | None, progress: Progress | None
     ) -> tuple[SegmentPieces, int, int]:
+        check_finite(segments, ("segments",))
         chunks: dict[int, PieceRows] = {}
 
         def chunk(first: int, last: int) -> None:
@@ -259,49 +272,3 @@ def _on_boundary(region: Polygon | Polyhedron) -> Task:
         return pieces, sum(part.n_beyond for part in parts), sum(part.n_rational for part in parts)
 
     return task
-
-
-def _clip_convex(
-    kernel: Any,
-    region: tuple[Any, ...],
-    settle: Settle,
-    segments: FloatArray,
-    points: FloatArray | None,
-    exponent: int,
-    budget: Budget,
-    workers: int | None,
-    progress: Progress | None,
-) -> tuple[SegmentPieces, int, int]:
-    """Run `kernel` over chunks of `points` = segments 2^-exponent and settle what it leaves open.
-
-    Each segment has one piece at most. Returns the pieces, how many items needed more than the filter, and how many
-    rational arithmetic.
-    """
-    assert points is not None
-    n, _, dimension = segments.shape
-    start, end = np.empty((n, dimension)), np.empty((n, dimension))
-    t, faces, state = np.empty((n, 2)), np.empty((n, 2), np.int64), np.empty(n, np.uint8)
-
-    def task(first: int, last: int) -> None:
-        with np.errstate(all="ignore"):  # uncompiled kernels: overflow is looked at by their filters
-            kernel(points, *region, first, last, start, end, t, faces, state)
-        part = slice(first, last)
-        if exponent:
-            is_kept = (state[part] & KEPT) != 0
-            for ends in (start, end):
-                ends[part][~is_kept] = 0.0
-                ends[part], doubtful = scaled_back(ends[part], exponent)
-                state[part][doubtful & is_kept & (faces[part] >= 0).any(axis=1)] = OPEN | BEYOND_FILTER
-        for item in first + np.flatnonzero(state[part] & OPEN):
-            budget.check()
-            piece = settle(segments[item, 0].tolist(), segments[item, 1].tolist())
-            if piece is None:
-                state[item] &= ~np.uint8(KEPT)
-            else:
-                state[item] |= KEPT
-                t[item], start[item], end[item], faces[item] = piece
-
-    run_chunks(task, n, budget=budget, workers=workers, progress=progress)
-    kept = np.flatnonzero(state & KEPT)
-    pieces = SegmentPieces(kept, start[kept] + 0.0, end[kept] + 0.0, t[kept] + 0.0, faces[kept])
-    return pieces, int((state & BEYOND_FILTER != 0).sum()), int((state & OPEN != 0).sum())

@@ -207,9 +207,14 @@ def as_points(
     return array
 
 
-def as_point_groups(groups: object, size: int | None, dimension: int | None, where: Where) -> FloatArray:
-    """Return segments, triangles or quads as a finite float64 array ``(n, size, dimension)``; none are welcome."""
-    array = as_floats(groups, 3, where)
+def as_point_groups(
+    groups: object, size: int | None, dimension: int | None, where: Where, must_be_finite: bool = True
+) -> FloatArray:
+    """Return segments, triangles or quads as a finite float64 array ``(n, size, dimension)``; none are welcome.
+
+    must_be_finite: as in `as_floats`.
+    """
+    array = as_floats(groups, 3, where, must_be_finite)
     if array.shape[0] == 0 and array.size == 0 and (array.shape[2] == 0 or dimension in (None, array.shape[2])):
         return np.zeros((0, size or 0, dimension or array.shape[2] or 2), np.float64)
     check_dimension(array.shape[2], dimension, where)

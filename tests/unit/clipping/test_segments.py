@@ -5,8 +5,10 @@ from __future__ import annotations
 import doctest
 import itertools
 import math
+import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -199,8 +201,31 @@ def test_empty_queries_and_report() -> None:
         pieces, accuracy = clip_segments(nothing, box, report=True)
         assert (pieces.start.shape, pieces.t.shape, len(pieces)) == ((0, 3), (0, 2), 0)
         assert (accuracy.decisions, accuracy.n_items, accuracy.coordinates_ulp) == ("exact", 0, 0.5)
-    _, accuracy = clip_segments([[[0, 0, 0], [1e-310, 5, 5]]], box, report=True)
+    flat = Aabb([0, 0, 0], [1e-310, 1, 1])
+    _, accuracy = clip_segments([[[0, 0, 0], [3e-310, 1, 1]]], flat, report=True)
     assert accuracy.n_rational == accuracy.n_beyond_filter == 1
+
+
+@pytest.mark.skipif(os.environ.get("NUMBA_DISABLE_JIT") == "1", reason="about compiled speed")
+def test_kernels_see_the_deadline() -> None:
+    rng = np.random.default_rng(12)
+    region = Convex(np.c_[rng.normal(size=(20000, 3)), np.full(20000, 9.0)])
+    segments = random_segments(rng, 20000, 3) * 0.1
+    clip_segments(segments[:10], region)
+    before = time.perf_counter()
+    with pytest.raises(DeadlineExceededError):
+        clip_segments(segments, region, deadline=0.05, workers=1)
+    assert time.perf_counter() - before < 0.2
+
+
+def test_numbers_that_are_none_are_found_in_large_batches() -> None:
+    for region in (boxes, convexes, spheres):
+        for value in (math.nan, -math.inf):
+            segments = np.zeros((5000, 2, 3)) + 9.0
+            segments[4321, 1, 2] = value
+            with pytest.raises(NotFiniteError) as caught:
+                clip_segments(segments, region(np.random.default_rng(0), 3)[0])
+            assert caught.value.where == ("segments", 4321, 1, 2)
 
 
 def test_refuses_what_it_cannot_take() -> None:

@@ -1,0 +1,35 @@
+"""numba_celltree: its Cohen-Sutherland, compiled, called for each segment of the plane from a compiled loop."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba
+import numpy as np
+from numba_celltree.algorithms.cohen_sutherland import cohen_sutherland_line_box_clip
+from numba_celltree.constants import Box, Point
+
+import engine
+from benchmarks.contenders import Prepared
+
+NAME, PACKAGE = "numba_celltree", "numba_celltree"
+
+
+@numba.njit(nogil=True)
+def _clip(segments: Any, low: Any, high: Any) -> tuple[Any, Any]:
+    box = Box(low[0], high[0], low[1], high[1])
+    clipped, kept = np.empty_like(segments), np.zeros(len(segments), np.bool_)
+    for i in range(len(segments)):
+        p, q = Point(segments[i, 0, 0], segments[i, 0, 1]), Point(segments[i, 1, 0], segments[i, 1, 1])
+        kept[i], p, q = cohen_sutherland_line_box_clip(p, q, box)
+        clipped[i, 0, 0], clipped[i, 0, 1], clipped[i, 1, 0], clipped[i, 1, 1] = p.x, p.y, q.x, q.y
+    return clipped, kept
+
+
+def _segments(subject: engine.Aabb, threads: int) -> Prepared:
+    return Prepared(
+        lambda segments: segments, lambda segments: _clip(segments, subject.min, subject.max), lambda found: found[1]
+    )
+
+
+MAKERS = {"segments": _segments}

@@ -1,0 +1,204 @@
+"""Runs the kernels of convex regions, on which a segment has one piece at most: decide, then fill.
+
+1. *decide* goes over the segments in chunks and lists those that are kept with the planes that bound them. What it
+   leaves open is settled by rational arithmetic and put in its place, so that the number of pieces is known.
+2. *fill* goes over the pieces in chunks and writes each where it belongs, nothing is copied. A coordinate that it
+   cannot round for sure is settled by rational arithmetic too.
+
+Kernels take numbers of sizes for which expansions are exact. Where more than a few items are left open, all is done
+again on numbers times a power of two, if there is one that brings them into that range.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from engine.clipping.exact_segments import Piece
+from engine.clipping.scaling import FloatArray, scaled_back
+from engine.parallel import Budget, Progress, run_chunks
+from engine.solids.checks import check_finite
+
+IntArray = npt.NDArray[np.int64]
+Settle = Callable[[list[float], list[float]], Piece | None]
+
+_FEW: Final = 32
+"""Open items that rational arithmetic settles in the time in which a batch is looked through for its exponent."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scaled:
+    """A batch and its region times 2^-exponent, as the kernels take them."""
+
+    points: FloatArray
+    region: tuple[Any, ...]
+    exponent: int
+
+
+@dataclass(frozen=True, slots=True)
+class Method:
+    """How segments are clipped on one region.
+
+    decide, fill: kernels; see cohen_sutherland.py. region: their arguments. settle: rational arithmetic on one segment.
+    scale: returns the batch scaled, None where it is well as it is or cannot be scaled exactly.
+    """
+
+    decide: Any
+    fill: Any
+    region: tuple[Any, ...]
+    settle: Settle
+    scale: Callable[[FloatArray], Scaled | None]
+
+
+@dataclass(frozen=True, slots=True)
+class PieceRows:
+    """Pieces in order, see `SegmentPieces`, and how many items needed more than the filter, and rational arithmetic."""
+
+    source: IntArray
+    start: FloatArray
+    end: FloatArray
+    t: FloatArray
+    faces: IntArray
+    n_beyond: int
+    n_rational: int
+
+
+def clip_on_convex(
+    segments: FloatArray, method: Method, budget: Budget, workers: int | None, progress: Progress | None
+) -> PieceRows:
+    """Return the piece of each segment that has one. segments: (n, 2, dim) float64, not yet looked at for NaN.
+
+    Raises: NotFiniteError.
+    """
+    scene = Scaled(segments, method.region, 0)
+    found = _clip(segments, method, scene, _FEW + len(segments) // 256, budget, workers, progress)
+    if found is None:
+        better = method.scale(segments)
+        found = _clip(segments, method, better or scene, len(segments), budget, workers, progress)
+    assert found is not None
+    return found
+
+
+def _clip(
+    segments: FloatArray,
+    method: Method,
+    scene: Scaled,
+    most_open: int,
+    budget: Budget,
+    workers: int | None,
+    progress: Progress | None,
+) -> PieceRows | None:
+    """Return the pieces; None where more than `most_open` items are left to rational arithmetic."""
+    n = len(segments)
+    listed, planes, still = np.empty(n, np.int32), np.empty((n, 2), np.int32), np.empty(n, np.int32)
+    decided: dict[int, IntArray] = {}
+
+    def decide(first: int, last: int) -> None:
+        counts = np.zeros(3, np.int64)
+        with np.errstate(all="ignore"):  # uncompiled kernels: overflow is looked at by their filters
+            method.decide(scene.points, *scene.region, first, last, budget.flag, listed, planes, still, counts)
+        decided[first] = counts
+
+    run_chunks(decide, n, budget=budget, workers=workers)
+    firsts = sorted(decided)
+    n_open = sum(int(decided[first][1]) for first in firsts)
+    if n_open:
+        check_finite(segments, ("segments",))  # kernels leave open what is not
+        if n_open > most_open:
+            return None
+    items = _joined(listed, [(first, int(decided[first][0])) for first in firsts])
+    bounding = _joined(planes, [(first, int(decided[first][0])) for first in firsts])
+    left = _joined(still, [(first, int(decided[first][1])) for first in firsts])
+    pieces: dict[int, Piece] = {}
+    for item in left.tolist():
+        budget.check()
+        piece = method.settle(segments[item, 0].tolist(), segments[item, 1].tolist())
+        if piece is not None:
+            pieces[item] = piece
+    if pieces:
+        items = np.append(items, np.array(list(pieces), np.int32))
+        bounding = np.append(bounding, np.full((len(pieces), 2), -1, np.int32), axis=0)
+        order = np.argsort(items, kind="stable")
+        items, bounding = items[order], bounding[order]
+    rows, unsure, n_beyond = _fill(scene, method, items, bounding, budget, workers, progress)
+    if len(unsure) + n_open > most_open:
+        return None
+    for row in unsure:
+        budget.check()
+        item = int(items[row])
+        piece = method.settle(segments[item, 0].tolist(), segments[item, 1].tolist())
+        assert piece is not None
+        pieces[item] = piece
+    if pieces:
+        _put(rows, pieces)
+    beyond = sum(int(decided[first][2]) for first in firsts)
+    return PieceRows(*rows, min(n, beyond + n_beyond + n_open), n_open + len(unsure))
+
+
+Rows = tuple[IntArray, FloatArray, FloatArray, FloatArray, IntArray]
+
+
+def _fill(
+    scene: Scaled,
+    method: Method,
+    items: npt.NDArray[np.int32],
+    planes: npt.NDArray[np.int32],
+    budget: Budget,
+    workers: int | None,
+    progress: Progress | None,
+) -> tuple[Rows, IntArray, int]:
+    """Return the rows of the pieces, which of them are not surely rounded, and how many needed more than one try."""
+    m, dimension = len(items), scene.points.shape[2]
+    source, ends, t = np.empty(m, np.int64), np.empty((2, m, dimension)), np.empty((m, 2))
+    faces, still = np.empty((m, 2), np.int64), np.empty(m, np.int32)
+    counts: dict[int, IntArray] = {}
+    unsure: list[IntArray] = []
+
+    def fill(first: int, last: int) -> None:
+        found = counts[first] = np.zeros(2, np.int64)
+        with np.errstate(all="ignore"):
+            method.fill(
+                scene.points,
+                *scene.region,
+                items,
+                planes,
+                first,
+                last,
+                budget.flag,
+                source,
+                ends,
+                t,
+                faces,
+                still,
+                found,
+            )
+        if scene.exponent:
+            is_cut = faces[first:last] >= 0
+            for side in range(2):
+                points, doubtful = scaled_back(ends[side, first:last], scene.exponent)
+                ends[side, first:last] = points
+                unsure.append(first + np.flatnonzero(doubtful & is_cut[:, side]))
+
+    run_chunks(fill, m, budget=budget, workers=workers, progress=progress)
+    unsure += [still[first : first + found[0]].astype(np.int64) for first, found in counts.items()]
+    rows = (source, ends[0], ends[1], t, faces)
+    return rows, np.unique(np.concatenate([np.zeros(0, np.int64), *unsure])), sum(int(c[1]) for c in counts.values())
+
+
+def _joined(array: npt.NDArray[np.int32], parts: list[tuple[int, int]]) -> npt.NDArray[np.int32]:
+    """Return the parts (first, how many) of an array one after another."""
+    if len(parts) == 1:
+        return array[parts[0][0] : parts[0][0] + parts[0][1]]
+    return np.concatenate([array[:0], *(array[first : first + n] for first, n in parts)])
+
+
+def _put(rows: Rows, pieces: dict[int, Piece]) -> None:
+    """Write settled pieces to their rows."""
+    source, start, end, t, faces = rows
+    places = np.searchsorted(source, np.array(list(pieces), np.int64))
+    for place, piece in zip(places, pieces.values()):
+        t[place], start[place], end[place], faces[place] = piece
