@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import asdict
 from functools import partial
 
 import numpy as np
@@ -11,8 +12,8 @@ import numpy as np
 import engine
 from benchmarks import memory, workloads
 from benchmarks.contenders import Absent, Prepared, load
-from benchmarks.measure import clocked
-from benchmarks.suite import Row, Suite, of_seconds, options
+from benchmarks.measure import clocked, interleaved, ratios
+from benchmarks.suite import Row, Suite, of_seconds, options, settle
 
 SIZES = ("1k", "86k", "1.38M")
 UNIFORM = {"1k": (10.0, 20.0), "86k": (20.0, 30.0), "1.38M": (30.0, 50.0)}
@@ -33,7 +34,8 @@ def tasks(suite: Suite) -> Iterator[Task]:
     for size in sizes:
         yield f"uniform, {size} faces vs Open3D", partial(_polyhedron, suite, size, "uniform", made)
         yield f"near the surface, {size} faces vs Open3D", partial(_polyhedron, suite, size, "near", made)
-    yield "cost of exactness", _cost_of_exactness
+    for place in ("uniform", "near"):
+        yield f"cost of exactness, {place}", partial(_cost_of_exactness, suite, sizes[-2:][0], place)
     for size in () if quick else SIZES[1:]:
         yield f"build, {size} faces", partial(_build, suite, size)
     size = "1k" if quick else "86k"
@@ -64,8 +66,26 @@ def _polyhedron(suite: Suite, size: str, place: str, made: dict[str, dict[str, P
         yield row
 
 
-def _cost_of_exactness(name: str) -> Iterable[Row]:
-    yield Row(name, "x", note="not available: the engine has no variant with plain signs")
+def _cost_of_exactness(suite: Suite, size: str, place: str, name: str) -> Iterable[Row]:
+    """Our time over that of the same code with plain signs, on the same cells."""
+    chosen = suite.options
+    mesh = workloads.mesh_of_size(size, chosen.seed)
+    draw = workloads.uniform_points if place == "uniform" else workloads.near_points
+    points = draw(mesh, chosen.n_points, chosen.seed)
+    ours = load("ours").MAKERS["polyhedron"](mesh, chosen.threads)
+    settle(ours, points)
+    plain = load("plain_signs").with_plain_signs(ours)
+    (a, b), (exact, found) = interleaved(
+        [lambda: plain.ask(points), lambda: ours.ask(points)], chosen.rounds, chosen.seconds
+    )
+    wall, cpu = ratios(a, b)
+    row = Row(name, "times", 1.05, 1.0, wall.median, wall.low, wall.high, cpu.median)
+    row.ours, row.peer = (f"{len(points) / t.median / 1e6:.3g} M/s" for t in (b, a))
+    row.note = (
+        f"{mesh.name}, {ours.method()}; plain signs answer {int((exact != found).sum())} of {len(points)} otherwise"
+    )
+    row.raw |= {"ours": asdict(b), "plain": asdict(a)}
+    yield row
 
 
 def _build(suite: Suite, size: str, name: str) -> Iterable[Row]:

@@ -54,6 +54,11 @@ def _first_number(context: Any, builder: Any, array_type: Any, array: Any, group
 
 def _parity_intrinsic(typing_context: Any, groups: Any, group: Any, x: Any, y: Any, z: Any) -> Any:
     """Return what `plain_parity` does; groups: C-contiguous."""
+    return types.int64(groups, types.int64, types.float32, types.float32, types.float32), _parity_code(float(BAND))
+
+
+def _parity_code(band: float | None) -> Any:
+    """Return what generates the parity beyond a band; None: from plain signs, never UNSURE, for comparison only."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         first = _first_number(context, builder, signature.args[0], arguments[0], arguments[1])
@@ -79,25 +84,27 @@ def _parity_intrinsic(typing_context: Any, groups: Any, group: Any, x: Any, y: A
         def chosen(how: str, a: Any, b: Any) -> Any:
             return builder.select(builder.fcmp_ordered(how, a, b), a, b)
 
-        above = ir.Constant(_VECTOR, [ir.Constant(_FLOAT, float(BAND))] * LANES)
-        below = ir.Constant(_VECTOR, [ir.Constant(_FLOAT, -float(BAND))] * LANES)
+        above = ir.Constant(_VECTOR, [ir.Constant(_FLOAT, band or 0.0)] * LANES)
+        below = ir.Constant(_VECTOR, [ir.Constant(_FLOAT, -(band or 0.0))] * LANES)
         side = builder.fsub(product(0), row(3))
         edges = [product(place) for place in (4, 7, 10)]
         least = chosen("<", chosen("<", edges[0], edges[1]), edges[2])
         most = chosen(">", chosen(">", edges[0], edges[1]), edges[2])
-        is_split = builder.and_(builder.fcmp_ordered("<", least, below), builder.fcmp_ordered(">", most, above))
         is_same = builder.or_(builder.fcmp_ordered(">", least, above), builder.fcmp_ordered("<", most, below))
-        is_apart = builder.or_(builder.fcmp_ordered(">", side, above), is_split)
         is_crossed = builder.and_(builder.fcmp_ordered("<", side, below), is_same)
         mask_type, word = ir.IntType(LANES), ir.IntType(64)
         crossed = builder.bitcast(is_crossed, mask_type)
-        sure = builder.bitcast(builder.or_(is_apart, is_crossed), mask_type)
         parity = builder.and_(builder.ctpop(crossed), ir.Constant(mask_type, 1))
+        if band is None:
+            return builder.zext(parity, word)
+        is_split = builder.and_(builder.fcmp_ordered("<", least, below), builder.fcmp_ordered(">", most, above))
+        is_apart = builder.or_(builder.fcmp_ordered(">", side, above), is_split)
+        sure = builder.bitcast(builder.or_(is_apart, is_crossed), mask_type)
         is_unsure = builder.icmp_unsigned("!=", sure, ir.Constant(mask_type, 2**LANES - 1))
         unsure = builder.shl(builder.zext(is_unsure, word), ir.Constant(word, 1))
         return builder.or_(builder.zext(parity, word), unsure)
 
-    return types.int64(groups, types.int64, types.float32, types.float32, types.float32), generate
+    return generate
 
 
 def _prefetch_intrinsic(typing_context: Any, groups: Any, group: Any) -> Any:
@@ -118,6 +125,15 @@ def _prefetch_intrinsic(typing_context: Any, groups: Any, group: Any) -> Any:
 
 
 group_parity: Any = plain_parity if numba_config.DISABLE_JIT else intrinsic(_parity_intrinsic)
+
+
+def _plain_signs(typing_context: Any, groups: Any, group: Any, x: Any, y: Any, z: Any) -> Any:
+    """Return the parity without a band."""
+    return types.int64(groups, types.int64, types.float32, types.float32, types.float32), _parity_code(None)
+
+
+plain_signs: Any = plain_parity if numba_config.DISABLE_JIT else intrinsic(_plain_signs)
+"""What `group_parity` would be if rounding did not matter: the benchmark measures against it what certainty costs."""
 prefetch_group: Any = plain_prefetch if numba_config.DISABLE_JIT else intrinsic(_prefetch_intrinsic)
 
 
