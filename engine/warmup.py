@@ -23,6 +23,7 @@ from engine.containment.build_cells import cells_if_they_pay
 from engine.containment.cell_order import gathered, order_by_cell
 from engine.containment.locate import locate
 from engine.containment.locate_scene import locate_scene
+from engine.containment.posed import posed_locator
 from engine.parallel import Budget
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
@@ -89,6 +90,9 @@ def _warm_containment() -> None:
             locate(points, solid)
         locate_scene(points, solids, poses)
         locate_scene(points, solids)
+        with Budget() as budget:  # what a scene asks of a single body, where its first pass is not sure
+            for solid, pose in zip(solids, poses):
+                posed_locator(solid, pose).fill(as_points(points, dimension), np.empty(len(points), np.int8), budget)
     _warm_cells()
 
 
@@ -106,6 +110,7 @@ def _warm_cells() -> None:
     many = np.random.default_rng(0).uniform(-1.2, 1.2, (_MANY, 3))
     ball = Polyhedron(vertices, faces)
     locate(many, ball)
+    locate_scene(many, [ball])  # so many that its voxels pay
     points = as_points(many, 3)
     with Budget() as budget:  # large batches near large meshes are asked in the order of their cells
         cells = cells_if_they_pay(ball, len(points), budget)

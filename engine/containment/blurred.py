@@ -211,14 +211,14 @@ def locate_by_columns_blurred(
             if column == cell_of(x_high, u.low, u.cells_per_unit, u.n_cells):
                 if row == cell_of(y_high, v.low, v.cells_per_unit, v.n_cells):
                     cell = row * u.n_cells + column
-                    location = _parity_in_column(q, blur, cell, vertices, triangles, boxes, areas, columns, flag)
+                    location = parity_in_column(q, blur, cell, vertices, triangles, boxes, areas, columns, flag)
         locations[item] = location
         n_open += location == UNDECIDED
     return n_open
 
 
 @inline
-def _parity_in_column(
+def parity_in_column(
     q: Any,
     blur: float,
     cell: int,

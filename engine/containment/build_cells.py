@@ -91,13 +91,13 @@ def cells_if_they_pay(solid: Polyhedron, n_points: int, budget: Budget) -> Cells
     The answers are the same either way. Building takes about 10 us a face, a vertical ray 0.2 us (1,000 faces) to 3 us
     (100,000); a solid that is asked about few points never gets cells.
     """
-    seen = solid.prepared("points_seen", lambda: [0])
+    seen = solid.prepared("points_seen", lambda: [0], budget.check)
     seen[0] += n_points
     if seen[0] < _PAYS_FROM + _PAYS_PER_FACE * len(solid.triangles):
         return None
     if not solid.prepared("can_have_cells", lambda: can_have_cells(solid)):
         return None
-    return solid.prepared("cells", lambda: build_cells(solid, budget))
+    return solid.prepared("cells", lambda: build_cells(solid, budget), budget.check)
 
 
 def build_cells(solid: Polyhedron, budget: Budget) -> Cells:

@@ -43,13 +43,13 @@ _WORDS: Final = 1 << 24
 
 def ring_cells_if_they_pay(solid: Polygon, n_points: int, budget: Budget) -> RingCells | None:
     """Return the cells of `solid` if they are there, or if the points asked so far would have paid for them."""
-    seen = solid.prepared("points_seen", lambda: [0])
+    seen = solid.prepared("points_seen", lambda: [0], budget.check)
     seen[0] += n_points
     if seen[0] < _PAYS_FROM + _PAYS_PER_EDGE * len(solid.vertices):
         return None
     if len(solid.vertices) > _MOST or not solid.prepared("is_in_range", lambda: [_is_in_range(solid)])[0]:
         return None
-    return solid.prepared("ring_cells", lambda: build_ring_cells(solid, budget))
+    return solid.prepared("ring_cells", lambda: build_ring_cells(solid, budget), budget.check)
 
 
 def _is_in_range(solid: Polygon) -> bool:

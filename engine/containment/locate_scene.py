@@ -1,24 +1,23 @@
 """Public: which of many solids hold each of many points.
 
-Boxes choose the candidates, grouped by body so that each body locates all of its candidates in one batch; the answers
-are written back point by point.
+A pass over the points finds the candidates and decides most of them (scene_pairs.py). What it leaves open is settled
+body by body (scene_rest.py), and the answers are put together point by point.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Final, Literal, overload
 
 import numpy as np
 import numpy.typing as npt
 
-from engine.bounding.grid import BoxGrid, build_box_grid
-from engine.containment.body_boxes import body_box
-from engine.containment.locators import Locator
-from engine.containment.posed import posed_locator
-from engine.containment.scene_pairs import count_candidates, group_by_body, list_candidates
-from engine.errors import EngineError, InvalidArrayError, WrongDimensionError
+from engine.containment.scene_pairs import drop_outside, put_in_order, scan_points, sort_by_cell
+from engine.containment.scene_rest import settle_rest
+from engine.containment.scene_tables import Scene, scene_of
+from engine.errors import InvalidArrayError, WrongDimensionError
 from engine.parallel import Budget, Cancel, Progress, check_options, run_chunks
 from engine.solids.base import FloatArray, IntArray, Solid
 from engine.solids.checks import as_points
@@ -26,10 +25,11 @@ from engine.solids.pose import Pose
 from engine.types import Accuracy
 
 _MOST_PAIRS: Final = 1 << 23
-"""Candidate pairs held at once, about 300 MB; points are taken in portions below it (one point at least)."""
-_MOST_POINTS: Final = 1 << 22
-_MOST_IN_GROUP: Final = 1 << 14
-"""Points that one body locates in one piece of work."""
+"""Candidate pairs held at once, about 300 MB; the rest of the points waits (one piece of work is done at least)."""
+
+
+_MOST_IN_BLOCK: Final = 1 << 15
+"""Points that are scanned in the order of their cells."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,15 +45,16 @@ class SceneLocations:
 
 
 @dataclass(frozen=True, slots=True)
-class _Scene:
-    """Bodies sorted into those with a box and those without."""
+class _Piece:
+    """What the first pass found for the points from `start` on, as `scan_points` lists it."""
 
-    lows: FloatArray
-    highs: FloatArray
-    grid: BoxGrid
-    bounded: IntArray
-    unbounded: IntArray
-    locators: list[Locator]
+    start: int
+    counts: IntArray
+    bodies: IntArray
+    located: npt.NDArray[np.int8]
+    places: IntArray
+    owners: IntArray
+    n_beyond: int
 
 
 @overload
@@ -93,8 +94,8 @@ def locate_scene(
 ) -> SceneLocations | tuple[SceneLocations, Accuracy]:
     """Find for each point the solids that hold it, inside or on the boundary.
 
-    A grid over the bodies' boxes gives each point's candidates; each body then locates its candidates as `locate` does.
-    For one solid use `locate`.
+    A grid over the bodies' boxes gives each point's candidates, and float filters with proven bounds decide most of
+    them at once; what they leave, each body locates as `locate` does. For one solid use `locate`.
 
     Parameters
         points: ``(n_points, dimension)`` numbers; borrowed.
@@ -121,36 +122,43 @@ def locate_scene(
     _check_solids(solids, poses)
     check_options(workers, progress)
     array = as_points(points, solids[0].dimension if len(solids) else None)
-    held_counts = np.zeros(len(array) + 1, np.int64)
-    portions: list[tuple[IntArray, npt.NDArray[np.bool_]]] = []
-    totals = [0, 0]
+    done: list[_Piece] = []
+    n_beyond = n_rational = 0
     with Budget(deadline, cancel) as budget:
-        scene = _prepare(solids, poses, array.shape[1], budget)
-        start = 0
-        while start < len(array):  # bound: each portion holds a point
-            counts = _count(array[start : start + _MOST_POINTS], scene, budget, workers)
-            ends = np.cumsum(counts)
-            stop = max(1, int(np.searchsorted(ends, _MOST_PAIRS, side="right")))
-            chunk = array[start : start + stop]
-            owners, bodies, located = _locate_pairs(chunk, counts[:stop], scene, budget, workers, totals)
-            held = np.flatnonzero(located >= 0)
-            held_counts[start + 1 : start + stop + 1] = np.bincount(owners[held], minlength=stop)
-            portions.append((bodies[held], located[held] == 0))
-            start += stop
+        scene = scene_of(solids, poses, array.shape[1], budget)
+        todo = [(0, -(-len(array) // _block_size(scene)))]
+        while todo:  # bound: each turn does a piece of work
+            pieces, todo = _scan(array, todo, scene, budget, workers)
+            counts = settle_rest(
+                array,
+                scene,
+                [piece.owners for piece in pieces],
+                [piece.bodies[piece.places] for piece in pieces],
+                [partial(piece.located.__setitem__, piece.places) for piece in pieces],
+                budget,
+                workers,
+            )
+            n_beyond += counts.beyond + sum(piece.n_beyond for piece in pieces)
+            n_rational += counts.rational
+            done += [_held(piece) for piece in pieces]
             if progress is not None:
-                progress(stop)
+                progress(sum(len(piece.counts) for piece in pieces))
         budget.check()
+    done.sort(key=lambda piece: piece.start)
+    offsets = np.zeros(len(array) + 1, np.int64)
+    if done:
+        np.cumsum(np.concatenate([piece.counts for piece in done]), out=offsets[1:])
     result = SceneLocations(
-        np.cumsum(held_counts),
-        np.concatenate([indices for indices, _ in portions] or [np.zeros(0, np.int64)]),
-        np.concatenate([on_boundary for _, on_boundary in portions] or [np.zeros(0, np.bool_)]),
+        offsets,
+        np.concatenate([np.zeros(0, np.int64), *(piece.bodies for piece in done)]),
+        np.concatenate([np.zeros(0, np.int8), *(piece.located for piece in done)]) == 0,
     )
     if not report:
         return result
-    is_exact = all(locator.decisions == "exact" for locator in scene.locators)
+    is_exact = all(locator.decisions == "exact" for locator in scene.locators.values())
     decisions: Literal["exact", "float64"] = "exact" if is_exact else "float64"
-    beyond, rational = (min(total, len(array)) for total in totals)
-    return result, Accuracy(decisions, None, len(array), beyond, rational, "box_grid")
+    n = len(array)
+    return result, Accuracy(decisions, None, n, min(n_beyond, n), min(n_rational, n), "box_grid")
 
 
 def _check_solids(solids: Sequence[Solid], poses: Sequence[Pose | None] | None) -> None:
@@ -180,92 +188,66 @@ def _check_solids(solids: Sequence[Solid], poses: Sequence[Pose | None] | None) 
             )
 
 
-def _prepare(solids: Sequence[Solid], poses: Sequence[Pose | None] | None, dimension: int, budget: Budget) -> _Scene:
-    """Return boxes, grid and locators of the bodies."""
-    lows, highs = np.empty((len(solids), dimension)), np.empty((len(solids), dimension))
-    locators = []
-    for index, solid in enumerate(solids):
-        if index % 64 == 0:
-            budget.check()
-        pose = None if poses is None else poses[index]
-        try:
-            locators.append(posed_locator(solid, pose))
-        except EngineError as error:
-            error.where = ("solids", index)
-            raise
-        lows[index], highs[index] = body_box(solid, pose)
-    is_bounded = np.isfinite(lows).all(axis=1) & np.isfinite(highs).all(axis=1)
-    is_empty = (lows > highs).any(axis=1)
-    bounded = np.flatnonzero(is_bounded & ~is_empty)
-    lows, highs = lows[bounded], highs[bounded]
-    side = max(1, min(1024, int(len(bounded) ** 0.5) * 2))
-    if len(bounded):
-        x_low, x_high, y_low, y_high = (np.ascontiguousarray(s[:, k]) for k in (0, 1) for s in (lows, highs))
-        grid = build_box_grid(x_low, x_high, y_low, y_high, side, side)
-    else:
-        nothing = np.full(1, np.inf)
-        grid = build_box_grid(nothing, -nothing, nothing, -nothing, 1, 1)
-    return _Scene(lows, highs, grid, bounded, np.flatnonzero(~is_bounded & ~is_empty), locators)
+def _scan(
+    points: FloatArray, todo: list[tuple[int, int]], scene: Scene, budget: Budget, workers: int | None
+) -> tuple[list[_Piece], list[tuple[int, int]]]:
+    """Return what the first pass finds in ranges of blocks of points, and the ranges that there was no room for."""
+    pieces: list[_Piece] = []
+    left: list[tuple[int, int]] = []
+    size = _block_size(scene)
+    n_pairs = 0
+
+    def task(first: int, start: int, stop: int) -> None:
+        nonlocal n_pairs
+        for block in range(first + start, first + stop):
+            if n_pairs > _MOST_PAIRS:
+                left.append((block, first + stop))
+                return
+            piece = _scan_block(points[block * size : (block + 1) * size], block * size, scene, budget)
+            pieces.append(piece)
+            n_pairs += len(piece.bodies)
+
+    for first, last in todo:
+        run_chunks(partial(task, first), last - first, budget=budget, first_chunk=1, workers=workers)
+    return pieces, left
 
 
-def _count(points: FloatArray, scene: _Scene, budget: Budget, workers: int | None) -> IntArray:
-    """Return how many candidates each point has."""
-    counts = np.empty(len(points), np.int64)
-
-    def task(start: int, stop: int) -> None:
-        count_candidates(points[start:stop], scene.lows, scene.highs, scene.grid, counts[start:stop], budget.flag)
-
-    run_chunks(task, len(points), budget=budget, workers=workers)
-    counts += len(scene.unbounded)
-    return counts
+def _block_size(scene: Scene) -> int:
+    """Return how many points are scanned together: so few that even all candidates of all of them find room."""
+    return max(1, min(_MOST_IN_BLOCK, _MOST_PAIRS // (4 * scene.most)))
 
 
-def _locate_pairs(
-    points: FloatArray, counts: IntArray, scene: _Scene, budget: Budget, workers: int | None, totals: list[int]
-) -> tuple[IntArray, IntArray, npt.NDArray[np.int8]]:
-    """Return owner, body and location of each candidate pair, by point and then by body."""
-    firsts = np.cumsum(counts) - counts
-    n_pairs = int(counts.sum())
-    owners, bodies = np.empty(n_pairs, np.int64), np.empty(n_pairs, np.int64)
+def _scan_block(points: FloatArray, start: int, scene: Scene, budget: Budget) -> _Piece:
+    """Return what the first pass finds for a block of points that begins at `start`."""
+    n, n_cells = len(points), len(scene.grid.offsets)
+    shift = max(0, (n_cells // n).bit_length())
+    order, in_order = np.empty(n, np.int32), np.empty_like(points)
+    ends = np.zeros((n_cells >> shift) + 2, np.int64)
+    sorted_counts, room = np.zeros(n, np.int64), n + n // 2 + scene.most
+    with np.errstate(all="ignore"):
+        sort_by_cell(points, scene.grid, shift, np.empty(n, np.int32), ends, order, in_order)
+        while True:  # bound: the room doubles until it holds all candidates
+            bodies, located = np.empty(room, np.int32), np.empty(room, np.int8)
+            n_done, n_listed, n_beyond = scan_points(
+                in_order, scene.tables, scene.grid, scene.unbounded, sorted_counts, bodies, located, budget.flag
+            )
+            if n_done == n or budget.flag[0]:
+                break
+            room *= 2
+    n_listed = 0 if budget.flag[0] else int(n_listed)  # a call about to end leaves nothing behind
+    counts = np.zeros(n, np.int64)
+    places, owners = np.empty(n_listed, np.int64), np.empty(n_listed, np.int64)
+    lists = np.empty(n_listed, np.int64), np.empty(n_listed, np.int8), places, owners
+    n_open = 0
+    if n_listed:
+        n_open = int(put_in_order(order, sorted_counts, bodies, located, counts, np.empty(n, np.int64), lists))
+    owners += start
+    return _Piece(start, counts, lists[0], lists[1], places[:n_open].copy(), owners[:n_open].copy(), int(n_beyond))
 
-    def list_pairs(start: int, stop: int) -> None:
-        list_candidates(
-            points[start:stop],
-            scene.lows,
-            scene.highs,
-            scene.grid,
-            scene.bounded,
-            scene.unbounded,
-            firsts[start:stop],
-            owners,
-            bodies,
-            budget.flag,
-        )
-        if start:
-            first, last = int(firsts[start]), int(firsts[stop]) if stop < len(points) else n_pairs
-            owners[first:last] += start
 
-    run_chunks(list_pairs, len(points), budget=budget, workers=workers)
-    sizes = np.bincount(bodies, minlength=len(scene.locators))
-    ends = np.cumsum(sizes) - sizes
-    groups = [
-        (int(body), int(begin), int(min(begin + _MOST_IN_GROUP, ends[body] + sizes[body])))
-        for body in np.flatnonzero(sizes)
-        for begin in range(int(ends[body]), int(ends[body] + sizes[body]), _MOST_IN_GROUP)
-    ]
-    order, located = np.empty(n_pairs, np.int64), np.empty(n_pairs, np.int8)
-    group_by_body(bodies, ends, order)
-    found_counts = []
-
-    def locate_groups(start: int, stop: int) -> None:
-        for body, begin, end in groups[start:stop]:
-            places = order[begin:end]
-            found = np.empty(end - begin, np.int8)
-            locator = scene.locators[body].chosen(end - begin, budget)
-            found_counts.append(locator.fill(points[owners[places]], found, budget))
-            located[places] = found
-
-    run_chunks(locate_groups, len(groups), budget=budget, first_chunk=1, workers=workers)
-    totals[0] += sum(found.beyond for found in found_counts)
-    totals[1] += sum(found.rational for found in found_counts)
-    return owners, bodies, located
+def _held(piece: _Piece) -> _Piece:
+    """Return the piece without the bodies that do not hold their point."""
+    if not len(piece.places):
+        return piece
+    n_held = int(drop_outside(piece.counts, piece.bodies, piece.located))
+    return replace(piece, bodies=piece.bodies[:n_held], located=piece.located[:n_held])

@@ -59,7 +59,7 @@ def columns_of(solid: Polyhedron, check: Check = no_check) -> Columns:
 
     check: called between the steps, a second's work for a million triangles; what it raises ends the building.
     """
-    return solid.prepared("columns", lambda: _build_columns(solid, check))
+    return solid.prepared("columns", lambda: _build_columns(solid, check), check)
 
 
 def columns_pay(solid: Polyhedron, n_points: int) -> bool:
@@ -106,7 +106,7 @@ def rings_of(solid: Polygon | Triangle, check: Check = no_check) -> Rings:
             return _build_rings(solid.vertices, solid.vertices[[1, 2, 0]], check)
         return _build_rings(solid.vertices, solid.vertices[next_in_ring(solid)], check)
 
-    return solid.prepared("slabs", build)
+    return solid.prepared("slabs", build, check)
 
 
 def _build_rings(starts: FloatArray, ends: FloatArray, check: Check) -> Rings:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass
-from typing import Any, ClassVar, TypeVar, cast
+from typing import Any, ClassVar, Final, TypeVar, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +18,8 @@ FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 T = TypeVar("T")
 
+_WAIT: Final = 0.005
+"""Seconds between two looks at the clock of a caller that waits for another thread's build."""
 _RUNTIME = ("__weakref__", "_lock", "_prepared")  # slots that are no part of a solid's value
 
 
@@ -46,20 +48,32 @@ class Solid:
     def __delattr__(self, name: str) -> None:
         raise AttributeError(f"a {self.type} is immutable: {name!r} cannot be deleted")
 
-    def prepared(self, key: str, build: Callable[[], T]) -> T:
+    def prepared(self, key: str, build: Callable[[], T], check: Callable[[], object] | None = None) -> T:
         """Return the structure kept under `key`; the first caller builds it, others wait for that one build.
 
         build: called without arguments, at most once unless it raises (then nothing is kept and the next caller tries
         again). It may ask this solid for other keys. What it returns must not be changed afterwards.
+        check: called every few milliseconds while another thread builds; what it raises ends the waiting.
         """
         try:
             return cast(T, self._prepared[key])
         except KeyError:
             pass
-        with self._lock:
+        if check is None:
+            self._lock.acquire()
+        else:
+            while not self._lock.acquire(timeout=_WAIT):  # bound: the build ends, or check raises
+                check()
+        try:
             if key not in self._prepared:
                 self._prepared[key] = build()
             return cast(T, self._prepared[key])
+        finally:
+            self._lock.release()
+
+    def kept(self, key: str) -> Any:
+        """Return the structure kept under `key`, None if there is none yet."""
+        return self._prepared.get(key)
 
     @property
     def memory(self) -> int:

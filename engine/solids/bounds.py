@@ -90,7 +90,7 @@ def bounds(
     check_options(workers, progress)
     with Budget(deadline, cancel) as budget:
         budget.check()
-        result, accuracy = solid.prepared("bounds", lambda: _bounds_of(solid, budget))
+        result, accuracy = solid.prepared("bounds", lambda: _bounds_of(solid, budget), budget.check)
     if progress is not None:
         progress(1)
     return (result, accuracy) if report else result

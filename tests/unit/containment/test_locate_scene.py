@@ -10,7 +10,7 @@ import pytest
 import engine
 from engine import Aabb, HalfSpace, Implicit, Pose, Sphere, locate, locate_scene
 from tests.reference.containment import locate as reference
-from tests.unit.containment.scenes import box_mesh, lattice_points, lattice_solids, made, spelled
+from tests.unit.containment.scenes import box_mesh, lattice_points, lattice_solids, made, merged, spelled
 
 TURNS = {2: [[0.6, -0.8], [0.8, 0.6]], 3: [[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]]}
 QUARTERS = {2: [[0, -1], [1, 0]], 3: [[0, -1, 0], [0, 0, -1], [1, 0, 0]]}
@@ -122,7 +122,7 @@ def test_portions_threads_and_order_change_nothing(monkeypatch: pytest.MonkeyPat
     points = random.uniform(0, 4, (3000, 3))
     whole = table(locate_scene(points, solids, workers=1), 61)
     monkeypatch.setattr("engine.containment.locate_scene._MOST_PAIRS", 500)
-    monkeypatch.setattr("engine.containment.locate_scene._MOST_IN_GROUP", 7)
+    monkeypatch.setattr("engine.containment.scene_rest._MOST_IN_GROUP", 7)
     done: list[int] = []
     cut = table(locate_scene(points[::-1], solids[::-1], progress=done.append), 61)
     assert (whole == cut[::-1, ::-1]).all()
@@ -149,3 +149,63 @@ def test_nothing_and_errors() -> None:
     assert refused.value.where == ("solids", 0)
     with pytest.raises(engine.DeadlineExceededError):
         locate_scene(np.zeros((1000, 2)), [box] * 100, deadline=0.0)
+
+
+def test_a_scene_asked_often_answers_alike() -> None:
+    """Polyhedra are asked by rays first, by voxels when those pay: same answers, walls and vertices included."""
+    random = np.random.default_rng(3)
+    shifts = np.array([[0, 0, 0], [4, 0, 0], [4, 4, 1], [1e6, 0, 0]])
+    meshes = [merged(box_mesh([0, 0, 0], [4, 4, 4]), box_mesh([1, 1, 1], [2, 3, 5])) for _ in shifts]
+    for mesh, shift in zip(meshes, shifts):
+        mesh["vertices"] = (np.array(mesh["vertices"]) + shift).tolist()
+    solids = [made(mesh) for mesh in meshes]
+    near = np.concatenate([random.uniform(-1, 6, (2000, 3)) + shift for shift in shifts])
+    points = np.concatenate([near, np.round(near * 2.0) / 2.0, *(solid.vertices for solid in solids)])
+    expected = np.stack([locate(points, solid) for solid in solids], axis=1)
+    for _ in range(3):
+        assert (table(locate_scene(points, solids), len(solids)) == expected).all()
+    assert all(solid.kept("voxels") is not None for solid in solids)
+
+
+def test_instances_by_voxels_equal_the_reference() -> None:
+    random = np.random.default_rng(4)
+    mesh = merged(box_mesh([0, 0, 0], [4, 4, 4]), box_mesh([1, 1, 1], [2, 3, 5]))
+    solid = made(mesh)
+    poses = [Pose(turn, move) for turn in (TURNS[3], QUARTERS[3], np.eye(3)) for move in random.integers(-2, 3, (4, 3))]
+    points = np.concatenate([np.array(mesh["vertices"]) @ pose.rotation.T + pose.translation for pose in poses])
+    points = np.concatenate([points, random.uniform(-6, 8, (4000, 3))])
+    found = [table(locate_scene(points, [solid] * len(poses), poses), len(poses)) for _ in range(2)]
+    assert solid.kept("voxels") is not None
+    assert (found[0] == found[1]).all()
+    for body in (0, 5, 11):
+        as_json = {"rotation": poses[body].rotation.tolist(), "translation": poses[body].translation.tolist()}
+        chosen = np.concatenate([np.arange(0, len(points) - 4000, 7), np.flatnonzero(found[0][:, body] >= 0)[:20]])
+        expected = [reference(points[item].tolist(), mesh, as_json) for item in chosen]
+        assert found[0][chosen, body].tolist() == expected
+
+
+@pytest.mark.parametrize("shift", [0.0, 1e6, 2.0**52])
+def test_many_polygons_with_walls_in_common(shift: float) -> None:
+    """Squares on a lattice, some with a hole, asked at their vertices, on their edges and an ulp beside them."""
+    squares = []
+    for i in range(6):
+        for j in range(6):
+            low = np.array([shift + 4 * i, shift + 4 * j])
+            rings = [low + np.array([[0, 0], [4, 0], [4, 4], [0, 4]])]
+            if (i + j) % 2:
+                rings.append(low + np.array([[1, 1], [3, 1], [2, 3]]))
+            squares.append(engine.Polygon(rings))
+    axis = shift + np.arange(-1.0, 26.0)
+    lattice = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
+    points = np.concatenate([lattice, np.nextafter(lattice, np.inf), lattice + 0.5])
+    found = table(locate_scene(points, squares), len(squares))
+    for index, square in enumerate(squares):
+        assert (found[:, index] == locate(points, square)).all()
+    assert (found[27 * 5 + 5] == 0).sum() == 4  # a corner of the lattice is on four squares
+
+
+def test_a_point_in_all_of_many_bodies_takes_room() -> None:
+    boxes = [Aabb([-k, -k], [k, k]) for k in range(1, 301)]
+    held = locate_scene(np.zeros((2000, 2)), boxes)
+    assert (np.diff(held.offsets) == 300).all()
+    assert not held.on_boundary.any()

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import engine
+from engine.parallel import Budget
 
 TETRAHEDRON = ([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
 SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
@@ -110,6 +111,31 @@ def test_a_build_that_fails_is_tried_again_and_builds_may_nest() -> None:
     with pytest.raises(engine.DeadlineExceededError):
         solid.prepared("tree", fail)
     assert solid.prepared("tree", lambda: solid.prepared("box", lambda: 41) + 1) == 42
+
+
+def test_who_waits_for_a_build_looks_at_his_own_clock() -> None:
+    solid, is_building, may_end = engine.Sphere([0, 0], 1), threading.Event(), threading.Event()
+
+    def build() -> int:
+        is_building.set()
+        may_end.wait(30.0)
+        return 41
+
+    builder = threading.Thread(target=lambda: solid.prepared("tree", build))
+    builder.start()
+    try:
+        assert is_building.wait(30.0)
+        assert solid.kept("tree") is None
+        with Budget(0.05) as budget, pytest.raises(engine.DeadlineExceededError):
+            solid.prepared("tree", lambda: 42, budget.check)
+        cancel = engine.Cancel()
+        cancel.set()
+        with Budget(None, cancel) as budget, pytest.raises(engine.CancelledError):
+            solid.prepared("tree", lambda: 42, budget.check)
+    finally:
+        may_end.set()
+        builder.join()
+    assert solid.prepared("tree", lambda: 43) == 41 == solid.kept("tree")
 
 
 def test_memory_counts_every_array_once() -> None:
