@@ -8,7 +8,8 @@ less than 2^-1075; `_TINY` covers all of them. Infinities and NaN fail the compa
 Points go in blocks through all rows, a row at a time, which is arithmetic on short arrays without a branch: what is
 kept of a point is its least signed distance. The sizes of the terms are taken at the block's largest coordinates, and
 the largest bound of all rows serves for all of them. The few points within it, and blocks whose terms are not far from
-overflow, are taken one by one.
+overflow, are taken one by one. Where there are many rows, the points that are outside some of those taken so far, by
+more than the largest bound of these, are settled and leave the block.
 
 A row may also be the rounded image of a rational one (a posed plane, a wall of a prism): each coefficient then carries
 another u, which the slack has room for (5 u of 8 u), but what the filter leaves open stays UNDECIDED.
@@ -32,6 +33,8 @@ _SLACK: Final = 8.0 * 2.0**-53
 _TINY: Final = 1e-320
 _BLOCK: Final = 256
 """Points taken together: their coordinates and least distances fit the first-level cache."""
+_ROWS: Final = 4
+"""Rows taken together: coordinates and least distances are loaded once for all of them."""
 _LARGE: Final = 1e300
 """Terms of a row whose sizes add up to less than this cannot overflow, in any order; NaN is not less."""
 
@@ -95,14 +98,22 @@ def _locate3(p: Any, planes: Any, is_exact: Any) -> tuple[int, bool]:
 
 
 @inline
-def _settle_least(least: Any, count: int, bound: float, locations: Any, start: int) -> int:
-    """Fill the locations of a block by the least distances (count,); return how many are UNDECIDED."""
-    n_open = 0
-    for k in range(count):
-        is_in, is_out = least[k] > bound, least[k] < -bound
-        locations[start + k] = np.int8(1) if is_in else np.int8(-1) if is_out else np.int8(UNDECIDED)
-        n_open += not (is_in | is_out)
-    return n_open
+def _largest(values: Any, folded: Any) -> float:
+    """Return the largest size of values (_BLOCK,), by halves: short loops that the compiler turns into vectors."""
+    half = _BLOCK // 2
+    for k in range(half):
+        folded[k] = max(abs(values[k]), abs(values[k + half]))
+    while half > 1:  # bound: log2(_BLOCK) turns
+        half //= 2
+        for k in range(half):
+            folded[k] = max(folded[k], folded[k + half])
+    return float(folded[0])
+
+
+@inline
+def _pays(row: int, n_rows: int) -> bool:
+    """Tell whether to leave out the points that are outside by now: after 8, 16, 32 ... rows, if many are to come."""
+    return row >= 8 and row & (row - 1) == 0 and n_rows - row >= 24
 
 
 @kernel
@@ -112,32 +123,52 @@ def locate_in_half_planes(points: Any, planes: Any, is_exact: Any, locations: An
     is_exact: (m,) bool, False for a row that is correctly rounded from a rational one, without underflow.
     Returns how many points needed more than the filter. Stops early, answers incomplete, once flag[0] is set.
     """
-    xs, ys, least = np.empty(_BLOCK), np.empty(_BLOCK), np.empty(_BLOCK)
-    n_beyond = 0
+    xs, ys, least, folded = np.empty(_BLOCK), np.empty(_BLOCK), np.empty(_BLOCK), np.empty(_BLOCK)
+    places, found = np.empty(_BLOCK, np.uint32), np.empty(_BLOCK, np.int8)
+    n_beyond, last = 0, len(planes) - 1
     for start in range(0, len(points), _BLOCK):
-        count = min(_BLOCK, len(points) - start)
-        x_size = y_size = 0.0
+        stop, is_thinned = min(start + _BLOCK, len(points)), False
+        count = stop - start
         for k in range(count):
             p = as_point2(points, start + k)
             xs[k], ys[k] = p.x, p.y
-            x_size, y_size = max(x_size, abs(p.x)), max(y_size, abs(p.y))
-            least[k] = _LARGE
-        largest = 0.0
-        for row in range(len(planes)):
+        xs[count:], ys[count:], least[:] = 0.0, 0.0, _LARGE
+        x_size, y_size, largest = _largest(xs, folded), _largest(ys, folded), 0.0
+        for row in range(0, len(planes), _ROWS):
             if flag[0]:
                 return n_beyond
-            h = as_half_space2(planes, row)
-            size = abs(h.a) * x_size + abs(h.b) * y_size + abs(h.c)
-            largest = size if not size <= largest else largest  # NaN is taken over, and ends the loop
+            if _pays(row, len(planes)):
+                if not is_thinned:
+                    is_thinned = True
+                    for k in range(count):
+                        places[k], locations[start + k] = k, -1
+                bound, n_left = _SLACK * largest + _TINY, 0
+                for k in range(count):
+                    left = np.uint32(n_left)
+                    xs[left], ys[left], least[left], places[left] = xs[k], ys[k], least[k], places[k]
+                    n_left += not least[k] < -bound
+                count = n_left
+            e, f = as_half_space2(planes, row), as_half_space2(planes, min(row + 1, last))
+            g, h = as_half_space2(planes, min(row + 2, last)), as_half_space2(planes, min(row + 3, last))
+            for each in (e, f, g, h):
+                size = abs(each.a) * x_size + abs(each.b) * y_size + abs(each.c)
+                largest = size if not size <= largest else largest  # NaN is taken over, and ends the loop
             if not largest < _LARGE:
                 break
             for k in range(count):
-                distance = h.a * xs[k] + h.b * ys[k] + h.c
-                least[k] = min(least[k], distance)
+                x, y = xs[k], ys[k]
+                first = min(e.a * x + e.b * y + e.c, f.a * x + f.b * y + f.c)
+                second = min(g.a * x + g.b * y + g.c, h.a * x + h.b * y + h.c)
+                least[k] = min(least[k], min(first, second))
         bound = _SLACK * largest + _TINY if largest < _LARGE else np.inf
-        if _settle_least(least, count, bound, locations, start) == 0:
-            continue
-        for item in range(start, start + count):
+        n_open = 0
+        for k in range(count):
+            is_in, is_out = least[k] > bound, least[k] < -bound
+            found[k] = UNDECIDED - is_in - 3 * is_out  # no branch: 1, -1 or 2
+            n_open += not (is_in | is_out)
+        for k in range(count):
+            locations[start + (places[k] if is_thinned else k)] = found[k]
+        for item in range(start, stop if n_open > 0 else start):
             if locations[item] == UNDECIDED:
                 locations[item], is_unsure = _locate2(as_point2(points, item), planes, is_exact)
                 n_beyond += is_unsure
@@ -147,32 +178,54 @@ def locate_in_half_planes(points: Any, planes: Any, is_exact: Any, locations: An
 @kernel
 def locate_in_half_spaces(points: Any, planes: Any, is_exact: Any, locations: Any, flag: Any) -> int:
     """Fill `locations` (n,) int8 for points (n, 3) and planes (m, 4); the rest as in the plane."""
-    xs, ys, zs, least = np.empty(_BLOCK), np.empty(_BLOCK), np.empty(_BLOCK), np.empty(_BLOCK)
-    n_beyond = 0
+    xs, ys, zs = np.empty(_BLOCK), np.empty(_BLOCK), np.empty(_BLOCK)
+    least, folded = np.empty(_BLOCK), np.empty(_BLOCK)
+    places, found = np.empty(_BLOCK, np.uint32), np.empty(_BLOCK, np.int8)
+    n_beyond, last = 0, len(planes) - 1
     for start in range(0, len(points), _BLOCK):
-        count = min(_BLOCK, len(points) - start)
-        x_size = y_size = z_size = 0.0
+        stop, is_thinned = min(start + _BLOCK, len(points)), False
+        count = stop - start
         for k in range(count):
             p = as_point3(points, start + k)
             xs[k], ys[k], zs[k] = p.x, p.y, p.z
-            x_size, y_size, z_size = max(x_size, abs(p.x)), max(y_size, abs(p.y)), max(z_size, abs(p.z))
-            least[k] = _LARGE
-        largest = 0.0
-        for row in range(len(planes)):
+        xs[count:], ys[count:], zs[count:], least[:] = 0.0, 0.0, 0.0, _LARGE
+        x_size, y_size, z_size, largest = _largest(xs, folded), _largest(ys, folded), _largest(zs, folded), 0.0
+        for row in range(0, len(planes), _ROWS):
             if flag[0]:
                 return n_beyond
-            h = as_half_space3(planes, row)
-            size = abs(h.a) * x_size + abs(h.b) * y_size + abs(h.c) * z_size + abs(h.d)
-            largest = size if not size <= largest else largest
+            if _pays(row, len(planes)):
+                if not is_thinned:
+                    is_thinned = True
+                    for k in range(count):
+                        places[k], locations[start + k] = k, -1
+                bound, n_left = _SLACK * largest + _TINY, 0
+                for k in range(count):
+                    left = np.uint32(n_left)
+                    xs[left], ys[left], zs[left] = xs[k], ys[k], zs[k]
+                    least[left], places[left] = least[k], places[k]
+                    n_left += not least[k] < -bound
+                count = n_left
+            e, f = as_half_space3(planes, row), as_half_space3(planes, min(row + 1, last))
+            g, h = as_half_space3(planes, min(row + 2, last)), as_half_space3(planes, min(row + 3, last))
+            for each in (e, f, g, h):
+                size = abs(each.a) * x_size + abs(each.b) * y_size + abs(each.c) * z_size + abs(each.d)
+                largest = size if not size <= largest else largest  # NaN is taken over, and ends the loop
             if not largest < _LARGE:
                 break
             for k in range(count):
-                distance = h.a * xs[k] + h.b * ys[k] + h.c * zs[k] + h.d
-                least[k] = min(least[k], distance)
+                x, y, z = xs[k], ys[k], zs[k]
+                first = min(e.a * x + e.b * y + e.c * z + e.d, f.a * x + f.b * y + f.c * z + f.d)
+                second = min(g.a * x + g.b * y + g.c * z + g.d, h.a * x + h.b * y + h.c * z + h.d)
+                least[k] = min(least[k], min(first, second))
         bound = _SLACK * largest + _TINY if largest < _LARGE else np.inf
-        if _settle_least(least, count, bound, locations, start) == 0:
-            continue
-        for item in range(start, start + count):
+        n_open = 0
+        for k in range(count):
+            is_in, is_out = least[k] > bound, least[k] < -bound
+            found[k] = UNDECIDED - is_in - 3 * is_out  # no branch: 1, -1 or 2
+            n_open += not (is_in | is_out)
+        for k in range(count):
+            locations[start + (places[k] if is_thinned else k)] = found[k]
+        for item in range(start, stop if n_open > 0 else start):
             if locations[item] == UNDECIDED:
                 locations[item], is_unsure = _locate3(as_point3(points, item), planes, is_exact)
                 n_beyond += is_unsure

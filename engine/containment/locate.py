@@ -89,11 +89,11 @@ def locate(
     with Budget(deadline, cancel) as budget:
         budget.check()
         locator = choice.chosen(len(array), budget)
-        if not locator.sees_not_finite:
-            check_finite(array, ("points",))
         order = None if locator.order is None else locator.order(array, budget)
 
         def task(start: int, stop: int) -> None:
+            if not locator.sees_not_finite:
+                check_finite(array[start:stop], ("points",))
             if order is None:
                 counts = locator.fill(array[start:stop], locations[start:stop], budget)
             else:

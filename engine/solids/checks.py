@@ -27,6 +27,8 @@ Where = tuple[str | int, ...]
 
 DIMENSIONS: Final = (2, 3)
 _FLOAT_INTEGERS: Final = 2**53  # every integer up to this size is a float64
+_AT_ONCE: Final = 1 << 15
+"""Numbers looked at together: what is noted of them stays in the first-level cache."""
 
 
 def spell(where: Where) -> str:
@@ -164,11 +166,13 @@ def _path(index: int, shape: list[int], where: Where) -> Where:
 
 def check_finite(array: FloatArray, where: Where) -> None:
     """Raise on the first NaN or infinity."""
-    finite: npt.NDArray[np.bool_] = np.isfinite(array)
-    if not finite.all():
-        path = _path(int(finite.argmin()), list(array.shape), where)
-        value = float(array.flat[int(finite.argmin())])
-        raise NotFiniteError(f"{spell(path)} is {value!r}; only finite numbers have a place", path)
+    flat = array.reshape(-1)
+    for start in range(0, len(flat), _AT_ONCE):
+        finite: npt.NDArray[np.bool_] = np.isfinite(flat[start : start + _AT_ONCE])
+        if not finite.all():
+            index = start + int(finite.argmin())
+            path = _path(index, list(array.shape), where)
+            raise NotFiniteError(f"{spell(path)} is {float(flat[index])!r}; only finite numbers have a place", path)
 
 
 def check_dimension(n_columns: int, dimension: int | None, where: Where, what: str = "positions of") -> None:

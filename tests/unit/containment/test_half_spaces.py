@@ -38,3 +38,17 @@ def test_lattice_points_on_many_rows(dimension: int, scales: tuple[float, float]
     assert {-1, 1} <= set(found.tolist())
     alone = np.concatenate([locate(points[item : item + 1], Convex(rows)) for item in range(290, 310)])
     assert np.array_equal(alone, found[290:310])
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("n_rows", [1, 5, 31, 41, 90])
+def test_points_that_leave_their_block_early(dimension: int, n_rows: int) -> None:
+    random = np.random.default_rng(n_rows)
+    rows = np.column_stack([random.integers(-9, 10, (n_rows, dimension)), np.full(n_rows, 20)]).astype(np.float64)
+    rows[:, 0] += (rows[:, :-1] == 0).all(axis=1)
+    rows[n_rows // 2] *= 1e9
+    for n_points in (3, 256, 300):
+        points = random.integers(-3, 4, (n_points, dimension)).astype(np.float64)
+        assert locate(points, Convex(rows)).tolist() == exact(points, rows.tolist())
+        points[-1] = 1e307
+        assert locate(points, Convex(rows)).tolist() == exact(points, rows.tolist())
