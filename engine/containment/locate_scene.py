@@ -28,7 +28,7 @@ _MOST_PAIRS: Final = 1 << 23
 """Candidate pairs held at once, about 300 MB; the rest of the points waits (one piece of work is done at least)."""
 
 
-_MOST_IN_BLOCK: Final = 1 << 15
+_MOST_IN_BLOCK: Final = 1 << 16
 """Points that are scanned in the order of their cells."""
 
 
