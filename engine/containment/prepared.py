@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from engine.bounding.grid import BoxGrid, build_box_grid
 from engine.containment.rational_locate import Check, next_in_ring, no_check
-from engine.containment.ray_parity import projected_area_signs
+from engine.containment.ray_parity import fill_rows
 from engine.predicates.rational import orient2d_rational
 from engine.solids.base import FloatArray, as_read_only
 from engine.solids.polygon import Polygon
@@ -71,30 +71,29 @@ def columns_pay(solid: Polyhedron, n_points: int) -> bool:
 
 def _build_columns(solid: Polyhedron, check: Check) -> Columns:
     check()
-    vertices = solid.vertices
-    low, high = np.empty((len(solid.triangles), 3)), np.empty((len(solid.triangles), 3))
-    for start in range(0, len(low), _AT_ONCE):
-        corners = vertices[solid.triangles[start : start + _AT_ONCE]]
-        corners.min(axis=1, out=low[start : start + _AT_ONCE])
-        corners.max(axis=1, out=high[start : start + _AT_ONCE])
+    vertices, given = solid.vertices, solid.triangles
+    heights = vertices[:, 2].copy()
+    tops = heights[given[:, 0]]
+    for corner in (1, 2):
         check()
-    order = np.argsort(-high[:, 2], kind="stable")
+        np.maximum(tops, heights[given[:, corner]], out=tops)
     check()
-    triangles = np.ascontiguousarray(solid.triangles[order], np.int32)
-    check()
-    low, high = low[order], high[order]
-    boxes = np.ascontiguousarray(np.stack([low, high], axis=2).reshape(len(order), 6))
+    order = np.argsort(-tops, kind="stable")
+    del tops
+    triangles, boxes = np.empty((len(order), 3), np.int32), np.empty((len(order), 6))
     areas = np.empty(len(order), np.int8)
-    for start in range(0, len(areas), _AT_ONCE):
+    for start in range(0, len(order), _AT_ONCE):
         check()
+        some = slice(start, start + _AT_ONCE)
         with np.errstate(all="ignore"):
-            projected_area_signs(vertices, triangles[start : start + _AT_ONCE], areas[start : start + _AT_ONCE])
+            fill_rows(vertices, given, order[some], triangles[some], boxes[some], areas[some])
+    check()
     for index in np.flatnonzero(areas == UNDECIDED):
         check()
         areas[index] = orient2d_rational(*vertices[triangles[index], :2].tolist())
     side = max(1, min(2048, int(len(order) ** 0.5)))
-    grid = build_box_grid(low[:, 0], high[:, 0], low[:, 1], high[:, 1], side, side, check)
-    return Columns(vertices, triangles, boxes, areas, grid, float(low[:, 2].min()))
+    grid = build_box_grid(boxes[:, 0], boxes[:, 1], boxes[:, 2], boxes[:, 3], side, side, check)
+    return Columns(vertices, triangles, boxes, areas, grid, float(boxes[:, 4].min()))
 
 
 def rings_of(solid: Polygon | Triangle, check: Check = no_check) -> Rings:

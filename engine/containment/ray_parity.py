@@ -23,7 +23,7 @@ from typing import Any, Final
 
 from engine.bounding.grid import cell_of
 from engine.jit import inline, kernel
-from engine.predicates.loading import as_point2, as_point3
+from engine.predicates.loading import as_point3
 from engine.predicates.orientation import orient2d_exact, orient2d_filter, orient3d_exact, orient3d_filter
 from engine.types import UNDECIDED, Point2
 
@@ -145,13 +145,22 @@ def cross_upwards(a: Any, b: Any, c: Any, area: int, z_low: float, q: Any) -> in
 
 
 @kernel
-def projected_area_signs(vertices: Any, triangles: Any, signs: Any) -> None:
-    """Fill signs (m,) int8 with the exact sign of each triangle's area seen from above, UNDECIDED out of range."""
-    for triangle in range(len(triangles)):
-        a = as_point2(vertices, triangles[triangle, 0])
-        b = as_point2(vertices, triangles[triangle, 1])
-        c = as_point2(vertices, triangles[triangle, 2])
-        signs[triangle] = orient2d(a, b, c)
+def fill_rows(vertices: Any, triangles: Any, order: Any, rows: Any, boxes: Any, areas: Any) -> None:
+    """Fill rows (m, 3) int32, boxes (m, 6) and areas (m,) int8 with the triangles that `order` names.
+
+    boxes: xmin, xmax, ymin, ymax, zmin, zmax. areas: exact sign of the area seen from above, UNDECIDED out of range.
+    """
+    for place in range(len(order)):
+        triangle = order[place]
+        for corner in range(3):
+            rows[place, corner] = triangles[triangle, corner]
+        a = as_point3(vertices, triangles[triangle, 0])
+        b = as_point3(vertices, triangles[triangle, 1])
+        c = as_point3(vertices, triangles[triangle, 2])
+        boxes[place, 0], boxes[place, 1] = min(a.x, b.x, c.x), max(a.x, b.x, c.x)
+        boxes[place, 2], boxes[place, 3] = min(a.y, b.y, c.y), max(a.y, b.y, c.y)
+        boxes[place, 4], boxes[place, 5] = min(a.z, b.z, c.z), max(a.z, b.z, c.z)
+        areas[place] = orient2d(Point2(a.x, a.y), Point2(b.x, b.y), Point2(c.x, c.y))
 
 
 @kernel
