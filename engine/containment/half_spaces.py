@@ -152,7 +152,7 @@ def locate_in_half_planes(points: Any, planes: Any, is_exact: Any, locations: An
             g, h = as_half_space2(planes, min(row + 2, last)), as_half_space2(planes, min(row + 3, last))
             for each in (e, f, g, h):
                 size = abs(each.a) * x_size + abs(each.b) * y_size + abs(each.c)
-                largest = size if not size <= largest else largest  # NaN is taken over, and ends the loop
+                largest = max(largest, size) if size < _LARGE else np.inf  # also for a row of NaN
             if not largest < _LARGE:
                 break
             for k in range(count):
@@ -209,7 +209,7 @@ def locate_in_half_spaces(points: Any, planes: Any, is_exact: Any, locations: An
             g, h = as_half_space3(planes, min(row + 2, last)), as_half_space3(planes, min(row + 3, last))
             for each in (e, f, g, h):
                 size = abs(each.a) * x_size + abs(each.b) * y_size + abs(each.c) * z_size + abs(each.d)
-                largest = size if not size <= largest else largest  # NaN is taken over, and ends the loop
+                largest = max(largest, size) if size < _LARGE else np.inf  # also for a row of NaN
             if not largest < _LARGE:
                 break
             for k in range(count):

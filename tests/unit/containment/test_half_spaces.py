@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine import Convex, locate
+from engine import Convex, Triangle, locate
 
 
 def exact(points: Any, rows: Any) -> list[int]:
@@ -52,3 +52,11 @@ def test_points_that_leave_their_block_early(dimension: int, n_rows: int) -> Non
         assert locate(points, Convex(rows)).tolist() == exact(points, rows.tolist())
         points[-1] = 1e307
         assert locate(points, Convex(rows)).tolist() == exact(points, rows.tolist())
+
+
+@pytest.mark.parametrize("turn", [0, 1, 2])
+def test_a_wall_that_no_double_holds_leaves_the_point_open_wherever_it_stands_among_the_walls(turn: int) -> None:
+    corners = np.array([[0.0, 0.0, 0.0], [5e-323, 0.0, 0.0], [0.0, 5e-323, 0.0]])  # its slanted wall is a row of NaN
+    points = np.array([[1e-152, 1e-152, 1.0], [1e-323, 1e-323, -1.0], [2.5e-323, 2.5e-323, 0.0], [-5e-324, 0.0, 0.0]])
+    found = locate(points, Triangle(np.roll(corners, turn, axis=0)))
+    assert found.tolist() == [-1, 1, 0, -1]
