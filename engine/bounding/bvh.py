@@ -1,18 +1,26 @@
-"""A tree of boxes over many small boxes, in flat arrays, built by the surface-area heuristic.
+"""A tree of boxes over many small boxes, eight children a node, in flat arrays, built by the surface-area heuristic.
 
-    node        boxes (n_nodes, 6): xmin ymin zmin xmax ymax zmax       child (n_nodes,)
-    inner       the union of its two children                           index of the left child, the right one follows
-    leaf        the box of one item, unchanged                          -1 - item
+    node     boxes (n_nodes, 6, 8) float32: rows cx cy cz hx hy hz,      child (n_nodes, 8) int32
+             centre and half width of each child, one child to a lane
+    inner    boxes that hold whole subtrees                              index of the child's node
+    block    at most eight items, first lane always filled               -1 - item
+    unused   centre 0, half width -1e30: apart from every box            EMPTY
 
-Node 0 is the root; a child stands behind its parent. Boxes are unions of the input boxes, so no rounding is involved.
+Node 0 is the root. Coordinates are those of the tree: x = origin + scale * local with a power of two for scale, so that
+every local coordinate is at most 2 in magnitude and float32 will do. Half widths are enlarged by what the conversion
+may lose: a child's box holds its items. Lanes are asked side by side by `box_lanes.py`; a block of eight items costs
+what one costs.
+
 The heuristic only decides how fast a query is: where its areas overflow, or many items share one centre, a run of items
 is halved as it stands.
 
-Source: I. Wald, On fast construction of SAH-based bounding volume hierarchies, 2007 (binning).
+Source: I. Wald, On fast construction of SAH-based bounding volume hierarchies, 2007 (binning); I. Wald, C. Benthin,
+S. Boulos, Getting rid of packets: efficient SIMD single-ray traversal using multi-branching BVHs, 2008 (collapsing).
 """
 
 from __future__ import annotations
 
+from math import frexp
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,58 +28,142 @@ import numpy.typing as npt
 
 from engine.jit import inline, kernel
 
+WIDTH = 8
 N_BINS = 16
 HEURISTIC_DEPTH = 40
-"""Below this depth runs are halved, so no leaf lies deeper than `MAX_DEPTH`."""
+"""Below this depth runs are halved, so no block lies deeper than `MAX_DEPTH`."""
 MAX_DEPTH = HEURISTIC_DEPTH + 40  # 2^40 items and more do not fit into memory
+EMPTY = -(2**31)
+UNUSED = np.float32(-1e30)
+ENLARGED = 2.0**-22
+"""Added to half widths: a centre rounded to float32 is off by 2^-24 of at most 2, the half width by as much."""
 
 
 class Bvh(NamedTuple):
-    """The two arrays of the picture above."""
+    """The arrays of the picture above."""
 
-    boxes: npt.NDArray[np.float64]
-    child: npt.NDArray[np.int64]
+    boxes: npt.NDArray[np.float32]
+    child: npt.NDArray[np.int32]
+    origin: npt.NDArray[np.float64]
+    """(3,)"""
+    scale: float
 
 
 def build_bvh(boxes: npt.NDArray[np.float64]) -> Bvh:
-    """Return the tree over `boxes` (n_items, 6) float64, n_items >= 1. Cost: n log n; two arrays are kept."""
-    n_nodes = 2 * boxes.shape[0] - 1
-    tree = Bvh(np.empty((n_nodes, 6)), np.empty(n_nodes, np.int64))
-    with np.errstate(all="ignore"):  # uncompiled runs only: overflow and empty widths are cases of `_split`
-        _build(boxes, tree.boxes, tree.child)
-    tree.boxes.setflags(write=False)
-    tree.child.setflags(write=False)
-    return tree
+    """Return the tree over `boxes` (n_items, 6) float64: xmin ymin zmin xmax ymax zmax; n_items >= 1.
+
+    Cost: n log n; two arrays are kept, of some 45 bytes an item.
+    """
+    n_items = len(boxes)
+    low, high = boxes[:, :3].min(axis=0), boxes[:, 3:].max(axis=0)
+    origin = 0.5 * low + 0.5 * high
+    half = float((0.5 * high - 0.5 * low).max())
+    power = frexp(half)[1] - 1 if half > 0.0 else 0
+    with np.errstate(all="ignore"):  # what underflows here is far below the enlargement of the boxes
+        middle = np.ldexp(origin, -power)
+        local = np.ldexp(boxes, -power) - np.concatenate([middle, middle])
+        order = np.arange(n_items)
+        halves, runs = np.empty((2 * n_items - 1, 6)), np.empty((2 * n_items - 1, 2), np.int64)
+        left = np.empty(2 * n_items - 1, np.int64)
+        n_halves = _halve(local, order, halves, left, runs)
+        nodes = np.empty((n_halves, 6, WIDTH), np.float32)
+        child = np.empty((n_halves, WIDTH), np.int32)
+        n_nodes = _widen(local, order, halves, left, runs, nodes, child)
+    origin.setflags(write=False)
+    return Bvh(_trimmed(nodes, n_nodes), _trimmed(child, n_nodes), origin, 2.0**power)
+
+
+def _trimmed(array: Any, n_rows: int) -> Any:
+    """Return the first rows as a read-only array that begins with a line of the cache."""
+    n_bytes = array[:n_rows].nbytes
+    room = np.empty(n_bytes + 64, np.uint8)
+    start = -room.ctypes.data % 64
+    kept = room[start : start + n_bytes].view(array.dtype).reshape(n_rows, *array.shape[1:])
+    kept[:] = array[:n_rows]
+    kept.setflags(write=False)
+    return kept
 
 
 @kernel
-def _build(items: Any, boxes: Any, child: Any) -> None:
-    """Fill `boxes` and `child` (caller guarantees 2 n - 1 rows) from the item boxes (n, 6)."""
-    n_items = items.shape[0]
-    order = np.arange(n_items)
-    stack = np.empty((2 * MAX_DEPTH, 4), np.int64)  # node, first of its run, end of its run, depth
-    stack[0, 0], stack[0, 1], stack[0, 2], stack[0, 3] = 0, 0, n_items, 0
+def _halve(items: Any, order: Any, boxes: Any, left: Any, runs: Any) -> int:
+    """Build a binary tree whose leaves are runs of `order` of at most eight items; return its number of nodes.
+
+    items (n, 6). Fills boxes (n_nodes, 6), left (n_nodes,): the left child, the right one follows, or -1, and runs
+    (n_nodes, 2): first and end in `order`. Caller guarantees 2 n - 1 rows.
+    """
+    stack = np.empty((2 * MAX_DEPTH, 2), np.int64)  # node, depth
+    stack[0, 0], stack[0, 1] = 0, 0
+    runs[0, 0], runs[0, 1] = 0, items.shape[0]
     n_stack, n_nodes = 1, 1
     bins = np.empty((N_BINS, 7))  # box and number of items of each bin
-    while n_stack > 0:  # bound: each turn writes one of the 2 n - 1 nodes
+    while n_stack > 0:  # bound: each turn ends one of the 2 n - 1 nodes
         n_stack -= 1
-        node, start, end, depth = stack[n_stack, 0], stack[n_stack, 1], stack[n_stack, 2], stack[n_stack, 3]
-        if end - start == 1:
-            boxes[node] = items[order[start]]
-            child[node] = -1 - order[start]
-            continue
+        node, depth = stack[n_stack, 0], stack[n_stack, 1]
+        start, end = runs[node, 0], runs[node, 1]
         _unite(items, order, start, end, boxes[node])
+        if end - start <= WIDTH:
+            left[node] = -1
+            continue
         middle = (start + end) // 2
         if depth < HEURISTIC_DEPTH:
             middle = _split(items, order, start, end, bins)
-        child[node] = n_nodes
+        left[node] = n_nodes
+        runs[n_nodes, 0], runs[n_nodes, 1] = start, middle
+        runs[n_nodes + 1, 0], runs[n_nodes + 1, 1] = middle, end
         for side in range(2):
-            stack[n_stack, 0] = n_nodes + side
-            stack[n_stack, 1] = start if side == 0 else middle
-            stack[n_stack, 2] = middle if side == 0 else end
-            stack[n_stack, 3] = depth + 1
+            stack[n_stack, 0], stack[n_stack, 1] = n_nodes + side, depth + 1
             n_stack += 1
         n_nodes += 2
+    return n_nodes
+
+
+@kernel
+def _widen(items: Any, order: Any, halves: Any, left: Any, runs: Any, boxes: Any, child: Any) -> int:
+    """Join binary nodes to nodes of eight, the largest boxes opened first; return the number of nodes filled."""
+    stack = np.empty((WIDTH * MAX_DEPTH + WIDTH, 2), np.int64)  # binary node, node
+    stack[0, 0], stack[0, 1] = 0, 0
+    n_stack, n_nodes = 1, 1
+    gathered = np.empty(WIDTH, np.int64)
+    while n_stack > 0:  # bound: each turn fills a node
+        n_stack -= 1
+        half, node = stack[n_stack, 0], stack[n_stack, 1]
+        for lane in range(WIDTH):
+            child[node, lane] = EMPTY
+            boxes[node, :3, lane] = 0.0
+            boxes[node, 3:, lane] = UNUSED
+        if left[half] < 0:
+            for place in range(runs[half, 0], runs[half, 1]):
+                lane = place - runs[half, 0]
+                child[node, lane] = -1 - order[place]
+                _set_lane(boxes, node, lane, items[order[place]])
+            continue
+        gathered[0], gathered[1] = left[half], left[half] + 1
+        n_gathered = 2
+        for _ in range(WIDTH - 2):
+            largest, area = -1, -1.0
+            for lane in range(n_gathered):
+                if left[gathered[lane]] >= 0 and _half_area(halves[gathered[lane]]) > area:
+                    largest, area = lane, _half_area(halves[gathered[lane]])
+            if largest < 0:
+                break
+            opened = left[gathered[largest]]
+            gathered[largest], gathered[n_gathered] = opened, opened + 1
+            n_gathered += 1
+        for lane in range(n_gathered):
+            child[node, lane] = n_nodes
+            _set_lane(boxes, node, lane, halves[gathered[lane]])
+            stack[n_stack, 0], stack[n_stack, 1] = gathered[lane], n_nodes
+            n_stack += 1
+            n_nodes += 1
+    return n_nodes
+
+
+@inline
+def _set_lane(boxes: Any, node: int, lane: int, box: Any) -> None:
+    """Store a box as float32, enlarged."""
+    for axis in range(3):
+        boxes[node, axis, lane] = 0.5 * (box[axis] + box[3 + axis])
+        boxes[node, 3 + axis, lane] = 0.5 * (box[3 + axis] - box[axis]) + ENLARGED
 
 
 @inline

@@ -8,11 +8,12 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.collision.collide import collide_pair, pair_function
+from engine.collision.dual_traversal import new_descent
 from engine.collision.mesh_mesh import mesh_mesh, what_to_seek
 from engine.collision.placement import PoseArrays
 from engine.collision.pose_batch import UNSETTLED, relate_poses
 from engine.collision.result import Witness, Work
-from engine.collision.shell import shell_of
+from engine.collision.shell import read_only, shell_of
 from engine.errors import InvalidArrayError, WrongDimensionError
 from engine.parallel import Budget, Cancel, Progress, run_chunks
 from engine.solids.base import FloatArray, Solid
@@ -21,6 +22,7 @@ from engine.solids.pose import Pose, check_rotations
 from engine.types import Accuracy, Relation
 
 Relations = npt.NDArray[np.int8]
+_ROOM = 64
 PoseCollisions = Relations | tuple[Relations, list[Witness | None]]
 
 
@@ -126,11 +128,13 @@ def _mesh_task(
 ) -> Callable[[int, int], None]:
     """Return the task that lets the kernel decide a range of poses."""
     a, b = shell_of(first), shell_of(second)
+    still = a.posed(None)
+    turns, moves = read_only(turns), read_only(moves)
     seek = what_to_seek(a, b, Work(budget, witness=False, boolean=boolean))
 
     def batch(start: int, stop: int) -> None:
-        pairs, kinds = np.empty((1, 2), np.int64), np.empty(1, np.int8)
-        poses = PoseArrays(turns[start:stop], moves[start:stop], True, False, b.reach)
+        pairs, kinds = np.empty((_ROOM, 2), np.int64), np.empty(_ROOM, np.int8)
+        poses = PoseArrays(turns[start:stop], moves[start:stop], True)
         with np.errstate(all="ignore"):
             relate_poses(
                 a.arrays,
@@ -139,8 +143,10 @@ def _mesh_task(
                 b.arrays,
                 b.components,
                 b.has_inside,
+                still,
                 poses,
                 seek,
+                new_descent(),
                 pairs,
                 kinds,
                 relations[start:stop],

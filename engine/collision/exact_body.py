@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from engine.bounding.bvh import MAX_DEPTH
-from engine.collision.placement import Box, PoseArrays, are_apart, placed_box, placement_of
+from engine.bounding.bvh import EMPTY, WIDTH
+from engine.collision.face_state import STACK_ROWS
+from engine.collision.placement import PoseArrays
 from engine.collision.shell import Shell, ShellArrays, lattice_shift
-from engine.jit import kernel
+from engine.jit import inline, kernel
 from engine.solids.pose import Pose
 
 Vector = tuple[int, int, int]
@@ -146,25 +147,40 @@ def rounded_outward(numerator: int, denominator: int) -> tuple[float, float]:
     return float(np.nextafter(value, -np.inf)), float(np.nextafter(value, np.inf))
 
 
+@inline
+def _is_lane_apart(shell: ShellArrays, node: int, lane: int, pose: PoseArrays, margin: float, bounds: Any) -> bool:
+    """Tell whether a placed child box surely has no common point with bounds (6,); NaN is never apart."""
+    r, t = pose.rotations[0], pose.translations[0]
+    for i in range(3):
+        centre, half = t[i], margin
+        for k in range(3):
+            centre += r[i, k] * (shell.origin[k] + shell.scale * float(shell.boxes[node, k, lane]))
+            half += abs(r[i, k]) * (shell.scale * float(shell.boxes[node, 3 + k, lane]))
+        if centre - half > bounds[3 + i] or centre + half < bounds[i]:
+            return True
+    return False
+
+
 @kernel
 def _faces_in_box(shell: ShellArrays, pose: PoseArrays, bounds: Any, found: Any) -> int:
     """Write the triangles whose placed boxes may meet bounds (6,) into found (room,); return their number."""
-    place = placement_of(pose)
-    wanted = Box(bounds[0], bounds[1], bounds[2], bounds[3], bounds[4], bounds[5])
-    stack = np.empty(MAX_DEPTH + 2, np.int64)
+    t = pose.translations[0]
+    shift = max(abs(t[0]), abs(t[1]), abs(t[2]))
+    margin = 2.0**-47 * (3.0 * shell.extent.reach + shift) + 2.0**-1060  # 8 times the error of `placement.py`
+    stack = np.empty(STACK_ROWS, np.int32)
     stack[0] = 0
     n_stack, n_found = 1, 0
     while n_stack > 0:  # bound: each node enters once
         n_stack -= 1
-        node = stack[n_stack]
-        if are_apart(wanted, placed_box(shell.boxes, node, place)):
-            continue
-        child = shell.child[node]
-        if child >= 0:
-            stack[n_stack] = child
-            stack[n_stack + 1] = child + 1
-            n_stack += 2
-        else:
+        node = int(stack[n_stack])
+        for lane in range(WIDTH):
+            child = int(shell.child[node, lane])
+            if child == EMPTY or _is_lane_apart(shell, node, lane, pose, margin, bounds):
+                continue
+            if child >= 0:
+                stack[n_stack] = child
+                n_stack += 1
+                continue
             if n_found < found.shape[0]:
                 found[n_found] = -1 - child
             n_found += 1

@@ -23,11 +23,14 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.collision.dual_traversal import (
+    FULL,
     SEEK_CONTACT,
     SEEK_OVERLAP,
     SEEK_PIERCING_BY_FIRST,
     SEEK_PIERCING_BY_SECOND,
+    SETTLED,
     find_contacts,
+    new_descent,
 )
 from engine.collision.exact_body import ExactBody, exact_pair
 from engine.collision.exact_cells import cells_of, is_inside_exact, pieces_of_segment, sides_at
@@ -49,7 +52,7 @@ from engine.solids.base import IntArray, Solid
 from engine.solids.pose import Pose
 from engine.types import UNDECIDED, Relation
 
-_FIRST_ROOM = 1024
+_ROOM = 1024
 _SAFE_POWER = 300
 _BLOCK = 64
 _PROBED = 8
@@ -166,22 +169,38 @@ class _Pair:
         question."""
         (first, second), flag = self.shells, self.work.budget.flag
         first_pose, second_pose = first.posed(self.poses[0]), second.posed(self.poses[1])
-        room = _FIRST_ROOM
-        stop = self.seek == SEEK_OVERLAP  # many weak contacts: look at some before all are listed
-        while True:  # bound: at most three turns; the third has the room that the second one counted
-            pairs, kinds = np.empty((room, 2), np.int64), np.empty(room, np.int8)
-            n_pairs, is_settled = find_contacts(
-                first.arrays, first_pose, second.arrays, second_pose, self.seek, stop, pairs, kinds, flag
+        pairs, kinds = np.empty((_ROOM, 2), np.int64), np.empty(_ROOM, np.int8)
+        descent = new_descent()
+        found_pairs: list[IntArray] = []
+        found_kinds: list[npt.NDArray[np.int8]] = []
+        how = FULL
+        while how == FULL:  # bound: each turn finds new pairs
+            how, n_pairs = find_contacts(
+                first.arrays,
+                first_pose,
+                second.arrays,
+                second_pose,
+                self.seek,
+                not found_pairs,
+                descent,
+                pairs,
+                kinds,
+                flag,
             )
             self.work.budget.check()
-            if n_pairs <= room:
-                break
-            if stop and self._is_overlap_near(pairs, kinds):
+            if how == SETTLED:
                 return pairs[:1], True
-            room, stop = max(n_pairs, 16 * _FIRST_ROOM if stop else 0), False
-        pairs, kinds = pairs[:n_pairs], kinds[:n_pairs]
-        if is_settled:
-            return pairs, True
+            found_pairs.append(pairs[:n_pairs].copy())
+            found_kinds.append(kinds[:n_pairs].copy())
+            if (
+                how == FULL
+                and len(found_pairs) == 1
+                and self.seek == SEEK_OVERLAP
+                and self._is_overlap_near(pairs, kinds)
+            ):
+                return pairs[:1], True
+        pairs, kinds = np.concatenate(found_pairs), np.concatenate(found_kinds)
+        n_pairs = len(pairs)
         pairs, kinds = self._in_order(pairs, kinds)
         open_ones = np.flatnonzero(kinds == UNDECIDED)
         self.work.n_beyond_filter += n_pairs

@@ -1,12 +1,14 @@
-"""Poses inside kernels: rounded positions with a proven error, conservative boxes, and orientation signs that know it.
+"""Poses inside kernels: rounded positions with a proven error, and orientation signs that know it.
 
 A posed vertex is exactly R p + t. Kernels see its rounded value and `error`, a bound on what rounding did to each
-coordinate; an orientation sign that this error could change is UNDECIDED, and the exact posed coordinates settle it
-elsewhere. A body without a pose has error 0, and its signs are settled here by expansions.
+coordinate; a sign that this error could change is settled by expansions of the exact posed coordinates
+(`triangle_triangle.py`) or UNDECIDED. Two bodies are placed together (`place_pair`): where both are posed, both are
+moved back by the first translation, so that only their distance counts and not where they are. A pose that turns a
+lattice into itself (`is_lattice_pose`) rounds nothing: error 0, and so does a body without a pose.
 
-**error.** Four rounded terms of a coordinate: |rounded - exact| <= g4 (|R| |p| + |t|) + 4h with u = 2^-53, g4 = 4u /
-(1 - 4u), h = 2^-1075. With |R| <= 1 + 1e-12 and |p| <= reach that is below 2^-50 (3 reach + max |t|) + 2^-1060, which
-leaves a factor of two for the rounding of the bound itself.
+**error.** Four rounded terms of a coordinate, and the rounded difference of two translations: |rounded - exact| <=
+g4 (|R| |p| + |t|) + u |t| + 4h with u = 2^-53, g4 = 4u / (1 - 4u), h = 2^-1075. With |R| <= 1 + 1e-12 and |p| <= reach
+that is below 2^-50 (3 reach + max |t|) + 2^-1060, with room for the rounding of the bound itself.
 
 **sign.** With u, v, w the rounded differences of three points from the first, M their largest component, and e twice
 the error (both ends of a difference), the exact determinant differs from that of the exact differences of the rounded
@@ -25,23 +27,17 @@ from engine.jit import inline
 from engine.predicates.orientation import orient2d, orient3d
 from engine.types import UNDECIDED, Point2, Point3
 
-BOX_MARGIN = 8.0
-"""A posed box is widened by this many times `error`: centre and half width, their images and the sums stay below 2."""
-
 
 class PoseArrays(NamedTuple):
-    """One or many poses of one body for kernels: rotations (n, 3, 3), translations (n, 3), are there any, do they round
-    no coordinate of the body, and the largest coordinate of the body."""
+    """One or many poses of one body for kernels: rotations (n, 3, 3), translations (n, 3); are there any."""
 
     rotations: npt.NDArray[np.float64]
     translations: npt.NDArray[np.float64]
     is_posed: bool
-    is_exact: bool
-    reach: float
 
 
 class Placement(NamedTuple):
-    """Rotation (rows), translation, the error of a rounded posed coordinate (0.0: exact), how far boxes are widened."""
+    """Rotation (rows), translation, and the error of a rounded posed coordinate (0.0: exact)."""
 
     xx: float
     xy: float
@@ -57,104 +53,77 @@ class Placement(NamedTuple):
     z: float
     is_posed: bool
     error: float
-    margin: float
 
 
-class Box(NamedTuple):
-    """An axis-aligned box."""
+class Extent(NamedTuple):
+    """What bounds need to know of a body's coordinates: the largest magnitude, and a power of two that divides all."""
 
-    x0: float
-    y0: float
-    z0: float
-    x1: float
-    y1: float
-    z1: float
+    reach: float
+    grain: float
 
 
 @inline
-def as_placement(
-    rotations: Any, translations: Any, item: int, is_posed: bool, is_exact: bool, reach: float
-) -> Placement:
-    """Load pose `item` for a body whose coordinates are at most `reach` in magnitude.
-
-    is_exact: caller guarantees that every rounded posed coordinate of the body is exact.
-    """
-    r, t = rotations[item], translations[item]
-    error = 0.0
-    if is_posed:
-        shift = max(abs(t[0]), abs(t[1]), abs(t[2]))
-        error = 2.0**-50 * (3.0 * reach + shift) + 2.0**-1060
-    margin = BOX_MARGIN * error
-    if is_exact:
-        error = 0.0
+def as_placement(pose: PoseArrays, item: int, x: float, y: float, z: float, error: float) -> Placement:
+    """Load the rotation of pose `item`, with a translation of the caller's."""
+    r = pose.rotations[item]
     return Placement(
-        r[0, 0],
-        r[0, 1],
-        r[0, 2],
-        r[1, 0],
-        r[1, 1],
-        r[1, 2],
-        r[2, 0],
-        r[2, 1],
-        r[2, 2],
-        t[0],
-        t[1],
-        t[2],
-        is_posed,
-        error,
-        margin,
-    )
+        r[0, 0], r[0, 1], r[0, 2], r[1, 0], r[1, 1], r[1, 2], r[2, 0], r[2, 1], r[2, 2], x, y, z, pose.is_posed, error
+    )  # fmt: skip
 
 
 @inline
-def placement_of(pose: PoseArrays) -> Placement:
-    """Load the one pose of a body."""
-    return as_placement(pose.rotations, pose.translations, 0, pose.is_posed, pose.is_exact, pose.reach)
+def is_lattice_rotation(rotation: Any) -> bool:
+    """Tell whether a rotation only permutes axes and turns signs."""
+    for i in range(3):
+        for k in range(3):
+            if rotation[i, k] != 0.0 and abs(rotation[i, k]) != 1.0:
+                return False
+    return True
 
 
 @inline
-def placed_point(points: Any, item: int, place: Placement) -> Point3:
+def is_multiple(value: float, grain: float) -> bool:
+    """Tell whether value / grain is an integer (False where the quotient overflows)."""
+    quotient = value / grain
+    return np.floor(quotient) == quotient and abs(quotient) < 2.0**53
+
+
+@inline
+def place_pair(
+    a: Extent, a_pose: PoseArrays, a_item: int, b: Extent, b_pose: PoseArrays, b_item: int
+) -> tuple[Placement, Placement]:
+    """Return the placements of two bodies, moved together so that a posed first body has no translation if both are."""
+    s, t = a_pose.translations[a_item], b_pose.translations[b_item]
+    x, y, z = t[0] - s[0], t[1] - s[1], t[2] - s[2]
+    shift = max(abs(x), abs(y), abs(z))
+    grain = min(a.grain, b.grain)
+    is_exact = not (a_pose.is_posed or b_pose.is_posed)
+    if not is_exact and is_lattice_rotation(a_pose.rotations[a_item]) and is_lattice_rotation(b_pose.rotations[b_item]):
+        is_exact = a.reach + b.reach + shift < 2.0**53 * grain and a.reach + b.reach + shift < 1e300
+        for k in range(3):
+            is_exact = is_exact and is_multiple(s[k], grain) and is_multiple(t[k], grain)
+    a_error = b_error = 0.0
+    if a_pose.is_posed and not is_exact:
+        a_error = 2.0**-50 * (3.0 * a.reach + (0.0 if b_pose.is_posed else shift)) + 2.0**-1060
+    if b_pose.is_posed and not is_exact:
+        b_error = 2.0**-50 * (3.0 * b.reach + shift) + 2.0**-1060
+    if b_pose.is_posed:  # an unposed body's translation is 0
+        a_place = as_placement(a_pose, a_item, 0.0, 0.0, 0.0, a_error)
+        return a_place, as_placement(b_pose, b_item, x, y, z, b_error)
+    return as_placement(a_pose, a_item, s[0], s[1], s[2], a_error), as_placement(b_pose, b_item, 0.0, 0.0, 0.0, 0.0)
+
+
+@inline
+def placed(p: Point3, place: Placement) -> Point3:
     """Return the rounded posed point, the point itself where there is no pose."""
-    x, y, z = points[item, 0], points[item, 1], points[item, 2]
+    x, y, z = p
     if not place.is_posed:
-        return Point3(x, y, z)
+        return p
     return Point3(
         place.xx * x + place.xy * y + place.xz * z + place.x,
         place.yx * x + place.yy * y + place.yz * z + place.y,
         place.zx * x + place.zy * y + place.zz * z + place.z,
     )
-
-
-@inline
-def placed_box(boxes: Any, node: int, place: Placement) -> Box:
-    """Return a box that holds the exact image of a tree's box (components may be NaN where numbers overflow)."""
-    x0, y0, z0 = boxes[node, 0], boxes[node, 1], boxes[node, 2]
-    x1, y1, z1 = boxes[node, 3], boxes[node, 4], boxes[node, 5]
-    if not place.is_posed:
-        return Box(x0, y0, z0, x1, y1, z1)
-    cx, cy, cz = 0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.5 * (z0 + z1)
-    hx, hy, hz = 0.5 * (x1 - x0), 0.5 * (y1 - y0), 0.5 * (z1 - z0)
-    margin = place.margin
-    x = place.xx * cx + place.xy * cy + place.xz * cz + place.x
-    y = place.yx * cx + place.yy * cy + place.yz * cz + place.y
-    z = place.zx * cx + place.zy * cy + place.zz * cz + place.z
-    rx = abs(place.xx) * hx + abs(place.xy) * hy + abs(place.xz) * hz + margin
-    ry = abs(place.yx) * hx + abs(place.yy) * hy + abs(place.yz) * hz + margin
-    rz = abs(place.zx) * hx + abs(place.zy) * hy + abs(place.zz) * hz + margin
-    return Box(x - rx, y - ry, z - rz, x + rx, y + ry, z + rz)
-
-
-@inline
-def are_apart(a: Box, b: Box) -> bool:
-    """Tell whether two boxes surely have no common point; comparisons with NaN are false, so overflow is never
-    apart."""
-    return a.x0 > b.x1 or b.x0 > a.x1 or a.y0 > b.y1 or b.y0 > a.y1 or a.z0 > b.z1 or b.z0 > a.z1
-
-
-@inline
-def size_of(box: Box) -> float:
-    """Return the sum of the three widths."""
-    return (box.x1 - box.x0) + (box.y1 - box.y0) + (box.z1 - box.z0)
 
 
 @inline
@@ -218,3 +187,5 @@ def placed_axis(axis: int, place: Placement) -> int:
 
 NO_ROTATION = np.eye(3).reshape(1, 3, 3)
 NO_TRANSLATION = np.zeros((1, 3))
+for _array in (NO_ROTATION, NO_TRANSLATION):
+    _array.setflags(write=False)

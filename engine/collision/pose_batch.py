@@ -4,11 +4,21 @@ from __future__ import annotations
 
 from typing import Any
 
-from engine.collision.dual_traversal import INTERRUPTED, SEEK_OVERLAP, search
-from engine.collision.parity import INSIDE, OUTSIDE, locate_point
-from engine.collision.placement import Placement, PoseArrays, as_placement, placed_point
+from engine.collision.dual_traversal import (
+    FULL,
+    INTERRUPTED,
+    SEEK_OVERLAP,
+    SETTLED,
+    Descent,
+    search,
+    start_descent,
+)
+from engine.collision.frames import defect_of
+from engine.collision.parity import INSIDE, OUTSIDE, brought_back, locate_point
+from engine.collision.placement import Placement, PoseArrays
 from engine.collision.shell import ShellArrays
 from engine.jit import inline, kernel
+from engine.predicates.loading import as_point3
 
 UNSETTLED = -1
 """Written in place of a relation: weak contacts, undecided signs, or components of which only some lie inside."""
@@ -30,10 +40,10 @@ def components_inside(
     """Return whether none, all or some of the components lie inside a shell that none of them meets, or `_UNSURE`."""
     if not has_inside:
         return _NONE
-    n_inside = 0
+    n_inside, defect = 0, defect_of(place)
     for item in range(components.shape[0]):
-        q = placed_point(source.vertices, source.triangles[components[item], 0], source_place)
-        where = locate_point(q, source_place.error, shell, place)
+        p = as_point3(source.vertices, source.triangles[components[item], 0])
+        where = locate_point(brought_back(p, source_place, place, defect), shell)
         if where == INSIDE:
             n_inside += 1
         elif where != OUTSIDE:
@@ -51,28 +61,35 @@ def relate_poses(
     second: ShellArrays,
     second_components: Any,
     second_has_inside: bool,
+    still: PoseArrays,
     poses: PoseArrays,
     seek: int,
+    descent: Descent,
     pairs: Any,
     kinds: Any,
     relations: Any,
     flag: Any,
 ) -> None:
-    """Fill relations (n,) int8 for the poses (n) of the second body; `pairs` and `kinds` hold one row of work space."""
-    still = as_placement(poses.rotations, poses.translations, 0, False, True, 0.0)
+    """Fill relations (n,) int8 for the poses (n) of the second body; still: of the first, which has none.
+
+    `descent`, `pairs` and `kinds` (some rows) are work space.
+    """
     for item in range(relations.shape[0]):
-        place = as_placement(poses.rotations, poses.translations, item, True, False, poses.reach)
-        n_pairs, is_settled = search(first, still, second, place, seek, False, pairs, kinds, flag)
-        if n_pairs == INTERRUPTED:
+        place = start_descent(first, still, 0, second, poses, item, descent)
+        how, n_pairs = search(first, second, place, descent, seek, pairs, kinds, flag)
+        has_contact = n_pairs > 0
+        while how == FULL:  # weak contacts so far: a later one may settle the question
+            how, _ = search(first, second, place, descent, seek, pairs, kinds, flag)
+        if how == INTERRUPTED:
             return
-        if is_settled:
+        if how == SETTLED:
             relations[item] = OVERLAPPING if seek == SEEK_OVERLAP else TOUCHING
             continue
         relations[item] = UNSETTLED
-        if n_pairs > 0:
+        if has_contact:
             continue
-        in_second = components_inside(first, first_components, still, second, place, second_has_inside)
-        in_first = components_inside(second, second_components, place, first, still, first_has_inside)
+        in_second = components_inside(first, first_components, place.a, second, place.b, second_has_inside)
+        in_first = components_inside(second, second_components, place.b, first, place.a, first_has_inside)
         if in_second == _NONE and in_first == _NONE:
             relations[item] = DISJOINT
         elif in_second == _ALL and in_first == _NONE:

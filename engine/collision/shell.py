@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from engine.bounding.bvh import build_bvh
-from engine.collision.placement import NO_ROTATION, NO_TRANSLATION, PoseArrays
-from engine.collision.triangle_triangle import projected
+from engine.bounding.bvh import EMPTY, build_bvh
+from engine.collision.placement import NO_ROTATION, NO_TRANSLATION, Extent, PoseArrays
+from engine.collision.triangle_triangle import Triangle3, projected
 from engine.jit import inline, kernel
 from engine.predicates.loading import as_point3
 from engine.predicates.orientation import orient2d
@@ -38,14 +38,18 @@ points; some other face crosses it along a segment; some other face of the same 
 
 
 class ShellArrays(NamedTuple):
-    """The arrays that kernels take. `state` is filled by kernels as needed: any thread writes the same values."""
+    """What kernels take; boxes to scale: the tree (`bvh.py`). `state` is filled by kernels as needed: any thread writes
+    the same values."""
 
     vertices: FloatArray
     triangles: IntArray
     axis: npt.NDArray[np.int8]
     state: npt.NDArray[np.int8]
-    boxes: FloatArray
-    child: IntArray
+    boxes: npt.NDArray[np.float32]
+    child: npt.NDArray[np.int32]
+    origin: FloatArray
+    scale: float
+    extent: Extent
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,23 +71,8 @@ class Shell:
     def posed(self, pose: Pose | None) -> PoseArrays:
         """Return the pose as kernels take it."""
         if pose is None:
-            return PoseArrays(NO_ROTATION, NO_TRANSLATION, False, True, self.reach)
-        rotations = np.ascontiguousarray(pose.rotation).reshape(1, 3, 3)
-        translations = np.ascontiguousarray(pose.translation).reshape(1, 3)
-        is_exact = is_exact_pose(self.arrays.vertices, pose)
-        return PoseArrays(rotations, translations, True, is_exact, self.reach)
-
-
-def is_exact_pose(points: FloatArray, pose: Pose) -> bool:
-    """Tell whether a pose only permutes axes, turns signs and adds without rounding: a lattice moved along itself."""
-    if not np.isin(pose.rotation, (-1.0, 0.0, 1.0)).all():
-        return False
-    with np.errstate(all="ignore"):
-        turned = points @ pose.rotation.T
-        moved = turned + pose.translation
-        back = moved - turned
-        lost = (turned - (moved - back)) + (pose.translation - back)
-        return bool((lost == 0.0).all())  # overflow: NaN is not zero
+            return PoseArrays(NO_ROTATION, NO_TRANSLATION, False)
+        return PoseArrays(read_only(pose.rotation[None]), read_only(pose.translation[None]), True)
 
 
 def shell_of(solid: Solid) -> Shell:
@@ -104,19 +93,70 @@ def build_shell(solid: Solid) -> Shell:
 
 
 def shell_of_triangles(vertices: FloatArray, triangles: IntArray, faces: IntArray, has_inside: bool) -> Shell:
-    """Return the shell of checked arrays."""
+    """Return the shell of checked arrays.
+
+    Triangles and vertices are copied in the order of the tree: the faces near a contact then lie side by side in
+    memory, which a large mesh, asked at another place by every pose, needs more than anything else.
+    """
     corners = vertices[triangles]
-    boxes = np.concatenate([corners.min(axis=1), corners.max(axis=1)], axis=1)
-    tree = build_bvh(boxes)
+    tree = build_bvh(np.concatenate([corners.min(axis=1), corners.max(axis=1)], axis=1))
+    is_item = (tree.child < 0) & (tree.child != EMPTY)
+    order = -1 - tree.child[is_item].astype(np.int64)
+    child = tree.child.copy()
+    child[is_item] = -1 - np.arange(len(order), dtype=np.int32)
+    triangles, faces = triangles[order], faces[order]
+    number = np.full(len(vertices), -1, np.int64)
+    used = np.empty(len(vertices), np.int64)
+    n_used = _renumber(triangles, number, used)
+    vertices = np.ascontiguousarray(vertices[used[:n_used]])
     axis = np.empty(len(triangles), np.int8)
     with np.errstate(over="ignore", invalid="ignore", under="ignore"):  # uncompiled runs only
         _find_axes(vertices, triangles, axis)
     parent = np.arange(len(vertices))
     join_vertices(triangles, np.zeros(len(triangles), np.bool_), parent)
     _, first = np.unique(parent[triangles[:, 0]], return_index=True)
+    extent = Extent(float(np.abs(vertices).max()), grain_of(vertices))
     state = np.full(len(triangles), STATE_UNKNOWN, np.int8)
-    arrays = ShellArrays(read_only(vertices), read_only(triangles), read_only(axis), state, tree.boxes, tree.child)
-    return Shell(arrays, faces, has_inside, np.sort(first), float(np.abs(corners).max()), lattice_shift(vertices))
+    arrays = ShellArrays(
+        read_only(vertices),
+        read_only(triangles),
+        read_only(axis),
+        state,
+        tree.boxes,
+        read_only(child),
+        tree.origin,
+        tree.scale,
+        extent,
+    )
+    return Shell(arrays, faces, has_inside, np.sort(first), extent.reach, lattice_shift(vertices))
+
+
+@kernel
+def _renumber(triangles: Any, number: Any, used: Any) -> int:
+    """Number vertices in the order in which triangles (n, 3) name them, and write that into triangles.
+
+    number (n_vertices,): -1 on entry. Fills used: the old number of each; returns how many there are.
+    """
+    n_used = 0
+    for item in range(triangles.shape[0]):
+        for corner in range(3):
+            vertex = triangles[item, corner]
+            if number[vertex] < 0:
+                number[vertex] = n_used
+                used[n_used] = vertex
+                n_used += 1
+            triangles[item, corner] = number[vertex]
+    return n_used
+
+
+def grain_of(values: FloatArray) -> float:
+    """Return the largest power of two that divides every value; 1.0 if all are zero."""
+    mantissas, exponents = np.frexp(values[values != 0.0])
+    if not mantissas.size:
+        return 1.0
+    whole = np.ldexp(mantissas, 53).astype(np.int64)
+    lowest = np.frexp((whole & -whole).astype(np.float64))[1] - 1  # place of the lowest bit set
+    return float(np.ldexp(1.0, int((exponents - 53 + lowest).min())))
 
 
 def lattice_shift(values: FloatArray) -> int:
@@ -165,6 +205,26 @@ def axis_of(p: Point3, q: Point3, r: Point3) -> int:
         if side != 0:
             found = UNKNOWN_AXIS
     return found
+
+
+@inline
+def triangle_of(shell: ShellArrays, item: int) -> Triangle3:
+    """Load a triangle in the body's own coordinates."""
+    return Triangle3(
+        as_point3(shell.vertices, shell.triangles[item, 0]),
+        as_point3(shell.vertices, shell.triangles[item, 1]),
+        as_point3(shell.vertices, shell.triangles[item, 2]),
+    )
+
+
+@inline
+def in_tree(shell: ShellArrays, p: Point3) -> Point3:
+    """Return a point in the coordinates of the body's tree, rounded."""
+    return Point3(
+        (p.x - shell.origin[0]) / shell.scale,
+        (p.y - shell.origin[1]) / shell.scale,
+        (p.z - shell.origin[2]) / shell.scale,
+    )
 
 
 @kernel

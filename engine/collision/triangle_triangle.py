@@ -1,16 +1,13 @@
-"""Do two triangles in space have a common point, and do they cross: by orientation signs alone.
+"""Two triangles in space: how they meet, decided by orientation signs only.
 
-                    p1                 T1 meets the plane of T2 in an interval of the line L of both planes, and so does
-        L __i1____ / \\ _____j1__      T2. p1 (p2) stands alone on its side. The intervals have a common point unless
-          i2______/___\\______j2       one ends before the other begins: two orientation signs.
-                 q1    r1
+Each triangle is compared with the plane of the other. Where both straddle, each plane cuts the other triangle in an
+interval of the common line, and two more signs tell whether the intervals have a common point, strictly or not; in one
+plane, the edges are separating axes. Two stages:
 
-A `CROSSING` is more than a contact: each triangle has vertices strictly on both sides of the other's plane, and the two
-intervals share more than a point, so a segment of positive length lies in the relative interior of both.
+- `classify_near`: float64 with one bound for all signs; answers APART or CROSSING, UNDECIDED where any sign is near 0.
+- `classify_exactly`: every sign exact, of points under their poses; answers always but out of exponent range.
 
-Coplanar triangles are compared in the projection along `axis`: closed triangles are disjoint exactly if one of the six
-edge lines has the other triangle strictly outside. Triangles without area are left UNDECIDED here, as is everything
-that a predicate leaves so; `exact_triangles.py` settles them.
+Caller guarantees that both triangles have an area (`exact_triangles.py` takes those without).
 
 Source: P. Guigue, O. Devillers, Fast and robust triangle-triangle overlap test using orientation predicates, 2003.
 Changed: the permutations are replaced by a rule that names the lone vertex; strict and weak contacts are told apart.
@@ -18,10 +15,13 @@ Changed: the permutations are replaced by a rule that names the lone vertex; str
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from engine.collision.placement import orient2d_near, orient3d_near
+import numpy as np
+
 from engine.jit import inline
+from engine.predicates.orientation import orient2d
+from engine.predicates.posed import UNPOSED, PosedPoint3, orient3d_posed
 from engine.types import UNDECIDED, Point2, Point3
 
 APART = 0
@@ -38,6 +38,24 @@ class Triangle3(NamedTuple):
     p: Point3
     q: Point3
     r: Point3
+
+
+class PosedTriangle(NamedTuple):
+    """Three points before their poses."""
+
+    p: PosedPoint3
+    q: PosedPoint3
+    r: PosedPoint3
+
+
+@inline
+def unposed(t: Triangle3) -> PosedTriangle:
+    """Return the triangle as one without a pose."""
+    return PosedTriangle(
+        PosedPoint3(t.p.x, t.p.y, t.p.z, UNPOSED),
+        PosedPoint3(t.q.x, t.q.y, t.q.z, UNPOSED),
+        PosedPoint3(t.r.x, t.r.y, t.r.z, UNPOSED),
+    )
 
 
 @inline
@@ -63,16 +81,6 @@ def lone_vertex(p: int, q: int, r: int) -> tuple[int, int]:
 
 
 @inline
-def turned(t: Triangle3, lone: int) -> Triangle3:
-    """Return the triangle with vertex `lone` first, orientation kept."""
-    if lone == 0:
-        return t
-    if lone == 1:
-        return Triangle3(t.q, t.r, t.p)
-    return Triangle3(t.r, t.p, t.q)
-
-
-@inline
 def is_one_side(p: int, q: int, r: int) -> bool:
     """Tell whether three signs are all 1 or all -1."""
     return (p == 1 and q == 1 and r == 1) or (p == -1 and q == -1 and r == -1)
@@ -84,21 +92,113 @@ def is_straddling(p: int, q: int, r: int) -> bool:
     return (p == 1 or q == 1 or r == 1) and (p == -1 or q == -1 or r == -1)
 
 
-@inline
-def classify_pair(t1: Triangle3, t2: Triangle3, axis: int, error: float) -> int:
-    """Return the class of two triangles that both have an area.
+# ---- near: one bound for all signs ----------------------------------------------------------------------------------
 
-    axis: a coordinate axis along which the projection of t1 has an area. error: of the rounded coordinates, 0.0 if
-    exact.
+
+@inline
+def minus(a: Point3, b: Point3) -> Point3:
+    """Return a - b."""
+    return Point3(a.x - b.x, a.y - b.y, a.z - b.z)
+
+
+@inline
+def cross(u: Point3, v: Point3) -> Point3:
+    """Return u x v."""
+    return Point3(u.y * v.z - u.z * v.y, u.z * v.x - u.x * v.z, u.x * v.y - u.y * v.x)
+
+
+@inline
+def dot(u: Point3, v: Point3) -> float:
+    """Return u . v."""
+    return u.x * v.x + u.y * v.y + u.z * v.z
+
+
+@inline
+def size_of(v: Point3) -> float:
+    """Return the largest magnitude of a component."""
+    return max(abs(v.x), abs(v.y), abs(v.z))
+
+
+@inline
+def with_lone_first(t: Triangle3, p: float, q: float, r: float) -> Triangle3:
+    """Return a triangle with the vertex first that is alone on its side of a plane; p, q, r: values, none near 0."""
+    above = (p > 0.0) + (q > 0.0) + (r > 0.0) == 1
+    if (p > 0.0) == above:
+        return t
+    if (q > 0.0) == above:
+        return Triangle3(t.q, t.r, t.p)
+    return Triangle3(t.r, t.p, t.q)
+
+
+@inline
+def classify_near(t1: Triangle3, t2: Triangle3, error: float) -> int:
+    """Return APART, CROSSING or UNDECIDED for two triangles of rounded points, each coordinate off by at most `error`.
+
+    **bound.** All differences of two of the six points are at most M = 2 m, m the largest from t1.p. A determinant of
+    three of them is off by at most 11 u P with P <= 6 M^3 for rounding (7 u P as in `orient3d_filter`; some of the
+    differences are rounded twice), 18 e (M + e)^2 for the error (e: twice it), and what underflows (`placement.py`).
     """
-    p2 = orient3d_near(t1.p, t1.q, t1.r, t2.p, error)
-    q2 = orient3d_near(t1.p, t1.q, t1.r, t2.q, error)
-    r2 = orient3d_near(t1.p, t1.q, t1.r, t2.r, error)
+    u, v = minus(t1.q, t1.p), minus(t1.r, t1.p)
+    p2, q2, r2 = minus(t2.p, t1.p), minus(t2.q, t1.p), minus(t2.r, t1.p)
+    m = 2.0 * max(max(size_of(u), size_of(v)), max(size_of(p2), size_of(q2), size_of(r2)))
+    e = 2.0 * error
+    bound = 2.0**-46 * (m * m * m) + 18.5 * e * ((m + e) * (m + e)) + 2.0**-1068 * (1.0 + m)
+    n1 = cross(u, v)
+    a, b, c = dot(n1, p2), dot(n1, q2), dot(n1, r2)
+    if (a > bound and b > bound and c > bound) or (a < -bound and b < -bound and c < -bound):
+        return APART
+    x, y = minus(q2, p2), minus(r2, p2)
+    n2 = cross(x, y)
+    # from t2.p: t1.p - t2.p = -p2
+    d, f, g = -dot(n2, p2), dot(n2, minus(u, p2)), dot(n2, minus(v, p2))
+    if (d > bound and f > bound and g > bound) or (d < -bound and f < -bound and g < -bound):
+        return APART
+    if not (min(abs(a), abs(b), abs(c)) > bound and min(abs(d), abs(f), abs(g)) > bound):
+        return UNDECIDED
+    # the lone vertices first, each above the plane of the other triangle
+    s, t = with_lone_first(t1, d, f, g), with_lone_first(t2, a, b, c)
+    if (d > 0.0) + (f > 0.0) + (g > 0.0) == 2:  # the lone one is below: turn the other triangle over
+        t = Triangle3(t.p, t.r, t.q)
+    if (a > 0.0) + (b > 0.0) + (c > 0.0) == 2:
+        s = Triangle3(s.p, s.r, s.q)
+    from_p = minus(t.p, s.p)
+    first = dot(cross(minus(s.q, s.p), from_p), minus(t.q, s.p))  # orient3d(s.q, t.p, s.p, t.q)
+    second = dot(cross(from_p, minus(s.r, s.p)), minus(t.r, s.p))  # orient3d(s.p, t.p, s.r, t.r)
+    if first > bound or second > bound:
+        return APART
+    if first < -bound and second < -bound:
+        return CROSSING
+    return UNDECIDED
+
+
+# ---- exact ----------------------------------------------------------------------------------------------------------
+
+
+@inline
+def turned(t: PosedTriangle, lone: int) -> PosedTriangle:
+    """Return the triangle with vertex `lone` first, orientation kept."""
+    if lone == 0:
+        return t
+    if lone == 1:
+        return PosedTriangle(t.q, t.r, t.p)
+    return PosedTriangle(t.r, t.p, t.q)
+
+
+@inline
+def classify_exactly(poses: Any, t1: PosedTriangle, t2: PosedTriangle, axis: int, error: float) -> int:
+    """Return the class of two triangles that both have an area; UNDECIDED only where exponents leave the range.
+
+    poses (n, 12), error: as for `orient3d_posed`. axis: a coordinate axis, before its pose, along which the projection
+    of t1 has an area.
+    """
+    p2 = orient3d_posed(poses, t1.p, t1.q, t1.r, t2.p, error)
+    q2 = orient3d_posed(poses, t1.p, t1.q, t1.r, t2.q, error)
+    r2 = orient3d_posed(poses, t1.p, t1.q, t1.r, t2.r, error)
     if is_one_side(p2, q2, r2):
         return APART
-    p1 = orient3d_near(t2.p, t2.q, t2.r, t1.p, error)
-    q1 = orient3d_near(t2.p, t2.q, t2.r, t1.q, error)
-    r1 = orient3d_near(t2.p, t2.q, t2.r, t1.r, error)
+    p1 = orient3d_posed(poses, t2.p, t2.q, t2.r, t1.p, error)
+    q1 = orient3d_posed(poses, t2.p, t2.q, t2.r, t1.q, error)
+    r1 = orient3d_posed(poses, t2.p, t2.q, t2.r, t1.r, error)
     if is_one_side(p1, q1, r1):
         return APART
     if p1 == UNDECIDED or q1 == UNDECIDED or r1 == UNDECIDED:
@@ -106,18 +206,21 @@ def classify_pair(t1: Triangle3, t2: Triangle3, axis: int, error: float) -> int:
     if p2 == UNDECIDED or q2 == UNDECIDED or r2 == UNDECIDED:
         return UNDECIDED
     if p2 == 0 and q2 == 0 and r2 == 0:
-        return classify_coplanar(t1, t2, axis)
+        how = separation(poses, t1, t2, axis, error)
+        if how == UNDECIDED:
+            return UNDECIDED
+        return APART if how == 1 else COPLANAR
     lone1, side1 = lone_vertex(p1, q1, r1)
     lone2, side2 = lone_vertex(p2, q2, r2)
     a, b = turned(t1, lone1), turned(t2, lone2)
     if side1 < 0:  # turn b over: now a.p is above b
-        b = Triangle3(b.p, b.r, b.q)
+        b = PosedTriangle(b.p, b.r, b.q)
     if side2 < 0:
-        a = Triangle3(a.p, a.r, a.q)
-    first = orient3d_near(a.q, b.p, a.p, b.q, error)
+        a = PosedTriangle(a.p, a.r, a.q)
+    first = orient3d_posed(poses, a.q, b.p, a.p, b.q, error)
     if first == 1:
         return APART
-    second = orient3d_near(a.p, b.p, a.r, b.r, error)
+    second = orient3d_posed(poses, a.p, b.p, a.r, b.r, error)
     if second == 1:
         return APART
     if first == UNDECIDED or second == UNDECIDED:
@@ -128,7 +231,7 @@ def classify_pair(t1: Triangle3, t2: Triangle3, axis: int, error: float) -> int:
 
 
 @inline
-def projected(p: Point3, axis: int) -> Point2:
+def projected(p: Any, axis: int) -> Point2:
     """Return the point without one coordinate, the two others in cyclic order."""
     if axis == 0:
         return Point2(p.y, p.z)
@@ -138,59 +241,76 @@ def projected(p: Point3, axis: int) -> Point2:
 
 
 @inline
-def outside_an_edge(a: Point2, b: Point2, c: Point2, d: Point2, e: Point2, f: Point2) -> int:
-    """Return how an edge of the triangle a b c, counter-clockwise, separates it from d e f.
+def beside(t: PosedTriangle, axis: int) -> PosedPoint3:
+    """Return a point off the plane of t: its first corner moved along `axis`, before its pose; maybe not finite."""
+    p, size = t.p, 0.0
+    for k in range(3):
+        a = t.p.x if k == 0 else (t.p.y if k == 1 else t.p.z)
+        b = t.q.x if k == 0 else (t.q.y if k == 1 else t.q.z)
+        c = t.r.x if k == 0 else (t.r.y if k == 1 else t.r.z)
+        size = max(size, abs(b - a), abs(c - a))
+    value = p.x if axis == 0 else (p.y if axis == 1 else p.z)
+    value = 0.5 * value if abs(value) > size else value + size  # either differs from `value`
+    return PosedPoint3(value if axis == 0 else p.x, value if axis == 1 else p.y, value if axis == 2 else p.z, p.pose)
 
-    1: some edge has all of d e f strictly outside; 0: outside or on it; -1: no edge separates; UNDECIDED.
+
+@inline
+def turn_in_plane(
+    poses: Any, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, off: PosedPoint3, axis: int, error: float
+) -> int:
+    """Return how a, b, c of one plane turn; off: a point off that plane. The sense is the same within a question."""
+    if axis >= 0:
+        return orient2d(projected(a, axis), projected(b, axis), projected(c, axis))
+    return orient3d_posed(poses, a, b, off, c, error)
+
+
+@inline
+def outside_an_edge(poses: Any, t: PosedTriangle, u: PosedTriangle, off: PosedPoint3, axis: int, error: float) -> int:
+    """Return how an edge of t separates it from u, both in one plane.
+
+    1: some edge has all of u strictly outside; 0: outside or on it; -1: no edge separates; UNDECIDED.
     """
+    turn = turn_in_plane(poses, t.p, t.q, t.r, off, axis, error)
+    if turn == UNDECIDED:
+        return UNDECIDED
     best = -1
     unsure = False
     for edge in range(3):
         if edge == 0:
-            s, t = a, b
+            s, e = t.p, t.q
         elif edge == 1:
-            s, t = b, c
+            s, e = t.q, t.r
         else:
-            s, t = c, a
-        d_side = orient2d_near(s, t, d, 0.0)
-        e_side = orient2d_near(s, t, e, 0.0)
-        f_side = orient2d_near(s, t, f, 0.0)
-        if d_side == UNDECIDED or e_side == UNDECIDED or f_side == UNDECIDED:
+            s, e = t.r, t.p
+        p_side = turn_in_plane(poses, s, e, u.p, off, axis, error)
+        if p_side == turn:
+            continue
+        q_side = turn_in_plane(poses, s, e, u.q, off, axis, error)
+        if q_side == turn:
+            continue
+        r_side = turn_in_plane(poses, s, e, u.r, off, axis, error)
+        if p_side == UNDECIDED or q_side == UNDECIDED or r_side == UNDECIDED:
             unsure = True
-        elif d_side < 0 and e_side < 0 and f_side < 0:
+        elif p_side == -turn and q_side == -turn and r_side == -turn:
             return 1
-        elif d_side <= 0 and e_side <= 0 and f_side <= 0:
+        elif r_side != turn:
             best = 0
     return UNDECIDED if unsure else best
 
 
 @inline
-def separation(t1: Triangle3, t2: Triangle3, axis: int) -> int:
+def separation(poses: Any, t1: PosedTriangle, t2: PosedTriangle, axis: int, error: float) -> int:
     """Return how two coplanar triangles with area lie: 1 apart, 0 only their borders meet, -1 interiors meet."""
-    a, b, c = projected(t1.p, axis), projected(t1.q, axis), projected(t1.r, axis)
-    d, e, f = projected(t2.p, axis), projected(t2.q, axis), projected(t2.r, axis)
-    turn1, turn2 = orient2d_near(a, b, c, 0.0), orient2d_near(d, e, f, 0.0)
-    if turn1 == UNDECIDED or turn2 == UNDECIDED:
+    off = beside(t1, axis)
+    if not np.isfinite(off.x + off.y + off.z):
         return UNDECIDED
-    if turn1 < 0:
-        b, c = c, b
-    if turn2 < 0:
-        e, f = f, e
-    first = outside_an_edge(a, b, c, d, e, f)
+    flat = axis if (t1.p.pose == UNPOSED and t2.p.pose == UNPOSED) else -1
+    first = outside_an_edge(poses, t1, t2, off, flat, error)
     if first == 1:
         return 1
-    second = outside_an_edge(d, e, f, a, b, c)
+    second = outside_an_edge(poses, t2, t1, off, flat, error)
     if second == 1:
         return 1
     if first == UNDECIDED or second == UNDECIDED:
         return UNDECIDED
     return max(first, second)
-
-
-@inline
-def classify_coplanar(t1: Triangle3, t2: Triangle3, axis: int) -> int:
-    """Return APART, COPLANAR or UNDECIDED for triangles of one plane."""
-    how = separation(t1, t2, axis)
-    if how == UNDECIDED:
-        return UNDECIDED
-    return APART if how == 1 else COPLANAR

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from engine.collision.shell import NO_AREA, UNKNOWN_AXIS, axis_of
-from engine.collision.triangle_triangle import APART, Triangle3, classify_pair
+from engine.collision.triangle_triangle import APART, Triangle3, classify_exactly, classify_near, unposed
 from engine.collision.triangle_triangle_2d import DISJOINT, OPEN, TOUCHING
 from engine.jit import inline, kernel
 from engine.predicates.loading import as_point3
@@ -34,6 +36,7 @@ def are_boxes_apart(t: Triangle3, u: Triangle3) -> bool:
 @kernel
 def relate_triangles_3d(first: Any, second: Any, relations: Any) -> None:
     """Fill relations (n,) int8 for the pairs of rows of two (n, 3, 3) float64 arrays; degenerate ones stay OPEN."""
+    poses = np.zeros((1, 12))  # nothing here has one
     for item in range(relations.shape[0]):
         t, u = as_triangle3(first, item), as_triangle3(second, item)
         relations[item] = OPEN
@@ -43,6 +46,8 @@ def relate_triangles_3d(first: Any, second: Any, relations: Any) -> None:
         axis, other_axis = axis_of(t.p, t.q, t.r), axis_of(u.p, u.q, u.r)
         if axis in (NO_AREA, UNKNOWN_AXIS) or other_axis in (NO_AREA, UNKNOWN_AXIS):
             continue
-        how = classify_pair(t, u, axis, 0.0)
+        how = classify_near(t, u, 0.0)
+        if how == UNDECIDED:
+            how = classify_exactly(poses, unposed(t), unposed(u), axis, 0.0)
         if how != UNDECIDED:
             relations[item] = DISJOINT if how == APART else TOUCHING

@@ -5,28 +5,34 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from engine.bounding.bvh import MAX_DEPTH, Bvh, build_bvh
+from engine.bounding.bvh import EMPTY, MAX_DEPTH, UNUSED, WIDTH, Bvh, build_bvh
 
 
 def check_tree(boxes: np.ndarray, tree: Bvh) -> None:
-    found, waiting = [], [(0, 0)]
+    """Every item once, within the box of its lane and of every lane above it."""
+    found, waiting = [], [(0, 0, [])]
     while waiting:
-        node, depth = waiting.pop()
+        node, depth, above = waiting.pop()
         assert depth < MAX_DEPTH
-        child = tree.child[node]
-        if child < 0:
+        assert tree.child[node, 0] != EMPTY
+        for lane in range(WIDTH):
+            child = tree.child[node, lane]
+            half = tree.boxes[node, 3:, lane].astype(float)
+            if child == EMPTY:
+                assert (half == UNUSED).all()
+                continue
+            around = [*above, (tree.boxes[node, :3, lane].astype(float), half)]
+            assert (child < 0) == (tree.child[node, 0] < 0)
+            if child >= 0:
+                assert child > node
+                waiting.append((int(child), depth + 1, around))
+                continue
             found.append(-1 - child)
-            assert np.array_equal(tree.boxes[node], boxes[-1 - child])
-            continue
-        assert child > node
-        union = np.concatenate(
-            [
-                np.minimum(tree.boxes[child, :3], tree.boxes[child + 1, :3]),
-                np.maximum(tree.boxes[child, 3:], tree.boxes[child + 1, 3:]),
-            ]
-        )
-        assert np.array_equal(union, tree.boxes[node])
-        waiting += [(child, depth + 1), (child + 1, depth + 1)]
+            with np.errstate(all="ignore"):
+                low, high = ((end / tree.scale - tree.origin / tree.scale) for end in np.split(boxes[-1 - child], 2))
+            for centre, half in around:
+                assert (centre - half <= low).all()
+                assert (high <= centre + half).all()
     assert sorted(found) == list(range(len(boxes)))
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from engine.collision.exact_triangles import classify_exact, kind_of_contact
 from engine.collision.placement import orient3d_near
-from engine.collision.triangle_triangle import APART, CONTACT, COPLANAR, CROSSING, Triangle3, classify_pair
+from engine.collision.triangle_triangle import APART, CONTACT, COPLANAR, CROSSING, Triangle3, classify_exactly, unposed
 from engine.jit import kernel
 from engine.predicates.loading import as_point3
 from engine.types import UNDECIDED
@@ -21,12 +21,13 @@ Corners = tuple[tuple[int, int, int], ...]
 
 
 @kernel
-def classify_batch(first: Any, second: Any, axes: Any, error: float, kinds: Any) -> None:
+def classify_batch(first: Any, second: Any, axes: Any, kinds: Any) -> None:
+    poses = np.zeros((1, 12))
     for item in range(kinds.shape[0]):
         a, b = first[item], second[item]
         t1 = Triangle3(as_point3(a, 0), as_point3(a, 1), as_point3(a, 2))
         t2 = Triangle3(as_point3(b, 0), as_point3(b, 1), as_point3(b, 2))
-        kinds[item] = classify_pair(t1, t2, axes[item], error)
+        kinds[item] = classify_exactly(poses, unposed(t1), unposed(t2), axes[item], 0.0)
 
 
 @kernel
@@ -65,7 +66,7 @@ def test_compiled_exact_and_reference_agree_on_a_lattice() -> None:
     have_area = (axes >= 0) & (axes_of(second) >= 0)
     kinds = np.full(len(first), UNDECIDED, np.int8)
     compiled = np.empty(int(have_area.sum()), np.int8)
-    classify_batch(first[have_area], second[have_area], axes[have_area], 0.0, compiled)
+    classify_batch(first[have_area], second[have_area], axes[have_area], compiled)
     kinds[have_area] = compiled
     for a, b, kind, area in zip(first, second, kinds, have_area, strict=True):
         t1, t2 = as_corners(a), as_corners(b)
