@@ -8,12 +8,14 @@ where R_a' stands for the inverse of R_a. **margin.** The transpose is used inst
 |R' R - I|, it is off by 3.1 defect relative to the vector it turns. Float64 rounding is below 2^-46 of the same
 magnitudes, rounding to float32 and the sums of `meeting` below 2^-19 of the numbers there, which are at most 2 + 3.5
 s_b / s_a + |T|. Where scales differ by more than 2^60 the axes of the smaller body are left out: nothing is apart on
-them.
+them; so are those of a map that is not finite.
 """
 
 from __future__ import annotations
 
 from typing import Any
+
+import numpy as np
 
 from engine.collision.placement import Placement
 from engine.jit import inline
@@ -21,7 +23,8 @@ from engine.types import Point3
 
 WIDEST_RATIO = 2.0**60
 WIDEST_MARGIN = 1e15
-NEVER_APART = 1e30
+NEVER_APART = 1e20
+"""Margin of a map that is left out: far above all boxes, far below `bvh.UNUSED`, which stays apart from everything."""
 
 
 @inline
@@ -76,9 +79,9 @@ def set_frame(
     a_reach = max(abs(a_origin[0]), abs(a_origin[1]), abs(a_origin[2]))
     sizes = (a_reach + largest(origin) + largest(shift)) / a_scale + 2.0 + 2.0 * ratio
     margin = 2.0**-19 * (2.0 + 3.5 * ratio + largest(t)) + (32.0 * defect + 2.0**-46) * sizes
-    if not (ratio <= WIDEST_RATIO and margin <= WIDEST_MARGIN):
+    if not (ratio <= WIDEST_RATIO and margin <= WIDEST_MARGIN and np.isfinite(t.x + t.y + t.z)):
         for row in range(21):
-            frame[row, :] = 0.0
+            frame[row, :] = 1.0 if 9 <= row < 18 else 0.0
         frame[21, :] = NEVER_APART
         return False
     for k in range(3):

@@ -100,6 +100,8 @@ def locate_point(own: OwnPoint, shell: ShellArrays) -> int:
     q, error = own.point, own.error
     local = in_tree(shell, q)
     slack = SLACK + error / shell.scale
+    if not (slack < 1.0 and np.isfinite(local.x + local.y + local.z)):  # case: the ends of the exponent range
+        return UNDECIDED
     if largest(local) > 4.0 + slack:
         return OUTSIDE
     low = (np.float32(local.x - slack), np.float32(local.y - slack), np.float32(local.z - slack))
