@@ -77,7 +77,7 @@ def segments_of(kind: str, region: engine.Solid, n: int, seed: int) -> np.ndarra
         return draw.uniform(-2.0, 2.0, (n, 2, dim))
     if kind == "ulp":
         ends = draw.integers(-4, 5, (n, 2, dim)) * 0.5
-        return ends + draw.integers(-4, 5, ends.shape) * np.spacing(ends)
+        return ends + draw.integers(-4, 5, ends.shape) * np.spacing(np.maximum(np.abs(ends), 0.5))
     targets = draw.choice([-1.0, 1.0], (n, dim))
     if kind == "edge":
         targets[np.arange(n), draw.integers(0, dim, n)] = draw.uniform(-1.0, 1.0, n)

@@ -65,10 +65,10 @@ def plane_value(low: Any, high: Any, plane: int) -> float:
 
 
 @inline
-def compare_planes(segment: Any, low: Any, high: Any, i: int, j: int) -> tuple[int, bool]:
-    """Return the sign of t_i - t_j for two planes that `segment` meets, and whether the filter sufficed."""
-    p_i, q_i, c_i = segment[0, i >> 1], segment[1, i >> 1], plane_value(low, high, i)
-    p_j, q_j, c_j = segment[0, j >> 1], segment[1, j >> 1], plane_value(low, high, j)
+def compare_planes(segments: Any, item: int, low: Any, high: Any, i: int, j: int) -> tuple[int, bool]:
+    """Return the sign of t_i - t_j for two planes that a segment meets, and whether the filter sufficed."""
+    p_i, q_i, c_i = segments[item, 0, i >> 1], segments[item, 1, i >> 1], plane_value(low, high, i)
+    p_j, q_j, c_j = segments[item, 0, j >> 1], segments[item, 1, j >> 1], plane_value(low, high, j)
     # n and d of one plane have one sign, so absolute values keep the ratio and make the products comparable
     order = compare_differences_filter(abs(c_i - p_i), abs(q_j - p_j), abs(c_j - p_j), abs(q_i - p_i))
     if order != UNDECIDED:
@@ -81,33 +81,33 @@ def compare_planes(segment: Any, low: Any, high: Any, i: int, j: int) -> tuple[i
 
 
 @inline
-def decide_crossing(segment: Any, low: Any, high: Any) -> tuple[int, int, int, bool]:
+def decide_crossing(segments: Any, item: int, low: Any, high: Any) -> tuple[int, int, int, bool]:
     """Decide on a segment whose outcodes share no bit: state, plane entered, plane left, whether filters sufficed."""
     entered = left = -1
     filtered = True
     for axis in range(low.size):
-        plane = plane_outside(segment[0, axis], low[axis], high[axis], axis)
+        plane = plane_outside(segments[item, 0, axis], low[axis], high[axis], axis)
         if plane >= 0:
             order, by_filter = 1, True
             if entered >= 0:
-                order, by_filter = compare_planes(segment, low, high, plane, entered)
+                order, by_filter = compare_planes(segments, item, low, high, plane, entered)
             if order == UNDECIDED:
                 return OPEN, -1, -1, False
             filtered = filtered and by_filter
             if order > 0:  # equal: the smaller plane stays
                 entered = plane
-        plane = plane_outside(segment[1, axis], low[axis], high[axis], axis)
+        plane = plane_outside(segments[item, 1, axis], low[axis], high[axis], axis)
         if plane >= 0:
             order, by_filter = -1, True
             if left >= 0:
-                order, by_filter = compare_planes(segment, low, high, plane, left)
+                order, by_filter = compare_planes(segments, item, low, high, plane, left)
             if order == UNDECIDED:
                 return OPEN, -1, -1, False
             filtered = filtered and by_filter
             if order < 0:
                 left = plane
     if entered >= 0 and left >= 0:
-        order, by_filter = compare_planes(segment, low, high, entered, left)
+        order, by_filter = compare_planes(segments, item, low, high, entered, left)
         if order == UNDECIDED:
             return OPEN, -1, -1, False
         filtered = filtered and by_filter
@@ -167,7 +167,7 @@ def decide_on_boxes_2d(
                 sure = sure and abs(c - d) > T_GAP * end + T_TINY
                 left = (0 + (qx > x1)) if c == end else 2 + (qy > y1)
         if not sure:
-            state, entered, left, filtered = decide_crossing(segments[i], low, high)
+            state, entered, left, filtered = decide_crossing(segments, i, low, high)
             if not filtered:
                 beyond += 1
             if state == OPEN:
@@ -220,7 +220,7 @@ def decide_on_boxes_3d(
                 sure = sure and second - end > T_GAP * end + T_TINY
                 left = (0 + (qx > x1)) if d == end else ((2 + (qy > y1)) if e == end else 4 + (qz > z1))
         if not sure:
-            state, entered, left, filtered = decide_crossing(segments[i], low, high)
+            state, entered, left, filtered = decide_crossing(segments, i, low, high)
             if not filtered:
                 beyond += 1
             if state == OPEN:
@@ -301,10 +301,9 @@ def fill_on_boxes_2d(
         for side in range(2):
             plane = planes[row, side]
             faces[row, side] = plane
-            point = ends[side]
             if plane < 0:
                 t[row, side] = side
-                point[row, 0], point[row, 1] = segments[i, side, 0] + 0.0, segments[i, side, 1] + 0.0
+                ends[side, row, 0], ends[side, row, 1] = segments[i, side, 0] + 0.0, segments[i, side, 1] + 0.0
                 continue
             at = plane_value(low, high, plane)
             if plane < 2:
@@ -318,10 +317,10 @@ def fill_on_boxes_2d(
             bound = T_BOUND * th
             if sure & is_x & is_y & (th + (tl - bound) == th + (tl + bound)):
                 t[row, side] = th + tl
-                point[row, 0], point[row, 1] = x + 0.0, y + 0.0
+                ends[side, row, 0], ends[side, row, 1] = x + 0.0, y + 0.0
             else:
                 tried = False
-                t[row, side], sure = cut_by_signs(segments[i], low, high, plane, point[row])
+                t[row, side], sure = cut_by_signs(segments[i], low, high, plane, ends[side, row])
                 all_sure = all_sure and sure
         if not tried:
             beyond += 1
@@ -359,11 +358,10 @@ def fill_on_boxes_3d(
         for side in range(2):
             plane = planes[row, side]
             faces[row, side] = plane
-            point = ends[side]
             if plane < 0:
                 t[row, side] = side
-                point[row, 0], point[row, 1] = segments[i, side, 0] + 0.0, segments[i, side, 1] + 0.0
-                point[row, 2] = segments[i, side, 2] + 0.0
+                ends[side, row, 0], ends[side, row, 1] = segments[i, side, 0] + 0.0, segments[i, side, 1] + 0.0
+                ends[side, row, 2] = segments[i, side, 2] + 0.0
                 continue
             axis, at = plane >> 1, plane_value(low, high, plane)
             j, k = AFTER[axis], AFTER[axis + 1]
@@ -373,10 +371,10 @@ def fill_on_boxes_3d(
             bound = T_BOUND * th
             if sure & is_x & is_y & (th + (tl - bound) == th + (tl + bound)):
                 t[row, side] = th + tl
-                point[row, axis], point[row, j], point[row, k] = at, x + 0.0, y + 0.0
+                ends[side, row, axis], ends[side, row, j], ends[side, row, k] = at, x + 0.0, y + 0.0
             else:
                 tried = False
-                t[row, side], sure = cut_by_signs(segments[i], low, high, plane, point[row])
+                t[row, side], sure = cut_by_signs(segments[i], low, high, plane, ends[side, row])
                 all_sure = all_sure and sure
         if not tried:
             beyond += 1

@@ -40,15 +40,18 @@ VALUE_TINY: Final = 2.0**-1070
 DD_VALUE_BOUND: Final = 32.0 * U2
 """Bound of a plane value in double-double: exact products and sums, whose tails, together below 4 u of the sum of
 absolute terms, are added up with six roundings."""
-BLOCK: Final = 64
-"""Planes whose values are taken before any is looked at."""
 T_ROUNDINGS: Final = 8.0 * 2.0**-53
 """Of a parameter in doubles, beside the bounds of its plane values."""
 
 
 def as_columns(rows: FloatArray) -> FloatArray:
-    """Return plane rows (m, dim + 1) as columns (dim + 2, m), the last one the sum of absolute normal components."""
-    columns = np.ascontiguousarray(np.vstack([rows.T, np.abs(rows[:, :-1]).sum(axis=1)]))
+    """Return plane rows (m, dim + 1) as columns (dim + 3, m).
+
+    The last two bound the error of a value in doubles: times the largest coordinate, and by themselves.
+    """
+    with np.errstate(all="ignore"):  # what overflows bounds nothing, and is left to exact arithmetic
+        slope = VALUE_BOUND * np.abs(rows[:, :-1]).sum(axis=1)
+        columns = np.ascontiguousarray(np.vstack([rows.T, slope, VALUE_BOUND * np.abs(rows[:, -1]) + VALUE_TINY]))
     columns.setflags(write=False)
     return columns
 
@@ -89,27 +92,27 @@ def exact_order(row_i: Any, row_j: Any, segment: Any) -> int:
 
 
 @inline
-def dd_value_2d(row: Any, x: float, y: float) -> tuple[float, float, float]:
+def dd_value_2d(a: float, b: float, d: float, x: float, y: float) -> tuple[float, float, float]:
     """Return the value of a row at a point as an unevaluated sum of two doubles and a bound of its error."""
-    ah, al = two_prod(row[0], x)
-    bh, bl = two_prod(row[1], y)
+    ah, al = two_prod(a, x)
+    bh, bl = two_prod(b, y)
     h, first = two_sum(ah, bh)
-    h, second = two_sum(h, row[2])
-    bound = DD_VALUE_BOUND * (abs(ah) + abs(bh) + abs(row[2])) + VALUE_TINY
+    h, second = two_sum(h, d)
+    bound = DD_VALUE_BOUND * (abs(ah) + abs(bh) + abs(d)) + VALUE_TINY
     h, low = two_sum(h, (al + bl) + (first + second))
     return h, low, bound
 
 
 @inline
-def dd_value_3d(row: Any, x: float, y: float, z: float) -> tuple[float, float, float]:
+def dd_value_3d(a: float, b: float, c: float, d: float, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Return the value of a row at a point: see `dd_value_2d`."""
-    ah, al = two_prod(row[0], x)
-    bh, bl = two_prod(row[1], y)
-    ch, cl = two_prod(row[2], z)
+    ah, al = two_prod(a, x)
+    bh, bl = two_prod(b, y)
+    ch, cl = two_prod(c, z)
     h, first = two_sum(ah, bh)
     h, second = two_sum(h, ch)
-    h, third = two_sum(h, row[3])
-    bound = DD_VALUE_BOUND * (abs(ah) + abs(bh) + abs(ch) + abs(row[3])) + VALUE_TINY
+    h, third = two_sum(h, d)
+    bound = DD_VALUE_BOUND * (abs(ah) + abs(bh) + abs(ch) + abs(d)) + VALUE_TINY
     h, low = two_sum(h, (al + bl) + (cl + first) + (second + third))
     return h, low, bound
 
@@ -155,19 +158,18 @@ def decide_by_rows(
 ) -> tuple[int, int, int, int]:
     """Decide on one segment by the n `chosen` planes: state, plane entered, plane left, 1 where filters did not do.
 
-    s_p, s_q, bounds: of each plane the values at both ends and their bound. An item with an
+    s_p, s_q, bounds: of each of them the values at both ends and their bound. An item with an
     open sign or order outside of the safe range is left open.
     """
     entered = left = -1
     beyond, checked = 0, False
-    for i_chosen in range(n):
-        i = chosen[i_chosen]
+    for i in range(n):
         sign_p = 1 if s_p[i] > bounds[i] else (-1 if -s_p[i] > bounds[i] else UNDECIDED)
         sign_q = 1 if s_q[i] > bounds[i] else (-1 if -s_q[i] > bounds[i] else UNDECIDED)
         if sign_p == UNDECIDED or sign_q == UNDECIDED:
             beyond = 1
             checked = checked or is_segment_safe(segment)
-            row = columns[:-1, i]
+            row = columns[:-2, chosen[i]]
             if not (checked and is_row_safe(row)):
                 return OPEN, -1, -1, 1
             if sign_p == UNDECIDED:
@@ -180,7 +182,7 @@ def decide_by_rows(
             return DROPPED, -1, -1, beyond
         other = entered if sign_p < 0 else left
         if other >= 0:
-            order, by_filter = compare_rows(segment, columns, s_p, s_q, bounds, i, other)
+            order, by_filter = compare_rows(segment, columns, s_p, s_q, bounds, chosen, i, other)
             beyond = beyond if by_filter else 1
             if order == UNDECIDED:
                 return OPEN, -1, -1, 1
@@ -189,7 +191,7 @@ def decide_by_rows(
         elif sign_p >= 0 and (other < 0 or order < 0):
             left = i
     if entered >= 0 and left >= 0:
-        order, by_filter = compare_rows(segment, columns, s_p, s_q, bounds, entered, left)
+        order, by_filter = compare_rows(segment, columns, s_p, s_q, bounds, chosen, entered, left)
         beyond = beyond if by_filter else 1
         if order == UNDECIDED:
             return OPEN, -1, -1, 1
@@ -199,12 +201,14 @@ def decide_by_rows(
 
 
 @inline
-def compare_rows(segment: Any, columns: Any, s_p: Any, s_q: Any, bounds: Any, i: int, j: int) -> tuple[int, bool]:
+def compare_rows(
+    segment: Any, columns: Any, s_p: Any, s_q: Any, bounds: Any, chosen: Any, i: int, j: int
+) -> tuple[int, bool]:
     """Return the sign of t_i - t_j for two planes that `segment` crosses, and whether the filter sufficed."""
     order = compare_ratios_filter(s_p[i], bounds[i], s_q[j], bounds[j], s_p[j], bounds[j], s_q[i], bounds[i])
     if order != UNDECIDED:
         return order, True
-    row_i, row_j = columns[:-1, i], columns[:-1, j]
+    row_i, row_j = columns[:-2, chosen[i]], columns[:-2, chosen[j]]
     if not (is_segment_safe(segment) and is_row_safe(row_i) and is_row_safe(row_j)):
         return UNDECIDED, False
     return exact_order(row_i, row_j, segment), False
@@ -219,8 +223,7 @@ def decide_by_parameters(s_p: Any, s_q: Any, bounds: Any, chosen: Any, n: int) -
     entered = left = -1
     start, start_slack, start_rival = -1.0, 0.0, -1.0  # the last plane entered, the next to last at its latest
     end, end_slack, end_rival = 2.0, 0.0, 2.0  # the first plane left, the second at its earliest
-    for i_chosen in range(n):
-        i = chosen[i_chosen]
+    for i in range(n):
         p, q, bound = s_p[i], s_q[i], bounds[i]
         if not (abs(p) > bound and abs(q) > bound):
             return OPEN, -1, -1
@@ -255,7 +258,8 @@ def decide_on_rows_2d(
 
     Outputs: see `decide_on_boxes_2d`.
     """
-    a, b, d, size = columns[0], columns[1], columns[2], columns[3]
+    a, b, d = columns[0], columns[1], columns[2]
+    slopes, floors = columns[3], columns[4]
     m = d.size
     s_p, s_q, bounds, chosen = np.empty(m), np.empty(m), np.empty(m), np.empty(m, np.int64)
     kept, n_open, beyond = first, first, 0
@@ -268,22 +272,19 @@ def decide_on_rows_2d(
             continue
         most = max(abs(px), abs(py), abs(qx), abs(qy))
         n_chosen, is_out = 0, False
-        for begin in range(0, m, BLOCK):
-            if stop[0]:
-                return
-            n_out, until = 0, min(m, begin + BLOCK)
-            for j in range(begin, until):
-                p = a[j] * px + b[j] * py + d[j]
-                q = a[j] * qx + b[j] * qy + d[j]
-                bound = VALUE_BOUND * (size[j] * most + abs(d[j])) + VALUE_TINY
-                s_p[j], s_q[j], bounds[j] = p, q, bound
-                n_out += (p < -bound) & (q < -bound)
-            if n_out:
+        for j in range(m):
+            p = a[j] * px + b[j] * py + d[j]
+            q = a[j] * qx + b[j] * qy + d[j]
+            bound = slopes[j] * most + floors[j]
+            if min(p, q) > bound:
+                continue
+            if max(p, q) < -bound:
                 is_out = True
                 break
-            for j in range(begin, until):
-                chosen[n_chosen] = j
-                n_chosen += not ((s_p[j] > bounds[j]) & (s_q[j] > bounds[j]))
+            s_p[n_chosen], s_q[n_chosen], bounds[n_chosen], chosen[n_chosen] = p, q, bound, j
+            n_chosen += 1
+            if stop[0]:
+                return
         if is_out:
             continue
         state, entered, left = decide_by_parameters(s_p, s_q, bounds, chosen, n_chosen)
@@ -295,7 +296,9 @@ def decide_on_rows_2d(
             n_open += 1
         if state != KEPT:
             continue
-        items[kept], planes[kept, 0], planes[kept, 1] = i, entered, left
+        items[kept] = i
+        planes[kept, 0] = chosen[entered] if entered >= 0 else -1
+        planes[kept, 1] = chosen[left] if left >= 0 else -1
         kept += 1
     n[0], n[1], n[2] = kept - first, n_open - first, beyond
 
@@ -308,7 +311,8 @@ def decide_on_rows_3d(
 
     Outputs: see `decide_on_boxes_2d`.
     """
-    a, b, c, d, size = columns[0], columns[1], columns[2], columns[3], columns[4]
+    a, b, c, d = columns[0], columns[1], columns[2], columns[3]
+    slopes, floors = columns[4], columns[5]
     m = d.size
     s_p, s_q, bounds, chosen = np.empty(m), np.empty(m), np.empty(m), np.empty(m, np.int64)
     kept, n_open, beyond = first, first, 0
@@ -321,22 +325,19 @@ def decide_on_rows_3d(
             continue
         most = max(abs(px), abs(py), abs(pz), abs(qx), abs(qy), abs(qz))
         n_chosen, is_out = 0, False
-        for begin in range(0, m, BLOCK):
-            if stop[0]:
-                return
-            n_out, until = 0, min(m, begin + BLOCK)
-            for j in range(begin, until):
-                p = a[j] * px + b[j] * py + c[j] * pz + d[j]
-                q = a[j] * qx + b[j] * qy + c[j] * qz + d[j]
-                bound = VALUE_BOUND * (size[j] * most + abs(d[j])) + VALUE_TINY
-                s_p[j], s_q[j], bounds[j] = p, q, bound
-                n_out += (p < -bound) & (q < -bound)
-            if n_out:
+        for j in range(m):
+            p = a[j] * px + b[j] * py + c[j] * pz + d[j]
+            q = a[j] * qx + b[j] * qy + c[j] * qz + d[j]
+            bound = slopes[j] * most + floors[j]
+            if min(p, q) > bound:
+                continue
+            if max(p, q) < -bound:
                 is_out = True
                 break
-            for j in range(begin, until):
-                chosen[n_chosen] = j
-                n_chosen += not ((s_p[j] > bounds[j]) & (s_q[j] > bounds[j]))
+            s_p[n_chosen], s_q[n_chosen], bounds[n_chosen], chosen[n_chosen] = p, q, bound, j
+            n_chosen += 1
+            if stop[0]:
+                return
         if is_out:
             continue
         state, entered, left = decide_by_parameters(s_p, s_q, bounds, chosen, n_chosen)
@@ -348,7 +349,9 @@ def decide_on_rows_3d(
             n_open += 1
         if state != KEPT:
             continue
-        items[kept], planes[kept, 0], planes[kept, 1] = i, entered, left
+        items[kept] = i
+        planes[kept, 0] = chosen[entered] if entered >= 0 else -1
+        planes[kept, 1] = chosen[left] if left >= 0 else -1
         kept += 1
     n[0], n[1], n[2] = kept - first, n_open - first, beyond
 
@@ -407,25 +410,26 @@ def fill_on_rows_2d(
         for side in range(2):
             plane = planes[row, side]
             faces[row, side] = plane
-            point = ends[side]
             if plane < 0:
                 t[row, side] = side
-                point[row, 0], point[row, 1] = (
+                ends[side, row, 0], ends[side, row, 1] = (
                     segments[i, side, 0] + 0.0,
                     segments[i, side, 1] + 0.0,
                 )
                 continue
-            at = columns[:-1, plane]
-            th, tl, slack, sure = parameter_of(dd_value_2d(at, px, py), dd_value_2d(at, qx, qy))
+            th, tl, slack, sure = parameter_of(
+                dd_value_2d(columns[0, plane], columns[1, plane], columns[2, plane], px, py),
+                dd_value_2d(columns[0, plane], columns[1, plane], columns[2, plane], qx, qy),
+            )
             x, is_x = point_at(px, qx, th, tl, slack)
             y, is_y = point_at(py, qy, th, tl, slack)
             bound = (T_BOUND + slack) * th
             if sure & is_x & is_y & (th + (tl - bound) == th + (tl + bound)):
                 t[row, side] = th + tl
-                point[row, 0], point[row, 1] = x + 0.0, y + 0.0
+                ends[side, row, 0], ends[side, row, 1] = x + 0.0, y + 0.0
             else:
                 tried = False
-                t[row, side], sure = cut_by_signs(at, segments[i], point[row])
+                t[row, side], sure = cut_by_signs(columns[:-2, plane], segments[i], ends[side, row])
                 all_sure = all_sure and sure
         if not tried:
             beyond += 1
@@ -464,27 +468,28 @@ def fill_on_rows_3d(
         for side in range(2):
             plane = planes[row, side]
             faces[row, side] = plane
-            point = ends[side]
             if plane < 0:
                 t[row, side] = side
-                point[row, 0], point[row, 1], point[row, 2] = (
+                ends[side, row, 0], ends[side, row, 1], ends[side, row, 2] = (
                     segments[i, side, 0] + 0.0,
                     segments[i, side, 1] + 0.0,
                     segments[i, side, 2] + 0.0,
                 )
                 continue
-            at = columns[:-1, plane]
-            th, tl, slack, sure = parameter_of(dd_value_3d(at, px, py, pz), dd_value_3d(at, qx, qy, qz))
+            th, tl, slack, sure = parameter_of(
+                dd_value_3d(columns[0, plane], columns[1, plane], columns[2, plane], columns[3, plane], px, py, pz),
+                dd_value_3d(columns[0, plane], columns[1, plane], columns[2, plane], columns[3, plane], qx, qy, qz),
+            )
             x, is_x = point_at(px, qx, th, tl, slack)
             y, is_y = point_at(py, qy, th, tl, slack)
             z, is_z = point_at(pz, qz, th, tl, slack)
             bound = (T_BOUND + slack) * th
             if sure & is_x & is_y & is_z & (th + (tl - bound) == th + (tl + bound)):
                 t[row, side] = th + tl
-                point[row, 0], point[row, 1], point[row, 2] = x + 0.0, y + 0.0, z + 0.0
+                ends[side, row, 0], ends[side, row, 1], ends[side, row, 2] = x + 0.0, y + 0.0, z + 0.0
             else:
                 tried = False
-                t[row, side], sure = cut_by_signs(at, segments[i], point[row])
+                t[row, side], sure = cut_by_signs(columns[:-2, plane], segments[i], ends[side, row])
                 all_sure = all_sure and sure
         if not tried:
             beyond += 1

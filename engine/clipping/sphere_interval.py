@@ -279,13 +279,13 @@ def coordinate_at(p: float, q: float, t: float, step: float, slack: float) -> tu
 
 
 @inline
-def newton_step_2d(segment: Any, center: Any, radius: float, t: float, side: int) -> tuple[float, float, bool]:
+def newton_step_2d(segments: Any, i: int, center: Any, radius: float, t: float, side: int) -> tuple[float, float, bool]:
     """Return the step from `t` to the root where the ball is entered (side 0) or left, its bound, and if that holds.
 
     Caller guarantees that there are roots. With the sign of F' that the root has, it is at most 2 |F / F'| away.
     """
-    x, xl, x_size, dx = place_on(segment[0, 0], segment[1, 0], center[0], t)
-    y, yl, y_size, dy = place_on(segment[0, 1], segment[1, 1], center[1], t)
+    x, xl, x_size, dx = place_on(segments[i, 0, 0], segments[i, 1, 0], center[0], t)
+    y, yl, y_size, dy = place_on(segments[i, 0, 1], segments[i, 1, 1], center[1], t)
     h, low = two_prod(-radius, radius)
     size = -h
     sh, sl = dd_mul(x, xl, x, xl)
@@ -333,10 +333,9 @@ def fill_on_sphere_2d(
         for side in range(2):
             plane = planes[row, side]
             faces[row, side] = plane
-            point = ends[side]
             if plane < 0:
                 t[row, side] = side
-                point[row, 0], point[row, 1] = (
+                ends[side, row, 0], ends[side, row, 1] = (
                     segments[i, side, 0] + 0.0,
                     segments[i, side, 1] + 0.0,
                 )
@@ -353,14 +352,14 @@ def fill_on_sphere_2d(
                 rr,
                 side,
             )
-            step, slack, sure = newton_step_2d(segments[i], center, radius, guess, side)
+            step, slack, sure = newton_step_2d(segments, i, center, radius, guess, side)
             t[row, side] = guess + step + 0.0
             sure = sure & (guess + (step - slack) == guess + (step + slack))
             at, is_sure = coordinate_at(segments[i, 0, 0], segments[i, 1, 0], guess, step, slack)
-            point[row, 0] = at + 0.0
+            ends[side, row, 0] = at + 0.0
             sure = sure & is_sure
             at, is_sure = coordinate_at(segments[i, 0, 1], segments[i, 1, 1], guess, step, slack)
-            point[row, 1] = at + 0.0
+            ends[side, row, 1] = at + 0.0
             sure = sure & is_sure
             all_sure = all_sure and sure
         if not all_sure:
@@ -370,14 +369,14 @@ def fill_on_sphere_2d(
 
 
 @inline
-def newton_step_3d(segment: Any, center: Any, radius: float, t: float, side: int) -> tuple[float, float, bool]:
+def newton_step_3d(segments: Any, i: int, center: Any, radius: float, t: float, side: int) -> tuple[float, float, bool]:
     """Return the step from `t` to the root where the ball is entered (side 0) or left, its bound, and if that holds.
 
     Caller guarantees that there are roots. With the sign of F' that the root has, it is at most 2 |F / F'| away.
     """
-    x, xl, x_size, dx = place_on(segment[0, 0], segment[1, 0], center[0], t)
-    y, yl, y_size, dy = place_on(segment[0, 1], segment[1, 1], center[1], t)
-    z, zl, z_size, dz = place_on(segment[0, 2], segment[1, 2], center[2], t)
+    x, xl, x_size, dx = place_on(segments[i, 0, 0], segments[i, 1, 0], center[0], t)
+    y, yl, y_size, dy = place_on(segments[i, 0, 1], segments[i, 1, 1], center[1], t)
+    z, zl, z_size, dz = place_on(segments[i, 0, 2], segments[i, 1, 2], center[2], t)
     h, low = two_prod(-radius, radius)
     size = -h
     sh, sl = dd_mul(x, xl, x, xl)
@@ -427,10 +426,9 @@ def fill_on_sphere_3d(
         for side in range(2):
             plane = planes[row, side]
             faces[row, side] = plane
-            point = ends[side]
             if plane < 0:
                 t[row, side] = side
-                point[row, 0], point[row, 1], point[row, 2] = (
+                ends[side, row, 0], ends[side, row, 1], ends[side, row, 2] = (
                     segments[i, side, 0] + 0.0,
                     segments[i, side, 1] + 0.0,
                     segments[i, side, 2] + 0.0,
@@ -449,17 +447,17 @@ def fill_on_sphere_3d(
                 rr,
                 side,
             )
-            step, slack, sure = newton_step_3d(segments[i], center, radius, guess, side)
+            step, slack, sure = newton_step_3d(segments, i, center, radius, guess, side)
             t[row, side] = guess + step + 0.0
             sure = sure & (guess + (step - slack) == guess + (step + slack))
             at, is_sure = coordinate_at(segments[i, 0, 0], segments[i, 1, 0], guess, step, slack)
-            point[row, 0] = at + 0.0
+            ends[side, row, 0] = at + 0.0
             sure = sure & is_sure
             at, is_sure = coordinate_at(segments[i, 0, 1], segments[i, 1, 1], guess, step, slack)
-            point[row, 1] = at + 0.0
+            ends[side, row, 1] = at + 0.0
             sure = sure & is_sure
             at, is_sure = coordinate_at(segments[i, 0, 2], segments[i, 1, 2], guess, step, slack)
-            point[row, 2] = at + 0.0
+            ends[side, row, 2] = at + 0.0
             sure = sure & is_sure
             all_sure = all_sure and sure
         if not all_sure:

@@ -29,6 +29,10 @@ Each product carries (1 + u)^3, its comparison one more rounding of the differen
 8 u leaves room for the rounding of the bound itself.
 """
 
+EXACT_DIFFERENCES: Final = 24.0 * 2.0**-106
+"""Bound of the second stage, whose leading products are exact: four products of a tail, below u of a product each, are
+rounded once, and six sums of such terms."""
+
 TINY: Final = 2.0**-1000
 """Added to the bound: covers products that underflow, so that the filter is safe for every finite input."""
 
@@ -82,6 +86,12 @@ def compare_differences(
         if left != right:
             return 1 if left > right else -1
         return 0 if left_tail == right_tail else (1 if left_tail > right_tail else -1)
+    left, left_tail = two_prod(ah, bh)
+    right, right_tail = two_prod(ch, dh)
+    gap, gap_tail = two_diff(left, right)
+    gap += gap_tail + ((left_tail - right_tail) + ((ah * bl + al * bh) - (ch * dl + cl * dh)))
+    if abs(gap) > EXACT_DIFFERENCES * (abs(left) + abs(right)) + TINY:
+        return 1 if gap > 0.0 else -1
     n = grow_product(e, 0, al, bl)
     n = grow_product(e, n, -cl, dl)
     n = grow_product(e, n, ah, bl)
