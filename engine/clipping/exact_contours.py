@@ -97,6 +97,7 @@ def clip_polygon(
                 contours[i_contour], met, dropped = clip_contour(contour, row)
                 n_contacts, has_dropped = n_contacts + met, has_dropped or dropped
         may_have_bridges = may_have_bridges or (has_dropped and n_contacts > 2)
+    may_have_bridges = may_have_bridges and any(contours)
     return [[[nearest(x, vertex[-1]) for x in vertex[:-1]] for vertex in contour] for contour in contours], (
         may_have_bridges
     )

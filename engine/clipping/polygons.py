@@ -125,8 +125,8 @@ def clip_polygons(
         that merely round to the same doubles are not. Spikes, repeated and self-crossing contours are clipped as they
         are.
     Bridges
-        `may_have_bridges` is False only where no bridge is possible: at each plane that dropped a vertex, all contours
-        of the polygon together met the plane in at most two points (vertices on it, edges through it).
+        `may_have_bridges` is False only where no bridge is possible: nothing is left, or at each plane that dropped a
+        vertex all contours of the polygon together met the plane in at most two points (vertices on it, edges through).
     Accuracy
         Decisions exact for every finite input; coordinates are the doubles nearest to the exact values, zero as +0.0.
         Nothing overflows. An item too complex to finish is marked in `status` and spoils no other.

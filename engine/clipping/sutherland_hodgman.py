@@ -10,6 +10,9 @@ A later plane decides about x from its double-doubles: their bound contains ever
 so a sign beyond it is the exact one. A sign within it, a coordinate that may round either way, two vertices in a plane
 that may coincide: the polygon is left open, and exact integers settle it (exact_contours.py).
 
+A plane that has all original vertices inside is left out, for what other planes leave lies between them; one that has
+all of them outside leaves nothing.
+
 Bound of a cut coordinate: the larger bound of both ends (x lies between them), the roundings of cut_point.py, and
 r |q - p| for weights known to a relative r: the parameter moves by at most 2 r t (1 - t) <= r / 2.
 
@@ -22,16 +25,22 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.clipping.cut_point import CUT_BOUND, is_safe
+from engine.clipping.cut_point import CUT_BOUND, POINT_BOUND, is_safe
 from engine.clipping.cyrus_beck import exact_sign
 from engine.jit import inline, kernel
 from engine.predicates.double_double import U2, dd_add, dd_div, dd_mul, dd_sub, surely_rounded
+from engine.predicates.error_free import two_diff, two_prod, two_sum
 from engine.types import UNDECIDED
 
 CLIPPED: Final = 0
 OPEN: Final = 1
+INSIDE: Final = 1
+OUTSIDE: Final = -1
+CUTS: Final = 0
 VALUE_BOUND: Final = 16.0 * 2.0**-53
 """Signs in doubles: a term loses the low parts of row and vertex, a product, three sums; its size as much again."""
+ACROSS_BOUND: Final = 4.0 * 2.0**-53
+"""A difference of a coordinate and a plane's, rounded twice."""
 DD_VALUE_BOUND: Final = 32.0 * U2
 """Signs in double-double: rows known to 2 u^2, products 5 u^2, three sums of 4 u^2."""
 
@@ -61,6 +70,22 @@ def value_of(high: Any, low: Any, points: Any, i: int) -> tuple[float, float, fl
         size += abs(ph)
         moved += abs(high[k]) * points[i, k, 2]
     return h, rest, DD_VALUE_BOUND * size + 1.01 * moved
+
+
+@inline
+def sign_across(sense: float, axis: int, at: float, points: Any, i: int) -> int:
+    """Return the exact sign at vertex i of the plane where a coordinate is `at`, or UNDECIDED; sense: of its normal."""
+    h, low, bound = points[i, axis, 0], points[i, axis, 1], points[i, axis, 2]
+    gap = (h - at) + low  # h and at close: the difference is exact; else far beyond any bound
+    if low == 0.0 and bound == 0.0:
+        gap, slack = (1.0 if h > at else (-1.0 if h < at else 0.0)), 0.0
+        if gap == 0.0:
+            return 0
+    else:
+        slack = bound + 4.0 * 2.0**-53 * abs(low) + ACROSS_BOUND * abs(gap)
+    if abs(gap) > slack:
+        return 1 if gap * sense > 0.0 else -1
+    return UNDECIDED
 
 
 @inline
@@ -112,8 +137,14 @@ def copy_vertex(source: Any, i: int, target: Any, j: int) -> None:
 @inline
 def cut_edge(high: Any, low: Any, axis: int, at: float, source: Any, p: int, q: int, target: Any, j: int) -> bool:
     """Set vertex j of `target` to where the edge p q crosses a plane; False where a value is known too roughly."""
-    ph, pl, p_bound = value_of(high, low, source, p)
-    qh, ql, q_bound = value_of(high, low, source, q)
+    if axis >= 0:
+        ph, pl = dd_add(source[p, axis, 0], source[p, axis, 1], -at, 0.0)
+        qh, ql = dd_add(source[q, axis, 0], source[q, axis, 1], -at, 0.0)
+        p_bound = source[p, axis, 2] + 4.0 * U2 * abs(ph)
+        q_bound = source[q, axis, 2] + 4.0 * U2 * abs(qh)
+    else:
+        ph, pl, p_bound = value_of(high, low, source, p)
+        qh, ql, q_bound = value_of(high, low, source, q)
     if ph < 0.0:
         ph, pl = -ph, -pl
     if qh < 0.0:
@@ -122,6 +153,7 @@ def cut_edge(high: Any, low: Any, axis: int, at: float, source: Any, p: int, q: 
         return False
     r = 1.01 * max(p_bound / ph, q_bound / qh)
     sum_h, sum_l = dd_add(ph, pl, qh, ql)
+    th, tl = dd_div(ph, pl, sum_h, sum_l)
     for k in range(source.shape[1]):
         xh, xl, x_bound = source[p, k, 0], source[p, k, 1], source[p, k, 2]
         yh, yl, y_bound = source[q, k, 0], source[q, k, 1], source[q, k, 2]
@@ -129,6 +161,12 @@ def cut_edge(high: Any, low: Any, axis: int, at: float, source: Any, p: int, q: 
             target[j, k, 0], target[j, k, 1], target[j, k, 2] = at, 0.0, 0.0
         elif xh == yh and xl == yl and x_bound == 0.0 and y_bound == 0.0:
             target[j, k, 0], target[j, k, 1], target[j, k, 2] = xh, xl, 0.0
+        elif xl == 0.0 and yl == 0.0 and x_bound == 0.0 and y_bound == 0.0:
+            dh, dl = two_diff(yh, xh)
+            mh, ml = two_prod(th, dh)
+            sh, sl = two_sum(xh, mh)
+            target[j, k, 0], target[j, k, 1] = two_sum(sh, (sl + ml) + (tl * dh + th * dl))
+            target[j, k, 2] = 1.01 * (POINT_BOUND * (abs(xh) + abs(mh)) + r * abs(dh))
         else:
             ah, al = dd_mul(xh, xl, qh, ql)
             bh, bl = dd_mul(yh, yl, ph, pl)
@@ -149,8 +187,14 @@ def clip_ring(
     plane was met, and whether a vertex was dropped.
     """
     n_contacts, has_dropped = 0, False
+    sense = 1.0
+    if axis >= 0 and high[axis] < 0.0:
+        sense = -1.0
     for i in range(n):
-        signs[i] = sign_at(high, low, source, i)
+        if axis >= 0:
+            signs[i] = sign_across(sense, axis, at, source, i)
+        else:
+            signs[i] = sign_at(high, low, source, i)
         if signs[i] == UNDECIDED:
             return -1, 0, False
         if signs[i] == 0:
@@ -193,6 +237,31 @@ def clip_ring(
             break
         kept -= 1
     return kept, n_contacts, True
+
+
+@inline
+def effect_of(high: Any, axis: int, at: float, vertices: Any, first: int, last: int, lows: Any, highs: Any) -> int:
+    """Tell what a plane does to vertices first .. last - 1: INSIDE all, OUTSIDE of it all, or CUTS, where unsure.
+
+    lows, highs: their smallest and largest coordinates. Exact: what later planes see are points between the vertices.
+    """
+    if axis >= 0:
+        if high[axis] > 0.0:
+            return INSIDE if lows[axis] >= at else (OUTSIDE if highs[axis] < at else CUTS)
+        return INSIDE if highs[axis] <= at else (OUTSIDE if lows[axis] > at else CUTS)
+    d = high.size - 1
+    size = abs(high[d])
+    for k in range(d):
+        size += abs(high[k]) * max(abs(lows[k]), abs(highs[k]))
+    bound = VALUE_BOUND * size
+    n_in = n_out = 0
+    for i in range(first, last):
+        value = high[d]
+        for k in range(d):
+            value += high[k] * vertices[i, k]
+        n_in += value > bound
+        n_out += -value > bound
+    return INSIDE if n_in == last - first else (OUTSIDE if n_out == last - first else CUTS)
 
 
 @inline
@@ -259,17 +328,44 @@ def clip_rings(
     here, there = np.empty((room, dimension, 3)), np.empty((room, dimension, 3))
     signs, on_plane = np.empty(room, np.int64), np.empty(room, np.bool_)
     contacts, dropped = np.empty(n_planes, np.int64), np.empty(n_planes, np.bool_)
+    cutting, lows, highs = np.empty(n_planes, np.int64), np.empty(dimension), np.empty(dimension)
     written = 0
     for polygon in range(first, last):
+        if stop[0]:
+            return polygon, written
         begun = written
-        contacts[:] = 0
-        dropped[:] = False
+        begin, until = ring_offsets[polygon_offsets[polygon]], ring_offsets[polygon_offsets[polygon + 1]]
+        safe = True
+        for k in range(dimension):
+            low_k = high_k = vertices[begin, k]
+            for i in range(begin, until):
+                x = vertices[i, k]
+                low_k, high_k = min(low_k, x), max(high_k, x)
+                safe = safe and is_safe(x)
+            lows[k], highs[k] = low_k, high_k
+        n_cutting, is_outside = 0, False
+        for plane in range(n_planes):
+            effect = CUTS
+            if safe:
+                effect = effect_of(high[plane], axes[plane], at[plane], vertices, begin, until, lows, highs)
+            is_outside = is_outside or effect == OUTSIDE
+            if effect == CUTS:
+                cutting[n_cutting] = plane
+                n_cutting += 1
+        state[polygon], may_have_bridges[polygon] = CLIPPED, False
+        if is_outside:
+            for ring in range(polygon_offsets[polygon], polygon_offsets[polygon + 1]):
+                sizes[ring] = 0
+            continue
+        for i_plane in range(n_cutting):
+            contacts[cutting[i_plane]], dropped[cutting[i_plane]] = 0, False
         is_open = False
         for ring in range(polygon_offsets[polygon], polygon_offsets[polygon + 1]):
             n = load_ring(vertices, ring_offsets[ring], ring_offsets[ring + 1], here)
-            for plane in range(n_planes):
-                if n <= 0 or stop[0]:
+            for i_plane in range(n_cutting):
+                if n <= 0:
                     break
+                plane = cutting[i_plane]
                 n, met, has_dropped = clip_ring(
                     high[plane], low[plane], axes[plane], at[plane], here, n, signs, there, on_plane
                 )
@@ -284,13 +380,12 @@ def clip_rings(
                 break
             sizes[ring] = n
             written += n
-        state[polygon], may_have_bridges[polygon] = CLIPPED, False
         if is_open:
             state[polygon], written = OPEN, begun
             for ring in range(polygon_offsets[polygon], polygon_offsets[polygon + 1]):
                 sizes[ring] = 0
             continue
-        for plane in range(n_planes):
-            if dropped[plane] and contacts[plane] > 2:
+        for i_plane in range(n_cutting):
+            if written > begun and dropped[cutting[i_plane]] and contacts[cutting[i_plane]] > 2:
                 may_have_bridges[polygon] = True
     return last, written
