@@ -11,6 +11,7 @@ again on numbers times a power of two, if there is one that brings them into tha
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
@@ -20,7 +21,7 @@ import numpy.typing as npt
 
 from engine.clipping.exact_segments import Piece
 from engine.clipping.scaling import FloatArray, scaled_back
-from engine.parallel import Budget, Progress, run_chunks
+from engine.parallel import Budget, Progress, check_options, run_chunks
 from engine.solids.checks import check_finite
 
 IntArray = npt.NDArray[np.int64]
@@ -67,6 +68,24 @@ class PieceRows:
     n_rational: int
 
 
+class Tally:
+    """Counts each segment once, when it is dropped or its piece is filled, also where all is done a second time."""
+
+    def __init__(self, progress: Progress | None) -> None:
+        self._progress = progress
+        self._done = self._told = 0
+
+    def restart(self) -> None:
+        """Count from the first segment on; nothing is told again."""
+        self._done = 0
+
+    def add(self, n_items: int) -> None:
+        self._done += n_items
+        if self._progress is not None and self._done > self._told:
+            self._progress(self._done - self._told)
+            self._told = self._done
+
+
 def clip_on_convex(
     segments: FloatArray, method: Method, budget: Budget, workers: int | None, progress: Progress | None
 ) -> PieceRows:
@@ -74,11 +93,13 @@ def clip_on_convex(
 
     Raises: NotFiniteError.
     """
-    scene = Scaled(segments, method.region, 0)
-    found = _clip(segments, method, scene, _FEW + len(segments) // 256, budget, workers, progress)
+    check_options(workers, progress)
+    scene, tally = Scaled(segments, method.region, 0), Tally(progress)
+    found = _clip(segments, method, scene, _FEW + len(segments) // 256, budget, workers, tally)
     if found is None:
         better = method.scale(segments)
-        found = _clip(segments, method, better or scene, len(segments), budget, workers, progress)
+        tally.restart()
+        found = _clip(segments, method, better or scene, len(segments), budget, workers, tally)
     assert found is not None
     return found
 
@@ -90,20 +111,26 @@ def _clip(
     most_open: int,
     budget: Budget,
     workers: int | None,
-    progress: Progress | None,
+    tally: Tally,
 ) -> PieceRows | None:
     """Return the pieces; None where more than `most_open` items are left to rational arithmetic."""
     n = len(segments)
     listed, planes, still = np.empty(n, np.int32), np.empty((n, 2), np.int32), np.empty(n, np.int32)
     decided: dict[int, IntArray] = {}
+    dropped: deque[int] = deque()
 
     def decide(first: int, last: int) -> None:
         counts = np.zeros(3, np.int64)
         with np.errstate(all="ignore"):  # uncompiled kernels: overflow is looked at by their filters
             method.decide(scene.points, *scene.region, first, last, budget.flag, listed, planes, still, counts)
         decided[first] = counts
+        dropped.append(last - first - int(counts[0] + counts[1]))
 
-    run_chunks(decide, n, budget=budget, workers=workers)
+    def count(_: int) -> None:
+        while dropped:
+            tally.add(dropped.popleft())
+
+    run_chunks(decide, n, budget=budget, workers=workers, progress=count)
     firsts = sorted(decided)
     n_open = sum(int(decided[first][1]) for first in firsts)
     if n_open:
@@ -119,12 +146,13 @@ def _clip(
         piece = method.settle(segments[item, 0].tolist(), segments[item, 1].tolist())
         if piece is not None:
             pieces[item] = piece
+    tally.add(len(left) - len(pieces))
     if pieces:
         items = np.append(items, np.array(list(pieces), np.int32))
         bounding = np.append(bounding, np.full((len(pieces), 2), -1, np.int32), axis=0)
         order = np.argsort(items, kind="stable")
         items, bounding = items[order], bounding[order]
-    rows, unsure, n_beyond = _fill(scene, method, items, bounding, budget, workers, progress)
+    rows, unsure, n_beyond = _fill(scene, method, items, bounding, budget, workers, tally)
     if len(unsure) + n_open > most_open:
         return None
     for row in unsure:
@@ -149,7 +177,7 @@ def _fill(
     planes: npt.NDArray[np.int32],
     budget: Budget,
     workers: int | None,
-    progress: Progress | None,
+    tally: Tally,
 ) -> tuple[Rows, IntArray, int]:
     """Return the rows of the pieces, which of them are not surely rounded, and how many needed more than one try."""
     m, dimension = len(items), scene.points.shape[2]
@@ -183,7 +211,7 @@ def _fill(
                 ends[side, first:last] = points
                 unsure.append(first + np.flatnonzero(doubtful & is_cut[:, side]))
 
-    run_chunks(fill, m, budget=budget, workers=workers, progress=progress)
+    run_chunks(fill, m, budget=budget, workers=workers, progress=tally.add)
     unsure += [still[first : first + found[0]].astype(np.int64) for first, found in counts.items()]
     rows = (source, ends[0], ends[1], t, faces)
     return rows, np.unique(np.concatenate([np.zeros(0, np.int64), *unsure])), sum(int(c[1]) for c in counts.values())

@@ -207,6 +207,18 @@ def test_empty_queries_and_report() -> None:
 
 
 @pytest.mark.skipif(os.environ.get("NUMBA_DISABLE_JIT") == "1", reason="about compiled speed")
+@pytest.mark.parametrize("scale", [1.0, 2.0**900])  # the second is done twice: as it is, then scaled
+def test_progress_counts_each_segment_once(scale: float) -> None:
+    draw = np.random.default_rng(12)
+    segments = draw.integers(-3, 4, (20_000, 2, 3)) * 0.5 * scale
+    region = Convex(np.array([[1.0, 1, 1, 2 * scale], [-1.0, 0.5, 0, scale], [0, 0, -1.0, scale]]))
+    for workers in (1, 2):
+        counts: list[int] = []
+        clip_segments(segments, region, workers=workers, progress=counts.append)
+        assert sum(counts) == len(segments)
+        assert min(counts) > 0
+
+
 def test_kernels_see_the_deadline() -> None:
     rng = np.random.default_rng(12)
     region = Convex(np.c_[rng.normal(size=(20000, 3)), np.full(20000, 9.0)])
