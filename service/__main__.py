@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import importlib.util
+import ipaddress
 import logging.config
+import os
 import signal
 import sys
-from copy import deepcopy
-from typing import Any
+import tempfile
+from contextlib import ExitStack
+from pathlib import Path
 
 import uvicorn
 from pydantic import ValidationError
-from uvicorn.config import LOGGING_CONFIG
 
+from service import logs
 from service.settings import Settings
 
 log = logging.getLogger("service")
@@ -25,8 +27,8 @@ def main() -> None:
     except ValidationError as error:
         lines = [f"GEOMETRY_{'_'.join(map(str, item['loc'])).upper()}: {item['msg']}" for item in error.errors()]
         sys.exit("a setting is wrong\n" + "\n".join(lines))
-    logs = _log_config(settings)
-    logging.config.dictConfig(logs)
+    config = logs.config_of(settings.log_level)
+    logging.config.dictConfig(config)
     # uvicorn drains, restores these handlers and raises the signal again: that must end in 0, not in a kill
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     signal.signal(signal.SIGINT, lambda *_: sys.exit(0))
@@ -38,36 +40,43 @@ def main() -> None:
         settings.max_body_bytes,
         settings.deadline_seconds,
     )
-    uvicorn.run(
-        "service.app:create_app",
-        factory=True,
-        host=settings.host,
-        port=settings.port,
-        workers=settings.workers,
-        http=_http_protocol(),
-        ws="none",
-        log_config=logs,
-        log_level=settings.log_level,
-        timeout_graceful_shutdown=round(settings.drain_seconds),
-        server_header=False,
-    )
+    if not settings.api_keys and not _is_loopback(settings.host):
+        log.warning("anyone who reaches %s may use this service: GEOMETRY_API_KEYS is not set", settings.host)
+    with ExitStack() as stack:
+        if settings.workers > 1:
+            _share(Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="geometry-"))), settings)
+        from service.protocol import Protocol
+
+        uvicorn.run(
+            "service.app:create_app",
+            factory=True,
+            host=settings.host,
+            port=settings.port,
+            workers=settings.workers,
+            http=Protocol,
+            ws="none",
+            log_config=config,
+            log_level=settings.log_level,
+            access_log=False,
+            timeout_graceful_shutdown=round(settings.drain_seconds),
+            server_header=False,
+        )
 
 
-def _log_config(settings: Settings) -> dict[str, Any]:
-    """Return uvicorn's way to log, with the service's own lines in it; worker processes set it up anew."""
-    config: dict[str, Any] = deepcopy(LOGGING_CONFIG)
-    config["formatters"]["default"]["fmt"] = "%(asctime)s %(levelprefix)s %(name)s: %(message)s"
-    config["loggers"]["service"] = {"handlers": ["default"], "level": settings.log_level.upper(), "propagate": False}
-    return config
+def _is_loopback(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
 
 
-def _http_protocol() -> Any:
-    """Return the faster of the two protocols that is installed; h11 reads on after an offer by itself."""
-    if importlib.util.find_spec("httptools") is None:
-        return "h11"
-    from service.protocol import Protocol
-
-    return Protocol
+def _share(folder: Path, settings: Settings) -> None:
+    """Give the worker processes one place for counters, and for solids if no folder is set; through the environment."""
+    counters = folder / "metrics"
+    counters.mkdir()
+    os.environ["PROMETHEUS_MULTIPROC_DIR"] = str(counters)
+    if settings.store_folder is None:
+        os.environ["GEOMETRY_STORE_FOLDER"] = str(folder / "solids")
 
 
 if __name__ == "__main__":

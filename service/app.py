@@ -17,6 +17,7 @@ from starlette.responses import Response
 import engine
 from service.docs import router as docs_router
 from service.errors import faults_of, http_fault, problem
+from service.gate import Gate
 from service.metrics import Metrics
 from service.openapi import openapi_of
 from service.playground import add_playground
@@ -60,13 +61,14 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     add_playground(app)
     app.add_exception_handler(HTTPException, _answer_http_exception)
     app.add_exception_handler(Exception, _answer_anything)
+    app.add_middleware(Gate, settings=settings)
     if settings.cors_origins:
         app.add_middleware(
             CORSMiddleware,
             allow_origins=list(settings.cors_origins),
             allow_methods=["GET", "HEAD", "POST"],
-            allow_headers=["Content-Type"],
-            expose_headers=["ETag", "Location", "Retry-After", "Server-Timing"],
+            allow_headers=["Authorization", "Content-Type", "X-API-Key", "X-Request-ID"],
+            expose_headers=["ETag", "Geometry-Accuracy", "Location", "Retry-After", "Server-Timing", "X-Request-ID"],
         )
     return app
 

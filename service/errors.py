@@ -57,6 +57,7 @@ SERVICE_STATUS: Final[dict[str, int]] = {
     "method_not_allowed": 405,
     "slow_body": 408,
     "slow_headers": 408,
+    "large_headers": 431,
     "body_too_large": 413,
     "unsupported_media_type": 415,
     "invalid_request": 422,

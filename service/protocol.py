@@ -3,29 +3,95 @@
 A client may offer HTTP/2 with any request (`Upgrade: h2c`; Java's HttpClient does so by default) and a server may
 ignore it (RFC 9110, 7.8). httptools stops after the headers of such a request, and uvicorn then hands the application
 a request without its body. Here the headers are parsed again without the offer, and what follows them is the body.
+
+Headers that do not arrive in time, or do not end, are answered with 408 or 431, and the connection is closed.
 """
 
 from __future__ import annotations
 
+import asyncio
 from contextlib import suppress
+from functools import cache
+from http import HTTPStatus
 from typing import Any, Final
 
 import httptools
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
+from service.errors import problem
+from service.schemas.arrays import Fault
+from service.settings import Settings
+
+_MOST_HEADER_BYTES: Final = 2**16
 _OFFER: Final = (b"upgrade", b"http2-settings", b"connection")
 
 
+@cache
+def _settings() -> Settings:
+    """Return the settings of this process: uvicorn makes protocols without the application's."""
+    return Settings()
+
+
 class Protocol(HttpToolsProtocol):
-    """uvicorn's protocol with a parser that reads on after an offer."""
+    """uvicorn's protocol with a parser that reads on after an offer, and limits to what comes before a request."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         self.parser: Any = _Parser(self)
+        self._timer: asyncio.TimerHandle | None = None  # runs while headers are waited for
+        self._header_bytes = 0
+        self._seconds = _settings().header_seconds
+
+    def connection_made(self, transport: Any) -> None:
+        """Start the clock for the first request."""
+        super().connection_made(transport)
+        self._start_clock()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Stop the clock."""
+        self._stop_clock()
+        super().connection_lost(exc)
+
+    def data_received(self, data: bytes) -> None:
+        """Parse `data`; headers without end are refused."""
+        super().data_received(data)
+        if self._timer is not None:
+            self._header_bytes += len(data)
+            if self._header_bytes > _MOST_HEADER_BYTES:
+                self._refuse("large_headers", f"the headers are longer than {_MOST_HEADER_BYTES} bytes; send fewer")
+
+    def on_message_begin(self) -> None:
+        """Start the clock for a later request on the same connection."""
+        super().on_message_begin()
+        if self._timer is None:
+            self._start_clock()
+
+    def _start_clock(self) -> None:
+        self._header_bytes = 0
+        seconds = self._seconds
+        detail = f"the headers did not arrive within {seconds:g} s; send them faster"
+        self._timer = self.loop.call_later(seconds, self._refuse, "slow_headers", detail)
+
+    def _stop_clock(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+    def _refuse(self, code: str, detail: str) -> None:
+        """Answer before there is a request, and close."""
+        self._stop_clock()
+        if self.transport.is_closing():
+            return
+        answer = problem([Fault((), code, detail)], {"connection": "close"})
+        lines = [f"HTTP/1.1 {answer.status_code} {HTTPStatus(answer.status_code).phrase}".encode()]
+        lines += [name + b": " + value for name, value in answer.raw_headers]
+        self.transport.write(b"\r\n".join([*lines, b"", bytes(answer.body)]))
+        self.transport.close()
 
     def on_headers_complete(self) -> None:
         """Start the request, unless its headers are to be parsed again."""
         if not self.parser.is_offer():
+            self._stop_clock()
             super().on_headers_complete()
 
     def on_message_complete(self) -> None:

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
-from pydantic import Field, field_validator
+from pydantic import Field, SecretStr, field_validator
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 Count = Annotated[int, Field(ge=1)]
@@ -33,7 +33,11 @@ class Settings(BaseSettings):
     workers: Count = 1
     """Processes; one uses all cores already, more of them help JSON decoding. Each has a memory of its own: without a
     store folder they share a temporary one."""
-    log_level: str = "info"
+    log_level: Literal["debug", "info", "warning", "error"] = "info"
+    access_log: bool = True
+    """A line for each request."""
+    api_keys: Annotated[tuple[SecretStr, ...], NoDecode] = ()
+    """Keys that requests must show one of, separated by commas; none by default: then anyone may call."""
     cors_origins: Annotated[tuple[str, ...], NoDecode] = ()
     """Origins that browsers may call from, separated by commas; none by default."""
 
@@ -66,6 +70,8 @@ class Settings(BaseSettings):
 
     deadline_seconds: Seconds = 30.0
     """Time from the last byte of the request to the answer; common proxies give up after 60 s."""
+    header_seconds: Seconds = 10.0
+    """Time for the headers of a request to arrive, from the connection or their first byte."""
     body_seconds: Seconds = 60.0
     """Time for a body to arrive: a slow sender must not hold its memory for ever."""
     drain_seconds: Seconds = 30.0
@@ -85,11 +91,11 @@ class Settings(BaseSettings):
     store_folder_bytes: Count = 10 * 2**30
     """Size of that folder; the files used longest ago leave first."""
 
-    @field_validator("cors_origins", mode="before")
+    @field_validator("cors_origins", "api_keys", mode="before")
     @classmethod
-    def _split_origins(cls, value: object) -> object:
+    def _split(cls, value: object) -> object:
         if isinstance(value, str):
-            return tuple(origin.strip() for origin in value.split(",") if origin.strip())
+            return tuple(item.strip() for item in value.split(",") if item.strip())
         return value
 
     @classmethod

@@ -13,10 +13,12 @@ from service.route import GeometryRoute
 _PROBLEM: Final = {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}}
 _OF_BODY: Final = {
     400: "The body is not JSON.",
+    401: "The service asks for a key, in the header Authorization (Bearer) or X-API-Key.",
+    403: "The key is wrong.",
     404: "A stored solid is not there (any more): put it again.",
     408: "The body did not arrive in time.",
     413: "The body is too large.",
-    415: "The body is not declared as application/json.",
+    415: "The header Content-Type is another; the header Accept-Post of the answer names the right one.",
     422: "The geometry breaks a rule; `code` says which, each pointer where.",
 }
 _OF_ALL: Final = {

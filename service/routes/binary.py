@@ -15,7 +15,9 @@ from service.routes.solids import Id, keep
 from service.schemas.solids import StoredSolidSummary
 from service.work import CallOf
 
-router = APIRouter(route_class=GeometryRoute, tags=["binary"], responses=responses(404, 408, 413, 415, 422, 503, 504))
+router = APIRouter(
+    route_class=GeometryRoute, tags=["binary"], responses=responses(401, 403, 404, 408, 413, 415, 422, 503, 504)
+)
 
 _BINARY: Final = {"type": "string", "format": "binary"}
 Octets = Annotated[bytes, Body(media_type=OCTETS), WithJsonSchema(_BINARY)]

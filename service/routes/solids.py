@@ -15,7 +15,7 @@ from service.schemas.solids import Solid, StoredSolidSummary
 from service.work import Call, CallOf
 
 router = router_of("solids")
-lookup = APIRouter(route_class=GeometryRoute, tags=["solids"], responses=responses(404, 503))
+lookup = APIRouter(route_class=GeometryRoute, tags=["solids"], responses=responses(401, 403, 404, 503))
 
 Id = Annotated[str, Path(description="Name of a stored solid, from `POST /v1/solids`.")]
 

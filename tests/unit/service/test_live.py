@@ -12,6 +12,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import httpx
@@ -29,7 +30,12 @@ class Service:
         environment = {**os.environ, **{f"GEOMETRY_{name.upper()}": str(value) for name, value in settings.items()}}
         command = [sys.executable, "-m", "service"]
         self.process = subprocess.Popen(
-            command, cwd=ROOT, env={**environment, "GEOMETRY_PORT": "0"}, stderr=subprocess.PIPE, text=True
+            command,
+            cwd=ROOT,
+            env={**environment, "GEOMETRY_PORT": "0"},
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
         )
         self.log: list[str] = []
         self.port = 0
@@ -42,19 +48,29 @@ class Service:
         assert self.process.stderr is not None
         for line in self.process.stderr:
             self.log.append(line)
-            if found := re.search(r"running on http://127\.0\.0\.1:(\d+)", line):
+            if found := re.search(r"running on http://[\d.]+:(\d+)", line):
                 self.port = int(found[1])
                 self._found.set()
 
     def wait_until_ready(self) -> None:
         end = time.monotonic() + 300
-        while httpx.get(f"{self.url}/readyz").status_code != 200:
+        while True:
+            with suppress(httpx.ConnectError):  # worker processes begin to listen later
+                if httpx.get(f"{self.url}/readyz").status_code == 200:
+                    return
             assert time.monotonic() < end, "".join(self.log)
             time.sleep(0.05)
 
     def stop(self) -> int:
         self.process.send_signal(signal.SIGTERM)
         return self.process.wait(60)
+
+    def close(self) -> None:
+        with suppress(ProcessLookupError):
+            os.killpg(self.process.pid, signal.SIGKILL)  # worker processes too
+        self.process.wait()
+        assert self.process.stderr is not None
+        self.process.stderr.close()
 
     def send(self, *parts: bytes, half_close: bool = False) -> bytes:
         """Send raw bytes over a socket of their own and return what comes back until it is closed or an object ends."""
@@ -74,22 +90,20 @@ class Service:
 
 @pytest.fixture(scope="module")
 def service() -> Iterator[Service]:
-    service = Service(max_body_bytes=10_000)
+    service = Service(max_body_bytes=10_000, header_seconds=0.7, body_seconds=0.7)
     try:
         yield service
         assert service.stop() == 0, "".join(service.log)
         assert "Traceback" not in "".join(service.log)
     finally:
-        service.process.kill()
-        service.process.wait()
-        assert service.process.stderr is not None
-        service.process.stderr.close()
+        service.close()
 
 
 def test_it_becomes_ready_and_answers(service: Service) -> None:
     service.wait_until_ready()
-    assert any("service: starting on" in line for line in service.log)
-    assert any("service: ready: kernels warm" in line for line in service.log)
+    assert any('"starting on ' in line for line in service.log)
+    assert all(json.loads(line)["level"] in ("info", "warning") for line in service.log)
+    assert any('"ready: kernels warm' in line for line in service.log)
     answer = httpx.post(f"{service.url}/v1/solids", json=SPHERE)
     assert answer.status_code == 201
     head = httpx.head(service.url + answer.headers["location"])
@@ -137,12 +151,81 @@ def test_broken_http_is_answered_or_closed(service: Service) -> None:
     assert httpx.get(f"{service.url}/healthz").status_code == 200
 
 
+def test_slow_headers_and_bodies_are_given_up(service: Service) -> None:
+    request = b"POST /v1/solids HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: 100\r\n\r\n{"
+    for parts, code in (((), b"slow_headers"), ((request[:30],), b"slow_headers"), ((request,), b"slow_body")):
+        before = time.monotonic()
+        answer = service.send(*parts)
+        assert answer.startswith(b"HTTP/1.1 408 "), answer
+        assert b'"code":"' + code in answer
+        assert b"\nconnection: close" in answer.lower()
+        assert 0.5 < time.monotonic() - before < 5
+    with httpx.Client() as client:  # an idle connection is no slow request
+        for _ in range(2):
+            assert client.get(f"{service.url}/healthz").status_code == 200
+            time.sleep(1)
+
+
+def test_headers_without_end_are_given_up(service: Service) -> None:
+    for lines in ([b"a: b\r\n" * 2000] * 6, [b"a: ", *[b"x" * 20_000] * 5]):
+        answer = service.send(b"GET /healthz HTTP/1.1\r\n", *lines)
+        assert answer.startswith((b"HTTP/1.1 431 ", b"HTTP/1.1 400 ")), answer
+
+
 def test_a_vanished_client_harms_nobody(service: Service) -> None:
     with socket.create_connection(("127.0.0.1", service.port)) as connection:
         connection.sendall(
             b"POST /v1/solids HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: 100\r\n\r\n{"
         )
     assert httpx.get(f"{service.url}/healthz").status_code == 200
+
+
+def test_a_stop_lets_requests_end() -> None:
+    """What has begun before SIGTERM is answered, and then the process ends with 0."""
+    service = Service()
+    try:
+        service.wait_until_ready()
+        body = json.dumps({"solid": SPHERE, "points": [[0.1, 0.2, 0.3]] * 20_000}).encode()
+        head = b"POST /v1/contains HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: %d\r\n\r\n"
+        connections = [socket.create_connection(("127.0.0.1", service.port), timeout=20) for _ in range(3)]
+        for connection in connections:
+            connection.sendall(head % len(body) + body[:-1])
+        time.sleep(0.3)
+        service.process.send_signal(signal.SIGTERM)
+        time.sleep(0.3)
+        for connection in connections:
+            with connection:
+                connection.sendall(body[-1:])
+                assert connection.recv(2**16).startswith(b"HTTP/1.1 200 ")
+        assert service.process.wait(60) == 0, "".join(service.log)
+    finally:
+        service.close()
+
+
+def test_several_workers_share_solids_and_counters() -> None:
+    service = Service(workers=2)
+    try:
+        service.wait_until_ready()
+        path = httpx.post(f"{service.url}/v1/solids", json=SPHERE).headers["location"]
+        for _ in range(20):  # connections of their own, so that either worker is asked
+            assert httpx.get(service.url + path).status_code == 200
+        counted = re.search(r'operation="get_solid",status="200"} (\S+)', httpx.get(f"{service.url}/metrics").text)
+        assert counted is not None
+        assert float(counted[1]) == 20
+        assert service.stop() == 0, "".join(service.log)
+    finally:
+        service.close()
+
+
+@pytest.mark.parametrize(("settings", "warns"), [({"api_keys": "abc"}, False), ({}, True)])
+def test_a_start_for_others_without_keys_says_so(settings: dict[str, str], warns: bool) -> None:
+    service = Service(host="0.0.0.0", **settings)
+    try:
+        assert any("GEOMETRY_API_KEYS is not set" in line for line in service.log) is warns
+        assert "abc" not in "".join(service.log)
+        assert service.stop() == 0
+    finally:
+        service.close()
 
 
 def test_a_wrong_setting_is_named() -> None:

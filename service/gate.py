@@ -1,0 +1,103 @@
+"""What every request passes: it gets a name, shows its key, takes the headers of safety with it, and leaves a log line.
+
+One ASGI callable around the application; a framework's middleware class would cost as much as a small answer.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import logging
+import re
+import secrets
+import time
+from typing import Any, Final
+
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from service.errors import ServiceError, faults_of, problem
+from service.settings import Settings
+
+log = logging.getLogger("service.access")
+
+OPEN: Final = frozenset({"/healthz", "/readyz"})
+"""Paths that need no key: who runs the service asks for them."""
+_SAFETY: Final = [
+    (b"x-content-type-options", b"nosniff"),
+    (b"x-frame-options", b"DENY"),
+    (b"referrer-policy", b"no-referrer"),
+    (b"cache-control", b"no-store"),
+    (b"content-security-policy", b"default-src 'none'; frame-ancestors 'none'"),
+]
+_NAME: Final = re.compile(rb"[A-Za-z0-9._-]{1,64}")
+
+
+class Gate:
+    """The application behind its gate."""
+
+    def __init__(self, app: ASGIApp, settings: Settings) -> None:
+        self._app = app
+        self._keys = [_digest(key.get_secret_value().encode()) for key in settings.api_keys]
+        self._logs = settings.access_log
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass one request on, or answer that its key is missing or wrong."""
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        before, status = time.perf_counter(), 0
+        headers = dict(scope["headers"])
+        given = headers.get(b"x-request-id", b"")
+        name = given if _NAME.fullmatch(given) else secrets.token_hex(8).encode()
+        scope.setdefault("state", {})["request_id"] = name.decode()
+
+        async def send_on(message: Message) -> None:
+            nonlocal status
+            if message["type"] == "http.response.start":
+                status = message["status"]
+                own = message["headers"]
+                there = {key for key, _ in own}
+                added = [header for header in _SAFETY if header[0] not in there]
+                message["headers"] = [*own, *added, (b"x-request-id", name)]
+            await send(message)
+
+        try:
+            if self._keys and scope["path"] not in OPEN:
+                try:
+                    self._check(headers)
+                except ServiceError as error:
+                    await problem(faults_of(error))(scope, receive, send_on)
+                    return
+            await self._app(scope, receive, send_on)
+        finally:
+            if self._logs:
+                _record(scope, status, time.perf_counter() - before)
+
+    def _check(self, headers: dict[bytes, bytes]) -> None:
+        """Raise `missing_key` or `wrong_key` unless the request shows a key; as slow for each wrong one."""
+        scheme, _, token = headers.get(b"authorization", b"").partition(b" ")
+        given = token.strip() if scheme.lower() == b"bearer" else headers.get(b"x-api-key", b"")
+        if not given:
+            raise ServiceError(
+                "missing_key", "send a key of this service: Authorization: Bearer KEY, or X-API-Key: KEY"
+            )
+        found = [hmac.compare_digest(_digest(given), key) for key in self._keys]
+        if not any(found):
+            raise ServiceError("wrong_key", "the key is none of this service's; GEOMETRY_API_KEYS holds them")
+
+
+def _digest(key: bytes) -> bytes:
+    """Return bytes of one length, so that comparing tells nothing of a key's length either."""
+    return hashlib.sha256(key).digest()
+
+
+def _record(scope: Scope, status: int, seconds: float) -> None:
+    fields: dict[str, Any] = {
+        "request_id": scope["state"]["request_id"],
+        "client": scope["client"][0] if scope.get("client") else "",
+        "method": scope["method"],
+        "path": scope["path"],
+        "status": status,
+        "milliseconds": round(1e3 * seconds, 3),
+    }
+    log.info("request", extra={"fields": fields})
