@@ -129,6 +129,7 @@ def _warm_collision() -> None:
         for other in (_cube(1.0), _cube(0.5), HalfSpace([1, 0, 0], -0.5), Sphere([0, 0, 0], 1)):
             collide(first, other)
     collide_scene(bodies)
+    collide_scene([Aabb([k, 0, 0], [k + 2, 1, 1]) for k in range(300)])  # many: their boxes go into a grid
     flat: list[Solid] = [Polygon([[[0, 0], [4, 0], [1, 1], [0, 4]]]), Triangle([[0, 0], [1, 0], [0, 1]])]
     collide_scene(flat)
     for dimension in (2, 3):

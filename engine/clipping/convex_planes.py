@@ -3,7 +3,9 @@
 A polyhedron's planes are rarely rows of doubles, so they stay implicit: three vertices each. It is convex when no
 vertex lies outside of any of its planes (exact orientation) and a point inside of all planes is inside of it. Then all
 faces lie on the hull of the vertices; inside the hull there is no face, so the even-odd location is the same
-everywhere there and INSIDE makes every point of the hull's boundary lie on some face: the solid is the hull.
+everywhere there and INSIDE makes every point of the hull's boundary lie on some face: the solid is the hull. Asking
+every vertex about every face is left to what `engine.solids.convexity`, one question an edge, does not certify: faces
+without area, and solids that are not convex, so that the answer can say why.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ from engine.errors import UnsupportedSolidError
 from engine.predicates.orientation import orient3d_batch
 from engine.predicates.rational import orient3d_rational
 from engine.solids.checks import digits
+from engine.solids.convexity import convexity
 from engine.solids.polyhedron import Polyhedron
 from engine.types import UNDECIDED, Location
 
@@ -57,6 +60,8 @@ def convex_planes(region: Polyhedron, check: Check) -> list[Row]:
 def _outward_triangles(region: Polyhedron, check: Check) -> IntArray:
     """Return the triangles with area, counter-clockwise from outside, or raise if the polyhedron is not convex."""
     vertices, triangles = region.vertices, region.triangles
+    if (certificate := convexity(region)) is not None:
+        return triangles if certificate.is_outward else triangles[:, ::-1]
     used = np.unique(triangles)
     behind, before = np.zeros(len(triangles), bool), np.zeros(len(triangles), bool)
     step = max(1, _BATCH // len(used))

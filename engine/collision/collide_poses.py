@@ -14,6 +14,7 @@ from engine.collision.placement import PoseArrays
 from engine.collision.pose_batch import UNSETTLED, relate_poses
 from engine.collision.result import Witness, Work
 from engine.collision.shell import read_only, shell_of
+from engine.collision.short_paths import convex_poses
 from engine.errors import InvalidArrayError, WrongDimensionError
 from engine.parallel import Budget, Cancel, Progress, run_chunks
 from engine.solids.base import FloatArray, Solid
@@ -81,7 +82,9 @@ def collide_poses(
 
         task = one_by_one
         if function is mesh_mesh:
-            batch = _mesh_task(first, second, turns, moves, relations, budget, boolean)
+            batch = convex_poses(first, second, turns, moves, relations, budget, boolean)
+            if batch is None:
+                batch = _mesh_task(first, second, turns, moves, relations, budget, boolean)
 
             def task(start: int, stop: int) -> None:
                 batch(start, stop)

@@ -15,6 +15,7 @@ from engine import (
     IndexOutOfRangeError,
     InvalidArrayError,
     Polygon,
+    Polyhedron,
     Pose,
     Relation,
     Sphere,
@@ -72,6 +73,28 @@ def test_pairs_can_be_left_out_or_looked_at_alone() -> None:
     assert as_list(collide_scene(cubes, skip=[(2, 1)])) == [(0, 1, 4), (2, 3, 4)]
     assert as_list(collide_scene(cubes, only=[(2, 1), (0, 3)])) == [(1, 2, 4)]
     assert as_list(collide_scene(cubes, only=[])) == []
+
+
+def test_a_crowd_of_convex_bodies_under_poses_is_every_pair() -> None:
+    rng = np.random.default_rng(3)
+    corner = Polyhedron([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+    kinds = [corner, Aabb([0, 0, 0], [1, 0.5, 0.25]), Aabb([0, 0, 0], [0.25, 0.25, 0.25]), corner]
+    solids = [kinds[k % 4] for k in range(300)]
+    poses = [
+        None if k % 7 == 0 else Pose(TURN if k % 3 else EYE, np.round(rng.uniform(0, 4, 3) * 4) / 4) for k in range(300)
+    ]
+    pairs = collide_scene(solids, poses)
+    only = rng.integers(0, 300, (60, 2))
+    some = [(i, j) for i, j in zip(pairs.first.tolist(), pairs.second.tolist())][::25]
+    for i, j in {*some, *((int(min(row)), int(max(row))) for row in only if row[0] != row[1])}:
+        relation = collide(solids[i], solids[j], first_pose=poses[i], second_pose=poses[j]).relation
+        assert dict(zip(zip(pairs.first.tolist(), pairs.second.tolist()), pairs.relation.tolist())).get(
+            (i, j), 0
+        ) == int(relation)
+    assert set(pairs.relation.tolist()) >= {Relation.OVERLAPPING, Relation.TOUCHING}
+    yes = collide_scene(solids, poses, boolean=True)
+    assert (yes.first.tolist(), yes.second.tolist()) == (pairs.first.tolist(), pairs.second.tolist())
+    assert (yes.relation == Relation.TOUCHING).all()
 
 
 def test_ten_thousand_boxes_in_a_lattice_touch_their_neighbours() -> None:

@@ -1,0 +1,216 @@
+"""What the short path for convex bodies sees of a solid: a few vertices, and what starts and ends its searches.
+
+A polyhedron certified convex (`engine.solids.convexity`) and a box are the hull of their vertices; a ball is one vertex
+with a radius around it. Bodies without interior (flat boxes, balls of radius 0) have no place here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from engine.jit import kernel
+from engine.solids.aabb import Aabb
+from engine.solids.base import FloatArray, IntArray, Solid
+from engine.solids.convexity import convexity
+from engine.solids.polyhedron import Polyhedron
+from engine.solids.sphere import Sphere
+
+MOST_FACES = 1 << 16
+"""Beyond this many triangles the question whether a polyhedron is convex is not asked: milliseconds, mostly for no."""
+
+BOX_TRIANGLES = np.array(
+    [t for a, b, c, d in ([0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6])
+     for t in ((a, b, c), (a, c, d))]
+)  # fmt: skip
+"""Counter-clockwise from outside; bit k of a corner's number says low or high on axis k."""
+
+CENTER, ASIDE = 0, 3
+RADIUS, REACH, ROUND = 6, 7, 8
+N_NUMBERS = 9
+"""Places in the numbers of a body: two points inside, the second off the symmetric middle (three places each); how far
+the farthest vertex is from either, rounded up; the largest magnitude of a coordinate, a ball's radius added; that
+radius, 0.0 for others."""
+
+WEIGHTS = tuple(weight / 1024 for weight in (16, 25, 31, 38, 4, 11, 13, 22))
+"""How far the second point inside is drawn to the farthest vertices on the diagonals: differently on every axis."""
+
+_NO_CLAIM = np.inf
+
+
+class ConvexArrays(NamedTuple):
+    """Several convex bodies, one after another; few arrays, because kernels count references to each.
+
+    points: (3, n) their vertices. graph: (n + 1,) places in itself where the neighbours of each vertex begin, the
+    vertices at the other end of its edges; then these; then for each body the vertex farthest along each of 8
+    diagonals. normals: (4, n_faces) about unit, outward; last how far off, relative to lengths. anchors: (n_faces,) a
+    vertex of each face. firsts: (3, n_bodies + 1) first vertex and face of each body; where its 8 vertices stand.
+    numbers: (n_bodies, N_NUMBERS).
+    """
+
+    points: FloatArray
+    graph: IntArray
+    normals: FloatArray
+    anchors: IntArray
+    firsts: IntArray
+    numbers: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ConvexBody:
+    """One convex body, its vertices numbered from 0.
+
+    first_neighbor: (n + 1,) into `neighbors`; outermost: (8,) vertices; the other fields as in `ConvexArrays`.
+    """
+
+    points: FloatArray
+    first_neighbor: IntArray
+    neighbors: IntArray
+    outermost: IntArray
+    normals: FloatArray
+    anchors: IntArray
+    numbers: FloatArray
+
+
+def convex_body_of(solid: Solid) -> ConvexBody | None:
+    """Return what the short path takes of a solid of space, None where the solid is not convex, or not surely."""
+    return solid.prepared("convex_body", lambda: _described(solid))
+
+
+def _described(solid: Solid) -> ConvexBody | None:
+    if isinstance(solid, Sphere) and solid.dimension == 3 and solid.radius > 0.0:
+        return _ball(solid)
+    if isinstance(solid, Aabb) and solid.dimension == 3 and bool((solid.min < solid.max).all()):
+        corners = np.array([[(solid.min, solid.max)[i >> k & 1][k] for k in range(3)] for i in range(8)])
+        with np.errstate(all="ignore"):
+            center = 0.5 * solid.min + 0.5 * solid.max
+        if bool(((solid.min < center) & (center < solid.max)).all()):
+            return _hull(corners, BOX_TRIANGLES, center)
+    if isinstance(solid, Polyhedron) and len(solid.triangles) <= MOST_FACES:
+        certificate = convexity(solid)
+        if certificate is not None:
+            triangles = solid.triangles if certificate.is_outward else solid.triangles[:, ::-1]
+            used, numbered = np.unique(triangles, return_inverse=True)
+            return _hull(solid.vertices[used], numbered.reshape(-1, 3), certificate.center)
+    return None
+
+
+def _ball(ball: Sphere) -> ConvexBody:
+    numbers = np.zeros(N_NUMBERS)
+    numbers[CENTER:ASIDE] = numbers[ASIDE:RADIUS] = ball.center
+    with np.errstate(over="ignore"):
+        numbers[RADIUS], numbers[ROUND] = ball.radius * (1.0 + 2.0**-40), ball.radius
+        numbers[REACH] = np.abs(ball.center).max() + ball.radius
+    none = np.empty(0, np.int64)
+    points = np.ascontiguousarray(ball.center[:, None])
+    return ConvexBody(points, np.zeros(2, np.int64), none, np.zeros(8, np.int64), np.empty((4, 0)), none, numbers)
+
+
+def _hull(vertices: FloatArray, triangles: IntArray, center: FloatArray) -> ConvexBody:
+    """Return the body of checked arrays: all vertices used, triangles outward."""
+    n_points, n_faces = len(vertices), len(triangles)
+    first_neighbor, neighbors = np.zeros(n_points + 1, np.int64), np.empty(3 * n_faces, np.int64)
+    outermost, numbers = np.empty(8, np.int64), np.zeros(N_NUMBERS)
+    normals = np.empty((4, n_faces))
+    numbers[CENTER:ASIDE] = center
+    points, triangles = np.ascontiguousarray(vertices.T), np.ascontiguousarray(triangles)
+    with np.errstate(all="ignore"):  # an overflow makes a claim impossible, not wrong
+        _describe(points, triangles, first_neighbor, neighbors, outermost, normals, numbers)
+    return ConvexBody(points, first_neighbor, neighbors, outermost, normals, triangles[:, 0].copy(), numbers)
+
+
+@kernel
+def _describe(
+    points: Any,
+    triangles: Any,
+    first_neighbor: Any,
+    neighbors: Any,
+    outermost: Any,
+    normals: Any,
+    numbers: Any,
+) -> None:
+    """Fill everything but points and the centre.
+
+    A normal from rounded differences and products is off by less than 14 u |v| |w| for the edges v, w; 2^-48 |v| |w|
+    covers making it a unit too, so long as that is small against its length.
+    """
+    n_points = points.shape[1]
+    for item in range(triangles.shape[0]):
+        for k in range(3):
+            first_neighbor[triangles[item, k] + 1] += 1
+    for point in range(n_points):
+        first_neighbor[point + 1] += first_neighbor[point]
+    filled = first_neighbor[:-1].copy()
+    for item in range(triangles.shape[0]):
+        a, b, c = triangles[item, 0], triangles[item, 1], triangles[item, 2]
+        for k in range(3):
+            start = triangles[item, k]
+            neighbors[filled[start]] = triangles[item, (k + 1) % 3]
+            filled[start] += 1
+        vx, vy, vz = points[0, b] - points[0, a], points[1, b] - points[1, a], points[2, b] - points[2, a]
+        wx, wy, wz = points[0, c] - points[0, a], points[1, c] - points[1, a], points[2, c] - points[2, a]
+        nx, ny, nz = vy * wz - vz * wy, vz * wx - vx * wz, vx * wy - vy * wx
+        length = np.sqrt(nx * nx + ny * ny + nz * nz)
+        sides = np.sqrt(vx * vx + vy * vy + vz * vz) * np.sqrt(wx * wx + wy * wy + wz * wz)
+        normals[0, item] = normals[1, item] = normals[2, item] = 0.0
+        normals[3, item] = _NO_CLAIM
+        if length > 2.0**-30 * sides and length > 2.0**-900 and length < 2.0**900:
+            normals[0, item], normals[1, item], normals[2, item] = nx / length, ny / length, nz / length
+            normals[3, item] = 2.0**-48 * sides / length
+    for octant in range(8):
+        best = -np.inf
+        outermost[octant] = 0
+        for point in range(n_points):
+            value = 0.0
+            for axis in range(3):
+                value += points[axis, point] if octant >> axis & 1 else -points[axis, point]
+            if value > best:
+                best = value
+                outermost[octant] = point
+    reach = 0.0
+    for axis in range(3):
+        c = numbers[CENTER + axis]
+        numbers[ASIDE + axis] = c
+        for octant in range(8):
+            numbers[ASIDE + axis] += WEIGHTS[octant] * (points[axis, outermost[octant]] - c)
+        for point in range(n_points):
+            reach = max(reach, abs(points[axis, point]))
+    radius = 0.0
+    for place in range(CENTER, RADIUS, 3):
+        for point in range(n_points):
+            square = 0.0
+            for axis in range(3):
+                square += (points[axis, point] - numbers[place + axis]) * (points[axis, point] - numbers[place + axis])
+            radius = max(radius, np.sqrt(square))
+    numbers[RADIUS] = radius * (1.0 + 2.0**-40) + 2.0**-50 * reach
+    numbers[REACH] = reach
+
+
+def pooled(bodies: Sequence[ConvexBody]) -> ConvexArrays:
+    """Return several bodies as the arrays that kernels take."""
+    first_point = _starts([body.points.shape[1] for body in bodies])
+    first_face = _starts([len(body.anchors) for body in bodies])
+    n_points = int(first_point[-1])
+    first_neighbor = _starts([len(body.neighbors) for body in bodies]) + n_points + 1
+    end = first_neighbor[-1:]
+    graph = [
+        *(body.first_neighbor[:-1] + start for body, start in zip(bodies, first_neighbor)),
+        end,
+        *(body.neighbors + start for body, start in zip(bodies, first_point)),
+        *(body.outermost + start for body, start in zip(bodies, first_point)),
+    ]
+    return ConvexArrays(
+        np.ascontiguousarray(np.concatenate([np.empty((3, 0)), *(body.points for body in bodies)], axis=1)),
+        np.concatenate(graph),
+        np.ascontiguousarray(np.concatenate([np.empty((4, 0)), *(body.normals for body in bodies)], axis=1)),
+        np.concatenate([np.empty(0, np.int64), *(body.anchors + start for body, start in zip(bodies, first_point))]),
+        np.stack([first_point, first_face, end + 8 * np.arange(len(bodies) + 1)]),
+        np.concatenate([np.empty(0), *(body.numbers for body in bodies)]).reshape(-1, N_NUMBERS),
+    )
+
+
+def _starts(counts: list[int]) -> IntArray:
+    return np.append(np.int64(0), np.cumsum(np.array(counts, np.int64)))

@@ -1,0 +1,103 @@
+"""The batches that decide most pairs of a scene: boxes, balls and convex polyhedra, in kernels for many pairs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from engine.collision.aabb_batch import relate_box_pairs
+from engine.collision.convex_body import ConvexArrays, ConvexBody, convex_body_of, pooled
+from engine.collision.convex_pair import UNSETTLED, relate_convex_pairs
+from engine.collision.scene_bodies import SceneBodies
+from engine.parallel import Budget, run_chunks
+from engine.solids.aabb import Aabb
+from engine.solids.base import FloatArray, IntArray, Solid
+
+Relations = npt.NDArray[np.int8]
+
+
+class ShortPaths:
+    """Which bodies of a scene have a short path, and the arrays that it takes."""
+
+    def __init__(self, bodies: SceneBodies, boolean: bool, budget: Budget) -> None:
+        self._bodies = bodies
+        self._boolean = boolean
+        self._budget = budget
+        is_box = np.array([isinstance(solid, Aabb) for solid in bodies.distinct], np.bool_)
+        self._is_box = is_box[bodies.kinds] & ~bodies.is_posed
+        self._pool: ConvexArrays | None = None
+        self._convex = np.full(len(bodies.solids), -1, np.int64)
+
+    def relations(self, pairs: IntArray, workers: int | None) -> Relations:
+        """Return the relations ``(n,)`` of pairs ``(n, 2)`` of bodies, UNSETTLED where no batch decides."""
+        found = np.full(len(pairs), UNSETTLED, np.int8)
+        bodies, flag = self._bodies, self._budget.flag
+        relate_box_pairs(bodies.low, bodies.high, self._is_box, pairs, found)
+        if bodies.dimension == 3 and (found == UNSETTLED).any():
+            self._prepare()
+        pool = self._pool
+        if pool is None:
+            return found
+        rows = np.append(np.int64(-1), self._convex)
+
+        def task(start: int, stop: int) -> None:
+            with np.errstate(all="ignore"):  # uncompiled runs only
+                relate_convex_pairs(
+                    pool,
+                    rows,
+                    bodies.rotations,
+                    bodies.translations,
+                    pairs[start:stop] + 1,
+                    self._boolean,
+                    found[start:stop],
+                    flag,
+                )
+
+        run_chunks(task, len(pairs), budget=self._budget, workers=workers)
+        return found
+
+    def _prepare(self) -> None:
+        """Look at each solid once: is it convex?"""
+        if self._pool is not None:
+            return
+        kinds = np.full(len(self._bodies.distinct), -1, np.int64)
+        convex: list[ConvexBody] = []
+        for kind, solid in enumerate(self._bodies.distinct):
+            self._budget.check()
+            body = convex_body_of(solid)
+            if body is not None:
+                kinds[kind] = len(convex)
+                convex.append(body)
+        self._pool = pooled(convex)
+        self._convex = kinds[self._bodies.kinds]
+
+
+def convex_poses(
+    first: Solid,
+    second: Solid,
+    rotations: FloatArray,
+    translations: FloatArray,
+    relations: Relations,
+    budget: Budget,
+    boolean: bool,
+) -> Callable[[int, int], None] | None:
+    """Return the task that fills relations for a range of poses of `second`, UNSETTLED where float64 does not decide;
+    None unless both solids are convex."""
+    bodies = [body for body in (convex_body_of(first), convex_body_of(second)) if body is not None]
+    if len(bodies) < 2:
+        return None
+    pool = pooled(bodies)
+
+    def fill(start: int, stop: int) -> None:
+        n = stop - start
+        turns = np.concatenate([np.eye(3)[None], rotations[start:stop]])
+        moves = np.concatenate([np.zeros((1, 3)), translations[start:stop]])
+        rows = np.append(np.int64(0), np.ones(n, np.int64))
+        pairs = np.column_stack([np.zeros(n, np.int64), np.arange(1, n + 1)])
+        with np.errstate(all="ignore"):  # uncompiled runs only
+            relate_convex_pairs(pool, rows, turns, moves, pairs, boolean, relations[start:stop], budget.flag)
+        budget.check()
+
+    return fill
