@@ -13,7 +13,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = (
     "numpy", "numba", "llvmlite", "open3d", "shapely", "trimesh", "embreex", "libigl", "vtk", "matplotlib", "coal",
-    "python-fcl", "manifold3d", "pyclipper", "numba-celltree",
+    "python-fcl", "cgal", "manifold3d", "pyclipper", "numba-celltree",
 )  # fmt: skip
 
 

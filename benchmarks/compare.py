@@ -1,0 +1,45 @@
+"""Compare two stored reports: ``python -m benchmarks.compare old.json new.json``, of two machines or two commits.
+
+Prints, for each row of both, how many times faster the second is, and every change in wrong answers. Exit code 1 if the
+second has more wrong answers of ours.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+
+def main(words: list[str] | None = None) -> int:
+    """Print the comparison."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("old", type=Path)
+    parser.add_argument("new", type=Path)
+    given = parser.parse_args(words)
+    old, new = (json.loads(path.read_text()) for path in (given.old, given.new))
+    for name, found in (("old", old), ("new", new)):
+        print(f"{name}: commit {found['commit']}, {found['processor']}, {found['cores']} cores, seed {found['seed']}")
+    print(f"{'contest':<46} {'contender':<34} {'speed':>8}  {'to ours':>8}  wrong")
+    before, worse = _by_key(old), 0
+    for key, row in _by_key(new).items():
+        was = before.get(key)
+        if was is None or not (row["rate"] and was["rate"]):
+            continue
+        base = (*key[:2], "ours")
+        relative = (row["rate"] / _by_key(new)[base]["rate"]) / (was["rate"] / before[base]["rate"])
+        wrong = (was["errors"]["wrong"], row["errors"]["wrong"])
+        changed = f"{wrong[0]} -> {wrong[1]}" if wrong[0] != wrong[1] else str(wrong[1])
+        print(f"{', '.join(key[:2]):<46} {key[2]:<34} {row['rate'] / was['rate']:>7.2f}x  {relative:>7.2f}x  {changed}")
+        worse += key[2] == "ours" and wrong[1] > wrong[0]
+    return 1 if worse else 0
+
+
+def _by_key(found: dict[str, Any]) -> dict[tuple[str, str, str], dict[str, Any]]:
+    return {(row["operation"], row["contest"], row["contender"]): row for row in found["rows"]}
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,91 @@
+"""The report runs without any peer, counts right and wrong answers, writes its page, and compares two results."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks import compare, contest, page
+from benchmarks.contest import Contender, Contest, Row, hold
+from benchmarks.fields import polygons, primitives, segments
+
+pytest.importorskip("gmpy2", reason="exact answers need gmpy2")
+
+
+def held(**answers: object) -> list[Row]:
+    """Return the rows of a contest on the numbers 0..99: is a number even?"""
+    items = np.arange(100)
+    contenders = [Contender(name, lambda ask=ask: ask) for name, ask in answers.items()]
+    return hold(Contest("numbers", "even", True, items, items % 2 == 0, contest.same, contenders), 3, 0.1)
+
+
+def test_right_wrong_refused_and_absent_are_told_apart() -> None:
+    def absent() -> object:
+        raise ImportError("no such package")
+
+    right, wrong, refused = held(
+        ours=lambda items: items % 2 == 0,
+        never=lambda items: np.zeros(len(items)),
+        odd=lambda items: np.where(items % 2, contest.REFUSED, 1),
+    )
+    assert (right.errors["wrong"], right.errors["refused"], right.errors["judged"]) == (0, 0, 100)
+    assert (wrong.errors["wrong"], refused.errors["refused"], refused.errors["wrong"]) == (50, 50, 0)
+    assert right.rate > 0
+    rows = hold(Contest("n", "e", True, np.arange(3), np.ones(3), contest.same, [Contender("x", absent)]), 1, 0.1)
+    assert rows[0].absent == "ImportError: no such package"
+
+
+def test_coordinates_are_judged_in_ulps() -> None:
+    exact = np.array([[1.0, 2.0], [np.nan, np.nan], [1.0, 1.0]])
+    answers = np.array([[1.0, 2.0 + 2**-50], [0.0, 0.0], [1.0, 1.0]])
+    found = contest.coordinates(answers, exact)
+    assert (found["wrong"], found["off"], found["coordinates"], found["ulp_largest"]) == (1, 1, 4, 2.0)
+
+
+def test_areas_are_wrong_beyond_a_millionth() -> None:
+    exact = np.array([[1.0, 1.0], [1.0, 1.0], [1.0, 1.0]])
+    found = contest.areas(np.array([1.0, 1.001, np.nan]), exact)
+    assert (found["wrong"], found["refused"], found["ulp_largest"]) == (1, 1, 0.0)
+
+
+@pytest.mark.parametrize("field", [primitives, polygons, segments], ids=lambda field: field.__name__.split(".")[-1])
+def test_ours_has_no_wrong_answer(field: object) -> None:
+    for each in field.contests(0, 0.01):  # type: ignore[attr-defined]
+        mine = [contender for contender in each.contenders if contender.name == "ours" or "textbook" in contender.name]
+        only = Contest(each.operation, each.name, each.is_hard, each.items, each.exact, each.judge, mine)
+        row = hold(only, 1, 0.01)[0]
+        assert row.errors["judged"] > 0
+        assert row.errors["wrong"] + row.errors["refused"] + row.errors.get("off", 0) == 0
+
+
+def test_ring_areas() -> None:
+    square, triangle = [[1, 1], [3, 1], [3, 3], [1, 3]], [[0, 0], [0, 2], [2, 0]]
+    assert polygons.ring_areas(np.array(square + triangle, float), np.array([0, 4, 7])).tolist() == [4.0, -2.0]
+
+
+def stored(path: Path, rate: float, wrong: int) -> str:
+    row = {"operation": "o", "contest": "c", "contender": "ours", "rate": rate, "errors": {"wrong": wrong}}
+    path.write_text(json.dumps({"commit": "x", "processor": "p", "cores": 2, "seed": 0, "rows": [row]}))
+    return str(path)
+
+
+def test_two_results_are_compared(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    old, new = stored(tmp_path / "a.json", 100.0, 0), stored(tmp_path / "b.json", 250.0, 1)
+    assert compare.main([old, new]) == 1
+    assert "2.50x" in capsys.readouterr().out
+    assert compare.main([new, old]) == 0
+
+
+def test_the_page_lists_wrong_answers_of_ours_first() -> None:
+    rows = held(ours=lambda items: items % 2 == 1, peer=lambda items: items % 2 == 0)
+    plain = [
+        {name: getattr(row, name) for name in Row.__slots__} | {"rate": row.rate, "net_rate": row.net_rate}
+        for row in rows
+    ]
+    facts = {"rows": plain, "versions": {}, "commit": "x", "seed": 0, "processor": "p", "cores": 2}
+    text = page.text_of(facts | {"load_before": 0, "load_after": 0, "seconds": 1.0})
+    assert text.index("Wrong answers of ours: 1 contest") < text.index("| hard inputs")
+    assert "peer" in text
