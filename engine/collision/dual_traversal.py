@@ -92,7 +92,8 @@ def new_descent() -> Descent:
 
 
 @inline
-def _store(poses: Any, row: int, pose: PoseArrays, item: int) -> None:
+def store_pose(poses: Any, row: int, pose: PoseArrays, item: int) -> None:
+    """Write one pose as exact signs take it: rotation by rows, then translation."""
     for i in range(3):
         for k in range(3):
             poses[row, 3 * i + k] = pose.rotations[item, i, k]
@@ -121,8 +122,8 @@ def start_descent(
     error = max(a.error, b.error)
     exact_error = 0.0
     if error != 0.0:
-        _store(descent.poses, 0, first_pose, first_item)
-        _store(descent.poses, 1, second_pose, second_item)
+        store_pose(descent.poses, 0, first_pose, first_item)
+        store_pose(descent.poses, 1, second_pose, second_item)
         if first_pose.is_posed:
             exact_error = posed_error(descent.poses, 0, first.extent.reach)
         if second_pose.is_posed:

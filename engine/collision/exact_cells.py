@@ -13,7 +13,7 @@ plane, whatever the move.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from fractions import Fraction
 from itertools import pairwise
 from typing import NamedTuple
@@ -49,6 +49,14 @@ class Sides(NamedTuple):
 
 def sides_at(body: ExactBody, q: Homogeneous, axis: int) -> Sides:
     """Return the status of `body` along `axis` at q; a face that holds q must not contain that axis."""
+    sides = sides_over(body, q, axis, None)
+    assert sides is not None
+    return sides
+
+
+def sides_over(body: ExactBody, q: Homogeneous, axis: int, plane: Plane | None) -> Sides | None:
+    """Return the status of `body` along `axis` at q, a point of `plane`; None where a face that holds q and is not
+    parallel to that plane leaves it open (it is not looked at where `plane` is None)."""
     if not body.shell.has_inside:
         return Sides(False, False, False)
     above = changes = is_on_face = False
@@ -57,19 +65,66 @@ def sides_at(body: ExactBody, q: Homogeneous, axis: int) -> Sides:
     low, high = _around(body, q)
     high[axis] = float("inf")
     for face in body.faces_in(low, high):
-        plane = body.plane(face)
-        slope = plane[axis]
+        other = body.plane(face)
+        slope = other[axis]
         if slope == 0:  # case: a face along the line, or without area
             continue
         corners = body.corners(face)
         if not _moved_line_meets(corners, j, k, x, y, w):
             continue
-        height = plane[0] * q[0] + plane[1] * q[1] + plane[2] * q[2] + plane[3] * w
+        height = other[0] * q[0] + other[1] * q[1] + other[2] * q[2] + other[3] * w
         if height == 0:
+            if plane is not None and any(cross(plane[:3], other[:3])):
+                return None
             is_on_face, changes = True, not changes
         elif (height < 0) == (slope > 0):  # the face lies above q
             above = not above
     return Sides(above, above != changes, above and not is_on_face)
+
+
+def even_sides(corners: Corners, plane: Plane, axis: int, touching: Iterable[Corners]) -> tuple[bool, bool]:
+    """Tell whether a body has one status just above (below) the whole of a face with area; `touching`: all faces of
+    the body that meet the face.
+
+    A face of the body comes between only where it meets the open face and leaves the plane on that side.
+    """
+    flat = [(p[(axis + 1) % 3], p[(axis + 2) % 3], 1) for p in corners]
+    turn = sign(dot(cross(flat[0], flat[1]), flat[2]))
+    lines = [cross(flat[i], flat[(i + 1) % 3]) for i in range(3)]
+    above = below = True
+    for points in touching:
+        values = [value_at(plane, p) for p in points]
+        low, high = min(values), max(values)
+        if (low, high) == (0, 0) or not _meets_open_face(_flat_trace(points, values, axis), flat, lines, turn):
+            continue
+        above = above and (high if plane[axis] > 0 else -low) <= 0
+        below = below and (-low if plane[axis] > 0 else high) <= 0
+    return above, below
+
+
+def _flat_trace(points: Corners, values: list[int], axis: int) -> list[Vector]:
+    """Return the ends (x, y, w), w > 0, of the segment or point in which a face meets a plane that does not hold it."""
+    j, k = (axis + 1) % 3, (axis + 2) % 3
+    ends = [(points[i][j], points[i][k], 1) for i in range(3) if values[i] == 0]
+    for i in range(3):
+        f, g = values[i], values[i - 2]
+        if f * g < 0:
+            p, q = points[i], points[i - 2]
+            x, y, w = f * q[j] - g * p[j], f * q[k] - g * p[k], f - g
+            ends.append((x, y, w) if w > 0 else (-x, -y, -w))
+    return ends
+
+
+def _meets_open_face(ends: list[Vector], flat: list[Vector], lines: list[Vector], turn: int) -> bool:
+    """Tell whether a segment or point of its plane meets an open triangle: no line of an edge, nor its own line, has
+    the two on different closed sides."""
+    if any(max(turn * dot(line, end) for end in ends) <= 0 for line in lines):
+        return False
+    if len(ends) < 2:
+        return True
+    own = cross(ends[0], ends[1])
+    values = [dot(own, p) for p in flat]
+    return not any(own) or min(values) < 0 < max(values)
 
 
 def _around(body: ExactBody, q: Homogeneous) -> tuple[list[float], list[float]]:

@@ -33,11 +33,12 @@ from engine.collision.dual_traversal import (
     new_descent,
 )
 from engine.collision.exact_body import ExactBody, exact_pair
-from engine.collision.exact_cells import cells_of, is_inside_exact, pieces_of_segment, sides_at
+from engine.collision.exact_cells import cells_of, even_sides, is_inside_exact, pieces_of_segment, sides_at, sides_over
 from engine.collision.exact_triangles import as_simplex, classify_exact, kind_of_contact
 from engine.collision.face_state import find_states
 from engine.collision.parity import INSIDE, locate_vertices
 from engine.collision.result import Collision, Kind, Witness, Work
+from engine.collision.separating_plane import is_separated
 from engine.collision.shell import (
     STATE_CLEAN,
     STATE_CROSSED,
@@ -57,6 +58,8 @@ _SAFE_POWER = 300
 _BLOCK = 64
 _PROBED = 8
 _NAMED = 32
+_WITHIN = ((1, 1, 1), (1, 1, 2), (2, 1, 1), (3, 5, 4), (7, 11, 5))
+"""Weights of the corners for points within a face."""
 STRENGTH: tuple[Kind, ...] = ("face_face", "edge_face", "vertex_face", "edge_edge", "vertex_edge", "vertex_vertex")
 """Of several contacts the witness is the one of the kind that stands first here; at most `_NAMED` are looked at."""
 
@@ -153,6 +156,8 @@ class _Pair:
             if self.seek == SEEK_OVERLAP:
                 return self._touch(Relation.OVERLAPPING, contacts)
             return self._touch(Relation.TOUCHING, contacts, piercing=self.seek != SEEK_CONTACT)
+        if len(contacts) and self._is_separated(contacts):
+            return self._touch(Relation.TOUCHING, contacts)
         patches = [self._patches_inside(own, contacts[:, own]) for own in (0, 1)]
         if not len(contacts):
             n_inside = [sum(len(patch.faces) for patch in found) for found in patches]
@@ -218,11 +223,19 @@ class _Pair:
         )
         return pairs[meet], False
 
+    def _is_separated(self, contacts: IntArray) -> bool:
+        """Tell whether a plane is known that separates the two bodies."""
+        (first, second), flag = self.shells, self.work.budget.flag
+        first_pose, second_pose = first.posed(self.poses[0]), second.posed(self.poses[1])
+        found = is_separated(first.arrays, first_pose, second.arrays, second_pose, contacts, flag)
+        self.work.budget.check()
+        return bool(found)
+
     def _is_overlap_near(self, pairs: IntArray, kinds: npt.NDArray[np.int8]) -> bool:
         """Tell whether the cells of a few faces in contact prove overlapping; such a pair is put first."""
         sure = np.flatnonzero(kinds != UNDECIDED)
         for index in sure[:: max(1, len(sure) // _PROBED)].tolist():
-            if self._look_at_cells(0, int(pairs[index, 0]))[0]:
+            if self._look_at_cells(0, int(pairs[index, 0]), None)[0]:
                 pairs[0] = pairs[index]
                 return True
         return False
@@ -310,7 +323,8 @@ class _Pair:
             if not both and (piercing or not self.work.witness or not self.shells[1 - own].has_inside):
                 continue
             for face in np.unique(contacts[:, own]).tolist():
-                overlaps, pierces = self._look_at_cells(own, face)
+                met = contacts[contacts[:, own] == face, 1 - own]
+                overlaps, pierces = self._look_at_cells(own, face, met)
                 if overlaps:
                     return self._touch(Relation.OVERLAPPING, contacts)
                 piercing = piercing or pierces
@@ -339,9 +353,9 @@ class _Pair:
                     return True
         return False
 
-    def _look_at_cells(self, own: int, face: int) -> tuple[bool, bool]:
+    def _look_at_cells(self, own: int, face: int, met: IntArray | None) -> tuple[bool, bool]:
         """Tell whether both insides come up to one side of some cell of a face, and whether a cell lies inside the
-        other."""
+        other. met: all faces of the other body that meet this one, if known."""
         body, other = self.exact[own], self.exact[1 - own]
         axis = body.axis(face)
         if axis < 0:
@@ -349,6 +363,10 @@ class _Pair:
         cutters = [other]
         if body.shell.has_inside and self._state(own, face) != STATE_CLEAN:
             cutters.append(body)
+        elif body.shell.has_inside and met is not None:
+            overlaps = self._overlaps_evenly(own, face, met)
+            if overlaps is not None:
+                return overlaps, False
         pierces = False
         for q in cells_of(body, face, cutters, self.work.budget):
             theirs = sides_at(other, q, axis)
@@ -358,6 +376,28 @@ class _Pair:
                     return True, False
             pierces = pierces or theirs.at
         return False, pierces
+
+    def _overlaps_evenly(self, own: int, face: int, met: IntArray) -> bool | None:
+        """Tell whether both insides come up to one side of a clean face; None where the other's status is not known to
+        be one all along the side of the face's inside.
+
+        No other answer is missing: a point of the face in the other's open interior has both insides beside it.
+        """
+        body, other = self.exact[own], self.exact[1 - own]
+        corners, plane, axis = body.corners(face), body.plane(face), body.axis(face)
+        is_even_above, is_even_below = even_sides(corners, plane, axis, (other.corners(i) for i in met.tolist()))
+        if not (is_even_above or is_even_below):
+            return None
+        for weights in _WITHIN:
+            x, y, z = (sum(w * p[side] for w, p in zip(weights, corners)) for side in range(3))
+            q = (x, y, z, sum(weights))
+            ours, theirs = sides_over(body, q, axis, plane), sides_over(other, q, axis, plane)
+            if ours is None or theirs is None:
+                continue
+            if (ours.above and not is_even_above) or (ours.below and not is_even_below):
+                return None
+            return (ours.above and theirs.above) or (ours.below and theirs.below)
+        return None
 
     def _pierces_without_area(self, own: int, face: int) -> bool:
         """Tell whether a face that is only a segment has a point in the other body's open interior."""
@@ -379,6 +419,8 @@ class _Pair:
             self.work.budget.check()
             kind = kind_of_contact(self.exact[0].corners(i), self.exact[1].corners(j))
             named.append((STRENGTH.index(kind), int(self.shells[0].faces[i]), int(self.shells[1].faces[j])))
+            if kind == STRENGTH[0]:  # coplanar pairs stand first, in the order of the caller's faces
+                break
         strength, first_face, second_face = min(named)
         return Collision(relation, Witness(STRENGTH[strength], first_face, second_face, "", piercing))
 
