@@ -1,0 +1,284 @@
+"""Cases that users of other libraries filed (benchmarks/filed), replayed on ours and on every peer.
+
+    python -m benchmarks.fields.filed                 # the tables; --cases: also one line for each case
+    python -m benchmarks.fields.filed --answers       # compute the exact answers anew and write them into cases.json
+
+Each contender runs in a process of its own, so that one that crashes or never returns costs its own case only. Points
+on a boundary count as contained, bodies that touch as meeting. An area is wrong when it is off by more than a millionth
+of the extent, a piece of a segment likewise; ours must equal the exact answer to the last bit. Nothing is timed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import multiprocessing
+import sys
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from importlib.metadata import PackageNotFoundError, version
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.filed import plane, space
+
+PATH = Path(__file__).resolve().parents[1] / "filed" / "cases.json"
+OUTCOMES = ("right", "wrong", "refused", "crashed", "no answer in time", "not applicable")
+LIMIT = 20.0
+"""Seconds for one case; imports count towards the first."""
+TOLERANCE = 2.0**-20
+"""Of the extent: more than rounding coordinates does, less than any piece anyone would miss."""
+Case = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Peer:
+    """One contender: for each kind of question a function of the case's input, or none."""
+
+    name: str
+    package: str
+    calls: dict[str, Callable[[Case], Any]]
+
+
+PEERS = (
+    Peer("ours", "", {}),
+    Peer("shapely", "shapely", {
+        "locate 2D": plane.shapely_locate, "clip_segments 2D": plane.shapely_segments,
+        "overlay 2D": plane.shapely_overlay, "collide 2D": plane.shapely_collide,
+    }),
+    Peer("shapely clip_by_rect", "shapely", {
+        "clip_segments 2D": plane.shapely_rectangle_segments, "clip_polygons 2D": plane.shapely_polygons,
+    }),
+    Peer("matplotlib", "matplotlib", {"locate 2D": plane.matplotlib_locate}),
+    Peer("pyclipper", "pyclipper", {
+        "locate 2D": plane.pyclipper_locate, "clip_segments 2D": plane.pyclipper_segments,
+        "clip_polygons 2D": plane.pyclipper_polygons, "overlay 2D": plane.pyclipper_overlay,
+    }),
+    Peer("Clipper2 by manifold3d", "manifold3d", {
+        "clip_polygons 2D": plane.clipper2_polygons, "overlay 2D": plane.clipper2_overlay,
+    }),
+    Peer("numba_celltree", "numba-celltree", {"clip_segments 2D": plane.celltree_segments}),
+    Peer("Open3D", "open3d", {"locate 3D": space.open3d_locate, "collide 3D": space.open3d_collide}),
+    Peer("trimesh + embreex", "trimesh", {
+        "locate 3D": space.trimesh_locate, "clip_segments 3D": space.trimesh_segments,
+    }),
+    Peer("libigl", "libigl", {"locate 3D": space.libigl_locate, "collide 3D": space.libigl_collide}),
+    Peer("VTK", "vtk", {"locate 3D": space.vtk_locate, "collide 3D": space.vtk_collide}),
+    Peer("CGAL", "cgal", {"locate 3D": space.cgal_locate}),
+    Peer("coal", "coal", {"collide 3D": space.coal_collide}),
+    Peer("fcl", "python-fcl", {"collide 3D": space.fcl_collide}),
+    Peer("manifold3d", "manifold3d", {"collide 3D": space.manifold_collide}),
+)  # fmt: skip
+
+
+def load() -> list[Case]:
+    """Return the cases."""
+    return json.loads(PATH.read_text("utf-8"))
+
+
+def kind_of(case: Case) -> str:
+    """Return the operation and the dimension."""
+    data = case["input"]
+    solid = data.get("solid") or data.get("region") or data.get("first") or data["subject"]
+    numbers = solid.get("vertices") or solid.get("min") or solid["rings"][0]
+    return f"{case['operation']} {np.size(numbers if 'min' in solid else numbers[0])}D"
+
+
+# --- judging ----------------------------------------------------------------------------------------------------------
+
+
+def is_right(case: Case, answer: Any) -> bool:
+    """Say whether a peer's answer is the exact one, up to rounding."""
+    exact = case["answer"]
+    match case["operation"]:
+        case "locate":
+            return [bool(held) for held in answer] == [location >= 0 for location in exact]
+        case "collide":
+            return bool(answer) == (exact != "disjoint")
+        case "overlay":
+            size = np.prod(np.maximum(*(_extent(case["input"][key]["rings"]) for key in ("subject", "clip"))))
+            area = Fraction(*(int(part, 16) for part in exact["area"].split("/")))
+            return abs(answer - float(area)) <= TOLERANCE * size
+        case "clip_polygons":
+            size = np.prod(_extent([ring for rings in case["input"]["polygons"] for ring in rings]))
+            return abs(answer - sum(plane.area_of([ring]) for rings in exact for ring in rings)) <= TOLERANCE * size
+    slack = TOLERANCE * _extent([case["input"]["segments"]]).max()
+    pieces = _long_pieces([(piece["segment"], piece["start"], piece["end"]) for piece in exact], slack)
+    found = _long_pieces(answer, slack)
+    return len(pieces) == len(found) and all(
+        i == j and np.abs(ends - others).max() <= slack
+        for (i, ends), (j, others) in zip(pieces, found, strict=True)
+    )  # fmt: skip
+
+
+def _extent(rings: list[Any]) -> np.ndarray:
+    every = np.concatenate([np.array(ring, float).reshape(-1, np.shape(ring)[-1]) for ring in rings])
+    return np.ptp(every, axis=0)
+
+
+def _long_pieces(pieces: Sequence[plane.Piece], slack: float) -> list[tuple[int, np.ndarray]]:
+    """Return the pieces that are more than a point, in order, each from its least end."""
+    rows = [(int(i), np.array(sorted([tuple(start), tuple(end)]), float)) for i, start, end in pieces]
+    rows = [row for row in rows if np.abs(row[1][1] - row[1][0]).max() > slack]
+    return sorted(rows, key=lambda row: (row[0], row[1].tolist()))
+
+
+# --- replaying --------------------------------------------------------------------------------------------------------
+
+
+def _answer(peer: Peer, case: Case) -> str:
+    """Return the outcome of one case; in the contender's own process."""
+    if peer.name == "ours":
+        from tests.hard.operations import OPERATIONS
+
+        return "right" if OPERATIONS[case["operation"]].by_engine(case["input"]) == case["answer"] else "wrong"
+    try:
+        return "right" if is_right(case, peer.calls[kind_of(case)](case["input"])) else "wrong"
+    except plane.NotApplicable:
+        return "not applicable"
+
+
+def _serve(pipe: Connection, name: str) -> None:
+    """Answer cases until there are no more."""
+    peer = next(peer for peer in PEERS if peer.name == name)
+    while (case := pipe.recv()) is not None:
+        try:
+            pipe.send((_answer(peer, case), ""))
+        except (ImportError, OSError) as error:
+            pipe.send(("absent", f"{type(error).__name__}: {error}".splitlines()[0]))
+        except Exception as error:  # whatever a peer raises
+            pipe.send(("refused", f"{type(error).__name__}: {error}".splitlines()[0]))
+
+
+def replay(names: Sequence[str] = (), limit: float = LIMIT) -> list[dict[str, str]]:
+    """Return one row for each contender and case: `case`, `kind`, `contender`, `package`, `outcome`, `note`.
+
+    A contender that cannot be imported has one row, with the outcome `absent`.
+    """
+    cases, rows = load(), []
+    for peer in PEERS:
+        if not names or peer.name in names:
+            rows += _replay_one(peer, cases, limit)
+    return rows
+
+
+def _replay_one(peer: Peer, cases: list[Case], limit: float) -> list[dict[str, str]]:
+    context, rows = multiprocessing.get_context("spawn"), []
+    process, pipe = None, None
+    for case in cases:
+        kind = kind_of(case)
+        row = {"case": case["id"], "kind": kind, "contender": peer.name, "package": peer.package}
+        if peer.name != "ours" and kind not in peer.calls:
+            rows.append(row | {"outcome": "not applicable", "note": ""})
+            continue
+        if process is None:
+            pipe, other = context.Pipe()
+            process = context.Process(target=_serve, args=(other, peer.name), daemon=True)
+            process.start()
+            other.close()
+        outcome, note = _ask(pipe, case, limit)
+        if outcome == "absent":
+            rows = [{**row, "case": "", "kind": "", "outcome": outcome, "note": note}]
+            break
+        if outcome in ("crashed", "no answer in time"):
+            process.kill()
+            process.join()
+            note, process = note or f"exit code {process.exitcode}", None
+        rows.append(row | {"outcome": outcome, "note": note})
+    if process is not None:
+        process.kill()
+        process.join()
+    return rows
+
+
+def _ask(pipe: Connection, case: Case, limit: float) -> tuple[str, str]:
+    try:
+        pipe.send(case)
+        return pipe.recv() if pipe.poll(limit) else ("no answer in time", f"{limit:g} s")
+    except (EOFError, ConnectionError):
+        return "crashed", ""
+
+
+# --- writing ----------------------------------------------------------------------------------------------------------
+
+
+def section(rows: list[dict[str, str]]) -> str:
+    """Return the section of the report: contenders and their counts, then every case that a peer does not pass."""
+    cases = {case["id"]: case for case in load()}
+    threads = len({case["thread"] for case in cases.values()})
+    lines = [
+        "## Cases that users filed\n",
+        f"{len(cases)} inputs from {threads} public threads about peers and other libraries, replayed on the installed "
+        "versions ([benchmarks/filed](../benchmarks/filed/README.md)). A boundary counts as contained, contact as "
+        "meeting; areas and pieces may be off by a millionth of the extent; ours must be exact to the last bit.\n",
+        "| contender | version | asked | " + " | ".join(OUTCOMES[:-1]) + " |",
+        "|---|---|---|" + "---|" * (len(OUTCOMES) - 1),
+    ]
+    for name in dict.fromkeys(row["contender"] for row in rows):
+        mine = [row for row in rows if row["contender"] == name]
+        if mine[0]["outcome"] == "absent":
+            lines.append(f"| {name} | not installed: {mine[0]['note']} |" + " |" * len(OUTCOMES))
+            continue
+        count = Counter(row["outcome"] for row in mine)
+        asked = len(mine) - count["not applicable"]
+        cells = " | ".join(str(count[outcome]) for outcome in OUTCOMES[:-1])
+        lines.append(f"| {name} | {_version(mine[0]['package'])} | {asked} | {cells} |")
+    failed: dict[str, list[str]] = {}
+    for row in rows:
+        if row["outcome"] not in ("right", "not applicable", "absent"):
+            how = "" if row["outcome"] == "wrong" else f" ({row['outcome']})"
+            failed.setdefault(row["case"], []).append(row["contender"] + how)
+    passed = len(cases) - len(failed)
+    lines += [f"\nAll contenders pass {passed} of the cases today; not these:\n", "| case | reported | wrong today |"]
+    lines.append("|---|---|---|")
+    for name, contenders in failed.items():
+        case = cases[name]
+        repository, number = case["thread"].split("#")
+        link = f"[{name}](https://github.com/{repository}/issues/{number})"
+        lines.append(f"| {link} | {case['about']} | {', '.join(contenders)} |")
+    return "\n".join(lines) + "\n"
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package) if package else ""
+    except PackageNotFoundError:
+        return "?"
+
+
+def write_answers() -> None:
+    """Compute every exact answer by the rational reference."""
+    from tests.hard.operations import OPERATIONS
+
+    cases = load()
+    for case in cases:
+        case["answer"] = OPERATIONS[case["operation"]].exact(case["input"])
+    PATH.write_text("[\n" + ",\n".join(json.dumps(case) for case in cases) + "\n]\n", "utf-8")
+
+
+def main(words: list[str] | None = None) -> int:
+    """Replay and print; 1 if an answer of ours is not right."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--answers", action="store_true", help="write the exact answers into cases.json")
+    parser.add_argument("--only", nargs="*", default=(), metavar="NAME", help="only these contenders")
+    parser.add_argument("--cases", action="store_true", help="print every answer that is not right, with its note")
+    options = parser.parse_args(words)
+    if options.answers:
+        write_answers()
+        return 0
+    rows = replay(options.only)
+    if options.cases:
+        for row in rows:
+            if row["outcome"] not in ("right", "not applicable"):
+                print(f"{row['contender']:<24} {row['outcome']:<18} {row['case']:<50} {row['note']}")
+    print(section(rows))
+    return int(any(row["contender"] == "ours" and row["outcome"] != "right" for row in rows))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
