@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from benchmarks.fields import filed
 from benchmarks.pictures import error_share
 
 LISTED = 8
@@ -25,6 +26,8 @@ def text_of(found: dict[str, Any]) -> str:
     for operation in dict.fromkeys(row["operation"] for row in rows):
         parts.append(f"\n## {operation[0].upper()}{operation[1:]}\n")
         parts += [_table(rows, operation, contest) for contest in _contests(rows, operation)]
+    if "filed" in found:
+        parts.append("\n" + filed.section(found["filed"]))
     return "".join(parts) + _legend()
 
 

@@ -23,7 +23,7 @@ from typing import Any
 
 from benchmarks import curves, machine, page, pictures
 from benchmarks.contest import Contest, Row, hold
-from benchmarks.fields import collision, containment, overlay, polygons, primitives, segments
+from benchmarks.fields import collision, containment, filed, overlay, polygons, primitives, segments
 from benchmarks.suite import RESULTS
 
 FIELDS = (containment, collision, segments, polygons, overlay, primitives)
@@ -50,8 +50,11 @@ def main(words: list[str] | None = None) -> int:
     if not options.only:
         measure = partial(curves.by_distance, options.seed, 100 if options.quick else 2000)
         found["curves"] = {"distance": measure(), "size": curves.by_size(options.seed, options.quick)}
+        say("the cases that users filed")
+        found["filed"] = filed.replay()
     found |= {"seconds": round(time.perf_counter() - started, 1), "load_after": machine.load()}
     wrong = sum(row.errors.get("wrong", 0) + row.errors.get("off", 0) for row in rows if row.contender == "ours")
+    wrong += sum(row["contender"] == "ours" and row["outcome"] != "right" for row in found.get("filed", ()))
     print(f"{len(rows)} rows in {found['seconds']} s; wrong answers or inexact coordinates of ours: {wrong}")
     if not (options.quick or options.only):
         path.parent.mkdir(parents=True, exist_ok=True)

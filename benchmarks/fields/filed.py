@@ -156,7 +156,7 @@ def _serve(pipe: Connection, name: str) -> None:
 
 
 def replay(names: Sequence[str] = (), limit: float = LIMIT) -> list[dict[str, str]]:
-    """Return one row for each contender and case: `case`, `kind`, `contender`, `package`, `outcome`, `note`.
+    """Return one row for each contender and case: `case`, `kind`, `contender`, `version`, `outcome`, `note`.
 
     A contender that cannot be imported has one row, with the outcome `absent`.
     """
@@ -172,7 +172,7 @@ def _replay_one(peer: Peer, cases: list[Case], limit: float) -> list[dict[str, s
     process, pipe = None, None
     for case in cases:
         kind = kind_of(case)
-        row = {"case": case["id"], "kind": kind, "contender": peer.name, "package": peer.package}
+        row = {"case": case["id"], "kind": kind, "contender": peer.name, "version": _version(peer.package)}
         if peer.name != "ours" and kind not in peer.calls:
             rows.append(row | {"outcome": "not applicable", "note": ""})
             continue
@@ -227,7 +227,7 @@ def section(rows: list[dict[str, str]]) -> str:
         count = Counter(row["outcome"] for row in mine)
         asked = len(mine) - count["not applicable"]
         cells = " | ".join(str(count[outcome]) for outcome in OUTCOMES[:-1])
-        lines.append(f"| {name} | {_version(mine[0]['package'])} | {asked} | {cells} |")
+        lines.append(f"| {name} | {mine[0]['version']} | {asked} | {cells} |")
     failed: dict[str, list[str]] = {}
     for row in rows:
         if row["outcome"] not in ("right", "not applicable", "absent"):

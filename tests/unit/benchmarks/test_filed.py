@@ -40,11 +40,11 @@ def test_contenders_that_die_or_hang_are_told_apart() -> None:
 
 def test_the_section_names_what_fails() -> None:
     rows = [
-        {"case": name, "kind": "", "contender": contender, "package": "", "outcome": outcome, "note": ""}
+        {"case": name, "kind": "", "contender": contender, "version": "", "outcome": outcome, "note": ""}
         for name in CASES
         for contender, outcome in (("ours", "right"), ("other", "crashed" if name.endswith("#1189") else "right"))
     ]
-    rows.append({"case": "", "kind": "", "contender": "third", "package": "", "outcome": "absent", "note": "no module"})
+    rows.append({"case": "", "kind": "", "contender": "third", "version": "", "outcome": "absent", "note": "no module"})
     text = filed.section(rows)
     assert f"| ours |  | {len(CASES)} | {len(CASES)} | 0 | 0 | 0 | 0 |" in text
     assert "| a point exactly on an edge was expected to be contained | other (crashed) |" in text
