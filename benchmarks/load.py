@@ -1,0 +1,175 @@
+"""The load generator: plain blocking sockets in Python, one process for each client, requests built beforehand.
+
+It runs on the same machine and shares the cores with what it measures. A request costs it about 20 us.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import re
+import socket
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+NAME = "blocking sockets, Python"
+_LENGTH = re.compile(rb"\r\ncontent-length: (\d+)", re.IGNORECASE)
+
+
+def request(path: str, body: bytes, media_type: str = "application/json") -> bytes:
+    """Return a POST request as bytes."""
+    head = f"POST {path} HTTP/1.1\r\nHost: x\r\nContent-Type: {media_type}\r\nContent-Length: {len(body)}\r\n\r\n"
+    return head.encode() + body
+
+
+def free_port() -> int:
+    """Return a port that nobody listens on now."""
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        return int(probe.getsockname()[1])
+
+
+def memory_of(pid: int) -> float:
+    """Return the resident megabytes of a process (Linux), else NaN."""
+    try:
+        return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 2**20
+    except OSError:
+        return float("nan")
+
+
+class Connection:
+    """One connection, kept open as long as the server likes."""
+
+    def __init__(self, port: int, timeout: float = 120.0) -> None:
+        self._address, self._timeout = ("127.0.0.1", port), timeout
+        self._socket: socket.socket | None = None
+
+    def ask(self, message: bytes) -> tuple[int, bytes]:
+        """Send a request; return status and body of the answer."""
+        if self._socket is None:
+            self._socket = socket.create_connection(self._address, self._timeout)
+            self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._socket.sendall(message)
+        got = bytearray(self._socket.recv(2**18))
+        while (end := got.find(b"\r\n\r\n")) < 0:
+            got += self._more()
+        head = bytes(got[:end])
+        length = int(_LENGTH.search(head)[1])  # type: ignore[index]
+        while len(got) < end + 4 + length:
+            got += self._more()
+        if b"\r\nconnection: close" in head.lower():
+            self.close()
+        return int(head[9:12]), bytes(got[end + 4 :])
+
+    def _more(self) -> bytes:
+        assert self._socket is not None
+        chunk = self._socket.recv(2**20)
+        if not chunk:
+            raise ConnectionResetError("closed within an answer")
+        return chunk
+
+    def close(self) -> None:
+        """Close the connection; the next request opens another."""
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None
+
+
+def wait_until(port: int, path: str) -> None:
+    """Wait until `path` answers 200; five minutes at most, the time of a first compilation."""
+    message = f"GET {path} HTTP/1.1\r\nHost: x\r\n\r\n".encode()
+    for _ in range(60_000):
+        with suppress(OSError):
+            connection = Connection(port)
+            status, _ = connection.ask(message)
+            connection.close()
+            if status == 200:
+                return
+        time.sleep(0.005)
+    raise TimeoutError(f"no {path} on port {port}")
+
+
+@dataclass
+class Seen:
+    """What one client saw."""
+
+    statuses: Counter[int] = field(default_factory=Counter)
+    seconds: list[float] = field(default_factory=list)
+    """Of answers with status 200."""
+    lost: int = 0
+    """Connections that broke within a request."""
+    span: float = 0.0
+
+
+def loop(port: int, message: bytes, seconds: float, pause: float = 0.0) -> Seen:
+    """Ask again and again, with a pause after each answer."""
+    seen, connection = Seen(), Connection(port)
+    start = time.perf_counter()
+    while time.perf_counter() - start < seconds:
+        before = time.perf_counter()
+        try:
+            status, _ = connection.ask(message)
+        except OSError:
+            connection.close()
+            seen.lost += 1
+            continue
+        seen.statuses[status] += 1
+        if status == 200:
+            seen.seconds.append(time.perf_counter() - before)
+        if pause:
+            time.sleep(pause)
+    seen.span = time.perf_counter() - start
+    connection.close()
+    return seen
+
+
+def many(port: int, message: bytes, seconds: float, n_connections: int, pause: float = 0.0) -> Seen:
+    """Run `loop` on several connections, a thread each; return what all saw."""
+    found: list[Seen] = []
+    threads = [
+        threading.Thread(target=lambda: found.append(loop(port, message, seconds, pause))) for _ in range(n_connections)
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    total = Seen()
+    for seen in found:
+        total.statuses += seen.statuses
+        total.seconds += seen.seconds
+        total.lost += seen.lost
+        total.span = max(total.span, seen.span)
+    return total
+
+
+def in_process(function: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
+    """Start `function` in a process of its own; return what waits for its result."""
+    context = multiprocessing.get_context("spawn")
+    ours, theirs = context.Pipe(duplex=False)
+    process = context.Process(target=_send_result, args=(theirs, function, arguments))
+    process.start()
+    theirs.close()
+
+    def result() -> Any:
+        value = ours.recv()
+        process.join()
+        ours.close()
+        return value
+
+    return result
+
+
+def _send_result(connection: Any, function: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
+    connection.send(function(*arguments))
+    connection.close()
+
+
+def percentile(values: list[float], share: float) -> float:
+    """Return the value that this share of `values` does not exceed."""
+    ordered = sorted(values)
+    return ordered[min(len(ordered) - 1, int(share * len(ordered)))]

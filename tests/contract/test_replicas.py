@@ -1,0 +1,95 @@
+"""Replicas behind nginx on one store: one is killed under load, nothing accepted is lost, ids agree."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import orjson
+import pytest
+
+import engine
+from benchmarks.load import Connection, free_port, request, wait_until
+from tests.unit.service.test_live import Service
+
+ROOT = Path(__file__).resolve().parents[2]
+CONF = (ROOT / "deploy" / "nginx.conf").read_text("utf-8")
+NGINX = shutil.which("nginx", path=f"{os.environ.get('PATH', '')}:/usr/sbin")
+
+
+def test_compose_states_the_same_topology() -> None:
+    compose = (ROOT / "deploy" / "compose.yml").read_text("utf-8")
+    names = re.findall(r"server (\S+):8000", CONF)
+    assert names == re.findall(r"^  (\S+): \*replica$", compose, re.MULTILINE)
+    assert re.search(r"listen (\d+);", CONF)[1] in re.search(r'"(\d+:\d+)"', compose)[1]  # type: ignore[index]
+
+
+def config(folder: Path, port: int, replicas: list[Service]) -> Path:
+    """Write the file of deploy/ with these ports, and all that it writes below `folder`."""
+    text = CONF.replace("listen 8080", f"listen 127.0.0.1:{port}")
+    for i_replica, replica in enumerate(replicas, 1):
+        text = text.replace(f"geometry-{i_replica}:8000", f"127.0.0.1:{replica.port}")
+    kinds = ("client_body", "proxy", "fastcgi", "uwsgi", "scgi")
+    paths = "".join(f"    {kind}_temp_path {folder}/{kind};\n" for kind in kinds)
+    text = text.replace("http {\n", f"http {{\n    access_log off;\n{paths}")
+    path = folder / "nginx.conf"
+    user = "user root;\n" if os.geteuid() == 0 else ""  # else its workers cannot enter `folder`, which is for its owner
+    path.write_text(f"{user}pid {folder}/nginx.pid;\nerror_log {folder}/error.log;\ndaemon off;\n{text}")
+    return path
+
+
+@pytest.mark.skipif(NGINX is None, reason="nginx is not installed (Debian's package nginx)")
+def test_a_replica_killed_under_load_loses_nothing(tmp_path: Path) -> None:
+    replicas = [Service(store_folder=tmp_path / "solids", access_log=False) for _ in range(2)]
+    port = free_port()
+    nginx = subprocess.Popen([str(NGINX), "-p", str(tmp_path), "-c", str(config(tmp_path, port, replicas))])
+    try:
+        for replica in replicas:
+            replica.wait_until_ready()
+        wait_until(port, "/readyz")
+        names, statuses, lost, wrong, end = set(), [], [], [], time.monotonic() + 4
+        points = np.random.default_rng(0).random((500, 3))
+
+        def work(seed: int) -> None:
+            connection = Connection(port)
+            source = np.random.default_rng(seed)
+            while time.monotonic() < end:
+                radius = 0.25 + int(source.integers(8)) / 16
+                body = orjson.dumps({"type": "sphere", "center": [0, 0, 0], "radius": radius})
+                try:
+                    status, answer = connection.ask(request("/v1/solids", body))
+                    statuses.append(status)
+                    name = orjson.loads(answer)["id"]
+                    names.add((radius, name))
+                    ask = request(f"/v1/solids/{name}/contains", points.tobytes(), "application/octet-stream")
+                    status, answer = connection.ask(ask)
+                    statuses.append(status)
+                    wrong.append(answer != engine.locate(points, engine.Sphere([0, 0, 0], radius)).tobytes())
+                except OSError as error:
+                    lost.append(error)
+                    connection.close()
+            connection.close()
+
+        workers = [threading.Thread(target=work, args=(seed,)) for seed in range(4)]
+        for worker in workers:
+            worker.start()
+        time.sleep(1.5)
+        replicas[0].process.kill()
+        for worker in workers:
+            worker.join()
+        assert not lost
+        assert len(statuses) > 100
+        assert set(statuses) <= {200, 201}
+        assert not any(wrong)
+        assert len(names) == len({radius for radius, _ in names}) == 8
+    finally:
+        nginx.terminate()
+        nginx.wait()
+        for replica in replicas:
+            replica.close()

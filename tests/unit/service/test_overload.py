@@ -1,0 +1,56 @@
+"""Far more requests than can be answered: no crash, 200 or 503 with Retry-After, in time, and memory stays."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from benchmarks import load
+from tests.unit.service.asking import SPHERE
+from tests.unit.service.test_live import Service
+
+DEADLINE = 5.0
+
+
+@pytest.fixture
+def service() -> Iterator[Service]:
+    service = Service(deadline_seconds=DEADLINE, queue_length=16, access_log=False)
+    try:
+        service.wait_until_ready()
+        yield service
+        assert service.stop() == 0, "".join(service.log)
+        assert "Traceback" not in "".join(service.log)
+    finally:
+        service.close()
+
+
+def overload(service: Service, seconds: float) -> None:
+    points = np.random.default_rng(0).random((10_000, 3)).tolist()
+    message = load.request("/v1/contains", json.dumps({"solid": SPHERE, "points": points}).encode())
+    assert set(load.many(service.port, message, 1.0, 2).statuses) == {200}  # two at a time are no trouble
+    clients = [load.in_process(load.many, service.port, message, seconds / 5, 30) for _ in range(2)]
+    for client in clients:
+        client()
+    before = load.memory_of(service.process.pid)
+    clients = [load.in_process(load.many, service.port, message, seconds, 30) for _ in range(2)]
+    seen = [client() for client in clients]
+    statuses = sum((one.statuses for one in seen), Counter[int]())
+    accepted = [second for one in seen for second in one.seconds]
+    assert set(statuses) == {200, 503}, statuses
+    assert not any(one.lost for one in seen)
+    assert load.percentile(accepted, 0.99) < DEADLINE
+    after = load.memory_of(service.process.pid)
+    assert not after > 1.25 * before + 50, (before, after)
+
+
+def test_five_seconds_of_overload(service: Service) -> None:
+    overload(service, 5.0)
+
+
+@pytest.mark.full
+def test_a_minute_of_overload(service: Service) -> None:
+    overload(service, 60.0)
