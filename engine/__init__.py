@@ -1,6 +1,7 @@
 """Exact answers to four questions about a scene: containment, collision, segment clipping, polygon clipping."""
 
-from engine.clipping.overlay import OverlayBatch, overlay, overlay_batch
+from engine.clipping.overlay import overlay
+from engine.clipping.overlay_batch import OverlayBatch, overlay_batch
 from engine.clipping.overlay_result import Collapse, Overlay, OverlayPiece
 from engine.clipping.polygons import ClippedPolygons, PolygonStatus, clip_polygons
 from engine.clipping.segments import SegmentPieces, clip_segments

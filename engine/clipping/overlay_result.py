@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.arrangement.exact_area import ExactRings
+from engine.clipping.implicit_rings import ImplicitRings
 
 
 class OverlayPiece(NamedTuple):
@@ -69,7 +70,7 @@ class Overlay:
     vertices_moved: int
     largest_displacement: float
     snapped: bool
-    exact: ExactRings
+    exact: ExactRings | ImplicitRings
 
     @property
     def n_pieces(self) -> int:

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.clipping.overlay import Operation, overlay, overlay_batch
+from engine.clipping.overlay import Operation, overlay
+from engine.clipping.overlay_batch import overlay_batch
 from engine.clipping.overlay_result import Overlay
 from engine.errors import (
     CancelledError,
@@ -230,6 +231,32 @@ def test_batch_equals_single_calls_whatever_the_workers() -> None:
     assert sum(done) == 2 * len(subjects)
     with pytest.raises(InvalidArrayError, match="equal length"):
         overlay_batch(subjects, clips[1:])
+
+
+def test_batch_is_flat_and_tells_what_is_no_double() -> None:
+    """Among ordinary pairs one that the kernel leaves open, and one whose result no double holds."""
+    huge = 1.7e308
+    shallow = [(-huge, -huge), (huge, huge), (huge, -huge)]
+    subjects = [Polygon([box(0, 0, 4)]), Polygon([[(0, 0), (1, 1), (0, 1)]]), Polygon(FRAME), Polygon([shallow])]
+    near = 1.0 + 2.0**-52
+    clips = [Polygon([box(2, 2, 4)]), Polygon([[(0, 0), (1, near), (near, 0.5)]]), Polygon(BOW_TIE), Polygon(FRAME)]
+    batch = overlay_batch(subjects, clips, "difference")
+    assert batch.status.tolist() == [0, 0, 0, 0]
+    assert len(batch) == len(batch.pair_offsets) - 1 == 4
+    pieces = [piece for result in batch for piece in (result.pieces if result else [])]
+    assert len(pieces) == len(batch.piece_offsets) - 1
+    rings = [ring for piece in pieces for ring in (piece.shell, *piece.holes)]
+    assert [len(ring) for ring in rings] == np.diff(batch.ring_offsets).tolist()
+    assert (np.concatenate(rings) == batch.vertices).all()
+    for pair, (subject, clip) in enumerate(zip(subjects, clips, strict=True)):
+        alone, here = overlay(subject, clip, "difference"), batch[pair]
+        assert here is not None
+        assert here.area_exact == alone.area_exact
+        assert shape(pickle.loads(pickle.dumps(batch))[pair]) == shape(alone)
+    with pytest.raises(IndexError):
+        _ = batch[4]
+    empty = overlay_batch([], [])
+    assert (len(empty), empty.overlays, empty.vertices.shape) == (0, (), (0, 2))
 
 
 def test_report_and_pickle() -> None:

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.clipping.overlay import RingArrays, overlay_rings
+from engine.clipping.implicit_rings import RingArrays
+from engine.clipping.overlay import overlay_rings
 from engine.clipping.overlay_result import Overlay
 from engine.parallel import Budget
 from tests.conftest import DATA

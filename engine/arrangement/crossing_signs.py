@@ -1,0 +1,206 @@
+"""Exact decisions on crossings of edges, each a sign: a double-double with a bound first, then an expansion.
+
+The crossing of an edge ab with the line through c and d divides ab by the two weights
+
+    w_a = orient(c, d, a),   w_b = orient(c, d, b)   (of opposite signs),   x = (a |w_b| + b |w_a|) / (|w_a| + |w_b|).
+
+All decisions are polynomials of degree four at most in the coordinates of the input, never of computed points.
+Preconditions: every coordinate is zero or within 2^-120 .. 2^120, so that expansions are exact (multiples of 2^-172, of
+2^-688 after a product of four) and double-doubles keep their bounds.
+
+Bounds. A weight as a double-double carries 32 u^2 (|p| + |q|) for its two products p and q: differences are exact,
+products 14 u^2, their sum 4 u^2. The product of two weights carries the errors of both and 5 u^2, its difference 4 u^2:
+the sums below take 16 u^2 of each product for these.
+
+Source: J. R. Shewchuk, Adaptive precision floating-point arithmetic and fast robust geometric predicates, 1997.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final, NamedTuple
+
+from engine.jit import inline, merged
+from engine.predicates.double_double import U2, dd_mul, dd_sub
+from engine.predicates.error_free import two_diff, workspace
+from engine.predicates.expansion import Components, add_product, grow, sign
+from engine.predicates.orientation import BOUND_2D, GUARD_2D, minor, orient2d_exact
+from engine.types import UNDECIDED, Point2
+
+WEIGHT_BOUND: Final = 32.0 * U2
+PRODUCT_BOUND: Final = 16.0 * U2
+WEIGHT_ROOM: Final = 16
+"""Components of a weight: the product of two differences of two components each, twice."""
+
+
+class Edges(NamedTuple):
+    """Closed rings as vertices; edge i runs from vertex i to vertex ``after[i]``.
+
+    x, y: float64; after, before, ring: int64; one entry a vertex.
+    """
+
+    x: Any
+    y: Any
+    after: Any
+    before: Any
+    ring: Any
+
+
+@merged
+def orient(edges: Edges, a: int, b: int, c: int) -> int:
+    """Return the sign of the turn a, b, c of three vertices, exactly."""
+    x, y = edges.x, edges.y
+    left = (x[a] - x[c]) * (y[b] - y[c])
+    right = (y[a] - y[c]) * (x[b] - x[c])
+    det = left - right
+    threshold = BOUND_2D * (abs(left) + abs(right)) + GUARD_2D
+    if det > threshold:
+        return 1
+    if -det > threshold:
+        return -1
+    return orient2d_exact(Point2(x[a], y[a]), Point2(x[b], y[b]), Point2(x[c], y[c]))
+
+
+@merged
+def turn_of_edges(edges: Edges, e: int, f: int) -> int:
+    """Return the sign of the cross product of the directions of the edges e and f, exactly."""
+    x, y = edges.x, edges.y
+    b, d = edges.after[e], edges.after[f]
+    left = (x[b] - x[e]) * (y[d] - y[f])
+    right = (y[b] - y[e]) * (x[d] - x[f])
+    det = left - right
+    threshold = BOUND_2D * (abs(left) + abs(right)) + GUARD_2D  # each factor, product and the sum is off by u
+    if det > threshold:
+        return 1
+    if -det > threshold:
+        return -1
+    if e == f:
+        return 0
+    return _exact_turn(edges, e, b, f, d)
+
+
+@inline
+def _exact_turn(edges: Edges, a: int, b: int, c: int, d: int) -> int:
+    x, y = edges.x, edges.y
+    ux, ux_tail = two_diff(x[b], x[a])
+    uy, uy_tail = two_diff(y[b], y[a])
+    vx, vx_tail = two_diff(x[d], x[c])
+    vy, vy_tail = two_diff(y[d], y[c])
+    e = workspace(16)
+    n = minor(e, ux, ux_tail, uy, uy_tail, vx, vx_tail, vy, vy_tail)
+    return sign(e, n)
+
+
+@inline
+def weight(edges: Edges, c: int, d: int, p: int) -> tuple[float, float, float]:
+    """Return orient(c, d, p) as a double-double, and its bound."""
+    x, y = edges.x, edges.y
+    ux, ux_tail = two_diff(x[d], x[c])
+    uy, uy_tail = two_diff(y[d], y[c])
+    wx, wx_tail = two_diff(x[p], x[c])
+    wy, wy_tail = two_diff(y[p], y[c])
+    ph, pl = dd_mul(ux, ux_tail, wy, wy_tail)
+    qh, ql = dd_mul(uy, uy_tail, wx, wx_tail)
+    h, low = dd_sub(ph, pl, qh, ql)
+    return h, low, WEIGHT_BOUND * (abs(ph) + abs(qh))
+
+
+@inline
+def exact_weight(edges: Edges, c: int, d: int, p: int, e: Components) -> int:
+    """Set e to orient(c, d, p); return its length, at most WEIGHT_ROOM."""
+    x, y = edges.x, edges.y
+    ux, ux_tail = two_diff(x[d], x[c])
+    uy, uy_tail = two_diff(y[d], y[c])
+    wx, wx_tail = two_diff(x[p], x[c])
+    wy, wy_tail = two_diff(y[p], y[c])
+    return minor(e, ux, ux_tail, uy, uy_tail, wx, wx_tail, wy, wy_tail)
+
+
+@inline
+def difference_of_products(
+    ph: float, pl: float, pe: float, qh: float, ql: float, qe: float,
+    rh: float, rl: float, re: float, sh: float, sl: float, se: float,
+) -> int:  # fmt: skip
+    """Return the sign of p q - r s for double-doubles with bounds, UNDECIDED where the bounds leave it open."""
+    ah, al = dd_mul(ph, pl, qh, ql)
+    bh, bl = dd_mul(rh, rl, sh, sl)
+    h, _ = dd_sub(ah, al, bh, bl)
+    bound = 1.001 * (abs(ph) * qe + abs(qh) * pe + abs(rh) * se + abs(sh) * re) + 2.0 * (pe * qe + re * se)
+    bound += PRODUCT_BOUND * (abs(ah) + abs(bh))
+    if h > bound:
+        return 1
+    if -h > bound:
+        return -1
+    return UNDECIDED
+
+
+@inline
+def order_of_crossings(edges: Edges, e: int, f: int, g: int) -> int:
+    """Return -1, 0 or 1 as the crossing of edge e with f comes before, with or after that with g, along e.
+
+    Caller guarantees that f and g each cross e in a point inside both.
+    """
+    a, b = e, edges.after[e]
+    fb, gb = edges.after[f], edges.after[g]
+    # With t_f = w_a / (w_a - w_b) the difference t_f - t_g has the sign of w_a(g) w_b(f) - w_a(f) w_b(g), times the
+    # signs of w_a(f) and w_a(g).
+    fah, fal, fae = weight(edges, f, fb, a)
+    fbh, fbl, fbe = weight(edges, f, fb, b)
+    gah, gal, gae = weight(edges, g, gb, a)
+    gbh, gbl, gbe = weight(edges, g, gb, b)
+    side = difference_of_products(gah, gal, gae, fbh, fbl, fbe, fah, fal, fae, gbh, gbl, gbe)
+    if side == UNDECIDED or abs(fah) <= fae or abs(gah) <= gae:
+        return _exact_order(edges, a, b, f, fb, g, gb)
+    return side if (fah > 0.0) == (gah > 0.0) else -side
+
+
+@inline
+def _exact_order(edges: Edges, a: int, b: int, f: int, fb: int, g: int, gb: int) -> int:
+    wfa, wfb, wga, wgb = workspace(16), workspace(16), workspace(16), workspace(16)
+    nfa, nfb = exact_weight(edges, f, fb, a, wfa), exact_weight(edges, f, fb, b, wfb)
+    nga, ngb = exact_weight(edges, g, gb, a, wga), exact_weight(edges, g, gb, b, wgb)
+    total = workspace(1024)  # 2 * 16 * 16 components for each of two products
+    n = add_product(total, 0, wga, nga, wfb, nfb)
+    for k in range(nfa):
+        wfa[k] = -wfa[k]
+    n = add_product(total, n, wfa, nfa, wgb, ngb)
+    return -sign(total, n) * sign(wfa, nfa) * sign(wga, nga)
+
+
+@inline
+def crossing_against(edges: Edges, e: int, f: int, axis: int, value: float, tail: float) -> int:
+    """Return the sign of a coordinate of the crossing of the edges e and f less ``value + tail``, exactly.
+
+    Caller guarantees that they cross in a point inside both; value and tail as two_sum gives them.
+    """
+    z = edges.x if axis == 0 else edges.y
+    a, b, fb = e, edges.after[e], edges.after[f]
+    wa, wb, p, q = workspace(16), workspace(16), workspace(4), workspace(4)
+    na, nb = exact_weight(edges, f, fb, a, wa), exact_weight(edges, f, fb, b, wb)
+    # x - v = ((a - v) |w_b| + (b - v) |w_a|) / (|w_a| + |w_b|)
+    np_, nq = _less(z[a], value, tail, p), _less(z[b], value, tail, q)
+    total = workspace(256)  # 2 * 16 * 3 components for each of two products
+    if sign(wa, na) < 0:
+        for k in range(na):
+            wa[k] = -wa[k]
+    else:
+        for k in range(nb):
+            wb[k] = -wb[k]
+    n = add_product(total, 0, wb, nb, p, np_)
+    n = add_product(total, n, wa, na, q, nq)
+    return sign(total, n)
+
+
+@inline
+def _less(z: float, value: float, tail: float, e: Components) -> int:
+    """Set e to z - value - tail; return its length, at most 3."""
+    n = 0
+    high, low = two_diff(z, value)
+    if low != 0.0:
+        e[0] = low
+        n = 1
+    if high != 0.0:
+        e[n] = high
+        n += 1
+    if tail == 0.0:
+        return n
+    return grow(e, n, -tail)

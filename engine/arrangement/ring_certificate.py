@@ -1,0 +1,128 @@
+"""A certificate that rounding left rings what they were: no vertex came near another edge than its own.
+
+Every vertex moves by less than the unit u of the largest coordinate, on a straight way. Two edges that have no vertex
+in common cannot touch on that way if they end more than 2 u apart; nor can two edges fold that have one in common, if
+the far end of each ends more than 2 u away from the other. If that holds for every pair with a vertex that moves, the
+rings after rounding are the exact ones deformed without a touch: valid, with the same pieces, holes and turns.
+
+Distances are computed in floating point. Differences are off by u each, so the distance from a line by less than 12 u
+more: `MARGIN` = 16 holds both. A pair that fails proves nothing; the caller then arranges the rounded rings anew.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from engine.arrangement.chain_rings import Rings
+from engine.arrangement.edge_tree import boxes_meet, build_tree, next_pairs
+from engine.jit import inline, merged
+from engine.predicates.orientation import orient2d
+from engine.types import Point2
+
+MARGIN: Final = 16.0 * 2.0**-52
+_FEW: Final = 40
+"""Edges up to which all pairs of boxes are looked at."""
+
+
+@merged
+def _is_far(px: float, py: float, ax: float, ay: float, bx: float, by: float, square: float) -> bool:
+    """Tell whether p is further from the segment ab than the root of ``square``."""
+    dx, dy, ex, ey = bx - ax, by - ay, px - ax, py - ay
+    along, length = ex * dx + ey * dy, dx * dx + dy * dy
+    if along <= 0.0:
+        return ex * ex + ey * ey > square
+    if along >= length:
+        ex, ey = px - bx, py - by
+        return ex * ex + ey * ey > square
+    across = dx * ey - dy * ex
+    return across * across > square * length
+
+
+@merged
+def _crosses(x: Any, y: Any, a: int, b: int, c: int, d: int) -> bool:
+    """Tell whether c and d are on two sides of ab, and a and b on two sides of cd, in floating point."""
+    dx, dy = x[b] - x[a], y[b] - y[a]
+    side_c, side_d = dx * (y[c] - y[a]) - dy * (x[c] - x[a]), dx * (y[d] - y[a]) - dy * (x[d] - x[a])
+    if (side_c > 0.0) == (side_d > 0.0):
+        return False
+    dx, dy = x[d] - x[c], y[d] - y[c]
+    side_a, side_b = dx * (y[a] - y[c]) - dy * (x[a] - x[c]), dx * (y[b] - y[c]) - dy * (x[b] - x[c])
+    return (side_a > 0.0) != (side_b > 0.0)
+
+
+@merged
+def _is_apart(points: Any, x: Any, y: Any, a: int, b: int, c: int, d: int, square: float) -> bool:
+    """Tell whether the edges ab and cd cannot touch, or fold, on the way to their rounded places."""
+    shared = 0
+    if points[a] == points[d]:
+        c, d, shared = d, c, 1
+    elif points[b] == points[c]:
+        a, b, shared = b, a, 1
+    elif points[b] == points[d]:
+        a, b, c, d, shared = b, a, d, c, 1
+    elif points[a] == points[c]:
+        shared = 1
+    far = _is_far(x[b], y[b], x[c], y[c], x[d], y[d], square) and _is_far(x[d], y[d], x[a], y[a], x[b], y[b], square)
+    if shared:
+        return far
+    return (
+        far
+        and _is_far(x[a], y[a], x[c], y[c], x[d], y[d], square)
+        and _is_far(x[c], y[c], x[a], y[a], x[b], y[b], square)
+        and not _crosses(x, y, a, b, c, d)
+    )
+
+
+@inline
+def certify(
+    rings: Rings, n_rings: int, n: int, x: Any, y: Any, moved: Any, largest: float, boxes: Any, marks: Any,
+    after: Any, tree: Any, tree_marks: Any, places: Any, stack: Any, pairs: Any, stop: Any,
+) -> bool:  # fmt: skip
+    """Tell whether the rings are certainly valid after rounding, no point on a straight line but where rings meet.
+
+    x, y: (n,) rounded points of ``rings``; moved: (n,) uint8. largest: magnitude of the largest coordinate. The rest is
+    scratch for n boxes.
+    """
+    margin = MARGIN * largest
+    square = margin * margin
+    any_moved = False
+    for ring in range(n_rings):
+        first, last = rings.offset[ring], rings.offset[ring + 1]
+        before = last - 1
+        for k in range(first, last):
+            after[before] = k
+            before = k
+    for k in range(n):
+        j = after[k]
+        marks[k] = moved[k] | moved[j]
+        i = after[j]
+        if marks[k] | moved[i]:
+            any_moved = True
+            if not rings.meets[j] and orient2d(Point2(x[k], y[k]), Point2(x[j], y[j]), Point2(x[i], y[i])) == 0:
+                return False
+        boxes[k, 0], boxes[k, 1] = min(x[k], x[j]) - margin, max(x[k], x[j]) + margin
+        boxes[k, 2], boxes[k, 3] = min(y[k], y[j]) - margin, max(y[k], y[j]) + margin
+    if not any_moved:
+        return True
+    points = rings.point
+    if n <= _FEW:
+        for i in range(n):
+            for j in range(i + 1, n):
+                if (
+                    (marks[i] | marks[j])
+                    and boxes_meet(boxes, i, boxes, j)
+                    and not _is_apart(points, x, y, i, after[i], j, after[j], square)
+                ):
+                    return False
+        return True
+    build_tree(boxes, marks, n, tree, tree_marks, places)
+    stack[0, 0], stack[0, 1], depth = 1, 1, 1
+    while depth > 0:  # bound: the walk through the tree
+        if stop[0]:
+            return False
+        found, depth = next_pairs(boxes, marks, n, tree, tree_marks, places, stack, depth, pairs)
+        for k in range(found):
+            i, j = pairs[k, 0], pairs[k, 1]
+            if not _is_apart(points, x, y, i, after[i], j, after[j], square):
+                return False
+    return True

@@ -1,0 +1,89 @@
+"""Rings of an overlay whose vertices are named by the input: a vertex of it, or the crossing of two of its edges.
+
+The compiled overlay decides without ever writing a crossing as a fraction. Who asks for the exact area gets the
+fractions made then, from the polygons given.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+import numpy.typing as npt
+
+from engine.arrangement.arrange import crossing, line_through
+from engine.arrangement.exact_area import ExactRings
+from engine.arrangement.nodes import Homogeneous, float_nodes
+
+
+@dataclass(frozen=True, slots=True)
+class RingArrays:
+    """Rings as arrays: vertices (n, 2) float64 and where each ring begins, (n_rings + 1,) int64; may be empty."""
+
+    vertices: npt.NDArray[np.float64]
+    offsets: npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class ImplicitRings:
+    """Exact rings over two polygons; the same questions as `ExactRings`, answered when asked.
+
+    sources: (n, 2) int64: an input vertex and -1, or the first vertices of two edges that cross; those of `clip` are
+    counted after those of `subject`. sizes: number of vertices of each ring.
+    """
+
+    subject: RingArrays
+    clip: RingArrays
+    sources: npt.NDArray[np.int64]
+    sizes: npt.NDArray[np.int64]
+
+    @property
+    def rings(self) -> tuple[tuple[Homogeneous, ...], ...]:
+        """The rings as integers."""
+        return self._made().rings
+
+    @property
+    def exponent(self) -> int:
+        """A coordinate is ``x / w * 2**exponent``."""
+        return self._made().exponent
+
+    def area(self) -> Fraction:
+        """Return the exact area; its length grows with the number of crossings."""
+        return self._made().area()
+
+    def nearest_area(self) -> float:
+        """Return the double nearest to the exact area. Raises `NotRepresentableError` beyond the largest double."""
+        return self._made().nearest_area()
+
+    def _made(self) -> ExactRings:
+        vertices = np.concatenate([self.subject.vertices, self.clip.vertices])
+        offsets = [*self.subject.offsets.tolist(), *(self.clip.offsets[1:] + len(self.subject.vertices)).tolist()]
+        firsts = np.unique(self.sources[self.sources >= 0])
+        ends = np.array([_end_of_edge(vertices, offsets, first) for first in firsts.tolist()], np.int64)
+        nodes, numbers = float_nodes(vertices[np.concatenate([firsts, ends])])
+        place = {first: k for k, first in enumerate(firsts.tolist())}
+        points = [nodes.points[number] for number in numbers]
+        made: list[Homogeneous] = []
+        for first, second in self.sources.tolist():
+            i, j = place[first], place.get(second, -1)
+            if j < 0:
+                made.append(points[i])
+            else:
+                lines = [line_through(points[k], points[len(firsts) + k]) for k in (i, j)]
+                made.append(crossing(*lines))
+        stops = np.cumsum(self.sizes).tolist()
+        return ExactRings(tuple(tuple(made[a:b]) for a, b in zip([0, *stops], stops)), nodes.exponent)
+
+
+def _end_of_edge(vertices: npt.NDArray[np.float64], offsets: Sequence[int], first: int) -> int:
+    """Return the next vertex of the ring that is not at the place of `first` (itself if there is none)."""
+    ring = int(np.searchsorted(offsets, first, side="right")) - 1
+    start, stop = offsets[ring], offsets[ring + 1]
+    after = first
+    for _ in range(stop - start):
+        after = after + 1 if after + 1 < stop else start
+        if (vertices[after] != vertices[first]).any():
+            break
+    return after

@@ -1,0 +1,54 @@
+"""Pairs of boxes from the implicit tree: exactly those that brute force finds, each once."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from engine.arrangement import edge_tree
+from engine.jit import kernel
+
+
+@kernel
+def pairs_of(boxes, marks, tree, tree_marks, places, stack, portion, found):  # type: ignore[no-untyped-def]
+    """Return how many pairs there are, written to `found`."""
+    n = len(boxes)
+    edge_tree.build_tree(boxes, marks, n, tree, tree_marks, places)
+    stack[0, 0], stack[0, 1] = 1, 1
+    depth, total = 1, 0
+    while depth > 0:
+        count, depth = edge_tree.next_pairs(boxes, marks, n, tree, tree_marks, places, stack, depth, portion)
+        found[total : total + count] = portion[:count]
+        total += count
+    return total
+
+
+@pytest.mark.parametrize("n", [1, 3, 4, 5, 33, 300])
+@pytest.mark.parametrize("share", [1.0, 0.2])
+@pytest.mark.parametrize("wanders", [True, False])
+def test_every_pair_once(n: int, share: float, wanders: bool) -> None:
+    random = np.random.default_rng([n, wanders])
+    low = np.cumsum(random.normal(size=(n, 2)), axis=0) if wanders else random.random((n, 2)) * np.sqrt(n)
+    high = low + random.random((n, 2)) * 2
+    boxes = np.stack([low[:, 0], high[:, 0], low[:, 1], high[:, 1]], axis=1)
+    marks = (random.random(n) < share).astype(np.uint8)
+    n_leaves = int(edge_tree.leaves_of(n))
+    found = np.empty((n * n, 2), np.int64)
+    total = pairs_of(
+        boxes,
+        marks,
+        np.empty((2 * n_leaves, 4)),
+        np.empty(2 * n_leaves, np.uint8),
+        np.empty(n, np.int64),
+        np.empty((edge_tree.DEEPEST, 2), np.int64),
+        np.empty((edge_tree.PORTION, 2), np.int64),
+        found,
+    )
+    got = sorted(tuple(sorted(pair)) for pair in found[:total].tolist())
+    expected = [
+        (i, j)
+        for i in range(n)
+        for j in range(i + 1, n)
+        if (marks[i] or marks[j]) and (low[i] <= high[j]).all() and (low[j] <= high[i]).all()
+    ]
+    assert got == expected
