@@ -10,7 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.clipping.implicit_rings import ImplicitRings, RingArrays
-from engine.clipping.overlay_kernel import DONE, overlay_pairs
+from engine.clipping.overlay_kernel import (
+    DONE,
+    NEEDS_CONTACTS,
+    NEEDS_OUTPUT,
+    OPEN,
+    overlay_pairs,
+    workspace_for,
+)
 from engine.clipping.overlay_result import Overlay
 from engine.clipping.scaling import exponent_of, scaled_back, shifted
 from engine.errors import CancelledError
@@ -87,27 +94,54 @@ def run_kernel(
 ) -> Found:
     """Overlay the pairs start .. stop - 1. Raises as `Budget.check` when the call must end."""
     n = stop - start
-    status, counts, displacement = np.empty(n, np.int8), np.empty((n, 4), np.int64), np.empty(n)
-    with np.errstate(all="ignore"):
-        vertices, sources, sizes, piece_sizes = overlay_pairs(
-            subjects.vertices,
-            subjects.ring_offsets,
-            subjects.polygon_offsets,
-            clips.vertices,
-            clips.ring_offsets,
-            clips.polygon_offsets,
-            start,
-            stop,
-            _KEPT_ARRAYS[operation],
-            budget.flag,
-            status,
-            counts,
-            displacement,
-        )
-    budget.check()
-    if budget.flag[0]:
-        raise CancelledError("another part of the call failed")  # the flag went up for that, not for time
-    return Found(status, counts, displacement, vertices, sources, sizes, piece_sizes)
+    status, counts, displacement = np.full(n, OPEN, np.int8), np.zeros((n, 4), np.int64), np.zeros(n)
+    n_vertices, n_rings = zip(_largest(subjects, start, stop), _largest(clips, start, stop))
+    room, reached, parts = max(64, sum(n_vertices) // 4), start, []
+    output = (8 * n + 4 * sum(n_vertices), 2 * n + 16)
+    scratch = workspace_for(sum(n_vertices), sum(n_rings), room)
+    while reached < stop:  # bound: each turn goes on, or makes room for one pair, geometrically
+        arrays = (
+            np.empty((output[0], 2)), np.empty((output[0], 2), np.int64),
+            np.empty(output[1], np.int64), np.empty(output[1], np.int64),
+        )  # fmt: skip
+        with np.errstate(all="ignore"):
+            reached, needs, *sizes = overlay_pairs(
+                subjects.vertices,
+                subjects.ring_offsets,
+                subjects.polygon_offsets,
+                clips.vertices,
+                clips.ring_offsets,
+                clips.polygon_offsets,
+                start,
+                stop,
+                reached,
+                _KEPT_ARRAYS[operation],
+                budget.flag,
+                scratch,
+                status,
+                counts,
+                displacement,
+                *arrays,
+            )
+        budget.check()
+        if budget.flag[0]:
+            raise CancelledError("another part of the call failed")  # the flag went up for that, not for time
+        parts.append([arrays[0][: sizes[0]], arrays[1][: sizes[0]], arrays[2][: sizes[1]], arrays[3][: sizes[2]]])
+        if needs == NEEDS_CONTACTS:
+            room *= 4
+            scratch = workspace_for(sum(n_vertices), sum(n_rings), room)
+        elif needs == NEEDS_OUTPUT:
+            rings, vertices = (int(counts[reached - start, k]) for k in (1, 2))
+            output = (max(2 * output[0], vertices), max(2 * output[1], rings))
+    joined = parts[0] if len(parts) == 1 else [np.concatenate(each) for each in zip(*parts)]
+    return Found(status, counts, displacement, *joined)
+
+
+def _largest(polygons: Polygons, start: int, stop: int) -> tuple[int, int]:
+    """Return the most vertices and the most rings of one of some polygons."""
+    first_ring = polygons.polygon_offsets[start : stop + 1]
+    most_vertices = np.diff(polygons.ring_offsets[first_ring]).max()
+    return int(most_vertices), int(np.diff(first_ring).max())
 
 
 def overlay_compiled(

@@ -9,12 +9,13 @@ number of crossings. Decisions are exact throughout. A pair is left OPEN, for th
 - a coordinate of the result cannot be rounded from double-doubles and exact signs;
 - rounding came so near another edge that ring_certificate.py cannot vouch for the rounded rings.
 
-Scratch arrays live as long as a chunk and grow when a pair needs more.
+Scratch arrays come from the caller, who gives more and calls again where they do not suffice: code that allocates
+takes most of its compiler's time.
 """
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -24,39 +25,144 @@ from engine.arrangement.chains import Chains, build_chains, build_stars
 from engine.arrangement.crossing_signs import Edges
 from engine.arrangement.edge_contacts import Events, enter_contact, root_of, unite
 from engine.arrangement.edge_events import sort_events
-from engine.arrangement.edge_tree import DEEPEST, PORTION, boxes_meet, build_tree, leaves_of, next_pairs
+from engine.arrangement.edge_tree import DEEPEST, LEAF, PORTION, boxes_meet, build_tree, leaves_of, next_pairs
 from engine.arrangement.ring_certificate import certify
 from engine.arrangement.ring_order import Ranking, rank_rings
-from engine.arrangement.rounded_crossings import round_crossing
+from engine.arrangement.rounded_crossings import LOST, round_crossing
 from engine.clipping.cut_point import is_safe
 from engine.jit import inline, kernel, merged
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
 
 DONE: Final = 0
 OPEN: Final = 1
+FINISHED: Final = 0
+NEEDS_CONTACTS: Final = 1
+"""The pair reached has more contacts than there is scratch for."""
+NEEDS_OUTPUT: Final = 2
+"""The pair reached has more vertices or rings than the output has room for."""
 _FEW: Final = 40
 """Edges up to which all pairs of boxes are looked at: fewer steps than a tree."""
+_UNKNOWN: Final = -2.0
+"""Error of a crossing that is not rounded yet."""
 
 
-@inline
-def _ints(array: Any, size: int) -> Any:
-    """Return `array` if it has room for `size` numbers, else a new one."""
-    return array if array.shape[0] >= size else np.empty(size + size // 2, np.int64)
+class Workspace(NamedTuple):
+    """Scratch of one chunk.
+
+    By vertex of a pair: edges, origins, chain_at, starts. By ring: tops, masks, rings, highest. By contact: events,
+    order, nodes, chains and what follows from them. points, node_of, marked: by vertex and contact.
+    """
+
+    edges: Edges
+    origins: Any
+    chain_at: Any
+    starts: Any
+    marked: Any
+    tops: Any
+    masks: Any
+    rings: Any
+    highest: Any
+    boxes: Any
+    marks: Any
+    tree: Any
+    tree_marks: Any
+    places: Any
+    stack: Any
+    pairs: Any
+    points: Any
+    node_of: Any
+    events: Events
+    order: Any
+    nodes: Any
+    chains: Chains
+    masks_before: Any
+    star_starts: Any
+    star_ends: Any
+    star: Any
+    place: Any
+    cycle: Any
+    following: Any
+    joined: Any
+    label: Any
+    regions: Any
+    inside: Any
+    bounds: Any
+    seen: Any
+    fan: Any
+    path: Any
+    path_place: Any
+    found: Rings
+    crossing_x: Any
+    crossing_y: Any
+    crossing_error: Any
+    x: Any
+    y: Any
+    moved: Any
+    ranking: Ranking
 
 
-@inline
-def _floats(array: Any, size: int) -> Any:
-    return array if array.shape[0] >= size else np.empty(size + size // 2)
+def workspace_for(n_vertices: int, n_rings: int, n_contacts: int) -> Workspace:
+    """Return scratch for pairs of up to so many vertices, rings and contacts."""
+    n, k = n_vertices + 1, n_contacts + 8
+    m = n + 2 * k  # points of all boundary rings: every vertex once, every end of a chain on two sides
+    n_leaves = 1
+    while n_leaves * LEAF < m:  # bound: 60 doublings
+        n_leaves *= 2
 
+    def ints(size: int) -> Any:
+        return np.empty(size, np.int64)
 
-@inline
-def _bytes(array: Any, size: int) -> Any:
-    return array if array.shape[0] >= size else np.empty(size + size // 2, np.uint8)
+    def octets(size: int) -> Any:
+        return np.empty(size, np.uint8)
 
-
-@inline
-def _boxes(array: Any, size: int) -> Any:
-    return array if array.shape[0] >= size else np.empty((size + size // 2, 4))
+    return Workspace(
+        edges=Edges(np.empty(n), np.empty(n), ints(n), ints(n), ints(n)),
+        origins=ints(n),
+        chain_at=ints(m),
+        starts=ints(n + 1),
+        marked=octets(n),
+        tops=ints(n_rings + 1),
+        masks=ints(n_rings + 1),
+        rings=ints(n_rings + 1),
+        highest=ints(n_rings + 1),
+        boxes=np.empty((m, 4)),
+        marks=octets(m),
+        tree=np.empty((2 * n_leaves, 4)),
+        tree_marks=octets(2 * n_leaves),
+        places=ints(m),
+        stack=np.empty((DEEPEST, 2), np.int64),
+        pairs=np.empty((PORTION, 2), np.int64),
+        points=ints(n + k),
+        node_of=ints(n + k),
+        events=Events(ints(k), ints(k), ints(k), np.empty(k), np.empty(k), ints(k), ints(k)),
+        order=ints(k),
+        nodes=ints(k),
+        chains=Chains(ints(k), ints(k), ints(k), ints(k), ints(k), ints(k)),
+        masks_before=ints(k),
+        star_starts=ints(k + 1),
+        star_ends=ints(k),
+        star=ints(2 * k),
+        place=ints(2 * k),
+        cycle=ints(2 * k),
+        following=ints(2 * k),
+        joined=ints(2 * k + 1),
+        label=ints(2 * k + 1),
+        regions=ints(2 * k + 1),
+        inside=octets(2 * k + 1),
+        bounds=octets(k),
+        seen=octets(2 * k),
+        fan=ints(k),
+        path=ints(2 * k),
+        path_place=ints(k),
+        found=Rings(ints(m), octets(m), ints(k + 1), ints(k)),
+        crossing_x=np.empty(k),
+        crossing_y=np.empty(k),
+        crossing_error=np.empty(k),
+        x=np.empty(m),
+        y=np.empty(m),
+        moved=octets(m),
+        ranking=Ranking(ints(k), np.empty(k), octets(k), ints(k), ints(k), ints(k)),
+    )
 
 
 @inline
@@ -220,239 +326,174 @@ def _join_faces(
         unite(regions, outer, beyond)
 
 
+@inline
+def _round_points(w: Workspace, n: int, n_crossings: int, n_points: int) -> tuple[float, float]:
+    """Round the points of all rings; return the largest coordinate, and how far a point moved or LOST."""
+    x, y, error = w.edges.x, w.edges.y, w.crossing_error
+    error[:n_crossings] = _UNKNOWN
+    farthest = largest = 0.0
+    lost = False
+    for k in range(n_points):
+        point = w.found.point[k]
+        if point < n:
+            w.x[k], w.y[k], w.moved[k] = x[point] + 0.0, y[point] + 0.0, 0
+        else:
+            c = point - n
+            if error[c] == _UNKNOWN:
+                cx, cy, ex, ey = round_crossing(w.edges, w.events.first[c], w.events.second[c])
+                lost = lost or ex < 0.0 or ey < 0.0
+                w.crossing_x[c], w.crossing_y[c] = cx, cy
+                error[c] = np.sqrt(ex * ex + ey * ey) * (1.0 + 2.0**-50)  # two squares, their sum, a root
+                farthest = max(farthest, error[c])
+            w.x[k], w.y[k], w.moved[k] = w.crossing_x[c], w.crossing_y[c], error[c] > 0.0
+        largest = max(largest, abs(w.x[k]), abs(w.y[k]))
+    return largest, LOST if lost else farthest
+
+
+@inline
+def _write(
+    w: Workspace, n: int, n_found: int, vertices: Any, sources: Any, sizes: Any, pieces: Any, n_out: int, n_rings: int,
+    n_pieces: int,
+) -> None:  # fmt: skip
+    """Append the rings in their order to the output, from its entries n_out, n_rings and n_pieces on."""
+    n_pieces -= 1
+    for k in range(n_found):
+        ring = w.ranking.order[k] if n_found > 1 else 0
+        first, last = w.found.offset[ring], w.found.offset[ring + 1]
+        i = w.ranking.start[ring]
+        for _ in range(last - first):
+            point = w.found.point[i]
+            vertices[n_out, 0], vertices[n_out, 1] = w.x[i], w.y[i]
+            if point < n:
+                sources[n_out, 0], sources[n_out, 1] = w.origins[point], -1
+            else:
+                sources[n_out, 0] = w.origins[w.events.first[point - n]]
+                sources[n_out, 1] = w.origins[w.events.second[point - n]]
+            n_out += 1
+            i = i + 1 if i + 1 < last else first
+        sizes[n_rings + k] = last - first
+        if w.ranking.is_hole[ring]:
+            pieces[n_pieces] += 1
+        else:
+            n_pieces += 1
+            pieces[n_pieces] = 1
+
+
 @kernel
 def overlay_pairs(
     subjects: Any, subject_rings: Any, subject_items: Any, clips: Any, clip_rings: Any, clip_items: Any,
-    first_item: int, last_item: int, kept: Any, stop: Any,
-    status: Any, counts: Any, displacement: Any,
-) -> Any:  # fmt: skip
-    """Overlay the pairs ``first_item`` .. ``last_item - 1``.
+    first_item: int, last_item: int, begin: int, kept: Any, stop: Any, w: Workspace,
+    status: Any, counts: Any, displacement: Any, vertices: Any, sources: Any, sizes: Any, pieces: Any,
+) -> tuple[int, int, int, int, int]:  # fmt: skip
+    """Overlay the pairs ``begin`` .. ``last_item - 1`` of those from ``first_item`` on.
 
     subjects, clips: (n, 2) float64 vertices; subject_rings, clip_rings: where each ring begins, and its end;
     subject_items, clip_items: the first ring of each polygon, and the end of the last one's. kept: (4,) uint8 by label.
     Fills, by pair from first_item on: status, (pairs,) int8, DONE or OPEN; counts, (pairs, 4) int64: pieces, rings,
     vertices, pairs of edges beyond the filter; displacement, (pairs,) float64: how far rounding moved a vertex at most.
-    Returns vertices (m, 2) float64, sources (m, 2) int64, ring sizes and rings by piece, all pairs one after another. A
-    source is the input vertex and -1, or the first vertices of the two edges that cross; clip vertices are counted
+    Fills, pair after pair from the beginning: vertices (m, 2) float64, sources (m, 2) int64, ring sizes, rings by piece.
+    A source is the input vertex and -1, or the first vertices of the two edges that cross; clip vertices are counted
     after those of all subjects.
+    Returns the pair reached, FINISHED or what is needed to go on with it, and numbers of vertices, rings, pieces.
     """
-    x, y = np.empty(64), np.empty(64)
-    after, before, ring_of = np.empty(64, np.int64), np.empty(64, np.int64), np.empty(64, np.int64)
-    origins, tops, masks, rings, highest = after.copy(), after.copy(), after.copy(), after.copy(), after.copy()
-    boxes, marks, tree, tree_marks = (
-        np.empty((64, 4)),
-        np.empty(64, np.uint8),
-        np.empty((64, 4)),
-        np.empty(64, np.uint8),
-    )
-    places = after.copy()
-    stack, pairs = np.empty((DEEPEST, 2), np.int64), np.empty((PORTION, 2), np.int64)
-    points, marked, chain_at, starts = after.copy(), np.empty(64, np.uint8), after.copy(), after.copy()
-    capacity = 128
-    event_edge, event_point = np.empty(capacity, np.int64), np.empty(capacity, np.int64)
-    event_other, event_t, event_slack = np.empty(capacity, np.int64), np.empty(capacity), np.empty(capacity)
-    crossing_first, crossing_second = np.empty(capacity, np.int64), np.empty(capacity, np.int64)
-    order, node_of, nodes = after.copy(), after.copy(), after.copy()
-    tail, head, first, last = after.copy(), after.copy(), after.copy(), after.copy()
-    mask, stands, masks_before = after.copy(), after.copy(), after.copy()
-    star_starts, star_ends, star, place = after.copy(), after.copy(), after.copy(), after.copy()
-    cycle, following, joined, label, regions = after.copy(), after.copy(), after.copy(), after.copy(), after.copy()
-    inside, bounds, seen = np.empty(64, np.uint8), np.empty(64, np.uint8), np.empty(64, np.uint8)
-    fan, path, path_place = after.copy(), after.copy(), after.copy()
-    ring_point, ring_offset, ring_region = after.copy(), after.copy(), after.copy()
-    ring_meets = np.empty(64, np.uint8)
-    crossing_x, crossing_y, crossing_error = np.empty(64), np.empty(64), np.empty(64)
-    px, py, moved = np.empty(64), np.empty(64), np.empty(64, np.uint8)
-    rank_start, rank_hole, rank_piece = after.copy(), np.empty(64, np.uint8), after.copy()
-    rank_order, rank_spare, rank_x = after.copy(), after.copy(), np.empty(64)
-    n_items = last_item - first_item
-    out_vertices, out_sources = np.empty((16 * n_items + 64, 2)), np.empty((16 * n_items + 64, 2), np.int64)
-    out_sizes, out_pieces = np.empty(2 * n_items + 64, np.int64), np.empty(2 * n_items + 64, np.int64)
+    edges, events, chains, found = w.edges, w.events, w.chains, w.found
+    x, y, after = edges.x, edges.y, edges.after
+    room = w.order.shape[0] - 8
     n_out = n_out_rings = n_out_pieces = 0
-    n_subject_vertices = subjects.shape[0]
-
-    for item in range(n_items):
-        at = first_item + item
+    for at in range(begin, last_item):
+        item = at - first_item
         status[item], displacement[item] = OPEN, 0.0
         counts[item, 0] = counts[item, 1] = counts[item, 2] = counts[item, 3] = 0
         if stop[0]:
             break
-        s_first, s_last, c_first, c_last = (
-            subject_items[at], subject_items[at + 1], clip_items[at], clip_items[at + 1]
-        )  # fmt: skip
-        room = subject_rings[s_last] - subject_rings[s_first] + clip_rings[c_last] - clip_rings[c_first] + 1
-        ring_room = s_last - s_first + c_last - c_first + 1
-        x, y, after, before = _floats(x, room), _floats(y, room), _ints(after, room), _ints(before, room)
-        ring_of, origins = _ints(ring_of, room), _ints(origins, room)
-        tops, masks, rings, highest = (
-            _ints(tops, ring_room), _ints(masks, ring_room), _ints(rings, ring_room), _ints(highest, ring_room)
-        )  # fmt: skip
-        edges = Edges(x, y, after, before, ring_of)
         n, n_rings, safe = _load(
-            subjects, subject_rings, s_first, s_last, 1, 0, edges, origins, tops, masks, 0, 0
+            subjects, subject_rings, subject_items[at], subject_items[at + 1], 1, 0, edges, w.origins, w.tops, w.masks,
+            0, 0,
         )  # fmt: skip
         n, n_rings, also_safe = _load(
-            clips, clip_rings, c_first, c_last, 2, n_subject_vertices, edges, origins, tops, masks, n, n_rings
-        )
+            clips, clip_rings, clip_items[at], clip_items[at + 1], 2, subjects.shape[0], edges, w.origins, w.tops,
+            w.masks, n, n_rings,
+        )  # fmt: skip
         if not (safe and also_safe):
             continue
-
-        boxes, marks = _boxes(boxes, n), _bytes(marks, n)
         for i in range(n):
             j = after[i]
-            boxes[i, 0], boxes[i, 1] = min(x[i], x[j]), max(x[i], x[j])
-            boxes[i, 2], boxes[i, 3] = min(y[i], y[j]), max(y[i], y[j])
-            marks[i] = 1
+            w.boxes[i, 0], w.boxes[i, 1] = min(x[i], x[j]), max(x[i], x[j])
+            w.boxes[i, 2], w.boxes[i, 3] = min(y[i], y[j]), max(y[i], y[j])
+            w.marks[i] = 1
         if n > _FEW:
-            tree, tree_marks = _boxes(tree, 2 * leaves_of(n)), _bytes(tree_marks, 2 * leaves_of(n))
-            places = _ints(places, n)
-            build_tree(boxes, marks, n, tree, tree_marks, places)
-        marked = _bytes(marked, n)
-        n_events = n_crossings = n_exact = 0
-        for _ in range(60):  # bound: the room grows fourfold each time
-            points = _ints(points, n + capacity)
-            events = Events(
-                event_edge, event_point, event_other, event_t, event_slack, crossing_first, crossing_second
-            )  # fmt: skip
-            n_events, n_crossings, n_exact = _find_contacts(
-                edges, n, n_rings, events, points, marked, rings, boxes, marks, tree, tree_marks, places,
-                stack, pairs, stop,
-            )  # fmt: skip
-            if n_events >= 0:
-                break
-            capacity = 4 * max(capacity, n // 4)
-            event_edge, event_point = np.empty(capacity, np.int64), np.empty(capacity, np.int64)
-            event_other, event_t, event_slack = np.empty(capacity, np.int64), np.empty(capacity), np.empty(capacity)
-            crossing_first, crossing_second = np.empty(capacity, np.int64), np.empty(capacity, np.int64)
-        events = Events(event_edge, event_point, event_other, event_t, event_slack, crossing_first, crossing_second)
-        n_points = n + n_crossings
-        starts, order, chain_at = _ints(starts, n + 1), _ints(order, n_events), _ints(chain_at, n)
-        sort_events(edges, events, n, n_events, points, starts, order, stop)
-
-        n_marked = n_events
-        for ring in range(n_rings):
-            marked[tops[ring]] = 1
-        for i in range(n):
-            n_marked += marked[i]
-        node_of, nodes = _ints(node_of, n_points), _ints(nodes, n_marked)
-        node_of[:n_points] = -1
-        most = n_marked + 1  # chains, and nodes
-        tail, head, first, last = _ints(tail, most), _ints(head, most), _ints(first, most), _ints(last, most)
-        mask, stands, masks_before = _ints(mask, most), _ints(stands, most), _ints(masks_before, most)
-        chains = Chains(tail, head, first, last, mask, stands)
+            build_tree(w.boxes, w.marks, n, w.tree, w.tree_marks, w.places)
+        n_events, n_crossings, n_exact = _find_contacts(
+            edges, n, n_rings, events, w.points, w.marked, w.rings, w.boxes, w.marks, w.tree, w.tree_marks, w.places,
+            w.stack, w.pairs, stop,
+        )  # fmt: skip
+        most = n_events  # chains and nodes: one for each event, and each vertex that is a node
+        if n_events >= 0:
+            for ring in range(n_rings):
+                w.marked[w.tops[ring]] = 1
+            for i in range(n):
+                most += w.marked[i]
+        if n_events < 0 or most > room:
+            return at, NEEDS_CONTACTS, n_out, n_out_rings, n_out_pieces
+        sort_events(edges, events, n, n_events, w.points, w.starts, w.order, stop)
+        w.node_of[: n + n_crossings] = -1
         n_nodes, n_chains = build_chains(
-            edges, events, points, marked, starts, order, tops, masks, n_rings, node_of, nodes, chains, chain_at
+            edges, events, w.points, w.marked, w.starts, w.order, w.tops, w.masks, n_rings, w.node_of, w.nodes, chains,
+            w.chain_at,
+        )  # fmt: skip
+        build_stars(
+            edges,
+            chains,
+            n_nodes,
+            n_chains,
+            w.star_starts,
+            w.star_ends,
+            w.star,
+            w.place,
+            w.masks_before,
+            w.x,
+            w.y,
+            stop,
         )
-        star_starts, star_ends = _ints(star_starts, n_nodes + 1), _ints(star_ends, n_nodes)
-        star, place = _ints(star, 2 * n_chains), _ints(place, 2 * n_chains)
-        px, py = _floats(px, 2 * n_chains), _floats(py, 2 * n_chains)
-        build_stars(edges, chains, n_nodes, n_chains, star_starts, star_ends, star, place, masks_before, px, py, stop)
-
-        cycle, following = _ints(cycle, 2 * n_chains), _ints(following, 2 * n_chains)
         if stop[0]:
             break
-        n_cycles = number_cycles(chains, n_chains, star_starts, star_ends, star, place, cycle, following, stop)
-        joined, label = _ints(joined, n_cycles + 1), _ints(label, n_cycles + 1)
-        regions, inside = _ints(regions, n_cycles + 1), _bytes(inside, n_cycles + 1)
+        n_cycles = number_cycles(
+            chains, n_chains, w.star_starts, w.star_ends, w.star, w.place, w.cycle, w.following, stop
+        )
         if stop[0]:
             break
         _join_faces(
-            edges, events, chains, n, n_rings, rings, tops, highest, node_of, points, starts, order, chain_at, star,
-            star_ends, cycle, n_cycles, tree, places, stack, joined, label, regions, stop,
+            edges, events, chains, n, n_rings, w.rings, w.tops, w.highest, w.node_of, w.points, w.starts, w.order,
+            w.chain_at, w.star, w.star_ends, w.cycle, n_cycles, w.tree, w.places, w.stack, w.joined, w.label, w.regions,
+            stop,
         )  # fmt: skip
-        bounds, fan, seen = _bytes(bounds, n_chains), _ints(fan, n_nodes), _bytes(seen, 2 * n_chains)
         choose_boundary(
-            chains, n_chains, cycle, n_cycles, kept, star_starts, n_nodes, joined, label, regions, inside, bounds, fan
-        )
-        path, path_place = _ints(path, 2 * n_chains), _ints(path_place, n_nodes)
-        ring_point, ring_offset = _ints(ring_point, n + 2 * n_chains), _ints(ring_offset, n_chains + 1)
-        ring_region, ring_meets = _ints(ring_region, n_chains), _bytes(ring_meets, n + 2 * n_chains)
-        found = Rings(ring_point, ring_meets, ring_offset, ring_region)
+            chains, n_chains, w.cycle, n_cycles, kept, w.star_starts, n_nodes, w.joined, w.label, w.regions, w.inside,
+            w.bounds, w.fan,
+        )  # fmt: skip
         n_found, m = walk_rings(
-            edges, chains, n_chains, nodes, n_nodes, cycle, inside, regions, star_starts, star_ends, star, place,
-            bounds, fan, seen, path, path_place, found, stop,
+            edges, chains, n_chains, w.nodes, n_nodes, w.cycle, w.inside, w.regions, w.star_starts, w.star_ends, w.star,
+            w.place, w.bounds, w.fan, w.seen, w.path, w.path_place, found, stop,
         )  # fmt: skip
         if stop[0]:
             break
-
-        px, py, moved = _floats(px, m), _floats(py, m), _bytes(moved, m)
-        crossing_x, crossing_y = _floats(crossing_x, n_crossings), _floats(crossing_y, n_crossings)
-        crossing_error = _floats(crossing_error, n_crossings)
-        crossing_error[:n_crossings] = -2.0
-        farthest = largest = 0.0
-        lost = any_moved = False
-        for k in range(m):
-            point = ring_point[k]
-            if point < n:
-                px[k], py[k], moved[k] = x[point] + 0.0, y[point] + 0.0, 0
-            else:
-                c = point - n
-                if crossing_error[c] == -2.0:
-                    cx, cy, ex, ey = round_crossing(edges, crossing_first[c], crossing_second[c])
-                    lost = lost or ex < 0.0 or ey < 0.0
-                    # two squares, their sum, a root: each rounded once
-                    crossing_x[c], crossing_y[c] = cx, cy
-                    crossing_error[c] = np.sqrt(ex * ex + ey * ey) * (1.0 + 2.0**-50)
-                    farthest = max(farthest, crossing_error[c])
-                px[k], py[k], moved[k] = crossing_x[c], crossing_y[c], crossing_error[c] > 0.0
-                any_moved = any_moved or crossing_error[c] > 0.0
-            largest = max(largest, abs(px[k]), abs(py[k]))
-        if lost:
+        largest, moved_by = _round_points(w, n, n_crossings, m)
+        if moved_by == LOST:
             continue
-        if any_moved:
-            boxes, marks, chain_at = _boxes(boxes, m), _bytes(marks, m), _ints(chain_at, m)
-            if m > _FEW:
-                tree, tree_marks = _boxes(tree, 2 * leaves_of(m)), _bytes(tree_marks, 2 * leaves_of(m))
-                places = _ints(places, m)
-            if not certify(
-                found, n_found, m, px, py, moved, largest, boxes, marks, chain_at, tree, tree_marks, places, stack,
-                pairs, stop,
-            ):  # fmt: skip
-                continue
-        rank_start, rank_hole, rank_piece = (
-            _ints(rank_start, n_found), _bytes(rank_hole, n_found), _ints(rank_piece, n_found)
-        )  # fmt: skip
-        rank_order, rank_spare = _ints(rank_order, n_found + 1), _ints(rank_spare, n_found)
-        rank_order[0] = 0
-        rank_x = _floats(rank_x, n_found)
-        ranking = Ranking(rank_start, rank_x, rank_hole, rank_piece, rank_order, rank_spare)
-        n_pieces = rank_rings(found, n_found, px, py, ranking, label)
+        if moved_by > 0.0 and not certify(
+            found, n_found, m, w.x, w.y, w.moved, largest, w.boxes, w.marks, w.chain_at, w.tree, w.tree_marks, w.places,
+            w.stack, w.pairs, stop,
+        ):  # fmt: skip
+            continue
+        n_pieces = rank_rings(found, n_found, w.x, w.y, w.ranking, w.label)
         if n_pieces < 0:
             continue
-
-        if n_out + m > out_vertices.shape[0]:
-            wider, more = np.empty((2 * (n_out + m), 2)), np.empty((2 * (n_out + m), 2), np.int64)
-            wider[:n_out], more[:n_out] = out_vertices[:n_out], out_sources[:n_out]
-            out_vertices, out_sources = wider, more
-        if n_out_rings + n_found > out_sizes.shape[0]:
-            sizes, by_piece = (
-                np.empty(2 * (n_out_rings + n_found), np.int64),
-                np.empty(2 * (n_out_rings + n_found), np.int64),
-            )
-            sizes[:n_out_rings], by_piece[:n_out_pieces] = out_sizes[:n_out_rings], out_pieces[:n_out_pieces]
-            out_sizes, out_pieces = sizes, by_piece
-        for k in range(n_found):
-            ring = rank_order[k]
-            start, stop_at = ring_offset[ring], ring_offset[ring + 1]
-            i = rank_start[ring]
-            for _ in range(stop_at - start):
-                point = ring_point[i]
-                out_vertices[n_out, 0], out_vertices[n_out, 1] = px[i], py[i]
-                if point < n:
-                    out_sources[n_out, 0], out_sources[n_out, 1] = origins[point], -1
-                else:
-                    out_sources[n_out, 0] = origins[crossing_first[point - n]]
-                    out_sources[n_out, 1] = origins[crossing_second[point - n]]
-                n_out += 1
-                i = i + 1 if i + 1 < stop_at else start
-            out_sizes[n_out_rings] = stop_at - start
-            n_out_rings += 1
-            if rank_hole[ring]:
-                out_pieces[n_out_pieces - 1] += 1
-            else:
-                out_pieces[n_out_pieces] = 1
-                n_out_pieces += 1
+        if n_out + m > vertices.shape[0] or n_out_rings + n_found > sizes.shape[0]:
+            counts[item, 1], counts[item, 2] = n_found, m
+            return at, NEEDS_OUTPUT, n_out, n_out_rings, n_out_pieces
+        _write(w, n, n_found, vertices, sources, sizes, pieces, n_out, n_out_rings, n_out_pieces)
+        n_out, n_out_rings, n_out_pieces = n_out + m, n_out_rings + n_found, n_out_pieces + n_pieces
         counts[item, 0], counts[item, 1], counts[item, 2], counts[item, 3] = n_pieces, n_found, m, n_exact
-        displacement[item] = farthest
+        displacement[item] = moved_by
         status[item] = DONE
-    return out_vertices[:n_out], out_sources[:n_out], out_sizes[:n_out_rings], out_pieces[:n_out_pieces]
+    return last_item, FINISHED, n_out, n_out_rings, n_out_pieces

@@ -66,7 +66,7 @@ def scattered(random: np.random.Generator, n_rings: int) -> Rings:
 @pytest.mark.parametrize("make", [soup, scattered])
 def test_many_rings(make: Any, seed: int) -> None:
     random = np.random.default_rng(seed)
-    subject, clip = make(random, 40), make(random, 60)
+    subject, clip = make(random, 16), make(random, 24)
     for operation in OPERATIONS:
         assert agree([*subject, [(-2, -2), (2, -2), (2, 2), (-2, 2)]], clip, operation)
 
