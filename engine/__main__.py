@@ -17,7 +17,8 @@ from typing import Any, get_args
 
 import numpy as np
 
-from engine.clipping.overlay import Operation, Output, overlay_batch
+from engine.clipping.overlay_batch import overlay_batch
+from engine.clipping.overlay_compiled import Operation, Output
 from engine.clipping.polygons import PolygonStatus, clip_polygons
 from engine.clipping.segments import clip_segments
 from engine.collision.collide_poses import collide_poses
@@ -114,7 +115,7 @@ def _overlay(options: Options) -> None:
         batch: Any = overlay_batch(
             subjects, clips, options.operation, output=options.rounding, progress=progress, deadline=options.deadline
         )
-    pieces = [[] if each is None else each.pieces for each in batch.overlays]
+    pieces = [[] if each is None else each.pieces for each in batch]
     write_geojson(options.output, [[[piece.shell, *piece.holes] for piece in item] for item in pieces])
 
 

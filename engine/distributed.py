@@ -22,8 +22,9 @@ import numpy.typing as npt
 from distributed import Client, Future, as_completed
 
 from engine.clipping import segments as clipping
-from engine.clipping.overlay import Operation, Output, OverlayBatch
-from engine.clipping.overlay import overlay_batch as overlay_pairs
+from engine.clipping.overlay_batch import OverlayBatch, join_batches
+from engine.clipping.overlay_batch import overlay_batch as overlay_pairs
+from engine.clipping.overlay_compiled import Operation, Output
 from engine.collision import collide_poses as poses
 from engine.containment import locate as containment
 from engine.errors import InvalidArrayError, InvalidInputError
@@ -92,15 +93,15 @@ def overlay_batch(
     progress: Progress | None = None,
 ) -> OverlayBatch:
     """Combine pairs of polygons, see `engine.overlay_batch`."""
-    overlay_pairs(subjects[:0], clips[:0], operation, output=output)  # checks the options here, not on a worker
+    options: dict[str, Any] = {"operation": operation, "output": output}
+    none: Any = overlay_pairs(subjects[:0], clips[:0], **options)  # checks the options here, not on a worker
     if len(subjects) != len(clips):
         raise InvalidArrayError(
             f"subjects and clips must be of equal length, got {len(subjects)} and {len(clips)}", ("clips",)
         )
-    function = partial(_overlay_batch, operation=operation, output=output)
+    function = partial(_overlay_batch, **options)
     found = sorted(_answers(client, function, (), (subjects, clips), part, progress), key=lambda each: each[0])
-    status = np.concatenate([np.zeros(0, np.int8), *(batch.status for _, batch in found)])
-    return OverlayBatch(tuple(overlay for _, batch in found for overlay in batch.overlays), status)
+    return join_batches([none, *(batch for _, batch in found)])
 
 
 def _locate(solids: tuple[Solid, ...], points: Any) -> Any:

@@ -213,6 +213,42 @@ def _joined(
     )
 
 
+def join_batches(batches: Sequence[OverlayBatch]) -> OverlayBatch:
+    """Return the pairs of some batches, at least one, as one batch."""
+    sizes = np.array([[int(firsts[-1]) for firsts in part._first_vertices] for part in batches])
+    n_subjects = int(sizes[:, 0].sum())
+    apart: dict[int, Overlay] = {}
+    sources, n_pairs = [], 0
+    for part, (here, _), (in_subjects, in_clips) in zip(batches, sizes, np.cumsum(sizes, axis=0) - sizes, strict=True):
+        moved = part._sources + np.where(part._sources < here, in_subjects, n_subjects - here + in_clips)
+        sources.append(np.where(part._sources < 0, -1, moved))
+        apart.update((n_pairs + pair, result) for pair, result in part._apart.items())
+        n_pairs += len(part)
+    firsts = [_chained([part._first_vertices[k] for part in batches]) for k in (0, 1)]
+    batch = OverlayBatch(
+        status=np.concatenate([part.status for part in batches]),
+        vertices=np.concatenate([part.vertices for part in batches]),
+        ring_offsets=_chained([part.ring_offsets for part in batches]),
+        piece_offsets=_chained([part.piece_offsets for part in batches]),
+        pair_offsets=_chained([part.pair_offsets for part in batches]),
+        displacement=np.concatenate([part.displacement for part in batches]),
+        _subjects=tuple(solid for part in batches for solid in part._subjects),
+        _clips=tuple(solid for part in batches for solid in part._clips),
+        _output=batches[0]._output,
+        _sources=np.concatenate(sources),
+        _first_vertices=(firsts[0], firsts[1]),
+        _apart=apart,
+    )
+    for name in ("status", "vertices", "ring_offsets", "piece_offsets", "pair_offsets", "displacement"):
+        getattr(batch, name).setflags(write=False)
+    return batch
+
+
+def _chained(offsets: Sequence[npt.NDArray[np.int64]]) -> npt.NDArray[np.int64]:
+    """Return the offsets of several arrays put one after another."""
+    return np.concatenate([[0], np.cumsum(np.concatenate([np.diff(each) for each in offsets]))])
+
+
 def _woven(
     is_apart: npt.NDArray[np.bool_], rest: npt.NDArray[np.generic], apart: npt.NDArray[np.generic]
 ) -> np.ndarray:

@@ -25,7 +25,7 @@ from engine.arrangement.chains import Chains, build_chains, build_stars
 from engine.arrangement.crossing_signs import Edges
 from engine.arrangement.edge_contacts import Events, enter_contact, root_of, unite
 from engine.arrangement.edge_events import sort_events
-from engine.arrangement.edge_tree import DEEPEST, LEAF, PORTION, boxes_meet, build_tree, leaves_of, next_pairs
+from engine.arrangement.edge_tree import DEEPEST, LEAF, PORTION, boxes_meet, build_tree, next_pairs
 from engine.arrangement.ring_certificate import certify
 from engine.arrangement.ring_order import Ranking, rank_rings
 from engine.arrangement.rounded_crossings import LOST, round_crossing
@@ -391,7 +391,8 @@ def overlay_pairs(
     subject_items, clip_items: the first ring of each polygon, and the end of the last one's. kept: (4,) uint8 by label.
     Fills, by pair from first_item on: status, (pairs,) int8, DONE or OPEN; counts, (pairs, 4) int64: pieces, rings,
     vertices, pairs of edges beyond the filter; displacement, (pairs,) float64: how far rounding moved a vertex at most.
-    Fills, pair after pair from the beginning: vertices (m, 2) float64, sources (m, 2) int64, ring sizes, rings by piece.
+    Fills, pair after pair from the beginning: vertices (m, 2) float64, sources (m, 2) int64, sizes (vertices by ring)
+    and pieces (rings by piece).
     A source is the input vertex and -1, or the first vertices of the two edges that cross; clip vertices are counted
     after those of all subjects.
     Returns the pair reached, FINISHED or what is needed to go on with it, and numbers of vertices, rings, pieces.
@@ -442,19 +443,9 @@ def overlay_pairs(
             w.chain_at,
         )  # fmt: skip
         build_stars(
-            edges,
-            chains,
-            n_nodes,
-            n_chains,
-            w.star_starts,
-            w.star_ends,
-            w.star,
-            w.place,
-            w.masks_before,
-            w.x,
-            w.y,
+            edges, chains, n_nodes, n_chains, w.star_starts, w.star_ends, w.star, w.place, w.masks_before, w.x, w.y,
             stop,
-        )
+        )  # fmt: skip
         if stop[0]:
             break
         n_cycles = number_cycles(

@@ -78,10 +78,13 @@ def test_segments_equal_one_process(client: Client, solid: engine.Polyhedron, po
 
 def test_overlays_equal_one_process(client: Client, points: np.ndarray) -> None:
     subjects = [engine.Polygon([corners]) for corners in points[:240, :2].reshape(-1, 4, 2)]
+    subjects[7] = subjects[-8] = engine.Polygon([[(0, 0), (1, 1), (0, 1)]])
     clips = subjects[::-1]
+    clips[7] = engine.Polygon([[(0, 0), (1, 1 + 2.0**-52), (1 + 2.0**-52, 0.5)]])  # left to the path in integers
     answer = distributed.overlay_batch(client, subjects, clips, "difference", part=9)
     here = engine.overlay_batch(subjects, clips, "difference")
-    np.testing.assert_array_equal(answer.status, here.status)
+    for name in ("status", "vertices", "ring_offsets", "piece_offsets", "pair_offsets", "displacement"):
+        np.testing.assert_array_equal(getattr(answer, name), getattr(here, name))
     assert [each.area_exact for each in answer.overlays] == [each.area_exact for each in here.overlays]
     for ours, theirs in zip(answer.overlays, here.overlays, strict=True):
         np.testing.assert_array_equal(ours.vertices, theirs.vertices)
