@@ -25,11 +25,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.clipping.cut_point import CUT_BOUND, POINT_BOUND, is_safe
-from engine.clipping.cyrus_beck import exact_sign
+from engine.clipping.cut_point import CUT_BOUND, POINT_BOUND, is_safe, side_of
+from engine.clipping.cyrus_beck import exact_sign, expand_value
 from engine.jit import inline, kernel
 from engine.predicates.double_double import U2, dd_add, dd_div, dd_mul, dd_sub, surely_rounded
-from engine.predicates.error_free import two_diff, two_prod, two_sum
+from engine.predicates.error_free import two_diff, two_prod, two_sum, workspace
 from engine.types import UNDECIDED
 
 CLIPPED: Final = 0
@@ -98,15 +98,21 @@ def is_exact(points: Any, i: int) -> bool:
 
 
 @inline
+def is_double_row(low: Any) -> bool:
+    """Tell whether a row of double-doubles is one of doubles."""
+    exact = True
+    for k in range(low.size):
+        exact = exact and low[k] == 0.0
+    return exact
+
+
+@inline
 def sign_at(high: Any, low: Any, points: Any, i: int) -> int:
     """Return the exact sign of a row at vertex i, or UNDECIDED."""
     sign = rough_sign(high, points, i)
     if sign != UNDECIDED:
         return sign
-    has_low = False
-    for k in range(low.size):
-        has_low = has_low or low[k] != 0.0
-    if not has_low and is_exact(points, i):
+    if is_double_row(low) and is_exact(points, i):
         return exact_sign(high, points[i, :, 0])
     h, _, bound = value_of(high, low, points, i)
     return 1 if h > bound else (-1 if -h > bound else UNDECIDED)
@@ -135,8 +141,23 @@ def copy_vertex(source: Any, i: int, target: Any, j: int) -> None:
 
 
 @inline
+def is_at(high: Any, source: Any, p: int, q: int, k: int, x: float) -> bool:
+    """Tell whether coordinate k is exactly x where the edge p q crosses the plane of a row; all three known doubles."""
+    wp, wq, e = workspace(8), workspace(8), workspace(96)
+    n_wp, n_wq = expand_value(high, source[p, :, 0], wp), expand_value(high, source[q, :, 0], wq)
+    # the values have two signs: turned over, one of them is a weight, and the sign asked for is not that of zero
+    for i in range(n_wq):
+        wq[i] = -wq[i]
+    return side_of(source[p, k, 0], source[q, k, 0], wp, n_wp, wq, n_wq, x, 0.0, e) == 0
+
+
+@inline
 def cut_edge(high: Any, low: Any, axis: int, at: float, source: Any, p: int, q: int, target: Any, j: int) -> bool:
-    """Set vertex j of `target` to where the edge p q crosses a plane; False where a value is known too roughly."""
+    """Set vertex j of `target` to where the edge p q crosses a plane; False where a value is known too roughly.
+
+    A coordinate that may be a double is compared with it exactly, where both ends and the row are doubles: cuts that
+    hit a lattice or another plane stay exact.
+    """
     if axis >= 0:
         ph, pl = dd_add(source[p, axis, 0], source[p, axis, 1], -at, 0.0)
         qh, ql = dd_add(source[q, axis, 0], source[q, axis, 1], -at, 0.0)
@@ -165,8 +186,14 @@ def cut_edge(high: Any, low: Any, axis: int, at: float, source: Any, p: int, q: 
             dh, dl = two_diff(yh, xh)
             mh, ml = two_prod(th, dh)
             sh, sl = two_sum(xh, mh)
-            target[j, k, 0], target[j, k, 1] = two_sum(sh, (sl + ml) + (tl * dh + th * dl))
-            target[j, k, 2] = 1.01 * (POINT_BOUND * (abs(xh) + abs(mh)) + r * abs(dh))
+            h, rest = two_sum(sh, (sl + ml) + (tl * dh + th * dl))
+            bound = 1.01 * (POINT_BOUND * (abs(xh) + abs(mh)) + r * abs(dh))
+            if abs(rest) <= bound:
+                double = h if abs(h) > bound else 0.0
+                if is_double_row(low) and is_exact(source, p) and is_exact(source, q):
+                    if is_at(high, source, p, q, k, double):
+                        h, rest, bound = double, 0.0, 0.0
+            target[j, k, 0], target[j, k, 1], target[j, k, 2] = h, rest, bound
         else:
             ah, al = dd_mul(xh, xl, qh, ql)
             bh, bl = dd_mul(yh, yl, ph, pl)
@@ -179,9 +206,24 @@ def cut_edge(high: Any, low: Any, axis: int, at: float, source: Any, p: int, q: 
 
 @inline
 def clip_ring(
-    high: Any, low: Any, axis: int, at: float, source: Any, n: int, signs: Any, target: Any, on_plane: Any
+    high: Any,
+    low: Any,
+    axis: int,
+    at: float,
+    source: Any,
+    n: int,
+    edges: Any,
+    ring: Any,
+    n_ring: int,
+    signs: Any,
+    target: Any,
+    target_edges: Any,
+    on_plane: Any,
 ) -> tuple[int, int, bool]:
     """Cut a ring of n vertices by one plane into `target`; `signs`, `on_plane`: scratch of the same room.
+
+    ring: the original n_ring vertices. edges: for each vertex of `source`, and so in `target_edges`, the original edge
+    that goes on from it, by its first vertex, -1 for one along a plane: cuts are made on original edges where possible.
 
     Returns the number of vertices left (-1: open; the ring itself where nothing is dropped), in how many points the
     plane was met, and whether a vertex was dropped.
@@ -211,20 +253,29 @@ def clip_ring(
                     continue
                 copy_vertex(source, i, target, kept)
                 on_plane[kept] = signs[i] == 0
+                target_edges[kept] = -1 if signs[i] == 0 and signs[following] < 0 else edges[i]
             else:
                 if signs[i] * signs[following] >= 0:
                     continue
                 n_contacts += 1
                 if kept + 1 >= target.shape[0]:
                     return -1, 0, False
-                if not cut_edge(high, low, axis, at, source, i, following, target, kept):
+                edge = edges[i]
+                if edge < 0:
+                    is_cut = cut_edge(high, low, axis, at, source, i, following, target, kept)
+                else:
+                    after = edge + 1 if edge + 1 < n_ring else 0
+                    is_cut = cut_edge(high, low, axis, at, ring, edge, after, target, kept)
+                if not is_cut:
                     return -1, 0, False
                 on_plane[kept] = True
+                target_edges[kept] = edge if signs[i] < 0 else -1
             if kept > 0 and on_plane[kept] and on_plane[kept - 1]:
                 relation = compare_vertices(target, kept, kept - 1)
                 if relation == UNDECIDED:
                     return -1, 0, False
                 if relation == 0:
+                    target_edges[kept - 1] = target_edges[kept]
                     continue
             kept += 1
             if kept >= target.shape[0]:
@@ -326,6 +377,7 @@ def clip_rings(
         largest = max(largest, ring_offsets[ring + 1] - ring_offsets[ring])
     room = 2 * largest + 2 * n_planes + 8  # a convex ring gains one vertex a plane; one that outgrows this is left open
     here, there = np.empty((room, dimension, 3)), np.empty((room, dimension, 3))
+    ring_points, edges, new_edges = np.empty((largest, dimension, 3)), np.empty(room, np.int64), np.empty(room, np.int64)
     signs, on_plane = np.empty(room, np.int64), np.empty(room, np.bool_)
     contacts, dropped = np.empty(n_planes, np.int64), np.empty(n_planes, np.bool_)
     cutting, lows, highs = np.empty(n_planes, np.int64), np.empty(dimension), np.empty(dimension)
@@ -362,17 +414,34 @@ def clip_rings(
         is_open = False
         for ring in range(polygon_offsets[polygon], polygon_offsets[polygon + 1]):
             n = load_ring(vertices, ring_offsets[ring], ring_offsets[ring + 1], here)
+            n_ring = n
+            for i in range(n):
+                copy_vertex(here, i, ring_points, i)
+                edges[i] = i
             for i_plane in range(n_cutting):
                 if n <= 0:
                     break
                 plane = cutting[i_plane]
                 n, met, has_dropped = clip_ring(
-                    high[plane], low[plane], axes[plane], at[plane], here, n, signs, there, on_plane
+                    high[plane],
+                    low[plane],
+                    axes[plane],
+                    at[plane],
+                    here,
+                    n,
+                    edges,
+                    ring_points,
+                    n_ring,
+                    signs,
+                    there,
+                    new_edges,
+                    on_plane,
                 )
                 contacts[plane] += met
                 if has_dropped:
                     dropped[plane] = True
                     here, there = there, here
+                    edges, new_edges = new_edges, edges
             if n > 0 and written + n > out.shape[0]:
                 return polygon, begun
             if n < 0 or not store_ring(here, n, out, written):
