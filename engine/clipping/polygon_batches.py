@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Final
 
 import numpy as np
@@ -63,9 +64,11 @@ def kernel_scene(vertices: FloatArray, planes: list[Row], budget: Budget) -> Ker
 
 
 def _double_double(number: int, shift: int) -> tuple[float, float]:
-    """Return number / 2^shift as a double-double."""
-    high = nearest(number, 1 << shift)
-    return high, _double_double_quotient(number, 1 << shift)[1]
+    """Return number / 2^shift as a double-double, whose low part is zero only where the high part is exact."""
+    high, low = _double_double_quotient(number, 1 << shift)
+    if low == 0.0 and Fraction(high) * (1 << shift) != number:
+        raise OverflowError(number)  # the low part underflows
+    return high, low
 
 
 def _double_double_quotient(top: int, bottom: int) -> tuple[float, float]:

@@ -8,13 +8,11 @@ double-double), keeps those on its inner side and cuts the edges that change sid
 
 A later plane decides about x from its double-doubles: their bound contains every rounding since the original input,
 so a sign beyond it is the exact one. A sign within it, a coordinate that may round either way, two vertices in a plane
-that may coincide: the polygon is left open, and exact integers settle it (exact_contours.py).
+that may coincide: what is known of the vertex may say that it is exactly zero or the same (vertex_origins.py). Else the
+polygon is left open, and exact integers settle it (exact_contours.py).
 
 A plane that has all original vertices inside is left out, for what other planes leave lies between them; one that has
 all of them outside leaves nothing.
-
-Bound of a cut coordinate: the larger bound of both ends (x lies between them), the roundings of cut_point.py, and
-r |q - p| for weights known to a relative r: the parameter moves by at most 2 r t (1 - t) <= r / 2.
 
 Source: I. E. Sutherland, G. W. Hodgman, Reentrant polygon clipping, 1974; the textbook's section on clipping polygons.
 """
@@ -25,11 +23,32 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.clipping.cut_point import CUT_BOUND, POINT_BOUND, is_safe, side_of
-from engine.clipping.cyrus_beck import exact_sign, expand_value
+from engine.clipping.cut_point import is_safe
+from engine.clipping.cut_vertices import (
+    VALUE_BOUND,
+    compare_vertices,
+    copy_vertex,
+    cut_edge,
+    is_exact,
+    sign_across,
+    sign_at,
+)
+from engine.clipping.vertex_origins import (
+    COLUMNS,
+    CORNER,
+    CUT_EDGE,
+    CUT_PLANE,
+    EDGE,
+    MOST_BITS,
+    PLANES,
+    corner_planes,
+    relation_of,
+    settle_corner,
+    settle_zeros,
+    sign_on_edge,
+)
 from engine.jit import inline, kernel
-from engine.predicates.double_double import U2, dd_add, dd_div, dd_mul, dd_sub, surely_rounded
-from engine.predicates.error_free import two_diff, two_prod, two_sum, workspace
+from engine.predicates.double_double import U2, surely_rounded
 from engine.types import UNDECIDED
 
 CLIPPED: Final = 0
@@ -37,210 +56,52 @@ OPEN: Final = 1
 INSIDE: Final = 1
 OUTSIDE: Final = -1
 CUTS: Final = 0
-VALUE_BOUND: Final = 16.0 * 2.0**-53
-"""Signs in doubles: a term loses the low parts of row and vertex, a product, three sums; its size as much again."""
-ACROSS_BOUND: Final = 4.0 * 2.0**-53
-"""A difference of a coordinate and a plane's, rounded twice."""
-DD_VALUE_BOUND: Final = 32.0 * U2
-"""Signs in double-double: rows known to 2 u^2, products 5 u^2, three sums of 4 u^2."""
-
-
-@inline
-def rough_sign(row: Any, points: Any, i: int) -> int:
-    """Return the sign of a row at vertex i from doubles, UNDECIDED where they do not prove it."""
-    d = row.size - 1
-    value, size, moved = row[d], abs(row[d]), 0.0
-    for k in range(d):
-        term = row[k] * points[i, k, 0]
-        value += term
-        size += abs(term)
-        moved += abs(row[k]) * points[i, k, 2]
-    bound = VALUE_BOUND * size + 1.01 * moved
-    return 1 if value > bound else (-1 if -value > bound else UNDECIDED)
-
-
-@inline
-def value_of(high: Any, low: Any, points: Any, i: int) -> tuple[float, float, float]:
-    """Return the value of a row of double-doubles at vertex i, and its bound."""
-    d = high.size - 1
-    h, rest, size, moved = high[d], low[d], abs(high[d]), 0.0
-    for k in range(d):
-        ph, pl = dd_mul(high[k], low[k], points[i, k, 0], points[i, k, 1])
-        h, rest = dd_add(h, rest, ph, pl)
-        size += abs(ph)
-        moved += abs(high[k]) * points[i, k, 2]
-    return h, rest, DD_VALUE_BOUND * size + 1.01 * moved
-
-
-@inline
-def sign_across(sense: float, axis: int, at: float, points: Any, i: int) -> int:
-    """Return the exact sign at vertex i of the plane where a coordinate is `at`, or UNDECIDED; sense: of its normal."""
-    h, low, bound = points[i, axis, 0], points[i, axis, 1], points[i, axis, 2]
-    gap = (h - at) + low  # h and at close: the difference is exact; else far beyond any bound
-    if low == 0.0 and bound == 0.0:
-        gap, slack = (1.0 if h > at else (-1.0 if h < at else 0.0)), 0.0
-        if gap == 0.0:
-            return 0
-    else:
-        slack = bound + 4.0 * 2.0**-53 * abs(low) + ACROSS_BOUND * abs(gap)
-    if abs(gap) > slack:
-        return 1 if gap * sense > 0.0 else -1
-    return UNDECIDED
-
-
-@inline
-def is_exact(points: Any, i: int) -> bool:
-    """Tell whether every coordinate of vertex i is a known double."""
-    exact = True
-    for k in range(points.shape[1]):
-        exact = exact and points[i, k, 2] == 0.0 and points[i, k, 1] == 0.0
-    return exact
-
-
-@inline
-def is_double_row(low: Any) -> bool:
-    """Tell whether a row of double-doubles is one of doubles."""
-    exact = True
-    for k in range(low.size):
-        exact = exact and low[k] == 0.0
-    return exact
-
-
-@inline
-def sign_at(high: Any, low: Any, points: Any, i: int) -> int:
-    """Return the exact sign of a row at vertex i, or UNDECIDED."""
-    sign = rough_sign(high, points, i)
-    if sign != UNDECIDED:
-        return sign
-    if is_double_row(low) and is_exact(points, i):
-        return exact_sign(high, points[i, :, 0])
-    h, _, bound = value_of(high, low, points, i)
-    return 1 if h > bound else (-1 if -h > bound else UNDECIDED)
-
-
-@inline
-def compare_vertices(points: Any, i: int, j: int) -> int:
-    """Return 0 if two vertices are the same point, 1 if they surely differ, else UNDECIDED."""
-    for k in range(points.shape[1]):
-        h, _ = dd_sub(points[i, k, 0], points[i, k, 1], points[j, k, 0], points[j, k, 1])
-        slack = 8.0 * U2 * (abs(points[i, k, 0]) + abs(points[j, k, 0]))
-        if abs(h) > points[i, k, 2] + points[j, k, 2] + slack:
-            return 1
-    if not (is_exact(points, i) and is_exact(points, j)):
-        return UNDECIDED
-    for k in range(points.shape[1]):
-        if points[i, k, 0] != points[j, k, 0]:
-            return 1
-    return 0
-
-
-@inline
-def copy_vertex(source: Any, i: int, target: Any, j: int) -> None:
-    for k in range(source.shape[1]):
-        target[j, k, 0], target[j, k, 1], target[j, k, 2] = source[i, k, 0], source[i, k, 1], source[i, k, 2]
-
-
-@inline
-def is_at(high: Any, source: Any, p: int, q: int, k: int, x: float) -> bool:
-    """Tell whether coordinate k is exactly x where the edge p q crosses the plane of a row; all three known doubles."""
-    wp, wq, e = workspace(8), workspace(8), workspace(96)
-    n_wp, n_wq = expand_value(high, source[p, :, 0], wp), expand_value(high, source[q, :, 0], wq)
-    # the values have two signs: turned over, one of them is a weight, and the sign asked for is not that of zero
-    for i in range(n_wq):
-        wq[i] = -wq[i]
-    return side_of(source[p, k, 0], source[q, k, 0], wp, n_wp, wq, n_wq, x, 0.0, e) == 0
-
-
-@inline
-def cut_edge(high: Any, low: Any, axis: int, at: float, source: Any, p: int, q: int, target: Any, j: int) -> bool:
-    """Set vertex j of `target` to where the edge p q crosses a plane; False where a value is known too roughly.
-
-    A coordinate that may be a double is compared with it exactly, where both ends and the row are doubles: cuts that
-    hit a lattice or another plane stay exact.
-    """
-    if axis >= 0:
-        ph, pl = dd_add(source[p, axis, 0], source[p, axis, 1], -at, 0.0)
-        qh, ql = dd_add(source[q, axis, 0], source[q, axis, 1], -at, 0.0)
-        p_bound = source[p, axis, 2] + 4.0 * U2 * abs(ph)
-        q_bound = source[q, axis, 2] + 4.0 * U2 * abs(qh)
-    else:
-        ph, pl, p_bound = value_of(high, low, source, p)
-        qh, ql, q_bound = value_of(high, low, source, q)
-    if ph < 0.0:
-        ph, pl = -ph, -pl
-    if qh < 0.0:
-        qh, ql = -qh, -ql
-    if not (p_bound < 0.001 * ph and q_bound < 0.001 * qh):
-        return False
-    r = 1.01 * max(p_bound / ph, q_bound / qh)
-    sum_h, sum_l = dd_add(ph, pl, qh, ql)
-    th, tl = dd_div(ph, pl, sum_h, sum_l)
-    for k in range(source.shape[1]):
-        xh, xl, x_bound = source[p, k, 0], source[p, k, 1], source[p, k, 2]
-        yh, yl, y_bound = source[q, k, 0], source[q, k, 1], source[q, k, 2]
-        if k == axis:
-            target[j, k, 0], target[j, k, 1], target[j, k, 2] = at, 0.0, 0.0
-        elif xh == yh and xl == yl and x_bound == 0.0 and y_bound == 0.0:
-            target[j, k, 0], target[j, k, 1], target[j, k, 2] = xh, xl, 0.0
-        elif xl == 0.0 and yl == 0.0 and x_bound == 0.0 and y_bound == 0.0:
-            dh, dl = two_diff(yh, xh)
-            mh, ml = two_prod(th, dh)
-            sh, sl = two_sum(xh, mh)
-            h, rest = two_sum(sh, (sl + ml) + (tl * dh + th * dl))
-            bound = 1.01 * (POINT_BOUND * (abs(xh) + abs(mh)) + r * abs(dh))
-            if abs(rest) <= bound:
-                double = h if abs(h) > bound else 0.0
-                if is_double_row(low) and is_exact(source, p) and is_exact(source, q):
-                    if is_at(high, source, p, q, k, double):
-                        h, rest, bound = double, 0.0, 0.0
-            target[j, k, 0], target[j, k, 1], target[j, k, 2] = h, rest, bound
-        else:
-            ah, al = dd_mul(xh, xl, qh, ql)
-            bh, bl = dd_mul(yh, yl, ph, pl)
-            nh, nl = dd_add(ah, al, bh, bl)
-            target[j, k, 0], target[j, k, 1] = dd_div(nh, nl, sum_h, sum_l)
-            roundings = CUT_BOUND * max(abs(xh), abs(yh)) + r * abs(yh - xh)
-            target[j, k, 2] = 1.01 * (max(x_bound, y_bound) + roundings)
-    return True
 
 
 @inline
 def clip_ring(
     high: Any,
     low: Any,
-    axis: int,
-    at: float,
+    axes: Any,
+    at: Any,
+    cutting: Any,
+    i_plane: int,
     source: Any,
     n: int,
-    edges: Any,
+    origins: Any,
     ring: Any,
     n_ring: int,
     signs: Any,
     target: Any,
-    target_edges: Any,
+    target_origins: Any,
     on_plane: Any,
 ) -> tuple[int, int, bool]:
-    """Cut a ring of n vertices by one plane into `target`; `signs`, `on_plane`: scratch of the same room.
+    """Cut a ring of n vertices by plane ``cutting[i_plane]`` into `target`; `signs`, `on_plane`: scratch.
 
-    ring: the original n_ring vertices. edges: for each vertex of `source`, and so in `target_edges`, the original edge
-    that goes on from it, by its first vertex, -1 for one along a plane: cuts are made on original edges where possible.
-
+    ring: the original n_ring vertices; parts of its edges are cut from the whole ones. origins, and so target_origins:
+    see vertex_origins.py, for each vertex of `source`.
     Returns the number of vertices left (-1: open; the ring itself where nothing is dropped), in how many points the
     plane was met, and whether a vertex was dropped.
     """
     n_contacts, has_dropped = 0, False
+    plane = cutting[i_plane]
+    axis, own_bit = axes[plane], 1 << i_plane if i_plane < MOST_BITS else 0
     sense = 1.0
-    if axis >= 0 and high[axis] < 0.0:
+    if axis >= 0 and high[plane, axis] < 0.0:
         sense = -1.0
     for i in range(n):
         if axis >= 0:
-            signs[i] = sign_across(sense, axis, at, source, i)
+            signs[i] = sign_across(sense, axis, at[plane], source, i)
         else:
-            signs[i] = sign_at(high, low, source, i)
+            signs[i] = sign_at(high[plane], low[plane], source, i)
+        if signs[i] == UNDECIDED and origins[i, CUT_EDGE] >= 0:
+            edge, by = origins[i, CUT_EDGE], origins[i, CUT_PLANE]
+            signs[i] = sign_on_edge(high, low, cutting, ring, n_ring, edge, by, plane)
         if signs[i] == UNDECIDED:
             return -1, 0, False
         if signs[i] == 0:
             n_contacts += 1
+            origins[i, PLANES] |= own_bit
         has_dropped = has_dropped or signs[i] < 0
     if not has_dropped:
         return n, n_contacts, False
@@ -253,35 +114,46 @@ def clip_ring(
                     continue
                 copy_vertex(source, i, target, kept)
                 on_plane[kept] = signs[i] == 0
-                target_edges[kept] = -1 if signs[i] == 0 and signs[following] < 0 else edges[i]
+                target_origins[kept, EDGE] = -1 if signs[i] == 0 and signs[following] < 0 else origins[i, EDGE]
+                for column in range(PLANES, COLUMNS):
+                    target_origins[kept, column] = origins[i, column]
             else:
                 if signs[i] * signs[following] >= 0:
                     continue
                 n_contacts += 1
                 if kept + 1 >= target.shape[0]:
                     return -1, 0, False
-                edge = edges[i]
+                edge = origins[i, EDGE]
                 if edge < 0:
-                    is_cut = cut_edge(high, low, axis, at, source, i, following, target, kept)
+                    is_cut = cut_edge(high[plane], low[plane], axis, at[plane], source, i, following, target, kept)
                 else:
                     after = edge + 1 if edge + 1 < n_ring else 0
-                    is_cut = cut_edge(high, low, axis, at, ring, edge, after, target, kept)
+                    is_cut = cut_edge(high[plane], low[plane], axis, at[plane], ring, edge, after, target, kept)
                 if not is_cut:
                     return -1, 0, False
                 on_plane[kept] = True
-                target_edges[kept] = edge if signs[i] < 0 else -1
+                shared = origins[i, PLANES] & origins[following, PLANES]
+                corner = corner_planes(high, cutting, shared, i_plane)
+                if corner != 0 and not is_exact(target, kept):
+                    settle_corner(high, low, cutting, corner, target, kept)
+                if shared != 0 and source.shape[1] == 3:
+                    settle_zeros(high, low, cutting, shared, i_plane, target, kept)
+                target_origins[kept, EDGE] = edge if signs[i] < 0 else -1
+                target_origins[kept, PLANES], target_origins[kept, CORNER] = shared | own_bit, corner
+                target_origins[kept, CUT_EDGE], target_origins[kept, CUT_PLANE] = edge, i_plane
             if kept > 0 and on_plane[kept] and on_plane[kept - 1]:
-                relation = compare_vertices(target, kept, kept - 1)
+                relation = relation_of(target, target_origins, kept, kept - 1)
                 if relation == UNDECIDED:
                     return -1, 0, False
                 if relation == 0:
-                    target_edges[kept - 1] = target_edges[kept]
+                    target_origins[kept - 1, EDGE] = target_origins[kept, EDGE]
+                    target_origins[kept - 1, PLANES] |= target_origins[kept, PLANES]
                     continue
             kept += 1
             if kept >= target.shape[0]:
                 return -1, 0, False
     while kept > 1 and on_plane[kept - 1] and on_plane[0]:
-        relation = compare_vertices(target, kept - 1, 0)
+        relation = relation_of(target, target_origins, kept - 1, 0)
         if relation == UNDECIDED:
             return -1, 0, False
         if relation == 1:
@@ -377,7 +249,8 @@ def clip_rings(
         largest = max(largest, ring_offsets[ring + 1] - ring_offsets[ring])
     room = 2 * largest + 2 * n_planes + 8  # a convex ring gains one vertex a plane; one that outgrows this is left open
     here, there = np.empty((room, dimension, 3)), np.empty((room, dimension, 3))
-    ring_points, edges, new_edges = np.empty((largest, dimension, 3)), np.empty(room, np.int64), np.empty(room, np.int64)
+    ring_points = np.empty((largest, dimension, 3))
+    origins, new_origins = np.empty((room, COLUMNS), np.int64), np.empty((room, COLUMNS), np.int64)
     signs, on_plane = np.empty(room, np.int64), np.empty(room, np.bool_)
     contacts, dropped = np.empty(n_planes, np.int64), np.empty(n_planes, np.bool_)
     cutting, lows, highs = np.empty(n_planes, np.int64), np.empty(dimension), np.empty(dimension)
@@ -417,31 +290,33 @@ def clip_rings(
             n_ring = n
             for i in range(n):
                 copy_vertex(here, i, ring_points, i)
-                edges[i] = i
+                origins[i, EDGE], origins[i, PLANES], origins[i, CORNER], origins[i, CUT_EDGE] = i, 0, 0, -1
             for i_plane in range(n_cutting):
                 if n <= 0:
                     break
                 plane = cutting[i_plane]
                 n, met, has_dropped = clip_ring(
-                    high[plane],
-                    low[plane],
-                    axes[plane],
-                    at[plane],
+                    high,
+                    low,
+                    axes,
+                    at,
+                    cutting,
+                    i_plane,
                     here,
                     n,
-                    edges,
+                    origins,
                     ring_points,
                     n_ring,
                     signs,
                     there,
-                    new_edges,
+                    new_origins,
                     on_plane,
                 )
                 contacts[plane] += met
                 if has_dropped:
                     dropped[plane] = True
                     here, there = there, here
-                    edges, new_edges = new_edges, edges
+                    origins, new_origins = new_origins, origins
             if n > 0 and written + n > out.shape[0]:
                 return polygon, begun
             if n < 0 or not store_ring(here, n, out, written):

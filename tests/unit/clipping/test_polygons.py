@@ -188,6 +188,22 @@ def test_arrays_of_triangles_and_any_workers() -> None:
     np.testing.assert_array_equal(again.vertices, results[0].vertices)
 
 
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_contours_through_corners_stay_in_the_kernel(dimension: int) -> None:
+    """Exact zeros that geometry explains need no integers: corners of a box, corners and edges of an octahedron."""
+    rng = np.random.default_rng(dimension)
+    contours = rng.integers(-20, 21, (60, 5, dimension)) / 8
+    contours[:20] = rng.uniform(-2, 2, (20, 5, dimension))
+    offset = rng.integers(-8, 9, (20, dimension)) / 8
+    contours[:20, 0], contours[:20, 1] = 1 + offset, 1 - offset  # an edge through the corner of the box
+    contours[20:30, 1:3, 0] = 1.0  # an edge on a plane
+    signs = np.array(list(itertools.product([-1.0, 1.0], repeat=dimension)))
+    for region in (Aabb([-1] * dimension, [1] * dimension), Convex(np.c_[signs, np.full(len(signs), 1.5)])):
+        clipped, accuracy = clip_polygons(contours, region, report=True)
+        assert accuracy.n_rational < 6
+        check(contours, region, clipped)
+
+
 def test_kernel_and_exact_integers_agree(monkeypatch: pytest.MonkeyPatch, pytestconfig: pytest.Config) -> None:
     """What the kernel settles is what exact integers settle, bit by bit, bridges included."""
     n = 3000 if pytestconfig.getoption("--full") else 60
