@@ -1,27 +1,38 @@
-"""Our own cells with plain signs: the same code, but no band around zero and nothing exact behind it. Fast and wrong.
+"""Our own kernels with plain signs: the same code, but no band around zero. Fast and wrong.
 
-The kernel is compiled from the same function, with the one call replaced that decides the signs.
+Cells: the kernel is compiled from the same function, with the one call replaced that decides the signs. Pairs of faces:
+likewise, with the one line replaced that sets the bound, so that a sign is left open only where it is 0.0.
 """
 
 from __future__ import annotations
 
+import inspect
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache
+from textwrap import dedent
 from types import FunctionType
+from typing import Any
 
 import numba
 import numpy as np
 
 from benchmarks.contenders import Prepared
+from engine.collision import dual_traversal, pose_batch, triangle_triangle
 from engine.containment import locators, segment_parity
 from engine.containment.cell_lanes import plain_signs
+
+_AS_ENGINE: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
+"""Options of `engine.jit`, without a cache."""
 
 
 @cache
 def _same_but_for_signs() -> object:
     exact = segment_parity.locate_by_cells.py_func
     changed = FunctionType(exact.__code__, {**exact.__globals__, "group_parity": plain_signs}, "locate_by_plain_signs")
-    return numba.njit(nogil=True, error_model="numpy")(changed)  # as engine.jit, without a cache
+    return numba.njit(**_AS_ENGINE)(changed)
 
 
 def with_plain_signs(ours: Prepared) -> Prepared:
@@ -36,3 +47,29 @@ def with_plain_signs(ours: Prepared) -> Prepared:
             locators.locate_by_cells = exact
 
     return replace(ours, ask=ask)
+
+
+@cache
+def _poses_by_plain_signs() -> Any:
+    source = dedent(inspect.getsource(triangle_triangle.classify_near.py_func))
+    start = source.index("def ")
+    bound = next(line for line in source.splitlines() if line.lstrip().startswith("bound ="))
+    space = dict(vars(triangle_triangle))
+    exec(source[start:].replace(bound, "    bound = 0.0"), space)
+    changed = _compiled(dual_traversal.search.py_func, classify_near=numba.njit(**_AS_ENGINE)(space["classify_near"]))
+    return _compiled(pose_batch.relate_poses.py_func, search=changed)
+
+
+def _compiled(function: FunctionType, **replaced: object) -> Any:
+    return numba.njit(**_AS_ENGINE)(FunctionType(function.__code__, {**function.__globals__, **replaced}))
+
+
+@contextmanager
+def poses_by_plain_signs() -> Iterator[None]:
+    """Have `collide_poses` decide pairs of faces by the bare sign of a float64 determinant: no bound on its error."""
+    module: Any = sys.modules["engine.collision.collide_poses"]  # the package's name stands for the function
+    exact, module.relate_poses = module.relate_poses, _poses_by_plain_signs()
+    try:
+        yield
+    finally:
+        module.relate_poses = exact

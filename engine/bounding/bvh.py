@@ -20,7 +20,7 @@ S. Boulos, Getting rid of packets: efficient SIMD single-ray traversal using mul
 
 from __future__ import annotations
 
-from math import frexp
+from math import frexp, ldexp
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -39,6 +39,9 @@ ENLARGED = 2.0**-22
 """Added to half widths: a centre rounded to float32 is off by 2^-24 of at most 2, the half width by as much."""
 
 
+_FEW_ROWS = 64
+
+
 class Bvh(NamedTuple):
     """The arrays of the picture above."""
 
@@ -54,37 +57,60 @@ def build_bvh(boxes: npt.NDArray[np.float64]) -> Bvh:
 
     Cost: n log n; two arrays are kept, of some 45 bytes an item.
     """
-    n_items = len(boxes)
-    low, high = boxes[:, :3].min(axis=0), boxes[:, 3:].max(axis=0)
-    origin = 0.5 * low + 0.5 * high
-    half = float((0.5 * high - 0.5 * low).max())
-    power = frexp(half)[1] - 1 if half > 0.0 else 0
+    origin = np.empty(3)
     with np.errstate(all="ignore"):  # what underflows here is far below the enlargement of the boxes
-        middle = np.ldexp(origin, -power)
-        local = np.ldexp(boxes, -power) - np.concatenate([middle, middle])
-        order = np.arange(n_items)
-        halves, runs = np.empty((2 * n_items - 1, 6)), np.empty((2 * n_items - 1, 2), np.int64)
-        left = np.empty(2 * n_items - 1, np.int64)
-        n_halves = _halve(local, order, halves, left, runs)
-        nodes = np.empty((n_halves, 6, WIDTH), np.float32)
-        child = np.empty((n_halves, WIDTH), np.int32)
-        n_nodes = _widen(local, order, halves, left, runs, nodes, child)
+        nodes, child, n_nodes, scale = _build(as_read_only(boxes), origin)
     origin.setflags(write=False)
-    return Bvh(_trimmed(nodes, n_nodes), _trimmed(child, n_nodes), origin, 2.0**power)
+    return Bvh(_trimmed(nodes, n_nodes), _trimmed(child, n_nodes), origin, scale)
+
+
+def as_read_only(array: Any) -> Any:
+    """Return a contiguous view that kernels cannot write to, so that each is compiled for one kind of array."""
+    view = np.ascontiguousarray(array).view()
+    view.setflags(write=False)
+    return view
 
 
 def _trimmed(array: Any, n_rows: int) -> Any:
-    """Return the first rows as a read-only array that begins with a line of the cache."""
-    n_bytes = array[:n_rows].nbytes
-    room = np.empty(n_bytes + 64, np.uint8)
-    start = -room.ctypes.data % 64
-    kept = room[start : start + n_bytes].view(array.dtype).reshape(n_rows, *array.shape[1:])
-    kept[:] = array[:n_rows]
+    """Return the first rows as a read-only array that begins with a line of the cache, unless it is small."""
+    kept = array[:n_rows].copy()
+    if n_rows > _FEW_ROWS:
+        room = np.empty(kept.nbytes + 64, np.uint8)
+        start = -room.ctypes.data % 64
+        aligned = room[start : start + kept.nbytes].view(array.dtype).reshape(kept.shape)
+        aligned[:] = kept
+        kept = aligned
     kept.setflags(write=False)
     return kept
 
 
 @kernel
+def _build(boxes: Any, origin: Any) -> tuple[Any, Any, int, float]:
+    """Fill origin (3,); return boxes and children of the nodes, some rows too many, the number of nodes, and scale."""
+    n_items, half = boxes.shape[0], 0.0
+    for axis in range(3):
+        low, high = boxes[0, axis], boxes[0, 3 + axis]
+        for item in range(1, n_items):
+            low, high = min(low, boxes[item, axis]), max(high, boxes[item, 3 + axis])
+        origin[axis] = 0.5 * low + 0.5 * high
+        half = max(half, 0.5 * high - 0.5 * low)
+    power = frexp(half)[1] - 1 if half > 0.0 else 0
+    once = ldexp(1.0, -power // 2)
+    again = ldexp(1.0, -power - (-power // 2))  # order: two factors, since 2^-power may be no float
+    local = np.empty((n_items, 6))
+    for item in range(n_items):
+        for side in range(6):
+            local[item, side] = boxes[item, side] * once * again - origin[side % 3] * once * again
+    order = np.arange(n_items)
+    halves, runs = np.empty((2 * n_items - 1, 6)), np.empty((2 * n_items - 1, 2), np.int64)
+    left = np.empty(2 * n_items - 1, np.int64)
+    n_halves = _halve(local, order, halves, left, runs)
+    nodes = np.empty((n_halves, 6, WIDTH), np.float32)
+    child = np.empty((n_halves, WIDTH), np.int32)
+    return nodes, child, _widen(local, order, halves, left, runs, nodes, child), ldexp(1.0, power)
+
+
+@inline
 def _halve(items: Any, order: Any, boxes: Any, left: Any, runs: Any) -> int:
     """Build a binary tree whose leaves are runs of `order` of at most eight items; return its number of nodes.
 
@@ -117,7 +143,7 @@ def _halve(items: Any, order: Any, boxes: Any, left: Any, runs: Any) -> int:
     return n_nodes
 
 
-@kernel
+@inline
 def _widen(items: Any, order: Any, halves: Any, left: Any, runs: Any, boxes: Any, child: Any) -> int:
     """Join binary nodes to nodes of eight, the largest boxes opened first; return the number of nodes filled."""
     stack = np.empty((WIDTH * MAX_DEPTH + WIDTH, 2), np.int64)  # binary node, node

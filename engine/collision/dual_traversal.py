@@ -35,7 +35,7 @@ from engine.collision.triangle_triangle import (
     classify_near,
     unposed,
 )
-from engine.jit import inline, kernel
+from engine.jit import inline
 from engine.predicates.loading import as_point3
 from engine.predicates.posed import UNPOSED, PosedPoint3, posed_error
 from engine.types import UNDECIDED
@@ -267,25 +267,3 @@ def search(
                     stack[n_stack, 1] = their_child[j, bit & 7]
                     n_stack += 1
         low = high = 0
-
-
-@kernel
-def find_contacts(
-    first: ShellArrays,
-    first_pose: PoseArrays,
-    second: ShellArrays,
-    second_pose: PoseArrays,
-    seek: int,
-    is_start: bool,
-    descent: Descent,
-    pairs: Any,
-    kinds: Any,
-    flag: Any,
-) -> tuple[int, int]:
-    """Run `search` for one pose of each body, from the start or from where it was left."""
-    rest = descent.rest.copy()
-    place = start_descent(first, first_pose, 0, second, second_pose, 0, descent)
-    if not is_start:
-        descent.stack[0, 0], descent.stack[0, 1] = 0, 0
-        descent.rest[:] = rest
-    return search(first, second, place, descent, seek, pairs, kinds, flag)

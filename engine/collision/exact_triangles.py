@@ -181,16 +181,18 @@ def separation_exact(t1: Corners, t2: Corners, plane: Plane) -> int:
     return best
 
 
-def kind_of_contact(t1: Corners, t2: Corners) -> Kind:
-    """Return the kind of the contact of two faces that meet: the one of highest dimension that occurs."""
+def kind_of_contact(t1: Corners, t2: Corners, plane1: Plane, plane2: Plane) -> Kind:
+    """Return the kind of the contact of two faces that meet, in these planes: the one of highest dimension that
+    occurs."""
     s1, s2 = as_simplex(t1), as_simplex(t2)
-    if len(s1) == 3 and len(s2) == 3:
-        plane = plane_through(t1)
-        if not any(value_at(plane, p) for p in t2) and separation_exact(t1, t2, plane) < 0:
-            return "face_face"
-    if _edge_meets_open_face(s1, s2) or _edge_meets_open_face(s2, s1):
+    values1, values2 = [value_at(plane2, p) for p in s1], [value_at(plane1, p) for p in s2]
+    if len(s1) == 3 and len(s2) == 3 and not any(values2) and separation_exact(t1, t2, plane1) < 0:
+        return "face_face"
+    if _edge_meets_open_face(s1, values1, s2, plane2) or _edge_meets_open_face(s2, values2, s1, plane1):
         return "edge_face"
-    if any(_is_in_open_face(p, s2) for p in s1) or any(_is_in_open_face(p, s1) for p in s2):
+    if any(value == 0 and _is_in_open_face(p, s2, plane2) for p, value in zip(s1, values1)):
+        return "vertex_face"
+    if any(value == 0 and _is_in_open_face(p, s1, plane1) for p, value in zip(s2, values2)):
         return "vertex_face"
     edges1, edges2 = _edges(s1), _edges(s2)
     if any(_open_edges_meet(e, f) for e in edges1 for f in edges2):
@@ -204,32 +206,35 @@ def _edges(s: tuple[Vector, ...]) -> list[tuple[Vector, Vector]]:
     return [(s[i], s[i - 1]) for i in range(len(s))] if len(s) == 3 else ([(s[0], s[1])] if len(s) == 2 else [])
 
 
-def _is_in_open_face(p: Vector, t: tuple[Vector, ...]) -> bool:
-    """Tell whether p lies in the relative interior of a triangle with area."""
-    if len(t) < 3 or not is_in_triangle(p, (t[0], t[1], t[2]), plane_through((t[0], t[1], t[2]))):
-        return False
-    return not any(is_on_segment(p, a, b) for a, b in _edges(t))
-
-
-def _edge_meets_open_face(s: tuple[Vector, ...], t: tuple[Vector, ...]) -> bool:
-    """Tell whether some open edge of s meets the relative interior of a triangle t with area."""
+def _is_in_open_face(p: Vector, t: tuple[Vector, ...], plane: Plane) -> bool:
+    """Tell whether p, in the plane of t, lies in the relative interior of a triangle with area."""
     if len(t) < 3:
         return False
-    corners = (t[0], t[1], t[2])
-    plane = plane_through(corners)
     axis = largest_axis(plane[:3])
-    flat = [without_axis(p, axis) for p in corners]
-    if turn(flat[0], flat[1], flat[2]) < 0:
-        flat = [flat[0], flat[2], flat[1]]
-    for a, b in _edges(s):
-        a_side, b_side = sign(value_at(plane, a)), sign(value_at(plane, b))
+    a, b, c, q = (without_axis(corner, axis) for corner in (*t, p))
+    first = turn(a, b, q)
+    return first != 0 and turn(b, c, q) == first and turn(c, a, q) == first
+
+
+def _edge_meets_open_face(s: tuple[Vector, ...], values: list[int], t: tuple[Vector, ...], plane: Plane) -> bool:
+    """Tell whether some open edge of s, corners at these values of the plane, meets the relative interior of a
+    triangle t with area."""
+    if len(t) < 3:
+        return False
+    for i in range(len(s) if len(s) == 3 else len(s) - 1):
+        a, b = s[i], s[i - 1]
+        a_side, b_side = sign(values[i]), sign(values[i - 1])
         if a_side * b_side < 0:
-            if len({side(a, b, corners[i], corners[(i + 1) % 3]) for i in range(3)}) == 1:
+            if len({side(a, b, t[k], t[(k + 1) % 3]) for k in range(3)}) == 1:
                 return True
         elif a_side == 0 and b_side == 0:
+            axis = largest_axis(plane[:3])
+            flat = [without_axis(p, axis) for p in t]
+            around = turn(flat[0], flat[1], flat[2])
             k, m = without_axis(a, axis), without_axis(b, axis)
             outside = any(
-                turn(flat[i], flat[(i + 1) % 3], k) <= 0 and turn(flat[i], flat[(i + 1) % 3], m) <= 0 for i in range(3)
+                around * turn(flat[n], flat[(n + 1) % 3], k) <= 0 and around * turn(flat[n], flat[(n + 1) % 3], m) <= 0
+                for n in range(3)
             )
             if not outside and {1, -1} <= {turn(k, m, p) for p in flat}:
                 return True

@@ -29,14 +29,14 @@ from engine.collision.dual_traversal import (
     SEEK_PIERCING_BY_FIRST,
     SEEK_PIERCING_BY_SECOND,
     SETTLED,
-    find_contacts,
     new_descent,
 )
-from engine.collision.exact_body import ExactBody, exact_pair
+from engine.collision.exact_body import ExactBody, Vector, exact_pair
 from engine.collision.exact_cells import cells_of, even_sides, is_inside_exact, pieces_of_segment, sides_at, sides_over
-from engine.collision.exact_triangles import as_simplex, classify_exact, kind_of_contact
+from engine.collision.exact_triangles import as_simplex, classify_exact, is_in_triangle, kind_of_contact
 from engine.collision.face_state import find_states
 from engine.collision.parity import INSIDE, locate_vertices
+from engine.collision.pose_batch import find_contacts
 from engine.collision.result import Collision, Kind, Witness, Work
 from engine.collision.separating_plane import is_separated
 from engine.collision.shell import (
@@ -93,9 +93,11 @@ def in_range(
     Without poses the predicates scale by themselves; the filter for rounded posed coordinates does not.
     """
     poses = [pose for pose in (first_pose, second_pose) if pose is not None]
+    if not poses:
+        return first, first_pose, second, second_pose
     largest = max(first.reach, second.reach, *(float(np.abs(pose.translation).max()) for pose in poses), 0.0)
     power = int(np.frexp(largest)[1])
-    if not poses or abs(power) <= _SAFE_POWER or largest == 0.0:
+    if abs(power) <= _SAFE_POWER or largest == 0.0:
         return first, first_pose, second, second_pose
     arrays = [first.arrays.vertices, second.arrays.vertices, *(pose.translation for pose in poses)]
     scaled = [np.ldexp(array, -power) for array in arrays]
@@ -140,6 +142,7 @@ class _Pair:
         self.poses = (first_pose, second_pose)
         self.work = work
         self.seek = what_to_seek(first, second, work)
+        self.is_disjoint = False
         self._exact: tuple[ExactBody, ExactBody] | None = None
 
     @property
@@ -152,6 +155,8 @@ class _Pair:
     def relation(self) -> Collision:
         """Return the answer."""
         contacts, is_settled = self._contacts()
+        if self.is_disjoint:
+            return Collision(Relation.DISJOINT)
         if is_settled:
             if self.seek == SEEK_OVERLAP:
                 return self._touch(Relation.OVERLAPPING, contacts)
@@ -180,10 +185,14 @@ class _Pair:
         found_kinds: list[npt.NDArray[np.int8]] = []
         how = FULL
         while how == FULL:  # bound: each turn finds new pairs
-            how, n_pairs = find_contacts(
+            how, n_pairs, apart = find_contacts(
                 first.arrays,
+                first.components,
+                first.has_inside,
                 first_pose,
                 second.arrays,
+                second.components,
+                second.has_inside,
                 second_pose,
                 self.seek,
                 not found_pairs,
@@ -195,6 +204,9 @@ class _Pair:
             self.work.budget.check()
             if how == SETTLED:
                 return pairs[:1], True
+            if apart == Relation.DISJOINT:
+                self.is_disjoint = True
+                return pairs[:0], False
             found_pairs.append(pairs[:n_pairs].copy())
             found_kinds.append(kinds[:n_pairs].copy())
             if (
@@ -283,17 +295,7 @@ class _Pair:
             vertices = np.unique(roots)
         else:
             vertices = triangles[shell.components, 0]
-        found = np.empty(len(vertices), np.int8)
-        locate_vertices(
-            shell.arrays,
-            shell.posed(self.poses[own]),
-            vertices,
-            other.arrays,
-            other.posed(self.poses[1 - own]),
-            found,
-            self.work.budget.flag,
-        )
-        self.work.budget.check()
+        found = self._located(own, vertices)
         for index in np.flatnonzero(found == UNDECIDED):
             self.work.budget.check()
             self.work.n_beyond_filter += 1
@@ -309,6 +311,15 @@ class _Pair:
             kept, roots = np.arange(len(triangles)), parent[triangles[:, 0]]
         return [_Patch(kept[roots == parent[vertex]]) for vertex in inside]
 
+    def _located(self, own: int, vertices: IntArray) -> npt.NDArray[np.int8]:
+        """Return where vertices that are on no face of the other body lie: INSIDE, -INSIDE or UNDECIDED."""
+        shell, other = self.shells[own], self.shells[1 - own]
+        poses = [body.posed(pose) for body, pose in zip(self.shells, self.poses)]
+        found = np.empty(len(vertices), np.int8)
+        locate_vertices(shell.arrays, poses[own], vertices, other.arrays, poses[1 - own], found, self.work.budget.flag)
+        self.work.budget.check()
+        return found
+
     def _overlap_or_touch(self, contacts: IntArray, patches: list[list[_Patch]]) -> Collision:
         """Return overlapping or touching, where no crossing has proven the first."""
         piercing = bool(patches[0] or patches[1])
@@ -322,9 +333,14 @@ class _Pair:
         for own in (0, 1):
             if not both and (piercing or not self.work.witness or not self.shells[1 - own].has_inside):
                 continue
-            for face in np.unique(contacts[:, own]).tolist():
+            faces = np.unique(contacts[:, own])
+            outside = self._vertices_outside(own, faces)
+            for face, state in zip(faces.tolist(), self._states(own, faces).tolist()):
                 met = contacts[contacts[:, own] == face, 1 - own]
-                overlaps, pierces = self._look_at_cells(own, face, met)
+                is_outlying = self._has_corner_outside(own, face, met, outside)
+                if own == 1 and both and is_outlying and state == STATE_CLEAN:
+                    continue  # case: a common cell without any face of the first is one of the second, in the first
+                overlaps, pierces = self._look_at_cells(own, face, met, is_outlying)
                 if overlaps:
                     return self._touch(Relation.OVERLAPPING, contacts)
                 piercing = piercing or pierces
@@ -353,9 +369,25 @@ class _Pair:
                     return True
         return False
 
-    def _look_at_cells(self, own: int, face: int, met: IntArray | None) -> tuple[bool, bool]:
+    def _vertices_outside(self, own: int, faces: IntArray) -> frozenset[int]:
+        """Return the corners of faces that lie outside the other body, if they do not lie on a face of it."""
+        shell, other = self.shells[own], self.shells[1 - own]
+        vertices = np.unique(shell.arrays.triangles[faces])
+        return (
+            frozenset(vertices[self._located(own, vertices) == -INSIDE].tolist()) if other.has_inside else frozenset()
+        )
+
+    def _has_corner_outside(self, own: int, face: int, met: IntArray, outside: frozenset[int]) -> bool:
+        """Tell whether a face with `met`, all it meets of the other body, surely has a corner outside that body."""
+        body, other = self.exact[own], self.exact[1 - own]
+        for vertex in self.shells[own].arrays.triangles[face].tolist():
+            if vertex in outside and not any(_may_hold(other, i, body.vertex(vertex)) for i in met.tolist()):
+                return True
+        return False
+
+    def _look_at_cells(self, own: int, face: int, met: IntArray | None, is_outlying: bool = False) -> tuple[bool, bool]:
         """Tell whether both insides come up to one side of some cell of a face, and whether a cell lies inside the
-        other. met: all faces of the other body that meet this one, if known."""
+        other. met: all faces of the other body that meet this one, if known; is_outlying: a corner lies outside it."""
         body, other = self.exact[own], self.exact[1 - own]
         axis = body.axis(face)
         if axis < 0:
@@ -364,7 +396,7 @@ class _Pair:
         if body.shell.has_inside and self._state(own, face) != STATE_CLEAN:
             cutters.append(body)
         elif body.shell.has_inside and met is not None:
-            overlaps = self._overlaps_evenly(own, face, met)
+            overlaps = self._overlaps_evenly(own, face, met, is_outlying)
             if overlaps is not None:
                 return overlaps, False
         pierces = False
@@ -377,7 +409,7 @@ class _Pair:
             pierces = pierces or theirs.at
         return False, pierces
 
-    def _overlaps_evenly(self, own: int, face: int, met: IntArray) -> bool | None:
+    def _overlaps_evenly(self, own: int, face: int, met: IntArray, is_outlying: bool) -> bool | None:
         """Tell whether both insides come up to one side of a clean face; None where the other's status is not known to
         be one all along the side of the face's inside.
 
@@ -388,6 +420,8 @@ class _Pair:
         is_even_above, is_even_below = even_sides(corners, plane, axis, (other.corners(i) for i in met.tolist()))
         if not (is_even_above or is_even_below):
             return None
+        if is_even_above and is_even_below and is_outlying:
+            return False
         for weights in _WITHIN:
             x, y, z = (sum(w * p[side] for w, p in zip(weights, corners)) for side in range(3))
             q = (x, y, z, sum(weights))
@@ -417,7 +451,8 @@ class _Pair:
         named = []
         for i, j in contacts[:_NAMED].tolist():
             self.work.budget.check()
-            kind = kind_of_contact(self.exact[0].corners(i), self.exact[1].corners(j))
+            a, b = self.exact
+            kind = kind_of_contact(a.corners(i), b.corners(j), a.plane(i), b.plane(j))
             named.append((STRENGTH.index(kind), int(self.shells[0].faces[i]), int(self.shells[1].faces[j])))
             if kind == STRENGTH[0]:  # coplanar pairs stand first, in the order of the caller's faces
                 break
@@ -433,3 +468,9 @@ class _Pair:
         return Collision(
             relation, Witness("containment", face if own == 0 else -1, face if own == 1 else -1, containing, piercing)
         )
+
+
+def _may_hold(body: ExactBody, face: int, p: Vector) -> bool:
+    """Tell whether a face holds a point; maybe, where the face has no area."""
+    plane = body.plane(face)
+    return not any(plane[:3]) or is_in_triangle(p, body.corners(face), plane)

@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 from engine.collision.dual_traversal import (
+    DONE,
     FULL,
     INTERRUPTED,
     SEEK_OVERLAP,
     SETTLED,
     Descent,
+    Place,
     search,
     start_descent,
 )
@@ -53,6 +55,63 @@ def components_inside(
     return _ALL if n_inside == components.shape[0] else _SOME
 
 
+@inline
+def relation_apart(
+    first: ShellArrays,
+    first_components: Any,
+    first_has_inside: bool,
+    second: ShellArrays,
+    second_components: Any,
+    second_has_inside: bool,
+    place: Place,
+) -> int:
+    """Return the relation of two bodies without contact, or UNSETTLED."""
+    in_second = components_inside(first, first_components, place.a, second, place.b, second_has_inside)
+    in_first = components_inside(second, second_components, place.b, first, place.a, first_has_inside)
+    if in_second == _NONE and in_first == _NONE:
+        return DISJOINT
+    if in_second == _ALL and in_first == _NONE:
+        return FIRST_INSIDE_SECOND
+    if in_second == _NONE and in_first == _ALL:
+        return SECOND_INSIDE_FIRST
+    return UNSETTLED
+
+
+@kernel
+def find_contacts(
+    first: ShellArrays,
+    first_components: Any,
+    first_has_inside: bool,
+    first_pose: PoseArrays,
+    second: ShellArrays,
+    second_components: Any,
+    second_has_inside: bool,
+    second_pose: PoseArrays,
+    seek: int,
+    is_start: bool,
+    descent: Descent,
+    pairs: Any,
+    kinds: Any,
+    flag: Any,
+) -> tuple[int, int, int]:
+    """Run `search` for one pose of each body, from the start or from where it was left.
+
+    Returns how it ended, the number of pairs, and, of a search from the start without any, `relation_apart`.
+    """
+    rest = descent.rest.copy()
+    place = start_descent(first, first_pose, 0, second, second_pose, 0, descent)
+    if not is_start:
+        descent.stack[0, 0], descent.stack[0, 1] = 0, 0
+        descent.rest[:] = rest
+    how, n_pairs = search(first, second, place, descent, seek, pairs, kinds, flag)
+    relation = UNSETTLED
+    if is_start and how == DONE and n_pairs == 0:
+        relation = relation_apart(
+            first, first_components, first_has_inside, second, second_components, second_has_inside, place
+        )
+    return how, n_pairs, relation
+
+
 @kernel
 def relate_poses(
     first: ShellArrays,
@@ -88,11 +147,6 @@ def relate_poses(
         relations[item] = UNSETTLED
         if has_contact:
             continue
-        in_second = components_inside(first, first_components, place.a, second, place.b, second_has_inside)
-        in_first = components_inside(second, second_components, place.b, first, place.a, first_has_inside)
-        if in_second == _NONE and in_first == _NONE:
-            relations[item] = DISJOINT
-        elif in_second == _ALL and in_first == _NONE:
-            relations[item] = FIRST_INSIDE_SECOND
-        elif in_second == _NONE and in_first == _ALL:
-            relations[item] = SECOND_INSIDE_FIRST
+        relations[item] = relation_apart(
+            first, first_components, first_has_inside, second, second_components, second_has_inside, place
+        )

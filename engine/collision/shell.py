@@ -7,12 +7,13 @@ inside. All arrays are in the body's own coordinates: poses are applied where a 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import frexp, ldexp
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from engine.bounding.bvh import EMPTY, build_bvh
+from engine.bounding.bvh import EMPTY, WIDTH, build_bvh
 from engine.collision.placement import NO_ROTATION, NO_TRANSLATION, Extent, PoseArrays
 from engine.collision.triangle_triangle import Triangle3, projected
 from engine.jit import inline, kernel
@@ -35,6 +36,10 @@ STATE_CROSSED = 1
 STATE_STACKED = 2
 """Values in `state`: nothing computed yet; no other face of the body meets the relative interior in more than single
 points; some other face crosses it along a segment; some other face of the same plane covers part of it (or unsure)."""
+
+
+STILL = PoseArrays(NO_ROTATION, NO_TRANSLATION, False)
+"""Of a body without a pose."""
 
 
 class ShellArrays(NamedTuple):
@@ -71,7 +76,7 @@ class Shell:
     def posed(self, pose: Pose | None) -> PoseArrays:
         """Return the pose as kernels take it."""
         if pose is None:
-            return PoseArrays(NO_ROTATION, NO_TRANSLATION, False)
+            return STILL
         return PoseArrays(read_only(pose.rotation[None]), read_only(pose.translation[None]), True)
 
 
@@ -98,65 +103,103 @@ def shell_of_triangles(vertices: FloatArray, triangles: IntArray, faces: IntArra
     Triangles and vertices are copied in the order of the tree: the faces near a contact then lie side by side in
     memory, which a large mesh, asked at another place by every pose, needs more than anything else.
     """
-    corners = vertices[triangles]
-    tree = build_bvh(np.concatenate([corners.min(axis=1), corners.max(axis=1)], axis=1))
-    is_item = (tree.child < 0) & (tree.child != EMPTY)
-    order = -1 - tree.child[is_item].astype(np.int64)
-    child = tree.child.copy()
-    child[is_item] = -1 - np.arange(len(order), dtype=np.int32)
-    triangles, faces = triangles[order], faces[order]
-    number = np.full(len(vertices), -1, np.int64)
-    used = np.empty(len(vertices), np.int64)
-    n_used = _renumber(triangles, number, used)
-    vertices = np.ascontiguousarray(vertices[used[:n_used]])
-    axis = np.empty(len(triangles), np.int8)
+    vertices, triangles = read_only(vertices), read_only(triangles)
+    n_triangles = len(triangles)
+    boxes = np.empty((n_triangles, 6))
+    _fill_boxes(vertices, triangles, boxes)
+    tree = build_bvh(boxes)
+    child, order = tree.child.copy(), np.empty(n_triangles, np.int64)
+    ordered, axis = np.empty((n_triangles, 3), np.int64), np.empty(n_triangles, np.int8)
+    used, components = np.empty((len(vertices), 3)), np.empty(n_triangles, np.int64)
     with np.errstate(over="ignore", invalid="ignore", under="ignore"):  # uncompiled runs only
-        _find_axes(vertices, triangles, axis)
-    parent = np.arange(len(vertices))
-    join_vertices(triangles, np.zeros(len(triangles), np.bool_), parent)
-    _, first = np.unique(parent[triangles[:, 0]], return_index=True)
-    extent = Extent(float(np.abs(vertices).max()), grain_of(vertices))
-    state = np.full(len(triangles), STATE_UNKNOWN, np.int8)
+        n_used, n_components = _lay_out(vertices, triangles, child, order, ordered, used, axis, components)
+        reach, lowest_bit, shift = _lattice_of(used[:n_used])
     arrays = ShellArrays(
-        read_only(vertices),
-        read_only(triangles),
+        read_only(used[:n_used].copy() if n_used < len(used) else used),
+        read_only(ordered),
         read_only(axis),
-        state,
+        np.full(n_triangles, STATE_UNKNOWN, np.int8),
         tree.boxes,
         read_only(child),
         tree.origin,
         tree.scale,
-        extent,
+        Extent(reach, ldexp(1.0, lowest_bit)),
     )
-    return Shell(arrays, faces, has_inside, np.sort(first), extent.reach, lattice_shift(vertices))
+    return Shell(arrays, faces[order], has_inside, components[:n_components].copy(), reach, shift)
 
 
 @kernel
-def _renumber(triangles: Any, number: Any, used: Any) -> int:
-    """Number vertices in the order in which triangles (n, 3) name them, and write that into triangles.
-
-    number (n_vertices,): -1 on entry. Fills used: the old number of each; returns how many there are.
-    """
-    n_used = 0
+def _fill_boxes(vertices: Any, triangles: Any, boxes: Any) -> None:
+    """Fill boxes (n, 6) with the smallest and the largest coordinates of each triangle."""
     for item in range(triangles.shape[0]):
-        for corner in range(3):
-            vertex = triangles[item, corner]
-            if number[vertex] < 0:
-                number[vertex] = n_used
-                used[n_used] = vertex
-                n_used += 1
-            triangles[item, corner] = number[vertex]
-    return n_used
+        for k in range(3):
+            p = vertices[triangles[item, 0], k]
+            q = vertices[triangles[item, 1], k]
+            r = vertices[triangles[item, 2], k]
+            boxes[item, k], boxes[item, 3 + k] = min(p, q, r), max(p, q, r)
 
 
-def grain_of(values: FloatArray) -> float:
-    """Return the largest power of two that divides every value; 1.0 if all are zero."""
-    mantissas, exponents = np.frexp(values[values != 0.0])
-    if not mantissas.size:
-        return 1.0
-    whole = np.ldexp(mantissas, 53).astype(np.int64)
-    lowest = np.frexp((whole & -whole).astype(np.float64))[1] - 1  # place of the lowest bit set
-    return float(np.ldexp(1.0, int((exponents - 53 + lowest).min())))
+@kernel
+def _lay_out(
+    vertices: Any, triangles: Any, child: Any, order: Any, ordered: Any, used: Any, axis: Any, components: Any
+) -> tuple[int, int]:
+    """Renumber triangles and vertices in the order of the tree; return the numbers of vertices and components.
+
+    child: of the tree, items renumbered. order (n,): the old number of each triangle; ordered (n, 3): its vertices;
+    used (n_vertices, 3): their coordinates; axis (n,): `axis_of`; components: the first triangle of each.
+    """
+    n_triangles = n_used = n_components = 0
+    number = np.full(vertices.shape[0], -1, np.int64)
+    for node in range(child.shape[0]):
+        for lane in range(WIDTH):
+            if child[node, lane] >= 0 or child[node, lane] == EMPTY:
+                continue
+            item = n_triangles
+            order[item] = -1 - child[node, lane]
+            child[node, lane] = -1 - item
+            n_triangles += 1
+            for corner in range(3):
+                vertex = triangles[order[item], corner]
+                if number[vertex] < 0:
+                    number[vertex] = n_used
+                    used[n_used] = vertices[vertex]
+                    n_used += 1
+                ordered[item, corner] = number[vertex]
+            axis[item] = axis_of(
+                as_point3(used, ordered[item, 0]),
+                as_point3(used, ordered[item, 1]),
+                as_point3(used, ordered[item, 2]),
+            )
+    parent = np.empty(n_used, np.int64)
+    join_vertices(ordered, np.zeros(n_triangles, np.bool_), parent)
+    number[:n_used] = 0
+    for item in range(n_triangles):
+        root = parent[ordered[item, 0]]
+        if number[root] == 0:
+            number[root] = 1
+            components[n_components] = item
+            n_components += 1
+    return n_used, n_components
+
+
+@kernel
+def _lattice_of(vertices: Any) -> tuple[float, int, int]:
+    """Return the largest magnitude of a coordinate, k of the largest power 2^k that divides all (0 if all are zero),
+    and k >= 0 so that every coordinate times 2^k is an integer, surely."""
+    reach, lowest, smallest = 0.0, 2000, 2000
+    for vertex in range(vertices.shape[0]):
+        for k in range(3):
+            value = abs(vertices[vertex, k])
+            if value == 0.0:
+                continue
+            reach = max(reach, value)
+            mantissa, exponent = frexp(value)
+            whole = int(mantissa * 2.0**53)
+            smallest = min(smallest, exponent)
+            lowest = min(lowest, exponent - 54 + frexp(float(whole & -whole))[1])
+    if smallest == 2000:
+        return 0.0, 0, 0
+    return reach, lowest, max(0, 53 - smallest)
 
 
 def lattice_shift(values: FloatArray) -> int:
@@ -167,7 +210,8 @@ def lattice_shift(values: FloatArray) -> int:
 
 def read_only(array: Any) -> Any:
     """Return a contiguous read-only array, so that every shell has one compiled type."""
-    array = np.ascontiguousarray(array)
+    if not array.flags.c_contiguous:
+        array = np.ascontiguousarray(array)
     if array.flags.writeable:
         array = array.view()
         array.setflags(write=False)
@@ -225,17 +269,6 @@ def in_tree(shell: ShellArrays, p: Point3) -> Point3:
         (p.y - shell.origin[1]) / shell.scale,
         (p.z - shell.origin[2]) / shell.scale,
     )
-
-
-@kernel
-def _find_axes(vertices: Any, triangles: Any, axes: Any) -> None:
-    """Fill axes (n,) with the axis of each triangle."""
-    for item in range(triangles.shape[0]):
-        axes[item] = axis_of(
-            as_point3(vertices, triangles[item, 0]),
-            as_point3(vertices, triangles[item, 1]),
-            as_point3(vertices, triangles[item, 2]),
-        )
 
 
 @inline

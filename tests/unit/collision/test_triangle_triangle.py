@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from engine.collision.exact_body import plane_through
 from engine.collision.exact_triangles import classify_exact, kind_of_contact
 from engine.collision.placement import orient3d_near
 from engine.collision.triangle_triangle import APART, CONTACT, COPLANAR, CROSSING, Triangle3, classify_exactly, unposed
@@ -75,7 +76,8 @@ def test_compiled_exact_and_reference_agree_on_a_lattice() -> None:
         if area:
             assert kind == exact
         if exact != APART:
-            assert kind_of_contact(t1, t2) == kind_of_contact(t2, t1)
+            one, other = plane_through(t1), plane_through(t2)
+            assert kind_of_contact(t1, t2, one, other) == kind_of_contact(t2, t1, other, one)
 
 
 def test_class_does_not_depend_on_the_order_of_vertices_or_triangles() -> None:
@@ -111,7 +113,7 @@ def test_named_cases(other: Corners, kind: int, contact: str | None) -> None:
     assert classify_exact(BASE, other) == kind
     assert classify_exact(other, BASE) == kind
     if contact is not None:
-        assert kind_of_contact(BASE, other) == contact
+        assert kind_of_contact(BASE, other, plane_through(BASE), plane_through(other)) == contact
 
 
 def test_signs_near_zero_are_left_open_and_others_survive_the_error() -> None:
