@@ -91,7 +91,10 @@ def _shapely() -> Ask:
     import shapely
 
     def ask(rings: np.ndarray) -> np.ndarray:
-        return shapely.area(shapely.clip_by_rect(shapely.polygons(rings), -1, -1, 1, 1))
+        try:
+            return shapely.area(shapely.clip_by_rect(shapely.polygons(rings), -1, -1, 1, 1))
+        except shapely.GEOSException:  # one polygon it cannot clip ends the whole call
+            return np.nan if len(rings) == 1 else np.hstack([ask(ring[None]) for ring in rings])
 
     return ask
 

@@ -30,6 +30,12 @@ def rings_of(solid: dict[str, Any]) -> Rings:
     raise NotApplicable(solid["type"])
 
 
+def refuse_poses(data: dict[str, Any]) -> None:
+    """Leave posed bodies to the peers that take poses."""
+    if "first_pose" in data or "second_pose" in data:
+        raise NotApplicable("no poses")
+
+
 def area_of(rings: list[Any]) -> float:
     """Return the sum of the signed areas, without its sign."""
     total = 0.0
@@ -102,11 +108,12 @@ def shapely_overlay(data: dict[str, Any]) -> float:
 def shapely_collide(data: dict[str, Any]) -> bool:
     import shapely
 
+    refuse_poses(data)
     first, second = data["first"], data["second"]
     if second["type"] == "sphere" and len(second["center"]) == 2:
         return shapely_shape(first).distance(shapely.Point(second["center"])) <= second["radius"]
-    # a polygon without area is not repaired away
-    return shapely.intersects(*(shapely.Polygon(rings_of(solid)[0]) for solid in (first, second)))
+    shapes = [rings_of(solid) for solid in (first, second)]
+    return shapely.intersects(*(shapely.Polygon(rings[0], rings[1:]) for rings in shapes))  # not repaired: as given
 
 
 # --- matplotlib -------------------------------------------------------------------------------------------------------
@@ -144,6 +151,7 @@ def _clipped(subject: list[Any], clip: list[Any], operation: str, are_closed: bo
 
     kinds = {
         "intersection": pyclipper.CT_INTERSECTION, "union": pyclipper.CT_UNION, "difference": pyclipper.CT_DIFFERENCE,
+        "symmetric_difference": pyclipper.CT_XOR,
     }  # fmt: skip
     clipper = pyclipper.Pyclipper()
     clipper.AddPaths(subject, pyclipper.PT_SUBJECT, are_closed)
@@ -184,6 +192,7 @@ def clipper2_overlay(data: dict[str, Any]) -> float:
         "intersection": lambda: first ^ second,
         "union": lambda: first + second,
         "difference": lambda: first - second,
+        "symmetric_difference": lambda: (first - second) + (second - first),
     }
     return found[data["operation"]]().area()
 
@@ -202,10 +211,10 @@ def celltree_segments(data: dict[str, Any]) -> list[Piece]:
 
     if data["region"]["type"] != "aabb":
         raise NotApplicable("boxes only")
-    (x0, y0), (x1, y1) = data["region"]["min"], data["region"]["max"]
-    found = []
-    for i, (a, b) in enumerate(data["segments"]):
-        kept, start, end = cohen_sutherland_line_box_clip(Point(*a), Point(*b), Box(x0, x1, y0, y1))
+    (x0, y0), (x1, y1) = np.array([data["region"]["min"], data["region"]["max"]], float).tolist()
+    box, found = Box(x0, x1, y0, y1), []
+    for i, (a, b) in enumerate(np.array(data["segments"], float).tolist()):
+        kept, start, end = cohen_sutherland_line_box_clip(Point(*a), Point(*b), box)
         if kept:
             found.append((i, tuple(start), tuple(end)))
     return found

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.filed.plane import NotApplicable, Piece
+from benchmarks.filed.plane import NotApplicable, Piece, refuse_poses
 
 
 def mesh_of(solid: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
@@ -33,6 +33,7 @@ def open3d_collide(data: dict[str, Any]) -> bool:
     from open3d.geometry import TriangleMesh
     from open3d.utility import Vector3dVector, Vector3iVector
 
+    refuse_poses(data)
     meshes = [mesh_of(data[key]) for key in ("first", "second")]
     first, second = (TriangleMesh(Vector3dVector(v), Vector3iVector(f.astype(np.int32))) for v, f in meshes)
     return first.is_intersecting(second)
@@ -78,6 +79,7 @@ def libigl_locate(data: dict[str, Any]) -> np.ndarray:
 def libigl_collide(data: dict[str, Any]) -> bool:
     import igl.copyleft.cgal as cgal
 
+    refuse_poses(data)
     return len(cgal.intersect_other(*mesh_of(data["first"]), *mesh_of(data["second"]), first_only=True)[0]) > 0
 
 
@@ -113,6 +115,7 @@ def vtk_locate(data: dict[str, Any]) -> np.ndarray:
 def vtk_collide(data: dict[str, Any]) -> bool:
     import vtk
 
+    refuse_poses(data)
     tester = vtk.vtkCollisionDetectionFilter()
     for port, key in enumerate(("first", "second")):
         tester.SetInputData(port, _polydata(*mesh_of(data[key])))
@@ -158,8 +161,12 @@ def _middle_and_sides(solid: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
 def coal_collide(data: dict[str, Any]) -> bool:
     import coal
 
-    def body(solid: dict[str, Any]) -> tuple[Any, Any]:
-        place = coal.Transform3s()
+    def body(key: str) -> tuple[Any, Any]:
+        solid, pose, place = data[key], data.get(f"{key}_pose"), coal.Transform3s()
+        if pose and solid["type"] in ("polyhedron", "surface"):
+            place = coal.Transform3s(*(np.array(pose[part], float) for part in ("rotation", "translation")))
+        elif pose:
+            raise NotApplicable("poses of meshes only")
         if solid["type"] == "aabb":
             middle, sides = _middle_and_sides(solid)
             place.setTranslation(middle)
@@ -175,14 +182,19 @@ def coal_collide(data: dict[str, Any]) -> bool:
         made.endModel()
         return made, place
 
-    first, second = body(data["first"]), body(data["second"])
+    first, second = body("first"), body("second")
     return coal.collide(*first, *second, coal.CollisionRequest(), coal.CollisionResult()) > 0
 
 
 def fcl_collide(data: dict[str, Any]) -> bool:
     import fcl
 
-    def body(solid: dict[str, Any]) -> Any:
+    def body(key: str) -> Any:
+        solid, pose, place = data[key], data.get(f"{key}_pose"), fcl.Transform()
+        if pose and solid["type"] in ("polyhedron", "surface"):
+            place = fcl.Transform(*(np.array(pose[part], float) for part in ("rotation", "translation")))
+        elif pose:
+            raise NotApplicable("poses of meshes only")
         if solid["type"] == "aabb":
             middle, sides = _middle_and_sides(solid)
             return fcl.CollisionObject(fcl.Box(*sides), fcl.Transform(middle))
@@ -193,9 +205,9 @@ def fcl_collide(data: dict[str, Any]) -> bool:
         made.beginModel(len(vertices), len(faces))
         made.addSubModel(vertices, faces)
         made.endModel()
-        return fcl.CollisionObject(made)
+        return fcl.CollisionObject(made, place)
 
-    first, second = body(data["first"]), body(data["second"])
+    first, second = body("first"), body("second")
     return fcl.collide(first, second, fcl.CollisionRequest(), fcl.CollisionResult()) > 0
 
 
@@ -205,6 +217,7 @@ def fcl_collide(data: dict[str, Any]) -> bool:
 def manifold_collide(data: dict[str, Any]) -> bool:
     import manifold3d
 
+    refuse_poses(data)
     if "surface" in (data["first"]["type"], data["second"]["type"]):
         raise NotApplicable("solids only")
     meshes = [mesh_of(data[key]) for key in ("first", "second")]
