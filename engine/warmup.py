@@ -145,6 +145,7 @@ def _warm_clipping() -> None:
             clip_segments(segments, region)
             if region.type not in ("sphere", "polygon"):
                 clip_polygons([[contour]], region)
+    clip_segments([[[-3.0, -3.0, -1.0], [3.0, 3.0, 1.0]]], _cube())  # through a corner, its middle inside no double
 
 
 def _warm_overlay() -> None:

@@ -14,10 +14,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from engine.clipping.box_tree import BoxTree, build_box_tree
-from engine.clipping.contacts import PROPER, find_contacts_2d, find_contacts_3d
+from engine.bounding.bvh import build_bvh
+from engine.clipping.box_tree import build_box_tree
+from engine.clipping.contacts import PROPER, find_contacts_2d
 from engine.clipping.exact_pieces import pieces_of
 from engine.clipping.exact_segments import Piece
+from engine.clipping.mesh_contacts import find_mesh_contacts, is_clear
 from engine.clipping.proper_pieces import SETTLED, clip_properly_2d, clip_properly_3d
 from engine.clipping.single_pieces import PieceRows
 from engine.containment.locators import locator_of
@@ -32,12 +34,15 @@ _LEAST_ROOM = 1 << 12  # contacts looked for at once; doubled where one segment 
 
 @dataclass(frozen=True, slots=True)
 class Boundary:
-    """elements: (k, 2 or 3) int64 into vertices (m, dim); faces: (k,) int64, the face or edge each is reported as."""
+    """elements: (k, 2 or 3) int64 into vertices (m, dim); faces: (k,) int64, the face or edge each is reported as.
+
+    tree: of the arguments that the kernels take, see `find_contacts_2d` and `find_mesh_contacts`.
+    """
 
     vertices: FloatArray
     elements: IntArray
     faces: IntArray
-    tree: BoxTree
+    tree: tuple[Any, ...]
 
 
 def boundary_of(region: Polygon | Polyhedron) -> Boundary:
@@ -52,7 +57,13 @@ def boundary_of(region: Polygon | Polyhedron) -> Boundary:
             faces = np.arange(len(following), dtype=np.int64)
             elements = np.stack([faces, following], axis=1)
         corners = region.vertices[elements]
-        tree = build_box_tree(corners.min(axis=1), corners.max(axis=1))
+        low, high = corners.min(axis=1), corners.max(axis=1)
+        if isinstance(region, Polyhedron):
+            wide = build_bvh(np.concatenate([low, high], axis=1))
+            tree: tuple[Any, ...] = (wide.boxes, wide.child, wide.origin, 1.0 / wide.scale)
+        else:
+            narrow = build_box_tree(low, high)
+            tree = (narrow.order, narrow.boxes)
         return Boundary(region.vertices, np.ascontiguousarray(elements), faces, tree)
 
     return region.prepared("clipping_boundary", build)
@@ -144,7 +155,7 @@ def _contacts(
     segments: FloatArray, first: int, last: int, boundary: Boundary, budget: Budget
 ) -> tuple[IntArray, IntArray, npt.NDArray[np.uint8]]:
     """Return the offsets (last - first + 1,) of each segment's contacts, their elements, and their kinds."""
-    kernel: Any = find_contacts_2d if segments.shape[2] == 2 else find_contacts_3d
+    kernel: Any = find_contacts_2d if segments.shape[2] == 2 else find_mesh_contacts
     room, done = max(_LEAST_ROOM, 8 * (last - first)), first
     ends, elements, kinds = [np.zeros(1, np.int64)], [], []
     while done < last:
@@ -157,8 +168,7 @@ def _contacts(
                 last,
                 boundary.vertices,
                 boundary.elements,
-                boundary.tree.order,
-                boundary.tree.boxes,
+                *boundary.tree,
                 budget.flag,
                 met,
                 kind,
@@ -190,7 +200,12 @@ def _pieces(
     corners = boundary.vertices[boundary.elements[elements]].tolist()
 
     def locate(point: list[Fraction]) -> int:
-        return rational_location(point, region, None, budget.check)
+        near = _near_point(point, boundary, budget) if len(point) == 3 else None
+        if near is None:
+            return rational_location(point, region, None, budget.check)
+        found = np.empty(1, np.int8)
+        locator_of(region).fill(near[None], found, budget)
+        return int(found[0])
 
     return pieces_of(
         segment[0].tolist(),
@@ -200,3 +215,21 @@ def _pieces(
         location,
         locate,
     )
+
+
+def _near_point(point: list[Fraction], boundary: Boundary, budget: Budget) -> FloatArray | None:
+    """Return a point of doubles that lies as `point` does, as nothing of the boundary is between them; else None."""
+    try:
+        middle = np.array([float(x) for x in point])
+    except OverflowError:
+        return None
+    low, high = np.nextafter(middle, -np.inf), np.nextafter(middle, np.inf)
+    is_known = np.array([x == y for x, y in zip(point, middle.tolist())])
+    low[is_known], high[is_known] = middle[is_known], middle[is_known]
+    corners = np.array(np.meshgrid(*zip(low, high), indexing="ij")).reshape(3, 8).T.copy()
+    with np.errstate(all="ignore"):
+        if not is_known.all() and not is_clear(
+            corners, boundary.vertices, boundary.elements, *boundary.tree, budget.flag
+        ):
+            return None
+    return middle

@@ -1,6 +1,7 @@
 """Which elements of a boundary does a segment meet, and how: edges of a polygon, triangles of a polyhedron.
 
-For each segment the box tree gives the elements nearby, and exact orientation signs sort them:
+For each segment a tree of boxes (in space: mesh_contacts.py) gives the elements nearby, exact orientation signs sort
+them:
 
     edge a b, segment p q in the plane         triangle a b c, segment p q in space
     a, b on either side of p q and             p, q on either side of the plane of a b c and the line p q
@@ -102,51 +103,6 @@ def find_contacts_2d(
             start = (node - n_leaves) * LEAF_SIZE
             for place in range(start, min(start + LEAF_SIZE, order.size)):
                 kind = edge_contact(vertices, elements[order[place]], segment)
-                if kind != APART:
-                    if found == room:
-                        return i
-                    elements_met[found], kinds[found] = order[place], kind
-                    found += 1
-        offsets[i - first + 1] = found
-        if stop[0]:
-            return i + 1
-    return last
-
-
-@kernel
-def find_contacts_3d(
-    segments: Any,
-    first: int,
-    last: int,
-    vertices: Any,
-    elements: Any,
-    order: Any,
-    boxes: Any,
-    stop: Any,
-    elements_met: Any,
-    kinds: Any,
-    offsets: Any,
-) -> int:
-    """Find the contacts of ``segments[first:last]``, (n, 2, 3) float64, with triangles: see `find_contacts_2d`."""
-    stack = np.empty(DEEPEST, np.int64)
-    n_leaves, room = boxes.shape[0] // 2, elements_met.size
-    found = 0
-    offsets[0] = 0
-    for i in range(first, last):
-        segment = segments[i]
-        stack[0], depth = 1, 1
-        while depth > 0:  # bound: each node enters the stack once
-            depth -= 1
-            node = stack[depth]
-            if not may_meet(segment, boxes[node]):
-                continue
-            if node < n_leaves:
-                stack[depth], stack[depth + 1] = 2 * node + 1, 2 * node
-                depth += 2
-                continue
-            start = (node - n_leaves) * LEAF_SIZE
-            for place in range(start, min(start + LEAF_SIZE, order.size)):
-                kind = triangle_contact(vertices, elements[order[place]], segment)
                 if kind != APART:
                     if found == room:
                         return i
