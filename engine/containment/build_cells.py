@@ -53,8 +53,8 @@ class Cells(NamedTuple):
     high: tuple[float, float, float]
     """The solid's box: beyond it all is outside."""
     statuses: Int8Array
-    """(n,) of level 0: the location of all points of a cell, UNDECIDED where its code says more; small enough to stay
-    in the cache."""
+    """(n + 1,) of level 0: the location of all points of a cell, UNDECIDED where its code says more, and last that of
+    points beyond the lattice; small enough to stay in the cache."""
     codes: Int32Array
     """Level 0, then 64 a brick."""
     groups: npt.NDArray[np.float32]
@@ -142,7 +142,7 @@ def build_cells(solid: Polyhedron, budget: Budget) -> Cells:
         lattice,
         (float(low[0]), float(low[1]), float(low[2])),
         (float(high[0]), float(high[1]), float(high[2])),
-        (np.minimum(codes[0], OPEN_CELL) + CODE_SHIFT).astype(np.int8),
+        np.append(np.minimum(codes[0], OPEN_CELL) + CODE_SHIFT, -1).astype(np.int8),
         np.concatenate(codes),
         groups,
     )

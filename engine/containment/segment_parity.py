@@ -15,7 +15,7 @@ import numpy as np
 
 from engine.containment.cell_lanes import ROWS, UNSURE, group_parity, prefetch_group
 from engine.containment.cells import LEVELS, PARTS, PLACE, finest, parts_of, reference_coordinate, share_of
-from engine.jit import kernel
+from engine.jit import inline, kernel
 from engine.types import UNDECIDED
 
 OUTSIDE_CELL: Final = -4
@@ -34,60 +34,73 @@ _AHEAD: Final = 6
 """Points between asking for a leaf's group and reading it: some 100 ns."""
 
 
+@inline
+def _first_status(points: Any, start: Any, end: Any, cells: Any, locations: Any, item_of: Any, n_kept: Any) -> Any:
+    """Write the status of level 0 for points start .. end, and append those that are UNDECIDED to item_of.
+
+    Returns how many that makes, and how many lie beyond the lattice. One pass without a branch: a point beyond, or not
+    finite, gets the status behind the last one.
+    """
+    low, scale, n, statuses = cells.lattice.low, cells.lattice.scale, cells.lattice.n, cells.statuses
+    nx, ny, beyond = np.int32(n[0]), np.int32(n[1]), np.uint32(n[0] * n[1] * n[2])
+    x_end, y_end, z_end = float(n[0]), float(n[1]), float(n[2])
+    n_beyond = np.uint64(0)
+    for item in range(start, end):
+        x = (points[item, 0] - low[0]) * scale[0]
+        y = (points[item, 1] - low[1]) * scale[1]
+        z = (points[item, 2] - low[2]) * scale[2]
+        is_within = (x >= 0.0) & (y >= 0.0) & (z >= 0.0) & (x < x_end) & (y < y_end) & (z < z_end)
+        x, y, z = x if is_within else 0.0, y if is_within else 0.0, z if is_within else 0.0
+        cell = np.uint32((np.int32(z) * ny + np.int32(y)) * nx + np.int32(x))
+        status = statuses[cell if is_within else beyond]
+        locations[item] = status
+        item_of[n_kept] = item
+        n_kept += np.uint64(status == UNDECIDED)
+        n_beyond += np.uint64(not is_within)
+    return n_kept, n_beyond
+
+
 @kernel
 def locate_by_cells(points: Any, cells: Any, locations: Any, flag: Any) -> int:
     """Fill `locations` (n,) int8 for points (n, 3) from a `Cells`; returns how many are left UNDECIDED.
 
     Points go through one stage after another, many at a time, so that the loads of a stage do not wait for each other:
     status on level 0, where most points end; codes there and in bricks; first group of the leaf, parity.
-    Returns NOT_FINITE, with the rest undone, where a point is not: it is in no box, so it costs nothing to look.
+    Returns NOT_FINITE, with the rest undone, where a point is not: it is in no cell, so it costs little to look.
     """
     low, scale, size, n = cells.lattice.low, cells.lattice.scale, cells.lattice.size, cells.lattice.n
-    codes, statuses, groups, box_low, box_high = cells.codes, cells.statuses, cells.groups, cells.low, cells.high
-    n_top = n[0] * n[1] * n[2]
+    codes, groups = cells.codes, cells.groups
+    n_top, top_shift = n[0] * n[1] * n[2], 2 * (LEVELS - 1)
     room = _FEWEST + _BLOCK + 1
-    item_of, code_of, level_of = np.empty(room, np.int64), np.empty(room, np.int32), np.empty(room, np.int32)
-    places, waiting = np.empty((room, 3), np.int32), np.empty(room, np.int32)
-    n_open = n_kept = 0
+    item_of, code_of, level_of = np.empty(room, np.uint64), np.empty(room, np.int32), np.empty(room, np.int32)
+    places, waiting = np.empty((room, 3), np.int32), np.empty(room, np.uint64)
+    n_open, n_kept = 0, np.uint64(0)
     for start in range(0, len(points), _BLOCK):
         if flag[0]:
             break
-        end = min(start + _BLOCK, len(points))
-        for item in range(start, end):
-            px, py, pz = points[item, 0], points[item, 1], points[item, 2]
-            if (
-                (px >= box_low[0])
-                & (px <= box_high[0])
-                & (py >= box_low[1])
-                & (py <= box_high[1])
-                & (pz >= box_low[2])
-                & (pz <= box_high[2])
-            ):
-                x, y, z = (px - low[0]) * scale[0], (py - low[1]) * scale[1], (pz - low[2]) * scale[2]
-                cell = np.uint32((np.int32(z) * np.int32(n[1]) + np.int32(y)) * np.int32(n[0]) + np.int32(x))
-                status = statuses[cell]
-                locations[item] = status
-                item_of[n_kept], code_of[n_kept] = item, cell
-                n_kept += status == UNDECIDED
-            else:
+        first, end = np.uint64(start), np.uint64(min(start + _BLOCK, len(points)))
+        n_kept, n_beyond = _first_status(points, first, end, cells, locations, item_of, n_kept)
+        if n_beyond > 0:
+            for item in range(first, end):
+                px, py, pz = points[item, 0], points[item, 1], points[item, 2]
                 if (px - px) + (py - py) + (pz - pz) != 0.0:
                     return NOT_FINITE
-                locations[item] = -1
         if n_kept < _FEWEST and end < len(points):
             continue
-        n_waiting = 0
+        n_waiting = np.uint64(0)
         for kept in range(n_kept):
             item = item_of[kept]
-            places[kept, 0] = finest(points[item, 0], low[0], scale[0])
-            places[kept, 1] = finest(points[item, 1], low[1], scale[1])
-            places[kept, 2] = finest(points[item, 2], low[2], scale[2])
-            code = codes[code_of[kept]]
+            x = finest(points[item, 0], low[0], scale[0])
+            y = finest(points[item, 1], low[1], scale[1])
+            z = finest(points[item, 2], low[2], scale[2])
+            places[kept, 0], places[kept, 1], places[kept, 2] = x, y, z
+            code = codes[np.uint64(((z >> top_shift) * n[1] + (y >> top_shift)) * n[0] + (x >> top_shift))]
             code_of[kept], level_of[kept] = code, 0
             waiting[n_waiting] = kept
-            n_waiting += code >= 0
-        n_open += n_kept - n_waiting
+            n_waiting += np.uint64(code >= 0)
+        n_open += int(n_kept) - int(n_waiting)
         for level in range(1, LEVELS):
-            n_left, part_shift = 0, 2 * (LEVELS - 1 - level)
+            n_left, part_shift = np.uint64(0), 2 * (LEVELS - 1 - level)
             for turn in range(n_waiting):
                 kept = waiting[turn]
                 code = code_of[kept]
@@ -97,18 +110,19 @@ def locate_by_cells(points: Any, cells: Any, locations: Any, flag: Any) -> int:
                         places[kept, 1] >> part_shift,
                         places[kept, 2] >> part_shift,
                     )
-                    code = codes[n_top + (code >> 1) * PARTS + (((z & 3) << 4) | ((y & 3) << 2) | (x & 3))]
+                    part = ((z & 3) << 4) | ((y & 3) << 2) | (x & 3)
+                    code = codes[np.uint64(n_top + (code >> 1) * PARTS + part)]
                     locations[item_of[kept]] = min(code, OPEN_CELL) + CODE_SHIFT
                     code_of[kept], level_of[kept] = code, level
                     n_open += code == OPEN_CELL
                 waiting[n_left] = kept
-                n_left += code >= 0
+                n_left += np.uint64(code >= 0)
             n_waiting = n_left
-        for turn in range(min(n_waiting, _AHEAD)):
+        for turn in range(min(n_waiting, np.uint64(_AHEAD))):
             prefetch_group(groups, code_of[waiting[turn]] >> 2)
         for turn in range(n_waiting):
-            if turn + _AHEAD < n_waiting:
-                prefetch_group(groups, code_of[waiting[turn + _AHEAD]] >> 2)
+            if turn + np.uint64(_AHEAD) < n_waiting:
+                prefetch_group(groups, code_of[waiting[turn + np.uint64(_AHEAD)]] >> 2)
             kept = waiting[turn]
             item, level, code = item_of[kept], level_of[kept], code_of[kept]
             parts, share, part_shift = parts_of(level), share_of(level), 2 * (LEVELS - 1 - level)
@@ -127,5 +141,5 @@ def locate_by_cells(points: Any, cells: Any, locations: Any, flag: Any) -> int:
                 parity = ((parity ^ found) & 1) | ((parity | found) & UNSURE)
             locations[item] = UNDECIDED if parity & UNSURE else ((code ^ (parity << 1)) & 2) - 1
             n_open += (parity & UNSURE) != 0
-        n_kept = 0
+        n_kept = np.uint64(0)
     return n_open
