@@ -38,7 +38,7 @@ def rotated(ring: np.ndarray, angle: float) -> np.ndarray:
 
 def lattice(random: Random) -> tuple[Rings, Rings]:
     size = int(random.integers(3, 17))
-    rings = [random.integers(0, size, (int(random.integers(3, 12)), 2)).astype(float) for _ in range(3)]
+    rings = [random.integers(0, size, (int(random.integers(4, 12)), 2)).astype(float) for _ in range(3)]
     return rings[:2], rings[2:]
 
 
