@@ -83,7 +83,7 @@ class GeometryRoute(APIRoute):
             finally:
                 call.free()
             headers = {"Server-Timing": call.timing(), **call.headers}
-            return Response(payload, call.status or status, headers, call.media_type if payload else None)
+            return Response(payload, call.status or status, headers, None if payload is None else call.media_type)
 
         return handle
 
@@ -124,8 +124,8 @@ class _Job:
             except ValidationError as error:
                 raise _InvalidBody(error, document) from None
 
-    def answer(self) -> bytes | memoryview:
-        """Return the encoded answer."""
+    def answer(self) -> bytes | memoryview | None:
+        """Return the encoded answer, None if there is no body."""
         self.call.remaining()  # it may have waited past its deadline
         self.decode()
         if self.question is not None:
@@ -139,7 +139,7 @@ class _Job:
             if isinstance(answer, np.ndarray):
                 self.call.media_type = OCTETS
                 return wire.octets(answer)
-            return b"" if answer is None else wire.encode(answer)
+            return None if answer is None else wire.encode(answer)
 
 
 class _InvalidBody(Exception):
@@ -215,7 +215,9 @@ def _too_large(limit: int) -> ServiceError:
     return ServiceError("body_too_large", detail)
 
 
-async def _run(pool: Pool, call: Call, job: Callable[[], bytes | memoryview], receive: Receive) -> bytes | memoryview:
+async def _run(
+    pool: Pool, call: Call, job: Callable[[], bytes | memoryview | None], receive: Receive
+) -> bytes | memoryview | None:
     """Run `job` in the pool and throw the call's cancel switch if the client goes away meanwhile."""
     watcher = asyncio.create_task(_watch(call, receive))
     try:

@@ -123,24 +123,25 @@ def _proper_pieces(
     start, end, t = np.empty((m, dimension)), np.empty((m, dimension)), np.empty((m, 2))
     faces, state = np.empty((m, 2), np.int64), np.empty(len(proper), np.uint8)
     kernel: Any = clip_properly_2d if dimension == 2 else clip_properly_3d
-    with np.errstate(all="ignore"):
-        kernel(
-            segments,
-            proper,
-            locations,
-            offsets,
-            elements,
-            boundary.vertices,
-            boundary.elements,
-            boundary.faces,
-            rows,
-            budget.flag,
-            start,
-            end,
-            t,
-            faces,
-            state,
-        )
+    if len(proper):  # no segments at all come as another kind of array, for which nothing is compiled
+        with np.errstate(all="ignore"):
+            kernel(
+                segments,
+                proper,
+                locations,
+                offsets,
+                elements,
+                boundary.vertices,
+                boundary.elements,
+                boundary.faces,
+                rows,
+                budget.flag,
+                start,
+                end,
+                t,
+                faces,
+                state,
+            )
     budget.check()
     kept = np.repeat(state == SETTLED, counts)
     source = np.repeat(proper, counts)[kept]

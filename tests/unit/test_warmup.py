@@ -43,11 +43,11 @@ solids = {
         engine.HalfSpace([1, 0], 0), engine.Convex([[1, 0, 0]])],
 }
 for dimension in (2, 3):
-    for points in layouts(np.linspace(0, 1, 30 * dimension).reshape(-1, dimension)):
+    for points in [*layouts(np.linspace(0, 1, 30 * dimension).reshape(-1, dimension)), np.empty((0, dimension))]:
         for solid in solids[dimension]:
             engine.locate(points, solid)
         engine.locate_scene(points, solids[dimension])
-    for segments in layouts(np.linspace(-1, 2, 6 * dimension).reshape(-1, 2, dimension)):
+    for segments in [*layouts(np.linspace(-1, 2, 6 * dimension).reshape(-1, 2, dimension)), np.empty((0, 2, dimension))]:
         for solid in solids[dimension]:
             engine.clip_segments(segments, solid)
     for triangles in layouts(np.linspace(-1, 2, 6 * dimension).reshape(-1, 3, dimension)):

@@ -39,6 +39,7 @@ async def test_contains_answers_with_locations_and_their_accuracy(client: httpx.
     assert "compute;dur=" in answer.headers["server-timing"]
     empty = await send(client, f"{path}/contains", b"")
     assert (empty.status_code, empty.content) == (200, b"")
+    assert empty.headers["content-type"] == "application/octet-stream"
 
 
 async def test_clip_segments_answers_with_ends_and_nan(client: httpx.AsyncClient) -> None:
