@@ -47,7 +47,8 @@ for dimension in (2, 3):
         for solid in solids[dimension]:
             engine.locate(points, solid)
         engine.locate_scene(points, solids[dimension])
-    for segments in [*layouts(np.linspace(-1, 2, 6 * dimension).reshape(-1, 2, dimension)), np.empty((0, 2, dimension))]:
+    segments_of = layouts(np.linspace(-1, 2, 6 * dimension).reshape(-1, 2, dimension))
+    for segments in [*segments_of, np.empty((0, 2, dimension))]:
         for solid in solids[dimension]:
             engine.clip_segments(segments, solid)
     for triangles in layouts(np.linspace(-1, 2, 6 * dimension).reshape(-1, 3, dimension)):

@@ -1,0 +1,261 @@
+"""The wire and the service under load: what HTTP adds to a kernel, what a batch does to others, what too much does.
+
+    python -m benchmarks.wire            # about five minutes
+    python -m benchmarks.wire --quick    # about a minute
+
+Loopback only. The load generator (load.py) shares the cores with the service. Requests and answers of both sides are
+counted whole; contenders take turns.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import socket
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import orjson
+
+import engine
+from benchmarks import load
+from benchmarks.load import Connection, free_port, in_process, memory_of, percentile, request, wait_until
+from benchmarks.measure import spread
+from benchmarks.suite import Row, Suite, options
+from service.settings import Settings
+
+ROOT = Path(__file__).resolve().parents[1]
+OCTETS = "application/octet-stream"
+SPHERE = {"type": "sphere", "center": [0.5, 0.5, 0.5], "radius": 0.5}
+
+
+@contextlib.contextmanager
+def serving(*words: str, ready: str, **settings: object) -> Iterator[tuple[int, subprocess.Popen[bytes]]]:
+    """Run a server in a process of its own until its path `ready` answers 200; yield port and process."""
+    port = free_port()
+    own = {f"GEOMETRY_{name.upper()}": str(value) for name, value in {"port": port, **settings}.items()}
+    command = [sys.executable, "-m", *words, *([] if words == ("service",) else [str(port)])]
+    process = subprocess.Popen(command, cwd=ROOT, env={**os.environ, **own}, stderr=subprocess.DEVNULL)
+    try:
+        wait_until(port, ready)
+        yield port, process
+    finally:
+        process.send_signal(signal.SIGTERM)
+        process.wait(60)
+
+
+def rate(port: int, message: bytes, seconds: float, n_connections: int) -> float:
+    """Return requests a second; every answer must be 200."""
+    seen = load.many(port, message, seconds, n_connections)
+    assert set(seen.statuses) == {200}, seen.statuses
+    return seen.statuses[200] / seen.span
+
+
+def rates(row: Row, sides: list[tuple[int, bytes]], seconds: float, rounds: int, n_connections: int) -> Row:
+    """Fill a row with how many times as many requests the first side answers, side by side in turns."""
+    found: list[list[float]] = [[], []]
+    for port, message in sides:
+        rate(port, message, min(seconds, 0.5), n_connections)
+    for round_ in range(rounds):
+        for i_side in (0, 1) if round_ % 2 == 0 else (1, 0):
+            found[i_side].append(in_process(rate, *sides[i_side], seconds, n_connections)())
+    middle = spread([ours / peer for ours, peer in zip(*found)])
+    row.value, row.low, row.high = middle.median, middle.low, middle.high
+    row.ours, row.peer = (f"{statistics.median(one):.4g}/s" for one in found)
+    row.raw["rates"] = found
+    return row
+
+
+class Wire:
+    """The rows, on one service and one contender that run throughout."""
+
+    def __init__(self, suite: Suite, ours: int, plain: int, process: subprocess.Popen[bytes]) -> None:
+        self.quick = suite.options.quick
+        self.rounds = suite.options.rounds
+        self.random = np.random.default_rng(suite.options.seed)
+        self.ours, self.plain, self.process = ours, plain, process
+
+    def binary(self, name: str) -> Iterable[Row]:
+        """1e6 points as octets against kernel and bare loopback."""
+        planes = self.random.normal(size=(32, 4))
+        planes[:, 3] = 1 + np.abs(planes[:, 3])
+        points = self.random.random((1_000_000, 3)) - 0.5
+        for label, solid, document in (
+            ("sphere", engine.Sphere([0, 0, 0], 0.5), {"type": "sphere", "center": [0, 0, 0], "radius": 0.5}),
+            ("convex of 32 planes", engine.Convex(planes), {"type": "convex", "planes": planes.tolist()}),
+        ):
+            connection = Connection(self.ours)
+            stored = json.loads(connection.ask(request("/v1/solids", orjson.dumps(document)))[1])
+            message = request(f"/v1/solids/{stored['id']}/contains", points.tobytes(), OCTETS)
+            expected = engine.locate(points, solid).tobytes()
+            with echo() as echo_port:
+                echoed = Connection(echo_port)
+                runs: list[Callable[[], Any]] = [
+                    lambda c=connection, m=message: c.ask(m),  # type: ignore[misc]
+                    lambda s=solid: engine.locate(points, s, report=True),  # type: ignore[misc]
+                    lambda c=echoed, m=message: c.ask(m),  # type: ignore[misc]
+                ]
+                took: list[list[float]] = [[], [], []]
+                wrong = int(runs[0]() != (200, expected))
+                for _ in range(3 + (10 if self.quick else 40)):
+                    for run, seconds in zip(runs, took):
+                        before = time.perf_counter()
+                        run()
+                        seconds.append(time.perf_counter() - before)
+                echoed.close()
+            connection.close()
+            middle = spread([ours / (kernel + bare) for ours, kernel, bare in zip(*(one[3:] for one in took))])
+            row = Row(f"{name}, {label}", "over", 1.35, 1.15, middle.median, middle.low, middle.high)
+            medians = [1e3 * statistics.median(one[3:]) for one in took]
+            row.ours, row.peer = f"{medians[0]:.4g} ms", f"{medians[1] + medians[2]:.4g} ms"
+            row.error, row.note = f"wrong: {wrong}", f"kernel {medians[1]:.3g} ms, loopback {medians[2]:.3g} ms"
+            row.raw["seconds"] = took
+            yield row
+
+    def ten_thousand(self, name: str) -> Iterable[Row]:
+        """1e4 points as JSON against the model of tuples."""
+        points = self.random.random((10_000, 3)).tolist()
+        ours = request("/v1/contains", json.dumps({"solid": SPHERE, "points": points}).encode())
+        plain = {"center": SPHERE["center"], "radius": SPHERE["radius"], "points": points}
+        sides = [(self.ours, ours), (self.plain, request("/plain", json.dumps(plain).encode()))]
+        answers = [json.loads(Connection(port).ask(message)[1])["contained"] for port, message in sides]
+        row = rates(Row(name, "x", 8, 12), sides, 1.0 if self.quick else 3.0, self.rounds, 2)
+        row.error = f"wrong: {int(answers[0] != answers[1])}"
+        yield row
+
+    def one(self, name: str) -> Iterable[Row]:
+        """One point as JSON against an async endpoint with the same model."""
+        body = json.dumps({"solid": SPHERE, "points": [[0.1, 0.2, 0.3]]}).encode()
+        sides = [(self.ours, request("/v1/contains", body)), (self.plain, request("/same-model", body))]
+        yield rates(Row(name, "x", 0.8, 1.2), sides, 1.0 if self.quick else 3.0, self.rounds, 4)
+
+    def beside_batches(self, name: str) -> Iterable[Row]:
+        """One-point requests while two clients loop the largest JSON that is taken."""
+        limit = Settings().max_body_bytes
+        n_points = int(limit / 61)
+        points = self.random.random((n_points, 3))
+        body = orjson.dumps({"solid": SPHERE, "points": points}, option=orjson.OPT_SERIALIZE_NUMPY)
+        assert 0.9 * limit < len(body) <= limit
+        seconds = 8.0 if self.quick else 30.0
+        message = request("/v1/contains", body)
+        batches = [in_process(load.loop, self.ours, message, seconds + 2) for _ in range(2)]
+        time.sleep(1.5)  # until both are at it
+        one = request("/v1/contains", json.dumps({"solid": SPHERE, "points": [[0.1, 0.2, 0.3]]}).encode())
+        seen = in_process(load.loop, self.ours, one, seconds - 2, 0.005)()
+        batch = [waiting() for waiting in batches]
+        row = Row(name, "ms", 25, 12, 1e3 * percentile(seen.seconds, 0.99))
+        row.low, row.high = 1e3 * percentile(seen.seconds, 0.5), 1e3 * max(seen.seconds)
+        row.ours = f"{len(seen.seconds)} asked"
+        statuses = sum((other.statuses for other in batch), seen.statuses)
+        took = statistics.median([second for other in batch for second in other.seconds] or [float("nan")])
+        row.note = (
+            f"beside it: median, longest; batches of {len(body) / 2**20:.0f} MB took {took:.2f} s; {dict(statuses)}"
+        )
+        row.raw["seconds"] = seen.seconds
+        yield row
+
+    def overload(self, name: str) -> Iterable[Row]:
+        """Ten times the load that can be sustained, batches of 1e4 points."""
+        body = {"solid": SPHERE, "points": self.random.random((10_000, 3)).tolist()}
+        message, seconds = request("/v1/contains", json.dumps(body).encode()), 5.0 if self.quick else 60.0
+        sustainable = in_process(rate, self.ours, message, 2.0, 2)()
+        n_clients, n_connections = 4, 40  # as many under way as ten times the two that sustain it, eight times over
+        before = memory_of(self.process.pid)
+        clients = [in_process(load.many, self.ours, message, seconds, n_connections) for _ in range(n_clients)]
+        seen = [waiting() for waiting in clients]
+        after = memory_of(self.process.pid)
+        statuses = sum((one.statuses for one in seen), load.Seen().statuses)
+        accepted = [second for one in seen for second in one.seconds]
+        offered = sum(statuses.values()) / seconds
+        row = Row(name, "s", 30, 30, percentile(accepted, 0.99), statistics.median(accepted), max(accepted))
+        row.ours, row.raw["statuses"] = f"{len(accepted) / seconds:.3g}/s", dict(statuses)
+        odd = sum(count for status, count in statuses.items() if status not in (200, 503))
+        lost = sum(one.lost for one in seen)
+        row.error = f"neither 200 nor 503: {odd}, lost: {lost}"
+        row.note = (
+            f"p99 of accepted (median, longest beside it), deadline 30 s; {n_clients * n_connections} connections ask "
+            f"{offered:.0f}/s, {sustainable:.0f}/s are sustainable; {dict(statuses)}; "
+            f"memory {before:.0f} to {after:.0f} MB; {'runs' if self.process.poll() is None else 'CRASHED'}"
+        )
+        yield row
+
+
+@contextlib.contextmanager
+def echo() -> Iterator[int]:
+    """Run the bare loopback: it reads as many bytes as a request of 1e6 points has and answers 1e6 of its own."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        waiting = in_process(_echo, server)
+        yield int(server.getsockname()[1])
+    waiting()
+
+
+def _echo(server: socket.socket) -> None:
+    buffer, answer = bytearray(2**20), b"HTTP/1.1 200 OK\r\ncontent-length: 1000000\r\n\r\n" + bytes(1_000_000)
+    connection, _ = server.accept()
+    with connection:
+        while got := connection.recv_into(buffer):
+            head, _, _ = bytes(buffer[:got]).partition(b"\r\n\r\n")
+            left = len(head) + 4 + 24_000_000 - got
+            while left > 0:
+                left -= connection.recv_into(buffer)
+            connection.sendall(answer)
+
+
+def start(suite: Suite, name: str) -> Iterable[Row]:
+    """From the start of the process to /readyz, with the compile cache filled."""
+    seconds = []
+    for _ in range(3 if suite.options.quick else 9):
+        before = time.perf_counter()
+        with serving("service", ready="/readyz"):
+            seconds.append(time.perf_counter() - before)
+    middle = spread(seconds)
+    yield Row(name, "s", 2.5, 1.5, middle.median, middle.low, middle.high)
+
+
+def imports(suite: Suite, name: str) -> Iterable[Row]:
+    """`import engine` over `import numba` alone, in processes of their own, in turns."""
+    took: dict[str, list[float]] = {"engine": [], "numba": []}
+    for _ in range(5 if suite.options.quick else 15):
+        for module, seconds in took.items():
+            code = f"import time; t = time.perf_counter(); import {module}; print(time.perf_counter() - t)"
+            done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+            seconds.append(float(done.stdout))
+    middle = spread([ours - peer for ours, peer in zip(took["engine"], took["numba"])])
+    row = Row(name, "s", 0.2, 0.1, middle.median, middle.low, middle.high)
+    row.ours, row.peer = (f"{statistics.median(took[module]):.3g} s" for module in ("engine", "numba"))
+    yield row
+
+
+def main(words: list[str] | None = None) -> int:
+    """Print the table; return the number of rows below their must."""
+    suite = Suite("wire", options(words, __doc__ or ""))
+    suite.facts["load_generator"] = load.NAME
+    print(f"load generator: {load.NAME}, on the same cores; loopback")
+    with (
+        serving("service", ready="/readyz", access_log="true") as (ours, process),
+        serving("benchmarks.contenders.plain_fastapi", ready="/openapi.json") as (plain, _),
+    ):
+        wire = Wire(suite, ours, plain, process)
+        return suite.run(
+            [
+                ("1e6 points, octets, over kernel + loopback", wire.binary),
+                ("1e4 points, JSON, against tuples", wire.ten_thousand),
+                ("one point, JSON, against the same model", wire.one),
+                ("p99 of one point beside two batches", wire.beside_batches),
+                ("overload", wire.overload),
+                ("start to ready, warm cache", lambda name: start(suite, name)),
+                ("import engine over numba", lambda name: imports(suite, name)),
+            ]
+        )
+
+
+if __name__ == "__main__":
+    sys.exit(main() > 0)
