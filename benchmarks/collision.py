@@ -18,6 +18,7 @@ import numpy as np
 
 import engine
 from benchmarks import workloads
+from benchmarks.collision_scenes import scene_tasks
 from benchmarks.contenders import Absent, Prepared, load
 from benchmarks.measure import clocked, interleaved, ratios, spread
 from benchmarks.poses import Pair, pair_of_size, random_rotations
@@ -42,6 +43,7 @@ def tasks(suite: Suite) -> Iterator[Task]:
             yield f"near contact, {size} faces vs {peer}", partial(_mesh_pair, suite, size, peer, GOALS[peer], made)
     for peer in PEERS:
         yield f"near contact, env / rob soup vs {peer}", partial(_mesh_pair, suite, "soup", peer, SOUP[peer], made)
+    yield from scene_tasks(suite, _bare_call)
     yield "cost of exactness", partial(_cost_of_exactness, suite, SIZES[:1] if quick else SIZES)
     size = "1k" if quick else "86k"
     yield f"prepare, {size} faces", partial(_prepare, suite, size)

@@ -1,6 +1,7 @@
 """coal: `coal.collide` called once a pose from Python, as its users must; surfaces, yes or no, the first contact ends.
 
-`BVHModelOBBRSS`, the model its documentation recommends; request and result are made once and reused.
+`BVHModelOBBRSS`, the model its documentation recommends, `Convex` for convex polyhedra; request and result are made
+once and reused.
 """
 
 from __future__ import annotations
@@ -25,8 +26,25 @@ def model(mesh: Mesh) -> coal.BVHModelOBBRSS:
     return made
 
 
+def convex(mesh: Mesh) -> coal.Convex:
+    """Return coal's own type for a convex polyhedron."""
+    points, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
+    for point in mesh.vertices:
+        points.append(point)
+    for a, b, c in mesh.faces.tolist():
+        triangles.append(coal.Triangle(a, b, c))
+    return coal.Convex(points, triangles)
+
+
 def _mesh_pair(pair: Pair, threads: int) -> Prepared:
-    first, second = model(pair.first), model(pair.second)
+    return _calls(model(pair.first), model(pair.second), pair)
+
+
+def _convex_pair(pair: Pair, threads: int) -> Prepared:
+    return _calls(convex(pair.first), convex(pair.second), pair)
+
+
+def _calls(first: coal.CollisionGeometry, second: coal.CollisionGeometry, pair: Pair) -> Prepared:
     request, result = coal.CollisionRequest(), coal.CollisionResult()
     request.enable_contact = False
     request.num_max_contacts = 1
@@ -45,4 +63,4 @@ def _mesh_pair(pair: Pair, threads: int) -> Prepared:
     return Prepared(native, ask, np.array)
 
 
-MAKERS = {"mesh_pair": _mesh_pair}
+MAKERS = {"mesh_pair": _mesh_pair, "convex_pair": _convex_pair}

@@ -8,6 +8,7 @@ from __future__ import annotations
 import fcl
 import numpy as np
 
+from benchmarks.collision_scenes import Crowd
 from benchmarks.contenders import Prepared
 from benchmarks.poses import Pair
 from benchmarks.workloads import Mesh
@@ -42,4 +43,40 @@ def _mesh_pair(pair: Pair, threads: int) -> Prepared:
     return Prepared(native, ask, np.array)
 
 
-MAKERS = {"mesh_pair": _mesh_pair}
+def _crowd(crowd: Crowd, threads: int) -> Prepared:
+    """The dynamic tree of boxes; each pair it finds calls back into Python, which asks for that pair and notes it."""
+    n = len(crowd.kinds)
+    shapes = []
+    for mesh in crowd.meshes:
+        polygons = np.column_stack([np.full(len(mesh.faces), 3), mesh.faces]).ravel()
+        shapes.append(fcl.Convex(mesh.vertices, len(mesh.faces), polygons))
+    objects = [
+        fcl.CollisionObject(shapes[kind], fcl.Transform(turn, move))
+        for kind, turn, move in zip(crowd.kinds, crowd.rotations, crowd.translations, strict=True)
+    ]
+    manager = fcl.DynamicAABBTreeCollisionManager()
+    manager.registerObjects(objects)
+    manager.setup()
+    request = fcl.CollisionRequest(num_max_contacts=1, enable_contact=False)
+
+    def ask(_: object) -> list[tuple[fcl.CollisionObject, fcl.CollisionObject]]:
+        found = []
+
+        def note(first: fcl.CollisionObject, second: fcl.CollisionObject, data: object) -> bool:
+            if fcl.collide(first, second, request, fcl.CollisionResult()) > 0:
+                found.append((first, second))
+            return False
+
+        manager.collide(None, note)
+        return found
+
+    def answer(found: list[tuple[fcl.CollisionObject, fcl.CollisionObject]]) -> np.ndarray:
+        numbers = {tuple(place): number for number, place in enumerate(crowd.translations.tolist())}
+        named = [[numbers[tuple(item.getTranslation())] for item in pair] for pair in found]
+        pairs = np.sort(np.array(named, np.int64).reshape(-1, 2), axis=1)
+        return np.sort(pairs[:, 0] * n + pairs[:, 1])
+
+    return Prepared(lambda rows: rows, ask, answer)
+
+
+MAKERS = {"mesh_pair": _mesh_pair, "crowd": _crowd}

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 import engine
+from benchmarks.collision_scenes import Crowd
 from benchmarks.contenders import Prepared
 from benchmarks.poses import Pair
 from benchmarks.workloads import Bodies, Mesh, Planes, Rings
@@ -71,8 +72,27 @@ def _mesh_pair(pair: Pair, threads: int) -> Prepared:
     return Prepared(native, ask, lambda found: found, lambda: first.memory + second.memory)
 
 
+def _convex_pair(pair: Pair, threads: int) -> Prepared:
+    asked = _mesh_pair(pair, threads)
+    return Prepared(asked.native, asked.ask, lambda found: found != engine.Relation.DISJOINT)
+
+
+def _crowd(crowd: Crowd, threads: int) -> Prepared:
+    """Every question starts from a list of solids and poses: nothing is kept but what a solid keeps of itself."""
+    meshes = [engine.Polyhedron(mesh.vertices, mesh.faces) for mesh in crowd.meshes]
+    solids = [meshes[kind] for kind in crowd.kinds]
+    poses = [engine.Pose(turn, move) for turn, move in zip(crowd.rotations, crowd.translations, strict=True)]
+
+    def ask(_: object) -> engine.ScenePairs:
+        return engine.collide_scene(solids, poses, workers=threads)
+
+    return Prepared(lambda rows: rows, ask, lambda found: found.first * len(solids) + found.second)
+
+
 MAKERS = {
     "polyhedron": _polyhedron,
+    "convex_pair": _convex_pair,
+    "crowd": _crowd,
     "mesh_pair": _mesh_pair,
     "polygon": _polygon,
     "convex": _convex,

@@ -73,9 +73,10 @@ def collide_poses(
         def one_by_one(start: int, stop: int) -> None:
             work = Work(budget, witness=witnesses, boolean=boolean)
             works.append(work)
-            for item in range(start, stop):
-                if relations[item] != UNSETTLED and (not witnesses or relations[item] == Relation.DISJOINT):
-                    continue
+            is_open = relations[start:stop] == UNSETTLED
+            if witnesses:
+                is_open |= relations[start:stop] != Relation.DISJOINT
+            for item in (start + np.flatnonzero(is_open)).tolist():
                 budget.check()
                 answer = collide_pair(first, second, None, Pose(turns[item], moves[item]), work)
                 relations[item], found[item] = answer.relation, answer.witness

@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.collision.collide import check_pose, pair_function
-from engine.collision.world_box import own_box, placed_boxes
+from engine.collision.posed_boxes import place_boxes
+from engine.collision.world_box import own_box
 from engine.errors import InvalidArrayError, UnsupportedSolidError, WrongDimensionError
 from engine.solids.base import FloatArray, IntArray, Solid
 from engine.solids.pose import Pose
@@ -49,28 +50,28 @@ def scene_bodies(solids: Sequence[Solid], poses: Sequence[Pose | None] | None) -
     placed: list[Pose | None] = [None] * len(bodies) if poses is None else list(poses)
     if len(placed) != len(bodies):
         raise InvalidArrayError(f"poses must be as many as solids, {len(bodies)}, got {len(placed)}", ("poses",))
-    numbers: dict[int, int] = {}
-    kinds = np.array([numbers.setdefault(id(body), len(numbers)) for body in bodies], np.int64)
-    _, firsts = np.unique(kinds, return_index=True)
+    _, firsts, kinds = np.unique(np.array(list(map(id, bodies)), np.int64), return_index=True, return_inverse=True)
+    order = np.argsort(firsts)  # by first appearance, whatever the addresses
+    kinds, firsts = np.argsort(order)[kinds], firsts[order]
     distinct = [bodies[first] for first in firsts.tolist()]
     _check_solids(distinct, firsts)
     dimension = distinct[0].dimension if distinct else 3
-    is_posed = np.array([pose is not None for pose in placed], np.bool_)
-    rows = np.flatnonzero(is_posed)
+    is_posed = np.ones(len(bodies), np.bool_)
+    if type(None) in set(map(type, placed)):
+        is_posed = np.array([pose is not None for pose in placed], np.bool_)
     turns, moves = _pose_numbers(placed, dimension, bodies)
-    rotations = np.broadcast_to(np.eye(dimension), (len(bodies) + 1, dimension, dimension)).copy()
-    translations = np.zeros((len(bodies) + 1, dimension))
-    rotations[rows + 1], translations[rows + 1] = turns, moves
-    boxes = np.array([own_box(solid) for solid in distinct]).reshape(-1, 2, dimension)
+    rotations, translations = np.empty((len(bodies) + 1, dimension, dimension)), np.zeros((len(bodies) + 1, dimension))
+    rotations[0] = np.eye(dimension)
+    rows: IntArray | slice = slice(1, None)
+    if len(turns) < len(bodies):
+        rotations[1:], rows = np.eye(dimension), np.flatnonzero(is_posed) + 1
+    rotations[rows], translations[rows] = turns, moves
+    own = [own_box(solid) for solid in distinct]
+    boxes, reaches = np.array([box[:2] for box in own]).reshape(-1, 2, dimension), np.array([box[2] for box in own])
     radii = np.array([getattr(solid, "radius", 0.0) for solid in distinct])
-    low, high = boxes[kinds, 0], boxes[kinds, 1]
-    low[rows], high[rows] = placed_boxes(low[rows], high[rows], rotations[rows + 1], translations[rows + 1])
-    is_round = radii[kinds] > 0.0
-    if is_round.any():
-        radius = radii[kinds[is_round]] * np.where(is_posed[is_round], 1.0 + 2.0**-38, 1.0)
-        with np.errstate(over="ignore"):
-            low[is_round] = np.nextafter(low[is_round] - radius[:, None], -np.inf)
-            high[is_round] = np.nextafter(high[is_round] + radius[:, None], np.inf)
+    low, high = np.empty((len(bodies), dimension)), np.empty((len(bodies), dimension))
+    with np.errstate(all="ignore"):  # uncompiled runs only
+        place_boxes(boxes, reaches, radii, kinds, is_posed, rotations[1:], translations[1:], low, high)
     return SceneBodies(bodies, placed, distinct, kinds, is_posed, rotations, translations, low, high)
 
 

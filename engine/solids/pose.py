@@ -10,6 +10,7 @@ import numpy as np
 from engine.errors import InvalidArrayError, NotRigidError, WrongDimensionError
 from engine.solids.base import FloatArray
 from engine.solids.checks import as_floats, as_vector, check_dimension, check_given_dimension, digits, frozen, spell
+from engine.solids.rotations import find_suspects
 
 TOLERANCE: Final = Fraction(1, 10**12)
 """Largest entry of ``R^T R - I`` that is still taken for a rotation; part of the contract, compared exactly."""
@@ -100,12 +101,12 @@ def check_rotations(rotations: FloatArray, where: tuple[str | int, ...] = ("rota
     """
     if rotations.ndim != 3 or rotations.shape[1] != rotations.shape[2]:
         raise InvalidArrayError(f"{spell(where)} must have shape (n, d, d), got {rotations.shape}", where)
-    dimension = rotations.shape[2]
+    is_suspect = np.zeros(len(rotations), np.bool_)
+    matrices = np.ascontiguousarray(rotations).view()
+    matrices.setflags(write=False)
     with np.errstate(all="ignore"):  # huge entries overflow, and are far from orthogonal
-        defects = np.abs(rotations.transpose(0, 2, 1) @ rotations - np.eye(dimension)).max(axis=(1, 2), initial=0.0)
-        is_far = ~(defects <= float(TOLERANCE) - _UNSURE)
-        determinants = np.linalg.det(np.where(is_far[:, None, None], np.eye(dimension), rotations))
-    for index in np.flatnonzero(is_far | (determinants <= 0.0)):
+        find_suspects(matrices, float(TOLERANCE) - _UNSURE, is_suspect)
+    for index in np.flatnonzero(is_suspect):
         matrix = rotations[index]
         path = where if one else (*where, int(index))
         defect = _exact_defect(matrix)
