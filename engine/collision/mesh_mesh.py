@@ -33,7 +33,7 @@ from engine.collision.dual_traversal import (
 )
 from engine.collision.exact_body import ExactBody, Vector, exact_pair
 from engine.collision.exact_cells import cells_of, even_sides, is_inside_exact, pieces_of_segment, sides_at, sides_over
-from engine.collision.exact_triangles import as_simplex, classify_exact, is_in_triangle, kind_of_contact
+from engine.collision.exact_triangles import as_simplex, classify_exact, is_flush, is_in_triangle, kind_of_contact
 from engine.collision.face_state import find_states
 from engine.collision.parity import INSIDE, locate_vertices
 from engine.collision.pose_batch import find_contacts
@@ -448,14 +448,18 @@ class _Pair:
         """Return a relation with two faces as its witness: the strongest kind among the first contacts."""
         if not self.work.witness:
             return Collision(relation)
-        named = []
-        for i, j in contacts[:_NAMED].tolist():
-            self.work.budget.check()
-            a, b = self.exact
-            kind = kind_of_contact(a.corners(i), b.corners(j), a.plane(i), b.plane(j))
-            named.append((STRENGTH.index(kind), int(self.shells[0].faces[i]), int(self.shells[1].faces[j])))
-            if kind == STRENGTH[0]:  # coplanar pairs stand first, in the order of the caller's faces
-                break
+        named: list[tuple[int, int, int]] = []
+        a, b = self.exact
+        for is_short in (True, False):  # order: flush faces are found soonest, and nothing is stronger
+            for i, j in contacts[: 0 if named else _NAMED].tolist():
+                self.work.budget.check()
+                faces = a.corners(i), b.corners(j), a.plane(i), b.plane(j)
+                if is_short and not is_flush(*faces):
+                    continue
+                kind = STRENGTH[0] if is_short else kind_of_contact(*faces)
+                named.append((STRENGTH.index(kind), int(self.shells[0].faces[i]), int(self.shells[1].faces[j])))
+                if is_short:  # coplanar pairs stand first, in the order of the caller's faces
+                    break
         strength, first_face, second_face = min(named)
         return Collision(relation, Witness(STRENGTH[strength], first_face, second_face, "", piercing))
 
