@@ -98,11 +98,11 @@ def find_contacts(
 
     Returns how it ended, the number of pairs, and, of a search from the start without any, `relation_apart`.
     """
-    rest = descent.rest.copy()
+    rest, bottom = descent.rest.copy(), descent.stack[0].copy()
     place = start_descent(first, first_pose, 0, second, second_pose, 0, descent)
     if not is_start:
-        descent.stack[0, 0], descent.stack[0, 1] = 0, 0
         descent.rest[:] = rest
+        descent.stack[0, 0], descent.stack[0, 1] = bottom[0], bottom[1]
     how, n_pairs = search(first, second, place, descent, seek, pairs, kinds, flag)
     relation = UNSETTLED
     if is_start and how == DONE and n_pairs == 0:

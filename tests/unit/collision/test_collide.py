@@ -93,6 +93,26 @@ def test_by_hand(first: Solid, second: Solid, expected: str, witness: dict[str, 
     assert relation(first, second) == found.relation
 
 
+def test_thousands_of_contacts_end_and_are_told() -> None:
+    n = 24
+    corners = np.stack(np.meshgrid(np.arange(n + 1), np.arange(n + 1), [0, 1], indexing="ij"), axis=-1).reshape(-1, 3)
+    number = np.arange(len(corners)).reshape(n + 1, n + 1, 2)
+    quads = []
+    for i in range(n):
+        for j in range(n):
+            a, b, c, d = number[i, j], number[i + 1, j], number[i + 1, j + 1], number[i, j + 1]
+            quads += [[a[1], b[1], c[1], d[1]], [a[0], d[0], c[0], b[0]]]
+    for k in range(n):
+        for ends in ((number[k, 0], number[k + 1, 0]), (number[k + 1, n], number[k, n])):
+            quads.append([ends[0][0], ends[1][0], ends[1][1], ends[0][1]])
+        for ends in ((number[0, k + 1], number[0, k]), (number[n, k], number[n, k + 1])):
+            quads.append([ends[0][0], ends[1][0], ends[1][1], ends[0][1]])
+    lower, upper = Polyhedron(corners, quads), Polyhedron(np.add(corners, [0, 0, 1]), quads)
+    beside = Polyhedron(np.add(corners, [0.25, 0.5, 1]), quads)
+    for other in (upper, beside):  # more contacts than one turn of the search has room for
+        assert collide(lower, other, deadline=60.0).relation == Relation.TOUCHING
+
+
 def test_faces_of_a_box_are_numbered_by_axis() -> None:
     cube = Aabb([0, 0, 0], [1, 1, 1])
     for axis in range(3):
