@@ -119,7 +119,7 @@ def _compare_heights(edges: Edges, v: int, a: int, b: int, c: int, d: int) -> in
     return sign(total, k)
 
 
-@inline
+@merged
 def _test_edge(edges: Edges, v: int, e: int, nearest: int) -> int:
     """Return e if it is above v and nearer than ``nearest``, else ``nearest``."""
     x = edges.x

@@ -90,14 +90,19 @@ def _exact_turn(edges: Edges, a: int, b: int, c: int, d: int) -> int:
     return sign(e, n)
 
 
-@inline
+@merged
 def weight(edges: Edges, c: int, d: int, p: int) -> tuple[float, float, float]:
     """Return orient(c, d, p) as a double-double, and its bound."""
     x, y = edges.x, edges.y
-    ux, ux_tail = two_diff(x[d], x[c])
-    uy, uy_tail = two_diff(y[d], y[c])
-    wx, wx_tail = two_diff(x[p], x[c])
-    wy, wy_tail = two_diff(y[p], y[c])
+    return _weight_of(x[c], y[c], x[d], y[d], x[p], y[p])
+
+
+@inline
+def _weight_of(cx: float, cy: float, dx: float, dy: float, px: float, py: float) -> tuple[float, float, float]:
+    ux, ux_tail = two_diff(dx, cx)
+    uy, uy_tail = two_diff(dy, cy)
+    wx, wx_tail = two_diff(px, cx)
+    wy, wy_tail = two_diff(py, cy)
     ph, pl = dd_mul(ux, ux_tail, wy, wy_tail)
     qh, ql = dd_mul(uy, uy_tail, wx, wx_tail)
     h, low = dd_sub(ph, pl, qh, ql)

@@ -3,7 +3,10 @@
 Consecutive edges of a ring lie near each other: four make a leaf, node i has the children 2 i and 2 i + 1, and the
 boxes of a level are found from the one below. Only where one edge lies far from the next (many small rings) are they
 first put in the order of a space-filling curve. The tree is walked against itself. Each box is
-``(x_min, x_max, y_min, y_max)``; a pair counts only where one of its two boxes is marked.
+``(x_min, x_max, y_min, y_max)``; a pair counts only where one of its two boxes is WANTED.
+
+A mark is a sum of bits: WANTED, and the quadrants' sides that the edge heads for. Edges one after another that all head
+for one quadrant meet nowhere but in the vertices they share, so such a node is not walked against itself.
 
 Pairs come in portions, so that memory does not grow with their number and the caller can look at the clock.
 
@@ -22,6 +25,10 @@ from engine.jit import inline, merged
 LEAF: Final = 4
 PORTION: Final = 2048
 """Pairs at once: some 50 us of exact tests."""
+WANTED: Final = 1
+"""A pair counts where one of its marks has this bit."""
+ANYWHERE: Final = 2 + 4 + 8 + 16
+"""Mark of an edge that ends a run: heading right, left, up and down at once."""
 DEEPEST: Final = 256
 """Places on the stack: a walk through 60 levels holds at most three pairs a level."""
 
@@ -38,12 +45,24 @@ def leaves_of(n: int) -> int:
 @merged
 def boxes_meet(boxes: Any, i: int, others: Any, j: int) -> bool:
     """Tell whether two closed boxes have a common point."""
-    return (
-        boxes[i, 0] <= others[j, 1]
-        and others[j, 0] <= boxes[i, 1]
-        and boxes[i, 2] <= others[j, 3]
-        and others[j, 2] <= boxes[i, 3]
+    return (  # all four at once: which fails first is not foreseeable, and a branch missed costs more than all
+        (boxes[i, 0] <= others[j, 1])
+        & (others[j, 0] <= boxes[i, 1])
+        & (boxes[i, 2] <= others[j, 3])
+        & (others[j, 2] <= boxes[i, 3])
     )
+
+
+@merged
+def heading(ux: float, uy: float) -> int:
+    """Return the mark of an edge with the direction u, which is not zero."""
+    return 2 * (ux > 0.0) + 4 * (ux < 0.0) + 8 * (uy > 0.0) + 16 * (uy < 0.0)
+
+
+@merged
+def _is_one_run(mark: int) -> bool:
+    """Tell whether edges that follow each other, with this mark in all, head for one quadrant."""
+    return (mark & 6) != 6 and (mark & 24) != 24
 
 
 @merged
@@ -56,8 +75,8 @@ def _spread(bits: int) -> int:
 
 
 @inline
-def _order_boxes(boxes: Any, n: int, places: Any) -> None:
-    """Fill ``places`` with the boxes in the order in which the leaves take them."""
+def _order_boxes(boxes: Any, n: int, places: Any) -> bool:
+    """Fill ``places`` with the boxes in the order in which the leaves take them; tell whether it is another order."""
     x_min = y_min = float("inf")
     x_max = y_max = float("-inf")
     way, x_last, y_last = 0.0, boxes[0, 0], boxes[0, 2]
@@ -71,13 +90,14 @@ def _order_boxes(boxes: Any, n: int, places: Any) -> None:
     if way * way <= 2.0 * n * (wide + high) * (
         wide + high
     ):  # the way through n places, well ordered, grows with the root
-        return
+        return False
     keys = np.empty(n, np.int64)
     by_x, by_y = 65535.0 / wide if wide > 0.0 else 0.0, 65535.0 / high if high > 0.0 else 0.0
     for k in range(n):
         x, y = boxes[k, 0] - x_min, boxes[k, 2] - y_min
         keys[k] = _spread(min(int(x * by_x), 65535)) | (_spread(min(int(y * by_y), 65535)) << 1)
     places[:n] = np.argsort(keys)
+    return True
 
 
 @inline
@@ -87,11 +107,11 @@ def build_tree(boxes: Any, marks: Any, n: int, tree: Any, tree_marks: Any, place
     places: (n,) int64, filled with the boxes in the order of the leaves.
     """
     n_leaves = leaves_of(n)
-    _order_boxes(boxes, n, places)
+    added = ANYWHERE if _order_boxes(boxes, n, places) else 0
     for leaf in range(n_leaves):
         x_min = y_min = float("inf")
         x_max = y_max = float("-inf")
-        mark = 0
+        mark = added
         for place in range(LEAF * leaf, min(LEAF * leaf + LEAF, n)):
             k = places[place]
             x_min, x_max = min(x_min, boxes[k, 0]), max(x_max, boxes[k, 1])
@@ -122,18 +142,23 @@ def next_pairs(
         depth -= 1
         i, j = stack[depth, 0], stack[depth, 1]
         if i < n_leaves:
+            if i == j and _is_one_run(tree_marks[i]):
+                continue
             for a in range(2 * i, 2 * i + 2):
                 for b in range(2 * j if i != j else a, 2 * j + 2):
-                    if (tree_marks[a] | tree_marks[b]) and boxes_meet(tree, a, tree, b):
+                    if ((tree_marks[a] | tree_marks[b]) & WANTED) and boxes_meet(tree, a, tree, b):
                         stack[depth, 0], stack[depth, 1] = a, b
                         depth += 1
             continue
+        if i == j and _is_one_run(tree_marks[i]):
+            continue
         first, second = LEAF * (i - n_leaves), LEAF * (j - n_leaves)
         for p in range(first, min(first + LEAF, n)):
-            a = places[p]
+            e = np.uint64(places[p])  # unsigned: no look at whether it counts from the end
+            mark = marks[e]
             for q in range(p + 1 if i == j else second, min(second + LEAF, n)):
-                b = places[q]
-                if (marks[a] | marks[b]) and boxes_meet(boxes, a, boxes, b):
-                    pairs[found, 0], pairs[found, 1] = a, b
+                f = np.uint64(places[q])
+                pairs[found, 0], pairs[found, 1] = e, f
+                if ((mark | marks[f]) & WANTED) & boxes_meet(boxes, e, boxes, f):
                     found += 1
     return found, depth

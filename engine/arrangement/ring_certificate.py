@@ -14,7 +14,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 from engine.arrangement.chain_rings import Rings
-from engine.arrangement.edge_tree import boxes_meet, build_tree, next_pairs
+from engine.arrangement.edge_tree import ANYWHERE, WANTED, boxes_meet, build_tree, next_pairs
 from engine.jit import inline, merged
 from engine.predicates.orientation import orient2d
 from engine.types import Point2
@@ -36,6 +36,15 @@ def _is_far(px: float, py: float, ax: float, ay: float, bx: float, by: float, sq
         return ex * ex + ey * ey > square
     across = dx * ey - dy * ex
     return across * across > square * length
+
+
+@merged
+def _is_beside(x: Any, y: Any, a: int, b: int, c: int, d: int, square: float) -> bool:
+    """Tell whether c and d are on one side of the line ab, further from it than the root of ``square``."""
+    dx, dy = x[b] - x[a], y[b] - y[a]
+    side_c, side_d = dx * (y[c] - y[a]) - dy * (x[c] - x[a]), dx * (y[d] - y[a]) - dy * (x[d] - x[a])
+    nearest = min(abs(side_c), abs(side_d))
+    return ((side_c > 0.0) == (side_d > 0.0)) & (nearest * nearest > square * (dx * dx + dy * dy))
 
 
 @merged
@@ -62,6 +71,8 @@ def _is_apart(points: Any, x: Any, y: Any, a: int, b: int, c: int, d: int, squar
         a, b, c, d, shared = b, a, d, c, 1
     elif points[a] == points[c]:
         shared = 1
+    if not shared and (_is_beside(x, y, a, b, c, d, square) or _is_beside(x, y, c, d, a, b, square)):
+        return True
     far = _is_far(x[b], y[b], x[c], y[c], x[d], y[d], square) and _is_far(x[d], y[d], x[a], y[a], x[b], y[b], square)
     if shared:
         return far
@@ -94,9 +105,9 @@ def certify(
             before = k
     for k in range(n):
         j = after[k]
-        marks[k] = moved[k] | moved[j]
+        marks[k] = ANYWHERE | WANTED * (moved[k] | moved[j])
         i = after[j]
-        if marks[k] | moved[i]:
+        if moved[k] | moved[j] | moved[i]:
             any_moved = True
             if not rings.meets[j] and orient2d(Point2(x[k], y[k]), Point2(x[j], y[j]), Point2(x[i], y[i])) == 0:
                 return False
@@ -109,7 +120,7 @@ def certify(
         for i in range(n):
             for j in range(i + 1, n):
                 if (
-                    (marks[i] | marks[j])
+                    ((marks[i] | marks[j]) & WANTED)
                     and boxes_meet(boxes, i, boxes, j)
                     and not _is_apart(points, x, y, i, after[i], j, after[j], square)
                 ):

@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 
 from engine.arrangement.crossing_signs import Edges, crossing_against, exact_weight, weight
-from engine.jit import inline
+from engine.jit import inline, merged
 from engine.predicates.double_double import U2, dd_add, dd_div, dd_scale, surely_rounded
 from engine.predicates.error_free import fast_two_sum, workspace
 from engine.predicates.expansion import compress
@@ -24,12 +24,12 @@ LOST: Final = -1.0
 """An error that tells that the double was not found."""
 
 
-@inline
+@merged
 def _abs2(h: float, low: float) -> tuple[float, float]:
     return (h, low) if h >= 0.0 else (-h, -low)
 
 
-@inline
+@merged
 def round_crossing(edges: Edges, e: int, f: int) -> tuple[float, float, float, float]:
     """Return the doubles nearest to the crossing of edges e and f, and a bound of the error of each.
 
@@ -71,7 +71,7 @@ def _leading(e: Any, n: int) -> tuple[float, float]:
     return (e[0], 0.0) if n == 1 else fast_two_sum(e[n - 1], e[n - 2])
 
 
-@inline
+@merged
 def _coordinate(
     edges: Edges, e: int, f: int, axis: int, p: float, q: float, ah: float, al: float, bh: float, bl: float,
     sum_h: float, sum_l: float, relative: float,
@@ -86,6 +86,12 @@ def _coordinate(
     bound = (CUT_BOUND + relative) * max(abs(p), abs(q))
     if abs(low) > bound and surely_rounded(h, low, bound):
         return h + 0.0, abs(low) + bound
+    return _settle(edges, e, f, axis, h, bound)
+
+
+@inline
+def _settle(edges: Edges, e: int, f: int, axis: int, h: float, bound: float) -> tuple[float, float]:
+    """Return what `_coordinate` does, by exact signs around h."""
     if abs(h) <= bound:
         h = 0.0  # case: a crossing on an axis, which the bound does not tell from what is near it
     side = crossing_against(edges, e, f, axis, h, 0.0)

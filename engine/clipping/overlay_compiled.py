@@ -37,8 +37,8 @@ KEPT: Final = {  # by the label of a face: in neither, in the subject, in the cl
 _KEPT_ARRAYS: Final = {name: np.array(kept, np.uint8) for name, kept in KEPT.items()}
 
 _kept = threading.local()
-_MOST_KEPT: Final = 50_000
-"""Vertices, rings and contacts up to which a thread keeps its scratch: 20 MB."""
+_MOST_KEPT: Final = 120_000
+"""Vertices, rings and contacts up to which a thread keeps its scratch: 50 MB."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,10 @@
     edges -> contacts -> events along edges -> chains -> stars -> faces, labels -> boundary rings -> doubles
 
 The steps are those of overlay.py on chains instead of single edges, so that after the contacts the work follows the
-number of crossings. Decisions are exact throughout. A pair is left OPEN, for the path in Python integers, where
+number of crossings. What lies outside of the other polygon's box and cannot be in the result is cut short at once:
+vertices that follow each other beyond one side of the common box give way to the first and the last of them, which
+moves the boundary there only. Decisions are exact throughout. A pair is left OPEN, for the path in Python integers,
+where
 
 - a coordinate is neither zero nor within 2^-120 .. 2^120, so that expansions might lose bits;
 - a coordinate of the result cannot be rounded from double-doubles and exact signs;
@@ -25,7 +28,17 @@ from engine.arrangement.chains import Chains, build_chains, build_stars
 from engine.arrangement.crossing_signs import Edges
 from engine.arrangement.edge_contacts import Events, enter_contact, root_of, unite
 from engine.arrangement.edge_events import sort_events
-from engine.arrangement.edge_tree import DEEPEST, LEAF, PORTION, boxes_meet, build_tree, next_pairs
+from engine.arrangement.edge_tree import (
+    ANYWHERE,
+    DEEPEST,
+    LEAF,
+    PORTION,
+    WANTED,
+    boxes_meet,
+    build_tree,
+    heading,
+    next_pairs,
+)
 from engine.arrangement.ring_certificate import certify
 from engine.arrangement.ring_order import Ranking, rank_rings
 from engine.arrangement.rounded_crossings import LOST, round_crossing
@@ -168,21 +181,34 @@ def workspace_for(n_vertices: int, n_rings: int, n_contacts: int) -> Workspace:
 @inline
 def _load(
     vertices: Any, offsets: Any, first_ring: int, last_ring: int, mask: int, base: int, edges: Edges, origins: Any,
-    tops: Any, masks: Any, n: int, n_rings: int,
+    tops: Any, masks: Any, box: tuple[float, float, float, float], n: int, n_rings: int,
 ) -> tuple[int, int, bool]:  # fmt: skip
     """Append rings without repeated points; return the numbers of vertices and rings, and whether all are in range.
 
-    base: what is added to the number of a vertex in ``origins``.
+    base: what is added to the number of a vertex in ``origins``. box: x_min, x_max, y_min, y_max; of vertices beyond
+    one of its sides, one after another, only the first and the last count.
     """
+    x_min, x_max, y_min, y_max = box
     x, y = edges.x, edges.y
     safe = True
     for ring in range(first_ring, last_ring):
         start = n
+        sides = sides_before = 0  # of the last vertex and of the one before it: which sides of the box it is beyond
         for k in range(offsets[ring], offsets[ring + 1]):
             px, py = vertices[k, 0], vertices[k, 1]
             safe = safe and is_safe(px) and is_safe(py)
             if n > start and x[n - 1] == px and y[n - 1] == py:
                 continue
+            beyond = 1 * (px < x_min) + 2 * (px > x_max) + 4 * (py < y_min) + 8 * (py > y_max)
+            if beyond & sides & sides_before:  # a triangle beyond that side changes no label in the box
+                n -= 1
+                if x[n - 1] == px and y[n - 1] == py:
+                    origins[n - 1] = base + k  # the next edge begins here
+                    sides, sides_before = sides_before, 0
+                    continue
+            else:
+                sides_before = sides
+            sides = beyond
             x[n], y[n], origins[n] = px, py, base + k
             n += 1
         while n > start + 1 and x[n - 1] == x[start] and y[n - 1] == y[start]:
@@ -199,6 +225,18 @@ def _load(
         tops[n_rings], masks[n_rings] = top, mask
         n_rings += 1
     return n, n_rings, safe
+
+
+@inline
+def _box_of(vertices: Any, first: int, last: int) -> tuple[float, float, float, float]:
+    """Return x_min, x_max, y_min, y_max of some vertices; inverted where there is none."""
+    x_min = y_min = np.inf
+    x_max = y_max = -np.inf
+    for k in range(first, last):
+        px, py = vertices[k, 0], vertices[k, 1]
+        x_min, x_max = min(x_min, px), max(x_max, px)
+        y_min, y_max = min(y_min, py), max(y_max, py)
+    return x_min, x_max, y_min, y_max
 
 
 @inline
@@ -225,7 +263,7 @@ def _find_contacts(
         for k in range(found):
             i, j = pairs[k, 0], pairs[k, 1]
             b, d = after[i], after[j]
-            turn_c, turn_d, bound = _turns(x, y, i, b, j, d)
+            turn_c, turn_d, bound = _turns(x, y, np.uint64(i), np.uint64(b), np.uint64(j), np.uint64(d))
             sure = abs(turn_c) > bound and abs(turn_d) > bound
             if (
                 (sure and (turn_c > 0.0) == (turn_d > 0.0))
@@ -233,7 +271,7 @@ def _find_contacts(
                 or (d == i and abs(turn_c) > bound)
             ):
                 continue  # both ends on one side, or consecutive edges that are not in line
-            turn_a, turn_b, bound_ab = _turns(x, y, j, d, i, b)
+            turn_a, turn_b, bound_ab = _turns(x, y, np.uint64(j), np.uint64(d), np.uint64(i), np.uint64(b))
             sure_ab = abs(turn_a) > bound_ab and abs(turn_b) > bound_ab
             if sure_ab and (turn_a > 0.0) == (turn_b > 0.0):
                 continue
@@ -407,13 +445,19 @@ def overlay_pairs(
         counts[item, 0] = counts[item, 1] = counts[item, 2] = counts[item, 3] = 0
         if stop[0]:
             break
+        first, first_end = subject_items[at], subject_items[at + 1]
+        second, second_end = clip_items[at], clip_items[at + 1]
+        x0, x1, y0, y1 = _box_of(subjects, subject_rings[first], subject_rings[first_end])
+        u0, u1, v0, v1 = _box_of(clips, clip_rings[second], clip_rings[second_end])
+        common = max(x0, u0), min(x1, u1), max(y0, v0), min(y1, v1)
+        whole = -np.inf, np.inf, -np.inf, np.inf
         n, n_rings, safe = _load(
-            subjects, subject_rings, subject_items[at], subject_items[at + 1], 1, 0, edges, w.origins, w.tops, w.masks,
-            0, 0,
+            subjects, subject_rings, first, first_end, 1, 0, edges, w.origins, w.tops, w.masks,
+            whole if kept[1] else common, 0, 0,
         )  # fmt: skip
         n, n_rings, also_safe = _load(
-            clips, clip_rings, clip_items[at], clip_items[at + 1], 2, subjects.shape[0], edges, w.origins, w.tops,
-            w.masks, n, n_rings,
+            clips, clip_rings, second, second_end, 2, subjects.shape[0], edges, w.origins, w.tops, w.masks,
+            whole if kept[2] else common, n, n_rings,
         )  # fmt: skip
         if not (safe and also_safe):
             continue
@@ -421,7 +465,7 @@ def overlay_pairs(
             j = after[i]
             w.boxes[i, 0], w.boxes[i, 1] = min(x[i], x[j]), max(x[i], x[j])
             w.boxes[i, 2], w.boxes[i, 3] = min(y[i], y[j]), max(y[i], y[j])
-            w.marks[i] = 1
+            w.marks[i] = WANTED | (heading(x[j] - x[i], y[j] - y[i]) if j == i + 1 else ANYWHERE)
         if n > _FEW:
             build_tree(w.boxes, w.marks, n, w.tree, w.tree_marks, w.places)
         n_events, n_crossings, n_exact = _find_contacts(

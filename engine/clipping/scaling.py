@@ -29,6 +29,10 @@ def exponent_of(*arrays: FloatArray) -> int:
 
 def shifted(array: FloatArray, exponent: int | npt.NDArray[np.int64]) -> FloatArray | None:
     """Return array 2^exponent, read-only as the arrays of callers are, if that is exact for every number, else None."""
+    if isinstance(exponent, int) and exponent == 0:
+        same = array.view()
+        same.setflags(write=False)
+        return same
     with np.errstate(all="ignore"):
         result: FloatArray = np.ldexp(array, exponent)
         result.setflags(write=False)

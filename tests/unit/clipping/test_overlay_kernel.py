@@ -71,6 +71,17 @@ def test_many_rings(make: Any, seed: int) -> None:
         assert agree([*subject, [(-2, -2), (2, -2), (2, 2), (-2, 2)]], clip, operation)
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_stretches_beyond_the_common_box(seed: int) -> None:
+    """Vertices beyond it are left out: stretches there and back, repeated points, and corners passed included."""
+    random = np.random.default_rng([8, seed])
+    far = random.integers(0, 2, (2, 40, 1)) * random.integers(-2, 3, (2, 40, 2))
+    subject, clip = random.integers(-1, 2, (2, 40, 2)) + far + [[[0, 0]], [[2, 1]]]
+    for operation in OPERATIONS:
+        assert agree([subject], [clip], operation)
+        assert agree([subject], [clip + np.array([30, 0])], operation)  # boxes apart
+
+
 @pytest.mark.parametrize("factor", [2.0**100, 2.0**-110, 2.0**400, 2.0**-500])
 def test_scale(factor: float) -> None:
     random = np.random.default_rng(7)
