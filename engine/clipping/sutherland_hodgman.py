@@ -33,6 +33,7 @@ from engine.clipping.cut_vertices import (
     sign_across,
     sign_at,
 )
+from engine.clipping.plain_rings import GIVEN_UP, NO_ROOM, SLACK, clip_plainly
 from engine.clipping.vertex_origins import (
     COLUMNS,
     CORNER,
@@ -163,28 +164,20 @@ def clip_ring(
 
 
 @inline
-def effect_of(high: Any, axis: int, at: float, vertices: Any, first: int, last: int, lows: Any, highs: Any) -> int:
-    """Tell what a plane does to vertices first .. last - 1: INSIDE all, OUTSIDE of it all, or CUTS, where unsure.
+def effect_of(high: Any, plane: int, bound: float, vertices: Any, begin: int, end: int) -> int:
+    """Tell what a plane does to vertices begin .. end - 1: INSIDE all, OUTSIDE of it all, or CUTS, where unsure.
 
-    lows, highs: their smallest and largest coordinates. Exact: what later planes see are points between the vertices.
+    bound: of a value's error. Exact: what later planes see are points between the vertices.
     """
-    if axis >= 0:
-        if high[axis] > 0.0:
-            return INSIDE if lows[axis] >= at else (OUTSIDE if highs[axis] < at else CUTS)
-        return INSIDE if highs[axis] <= at else (OUTSIDE if lows[axis] > at else CUTS)
-    d = high.size - 1
-    size = abs(high[d])
-    for k in range(d):
-        size += abs(high[k]) * max(abs(lows[k]), abs(highs[k]))
-    bound = VALUE_BOUND * size
+    d = vertices.shape[1]
     n_in = n_out = 0
-    for i in range(first, last):
-        value = high[d]
+    for i in range(begin, end):
+        value = high[plane, d]
         for k in range(d):
-            value += high[k] * vertices[i, k]
+            value += high[plane, k] * vertices[i, k]
         n_in += value > bound
         n_out += -value > bound
-    return INSIDE if n_in == last - first else (OUTSIDE if n_out == last - first else CUTS)
+    return INSIDE if n_in == end - begin else (OUTSIDE if n_out == end - begin else CUTS)
 
 
 @inline
@@ -218,6 +211,134 @@ def store_ring(points: Any, n: int, out: Any, first: int) -> bool:
     return True
 
 
+@inline
+def careful_scratch(room: int, largest: int, dimension: int) -> tuple[Any, ...]:
+    """Return what `clip_carefully` works in: for rings of at most `largest` vertices that grow to `room`."""
+    return (
+        np.empty((room, dimension, 3)),
+        np.empty((room, dimension, 3)),
+        np.empty((largest, dimension, 3)),
+        np.empty((room, COLUMNS), np.int64),
+        np.empty((room, COLUMNS), np.int64),
+        np.empty(room, np.int64),
+        np.empty(room, np.bool_),
+    )
+
+
+@inline
+def clip_carefully(
+    vertices: Any,
+    ring_offsets: Any,
+    first: int,
+    last: int,
+    high: Any,
+    low: Any,
+    axes: Any,
+    at: Any,
+    cutting: Any,
+    n_cutting: int,
+    scratch: Any,
+    contacts: Any,
+    dropped: Any,
+    out: Any,
+    written: int,
+    sizes: Any,
+) -> int:
+    """Clip rings first .. last - 1, one polygon, by the planes of `cutting` into ``out[written:]``; fills their sizes.
+
+    Adds to contacts, dropped. Returns the vertices left, GIVEN_UP or NO_ROOM.
+    """
+    here, there, ring_points, origins, new_origins, signs, on_plane = scratch
+    begun = written
+    for ring in range(first, last):
+        n = load_ring(vertices, ring_offsets[ring], ring_offsets[ring + 1], here)
+        n_ring = n
+        for i in range(n):
+            copy_vertex(here, i, ring_points, i)
+            origins[i, EDGE], origins[i, PLANES], origins[i, CORNER], origins[i, CUT_EDGE] = i, 0, 0, -1
+        for i_plane in range(n_cutting):
+            if n <= 0:
+                break
+            plane = cutting[i_plane]
+            n, met, has_dropped = clip_ring(
+                high,
+                low,
+                axes,
+                at,
+                cutting,
+                i_plane,
+                here,
+                n,
+                origins,
+                ring_points,
+                n_ring,
+                signs,
+                there,
+                new_origins,
+                on_plane,
+            )
+            contacts[plane] += met
+            if has_dropped:
+                dropped[plane] = True
+                here, there = there, here
+                origins, new_origins = new_origins, origins
+        if n > 0 and written + n > out.shape[0]:
+            return NO_ROOM
+        if n < 0 or not store_ring(here, n, out, written):
+            return GIVEN_UP
+        sizes[ring] = n
+        written += n
+    return written - begun
+
+
+@inline
+def plan_cuts(
+    vertices: Any,
+    begin: int,
+    end: int,
+    high: Any,
+    axes: Any,
+    at: Any,
+    reach: Any,
+    lows: Any,
+    highs: Any,
+    cutting: Any,
+    slack: Any,
+) -> tuple[int, bool]:
+    """List in `cutting` the planes that may cut vertices begin .. end - 1; return how many, -1 if none is left inside.
+
+    Also returns whether every coordinate is safe. reach: their largest sizes; slack: see plain_rings.py.
+    """
+    safe, n_cutting = True, 0
+    for k in range(vertices.shape[1]):
+        low_k = high_k = vertices[begin, k]
+        for i in range(begin, end):
+            x = vertices[i, k]
+            low_k, high_k = min(low_k, x), max(high_k, x)
+            safe = safe and is_safe(x)
+        lows[k], highs[k], reach[k] = low_k, high_k, max(abs(low_k), abs(high_k))
+    for plane in range(high.shape[0]):
+        axis, effect, size = axes[plane], CUTS, 0.0
+        if safe and axis >= 0:
+            is_up, place = high[plane, axis] > 0.0, at[plane]
+            if lows[axis] >= place if is_up else highs[axis] <= place:
+                effect = INSIDE
+            elif highs[axis] < place if is_up else lows[axis] > place:
+                effect = OUTSIDE
+            size = abs(place) + reach[axis]
+        elif safe:
+            size = abs(high[plane, vertices.shape[1]])
+            for k in range(vertices.shape[1]):
+                size += abs(high[plane, k]) * reach[k]
+            effect = effect_of(high, plane, VALUE_BOUND * size, vertices, begin, end)
+        if effect == OUTSIDE:
+            return -1, safe
+        if effect == CUTS:
+            cutting[n_cutting], slack[n_cutting] = plane, SLACK * size
+            n_cutting += 1
+    return n_cutting, safe
+
+
 @kernel
 def clip_rings(
     vertices: Any,
@@ -248,88 +369,96 @@ def clip_rings(
     for ring in range(polygon_offsets[first], polygon_offsets[last]):
         largest = max(largest, ring_offsets[ring + 1] - ring_offsets[ring])
     room = 2 * largest + 2 * n_planes + 8  # a convex ring gains one vertex a plane; one that outgrows this is left open
-    here, there = np.empty((room, dimension, 3)), np.empty((room, dimension, 3))
-    ring_points = np.empty((largest, dimension, 3))
-    origins, new_origins = np.empty((room, COLUMNS), np.int64), np.empty((room, COLUMNS), np.int64)
-    signs, on_plane = np.empty(room, np.int64), np.empty(room, np.bool_)
+    pool, edges = np.empty((2 * room, dimension, 3)), np.empty(2 * room, np.int32)
+    rings, inside = np.empty((2, room), np.int32), np.empty(room, np.bool_)
+    scratch = careful_scratch(0, 0, dimension)
     contacts, dropped = np.empty(n_planes, np.int64), np.empty(n_planes, np.bool_)
-    cutting, lows, highs = np.empty(n_planes, np.int64), np.empty(dimension), np.empty(dimension)
+    cutting, slack = np.empty(n_planes, np.int64), np.empty(n_planes)
+    reach, lows, highs = np.empty(dimension), np.empty(dimension), np.empty(dimension)
     written = 0
     for polygon in range(first, last):
         if stop[0]:
             return polygon, written
-        begun = written
-        begin, until = ring_offsets[polygon_offsets[polygon]], ring_offsets[polygon_offsets[polygon + 1]]
-        safe = True
-        for k in range(dimension):
-            low_k = high_k = vertices[begin, k]
-            for i in range(begin, until):
-                x = vertices[i, k]
-                low_k, high_k = min(low_k, x), max(high_k, x)
-                safe = safe and is_safe(x)
-            lows[k], highs[k] = low_k, high_k
-        n_cutting, is_outside = 0, False
-        for plane in range(n_planes):
-            effect = CUTS
-            if safe:
-                effect = effect_of(high[plane], axes[plane], at[plane], vertices, begin, until, lows, highs)
-            is_outside = is_outside or effect == OUTSIDE
-            if effect == CUTS:
-                cutting[n_cutting] = plane
-                n_cutting += 1
+        first_ring, last_ring = polygon_offsets[polygon], polygon_offsets[polygon + 1]
+        n_cutting, safe = plan_cuts(
+            vertices,
+            ring_offsets[first_ring],
+            ring_offsets[last_ring],
+            high,
+            axes,
+            at,
+            reach,
+            lows,
+            highs,
+            cutting,
+            slack,
+        )
         state[polygon], may_have_bridges[polygon] = CLIPPED, False
-        if is_outside:
-            for ring in range(polygon_offsets[polygon], polygon_offsets[polygon + 1]):
+        if n_cutting < 0:
+            for ring in range(first_ring, last_ring):
                 sizes[ring] = 0
             continue
-        for i_plane in range(n_cutting):
-            contacts[cutting[i_plane]], dropped[cutting[i_plane]] = 0, False
-        is_open = False
-        for ring in range(polygon_offsets[polygon], polygon_offsets[polygon + 1]):
-            n = load_ring(vertices, ring_offsets[ring], ring_offsets[ring + 1], here)
-            n_ring = n
-            for i in range(n):
-                copy_vertex(here, i, ring_points, i)
-                origins[i, EDGE], origins[i, PLANES], origins[i, CORNER], origins[i, CUT_EDGE] = i, 0, 0, -1
-            for i_plane in range(n_cutting):
-                if n <= 0:
-                    break
-                plane = cutting[i_plane]
-                n, met, has_dropped = clip_ring(
-                    high,
-                    low,
-                    axes,
-                    at,
-                    cutting,
-                    i_plane,
-                    here,
-                    n,
-                    origins,
-                    ring_points,
-                    n_ring,
-                    signs,
-                    there,
-                    new_origins,
-                    on_plane,
-                )
-                contacts[plane] += met
-                if has_dropped:
-                    dropped[plane] = True
-                    here, there = there, here
-                    origins, new_origins = new_origins, origins
-            if n > 0 and written + n > out.shape[0]:
-                return polygon, begun
-            if n < 0 or not store_ring(here, n, out, written):
-                is_open = True
+        for i in range(n_cutting):
+            contacts[cutting[i]], dropped[cutting[i]] = 0, False
+        total = 0 if safe else GIVEN_UP
+        for ring in range(first_ring, last_ring):
+            if total < 0:
                 break
+            n = clip_plainly(
+                vertices,
+                ring_offsets[ring],
+                ring_offsets[ring + 1],
+                high,
+                low,
+                axes,
+                at,
+                slack,
+                reach,
+                cutting,
+                n_cutting,
+                pool,
+                edges,
+                rings,
+                inside,
+                contacts,
+                dropped,
+                out,
+                written + total,
+            )
             sizes[ring] = n
-            written += n
-        if is_open:
-            state[polygon], written = OPEN, begun
-            for ring in range(polygon_offsets[polygon], polygon_offsets[polygon + 1]):
+            total = total + n if n >= 0 else n
+        if total == GIVEN_UP and safe:
+            if scratch[0].shape[0] == 0:
+                scratch = careful_scratch(room, largest, dimension)
+            for i in range(n_cutting):
+                contacts[cutting[i]], dropped[cutting[i]] = 0, False
+            total = clip_carefully(
+                vertices,
+                ring_offsets,
+                first_ring,
+                last_ring,
+                high,
+                low,
+                axes,
+                at,
+                cutting,
+                n_cutting,
+                scratch,
+                contacts,
+                dropped,
+                out,
+                written,
+                sizes,
+            )
+        if total == NO_ROOM:
+            return polygon, written
+        if total == GIVEN_UP:
+            state[polygon] = OPEN
+            for ring in range(first_ring, last_ring):
                 sizes[ring] = 0
             continue
-        for i_plane in range(n_cutting):
-            if written > begun and dropped[cutting[i_plane]] and contacts[cutting[i_plane]] > 2:
+        written += total
+        for i in range(n_cutting):
+            if total > 0 and dropped[cutting[i]] and contacts[cutting[i]] > 2:
                 may_have_bridges[polygon] = True
     return last, written
