@@ -12,8 +12,9 @@ import numpy.typing as npt
 from engine.clipping.cut_point import LARGEST, SMALLEST
 from engine.clipping.exact_contours import Row
 from engine.clipping.exact_segments import nearest
+from engine.clipping.plain_rings import OPEN
 from engine.clipping.scaling import exponent_of, scaled_back, shifted
-from engine.clipping.sutherland_hodgman import OPEN, clip_rings
+from engine.clipping.sutherland_hodgman import clip_rings
 from engine.parallel import Budget
 from engine.solids.base import FloatArray, IntArray
 

@@ -19,13 +19,12 @@ Source: I. E. Sutherland, G. W. Hodgman, Reentrant polygon clipping, 1974; the t
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
 from engine.clipping.cut_point import is_safe
 from engine.clipping.cut_vertices import (
-    VALUE_BOUND,
     compare_vertices,
     copy_vertex,
     cut_edge,
@@ -33,7 +32,7 @@ from engine.clipping.cut_vertices import (
     sign_across,
     sign_at,
 )
-from engine.clipping.plain_rings import GIVEN_UP, NO_ROOM, SLACK, clip_plainly
+from engine.clipping.plain_rings import GIVEN_UP, NO_ROOM, OPEN, clip_plainly
 from engine.clipping.vertex_origins import (
     COLUMNS,
     CORNER,
@@ -51,12 +50,6 @@ from engine.clipping.vertex_origins import (
 from engine.jit import inline, kernel
 from engine.predicates.double_double import U2, surely_rounded
 from engine.types import UNDECIDED
-
-CLIPPED: Final = 0
-OPEN: Final = 1
-INSIDE: Final = 1
-OUTSIDE: Final = -1
-CUTS: Final = 0
 
 
 @inline
@@ -161,23 +154,6 @@ def clip_ring(
             break
         kept -= 1
     return kept, n_contacts, True
-
-
-@inline
-def effect_of(high: Any, plane: int, bound: float, vertices: Any, begin: int, end: int) -> int:
-    """Tell what a plane does to vertices begin .. end - 1: INSIDE all, OUTSIDE of it all, or CUTS, where unsure.
-
-    bound: of a value's error. Exact: what later planes see are points between the vertices.
-    """
-    d = vertices.shape[1]
-    n_in = n_out = 0
-    for i in range(begin, end):
-        value = high[plane, d]
-        for k in range(d):
-            value += high[plane, k] * vertices[i, k]
-        n_in += value > bound
-        n_out += -value > bound
-    return INSIDE if n_in == end - begin else (OUTSIDE if n_out == end - begin else CUTS)
 
 
 @inline
@@ -291,54 +267,6 @@ def clip_carefully(
     return written - begun
 
 
-@inline
-def plan_cuts(
-    vertices: Any,
-    begin: int,
-    end: int,
-    high: Any,
-    axes: Any,
-    at: Any,
-    reach: Any,
-    lows: Any,
-    highs: Any,
-    cutting: Any,
-    slack: Any,
-) -> tuple[int, bool]:
-    """List in `cutting` the planes that may cut vertices begin .. end - 1; return how many, -1 if none is left inside.
-
-    Also returns whether every coordinate is safe. reach: their largest sizes; slack: see plain_rings.py.
-    """
-    safe, n_cutting = True, 0
-    for k in range(vertices.shape[1]):
-        low_k = high_k = vertices[begin, k]
-        for i in range(begin, end):
-            x = vertices[i, k]
-            low_k, high_k = min(low_k, x), max(high_k, x)
-            safe = safe and is_safe(x)
-        lows[k], highs[k], reach[k] = low_k, high_k, max(abs(low_k), abs(high_k))
-    for plane in range(high.shape[0]):
-        axis, effect, size = axes[plane], CUTS, 0.0
-        if safe and axis >= 0:
-            is_up, place = high[plane, axis] > 0.0, at[plane]
-            if lows[axis] >= place if is_up else highs[axis] <= place:
-                effect = INSIDE
-            elif highs[axis] < place if is_up else lows[axis] > place:
-                effect = OUTSIDE
-            size = abs(place) + reach[axis]
-        elif safe:
-            size = abs(high[plane, vertices.shape[1]])
-            for k in range(vertices.shape[1]):
-                size += abs(high[plane, k]) * reach[k]
-            effect = effect_of(high, plane, VALUE_BOUND * size, vertices, begin, end)
-        if effect == OUTSIDE:
-            return -1, safe
-        if effect == CUTS:
-            cutting[n_cutting], slack[n_cutting] = plane, SLACK * size
-            n_cutting += 1
-    return n_cutting, safe
-
-
 @kernel
 def clip_rings(
     vertices: Any,
@@ -371,94 +299,75 @@ def clip_rings(
     room = 2 * largest + 2 * n_planes + 8  # a convex ring gains one vertex a plane; one that outgrows this is left open
     pool, edges = np.empty((2 * room, dimension, 3)), np.empty(2 * room, np.int32)
     rings, inside = np.empty((2, room), np.int32), np.empty(room, np.bool_)
-    scratch = careful_scratch(0, 0, dimension)
     contacts, dropped = np.empty(n_planes, np.int64), np.empty(n_planes, np.bool_)
     cutting, slack = np.empty(n_planes, np.int64), np.empty(n_planes)
     reach, lows, highs = np.empty(dimension), np.empty(dimension), np.empty(dimension)
-    written = 0
-    for polygon in range(first, last):
-        if stop[0]:
-            return polygon, written
-        first_ring, last_ring = polygon_offsets[polygon], polygon_offsets[polygon + 1]
-        n_cutting, safe = plan_cuts(
+    scratch = careful_scratch(0, 0, dimension)
+    polygon, written = first, 0
+    while polygon < last:
+        polygon, written, outcome, n_cutting = clip_plainly(
             vertices,
-            ring_offsets[first_ring],
-            ring_offsets[last_ring],
+            ring_offsets,
+            polygon_offsets,
             high,
+            low,
             axes,
             at,
+            polygon,
+            last,
+            stop,
+            out,
+            written,
+            sizes,
+            state,
+            may_have_bridges,
+            pool,
+            edges,
+            rings,
+            inside,
+            contacts,
+            dropped,
+            cutting,
+            slack,
             reach,
             lows,
             highs,
-            cutting,
-            slack,
         )
-        state[polygon], may_have_bridges[polygon] = CLIPPED, False
-        if n_cutting < 0:
-            for ring in range(first_ring, last_ring):
-                sizes[ring] = 0
-            continue
+        if outcome != GIVEN_UP:
+            break
+        if scratch[0].shape[0] == 0:
+            scratch = careful_scratch(room, largest, dimension)
         for i in range(n_cutting):
             contacts[cutting[i]], dropped[cutting[i]] = 0, False
-        total = 0 if safe else GIVEN_UP
-        for ring in range(first_ring, last_ring):
-            if total < 0:
-                break
-            n = clip_plainly(
-                vertices,
-                ring_offsets[ring],
-                ring_offsets[ring + 1],
-                high,
-                low,
-                axes,
-                at,
-                slack,
-                reach,
-                cutting,
-                n_cutting,
-                pool,
-                edges,
-                rings,
-                inside,
-                contacts,
-                dropped,
-                out,
-                written + total,
-            )
-            sizes[ring] = n
-            total = total + n if n >= 0 else n
-        if total == GIVEN_UP and safe:
-            if scratch[0].shape[0] == 0:
-                scratch = careful_scratch(room, largest, dimension)
-            for i in range(n_cutting):
-                contacts[cutting[i]], dropped[cutting[i]] = 0, False
-            total = clip_carefully(
-                vertices,
-                ring_offsets,
-                first_ring,
-                last_ring,
-                high,
-                low,
-                axes,
-                at,
-                cutting,
-                n_cutting,
-                scratch,
-                contacts,
-                dropped,
-                out,
-                written,
-                sizes,
-            )
-        if total == NO_ROOM:
-            return polygon, written
-        if total == GIVEN_UP:
+        first_ring, last_ring = polygon_offsets[polygon], polygon_offsets[polygon + 1]
+        n = clip_carefully(
+            vertices,
+            ring_offsets,
+            first_ring,
+            last_ring,
+            high,
+            low,
+            axes,
+            at,
+            cutting,
+            n_cutting,
+            scratch,
+            contacts,
+            dropped,
+            out,
+            written,
+            sizes,
+        )
+        if n == NO_ROOM:
+            break
+        if n == GIVEN_UP:
             state[polygon] = OPEN
             for ring in range(first_ring, last_ring):
                 sizes[ring] = 0
-            continue
-        written += total
-        for i in range(n_cutting):
-            if total > 0 and dropped[cutting[i]] and contacts[cutting[i]] > 2:
-                may_have_bridges[polygon] = True
-    return last, written
+        else:
+            written += n
+            for i in range(n_cutting):
+                if n > 0 and dropped[cutting[i]] and contacts[cutting[i]] > 2:
+                    may_have_bridges[polygon] = True
+        polygon += 1
+    return polygon, written
