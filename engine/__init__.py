@@ -53,7 +53,7 @@ from engine.solids.pose import Pose
 from engine.solids.sphere import Sphere
 from engine.solids.surface import Surface
 from engine.solids.triangle import Triangle
-from engine.types import Accuracy, Location, Relation
+from engine.types import Accuracy, Location, Rcc8, Relation
 from engine.version import __version__
 from engine.warmup import warm
 
@@ -94,6 +94,7 @@ __all__ = [
     "PolygonStatus",
     "Polyhedron",
     "Pose",
+    "Rcc8",
     "Relation",
     "RepeatedIndexError",
     "RingTooShortError",

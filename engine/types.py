@@ -70,6 +70,30 @@ class Relation(IntEnum):
         return self.name.lower()
 
 
+class Rcc8(IntEnum):
+    """The eight relations of the region connection calculus; "inside" and "around" are those of the first body."""
+
+    DC = 0
+    EC = 1
+    PO = 2
+    EQ = 3
+    TPP = 4
+    NTPP = 5
+    TPPI = 6
+    NTPPI = 7
+
+    @property
+    def label(self) -> str:
+        """The usual name, for example ``TPPi``."""
+        return self.name.replace("PPI", "PPi")
+
+    @property
+    def swapped(self) -> Rcc8:
+        """The relation of the second body to the first."""
+        swap = {Rcc8.TPP: Rcc8.TPPI, Rcc8.NTPP: Rcc8.NTPPI, Rcc8.TPPI: Rcc8.TPP, Rcc8.NTPPI: Rcc8.NTPP}
+        return swap.get(self, self)
+
+
 @dataclass(frozen=True, slots=True)
 class Accuracy:
     """What one call can say of its own accuracy and cost.

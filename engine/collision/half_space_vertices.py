@@ -31,7 +31,7 @@ def collide_half_space_mesh(
     shell = shell_of(body)
     used = np.unique(shell.arrays.triangles)
     plane = image_half_space(half_space.normal, half_space.offset, half_space_pose)
-    signs = _signs(plane, shell.arrays.vertices[used], body_pose, work)
+    signs = signs_of(plane, shell.arrays.vertices[used], body_pose, work)
 
     def reaches_inside() -> bool:
         if not shell.has_inside:
@@ -41,7 +41,7 @@ def collide_half_space_mesh(
         for face in np.flatnonzero(positive[shell.arrays.triangles].any(axis=1)).tolist():
             work.budget.check()
             piece = live_piece(shell, face, work.budget)
-            if piece is not None and any(_value(plane, p, body_pose) > 0 for p in piece.vertices()):
+            if piece is not None and any(value_at_image(plane, p, body_pose) > 0 for p in piece.vertices()):
                 return True
         return False
 
@@ -80,7 +80,7 @@ def _relation(signs: npt.NDArray[np.int8], reaches_inside: Callable[[], bool], f
     return Collision(Relation.TOUCHING, Witness("surface", second_face=face, piercing=enters))
 
 
-def _value(plane: tuple[Vector, Fraction], point: Vector, pose: Pose | None) -> Fraction:
+def value_at_image(plane: tuple[Vector, Fraction], point: Vector, pose: Pose | None) -> Fraction:
     """Return normal . image(point) + offset for a point of rational coordinates."""
     normal, offset = plane
     if pose is not None:
@@ -89,7 +89,7 @@ def _value(plane: tuple[Vector, Fraction], point: Vector, pose: Pose | None) -> 
     return dot(normal, point) + offset
 
 
-def _signs(plane: tuple[Vector, Fraction], points: FloatArray, pose: Pose | None, work: Work) -> npt.NDArray[np.int8]:
+def signs_of(plane: tuple[Vector, Fraction], points: FloatArray, pose: Pose | None, work: Work) -> npt.NDArray[np.int8]:
     """Return the exact sign of the plane at the image of each of ``(n, 3)`` points.
 
     The function is pulled back: with N = n R and D = n . t + d, both rational, it is N . p + D. Scaled so that the

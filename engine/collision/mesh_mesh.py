@@ -35,7 +35,7 @@ from engine.collision.exact_body import ExactBody, Vector, exact_pair
 from engine.collision.exact_cells import cells_of, even_sides, is_inside_exact, pieces_of_segment, sides_at, sides_over
 from engine.collision.exact_triangles import as_simplex, classify_exact, is_flush, is_in_triangle, kind_of_contact
 from engine.collision.face_state import find_states
-from engine.collision.parity import INSIDE, locate_vertices
+from engine.collision.parity import INSIDE, OUTSIDE, locate_vertices
 from engine.collision.pose_batch import find_contacts
 from engine.collision.result import Collision, Kind, Witness, Work
 from engine.collision.separating_plane import is_separated
@@ -58,7 +58,7 @@ _SAFE_POWER = 300
 _BLOCK = 64
 _PROBED = 8
 _NAMED = 32
-_WITHIN = ((1, 1, 1), (1, 1, 2), (2, 1, 1), (3, 5, 4), (7, 11, 5))
+WITHIN = ((1, 1, 1), (1, 1, 2), (2, 1, 1), (3, 5, 4), (7, 11, 5))
 """Weights of the corners for points within a face."""
 STRENGTH: tuple[Kind, ...] = ("face_face", "edge_face", "vertex_face", "edge_edge", "vertex_edge", "vertex_vertex")
 """Of several contacts the witness is the one of the kind that stands first here; at most `_NAMED` are looked at."""
@@ -70,7 +70,15 @@ def mesh_mesh(first: Solid, second: Solid, first_pose: Pose | None, second_pose:
 
 
 def relate(first: Shell, first_pose: Pose | None, second: Shell, second_pose: Pose | None, work: Work) -> Collision:
-    """Return the relation of two placed shells.
+    """Return the relation of two placed shells."""
+    with np.errstate(all="ignore"):  # kernels, where they run uncompiled
+        return MeshPair(*simplest(first, first_pose, second, second_pose), work).relation()
+
+
+def simplest(
+    first: Shell, first_pose: Pose | None, second: Shell, second_pose: Pose | None
+) -> tuple[Shell, Pose | None, Shell, Pose | None]:
+    """Return a placed pair that has the same relation, scaled into the range of the kernels where that is exact.
 
     Two equal poses are left out: an invertible affine map, applied to both, changes no relation.
     """
@@ -80,9 +88,7 @@ def relate(first: Shell, first_pose: Pose | None, second: Shell, second_pose: Po
         second_pose = None
     if first_pose is not None and first_pose == second_pose:
         first_pose = second_pose = None
-    first, first_pose, second, second_pose = in_range(first, first_pose, second, second_pose)
-    with np.errstate(all="ignore"):  # kernels, where they run uncompiled
-        return _Pair(first, first_pose, second, second_pose, work).relation()
+    return in_range(first, first_pose, second, second_pose)
 
 
 def in_range(
@@ -126,13 +132,13 @@ def what_to_seek(first: Shell, second: Shell, work: Work) -> int:
 
 
 @dataclass(frozen=True, slots=True)
-class _Patch:
-    """Faces connected through vertices, none in contact with the other body, all inside it."""
+class Patch:
+    """Faces connected through vertices, none in contact with the other body, all inside it or all outside."""
 
     faces: IntArray
 
 
-class _Pair:
+class MeshPair:
     """One question, and the exact coordinates computed for it so far."""
 
     def __init__(
@@ -163,7 +169,7 @@ class _Pair:
             return self._touch(Relation.TOUCHING, contacts, piercing=self.seek != SEEK_CONTACT)
         if len(contacts) and self._is_separated(contacts):
             return self._touch(Relation.TOUCHING, contacts)
-        patches = [self._patches_inside(own, contacts[:, own]) for own in (0, 1)]
+        patches = [self._patches(own, contacts[:, own], INSIDE) for own in (0, 1)]
         if not len(contacts):
             n_inside = [sum(len(patch.faces) for patch in found) for found in patches]
             if n_inside == [0, 0]:
@@ -279,8 +285,8 @@ class _Pair:
     def _state(self, own: int, face: int) -> int:
         return int(self._states(own, np.array([face]))[0])
 
-    def _patches_inside(self, own: int, in_contact: IntArray) -> list[_Patch]:
-        """Return the patches of one body, away from its faces in contact, that lie inside the other body."""
+    def _patches(self, own: int, in_contact: IntArray, place: int) -> list[Patch]:
+        """Return the patches of one body, away from its faces in contact, that lie INSIDE or OUTSIDE the other body."""
         shell, other = self.shells[own], self.shells[1 - own]
         if not other.has_inside:
             return []
@@ -301,18 +307,18 @@ class _Pair:
             self.work.n_beyond_filter += 1
             self.work.n_rational += 1
             point = self.exact[own].vertex(int(vertices[index]))
-            found[index] = INSIDE if sides_at(self.exact[1 - own], (*point, 1), 2).at else -INSIDE
-        inside = vertices[found == INSIDE]
-        if not len(inside):
+            found[index] = INSIDE if sides_at(self.exact[1 - own], (*point, 1), 2).at else OUTSIDE
+        there = vertices[found == place]
+        if not len(there):
             return []
         if not len(in_contact):
             parent = np.empty(len(shell.arrays.vertices), np.int64)
             join_vertices(triangles, np.zeros(len(triangles), np.bool_), parent)
             kept, roots = np.arange(len(triangles)), parent[triangles[:, 0]]
-        return [_Patch(kept[roots == parent[vertex]]) for vertex in inside]
+        return [Patch(kept[roots == parent[vertex]]) for vertex in there]
 
     def _located(self, own: int, vertices: IntArray) -> npt.NDArray[np.int8]:
-        """Return where vertices that are on no face of the other body lie: INSIDE, -INSIDE or UNDECIDED."""
+        """Return where vertices that are on no face of the other body lie: INSIDE, OUTSIDE or UNDECIDED."""
         shell, other = self.shells[own], self.shells[1 - own]
         poses = [body.posed(pose) for body, pose in zip(self.shells, self.poses)]
         found = np.empty(len(vertices), np.int8)
@@ -320,7 +326,7 @@ class _Pair:
         self.work.budget.check()
         return found
 
-    def _overlap_or_touch(self, contacts: IntArray, patches: list[list[_Patch]]) -> Collision:
+    def _overlap_or_touch(self, contacts: IntArray, patches: list[list[Patch]]) -> Collision:
         """Return overlapping or touching, where no crossing has proven the first."""
         piercing = bool(patches[0] or patches[1])
         both = self.shells[0].has_inside and self.shells[1].has_inside
@@ -353,7 +359,7 @@ class _Pair:
         own = 0 if patches[0] else 1
         return self._contain(Relation.TOUCHING, own, patches[own][0], piercing=piercing)
 
-    def _has_inside_beside(self, own: int, patch: _Patch) -> bool:
+    def _has_inside_beside(self, own: int, patch: Patch) -> bool:
         """Tell whether the body's own inside comes up to some face of a patch."""
         shell, body = self.shells[own], None
         with_area = patch.faces[shell.arrays.axis[patch.faces] != -1]
@@ -374,7 +380,7 @@ class _Pair:
         shell, other = self.shells[own], self.shells[1 - own]
         vertices = np.unique(shell.arrays.triangles[faces])
         return (
-            frozenset(vertices[self._located(own, vertices) == -INSIDE].tolist()) if other.has_inside else frozenset()
+            frozenset(vertices[self._located(own, vertices) == OUTSIDE].tolist()) if other.has_inside else frozenset()
         )
 
     def _has_corner_outside(self, own: int, face: int, met: IntArray, outside: frozenset[int]) -> bool:
@@ -422,7 +428,7 @@ class _Pair:
             return None
         if is_even_above and is_even_below and is_outlying:
             return False
-        for weights in _WITHIN:
+        for weights in WITHIN:
             x, y, z = (sum(w * p[side] for w, p in zip(weights, corners)) for side in range(3))
             q = (x, y, z, sum(weights))
             ours, theirs = sides_over(body, q, axis, plane), sides_over(other, q, axis, plane)
@@ -463,7 +469,7 @@ class _Pair:
         strength, first_face, second_face = min(named)
         return Collision(relation, Witness(STRENGTH[strength], first_face, second_face, "", piercing))
 
-    def _contain(self, relation: Relation, own: int, patch: _Patch, *, piercing: bool = False) -> Collision:
+    def _contain(self, relation: Relation, own: int, patch: Patch, *, piercing: bool = False) -> Collision:
         """Return a relation with a part of body `own` inside the other one as its witness."""
         if not self.work.witness:
             return Collision(relation)

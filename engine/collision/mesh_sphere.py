@@ -34,7 +34,8 @@ class Features:
     """What a ball is measured against.
 
     low, high: (n, d) float64 boxes that hold the faces or edges. vertices: (m, d) float64, each within `error` of an
-    exact position on every axis. distance: exact squared distance from the centre to a face. vertex: an exact position.
+    exact position on every axis. distance: exact squared distance from the centre to a face. corners: of a face, exact.
+    vertex: an exact position.
     reaches_inside: whether the live part of the boundary enters the open ball. faces: the caller's number of each.
     """
 
@@ -43,6 +44,7 @@ class Features:
     vertices: FloatArray
     error: float
     distance: Callable[[int], Fraction]
+    corners: Callable[[int], tuple[Vector, ...]]
     vertex: Callable[[int], Vector]
     reaches_inside: Callable[[list[int], Fraction], bool]
     faces: Callable[[int], int]
@@ -54,7 +56,7 @@ def collide_mesh_sphere(
 ) -> Collision:
     """Return the relation of a polyhedron, surface or 3D box (first) and a ball (second), exact."""
     center = image_point(sphere.center, sphere_pose)
-    return _relation(_mesh_features(body, body_pose, center, work), body, body_pose, center, sphere.radius, work)
+    return _relation(mesh_features(body, body_pose, center, work), body, body_pose, center, sphere.radius, work)
 
 
 def collide_outline_sphere(
@@ -62,7 +64,7 @@ def collide_outline_sphere(
 ) -> Collision:
     """Return the relation of a polygon, triangle or 2D box (first) and a disc (second), exact."""
     center = image_point(sphere.center, sphere_pose)
-    return _relation(_outline_features(body, body_pose, center, work), body, body_pose, center, sphere.radius, work)
+    return _relation(outline_features(body, body_pose, center, work), body, body_pose, center, sphere.radius, work)
 
 
 @np.errstate(over="ignore", invalid="ignore")  # an infinite bound only sends a face to the exact test
@@ -132,7 +134,8 @@ def _all_vertices_within(
     return True
 
 
-def _mesh_features(body: Solid, pose: Pose | None, center: Vector, work: Work) -> Features:
+def mesh_features(body: Solid, pose: Pose | None, center: Vector, work: Work) -> Features:
+    """Return what a ball is measured against, of a polyhedron, surface or 3D box."""
     shell = shell_of(body)
     arrays = shell.arrays
     used = np.unique(arrays.triangles)
@@ -142,8 +145,11 @@ def _mesh_features(body: Solid, pose: Pose | None, center: Vector, work: Work) -
     def exact(index: int) -> Vector:
         return image_point(arrays.vertices[index].tolist(), pose)
 
+    def corners(face: int) -> tuple[Vector, ...]:
+        return tuple(exact(vertex) for vertex in arrays.triangles[face].tolist())
+
     def distance(face: int) -> Fraction:
-        a, b, c = (exact(vertex) for vertex in arrays.triangles[face].tolist())
+        a, b, c = corners(face)
         return triangle_distance(center, a, b, c)
 
     def reaches_inside(candidates: list[int], limit: Fraction) -> bool:
@@ -155,6 +161,7 @@ def _mesh_features(body: Solid, pose: Pose | None, center: Vector, work: Work) -
         vertices[used],
         error,
         distance,
+        corners,
         lambda item: exact(int(used[item])),
         reaches_inside,
         lambda face: int(shell.faces[face]),
@@ -169,12 +176,13 @@ def _live_distances(
         work.budget.check()
         piece = live_piece(shell, face, work.budget)
         if piece is not None:
-            distance = _moved(piece, pose).squared_distance(center)
+            distance = moved_piece(piece, pose).squared_distance(center)
             if distance is not None:
                 yield distance
 
 
-def _moved(piece: LivePiece, pose: Pose | None) -> LivePiece:
+def moved_piece(piece: LivePiece, pose: Pose | None) -> LivePiece:
+    """Return the exact image of a live piece."""
     if pose is None:
         return piece
     rows = [tuple(map(Fraction, row)) for row in pose.rotation.tolist()]
@@ -194,7 +202,8 @@ def _placed(vertices: FloatArray, pose: Pose | None, reach: float) -> tuple[Floa
         return vertices @ pose.rotation.T + pose.translation, 2.0**-49 * (3.0 * reach + shift) + 2.0**-1060
 
 
-def _outline_features(body: Solid, pose: Pose | None, center: Vector, work: Work) -> Features:
+def outline_features(body: Solid, pose: Pose | None, center: Vector, work: Work) -> Features:
+    """Return what a disc is measured against, of a polygon, triangle or 2D box."""
     outline = outline_of(body, pose, work.budget)
     vertices = np.array([[rounded(value) for value in point] for point in outline.points])
 
@@ -211,6 +220,7 @@ def _outline_features(body: Solid, pose: Pose | None, center: Vector, work: Work
         vertices,
         2.0**-52 * float(np.abs(vertices).max()) + 2.0**-1074,
         lambda edge: segment_distance(center, *outline.edge(edge)),
+        outline.edge,
         lambda vertex: outline.points[vertex],
         reaches_inside,
         lambda edge: edge,

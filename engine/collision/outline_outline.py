@@ -41,7 +41,7 @@ def collide_outline_outline(
     beside = [(labels[f], labels[g]) for f, g in zip(subdivision.faces[0::2], subdivision.faces[1::2])]
     first_points = [rational_location(a.points[k], second, second_pose, work.budget.check) for k in single_points(a)]
     second_points = [rational_location(b.points[k], first, first_pose, work.budget.check) for k in single_points(b)]
-    meets = _boundaries_meet(arrangement) or Location.BOUNDARY in (*first_points, *second_points)
+    meets = boundaries_meet(arrangement) or Location.BOUNDARY in (*first_points, *second_points)
     # Edges of one body, not of the other, with the other's open interior on both sides.
     first_parts = [bool(left & right & SECOND) for c, (left, right) in zip(arrangement.cover, beside) if c == FIRST]
     second_parts = [bool(left & right & FIRST) for c, (left, right) in zip(arrangement.cover, beside) if c == SECOND]
@@ -62,7 +62,7 @@ def collide_outline_outline(
     return Collision(Relation.OVERLAPPING if overlapping else Relation.TOUCHING, witness)
 
 
-def _boundaries_meet(arrangement: Arrangement) -> bool:
+def boundaries_meet(arrangement: Arrangement) -> bool:
     """Tell whether some edge belongs to both bodies, or some node has edges of both."""
     if BOTH in arrangement.cover:
         return True

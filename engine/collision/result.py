@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 from engine.parallel import Budget
 from engine.solids.pose import Pose
-from engine.types import Relation
+from engine.types import Rcc8, Relation
 
 Kind = Literal[
     "vertex_vertex", "vertex_edge", "vertex_face", "edge_edge", "edge_face", "face_face", "containment", "surface"
@@ -43,10 +43,14 @@ class Witness:
 
 @dataclass(frozen=True, slots=True)
 class Collision:
-    """How two bodies lie to each other; `witness` is None when they are disjoint, or where none was asked for."""
+    """How two bodies lie to each other; `witness` is None when they are disjoint, or where none was asked for.
+
+    detail: which of the eight relations of RCC-8, where asked for; None where a body has no interior.
+    """
 
     relation: Relation
     witness: Witness | None = None
+    detail: Rcc8 | None = None
 
     def swapped(self) -> Collision:
         """Return the answer for the two bodies in the other order."""
@@ -62,7 +66,24 @@ class Collision:
             witness = replace(
                 witness, first_face=witness.second_face, second_face=witness.first_face, containing=containing
             )
-        return Collision(swap.get(self.relation, self.relation), witness)
+        detail = None if self.detail is None else self.detail.swapped
+        return Collision(swap.get(self.relation, self.relation), witness, detail)
+
+
+class Parts(NamedTuple):
+    """What of two bodies lies outside the other, for bodies whose open interiors meet.
+
+    first, second: whether some of that body's open interior lies outside the other one. meet: whether the boundaries
+    have a common point.
+    """
+
+    first: bool
+    second: bool
+    meet: bool
+
+    def swapped(self) -> Parts:
+        """Return the same for the two bodies in the other order."""
+        return Parts(self.second, self.first, self.meet)
 
 
 @dataclass(slots=True)

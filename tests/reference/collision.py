@@ -16,7 +16,12 @@ from tests.reference.contact import (
 from tests.reference.containment import locate_by_edges, locate_by_triangles
 from tests.reference.exact import Q, Vector, cross, dot, q, sign, square, sub
 from tests.reference.solids import Solid, dimension, edges, image, rows, triangles, value
-from tests.reference.sweep import interiors_meet_in_plane, interiors_meet_in_space
+from tests.reference.sweep import (
+    interiors_meet_in_plane,
+    interiors_meet_in_space,
+    parities_in_plane,
+    parities_in_space,
+)
 
 DISJOINT, FIRST_INSIDE_SECOND, SECOND_INSIDE_FIRST, OVERLAPPING, TOUCHING = range(5)
 SWAPPED = (DISJOINT, SECOND_INSIDE_FIRST, FIRST_INSIDE_SECOND, OVERLAPPING, TOUCHING)
@@ -82,6 +87,28 @@ def _bodies(first: Solid, second: Solid, first_pose: Solid | None, second_pose: 
     if not any(is_surface) and (interiors_meet_in_plane if dimension(first) == 2 else interiors_meet_in_space)(a, b):
         return OVERLAPPING
     return TOUCHING
+
+
+def detail(
+    first: Solid, second: Solid, first_pose: Solid | None = None, second_pose: Solid | None = None
+) -> str | None:
+    """Return the name of the relation of RCC-8 of two bodies with faces, None where one has no interior."""
+    if first_pose == second_pose:
+        first_pose = second_pose = None
+    a, b = _faces(first, first_pose), _faces(second, second_pose)
+    planar = dimension(first) == 2
+    parities, meet = (parities_in_plane, segments_meet) if planar else (parities_in_space, triangles_meet)
+    if not parities(a, a) or not parities(b, b):
+        return None
+    found = parities(a, b)
+    boundaries_meet = any(boxes_meet(one, other) and meet(one, other) for one in a for other in b)
+    if (1, 1) not in found:
+        return "EC" if boundaries_meet or relation(first, second, first_pose, second_pose) != DISJOINT else "DC"
+    if (1, 0) in found and (0, 1) in found:
+        return "PO"
+    if (1, 0) not in found and (0, 1) not in found:
+        return "EQ"
+    return ("T" if boundaries_meet else "NT") + ("PPi" if (1, 0) in found else "PP")
 
 
 def _half_spaces(first: Vector, second: Vector) -> int:

@@ -29,6 +29,30 @@ def interiors_meet_in_space(first: list[Triangle], second: list[Triangle]) -> bo
     return False
 
 
+def parities_in_space(first: list[Triangle], second: list[Triangle]) -> set[tuple[int, int]]:
+    """Return the parities (in the first, in the second) that some open set has, outside of both aside."""
+    first, second = [_with_area(faces) for faces in (first, second)]
+    found: set[tuple[int, int]] = set()
+    for left, right in pairwise(sorted(_critical(first + second))):
+        x = (left + right) / 2
+        found |= parities_in_plane(_slice(first, x), _slice(second, x))
+    return found - {(0, 0)}
+
+
+def parities_in_plane(first: list[Segment], second: list[Segment]) -> set[tuple[int, int]]:
+    """Return the same for two closed edge sets of the plane."""
+    first, second = [[s for s in edges if s[0] != s[1]] for edges in (first, second)]
+    cuts = {p[0] for edge in first + second for p in edge}
+    for one, other in combinations(first + second, 2):
+        point = crossing_of_lines(one, other)
+        if point is not None:
+            cuts.add(point[0])
+    found: set[tuple[int, int]] = set()
+    for left, right in pairwise(sorted(cuts)):
+        found |= _parities_on_line(first, second, (left + right) / 2)
+    return found - {(0, 0)}
+
+
 def _with_area(faces: list[Triangle]) -> list[Triangle]:
     return [face for face in faces if square(cross(sub(face[1], face[0]), sub(face[2], face[0]))) != 0]
 
@@ -110,8 +134,12 @@ def interiors_meet_in_plane(first: list[Segment], second: list[Segment]) -> bool
 
 
 def _meet_on_line(first: list[Segment], second: list[Segment], x: Q) -> bool:
+    return (1, 1) in _parities_on_line(first, second, x)
+
+
+def _parities_on_line(first: list[Segment], second: list[Segment], x: Q) -> set[tuple[int, int]]:
     """Walk up the line at x, which holds no end point, and count the parity of both bodies between crossings."""
-    events = []
+    events, found = [], set()
     for body, edges in enumerate((first, second)):
         for a, b in edges:
             if (a[0] - x) * (b[0] - x) < 0:
@@ -120,6 +148,6 @@ def _meet_on_line(first: list[Segment], second: list[Segment], x: Q) -> bool:
     parity = [0, 0]
     for (y, body), (after, _) in pairwise(events):
         parity[body] ^= 1
-        if after > y and parity == [1, 1]:
-            return True
-    return False
+        if after > y:
+            found.add((parity[0], parity[1]))
+    return found

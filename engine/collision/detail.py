@@ -1,0 +1,142 @@
+"""The eight relations of RCC-8, from the five: one table from the types of an overlapping pair to what sticks out.
+
+Disjoint is DC, touching EC, inside NTPP. Only overlapping splits further: neither body sticks out of the other, EQ; one
+does, TPP or NTPP by whether the boundaries meet; both do, PO.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from engine.arrangement.subdivision import label_faces, subdivide
+from engine.collision.ball_detail import body_ball_parts
+from engine.collision.half_space_detail import half_space_mesh_parts, half_space_outline_parts
+from engine.collision.images import dot, image_half_space, image_point, minus, squared_length
+from engine.collision.live_faces import live_piece
+from engine.collision.mesh_detail import mesh_parts
+from engine.collision.outline import arrange_outlines, live_edges, outline_of, single_points
+from engine.collision.outline_outline import FIRST, SECOND, boundaries_meet
+from engine.collision.pairs import MESHES, OUTLINES
+from engine.collision.result import Parts, Work
+from engine.collision.shell import shell_of
+from engine.containment.rational_locate import rational_location
+from engine.errors import UnsupportedSolidError
+from engine.parallel import Budget
+from engine.solids.base import Solid
+from engine.solids.half_space import HalfSpace
+from engine.solids.pose import Pose
+from engine.solids.sphere import Sphere
+from engine.solids.surface import Surface
+from engine.types import Location, Rcc8, Relation
+
+PartsFunction = Callable[[Any, Any, Pose | None, Pose | None, Work], Parts]
+
+
+def check_has_detail(first: Solid, second: Solid) -> None:
+    """Raise where a body can have no interior by its type."""
+    for name, solid in (("first", first), ("second", second)):
+        if isinstance(solid, Surface):
+            raise UnsupportedSolidError(
+                f"{name} is a surface, which has no interior: detail is told of solids; make it a polyhedron, "
+                "or ask without detail",
+                (name,),
+            )
+
+
+def detail_of(
+    first: Solid, second: Solid, first_pose: Pose | None, second_pose: Pose | None, relation: Relation, work: Work
+) -> Rcc8 | None:
+    """Return the relation of RCC-8 of a checked pair whose relation is known; None where a body has no interior."""
+    if relation != Relation.OVERLAPPING:
+        if not (has_interior(first, work.budget) and has_interior(second, work.budget)):
+            return None
+        return {
+            Relation.DISJOINT: Rcc8.DC,
+            Relation.TOUCHING: Rcc8.EC,
+            Relation.FIRST_INSIDE_SECOND: Rcc8.NTPP,
+            Relation.SECOND_INSIDE_FIRST: Rcc8.NTPPI,
+        }[relation]
+    if first_pose is not None and first_pose == second_pose:
+        first_pose = second_pose = None
+    function = PARTS.get((first.dimension, first.type, second.type))
+    if function is not None:
+        parts = function(first, second, first_pose, second_pose, work)
+    else:
+        function = PARTS[first.dimension, second.type, first.type]
+        parts = function(second, first, second_pose, first_pose, work).swapped()
+    if parts.first and parts.second:
+        return Rcc8.PO
+    if parts.first:
+        return Rcc8.TPPI if parts.meet else Rcc8.NTPPI
+    if parts.second:
+        return Rcc8.TPP if parts.meet else Rcc8.NTPP
+    return Rcc8.EQ
+
+
+def has_interior(solid: Solid, budget: Budget) -> bool:
+    """Tell whether some open set lies within a solid."""
+    if isinstance(solid, HalfSpace):
+        return True
+    if isinstance(solid, Sphere):
+        return solid.radius > 0.0
+    if solid.dimension == 2:
+        return bool(live_edges(outline_of(solid, None, budget), budget))
+    shell = shell_of(solid)
+    return shell.has_inside and any(live_piece(shell, face, budget) is not None for face in range(len(shell.faces)))
+
+
+def _sphere_sphere(
+    first: Sphere, second: Sphere, first_pose: Pose | None, second_pose: Pose | None, work: Work
+) -> Parts:
+    between = squared_length(minus(image_point(first.center, first_pose), image_point(second.center, second_pose)))
+    r, s = image_point([first.radius, second.radius], None)
+    return Parts(r > s or between > (s - r) ** 2, s > r or between > (s - r) ** 2, True)
+
+
+def _half_spaces(
+    first: HalfSpace, second: HalfSpace, first_pose: Pose | None, second_pose: Pose | None, work: Work
+) -> Parts:
+    """Overlapping half-spaces are equal, or their planes cross, or each holds the plane of the other."""
+    n, d = image_half_space(first.normal, first.offset, first_pose)
+    m, e = image_half_space(second.normal, second.offset, second_pose)
+    axis = max(range(len(n)), key=lambda k: abs(n[k]))
+    factor = m[axis] / n[axis]
+    is_equal = factor > 0 and all(q == factor * p for p, q in zip((*n, d), (*m, e)))
+    return Parts(not is_equal, not is_equal, True)
+
+
+def _half_space_sphere(
+    half_space: HalfSpace, sphere: Sphere, half_space_pose: Pose | None, sphere_pose: Pose | None, work: Work
+) -> Parts:
+    """A ball that overlaps a half-space reaches its plane."""
+    normal, offset = image_half_space(half_space.normal, half_space.offset, half_space_pose)
+    height = dot(normal, image_point(sphere.center, sphere_pose)) + offset
+    (radius,) = image_point([sphere.radius], None)
+    return Parts(True, height < 0 or height**2 < radius**2 * squared_length(normal), True)
+
+
+def _outlines(first: Solid, second: Solid, first_pose: Pose | None, second_pose: Pose | None, work: Work) -> Parts:
+    outlines = [outline_of(first, first_pose, work.budget), outline_of(second, second_pose, work.budget)]
+    arrangement, _ = arrange_outlines(outlines, work.budget)
+    labels = label_faces(subdivide(arrangement, work.budget))
+    meet = boundaries_meet(arrangement)
+    for outline, other, pose in ((outlines[0], second, second_pose), (outlines[1], first, first_pose)):
+        for vertex in single_points(outline):
+            at = rational_location(outline.points[vertex], other, pose, work.budget.check)
+            meet = meet or at == Location.BOUNDARY
+    return Parts(FIRST in labels, SECOND in labels, meet)
+
+
+PARTS: dict[tuple[int, str, str], PartsFunction] = {
+    **{(3, first, second): mesh_parts for first in MESHES for second in MESHES},
+    **{(2, first, second): _outlines for first in OUTLINES for second in OUTLINES},
+    **{(3, "half_space", body): half_space_mesh_parts for body in MESHES},
+    **{(2, "half_space", body): half_space_outline_parts for body in OUTLINES},
+    **{(3, body, "sphere"): body_ball_parts for body in MESHES},
+    **{(2, body, "sphere"): body_ball_parts for body in OUTLINES},
+}
+for _dimension in (2, 3):
+    PARTS[_dimension, "half_space", "half_space"] = _half_spaces
+    PARTS[_dimension, "half_space", "sphere"] = _half_space_sphere
+    PARTS[_dimension, "sphere", "sphere"] = _sphere_sphere
