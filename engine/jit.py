@@ -55,6 +55,7 @@ def _source(module: str) -> str | None:
     return None
 
 
+@functools.cache
 def imported_modules(module: str) -> set[str]:
     """Return the engine modules that `module` names in its import lines (``engine/__init__`` is left out)."""
     found: set[str] = set()
