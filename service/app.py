@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import logging
+import sys
 import threading
 import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from typing import Final
 
 from fastapi import FastAPI
 from starlette.exceptions import HTTPException
@@ -28,6 +30,9 @@ from service.work import Memory, Pool
 
 log = logging.getLogger("service")
 
+SWITCH_SECONDS: Final = 0.0002
+"""How long one thread keeps the interpreter while others wait: the event loop hands over several times a request, and
+with Python's 5 ms each time beside a batch, small requests would wait for tens of milliseconds."""
 DESCRIPTION = """Containment, collision and clipping with exact decisions.
 
 Every float64 given is taken as the exact number it is; every yes/no, side, order, count and relation equals what exact
@@ -77,6 +82,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     """Compile or load the kernels in a thread, so that /healthz answers meanwhile; drain the pool at the end."""
     app.state.pool = Pool(app.state.settings)
+    sys.setswitchinterval(SWITCH_SECONDS)
     threading.Thread(target=_warm, args=(app,), name="warm-up", daemon=True).start()
     try:
         yield
