@@ -1,0 +1,117 @@
+"""What each way of reducing the quadratic cost of collision saves: the table of docs/collision_cost.md.
+
+python -m benchmarks.collision_cost [--quick]
+
+One thread, two generated bodies near contact; every figure is the best of three runs. Nothing needs peers or data.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+import engine
+from benchmarks.collision_scenes import belted_ball, crowd
+from benchmarks.measure import clocked
+from benchmarks.poses import Pair, near_contact
+from benchmarks.workloads import Mesh, bumpy_sphere
+from engine.textbook import collide_by_edges
+
+Line = tuple[str, str, str]
+"""The approach, its time in words, what it settles."""
+
+
+def best(run: Callable[[], object]) -> float:
+    run()
+    return min(clocked(run)[0] for _ in range(3))
+
+
+def shown(seconds: float) -> str:
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)):
+        if seconds >= size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds / 1e-9:.3g} ns"
+
+
+def ask(pair: Pair, **options: bool) -> Callable[[], np.ndarray]:
+    first, second = pair.solids()
+    engine.collide_poses(first, second, pair.rotations[:1], pair.translations[:1])  # builds what is kept
+    return lambda: engine.collide_poses(first, second, pair.rotations, pair.translations, workers=1, **options)
+
+
+def bodies(times: int, n_poses: int) -> Pair:
+    first, second = (bumpy_sphere(f"cost {seed}", seed, times) for seed in (1, 2))
+    return near_contact(f"cost {times}", first, second, True, n_poses, 1)
+
+
+def naive(times: int) -> Line:
+    """Every edge against every face, for a pose without contact: nothing ends the loops early."""
+    pair = bodies(times, 50)
+    free = int(np.flatnonzero(ask(pair)() == engine.Relation.DISJOINT)[0])
+    moved = np.ascontiguousarray(pair.second.vertices @ pair.rotations[free].T + pair.translations[free])
+    faces = pair.first.faces.astype(np.int64), pair.second.faces.astype(np.int64)
+    seconds = best(lambda: collide_by_edges.collide(pair.first.vertices, faces[0], moved, faces[1]))
+    return f"all pairs, {len(faces[0]):,} x {len(faces[1]):,} faces", shown(seconds), "everything, in float64 only"
+
+
+def volumes(pair: Pair) -> Iterator[Line]:
+    """One bounding volume for each body: near contact, and at places of a scene ten bodies wide."""
+    n, middles, radii, random = len(pair.rotations), [], [], np.random.default_rng(1)
+    for mesh in (pair.first, pair.second):
+        middles.append(0.5 * (mesh.vertices.min(0) + mesh.vertices.max(0)))
+        radii.append(np.linalg.norm(mesh.vertices - middles[-1], axis=1).max())
+    low, high = pair.first.vertices.min(0), pair.first.vertices.max(0)
+    half = 0.5 * (pair.second.vertices.max(0) - pair.second.vertices.min(0))
+    scattered = middles[0] + random.uniform(-1, 1, (n, 3)) * 5 * (high - low)
+
+    def by_sphere(places: np.ndarray) -> np.ndarray:
+        return np.linalg.norm(places - middles[0], axis=1) > sum(radii)
+
+    def by_box(places: np.ndarray) -> np.ndarray:
+        reach = np.abs(pair.rotations) @ half
+        return ((places - reach > high) | (places + reach < low)).any(axis=1)
+
+    places = pair.rotations @ middles[1] + pair.translations
+    for name, test in (("bounding sphere", by_sphere), ("bounding box, turned with the body", by_box)):
+        settled = f"{test(scattered).mean():.1%} of scattered poses, {test(places).mean():.1%} near contact"
+        yield name, shown(best(lambda test=test: test(places)) / n), settled
+
+
+def lines(is_quick: bool) -> Iterator[Line]:
+    n_poses = 200 if is_quick else 2_000
+    for times in (2, 3) if is_quick else (2, 3, 4):
+        yield naive(times)
+    for times in (3, 4) if is_quick else (3, 4, 5):
+        pair = bodies(times, n_poses)
+        if times == 3:
+            yield from volumes(pair)
+        name = f"box trees, {len(pair.first.faces):,} x {len(pair.second.faces):,} faces"
+        yield name, shown(best(ask(pair)) / n_poses), "five relations, exact"
+    yield "the same, boolean only", shown(best(ask(pair, boolean=True)) / n_poses), "disjoint or not, exact"
+    first, second = pair.solids()
+    poses = [engine.Pose(r, t) for r, t in zip(pair.rotations[:100], pair.translations[:100], strict=True)]
+    seconds = best(lambda: [engine.collide(first, second, second_pose=pose, boolean=True) for pose in poses]) / 100
+    yield "the same, one call a pose", shown(seconds), "disjoint or not, exact"
+    convex = belted_ball(100, 1)
+    dented = Mesh("dented", convex.vertices.copy(), convex.faces)
+    dented.vertices[50] *= 0.9
+    for name, mesh in (("100 vertices, box trees (one dent)", dented), ("100 vertices, convex path", convex)):
+        seconds = best(ask(near_contact(name, mesh, mesh, True, n_poses, 1))) / n_poses
+        yield name, shown(seconds), "five relations, exact"
+    for n_bodies in (300,) if is_quick else (1_000, 3_000):
+        scene = crowd(n_bodies, 1)
+        solids = [engine.Polyhedron(scene.meshes[kind].vertices, scene.meshes[kind].faces) for kind in range(8)]
+        stand = [engine.Pose(r, t) for r, t in zip(scene.rotations, scene.translations, strict=True)]
+        every = [solids[kind] for kind in scene.kinds]
+        pairs = np.stack(np.triu_indices(n_bodies, 1), axis=1)
+        for how, only in (("every pair's boxes", pairs), ("grid of boxes", None)):
+            run = best(lambda only=only: engine.collide_scene(every, stand, only=only, workers=1))  # noqa: B023
+            yield f"{n_bodies:,} bodies, {how}", shown(run), "every colliding pair, exact"
+
+
+if __name__ == "__main__":
+    print("| approach | time | settles |\n|---|---|---|", flush=True)
+    for line in lines("--quick" in sys.argv):
+        print(f"| {' | '.join(line)} |", flush=True)
