@@ -100,6 +100,25 @@ def _summary(rows: list[dict[str, Any]]) -> str:
     return "\n".join(lines) + "\n\n"
 
 
+def smallest(found: dict[str, Any]) -> str:
+    """Return the README's table: of each operation its first hard contest."""
+    rows, seen = [], set()
+    for name, ours, peer in summary_rows(found["rows"]):
+        if ours["operation"] not in seen and not ours["operation"].startswith(("orientation", "containment, ")):
+            seen.add(ours["operation"])
+            rows.append((name, ours, peer))
+    lines = [
+        "| hard inputs | ours, a second | wrong | fastest peer | a second | wrong or refused |",
+        "|---|---|---|---|---|---|",
+    ]
+    for name, ours, peer in rows:
+        lines.append(
+            f"| {name} | {ours['rate']:,.0f} | {ours['errors']['wrong']} of {ours['errors']['judged']:,} | "
+            f"{peer['contender']} | {peer['rate']:,.0f} | {_percent(error_share(peer))} |"
+        )
+    return "\n".join(lines) + "\n"
+
+
 def _facts(found: dict[str, Any]) -> str:
     versions = ", ".join(f"{name} {version}" for name, version in found["versions"].items())
     return (

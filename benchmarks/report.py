@@ -27,7 +27,9 @@ from benchmarks.fields import collision, containment, filed, overlay, polygons, 
 from benchmarks.suite import RESULTS
 
 FIELDS = (containment, collision, segments, polygons, overlay, primitives)
-DOCS = Path(__file__).resolve().parents[1] / "docs"
+ROOT = Path(__file__).resolve().parents[1]
+DOCS, README = ROOT / "docs", ROOT / "README.md"
+BEGIN, END = "<!-- benchmarks.report writes this table -->", "<!-- to here -->"
 
 
 def main(words: list[str] | None = None) -> int:
@@ -74,6 +76,8 @@ def _write_pages(found: dict[str, Any]) -> None:
         (DOCS / "pictures").mkdir(parents=True, exist_ok=True)
         (DOCS / "pictures" / name).write_text(text)
     (DOCS / "speed_and_error.md").write_text(page.text_of(found))
+    head, _, rest = README.read_text().partition(BEGIN)
+    README.write_text(f"{head}{BEGIN}\n{page.smallest(found)}{END}{rest.partition(END)[2]}")
 
 
 def say(words: str) -> None:
