@@ -22,7 +22,8 @@ def _made(rings: Rings) -> shapely.Polygon:
 def _polygon(rings: Rings, threads: int) -> Prepared:
     polygon = _made(rings)
     shapely.prepare(polygon)
-    shapely.contains_xy(polygon, *rings.rings[0][0])  # the index is made at the first question
+    shapely.contains_xy(polygon, *np.mean(rings.rings[0][:64], axis=0).repeat(4).reshape(2, 4))
+    # the index is made lazily, at the second question or so: by two threads at once, the process may crash
 
     def native(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return np.ascontiguousarray(points[:, 0]), np.ascontiguousarray(points[:, 1])
