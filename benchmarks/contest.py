@@ -120,9 +120,15 @@ def _built(contest: Contest, contender: Contender, row: Row, seconds: float) -> 
         row.absent = f"{type(error).__name__}: {error}".splitlines()[0]
         return None
     row.build, row.memory = time.perf_counter() - before, max(0, _resident() - resident)
-    ask(contest.items[:PROBE])  # cold: compiles, loads
-    row.n_items = _how_many(ask, contest.items, seconds)
-    answers = ask(contest.items[: row.n_items])
+    try:
+        ask(contest.items[:PROBE])  # cold: compiles, loads
+        row.n_items = _how_many(ask, contest.items, seconds)
+        answers = ask(contest.items[: row.n_items])
+    except Exception as error:  # of a peer, for the whole batch; ours has no excuse
+        if contender.name == "ours":
+            raise
+        row.absent = f"raised {type(error).__name__}: {error}".splitlines()[0]
+        return None
     n_judged = min(row.n_items, len(contest.exact))
     row.errors = contest.judge(answers[:n_judged], contest.exact[:n_judged])
     if contender.exact_share is not None:

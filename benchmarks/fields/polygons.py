@@ -78,7 +78,7 @@ def _ours() -> Ask:
 
 def _textbook() -> Ask:
     def ask(rings: np.ndarray) -> np.ndarray:
-        clipped = [sutherland_hodgman.clip_on_convex([ring], BOX)[0] for ring in rings]
+        clipped = [next(iter(sutherland_hodgman.clip_on_convex([ring], BOX)), np.empty((0, 2))) for ring in rings]
         found, sizes = np.zeros(len(rings)), np.array([len(ring) for ring in clipped])
         kept = sizes > 0
         found[kept] = np.abs(ring_areas(np.concatenate(clipped), np.append(0, np.cumsum(sizes[kept]))))
