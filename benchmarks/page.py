@@ -154,7 +154,7 @@ def _table(rows: list[dict[str, Any]], operation: str, contest: str) -> str:
     ]
     for row in mine:
         if row["absent"]:
-            lines.append(f"| {row['contender']} | not installed: {row['absent']} |" + " |" * 10)
+            lines.append(f"| {row['contender']} | absent: {row['absent']} |" + " |" * 10)
             continue
         errors = row["errors"]
         low, high = _quartiles(row)
