@@ -136,6 +136,9 @@ Up is wrong, right is fast; the lowest lane is exactly zero wrong.
 
 ![Speed against size](pictures/speed_by_size.svg)
 
+Left: batches of 50,000 points, of 100 where the first question took too long; asked so little, a mesh beyond some
+20,000 faces never gets our cells, and 100 points at once cost a pass over the faces. Right: one mesh of 20,480 faces.
+
 ![Errors of clipped coordinates](pictures/coordinate_errors.svg)
 
 The hard cases themselves, with drawings: [hard_cases.md](hard_cases.md).
