@@ -8,16 +8,18 @@ changes from round to round; a slow one gets the first so many items only, which
 from __future__ import annotations
 
 import gc
+import os
 import statistics
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from benchmarks.measure import spread
+from benchmarks.load import memory_of
+from benchmarks.measure import clocked
 
 Ask = Callable[[Any], Any]
 REFUSED = -9
@@ -89,10 +91,6 @@ class Row:
         return self.n_items / max(statistics.median(self.seconds) - self.n_items * self.call_overhead, 1e-12)
 
 
-def _resident() -> int:
-    return int(Path("/proc/self/statm").read_text().split()[1]) * 4096
-
-
 def hold(contest: Contest, rounds: int, seconds: float) -> list[Row]:
     """Return one row for each contender; each is timed for about `seconds`."""
     rows, asks = [], []
@@ -106,20 +104,21 @@ def hold(contest: Contest, rounds: int, seconds: float) -> list[Row]:
             if asks[i] is None:
                 continue
             gc.collect()
-            rows[i].seconds.append(_seconds_of(asks[i], contest.items[: rows[i].n_items]))
+            rows[i].seconds.append(clocked(partial(asks[i], contest.items[: rows[i].n_items]))[0])
     return rows
 
 
 def _built(contest: Contest, contender: Contender, row: Row, seconds: float) -> Ask | None:
     """Build a contender, ask it once, judge its answers; None if it is absent."""
     gc.collect()
-    resident, before = _resident(), time.perf_counter()
+    resident, before = memory_of(os.getpid()), time.perf_counter()
     try:
         ask = contender.make()
     except (ImportError, OSError) as error:
         row.absent = f"{type(error).__name__}: {error}".splitlines()[0]
         return None
-    row.build, row.memory = time.perf_counter() - before, max(0, _resident() - resident)
+    row.build = time.perf_counter() - before
+    row.memory = int(max(0.0, memory_of(os.getpid()) - resident) * 2**20)
     try:
         ask(contest.items[:PROBE])  # cold: compiles, loads
         row.n_items = _how_many(ask, contest.items, seconds)
@@ -138,19 +137,14 @@ def _built(contest: Contest, contender: Contender, row: Row, seconds: float) -> 
     return ask
 
 
-def _seconds_of(ask: Ask, items: Any) -> float:
-    before = time.perf_counter()
-    ask(items)
-    return time.perf_counter() - before
-
-
 def _how_many(ask: Ask, items: Any, seconds: float) -> int:
     """Return how many items a contender answers in about so many seconds; some have a large cost per call."""
     n_items = PROBE
     while n_items < len(items):
-        taken = _seconds_of(ask, items[:n_items])
+        once = partial(ask, items[:n_items])
+        taken = clocked(once)[0]
         if 2 * taken > seconds:  # it may have built something that later questions use
-            taken = min(taken, _seconds_of(ask, items[:n_items]))
+            taken = min(taken, clocked(once)[0])
         if 2 * taken > seconds:
             return n_items
         n_items = int(n_items * min(8.0, max(1.5, seconds / max(taken, 1e-9))))
@@ -203,9 +197,3 @@ def areas(answers: np.ndarray, exact: np.ndarray) -> dict[str, Any]:
         "ulp_largest": float(good.max(initial=0.0)),
         "ulp_median": float(np.median(good)) if len(good) else 0.0,
     }
-
-
-def quartiles(row: Row) -> tuple[float, float]:
-    """Return the quartiles of the row's items a second."""
-    found = spread(row.seconds)
-    return row.n_items / found.high, row.n_items / found.low

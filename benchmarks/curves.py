@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import time
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from benchmarks.contest import Contender
 from benchmarks.fields import containment
+from benchmarks.measure import clocked
 from benchmarks.workloads import Mesh, Rings, bumpy_sphere, generator, uniform_points
 
 ULPS = (0, 1, 2, 4, 16, 64, 2**10, 2**14, 2**18, 2**24, 2**30)
@@ -78,15 +79,11 @@ def _time(table: dict[str, list[list[float]]], contender: Contender, items: np.n
         ask = contender.make()
     except (ImportError, OSError):
         return
-    before = time.perf_counter()
-    ask(items[:100])
-    if (time.perf_counter() - before) * len(items) > 3000:  # a contender of 30 ms a point is given 100 points
+    if clocked(partial(ask, items[:100]))[0] * len(items) > 3000:  # a contender of 30 ms a point is given 100 points
         items = items[:100]
     seconds = []
     for _ in range(5):
-        before = time.perf_counter()
-        ask(items)
-        seconds.append(time.perf_counter() - before)
+        seconds.append(clocked(partial(ask, items))[0])
         if sum(seconds) > 3:
             break
     table.setdefault(contender.name, []).append([place, len(items) / float(np.median(seconds))])

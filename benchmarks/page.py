@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from benchmarks.fields import filed
+from benchmarks.measure import spread
 from benchmarks.pictures import error_share
 
 LISTED = 8
@@ -176,8 +177,6 @@ def _table(rows: list[dict[str, Any]], operation: str, contest: str) -> str:
 
 
 def _quartiles(row: dict[str, Any]) -> tuple[float, float]:
-    from benchmarks.measure import spread
-
     found = spread(row["seconds"])
     return row["n_items"] / found.high, row["n_items"] / found.low
 
