@@ -4,13 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from engine.collision.convex_pair import (
-    DISJOINT,
-    FIRST_INSIDE_SECOND,
-    OVERLAPPING,
-    SECOND_INSIDE_FIRST,
-    TOUCHING,
-)
+from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING
 from engine.jit import inline, kernel
 
 

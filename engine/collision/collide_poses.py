@@ -7,11 +7,12 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
+from engine.collision.codes import UNSETTLED
 from engine.collision.collide import collide_pair, pair_function
 from engine.collision.dual_traversal import new_descent
 from engine.collision.mesh_mesh import mesh_mesh, what_to_seek
 from engine.collision.placement import PoseArrays
-from engine.collision.pose_batch import UNSETTLED, relate_poses
+from engine.collision.pose_batch import relate_poses
 from engine.collision.result import Witness, Work
 from engine.collision.shell import read_only, shell_of
 from engine.collision.short_paths import convex_poses

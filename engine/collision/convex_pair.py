@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, UNSETTLED
 from engine.collision.convex_body import ASIDE, CENTER, RADIUS, ConvexArrays
 from engine.collision.portal import (
     APART,
@@ -31,9 +32,6 @@ from engine.collision.portal import (
 )
 from engine.jit import inline, kernel, merged
 from engine.types import Point3
-
-UNSETTLED = -1
-DISJOINT, FIRST_INSIDE_SECOND, SECOND_INSIDE_FIRST, OVERLAPPING, TOUCHING = range(5)  # as in engine.types.Relation
 
 _OUT, _WITHIN, _OPEN = range(3)
 _POLL_EVERY = 256

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
 from engine.collision.dual_traversal import (
     DONE,
     FULL,
@@ -21,11 +22,6 @@ from engine.collision.placement import Placement, PoseArrays
 from engine.collision.shell import ShellArrays
 from engine.jit import inline, kernel
 from engine.predicates.loading import as_point3
-
-UNSETTLED = -1
-"""Written in place of a relation: weak contacts, undecided signs, or components of which only some lie inside."""
-
-DISJOINT, FIRST_INSIDE_SECOND, SECOND_INSIDE_FIRST, OVERLAPPING, TOUCHING = range(5)  # as in engine.types.Relation
 
 _NONE, _ALL, _SOME, _UNSURE = range(4)
 

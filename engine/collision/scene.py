@@ -11,8 +11,8 @@ import numpy.typing as npt
 
 from engine.bounding.box_grid import pairs_of_boxes
 from engine.bounding.sweep import BLOCK
+from engine.collision.codes import UNSETTLED
 from engine.collision.collide import collide_pair
-from engine.collision.convex_pair import UNSETTLED
 from engine.collision.result import Witness, Work
 from engine.collision.scene_bodies import SceneBodies, scene_bodies
 from engine.collision.short_paths import ShortPaths

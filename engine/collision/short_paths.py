@@ -8,8 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.collision.aabb_batch import relate_box_pairs
+from engine.collision.codes import UNSETTLED
 from engine.collision.convex_body import ConvexArrays, ConvexBody, convex_body_of, pooled
-from engine.collision.convex_pair import UNSETTLED, relate_convex_pairs
+from engine.collision.convex_pair import relate_convex_pairs
 from engine.collision.scene_bodies import SceneBodies
 from engine.parallel import Budget, run_chunks
 from engine.solids.aabb import Aabb

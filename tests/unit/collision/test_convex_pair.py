@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from engine import Aabb, Polyhedron, Pose, Relation, Solid, Sphere
+from engine.collision.codes import UNSETTLED
 from engine.collision.collide import collide_pair
 from engine.collision.convex_body import convex_body_of, pooled
-from engine.collision.convex_pair import UNSETTLED, relate_convex_pairs
+from engine.collision.convex_pair import relate_convex_pairs
 from engine.collision.result import Work
 
 CUBE = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]]
