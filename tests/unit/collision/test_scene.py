@@ -138,9 +138,9 @@ def test_witnesses_come_with_the_pairs_when_asked_for() -> None:
 
 
 def test_a_scene_in_which_all_meet_all_ends_at_its_deadline() -> None:
-    solids = [Aabb([0, 0, 0], [1 + k, 1, 1]) for k in range(4000)]  # eight million pairs
+    solids = [Aabb([0, 0, 0], [1 + k, 1, 1]) for k in range(12_000)]  # 72 million pairs, 20 s
     collide_scene(solids[:3])  # compiles
-    before = time.monotonic()
+    before = time.process_time()  # a busy machine may keep the call waiting
     with pytest.raises(DeadlineExceededError):
-        collide_scene(solids, deadline=0.5)
-    assert time.monotonic() - before < 2.0
+        collide_scene(solids, deadline=0.2)
+    assert time.process_time() - before < 5
