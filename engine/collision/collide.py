@@ -9,7 +9,6 @@ from engine.collision.pairs import PAIRS
 from engine.collision.result import Collision, PairFunction, Work
 from engine.errors import (
     InvalidArrayError,
-    InvalidInputError,
     UnsupportedPairError,
     UnsupportedSolidError,
     WrongDimensionError,
@@ -164,9 +163,7 @@ def collide(
     check_pose(second_pose, second, "second_pose")
     check_options(workers, progress)
     if detail:
-        if boolean:
-            raise InvalidInputError("detail needs the relation, which boolean leaves open; ask for one", ("detail",))
-        check_has_detail(first, second)
+        check_has_detail(((("first",), first), (("second",), second)), boolean)
     with Budget(deadline, cancel) as budget:
         budget.check()
         work = Work(budget, boolean=boolean)

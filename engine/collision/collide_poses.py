@@ -9,6 +9,15 @@ import numpy.typing as npt
 
 from engine.collision.codes import UNSETTLED
 from engine.collision.collide import collide_pair, pair_function
+from engine.collision.detail import (
+    NO_DETAIL,
+    Details,
+    check_has_detail,
+    code_of,
+    detail_of,
+    details_where_proven,
+    has_interior,
+)
 from engine.collision.dual_traversal import new_descent
 from engine.collision.mesh_mesh import mesh_mesh, what_to_seek
 from engine.collision.placement import PoseArrays
@@ -25,7 +34,10 @@ from engine.types import Accuracy, Relation
 
 Relations = npt.NDArray[np.int8]
 _ROOM = 64
-PoseCollisions = Relations | tuple[Relations, list[Witness | None]]
+Witnesses = list[Witness | None]
+PoseCollisions = (
+    Relations | tuple[Relations, Witnesses] | tuple[Relations, Details] | tuple[Relations, Witnesses, Details]
+)
 
 
 def collide_poses(
@@ -36,6 +48,7 @@ def collide_poses(
     *,
     witnesses: bool = False,
     boolean: bool = False,
+    detail: bool = False,
     workers: int | None = None,
     deadline: float | None = None,
     cancel: Cancel | None = None,
@@ -63,24 +76,33 @@ def collide_poses(
     [3, 4, 0]
     """
     function, _ = pair_function(first, second)
+    if detail:
+        check_has_detail(((("first",), first), (("second",), second)), boolean)
     turns, moves = as_poses(rotations, translations, first.dimension)
     n_poses = len(turns)
     relations = np.full(n_poses, UNSETTLED, np.int8)
-    found: list[Witness | None] = [None] * n_poses
+    found: Witnesses = [None] * n_poses
+    details = np.full(n_poses, NO_DETAIL, np.int8)
     with Budget(deadline, cancel) as budget:
         budget.check()
+        has_detail = detail and has_interior(first, budget) and has_interior(second, budget)
         works: list[Work] = []
 
         def one_by_one(start: int, stop: int) -> None:
             work = Work(budget, witness=witnesses, boolean=boolean)
             works.append(work)
             is_open = relations[start:stop] == UNSETTLED
+            if has_detail:
+                details[start:stop] = np.where(is_open, NO_DETAIL, details_where_proven(relations[start:stop]))
             if witnesses:
                 is_open |= relations[start:stop] != Relation.DISJOINT
             for item in (start + np.flatnonzero(is_open)).tolist():
                 budget.check()
-                answer = collide_pair(first, second, None, Pose(turns[item], moves[item]), work)
+                pose = Pose(turns[item], moves[item])
+                answer = collide_pair(first, second, None, pose, work)
                 relations[item], found[item] = answer.relation, answer.witness
+                if has_detail and details[item] == NO_DETAIL:
+                    details[item] = code_of(detail_of(first, second, None, pose, answer.relation, work))
 
         task = one_by_one
         if function is mesh_mesh:
@@ -93,7 +115,11 @@ def collide_poses(
                 one_by_one(start, stop)
 
         run_chunks(task, n_poses, budget=budget, first_chunk=8, workers=workers, progress=progress)
-    result: PoseCollisions = (relations, found) if witnesses else relations
+    result: PoseCollisions = relations
+    if detail:
+        result = (relations, found, details) if witnesses else (relations, details)
+    elif witnesses:
+        result = (relations, found)
     if not report:
         return result
     method = "+".join(sorted({first.type, second.type}))

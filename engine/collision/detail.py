@@ -6,8 +6,11 @@ does, TPP or NTPP by whether the boundaries meet; both do, PO.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
+
+import numpy as np
+import numpy.typing as npt
 
 from engine.arrangement.subdivision import label_faces, subdivide
 from engine.collision.ball_detail import body_ball_parts
@@ -21,9 +24,11 @@ from engine.collision.pairs import MESHES, OUTLINES
 from engine.collision.result import Parts, Work
 from engine.collision.shell import shell_of
 from engine.containment.rational_locate import rational_location
-from engine.errors import UnsupportedSolidError
+from engine.errors import InvalidInputError, UnsupportedSolidError
 from engine.parallel import Budget
-from engine.solids.base import Solid
+from engine.solids.aabb import Aabb
+from engine.solids.base import FloatArray, IntArray, Solid
+from engine.solids.checks import spell
 from engine.solids.half_space import HalfSpace
 from engine.solids.pose import Pose
 from engine.solids.sphere import Sphere
@@ -31,17 +36,52 @@ from engine.solids.surface import Surface
 from engine.types import Location, Rcc8, Relation
 
 PartsFunction = Callable[[Any, Any, Pose | None, Pose | None, Work], Parts]
+Details = npt.NDArray[np.int8]
+
+NO_DETAIL = -1
+"""In place of a code of `Rcc8`: a body without interior."""
+
+UNLESS_OVERLAPPING = {
+    Relation.DISJOINT: Rcc8.DC,
+    Relation.TOUCHING: Rcc8.EC,
+    Relation.FIRST_INSIDE_SECOND: Rcc8.NTPP,
+    Relation.SECOND_INSIDE_FIRST: Rcc8.NTPPI,
+}
+_WHERE_PROVEN = np.array([UNLESS_OVERLAPPING.get(relation, Rcc8.PO) for relation in Relation], np.int8)
 
 
-def check_has_detail(first: Solid, second: Solid) -> None:
-    """Raise where a body can have no interior by its type."""
-    for name, solid in (("first", first), ("second", second)):
+def check_has_detail(named: Iterable[tuple[tuple[str | int, ...], Solid]], boolean: bool) -> None:
+    """Raise where a body, given with where it stands in the call, can have no interior by its type."""
+    if boolean:
+        raise InvalidInputError("detail needs the relation, which boolean leaves open; ask for one", ("detail",))
+    for where, solid in named:
         if isinstance(solid, Surface):
             raise UnsupportedSolidError(
-                f"{name} is a surface, which has no interior: detail is told of solids; make it a polyhedron, "
+                f"{spell(where)} is a surface, which has no interior: detail is told of solids; make it a polyhedron, "
                 "or ask without detail",
-                (name,),
+                where,
             )
+
+
+def details_where_proven(relations: npt.NDArray[np.int8]) -> Details:
+    """Return the codes for pairs that a batch of meshes or convex bodies decided: one that finds overlapping does so by
+    a crossing, or by a point of either body outside the other, so that is PO."""
+    return _WHERE_PROVEN[relations]
+
+
+def details_of_boxes(low: FloatArray, high: FloatArray, pairs: IntArray, relations: npt.NDArray[np.int8]) -> Details:
+    """Return the codes for pairs (n, 2) of boxes (n_boxes, d) that are not flat."""
+    i, j = pairs.T
+    i_sticks_out = ((low[i] < low[j]) | (high[j] < high[i])).any(axis=1)
+    j_sticks_out = ((low[j] < low[i]) | (high[i] < high[j])).any(axis=1)
+    shared = np.where(j_sticks_out, Rcc8.TPP, Rcc8.EQ)
+    split = np.where(i_sticks_out, np.where(j_sticks_out, Rcc8.PO, Rcc8.TPPI), shared)
+    return np.where(relations == Relation.OVERLAPPING, split, _WHERE_PROVEN[relations]).astype(np.int8)
+
+
+def code_of(detail: Rcc8 | None) -> int:
+    """Return the code of a relation of RCC-8 in arrays."""
+    return NO_DETAIL if detail is None else int(detail)
 
 
 def detail_of(
@@ -51,12 +91,7 @@ def detail_of(
     if relation != Relation.OVERLAPPING:
         if not (has_interior(first, work.budget) and has_interior(second, work.budget)):
             return None
-        return {
-            Relation.DISJOINT: Rcc8.DC,
-            Relation.TOUCHING: Rcc8.EC,
-            Relation.FIRST_INSIDE_SECOND: Rcc8.NTPP,
-            Relation.SECOND_INSIDE_FIRST: Rcc8.NTPPI,
-        }[relation]
+        return UNLESS_OVERLAPPING[relation]
     if first_pose is not None and first_pose == second_pose:
         first_pose = second_pose = None
     function = PARTS.get((first.dimension, first.type, second.type))
@@ -75,11 +110,17 @@ def detail_of(
 
 
 def has_interior(solid: Solid, budget: Budget) -> bool:
-    """Tell whether some open set lies within a solid."""
+    """Tell whether some open set lies within a solid; asked once of each."""
+    return solid.prepared("has_interior", lambda: _has_interior(solid, budget), budget.check)
+
+
+def _has_interior(solid: Solid, budget: Budget) -> bool:
     if isinstance(solid, HalfSpace):
         return True
     if isinstance(solid, Sphere):
         return solid.radius > 0.0
+    if isinstance(solid, Aabb):
+        return bool((solid.min < solid.max).all())
     if solid.dimension == 2:
         return bool(live_edges(outline_of(solid, None, budget), budget))
     shell = shell_of(solid)

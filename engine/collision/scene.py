@@ -13,6 +13,7 @@ from engine.bounding.box_grid import pairs_of_boxes
 from engine.bounding.sweep import BLOCK
 from engine.collision.codes import UNSETTLED
 from engine.collision.collide import collide_pair
+from engine.collision.detail import NO_DETAIL, Details, check_has_detail, code_of, detail_of, has_interior
 from engine.collision.result import Witness, Work
 from engine.collision.scene_bodies import SceneBodies, scene_bodies
 from engine.collision.short_paths import ShortPaths
@@ -32,12 +33,14 @@ class ScenePairs:
     first, second: ``(n_pairs,)`` int64, indices of bodies, first < second.
     relation: ``(n_pairs,)`` int8, `Relation` of the first to the second, never DISJOINT.
     witnesses: one a pair, where asked for; else None.
+    detail: ``(n_pairs,)`` int8, codes of `Rcc8`, -1 where a body has no interior, where asked for; else None.
     """
 
     first: IntArray
     second: IntArray
     relation: npt.NDArray[np.int8]
     witnesses: tuple[Witness | None, ...] | None = None
+    detail: Details | None = None
 
 
 def collide_scene(
@@ -48,6 +51,7 @@ def collide_scene(
     only: object = None,
     witnesses: bool = False,
     boolean: bool = False,
+    detail: bool = False,
     workers: int | None = None,
     deadline: float | None = None,
     cancel: Cancel | None = None,
@@ -64,8 +68,8 @@ def collide_scene(
     Parameters: solids: bodies of one dimension, of the types that `collide` takes. poses: one or None for each. skip:
     ``(n, 2)`` pairs of indices to leave out, in either order. only: ``(n, 2)`` the only pairs to look at. witnesses:
     give the witness of each pair too. boolean: disjoint or not is all that is wanted, every pair found is answered as
-    touching, sooner. workers, deadline, cancel, progress (items are candidate pairs), report: as
-    everywhere.
+    touching, sooner. detail: which of the eight relations of RCC-8 holds too, as by `collide`; no body may be a
+    surface. workers, deadline, cancel, progress (items are candidate pairs), report: as everywhere.
     Returns: `ScenePairs`; with report=True a pair of it and an `Accuracy` whose items are the candidate pairs.
     Boundary and degenerate input: as `collide`. An empty scene has no pairs; two surfaces touch or are disjoint.
     Accuracy: exact. Cost: n log n for the boxes, 1 us or less for each pair that a batch decides, then as `collide`.
@@ -80,12 +84,14 @@ def collide_scene(
     """
     check_options(workers, progress)
     bodies = scene_bodies(solids, poses)
+    if detail:
+        check_has_detail(((("solids", i), solid) for i, solid in enumerate(bodies.solids)), boolean)
     with Budget(deadline, cancel) as budget:
         budget.check()
         skipped = None if skip is None else _keys(skip, len(bodies.solids), "skip")
         wanted = None if only is None else _keys(only, len(bodies.solids), "only")
         short_paths = ShortPaths(bodies, boolean, budget)
-        parts: list[tuple[IntArray, Relations, list[Witness | None]]] = []
+        parts: list[_Part] = []
         works: list[Work] = []
         n_candidates = n_open = 0
         for pairs in _candidates(bodies, wanted, budget):
@@ -96,6 +102,7 @@ def collide_scene(
             relations = short_paths.relations(pairs, workers)
             is_open = relations == UNSETTLED
             n_open += int(is_open.sum())
+            details = short_paths.details(pairs, relations) if detail else None
             if witnesses:
                 is_open |= relations != Relation.DISJOINT
             open_ones = np.flatnonzero(is_open)
@@ -110,14 +117,18 @@ def collide_scene(
                 open_ones: IntArray = open_ones,
                 relations: Relations = relations,
                 found: list[Witness | None] = found,
+                details: Details | None = details,
             ) -> None:
                 work = Work(budget, witness=witnesses, boolean=boolean)
                 works.append(work)
                 for item in open_ones[start:stop].tolist():
                     budget.check()
                     i, j = pairs[item].tolist()
-                    answer = collide_pair(bodies.solids[i], bodies.solids[j], bodies.poses[i], bodies.poses[j], work)
+                    pair = bodies.solids[i], bodies.solids[j], bodies.poses[i], bodies.poses[j]
+                    answer = collide_pair(*pair, work)
                     relations[item] = answer.relation
+                    if details is not None and details[item] == NO_DETAIL:
+                        details[item] = code_of(detail_of(*pair, answer.relation, work))
                     if witnesses:
                         found[item] = answer.witness
 
@@ -125,9 +136,13 @@ def collide_scene(
             kept = np.flatnonzero(relations != Relation.DISJOINT)
             if boolean:
                 relations[kept] = Relation.TOUCHING
-            parts.append((pairs[kept], relations[kept], [found[item] for item in kept.tolist()] if witnesses else []))
+            if details is not None:
+                details = details[kept]
+                details[~_have_interiors(bodies, pairs[kept], budget)] = NO_DETAIL
+            named = [found[item] for item in kept.tolist()] if witnesses else []
+            parts.append((pairs[kept], relations[kept], named, details))
         budget.check()
-    result = _joined(parts, witnesses)
+    result = _joined(parts, witnesses, detail)
     if not report:
         return result
     beyond, rational = sum(work.n_beyond_filter for work in works), sum(work.n_rational for work in works)
@@ -135,12 +150,26 @@ def collide_scene(
     return result, Accuracy("exact", None, n_candidates, max(beyond, n_open), rational, how)
 
 
-def _joined(parts: list[tuple[IntArray, Relations, list[Witness | None]]], witnesses: bool) -> ScenePairs:
+_Part = tuple[IntArray, Relations, list[Witness | None], Details | None]
+"""Of a block of candidates those that collide: pairs, relations, witnesses and details, these where asked for."""
+
+
+def _joined(parts: list[_Part], witnesses: bool, detail: bool) -> ScenePairs:
     """Return the colliding pairs of all blocks as one."""
+    none = np.empty(0, np.int8)
     pairs = np.concatenate([np.empty((0, 2), np.int64), *(part[0] for part in parts)])
-    relations = np.concatenate([np.empty(0, np.int8), *(part[1] for part in parts)])
+    relations = np.concatenate([none, *(part[1] for part in parts)])
     named = tuple(witness for part in parts for witness in part[2]) if witnesses else None
-    return ScenePairs(pairs[:, 0].copy(), pairs[:, 1].copy(), relations, named)
+    details = np.concatenate([none, *(part[3] for part in parts if part[3] is not None)]) if detail else None
+    return ScenePairs(pairs[:, 0].copy(), pairs[:, 1].copy(), relations, named, details)
+
+
+def _have_interiors(bodies: SceneBodies, pairs: IntArray, budget: Budget) -> npt.NDArray[np.bool_]:
+    """Tell for pairs of bodies whether both have an interior."""
+    kinds, places = np.unique(bodies.kinds[pairs], return_inverse=True)
+    solid = np.array([has_interior(bodies.distinct[kind], budget) for kind in kinds.tolist()], np.bool_)
+    first, second = places.reshape(-1, 2).T
+    return solid[first] & solid[second]
 
 
 def _candidates(bodies: SceneBodies, wanted: IntArray | None, budget: Budget) -> Iterator[IntArray]:

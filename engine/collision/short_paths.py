@@ -11,6 +11,7 @@ from engine.collision.aabb_batch import relate_box_pairs
 from engine.collision.codes import UNSETTLED
 from engine.collision.convex_body import ConvexArrays, ConvexBody, convex_body_of, pooled
 from engine.collision.convex_pair import relate_convex_pairs
+from engine.collision.detail import NO_DETAIL, Details, details_of_boxes, details_where_proven
 from engine.collision.scene_bodies import SceneBodies
 from engine.parallel import Budget, run_chunks
 from engine.solids.aabb import Aabb
@@ -57,6 +58,14 @@ class ShortPaths:
                 )
 
         run_chunks(task, len(pairs), budget=self._budget, workers=workers)
+        return found
+
+    def details(self, pairs: IntArray, relations: Relations) -> Details:
+        """Return the codes of `Rcc8` of pairs of bodies with interiors whose relations are those that `relations`
+        found; NO_DETAIL where these are UNSETTLED."""
+        found = np.where(relations == UNSETTLED, np.int8(NO_DETAIL), details_where_proven(relations))
+        boxes = np.flatnonzero(self._is_box[pairs].all(axis=1))
+        found[boxes] = details_of_boxes(self._bodies.low, self._bodies.high, pairs[boxes], relations[boxes])
         return found
 
     def _prepare(self) -> None:

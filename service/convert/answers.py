@@ -151,42 +151,57 @@ def from_clipped(clipped: engine.ClippedPolygons, accuracy: engine.Accuracy) -> 
 def from_collision(collision_: engine.Collision, accuracy: engine.Accuracy) -> collision.CollideResponse:
     """Return the answer of `collide` for one pose."""
     return collision.CollideResponse.model_construct(
-        collisions=[_collision_answer(collision_.relation, collision_.witness)], accuracy=from_accuracy(accuracy)
+        collisions=[_collision_answer(collision_.relation, collision_.witness, collision_.detail)],
+        accuracy=from_accuracy(accuracy),
     )
 
 
 def from_pose_collisions(found: Any, accuracy: engine.Accuracy) -> collision.CollideResponse:
     """Return the answer of `collide` for many poses."""
-    relations, witnesses = found
+    relations, witnesses, *details = found
     return collision.CollideResponse.model_construct(
         collisions=[
-            _collision_answer(engine.Relation(relation), witness)
-            for relation, witness in zip(relations.tolist(), witnesses)
+            _collision_answer(engine.Relation(relation), witness, detail)
+            for relation, witness, detail in zip(
+                relations.tolist(), witnesses, _details(details[0] if details else None, len(relations))
+            )
         ],
         accuracy=from_accuracy(accuracy),
     )
 
 
-def _collision_answer(relation: engine.Relation, witness: engine.Witness | None) -> collision.CollisionAnswer:
-    if witness is None:
-        return collision.CollisionAnswer.model_construct(relation=relation.label)
-    return collision.CollisionAnswer.model_construct(
-        relation=relation.label,
-        witness=collision.CollisionWitness.model_construct(
+def _details(codes: Any, n_items: int) -> list[engine.Rcc8 | None]:
+    """Return the relations of RCC-8 of `n_items` pairs: None where none was asked for (codes None), or none is."""
+    if codes is None:
+        return [None] * n_items
+    return [None if code < 0 else engine.Rcc8(code) for code in codes.tolist()]
+
+
+def _collision_answer(
+    relation: engine.Relation, witness: engine.Witness | None, detail: engine.Rcc8 | None
+) -> collision.CollisionAnswer:
+    answer = collision.CollisionAnswer.model_construct(
+        relation=relation.label, detail=None if detail is None else detail.label
+    )
+    if witness is not None:
+        answer.witness = collision.CollisionWitness.model_construct(
             kind=witness.kind,
             first_face=None if witness.first_face < 0 else witness.first_face,
             second_face=None if witness.second_face < 0 else witness.second_face,
             containing=witness.containing or None,
             piercing=witness.piercing,
-        ),
-    )
+        )
+    return answer
 
 
 def from_scene_pairs(pairs: engine.ScenePairs, accuracy: engine.Accuracy) -> collision.CollideSceneResponse:
     """Return the answer of `collide/scene`."""
     labels = [relation.label for relation in engine.Relation]
-    columns = zip(pairs.first.tolist(), pairs.second.tolist(), pairs.relation.tolist())
-    return collision.CollideSceneResponse.model_construct(
-        pairs=[{"first": first, "second": second, "relation": labels[code]} for first, second, code in columns],
-        accuracy=from_accuracy(accuracy),
-    )
+    found = [
+        {"first": first, "second": second, "relation": labels[code]}
+        for first, second, code in zip(pairs.first.tolist(), pairs.second.tolist(), pairs.relation.tolist())
+    ]
+    for pair, detail in zip(found, _details(pairs.detail, len(found))):
+        if detail is not None:
+            pair["detail"] = detail.label
+    return collision.CollideSceneResponse.model_construct(pairs=found, accuracy=from_accuracy(accuracy))

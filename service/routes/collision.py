@@ -17,10 +17,11 @@ def collide(question: CollideRequest, call: CallOf) -> CollideResponse:
     first = questions.to_solid(question.first, call, ("first",))
     second = questions.to_solid(question.second, call, ("second",))
     if question.poses is None:
-        return answers.from_collision(*call.compute(engine.collide, first, second))
+        return answers.from_collision(*call.compute(engine.collide, first, second, detail=bool(question.detail)))
     rotations, translations = questions.to_poses(question.poses, second.dimension)
+    options = {"witnesses": True, "detail": bool(question.detail)}
     found = call.compute(
-        engine.collide_poses, first, second, rotations, translations, witnesses=True, where=questions.where_in_poses
+        engine.collide_poses, first, second, rotations, translations, **options, where=questions.where_in_poses
     )
     return answers.from_pose_collisions(*found)
 
@@ -29,6 +30,6 @@ def collide(question: CollideRequest, call: CallOf) -> CollideResponse:
 def collide_scene(question: CollideSceneRequest, call: CallOf) -> CollideSceneResponse:
     """List every pair of bodies with a common point, and how each lies to the other."""
     solids, poses = questions.to_bodies(question.bodies, call)
-    options = {"skip": question.skip, "only": question.only}
+    options = {"skip": question.skip, "only": question.only, "detail": bool(question.detail)}
     found = call.compute(engine.collide_scene, solids, poses, **options, where=questions.where_in_scene)
     return answers.from_scene_pairs(*found)

@@ -12,10 +12,13 @@ from service.schemas.problem import Accuracy, Count, Schema, with_example
 from service.schemas.solids import Body, RigidPose, Solid
 
 CollisionRelation = Literal["disjoint", "first_inside_second", "second_inside_first", "overlapping", "touching"]
+Detail = Literal["DC", "EC", "PO", "EQ", "TPP", "NTPP", "TPPi", "NTPPi"]
 Pairs = Annotated[Array, Numbers(Axis(0, "max_pairs"), Axis(2, 2), kind="integer", minimum=0)]
 
 _CUBE = {"type": "aabb", "min": [0, 0, 0], "max": [1, 1, 1]}
 _BALL = {"type": "sphere", "center": [2, 0.5, 0.5], "radius": 1}
+_DETAIL = "Say which of the eight relations of RCC-8 holds too: tangentially inside (TPP), equal (EQ), ..."
+_FOUND = "Which relation of RCC-8, where asked for; left out if a body has no interior."
 
 
 class CollideRequest(Schema):
@@ -29,6 +32,7 @@ class CollideRequest(Schema):
         "Poses of `second`, one answer each; without them one answer for where it stands. Time is discrete: two poses "
         "may be free while a motion between them collides."
     )
+    detail: bool = left_out(_DETAIL)
 
 
 class CollisionWitness(Schema):
@@ -51,6 +55,7 @@ class CollisionAnswer(Schema):
 
     relation: CollisionRelation
     witness: CollisionWitness = left_out("Left out when disjoint.")
+    detail: Detail = left_out(_FOUND)
 
 
 class CollideResponse(Schema):
@@ -79,6 +84,7 @@ class CollideSceneRequest(Schema):
     bodies: Annotated[list[Body], AtMost("max_bodies")]
     skip: Pairs = left_out("Pairs of bodies to leave out.")
     only: Pairs = left_out("The only pairs to look at.")
+    detail: bool = left_out(_DETAIL)
 
 
 class CollidingPair(Schema):
@@ -87,6 +93,7 @@ class CollidingPair(Schema):
     first: Count
     second: Count
     relation: CollisionRelation
+    detail: Detail = left_out(_FOUND)
 
 
 class CollideSceneResponse(Schema):

@@ -6,7 +6,19 @@ import numpy as np
 import pytest
 
 import engine
-from engine import Aabb, HalfSpace, Polygon, Polyhedron, Pose, Rcc8, Relation, Sphere, collide
+from engine import (
+    Aabb,
+    HalfSpace,
+    Polygon,
+    Polyhedron,
+    Pose,
+    Rcc8,
+    Relation,
+    Sphere,
+    collide,
+    collide_poses,
+    collide_scene,
+)
 from tests.reference.collision import detail
 from tests.reference.shapes import Solid, box, polygon, rectangle, reversed_faces, union_of
 from tests.unit.collision.test_collide import (
@@ -182,6 +194,54 @@ def test_spheres_and_half_spaces(first: engine.Solid, second: engine.Solid, expe
     assert collide(second, first, detail=True).detail == found.swapped().detail
 
 
+def code_of(found: engine.Collision) -> int:
+    return -1 if found.detail is None else int(found.detail)
+
+
+def test_poses_are_one_by_one_and_equal_the_reference() -> None:
+    eye, turn = np.eye(3).tolist(), [[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]]
+    rotations = [eye, eye, [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]], turn, eye]
+    translations = [[0.0, 0.0, 0.0], [2.0, 2.0, 2.0], [1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [6.0, 0.0, 0.0]]
+    seen: set[str | None] = set()
+    for first, second in ((BIG, UNIT), (UNIT, OTHER_DIAGONALS), (BEAM, UNIT), (UNIT, BIG), (BIG, DOUBLED)):
+        relations, codes = collide_poses(made(first), made(second), rotations, translations, detail=True)
+        for turned, by, relation, code in zip(rotations, translations, relations, codes, strict=True):
+            found = collide(made(first), made(second), second_pose=Pose(turned, by), detail=True)
+            assert (relation, code) == (found.relation, code_of(found))
+            seen.add(name_of(found))
+            if first is BIG and second is UNIT:  # the reference is slow
+                assert name_of(found) == detail(first, second, None, {"rotation": turned, "translation": by})
+        with_both = collide_poses(made(first), made(second), rotations, translations, witnesses=True, detail=True)
+        assert [len(part) for part in with_both] == [5, 5, 5]
+        assert with_both[2].tolist() == codes.tolist()
+    assert seen == {"DC", "EC", "PO", "EQ", "TPP", "TPPi", "NTPPi", None}
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_scene_is_every_pair(dimension: int) -> None:
+    low = [[0.0] * dimension, [1.0] * dimension, [2.0] * dimension]
+    solids: list[engine.Solid] = [Aabb(a, [x + side for x in a]) for a in low for side in (0.0, 1.0, 2.0, 3.0)]
+    solids += [Sphere([2.0] * dimension, radius) for radius in (0.0, 1.0, 2.0)]
+    solids += [Aabb(low[1], low[2]), HalfSpace([1.0] + [0.0] * (dimension - 1), -1.0)]
+    if dimension == 3:
+        solids += [made(body) for body in (BIG, HOLLOW, DOUBLED, BEAM)]
+    else:
+        solids += [Polygon([[[0, 0], [3, 0], [3, 3], [0, 3]]]), engine.Triangle([[0, 0], [2, 0], [0, 2]])]
+    turn = Pose([[0.0, -1.0], [1.0, 0.0]], [3, 0]) if dimension == 2 else Pose(np.eye(3)[[1, 0, 2]] * -1.0, [3, 3, 0])
+    poses = [turn if i % 5 == 4 else None for i in range(len(solids))]
+    pairs = collide_scene(solids, poses, detail=True)
+    assert pairs.detail is not None
+    plain = collide_scene(solids, poses, witnesses=True)
+    assert plain.detail is None
+    assert (plain.first.tolist(), plain.relation.tolist()) == (pairs.first.tolist(), pairs.relation.tolist())
+    named = collide_scene(solids, poses, witnesses=True, detail=True)
+    assert (named.witnesses, named.detail.tolist()) == (plain.witnesses, pairs.detail.tolist())
+    for i, j, code in zip(pairs.first.tolist(), pairs.second.tolist(), pairs.detail.tolist()):
+        found = collide(solids[i], solids[j], first_pose=poses[i], second_pose=poses[j], detail=True)
+        assert code == code_of(found), (i, j)
+    assert set(pairs.detail.tolist()) >= {-1, Rcc8.EC, Rcc8.PO, Rcc8.EQ, Rcc8.TPP, Rcc8.NTPP, Rcc8.TPPI, Rcc8.NTPPI}
+
+
 def test_names_and_codes() -> None:
     assert [code.label for code in Rcc8] == ["DC", "EC", "PO", "EQ", "TPP", "NTPP", "TPPi", "NTPPi"]
     assert collide(made(UNIT), made(BIG)).detail is None
@@ -215,3 +275,11 @@ def test_what_has_no_detail_is_refused() -> None:
     assert caught.value.where == ("second",)
     with pytest.raises(engine.InvalidInputError, match="boolean"):
         collide(made(UNIT), made(BIG), detail=True, boolean=True)
+    with pytest.raises(engine.UnsupportedSolidError, match="no interior") as caught:
+        collide_poses(made(UNIT), made(SQUARE), [np.eye(3)], [[0, 0, 0]], detail=True)
+    assert caught.value.where == ("second",)
+    with pytest.raises(engine.UnsupportedSolidError, match="no interior") as caught:
+        collide_scene([made(UNIT), made(SQUARE)], detail=True)
+    assert caught.value.where == ("solids", 1)
+    with pytest.raises(engine.InvalidInputError, match="boolean"):
+        collide_scene([made(UNIT)], detail=True, boolean=True)

@@ -74,6 +74,24 @@ async def test_scene_lists_colliding_pairs(client: httpx.AsyncClient) -> None:
     assert (await client.post("/v1/collide/scene", json={"bodies": []})).json()["pairs"] == []
 
 
+async def test_the_eight_relations_are_told_when_asked_for(client: httpx.AsyncClient) -> None:
+    half = {**CUBE, "max": [1, 1, 0.5]}
+    found = await collide(client, first=half, second=CUBE, detail=True)
+    assert [answer["detail"] for answer in found["collisions"]] == ["TPP"]
+    poses = [moved(0, 0, 0), moved(0, 0, 0.25), moved(0, 0, 1), moved(0, 0, 2)]
+    found = await collide(client, first=CUBE, second=half, poses=poses, detail=True)
+    assert [answer["detail"] for answer in found["collisions"]] == ["TPPi", "TPPi", "EC", "DC"]
+    assert "detail" not in (await collide(client, first=CUBE, second=half, detail=False))["collisions"][0]
+    flat = {**CUBE, "max": [1, 1, 0]}
+    assert "detail" not in (await collide(client, first=CUBE, second=flat, detail=True))["collisions"][0]
+    bodies = [{"solid": CUBE}, {"solid": CUBE}, {"solid": half}, {"solid": flat}]
+    answer = await client.post("/v1/collide/scene", json={"bodies": bodies, "detail": True})
+    assert answer.status_code == 200, answer.text
+    CollideSceneResponse.model_validate_json(answer.content, context=Settings())
+    details = {(pair["first"], pair["second"]): pair.get("detail") for pair in answer.json()["pairs"]}
+    assert details == {(0, 1): "EQ", (0, 2): "TPPi", (1, 2): "TPPi", (0, 3): None, (1, 3): None, (2, 3): None}
+
+
 SCALED = {"rotation": [[2, 0, 0], [0, 1, 0], [0, 0, 1]], "translation": [0, 0, 0]}
 
 
@@ -91,6 +109,9 @@ SCALED = {"rotation": [[2, 0, 0], [0, 1, 0], [0, 0, 1]], "translation": [0, 0, 0
         ({"poses": [{"rotation": [[1, 0, 0], [0, 1], [0, 0, 1]], "translation": [0, 0, 0]}]}, "invalid_array",
          "/poses/0/rotation/1"),
         ({"poses": None}, "invalid_request", "/poses"),
+        ({"detail": 1}, "invalid_request", "/detail"),
+        ({"first": {"type": "surface", "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 2]]},
+          "second": CUBE, "detail": True}, "unsupported_solid", "/first"),
         ({"poses": {}}, "invalid_request", "/poses"),
     ],
 )  # fmt: skip
