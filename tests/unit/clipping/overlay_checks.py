@@ -124,6 +124,28 @@ def assert_area_close(result: Overlay) -> None:
     assert abs(total - result.area_exact) <= Fraction(2 * result.largest_displacement * length)
 
 
+def area_error(result: Overlay, exact: Fraction) -> tuple[float, float]:
+    """Return how far the output's area is from the exact one, and its perimeter, that of lost parts included."""
+    if not result.rounds:
+        return 0.0, 0.0
+    total, length = Fraction(0), 0.0
+    for ring in result.rings:
+        length += float(np.hypot(*(ring - np.concatenate([ring[-1:], ring[:-1]])).T).sum())
+        numbers = [number.as_integer_ratio() for number in ring.ravel().tolist()]
+        scale = max(bottom for _, bottom in numbers)
+        whole = [top * (scale // bottom) for top, bottom in numbers]
+        x, y = whole[::2], whole[1::2]
+        total += Fraction(sum(x[k - 1] * y[k] - x[k] * y[k - 1] for k in range(len(x))), 2 * scale * scale)
+    error = abs(total - exact)
+    if error and result.collapsed:
+        scale = Fraction(2) ** result.exact.exponent
+        for ring in result.exact.rings:
+            for (ax, ay, aw), (bx, by, bw) in pairwise([*ring, ring[0]]):
+                sides = [float(Fraction(p * bw - q * aw, aw * bw) * scale) for p, q in ((ax, bx), (ay, by))]
+                length += float(np.hypot(*sides))
+    return float(error), length
+
+
 def assert_equals_reference(result: Overlay, subject: list[Any], clip: list[Any], operation: str) -> None:
     expected = reference_overlay({"type": "polygon", "rings": subject}, {"type": "polygon", "rings": clip}, operation)
     assert Q(result.area_exact.numerator, result.area_exact.denominator) == expected.area
