@@ -63,7 +63,9 @@ def row_shape(rng: Random, n: int, dimension: int) -> Shape:
     targets = [-normal * offset / (normal @ normal) for normal, offset in zip(normals, offsets)]
     for chosen in itertools.islice(itertools.combinations(range(n), dimension), 20):
         rows = normals[list(chosen)]
-        if abs(np.linalg.det(rows)) > 0.1:
+        with np.errstate(divide="ignore"):
+            volume = abs(np.linalg.det(rows))
+        if volume > 0.1:
             targets.append(np.linalg.solve(rows, -offsets[list(chosen)]).round(12) + 0.0)
     return Shape("rows", np.c_[normals, offsets], np.array(targets))
 
@@ -73,7 +75,13 @@ def half_space(rng: Random, dimension: int) -> Shape:
 
 
 def convex(rng: Random, dimension: int) -> Shape:
-    return row_shape(rng, int(rng.integers(2, 12)), dimension)
+    """Up to twelve planes; now and then up to a hundred around a ball, a long cascade."""
+    if rng.random() < 0.97:
+        return row_shape(rng, int(rng.integers(2, 12)), dimension)
+    normals = rng.normal(size=(int(rng.integers(20, 101)), dimension))
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    offsets = np.full(len(normals), 1.0) if on_lattice(rng) else rng.uniform(0.9, 1.1, len(normals))
+    return Shape("rows", np.c_[normals, offsets], -normals * offsets[:, None])
 
 
 def aabb(rng: Random, dimension: int) -> Shape:
@@ -111,7 +119,8 @@ def polygon(rng: Random, dimension: int) -> Shape:
     for _ in range(int(rng.integers(1, 4))):
         n = int(rng.integers(3, 9))
         if on_lattice(rng):
-            rings.append(rng.integers(-2, 3, (n, 2)).astype(float))
+            ring = rng.integers(-2, 3, (n, 2)).astype(float)
+            rings.append(ring if n > 3 or (ring[0] != ring[-1]).any() else ring + np.array([[0, 0], [0, 0], [1, 0]]))
         else:
             angles = np.sort(rng.uniform(0, 2 * np.pi, n))
             rings.append(rng.uniform(0.3, 2, (n, 1)) * np.stack([np.cos(angles), np.sin(angles)], axis=1))
