@@ -20,13 +20,12 @@ within (28 u^2 + 2 r) M of its value; 40 u^2 + 2.5 r covers the terms of higher 
 
 from __future__ import annotations
 
-import math
 from typing import Any, Final
 
 import numpy as np
 
 from engine.jit import inline
-from engine.predicates.double_double import U2, dd_add, dd_div, dd_scale, surely_rounded
+from engine.predicates.double_double import U2, dd_add, dd_div, dd_scale, even_of, surely_rounded
 from engine.predicates.error_free import two_diff, two_prod, two_sum
 from engine.predicates.expansion import Components, grow_product, sign
 
@@ -117,13 +116,6 @@ def side_of(
         n = grow_product(e, n, wp[i], -step)
         n = grow_product(e, n, wp[i], bh)
     return sign(e, n)
-
-
-@inline
-def even_of(x: float, other: float) -> float:
-    """Return which of two neighbouring doubles has the even significand."""
-    half = 0.5 * (x / abs(other - x))
-    return x if math.floor(half) == half else other
 
 
 @inline

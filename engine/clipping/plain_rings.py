@@ -1,93 +1,49 @@
-"""Sutherland-Hodgman on rings without a special case: no vertex on a plane, no sign near zero, no cuts that coincide.
+"""Sutherland-Hodgman on rings whose every decision and coordinate doubles and double-doubles prove.
 
 That is nearly every ring, so the work is that of careless code: vertices stay where they are and a ring is a list of
-their numbers; signs come from doubles, with one slack for a plane and polygon; only cuts are made in double-double. At
-the first doubt the polygon is given up, and the careful passes of sutherland_hodgman.py begin anew.
+their numbers; only cuts are made in double-double. A cut is kept only where its doubles are surely the nearest ones.
+Rounding keeps order: where such a double lies beside a wall of a box so does the vertex, and vertices whose doubles
+differ are two. Original vertices are doubles, so on a wall they are decided too. At the first doubt the polygon is
+given up, and exact_rings.py begins anew.
 
-One long function for that reason: compiled code counts references to each array that it hands to another function, and
-that was two fifths of the time. The functions that it calls take numbers; those that take arrays are rarely reached.
+One long function, and arrays of one dimension: compiled code counts references to each array that it hands to another
+function, and that was two fifths of the time. The functions that it calls take numbers.
 
-pool: (room, dim, 3) float64, vertices as in cut_vertices.py, those of the ring first. edges: (room,) int32, the
-original edge that goes on from a vertex, -1 for one along a plane.
+pool: (room * dim,) float64, the doubles of vertices, those of the ring first. rests: (room * dim * 2,) float64, for
+each coordinate of a cut what its double leaves over, and the bound of its error. edges: (room,) int32, the original
+edge that goes on from a vertex, -1 for one along a plane.
 
-Slack: every vertex lies within `reach` of zero, so a value in doubles is wrong by less than 2^-49 of the plane's row at
-`reach`; cuts that are known to less than 2^-48 of `reach` are given up.
+Slack of planes across no axis: every vertex lies in the box of its polygon, so a value in doubles is wrong by less than
+2^-49 of the plane's row on that box.
 """
 
 from __future__ import annotations
 
 from typing import Any, Final
 
-from engine.clipping.cut_point import CUT_BOUND, POINT_BOUND, is_safe
-from engine.clipping.cut_vertices import DD_VALUE_BOUND, VALUE_BOUND, compare_vertices, sign_across, sign_at
-from engine.jit import inline, merged
-from engine.predicates.double_double import U2, dd_add, dd_div, dd_mul, surely_rounded
-from engine.predicates.error_free import two_diff, two_prod, two_sum
-from engine.types import UNDECIDED
+from engine.clipping.cut_vertices import (
+    TINY,
+    VALUE_BOUND,
+    WIDEST,
+    between,
+    distance_across,
+    is_at,
+    on_edge,
+    plus_term,
+    share_of_edge,
+    value_bound,
+)
+from engine.jit import merged
+from engine.predicates.double_double import dd_add, dd_div, surely_rounded
 
 DONE: Final = 0
 GIVEN_UP: Final = -1
 NO_ROOM: Final = -2
 CLIPPED: Final = 0
 OPEN: Final = 1
+EXACT: Final = 2
+"""States of a polygon: settled by doubles, by nothing yet, by whole numbers."""
 _SLACK: Final = 2.0**-45
-_KNOWN: Final = 2.0**-48
-_APART: Final = 2.0**-40
-
-
-@inline
-def distance_across(x: float, low: float, bound: float, at: float) -> tuple[float, float, float]:
-    """Return x - at as a double-double, and its bound."""
-    if low == 0.0:
-        h, rest = two_diff(x, at)
-        return h, rest, bound
-    h, rest = dd_add(x, low, -at, 0.0)
-    return h, rest, bound + 4.0 * U2 * abs(h)
-
-
-@inline
-def plus_term(
-    h: float, rest: float, size: float, moved: float, a: float, a_low: float, x: float, x_low: float, bound: float
-) -> tuple[float, float, float, float]:
-    """Return the sum h + rest with a x added to it, and its sums of sizes and of bounds; see `value_of`."""
-    ph, pl = dd_mul(a, a_low, x, x_low)
-    h, rest = dd_add(h, rest, ph, pl)
-    return h, rest, size + abs(ph), moved + abs(a) * bound
-
-
-@inline
-def between(
-    x: float,
-    x_low: float,
-    x_bound: float,
-    y: float,
-    y_low: float,
-    y_bound: float,
-    ph: float,
-    pl: float,
-    qh: float,
-    ql: float,
-    sum_h: float,
-    sum_l: float,
-    th: float,
-    tl: float,
-    r: float,
-) -> tuple[float, float, float, bool]:
-    """Return the coordinate x + t (y - x) and its bound, as `cut_edge` does; False where it may be a double."""
-    if x_low != 0.0 or y_low != 0.0 or x_bound != 0.0 or y_bound != 0.0:
-        ah, al = dd_mul(x, x_low, qh, ql)
-        bh, bl = dd_mul(y, y_low, ph, pl)
-        nh, nl = dd_add(ah, al, bh, bl)
-        h, rest = dd_div(nh, nl, sum_h, sum_l)
-        return h, rest, 1.01 * (max(x_bound, y_bound) + CUT_BOUND * max(abs(x), abs(y)) + r * abs(y - x)), True
-    if x == y:
-        return x, 0.0, 0.0, True
-    dh, dl = two_diff(y, x)
-    mh, ml = two_prod(th, dh)
-    sh, sl = two_sum(x, mh)
-    h, rest = two_sum(sh, (sl + ml) + (tl * dh + th * dl))
-    bound = 1.01 * (POINT_BOUND * (abs(x) + abs(mh)) + r * abs(dh))
-    return h, rest, bound, abs(rest) > bound
 
 
 @merged
@@ -107,225 +63,262 @@ def clip_plainly(
     sizes: Any,
     state: Any,
     may_have_bridges: Any,
+    names: Any,
     pool: Any,
+    rests: Any,
     edges: Any,
     rings: Any,
-    inside: Any,
+    signs: Any,
     contacts: Any,
     dropped: Any,
     cutting: Any,
     slack: Any,
-    reach: Any,
     lows: Any,
     highs: Any,
 ) -> tuple[int, int, int, int]:
     """Clip polygons from `first` on as `clip_rings` does, up to one that needs care.
 
-    pool .. highs: scratch. Returns the polygon reached, the vertices written, NO_ROOM (or stopped), GIVEN_UP or DONE,
-    and how many planes of `cutting` may cut the polygon reached.
+    vertices, out: as one row of numbers. names: a tuple of as many numbers as there are axes, so that their count is
+    known when this is compiled. pool .. highs: scratch. Returns the polygon reached, the vertices written, NO_ROOM (or
+    stopped), GIVEN_UP or DONE, and how many planes of `cutting` may cut the polygon reached.
     """
-    d, n_planes = vertices.shape[1], high.shape[0]
+    d, n_planes = len(names), high.shape[0]
     for polygon in range(first, last):
         if stop[0]:
             return polygon, written, NO_ROOM, 0
         first_ring, last_ring = polygon_offsets[polygon], polygon_offsets[polygon + 1]
         begin, end = ring_offsets[first_ring], ring_offsets[last_ring]
-        is_safe_polygon = True
+        state[polygon], may_have_bridges[polygon] = CLIPPED, False
         for k in range(d):
-            low_k = high_k = vertices[begin, k]
+            low_k = high_k = vertices[begin * d + k]
             for i in range(begin, end):
-                x = vertices[i, k]
-                low_k, high_k = min(low_k, x), max(high_k, x)
-                is_safe_polygon = is_safe_polygon and is_safe(x)
-            lows[k], highs[k], reach[k] = low_k, high_k, max(abs(low_k), abs(high_k))
-        state[polygon], may_have_bridges[polygon] = CLIPPED if is_safe_polygon else OPEN, False
+                x = vertices[i * d + k]
+                low_k, high_k = x if x < low_k else low_k, x if x > high_k else high_k
+            lows[k], highs[k] = low_k, high_k
         # a plane that has all vertices inside cuts nothing: what later planes see are points between the vertices
-        n_cutting, is_outside = 0, not is_safe_polygon
+        n_cutting, is_outside = 0, False
         for plane in range(n_planes):
-            if is_outside:
-                break
             axis = axes[plane]
             if axis >= 0:
                 place, is_up = at[plane], high[plane, axis] > 0.0
-                if (lows[axis] >= place) if is_up else (highs[axis] <= place):
-                    continue
-                is_outside = (highs[axis] < place) if is_up else (lows[axis] > place)
-                size = abs(place) + reach[axis]
+                low_k, high_k, size = lows[axis], highs[axis], 0.0
+                is_cut = (low_k < place) if is_up else (high_k > place)
+                is_outside = (high_k < place) if is_up else (low_k > place)
             else:
-                size = abs(high[plane, d])
+                least = most = high[plane, d]
+                size = abs(least)
                 for k in range(d):
-                    size += abs(high[plane, k]) * reach[k]
-                n_in, n_out = 0, 0
-                for i in range(begin, end):
-                    value = high[plane, d]
-                    for k in range(d):
-                        value += high[plane, k] * vertices[i, k]
-                    n_in += value > VALUE_BOUND * size
-                    n_out += -value > VALUE_BOUND * size
-                if n_in == end - begin:
-                    continue
-                is_outside = n_out == end - begin
-            cutting[n_cutting], slack[n_cutting] = plane, _SLACK * size
-            contacts[plane], dropped[plane] = 0, False
-            n_cutting += 1
+                    x, y = high[plane, k] * lows[k], high[plane, k] * highs[k]
+                    least, most, size = least + min(x, y), most + max(x, y), size + max(abs(x), abs(y))
+                is_cut, is_outside = not least > VALUE_BOUND * size, -most > VALUE_BOUND * size + TINY
+            cutting[n_cutting], slack[n_cutting] = plane, _SLACK * size + TINY
+            contacts[n_cutting], dropped[n_cutting] = 0, False
+            n_cutting += is_cut
+            if is_outside:
+                break
         if is_outside:
             for ring in range(first_ring, last_ring):
                 sizes[ring] = 0
             continue
-        begun = written
+        begun, most = written, edges.size  # two rings of at most as many vertices as there is room for
         for ring in range(first_ring, last_ring):
-            n = 0
-            for i in range(ring_offsets[ring], ring_offsets[ring + 1]):
-                is_same = i > ring_offsets[ring]
+            n, begin, end, here, there = 0, ring_offsets[ring], ring_offsets[ring + 1], 0, most
+            for i in range(begin, end):
+                is_same, before = True, max(i - 1, begin)
                 for k in range(d):
-                    x = vertices[i, k]
-                    is_same = is_same and vertices[i - 1, k] == x
-                    pool[n, k, 0], pool[n, k, 1], pool[n, k, 2] = x, 0.0, 0.0
-                rings[0, n], edges[n] = n, n
-                n += not is_same
+                    x = vertices[i * d + k]
+                    is_same = is_same & (vertices[before * d + k] == x)
+                    pool[n * d + k] = x
+                rings[n], edges[n] = n, n
+                n += (not is_same) or i == begin
             while n > 1:
                 is_same = True
                 for k in range(d):
-                    is_same = is_same and pool[n - 1, k, 0] == pool[0, k, 0]
+                    is_same = is_same & (pool[(n - 1) * d + k] == pool[k])
                 if not is_same:
                     break
                 n -= 1
-            size_pool, n_ring, now = n, n, 0
+            size_pool, n_ring = n, n
             for i_plane in range(n_cutting):
                 plane, near = cutting[i_plane], slack[i_plane]
                 axis, place = axes[plane], at[plane]
-                sense = 1.0
-                if axis >= 0 and high[plane, axis] < 0.0:
-                    sense = -1.0
-                n_in = 0
-                for i in range(n):
-                    v = rings[now, i]
-                    if axis >= 0:
-                        value = sense * (pool[v, axis, 0] - place)
-                    else:
+                n_in, n_on = 0, 0
+                if axis >= 0:
+                    sense = 1 if high[plane, axis] > 0.0 else -1
+                    for i in range(n):
+                        v = rings[here + i]
+                        x = pool[v * d + axis]
+                        sign = sense if x > place else (-sense if x < place else 0)
+                        if sign == 0 and v >= n_ring:
+                            rest, bound = rests[2 * (v * d + axis)], rests[2 * (v * d + axis) + 1]
+                            if abs(rest) > bound:
+                                sign = sense if rest > 0.0 else -sense
+                            elif bound > 0.0:
+                                return polygon, begun, GIVEN_UP, n_cutting
+                        signs[i] = sign
+                        n_in += sign >= 0
+                        n_on += sign == 0
+                else:
+                    for i in range(n):
+                        v = rings[here + i]
                         value = high[plane, d]
                         for k in range(d):
-                            value += high[plane, k] * pool[v, k, 0]
-                    if abs(value) <= near:
-                        if axis >= 0:
-                            sign = sign_across(sense, axis, place, pool, v)
-                        else:
-                            sign = sign_at(high[plane], low[plane], pool, v)
-                        if sign == 0 or sign == UNDECIDED:
+                            value += high[plane, k] * pool[v * d + k]
+                        if abs(value) <= near:
                             return polygon, begun, GIVEN_UP, n_cutting
-                        value = float(sign)
-                    inside[i] = value > 0.0
-                    n_in += value > 0.0
+                        signs[i] = 1 if value > 0.0 else -1
+                        n_in += value > 0.0
+                contacts[i_plane] += n_on
                 if n_in == n:
                     continue
-                if size_pool + n > pool.shape[0] or 2 * n > rings.shape[1]:
+                dropped[i_plane] = True
+                if size_pool + n > most:
                     return polygon, begun, GIVEN_UP, n_cutting
-                dropped[plane] = True
-                kept, before, other = 0, size_pool, 1 - now
+                kept, size_before, was_on, first_on = 0, size_pool, False, False
+                signs[n] = signs[0]
                 for i in range(n):
-                    v, following = rings[now, i], i + 1 if i + 1 < n else 0
-                    if inside[i]:
-                        rings[other, kept] = v
-                        kept += 1
-                    if inside[i] == inside[following]:
-                        continue
-                    edge, p, q, j = edges[v], v, rings[now, following], size_pool
-                    if edge >= 0:
-                        p, q = edge, edge + 1 if edge + 1 < n_ring else 0
-                    is_known = axis >= 0  # case: along a plane across another axis, to a corner of a box
-                    for k in range(d):
-                        is_double = pool[p, k, 1] == 0.0 and pool[p, k, 2] == 0.0
-                        is_double = is_double and pool[q, k, 1] == 0.0 and pool[q, k, 2] == 0.0
-                        is_known = is_known and (k == axis or (is_double and pool[p, k, 0] == pool[q, k, 0]))
-                    if is_known:
-                        for k in range(d):
-                            pool[j, k, 0], pool[j, k, 1], pool[j, k, 2] = pool[p, k, 0], 0.0, 0.0
-                        pool[j, axis, 0] = place
-                    else:
-                        if axis >= 0:
-                            ph, pl, p_bound = distance_across(
-                                pool[p, axis, 0], pool[p, axis, 1], pool[p, axis, 2], place
-                            )
-                            qh, ql, q_bound = distance_across(
-                                pool[q, axis, 0], pool[q, axis, 1], pool[q, axis, 2], place
-                            )
-                        else:
-                            ph, pl, p_size, p_moved = high[plane, d], low[plane, d], abs(high[plane, d]), 0.0
-                            qh, ql, q_size, q_moved = ph, pl, p_size, 0.0
+                    v, sign, sign_after = rings[here + i], signs[i], signs[i + 1]
+                    if sign >= 0:
+                        if sign == 0 and was_on:
+                            is_same, b = True, rings[there + kept - 1]
                             for k in range(d):
-                                a, a_low = high[plane, k], low[plane, k]
-                                ph, pl, p_size, p_moved = plus_term(
-                                    ph, pl, p_size, p_moved, a, a_low, pool[p, k, 0], pool[p, k, 1], pool[p, k, 2]
-                                )
-                                qh, ql, q_size, q_moved = plus_term(
-                                    qh, ql, q_size, q_moved, a, a_low, pool[q, k, 0], pool[q, k, 1], pool[q, k, 2]
-                                )
-                            p_bound = DD_VALUE_BOUND * p_size + 1.01 * p_moved
-                            q_bound = DD_VALUE_BOUND * q_size + 1.01 * q_moved
-                        if ph < 0.0:
-                            ph, pl = -ph, -pl
-                        if qh < 0.0:
-                            qh, ql = -qh, -ql
-                        if not (p_bound < 0.001 * ph and q_bound < 0.001 * qh):
-                            return polygon, begun, GIVEN_UP, n_cutting
-                        r = 0.0
-                        if p_bound > 0.0 or q_bound > 0.0:
-                            r = 1.01 * max(p_bound / ph, q_bound / qh)
-                        sum_h, sum_l = dd_add(ph, pl, qh, ql)
-                        th, tl = dd_div(ph, pl, sum_h, sum_l)
-                        for k in range(d):
-                            h, rest, bound, is_sure = place, 0.0, 0.0, True
-                            if k != axis:
-                                h, rest, bound, is_sure = between(
-                                    pool[p, k, 0],
-                                    pool[p, k, 1],
-                                    pool[p, k, 2],
-                                    pool[q, k, 0],
-                                    pool[q, k, 1],
-                                    pool[q, k, 2],
-                                    ph,
-                                    pl,
-                                    qh,
-                                    ql,
-                                    sum_h,
-                                    sum_l,
-                                    th,
-                                    tl,
-                                    r,
-                                )
-                            pool[j, k, 0], pool[j, k, 1], pool[j, k, 2] = h, rest, bound
-                            if not is_sure or bound > _KNOWN * reach[k]:
+                                is_same = is_same & (pool[v * d + k] == pool[b * d + k])
+                            if is_same:
                                 return polygon, begun, GIVEN_UP, n_cutting
-                    if kept > 0 and rings[other, kept - 1] >= before:
-                        is_apart, c = False, rings[other, kept - 1]
+                        was_on = sign == 0
+                        first_on = was_on if kept == 0 else first_on
+                        if was_on and sign_after < 0:
+                            edges[v] = -1
+                        rings[there + kept] = v
+                        kept += 1
+                    if sign * sign_after >= 0:
+                        continue
+                    w = rings[here + i + 1] if i + 1 < n else rings[here]
+                    edge, j, is_sure = edges[v], size_pool, True
+                    if axis >= 0 and edge >= 0:
+                        p, q = edge, edge + 1 if edge + 1 < n_ring else 0
+                        a, b = pool[p * d + axis], pool[q * d + axis]
+                        th, tl, is_sure = share_of_edge(a, b, place)
                         for k in range(d):
-                            x, y, bound = pool[j, k, 0], pool[c, k, 0], pool[j, k, 2] + pool[c, k, 2]
-                            is_apart = is_apart or abs(x - y) > _APART * (abs(x) + abs(y)) + bound
-                        if not is_apart and compare_vertices(pool, j, c) != 1:
+                            if k == axis:
+                                h, rest, bound = place, 0.0, 0.0
+                            else:
+                                x, y = pool[p * d + k], pool[q * d + k]
+                                h, rest, bound = on_edge(x, y, th, tl)
+                                if abs(rest) <= bound:
+                                    near_double = h if abs(h) > bound else 0.0
+                                    if is_at(x, y, a, b, place, near_double):
+                                        h, rest, bound = near_double, 0.0, 0.0
+                                is_sure = is_sure & surely_rounded(h, rest, bound)
+                            pool[j * d + k] = h
+                            rests[2 * (j * d + k)], rests[2 * (j * d + k) + 1] = rest, bound
+                    else:
+                        p, q = v, w
+                        if edge >= 0:
+                            p, q = edge, edge + 1 if edge + 1 < n_ring else 0
+                        is_known = axis >= 0  # case: along a plane across another axis, to a corner of a box
+                        for k in range(d):
+                            is_double = (p < n_ring or rests[2 * (p * d + k) + 1] == 0.0) and (
+                                q < n_ring or rests[2 * (q * d + k) + 1] == 0.0
+                            )
+                            is_same = is_double and pool[p * d + k] == pool[q * d + k]
+                            is_known = is_known and (k == axis or is_same)
+                        if is_known:
+                            for k in range(d):
+                                pool[j * d + k] = place if k == axis else pool[p * d + k]
+                                rests[2 * (j * d + k)], rests[2 * (j * d + k) + 1] = 0.0, 0.0
+                        else:
+                            if axis >= 0:
+                                x, y = p * d + axis, q * d + axis
+                                rest, bound = (rests[2 * x], rests[2 * x + 1]) if p >= n_ring else (0.0, 0.0)
+                                ph, pl, p_bound = distance_across(pool[x], rest, bound, place)
+                                rest, bound = (rests[2 * y], rests[2 * y + 1]) if q >= n_ring else (0.0, 0.0)
+                                qh, ql, q_bound = distance_across(pool[y], rest, bound, place)
+                            else:
+                                ph, pl, p_size, p_moved = high[plane, d], low[plane, d], abs(high[plane, d]), 0.0
+                                qh, ql, q_size, q_moved = ph, pl, p_size, 0.0
+                                for k in range(d):
+                                    a, a_low, x, y = high[plane, k], low[plane, k], p * d + k, q * d + k
+                                    rest, bound = (rests[2 * x], rests[2 * x + 1]) if p >= n_ring else (0.0, 0.0)
+                                    ph, pl, p_size, p_moved = plus_term(
+                                        ph, pl, p_size, p_moved, a, a_low, pool[x], rest, bound
+                                    )
+                                    rest, bound = (rests[2 * y], rests[2 * y + 1]) if q >= n_ring else (0.0, 0.0)
+                                    qh, ql, q_size, q_moved = plus_term(
+                                        qh, ql, q_size, q_moved, a, a_low, pool[y], rest, bound
+                                    )
+                                p_bound, q_bound = value_bound(p_size, p_moved), value_bound(q_size, q_moved)
+                            if ph < 0.0:
+                                ph, pl = -ph, -pl
+                            if qh < 0.0:
+                                qh, ql = -qh, -ql
+                            least = min(ph, qh)
+                            if not (p_bound < 0.001 * ph and q_bound < 0.001 * qh and least > WIDEST):
+                                return polygon, begun, GIVEN_UP, n_cutting
+                            r = 0.0
+                            if p_bound > 0.0 or q_bound > 0.0:
+                                r = 1.01 * max(p_bound / ph, q_bound / qh)
+                            sum_h, sum_l = dd_add(ph, pl, qh, ql)
+                            th, tl = dd_div(ph, pl, sum_h, sum_l)
+                            for k in range(d):
+                                h, rest, bound = place, 0.0, 0.0
+                                if k != axis:
+                                    x, y = p * d + k, q * d + k
+                                    x_low, x_bound = (rests[2 * x], rests[2 * x + 1]) if p >= n_ring else (0.0, 0.0)
+                                    y_low, y_bound = (rests[2 * y], rests[2 * y + 1]) if q >= n_ring else (0.0, 0.0)
+                                    h, rest, bound = between(
+                                        pool[x],
+                                        x_low,
+                                        x_bound,
+                                        pool[y],
+                                        y_low,
+                                        y_bound,
+                                        ph,
+                                        pl,
+                                        qh,
+                                        ql,
+                                        sum_h,
+                                        sum_l,
+                                        th,
+                                        tl,
+                                        r,
+                                    )
+                                is_sure = is_sure & surely_rounded(h, rest, bound)
+                                pool[j * d + k] = h
+                                rests[2 * (j * d + k)], rests[2 * (j * d + k) + 1] = rest, bound
+                    if not is_sure:
+                        return polygon, begun, GIVEN_UP, n_cutting
+                    if was_on:
+                        is_same, b = True, rings[there + kept - 1]
+                        for k in range(d):
+                            is_same = is_same & (pool[j * d + k] == pool[b * d + k])
+                        if is_same:
                             return polygon, begun, GIVEN_UP, n_cutting
-                    edges[j] = -1 if inside[i] else edge
-                    rings[other, kept] = j
+                    was_on = True
+                    first_on = True if kept == 0 else first_on
+                    edges[j] = -1 if sign > 0 else edge
+                    rings[there + kept] = j
                     kept += 1
                     size_pool += 1
-                contacts[plane] += size_pool - before
-                if kept > 1 and rings[other, kept - 1] >= before and rings[other, 0] >= before:
-                    if compare_vertices(pool, rings[other, kept - 1], rings[other, 0]) != 1:
+                contacts[i_plane] += size_pool - size_before
+                if kept > 1 and was_on and first_on:
+                    is_same, a, b = True, rings[there + kept - 1], rings[there]
+                    for k in range(d):
+                        is_same = is_same & (pool[a * d + k] == pool[b * d + k])
+                    if is_same:
                         return polygon, begun, GIVEN_UP, n_cutting
-                n, now = kept, other
+                n, here, there = kept, there, here
                 if n == 0:
                     break
-            if written + n > out.shape[0]:
+            if (written + n) * d > out.size:
                 return polygon, begun, NO_ROOM, n_cutting
             for i in range(n):
-                j = rings[now, i]
+                j = rings[here + i]
                 for k in range(d):
-                    h, rest, bound = pool[j, k, 0], pool[j, k, 1], pool[j, k, 2]
-                    if bound > 0.0 and not surely_rounded(h, rest, bound + 2.0 * U2 * abs(h)):
-                        return polygon, begun, GIVEN_UP, n_cutting
-                    out[written + i, k] = h + rest
+                    out[(written + i) * d + k] = pool[j * d + k]
             sizes[ring] = n
             written += n
         for i in range(n_cutting):
-            if written > begun and dropped[cutting[i]] and contacts[cutting[i]] > 2:
+            if written > begun and dropped[i] and contacts[i] > 2:
                 may_have_bridges[polygon] = True
     return last, written, DONE, 0

@@ -16,6 +16,7 @@ from engine.clipping.plain_rings import OPEN
 from engine.clipping.scaling import exponent_of, scaled_back, shifted
 from engine.clipping.sutherland_hodgman import clip_rings
 from engine.parallel import Budget
+from engine.predicates.digits import packed_numbers
 from engine.solids.base import FloatArray, IntArray
 
 _DEEPEST: Final = -900
@@ -25,7 +26,8 @@ _DEEPEST: Final = -900
 @dataclass(frozen=True, slots=True)
 class KernelScene:
     """vertices: (m, dim) float64 times 2^-exponent; high, low: (planes, dim + 1) float64 for them; axes: (planes,)
-    int64, the axis that a plane cuts across in one known double `at`, else -1."""
+    int64, the axis that a plane cuts across in one known double `at`, else -1; row_heap, row_places: the rows for them
+    in whole numbers, see digits.py."""
 
     vertices: FloatArray
     exponent: int
@@ -33,6 +35,8 @@ class KernelScene:
     low: FloatArray
     axes: IntArray
     at: FloatArray
+    row_heap: IntArray
+    row_places: IntArray
 
 
 def kernel_scene(vertices: FloatArray, planes: list[Row], budget: Budget) -> KernelScene | None:
@@ -43,11 +47,13 @@ def kernel_scene(vertices: FloatArray, planes: list[Row], budget: Budget) -> Ker
         return None
     high, low = np.zeros((len(planes), len(planes[0]))), np.zeros((len(planes), len(planes[0])))
     axes, at = np.full(len(planes), -1, np.int64), np.zeros(len(planes))
+    rows: list[list[int]] = []
     for i, row in enumerate(planes):
         if i % 256 == 0:
             budget.check()
         *normal, offset = [x << exponent for x in row[:-1]] + [row[-1]] if exponent > 0 else row
         offset = offset << -exponent if exponent < 0 else offset
+        rows.append([*normal, offset])
         shift = max(map(int.bit_length, normal))  # the row is divided by 2^shift: its largest number is about 1
         try:
             for k, number in enumerate([*normal, offset]):
@@ -61,7 +67,8 @@ def kernel_scene(vertices: FloatArray, planes: list[Row], budget: Budget) -> Ker
     sizes = np.abs(np.concatenate([high.ravel(), low.ravel()]))
     if ((sizes != 0.0) & ((sizes < SMALLEST) | (sizes > LARGEST))).any():
         return None
-    return KernelScene(points, exponent, high, low, axes, at)
+    packed = packed_numbers(rows)
+    return None if packed is None else KernelScene(points, exponent, high, low, axes, at, *packed)
 
 
 def _double_double(number: int, shift: int) -> tuple[float, float]:
@@ -95,18 +102,20 @@ def clip_chunk(
     Fills sizes (of rings), state and may_have_bridges (of polygons); see `clip_rings`.
     """
     n_vertices = int(ring_offsets[polygon_offsets[last]] - ring_offsets[polygon_offsets[first]])
-    room, done, parts = n_vertices + 4 * len(scene.high) + 64, first, []
+    d, room, done, parts = scene.vertices.shape[1], n_vertices + 4 * len(scene.high) + 64, first, []
     while done < last:
-        out = np.empty((room, scene.vertices.shape[1]))
+        out = np.empty(room * d)
         with np.errstate(all="ignore"):
             reached, written = clip_rings(
-                scene.vertices,
+                scene.vertices.reshape(-1),
                 ring_offsets,
                 polygon_offsets,
                 scene.high,
                 scene.low,
                 scene.axes,
                 scene.at,
+                scene.row_heap,
+                scene.row_places,
                 done,
                 last,
                 budget.flag,
@@ -114,12 +123,13 @@ def clip_chunk(
                 sizes,
                 state,
                 may_have_bridges,
+                tuple(range(d)),
             )
         budget.check()
-        parts.append(out[:written])
+        parts.append(out[: written * d].reshape(-1, d))
         room = room if reached > done else 2 * room
         done = reached
-    vertices = np.concatenate(parts) if parts else np.zeros((0, scene.vertices.shape[1]))
+    vertices = np.concatenate(parts) if parts else np.zeros((0, d))
     if scene.exponent:
         vertices, doubtful = scaled_back(vertices, scene.exponent)
         if doubtful.any():

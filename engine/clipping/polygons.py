@@ -13,6 +13,7 @@ import numpy.typing as npt
 from engine.clipping.box_planes import box_rows
 from engine.clipping.convex_planes import convex_planes
 from engine.clipping.exact_contours import Row, clip_polygon, integer_row, reduced
+from engine.clipping.plain_rings import OPEN
 from engine.clipping.polygon_batches import clip_chunk, kernel_scene
 from engine.errors import EmptyGeometryError, InvalidArrayError, TooComplexError, UnsupportedSolidError
 from engine.parallel import Budget, Cancel, Progress, run_chunks
@@ -239,7 +240,7 @@ def _clip(
 
     vertices.setflags(write=False)
     scene = kernel_scene(vertices, planes, budget)
-    is_open = np.ones(n, np.uint8)
+    state = np.full(n, OPEN, np.uint8)
 
     def settle(i: int) -> FloatArray:
         rings = range(polygon_offsets[i], polygon_offsets[i + 1])
@@ -256,12 +257,12 @@ def _clip(
         settled = np.zeros((0, dimension))
         if scene is not None:
             settled = clip_chunk(
-                scene, ring_offsets, polygon_offsets, first, last, budget, sizes, is_open, may_have_bridges
+                scene, ring_offsets, polygon_offsets, first, last, budget, sizes, state, may_have_bridges
             )
         found, taken = [], 0
         counts = np.add.reduceat(np.append(sizes, 0), polygon_offsets[first : last + 1]) if last > first else sizes
         before = _offsets(counts[: last - first])
-        for i in first + np.flatnonzero(is_open[first:last]):
+        for i in first + np.flatnonzero(state[first:last] == OPEN):
             budget.check()
             found += [settled[taken : before[i - first]], settle(int(i))]
             taken = int(before[i - first])
@@ -279,5 +280,4 @@ def _clip(
         status,
         may_have_bridges,
     )
-    n_open = int(is_open.sum())
-    return clipped, n_open, n_open
+    return clipped, int(np.count_nonzero(state)), int(np.count_nonzero(state == OPEN))

@@ -83,3 +83,10 @@ def surely_rounded(h: float, low: float, bound: float) -> bool:
     bound is zero. False where a NaN came in.
     """
     return h + (low - bound) == h + (low + bound)
+
+
+@inline
+def even_of(x: float, other: float) -> float:
+    """Return which of two neighbouring doubles has the even significand."""
+    half = 0.5 * (x / abs(other - x))
+    return x if math.floor(half) == half else other
