@@ -1,8 +1,13 @@
 """Pairs of boxes with a common point, by a grid of cells at least as wide as all boxes but a few large ones.
 
 A box stands in the cell of its low corner. Two boxes of one cell's width or less that meet have their low corners at
-most a width apart on each axis, so in the same or in neighbouring cells: three runs of cells side by side in the plane,
-nine in space. The few largest boxes, infinite ones among them, are compared with all others. `cell_of` is monotone in
+most a width apart on each axis, so in the same or in neighbouring cells. Each pair is looked for from one side only:
+
+    y   a a a      boxes are laid out by cell, so that the cells marked with one letter are one run of boxes: b the
+    ^   . B b      later ones of the box's own cell B and those of the next cell, a the row above; then three such
+    +-> . . . x    rows of the layer behind. A rim of empty cells saves every question whether a neighbour exists.
+
+The few largest boxes, infinite ones among them, stand last and are compared with all others. `cell_of` is monotone in
 floating point and corners a width apart are at most one cell apart, because the width is enlarged first. Right for many
 boxes of like size; `engine.bounding.sweep` is for others.
 
@@ -12,7 +17,7 @@ Source: C. Ericson, Real-Time Collision Detection, 2005, section 7.1 (uniform gr
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -30,99 +35,121 @@ _CROWD: Final = 48
 """Boxes that share a cell with one box, on average, beyond which a sweep is no worse."""
 
 
+class BoxGrid(NamedTuple):
+    """Boxes by cell, the large ones last.
+
+    boxes (n, 6): low, then high. numbers (n,): which box each is. cells (n,): its cell, -1 where it is large. starts
+    (n_cells + 1,) int32: where each cell begins among them. row, layer: how far the next cell on y and on z is.
+    """
+
+    boxes: FloatArray
+    numbers: IntArray
+    cells: IntArray
+    starts: npt.NDArray[np.int32]
+    row: int
+    layer: int
+
+
 def pairs_of_boxes(low: FloatArray, high: FloatArray, flag: Any, block: int = BLOCK) -> Iterator[IntArray]:
-    """Yield what `meeting_boxes` yields, by a grid where the boxes are many and of like size."""
-    n_boxes, dimension = low.shape
-    grid = None
-    if n_boxes >= _FEWEST:
-        boxes = np.zeros((n_boxes, 6))
-        boxes[:, :dimension], boxes[:, 3 : 3 + dimension] = low, high
-        with np.errstate(all="ignore"):
-            grid = _grid_of(boxes, dimension)
+    """Yield the pairs of `meeting_boxes`, by a grid where the boxes are many and of like size; each block is sorted,
+    but where there are several a later one may hold smaller indices."""
+    n_boxes = len(low)
+    grid = _grid_of(low, high) if n_boxes >= _FEWEST else None
     if grid is None:
         yield from meeting_boxes(low, high, flag, block)
         return
     start, room = 0, max(block, 1) + n_boxes  # one box meets fewer others than there are
     keys = np.empty(room, np.int64)
     while start < n_boxes:  # bound: start grows
-        n_found, start = _collect(boxes, *grid, start, max(block, 1), keys, flag)
+        n_found, start = _collect(grid, start, max(block, 1), keys, flag)
         found = np.sort(keys[:n_found])
         if n_found:
             yield np.stack([found // n_boxes, found % n_boxes], axis=1)
 
 
-def _grid_of(boxes: FloatArray, dimension: int) -> tuple[IntArray, IntArray, IntArray, IntArray, IntArray] | None:
-    """Return the cell of each box (-1: large), cells on each axis, the large ones, the others by cell and where each
-    cell starts among them; None where a sweep is better."""
-    n_boxes = len(boxes)
+@np.errstate(all="ignore")
+def _grid_of(low: FloatArray, high: FloatArray) -> BoxGrid | None:
+    """Return the grid of boxes (n, d), None where a sweep is better."""
+    n_boxes, dimension = low.shape
     extent = np.empty(n_boxes)
-    _measure(boxes, extent)
+    _measure(low, high, extent)
     widest, widest_of_all = float(np.partition(extent, n_boxes - _LARGE - 1)[n_boxes - _LARGE - 1]), float(extent.max())
     if widest * 4.0 >= widest_of_all:  # all of like size: none is large
         widest = widest_of_all
     span = np.array([[np.inf] * 3, [-np.inf] * 3])
-    _spread(boxes, extent, widest, span)
+    _spread(low, extent, widest, span)
     least, most = span
+    least[dimension:] = most[dimension:] = 0.0
     width = np.maximum(widest, (most - least) / (n_boxes ** (1.0 / dimension) * 2.0))
     width = width * _ENLARGED + 2.0**-52 * np.maximum(np.abs(least), np.abs(most)) * 4.0 + 2.0**-1000
     last = np.floor((most - least) / width)
     if not (np.isfinite(last).all() and np.isfinite(width).all()):
         return None
-    counts = last.astype(np.int64) + 1
-    cells, order = np.empty(n_boxes, np.int64), np.empty(n_boxes, np.int64)
-    starts = np.zeros(int(counts.prod()) + 1, np.int64)
-    if _sort_into_cells(boxes, extent, widest, least, width, counts, cells, order, starts) > _CROWD * n_boxes:
+    counts = last.astype(np.int64) + 3  # a rim of one cell on either side
+    row, layer = int(counts[0]), int(counts[0] * counts[1])
+    boxes, numbers, cells = np.zeros((n_boxes, 6)), np.empty(n_boxes, np.int64), np.empty(n_boxes, np.int64)
+    starts = np.zeros(layer * int(counts[2]) + 1, np.int32)
+    grid = BoxGrid(boxes, numbers, cells, starts, row, layer)
+    if _sort_into_cells(low, high, extent, widest, least, width, grid) > _CROWD * n_boxes:
         return None
-    return cells, counts, np.flatnonzero(extent > widest), order, starts
+    return grid
 
 
 @kernel
-def _measure(boxes: Any, extent: Any) -> None:
+def _measure(low: Any, high: Any, extent: Any) -> None:
     """Fill extent (n,) with the largest side of each box, infinite where a bound is or the side overflows."""
-    for box in range(boxes.shape[0]):
+    for box in range(low.shape[0]):
         side = 0.0
-        for axis in range(3):
-            side = max(side, boxes[box, 3 + axis] - boxes[box, axis])
-            if not (np.isfinite(boxes[box, axis]) and np.isfinite(boxes[box, 3 + axis])):
+        for axis in range(low.shape[1]):
+            side = max(side, high[box, axis] - low[box, axis])
+            if not (np.isfinite(low[box, axis]) and np.isfinite(high[box, axis])):
                 side = np.inf
         extent[box] = side
 
 
 @kernel
-def _spread(boxes: Any, extent: Any, widest: float, span: Any) -> None:
+def _spread(low: Any, extent: Any, widest: float, span: Any) -> None:
     """Fill span (2, 3) with the least and the greatest low corner of boxes that are not large."""
-    for box in range(boxes.shape[0]):
+    for box in range(low.shape[0]):
         if extent[box] <= widest:
-            for axis in range(3):
-                span[0, axis] = min(span[0, axis], boxes[box, axis])
-                span[1, axis] = max(span[1, axis], boxes[box, axis])
+            for axis in range(low.shape[1]):
+                span[0, axis] = min(span[0, axis], low[box, axis])
+                span[1, axis] = max(span[1, axis], low[box, axis])
 
 
 @kernel
-def _sort_into_cells(
-    boxes: Any, extent: Any, widest: float, least: Any, width: Any, counts: Any, cells: Any, order: Any, starts: Any
-) -> int:
-    """Fill cells (n,), order (boxes that are not large, by cell) and starts (n_cells + 1,), zeros before; return the
-    sum of the squares of how many share a cell."""
-    n_boxes, n_cells = boxes.shape[0], starts.shape[0] - 1
+def _sort_into_cells(low: Any, high: Any, extent: Any, widest: float, least: Any, width: Any, grid: BoxGrid) -> int:
+    """Fill the arrays of the grid, boxes and starts zero before; return the sum of the squares of how many share a
+    cell."""
+    starts, n_boxes, n_cells, dimension = grid.starts, low.shape[0], grid.starts.shape[0] - 1, low.shape[1]
+    cells = np.empty(n_boxes, np.int64)
+    n_small = 0
     for box in range(n_boxes):
         cells[box] = -1
         if extent[box] <= widest:
-            cell = 0
-            for axis in range(2, -1, -1):
-                cell = cell * counts[axis] + int((boxes[box, axis] - least[axis]) / width[axis])
+            cell = 1 + grid.row + grid.layer
+            for axis in range(dimension):
+                step = 1 if axis == 0 else (grid.row if axis == 1 else grid.layer)
+                cell += step * int((low[box, axis] - least[axis]) / width[axis])
             cells[box] = cell
             starts[cell + 1] += 1
+            n_small += 1
     n_sharing = 0
     for cell in range(n_cells):
-        n_sharing += starts[cell + 1] * starts[cell + 1]
+        n_sharing += int(starts[cell + 1]) * int(starts[cell + 1])
         starts[cell + 1] += starts[cell]
-    filled = starts[:-1].copy()
+    filled, n_large = starts[:-1].copy(), 0
     for box in range(n_boxes):
         cell = cells[box]
         if cell >= 0:
-            order[filled[cell]] = box
+            place = int(filled[cell])
             filled[cell] += 1
+        else:
+            place = n_small + n_large
+            n_large += 1
+        grid.numbers[place], grid.cells[place] = box, cell
+        for axis in range(dimension):
+            grid.boxes[place, axis], grid.boxes[place, 3 + axis] = low[box, axis], high[box, axis]
     return n_sharing
 
 
@@ -139,47 +166,39 @@ def _meet(boxes: Any, box: int, other: int) -> bool:
     )
 
 
+@inline
+def _add_run(boxes: Any, numbers: Any, box: int, start: int, stop: int, keys: Any, n_found: int) -> int:
+    """Write the keys of the pairs of a box with those of a run that it meets; return the number then found. One key
+    more than is found may be written."""
+    n_boxes, own = numbers.shape[0], numbers[box]
+    for other in range(start, stop):
+        number = numbers[other]
+        keys[n_found] = min(own, number) * n_boxes + max(own, number)
+        n_found += 1 if _meet(boxes, box, other) else 0
+    return n_found
+
+
 @kernel
-def _collect(
-    boxes: Any,
-    cells: Any,
-    counts: Any,
-    large: Any,
-    order: Any,
-    starts: Any,
-    start: int,
-    enough: int,
-    keys: Any,
-    flag: Any,
-) -> tuple[int, int]:
-    """Write first * n + second of pairs with first >= start until `enough` are found; return number and next first."""
-    n_boxes, n_found = boxes.shape[0], 0
+def _collect(grid: BoxGrid, start: int, enough: int, keys: Any, flag: Any) -> tuple[int, int]:
+    """Write first * n + second of the pairs of boxes from place `start` on with those after them, until `enough` are
+    found; return their number and the place to go on from."""
+    boxes, numbers, starts, row, layer = grid.boxes, grid.numbers, grid.starts, grid.row, grid.layer
+    n_boxes, n_small, n_found = numbers.shape[0], int(starts[-1]), 0
     for box in range(start, n_boxes):
         if flag[0] != 0:
             return 0, n_boxes
         if n_found >= enough:
             return n_found, box
-        cell = cells[box]
+        cell = grid.cells[box]
         if cell < 0:
-            for other in range(box + 1, n_boxes):
-                if _meet(boxes, box, other):
-                    keys[n_found] = box * n_boxes + other
-                    n_found += 1
+            n_found = _add_run(boxes, numbers, box, box + 1, n_boxes, keys, n_found)
             continue
-        for item in range(large.shape[0]):
-            other = large[item]
-            if other > box and _meet(boxes, box, other):
-                keys[n_found] = box * n_boxes + other
-                n_found += 1
-        x, row = cell % counts[0], cell // counts[0]
-        y, z = row % counts[1], row // counts[1]
-        for k in range(max(z - 1, 0), min(z + 2, counts[2])):
-            for j in range(max(y - 1, 0), min(y + 2, counts[1])):
-                line = (k * counts[1] + j) * counts[0]
-                stop = starts[line + min(x + 2, counts[0])]
-                for item in range(starts[line + max(x - 1, 0)], stop):
-                    other = order[item]
-                    if other > box and _meet(boxes, box, other):
-                        keys[n_found] = box * n_boxes + other
-                        n_found += 1
+        n_found = _add_run(boxes, numbers, box, box + 1, starts[cell + 2], keys, n_found)
+        cell += row
+        n_found = _add_run(boxes, numbers, box, starts[cell - 1], starts[cell + 2], keys, n_found)
+        cell += layer - 2 * row
+        for _ in range(3):
+            n_found = _add_run(boxes, numbers, box, starts[cell - 1], starts[cell + 2], keys, n_found)
+            cell += row
+        n_found = _add_run(boxes, numbers, box, n_small, n_boxes, keys, n_found)
     return n_found, n_boxes

@@ -155,12 +155,17 @@ _Part = tuple[IntArray, Relations, list[Witness | None], Details | None]
 
 
 def _joined(parts: list[_Part], witnesses: bool, detail: bool) -> ScenePairs:
-    """Return the colliding pairs of all blocks as one."""
+    """Return the colliding pairs of all blocks as one, sorted; each block is."""
     none = np.empty(0, np.int8)
     pairs = np.concatenate([np.empty((0, 2), np.int64), *(part[0] for part in parts)])
     relations = np.concatenate([none, *(part[1] for part in parts)])
     named = tuple(witness for part in parts for witness in part[2]) if witnesses else None
     details = np.concatenate([none, *(part[3] for part in parts if part[3] is not None)]) if detail else None
+    if len(parts) > 1:
+        order = np.lexsort((pairs[:, 1], pairs[:, 0]))
+        pairs, relations = pairs[order], relations[order]
+        named = None if named is None else tuple(named[item] for item in order.tolist())
+        details = None if details is None else details[order]
     return ScenePairs(pairs[:, 0].copy(), pairs[:, 1].copy(), relations, named, details)
 
 
@@ -173,7 +178,8 @@ def _have_interiors(bodies: SceneBodies, pairs: IntArray, budget: Budget) -> npt
 
 
 def _candidates(bodies: SceneBodies, wanted: IntArray | None, budget: Budget) -> Iterator[IntArray]:
-    """Yield the pairs whose boxes meet, of those wanted (keys first * n + second), in blocks, sorted."""
+    """Yield the pairs whose boxes meet, of those wanted (keys first * n + second), in blocks, each of them
+    sorted."""
     n_bodies = len(bodies.solids)
     if n_bodies < 2 or (wanted is not None and not len(wanted)):
         return

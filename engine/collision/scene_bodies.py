@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.collision.collide import check_pose, pair_function
+from engine.collision.identities import numbered
 from engine.collision.posed_boxes import place_boxes
 from engine.collision.world_box import own_box
 from engine.errors import InvalidArrayError, UnsupportedSolidError, WrongDimensionError
@@ -50,22 +51,18 @@ def scene_bodies(solids: Sequence[Solid], poses: Sequence[Pose | None] | None) -
     placed: list[Pose | None] = [None] * len(bodies) if poses is None else list(poses)
     if len(placed) != len(bodies):
         raise InvalidArrayError(f"poses must be as many as solids, {len(bodies)}, got {len(placed)}", ("poses",))
-    _, firsts, kinds = np.unique(np.array(list(map(id, bodies)), np.int64), return_index=True, return_inverse=True)
-    order = np.argsort(firsts)  # by first appearance, whatever the addresses
-    kinds, firsts = np.argsort(order)[kinds], firsts[order]
+    kinds, firsts = numbered(np.fromiter(map(id, bodies), np.int64, len(bodies)))
     distinct = [bodies[first] for first in firsts.tolist()]
     _check_solids(distinct, firsts)
     dimension = distinct[0].dimension if distinct else 3
-    is_posed = np.ones(len(bodies), np.bool_)
-    if type(None) in set(map(type, placed)):
-        is_posed = np.array([pose is not None for pose in placed], np.bool_)
-    turns, moves = _pose_numbers(placed, dimension, bodies)
+    is_posed, numbers = _pose_numbers(placed, dimension, bodies)
     rotations, translations = np.empty((len(bodies) + 1, dimension, dimension)), np.zeros((len(bodies) + 1, dimension))
     rotations[0] = np.eye(dimension)
     rows: IntArray | slice = slice(1, None)
-    if len(turns) < len(bodies):
+    if len(numbers) < len(bodies):
         rotations[1:], rows = np.eye(dimension), np.flatnonzero(is_posed) + 1
-    rotations[rows], translations[rows] = turns, moves
+    rotations[rows] = numbers[:, : dimension**2].reshape(-1, dimension, dimension)
+    translations[rows] = numbers[:, dimension**2 :]
     own = [own_box(solid) for solid in distinct]
     boxes, reaches = np.array([box[:2] for box in own]).reshape(-1, 2, dimension), np.array([box[2] for box in own])
     radii = np.array([getattr(solid, "radius", 0.0) for solid in distinct])
@@ -75,16 +72,20 @@ def scene_bodies(solids: Sequence[Solid], poses: Sequence[Pose | None] | None) -
     return SceneBodies(bodies, placed, distinct, kinds, is_posed, rotations, translations, low, high)
 
 
-def _pose_numbers(placed: list[Pose | None], dimension: int, bodies: list[Solid]) -> tuple[FloatArray, FloatArray]:
-    """Return rotations and translations of the poses that are not None; raise on the first that is no pose, or of
-    another dimension. One join of their buffers is several times as fast as stacking arrays."""
-    moving = [pose for pose in placed if pose is not None]
-    if set(map(type, moving)) <= {Pose}:
-        turns = np.frombuffer(b"".join([pose.rotation for pose in moving]))  # type: ignore[misc] # arrays are buffers
-        moves = np.frombuffer(b"".join([pose.translation for pose in moving]))  # type: ignore[misc]
-        n = len(moving)
-        if len(turns) == n * dimension**2 and len(moves) == n * dimension:  # none of 2 rows makes up for one of 3
-            return turns.reshape(n, dimension, dimension), moves.reshape(n, dimension)
+def _pose_numbers(
+    placed: list[Pose | None], dimension: int, bodies: list[Solid]
+) -> tuple[npt.NDArray[np.bool_], FloatArray]:
+    """Return which bodies have a pose, and these poses' numbers, one row each: the rotation, then the translation.
+
+    Raises on the first that is no pose, or of another dimension.
+    """
+    types, moving, is_posed = set(map(type, placed)), placed, np.ones(len(placed), np.bool_)
+    if type(None) in types:
+        moving, is_posed = [pose for pose in placed if pose is not None], np.array([p is not None for p in placed])
+    if types <= {Pose, type(None)}:
+        numbers = np.frombuffer(b"".join([pose.numbers for pose in moving]))  # type: ignore[union-attr]
+        if len(numbers) == len(moving) * (dimension**2 + dimension):  # none of 2 rows makes up for one of 3
+            return is_posed, numbers.reshape(-1, dimension**2 + dimension)
     for index, pose in enumerate(placed):
         check_pose(pose, bodies[index], f"poses[{index}]")
     raise AssertionError("unreachable")

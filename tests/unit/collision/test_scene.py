@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import time
+from functools import partial
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from engine import (
     UnsupportedSolidError,
     WrongDimensionError,
 )
+from engine.bounding.box_grid import pairs_of_boxes
 from engine.collision.collide import collide
 from engine.collision.scene import collide_scene
 
@@ -105,6 +107,29 @@ def test_ten_thousand_boxes_in_a_lattice_touch_their_neighbours() -> None:
     neighbours = sum((n - (dx != 0)) * (n - (dy != 0)) * (n - (dz != 0)) for dx, dy, dz in np.ndindex(3, 3, 3)) - n**3
     assert len(pairs.first) == neighbours // 2 == report.n_items
     assert (pairs.relation == Relation.TOUCHING).all()
+
+
+def test_pairs_found_in_several_blocks_are_sorted(monkeypatch: pytest.MonkeyPatch) -> None:
+    at = np.random.default_rng(5).uniform(0, 8, (600, 3))
+    solids = [Sphere(place, 0.5) for place in at]
+    expected = collide_scene(solids, witnesses=True, detail=True)
+    monkeypatch.setattr("engine.collision.scene.pairs_of_boxes", partial(pairs_of_boxes, block=50))
+    found = collide_scene(solids, witnesses=True, detail=True)
+    assert as_list(found) == as_list(expected) == sorted(as_list(expected))
+    assert found.witnesses == expected.witnesses
+    assert found.detail.tolist() == expected.detail.tolist()
+
+
+def test_the_same_solid_many_times_counts_once_and_bad_poses_are_named() -> None:
+    cube, ball = Aabb([0, 0, 0], [1, 1, 1]), Sphere([0, 0, 0], 1)
+    steps = [Pose(EYE, [k, 0, 0]) for k in range(5)]
+    assert as_list(collide_scene([cube, ball, cube, cube, ball], steps)) == every_pair(
+        [cube, ball, cube, cube, ball], steps
+    )
+    with pytest.raises(WrongDimensionError, match=r"poses\[1\]"):
+        collide_scene([cube, cube], [None, Pose(np.eye(2), [0, 0])])
+    with pytest.raises(InvalidArrayError, match=r"poses\[1\]"):
+        collide_scene([cube, cube], [steps[0], np.eye(3)])
 
 
 def test_an_empty_scene_and_a_single_body_have_no_pairs() -> None:
