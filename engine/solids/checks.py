@@ -114,8 +114,10 @@ def _as_floats(values: object, depth: int, where: Where, must_be_finite: bool) -
             f"{spell(where)} must have {depth} axes, got {_kind(array)}; a single item still needs its outer axis",
             where,
         )
-    if array.dtype.kind == "f" and array.dtype.itemsize <= 8:
-        result: FloatArray = np.require(array, np.float64, ["C", "A", "E"])
+    if array.dtype == np.float64 and type(array) is np.ndarray and array.flags.c_contiguous and array.flags.aligned:
+        result: FloatArray = array
+    elif array.dtype.kind == "f" and array.dtype.itemsize <= 8:
+        result = np.require(array, np.float64, ["C", "A", "E"])
     else:
         with np.errstate(over="ignore", under="ignore"):  # wider floats: judged by the check
             result = np.require(array, np.float64, ["C", "A", "E"])

@@ -8,7 +8,7 @@ without repeated positions, the common case, keeps one array for both.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +17,7 @@ from engine.errors import IndexOutOfRangeError, InvalidArrayError, RepeatedIndex
 from engine.solids.base import FloatArray, IntArray, Solid
 from engine.solids.checks import as_points, check_not_empty, frozen, shown
 from engine.solids.ear_cutting import cut_faces
+from engine.solids.sound_triangles import MOST_CORNERS, MOST_VERTICES, are_sound
 
 
 class Mesh(Solid):
@@ -28,6 +29,7 @@ class Mesh(Solid):
     """``(n, 3)``: as given."""
     face_indices: IntArray
     """The vertex indices of all faces as given, one face after another."""
+    _must_close: ClassVar[bool] = False
     _face_offsets: IntArray | None  # None: every face is a triangle
     _triangles: IntArray | None  # None: `face_indices`, three by three
     _triangle_faces: IntArray | None  # None: triangle i is face i
@@ -37,13 +39,14 @@ class Mesh(Solid):
         check_not_empty(len(points), "vertex", ("vertices",))
         points = frozen(points)
         offsets, indices = as_faces(faces, len(points))
-        check_repeated_indices(offsets, indices)
-        first_equal = first_equal_points(points)
-        merged = indices if first_equal is None else first_equal[indices]
-        self._check_faces(points, offsets, indices, merged)
-        triangles, triangle_faces = merged, None
-        if offsets is not None:
-            triangles, triangle_faces = cut_faces(points, offsets, indices, merged)
+        triangles, triangle_faces = indices, None
+        if offsets is not None or not self._is_small_and_sound(points, indices):
+            check_repeated_indices(offsets, indices)
+            first_equal = first_equal_points(points)
+            triangles = merged = indices if first_equal is None else first_equal[indices]
+            self._check_faces(points, offsets, indices, merged)
+            if offsets is not None:
+                triangles, triangle_faces = cut_faces(points, offsets, indices, merged)
         for array in (offsets, indices, triangles, triangle_faces):
             if array is not None:
                 array.setflags(write=False)
@@ -55,6 +58,12 @@ class Mesh(Solid):
             _triangles=None if triangles is indices else triangles,
             _triangle_faces=triangle_faces,
         )
+
+    def _is_small_and_sound(self, points: FloatArray, indices: IntArray) -> bool:
+        """Tell whether these are few triangles without any fault or equal points: no other check is needed then."""
+        if len(points) > MOST_VERTICES or len(indices) > MOST_CORNERS:
+            return False
+        return bool(are_sound(points, indices, self._must_close))
 
     def _check_faces(self, vertices: FloatArray, offsets: IntArray | None, indices: IntArray, merged: IntArray) -> None:
         """Raise if the faces break an invariant of this kind of mesh."""
@@ -100,6 +109,7 @@ def as_faces(faces: object, n_vertices: int) -> tuple[IntArray | None, IntArray]
     faces: an integer array ``(m, k)`` or a list of lists of whole numbers, three or more each.
     Raises: InvalidArrayError, EmptyGeometryError, RingTooShortError, IndexOutOfRangeError.
     """
+    counts: IntArray | None
     if isinstance(faces, (list, tuple)):
         counts, flat = _flatten(faces)
     else:
@@ -112,17 +122,19 @@ def as_faces(faces: object, n_vertices: int) -> tuple[IntArray | None, IntArray]
                 f"got dtype {array.dtype} and shape {array.shape}",
                 ("faces",),
             )
-        counts, flat = np.full(array.shape[0], array.shape[1], np.int64), array.ravel()
-    check_not_empty(len(counts), "face", ("faces",))
-    if counts.min() < 3:
-        i_face = int(np.argmax(counts < 3))
-        raise RingTooShortError(
-            f"faces[{i_face}] has {counts[i_face]} vertices; a face needs at least 3", ("faces", i_face)
-        )
-    offsets = None if counts.max() == 3 else np.append(np.int64(0), np.cumsum(counts))
-    is_outside = (flat < 0) | (flat >= n_vertices)
-    if is_outside.any():
-        position = int(np.argmax(is_outside))
+        flat = array.ravel()
+        counts = None if array.shape[1] == 3 else np.full(array.shape[0], array.shape[1], np.int64)
+    check_not_empty(len(flat) if counts is None else len(counts), "face", ("faces",))
+    offsets = None
+    if counts is not None:
+        if counts.min() < 3:
+            i_face = int(np.argmax(counts < 3))
+            raise RingTooShortError(
+                f"faces[{i_face}] has {counts[i_face]} vertices; a face needs at least 3", ("faces", i_face)
+            )
+        offsets = None if counts.max() == 3 else np.append(np.int64(0), np.cumsum(counts))
+    if flat.min() < 0 or flat.max() >= n_vertices:
+        position = int(np.argmax((flat < 0) | (flat >= n_vertices)))
         i_face, i_corner = _place(offsets, position)
         raise IndexOutOfRangeError(
             f"faces[{i_face}][{i_corner}] is {shown(int(flat[position]))}, "

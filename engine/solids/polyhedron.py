@@ -37,6 +37,7 @@ class Polyhedron(Mesh):
     __slots__ = ()
 
     type: ClassVar[str] = "polyhedron"
+    _must_close: ClassVar[bool] = True
 
     def _check_faces(self, vertices: FloatArray, offsets: IntArray | None, indices: IntArray, merged: IntArray) -> None:
         check_closed(vertices, offsets, indices, merged)
