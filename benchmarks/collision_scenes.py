@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cache, partial
 
 import numpy as np
@@ -56,6 +56,12 @@ class Crowd:
     kinds: np.ndarray
     rotations: np.ndarray
     translations: np.ndarray
+
+    def frames(self) -> list[Crowd]:
+        """Return the crowd a step away, every body moved, and as it stands."""
+        random = workloads.generator(self.name, 1)
+        step = random.uniform(-0.25, 0.25, self.translations.shape)
+        return [replace(self, translations=self.translations + step), self]
 
 
 @cache
@@ -143,7 +149,25 @@ def _crowd(suite: Suite, n_bodies: int, name: str) -> Iterable[Row]:
     )
     row.raw |= {"ours": asdict(a), "peer": asdict(b), "build": build}
     yield row
+    yield _moving(suite, bodies, n_bodies)
     yield _all_relations(bodies, n_bodies)
+
+
+def _moving(suite: Suite, bodies: Crowd, n_bodies: int) -> Row:
+    """The crowd, every body moved before each question: fcl updates its tree, ours starts from nothing as always."""
+    chosen, row = suite.options, Row(f"{n_bodies:,} bodies, all moved before, vs fcl's manager", "x")
+    ours, peer = (load(name).MAKERS["moving_crowd"](bodies, 1) for name in ("ours", "fcl_calls"))
+    asked = [contender.native(np.arange(n_bodies)) for contender in (ours, peer)]
+    runs = [partial(contender.ask, frames) for contender, frames in zip((ours, peer), asked, strict=True)]
+    (a, b), found = interleaved(runs, min(chosen.rounds, 5), chosen.seconds)
+    differ = len(np.setxor1d(ours.answer(found[0]), peer.answer(found[1])))
+    wall, cpu = ratios(a, b)
+    row.value, row.low, row.high, row.cpu_value = wall.median, wall.low, wall.high, cpu.median
+    n_frames = len(asked[0])
+    row.ours, row.peer = (f"{timing.median / n_frames * 1e3:.3g} ms" for timing in (a, b))
+    row.note = f"{differ} pairs differ; fcl: new transforms, update, all pairs; ours: all pairs under new poses"
+    row.raw |= {"ours": asdict(a), "peer": asdict(b)}
+    return row
 
 
 def _all_relations(bodies: Crowd, n_bodies: int) -> Row:

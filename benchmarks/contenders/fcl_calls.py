@@ -43,40 +43,64 @@ def _mesh_pair(pair: Pair, threads: int) -> Prepared:
     return Prepared(native, ask, np.array)
 
 
-def _crowd(crowd: Crowd, threads: int) -> Prepared:
+class _Manager:
     """The dynamic tree of boxes; each pair it finds calls back into Python, which asks for that pair and notes it."""
-    n = len(crowd.kinds)
-    shapes = []
-    for mesh in crowd.meshes:
-        polygons = np.column_stack([np.full(len(mesh.faces), 3), mesh.faces]).ravel()
-        shapes.append(fcl.Convex(mesh.vertices, len(mesh.faces), polygons))
-    objects = [
-        fcl.CollisionObject(shapes[kind], fcl.Transform(turn, move))
-        for kind, turn, move in zip(crowd.kinds, crowd.rotations, crowd.translations, strict=True)
-    ]
-    manager = fcl.DynamicAABBTreeCollisionManager()
-    manager.registerObjects(objects)
-    manager.setup()
-    request = fcl.CollisionRequest(num_max_contacts=1, enable_contact=False)
 
-    def ask(_: object) -> list[tuple[fcl.CollisionObject, fcl.CollisionObject]]:
+    def __init__(self, crowd: Crowd) -> None:
+        shapes = []
+        for mesh in crowd.meshes:
+            polygons = np.column_stack([np.full(len(mesh.faces), 3), mesh.faces]).ravel()
+            shapes.append(fcl.Convex(mesh.vertices, len(mesh.faces), polygons))
+        self.objects = [
+            fcl.CollisionObject(shapes[kind], pose) for kind, pose in zip(crowd.kinds, _transforms(crowd), strict=True)
+        ]
+        self.tree = fcl.DynamicAABBTreeCollisionManager()
+        self.tree.registerObjects(self.objects)
+        self.tree.setup()
+        self._request = fcl.CollisionRequest(num_max_contacts=1, enable_contact=False)
+        self._numbers = {tuple(place): number for number, place in enumerate(crowd.translations.tolist())}
+
+    def pairs(self) -> list[tuple[fcl.CollisionObject, fcl.CollisionObject]]:
+        """Return the colliding pairs."""
         found = []
 
         def note(first: fcl.CollisionObject, second: fcl.CollisionObject, data: object) -> bool:
-            if fcl.collide(first, second, request, fcl.CollisionResult()) > 0:
+            if fcl.collide(first, second, self._request, fcl.CollisionResult()) > 0:
                 found.append((first, second))
             return False
 
-        manager.collide(None, note)
+        self.tree.collide(None, note)
         return found
 
-    def answer(found: list[tuple[fcl.CollisionObject, fcl.CollisionObject]]) -> np.ndarray:
-        numbers = {tuple(place): number for number, place in enumerate(crowd.translations.tolist())}
-        named = [[numbers[tuple(item.getTranslation())] for item in pair] for pair in found]
+    def answer(self, found: list[tuple[fcl.CollisionObject, fcl.CollisionObject]]) -> np.ndarray:
+        """Return first * n + second of pairs found where the crowd stands."""
+        named = [[self._numbers[tuple(item.getTranslation())] for item in pair] for pair in found]
         pairs = np.sort(np.array(named, np.int64).reshape(-1, 2), axis=1)
-        return np.sort(pairs[:, 0] * n + pairs[:, 1])
-
-    return Prepared(lambda rows: rows, ask, answer)
+        return np.sort(pairs[:, 0] * len(self.objects) + pairs[:, 1])
 
 
-MAKERS = {"mesh_pair": _mesh_pair, "crowd": _crowd}
+def _transforms(crowd: Crowd) -> list[fcl.Transform]:
+    return [fcl.Transform(turn, move) for turn, move in zip(crowd.rotations, crowd.translations, strict=True)]
+
+
+def _crowd(crowd: Crowd, threads: int) -> Prepared:
+    manager = _Manager(crowd)
+    return Prepared(lambda rows: rows, lambda _: manager.pairs(), manager.answer)
+
+
+def _moving_crowd(crowd: Crowd, threads: int) -> Prepared:
+    """Every body gets a new pose, the tree is updated, then asked: once for each of the poses of `Crowd.frames`."""
+    manager = _Manager(crowd)
+
+    def ask(frames: list[list[fcl.Transform]]) -> list[tuple[fcl.CollisionObject, fcl.CollisionObject]]:
+        for poses in frames:
+            for item, pose in zip(manager.objects, poses, strict=True):
+                item.setTransform(pose)
+            manager.tree.update()
+            found = manager.pairs()
+        return found
+
+    return Prepared(lambda rows: [_transforms(frame) for frame in crowd.frames()], ask, manager.answer)
+
+
+MAKERS = {"mesh_pair": _mesh_pair, "crowd": _crowd, "moving_crowd": _moving_crowd}

@@ -79,9 +79,8 @@ def _convex_pair(pair: Pair, threads: int) -> Prepared:
 
 def _crowd(crowd: Crowd, threads: int) -> Prepared:
     """Every question starts from a list of solids and poses: nothing is kept but what a solid keeps of itself."""
-    meshes = [engine.Polyhedron(mesh.vertices, mesh.faces) for mesh in crowd.meshes]
-    solids = [meshes[kind] for kind in crowd.kinds]
-    poses = [engine.Pose(turn, move) for turn, move in zip(crowd.rotations, crowd.translations, strict=True)]
+    solids = _crowd_solids(crowd)
+    poses = _crowd_poses(crowd)
 
     def ask(_: object) -> engine.ScenePairs:
         return engine.collide_scene(solids, poses, workers=threads)
@@ -89,10 +88,36 @@ def _crowd(crowd: Crowd, threads: int) -> Prepared:
     return Prepared(lambda rows: rows, ask, lambda found: found.first * len(solids) + found.second)
 
 
+def _moving_crowd(crowd: Crowd, threads: int) -> Prepared:
+    """The same question for each of the poses of `Crowd.frames`."""
+    solids = _crowd_solids(crowd)
+
+    def ask(frames: list[list[engine.Pose]]) -> engine.ScenePairs:
+        for poses in frames:
+            found = engine.collide_scene(solids, poses, workers=threads)
+        return found
+
+    return Prepared(
+        lambda rows: [_crowd_poses(frame) for frame in crowd.frames()],
+        ask,
+        lambda found: found.first * len(solids) + found.second,
+    )
+
+
+def _crowd_solids(crowd: Crowd) -> list[engine.Polyhedron]:
+    meshes = [engine.Polyhedron(mesh.vertices, mesh.faces) for mesh in crowd.meshes]
+    return [meshes[kind] for kind in crowd.kinds]
+
+
+def _crowd_poses(crowd: Crowd) -> list[engine.Pose]:
+    return [engine.Pose(turn, move) for turn, move in zip(crowd.rotations, crowd.translations, strict=True)]
+
+
 MAKERS = {
     "polyhedron": _polyhedron,
     "convex_pair": _convex_pair,
     "crowd": _crowd,
+    "moving_crowd": _moving_crowd,
     "mesh_pair": _mesh_pair,
     "polygon": _polygon,
     "convex": _convex,
