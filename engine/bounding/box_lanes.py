@@ -20,13 +20,10 @@ from numba import config as numba_config
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
-from numba.np.arrayobj import make_array
 
-LANES: Final = 8
+from engine.bounding.row_lanes import LANES, WORD, any_above, bits_without, first_row, load_row, spread, spread_number
+
 FRAME_ROWS: Final = 22
-_FLOAT: Final = ir.FloatType()
-_WORD: Final = ir.IntType(64)
-_VECTOR: Final = ir.VectorType(_FLOAT, LANES)
 
 
 def plain_meeting(first: Any, i: int, second: Any, j: int, frames: Any) -> tuple[int, int]:
@@ -65,27 +62,6 @@ def plain_lowest_bit(bits: int) -> int:
     return (int(bits) & -int(bits)).bit_length() - 1
 
 
-def _data(context: Any, builder: Any, array_type: Any, array: Any) -> Any:
-    return builder.bitcast(make_array(array_type)(context, builder, array).data, _FLOAT.as_pointer())
-
-
-def _row(builder: Any, first: Any, place: int) -> Any:
-    there = builder.gep(first, [ir.Constant(_WORD, place * LANES)])
-    loaded = builder.load(builder.bitcast(there, _VECTOR.as_pointer()))
-    loaded.align = 4  # of a float: numpy promises no more
-    return loaded
-
-
-def _spread(builder: Any, vector: Any, lane: int) -> Any:
-    lanes = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [lane] * LANES)
-    return builder.shuffle_vector(vector, ir.Constant(_VECTOR, ir.Undefined), lanes)
-
-
-def _spread_number(builder: Any, value: Any) -> Any:
-    one = builder.insert_element(ir.Constant(_VECTOR, ir.Undefined), value, ir.Constant(ir.IntType(32), 0))
-    return _spread(builder, one, 0)
-
-
 def _image(builder: Any, box: list[Any], frame: list[Any]) -> tuple[list[Any], list[Any]]:
     """Return low and high of the eight boxes around the images of eight boxes."""
 
@@ -102,26 +78,18 @@ def _image(builder: Any, box: list[Any], frame: list[Any]) -> tuple[list[Any], l
     return lows, highs
 
 
-def _any_above(builder: Any, pairs: list[tuple[Any, Any]]) -> Any:
-    found = None
-    for greater, less in pairs:
-        is_above = builder.fcmp_ordered(">", greater, less)
-        found = is_above if found is None else builder.or_(found, is_above)
-    return found
-
-
 def _meeting_intrinsic(typing_context: Any, first: Any, i: Any, second: Any, j: Any, frames: Any) -> Any:
     """Return what `plain_meeting` does; arrays C-contiguous."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         def node(which: int) -> list[Any]:
-            data = _data(context, builder, signature.args[which], arguments[which])
-            data = builder.gep(data, [builder.mul(arguments[which + 1], ir.Constant(_WORD, 6 * LANES))])
-            return [_row(builder, data, place) for place in range(6)]
+            array_type, array, item = signature.args[which], arguments[which], arguments[which + 1]
+            data = first_row(context, builder, array_type, array, item, 6)
+            return [load_row(builder, data, place) for place in range(6)]
 
         a, b = node(0), node(2)
-        data = _data(context, builder, signature.args[4], arguments[4])
-        frame = [_row(builder, data, place) for place in range(2 * FRAME_ROWS)]
+        data = first_row(context, builder, signature.args[4], arguments[4], ir.Constant(WORD, 0), FRAME_ROWS)
+        frame = [load_row(builder, data, place) for place in range(2 * FRAME_ROWS)]
         b_low, b_high = _image(builder, b, frame[:FRAME_ROWS])
         a_low, a_high = _image(builder, a, frame[FRAME_ROWS:])
         own_low = [builder.fsub(a[k], a[3 + k]) for k in range(3)]
@@ -134,14 +102,13 @@ def _meeting_intrinsic(typing_context: Any, first: Any, i: Any, second: Any, j: 
             for lane in range(4 * half, 4 * half + 4):
                 pairs = []
                 for k in range(3):
-                    pairs.append((b_low[k], _spread(builder, own_high[k], lane)))
-                    pairs.append((_spread(builder, own_low[k], lane), b_high[k]))
+                    pairs.append((b_low[k], spread(builder, own_high[k], lane)))
+                    pairs.append((spread(builder, own_low[k], lane), b_high[k]))
                 for k in range(3):
-                    pairs.append((their_low[k], _spread(builder, a_high[k], lane)))
-                    pairs.append((_spread(builder, a_low[k], lane), their_high[k]))
-                apart = builder.bitcast(_any_above(builder, pairs), ir.IntType(LANES))
-                row = builder.zext(builder.not_(apart), _WORD)
-                row = builder.shl(row, ir.Constant(_WORD, LANES * (lane - 4 * half)))
+                    pairs.append((their_low[k], spread(builder, a_high[k], lane)))
+                    pairs.append((spread(builder, a_low[k], lane), their_high[k]))
+                row = bits_without(builder, any_above(builder, pairs))
+                row = builder.shl(row, ir.Constant(WORD, LANES * (lane - 4 * half)))
                 bits = row if bits is None else builder.or_(bits, row)
             halves.append(bits)
         return cgutils.pack_array(builder, halves)
@@ -154,16 +121,14 @@ def _inside_box_intrinsic(typing_context: Any, boxes: Any, node: Any, low: Any, 
     """Return what `plain_inside_box` does."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        data = _data(context, builder, signature.args[0], arguments[0])
-        data = builder.gep(data, [builder.mul(arguments[1], ir.Constant(_WORD, 6 * LANES))])
-        b = [_row(builder, data, place) for place in range(6)]
+        data = first_row(context, builder, signature.args[0], arguments[0], arguments[1], 6)
+        b = [load_row(builder, data, place) for place in range(6)]
         pairs = []
         for k in range(3):
-            low, high = (_spread_number(builder, builder.extract_value(arguments[end], k)) for end in (2, 3))
+            low, high = (spread_number(builder, builder.extract_value(arguments[end], k)) for end in (2, 3))
             pairs.append((builder.fsub(b[k], b[3 + k]), high))
             pairs.append((low, builder.fadd(b[k], b[3 + k])))
-        apart = builder.bitcast(_any_above(builder, pairs), ir.IntType(LANES))
-        return builder.zext(builder.not_(apart), _WORD)
+        return bits_without(builder, any_above(builder, pairs))
 
     triple = types.UniTuple(types.float32, 3)
     return types.int64(boxes, types.int64, triple, triple), generate

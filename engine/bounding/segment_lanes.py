@@ -16,12 +16,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from llvmlite import ir
 from numba import config as numba_config
 from numba import types
 from numba.extending import intrinsic
 
-from engine.bounding.box_lanes import _VECTOR, _WORD, LANES, _data, _row, _spread_number
+from engine.bounding.row_lanes import LANES, absolute, bits_without, first_row, load_row, spread_number
 
 PAIRS = ((0, 1), (1, 2), (2, 0))
 
@@ -47,32 +46,25 @@ def _near_segment_intrinsic(
     """Return what `plain_near_segment` does."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        words = ir.VectorType(ir.IntType(32), LANES)
-        without_sign = ir.Constant(words, [0x7FFFFFFF] * LANES)
-
-        def absolute(vector: Any) -> Any:
-            return builder.bitcast(builder.and_(builder.bitcast(vector, words), without_sign), _VECTOR)
-
         def triple(place: int) -> list[Any]:
-            return [_spread_number(builder, builder.extract_value(arguments[place], k)) for k in range(3)]
+            return [spread_number(builder, builder.extract_value(arguments[place], k)) for k in range(3)]
 
-        data = _data(context, builder, signature.args[0], arguments[0])
-        data = builder.gep(data, [builder.mul(arguments[1], ir.Constant(_WORD, 6 * LANES))])
-        b = [_row(builder, data, place) for place in range(6)]
+        data = first_row(context, builder, signature.args[0], arguments[0], arguments[1], 6)
+        b = [load_row(builder, data, place) for place in range(6)]
         m, e = triple(2), triple(3)
-        slack, tiny = (_spread_number(builder, arguments[place]) for place in (4, 5))
+        slack, tiny = (spread_number(builder, arguments[place]) for place in (4, 5))
         w = [builder.fsub(m[k], b[k]) for k in range(3)]
         h = [builder.fadd(b[3 + k], slack) for k in range(3)]
-        a = [absolute(e[k]) for k in range(3)]
+        a = [absolute(builder, e[k]) for k in range(3)]
         apart = None
         for k in range(3):
-            found = builder.fcmp_ordered(">", absolute(w[k]), builder.fadd(h[k], a[k]))
+            found = builder.fcmp_ordered(">", absolute(builder, w[k]), builder.fadd(h[k], a[k]))
             apart = found if apart is None else builder.or_(apart, found)
         for i, j in PAIRS:
             gap = builder.fsub(builder.fmul(e[i], w[j]), builder.fmul(e[j], w[i]))
             reach = builder.fadd(builder.fadd(builder.fmul(h[i], a[j]), builder.fmul(h[j], a[i])), tiny)
-            apart = builder.or_(apart, builder.fcmp_ordered(">", absolute(gap), reach))
-        return builder.zext(builder.bitcast(builder.not_(apart), ir.IntType(LANES)), _WORD)
+            apart = builder.or_(apart, builder.fcmp_ordered(">", absolute(builder, gap), reach))
+        return bits_without(builder, apart)
 
     triple = types.UniTuple(types.float32, 3)
     return types.int64(boxes, types.int64, triple, triple, types.float32, types.float32), generate

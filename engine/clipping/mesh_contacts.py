@@ -16,8 +16,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.bounding.box_lanes import LANES, lowest_bit
+from engine.bounding.box_lanes import lowest_bit
 from engine.bounding.bvh import EMPTY, MAX_DEPTH
+from engine.bounding.row_lanes import LANES
 from engine.bounding.segment_lanes import near_segment
 from engine.clipping.contacts import APART, triangle_contact
 from engine.jit import inline, kernel

@@ -1,8 +1,9 @@
 """All pairs of faces of two placed bodies that have a common point, or the first pair that settles the question.
 
-Two trees are descended together: a pair of nodes is replaced by those pairs of their children whose boxes may meet
-(`box_lanes.meeting`), two blocks of faces by pairs of faces, which go to `classify_faces`. Boxes are conservative under
-a pose, so no contact is missed.
+Two trees are descended together: a pair of nodes is replaced by those pairs of their children whose boxes
+(`box_lanes.meeting`) and discs (`disc_lanes.py`) may meet, two blocks of faces by the pairs of faces that neither boxes
+nor planes part (`face_lanes.py`); those are classified by signs. All of these are conservative under a pose, so no
+contact is missed.
 
 The search can be left when its room for pairs is full and taken up again: what it still has to do is in `Descent`.
 """
@@ -14,8 +15,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from engine.bounding.box_lanes import FRAME_ROWS, LANES, lowest_bit, meeting
+from engine.bounding.box_lanes import FRAME_ROWS, lowest_bit, meeting
 from engine.bounding.bvh import MAX_DEPTH
+from engine.bounding.row_lanes import LANES
+from engine.collision.disc_lanes import discs_meeting
+from engine.collision.face_lanes import WORK_ROWS, faces_meeting
 from engine.collision.face_state import proves_overlap, state_of
 from engine.collision.frames import defect_of, set_frame
 from engine.collision.placement import (
@@ -62,13 +66,15 @@ class Descent(NamedTuple):
     """Work space of a search, and what it still has to do.
 
     stack (STACK_ROWS, 2) int32: pairs of nodes. rest (5,) int64: pairs waiting; then, of the pair of blocks at hand,
-    nodes i, j and the two halves of the bits of `meeting` not looked at yet. frames (2, 22, 8) float32: see
-    `box_lanes.py`. poses (2, 12) float64: rotation and translation of either body, for exact signs.
+    nodes i, j and the two halves of the bits of `faces_meeting` not looked at yet. frames (2, 22, 8) float32: see
+    `box_lanes.py`. work (28, 8) float32: of `disc_lanes.py` and `face_lanes.py`, for one pair of nodes. poses (2, 12)
+    float64: rotation and translation of either body, for exact signs.
     """
 
     stack: npt.NDArray[np.int32]
     rest: npt.NDArray[np.int64]
     frames: npt.NDArray[np.float32]
+    work: npt.NDArray[np.float32]
     poses: npt.NDArray[np.float64]
 
 
@@ -87,6 +93,7 @@ def new_descent() -> Descent:
         np.empty((STACK_ROWS, 2), np.int32),
         np.empty(5, np.int64),
         np.empty((2, FRAME_ROWS, LANES), np.float32),
+        np.empty((WORK_ROWS, LANES), np.float32),
         np.zeros((2, 12)),
     )
 
@@ -205,6 +212,8 @@ def search(
     vertices, triangles, child = first.vertices, first.triangles, first.child
     their_vertices, their_triangles, their_child = second.vertices, second.triangles, second.child
     boxes, their_boxes, frames = first.boxes, second.boxes, descent.frames
+    blocks, their_blocks, work = first.blocks, second.blocks, descent.work
+    discs, their_discs, scales = first.discs, second.discs, (first.scale, second.scale)
     n_stack, n_pairs = rest[0], 0
     i, j, low, high = rest[1], rest[2], rest[3], rest[4]
     while True:  # bound: each pair of nodes, and each pair of faces, enters once
@@ -241,10 +250,11 @@ def search(
             return INTERRUPTED, n_pairs
         n_stack -= 1
         i, j = int(stack[n_stack, 0]), int(stack[n_stack, 1])
-        low, high = meeting(boxes, i, their_boxes, j, frames)
         i_block, j_block = child[i, 0] < 0, their_child[j, 0] < 0
         if i_block and j_block:
+            low, high = faces_meeting(blocks, i, their_blocks, j, frames, work)
             continue
+        low, high = meeting(boxes, i, their_boxes, j, frames)
         if j_block:  # only the lanes of i count
             for lane in range(LANES):
                 if (low if lane < 4 else high) >> (8 * (lane & 3)) & 255 != 0:
@@ -258,6 +268,7 @@ def search(
                 bits &= bits - 1
                 n_stack += 1
         else:
+            low, high = discs_meeting(low, high, discs, i, their_discs, j, frames, scales, work)
             for half in range(2):
                 bits = low if half == 0 else high
                 while bits != 0:

@@ -14,6 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.bounding.bvh import EMPTY, WIDTH, build_bvh
+from engine.collision.disc_lanes import DISC_ROWS, fill_discs
+from engine.collision.face_lanes import CORNER_ROWS, NOWHERE
 from engine.collision.placement import NO_ROTATION, NO_TRANSLATION, Extent, PoseArrays
 from engine.collision.triangle_triangle import Triangle3, projected
 from engine.jit import inline, kernel
@@ -43,8 +45,9 @@ STILL = PoseArrays(NO_ROTATION, NO_TRANSLATION, False)
 
 
 class ShellArrays(NamedTuple):
-    """What kernels take; boxes to scale: the tree (`bvh.py`). `state` is filled by kernels as needed: any thread writes
-    the same values."""
+    """What kernels take; boxes to scale: the tree (`bvh.py`); blocks, discs: what its blocks (`face_lanes.py`) and its
+    inner nodes (`disc_lanes.py`) hold beside boxes, the rows of the other kind not set. `state` is filled by kernels as
+    needed: any thread writes the same values."""
 
     vertices: FloatArray
     triangles: IntArray
@@ -52,6 +55,8 @@ class ShellArrays(NamedTuple):
     state: npt.NDArray[np.int8]
     boxes: npt.NDArray[np.float32]
     child: npt.NDArray[np.int32]
+    blocks: npt.NDArray[np.float32]
+    discs: npt.NDArray[np.float32]
     origin: FloatArray
     scale: float
     extent: Extent
@@ -114,6 +119,10 @@ def shell_of_triangles(vertices: FloatArray, triangles: IntArray, faces: IntArra
     with np.errstate(over="ignore", invalid="ignore", under="ignore"):  # uncompiled runs only
         n_used, n_components = _lay_out(vertices, triangles, child, order, ordered, used, axis, components)
         reach, lowest_bit, shift = _lattice_of(used[:n_used])
+    blocks = np.empty((len(child), CORNER_ROWS, WIDTH), np.float32)
+    _fill_blocks(used, ordered, child, tree.origin, tree.scale, blocks)
+    discs = np.empty((len(child), DISC_ROWS, WIDTH), np.float32)
+    fill_discs(blocks, child, tree.boxes, discs)
     arrays = ShellArrays(
         read_only(used[:n_used].copy() if n_used < len(used) else used),
         read_only(ordered),
@@ -121,6 +130,8 @@ def shell_of_triangles(vertices: FloatArray, triangles: IntArray, faces: IntArra
         np.full(n_triangles, STATE_UNKNOWN, np.int8),
         tree.boxes,
         read_only(child),
+        read_only(blocks),
+        read_only(discs),
         tree.origin,
         tree.scale,
         Extent(reach, ldexp(1.0, lowest_bit)),
@@ -180,6 +191,22 @@ def _lay_out(
             components[n_components] = item
             n_components += 1
     return n_used, n_components
+
+
+@kernel
+def _fill_blocks(vertices: Any, triangles: Any, child: Any, origin: Any, scale: float, blocks: Any) -> None:
+    """Fill blocks (n_nodes, 9, 8) with the corners of the triangles of each block, in the coordinates of the tree."""
+    for node in range(child.shape[0]):
+        if child[node, 0] >= 0:
+            continue
+        for lane in range(WIDTH):
+            if child[node, lane] == EMPTY:
+                blocks[node, :, lane] = NOWHERE
+                continue
+            for corner in range(3):
+                vertex = triangles[-1 - child[node, lane], corner]
+                for k in range(3):
+                    blocks[node, 3 * corner + k, lane] = (vertices[vertex, k] - origin[k]) / scale
 
 
 @kernel
