@@ -35,7 +35,7 @@ from engine.types import Point3
 
 _OUT, _WITHIN, _OPEN = range(3)
 _POLL_EVERY = 256
-_LARGEST_ERROR = 2.0**250
+LARGEST_ERROR = 2.0**250
 """Reached where coordinates are about 2^299: products of four lengths stay finite below it."""
 
 
@@ -43,12 +43,12 @@ _LARGEST_ERROR = 2.0**250
 def relate_convex(pool: ConvexArrays, first: int, second: int, a: Frame, b: Frame, is_boolean: bool) -> int:
     """Return the relation of two convex bodies, or UNSETTLED; is_boolean: OVERLAPPING for all that is not disjoint."""
     error = a.error + b.error
-    if not error < _LARGEST_ERROR:
+    if not error < LARGEST_ERROR:
         return UNSETTLED
-    start = minus(_inner(pool.numbers, first, a, CENTER), _inner(pool.numbers, second, b, ASIDE))
+    start = minus(inner_point(pool.numbers, first, a, CENTER), inner_point(pool.numbers, second, b, ASIDE))
     square = dot(start, start)
     first_radius, second_radius = pool.numbers[first, RADIUS], pool.numbers[second, RADIUS]
-    if _is_farther(square, first_radius + second_radius, error):
+    if is_farther(square, first_radius + second_radius, error):
         return DISJOINT
     if a.round > 0.0 and b.round > 0.0:
         return _relate_balls(np.sqrt(square), a.round, b.round, error)
@@ -57,14 +57,19 @@ def relate_convex(pool: ConvexArrays, first: int, second: int, a: Frame, b: Fram
         return DISJOINT
     if found != MEETING:
         return UNSETTLED
-    if is_boolean:
-        return OVERLAPPING
+    return OVERLAPPING if is_boolean else relate_meeting(pool, first, second, a, b, square)
+
+
+@inline
+def relate_meeting(pool: ConvexArrays, first: int, second: int, a: Frame, b: Frame, square: float) -> int:
+    """Return the relation of two bodies whose open interiors meet, or UNSETTLED; square: of how far they are."""
+    error = a.error + b.error
     first_lies = second_lies = _OUT
-    if not _is_farther(square, second_radius, error):
+    if not is_farther(square, pool.numbers[second, RADIUS], error):
         first_lies = _lies(pool, first, second, a, b, square)
     if first_lies == _WITHIN:
         return FIRST_INSIDE_SECOND
-    if not _is_farther(square, first_radius, error):
+    if not is_farther(square, pool.numbers[first, RADIUS], error):
         second_lies = _lies(pool, second, first, b, a, square)
     if second_lies == _WITHIN:
         return SECOND_INSIDE_FIRST
@@ -88,13 +93,13 @@ def _relate_balls(distance: float, first_radius: float, second_radius: float, er
 
 
 @merged
-def _inner(numbers: Any, body: int, f: Frame, which: int) -> Point3:
+def inner_point(numbers: Any, body: int, f: Frame, which: int) -> Point3:
     """Return one of the two points inside a body, posed: CENTER or ASIDE."""
     return placed(f, numbers[body, which], numbers[body, which + 1], numbers[body, which + 2])
 
 
 @merged
-def _is_farther(square: float, distance: float, error: float) -> bool:
+def is_farther(square: float, distance: float, error: float) -> bool:
     """Tell whether a distance, given by its square, surely is larger than one that a pose may have stretched."""
     limit = distance * (1.0 + 2.0**-30) + 8.0 * error
     return square > limit * limit + 2.0**-900
@@ -106,7 +111,7 @@ def _lies(pool: ConvexArrays, inner: int, outer: int, a: Frame, b: Frame, square
     error = 8.0 * (a.error + b.error)
     first, stop = pool.firsts[1, outer], pool.firsts[1, outer + 1]
     if first == stop:
-        return _lies_in_ball(pool.points, a, _inner(pool.numbers, outer, b, CENTER), b.round, error)
+        return _lies_in_ball(pool.points, a, inner_point(pool.numbers, outer, b, CENTER), b.round, error)
     extent = np.sqrt(square) + pool.numbers[inner, RADIUS] + pool.numbers[outer, RADIUS]
     result = _WITHIN
     for face in range(first, stop):

@@ -11,8 +11,11 @@ from engine.collision.aabb_batch import relate_box_pairs
 from engine.collision.codes import UNSETTLED
 from engine.collision.convex_body import ConvexArrays, ConvexBody, convex_body_of, pooled
 from engine.collision.convex_pair import relate_convex_pairs
+from engine.collision.convex_poses import lane_arrays, relate_in_lanes
 from engine.collision.detail import NO_DETAIL, Details, details_of_boxes, details_where_proven
+from engine.collision.placement import NO_ROTATION, NO_TRANSLATION, PoseArrays
 from engine.collision.scene_bodies import SceneBodies
+from engine.collision.shell import read_only
 from engine.parallel import Budget, run_chunks
 from engine.solids.aabb import Aabb
 from engine.solids.base import FloatArray, IntArray, Solid
@@ -98,16 +101,24 @@ def convex_poses(
     bodies = [body for body in (convex_body_of(first), convex_body_of(second)) if body is not None]
     if len(bodies) < 2:
         return None
-    pool = pooled(bodies)
+    pool, lanes = pooled(bodies), lane_arrays(*bodies)
+    still, turns, moves = PoseArrays(NO_ROTATION, NO_TRANSLATION, False), read_only(rotations), read_only(translations)
 
     def fill(start: int, stop: int) -> None:
-        n = stop - start
-        turns = np.concatenate([np.eye(3)[None], rotations[start:stop]])
-        moves = np.concatenate([np.zeros((1, 3)), translations[start:stop]])
-        rows = np.append(np.int64(0), np.ones(n, np.int64))
-        pairs = np.column_stack([np.zeros(n, np.int64), np.arange(1, n + 1)])
+        found = relations[start:stop]
         with np.errstate(all="ignore"):  # uncompiled runs only
-            relate_convex_pairs(pool, rows, turns, moves, pairs, boolean, relations[start:stop], budget.flag)
+            if lanes is not None:
+                poses = PoseArrays(turns[start:stop], moves[start:stop], True)
+                relate_in_lanes(pool, lanes, still, poses, boolean, found, budget.flag)
+            rest = np.flatnonzero(found == UNSETTLED)
+            if len(rest):
+                rows = np.append(np.int64(0), np.ones(len(rest), np.int64))
+                pairs = np.column_stack([np.zeros(len(rest), np.int64), np.arange(1, len(rest) + 1)])
+                placed = np.concatenate([NO_ROTATION, turns[start + rest]])
+                moved = np.concatenate([NO_TRANSLATION, moves[start + rest]])
+                answers = np.full(len(rest), UNSETTLED, np.int8)
+                relate_convex_pairs(pool, rows, placed, moved, pairs, boolean, answers, budget.flag)
+                found[rest] = answers
         budget.check()
 
     return fill
