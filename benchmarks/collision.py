@@ -22,6 +22,7 @@ from benchmarks.collision_scenes import scene_tasks
 from benchmarks.contenders import Absent, Prepared, load
 from benchmarks.measure import clocked, interleaved, ratios, spread
 from benchmarks.poses import Pair, pair_of_size, random_rotations
+from benchmarks.settled import judged
 from benchmarks.suite import Row, Suite, of_seconds, options
 
 PEERS = ("coal_calls", "fcl_calls")
@@ -111,12 +112,12 @@ def _mesh_pair(
     row.ours, row.peer = (f"{timing.median / n_poses * 1e6:.3g} us" for timing in (a, b))
     colliding = relations != engine.Relation.DISJOINT
     inside = (relations == 1) | (relations == 2)
-    differ = int((colliding != peer.answer(collides)).sum())
+    differ, counts = judged(pair, colliding, peer.answer(collides), module.NAME)
     row.note = (
         f"net {net.median:.3g}; {pair.name}, {n_poses} poses, {colliding.mean():.0%} collide, "
-        f"{inside.sum()} of them inside; {differ} answers differ"
+        f"{inside.sum()} of them inside; {differ}"
     )
-    row.raw |= {"ours": asdict(a), "peer": asdict(b), "bare_call": bare / n_poses, "net": asdict(net), "differ": differ}
+    row.raw |= {"ours": asdict(a), "peer": asdict(b), "bare_call": bare / n_poses, "net": asdict(net), **counts}
     yield row
 
 

@@ -13,6 +13,7 @@ from benchmarks import workloads
 from benchmarks.contenders import Absent, load
 from benchmarks.measure import clocked, interleaved, ratios, spread
 from benchmarks.poses import Pair, near_contact, random_rotations
+from benchmarks.settled import judged
 from benchmarks.suite import Row, Suite
 
 BALLS = {10: (4, 2), 32: (10, 3), 100: (14, 7), 200: (18, 11)}
@@ -113,6 +114,7 @@ def _convex(
     runs = [partial(contender.ask, poses) for contender, poses in zip(contenders, asked, strict=True)]
     (a, b), found = interleaved(runs, chosen.rounds, chosen.seconds)
     ours, theirs = (contender.answer(each) for contender, each in zip(contenders, found, strict=True))
+    differ, counts = judged(pair, ours, theirs, module.NAME)
     bare = bare_call("coal_calls") * n_poses
     net = spread([(peer - bare) / mine for mine, peer in zip(a.wall, b.wall, strict=True)])
     gross, _ = ratios(a, b)
@@ -121,9 +123,9 @@ def _convex(
     row.ours, row.peer = (f"{timing.median / n_poses * 1e6:.3g} us" for timing in (a, b))
     row.note = (
         f"gross {gross.median:.3g}; bare call {bare / n_poses * 1e6:.3g} us; {n_poses} poses, {ours.mean():.0%} "
-        f"collide; {int((ours != theirs).sum())} answers differ"
+        f"collide; {differ}"
     )
-    row.raw |= {"ours": asdict(a), "peer": asdict(b), "bare_call": bare / n_poses, "net": asdict(net)}
+    row.raw |= {"ours": asdict(a), "peer": asdict(b), "bare_call": bare / n_poses, "net": asdict(net), **counts}
     yield row
 
 
