@@ -121,13 +121,14 @@ def _warm_cells() -> None:
 
 
 def _warm_collision() -> None:
-    turns, moves = np.broadcast_to(np.eye(3), (3, 3, 3)), [[0.5, 0, 0], [1, 0, 0], [5, 0, 0]]
+    turns, moves = np.broadcast_to(np.eye(3), (3, 3, 3)), np.array([[0.5, 0, 0], [1, 0, 0], [5, 0, 0]])
     sheet = Surface([[0, 0, 0.5], [2, 0, 0.5], [0, 2, 0.5]], [[0, 1, 2]])
     bodies: list[Solid] = [_cube(), sheet, Aabb([0, 0, 0], [1, 1, 1])]
     for first in bodies:
         collide_poses(first, bodies[0], turns, moves, witnesses=True)
         for other in (_cube(1.0), _cube(0.5), HalfSpace([1, 0, 0], -0.5), Sphere([0, 0, 0], 1)):
             collide(first, other)
+    collide_poses(bodies[0], _cube(0.5), np.repeat(turns, 12, axis=0), np.repeat(moves, 12, axis=0))  # eight at a time
     collide_scene(bodies)
     collide_scene([Aabb([k, 0, 0], [k + 2, 1, 1]) for k in range(300)])  # many: their boxes go into a grid
     flat: list[Solid] = [Polygon([[[0, 0], [4, 0], [1, 1], [0, 4]]]), Triangle([[0, 0], [1, 0], [0, 1]])]

@@ -30,6 +30,9 @@ from engine.collision.portal_lanes import (
 from engine.jit import inline, kernel
 from engine.types import Point3
 
+LEAST_POSES = 32
+"""What the lanes need is made in the time that they spare on so many poses."""
+
 _ALL_LANES = (1 << N_LANES) - 1
 
 

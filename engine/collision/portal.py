@@ -10,9 +10,9 @@ of R at most 1.01), the product with a vertex by 3u more, d . t by 3u |d|_1 |t|,
 16 u |d|_1 (3.1 reach + |t|) for each body, which is less than 1.1 |d|_1 `error`.
 
 **Meeting** is proven by four points of M with the origin strictly inside of their tetrahedron. Each is the difference
-of two rounded posed points, of which a coordinate is off by at most `error` together, so each of the four determinants
-by less than 18.5 e (m + e)^2 (`placement.py`), and by 2^-50 of six products at most m^3 for rounding, where
-m 2^-51 < e. Bodies with an interior then share an interior point.
+of two rounded posed points, of which a coordinate is off by at most `error` = e together, so a determinant |p q r| by
+less than e (|p x q|_1 + |p x r|_1 + |q x r|_1) + 18 e^2 m + 6 e^3 where no coordinate exceeds m, and by 2^-50 of six
+products at most m^3 for rounding. Bodies with an interior then share an interior point.
 
 What neither proves (contact, or almost) is UNSURE and decided elsewhere. Exponents: the caller keeps coordinates below
 2^300 (`convex_pair`), so no product of four lengths overflows; a direction or a determinant of at most 2^-900 proves
@@ -204,12 +204,22 @@ def is_around_origin(a: Point3, b: Point3, c: Point3, d: Point3, error: float) -
         max(abs(c.x), abs(c.y), abs(c.z)),
         max(abs(d.x), abs(d.y), abs(d.z)),
     )
-    limit = 32.0 * error * ((m + error) * (m + error)) + _GUARD
     bc, ad = cross(b, c), cross(a, d)
+    size_ab, size_ac, size_ad = _size(cross(a, b)), _size(cross(a, c)), _size(ad)
+    size_bc, size_bd, size_cd = _size(bc), _size(cross(b, d)), _size(cross(c, d))
+    e, rest = 1.001 * error, 20.0 * error * error * (m + error) + 2.0**-47 * (m * m * m) + _GUARD
+    limit_a, limit_b = e * (size_bc + size_bd + size_cd) + rest, e * (size_ac + size_ad + size_cd) + rest
+    limit_c, limit_d = e * (size_ab + size_ad + size_bd) + rest, e * (size_ab + size_ac + size_bc) + rest
     without_a, without_d, without_b, without_c = dot(bc, d), -dot(bc, a), dot(ad, c), -dot(ad, b)
-    if without_a > limit and without_b > limit and without_c > limit and without_d > limit:
+    if without_a > limit_a and without_b > limit_b and without_c > limit_c and without_d > limit_d:
         return True
-    return without_a < -limit and without_b < -limit and without_c < -limit and without_d < -limit
+    return without_a < -limit_a and without_b < -limit_b and without_c < -limit_c and without_d < -limit_d
+
+
+@merged
+def _size(a: Point3) -> float:
+    """Return |a|_1."""
+    return abs(a.x) + abs(a.y) + abs(a.z)
 
 
 @inline

@@ -11,7 +11,7 @@ from engine.collision.aabb_batch import relate_box_pairs
 from engine.collision.codes import UNSETTLED
 from engine.collision.convex_body import ConvexArrays, ConvexBody, convex_body_of, pooled
 from engine.collision.convex_pair import relate_convex_pairs
-from engine.collision.convex_poses import lane_arrays, relate_in_lanes
+from engine.collision.convex_poses import LEAST_POSES, lane_arrays, relate_in_lanes
 from engine.collision.detail import NO_DETAIL, Details, details_of_boxes, details_where_proven
 from engine.collision.placement import NO_ROTATION, NO_TRANSLATION, PoseArrays
 from engine.collision.scene_bodies import SceneBodies
@@ -101,7 +101,7 @@ def convex_poses(
     bodies = [body for body in (convex_body_of(first), convex_body_of(second)) if body is not None]
     if len(bodies) < 2:
         return None
-    pool, lanes = pooled(bodies), lane_arrays(*bodies)
+    pool, lanes = pooled(bodies), lane_arrays(*bodies) if len(relations) >= LEAST_POSES else None
     still, turns, moves = PoseArrays(NO_ROTATION, NO_TRANSLATION, False), read_only(rotations), read_only(translations)
 
     def fill(start: int, stop: int) -> None:

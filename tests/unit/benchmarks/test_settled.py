@@ -15,7 +15,7 @@ FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
 CORNER = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 SMALL = np.concatenate([0.1 * CORNER, 0.1 * CORNER + 5])
 MOVES = np.array([[0.1, 0.1, 0.1], [0.4, 0.4, 0.2], [0.4, 0.4, 0.21], [0.95, 0, 0], [-4.95, -4.95, -4.95]])
-"""Of the two small corners: inside, a rounding off the slanted face, a little off it, crossing it, the second one inside."""
+"""Of the two small corners: inside, a rounding off the slanted face, a little off it, crossing, the second inside."""
 
 
 def a_pair(is_closed: bool) -> Pair:
