@@ -23,16 +23,17 @@ import hashlib
 import os
 import re
 import shutil
+import sys
 import tempfile
 import uuid
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numba
 from numba import config as numba_config
-from numba.core.caching import IndexDataCacheFile
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile, UserProvidedCacheLocator
 from numba.core.registry import CPUDispatcher
 
 KERNELS: list[Any] = []
@@ -124,17 +125,6 @@ def _copy_seed(seed: Path, folder: Path) -> None:
             part.replace(target)
 
 
-@contextmanager
-def _cache_at(folder: Path) -> Iterator[None]:
-    """numba settles a function's cache folder when it decorates it: set the folder for that moment only."""
-    before = numba_config.CACHE_DIR
-    numba_config.CACHE_DIR = str(folder)
-    try:
-        yield
-    finally:
-        numba_config.CACHE_DIR = before
-
-
 class _CacheFile(IndexDataCacheFile):  # type: ignore[misc] # numba carries no types
     """numba's cache file, made safe between processes and for trouble with the disk.
 
@@ -165,38 +155,89 @@ class _CacheFile(IndexDataCacheFile):  # type: ignore[misc] # numba carries no t
         return index
 
 
+class _Locator(UserProvidedCacheLocator):  # type: ignore[misc] # numba carries no types
+    """Names the folder and the file of one kernel; numba's own would look for a folder that can be written first."""
+
+    def __init__(self, function: Callable[..., Any], folder: Path) -> None:
+        self._py_file = function.__code__.co_filename
+        self._lineno = function.__code__.co_firstlineno
+        self._cache_path = str(folder / source_digest(function.__module__))
+
+
+class _Implementation(CompileResultCacheImpl):  # type: ignore[misc]
+    """How numba writes and reads compiled code, at the place that `_Locator` names."""
+
+    def __init__(self, function: Callable[..., Any], folder: Path) -> None:
+        self._lineno = function.__code__.co_firstlineno
+        self._locator = _Locator(function, folder)
+        name = f"{Path(function.__code__.co_filename).stem}.{function.__qualname__}"
+        self._filename_base = self.get_filename_base(name, getattr(sys, "abiflags", ""))
+
+
+class _KernelCache(FunctionCache):  # type: ignore[misc]
+    """The cache of one kernel, looked for at its first call: importing the engine reads no source but Python's."""
+
+    def __init__(self, function: Callable[..., Any], folder: Path) -> None:
+        self._name, self._py_func, self._folder = repr(function), function, folder
+        self.enable()
+
+    @functools.cached_property
+    def _impl(self) -> _Implementation:
+        return _Implementation(self._py_func, self._folder)
+
+    @functools.cached_property
+    def _cache_path(self) -> str:
+        path: str = self._impl.locator.get_cache_path()
+        return path
+
+    @functools.cached_property
+    def _cache_file(self) -> _CacheFile:
+        return _CacheFile(self._cache_path, self._impl.filename_base, source_stamp=None)
+
+
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile an outer loop: called from Python, releases the interpreter lock, cached on disk."""
+    compiled = numba.njit(**_OPTIONS)(function)
     folder = cache_folder()
-    if folder is None or numba_config.DISABLE_JIT:
-        compiled = numba.njit(**_OPTIONS)(function)
-    else:
-        with _cache_at(folder / source_digest(function.__module__)):
-            compiled = numba.njit(cache=True, **_OPTIONS)(function)
-        cache = compiled._cache
-        cache._cache_file = _CacheFile(cache._cache_path, cache._impl.filename_base, source_stamp=None)
+    if folder is not None and not numba_config.DISABLE_JIT:
+        compiled._cache = _KernelCache(function, folder)
     KERNELS.append(compiled)
     return compiled
 
 
-class _Inline(CPUDispatcher):  # type: ignore[misc] # numba carries no types
-    """A function for compiled callers only; the wrappers that let Python call it are a third of all compile time.
+class _Inline:
+    """A function for compiled callers only; the compiler is told of it when it first compiles a caller.
 
-    A call from Python (a test, a debugger) compiles it a second time, with them.
+    Where all callers come from the cache it never is: making a dispatcher takes half a millisecond, and there are
+    hundreds. The wrappers that let Python call it are left out, a third of all compile time; a call from Python (a
+    test, a debugger) compiles it a second time, with them.
     """
 
+    def __init__(self, function: Callable[..., Any], **options: Any) -> None:
+        functools.update_wrapper(self, function)
+        self.py_func = function
+        self._options = _OPTIONS | {"nopython": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True} | options
+
+    @functools.cached_property
+    def _dispatcher(self) -> CPUDispatcher:
+        return CPUDispatcher(py_func=self.py_func, targetoptions=self._options)
+
+    @property
+    def _numba_type_(self) -> Any:
+        """What numba asks any object for: it knows nothing of this class."""
+        return self._dispatcher._numba_type_
+
+    @functools.cached_property
+    def _from_python(self) -> Any:
+        return numba.njit(**_OPTIONS)(self.py_func)
+
     def __call__(self, *arguments: Any) -> Any:
-        if not hasattr(self, "_from_python"):
-            self._from_python = numba.njit(**_OPTIONS)(self.py_func)
         return self._from_python(*arguments)
 
 
 def inline(function: Callable[..., Any]) -> Any:
     """Compile a small function that kernels call; it lives in the caller's cached code."""
-    if numba_config.DISABLE_JIT:
-        return function
-    options = _OPTIONS | {"nopython": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-    return _Inline(py_func=function, targetoptions=options)
+    return function if numba_config.DISABLE_JIT else _Inline(function)
 
 
 def merged(function: Callable[..., Any]) -> Any:
@@ -204,7 +245,4 @@ def merged(function: Callable[..., Any]) -> Any:
 
     The compiler counts references to arrays at every call that it leaves; merged calls let it drop most of that.
     """
-    compiled = inline(function)
-    if not numba_config.DISABLE_JIT:
-        compiled.targetoptions["forceinline"] = True
-    return compiled
+    return function if numba_config.DISABLE_JIT else _Inline(function, forceinline=True)

@@ -22,7 +22,6 @@ from numba import config as numba_config
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
-from numba.np.arrayobj import make_array, populate_array
 
 from engine.jit import inline
 
@@ -66,6 +65,8 @@ def _workspace_intrinsic(typing_context: Any, size: Any) -> Any:
     """Return an uninitialised float64 array of a literal size on the caller's stack; it must not be returned."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        from numba.np.arrayobj import make_array, populate_array  # 0.1 s to import, and only the compiler needs it
+
         word = context.get_value_type(types.intp)
         array_type = signature.return_type
         data = cgutils.alloca_once(builder, ir.DoubleType(), size=word(size.literal_value))
