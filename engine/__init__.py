@@ -39,6 +39,7 @@ from engine.errors import (
     WrongDimensionError,
     ZeroNormalError,
 )
+from engine.files.meshes import read_mesh
 from engine.parallel import Cancel
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
@@ -125,5 +126,6 @@ __all__ = [
     "locate_scene",
     "overlay",
     "overlay_batch",
+    "read_mesh",
     "warm",
 ]

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import logging
-from typing import IO, Final
+from typing import IO, Any, Final
 
 import numpy as np
 
-from engine.errors import EmptyGeometryError, InvalidInputError
+from engine.errors import EmptyGeometryError, IndexOutOfRangeError, InvalidInputError
 from engine.solids.base import FloatArray, IntArray
 from engine.solids.polyhedron import Polyhedron
 
@@ -15,19 +15,24 @@ FORMATS: Final = ("stl", "obj", "ply", "off", "glb")
 
 
 def read_polyhedron(file: IO[bytes], file_format: str) -> Polyhedron:
-    """Return the polyhedron that a mesh file describes, with the checks and the errors of its constructor.
-
-    Vertices at equal coordinates become one, as everywhere; nothing else is repaired. Coordinates are those of the
-    file: decimals become the nearest double, single precision is exact in double. The meshes of a GLB scene are put
-    together; a node's transform is applied in floating point, so that its coordinates are rounded once.
-    Raises: InvalidInputError for another format, a file that cannot be read, or where trimesh is not installed.
-    """
-    vertices, faces = read_mesh(file, file_format)
-    return Polyhedron(vertices, faces)
+    """Return the polyhedron that a mesh file describes, with the checks and the errors of its constructor."""
+    return Polyhedron(*read_mesh(file, file_format))
 
 
 def read_mesh(file: IO[bytes], file_format: str) -> tuple[FloatArray, IntArray]:
-    """Return vertices ``(n, 3)`` and triangles ``(m, 3)`` of a mesh file; see `read_polyhedron`."""
+    """Return the vertices and the triangles of a mesh file, for `Polyhedron` or `Surface`, which check them.
+
+    Vertices at equal coordinates become one, in the order of the file; nothing else is repaired, and polygons are cut
+    into triangles. Nothing that the file names is read.
+
+    Parameters: file: open for reading bytes; file_format: stl, obj, ply, off or glb.
+    Returns: vertices ``(n, 3) float64`` and indices of them ``(m, 3) int64``.
+    Accuracy: coordinates are those of the file: decimals become the nearest double, single precision is exact in
+    double. The meshes of a GLB scene are put together; a node's transform is applied in floating point, so that its
+    coordinates are rounded once.
+    Raises: InvalidInputError for another format, a file that cannot be read, or where trimesh is not installed;
+    EmptyGeometryError for a file without faces; IndexOutOfRangeError where a face names a vertex that is not there.
+    """
     if file_format not in FORMATS:
         raise InvalidInputError(f"format must be one of {', '.join(FORMATS)}, got {file_format!r}", ("format",))
     try:
@@ -38,12 +43,29 @@ def read_mesh(file: IO[bytes], file_format: str) -> tuple[FloatArray, IntArray]:
         ) from None
     logging.getLogger("trimesh").setLevel(logging.CRITICAL)  # its warnings about repairs that we do not ask for
     try:
-        scene = trimesh.load_scene(file, file_type=file_format, process=False, maintain_order=True, skip_materials=True)
-        mesh = scene.to_mesh()
+        with np.errstate(all="ignore"):
+            scene = trimesh.load_scene(
+                file, file_type=file_format, process=False, maintain_order=True, skip_materials=True
+            )
+            mesh = scene.to_mesh()
+            vertices, faces = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
+    except MemoryError:
+        raise
     except Exception as error:  # the parsers raise whatever the bytes lead them to
         raise InvalidInputError(
-            f"the file cannot be read as {file_format}: {type(error).__name__}: {error}", ("file",)
+            f"the file cannot be read as {file_format}: {type(error).__name__}: {error!s:.200}", ("file",)
         ) from error
-    if not len(mesh.faces):
+    if not len(faces):
         raise EmptyGeometryError(f"the {file_format} file holds no faces", ("file",))
-    return np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise IndexOutOfRangeError(f"a face names a vertex beyond the {len(vertices)} there are", ("file",))
+    return _merged(vertices, faces)
+
+
+def _merged(vertices: Any, faces: Any) -> tuple[FloatArray, IntArray]:
+    """Return the vertices at different coordinates in their first order, and the faces with their new indices."""
+    _, first, inverse = np.unique(vertices + 0.0, axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    rank = np.empty(len(order), np.int64)
+    rank[order] = np.arange(len(order))
+    return vertices[first[order]], rank[inverse.reshape(-1)][faces]
