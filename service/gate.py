@@ -11,7 +11,7 @@ import logging
 import re
 import secrets
 import time
-from typing import Any, Final
+from typing import Final
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -92,7 +92,11 @@ def _digest(key: bytes) -> bytes:
 
 
 def _record(scope: Scope, status: int, seconds: float) -> None:
-    fields: dict[str, Any] = {
+    if not log.isEnabledFor(logging.INFO):
+        return
+    # as log.info() makes it, without the search for the line that called it: half of what a log line costs
+    record = logging.LogRecord(log.name, logging.INFO, __file__, 0, "request", (), None)
+    record.fields = {
         "request_id": scope["state"]["request_id"],
         "client": scope["client"][0] if scope.get("client") else "",
         "method": scope["method"],
@@ -100,4 +104,4 @@ def _record(scope: Scope, status: int, seconds: float) -> None:
         "status": status,
         "milliseconds": round(1e3 * seconds, 3),
     }
-    log.info("request", extra={"fields": fields})
+    log.handle(record)

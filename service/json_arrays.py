@@ -13,8 +13,8 @@ text, rows of several lengths, an integer too large) is `Unfit`: the other decod
 
 from __future__ import annotations
 
+import mmap
 import re
-from collections.abc import Iterator
 from itertools import chain
 from typing import Any, Final
 
@@ -24,6 +24,8 @@ from pydantic_core import from_json
 
 PIECE: Final = 2**17
 """Bytes parsed at once: 0.4 ms, and text and result stay in the processor's cache."""
+STEP: Final = 2**22
+"""Bytes searched at once: 0.3 ms."""
 LEAST: Final = 2**12
 """Bytes without a string in them that are worth looking at."""
 EXACT_INTEGERS: Final = 2**53
@@ -36,11 +38,14 @@ _MARK: Final = -(10**18)
 """Stands for the first array in the rest of the text; the others follow downwards."""
 
 
+Body = bytes | bytearray | mmap.mmap
+
+
 class Unfit(Exception):
     """The text, or an array in it, is none that is taken here."""
 
 
-def decode(body: bytes | bytearray) -> Any:
+def decode(body: Body) -> Any:
     """Return the value of the JSON text `body`, its long arrays of numbers as ndarrays (int64 or float64)."""
     rest, arrays, end = [], [], 0
     for start, stop in _sections(body):
@@ -61,19 +66,32 @@ def decode(body: bytes | bytearray) -> Any:
     return document
 
 
-def _sections(body: bytes | bytearray) -> Iterator[tuple[int, int]]:
-    """Yield start and stop of what is likely to be the value of a member and a long array of numbers."""
-    is_quote = np.frombuffer(body, np.uint8) == ord('"')
-    if np.count_nonzero(is_quote) * LEAST > 8 * len(body):
-        return  # mostly strings
-    quotes = np.concatenate([np.flatnonzero(is_quote), [len(body)]])
-    for i_quote in np.flatnonzero(np.diff(quotes) > LEAST).tolist():
-        start, stop = quotes[i_quote].item() + 1, quotes[i_quote + 1].item()
-        value = _VALUE.match(body, start, stop)
-        brace = body.find(b"}", start, stop)
-        end = brace if brace >= 0 else body.rfind(b",", start, stop)
-        if value is not None and end > value.end():
-            yield value.end(), end
+def _sections(body: Body) -> list[tuple[int, int]]:
+    """Return start and stop of what is likely to be the value of a member and a long array of numbers."""
+    found, n_quotes, most = [], 0, 8 * len(body) // LEAST
+    quote = _find(body, b'"', 0, len(body))
+    while quote >= 0:  # bound: each turn goes on to the next quote
+        n_quotes += 1
+        if n_quotes > most:
+            return []  # mostly strings
+        start, quote = quote + 1, _find(body, b'"', quote + 1, len(body))
+        stop = quote if quote >= 0 else len(body)
+        if stop - start >= LEAST:
+            value = _VALUE.match(body, start, stop)
+            brace = _find(body, b"}", start, stop)
+            end = brace if brace >= 0 else body.rfind(b",", start, stop)
+            if value is not None and end > value.end():
+                found.append((value.end(), end))
+    return found
+
+
+def _find(body: Body, byte: bytes, start: int, stop: int) -> int:
+    """Return where `byte` first stands, -1 if nowhere; in steps, so that no other thread waits long."""
+    for at in range(start, stop, STEP):
+        found: int = body.find(byte, at, min(at + STEP, stop))
+        if found >= 0:
+            return found
+    return -1
 
 
 def _put(value: Any, waiting: dict[int, Any]) -> Any:

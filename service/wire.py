@@ -24,7 +24,7 @@ PART: Final = 20_000
 """Items encoded at once: half a millisecond."""
 
 
-def decode_fast(body: bytes | bytearray) -> Any:
+def decode_fast(body: json_arrays.Body) -> Any:
     """Return what `decode` returns, with ndarrays in the place of long arrays of numbers; None if there are none, or
     if anything about the body is not as it should be: then `decode` finds out what."""
     if len(body) < json_arrays.LEAST:
@@ -35,10 +35,11 @@ def decode_fast(body: bytes | bytearray) -> Any:
         return None
 
 
-def decode(body: bytes | bytearray) -> Any:
+def decode(body: json_arrays.Body) -> Any:
     """Return the value that the JSON text `body` stands for; `not_json` otherwise."""
+    text = body if isinstance(body, (bytes, bytearray)) else bytes(memoryview(body))
     try:
-        return from_json(body, cache_strings="keys")
+        return from_json(text, cache_strings="keys")
     except ValueError as error:
         raise ServiceError("not_json", f"the body is no JSON that is taken here: {error}") from None
 
