@@ -1,6 +1,7 @@
 """Clients generated from the stored document are called against the running service, and Java's own client too.
 
-Each part runs where its tool is installed: openapi-python-client (the extra `test`), npm, a JDK.
+Each part runs where its tools are installed: openapi-python-client (the extra `test`), openapi-generator-cli (from
+PyPI, with its Java program inside), npm, a JDK, Debian's Jackson, Go with Debian's validator.
 """
 
 from __future__ import annotations
@@ -19,6 +20,22 @@ from tests.unit.service.test_live import Service
 
 DOCUMENT = Path(__file__).with_name("openapi.json")
 CALLS = Path(__file__).with_name("clients")
+ANSWERS = ["201", "[false,true,true]", "touching", "422"]
+JACKSON = [Path("/usr/share/java") / f"jackson-{part}.jar" for part in ("core", "annotations", "databind")]
+GO_PATH = Path("/usr/share/gocode")
+STAND_INS = {
+    "javax/annotation/Generated": "@interface Generated { String value(); String comments(); }",
+    "javax/annotation/Nonnull": "@interface Nonnull {}",
+    "javax/annotation/Nullable": "@interface Nullable {}",
+    "org/openapitools/client/RFC3339JavaTimeModule": "class RFC3339JavaTimeModule "
+    "extends com.fasterxml.jackson.databind.module.SimpleModule {}",
+    "com/fasterxml/jackson/datatype/jsr310/JavaTimeModule": "class JavaTimeModule "
+    "extends com.fasterxml.jackson.databind.module.SimpleModule {}",
+}
+"""What a generated Java client wants beside Jackson: markers, and a module for dates, which the API has none of."""
+
+needs_java = pytest.mark.skipif(shutil.which("java") is None, reason="no JDK is installed")
+needs_npm = pytest.mark.skipif(shutil.which("npm") is None, reason="no npm is installed")
 
 
 @pytest.fixture(scope="module")
@@ -34,6 +51,8 @@ def service() -> Iterator[Service]:
 def run(*command: object, folder: Path, **environment: str) -> str:
     """Run a command in `folder` and return what it prints; fail with all of it if it fails."""
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
+    if "PYTHONPATH" in environment:
+        environment["PYTHONPATH"] += os.pathsep + os.environ.get("PYTHONPATH", "")
     environment = {**os.environ, "PATH": path, **environment}
     done = subprocess.run(
         [str(word) for word in command], cwd=folder, env=environment, capture_output=True, text=True, timeout=300
@@ -42,7 +61,7 @@ def run(*command: object, folder: Path, **environment: str) -> str:
     return done.stdout
 
 
-@pytest.mark.skipif(shutil.which("java") is None, reason="no JDK is installed")
+@needs_java
 def test_java_http_client_with_its_defaults(service: Service, tmp_path: Path) -> None:
     """It offers h2c with every request, body included."""
     printed = run("java", CALLS / "Call.java", service.url, folder=tmp_path)
@@ -59,19 +78,80 @@ def test_openapi_python_client(service: Service, tmp_path: Path) -> None:
     assert printed.split() == ["201", "[False,True,True]", "touching", "422"]
 
 
+def generate(folder: Path, language: str, *words: str) -> Path:
+    """Make a client of the stored document by openapi-generator."""
+    package = pytest.importorskip("openapi_generator_cli", reason="openapi-generator-cli is missing")
+    program = next(Path(package.__file__).parent.glob("*.jar"))
+    words = ("generate", "-g", language, "-i", str(DOCUMENT), "-o", "generated", *words)
+    run("java", "-jar", program, *words, folder=folder)
+    return folder / "generated"
+
+
+def run_typescript(service: Service, folder: Path, call: str, *packages: str) -> str:
+    """Compile and run one of the calls in `folder`, where its client was generated."""
+    run("npm", "install", "--silent", "--no-audit", "--no-fund", "typescript@5.9", *packages, folder=folder)
+    shutil.copy(CALLS / call, folder / "call.ts")
+    options = ("--strict", "--target", "es2022", "--module", "nodenext", "--skipLibCheck", "--lib", "es2022,dom")
+    (folder / "package.json").write_text('{"type": "module"}')
+    run("npx", "tsc", *options, "call.ts", folder=folder)
+    return run("node", "call.js", service.url, folder=folder)
+
+
 @pytest.mark.full
-@pytest.mark.skipif(shutil.which("npm") is None, reason="no npm is installed")
+@needs_npm
 def test_openapi_typescript(service: Service, tmp_path: Path) -> None:
     packages = ("openapi-typescript@7", "openapi-fetch@0.14", "typescript@5.9")
     run("npm", "install", "--silent", "--no-audit", "--no-fund", *packages, folder=tmp_path)
     run("npx", "openapi-typescript", DOCUMENT, "-o", "api.d.ts", folder=tmp_path)
-    shutil.copy(CALLS / "call.ts", tmp_path)
-    options = ("--strict", "--target", "es2022", "--module", "nodenext", "--skipLibCheck", "--lib", "es2022,dom")
-    run("npx", "tsc", *options, "call.ts", folder=tmp_path)
-    (tmp_path / "package.json").write_text('{"type": "module"}')
-    assert run("node", "call.js", service.url, folder=tmp_path).split() == [
-        "201",
-        "[false,true,true]",
-        "touching",
-        "422",
-    ]
+    assert run_typescript(service, tmp_path, "call.ts", *packages).split() == ANSWERS
+
+
+@pytest.mark.full
+@needs_java
+@needs_npm
+def test_openapi_generator_typescript_fetch(service: Service, tmp_path: Path) -> None:
+    generate(tmp_path, "typescript-fetch", "-p", "importFileExtension=.js")
+    assert run_typescript(service, tmp_path, "call_openapi_generator.ts").split() == ANSWERS
+
+
+@pytest.mark.full
+@needs_java
+def test_openapi_generator_python(service: Service, tmp_path: Path) -> None:
+    pytest.importorskip("dateutil", reason="python-dateutil is missing")
+    pytest.importorskip("urllib3", reason="urllib3 is missing")
+    folder = generate(tmp_path, "python")
+    printed = run(sys.executable, CALLS / "call_openapi_generator.py", service.url, folder=folder, PYTHONPATH=".")
+    assert printed.lower().split() == ANSWERS
+
+
+@pytest.mark.full
+@needs_java
+@pytest.mark.skipif(not all(path.exists() for path in JACKSON), reason="no libjackson2-databind-java is installed")
+def test_openapi_generator_java(service: Service, tmp_path: Path) -> None:
+    folder = generate(tmp_path, "java", "--library", "native", "-p", "openApiNullable=false,dateLibrary=legacy")
+    sources = folder / "src" / "main" / "java"
+    (sources / "org" / "openapitools" / "client" / "RFC3339InstantDeserializer.java").unlink()
+    for name, text in STAND_INS.items():
+        path = sources / f"{name}.java"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(f"package {name.rpartition('/')[0].replace('/', '.')};\npublic {text}\n")
+    libraries = os.pathsep.join(map(str, JACKSON))
+    classes = tmp_path / "classes"
+    words = ("-nowarn", "-d", classes, "-cp", libraries, CALLS / "CallGenerated.java", *sources.rglob("*.java"))
+    run("javac", *words, folder=tmp_path)
+    printed = run("java", "-cp", f"{classes}{os.pathsep}{libraries}", "CallGenerated", service.url, folder=tmp_path)
+    assert printed.split() == ANSWERS
+
+
+@pytest.mark.full
+@needs_java
+@pytest.mark.skipif(shutil.which("go") is None, reason="no Go is installed")
+def test_openapi_generator_go(service: Service, tmp_path: Path) -> None:
+    if not (GO_PATH / "src" / "gopkg.in" / "validator.v2").exists():
+        pytest.skip("no golang-gopkg-validator.v2-dev is installed")
+    folder = tmp_path / "src"
+    folder.mkdir()
+    shutil.rmtree(generate(folder, "go") / "test")
+    places = {"GO111MODULE": "off", "GOPATH": f"{tmp_path}{os.pathsep}{GO_PATH}", "GOCACHE": str(tmp_path / "cache")}
+    printed = run("go", "run", CALLS / "call_openapi_generator.go", service.url, folder=folder, **places)
+    assert printed.split() == ANSWERS
