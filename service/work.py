@@ -9,9 +9,8 @@ from __future__ import annotations
 import asyncio
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from typing import Annotated, Any, Final, TypeVar
 
 from fastapi import Depends
@@ -46,6 +45,21 @@ class Memory:
         self.taken += size
 
 
+class _Phase:
+    """Adds the time from entering to leaving; a generator as context manager takes three times as long."""
+
+    __slots__ = ("_before", "_name", "_seconds")
+
+    def __init__(self, seconds: dict[str, float], name: str) -> None:
+        self._seconds, self._name = seconds, name
+
+    def __enter__(self) -> None:
+        self._before = time.perf_counter()
+
+    def __exit__(self, *_: object) -> None:
+        self._seconds[self._name] += time.perf_counter() - self._before
+
+
 class Call:
     """One request under way: its limits, the store, its deadline and cancel switch, the time each phase took."""
 
@@ -67,14 +81,9 @@ class Call:
         self.status: int | None = None
         self.headers: dict[str, str] = {}
 
-    @contextmanager
-    def phase(self, name: str) -> Iterator[None]:
+    def phase(self, name: str) -> _Phase:
         """Count the time spent inside under `name`."""
-        before = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.seconds[name] += time.perf_counter() - before
+        return _Phase(self.seconds, name)
 
     def take(self, size: int) -> None:
         """Account for so many more bytes of a body; `out_of_memory` if there are too many under way."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -12,10 +12,12 @@ from engine import Solid
 from service.schemas import bounds, collision, containment, overlay, polygons, segments, solids
 from service.schemas.problem import Accuracy
 
+_BOUNDARY: Final = int(engine.Location.BOUNDARY)  # numpy compares with an enum's member more slowly
+
 
 def from_accuracy(accuracy: engine.Accuracy) -> Accuracy:
     """Return the accuracy object of an answer."""
-    return Accuracy.model_construct(
+    return Accuracy.made(
         decisions=accuracy.decisions,
         coordinates_ulp=accuracy.coordinates_ulp,
         items=accuracy.n_items,
@@ -32,7 +34,7 @@ def from_stored(name: str, solid: Solid) -> solids.StoredSolidSummary:
         counts["rings"] = len(solid.ring_offsets) - 1
     if hasattr(solid, "face_offsets"):
         counts["faces"] = len(solid.face_offsets) - 1
-    return solids.StoredSolidSummary.model_construct(
+    return solids.StoredSolidSummary.made(
         id=name,
         type=solid.type,
         dimension=solid.dimension,
@@ -44,9 +46,9 @@ def from_stored(name: str, solid: Solid) -> solids.StoredSolidSummary:
 
 def from_locations(locations: Any, accuracy: engine.Accuracy) -> containment.ContainsResponse:
     """Return the answer of `contains`."""
-    return containment.ContainsResponse.model_construct(
-        contained=locations >= engine.Location.BOUNDARY,
-        boundary=np.flatnonzero(locations == engine.Location.BOUNDARY),
+    return containment.ContainsResponse.made(
+        contained=locations >= _BOUNDARY,
+        boundary=np.flatnonzero(locations == _BOUNDARY),
         accuracy=from_accuracy(accuracy),
     )
 
@@ -55,7 +57,7 @@ def from_scene_locations(found: engine.SceneLocations, accuracy: engine.Accuracy
     """Return the answer of `contains/scene`: ragged arrays as lists of lists."""
     on_boundary = np.asarray(found.on_boundary, bool)
     before = np.concatenate([[0], np.cumsum(on_boundary)])
-    return containment.ContainsSceneResponse.model_construct(
+    return containment.ContainsSceneResponse.made(
         bodies=_split(found.indices, found.offsets),
         boundary=_split(found.indices[on_boundary], before[found.offsets]),
         accuracy=from_accuracy(accuracy),
@@ -69,9 +71,9 @@ def _split(items: Any, offsets: Any) -> list[list[int]]:
 
 def from_bounds(found: engine.Bounds, accuracy: engine.Accuracy) -> bounds.BoundsResponse:
     """Return the answer of `bounds`."""
-    return bounds.BoundsResponse.model_construct(
-        aabb=bounds.AabbBounds.model_construct(min=found.aabb.min, max=found.aabb.max),
-        sphere=bounds.SphereBounds.model_construct(center=found.sphere.center, radius=found.sphere.radius),
+    return bounds.BoundsResponse.made(
+        aabb=bounds.AabbBounds.made(min=found.aabb.min, max=found.aabb.max),
+        sphere=bounds.SphereBounds.made(center=found.sphere.center, radius=found.sphere.radius),
         accuracy=from_accuracy(accuracy),
     )
 
@@ -79,7 +81,7 @@ def from_bounds(found: engine.Bounds, accuracy: engine.Accuracy) -> bounds.Bound
 def from_pieces(pieces: engine.SegmentPieces, accuracy: engine.Accuracy) -> segments.ClipSegmentsResponse:
     """Return the answer of `clip/segments`."""
     columns = (pieces.source, pieces.start, pieces.end, pieces.t, pieces.faces)
-    return segments.ClipSegmentsResponse.model_construct(
+    return segments.ClipSegmentsResponse.made(
         pieces=[
             {"segment": source, "start": start, "end": end, "t": t, "faces": faces}
             for source, start, end, t, faces in zip(*(column.tolist() for column in columns))
@@ -90,19 +92,17 @@ def from_pieces(pieces: engine.SegmentPieces, accuracy: engine.Accuracy) -> segm
 
 def from_overlay(result: engine.Overlay, accuracy: engine.Accuracy) -> overlay.OverlayResponse:
     """Return the answer of `overlay`."""
-    return overlay.OverlayResponse.model_construct(
+    return overlay.OverlayResponse.made(
         pieces=[
-            overlay.OverlayPiece.model_construct(
-                shell=_closed(piece.shell), holes=[_closed(hole) for hole in piece.holes]
-            )
+            overlay.OverlayPiece.made(shell=_closed(piece.shell), holes=[_closed(hole) for hole in piece.holes])
             for piece in result.pieces
         ],
         area=_area(result),
         collapsed=[
-            overlay.OverlayCollapse.model_construct(kind=part.kind, area=float(part.area), near=part.near)
+            overlay.OverlayCollapse.made(kind=part.kind, area=float(part.area), near=part.near)
             for part in result.collapsed
         ],
-        rounding=overlay.OverlayRounding.model_construct(
+        rounding=overlay.OverlayRounding.made(
             may_be_invalid=result.may_be_invalid,
             rounds=result.rounds,
             snapped=result.snapped,
@@ -134,9 +134,9 @@ def _area(result: engine.Overlay) -> float | None:
 def from_clipped(clipped: engine.ClippedPolygons, accuracy: engine.Accuracy) -> polygons.ClipPolygonsResponse:
     """Return the answer of `clip/polygons`."""
     offsets = clipped.polygon_offsets.tolist()
-    return polygons.ClipPolygonsResponse.model_construct(
+    return polygons.ClipPolygonsResponse.made(
         polygons=[
-            polygons.ClippedPolygon.model_construct(
+            polygons.ClippedPolygon.made(
                 rings=clipped.rings(i_polygon),
                 contours=clipped.contours[start:stop],
                 status=engine.PolygonStatus(clipped.status[i_polygon]).name.lower(),
@@ -150,7 +150,7 @@ def from_clipped(clipped: engine.ClippedPolygons, accuracy: engine.Accuracy) -> 
 
 def from_collision(collision_: engine.Collision, accuracy: engine.Accuracy) -> collision.CollideResponse:
     """Return the answer of `collide` for one pose."""
-    return collision.CollideResponse.model_construct(
+    return collision.CollideResponse.made(
         collisions=[_collision_answer(collision_.relation, collision_.witness, collision_.detail)],
         accuracy=from_accuracy(accuracy),
     )
@@ -159,7 +159,7 @@ def from_collision(collision_: engine.Collision, accuracy: engine.Accuracy) -> c
 def from_pose_collisions(found: Any, accuracy: engine.Accuracy) -> collision.CollideResponse:
     """Return the answer of `collide` for many poses."""
     relations, witnesses, *details = found
-    return collision.CollideResponse.model_construct(
+    return collision.CollideResponse.made(
         collisions=[
             _collision_answer(engine.Relation(relation), witness, detail)
             for relation, witness, detail in zip(
@@ -180,11 +180,9 @@ def _details(codes: Any, n_items: int) -> list[engine.Rcc8 | None]:
 def _collision_answer(
     relation: engine.Relation, witness: engine.Witness | None, detail: engine.Rcc8 | None
 ) -> collision.CollisionAnswer:
-    answer = collision.CollisionAnswer.model_construct(
-        relation=relation.label, detail=None if detail is None else detail.label
-    )
+    answer = collision.CollisionAnswer.made(relation=relation.label, detail=None if detail is None else detail.label)
     if witness is not None:
-        answer.witness = collision.CollisionWitness.model_construct(
+        answer.witness = collision.CollisionWitness.made(
             kind=witness.kind,
             first_face=None if witness.first_face < 0 else witness.first_face,
             second_face=None if witness.second_face < 0 else witness.second_face,
@@ -204,4 +202,4 @@ def from_scene_pairs(pairs: engine.ScenePairs, accuracy: engine.Accuracy) -> col
     for pair, detail in zip(found, _details(pairs.detail, len(found))):
         if detail is not None:
             pair["detail"] = detail.label
-    return collision.CollideSceneResponse.model_construct(pairs=found, accuracy=from_accuracy(accuracy))
+    return collision.CollideSceneResponse.made(pairs=found, accuracy=from_accuracy(accuracy))

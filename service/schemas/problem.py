@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -16,6 +16,14 @@ class Schema(BaseModel):
     """Base of all models: nothing is converted (``"1.5"`` and ``true`` are no numbers), unknown fields are refused."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
+
+    @classmethod
+    def made(cls, **fields: Any) -> Self:
+        """Return an answer of these fields, unchecked, for `wire.encode` only: pydantic's own way takes six times as
+        long, for what an answer never uses."""
+        answer = cls.__new__(cls)
+        answer.__dict__.update(fields)
+        return answer
 
 
 def with_example(example: dict[str, Any]) -> ConfigDict:
