@@ -180,16 +180,21 @@ def _details(codes: Any, n_items: int) -> list[engine.Rcc8 | None]:
 def _collision_answer(
     relation: engine.Relation, witness: engine.Witness | None, detail: engine.Rcc8 | None
 ) -> collision.CollisionAnswer:
-    answer = collision.CollisionAnswer.made(relation=relation.label, detail=None if detail is None else detail.label)
-    if witness is not None:
-        answer.witness = collision.CollisionWitness.made(
-            kind=witness.kind,
-            first_face=None if witness.first_face < 0 else witness.first_face,
-            second_face=None if witness.second_face < 0 else witness.second_face,
-            containing=witness.containing or None,
-            piercing=witness.piercing,
-        )
-    return answer
+    return collision.CollisionAnswer.made(
+        relation=relation.label,
+        witness=None if witness is None else _witness(witness),
+        detail=None if detail is None else detail.label,
+    )
+
+
+def _witness(witness: engine.Witness) -> collision.CollisionWitness:
+    return collision.CollisionWitness.made(
+        kind=witness.kind,
+        first_face=None if witness.first_face < 0 else witness.first_face,
+        second_face=None if witness.second_face < 0 else witness.second_face,
+        containing=witness.containing or None,
+        piercing=witness.piercing,
+    )
 
 
 def from_scene_pairs(pairs: engine.ScenePairs, accuracy: engine.Accuracy) -> collision.CollideSceneResponse:
