@@ -100,7 +100,8 @@ def _warm(app: FastAPI) -> None:
         app.state.warm_error = f"warm-up failed: {error}; restart the service"
         log.exception("warm-up failed")
         return
-    gc.freeze()  # half a million objects of modules and compiler that no later collection has to walk through
+    if not gc.get_freeze_count():
+        gc.freeze()  # half a million objects of modules and compiler that no later collection has to walk through
     app.state.warm.set()
     log.info("ready: kernels warm after %.1f s", time.perf_counter() - before)
 

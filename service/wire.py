@@ -10,6 +10,7 @@ Long lists are encoded in parts, since orjson lets no other thread run meanwhile
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, Final
 
 import numpy as np
@@ -46,7 +47,37 @@ def decode(body: json_arrays.Body) -> Any:
 
 def encode(answer: Any) -> bytes:
     """Return an answer model as JSON; arrays may stand wherever the schema has lists."""
-    return orjson.dumps(answer, default=_plain, option=orjson.OPT_SERIALIZE_NUMPY)
+    if isinstance(answer, BaseModel) and any(map(_is_long, vars(answer).values())):
+        return b"".join(_pieces(answer))
+    return _dumps(answer)
+
+
+def _dumps(value: Any) -> bytes:
+    return orjson.dumps(value, default=_plain, option=orjson.OPT_SERIALIZE_NUMPY)
+
+
+def _is_long(value: Any) -> bool:
+    return isinstance(value, (np.ndarray, list)) and len(value) > PART
+
+
+def _pieces(answer: BaseModel) -> Iterator[bytes | memoryview]:
+    """Yield the text of an answer, its long lists in parts: as one text it would be copied once more."""
+    lead = b"{"
+    for name, item in vars(answer).items():
+        if item is not None:
+            yield lead + orjson.dumps(name) + b":"
+            yield from _parts(item) if _is_long(item) else (_dumps(item),)
+            lead = b","
+    yield b"}"
+
+
+def _parts(items: Any) -> Iterator[bytes | memoryview]:
+    yield b"["
+    for start in range(0, len(items), PART):
+        if start:
+            yield b","
+        yield memoryview(_dumps(items[start : start + PART]))[1:-1]
+    yield b"]"
 
 
 def octets(array: Any) -> memoryview:
@@ -64,7 +95,4 @@ def _plain(value: Any) -> Any:
 
 
 def _in_parts(value: Any) -> Any:
-    if not isinstance(value, (np.ndarray, list)) or len(value) <= PART:
-        return value
-    parts = [encode(value[start : start + PART])[1:-1] for start in range(0, len(value), PART)]
-    return orjson.Fragment(b"[" + b",".join(parts) + b"]")
+    return orjson.Fragment(b"".join(_parts(value))) if _is_long(value) else value

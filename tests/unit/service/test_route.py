@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import time
 from collections.abc import AsyncIterator
 from typing import Any
 
 import anyio
 import httpx
+import numpy as np
 import pytest
 from fastapi import FastAPI
 
@@ -236,3 +238,35 @@ async def test_pointers_lead_into_the_request(client: httpx.AsyncClient) -> None
     (error,) = check_problem(await client.post("/v1/solids", json=body), 422, "invalid_array")["errors"]
     assert error["pointer"] == "/operands/1/operands/1/radius"
     assert resolve(body, error["pointer"]) == "1"
+
+
+@pytest.fixture
+def large(monkeypatch: pytest.MonkeyPatch) -> int:
+    """Bytes from which bodies lie in memory of their own, fewer than usual."""
+    monkeypatch.setattr("service.route.LARGE", 2**18)
+    return 2**18
+
+
+async def test_large_bodies_are_answered_and_refused_as_small_ones(client: httpx.AsyncClient, large: int) -> None:
+    body = b'{"solid": %s, "points": [[0, 0, 0], [2, 0, 0]]%s}' % (json.dumps(SPHERE).encode(), b" " * large)
+    answer = await client.post("/v1/contains", content=body, headers=JSON)
+    assert answer.json()["contained"] == [True, False]
+    wrong = body.replace(b"[2, 0, 0]", b"[2, 0, true]")
+    problem = check_problem(await client.post("/v1/contains", content=wrong, headers=JSON), 422, "invalid_array")
+    assert problem["errors"][0]["pointer"] == "/points/1/2"
+    points = np.full((large // 24 + 1, 3), 0.5)
+    points[7] = 1
+    stored = (await client.post("/v1/solids", json=SPHERE)).headers["location"]
+    octets = {"Content-Type": "application/octet-stream"}
+    answer = await client.post(f"{stored}/contains", content=points.tobytes(), headers=octets)
+    assert np.flatnonzero(np.frombuffer(answer.content, np.int8) < 0).tolist() == [7]
+
+
+@pytest.mark.parametrize("declared", [2**18, 2**19])
+async def test_a_length_that_is_not_the_bodys_is_not_believed(
+    client: httpx.AsyncClient, large: int, declared: int
+) -> None:
+    """The server holds requests to their length; here nothing does."""
+    body = b'{"solid": %s, "points": [[0, 0, 0]]%s}' % (json.dumps(SPHERE).encode(), b" " * 3 * 2**17)
+    answer = await client.post("/v1/contains", content=body, headers={**JSON, "Content-Length": str(declared)})
+    assert answer.json()["contained"] == [True]

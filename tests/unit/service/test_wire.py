@@ -11,6 +11,8 @@ import pytest
 
 from service import wire
 from service.errors import ServiceError
+from service.schemas.containment import ContainsResponse
+from service.schemas.problem import Accuracy
 
 HARD = [
     "2.2250738585072011e-308",  # hung PHP
@@ -75,3 +77,16 @@ def test_arrays_encode_to_numbers_that_decode_to_the_same_bits() -> None:
     assert np.array(json.loads(wire.encode({"a": values}))["a"]).tobytes() == values.tobytes()
     assert wire.encode({"a": values[:0], "b": values[:, 0] > 0, "c": values[:2, 1] > 2, "i": np.arange(2, dtype="i1")})
     assert json.loads(wire.encode(values[::2])) == values[::2].tolist()
+
+
+@pytest.mark.parametrize("length", [0, 1, wire.PART, wire.PART + 1, 3 * wire.PART])
+def test_long_answers_are_encoded_as_short_ones(length: int) -> None:
+    accuracy = Accuracy.made(decisions="exact", coordinates_ulp=None, items=length)
+    answer = ContainsResponse.made(
+        contained=np.arange(length) % 3 == 0, boundary=list(range(length)), accuracy=accuracy, missing=None
+    )
+    assert json.loads(wire.encode(answer)) == {
+        "contained": [k % 3 == 0 for k in range(length)],
+        "boundary": list(range(length)),
+        "accuracy": {"decisions": "exact", "items": length},
+    }
