@@ -40,7 +40,11 @@ def solids(rings: Sequence[Rings]) -> list[Polygon]:
 
 
 def assert_valid_for_shapely(batch: OverlayBatch) -> None:
-    """Every result as one multipolygon: simple rings, holes in shells, pieces apart save for single points."""
+    """Every result as one multipolygon: simple rings, holes in shells, pieces apart save for single points.
+
+    Where GEOS says no, integers decide: in some nearly collinear rings it finds an intersection that is not there, with
+    u = 2^-53 in (0.5 + 38u, 0.5 + 22u), (8.8, 8.8), (0.5 + 41u, 0.5 + 25u), (24, 24), (17.3, 17.3), (3, 23) (3.14).
+    """
     if importlib.util.find_spec("shapely") is None:
         return
     import shapely
@@ -54,7 +58,8 @@ def assert_valid_for_shapely(batch: OverlayBatch) -> None:
     rings = shapely.linearrings(batch.vertices[places], indices=closed)
     pieces = shapely.polygons(rings, indices=counted(batch.piece_offsets))
     results = shapely.multipolygons(pieces, indices=np.unique(counted(batch.pair_offsets), return_inverse=True)[1])
-    assert shapely.is_valid(results).all(), shapely.is_valid_reason(results[~shapely.is_valid(results)])[0]
+    for i in np.flatnonzero(~shapely.is_valid(results)):
+        assert_valid(present(batch[int(np.flatnonzero(np.diff(batch.pair_offsets))[i])]))
 
 
 def counted(offsets: np.ndarray) -> np.ndarray:
