@@ -13,6 +13,9 @@ pool: (room * dim,) float64, the doubles of vertices, those of the ring first. r
 each coordinate of a cut what its double leaves over, and the bound of its error. edges: (room,) int32, the original
 edge that goes on from a vertex, -1 for one along a plane.
 
+Neighbours on the same side of every plane stay and go together: a long ring is first taken as runs of them, each
+standing as its first vertex, up to ``ends`` of it.
+
 Slack of planes across no axis: every vertex lies in the box of its polygon, so a value in doubles is wrong by less than
 2^-49 of the plane's row on that box.
 """
@@ -44,6 +47,37 @@ OPEN: Final = 1
 EXACT: Final = 2
 """States of a polygon: settled by doubles, by nothing yet, by whole numbers."""
 _SLACK: Final = 2.0**-45
+LONG: Final = 8
+"""Vertices from which on a ring is taken as runs: of fewer, nearly every one is a run of its own."""
+MOST_BITS: Final = 30
+ALONE: Final = 1 << MOST_BITS
+"""Mark of a vertex on a plane (or near it): a run of its own."""
+
+
+@merged
+def load_ring(
+    vertices: Any, begin: int, end: int, d: int, pool: Any
+) -> tuple[int, float, float, float, float, float, float]:
+    """Load a ring into `pool` without vertices equal to the one before; return how many, and the bounds of each axis.
+
+    The first vertex may still be repeated at the end.
+    """
+    x, y, z = vertices[begin * d], vertices[begin * d + 1], 0.0 if d == 2 else vertices[begin * d + 2]
+    pool[0], pool[1] = x, y
+    if d == 3:
+        pool[2] = z
+    n, x_low, x_high, y_low, y_high, z_low, z_high = 1, x, x, y, y, z, z
+    for i in range(begin + 1, end):
+        u, v, w = vertices[i * d], vertices[i * d + 1], 0.0 if d == 2 else vertices[i * d + 2]
+        pool[n * d], pool[n * d + 1] = u, v
+        if d == 3:
+            pool[n * d + 2] = w
+        n += (u != x) | (v != y) | (w != z)
+        x, y, z = u, v, w
+        x_low, x_high = x if x < x_low else x_low, x if x > x_high else x_high
+        y_low, y_high = y if y < y_low else y_low, y if y > y_high else y_high
+        z_low, z_high = z if z < z_low else z_low, z if z > z_high else z_high
+    return n, x_low, x_high, y_low, y_high, z_low, z_high
 
 
 @merged
@@ -67,6 +101,8 @@ def clip_plainly(
     pool: Any,
     rests: Any,
     edges: Any,
+    ends: Any,
+    codes: Any,
     rings: Any,
     signs: Any,
     contacts: Any,
@@ -87,14 +123,18 @@ def clip_plainly(
         if stop[0]:
             return polygon, written, NO_ROOM, 0
         first_ring, last_ring = polygon_offsets[polygon], polygon_offsets[polygon + 1]
-        begin, end = ring_offsets[first_ring], ring_offsets[last_ring]
         state[polygon], may_have_bridges[polygon] = CLIPPED, False
-        for k in range(d):
-            low_k = high_k = vertices[begin * d + k]
-            for i in range(begin, end):
-                x = vertices[i * d + k]
-                low_k, high_k = x if x < low_k else low_k, x if x > high_k else high_k
-            lows[k], highs[k] = low_k, high_k
+        n_loaded, x_low, x_high, y_low, y_high, z_low, z_high = load_ring(
+            vertices, ring_offsets[first_ring], ring_offsets[first_ring + 1], d, pool
+        )
+        for ring in range(first_ring + 1, last_ring):
+            n_loaded, x, x_most, y, y_most, z, z_most = load_ring(
+                vertices, ring_offsets[ring], ring_offsets[ring + 1], d, pool
+            )
+            x_low, x_high = min(x, x_low), max(x_most, x_high)
+            y_low, y_high = min(y, y_low), max(y_most, y_high)
+            z_low, z_high = min(z, z_low), max(z_most, z_high)
+        lows[0], lows[1], lows[2], highs[0], highs[1], highs[2] = x_low, y_low, z_low, x_high, y_high, z_high
         # a plane that has all vertices inside cuts nothing: what later planes see are points between the vertices
         n_cutting, is_outside = 0, False
         for plane in range(n_planes):
@@ -122,15 +162,10 @@ def clip_plainly(
             continue
         begun, most = written, edges.size  # two rings of at most as many vertices as there is room for
         for ring in range(first_ring, last_ring):
-            n, begin, end, here, there = 0, ring_offsets[ring], ring_offsets[ring + 1], 0, most
-            for i in range(begin, end):
-                is_same, before = True, max(i - 1, begin)
-                for k in range(d):
-                    x = vertices[i * d + k]
-                    is_same = is_same & (vertices[before * d + k] == x)
-                    pool[n * d + k] = x
-                rings[n], edges[n] = n, n
-                n += (not is_same) or i == begin
+            here, there = 0, most
+            if last_ring > first_ring + 1:
+                n_loaded, _, _, _, _, _, _ = load_ring(vertices, ring_offsets[ring], ring_offsets[ring + 1], d, pool)
+            n = n_loaded
             while n > 1:
                 is_same = True
                 for k in range(d):
@@ -139,6 +174,34 @@ def clip_plainly(
                     break
                 n -= 1
             size_pool, n_ring = n, n
+            if n >= LONG and n_cutting <= MOST_BITS:
+                for i in range(n):
+                    codes[i] = 0
+                for i_plane in range(n_cutting):
+                    plane, near, bit = cutting[i_plane], slack[i_plane], 1 << i_plane
+                    axis, place = axes[plane], at[plane]
+                    if axis >= 0:
+                        for i in range(n):
+                            x = pool[i * d + axis]
+                            codes[i] |= bit if x < place else (ALONE if x == place else 0)
+                    else:
+                        for i in range(n):
+                            value = high[plane, d]
+                            for k in range(d):
+                                value += high[plane, k] * pool[i * d + k]
+                            codes[i] |= bit if value < -near else (ALONE if value <= near else 0)
+                n, before = 0, -1
+                for i in range(n_ring):
+                    code = codes[i]
+                    if code != before or code >= ALONE:
+                        rings[n], before = i, code
+                        n += 1
+                rings[n] = n_ring
+                for i in range(n):
+                    edges[rings[i]] = ends[rings[i]] = rings[i + 1] - 1
+            else:
+                for i in range(n):
+                    rings[i] = edges[i] = ends[i] = i
             for i_plane in range(n_cutting):
                 plane, near = cutting[i_plane], slack[i_plane]
                 axis, place = axes[plane], at[plane]
@@ -310,14 +373,17 @@ def clip_plainly(
                 n, here, there = kept, there, here
                 if n == 0:
                     break
-            if (written + n) * d > out.size:
+            if (written + n_ring + n) * d > out.size:
                 return polygon, begun, NO_ROOM, n_cutting
+            place_out = written * d
             for i in range(n):
                 j = rings[here + i]
-                for k in range(d):
-                    out[(written + i) * d + k] = pool[j * d + k]
-            sizes[ring] = n
-            written += n
+                last_of_run = ends[j] if j < n_ring else j
+                for place_in in range(j * d, (last_of_run + 1) * d):
+                    out[place_out] = pool[place_in]
+                    place_out += 1
+            sizes[ring] = place_out // d - written
+            written = place_out // d
         for i in range(n_cutting):
             if written > begun and dropped[i] and contacts[i] > 2:
                 may_have_bridges[polygon] = True

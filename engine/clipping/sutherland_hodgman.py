@@ -63,10 +63,11 @@ def clip_rings(
         4 * largest + 4 * n_planes + 16
     )  # a convex ring gains one vertex a plane; one that outgrows this is left open
     pool, rests = np.empty(room * dimension), np.empty(2 * room * dimension)
+    ends, codes = np.empty(room, np.int32), np.empty(room, np.int32)
     edges, rings, signs = np.empty(room, np.int32), np.empty(2 * room, np.int32), np.empty(room, np.int8)
     contacts, dropped = np.empty(n_planes, np.int64), np.empty(n_planes, np.bool_)
     cutting, slack = np.empty(n_planes, np.int64), np.empty(n_planes)
-    lows, highs = np.empty(dimension), np.empty(dimension)
+    lows, highs = np.empty(3), np.empty(3)
     is_ready, scratch = False, exact_scratch(0, dimension, row_heap[:0], row_places[:0])
     polygon, written = first, 0
     while polygon < last:
@@ -90,6 +91,8 @@ def clip_rings(
             pool,
             rests,
             edges,
+            ends,
+            codes,
             rings,
             signs,
             contacts,

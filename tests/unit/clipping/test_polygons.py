@@ -118,6 +118,20 @@ def test_long_cascades_are_about_the_original_input() -> None:
     check([square, square + rng.normal(size=(4, 3)) * 0.3], region)
 
 
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_long_rings_are_taken_in_runs(dimension: int) -> None:
+    """Many vertices on one side of all planes, and single ones on the planes between them; the ends of a ring equal."""
+    rng = np.random.default_rng(6)
+    walks = np.cumsum(rng.integers(-1, 2, (12, 40, dimension)) / 4, axis=1)
+    walks[6:] += rng.uniform(-0.1, 0.1, (6, 40, dimension))
+    walks[:3, -1] = walks[:3, 0]
+    for region in (
+        Aabb([-0.5] * dimension, [0.5] * dimension),
+        Convex(np.c_[np.eye(dimension) + 1, np.ones(dimension)]),
+    ):
+        check(walks, region)
+
+
 def test_too_complex_is_marked_and_spoils_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(4)
     monkeypatch.setattr("engine.clipping.exact_contours.MOST_BITS", 400)
