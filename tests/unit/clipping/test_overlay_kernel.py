@@ -12,8 +12,8 @@ from engine.clipping.overlay_compiled import Operation, overlay_compiled
 from engine.clipping.overlay_exact import overlay_exactly
 from engine.parallel import Budget
 from tests.unit.clipping.overlay_checks import OPERATIONS, assert_valid
+from tests.unit.clipping.overlay_families import FAMILIES, star
 from tests.unit.clipping.test_overlay import PAIRS
-from tests.unit.clipping.test_overlay_generated import FAMILIES, star
 
 Rings = list[Any]
 
