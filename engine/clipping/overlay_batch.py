@@ -130,8 +130,8 @@ def overlay_batch(
             f"subjects and clips must be of equal length, got {len(subjects)} and {len(clips)}", ("clips",)
         )
     for solids, name in ((subjects, "subjects"), (clips, "clips")):
-        for i_pair, solid in enumerate(solids):
-            if not isinstance(solid, Polygon):
+        if set(map(type, solids)) - {Polygon}:
+            for i_pair, solid in enumerate(solids):
                 rings_of(solid, name, i_pair)
     sides = [_gathered(subjects), _gathered(clips)]
     parts: dict[int, Found] = {}

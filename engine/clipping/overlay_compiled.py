@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final, Literal, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +16,6 @@ from engine.clipping.overlay_kernel import (
     DONE,
     NEEDS_CONTACTS,
     NEEDS_OUTPUT,
-    OPEN,
     Workspace,
     overlay_pairs,
     workspace_for,
@@ -27,6 +27,7 @@ from engine.parallel import Budget
 
 Operation = Literal["intersection", "union", "difference", "symmetric_difference"]
 Output = Literal["valid", "nearest"]
+Scalar = TypeVar("Scalar", bound=np.generic)
 
 KEPT: Final = {  # by the label of a face: in neither, in the subject, in the clip, in both
     "intersection": (False, False, False, True),
@@ -37,17 +38,22 @@ KEPT: Final = {  # by the label of a face: in neither, in the subject, in the cl
 _KEPT_ARRAYS: Final = {name: np.array(kept, np.uint8) for name, kept in KEPT.items()}
 
 _kept = threading.local()
-_MOST_KEPT: Final = 120_000
-"""Vertices, rings and contacts up to which a thread keeps its scratch: 50 MB."""
+_MOST_KEPT: Final = 160_000
+"""Vertices, rings and contacts up to which a thread keeps its scratch: 80 MB, of which it has what was once used."""
 
 
 @dataclass(frozen=True, slots=True)
 class Polygons:
-    """Many polygons as flat arrays: vertices (n, 2) float64, rings by vertex offsets, polygons by ring offsets."""
+    """Many polygons as flat arrays: vertices (n, 2) float64, rings by vertex offsets, polygons by ring offsets.
+
+    n_vertices, n_rings: int64, by polygon.
+    """
 
     vertices: npt.NDArray[np.float64]
     ring_offsets: npt.NDArray[np.int64]
     polygon_offsets: npt.NDArray[np.int64]
+    n_vertices: npt.NDArray[np.int64]
+    n_rings: npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,31 +86,50 @@ def gathered(vertices: Sequence[npt.NDArray[np.float64]], ring_offsets: Sequence
     else:
         offsets = np.zeros(first_ring[-1] + 1, np.int64)
         offsets[1:] = np.concatenate([each[1:] for each in ring_offsets]) + np.repeat(first_vertex[:-1], n_rings)
-    return frozen_polygons(np.concatenate([np.zeros((0, 2)), *vertices]), offsets, first_ring)
+    joined = np.concatenate([np.zeros((0, 2)), *vertices])
+    return Polygons(as_frozen(joined), as_frozen(offsets), as_frozen(first_ring), n_vertices, n_rings)
 
 
-def frozen_polygons(
-    vertices: npt.NDArray[np.float64], ring_offsets: npt.NDArray[np.int64], polygon_offsets: npt.NDArray[np.int64]
-) -> Polygons:
-    """Return `Polygons` over arrays of the one kind that kernels are compiled for."""
-    doubles = np.ascontiguousarray(vertices, np.float64).reshape(-1, 2).view()
-    rings, polygons = (np.ascontiguousarray(each, np.int64).view() for each in (ring_offsets, polygon_offsets))
-    doubles.setflags(write=False)
-    rings.setflags(write=False)
-    polygons.setflags(write=False)
-    return Polygons(doubles, rings, polygons)
+def as_frozen(array: npt.NDArray[Scalar]) -> npt.NDArray[Scalar]:
+    """Return an array of the one kind that kernels are compiled for: itself, a read-only view, or a copy."""
+    array = np.ascontiguousarray(array)
+    if array.flags.writeable:
+        array = array.view()
+        array.setflags(write=False)
+    return array
 
 
 def run_kernel(
     subjects: Polygons, clips: Polygons, start: int, stop: int, operation: Operation, budget: Budget
 ) -> Found:
     """Overlay the pairs start .. stop - 1. Raises as `Budget.check` when the call must end."""
+    sides = [(each.n_vertices[start:stop], each.n_rings[start:stop]) for each in (subjects, clips)]
+    n_vertices, n_rings = (sum(int(side[k].max()) for side in sides) for k in (0, 1))
+    n_in_all = sum(int(side[0].sum()) for side in sides)
+    return _run(_flat(subjects), _flat(clips), start, stop, n_vertices, n_rings, n_in_all, operation, budget)
+
+
+def _flat(polygons: Polygons) -> tuple[npt.NDArray[np.generic], ...]:
+    return polygons.vertices, polygons.ring_offsets, polygons.polygon_offsets
+
+
+def _run(
+    subjects: tuple[npt.NDArray[np.generic], ...],
+    clips: tuple[npt.NDArray[np.generic], ...],
+    start: int,
+    stop: int,
+    n_vertices: int,
+    n_rings: int,
+    n_in_all: int,
+    operation: Operation,
+    budget: Budget,
+) -> Found:
+    """Overlay the pairs start .. stop - 1, none of more vertices and rings than told; all of n_in_all vertices."""
     n = stop - start
-    status, counts, displacement = np.full(n, OPEN, np.int8), np.zeros((n, 4), np.int64), np.zeros(n)
-    n_vertices, n_rings = zip(_largest(subjects, start, stop), _largest(clips, start, stop))
-    room, reached, parts = max(256, 4 * sum(n_vertices)), start, []
-    output = (8 * n + 8 * sum(n_vertices), 2 * n + sum(n_vertices))  # pages that nothing is written to cost nothing
-    scratch = _scratch(sum(n_vertices), sum(n_rings), room)
+    status, counts, displacement = np.empty(n, np.int8), np.empty((n, 4), np.int64), np.empty(n)
+    reached, parts = start, []
+    output = (8 * n + 7 * n_vertices + n_in_all, 2 * n + n_vertices)  # pages that nothing is written to cost nothing
+    scratch, room = _scratch(n_vertices, n_rings, max(256, 4 * n_vertices))
     while reached < stop:  # bound: each turn goes on, or makes room for one pair, geometrically
         arrays = (
             np.empty((output[0], 2)), np.empty((output[0], 2), np.int64),
@@ -112,12 +137,8 @@ def run_kernel(
         )  # fmt: skip
         with np.errstate(all="ignore"):
             reached, needs, *sizes = overlay_pairs(
-                subjects.vertices,
-                subjects.ring_offsets,
-                subjects.polygon_offsets,
-                clips.vertices,
-                clips.ring_offsets,
-                clips.polygon_offsets,
+                *subjects,
+                *clips,
                 start,
                 stop,
                 reached,
@@ -134,8 +155,7 @@ def run_kernel(
             raise CancelledError("another part of the call failed")  # the flag went up for that, not for time
         parts.append([arrays[0][: sizes[0]], arrays[1][: sizes[0]], arrays[2][: sizes[1]], arrays[3][: sizes[2]]])
         if needs == NEEDS_CONTACTS:
-            room *= 4
-            scratch = _scratch(sum(n_vertices), sum(n_rings), room)
+            scratch, room = _scratch(n_vertices, n_rings, 2 * room)
         elif needs == NEEDS_OUTPUT:
             rings, vertices = (int(counts[reached - start, k]) for k in (1, 2))
             output = (max(2 * output[0], vertices), max(2 * output[1], rings))
@@ -143,23 +163,16 @@ def run_kernel(
     return Found(status, counts, displacement, *joined)
 
 
-def _scratch(n_vertices: int, n_rings: int, n_contacts: int) -> Workspace:
-    """Return scratch of at least that size: that of this thread's last call if it suffices, its memory is warm."""
+def _scratch(n_vertices: int, n_rings: int, n_contacts: int) -> tuple[Workspace, int]:
+    """Return scratch of at least that size, and for how many contacts: this thread's last if that suffices (warm)."""
     asked = (n_vertices, n_rings, n_contacts)
     size, kept = getattr(_kept, "scratch", ((0, 0, 0), None))
     if kept is not None and all(have >= need for have, need in zip(size, asked, strict=True)):
-        return kept
+        return kept, size[2]
     made = workspace_for(*asked)
     if n_vertices + n_rings + n_contacts <= _MOST_KEPT:
         _kept.scratch = asked, made
-    return made
-
-
-def _largest(polygons: Polygons, start: int, stop: int) -> tuple[int, int]:
-    """Return the most vertices and the most rings of one of some polygons."""
-    first_ring = polygons.polygon_offsets[start : stop + 1]
-    most_vertices = np.diff(polygons.ring_offsets[first_ring]).max()
-    return int(most_vertices), int(np.diff(first_ring).max())
+    return made, n_contacts
 
 
 def overlay_compiled(
@@ -169,20 +182,17 @@ def overlay_compiled(
 
     A scene outside of the kernel's range is brought into it by a power of two where that is exact.
     """
-    exponent = exponent_of(subject.vertices, clip.vertices)
-    first, second = shifted(subject.vertices, -exponent), shifted(clip.vertices, -exponent)
-    if first is None or second is None:
-        return None
-    found = run_kernel(
-        frozen_polygons(first, subject.offsets, np.array([0, len(subject.offsets) - 1])),
-        frozen_polygons(second, clip.offsets, np.array([0, len(clip.offsets) - 1])),
-        0,
-        1,
-        operation,
-        budget,
-    )
+    found, exponent = _run_one(subject, clip, operation, budget), 0
     if found.status[0] != DONE:
-        return None
+        exponent = exponent_of(subject.vertices, clip.vertices)
+        if exponent == 0:
+            return None
+        first, second = shifted(subject.vertices, -exponent), shifted(clip.vertices, -exponent)
+        if first is None or second is None:
+            return None
+        found = _run_one(RingArrays(first, subject.offsets), RingArrays(second, clip.offsets), operation, budget)
+        if found.status[0] != DONE:
+            return None
     vertices, displacement = found.vertices, float(found.displacement[0])
     if exponent:
         vertices, doubtful = scaled_back(vertices, exponent)
@@ -191,6 +201,24 @@ def overlay_compiled(
         displacement = float(np.nextafter(np.ldexp(displacement, exponent), np.inf)) if displacement else 0.0
     exact = ImplicitRings(subject, clip, found.sources, found.sizes)
     return as_overlay(vertices, found.sizes, found.piece_sizes, displacement, exact, output), int(found.counts[0, 3])
+
+
+def _run_one(subject: RingArrays, clip: RingArrays, operation: Operation, budget: Budget) -> Found:
+    n_rings = len(subject.offsets) + len(clip.offsets) - 2
+    first, second = (
+        (as_frozen(each.vertices), as_frozen(each.offsets), _one_polygon(len(each.offsets) - 1))
+        for each in (subject, clip)
+    )
+    n_vertices = len(subject.vertices) + len(clip.vertices)
+    return _run(first, second, 0, 1, n_vertices, n_rings, n_vertices, operation, budget)
+
+
+@functools.lru_cache(64)
+def _one_polygon(n_rings: int) -> npt.NDArray[np.int64]:
+    """Return the ring offsets of one polygon."""
+    offsets = np.array([0, n_rings])
+    offsets.setflags(write=False)
+    return offsets
 
 
 def as_overlay(
