@@ -147,6 +147,7 @@ def _warm_clipping() -> None:
             if region.type not in ("sphere", "polygon"):
                 clip_polygons([[contour]], region)
     clip_segments([[[-3.0, -3.0, -1.0], [3.0, 3.0, 1.0]]], _cube())  # through a corner, its middle inside no double
+    clip_segments([[[-1.0, -1.0], [2.0, 2.0]]], Polygon([[[0, 0], [4, 0], [1, 1], [0, 4]]]))  # through corners
 
 
 def _warm_overlay() -> None:

@@ -1,180 +1,162 @@
 """Segments on polygons and polyhedra: contacts by a box tree, pieces between them; several for each segment.
 
-Segments without any contact lie on one side: the location of their first end decides, in batches. Those with proper
-crossings only are cut by a kernel (proper_pieces.py), the others in exact arithmetic (exact_pieces.py). Zero-length
-segments are points.
+A kernel cuts the segments that meet the boundary in proper crossings only (proper_pieces.py). Where a location is
+wanted that parity leaves open, the locator of the region tells it; what meets the boundary otherwise, in an edge, a
+vertex, a face, is cut in exact arithmetic (exact_pieces.py). Zero-length segments are points.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from engine.bounding.bvh import build_bvh
-from engine.clipping.box_tree import build_box_tree
+from engine.clipping.boundary import Mesh, Outline, boundary_of
 from engine.clipping.contacts import PROPER, find_contacts_2d
 from engine.clipping.exact_pieces import pieces_of
 from engine.clipping.exact_segments import Piece
 from engine.clipping.mesh_contacts import find_mesh_contacts, is_clear
-from engine.clipping.proper_pieces import SETTLED, clip_properly_2d, clip_properly_3d
+from engine.clipping.proper_pieces import OPEN, SETTLED, UNLOCATED, Rows, cut_on_mesh, cut_on_outline
 from engine.clipping.single_pieces import PieceRows
-from engine.containment.locators import locator_of
+from engine.containment.locators import Locator, locator_of
 from engine.containment.rational_locate import rational_location
 from engine.parallel import Budget
 from engine.solids.base import FloatArray, IntArray
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
+from engine.types import UNDECIDED
 
-_LEAST_ROOM = 1 << 12  # contacts looked for at once; doubled where one segment has more
+Locations = npt.NDArray[np.int8]
 
-
-@dataclass(frozen=True, slots=True)
-class Boundary:
-    """elements: (k, 2 or 3) int64 into vertices (m, dim); faces: (k,) int64, the face or edge each is reported as.
-
-    tree: of the arguments that the kernels take, see `find_contacts_2d` and `find_mesh_contacts`.
-    """
-
-    vertices: FloatArray
-    elements: IntArray
-    faces: IntArray
-    tree: tuple[Any, ...]
+_LEAST_ROOM: Final = 1 << 8
+"""Contacts, or pieces, looked for at once; doubled where one segment has more."""
+_CONTACTS: Final = 64
+"""Of one segment; likewise."""
 
 
-def boundary_of(region: Polygon | Polyhedron) -> Boundary:
-    """Return the prepared boundary of a region: triangles, or the edges of all rings by their first vertex."""
-
-    def build() -> Boundary:
-        if isinstance(region, Polyhedron):
-            elements, faces = region.triangles, region.triangle_faces
-        else:
-            following = np.arange(1, len(region.vertices) + 1, dtype=np.int64)
-            following[region.ring_offsets[1:] - 1] = region.ring_offsets[:-1]
-            faces = np.arange(len(following), dtype=np.int64)
-            elements = np.stack([faces, following], axis=1)
-        corners = region.vertices[elements]
-        low, high = corners.min(axis=1), corners.max(axis=1)
-        if isinstance(region, Polyhedron):
-            wide = build_bvh(np.concatenate([low, high], axis=1))
-            tree: tuple[Any, ...] = (wide.boxes, wide.child, wide.origin, 1.0 / wide.scale)
-        else:
-            narrow = build_box_tree(low, high)
-            tree = (narrow.order, narrow.boxes)
-        return Boundary(region.vertices, np.ascontiguousarray(elements), faces, tree)
-
-    return region.prepared("clipping_boundary", build)
+def locator_for(region: Polygon | Polyhedron, n_segments: int, budget: Budget) -> Locator | None:
+    """Return what locates the first ends of so many segments faster than their own parity does, if there is such."""
+    chosen = locator_of(region).chosen(n_segments, budget)
+    return chosen if chosen.method in _FAST else None
 
 
-def clip_chunk(segments: FloatArray, first: int, last: int, region: Polygon | Polyhedron, budget: Budget) -> PieceRows:
+_FAST: Final = ("segment_parity", "ring_cells")
+
+
+def clip_chunk(
+    segments: FloatArray,
+    first: int,
+    last: int,
+    region: Polygon | Polyhedron,
+    locator: Locator | None,
+    budget: Budget,
+) -> PieceRows:
     """Return the pieces of ``segments[first:last]``, (n, 2, dim) float64, in order of source and t."""
     boundary = boundary_of(region)
-    part = segments[first:last]
-    locations = np.empty(len(part), np.int8)
-    counts = locator_of(region).fill(part[:, 0].copy(), locations, budget)
-    offsets, elements, kinds = _contacts(segments, first, last, boundary, budget)
-    n_contacts = np.diff(offsets)
-    n_contacts[(part[:, 0] == part[:, 1]).all(axis=1)] = 0  # points: their location says it all
-    whole = np.flatnonzero((n_contacts == 0) & (locations >= 0))
-    n_improper = np.diff(np.append(0, np.cumsum(kinds != PROPER))[offsets])
-    proper = np.flatnonzero((n_contacts > 0) & (n_improper == 0) & (np.abs(locations) == 1))
-    rows, settled = _proper_pieces(part, proper, locations, offsets, elements, boundary, budget)
-    is_open = n_contacts > 0
-    is_open[settled] = False
-    sources, pieces = [], []
-    cut = np.flatnonzero(is_open)
-    for i in cut:
+    chosen = np.arange(first, last)
+    locations = np.full(len(chosen), UNDECIDED, np.int8)
+    if locator is not None and len(chosen):
+        locator.fill(segments[first:last, 0].copy(), locations, budget)
+    parts, state = _settle(segments, chosen, locations, boundary, budget)
+    left = np.flatnonzero(state != SETTLED)
+    if not len(left):
+        return _joined(parts, 0, 0)
+    locator_of(region).fill(segments[chosen[left], 0], locations_left := np.empty(len(left), np.int8), budget)
+    unlocated = state[left] == UNLOCATED
+    again = chosen[left[unlocated]]
+    more, state_again = _settle(segments, again, locations_left[unlocated], boundary, budget)
+    is_open = ~unlocated
+    is_open[unlocated] = state_again != SETTLED
+    parts += more
+    parts.append(_exact(segments, chosen[left[is_open]], locations_left[is_open], region, boundary, budget))
+    return _joined(parts, len(left), int(is_open.sum()))
+
+
+def _joined(parts: list[Rows], n_beyond: int, n_rational: int) -> PieceRows:
+    """Return the rows of some parts by source; pieces of one segment stand together in one part."""
+    rows = Rows(*(np.concatenate(arrays) for arrays in zip(*parts)))
+    if (rows.source[1:] < rows.source[:-1]).any():
+        order = np.argsort(rows.source, kind="stable")
+        rows = Rows(*(array[order] for array in rows))
+    return PieceRows(*rows, n_beyond, n_rational)
+
+
+def _settle(
+    segments: FloatArray, chosen: IntArray, locations: Locations, boundary: Outline | Mesh, budget: Budget
+) -> tuple[list[Rows], npt.NDArray[np.uint8]]:
+    """Return the pieces of those chosen segments that the kernel settles, and the state of each."""
+    state = np.full(len(chosen), OPEN, np.uint8)
+    kernel: Any = cut_on_mesh if isinstance(boundary, Mesh) else cut_on_outline
+    parts, room, done = [_rows(0, segments.shape[2])], _LEAST_ROOM + len(chosen), np.array([0, 0, _CONTACTS])
+    while done[0] < len(chosen):
+        reached, rows = int(done[0]), _rows(room, segments.shape[2])
+        with np.errstate(all="ignore"):  # uncompiled kernels: overflow is looked at by their filters
+            kernel(segments, chosen, locations, boundary, budget.flag, rows, state, done)
+        budget.check()
+        if done[0] == reached:
+            room *= 2  # of rows, if not of contacts
+        parts.append(Rows(*(array[: done[1]] for array in rows)))
+    return parts, state
+
+
+def _rows(n: int, dimension: int) -> Rows:
+    """Return room for n pieces."""
+    ends = np.empty((2, n, dimension))
+    return Rows(np.empty(n, np.int64), ends[0], ends[1], np.empty((n, 2)), np.empty((n, 2), np.int64))
+
+
+def _exact(
+    segments: FloatArray,
+    chosen: IntArray,
+    locations: Locations,
+    region: Polygon | Polyhedron,
+    boundary: Outline | Mesh,
+    budget: Budget,
+) -> Rows:
+    """Return the pieces of the chosen segments by exact arithmetic."""
+    part = segments[chosen]
+    offsets, elements, kinds = _contacts(part, boundary, budget)
+    sources: list[int] = []
+    pieces: list[Piece] = []
+    for i, segment in enumerate(part):
         budget.check()
         mine = slice(offsets[i], offsets[i + 1])
-        found = _pieces(part[i], elements[mine], kinds[mine], int(locations[i]), region, boundary, budget)
-        sources += [i] * len(found)
+        if (segment[0] == segment[1]).all():  # a point: its location says it all
+            found = []
+            if locations[i] >= 0:
+                found = [Piece((0.0, 1.0), segment[0].tolist(), segment[1].tolist(), (-1, -1))]
+        else:
+            found = _pieces(segment, elements[mine], kinds[mine], int(locations[i]), region, boundary, budget)
+        sources += [int(chosen[i])] * len(found)
         pieces += found
-    n = len(whole)
-    ends = np.tile([0.0, 1.0], (n, 1)), np.full((n, 2), -1, np.int64)
-    source = np.concatenate([whole, rows.source, np.array(sources, np.int64)])
-    order = np.argsort(source, kind="stable")  # pieces of one segment stay in order of t
-    return PieceRows(
-        source[order] + first,
-        np.concatenate([part[whole, 0], rows.start, _points(pieces, 1, part.shape[2])])[order] + 0.0,
-        np.concatenate([part[whole, 1], rows.end, _points(pieces, 2, part.shape[2])])[order] + 0.0,
-        np.concatenate([ends[0], rows.t, _points(pieces, 0, 2)])[order],
-        np.concatenate([ends[1], rows.faces, np.array([p.faces for p in pieces], np.int64).reshape(-1, 2)])[order],
-        min(len(part), len(cut) + counts.beyond),
-        len(cut),
+    dimension = segments.shape[2]
+    return Rows(
+        np.array(sources, np.int64),
+        _points(pieces, 1, dimension),
+        _points(pieces, 2, dimension),
+        _points(pieces, 0, 2),
+        np.array([piece.faces for piece in pieces], np.int64).reshape(-1, 2),
     )
 
 
-def _proper_pieces(
-    segments: FloatArray,
-    proper: IntArray,
-    locations: npt.NDArray[np.int8],
-    offsets: IntArray,
-    elements: IntArray,
-    boundary: Boundary,
-    budget: Budget,
-) -> tuple[PieceRows, IntArray]:
-    """Return the pieces of those `proper` segments that the kernel settles, and which these are."""
-    counts = (np.diff(offsets)[proper] + (locations[proper] > 0) + 1) // 2
-    rows = np.cumsum(counts) - counts
-    m, dimension = int(counts.sum()), segments.shape[2]
-    start, end, t = np.empty((m, dimension)), np.empty((m, dimension)), np.empty((m, 2))
-    faces, state = np.empty((m, 2), np.int64), np.empty(len(proper), np.uint8)
-    kernel: Any = clip_properly_2d if dimension == 2 else clip_properly_3d
-    if len(proper):  # no segments at all come as another kind of array, for which nothing is compiled
-        with np.errstate(all="ignore"):
-            kernel(
-                segments,
-                proper,
-                locations,
-                offsets,
-                elements,
-                boundary.vertices,
-                boundary.elements,
-                boundary.faces,
-                rows,
-                budget.flag,
-                start,
-                end,
-                t,
-                faces,
-                state,
-            )
-    budget.check()
-    kept = np.repeat(state == SETTLED, counts)
-    source = np.repeat(proper, counts)[kept]
-    return PieceRows(source, start[kept], end[kept], t[kept], faces[kept], 0, 0), proper[state == SETTLED]
-
-
 def _points(pieces: list[Piece], field: int, width: int) -> FloatArray:
-    return np.array([piece[field] for piece in pieces], np.float64).reshape(-1, width)
+    return np.array([piece[field] for piece in pieces], np.float64).reshape(-1, width) + 0.0
 
 
 def _contacts(
-    segments: FloatArray, first: int, last: int, boundary: Boundary, budget: Budget
+    segments: FloatArray, boundary: Outline | Mesh, budget: Budget
 ) -> tuple[IntArray, IntArray, npt.NDArray[np.uint8]]:
-    """Return the offsets (last - first + 1,) of each segment's contacts, their elements, and their kinds."""
-    kernel: Any = find_contacts_2d if segments.shape[2] == 2 else find_mesh_contacts
-    room, done = max(_LEAST_ROOM, 8 * (last - first)), first
-    ends, elements, kinds = [np.zeros(1, np.int64)], [], []
+    """Return the offsets (n + 1,) of each segment's contacts, their elements, and their kinds."""
+    kernel: Any = find_mesh_contacts if isinstance(boundary, Mesh) else find_contacts_2d
+    last = len(segments)
+    room, done = max(_LEAST_ROOM, 8 * last), 0
+    ends, elements, kinds = [np.zeros(1, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0, np.uint8)]
     while done < last:
-        met, kind = np.empty(room, np.int64), np.empty(room, np.uint8)
-        offsets = np.empty(last - done + 1, np.int64)
+        met, kind, offsets = np.empty(room, np.int64), np.empty(room, np.uint8), np.empty(last - done + 1, np.int64)
         with np.errstate(all="ignore"):
-            reached = kernel(
-                segments,
-                done,
-                last,
-                boundary.vertices,
-                boundary.elements,
-                *boundary.tree,
-                budget.flag,
-                met,
-                kind,
-                offsets,
-            )
+            reached = kernel(segments, done, last, boundary, budget.flag, met, kind, offsets)
         budget.check()
         if reached == done:
             room *= 2
@@ -184,8 +166,6 @@ def _contacts(
         elements.append(met[:found])
         kinds.append(kind[:found])
         done = reached
-    if not elements:
-        return ends[0], np.zeros(0, np.int64), np.zeros(0, np.uint8)
     return np.concatenate(ends), np.concatenate(elements), np.concatenate(kinds)
 
 
@@ -195,13 +175,13 @@ def _pieces(
     kinds: npt.NDArray[np.uint8],
     location: int,
     region: Polygon | Polyhedron,
-    boundary: Boundary,
+    boundary: Outline | Mesh,
     budget: Budget,
 ) -> list[Piece]:
-    corners = boundary.vertices[boundary.elements[elements]].tolist()
+    corners = boundary.elements[elements].tolist()
 
     def locate(point: list[Fraction]) -> int:
-        near = _near_point(point, boundary, budget) if len(point) == 3 else None
+        near = _near_point(point, boundary, budget) if isinstance(boundary, Mesh) else None
         if near is None:
             return rational_location(point, region, None, budget.check)
         found = np.empty(1, np.int8)
@@ -218,7 +198,7 @@ def _pieces(
     )
 
 
-def _near_point(point: list[Fraction], boundary: Boundary, budget: Budget) -> FloatArray | None:
+def _near_point(point: list[Fraction], boundary: Mesh, budget: Budget) -> FloatArray | None:
     """Return a point of doubles that lies as `point` does, as nothing of the boundary is between them; else None."""
     try:
         middle = np.array([float(x) for x in point])
@@ -229,8 +209,6 @@ def _near_point(point: list[Fraction], boundary: Boundary, budget: Budget) -> Fl
     low[is_known], high[is_known] = middle[is_known], middle[is_known]
     corners = np.array(np.meshgrid(*zip(low, high), indexing="ij")).reshape(3, 8).T.copy()
     with np.errstate(all="ignore"):
-        if not is_known.all() and not is_clear(
-            corners, boundary.vertices, boundary.elements, *boundary.tree, budget.flag
-        ):
+        if not is_known.all() and not is_clear(corners, boundary, budget.flag):
             return None
     return middle

@@ -21,8 +21,8 @@ import numpy as np
 
 from engine.clipping.box_tree import DEEPEST, LEAF_SIZE, may_meet
 from engine.jit import inline, kernel
-from engine.predicates.loading import as_point2, as_point3
-from engine.predicates.orientation import orient2d, orient3d
+from engine.predicates.loading import as_point2
+from engine.predicates.orientation import orient2d
 
 APART: Final = 0
 PROPER: Final = 1
@@ -30,9 +30,9 @@ DEGENERATE: Final = 2
 
 
 @inline
-def edge_contact(vertices: Any, element: Any, segment: Any) -> int:
-    """Return how a segment and an edge of the plane meet; element: the indices of the edge's ends."""
-    a, b = as_point2(vertices, element[0]), as_point2(vertices, element[1])
+def edge_contact(edge: Any, segment: Any) -> int:
+    """Return how a segment and an edge of the plane meet, (2, 2) float64 both."""
+    a, b = as_point2(edge, 0), as_point2(edge, 1)
     p, q = as_point2(segment, 0), as_point2(segment, 1)
     of_a, of_b = orient2d(p, q, a), orient2d(p, q, b)
     if of_a == of_b and (of_a == 1 or of_a == -1):
@@ -46,68 +46,52 @@ def edge_contact(vertices: Any, element: Any, segment: Any) -> int:
 
 
 @inline
-def triangle_contact(vertices: Any, element: Any, segment: Any) -> int:
-    """Return how a segment and a triangle of space meet; element: the indices of the triangle's corners."""
-    a, b, c = as_point3(vertices, element[0]), as_point3(vertices, element[1]), as_point3(vertices, element[2])
-    p, q = as_point3(segment, 0), as_point3(segment, 1)
-    of_p, of_q = orient3d(a, b, c, p), orient3d(a, b, c, q)
-    if of_p == of_q and (of_p == 1 or of_p == -1):
-        return APART
-    ab, bc, ca = orient3d(p, q, a, b), orient3d(p, q, b, c), orient3d(p, q, c, a)
-    if of_p != 0 or of_q != 0:  # case: in the plane of the triangle the edge signs are all zero and say nothing
-        has_left, has_right = ab == 1 or bc == 1 or ca == 1, ab == -1 or bc == -1 or ca == -1
-        if has_left and has_right:
-            return APART
-    if ab == bc and bc == ca and abs(ab) == 1 and abs(of_p) == 1 and abs(of_q) == 1:
-        return PROPER
-    return DEGENERATE
+def gather_edge_contacts(outline: Any, segment: Any, stack: Any, met: Any, kinds: Any, found: int) -> int:
+    """Append the contacts of a segment (2, 2) to the `found` first of met and kinds; return how many these are then.
+
+    -1 where there is no room. stack: (DEEPEST,) int64.
+    """
+    n_leaves, n_edges = outline.boxes.shape[0] // 2, outline.order.size
+    stack[0], depth = 1, 1
+    while depth > 0:  # bound: each node enters the stack once
+        depth -= 1
+        node = stack[depth]
+        if not may_meet(segment, outline.boxes[node]):
+            continue
+        if node < n_leaves:
+            stack[depth], stack[depth + 1] = 2 * node + 1, 2 * node
+            depth += 2
+            continue
+        start = (node - n_leaves) * LEAF_SIZE
+        for place in range(start, min(start + LEAF_SIZE, n_edges)):
+            element = outline.order[place]
+            kind = edge_contact(outline.elements[element], segment)
+            if kind != APART:
+                if found == met.size:
+                    return -1
+                met[found], kinds[found] = element, kind
+                found += 1
+    return found
 
 
 @kernel
 def find_contacts_2d(
-    segments: Any,
-    first: int,
-    last: int,
-    vertices: Any,
-    elements: Any,
-    order: Any,
-    boxes: Any,
-    stop: Any,
-    elements_met: Any,
-    kinds: Any,
-    offsets: Any,
+    segments: Any, first: int, last: int, outline: Any, stop: Any, elements_met: Any, kinds: Any, offsets: Any
 ) -> int:
     """Find the contacts of ``segments[first:last]`` with the edges of a polygon.
 
-    segments: (n, 2, 2) float64. elements: (k, 2) int64 into vertices (m, 2). order, boxes: see `BoxTree`. stop: one
-    uint8, polled. elements_met, kinds: int64 and uint8 of equal length, filled with the contacts one segment after
-    another; offsets: (last - first + 1,) int64, those of segment i end before offsets[i - first + 1]. Returns the
-    index after the last segment that had room for all its contacts.
+    segments: (n, 2, 2) float64. stop: one uint8, polled. elements_met, kinds: int64 and uint8 of equal length, filled
+    with the contacts one segment after another; offsets: (last - first + 1,) int64, those of segment i end before
+    offsets[i - first + 1]. Returns the index after the last segment that had room for all its contacts.
     """
     stack = np.empty(DEEPEST, np.int64)
-    n_leaves, room = boxes.shape[0] // 2, elements_met.size
     found = 0
     offsets[0] = 0
     for i in range(first, last):
-        segment = segments[i]
-        stack[0], depth = 1, 1
-        while depth > 0:  # bound: each node enters the stack once
-            depth -= 1
-            node = stack[depth]
-            if not may_meet(segment, boxes[node]):
-                continue
-            if node < n_leaves:
-                stack[depth], stack[depth + 1] = 2 * node + 1, 2 * node
-                depth += 2
-                continue
-            start = (node - n_leaves) * LEAF_SIZE
-            for place in range(start, min(start + LEAF_SIZE, order.size)):
-                kind = edge_contact(vertices, elements[order[place]], segment)
-                if kind != APART:
-                    if found == room:
-                        return i
-                    elements_met[found], kinds[found] = order[place], kind
-                    found += 1
+        after = gather_edge_contacts(outline, segments[i], stack, elements_met, kinds, found)
+        if after < 0:
+            return i
+        found = after
         offsets[i - first + 1] = found
         if stop[0]:
             return i + 1

@@ -20,8 +20,10 @@ from engine.bounding.box_lanes import lowest_bit
 from engine.bounding.bvh import EMPTY, MAX_DEPTH
 from engine.bounding.row_lanes import LANES
 from engine.bounding.segment_lanes import near_segment
-from engine.clipping.contacts import APART, triangle_contact
-from engine.jit import inline, kernel
+from engine.bounding.triangle_lanes import AXES_BEFORE, longest_axis, near_triangles
+from engine.clipping.contacts import APART
+from engine.clipping.triangle_contact import triangle_contact
+from engine.jit import inline, kernel, merged
 from engine.predicates.loading import as_point3
 from engine.predicates.orientation import orient3d
 from engine.types import Point3
@@ -35,7 +37,7 @@ LIMIT: Final = 4.0
 NOWHERE: Final = (np.float32(0.0), np.float32(0.0), np.float32(0.0))
 
 
-@inline
+@merged
 def local_segment(p: Point3, q: Point3, origin: Any, inverse: float) -> tuple[Any, Any, float, float, bool]:
     """Return middle, half, slack and tiny (`near_segment`) of a segment, and whether it comes near the tree at all."""
     ox, oy, oz = origin[0] * inverse, origin[1] * inverse, origin[2] * inverse
@@ -65,55 +67,65 @@ def local_segment(p: Point3, q: Point3, origin: Any, inverse: float) -> tuple[An
     )
 
 
-@kernel
-def find_mesh_contacts(
-    segments: Any,
-    first: int,
-    last: int,
-    vertices: Any,
-    elements: Any,
-    boxes: Any,
-    child: Any,
-    origin: Any,
-    inverse: float,
-    stop: Any,
-    elements_met: Any,
-    kinds: Any,
-    offsets: Any,
-) -> int:
-    """Find the contacts of ``segments[first:last]``, (n, 2, 3) float64, with triangles: see `find_contacts_2d`.
+@inline
+def gather_mesh_contacts(mesh: Any, segment: Any, stack: Any, met: Any, kinds: Any, found: int) -> int:
+    """Append the contacts of a segment (2, 3) to the `found` first of met and kinds; return how many these are then.
 
-    boxes, child, origin, inverse (of scale): see `Bvh`.
+    -1 where there is no room. stack: (STACK,) int64.
     """
-    stack = np.empty(STACK, np.int64)
-    room, found = elements_met.size, 0
-    offsets[0] = 0
-    for i in range(first, last):
-        segment = segments[i]
-        p, q = as_point3(segment, 0), as_point3(segment, 1)
-        middle, half, slack, tiny, is_near = local_segment(p, q, origin, inverse)
-        depth = 0
-        if is_near:
-            stack[0], depth = 0, 1
-        while depth > 0:  # bound: each node enters the stack once
-            depth -= 1
-            node = stack[depth]
-            bits = near_segment(boxes, node, middle, half, np.float32(slack), np.float32(tiny))
+    p, q = as_point3(segment, 0), as_point3(segment, 1)
+    middle, half, slack, tiny, is_near = local_segment(p, q, mesh.origin, mesh.inverse)
+    if not is_near:
+        return found
+    k = longest_axis(half)
+    i, j = AXES_BEFORE[k], AXES_BEFORE[k + 1]
+    turned = (middle[i], middle[j], middle[k])
+    r, s = np.float32(half[i] / half[k]), np.float32(half[j] / half[k])
+    double = np.float32(2.0 * slack)  # 32 u (S + 2) of triangle_lanes.py, and twice what cutting loses
+    reach = np.float32(abs(half[k]) + double)
+    stack[0], depth = 0, 1
+    while depth > 0:  # bound: each node enters the stack once
+        depth -= 1
+        node = stack[depth]
+        if mesh.child[node, 0] >= 0:
+            bits = near_segment(mesh.boxes, node, middle, half, np.float32(slack), np.float32(tiny))
             while bits != 0:
                 lane = lowest_bit(bits)
                 bits &= bits - 1
-                below = child[node, lane]
+                below = mesh.child[node, lane]
                 if below >= 0:
                     stack[depth] = below
                     depth += 1
-                elif below != EMPTY:
-                    element = -1 - below
-                    kind = triangle_contact(vertices, elements[element], segment)
-                    if kind != APART:
-                        if found == room:
-                            return i
-                        elements_met[found], kinds[found] = element, kind
-                        found += 1
+            continue
+        bits = near_triangles(mesh.corners, node, i, j, k, turned, r, s, reach, double)
+        while bits != 0:
+            lane = lowest_bit(bits)
+            bits &= bits - 1
+            below = mesh.child[node, lane]
+            if below != EMPTY:
+                element = -1 - below
+                kind = triangle_contact(mesh.elements[element], segment)
+                if kind != APART:
+                    if found == met.size:
+                        return -1
+                    met[found], kinds[found] = element, kind
+                    found += 1
+    return found
+
+
+@kernel
+def find_mesh_contacts(
+    segments: Any, first: int, last: int, mesh: Any, stop: Any, elements_met: Any, kinds: Any, offsets: Any
+) -> int:
+    """Find the contacts of ``segments[first:last]``, (n, 2, 3) float64, with triangles: see `find_contacts_2d`."""
+    stack = np.empty(STACK, np.int64)
+    found = 0
+    offsets[0] = 0
+    for i in range(first, last):
+        after = gather_mesh_contacts(mesh, segments[i], stack, elements_met, kinds, found)
+        if after < 0:
+            return i
+        found = after
         offsets[i - first + 1] = found
         if stop[0]:
             return i + 1
@@ -121,15 +133,15 @@ def find_mesh_contacts(
 
 
 @kernel
-def is_clear(
-    corners: Any, vertices: Any, elements: Any, boxes: Any, child: Any, origin: Any, inverse: float, stop: Any
-) -> bool:
+def is_clear(corners: Any, mesh: Any, stop: Any) -> bool:
     """Tell whether a box surely meets no triangle: exact signs of all its corners; False where that is not known.
 
     corners: (8, 3) float64, those of the box, the last opposite to the first.
     """
     stack = np.empty(STACK, np.int64)
-    middle, half, slack, tiny, is_near = local_segment(as_point3(corners, 0), as_point3(corners, 7), origin, inverse)
+    middle, half, slack, tiny, is_near = local_segment(
+        as_point3(corners, 0), as_point3(corners, 7), mesh.origin, mesh.inverse
+    )
     if not is_near:
         return True
     # the box reaches as far from its diagonal as that is long
@@ -138,21 +150,17 @@ def is_clear(
     while depth > 0:
         depth -= 1
         node = stack[depth]
-        bits = near_segment(boxes, node, middle, half, np.float32(slack), np.float32(tiny))
+        bits = near_segment(mesh.boxes, node, middle, half, np.float32(slack), np.float32(tiny))
         while bits != 0:
             lane = lowest_bit(bits)
             bits &= bits - 1
-            below = child[node, lane]
+            below = mesh.child[node, lane]
             if below >= 0:
                 stack[depth] = below
                 depth += 1
             elif below != EMPTY:
-                element = elements[-1 - below]
-                a, b, c = (
-                    as_point3(vertices, element[0]),
-                    as_point3(vertices, element[1]),
-                    as_point3(vertices, element[2]),
-                )
+                triangle = mesh.elements[-1 - below]
+                a, b, c = as_point3(triangle, 0), as_point3(triangle, 1), as_point3(triangle, 2)
                 side = orient3d(a, b, c, as_point3(corners, 0))
                 for k in range(1, 8):
                     if orient3d(a, b, c, as_point3(corners, k)) != side:

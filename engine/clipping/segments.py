@@ -16,7 +16,7 @@ from engine.clipping.cohen_sutherland import (
     fill_on_boxes_2d,
     fill_on_boxes_3d,
 )
-from engine.clipping.concave import clip_chunk
+from engine.clipping.concave import clip_chunk, locator_for
 from engine.clipping.cyrus_beck import (
     as_columns,
     decide_on_rows_2d,
@@ -256,12 +256,13 @@ def _on_boundary(region: Polygon | Polyhedron) -> Task:
     ) -> tuple[SegmentPieces, int, int]:
         check_finite(segments, ("segments",))
         chunks: dict[int, PieceRows] = {}
+        locator = locator_for(region, len(segments), budget)
 
         def chunk(first: int, last: int) -> None:
-            chunks[first] = clip_chunk(segments, first, last, region, budget)
+            chunks[first] = clip_chunk(segments, first, last, region, locator, budget)
 
         run_chunks(chunk, len(segments), budget=budget, workers=workers, progress=progress, first_chunk=16)
-        parts = [chunks[first] for first in sorted(chunks)] or [clip_chunk(segments, 0, 0, region, budget)]
+        parts = [chunks[first] for first in sorted(chunks)] or [clip_chunk(segments, 0, 0, region, locator, budget)]
         pieces = SegmentPieces(
             np.concatenate([part.source for part in parts]),
             np.concatenate([part.start for part in parts]),

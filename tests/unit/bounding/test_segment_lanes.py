@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from engine.bounding.bvh import build_bvh
 from engine.bounding.segment_lanes import plain_near_segment
+from engine.clipping.boundary import Mesh, mesh_of
+from engine.clipping.contacts import APART
 from engine.clipping.mesh_contacts import find_mesh_contacts, is_clear, local_segment
+from engine.clipping.triangle_contact import exact_contact
 from engine.types import Point3
 
 Floats = np.ndarray
@@ -36,24 +37,22 @@ def test_contacts_are_those_of_all_triangles() -> None:
     triangles = rng.integers(0, 400, (300, 3))
     triangles = triangles[[len({tuple(vertices[k]) for k in triangle}) == 3 for triangle in triangles]]
     corners = vertices[triangles]
-    tree = build_bvh(np.concatenate([corners.min(axis=1), corners.max(axis=1)], axis=1))
-    one = build_bvh(np.array([[-1e9] * 3 + [1e9] * 3]))  # asked triangle by triangle
     segments = np.concatenate([rng.integers(-12, 13, (40, 2, 3)) / 4, rng.uniform(-3, 3, (40, 2, 3))])
     segments = np.concatenate([segments, segments[:5] * 1e6])
     stop, room = np.zeros(1, np.uint8), 100_000
 
-    def found(elements: Floats, wide: Any) -> tuple[Floats, Floats, Floats]:
+    def found(mesh: Mesh) -> tuple[Floats, Floats, Floats]:
         met, kinds, offsets = np.empty(room, np.int64), np.empty(room, np.uint8), np.empty(len(segments) + 1, np.int64)
-        arguments = (wide.boxes, wide.child, wide.origin, 1.0 / wide.scale, stop, met, kinds, offsets)
-        assert find_mesh_contacts(segments, 0, len(segments), vertices, elements, *arguments) == len(segments)
+        assert find_mesh_contacts(segments, 0, len(segments), mesh, stop, met, kinds, offsets) == len(segments)
         return met, kinds, offsets
 
-    met, kinds, offsets = found(triangles, tree)
+    met, kinds, offsets = found(mesh_of(corners, np.arange(len(corners))))
     expected: list[set[tuple[int, int]]] = [set() for _ in segments]
-    for i, triangle in enumerate(triangles):
-        _, kind, ends = found(triangle[None], one)
-        for k in np.flatnonzero(np.diff(ends)):
-            expected[k].add((i, int(kind[ends[k]])))
+    for i, triangle in enumerate(corners):
+        for k, segment in enumerate(segments):
+            kind = exact_contact(triangle, segment)
+            if kind != APART:
+                expected[k].add((i, kind))
     assert any(expected)
     for k, pairs in enumerate(expected):
         mine = slice(offsets[k], offsets[k + 1])
@@ -61,13 +60,11 @@ def test_contacts_are_those_of_all_triangles() -> None:
 
 
 def test_clear_boxes_hold_no_triangle() -> None:
-    vertices, triangles = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]])
-    tree = build_bvh(np.array([[0.0, 0, 0, 1, 1, 0]]))
+    mesh = mesh_of(np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]]), np.zeros(1, np.int64))
 
     def clear(low: list[float], high: list[float]) -> bool:
         corners = np.array(np.meshgrid(*zip(low, high), indexing="ij")).reshape(3, 8).T.copy()
-        arguments = (tree.boxes, tree.child, tree.origin, 1.0 / tree.scale, np.zeros(1, np.uint8))
-        return bool(is_clear(corners, vertices, triangles, *arguments))
+        return bool(is_clear(corners, mesh, np.zeros(1, np.uint8)))
 
     above = float(np.nextafter(0.0, 1.0))
     assert clear([0.25, 0.25, above], [0.5, 0.5, 1.0])

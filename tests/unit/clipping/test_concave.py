@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from engine.clipping.box_tree import LEAF_SIZE, build_box_tree
+from engine.clipping.proper_pieces import OPEN, Rows
 from engine.clipping.segments import clip_segments
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
@@ -158,6 +159,12 @@ def test_large_meshes_agree_with_point_location(data: Path) -> None:
     assert (inside.ravel() == (locate(points.reshape(-1, 3), spot) >= 0)).all()
 
 
+def nothing_settled(
+    segments: Any, chosen: Any, locations: Any, boundary: Any, budget: Any
+) -> tuple[list[Rows], np.ndarray]:
+    return [], np.full(len(chosen), OPEN, np.uint8)
+
+
 def test_kernel_and_exact_integers_agree(monkeypatch: pytest.MonkeyPatch) -> None:
     """Proper crossings cut by the kernel are what exact integers give, bit by bit."""
     for dimension, regions in REGIONS.items():
@@ -166,10 +173,27 @@ def test_kernel_and_exact_integers_agree(monkeypatch: pytest.MonkeyPatch) -> Non
             segments = np.concatenate([random_segments(rng, 40, dimension), through(rng, vertices_of(region), 40)])
             both = [clip_segments(segments, region)]
             with monkeypatch.context() as patch:
-                patch.setattr("engine.clipping.concave.PROPER", 99)  # no contact counts as proper
+                patch.setattr("engine.clipping.concave._settle", nothing_settled)
                 both.append(clip_segments(segments, region))
             for name in ("source", "start", "end", "t", "faces"):
                 np.testing.assert_array_equal(getattr(both[0], name), getattr(both[1], name))
+
+
+def test_more_crossings_than_there_is_room_for_at_first() -> None:
+    """A comb of 50 teeth and 40 boxes in a row, cut lengthwise, again and again."""
+    teeth = np.arange(100.0)
+    tips = np.stack([teeth, np.where(teeth % 2, 1.0, 5.0)], axis=1)
+    comb = Polygon([[*tips.tolist(), [99.0, 0.0], [0.0, 0.0]]])
+    boxes = solid_of(union_of(*(box((4 * k, 0, 0), (4 * k + 1.5, 1, 1)) for k in range(40))))
+    along: list[tuple[Solid, Any, int]] = [
+        (comb, [[-1.3, 2.9], [100.1, 3.1]], 50),
+        (boxes, [[-1, 0.3, 0.4], [163.7, 0.6, 0.7]], 40),
+    ]
+    for region, line, n in along:
+        pieces, accuracy = clip_segments(np.array([line] * 110), region, report=True)
+        assert len(pieces) == 110 * n
+        assert accuracy.n_rational == 0
+        assert_exact(clip_segments([line], region), np.array([line]), region)
 
 
 def test_box_tree_holds_every_element() -> None:

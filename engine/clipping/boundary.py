@@ -1,0 +1,107 @@
+"""What the kernels read of a polygon or polyhedron whose boundary segments are cut on, prepared once a solid."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from engine.bounding.box_lanes import LANES
+from engine.bounding.bvh import EMPTY, UNUSED, Bvh, as_read_only, build_bvh
+from engine.bounding.triangle_lanes import CORNER_ROWS
+from engine.clipping.box_tree import build_box_tree
+from engine.solids.base import FloatArray, IntArray
+from engine.solids.polygon import Polygon
+from engine.solids.polyhedron import Polyhedron
+
+
+class Outline(NamedTuple):
+    """The edges of all rings of a polygon."""
+
+    elements: FloatArray
+    """(k, 2, 2) the corners of each edge: where one is read, all are."""
+    faces: IntArray
+    """(k,) what each edge is reported as."""
+    beyond: FloatArray
+    """(2, 2) the coordinates next below and next above those of all edges."""
+    order: IntArray
+    boxes: FloatArray
+    """order, boxes: see `BoxTree`."""
+
+
+class Mesh(NamedTuple):
+    """The triangles of a polyhedron."""
+
+    elements: FloatArray
+    """(k, 3, 3) the corners of each triangle."""
+    faces: IntArray
+    """(k,) the face of the caller that each triangle is reported as."""
+    beyond: FloatArray
+    """(2, 3) the coordinates next below and next above those of all triangles."""
+    boxes: npt.NDArray[np.float32]
+    child: npt.NDArray[np.int32]
+    origin: FloatArray
+    inverse: float
+    """boxes, child, origin, 1 / scale: see `Bvh`."""
+    corners: npt.NDArray[np.float32]
+    """See `corners_of`."""
+
+
+def boundary_of(region: Polygon | Polyhedron) -> Outline | Mesh:
+    """Return the prepared boundary of a region."""
+
+    def build() -> Outline | Mesh:
+        if isinstance(region, Polyhedron):
+            return mesh_of(region.vertices[region.triangles], region.triangle_faces)
+        following = np.arange(1, len(region.vertices) + 1, dtype=np.int64)
+        following[region.ring_offsets[1:] - 1] = region.ring_offsets[:-1]
+        first = np.arange(len(following), dtype=np.int64)  # an edge is named by its first vertex
+        return outline_of(region.vertices[np.stack([first, following], axis=1)], first)
+
+    return region.prepared("clipping_boundary", build)
+
+
+def outline_of(elements: FloatArray, faces: IntArray) -> Outline:
+    """Return what the kernels read of some edges (k, 2, 2)."""
+    low, high = elements.min(axis=1), elements.max(axis=1)
+    tree = build_box_tree(low, high)
+    arrays = (elements, faces, _beyond(low, high), tree.order, tree.boxes)
+    return Outline(*(as_read_only(array) for array in arrays))
+
+
+def mesh_of(elements: FloatArray, faces: IntArray) -> Mesh:
+    """Return what the kernels read of some triangles (k, 3, 3)."""
+    low, high = elements.min(axis=1), elements.max(axis=1)
+    tree = build_bvh(np.concatenate([low, high], axis=1))
+    return Mesh(
+        as_read_only(elements),
+        as_read_only(faces),
+        as_read_only(_beyond(low, high)),
+        tree.boxes,
+        tree.child,
+        tree.origin,
+        1.0 / tree.scale,
+        corners_of(tree, elements),
+    )
+
+
+def _beyond(low: FloatArray, high: FloatArray) -> FloatArray:
+    """Return the coordinates next below and next above all boxes."""
+    return np.stack([np.nextafter(low.min(axis=0), -np.inf), np.nextafter(high.max(axis=0), np.inf)])
+
+
+def corners_of(tree: Bvh, elements: FloatArray) -> npt.NDArray[np.float32]:
+    """Return the corners (n_nodes, 9, 8) float32 of the triangles in each block of a tree, in its coordinates.
+
+    Rows of inner nodes, and lanes without a triangle, lie far from everything.
+    """
+    is_item = (tree.child < 0) & (tree.child != EMPTY)
+    node, lane = np.nonzero(is_item)
+    corners = np.full((len(is_item), CORNER_ROWS, LANES), -UNUSED, np.float32)
+    inverse = 1.0 / tree.scale
+    with np.errstate(all="ignore"):  # what underflows here is far below what the lanes round
+        local = elements[-1 - tree.child[is_item]] * inverse - tree.origin * inverse
+    corners[node, :, lane] = local.reshape(-1, CORNER_ROWS)
+    corners.setflags(write=False)
+    return corners
