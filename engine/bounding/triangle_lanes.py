@@ -32,7 +32,7 @@ from numba import config as numba_config
 from numba import types
 from numba.extending import intrinsic
 
-from engine.bounding.box_lanes import _VECTOR, _WORD, LANES, _data, _spread_number
+from engine.bounding.row_lanes import LANES, VECTOR, WORD, first_row, spread_number
 from engine.jit import inline
 
 CORNER_ROWS: Final = 9
@@ -92,10 +92,10 @@ def _near_triangles_intrinsic(
         without_sign, sign = ir.Constant(words, [0x7FFFFFFF] * LANES), ir.Constant(words, [0x80000000] * LANES)
 
         def absolute(vector: Any) -> Any:
-            return builder.bitcast(builder.and_(builder.bitcast(vector, words), without_sign), _VECTOR)
+            return builder.bitcast(builder.and_(builder.bitcast(vector, words), without_sign), VECTOR)
 
         def negative(vector: Any) -> Any:
-            return builder.bitcast(builder.xor(builder.bitcast(vector, words), sign), _VECTOR)
+            return builder.bitcast(builder.xor(builder.bitcast(vector, words), sign), VECTOR)
 
         def any_of(found: list[Any]) -> Any:
             return builder.or_(builder.or_(found[0], found[1]), found[2])
@@ -103,18 +103,17 @@ def _near_triangles_intrinsic(
         def all_of(found: list[Any]) -> Any:
             return builder.and_(builder.and_(found[0], found[1]), found[2])
 
-        data = _data(context, builder, signature.args[0], arguments[0])
-        data = builder.gep(data, [builder.mul(arguments[1], ir.Constant(_WORD, CORNER_ROWS * LANES))])
-        first = [builder.gep(data, [builder.mul(arguments[place], ir.Constant(_WORD, LANES))]) for place in (2, 3, 4)]
+        data = first_row(context, builder, signature.args[0], arguments[0], arguments[1], CORNER_ROWS)
+        first = [builder.gep(data, [builder.mul(arguments[place], ir.Constant(WORD, LANES))]) for place in (2, 3, 4)]
 
         def row(corner: int, axis: int) -> Any:
-            there = builder.gep(first[axis], [ir.Constant(_WORD, 3 * corner * LANES)])
-            loaded = builder.load(builder.bitcast(there, _VECTOR.as_pointer()))
+            there = builder.gep(first[axis], [ir.Constant(WORD, 3 * corner * LANES)])
+            loaded = builder.load(builder.bitcast(there, VECTOR.as_pointer()))
             loaded.align = 4  # of a float: numpy promises no more
             return loaded
 
-        m = [_spread_number(builder, builder.extract_value(arguments[5], axis)) for axis in range(3)]
-        r, s, reach, slack = (_spread_number(builder, arguments[place]) for place in (6, 7, 8, 9))
+        m = [spread_number(builder, builder.extract_value(arguments[5], axis)) for axis in range(3)]
+        r, s, reach, slack = (spread_number(builder, arguments[place]) for place in (6, 7, 8, 9))
         z = [builder.fsub(row(corner, 2), m[2]) for corner in range(3)]
         x = [builder.fsub(builder.fsub(row(c, 0), m[0]), builder.fmul(r, z[c])) for c in range(3)]
         y = [builder.fsub(builder.fsub(row(c, 1), m[1]), builder.fmul(s, z[c])) for c in range(3)]
@@ -127,7 +126,7 @@ def _near_triangles_intrinsic(
         apart = builder.and_(is_left, is_right)
         apart = builder.or_(apart, all_of([builder.fcmp_ordered(">", z[c], reach) for c in range(3)]))
         apart = builder.or_(apart, all_of([builder.fcmp_ordered("<", z[c], before) for c in range(3)]))
-        return builder.zext(builder.bitcast(builder.not_(apart), ir.IntType(LANES)), _WORD)
+        return builder.zext(builder.bitcast(builder.not_(apart), ir.IntType(LANES)), WORD)
 
     triple, number, word = types.UniTuple(types.float32, 3), types.float32, types.int64
     return types.int64(corners, word, word, word, word, triple, number, number, number, number), generate

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from engine.bounding.box_lanes import LANES
 from engine.bounding.bvh import EMPTY, UNUSED, Bvh, as_read_only, build_bvh
+from engine.bounding.row_lanes import LANES
 from engine.bounding.triangle_lanes import CORNER_ROWS
 from engine.clipping.box_tree import build_box_tree
 from engine.solids.base import FloatArray, IntArray
