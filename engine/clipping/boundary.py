@@ -87,8 +87,9 @@ def mesh_of(elements: FloatArray, faces: IntArray) -> Mesh:
 
 
 def _beyond(low: FloatArray, high: FloatArray) -> FloatArray:
-    """Return the coordinates next below and next above all boxes."""
-    return np.stack([np.nextafter(low.min(axis=0), -np.inf), np.nextafter(high.max(axis=0), np.inf)])
+    """Return the coordinates next below and next above all boxes, infinite where there are none."""
+    with np.errstate(over="ignore"):
+        return np.stack([np.nextafter(low.min(axis=0), -np.inf), np.nextafter(high.max(axis=0), np.inf)])
 
 
 def corners_of(tree: Bvh, elements: FloatArray) -> npt.NDArray[np.float32]:

@@ -204,9 +204,12 @@ def _near_point(point: list[Fraction], boundary: Mesh, budget: Budget) -> FloatA
         middle = np.array([float(x) for x in point])
     except OverflowError:
         return None
-    low, high = np.nextafter(middle, -np.inf), np.nextafter(middle, np.inf)
+    with np.errstate(over="ignore"):
+        low, high = np.nextafter(middle, -np.inf), np.nextafter(middle, np.inf)
     is_known = np.array([x == y for x, y in zip(point, middle.tolist())])
     low[is_known], high[is_known] = middle[is_known], middle[is_known]
+    if not (np.isfinite(low).all() and np.isfinite(high).all()):
+        return None
     corners = np.array(np.meshgrid(*zip(low, high), indexing="ij")).reshape(3, 8).T.copy()
     with np.errstate(all="ignore"):
         if not is_known.all() and not is_clear(corners, boundary, budget.flag):

@@ -254,9 +254,10 @@ def all_proper(kinds: Any, n: int) -> bool:
 def way_out(segment: Any, beyond: Any, way: Any) -> int:
     """Set `way` (2, dim) to the shortest way, along an axis, from an end of a segment to a side of the boundary's box.
 
-    Returns the end (0 or 1), or -1 and -2 where the end 0 or 1 lies outside: its location is known.
+    Returns the end (0 or 1); -1 and -2 where the end 0 or 1 lies outside: its location is known; -3 where no way has a
+    length that a double holds.
     """
-    shortest, nearest, axis, target = np.inf, 0, 0, np.inf
+    shortest, nearest, axis, target = np.inf, -3, 0, 0.0
     for end in range(2):
         for k in range(segment.shape[1]):
             x, low, high = segment[end, k], beyond[0, k], beyond[1, k]
@@ -267,7 +268,7 @@ def way_out(segment: Any, beyond: Any, way: Any) -> int:
             if high - x < shortest:
                 shortest, nearest, axis, target = high - x, end, k, high
     for k in range(segment.shape[1]):
-        way[0, k] = way[1, k] = segment[nearest, k]
+        way[0, k] = way[1, k] = segment[max(nearest, 0), k]
     way[1, axis] = target
     return nearest
 
@@ -311,7 +312,7 @@ def cut_on_outline(
             end, turns = way_out(segment, outline.beyond, way), 0
             if end >= 0:
                 turns = gather_edge_contacts(outline, way, stack, cuts.met[found:], cuts.kinds[found:], 0)
-            if turns < 0 or not all_proper(cuts.kinds[found:], turns):
+            if end == -3 or turns < 0 or not all_proper(cuts.kinds[found:], turns):
                 state[place] = UNLOCATED
                 continue
             turns += found if end == 1 or end == -2 else 0
@@ -356,7 +357,7 @@ def cut_on_mesh(
             end, turns = way_out(segment, mesh.beyond, way), 0
             if end >= 0:
                 turns = gather_mesh_contacts(mesh, way, stack, cuts.met[found:], cuts.kinds[found:], 0)
-            if turns < 0 or not all_proper(cuts.kinds[found:], turns):
+            if end == -3 or turns < 0 or not all_proper(cuts.kinds[found:], turns):
                 state[place] = UNLOCATED
                 continue
             turns += found if end == 1 or end == -2 else 0

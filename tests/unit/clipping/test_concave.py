@@ -94,6 +94,18 @@ def test_convex_regions_agree_with_their_boundary(dimension: int) -> None:
         np.testing.assert_array_equal(getattr(by_boundary, name), getattr(by_planes, name))
 
 
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_walls_at_the_end_of_the_doubles(dimension: int) -> None:
+    """No coordinate lies beyond the walls, and no way to them has a length that a double holds."""
+    most = np.finfo(np.float64).max
+    rng = np.random.default_rng(dimension)
+    places = np.array([-most, -most / 2, -1.0, 0.0, 5e-324, 1.0, most / 2, np.nextafter(most, 0), most])
+    segments = places[rng.integers(0, len(places), (40, 2, dimension))]
+    for low, high in itertools.product([-most, -1.0, 0.0], [most, np.nextafter(most, 0)]):
+        corners = np.array(list(itertools.product([low, high], repeat=dimension)))
+        check(segments, solid_of(box([low] * 3, [high] * 3)) if dimension == 3 else Polygon([corners[[0, 2, 3, 1]]]))
+
+
 def test_pieces_by_hand() -> None:
     frame = Polygon([SQUARE, [[-1, -1], [-1, 1], [1, 1], [1, -1]]])
     cases: list[tuple[Any, list[tuple[float, float]], list[tuple[int, int]]]] = [
