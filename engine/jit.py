@@ -1,8 +1,9 @@
 """The only file that spells compiler options, and where compiled code is kept.
 
-Two decorators. `kernel`: an outer loop over arrays, called from Python, releases the interpreter lock, cached on disk.
-`inline`: a small function that compiled code calls. Arithmetic is strict IEEE double: `fastmath` is off everywhere,
-and nothing is fused unless `fma` (error_free.py) is called by name.
+Four decorators. `kernel`: an outer loop over arrays, called from Python, releases the interpreter lock, cached on disk.
+`inline`: a small function that compiled code calls. `merged`: one for which no call is ever left; `called`: one for
+which a call always is. Arithmetic is strict IEEE double: `fastmath` is off everywhere, and nothing is fused unless
+`fma` (error_free.py) is called by name.
 
 **The cache.** numba looks at the file of the kernel only, so a cached kernel would not notice that a helper in another
 file changed. Each module therefore caches into a folder named by a hash of its own source and of every engine module
@@ -34,7 +35,11 @@ from typing import Any
 import numba
 from numba import config as numba_config
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile, UserProvidedCacheLocator
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler_machinery import register_pass
+from numba.core.lowering import Lower
 from numba.core.registry import CPUDispatcher
+from numba.core.typed_passes import NativeLowering
 
 KERNELS: list[Any] = []
 """Every kernel of the modules imported so far, for the tests of `engine.warm`."""
@@ -213,14 +218,17 @@ class _Inline:
     test, a debugger) compiles it a second time, with them.
     """
 
-    def __init__(self, function: Callable[..., Any], **options: Any) -> None:
+    def __init__(
+        self, function: Callable[..., Any], compiler: type[CompilerBase] | None = None, **options: Any
+    ) -> None:
         functools.update_wrapper(self, function)
         self.py_func = function
+        self._compiler = {} if compiler is None else {"pipeline_class": compiler}
         self._options = _OPTIONS | {"nopython": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True} | options
 
     @functools.cached_property
     def _dispatcher(self) -> CPUDispatcher:
-        return CPUDispatcher(py_func=self.py_func, targetoptions=self._options)
+        return CPUDispatcher(py_func=self.py_func, targetoptions=self._options, **self._compiler)
 
     @property
     def _numba_type_(self) -> Any:
@@ -235,6 +243,33 @@ class _Inline:
         return self._from_python(*arguments)
 
 
+class _CalledLower(Lower):  # type: ignore[misc] # numba carries no types
+    """Writes a function that the compiler may not copy into its callers."""
+
+    def setup_function(self, fndesc: Any) -> None:
+        super().setup_function(fndesc)
+        self.function.attributes.add("noinline")
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _CalledLowering(NativeLowering):  # type: ignore[misc]
+    _name = "engine_called_lowering"
+
+    @property
+    def lowering_class(self) -> type[Lower]:
+        return _CalledLower
+
+
+class _CalledCompiler(CompilerBase):  # type: ignore[misc]
+    """numba's own steps, but for how a function is written."""
+
+    def define_pipelines(self) -> list[Any]:
+        steps = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        steps.passes = [(_CalledLowering if step is NativeLowering else step, text) for step, text in steps.passes]
+        steps.finalize()
+        return [steps]
+
+
 def inline(function: Callable[..., Any]) -> Any:
     """Compile a small function that kernels call; it lives in the caller's cached code."""
     return function if numba_config.DISABLE_JIT else _Inline(function)
@@ -246,3 +281,12 @@ def merged(function: Callable[..., Any]) -> Any:
     The compiler counts references to arrays at every call that it leaves; merged calls let it drop most of that.
     """
     return function if numba_config.DISABLE_JIT else _Inline(function, forceinline=True)
+
+
+def called(function: Callable[..., Any]) -> Any:
+    """Compile as `inline` does, and always leave a call: for long code, the rare exact path of a decision above all.
+
+    The compiler works on everything below a function again with each of its callers, and what it copies there grows
+    from one to the next. `inline` functions below a merged one are merged as well; these are not.
+    """
+    return function if numba_config.DISABLE_JIT else _Inline(function, _CalledCompiler, forceinline=False)

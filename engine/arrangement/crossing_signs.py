@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from typing import Any, Final, NamedTuple
 
-from engine.jit import inline, merged
+from engine.jit import called, inline, merged
 from engine.predicates.double_double import U2, dd_mul, dd_sub
 from engine.predicates.error_free import two_diff, workspace
 from engine.predicates.expansion import Components, add_product, grow, sign
@@ -57,7 +57,12 @@ def orient(edges: Edges, a: int, b: int, c: int) -> int:
         return 1
     if -det > threshold:
         return -1
-    return orient2d_exact(Point2(x[a], y[a]), Point2(x[b], y[b]), Point2(x[c], y[c]))
+    return _exact_orient(x[a], y[a], x[b], y[b], x[c], y[c])
+
+
+@called
+def _exact_orient(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> int:
+    return orient2d_exact(Point2(ax, ay), Point2(bx, by), Point2(cx, cy))
 
 
 @merged
@@ -78,7 +83,7 @@ def turn_of_edges(edges: Edges, e: int, f: int) -> int:
     return _exact_turn(edges, e, b, f, d)
 
 
-@inline
+@called
 def _exact_turn(edges: Edges, a: int, b: int, c: int, d: int) -> int:
     x, y = edges.x, edges.y
     ux, ux_tail = two_diff(x[b], x[a])
@@ -109,7 +114,7 @@ def _weight_of(cx: float, cy: float, dx: float, dy: float, px: float, py: float)
     return h, low, WEIGHT_BOUND * (abs(ph) + abs(qh))
 
 
-@inline
+@called
 def exact_weight(edges: Edges, c: int, d: int, p: int, e: Components) -> int:
     """Set e to orient(c, d, p); return its length, at most WEIGHT_ROOM."""
     x, y = edges.x, edges.y
@@ -138,7 +143,7 @@ def difference_of_products(
     return UNDECIDED
 
 
-@inline
+@called
 def order_of_crossings(edges: Edges, e: int, f: int, g: int) -> int:
     """Return -1, 0 or 1 as the crossing of edge e with f comes before, with or after that with g, along e.
 
@@ -158,7 +163,7 @@ def order_of_crossings(edges: Edges, e: int, f: int, g: int) -> int:
     return side if (fah > 0.0) == (gah > 0.0) else -side
 
 
-@inline
+@called
 def _exact_order(edges: Edges, a: int, b: int, f: int, fb: int, g: int, gb: int) -> int:
     wfa, wfb, wga, wgb = workspace(16), workspace(16), workspace(16), workspace(16)
     nfa, nfb = exact_weight(edges, f, fb, a, wfa), exact_weight(edges, f, fb, b, wfb)
@@ -171,7 +176,7 @@ def _exact_order(edges: Edges, a: int, b: int, f: int, fb: int, g: int, gb: int)
     return -sign(total, n) * sign(wfa, nfa) * sign(wga, nga)
 
 
-@inline
+@called
 def crossing_against(edges: Edges, e: int, f: int, axis: int, value: float, tail: float) -> int:
     """Return the sign of a coordinate of the crossing of the edges e and f less ``value + tail``, exactly.
 

@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 
 from engine.arrangement.crossing_signs import Edges, crossing_against, exact_weight, weight
-from engine.jit import inline, merged
+from engine.jit import called, inline, merged
 from engine.predicates.double_double import U2, dd_add, dd_div, dd_scale, surely_rounded
 from engine.predicates.error_free import fast_two_sum, workspace
 from engine.predicates.expansion import compress
@@ -29,7 +29,7 @@ def _abs2(h: float, low: float) -> tuple[float, float]:
     return (h, low) if h >= 0.0 else (-h, -low)
 
 
-@merged
+@called
 def round_crossing(edges: Edges, e: int, f: int) -> tuple[float, float, float, float]:
     """Return the doubles nearest to the crossing of edges e and f, and a bound of the error of each.
 
@@ -51,7 +51,7 @@ def round_crossing(edges: Edges, e: int, f: int) -> tuple[float, float, float, f
     return x, y, x_error, y_error
 
 
-@inline
+@called
 def _weights_from_expansions(edges: Edges, a: int, b: int, f: int, fb: int) -> tuple[float, float, float, float]:
     """Return the weights of a and b to twice 53 bits, both as positive double-doubles."""
     first, second = workspace(16), workspace(16)
@@ -89,7 +89,7 @@ def _coordinate(
     return _settle(edges, e, f, axis, h, bound)
 
 
-@inline
+@called
 def _settle(edges: Edges, e: int, f: int, axis: int, h: float, bound: float) -> tuple[float, float]:
     """Return what `_coordinate` does, by exact signs around h."""
     if abs(h) <= bound:
