@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from engine.arrangement.chains import Chains, is_live, standing
 from engine.arrangement.crossing_signs import Edges, crossing_against, exact_weight, orient, turn_of_edges
-from engine.arrangement.edge_contacts import Events
+from engine.arrangement.edge_contacts import POLL, Events
 from engine.arrangement.edge_tree import LEAF, leaves_of
 from engine.jit import inline, merged
 from engine.predicates.error_free import two_diff, workspace
@@ -34,6 +34,8 @@ def number_cycles(
     for half in range(2 * n_chains):
         cycle[half] = -1
     for chain in range(n_chains):
+        if chain & POLL == 0 and stop[0]:
+            return 0
         if is_live(chains, chain):
             for half in (2 * chain, 2 * chain + 1):
                 twin = half ^ 1

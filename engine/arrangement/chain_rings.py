@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from engine.arrangement.chain_faces import find_label, join
 from engine.arrangement.chains import Chains, is_live, leaving_edge, origin
 from engine.arrangement.crossing_signs import Edges, orient, turn_of_edges
-from engine.arrangement.edge_contacts import root_of, unite
+from engine.arrangement.edge_contacts import POLL, root_of, unite
 from engine.jit import inline, merged
 
 
@@ -28,7 +28,7 @@ class Rings(NamedTuple):
 @inline
 def choose_boundary(
     chains: Chains, n_chains: int, cycle: Any, n_cycles: int, kept: Any, starts: Any, n_nodes: int, parent: Any,
-    label: Any, regions: Any, inside: Any, bounds: Any, fan: Any,
+    label: Any, regions: Any, inside: Any, bounds: Any, fan: Any, stop: Any,
 ) -> None:  # fmt: skip
     """Fill ``inside`` by cycle, ``bounds`` by chain, ``fan`` (boundary chains) by node, and join regions.
 
@@ -36,13 +36,19 @@ def choose_boundary(
     the unbounded face, whose label is 0. regions: forest of the cycles, those of one face joined already.
     """
     for chain in range(n_chains):
+        if chain & POLL == 0 and stop[0]:
+            return
         if is_live(chains, chain):
             join(parent, label, cycle[2 * chain], cycle[2 * chain + 1], chains.mask[chain])
     _, unbounded = find_label(parent, label, n_cycles)
     for i in range(n_cycles):
+        if i & POLL == 0 and stop[0]:
+            return
         inside[i] = kept[find_label(parent, label, i)[1] ^ unbounded]
     fan[:n_nodes] = 0
     for chain in range(n_chains):
+        if chain & POLL == 0 and stop[0]:
+            return
         bounds[chain] = 0
         if is_live(chains, chain):
             left, right = cycle[2 * chain], cycle[2 * chain + 1]
@@ -69,11 +75,13 @@ def _following(chains: Chains, half: int, starts: Any, ends: Any, star: Any, pla
 @inline
 def _emit(
     edges: Edges, chains: Chains, nodes: Any, fan: Any, path: Any, first: int, last: int, region: int, rings: Rings,
-    n_rings: int, n_points: int,
+    n_rings: int, n_points: int, stop: Any,
 ) -> int:  # fmt: skip
     """Write the ring of the half-chains ``path[first:last]``, straight points left out; return the number of points."""
     before = path[last - 1]
     for k in range(first, last):
+        if k & POLL == 0 and stop[0]:
+            return n_points
         half = path[k]
         chain = half >> 1
         node = origin(chains, half)
@@ -82,15 +90,15 @@ def _emit(
             n_points += 1
         if chains.first[chain] != chains.last[chain]:
             if half & 1:
-                v, stop = chains.last[chain], chains.first[chain]
-                while v != stop:  # bound: the vertices of the chain
+                v, end = chains.last[chain], chains.first[chain]
+                while v != end:  # bound: the vertices of the chain
                     if orient(edges, edges.before[v], v, edges.after[v]) != 0:
                         rings.point[n_points], rings.meets[n_points] = v, 0
                         n_points += 1
                     v = edges.before[v]
             else:
-                v, stop = chains.first[chain], chains.last[chain]
-                while v != stop:  # bound: the vertices of the chain
+                v, end = chains.first[chain], chains.last[chain]
+                while v != end:  # bound: the vertices of the chain
                     v = edges.after[v]
                     if orient(edges, edges.before[v], v, edges.after[v]) != 0:
                         rings.point[n_points], rings.meets[n_points] = v, 0
@@ -127,13 +135,15 @@ def walk_rings(
         half, depth = start, 0
         # invariant: a node of more than two boundary chains where path[k] begins has place k, no other is on the path
         while not seen[half]:  # bound: each turn marks one half-chain
+            if depth & POLL == 0 and stop[0]:
+                return n_rings, n_points
             seen[half] = 1
             node = origin(chains, half)
             if fan[node] > 2:
                 first = path_place[node]
                 if first >= 0:
                     n_points = _emit(
-                        edges, chains, nodes, fan, path, first, depth, region, rings, n_rings, n_points
+                        edges, chains, nodes, fan, path, first, depth, region, rings, n_rings, n_points, stop
                     )  # fmt: skip
                     n_rings += 1
                     for k in range(first, depth):
@@ -143,7 +153,7 @@ def walk_rings(
             path[depth] = half
             depth += 1
             half = _following(chains, half, starts, ends, star, place, bounds)
-        n_points = _emit(edges, chains, nodes, fan, path, 0, depth, region, rings, n_rings, n_points)
+        n_points = _emit(edges, chains, nodes, fan, path, 0, depth, region, rings, n_rings, n_points, stop)
         n_rings += 1
         for k in range(depth):
             path_place[origin(chains, path[k])] = -1

@@ -12,8 +12,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from engine.arrangement.crossing_signs import Edges, turn_of_edges
-from engine.arrangement.edge_contacts import Events, root_of
-from engine.jit import inline, merged
+from engine.arrangement.edge_contacts import POLL, Events, root_of
+from engine.jit import called, inline, merged
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
 
 
@@ -66,7 +66,7 @@ def _node(node_of: Any, nodes: Any, n_nodes: int, point: int) -> tuple[int, int]
 @inline
 def build_chains(
     edges: Edges, events: Events, parent: Any, marked: Any, starts: Any, order: Any,
-    ring_tops: Any, ring_masks: Any, n_rings: int, node_of: Any, nodes: Any, chains: Chains, chain_at: Any,
+    ring_tops: Any, ring_masks: Any, n_rings: int, node_of: Any, nodes: Any, chains: Chains, chain_at: Any, stop: Any,
 ) -> tuple[int, int]:  # fmt: skip
     """Walk every ring from its top vertex and cut it at its nodes; return the numbers of nodes and chains.
 
@@ -80,6 +80,8 @@ def build_chains(
         chains.tail[n_chains], chains.first[n_chains], chains.mask[n_chains] = at, top, ring_masks[ring]
         e = top
         while True:  # bound: once around the ring
+            if stop[0]:
+                return n_nodes, n_chains
             chain_at[e] = n_chains
             before = -1
             for k in range(starts[e], starts[e + 1]):
@@ -115,7 +117,7 @@ def _half_turn(edges: Edges, edge: int, is_back: int) -> int:
     return 0 if y[b] > y[a] else 1
 
 
-@inline
+@called
 def _compare_directions(edges: Edges, chains: Chains, g: int, h: int) -> int:
     """Return -1, 0 or 1 as half-chain g leaves before, with or after h, counter-clockwise from straight up."""
     e, f = leaving_edge(chains, g), leaving_edge(chains, h)
@@ -140,11 +142,15 @@ def build_stars(
     starts[: n_nodes + 1] = 0
     for chain in range(n_chains):
         masks[chain] = chains.mask[chain]
+        if chain & POLL == 0 and stop[0]:
+            return
         starts[chains.tail[chain] + 1] += 1
         starts[chains.head[chain] + 1] += 1
     for node in range(n_nodes):
         starts[node + 1] += starts[node]
     for half in range(2 * n_chains - 1, -1, -1):
+        if half & POLL == 0 and stop[0]:
+            return
         node = origin(chains, half)
         starts[node + 1] -= 1
         star[starts[node + 1]] = half
@@ -188,7 +194,7 @@ def build_stars(
             place[star[k]] = k
 
 
-@inline
+@called
 def _unite_twins(edges: Edges, chains: Chains, star: Any, first: int, last: int, masks: Any) -> int:
     """Let the lowest chain of each direction stand for all, and close the gaps; return where the star then ends.
 

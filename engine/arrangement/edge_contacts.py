@@ -15,21 +15,25 @@ from __future__ import annotations
 from typing import Any, Final, NamedTuple
 
 from engine.arrangement.crossing_signs import Edges, orient
-from engine.jit import inline, merged
+from engine.jit import called, inline, merged
 
+POLL: Final = 0x3FFF
+"""Steps of some 10 to 100 ns between two looks at the flag that ends a call, as a mask of their number."""
 UNSURE_SLACK: Final = 4.0
 """Slack of a parameter known by its sign only: any comparison with it is made exactly."""
 
 
 class Events(NamedTuple):
     """Points inside edges. edge: the edge; point: its number; other: the edge that crosses there, -1 for a vertex;
-    t, slack: parameter along the edge and bound of its error. First, second: by crossing, its edges."""
+    t, slack: parameter along the edge and bound of its error; reach: how far along the edge the other one is nearer
+    than the margin of clearance.py, and the slack. First, second: by crossing, its edges."""
 
     edge: Any
     point: Any
     other: Any
     t: Any
     slack: Any
+    reach: Any
     first: Any
     second: Any
 
@@ -56,7 +60,7 @@ def unite(parent: Any, i: int, j: int) -> None:
 @merged
 def _add_event(events: Events, at: int, edge: int, point: int, other: int, t: float, slack: float) -> None:
     events.edge[at], events.point[at], events.other[at] = edge, point, other
-    events.t[at], events.slack[at] = t, slack
+    events.t[at], events.slack[at], events.reach[at] = t, slack, UNSURE_SLACK
 
 
 @inline
@@ -83,7 +87,7 @@ def _put_vertex(edges: Edges, events: Events, at: int, parent: Any, marked: Any,
     return at
 
 
-@inline
+@called
 def enter_contact(
     edges: Edges, events: Events, n_events: int, n_crossings: int, n: int, parent: Any, marked: Any, rings: Any,
     e: int, f: int,

@@ -7,17 +7,15 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-import numpy as np
-
 from engine.arrangement.crossing_signs import Edges, order_of_crossings, orient
-from engine.arrangement.edge_contacts import Events, unite
-from engine.jit import inline, merged
+from engine.arrangement.edge_contacts import POLL, Events, unite
+from engine.jit import called, inline
 
-_FEW: Final = 24
-"""Events that are sorted by insertion at once; more are brought into their approximate order before."""
+_RUN: Final = 16
+"""Events that are sorted by insertion; more are merged."""
 
 
-@merged
+@called
 def compare_events(edges: Edges, events: Events, e: int, i: int, j: int) -> int:
     """Return -1, 0 or 1 as event i of edge e comes before, with or after event j."""
     gap = events.t[i] - events.t[j]
@@ -57,12 +55,41 @@ def _order_of_vertices(edges: Edges, e: int, v: int, w: int) -> int:
 
 
 @inline
+def _sort_by_key(keys: Any, order: Any, first: int, last: int, spare_keys: Any, spare: Any) -> None:
+    """Sort ``keys[first:last]`` and ``order`` with them: runs by insertion, then merged. spare_keys, spare: scratch."""
+    for low in range(first, last, _RUN):
+        for k in range(low + 1, min(low + _RUN, last)):
+            key, moving, at = keys[k], order[k], k
+            while at > low and keys[at - 1] > key:  # bound: the run sorted so far
+                keys[at], order[at] = keys[at - 1], order[at - 1]
+                at -= 1
+            keys[at], order[at] = key, moving
+    width = _RUN
+    while width < last - first:  # bound: doubles
+        for low in range(first, last, 2 * width):
+            middle, high = min(low + width, last), min(low + 2 * width, last)
+            i, j = low, middle
+            for k in range(low, high):
+                if j >= high or (i < middle and keys[i] <= keys[j]):
+                    spare_keys[k], spare[k] = keys[i], order[i]
+                    i += 1
+                else:
+                    spare_keys[k], spare[k] = keys[j], order[j]
+                    j += 1
+        for k in range(first, last):
+            keys[k], order[k] = spare_keys[k], spare[k]
+        width *= 2
+
+
+@inline
 def sort_events(
-    edges: Edges, events: Events, n: int, n_events: int, parent: Any, starts: Any, order: Any, stop: Any
-) -> None:
+    edges: Edges, events: Events, n: int, n_events: int, parent: Any, starts: Any, order: Any, keys: Any,
+    spare_keys: Any, spare: Any, stop: Any,
+) -> bool:  # fmt: skip
     """Fill ``starts``, (n + 1,), and ``order``: events ``order[starts[e]:starts[e + 1]]`` lie along edge e.
 
-    Unites events at one point in ``parent``.
+    Unites events at one point in ``parent``. Returns whether the events of every edge are further apart than their
+    reaches. keys, spare_keys: float64, spare: int64, scratch by event.
     """
     starts[: n + 1] = 0
     for i in range(n_events):
@@ -70,21 +97,33 @@ def sort_events(
     for e in range(n):
         starts[e + 1] += starts[e]
     for i in range(n_events - 1, -1, -1):  # each edge's part is filled from its end: starts[e + 1] comes down
+        if i & POLL == 0 and stop[0]:
+            return False
         e = events.edge[i]
         starts[e + 1] -= 1
         order[starts[e + 1]] = i
+        keys[starts[e + 1]] = events.t[i]
     for e in range(n):  # starts[e + 1] has come down to where the part of e begins
         starts[e] = starts[e + 1]
     starts[n] = n_events
+    are_clear = True
     for e in range(n):
         first, last = starts[e], starts[e + 1]
         if last - first < 2:
             continue
         if stop[0]:
-            return
-        if last - first > _FEW:
-            here = order[first:last].copy()
-            order[first:last] = here[np.argsort(events.t[here])]
+            return False
+        _sort_by_key(keys, order, first, last, spare_keys, spare)
+        is_sorted = True
+        slack, reach = events.slack[order[first]], events.reach[order[first]]
+        for k in range(first + 1, last):
+            slack_before, slack = slack, events.slack[order[k]]
+            reach_before, reach = reach, events.reach[order[k]]
+            gap = keys[k] - keys[k - 1]
+            is_sorted &= gap > slack + slack_before
+            are_clear &= gap > reach + reach_before
+        if is_sorted:
+            continue
         for k in range(first + 1, last):
             moving = order[k]
             at = k
@@ -97,3 +136,4 @@ def sort_events(
                 order[at] = order[at - 1]
                 at -= 1
             order[at] = moving
+    return are_clear

@@ -6,7 +6,8 @@ first put in the order of a space-filling curve. The tree is walked against itse
 ``(x_min, x_max, y_min, y_max)``; a pair counts only where one of its two boxes is WANTED.
 
 A mark is a sum of bits: WANTED, and the quadrants' sides that the edge heads for. Edges one after another that all head
-for one quadrant meet nowhere but in the vertices they share, so such a node is not walked against itself.
+for one quadrant meet nowhere but in the vertices they share, so such a node is not walked against itself, nor two that
+follow each other and are one such run together.
 
 Pairs come in portions, so that memory does not grow with their number and the caller can look at the clock.
 
@@ -141,16 +142,14 @@ def next_pairs(
     while depth > 0 and found <= PORTION - LEAF * LEAF:
         depth -= 1
         i, j = stack[depth, 0], stack[depth, 1]
+        if j - i <= 1 and _is_one_run(tree_marks[i] | tree_marks[j]):  # invariant: i <= j, both on one level
+            continue
         if i < n_leaves:
-            if i == j and _is_one_run(tree_marks[i]):
-                continue
             for a in range(2 * i, 2 * i + 2):
                 for b in range(2 * j if i != j else a, 2 * j + 2):
                     if ((tree_marks[a] | tree_marks[b]) & WANTED) and boxes_meet(tree, a, tree, b):
                         stack[depth, 0], stack[depth, 1] = a, b
                         depth += 1
-            continue
-        if i == j and _is_one_run(tree_marks[i]):
             continue
         first, second = LEAF * (i - n_leaves), LEAF * (j - n_leaves)
         for p in range(first, min(first + LEAF, n)):

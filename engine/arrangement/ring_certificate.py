@@ -14,6 +14,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 from engine.arrangement.chain_rings import Rings
+from engine.arrangement.edge_contacts import POLL
 from engine.arrangement.edge_tree import ANYWHERE, WANTED, boxes_meet, build_tree, next_pairs
 from engine.jit import inline, merged
 from engine.predicates.orientation import orient2d
@@ -59,44 +60,62 @@ def _crosses(x: Any, y: Any, a: int, b: int, c: int, d: int) -> bool:
     return (side_a > 0.0) != (side_b > 0.0)
 
 
-@merged
-def _is_apart(points: Any, x: Any, y: Any, a: int, b: int, c: int, d: int, square: float) -> bool:
-    """Tell whether the edges ab and cd cannot touch, or fold, on the way to their rounded places."""
-    shared = 0
-    if points[a] == points[d]:
-        c, d, shared = d, c, 1
-    elif points[b] == points[c]:
-        a, b, shared = b, a, 1
-    elif points[b] == points[d]:
-        a, b, c, d, shared = b, a, d, c, 1
-    elif points[a] == points[c]:
-        shared = 1
-    if not shared and (_is_beside(x, y, a, b, c, d, square) or _is_beside(x, y, c, d, a, b, square)):
+@inline
+def segments_are_far(x: Any, y: Any, a: int, b: int, c: int, d: int, square: float) -> bool:
+    """Tell whether the segments ab and cd are further apart than the root of ``square``."""
+    if _is_beside(x, y, a, b, c, d, square) or _is_beside(x, y, c, d, a, b, square):
         return True
-    far = _is_far(x[b], y[b], x[c], y[c], x[d], y[d], square) and _is_far(x[d], y[d], x[a], y[a], x[b], y[b], square)
-    if shared:
-        return far
     return (
-        far
+        _is_far(x[b], y[b], x[c], y[c], x[d], y[d], square)
+        and _is_far(x[d], y[d], x[a], y[a], x[b], y[b], square)
         and _is_far(x[a], y[a], x[c], y[c], x[d], y[d], square)
         and _is_far(x[c], y[c], x[a], y[a], x[b], y[b], square)
         and not _crosses(x, y, a, b, c, d)
     )
 
 
+@merged
+def _is_apart(points: Any, x: Any, y: Any, a: int, b: int, c: int, d: int, square: float) -> bool:
+    """Tell whether the edges ab and cd cannot touch, or fold, on the way to their rounded places."""
+    if points[a] == points[d]:
+        c, d = d, c
+    elif points[b] == points[c]:
+        a, b = b, a
+    elif points[b] == points[d]:
+        a, b, c, d = b, a, d, c
+    elif points[a] != points[c]:
+        return segments_are_far(x, y, a, b, c, d, square)
+    return _is_far(x[b], y[b], x[c], y[c], x[d], y[d], square) and _is_far(x[d], y[d], x[a], y[a], x[b], y[b], square)
+
+
+@inline
+def has_straight_point(rings: Rings, n_rings: int, x: Any, y: Any, moved: Any) -> bool:
+    """Tell whether rounding put a point, one where rings do not meet, on a straight line with its neighbours."""
+    for ring in range(n_rings):
+        first, last = rings.offset[ring], rings.offset[ring + 1]
+        i, j = last - 2, last - 1
+        for k in range(first, last):
+            if (moved[i] | moved[j] | moved[k]) and not rings.meets[j]:
+                if orient2d(Point2(x[i], y[i]), Point2(x[j], y[j]), Point2(x[k], y[k])) == 0:
+                    return True
+            i, j = j, k
+    return False
+
+
 @inline
 def certify(
-    rings: Rings, n_rings: int, n: int, x: Any, y: Any, moved: Any, largest: float, boxes: Any, marks: Any,
+    rings: Rings, n_rings: int, n: int, x: Any, y: Any, moved: Any, boxes: Any, marks: Any,
     after: Any, tree: Any, tree_marks: Any, places: Any, stack: Any, pairs: Any, stop: Any,
 ) -> bool:  # fmt: skip
-    """Tell whether the rings are certainly valid after rounding, no point on a straight line but where rings meet.
+    """Tell whether the rings are certainly valid after rounding, no edges near each other that do not meet.
 
-    x, y: (n,) rounded points of ``rings``; moved: (n,) uint8. largest: magnitude of the largest coordinate. The rest is
-    scratch for n boxes.
+    x, y: (n,) rounded points of ``rings``; moved: (n,) uint8. The rest is scratch for n boxes.
     """
+    largest = 0.0
+    for k in range(n):
+        largest = max(largest, abs(x[k]), abs(y[k]))
     margin = MARGIN * largest
     square = margin * margin
-    any_moved = False
     for ring in range(n_rings):
         first, last = rings.offset[ring], rings.offset[ring + 1]
         before = last - 1
@@ -104,17 +123,12 @@ def certify(
             after[before] = k
             before = k
     for k in range(n):
+        if k & POLL == 0 and stop[0]:
+            return False
         j = after[k]
         marks[k] = ANYWHERE | WANTED * (moved[k] | moved[j])
-        i = after[j]
-        if moved[k] | moved[j] | moved[i]:
-            any_moved = True
-            if not rings.meets[j] and orient2d(Point2(x[k], y[k]), Point2(x[j], y[j]), Point2(x[i], y[i])) == 0:
-                return False
         boxes[k, 0], boxes[k, 1] = min(x[k], x[j]) - margin, max(x[k], x[j]) + margin
         boxes[k, 2], boxes[k, 3] = min(y[k], y[j]) - margin, max(y[k], y[j]) + margin
-    if not any_moved:
-        return True
     points = rings.point
     if n <= _FEW:
         for i in range(n):

@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from engine.arrangement.chain_rings import Rings
+from engine.arrangement.edge_contacts import POLL
 from engine.jit import inline
 from engine.predicates.orientation import orient2d
 from engine.types import Point2
@@ -44,7 +45,7 @@ def _is_before(rings: Rings, ranking: Ranking, x: Any, y: Any, i: int, j: int) -
 
 
 @inline
-def _sort(rings: Rings, ranking: Ranking, x: Any, y: Any, n: int, is_by_piece: bool) -> None:
+def _sort(rings: Rings, ranking: Ranking, x: Any, y: Any, n: int, is_by_piece: bool, stop: Any) -> None:
     """Sort the first n entries of ``ranking.order``: merging runs of doubling length. is_by_piece: pieces differ."""
     order, spare, first_x = ranking.order, ranking.spare, ranking.x
     width = 1
@@ -53,6 +54,8 @@ def _sort(rings: Rings, ranking: Ranking, x: Any, y: Any, n: int, is_by_piece: b
             middle, high = min(low + width, n), min(low + 2 * width, n)
             i, j = low, middle
             for k in range(low, high):
+                if k & POLL == 0 and stop[0]:
+                    return
                 if i < middle and j < high:
                     p, q = order[i], order[j]
                     if is_by_piece or first_x[p] == first_x[q]:
@@ -72,7 +75,7 @@ def _sort(rings: Rings, ranking: Ranking, x: Any, y: Any, n: int, is_by_piece: b
 
 
 @inline
-def rank_rings(rings: Rings, n_rings: int, x: Any, y: Any, ranking: Ranking, piece_of: Any) -> int:
+def rank_rings(rings: Rings, n_rings: int, x: Any, y: Any, ranking: Ranking, piece_of: Any, stop: Any) -> int:
     """Fill ``ranking``; return the number of pieces, -1 if a region has not exactly one shell.
 
     piece_of: scratch by region.
@@ -95,7 +98,9 @@ def rank_rings(rings: Rings, n_rings: int, x: Any, y: Any, ranking: Ranking, pie
             n_pieces += 1
     if n_rings == 1:
         return n_pieces if n_pieces == 1 else -1
-    _sort(rings, ranking, x, y, n_pieces, False)
+    _sort(rings, ranking, x, y, n_pieces, False, stop)
+    if stop[0]:
+        return -1
     for k in range(n_pieces):
         region = rings.region[ranking.order[k]]
         if piece_of[region] >= 0:
@@ -108,5 +113,5 @@ def rank_rings(rings: Rings, n_rings: int, x: Any, y: Any, ranking: Ranking, pie
     if n_pieces < n_rings:
         for ring in range(n_rings):
             ranking.order[ring] = ring
-        _sort(rings, ranking, x, y, n_rings, True)
+        _sort(rings, ranking, x, y, n_rings, True, stop)
     return n_pieces

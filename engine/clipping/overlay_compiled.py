@@ -16,11 +16,10 @@ from engine.clipping.overlay_kernel import (
     DONE,
     NEEDS_CONTACTS,
     NEEDS_OUTPUT,
-    Workspace,
     overlay_pairs,
-    workspace_for,
 )
 from engine.clipping.overlay_result import Overlay
+from engine.clipping.overlay_workspace import Workspace, workspace_for
 from engine.clipping.scaling import exponent_of, scaled_back, shifted
 from engine.errors import CancelledError
 from engine.parallel import Budget

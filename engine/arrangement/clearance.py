@@ -1,0 +1,74 @@
+"""Whether edges keep clear of each other: then rounding crossings to doubles cannot change what rings are.
+
+Every crossing moves by less than the unit u of the largest coordinate, every vertex stays. Rings of the arrangement
+stay what they are if, by a margin of some units,
+
+- two edges that have no point in common are apart;
+- on an edge that crosses another in X, every node but X is away from the other's line: the distance from that line
+  grows evenly from X on, so it is enough that the nodes next to X (the ends of the edge among them) are;
+- where edges follow each other, the nodes next to their common vertex are away from the other edge.
+
+Then any two stretches between nodes are apart, or meet in a node and the far end of each is away from the other, on the
+whole way to their rounded places: no stretch touches, passes or folds onto another. This holds for all edges, so for
+those of any result; where it fails, ring_certificate.py looks at the rounded rings of the result alone.
+
+Distances are computed in floating point. An orientation is off by 3 u in each length that it multiplies, so a distance
+from a line by less than 12 u; with the two vertices that move that makes 14 u. `CLEARANCE` is four times as much.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from engine.arrangement.crossing_signs import Edges
+from engine.arrangement.edge_contacts import Events
+from engine.arrangement.ring_certificate import segments_are_far
+from engine.jit import inline
+
+CLEARANCE: Final = 64.0 * 2.0**-52
+"""The margin, in units of the largest coordinate."""
+
+
+@inline
+def edges_are_far(edges: Edges, e: int, f: int, margin: float) -> bool:
+    """Tell whether two edges that do not meet are surely further apart than the margin."""
+    return segments_are_far(edges.x, edges.y, e, edges.after[e], f, edges.after[f], margin * margin)
+
+
+@inline
+def _corner_is_clear(edges: Edges, v: int, share_before: float, share_after: float, margin: float) -> bool:
+    """Tell whether the nodes next to vertex v are away from the other edge there.
+
+    share_before, share_after: which part of the edge before v, and of that after it, lies between v and the next node.
+    """
+    x, y = edges.x, edges.y
+    p, q = edges.before[v], edges.after[v]
+    ux, uy, wx, wy = x[p] - x[v], y[p] - y[v], x[q] - x[v], y[q] - y[v]
+    if ux * wx + uy * wy <= 0.0:  # v is what is nearest to each
+        return share_before * max(abs(ux), abs(uy)) > margin and share_after * max(abs(wx), abs(wy)) > margin
+    turn = abs(ux * wy - uy * wx)
+    return share_before * turn > margin * (abs(wx) + abs(wy)) and share_after * turn > margin * (abs(ux) + abs(uy))
+
+
+@inline
+def ends_are_clear(edges: Edges, events: Events, n: int, starts: Any, order: Any, margin: float) -> bool:
+    """Tell whether the first and the last event of every edge are far enough from its ends, and from its neighbours."""
+    for e in range(n):
+        first, last = starts[e], starts[e + 1]
+        if first == last:
+            continue
+        low, high = order[first], order[last - 1]
+        if events.t[low] <= events.reach[low] or 1.0 - events.t[high] <= events.reach[high]:
+            return False
+        before, after = edges.before[e], edges.after[e]
+        share_before = share_after = 1.0
+        if starts[before] < starts[before + 1]:
+            share_before = 1.0 - events.t[order[starts[before + 1] - 1]]
+        if starts[after] < starts[after + 1]:
+            share_after = events.t[order[starts[after]]]
+        if not (
+            _corner_is_clear(edges, e, share_before, events.t[low], margin)
+            and _corner_is_clear(edges, after, 1.0 - events.t[high], share_after, margin)
+        ):
+            return False
+    return True

@@ -1,0 +1,137 @@
+"""Scratch of the compiled overlay: few arrays by size, their rows by name.
+
+The rows are made here, not in compiled code: counting the references to rows made there took minutes of its compiler's
+time.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from engine.arrangement.chain_rings import Rings
+from engine.arrangement.chains import Chains
+from engine.arrangement.crossing_signs import Edges
+from engine.arrangement.edge_contacts import Events
+from engine.arrangement.edge_tree import DEEPEST, LEAF, PORTION
+from engine.arrangement.ring_order import Ranking
+
+
+class Buffers(NamedTuple):
+    """Scratch by size: a row for each purpose, by vertex, ring, contact, half-chain and point of a boundary ring."""
+
+    vertex_floats: Any
+    vertex_integers: Any
+    ring_integers: Any
+    contact_floats: Any
+    contact_integers: Any
+    half_integers: Any
+    half_octets: Any
+    point_floats: Any
+    point_integers: Any
+    point_octets: Any
+    boxes: Any
+    tree: Any
+    tree_marks: Any
+    stack: Any
+    pairs: Any
+
+
+class Workspace(NamedTuple):
+    """Scratch by name: rows of the arrays of `Buffers`."""
+
+    edges: Edges
+    origins: Any
+    chain_at: Any
+    starts: Any
+    marked: Any
+    tops: Any
+    masks: Any
+    rings: Any
+    highest: Any
+    boxes: Any
+    marks: Any
+    tree: Any
+    tree_marks: Any
+    places: Any
+    stack: Any
+    pairs: Any
+    points: Any
+    node_of: Any
+    events: Events
+    order: Any
+    nodes: Any
+    chains: Chains
+    masks_before: Any
+    star_starts: Any
+    star_ends: Any
+    star: Any
+    place: Any
+    cycle: Any
+    following: Any
+    joined: Any
+    label: Any
+    regions: Any
+    inside: Any
+    bounds: Any
+    seen: Any
+    fan: Any
+    path: Any
+    path_place: Any
+    found: Rings
+    crossing_x: Any
+    crossing_y: Any
+    crossing_error: Any
+    x: Any
+    y: Any
+    moved: Any
+    ranking: Ranking
+
+
+def workspace_for(n_vertices: int, n_rings: int, n_contacts: int) -> Workspace:
+    """Return scratch for pairs of up to so many vertices, rings and contacts."""
+    n, k = n_vertices + 1, n_contacts + 8
+    m = n + 2 * k  # points of all boundary rings: every vertex once, every end of a chain on two sides
+    n_leaves = 1
+    while n_leaves * LEAF < m:  # bound: 60 doublings
+        n_leaves *= 2
+    buffers = Buffers(
+        vertex_floats=np.empty((2, n)),
+        vertex_integers=np.empty((5, n + 1), np.int64),
+        ring_integers=np.empty((4, n_rings + 1), np.int64),
+        contact_floats=np.empty((7, k)),
+        contact_integers=np.empty((24, k + 1), np.int64),
+        half_integers=np.empty((8, 2 * k + 1), np.int64),
+        half_octets=np.empty((4, 2 * k + 1), np.uint8),
+        point_floats=np.empty((2, m)),
+        point_integers=np.empty((5, m), np.int64),
+        point_octets=np.empty((4, m), np.uint8),
+        boxes=np.empty((m, 4)),
+        tree=np.empty((2 * n_leaves, 4)),
+        tree_marks=np.empty(2 * n_leaves, np.uint8),
+        stack=np.empty((DEEPEST, 2), np.int64),
+        pairs=np.empty((PORTION, 2), np.int64),
+    )
+    return _workspace_of(buffers)
+
+
+def _workspace_of(buffers: Buffers) -> Workspace:
+    """Return the rows of some buffers by name."""
+    vx, v, r = buffers.vertex_floats, buffers.vertex_integers, buffers.ring_integers
+    cx, c = buffers.contact_floats, buffers.contact_integers
+    h, hb = buffers.half_integers, buffers.half_octets
+    px, p, pb = buffers.point_floats, buffers.point_integers, buffers.point_octets
+    edges = Edges(vx[0], vx[1], v[0], v[1], v[2])
+    events = Events(c[0], c[1], c[2], cx[0], cx[1], cx[2], c[3], c[4])
+    chains = Chains(c[5], c[6], c[7], c[8], c[9], c[10])
+    found = Rings(p[0], pb[0], c[11], c[12])
+    ranking = Ranking(c[13], cx[3], hb[0], c[14], c[15], c[16])
+    return Workspace(
+        edges, v[3], p[1], v[4], pb[1],
+        r[0], r[1], r[2], r[3],
+        buffers.boxes, pb[2], buffers.tree, buffers.tree_marks, p[2], buffers.stack, buffers.pairs,
+        p[3], p[4], events, c[17], c[18], chains, c[19], c[20], c[21],
+        h[0], h[1], h[2], h[3], h[4], h[5], h[6], hb[1], hb[2], hb[3],
+        c[22], h[7], c[23], found, cx[4], cx[5], cx[6], px[0], px[1], pb[3], ranking,
+    )  # fmt: skip
