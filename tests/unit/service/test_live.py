@@ -53,7 +53,7 @@ class Service:
                 self._found.set()
 
     def wait_until_ready(self) -> None:
-        end = time.monotonic() + 300
+        end = time.monotonic() + 900  # a cold cache is filled meanwhile
         while True:
             with suppress(httpx.ConnectError):  # worker processes begin to listen later
                 if httpx.get(f"{self.url}/readyz").status_code == 200:
