@@ -353,14 +353,15 @@ def merged(contour: list[Vertex]) -> list[Vertex]:
 
 
 def planes_of(region: dict[str, Any]) -> list[Row]:
-    """Return the planes in clipping order for vertices (x, y[, z], 1); of a convex polyhedron one for each face."""
+    """Return the planes in clipping order for vertices (x, y[, z], 1); of a convex polyhedron those of its triangles.
+
+    A face of four vertices that rounding has bent has two planes: the solid is what its triangles bound.
+    """
     scene = scene_of(region, [])
     if scene.kind != "polyhedron":
         return [(*(x << scene.bits for x in row[:-1]), row[-1]) for row in scene.rows]
-    found: dict[int, Row] = {}
-    for _, _, _, row, face in scene.triangles:  # faces run counter-clockwise seen from outside
-        found.setdefault(face, (*(-x << scene.bits for x in row[:3]), -row[3]))
-    return list(found.values())
+    rows = [(*(-x << scene.bits for x in row[:3]), -row[3]) for _, _, _, row, _ in scene.triangles]  # outward faces
+    return list(dict.fromkeys(tuple(x // gcd(*row) for x in row) for row in rows))
 
 
 def clip_polygon(rings: list[list[list[float]]], planes: list[Row]) -> tuple[list[list[list[float]]], bool]:
