@@ -355,12 +355,15 @@ def merged(contour: list[Vertex]) -> list[Vertex]:
 def planes_of(region: dict[str, Any]) -> list[Row]:
     """Return the planes in clipping order for vertices (x, y[, z], 1); of a convex polyhedron those of its triangles.
 
-    A face of four vertices that rounding has bent has two planes: the solid is what its triangles bound.
+    A face of four vertices that rounding has bent has two planes: the solid is what its triangles bound. Rounding may
+    turn a small one inside out, too: its faces then run clockwise.
     """
     scene = scene_of(region, [])
     if scene.kind != "polyhedron":
         return [(*(x << scene.bits for x in row[:-1]), row[-1]) for row in scene.rows]
-    rows = [(*(-x << scene.bits for x in row[:3]), -row[3]) for _, _, _, row, _ in scene.triangles]  # outward faces
+    (*normal, offset), corners = scene.triangles[0][3], [p for triangle in scene.triangles for p in triangle[:3]]
+    sign = 1 if any(sum(a * x for a, x in zip(normal, p)) + offset > 0 for p in corners) else -1
+    rows = [(*(sign * x << scene.bits for x in row[:3]), sign * row[3]) for *_, row, _ in scene.triangles]
     return list(dict.fromkeys(tuple(x // gcd(*row) for x in row) for row in rows))
 
 
