@@ -18,10 +18,19 @@ import numpy as np
 from llvmlite import ir
 from numba import config as numba_config
 from numba import types
-from numba.core import cgutils
 from numba.extending import intrinsic
 
-from engine.bounding.row_lanes import LANES, WORD, any_above, bits_without, first_row, load_row, spread, spread_number
+from engine.bounding.row_lanes import (
+    LANES,
+    WORD,
+    any_above,
+    bits_by_row,
+    bits_without,
+    first_row,
+    load_row,
+    spread,
+    spread_number,
+)
 
 FRAME_ROWS: Final = 22
 
@@ -96,22 +105,18 @@ def _meeting_intrinsic(typing_context: Any, first: Any, i: Any, second: Any, j: 
         own_high = [builder.fadd(a[k], a[3 + k]) for k in range(3)]
         their_low = [builder.fsub(b[k], b[3 + k]) for k in range(3)]
         their_high = [builder.fadd(b[k], b[3 + k]) for k in range(3)]
-        halves = []
-        for half in range(2):
-            bits = None
-            for lane in range(4 * half, 4 * half + 4):
-                pairs = []
-                for k in range(3):
-                    pairs.append((b_low[k], spread(builder, own_high[k], lane)))
-                    pairs.append((spread(builder, own_low[k], lane), b_high[k]))
-                for k in range(3):
-                    pairs.append((their_low[k], spread(builder, a_high[k], lane)))
-                    pairs.append((spread(builder, a_low[k], lane), their_high[k]))
-                row = bits_without(builder, any_above(builder, pairs))
-                row = builder.shl(row, ir.Constant(WORD, LANES * (lane - 4 * half)))
-                bits = row if bits is None else builder.or_(bits, row)
-            halves.append(bits)
-        return cgutils.pack_array(builder, halves)
+
+        def pairs_of(lane: int) -> list[tuple[Any, Any]]:
+            pairs = []
+            for k in range(3):
+                pairs.append((b_low[k], spread(builder, own_high[k], lane)))
+                pairs.append((spread(builder, own_low[k], lane), b_high[k]))
+            for k in range(3):
+                pairs.append((their_low[k], spread(builder, a_high[k], lane)))
+                pairs.append((spread(builder, a_low[k], lane), their_high[k]))
+            return pairs
+
+        return bits_by_row(builder, pairs_of)
 
     pair = types.UniTuple(types.int64, 2)
     return pair(first, types.int64, second, types.int64, frames), generate

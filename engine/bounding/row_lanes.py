@@ -5,9 +5,11 @@ Every function here emits instructions; `builder` is llvmlite's.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Final
 
 from llvmlite import ir
+from numba.core import cgutils
 from numba.np.arrayobj import make_array
 
 LANES: Final = 8
@@ -73,3 +75,16 @@ def any_above(builder: Any, pairs: list[tuple[Any, Any]]) -> Any:
 def bits_without(builder: Any, lanes: Any) -> Any:
     """Return an int64 with a bit for each of eight lanes that is not set in `lanes`."""
     return builder.zext(builder.bitcast(builder.not_(lanes), ir.IntType(LANES)), WORD)
+
+
+def bits_by_row(builder: Any, pairs_of: Callable[[int], list[tuple[Any, Any]]]) -> Any:
+    """Return two int64 with a byte for each of eight lanes: the lanes in which no pair of ``pairs_of(lane)`` parts."""
+    halves = []
+    for half in range(2):
+        bits = None
+        for place in range(4):
+            row = bits_without(builder, any_above(builder, pairs_of(4 * half + place)))
+            row = builder.shl(row, ir.Constant(WORD, LANES * place))
+            bits = row if bits is None else builder.or_(bits, row)
+        halves.append(bits)
+    return cgutils.pack_array(builder, halves)

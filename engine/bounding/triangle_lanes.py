@@ -32,7 +32,16 @@ from numba import config as numba_config
 from numba import types
 from numba.extending import intrinsic
 
-from engine.bounding.row_lanes import LANES, VECTOR, WORD, first_row, spread_number
+from engine.bounding.row_lanes import (
+    LANES,
+    VECTOR,
+    WORD,
+    absolute,
+    bits_without,
+    first_row,
+    load_row,
+    spread_number,
+)
 from engine.jit import inline
 
 CORNER_ROWS: Final = 9
@@ -89,10 +98,7 @@ def _near_triangles_intrinsic(
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         words = ir.VectorType(ir.IntType(32), LANES)
-        without_sign, sign = ir.Constant(words, [0x7FFFFFFF] * LANES), ir.Constant(words, [0x80000000] * LANES)
-
-        def absolute(vector: Any) -> Any:
-            return builder.bitcast(builder.and_(builder.bitcast(vector, words), without_sign), VECTOR)
+        sign = ir.Constant(words, [0x80000000] * LANES)
 
         def negative(vector: Any) -> Any:
             return builder.bitcast(builder.xor(builder.bitcast(vector, words), sign), VECTOR)
@@ -107,17 +113,14 @@ def _near_triangles_intrinsic(
         first = [builder.gep(data, [builder.mul(arguments[place], ir.Constant(WORD, LANES))]) for place in (2, 3, 4)]
 
         def row(corner: int, axis: int) -> Any:
-            there = builder.gep(first[axis], [ir.Constant(WORD, 3 * corner * LANES)])
-            loaded = builder.load(builder.bitcast(there, VECTOR.as_pointer()))
-            loaded.align = 4  # of a float: numpy promises no more
-            return loaded
+            return load_row(builder, first[axis], 3 * corner)
 
         m = [spread_number(builder, builder.extract_value(arguments[5], axis)) for axis in range(3)]
         r, s, reach, slack = (spread_number(builder, arguments[place]) for place in (6, 7, 8, 9))
         z = [builder.fsub(row(corner, 2), m[2]) for corner in range(3)]
         x = [builder.fsub(builder.fsub(row(c, 0), m[0]), builder.fmul(r, z[c])) for c in range(3)]
         y = [builder.fsub(builder.fsub(row(c, 1), m[1]), builder.fmul(s, z[c])) for c in range(3)]
-        sizes = [builder.fadd(absolute(x[c]), absolute(y[c])) for c in range(3)]
+        sizes = [builder.fadd(absolute(builder, x[c]), absolute(builder, y[c])) for c in range(3)]
         bound = builder.fmul(slack, builder.fadd(builder.fadd(sizes[0], sizes[1]), sizes[2]))
         edges = [builder.fsub(builder.fmul(x[a], y[b]), builder.fmul(y[a], x[b])) for a, b in ((0, 1), (1, 2), (2, 0))]
         lower, before = negative(bound), negative(reach)
@@ -126,7 +129,7 @@ def _near_triangles_intrinsic(
         apart = builder.and_(is_left, is_right)
         apart = builder.or_(apart, all_of([builder.fcmp_ordered(">", z[c], reach) for c in range(3)]))
         apart = builder.or_(apart, all_of([builder.fcmp_ordered("<", z[c], before) for c in range(3)]))
-        return builder.zext(builder.bitcast(builder.not_(apart), ir.IntType(LANES)), WORD)
+        return bits_without(builder, apart)
 
     triple, number, word = types.UniTuple(types.float32, 3), types.float32, types.int64
     return types.int64(corners, word, word, word, word, triple, number, number, number, number), generate

@@ -23,7 +23,6 @@ import numpy as np
 from llvmlite import ir
 from numba import config as numba_config
 from numba import types
-from numba.core import cgutils
 from numba.extending import intrinsic
 
 from engine.bounding.box_lanes import FRAME_ROWS, lowest_bit
@@ -33,6 +32,7 @@ from engine.bounding.row_lanes import (
     WORD,
     absolute,
     any_above,
+    bits_by_row,
     bits_without,
     dot,
     first_row,
@@ -41,9 +41,9 @@ from engine.bounding.row_lanes import (
     spread_number,
     store_row,
 )
+from engine.bounding.triangle_lanes import CORNER_ROWS
 from engine.jit import inline
 
-CORNER_ROWS: Final = 9
 NOWHERE: Final = 1e30
 """Coordinate of the corners of a lane that is not used: beyond every image and every margin."""
 
@@ -197,21 +197,17 @@ def _meet_boxes_intrinsic(typing_context: Any, first: Any, i: Any, second: Any, 
             )  # fmt: skip
         (a_low, a_high, b_image_low, b_image_high), (b_low, b_high, a_image_low, a_image_high) = sides
         beyond = spread_number(builder, ir.Constant(FLOAT, _BEYOND))
-        halves = []
-        for half in range(2):
-            bits = None
-            for lane in range(4 * half, 4 * half + 4):
-                pairs = [(spread(builder, a_low[0], lane), beyond)]  # case: neither lane is used
-                for k in range(3):
-                    pairs.append((b_image_low[k], spread(builder, a_high[k], lane)))
-                    pairs.append((spread(builder, a_low[k], lane), b_image_high[k]))
-                    pairs.append((b_low[k], spread(builder, a_image_high[k], lane)))
-                    pairs.append((spread(builder, a_image_low[k], lane), b_high[k]))
-                row = bits_without(builder, any_above(builder, pairs))
-                row = builder.shl(row, ir.Constant(WORD, LANES * (lane - 4 * half)))
-                bits = row if bits is None else builder.or_(bits, row)
-            halves.append(bits)
-        return cgutils.pack_array(builder, halves)
+
+        def pairs_of(lane: int) -> list[tuple[Any, Any]]:
+            pairs = [(spread(builder, a_low[0], lane), beyond)]  # case: neither lane is used
+            for k in range(3):
+                pairs.append((b_image_low[k], spread(builder, a_high[k], lane)))
+                pairs.append((spread(builder, a_low[k], lane), b_image_high[k]))
+                pairs.append((b_low[k], spread(builder, a_image_high[k], lane)))
+                pairs.append((spread(builder, a_image_low[k], lane), b_high[k]))
+            return pairs
+
+        return bits_by_row(builder, pairs_of)
 
     pair = types.UniTuple(types.int64, 2)
     return pair(first, types.int64, second, types.int64, frames, work), generate

@@ -14,8 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.bounding.bvh import EMPTY, WIDTH, build_bvh
+from engine.bounding.triangle_lanes import CORNER_ROWS
 from engine.collision.disc_lanes import DISC_ROWS, fill_discs
-from engine.collision.face_lanes import CORNER_ROWS, NOWHERE
+from engine.collision.face_lanes import NOWHERE
 from engine.collision.placement import NO_ROTATION, NO_TRANSLATION, Extent, PoseArrays
 from engine.collision.triangle_triangle import Triangle3, projected
 from engine.jit import inline, kernel

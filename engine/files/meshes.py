@@ -9,6 +9,7 @@ import numpy as np
 
 from engine.errors import EmptyGeometryError, IndexOutOfRangeError, InvalidInputError
 from engine.solids.base import FloatArray, IntArray
+from engine.solids.mesh import first_equal_points
 from engine.solids.polyhedron import Polyhedron
 
 FORMATS: Final = ("stl", "obj", "ply", "off", "glb")
@@ -57,15 +58,19 @@ def read_mesh(file: IO[bytes], file_format: str) -> tuple[FloatArray, IntArray]:
         ) from error
     if not len(faces):
         raise EmptyGeometryError(f"the {file_format} file holds no faces", ("file",))
-    if faces.min() < 0 or faces.max() >= len(vertices):
-        raise IndexOutOfRangeError(f"a face names a vertex beyond the {len(vertices)} there are", ("file",))
+    if len(beyond := np.argwhere((faces < 0) | (faces >= len(vertices)))):
+        face, corner = beyond[0].tolist()
+        raise IndexOutOfRangeError(
+            f"triangle {face} names vertex {faces[face, corner]}, the file holds {len(vertices)}; correct the file",
+            ("file",),
+        )
     return _merged(vertices, faces)
 
 
 def _merged(vertices: Any, faces: Any) -> tuple[FloatArray, IntArray]:
     """Return the vertices at different coordinates in their first order, and the faces with their new indices."""
-    _, first, inverse = np.unique(vertices + 0.0, axis=0, return_index=True, return_inverse=True)
-    order = np.argsort(first)
-    rank = np.empty(len(order), np.int64)
-    rank[order] = np.arange(len(order))
-    return vertices[first[order]], rank[inverse.reshape(-1)][faces]
+    first = first_equal_points(vertices + 0.0)
+    if first is None:
+        return vertices, faces
+    is_first = first == np.arange(len(first))
+    return vertices[is_first], (np.cumsum(is_first) - 1)[first][faces]
