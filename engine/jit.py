@@ -1,8 +1,9 @@
 """The only file that spells compiler options, and where compiled code is kept.
 
-Four decorators. `kernel`: an outer loop over arrays, called from Python, releases the interpreter lock, cached on disk.
+Decorators. `kernel`: an outer loop over arrays, called from Python, releases the interpreter lock, cached on disk.
 `inline`: a small function that compiled code calls. `merged`: one for which no call is ever left; `called`: one for
-which a call always is. Arithmetic is strict IEEE double: `fastmath` is off everywhere, and nothing is fused unless
+which a call always is. `bare_kernel` and `allocating` are a kernel, and what it calls, without counted references.
+Arithmetic is strict IEEE double: `fastmath` is off everywhere, and nothing is fused unless
 `fma` (error_free.py) is called by name.
 
 **The cache.** numba looks at the file of the kernel only, so a cached kernel would not notice that a helper in another
@@ -202,7 +203,19 @@ class _KernelCache(FunctionCache):  # type: ignore[misc]
 
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile an outer loop: called from Python, releases the interpreter lock, cached on disk."""
-    compiled = numba.njit(**_OPTIONS)(function)
+    return _kernel(function)
+
+
+def bare_kernel(function: Callable[..., Any]) -> Any:
+    """Compile as `kernel` does, without counting references to arrays, there and in all that it calls.
+
+    Nothing below may make an array, or assign a part of one to another, unless it is `allocating`.
+    """
+    return _kernel(function, _nrt=False)
+
+
+def _kernel(function: Callable[..., Any], **options: Any) -> Any:
+    compiled = numba.njit(**_OPTIONS, **options)(function)
     folder = cache_folder()
     if folder is not None and not numba_config.DISABLE_JIT:
         compiled._cache = _KernelCache(function, folder)
@@ -290,3 +303,8 @@ def called(function: Callable[..., Any]) -> Any:
     from one to the next. `inline` functions below a merged one are merged as well; these are not.
     """
     return function if numba_config.DISABLE_JIT else _Inline(function, _CalledCompiler, forceinline=False)
+
+
+def allocating(function: Callable[..., Any]) -> Any:
+    """Compile as `called` does, for a function below a bare kernel that makes arrays of its own and returns none."""
+    return function if numba_config.DISABLE_JIT else _Inline(function, _CalledCompiler, forceinline=False, _nrt=True)

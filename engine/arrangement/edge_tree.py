@@ -21,7 +21,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.jit import inline, merged
+from engine.jit import allocating, inline, merged
 
 LEAF: Final = 4
 PORTION: Final = 2048
@@ -75,7 +75,7 @@ def _spread(bits: int) -> int:
     return (bits | (bits << 1)) & 0x55555555
 
 
-@inline
+@allocating
 def _order_boxes(boxes: Any, n: int, places: Any) -> bool:
     """Fill ``places`` with the boxes in the order in which the leaves take them; tell whether it is another order."""
     x_min = y_min = float("inf")

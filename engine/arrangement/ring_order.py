@@ -70,7 +70,8 @@ def _sort(rings: Rings, ranking: Ranking, x: Any, y: Any, n: int, is_by_piece: b
                 else:
                     spare[k] = order[j]
                     j += 1
-        order[:n] = spare[:n]
+        for k in range(n):
+            order[k] = spare[k]
         width *= 2
 
 

@@ -37,7 +37,7 @@ from engine.clipping.cut_point import LARGEST
 from engine.clipping.overlay_convex import UNSETTLED, Passages, intersect_convex
 from engine.clipping.overlay_loading import box_of, fill_boxes, load_rings, magnitude
 from engine.clipping.overlay_workspace import Workspace
-from engine.jit import inline, kernel
+from engine.jit import bare_kernel, inline
 
 DONE: Final = 0
 OPEN: Final = 1
@@ -148,7 +148,7 @@ def _write_ring(w: Workspace, m: int, low: int, vertices: Any, sources: Any, n_o
         i = i + 1 if i + 1 < m else 0
 
 
-@kernel
+@bare_kernel
 def overlay_pairs(
     subjects: Any, subject_rings: Any, subject_items: Any, clips: Any, clip_rings: Any, clip_items: Any,
     first_item: int, last_item: int, begin: int, kept: Any, stop: Any, w: Workspace,
