@@ -273,7 +273,7 @@ def load_ring(s: Any, vertices: Any, first: int, last: int) -> int:
         is_same = n > 0
         for k in range(d):
             is_same = is_same and s.points[n - 1, k] == vertices[i * d + k]
-            s.points[n, k] = vertices[i * d + k]
+            s.points[n, k] = vertices[i * d + k] + 0.0
         s.rings[0, n], s.edges[n], s.along[n] = n, n, -1
         n += not is_same
     while n > 1:

@@ -36,6 +36,7 @@ from engine.clipping.cut_vertices import (
     share_of_edge,
     value_bound,
 )
+from engine.clipping.moving import move
 from engine.jit import merged
 from engine.predicates.double_double import dd_add, dd_div, surely_rounded
 
@@ -60,18 +61,18 @@ def load_ring(
 ) -> tuple[int, float, float, float, float, float, float]:
     """Load a ring into `pool` without vertices equal to the one before; return how many, and the bounds of each axis.
 
-    The first vertex may still be repeated at the end.
+    Zeros become +0.0. The first vertex may still be repeated at the end.
     """
     x, y, z = vertices[begin * d], vertices[begin * d + 1], 0.0 if d == 2 else vertices[begin * d + 2]
-    pool[0], pool[1] = x, y
+    pool[0], pool[1] = x + 0.0, y + 0.0
     if d == 3:
-        pool[2] = z
+        pool[2] = z + 0.0
     n, x_low, x_high, y_low, y_high, z_low, z_high = 1, x, x, y, y, z, z
     for i in range(begin + 1, end):
         u, v, w = vertices[i * d], vertices[i * d + 1], 0.0 if d == 2 else vertices[i * d + 2]
-        pool[n * d], pool[n * d + 1] = u, v
+        pool[n * d], pool[n * d + 1] = u + 0.0, v + 0.0
         if d == 3:
-            pool[n * d + 2] = w
+            pool[n * d + 2] = w + 0.0
         n += (u != x) | (v != y) | (w != z)
         x, y, z = u, v, w
         x_low, x_high = x if x < x_low else x_low, x if x > x_high else x_high
@@ -174,7 +175,9 @@ def clip_plainly(
                     break
                 n -= 1
             size_pool, n_ring = n, n
-            if n >= LONG and n_cutting <= MOST_BITS:
+            if n_cutting == 0:
+                rings[0], ends[0], n = 0, n - 1, 1
+            elif n >= LONG and n_cutting <= MOST_BITS:
                 for i in range(n):
                     codes[i] = 0
                 for i_plane in range(n_cutting):
@@ -193,9 +196,9 @@ def clip_plainly(
                 n, before = 0, -1
                 for i in range(n_ring):
                     code = codes[i]
-                    if code != before or code >= ALONE:
-                        rings[n], before = i, code
-                        n += 1
+                    rings[n] = i
+                    n += (code != before) | (code >= ALONE)
+                    before = code
                 rings[n] = n_ring
                 for i in range(n):
                     edges[rings[i]] = ends[rings[i]] = rings[i + 1] - 1
@@ -211,7 +214,7 @@ def clip_plainly(
                     for i in range(n):
                         v = rings[here + i]
                         x = pool[v * d + axis]
-                        sign = sense if x > place else (-sense if x < place else 0)
+                        sign = sense * (int(x > place) - int(x < place))
                         if sign == 0 and v >= n_ring:
                             rest, bound = rests[2 * (v * d + axis)], rests[2 * (v * d + axis) + 1]
                             if abs(rest) > bound:
@@ -379,9 +382,9 @@ def clip_plainly(
             for i in range(n):
                 j = rings[here + i]
                 last_of_run = ends[j] if j < n_ring else j
-                for place_in in range(j * d, (last_of_run + 1) * d):
-                    out[place_out] = pool[place_in]
-                    place_out += 1
+                n_numbers = (last_of_run + 1 - j) * d
+                move(out, place_out, pool, j * d, n_numbers)
+                place_out += n_numbers
             sizes[ring] = place_out // d - written
             written = place_out // d
         for i in range(n_cutting):

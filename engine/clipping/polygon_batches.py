@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -13,24 +13,23 @@ from engine.clipping.cut_point import LARGEST, SMALLEST
 from engine.clipping.exact_contours import Row
 from engine.clipping.exact_segments import nearest
 from engine.clipping.plain_rings import OPEN
-from engine.clipping.scaling import exponent_of, scaled_back, shifted
+from engine.clipping.scaling import exponent_above, scaled_back, shifted
 from engine.clipping.sutherland_hodgman import clip_rings
 from engine.parallel import Budget
 from engine.predicates.digits import packed_numbers
-from engine.solids.base import FloatArray, IntArray
+from engine.solids.base import FloatArray, IntArray, Solid
 
 _DEEPEST: Final = -900
 """Scenes below 2^-900 have subnormal results, which the kernel would round twice."""
 
 
-@dataclass(frozen=True, slots=True)
-class KernelScene:
-    """vertices: (m, dim) float64 times 2^-exponent; high, low: (planes, dim + 1) float64 for them; axes: (planes,)
-    int64, the axis that a plane cuts across in one known double `at`, else -1; row_heap, row_places: the rows for them
-    in whole numbers, see digits.py."""
+class PlaneTables(NamedTuple):
+    """Planes as the kernel takes them, see `clip_rings`; prepared once a region where nothing is scaled.
 
-    vertices: FloatArray
-    exponent: int
+    high, low: (planes, dim + 1) float64; axes: (planes,) int64, the axis that a plane cuts across in one known double
+    `at`, else -1; row_heap, row_places: the rows in whole numbers, see digits.py.
+    """
+
     high: FloatArray
     low: FloatArray
     axes: IntArray
@@ -39,12 +38,35 @@ class KernelScene:
     row_places: IntArray
 
 
-def kernel_scene(vertices: FloatArray, planes: list[Row], budget: Budget) -> KernelScene | None:
-    """Return the scene as the kernel takes it, None where numbers lie too far apart for it."""
-    exponent = exponent_of(vertices)
+@dataclass(frozen=True, slots=True)
+class KernelScene:
+    """vertices: (m, dim) float64 times 2^-exponent; tables: the planes for them."""
+
+    vertices: FloatArray
+    exponent: int
+    tables: PlaneTables
+
+
+def kernel_scene(
+    region: Solid, vertices: FloatArray, largest: float, planes: list[Row], budget: Budget
+) -> KernelScene | None:
+    """Return the scene as the kernel takes it, None where numbers lie too far apart for it.
+
+    largest: magnitude of any coordinate. planes: those of the region.
+    """
+    exponent = exponent_above(largest)
     points = shifted(vertices, -exponent) if exponent else vertices
     if points is None or exponent < _DEEPEST or not planes:
         return None
+    if exponent:
+        tables = _plane_tables(planes, exponent, budget)
+    else:
+        tables = region.prepared("clipping_tables", lambda: _plane_tables(planes, 0, budget), budget.check)
+    return None if tables is None else KernelScene(points, exponent, tables)
+
+
+def _plane_tables(planes: list[Row], exponent: int, budget: Budget) -> PlaneTables | None:
+    """Return planes for vertices times 2^-exponent, None where numbers lie too far apart for the kernel."""
     high, low = np.zeros((len(planes), len(planes[0]))), np.zeros((len(planes), len(planes[0])))
     axes, at = np.full(len(planes), -1, np.int64), np.zeros(len(planes))
     rows: list[list[int]] = []
@@ -68,7 +90,7 @@ def kernel_scene(vertices: FloatArray, planes: list[Row], budget: Budget) -> Ker
     if ((sizes != 0.0) & ((sizes < SMALLEST) | (sizes > LARGEST))).any():
         return None
     packed = packed_numbers(rows)
-    return None if packed is None else KernelScene(points, exponent, high, low, axes, at, *packed)
+    return None if packed is None else PlaneTables(high, low, axes, at, *packed)
 
 
 def _double_double(number: int, shift: int) -> tuple[float, float]:
@@ -102,7 +124,7 @@ def clip_chunk(
     Fills sizes (of rings), state and may_have_bridges (of polygons); see `clip_rings`.
     """
     n_vertices = int(ring_offsets[polygon_offsets[last]] - ring_offsets[polygon_offsets[first]])
-    d, room, done, parts = scene.vertices.shape[1], n_vertices + 4 * len(scene.high) + 64, first, []
+    d, room, done, parts = scene.vertices.shape[1], n_vertices + 4 * len(scene.tables.high) + 64, first, []
     while done < last:
         out = np.empty(room * d)
         with np.errstate(all="ignore"):
@@ -110,12 +132,7 @@ def clip_chunk(
                 scene.vertices.reshape(-1),
                 ring_offsets,
                 polygon_offsets,
-                scene.high,
-                scene.low,
-                scene.axes,
-                scene.at,
-                scene.row_heap,
-                scene.row_places,
+                *scene.tables,
                 done,
                 last,
                 budget.flag,
@@ -129,7 +146,7 @@ def clip_chunk(
         parts.append(out[: written * d].reshape(-1, d))
         room = room if reached > done else 2 * room
         done = reached
-    vertices = np.concatenate(parts) if parts else np.zeros((0, d))
+    vertices = parts[0] if len(parts) == 1 else np.concatenate([np.zeros((0, d)), *parts])
     if scene.exponent:
         vertices, doubtful = scaled_back(vertices, scene.exponent)
         if doubtful.any():

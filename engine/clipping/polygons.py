@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any, Literal, overload
+from typing import Any, Literal, NamedTuple, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -15,11 +15,12 @@ from engine.clipping.convex_planes import convex_planes
 from engine.clipping.exact_contours import Row, clip_polygon, integer_row, reduced
 from engine.clipping.plain_rings import OPEN
 from engine.clipping.polygon_batches import clip_chunk, kernel_scene
+from engine.clipping.scaling import largest_of
 from engine.errors import EmptyGeometryError, InvalidArrayError, TooComplexError, UnsupportedSolidError
 from engine.parallel import Budget, Cancel, Progress, run_chunks
 from engine.solids.aabb import Aabb
 from engine.solids.base import FloatArray, IntArray, Solid
-from engine.solids.checks import as_point_groups, as_points, check_dimension
+from engine.solids.checks import as_point_groups, as_points, check_dimension, check_finite
 from engine.solids.convex import Convex
 from engine.solids.half_space import HalfSpace
 from engine.solids.polygon import Polygon
@@ -144,10 +145,8 @@ def clip_polygons(
     """
     with Budget(deadline, cancel) as budget:
         planes = _planes(region, budget)
-        vertices, ring_offsets, polygon_offsets = as_contours(polygons, region.dimension)
-        clipped, n_beyond, n_rational = _clip(
-            vertices, ring_offsets, polygon_offsets, planes, budget, workers, progress
-        )
+        contours = as_contours(polygons, region.dimension)
+        clipped, n_beyond, n_rational = _clip(contours, region, planes, budget, workers, progress)
     if not report:
         return clipped
     return clipped, Accuracy("exact", 0.5, len(clipped), n_beyond, n_rational, "sutherland_hodgman")
@@ -170,25 +169,43 @@ def _planes(region: Solid, budget: Budget) -> list[Row]:
                 "aabb, convex or convex polyhedron, or use overlay for polygons in the plane",
                 ("region",),
             )
-    found: dict[Row, None] = {}
-    for index, row in enumerate(rows.tolist()):
-        if index % 256 == 0:
-            budget.check()
-        found[reduced(integer_row(row))] = None
-    return list(found)
+
+    def build() -> list[Row]:
+        found: dict[Row, None] = {}
+        for index, row in enumerate(rows.tolist()):
+            if index % 256 == 0:
+                budget.check()
+            found[reduced(integer_row(row))] = None
+        return list(found)
+
+    return region.prepared("clipping_planes", build, budget.check)
 
 
-def as_contours(polygons: Any, dimension: int) -> tuple[FloatArray, IntArray, IntArray]:
-    """Return all vertices (m, dim) with the offsets of rings and polygons; none at all are welcome.
+class Contours(NamedTuple):
+    """The rings of all polygons."""
+
+    vertices: FloatArray
+    """(m, dim), read-only; zeros of either sign."""
+    ring_offsets: IntArray
+    polygon_offsets: IntArray
+    largest: float
+    """Magnitude of any coordinate."""
+
+
+def as_contours(polygons: Any, dimension: int) -> Contours:
+    """Return all rings; none at all are welcome, an array is borrowed.
 
     Raises: InvalidArrayError, WrongDimensionError, NotFiniteError, EmptyGeometryError, each naming the element.
     """
     if isinstance(polygons, np.ndarray):
-        array = as_point_groups(polygons, None, dimension, ("polygons",))
+        array = as_point_groups(polygons, None, dimension, ("polygons",), must_be_finite=False)
         n, size = array.shape[:2]
         if n and not size:
             raise EmptyGeometryError("polygons[0] has no vertices; leave it out", ("polygons", 0))
-        return array.reshape(-1, dimension) + 0.0, size * np.arange(n + 1), np.arange(n + 1)
+        largest = largest_of(array)
+        if not np.isfinite(largest):
+            check_finite(array, ("polygons",))
+        return Contours(array.reshape(-1, dimension), size * np.arange(n + 1), np.arange(n + 1), largest)
     if not isinstance(polygons, (list, tuple)):
         raise InvalidArrayError(
             f"polygons must be a list of polygons, got {type(polygons).__name__}; put a single one into a list",
@@ -213,8 +230,9 @@ def as_contours(polygons: Any, dimension: int) -> tuple[FloatArray, IntArray, In
                 raise EmptyGeometryError(f"polygons[{i}][{j}] has no vertices; leave it out", ("polygons", i, j))
         rings += found
         counts.append(len(found))
-    vertices = np.concatenate(rings) + 0.0 if rings else np.zeros((0, dimension))
-    return vertices, _offsets([len(ring) for ring in rings]), _offsets(counts)
+    vertices = np.concatenate(rings) if rings else np.zeros((0, dimension))
+    vertices.setflags(write=False)
+    return Contours(vertices, _offsets([len(ring) for ring in rings]), _offsets(counts), largest_of(vertices))
 
 
 def _offsets(counts: Sequence[int] | IntArray) -> IntArray:
@@ -224,34 +242,32 @@ def _offsets(counts: Sequence[int] | IntArray) -> IntArray:
 
 
 def _clip(
-    vertices: FloatArray,
-    ring_offsets: IntArray,
-    polygon_offsets: IntArray,
+    contours: Contours,
+    region: Solid,
     planes: list[Row],
     budget: Budget,
     workers: int | None,
     progress: Progress | None,
 ) -> tuple[ClippedPolygons, int, int]:
     """Clip every polygon; return the result, how many polygons needed more than the filter, and rational arithmetic."""
+    vertices, ring_offsets, polygon_offsets, largest = contours
     n, dimension = len(polygon_offsets) - 1, vertices.shape[1]
     status, may_have_bridges = np.zeros(n, np.int8), np.zeros(n, np.bool_)
     sizes = np.zeros(len(ring_offsets) - 1, np.int64)
     parts: dict[int, FloatArray] = {}
-
-    vertices.setflags(write=False)
-    scene = kernel_scene(vertices, planes, budget)
+    scene = kernel_scene(region, vertices, largest, planes, budget)
     state = np.full(n, OPEN, np.uint8)
 
     def settle(i: int) -> FloatArray:
         rings = range(polygon_offsets[i], polygon_offsets[i + 1])
         points = [vertices[ring_offsets[j] : ring_offsets[j + 1]].tolist() for j in rings]
         try:
-            contours, may_have_bridges[i] = clip_polygon(points, planes, budget.check)
+            found, may_have_bridges[i] = clip_polygon(points, planes, budget.check)
         except TooComplexError:
             status[i] = PolygonStatus.TOO_COMPLEX
             return np.zeros((0, dimension))
-        sizes[rings.start : rings.stop] = [len(contour) for contour in contours]
-        return np.array([vertex for contour in contours for vertex in contour], np.float64).reshape(-1, dimension)
+        sizes[rings.start : rings.stop] = [len(contour) for contour in found]
+        return np.array([vertex for contour in found for vertex in contour], np.float64).reshape(-1, dimension)
 
     def task(first: int, last: int) -> None:
         settled = np.zeros((0, dimension))
@@ -259,14 +275,17 @@ def _clip(
             settled = clip_chunk(
                 scene, ring_offsets, polygon_offsets, first, last, budget, sizes, state, may_have_bridges
             )
-        found, taken = [], 0
-        counts = np.add.reduceat(np.append(sizes, 0), polygon_offsets[first : last + 1]) if last > first else sizes
-        before = _offsets(counts[: last - first])
-        for i in first + np.flatnonzero(state[first:last] == OPEN):
-            budget.check()
-            found += [settled[taken : before[i - first]], settle(int(i))]
-            taken = int(before[i - first])
-        parts[first] = np.concatenate([*found, settled[taken:]])
+        open_ones = first + np.flatnonzero(state[first:last] == OPEN)
+        if len(open_ones):
+            rings = polygon_offsets[first : last + 1]
+            before = _offsets(sizes[rings[0] : rings[-1]])[rings - rings[0]]  # vertices that the kernel left
+            found, taken = [], 0
+            for i in open_ones:
+                budget.check()
+                found += [settled[taken : before[i - first]], settle(int(i))]
+                taken = int(before[i - first])
+            settled = np.concatenate([*found, settled[taken:]])
+        parts[first] = settled
 
     run_chunks(task, n, budget=budget, workers=workers, progress=progress, first_chunk=64)
     left = np.flatnonzero(sizes)

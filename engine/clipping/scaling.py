@@ -20,9 +20,18 @@ COMFORTABLE: Final = 64
 SMALLEST_NORMAL: Final = 2.0**-1022
 
 
+def largest_of(*arrays: FloatArray) -> float:
+    """Return the largest magnitude of any coordinate, no finite number where one is none."""
+    return max((max(float(array.max()), -float(array.min())) for array in arrays if array.size), default=0.0)
+
+
 def exponent_of(*arrays: FloatArray) -> int:
     """Return e such that the largest coordinate is below 2^e, and 0 where no scaling is needed."""
-    largest = max((max(float(array.max()), -float(array.min())) for array in arrays if array.size), default=0.0)
+    return exponent_above(largest_of(*arrays))
+
+
+def exponent_above(largest: float) -> int:
+    """Return e such that a coordinate is below 2^e, and 0 where no scaling is needed."""
     exponent = int(np.frexp(largest)[1])
     return 0 if largest == 0.0 or abs(exponent) <= COMFORTABLE else exponent
 

@@ -262,6 +262,20 @@ def test_empty_queries_and_report() -> None:
         assert (accuracy.decisions, accuracy.n_items, accuracy.method) == ("exact", 0, "sutherland_hodgman")
 
 
+def test_zeros_of_either_sign_are_one() -> None:
+    rng = np.random.default_rng(5)
+    for dimension in (2, 3):
+        rings = rng.integers(-2, 3, (200, 9, dimension)) * 1.0
+        negative = np.where(rings == 0.0, -0.0, rings)
+        kept = negative.copy()
+        for region in regions_of(rng, dimension):
+            first, second = clip_polygons(rings, region), clip_polygons(negative, region)
+            for name in ClippedPolygons.__slots__:
+                np.testing.assert_array_equal(getattr(first, name), getattr(second, name), err_msg=str(region))
+            assert not np.signbit(second.vertices[second.vertices == 0.0]).any()
+        assert negative.tobytes() == kept.tobytes()
+
+
 def test_refuses_what_it_cannot_take() -> None:
     box, ring = Aabb([0, 0], [1, 1]), [[0, 0], [1, 1], [0, 1]]
     cases: list[tuple[Any, Any, type[Exception], Any]] = [
@@ -269,6 +283,8 @@ def test_refuses_what_it_cannot_take() -> None:
         ([[ring]], Polygon([ring]), UnsupportedSolidError, ("region",)),
         ([[[[0, 0, 0], [1, 1, 1], [0, 1, 1]]]], box, WrongDimensionError, ("polygons", 0, 0)),
         ([[ring], [[[0, 0], [1, math.nan], [1, 1]]]], box, NotFiniteError, ("polygons", 1, 0, 1, 1)),
+        (np.array([ring, [[0, 0], [1, math.nan], [1, 1]]]), box, NotFiniteError, ("polygons", 1, 1, 1)),
+        (np.array([ring, [[0, 0], [1, 1], [-math.inf, 1]]]), box, NotFiniteError, ("polygons", 1, 2, 0)),
         ([[ring], []], box, EmptyGeometryError, ("polygons", 1)),
         ([[ring, []]], box, EmptyGeometryError, ("polygons", 0, 1)),
         ([1], box, InvalidArrayError, ("polygons", 0)),
