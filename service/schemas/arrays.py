@@ -234,6 +234,8 @@ def _is_exact(value: int) -> bool:
 
 def _show(value: Any) -> str:
     """Return a short JSON-like text of `value`: enough to find it, never the whole body."""
+    if isinstance(value, np.generic):  # a number of a long list that was decoded into an array
+        value = value.item()
     if isinstance(value, (list, np.ndarray)):
         return f"a list of {len(value)}"
     if isinstance(value, dict):

@@ -53,6 +53,7 @@ async def test_no_polygons_no_entries(client: httpx.AsyncClient, region: dict[st
     [
         ({"region": SPHERE}, "unsupported_solid", "/region"),
         ({"polygons": [TRIANGLE]}, "invalid_array", "/polygons/0/0/0"),
+        ({"polygons": [[1]] * 3000}, "invalid_array", "/polygons/0/0"),  # long: decoded into an array at first
         ({"polygons": [[]]}, "empty_geometry", "/polygons/0"),
         ({"polygons": [[[]]]}, "empty_geometry", "/polygons/0/0"),
         ({"polygons": {}}, "invalid_request", "/polygons"),
