@@ -36,10 +36,11 @@ from typing import Any
 import numba
 from numba import config as numba_config
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile, UserProvidedCacheLocator
-from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder, compile_result
 from numba.core.compiler_machinery import register_pass
 from numba.core.lowering import Lower
 from numba.core.registry import CPUDispatcher
+from numba.core.runtime import rtsys
 from numba.core.typed_passes import NativeLowering
 
 KERNELS: list[Any] = []
@@ -48,14 +49,14 @@ KERNELS: list[Any] = []
 _OPTIONS: dict[str, Any] = {"nogil": True, "fastmath": False, "error_model": "numpy"}
 _ROOT = Path(__file__).resolve().parent
 _IMPORT = re.compile(
-    r"^\s*(?:from\s+engine([.\w]*)\s+import\s+(\([^)]*\)|[^\n]*)|import\s+engine([.\w]+))", re.MULTILINE
+    r"^[ \t]*(?:from\s+engine([.\w]*)\s+import\s+(\([^)]*\)|[^\n]*)|import\s+engine([.\w]+))", re.MULTILINE
 )
 
 
 @functools.cache
 def _source(module: str) -> str | None:
     """Return the source text of the dotted engine `module`, None if there is no such file."""
-    base = _ROOT.joinpath(*module.split(".")[1:])
+    base = _folder(module)
     for path in (base.with_suffix(".py"), base / "__init__.py"):
         if module != "engine" and path.is_file():
             return path.read_text("utf-8")
@@ -68,10 +69,16 @@ def imported_modules(module: str) -> set[str]:
     found: set[str] = set()
     for match in _IMPORT.finditer(_source(module) or ""):
         package = "engine" + (match[1] or match[3] or "")
-        names = re.findall(r"\w+", re.sub(r"#.*|\bas\s+\w+", "", match[2] or ""))
-        candidates = [package, *(f"{package}.{name}" for name in names)]
+        candidates = [package]
+        if _folder(package).is_dir():
+            names = re.findall(r"\w+", re.sub(r"#.*|\bas\s+\w+", "", match[2] or ""))
+            candidates += [f"{package}.{name}" for name in names]
         found.update(name for name in candidates if _source(name) is not None)
     return found
+
+
+def _folder(module: str) -> Path:
+    return _ROOT.joinpath(*module.split(".")[1:])
 
 
 @functools.cache
@@ -84,8 +91,13 @@ def source_digest(module: str) -> str:
         waiting |= imported_modules(name) - reached
     digest = hashlib.sha256(numba.__version__.encode())
     for name in sorted(reached):
-        digest.update(f"\0{name}\0{_source(name)}".encode())
+        digest.update(f"\0{name}\0".encode() + _source_hash(name))
     return digest.hexdigest()[:20]
+
+
+@functools.cache
+def _source_hash(module: str) -> bytes:
+    return hashlib.sha256(str(_source(module)).encode()).digest()
 
 
 def _is_writable(folder: Path) -> bool:
@@ -171,13 +183,52 @@ class _Locator(UserProvidedCacheLocator):  # type: ignore[misc] # numba carries 
 
 
 class _Implementation(CompileResultCacheImpl):  # type: ignore[misc]
-    """How numba writes and reads compiled code, at the place that `_Locator` names."""
+    """How compiled code is written and read, at the place that `_Locator` names.
+
+    Machine code alone. numba puts the code from before the last steps of compiling beside it, for callers that are
+    compiled later, and parses that at each load: more than half of all loading. No compiled function calls a kernel (a
+    test looks), and should one, numba says that the kernel is unfit for linking. The constants of a function that has
+    none, and the annotated source, are left out too.
+    """
 
     def __init__(self, function: Callable[..., Any], folder: Path) -> None:
         self._lineno = function.__code__.co_firstlineno
         self._locator = _Locator(function, folder)
         name = f"{Path(function.__code__.co_filename).stem}.{function.__qualname__}"
         self._filename_base = self.get_filename_base(name, getattr(sys, "abiflags", ""))
+
+    def reduce(self, result: CompileResult) -> Any:
+        """Return what is kept of a compiled kernel."""
+        (name, _, (code, _)), fndesc, environment, signature, *_, reload, constants = super().reduce(result)
+        constants = [item for item in constants if item.consts]
+        return name, code, fndesc, environment, signature, reload, constants
+
+    def rebuild(self, target_context: Any, payload: Any) -> CompileResult:
+        """Return the kernel of which `payload` is kept, ready to be called."""
+        name, code, fndesc, environment, signature, reload, constants = payload
+        for prepare in reload:
+            prepare()
+        codegen = target_context.codegen()
+        library = codegen.create_library(name)
+        library.enable_object_caching()
+        library._set_compiled_object(code)
+        library._finalize_final_module()
+        codegen._engine._defined_symbols |= {fndesc.llvm_func_name, fndesc.llvm_cpython_wrapper_name}
+        for item in constants:
+            codegen.set_env(item.env_name, item)
+        return compile_result(
+            target_context=target_context,
+            typing_context=target_context.typing_context,
+            library=library,
+            environment=environment,
+            entry_point=target_context.get_executable(library, fndesc, environment),
+            fndesc=fndesc,
+            signature=signature,
+            objectmode=False,
+            lifted=(),
+            reload_init=reload,
+            referenced_envs=constants,
+        )
 
 
 class _KernelCache(FunctionCache):  # type: ignore[misc]
@@ -199,6 +250,14 @@ class _KernelCache(FunctionCache):  # type: ignore[misc]
     @functools.cached_property
     def _cache_file(self) -> _CacheFile:
         return _CacheFile(self._cache_path, self._impl.filename_base, source_stamp=None)
+
+    def load_overload(self, signature: Any, target_context: Any) -> CompileResult | None:
+        """Return the kernel for `signature`, None if it is not there.
+
+        numba first brings in everything that it can compile, a third of a second; compiling does that by itself.
+        """
+        rtsys.initialize(target_context)
+        return self._load_overload(signature, target_context)
 
 
 def kernel(function: Callable[..., Any]) -> Any:

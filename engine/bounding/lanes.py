@@ -16,7 +16,6 @@ from llvmlite import ir
 from numba import config as numba_config
 from numba import types
 from numba.extending import intrinsic, lower_builtin, models, register_model, type_callable
-from numba.np.arrayobj import make_array
 
 N_LANES: Final = 8
 _FLOAT: Final = ir.FloatType()
@@ -126,7 +125,7 @@ def _spread_intrinsic(typing_context: Any, value: Any) -> Any:
 
 
 def _address(context: Any, builder: Any, rows_type: Any, rows: Any, row: Any) -> Any:
-    data = builder.bitcast(make_array(rows_type)(context, builder, rows).data, _FLOAT.as_pointer())
+    data = builder.bitcast(context.make_array(rows_type)(context, builder, rows).data, _FLOAT.as_pointer())
     there = builder.gep(data, [builder.mul(row, ir.Constant(_WORD, N_LANES))])
     return builder.bitcast(there, _VECTOR.as_pointer())
 

@@ -10,7 +10,6 @@ from typing import Any, Final
 
 from llvmlite import ir
 from numba.core import cgutils
-from numba.np.arrayobj import make_array
 
 LANES: Final = 8
 FLOAT: Final = ir.FloatType()
@@ -20,7 +19,7 @@ VECTOR: Final = ir.VectorType(FLOAT, LANES)
 
 def first_row(context: Any, builder: Any, array_type: Any, array: Any, item: Any, n_rows: int) -> Any:
     """Return where item number `item` of an array (n, n_rows, 8) begins."""
-    start = builder.bitcast(make_array(array_type)(context, builder, array).data, FLOAT.as_pointer())
+    start = builder.bitcast(context.make_array(array_type)(context, builder, array).data, FLOAT.as_pointer())
     return builder.gep(start, [builder.mul(item, ir.Constant(WORD, n_rows * LANES))])
 
 

@@ -183,7 +183,7 @@ def _lay_out(
                 as_point3(used, ordered[item, 2]),
             )
     parent = np.empty(n_used, np.int64)
-    join_vertices(ordered, np.zeros(n_triangles, np.bool_), parent)
+    _join(ordered, np.zeros(n_triangles, np.bool_), parent)
     number[:n_used] = 0
     for item in range(n_triangles):
         root = parent[ordered[item, 0]]
@@ -311,6 +311,11 @@ def root_of(parent: Any, vertex: int) -> int:
 @kernel
 def join_vertices(triangles: Any, left_out: Any, parent: Any) -> None:
     """Set parent (n_vertices,) so that vertices connected by triangles not left out have one representative."""
+    _join(triangles, left_out, parent)
+
+
+@inline
+def _join(triangles: Any, left_out: Any, parent: Any) -> None:
     for vertex in range(parent.shape[0]):
         parent[vertex] = vertex
     for item in range(triangles.shape[0]):

@@ -17,7 +17,6 @@ from numba import config as numba_config
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
-from numba.np.arrayobj import make_array
 
 from engine.containment.cell_entries import BAND
 
@@ -48,7 +47,7 @@ def plain_prefetch(groups: Any, group: int) -> None:
 
 
 def _first_number(context: Any, builder: Any, array_type: Any, array: Any, group: Any) -> Any:
-    data = builder.bitcast(make_array(array_type)(context, builder, array).data, _FLOAT.as_pointer())
+    data = builder.bitcast(context.make_array(array_type)(context, builder, array).data, _FLOAT.as_pointer())
     return builder.gep(data, [builder.mul(group, ir.Constant(group.type, ROWS * LANES))])
 
 
