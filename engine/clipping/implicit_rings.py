@@ -30,13 +30,13 @@ class RingArrays:
 class ImplicitRings:
     """Exact rings over two polygons; the same questions as `ExactRings`, answered when asked.
 
-    sources: (n, 2) int64: an input vertex and -1, or the first vertices of two edges that cross; those of `clip` are
+    sources: (n, 2) integers: an input vertex and -1, or the first vertices of two edges that cross; those of `clip` are
     counted after those of `subject`. sizes: number of vertices of each ring.
     """
 
     subject: RingArrays
     clip: RingArrays
-    sources: npt.NDArray[np.int64]
+    sources: npt.NDArray[np.signedinteger]
     sizes: npt.NDArray[np.int64]
 
     @property

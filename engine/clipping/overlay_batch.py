@@ -176,7 +176,7 @@ def _joined(
     n_pieces, n_rings, n_vertices = (np.concatenate([none, *(part.counts[:, k] for part in parts)]) for k in range(3))
     displacement = np.concatenate([np.zeros(0), *(part.displacement for part in parts)])
     vertices = np.concatenate([np.zeros((0, 2)), *(part.vertices for part in parts)])
-    sources = np.concatenate([np.zeros((0, 2), np.int64), *(part.sources for part in parts)])
+    sources = np.concatenate([np.zeros((0, 2), np.int32), *(part.sources for part in parts)])
     sizes = np.concatenate([none, *(part.sizes for part in parts)])
     piece_sizes = np.concatenate([none, *(part.piece_sizes for part in parts)])
     if apart:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Literal, TypeVar
@@ -19,7 +18,7 @@ from engine.clipping.overlay_kernel import (
     overlay_pairs,
 )
 from engine.clipping.overlay_result import Overlay
-from engine.clipping.overlay_workspace import Workspace, workspace_for
+from engine.clipping.overlay_workspace import keep, scratch_for
 from engine.clipping.scaling import exponent_of, scaled_back, shifted
 from engine.errors import CancelledError
 from engine.parallel import Budget
@@ -35,10 +34,6 @@ KEPT: Final = {  # by the label of a face: in neither, in the subject, in the cl
     "symmetric_difference": (False, True, True, False),
 }
 _KEPT_ARRAYS: Final = {name: np.array(kept, np.uint8) for name, kept in KEPT.items()}
-
-_kept = threading.local()
-_MOST_KEPT: Final = 160_000
-"""Vertices, rings and contacts up to which a thread keeps its scratch: 80 MB, of which it has what was once used."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +63,7 @@ class Found:
     counts: npt.NDArray[np.int64]
     displacement: npt.NDArray[np.float64]
     vertices: npt.NDArray[np.float64]
-    sources: npt.NDArray[np.int64]
+    sources: npt.NDArray[np.int32]
     sizes: npt.NDArray[np.int64]
     piece_sizes: npt.NDArray[np.int64]
 
@@ -127,15 +122,12 @@ def _run(
     n = stop - start
     status, counts, displacement = np.empty(n, np.int8), np.empty((n, 4), np.int64), np.empty(n)
     reached, parts = start, []
-    output = (8 * n + 7 * n_vertices + n_in_all, 2 * n + n_vertices)  # pages that nothing is written to cost nothing
-    scratch, room = _scratch(n_vertices, n_rings, max(256, 4 * n_vertices))
+    n_contacts = max(256, 4 * n_vertices)
+    n_out, n_out_rings = 8 * n + n_in_all, 2 * n
     while reached < stop:  # bound: each turn goes on, or makes room for one pair, geometrically
-        arrays = (
-            np.empty((output[0], 2)), np.empty((output[0], 2), np.int64),
-            np.empty(output[1], np.int64), np.empty(output[1], np.int64),
-        )  # fmt: skip
+        scratch = scratch_for(n_vertices, n_rings, n_contacts, n_out, n_out_rings)
         with np.errstate(all="ignore"):
-            reached, needs, *sizes = overlay_pairs(
+            reached, needs, filled, n_filled, n_pieces, used = overlay_pairs(
                 *subjects,
                 *clips,
                 start,
@@ -143,35 +135,26 @@ def _run(
                 reached,
                 _KEPT_ARRAYS[operation],
                 budget.flag,
-                scratch,
+                scratch.workspace,
                 status,
                 counts,
                 displacement,
-                *arrays,
+                *scratch.output,
             )
         budget.check()
         if budget.flag[0]:
             raise CancelledError("another part of the call failed")  # the flag went up for that, not for time
-        parts.append([arrays[0][: sizes[0]], arrays[1][: sizes[0]], arrays[2][: sizes[1]], arrays[3][: sizes[2]]])
+        vertices, sources, sizes, pieces = scratch.output
+        parts.append(
+            (vertices[:filled].copy(), sources[:filled].copy(), sizes[:n_filled].copy(), pieces[:n_pieces].copy())
+        )
+        keep(scratch, n_vertices, used, filled)
         if needs == NEEDS_CONTACTS:
-            scratch, room = _scratch(n_vertices, n_rings, 2 * room)
+            n_contacts = 2 * scratch.n_contacts
         elif needs == NEEDS_OUTPUT:
-            rings, vertices = (int(counts[reached - start, k]) for k in (1, 2))
-            output = (max(2 * output[0], vertices), max(2 * output[1], rings))
+            n_out_rings, n_out = (max(n, int(counts[reached - start, k])) for k, n in ((1, n_out_rings), (2, n_out)))
     joined = parts[0] if len(parts) == 1 else [np.concatenate(each) for each in zip(*parts)]
     return Found(status, counts, displacement, *joined)
-
-
-def _scratch(n_vertices: int, n_rings: int, n_contacts: int) -> tuple[Workspace, int]:
-    """Return scratch of at least that size, and for how many contacts: this thread's last if that suffices (warm)."""
-    asked = (n_vertices, n_rings, n_contacts)
-    size, kept = getattr(_kept, "scratch", ((0, 0, 0), None))
-    if kept is not None and all(have >= need for have, need in zip(size, asked, strict=True)):
-        return kept, size[2]
-    made = workspace_for(*asked)
-    if n_vertices + n_rings + n_contacts <= _MOST_KEPT:
-        _kept.scratch = asked, made
-    return made, n_contacts
 
 
 def overlay_compiled(

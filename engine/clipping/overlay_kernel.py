@@ -153,23 +153,24 @@ def overlay_pairs(
     subjects: Any, subject_rings: Any, subject_items: Any, clips: Any, clip_rings: Any, clip_items: Any,
     first_item: int, last_item: int, begin: int, kept: Any, stop: Any, w: Workspace,
     status: Any, counts: Any, displacement: Any, vertices: Any, sources: Any, sizes: Any, pieces: Any,
-) -> tuple[int, int, int, int, int]:  # fmt: skip
+) -> tuple[int, int, int, int, int, int]:  # fmt: skip
     """Overlay the pairs ``begin`` .. ``last_item - 1`` of those from ``first_item`` on.
 
     subjects, clips: (n, 2) float64 vertices; subject_rings, clip_rings: where each ring begins, and its end;
     subject_items, clip_items: the first ring of each polygon, and the end of the last one's. kept: (4,) uint8 by label.
     Fills, by pair from first_item on: status, (pairs,) int8, DONE or OPEN; counts, (pairs, 4) int64: pieces, rings,
     vertices, pairs of edges beyond the filter; displacement, (pairs,) float64: how far rounding moved a vertex at most.
-    Fills, pair after pair from the beginning: vertices (m, 2) float64, sources (m, 2) int64, sizes (vertices by ring)
+    Fills, pair after pair from the beginning: vertices (m, 2) float64, sources (m, 2) int32, sizes (vertices by ring)
     and pieces (rings by piece).
     A source is the input vertex and -1, or the first vertices of the two edges that cross; clip vertices are counted
     after those of all subjects.
-    Returns the pair reached, FINISHED or what is needed to go on with it, and numbers of vertices, rings, pieces.
+    Returns the pair reached, FINISHED or what is needed to go on with it, numbers of vertices, rings, pieces, and how
+    many contacts there was scratch used for at most.
     """
     edges, events, chains, found = w.edges, w.events, w.chains, w.found
     room = w.order.shape[0] - 9
     is_intersection = not (kept[0] or kept[1] or kept[2])
-    n_out = n_out_rings = n_out_pieces = 0
+    n_out = n_out_rings = n_out_pieces = used = 0
     for at in range(begin, last_item):
         item = at - first_item
         status[item], displacement[item] = OPEN, 0.0
@@ -193,7 +194,7 @@ def overlay_pairs(
             if m != UNSETTLED:
                 if n_out + m > vertices.shape[0] or n_out_rings + 1 > sizes.shape[0]:
                     counts[item, 1], counts[item, 2] = 1, m
-                    return at, NEEDS_OUTPUT, n_out, n_out_rings, n_out_pieces
+                    return at, NEEDS_OUTPUT, n_out, n_out_rings, n_out_pieces, used
                 if m > 0:
                     _write_ring(w, m, low, vertices, sources, n_out)
                     sizes[n_out_rings], pieces[n_out_pieces] = m, 1
@@ -229,7 +230,8 @@ def overlay_pairs(
             for i in range(n):
                 most += int(w.marked[i])
         if n_events < 0 or most > room:
-            return at, NEEDS_CONTACTS, n_out, n_out_rings, n_out_pieces
+            return at, NEEDS_CONTACTS, n_out, n_out_rings, n_out_pieces, room
+        used = max(used, most)
         are_clear = sort_events(
             edges, events, n, n_events, w.points, w.starts, w.order, w.crossing_x, w.crossing_y, w.nodes, stop
         )
@@ -287,10 +289,10 @@ def overlay_pairs(
             continue
         if n_out + m > vertices.shape[0] or n_out_rings + n_found > sizes.shape[0]:
             counts[item, 1], counts[item, 2] = n_found, m
-            return at, NEEDS_OUTPUT, n_out, n_out_rings, n_out_pieces
+            return at, NEEDS_OUTPUT, n_out, n_out_rings, n_out_pieces, used
         _write(w, n, n_found, vertices, sources, sizes, pieces, n_out, n_out_rings, n_out_pieces)
         n_out, n_out_rings, n_out_pieces = n_out + m, n_out_rings + n_found, n_out_pieces + n_pieces
         counts[item, 0], counts[item, 1], counts[item, 2], counts[item, 3] = n_pieces, n_found, m, n_exact
         displacement[item] = moved_by
         status[item] = DONE
-    return last_item, FINISHED, n_out, n_out_rings, n_out_pieces
+    return last_item, FINISHED, n_out, n_out_rings, n_out_pieces, used

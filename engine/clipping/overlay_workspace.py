@@ -6,9 +6,12 @@ time.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+import threading
+from dataclasses import dataclass
+from typing import Any, Final, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from engine.arrangement.chain_rings import Rings
 from engine.arrangement.chains import Chains
@@ -16,6 +19,14 @@ from engine.arrangement.crossing_signs import Edges
 from engine.arrangement.edge_contacts import Events
 from engine.arrangement.edge_tree import DEEPEST, LEAF, PORTION
 from engine.arrangement.ring_order import Ranking
+
+_kept = threading.local()
+_MOST_KEPT: Final = 80_000_000
+"""Bytes that were written to up to which a thread keeps its scratch."""
+_BY_VERTEX: Final = 200
+_BY_CONTACT: Final = 450
+_BY_OUTPUT: Final = 40
+"""Bytes of scratch for each vertex, contact, and vertex of the output."""
 
 
 class Buffers(NamedTuple):
@@ -87,6 +98,49 @@ class Workspace(NamedTuple):
     y: Any
     moved: Any
     ranking: Ranking
+
+
+@dataclass(frozen=True, slots=True)
+class Scratch:
+    """What the kernel writes to, for pairs of up to so many vertices, rings and contacts, and for so much output.
+
+    output: vertices (m, 2) float64, their sources (m, 2) int32, sizes of rings and of pieces, both (n,) int64.
+    """
+
+    n_vertices: int
+    n_rings: int
+    n_contacts: int
+    workspace: Workspace
+    output: tuple[npt.NDArray[np.float64], npt.NDArray[np.int32], npt.NDArray[np.int64], npt.NDArray[np.int64]]
+
+
+def scratch_for(n_vertices: int, n_rings: int, n_contacts: int, n_out: int, n_out_rings: int) -> Scratch:
+    """Return scratch of that size at least: what this thread kept if that suffices, or else new.
+
+    One pair of that size always finds room in the output: every contact adds a vertex and a ring at most. What is not
+    written to costs nothing; pages that are for the first time cost more than the kernel does.
+    """
+    kept: Scratch | None = getattr(_kept, "scratch", None)
+    if kept is not None and (kept.n_vertices < n_vertices or kept.n_rings < n_rings or kept.n_contacts < n_contacts):
+        kept = None
+    if kept is not None and len(kept.output[0]) >= n_out and len(kept.output[2]) >= n_out_rings:
+        return kept
+    n_out, n_out_rings = max(n_out, n_vertices + n_contacts), max(n_out_rings, n_contacts)
+    output = (
+        np.empty((n_out, 2)), np.empty((n_out, 2), np.int32),
+        np.empty(n_out_rings, np.int64), np.empty(n_out_rings, np.int64),
+    )  # fmt: skip
+    if kept is not None:
+        return Scratch(kept.n_vertices, kept.n_rings, kept.n_contacts, kept.workspace, output)
+    return Scratch(n_vertices, n_rings, n_contacts, workspace_for(n_vertices, n_rings, n_contacts), output)
+
+
+def keep(scratch: Scratch, n_vertices: int, n_contacts: int, n_out: int) -> None:
+    """Let this thread keep scratch of which so much was written to, unless that is too much."""
+    if _BY_VERTEX * n_vertices + _BY_CONTACT * n_contacts + _BY_OUTPUT * n_out <= _MOST_KEPT:
+        _kept.scratch = scratch
+    elif getattr(_kept, "scratch", None) is scratch:
+        del _kept.scratch
 
 
 def workspace_for(n_vertices: int, n_rings: int, n_contacts: int) -> Workspace:
