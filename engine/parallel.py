@@ -141,12 +141,14 @@ def default_workers() -> int:
 
 _pool: ThreadPoolExecutor | None = None
 _pool_lock = threading.Lock()
+_n_calls = 0
+"""Calls that use the pool now."""
 
 
 def _forget_pool() -> None:
     """A forked child has the pool's object but none of its threads."""
-    global _pool, _pool_lock
-    _pool, _pool_lock = None, threading.Lock()
+    global _pool, _pool_lock, _n_calls
+    _pool, _pool_lock, _n_calls = None, threading.Lock(), 0
 
 
 if hasattr(os, "register_at_fork"):
@@ -173,7 +175,8 @@ def run_chunks(
     """Call ``task(start, stop)`` until the ranges cover ``0 .. n_items``, each item once.
 
     The first chunk runs in the calling thread and is timed; later ones are sized to take `CHUNK_SECONDS`. With one
-    worker, or when the first chunk was all, no thread is involved. Tasks write to disjoint slices, so the result does
+    worker, or as long as what is left would take less than that, no other thread is involved: to wake one takes half a
+    millisecond. Tasks write to disjoint slices, so the result does
     not depend on `workers` or on the sizes chosen.
 
     task: must not call `run_chunks` with more than one worker (the pool is shared and could wait on itself).
@@ -182,10 +185,11 @@ def run_chunks(
     """
     check_options(workers, progress)
     n_workers = default_workers() if workers is None else workers
-    done, chunk = 0, max(1, first_chunk)
+    done, chunk, pace = 0, max(1, first_chunk), 0.0  # pace: seconds an item
     while done < n_items:
         budget.check()
-        if done and n_workers > 1 and n_items - done > chunk:
+        is_worth_it = n_items - done > chunk and (n_items - done) * pace > CHUNK_SECONDS
+        if done and n_workers > 1 and is_worth_it:
             _run_threaded(task, done, n_items, chunk, n_workers, budget, progress)
             break
         stop = min(n_items, done + chunk)
@@ -194,7 +198,7 @@ def run_chunks(
         seconds = time.perf_counter() - before
         if progress is not None:
             progress(stop - done)
-        chunk = _next_chunk(stop - done, seconds)
+        chunk, pace = _next_chunk(stop - done, seconds), seconds / (stop - done)
         done = stop
     budget.check()
 
@@ -202,6 +206,33 @@ def run_chunks(
 def _next_chunk(n_items: int, seconds: float) -> int:
     """Return the chunk that should take `CHUNK_SECONDS`, at most eight times the last (the first may be untypical)."""
     return max(1, int(n_items * min(8.0, CHUNK_SECONDS / max(seconds, 1e-9))))
+
+
+class _Ranges:
+    """What is left of a batch. Towards the end chunks get smaller, so that all threads end together."""
+
+    def __init__(self, start: int, n_items: int, chunk: int, n_workers: int) -> None:
+        self._start, self._n_items = start, n_items
+        self._chunk, self._n_workers = chunk, n_workers
+        self._lock = threading.Lock()
+
+    @property
+    def are_left(self) -> bool:
+        return self._start < self._n_items
+
+    def take(self) -> tuple[int, int] | None:
+        """Return the next range, None where there is none."""
+        with self._lock:
+            first = self._start
+            if first >= self._n_items:
+                return None
+            share = max(1, self._chunk // _SMALLEST, (self._n_items - first) // (2 * self._n_workers))
+            self._start = min(self._n_items, first + min(self._chunk, share))
+            return first, self._start
+
+    def took(self, n_items: int, seconds: float) -> None:
+        """Size the chunks to come by one that is done."""
+        self._chunk = _next_chunk(n_items, seconds)
 
 
 def _run_threaded(
@@ -213,42 +244,58 @@ def _run_threaded(
     budget: Budget,
     progress: Progress | None,
 ) -> None:
-    """Keep `n_workers` chunks in flight; on the first error raise the flag, wait for those in flight, re-raise.
+    """Keep `n_workers` threads at work; on the first error raise the flag, wait for those at work, re-raise.
 
-    Where that is every thread of the pool, one more chunk waits in its queue, so that none is idle while this thread
-    wakes up. Towards the end chunks get smaller, so that all threads end together.
+    A thread goes from chunk to chunk by itself: to wake this one after each costs a tenth of the time. It comes back
+    after a chunk where another call uses the pool, for a fair turn of both, or where `progress` is to be told.
     """
-    pool, failure = _shared_pool(), None
-    n_submitted = n_workers + (n_workers >= default_workers())
-    in_flight: dict[Future[float], tuple[int, int]] = {}
-    while start < n_items or in_flight:
-        while start < n_items and len(in_flight) < n_submitted and failure is None:
-            share = max(1, chunk // _SMALLEST, (n_items - start) // (2 * n_workers))
-            stop = min(n_items, start + min(chunk, share))
-            in_flight[pool.submit(_timed, task, start, stop)] = (start, stop)
-            start = stop
-        if not in_flight:
-            break
-        finished, _ = wait(in_flight, return_when=FIRST_COMPLETED)
-        for future in sorted(finished, key=lambda item: in_flight[item]):
-            first, stop = in_flight.pop(future)
-            if (error := future.exception()) is not None:
-                failure = failure or error
+    global _n_calls
+    ranges, pool = _Ranges(start, n_items, chunk, n_workers), _shared_pool()
+    failures: list[tuple[int, BaseException]] = []
+
+    def work() -> int:
+        n_done = 0
+        while not failures and (found := ranges.take()) is not None:
+            first, stop = found
+            before = time.perf_counter()
+            try:
+                task(first, stop)
+            except BaseException as error:  # the caller's, who gets it
+                failures.append((first, error))
                 budget.flag[0] = 1
-                continue
-            chunk = _next_chunk(stop - first, future.result())
-            if progress is not None and failure is None:
-                progress(stop - first)
-        try:
-            budget.check()
-        except (CancelledError, DeadlineExceededError) as error:
-            failure = failure or error
-            budget.flag[0] = 1
-    if failure is not None:
-        raise failure
+                break
+            ranges.took(stop - first, time.perf_counter() - before)
+            n_done += stop - first
+            try:
+                budget.check()
+            except (CancelledError, DeadlineExceededError) as error:
+                failures.append((n_items, error))
+                budget.flag[0] = 1
+            if progress is not None or _n_calls > 1:
+                break
+        return n_done
 
-
-def _timed(task: Callable[[int, int], object], start: int, stop: int) -> float:
-    before = time.perf_counter()
-    task(start, stop)
-    return time.perf_counter() - before
+    # where that is every thread of the pool, one more turn waits in its queue, so that none is idle meanwhile
+    n_turns = n_workers + (n_workers >= default_workers())
+    with _pool_lock:
+        _n_calls += 1
+    try:
+        turns: set[Future[int]] = set()
+        while True:
+            while len(turns) < n_turns and not failures and ranges.are_left:
+                turns.add(pool.submit(work))
+            if not turns:
+                break
+            finished, turns = wait(turns, return_when=FIRST_COMPLETED)
+            for future in finished:
+                if progress is not None and not failures and future.result():
+                    progress(future.result())
+    except BaseException as error:  # of `progress`, or an interrupt: nobody waits for the threads, let them end
+        failures.append((-1, error))
+        budget.flag[0] = 1
+        raise
+    finally:
+        with _pool_lock:
+            _n_calls -= 1
+    if failures:
+        raise min(failures, key=lambda failure: failure[0])[1]

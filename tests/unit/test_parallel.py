@@ -9,6 +9,7 @@ import time
 import numpy as np
 import pytest
 
+from engine import parallel
 from engine.errors import CancelledError, DeadlineExceededError, InvalidInputError
 from engine.parallel import Budget, Cancel, check_options, run_chunks
 
@@ -71,6 +72,69 @@ def test_an_error_in_a_chunk_reaches_the_caller(workers: int) -> None:
 
     with Budget() as budget, pytest.raises(ZeroDivisionError):
         run_chunks(task, 100_000, budget=budget, first_chunk=10, workers=workers)
+
+
+@pytest.mark.parametrize("has_progress", [False, True])
+def test_two_calls_take_fair_turns(has_progress: bool) -> None:
+    """A thread that goes from chunk to chunk by itself lets a later, shorter call have its turns."""
+    done: dict[str, list[int]] = {"long": [], "short": []}
+
+    def run(name: str, n_items: int) -> None:
+        def task(start: int, stop: int) -> None:
+            time.sleep(1e-5 * (stop - start))
+            done[name].append(stop - start)
+
+        reported: list[int] = []
+        with Budget() as budget:
+            progress = reported.append if has_progress else None
+            run_chunks(task, n_items, budget=budget, first_chunk=100, workers=4, progress=progress)
+        assert sum(done[name]) == n_items
+        assert sum(reported) == (n_items if has_progress else 0)
+
+    long = threading.Thread(target=run, args=("long", 60_000))
+    long.start()
+    while sum(done["long"]) < 2_000:
+        time.sleep(0.001)
+    before = sum(done["long"])
+    run("short", 2_000)
+    meanwhile = sum(done["long"]) - before
+    long.join()
+    assert sum(done["long"]) == 60_000
+    assert meanwhile < 10 * 2_000
+
+
+@pytest.mark.parametrize("is_progress", [False, True])
+def test_threads_end_soon_after_an_error(is_progress: bool) -> None:
+    """Nobody waits for them where the error is the progress bar's; they must not go on through the batch."""
+    n_begun: list[int] = []
+
+    def task(start: int, _stop: int) -> None:
+        n_begun.append(start)
+        time.sleep(0.001)
+        if not is_progress and start > 100:
+            raise ZeroDivisionError
+
+    def progress(_n_items: int) -> None:
+        if is_progress and len(n_begun) > 3:
+            raise ZeroDivisionError
+
+    with Budget() as budget, pytest.raises(ZeroDivisionError):
+        run_chunks(task, 10**9, budget=budget, first_chunk=1, workers=2, progress=progress)
+    time.sleep(0.02)
+    n_then = len(n_begun)
+    time.sleep(0.02)
+    assert len(n_begun) == n_then
+
+
+@pytest.mark.parametrize(("seconds", "is_alone"), [(60.0, True), (1e-9, False)])
+def test_what_takes_less_than_a_chunk_stays_in_the_calling_thread(
+    monkeypatch: pytest.MonkeyPatch, seconds: float, is_alone: bool
+) -> None:
+    monkeypatch.setattr(parallel, "CHUNK_SECONDS", seconds)
+    seen: set[int] = set()
+    with Budget() as budget:
+        run_chunks(lambda *_: seen.add(threading.get_ident()), 10_000, budget=budget, first_chunk=100, workers=2)
+    assert (seen == {threading.get_ident()}) is is_alone
 
 
 def test_workers_must_be_positive() -> None:
