@@ -19,7 +19,7 @@ COPY service service
 RUN python -m venv /opt/exact-geometry
 RUN /opt/exact-geometry/bin/pip install --no-cache-dir . httptools uvloop
 # -P: the engine that was installed, not the one in this folder, since the cache knows a kernel by the path of its file
-RUN ENGINE_CACHE_DIR=/opt/exact-geometry/kernels /opt/exact-geometry/bin/python -P -c "import engine; engine.warm()"
+RUN ENGINE_CACHE_DIR=/opt/exact-geometry/kernels /opt/exact-geometry/bin/python -P -c "import engine, os; engine.warm(processes=os.cpu_count())"
 
 FROM python:3.12-slim
 

@@ -15,6 +15,7 @@ import numpy as np
 from engine.clipping.overlay import overlay
 from engine.clipping.polygons import clip_polygons
 from engine.clipping.segments import clip_segments
+from engine.cold_start import fill_cache
 from engine.collision.collide import collide
 from engine.collision.collide_poses import collide_poses
 from engine.collision.scene import collide_scene
@@ -45,15 +46,17 @@ _is_warm = threading.Event()
 _lock = threading.Lock()
 
 
-def warm(progress: Callable[[int], object] | None = None) -> None:
+def warm(progress: Callable[[int], object] | None = None, *, processes: int = 1) -> None:
     """Compile or load every kernel; the second call returns at once.
 
-    Takes a minute or so where nothing is cached, else a second. Safe to call from several threads (the others wait) and
-    processes (each compiles what it does not find). progress: called with 1 after each of `STEPS` steps.
+    Takes minutes where nothing is cached, else a second. Safe to call from several threads (the others wait) and
+    processes (each compiles what it does not find). progress: called with 1 after each of `STEPS` steps. processes:
+    where nothing is cached, up to so many more processes are started that compile (some 500 MB each), and end.
     """
     with _lock:
         if _is_warm.is_set():
             return
+        fill_cache(__name__, len(STEPS), processes)
         for step in STEPS:
             step()
             if progress is not None:
@@ -138,16 +141,23 @@ def _warm_collision() -> None:
         collide_triangles(corners, corners + 0.25)
 
 
-def _warm_clipping() -> None:
-    for dimension in (2, 3):
-        segments = np.linspace(-1.0, 2.0, 8 * dimension).reshape(4, 2, dimension)
-        contour = np.array([[-1.0, -1.0, 0.5], [2.0, 0.0, 0.5], [0.0, 2.0, 0.5]])[:, :dimension]
-        for region in _regions(dimension):
-            clip_segments(segments, region)
-            if region.type not in ("sphere", "polygon"):
-                clip_polygons([[contour]], region)
-    clip_segments([[[-3.0, -3.0, -1.0], [3.0, 3.0, 1.0]]], _cube())  # through a corner, its middle inside no double
+def _warm_clipping_2d() -> None:
+    _clip(2)
     clip_segments([[[-1.0, -1.0], [2.0, 2.0]]], Polygon([[[0, 0], [4, 0], [1, 1], [0, 4]]]))  # through corners
+
+
+def _warm_clipping_3d() -> None:
+    _clip(3)
+    clip_segments([[[-3.0, -3.0, -1.0], [3.0, 3.0, 1.0]]], _cube())  # through a corner, its middle inside no double
+
+
+def _clip(dimension: int) -> None:
+    segments = np.linspace(-1.0, 2.0, 8 * dimension).reshape(4, 2, dimension)
+    contour = np.array([[-1.0, -1.0, 0.5], [2.0, 0.0, 0.5], [0.0, 2.0, 0.5]])[:, :dimension]
+    for region in _regions(dimension):
+        clip_segments(segments, region)
+        if region.type not in ("sphere", "polygon"):
+            clip_polygons([[contour]], region)
 
 
 def _warm_overlay() -> None:
@@ -165,4 +175,5 @@ def _warm_bounds() -> None:
                 bounds(solid)
 
 
-STEPS = (_warm_containment, _warm_clipping, _warm_overlay, _warm_bounds, _warm_collision)
+STEPS = (_warm_collision, _warm_clipping_2d, _warm_overlay, _warm_clipping_3d, _warm_containment, _warm_bounds)
+"""Parts of the work, long ones first; what several need is compiled by the first."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import logging
+import os
 import sys
 import threading
 import time
@@ -95,7 +96,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
 def _warm(app: FastAPI) -> None:
     before = time.perf_counter()
     try:
-        engine.warm()
+        engine.warm(processes=os.cpu_count() or 1)
     except Exception as error:
         app.state.warm_error = f"warm-up failed: {error}; restart the service"
         log.exception("warm-up failed")

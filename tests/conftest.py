@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
 
+from engine.cold_start import fill_cache
+from engine.warmup import STEPS
+
 ROOT = Path(__file__).resolve().parents[1]
 DATA = ROOT.parent / "shared" / "data"
+WHOLE_SUITE = 4000
+"""Tests from which on a run will need nearly every kernel."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -21,6 +27,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             item.add_marker(pytest.mark.skip(reason="large sample: runs with --full"))
         if item.get_closest_marker("data") and not DATA.is_dir():
             item.add_marker(pytest.mark.skip(reason=f"no shared data at {DATA}"))
+
+
+def pytest_collection_finish(session: pytest.Session) -> None:
+    """Compile by every core before a run of the whole suite, where no kernel is cached yet."""
+    if len(session.items) >= WHOLE_SUITE and not session.config.getoption("--collect-only"):
+        fill_cache("engine.warmup", len(STEPS), os.cpu_count() or 1)
 
 
 @pytest.fixture(scope="session")

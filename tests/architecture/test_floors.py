@@ -13,6 +13,7 @@ FLOORS = {
     "engine.errors": 0,
     "engine.types": 0,
     "engine.jit": 0,
+    "engine.cold_start": 1,
     "engine.parallel": 0,
     "engine.predicates": 1,
     "engine.bounding": 2,

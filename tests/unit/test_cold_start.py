@@ -1,0 +1,83 @@
+"""An empty kernel cache is filled once, by several processes, and never by a step that failed."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from numba import config as numba_config
+
+ROOT = Path(__file__).resolve().parents[2]
+pytestmark = pytest.mark.skipif(bool(numba_config.DISABLE_JIT), reason="the compiler is disabled")
+
+WORK = """
+import os, pathlib
+PLACE = pathlib.Path({place!r})
+
+def say(step):
+    (PLACE / f"{{step}}-{{os.getpid()}}").touch()
+
+STEPS = [lambda: say(0), lambda: say(1), lambda: {third}]
+"""
+FILL = "from engine.cold_start import fill_cache; fill_cache('engine.work', 3, 2)"
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Path:
+    package = tmp_path / "engine"
+    package.mkdir()
+    for name in ("__init__.py", "jit.py", "cold_start.py"):
+        text = "" if name == "__init__.py" else (ROOT / "engine" / name).read_text("utf-8")
+        (package / name).write_text(text)
+    (tmp_path / "done").mkdir()
+    return tmp_path
+
+
+def fill(place: Path, third: str = "say(2)") -> subprocess.Popen[bytes]:
+    (place / "engine" / "work.py").write_text(WORK.format(place=str(place / "done"), third=third))
+    variables = {"PYTHONPATH": str(place), "ENGINE_CACHE_DIR": str(place / "cache")}
+    return subprocess.Popen([sys.executable, "-c", FILL], env={**os.environ, **variables}, cwd=place)
+
+
+def steps_done(place: Path) -> list[str]:
+    return sorted(file.name.partition("-")[0] for file in (place / "done").iterdir())
+
+
+def test_each_step_runs_once_in_its_own_process_whoever_asks(place: Path) -> None:
+    assert [process.wait(120) for process in [fill(place), fill(place)]] == [0, 0]
+    assert fill(place).wait(120) == 0
+    assert steps_done(place) == ["0", "1", "2"]
+    assert len({file.name.partition("-")[2] for file in (place / "done").iterdir()}) == 3
+
+
+def test_a_step_that_fails_is_tried_again(place: Path) -> None:
+    assert fill(place, "1 / 0").wait(120) == 0
+    assert steps_done(place) == ["0", "1"]
+    assert fill(place, "1 / 0").wait(120) == 0
+    assert steps_done(place) == ["0", "0", "1", "1"]
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="no /proc to look processes up in")
+def test_steps_end_with_the_process_that_asked(place: Path) -> None:
+    asked = fill(place, "[say(2), __import__('time').sleep(600)]")
+    while "2" not in steps_done(place):
+        assert asked.poll() is None
+    asked.kill()
+    asked.wait()
+    (sleeper,) = [int(file.name.partition("-")[2]) for file in (place / "done").glob("2-*")]
+    for _ in range(1000):
+        if not _lives(sleeper):
+            return
+        subprocess.run(["sleep", "0.05"], check=True)
+    raise AssertionError("the step lives on")
+
+
+def _lives(process: int) -> bool:
+    stat = Path(f"/proc/{process}/stat")
+    try:
+        return stat.read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
