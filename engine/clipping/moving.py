@@ -8,7 +8,6 @@ from numba import config as numba_config
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
-from numba.np.arrayobj import make_array
 
 
 def plain_move(target: Any, at: int, source: Any, first: int, n: int) -> None:
@@ -24,7 +23,7 @@ def _move_intrinsic(typing_context: Any, target: Any, at: Any, source: Any, firs
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         def place(array: int) -> Any:
-            data = make_array(signature.args[array])(context, builder, arguments[array]).data
+            data = context.make_array(signature.args[array])(context, builder, arguments[array]).data
             return builder.gep(data, [arguments[array + 1]])
 
         cgutils.raw_memcpy(builder, place(0), place(2), arguments[4], 8)
