@@ -25,6 +25,7 @@ from service.gate import Gate
 from service.metrics import Metrics
 from service.openapi import openapi_of
 from service.playground import add_playground
+from service.route import posts_of
 from service.routes import binary, bounds, collision, containment, health, overlay, polygons, segments, solids
 from service.settings import Settings
 from service.store import Store
@@ -61,14 +62,15 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.state.metrics = Metrics()
     app.state.warm, app.state.warm_error = threading.Event(), None
     app.openapi = openapi_of(app, settings)  # type: ignore[method-assign]
-    for module in (containment, collision, segments, polygons, overlay, bounds, solids, binary, health):
+    modules = (containment, collision, segments, polygons, overlay, bounds, solids, binary, health)
+    for module in modules:
         app.include_router(module.router)
     app.include_router(solids.lookup)
     app.include_router(docs_router)
     add_playground(app)
     app.add_exception_handler(HTTPException, _answer_http_exception)
     app.add_exception_handler(Exception, _answer_anything)
-    app.add_middleware(Gate, settings=settings)
+    app.add_middleware(Gate, settings=settings, posts=posts_of(module.router for module in modules))
     if settings.cors_origins:
         app.add_middleware(
             CORSMiddleware,

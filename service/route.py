@@ -13,12 +13,12 @@ from __future__ import annotations
 import asyncio
 import logging
 import mmap
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Iterable
 from contextlib import suppress
 from typing import Any, Final
 
 import numpy as np
-from fastapi.routing import APIRoute
+from fastapi.routing import APIRoute, APIRouter
 from pydantic import TypeAdapter, ValidationError
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response
@@ -38,12 +38,13 @@ OCTETS: Final = "application/octet-stream"
 LARGE: Final = 2**22
 """Bytes from which a body gets memory in large pages: to give 64 MB of small ones back holds all threads for 5 ms."""
 Query = dict[str, tuple[TypeAdapter[Any], bool]]
+Answer = Callable[[Request], Coroutine[Any, Any, Response]]
 
 
 class GeometryRoute(APIRoute):
     """A route whose endpoint takes ``question`` (the body's model, if any), path parameters, and ``call``."""
 
-    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+    def get_route_handler(self) -> Answer:
         """Return the coroutine that answers a request."""
         endpoint, status = self.endpoint, self.status_code or 200
         body_field: Any = None if self.body_field is None else self.body_field.field_info
@@ -66,9 +67,10 @@ class GeometryRoute(APIRoute):
                 arguments = {**request.path_params, **_queried(request, query)}
                 job = _Job(endpoint, adapter, arguments, call)
                 if media_type is not None:
-                    _check_media_type(request, media_type)
+                    headers = dict(request.scope["headers"])  # a look-up in the framework's reads them all
+                    _check_media_type(headers.get(b"content-type", b""), media_type)
                     state.pool.check_room()
-                    job.body = await _read(request, call)
+                    job.body = await _read(request.receive, headers.get(b"content-length", b"0"), call)
                     job.question = job.body if adapter is None else None
                 if len(job.body) <= call.settings.inline_bytes and state.warm.is_set():
                     job.decode()
@@ -89,6 +91,16 @@ class GeometryRoute(APIRoute):
             return Response(payload, call.status or status, headers, None if payload is None else call.media_type)
 
         return handle
+
+
+def posts_of(routers: Iterable[APIRouter]) -> dict[str, Answer]:
+    """Return what answers a POST, for each path without parameters."""
+    routes = [route for router in routers for route in router.routes if isinstance(route, GeometryRoute)]
+    return {
+        route.path: route.get_route_handler()
+        for route in routes
+        if route.methods == {"POST"} and not route.param_convertors
+    }
 
 
 class _Job:
@@ -161,8 +173,8 @@ def _failed(error: Exception, request: Request) -> Response:
     return problem(faults, getattr(error, "headers", None) or {})
 
 
-def _check_media_type(request: Request, expected: str) -> None:
-    given = request.headers.get("content-type", "")
+def _check_media_type(header: bytes, expected: str) -> None:
+    given = header.decode("latin-1")
     kind = given.partition(";")[0].strip().lower()
     is_json = expected == JSON and kind.startswith("application/") and kind.endswith("+json")
     if kind != expected and not is_json:
@@ -174,7 +186,7 @@ def _check_media_type(request: Request, expected: str) -> None:
 
 def _queried(request: Request, query: Query) -> dict[str, Any]:
     """Return the query's parameters as declared; what is left out is the endpoint's own default."""
-    found = {}
+    found: dict[str, Any] = {}
     for name, (adapter, is_required) in query.items():
         value = request.query_params.get(name)
         if value is None and not is_required:
@@ -188,18 +200,21 @@ def _queried(request: Request, query: Query) -> dict[str, Any]:
     return found
 
 
-async def _read(request: Request, call: Call) -> Body:
+async def _read(receive: Receive, length: bytes, call: Call) -> Body:
     """Return the body, refused as soon as it is known to be too long, declared or not, or too slow."""
     limit, seconds = call.settings.max_body_bytes, call.settings.body_seconds
-    header = request.headers.get("content-length", "0")
-    declared = int(header) if header.isdigit() else 0
+    declared = int(length) if length.isdigit() else 0
     if declared > limit:
         raise _too_large(limit)
     call.take(declared)
-    body, size = _room(declared), 0
+    body, size, is_more = _room(declared), 0, True
     try:
         async with asyncio.timeout(seconds):
-            async for chunk in request.stream():
+            while is_more:
+                message = await receive()
+                if message["type"] == "http.disconnect":
+                    raise ClientDisconnect
+                chunk, is_more = message.get("body", b""), message.get("more_body", False)
                 end = size + len(chunk)
                 if end > limit:
                     raise _too_large(limit)

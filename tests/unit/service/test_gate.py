@@ -13,6 +13,7 @@ from fastapi import FastAPI
 
 import engine
 from service.app import create_app
+from service.gate import Gate
 from service.logs import JsonFormatter
 from service.settings import Settings
 from tests.unit.service.asking import SPHERE, check_problem, client_of
@@ -99,3 +100,12 @@ async def test_origins_that_are_set_may_call(monkeypatch: pytest.MonkeyPatch, an
         assert "X-Request-ID" in answer.headers["access-control-expose-headers"]
         other = await client.get("/healthz", headers={"Origin": "https://b.example"})
         assert "access-control-allow-origin" not in other.headers
+
+
+async def test_the_gate_knows_every_question(app: FastAPI, client: httpx.AsyncClient) -> None:
+    """Whatever is asked by POST, and has no parameter in its path, is answered without the framework's search."""
+    (gate,) = [item for item in app.user_middleware if item.cls is Gate]
+    document = (await client.get("/openapi.json")).json()
+    paths = {path for path, item in document["paths"].items() if "post" in item and "{" not in path}
+    assert set(gate.kwargs["posts"]) == paths  # type: ignore[arg-type]
+    assert (await client.put("/v1/contains", json={})).status_code == 405
