@@ -12,6 +12,7 @@ from engine.arrangement.chain_faces import find_label, join
 from engine.arrangement.chains import Chains, is_live, leaving_edge, origin
 from engine.arrangement.crossing_signs import Edges, orient, turn_of_edges
 from engine.arrangement.edge_contacts import POLL, root_of, unite
+from engine.arrangement.edge_tree import BENT
 from engine.jit import inline, merged
 
 
@@ -74,8 +75,8 @@ def _following(chains: Chains, half: int, starts: Any, ends: Any, star: Any, pla
 
 @inline
 def _emit(
-    edges: Edges, chains: Chains, nodes: Any, fan: Any, path: Any, first: int, last: int, region: int, rings: Rings,
-    n_rings: int, n_points: int, stop: Any,
+    edges: Edges, chains: Chains, nodes: Any, fan: Any, marks: Any, path: Any, first: int, last: int, region: int,
+    rings: Rings, n_rings: int, n_points: int, stop: Any,
 ) -> int:  # fmt: skip
     """Write the ring of the half-chains ``path[first:last]``, straight points left out; return the number of points."""
     before = path[last - 1]
@@ -92,7 +93,7 @@ def _emit(
             if half & 1:
                 v, end = chains.last[chain], chains.first[chain]
                 while v != end:  # bound: the vertices of the chain
-                    if orient(edges, edges.before[v], v, edges.after[v]) != 0:
+                    if marks[v] & BENT or orient(edges, edges.before[v], v, edges.after[v]) != 0:
                         rings.point[n_points], rings.meets[n_points] = v, 0
                         n_points += 1
                     v = edges.before[v]
@@ -100,7 +101,7 @@ def _emit(
                 v, end = chains.first[chain], chains.last[chain]
                 while v != end:  # bound: the vertices of the chain
                     v = edges.after[v]
-                    if orient(edges, edges.before[v], v, edges.after[v]) != 0:
+                    if marks[v] & BENT or orient(edges, edges.before[v], v, edges.after[v]) != 0:
                         rings.point[n_points], rings.meets[n_points] = v, 0
                         n_points += 1
         before = half
@@ -112,11 +113,12 @@ def _emit(
 @inline
 def walk_rings(
     edges: Edges, chains: Chains, n_chains: int, nodes: Any, n_nodes: int, cycle: Any, inside: Any, regions: Any,
-    starts: Any, ends: Any, star: Any, place: Any, bounds: Any, fan: Any, seen: Any, path: Any, path_place: Any,
-    rings: Rings, stop: Any,
+    starts: Any, ends: Any, star: Any, place: Any, bounds: Any, fan: Any, marks: Any, seen: Any, path: Any,
+    path_place: Any, rings: Rings, stop: Any,
 ) -> tuple[int, int]:  # fmt: skip
     """Write all boundary rings; return how many rings and points.
 
+    marks: of the edges, BENT where the boundary surely turns at the first vertex.
     seen: (2 n_chains,) uint8; path: (2 n_chains,) and path_place: (n_nodes,) int64, scratch.
     """
     seen[: 2 * n_chains] = 0
@@ -143,7 +145,7 @@ def walk_rings(
                 first = path_place[node]
                 if first >= 0:
                     n_points = _emit(
-                        edges, chains, nodes, fan, path, first, depth, region, rings, n_rings, n_points, stop
+                        edges, chains, nodes, fan, marks, path, first, depth, region, rings, n_rings, n_points, stop
                     )  # fmt: skip
                     n_rings += 1
                     for k in range(first, depth):
@@ -153,7 +155,7 @@ def walk_rings(
             path[depth] = half
             depth += 1
             half = _following(chains, half, starts, ends, star, place, bounds)
-        n_points = _emit(edges, chains, nodes, fan, path, 0, depth, region, rings, n_rings, n_points, stop)
+        n_points = _emit(edges, chains, nodes, fan, marks, path, 0, depth, region, rings, n_rings, n_points, stop)
         n_rings += 1
         for k in range(depth):
             path_place[origin(chains, path[k])] = -1

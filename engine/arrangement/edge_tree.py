@@ -30,6 +30,8 @@ WANTED: Final = 1
 """A pair counts where one of its marks has this bit."""
 ANYWHERE: Final = 2 + 4 + 8 + 16
 """Mark of an edge that ends a run: heading right, left, up and down at once."""
+BENT: Final = 32
+"""Mark of an edge at whose first vertex the ring surely turns."""
 DEEPEST: Final = 256
 """Places on the stack: a walk through 60 levels holds at most three pairs a level."""
 

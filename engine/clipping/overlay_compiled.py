@@ -135,7 +135,7 @@ def _run(
                 reached,
                 _KEPT_ARRAYS[operation],
                 budget.flag,
-                scratch.workspace,
+                scratch.buffers,
                 status,
                 counts,
                 displacement,

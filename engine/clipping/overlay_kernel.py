@@ -11,8 +11,8 @@ number of crossings. Decisions are exact throughout. A pair is left OPEN, for th
 
 The intersection of two convex rings is overlay_convex.py's where floating point is sure of all that it asks.
 
-Scratch arrays come from the caller, who gives more and calls again where they do not suffice: code that allocates
-takes most of its compiler's time.
+Scratch arrays come from the caller, who gives more and calls again where they do not suffice: nothing here allocates,
+so nothing counts references to arrays.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from engine.arrangement.rounded_crossings import LOST, round_crossing
 from engine.clipping.cut_point import LARGEST
 from engine.clipping.overlay_convex import UNSETTLED, Passages, intersect_convex
 from engine.clipping.overlay_loading import box_of, fill_boxes, load_rings, magnitude
-from engine.clipping.overlay_workspace import Workspace
+from engine.clipping.overlay_workspace import Buffers, Workspace, rows_of
 from engine.jit import bare_kernel, inline
 
 DONE: Final = 0
@@ -151,7 +151,7 @@ def _write_ring(w: Workspace, m: int, low: int, vertices: Any, sources: Any, n_o
 @bare_kernel
 def overlay_pairs(
     subjects: Any, subject_rings: Any, subject_items: Any, clips: Any, clip_rings: Any, clip_items: Any,
-    first_item: int, last_item: int, begin: int, kept: Any, stop: Any, w: Workspace,
+    first_item: int, last_item: int, begin: int, kept: Any, stop: Any, buffers: Buffers,
     status: Any, counts: Any, displacement: Any, vertices: Any, sources: Any, sizes: Any, pieces: Any,
 ) -> tuple[int, int, int, int, int, int]:  # fmt: skip
     """Overlay the pairs ``begin`` .. ``last_item - 1`` of those from ``first_item`` on.
@@ -167,6 +167,7 @@ def overlay_pairs(
     Returns the pair reached, FINISHED or what is needed to go on with it, numbers of vertices, rings, pieces, and how
     many contacts there was scratch used for at most.
     """
+    w = rows_of(buffers)
     edges, events, chains, found = w.edges, w.events, w.chains, w.found
     room = w.order.shape[0] - 9
     is_intersection = not (kept[0] or kept[1] or kept[2])
@@ -269,7 +270,7 @@ def overlay_pairs(
             break
         n_found, m = walk_rings(
             edges, chains, n_chains, w.nodes, n_nodes, w.cycle, w.inside, w.regions, w.star_starts, w.star_ends, w.star,
-            w.place, w.bounds, w.fan, w.seen, w.path, w.path_place, found, stop,
+            w.place, w.bounds, w.fan, w.marks, w.seen, w.path, w.path_place, found, stop,
         )  # fmt: skip
         if stop[0]:
             break

@@ -12,9 +12,10 @@ import numpy as np
 
 from engine.arrangement.crossing_signs import Edges
 from engine.arrangement.edge_contacts import POLL
-from engine.arrangement.edge_tree import ANYWHERE, WANTED, heading
+from engine.arrangement.edge_tree import ANYWHERE, BENT, WANTED, heading
 from engine.clipping.cut_point import SMALLEST
 from engine.jit import inline
+from engine.predicates.orientation import BOUND_2D, GUARD_2D
 
 
 @inline
@@ -32,24 +33,25 @@ def load_rings(
     safe = True
     for ring in range(first_ring, last_ring):
         start = n
+        qx = qy = np.nan  # the last vertex
         sides = sides_before = 0  # of the last vertex and of the one before it: which sides of the box it is beyond
         for k in range(offsets[ring], offsets[ring + 1]):
             if k & POLL == 0 and stop[0]:
                 return 0, 0, False
             px, py = vertices[k, 0], vertices[k, 1]
             safe &= ((abs(px) >= SMALLEST) | (px == 0.0)) & ((abs(py) >= SMALLEST) | (py == 0.0))
-            if n > start and x[n - 1] == px and y[n - 1] == py:
+            if px == qx and py == qy:
                 continue
             beyond = 1 * (px < x_min) + 2 * (px > x_max) + 4 * (py < y_min) + 8 * (py > y_max)
             if beyond & sides & sides_before:  # a triangle beyond that side changes no label in the box
                 n -= 1
                 if x[n - 1] == px and y[n - 1] == py:
                     origins[n - 1] = base + k  # the next edge begins here
-                    sides, sides_before = sides_before, 0
+                    sides, sides_before, qx, qy = sides_before, 0, px, py
                     continue
             else:
                 sides_before = sides
-            sides = beyond
+            sides, qx, qy = beyond, px, py
             x[n], y[n], origins[n] = px, py, base + k
             n += 1
         while n > start + 1 and x[n - 1] == x[start] and y[n - 1] == y[start]:
@@ -57,12 +59,13 @@ def load_rings(
         if n - start < 3:  # a point, or an edge there and back
             n = start
             continue
-        top = start
         for k in range(start, n):
             edges.after[k], edges.before[k], edges.ring[k] = k + 1, k - 1, n_rings
-            if x[k] > x[top] or (x[k] == x[top] and y[k] > y[top]):
-                top = k
         edges.after[n - 1], edges.before[start] = start, n - 1
+        top, px, py = start, x[start], y[start]
+        for k in range(start + 1, n):
+            if x[k] > px or (x[k] == px and y[k] > py):
+                top, px, py = k, x[k], y[k]
         tops[n_rings], masks[n_rings] = top, mask
         n_rings += 1
     return n, n_rings, safe
@@ -92,14 +95,24 @@ def fill_boxes(edges: Edges, n: int, margin: float, boxes: Any, marks: Any) -> f
 
     Its length is the larger of both coordinates'.
     """
-    x, y, after = edges.x, edges.y, edges.after
+    x, y = edges.x, edges.y
     shortest = np.inf
-    for i in range(n):
-        j = after[i]
-        px, py, qx, qy = x[i], y[i], x[j], y[j]
-        ux, uy = qx - px, qy - py
-        boxes[i, 0], boxes[i, 1] = min(px, qx) - margin, max(px, qx) + margin
-        boxes[i, 2], boxes[i, 3] = min(py, qy) - margin, max(py, qy) + margin
-        marks[i] = WANTED | (heading(ux, uy) if j == i + 1 else ANYWHERE)
-        shortest = min(shortest, max(abs(ux), abs(uy)))
+    first = 0
+    while first < n:  # bound: each turn passes one ring
+        last = edges.before[first]
+        px, py = x[last], y[last]
+        qx, qy = x[first], y[first]
+        vx, vy = qx - px, qy - py
+        for i in range(first, last + 1):
+            j = i + 1 if i < last else first
+            px, py, qx, qy = qx, qy, x[j], y[j]
+            ux, uy = qx - px, qy - py
+            boxes[i, 0], boxes[i, 1] = min(px, qx) - margin, max(px, qx) + margin
+            boxes[i, 2], boxes[i, 3] = min(py, qy) - margin, max(py, qy) + margin
+            left, right = vx * uy, vy * ux
+            is_bent = abs(left - right) > BOUND_2D * (abs(left) + abs(right)) + GUARD_2D  # see turn_of_edges
+            marks[i] = WANTED | BENT * is_bent | (heading(ux, uy) if i < last else ANYWHERE)
+            shortest = min(shortest, max(abs(ux), abs(uy)))
+            vx, vy = ux, uy
+        first = last + 1
     return shortest

@@ -1,7 +1,6 @@
 """Scratch of the compiled overlay: few arrays by size, their rows by name.
 
-The rows are made here, not in compiled code: counting the references to rows made there took minutes of its compiler's
-time.
+The kernel is handed the few arrays and takes their rows itself: handing over eighty costs more than a small overlay.
 """
 
 from __future__ import annotations
@@ -19,6 +18,7 @@ from engine.arrangement.crossing_signs import Edges
 from engine.arrangement.edge_contacts import Events
 from engine.arrangement.edge_tree import DEEPEST, LEAF, PORTION
 from engine.arrangement.ring_order import Ranking
+from engine.jit import merged
 
 _kept = threading.local()
 _MOST_KEPT: Final = 80_000_000
@@ -110,7 +110,7 @@ class Scratch:
     n_vertices: int
     n_rings: int
     n_contacts: int
-    workspace: Workspace
+    buffers: Buffers
     output: tuple[npt.NDArray[np.float64], npt.NDArray[np.int32], npt.NDArray[np.int64], npt.NDArray[np.int64]]
 
 
@@ -131,8 +131,8 @@ def scratch_for(n_vertices: int, n_rings: int, n_contacts: int, n_out: int, n_ou
         np.empty(n_out_rings, np.int64), np.empty(n_out_rings, np.int64),
     )  # fmt: skip
     if kept is not None:
-        return Scratch(kept.n_vertices, kept.n_rings, kept.n_contacts, kept.workspace, output)
-    return Scratch(n_vertices, n_rings, n_contacts, workspace_for(n_vertices, n_rings, n_contacts), output)
+        return Scratch(kept.n_vertices, kept.n_rings, kept.n_contacts, kept.buffers, output)
+    return Scratch(n_vertices, n_rings, n_contacts, buffers_for(n_vertices, n_rings, n_contacts), output)
 
 
 def keep(scratch: Scratch, n_vertices: int, n_contacts: int, n_out: int) -> None:
@@ -143,14 +143,14 @@ def keep(scratch: Scratch, n_vertices: int, n_contacts: int, n_out: int) -> None
         del _kept.scratch
 
 
-def workspace_for(n_vertices: int, n_rings: int, n_contacts: int) -> Workspace:
+def buffers_for(n_vertices: int, n_rings: int, n_contacts: int) -> Buffers:
     """Return scratch for pairs of up to so many vertices, rings and contacts."""
     n, k = n_vertices + 1, n_contacts + 8
     m = n + 2 * k  # points of all boundary rings: every vertex once, every end of a chain on two sides
     n_leaves = 1
     while n_leaves * LEAF < m:  # bound: 60 doublings
         n_leaves *= 2
-    buffers = Buffers(
+    return Buffers(
         vertex_floats=np.empty((2, n)),
         vertex_integers=np.empty((5, n + 1), np.int64),
         ring_integers=np.empty((4, n_rings + 1), np.int64),
@@ -167,10 +167,10 @@ def workspace_for(n_vertices: int, n_rings: int, n_contacts: int) -> Workspace:
         stack=np.empty((DEEPEST, 2), np.int64),
         pairs=np.empty((PORTION, 2), np.int64),
     )
-    return _workspace_of(buffers)
 
 
-def _workspace_of(buffers: Buffers) -> Workspace:
+@merged
+def rows_of(buffers: Buffers) -> Workspace:
     """Return the rows of some buffers by name."""
     vx, v, r = buffers.vertex_floats, buffers.vertex_integers, buffers.ring_integers
     cx, c = buffers.contact_floats, buffers.contact_integers
