@@ -117,10 +117,11 @@ class Scratch:
 def scratch_for(n_vertices: int, n_rings: int, n_contacts: int, n_out: int, n_out_rings: int) -> Scratch:
     """Return scratch of that size at least: what this thread kept if that suffices, or else new.
 
+    It is the caller's until `keep`: a signal handler may overlay while what the kernel left is not copied yet.
     One pair of that size always finds room in the output: every contact adds a vertex and a ring at most. What is not
     written to costs nothing; pages that are for the first time cost more than the kernel does.
     """
-    kept: Scratch | None = getattr(_kept, "scratch", None)
+    kept: Scratch | None = vars(_kept).pop("scratch", None)
     if kept is not None and (kept.n_vertices < n_vertices or kept.n_rings < n_rings or kept.n_contacts < n_contacts):
         kept = None
     if kept is not None and len(kept.output[0]) >= n_out and len(kept.output[2]) >= n_out_rings:
@@ -139,8 +140,6 @@ def keep(scratch: Scratch, n_vertices: int, n_contacts: int, n_out: int) -> None
     """Let this thread keep scratch of which so much was written to, unless that is too much."""
     if _BY_VERTEX * n_vertices + _BY_CONTACT * n_contacts + _BY_OUTPUT * n_out <= _MOST_KEPT:
         _kept.scratch = scratch
-    elif getattr(_kept, "scratch", None) is scratch:
-        del _kept.scratch
 
 
 def buffers_for(n_vertices: int, n_rings: int, n_contacts: int) -> Buffers:

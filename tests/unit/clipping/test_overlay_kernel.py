@@ -117,3 +117,19 @@ def test_a_raised_flag_ends_the_kernel() -> None:
     budget.flag[0] = 1
     with pytest.raises(Exception, match="another part"):
         overlay_compiled(arrays(PAIRS["corners"][0]), arrays(PAIRS["corners"][1]), "union", "valid", budget)
+
+
+def test_a_signal_handler_may_overlay() -> None:
+    """It runs when the kernel returns, before what that left in this thread's scratch is copied."""
+    random = np.random.default_rng(5)
+    pair, other = (tuple(arrays([star(random, n)]) for _ in range(2)) for n in (30, 9))
+
+    class Interrupted(Budget):
+        def check(self) -> None:
+            overlay_compiled(other[0], other[1], "union", "valid", Budget())
+
+    expected = overlay_compiled(pair[0], pair[1], "union", "valid", Budget())
+    found = overlay_compiled(pair[0], pair[1], "union", "valid", Interrupted())
+    assert expected is not None
+    assert found is not None
+    assert found[0].vertices.tolist() == expected[0].vertices.tolist()
