@@ -12,10 +12,14 @@ The textbook cuts the outside end at one plane after another until the codes say
 1. Its loop can run for ever by rounding, (1, 1)-(-1, -1) on the box [1e-9, 3]^2. Here each plane is looked at once:
    the last plane entered and the first one left bound the piece, if in this order.
 2. It decides from rounded points. Here the parameters of the planes, quotients of differences of original coordinates,
-   are compared in doubles beyond their bound, else exactly: n_i / d_i against n_j / d_j as n_i d_j against n_j d_i.
-   The cut coordinate is the plane's own value.
+   are compared in doubles beyond their bound, then in double-doubles, else exactly: n_i / d_i against n_j / d_j as
+   n_i d_j against n_j d_i. The cut coordinate is the plane's own value.
 
-Two kernels: `decide_*` says which planes bound each piece, `fill_*` makes the points of the pieces that there are.
+The first two comparisons are made for a block of segments at once, without branches: so the compiler uses vectors, and
+no processor has to foretell on which side of a plane a point lies. In the plane z is 0 throughout.
+
+Two kernels: `decide_on_boxes` says which planes bound each piece, `fill_on_boxes` (box_pieces.py) makes the points of
+the pieces that there are.
 
 Source: Cohen and Sutherland in W. M. Newman, R. F. Sproull, Principles of Interactive Computer Graphics, 1979; the
 textbook's section on clipping segments on an AABB.
@@ -25,10 +29,12 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from engine.clipping.cut_point import is_safe, parameter_and_point, point_at
-from engine.jit import inline, kernel
-from engine.predicates.double_double import U2, dd_div
-from engine.predicates.error_free import two_diff, workspace
+import numpy as np
+
+from engine.clipping.cut_point import is_safe
+from engine.clipping.plane_meeting import gap_between, meetings
+from engine.jit import called, inline, kernel, merged
+from engine.predicates.error_free import workspace
 from engine.predicates.parameters import compare_differences, compare_differences_filter
 from engine.types import UNDECIDED
 
@@ -42,10 +48,8 @@ T_GAP: Final = 16.0 * 2.0**-53
 """Parameters t are quotients of two differences, within 3 u (1 + u)^2 of themselves; two of them and this test: 8 u."""
 T_TINY: Final = 2.0**-1060
 """Parameters that underflow."""
-T_BOUND: Final = 24.0 * U2
-"""Of t in double-double, relative: a quotient of two differences without error, and the test of its rounding."""
-AFTER: Final = (1, 2, 0, 1)
-"""The two axes that follow an axis: AFTER[axis], AFTER[axis + 1]."""
+BLOCK: Final = 64
+"""Segments looked at together: fifteen numbers each stay in the nearest cache."""
 
 
 @inline
@@ -64,321 +68,176 @@ def plane_value(low: Any, high: Any, plane: int) -> float:
     return high[plane >> 1] if plane & 1 else low[plane >> 1]
 
 
-@inline
-def compare_planes(segments: Any, item: int, low: Any, high: Any, i: int, j: int) -> tuple[int, bool]:
-    """Return the sign of t_i - t_j for two planes that a segment meets, and whether the filter sufficed."""
-    p_i, q_i, c_i = segments[item, 0, i >> 1], segments[item, 1, i >> 1], plane_value(low, high, i)
-    p_j, q_j, c_j = segments[item, 0, j >> 1], segments[item, 1, j >> 1], plane_value(low, high, j)
+@called
+def compare_planes(p_i: float, q_i: float, c_i: float, p_j: float, q_j: float, c_j: float) -> int:
+    """Return the sign of t_i - t_j for two planes that a segment meets: at c, from p to q on their axes."""
     # n and d of one plane have one sign, so absolute values keep the ratio and make the products comparable
     order = compare_differences_filter(abs(c_i - p_i), abs(q_j - p_j), abs(c_j - p_j), abs(q_i - p_i))
     if order != UNDECIDED:
-        return order, True
+        return order
     if not (is_safe(p_i) and is_safe(q_i) and is_safe(c_i) and is_safe(p_j) and is_safe(q_j) and is_safe(c_j)):
-        return UNDECIDED, False
+        return UNDECIDED
     e = workspace(16)
     order = compare_differences(c_i, p_i, q_j, p_j, c_j, p_j, q_i, p_i, e)
-    return order if (q_i > p_i) == (q_j > p_j) else -order, False
+    return order if (q_i > p_i) == (q_j > p_j) else -order
 
 
 @inline
-def decide_crossing(segments: Any, item: int, low: Any, high: Any) -> tuple[int, int, int, bool]:
-    """Decide on a segment whose outcodes share no bit: state, plane entered, plane left, whether filters sufficed."""
+def decide_exactly(segments: Any, item: int, low: Any, high: Any) -> tuple[int, int, int]:
+    """Decide on a segment whose outcodes share no bit: state, plane entered, plane left."""
     entered = left = -1
-    filtered = True
-    for axis in range(low.size):
-        plane = plane_outside(segments[item, 0, axis], low[axis], high[axis], axis)
-        if plane >= 0:
-            order, by_filter = 1, True
-            if entered >= 0:
-                order, by_filter = compare_planes(segments, item, low, high, plane, entered)
+    size, dimension = 0.0, low.size
+    for axis in range(dimension):
+        size += abs(segments[item, 0, axis]) + abs(segments[item, 1, axis])
+    if not (size < LARGE):
+        return OPEN, -1, -1
+    for turn in range(2 * dimension + 1):
+        axis, side = turn >> 1, turn & 1
+        if axis < dimension:
+            plane = plane_outside(segments[item, side, axis], low[axis], high[axis], axis)
+            other = left if side else entered
+        else:  # at last the last plane entered and the first one left
+            plane, other = left, entered
+        order = 0
+        if plane >= 0 and other >= 0:
+            i, j = plane >> 1, other >> 1
+            order = compare_planes(
+                segments[item, 0, i],
+                segments[item, 1, i],
+                plane_value(low, high, plane),
+                segments[item, 0, j],
+                segments[item, 1, j],
+                plane_value(low, high, other),
+            )
             if order == UNDECIDED:
-                return OPEN, -1, -1, False
-            filtered = filtered and by_filter
-            if order > 0:  # equal: the smaller plane stays
-                entered = plane
-        plane = plane_outside(segments[item, 1, axis], low[axis], high[axis], axis)
-        if plane >= 0:
-            order, by_filter = -1, True
-            if left >= 0:
-                order, by_filter = compare_planes(segments, item, low, high, plane, left)
-            if order == UNDECIDED:
-                return OPEN, -1, -1, False
-            filtered = filtered and by_filter
-            if order < 0:
-                left = plane
-    if entered >= 0 and left >= 0:
-        order, by_filter = compare_planes(segments, item, low, high, entered, left)
-        if order == UNDECIDED:
-            return OPEN, -1, -1, False
-        filtered = filtered and by_filter
-        if order > 0:
-            return DROPPED, -1, -1, filtered
-    return KEPT, entered, left, filtered
+                return OPEN, -1, -1
+        if axis == dimension:
+            return (DROPPED, -1, -1) if order < 0 else (KEPT, entered, left)
+        if side == 0 and (other < 0 or order > 0) and plane >= 0:  # equal: the smaller plane stays
+            entered = plane
+        if side == 1 and (other < 0 or order < 0) and plane >= 0:
+            left = plane
+    return OPEN, -1, -1  # not reached
 
 
-@inline
-def parameters(p: float, q: float, low: float, high: float) -> tuple[float, float]:
-    """Return where a segment enters and leaves the slab low .. high of one axis: -1 and 2 where it does not.
+@merged
+def slab(p: float, q: float, low: float, high: float, not_entered: float, not_left: float) -> tuple[float, float]:
+    """Return the parameters at which p q, on one axis, enters and leaves low .. high, or those given."""
+    d = q - p if p != q else 1.0  # not met: any number
+    enters, leaves = ((low if p < low else high) - p) / d, ((low if q < low else high) - p) / d
+    return (enters if (p < low) | (p > high) else not_entered), (leaves if (q < low) | (q > high) else not_left)
 
-    Written without branches, which no processor could foretell.
-    """
-    d = q - p
-    enters, leaves = (low if p < low else high) - p, (low if q < low else high) - p
-    t_enter, t_leave = enters / d, leaves / d
-    return (t_enter if (p < low) | (p > high) else -1.0), (t_leave if (q < low) | (q > high) else 2.0)
+
+@merged
+def decide_roughly(
+    px: float, py: float, pz: float, qx: float, qy: float, qz: float,
+    x0: float, y0: float, z0: float, x1: float, y1: float, z1: float,
+) -> tuple[float, float, float]:  # fmt: skip
+    """Decide on the segment p q and a box, state OPEN where doubles do not suffice, plane entered, plane left."""
+    misses = (max(px, qx) < x0) | (min(px, qx) > x1) | (max(py, qy) < y0) | (min(py, qy) > y1)
+    misses = misses | (max(pz, qz) < z0) | (min(pz, qz) > z1)  # the outcodes share a bit
+    # planes that are not met stand in an order of their own, far from all others
+    a, d = slab(px, qx, x0, x1, -1.0, 2.0)
+    b, e = slab(py, qy, y0, y1, -2.0, 3.0)
+    c, f = slab(pz, qz, z0, z1, -3.0, 4.0)
+    start, end = max(a, max(b, c)), min(d, min(e, f))
+    before, after = max(min(a, b), min(max(a, b), c)), min(max(d, e), max(min(d, e), f))  # the second of three
+    gap = T_GAP * max(start, end) + T_TINY
+    drops = misses | (start - end > gap)
+    keeps = (end - start > gap) & (start - before > gap) & (after - end > gap)
+    x_entered, y_entered, z_entered = (1.0 if px > x1 else 0.0), (3.0 if py > y1 else 2.0), (5.0 if pz > z1 else 4.0)
+    entered = x_entered if a == start else (y_entered if b == start else z_entered)
+    x_left, y_left, z_left = (1.0 if qx > x1 else 0.0), (3.0 if qy > y1 else 2.0), (5.0 if qz > z1 else 4.0)
+    left = x_left if d == end else (y_left if e == end else z_left)
+    is_plain = abs(px) + abs(py) + abs(pz) + abs(qx) + abs(qy) + abs(qz) < LARGE
+    state = 0.0 if drops else (1.0 if keeps else 2.0)
+    return (state if is_plain else 2.0), (entered if start >= 0.0 else -1.0), (left if end <= 1.5 else -1.0)
+
+
+@merged
+def decide_closely(
+    px: float, py: float, pz: float, qx: float, qy: float, qz: float,
+    x0: float, y0: float, z0: float, x1: float, y1: float, z1: float,
+) -> tuple[float, float, float]:  # fmt: skip
+    """Decide as `decide_roughly` does, with double-doubles."""
+    a, d, is_x = meetings(px, qx, x0, x1, 0.0)
+    b, e, is_y = meetings(py, qy, y0, y1, 1.0)
+    c, f, is_z = meetings(pz, qz, z0, z1, 2.0)
+    gap, sure_1 = gap_between(a, b)
+    entered = a if gap >= 0.0 else b  # equal: the smaller plane stays
+    gap, sure_2 = gap_between(entered, c)
+    entered = entered if gap >= 0.0 else c
+    gap, sure_3 = gap_between(d, e)
+    left = d if gap <= 0.0 else e
+    gap, sure_4 = gap_between(left, f)
+    left = left if gap <= 0.0 else f
+    gap, sure_5 = gap_between(entered, left)
+    is_plain = abs(px) + abs(py) + abs(pz) + abs(qx) + abs(qy) + abs(qz) < LARGE
+    sure = is_plain & is_x & is_y & is_z & sure_1 & sure_2 & sure_3 & sure_4 & sure_5
+    return (2.0 if not sure else (0.0 if gap > 0.0 else 1.0)), entered.plane, left.plane
+
+
+@merged
+def point_of(segments: Any, item: int, end: int, is_flat: bool) -> tuple[float, float, float]:
+    """Return an end of a segment, in the plane with z = 0."""
+    return segments[item, end, 0], segments[item, end, 1], (0.0 if is_flat else segments[item, end, 2])
+
+
+@merged
+def corners_of(low: Any, high: Any) -> tuple[float, float, float, float, float, float]:
+    """Return the coordinates of a box, low ones first, in the plane with z from -1 to 1."""
+    is_flat = low.size == 2
+    return low[0], low[1], (-1.0 if is_flat else low[2]), high[0], high[1], (1.0 if is_flat else high[2])
 
 
 @kernel
-def decide_on_boxes_2d(
+def decide_on_boxes(
     segments: Any, low: Any, high: Any, first: int, last: int, stop: Any, items: Any, planes: Any, still: Any, n: Any
 ) -> None:
-    """Decide on ``segments[first:last]`` ((n, 2, 2) float64) and the box `low`, `high`.
+    """Decide on ``segments[first:last]`` ((n, 2, dim) float64) and the box `low`, `high`.
 
     items: from ``items[first]`` on the segments that are kept, in order, in planes (n, 2) the planes entered and left,
     -1 for an end of the segment. still: likewise the segments left open. n: how many are kept, open, and went beyond
     the filter. stop: one uint8, polled.
     """
-    x0, x1, y0, y1 = low[0], high[0], low[1], high[1]
+    is_flat = low.size == 2
+    x0, y0, z0, x1, y1, z1 = corners_of(low, high)
+    px, py, pz, qx, qy, qz = (
+        workspace(64), workspace(64), workspace(64), workspace(64), workspace(64), workspace(64),
+    )  # fmt: skip
+    state, entered, left, unsure = workspace(64), workspace(64), workspace(64), np.empty(BLOCK, np.int64)
     kept, n_open, beyond = first, first, 0
-    for i in range(first, last):
+    for start in range(first, last, BLOCK):
         if stop[0]:
             return
-        px, py, qx, qy = segments[i, 0, 0], segments[i, 0, 1], segments[i, 1, 0], segments[i, 1, 1]
-        if not (abs(px) + abs(py) + abs(qx) + abs(qy) < LARGE):
-            still[n_open] = i
-            n_open += 1
-            continue
-        if (max(px, qx) < x0) | (min(px, qx) > x1) | (max(py, qy) < y0) | (min(py, qy) > y1):
-            continue  # the outcodes share a bit
-        a, c = parameters(px, qx, x0, x1)
-        b, d = parameters(py, qy, y0, y1)
-        start, end = max(a, b), min(c, d)
-        entered = left = -1
-        if start > end:
-            if start - end > T_GAP * start + T_TINY:
-                continue
-            sure = False
-        else:
-            sure = end - start > T_GAP * end + T_TINY
-            if start >= 0.0:
-                sure = sure and abs(a - b) > T_GAP * start + T_TINY
-                entered = (0 + (px > x1)) if a == start else 2 + (py > y1)
-            if end <= 1.5:
-                sure = sure and abs(c - d) > T_GAP * end + T_TINY
-                left = (0 + (qx > x1)) if c == end else 2 + (qy > y1)
-        if not sure:
-            state, entered, left, filtered = decide_crossing(segments, i, low, high)
-            if not filtered:
-                beyond += 1
-            if state == OPEN:
-                still[n_open] = i
+        size = min(BLOCK, last - start)
+        for j in range(size):
+            px[j], py[j], pz[j] = point_of(segments, start + j, 0, is_flat)
+            qx[j], qy[j], qz[j] = point_of(segments, start + j, 1, is_flat)
+        for j in range(BLOCK):  # a number of turns that the compiler knows; those past `size` are not looked at
+            state[j], entered[j], left[j] = decide_roughly(
+                px[j], py[j], pz[j], qx[j], qy[j], qz[j], x0, y0, z0, x1, y1, z1
+            )
+        n_unsure = 0
+        for j in range(size):
+            if state[j] == OPEN:
+                unsure[n_unsure] = j
+                n_unsure += 1
+        for k in range(n_unsure):
+            px[k], py[k], pz[k] = point_of(segments, start + unsure[k], 0, is_flat)
+            qx[k], qy[k], qz[k] = point_of(segments, start + unsure[k], 1, is_flat)
+        for k in range((n_unsure + 7) >> 3 << 3):  # whole vectors
+            px[k], py[k], pz[k] = decide_closely(px[k], py[k], pz[k], qx[k], qy[k], qz[k], x0, y0, z0, x1, y1, z1)
+        for k in range(n_unsure):
+            j = unsure[k]
+            state[j], entered[j], left[j] = px[k], py[k], pz[k]
+            if state[j] == OPEN:
+                state[j], entered[j], left[j] = decide_exactly(segments, start + j, low, high)
+            if state[j] == OPEN:
+                still[n_open] = start + j
                 n_open += 1
-            if state != KEPT:
-                continue
-        items[kept], planes[kept, 0], planes[kept, 1] = i, entered, left
-        kept += 1
+        beyond += n_unsure
+        for j in range(size):  # kept <= start + j: what is not kept is written over
+            items[kept], planes[kept, 0], planes[kept, 1] = start + j, int(entered[j]), int(left[j])
+            kept += state[j] == KEPT
     n[0], n[1], n[2] = kept - first, n_open - first, beyond
-
-
-@kernel
-def decide_on_boxes_3d(
-    segments: Any, low: Any, high: Any, first: int, last: int, stop: Any, items: Any, planes: Any, still: Any, n: Any
-) -> None:
-    """Decide on ``segments[first:last]`` ((n, 2, 3) float64) and the box `low`, `high`: see `decide_on_boxes_2d`."""
-    x0, x1, y0, y1, z0, z1 = low[0], high[0], low[1], high[1], low[2], high[2]
-    kept, n_open, beyond = first, first, 0
-    for i in range(first, last):
-        if stop[0]:
-            return
-        px, py, pz = segments[i, 0, 0], segments[i, 0, 1], segments[i, 0, 2]
-        qx, qy, qz = segments[i, 1, 0], segments[i, 1, 1], segments[i, 1, 2]
-        if not (abs(px) + abs(py) + abs(pz) + abs(qx) + abs(qy) + abs(qz) < LARGE):
-            still[n_open] = i
-            n_open += 1
-            continue
-        misses = (max(px, qx) < x0) | (min(px, qx) > x1) | (max(py, qy) < y0) | (min(py, qy) > y1)
-        if misses | (max(pz, qz) < z0) | (min(pz, qz) > z1):
-            continue
-        a, d = parameters(px, qx, x0, x1)
-        b, e = parameters(py, qy, y0, y1)
-        c, f = parameters(pz, qz, z0, z1)
-        start, end = max(a, max(b, c)), min(d, min(e, f))
-        entered = left = -1
-        if start > end:
-            if start - end > T_GAP * start + T_TINY:
-                continue
-            sure = False
-        else:
-            sure = end - start > T_GAP * end + T_TINY
-            if start >= 0.0:
-                # the second largest of three, without branches
-                second = max(min(a, b), min(max(a, b), c))
-                sure = sure and start - second > T_GAP * start + T_TINY
-                entered = (0 + (px > x1)) if a == start else ((2 + (py > y1)) if b == start else 4 + (pz > z1))
-            if end <= 1.5:
-                second = min(max(d, e), max(min(d, e), f))
-                sure = sure and second - end > T_GAP * end + T_TINY
-                left = (0 + (qx > x1)) if d == end else ((2 + (qy > y1)) if e == end else 4 + (qz > z1))
-        if not sure:
-            state, entered, left, filtered = decide_crossing(segments, i, low, high)
-            if not filtered:
-                beyond += 1
-            if state == OPEN:
-                still[n_open] = i
-                n_open += 1
-            if state != KEPT:
-                continue
-        items[kept], planes[kept, 0], planes[kept, 1] = i, entered, left
-        kept += 1
-    n[0], n[1], n[2] = kept - first, n_open - first, beyond
-
-
-@inline
-def cut_roughly(p: float, q: float, at: float) -> tuple[float, float, bool]:
-    """Return the parameter at which one coordinate from p to q is `at`, and whether it is within T_BOUND of itself."""
-    wh, wl = two_diff(at, p)
-    sh, sl = two_diff(q, p)
-    th, tl = dd_div(wh, wl, sh, sl)
-    return th, tl, abs(wh) >= 2.0**-500 and 2.0**-400 <= abs(sh) <= 2.0**400
-
-
-@inline
-def cut_by_signs(segment: Any, low: Any, high: Any, plane: int, point: Any) -> tuple[float, bool]:
-    """Set `point` to where `segment` crosses `plane`, settled by exact signs; return t and whether all is sure."""
-    axis, at = plane >> 1, plane_value(low, high, plane)
-    p, q = segment[0, axis], segment[1, axis]
-    if not (is_safe(p) and is_safe(q) and is_safe(at)):
-        return 0.0, False
-    wp, wq, e = workspace(2), workspace(2), workspace(24)
-    flip = 1.0 if q > p else -1.0
-    n_wp, n_wq = difference(flip * at, flip * p, wp), difference(flip * q, flip * at, wq)
-    return parameter_and_point(segment, wp, n_wp, wq, n_wq, axis, at, point, e)
-
-
-@inline
-def difference(a: float, b: float, e: Any) -> int:
-    """Set e to a - b as an expansion; two places."""
-    h, low = two_diff(a, b)
-    n = 0
-    for part in (low, h):
-        if part != 0.0:
-            e[n] = part
-            n += 1
-    return n
-
-
-@kernel
-def fill_on_boxes_2d(
-    segments: Any,
-    low: Any,
-    high: Any,
-    items: Any,
-    planes: Any,
-    first: int,
-    last: int,
-    stop: Any,
-    source: Any,
-    ends: Any,
-    t: Any,
-    faces: Any,
-    still: Any,
-    n: Any,
-) -> None:
-    """Fill rows first .. last - 1 of the pieces of ``segments`` ((n, 2, 2) float64) on the box `low`, `high`.
-
-    items: (m,) int32, planes: (m, 2) int32, as decided. source: (m,) int64. ends: start and end, (m, 2) float64 each.
-    t, faces: (m, 2) float64 and int64. still: from ``still[first]`` on the rows that are not surely rounded. n: how
-    many of them, and how many needed more than the first try. stop: one uint8, polled.
-    """
-    n_open = beyond = 0
-    for row in range(first, last):
-        if stop[0]:
-            return
-        i = items[row]
-        source[row] = i
-        px, py, qx, qy = segments[i, 0, 0], segments[i, 0, 1], segments[i, 1, 0], segments[i, 1, 1]
-        all_sure = tried = True
-        for side in range(2):
-            plane = planes[row, side]
-            faces[row, side] = plane
-            if plane < 0:
-                t[row, side] = side
-                ends[side, row, 0], ends[side, row, 1] = segments[i, side, 0] + 0.0, segments[i, side, 1] + 0.0
-                continue
-            at = plane_value(low, high, plane)
-            if plane < 2:
-                th, tl, sure = cut_roughly(px, qx, at)
-                x, y, is_x = at, at, True
-                y, is_y = point_at(py, qy, th, tl, 0.0)
-            else:
-                th, tl, sure = cut_roughly(py, qy, at)
-                x, is_x = point_at(px, qx, th, tl, 0.0)
-                y, is_y = at, True
-            bound = T_BOUND * th
-            if sure & is_x & is_y & (th + (tl - bound) == th + (tl + bound)):
-                t[row, side] = th + tl
-                ends[side, row, 0], ends[side, row, 1] = x + 0.0, y + 0.0
-            else:
-                tried = False
-                t[row, side], sure = cut_by_signs(segments[i], low, high, plane, ends[side, row])
-                all_sure = all_sure and sure
-        if not tried:
-            beyond += 1
-        if not all_sure:
-            still[first + n_open] = row
-            n_open += 1
-    n[0], n[1] = n_open, beyond
-
-
-@kernel
-def fill_on_boxes_3d(
-    segments: Any,
-    low: Any,
-    high: Any,
-    items: Any,
-    planes: Any,
-    first: int,
-    last: int,
-    stop: Any,
-    source: Any,
-    ends: Any,
-    t: Any,
-    faces: Any,
-    still: Any,
-    n: Any,
-) -> None:
-    """Fill rows first .. last - 1 of the pieces of ``segments`` ((n, 2, 3) float64): see `fill_on_boxes_2d`."""
-    n_open = beyond = 0
-    for row in range(first, last):
-        if stop[0]:
-            return
-        i = items[row]
-        source[row] = i
-        all_sure = tried = True
-        for side in range(2):
-            plane = planes[row, side]
-            faces[row, side] = plane
-            if plane < 0:
-                t[row, side] = side
-                ends[side, row, 0], ends[side, row, 1] = segments[i, side, 0] + 0.0, segments[i, side, 1] + 0.0
-                ends[side, row, 2] = segments[i, side, 2] + 0.0
-                continue
-            axis, at = plane >> 1, plane_value(low, high, plane)
-            j, k = AFTER[axis], AFTER[axis + 1]
-            th, tl, sure = cut_roughly(segments[i, 0, axis], segments[i, 1, axis], at)
-            x, is_x = point_at(segments[i, 0, j], segments[i, 1, j], th, tl, 0.0)
-            y, is_y = point_at(segments[i, 0, k], segments[i, 1, k], th, tl, 0.0)
-            bound = T_BOUND * th
-            if sure & is_x & is_y & (th + (tl - bound) == th + (tl + bound)):
-                t[row, side] = th + tl
-                ends[side, row, axis], ends[side, row, j], ends[side, row, k] = at, x + 0.0, y + 0.0
-            else:
-                tried = False
-                t[row, side], sure = cut_by_signs(segments[i], low, high, plane, ends[side, row])
-                all_sure = all_sure and sure
-        if not tried:
-            beyond += 1
-        if not all_sure:
-            still[first + n_open] = row
-            n_open += 1
-    n[0], n[1] = n_open, beyond

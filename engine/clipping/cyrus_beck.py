@@ -20,8 +20,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.clipping.cohen_sutherland import DROPPED, KEPT, LARGE, OPEN, T_BOUND
-from engine.clipping.cut_point import cut_coordinate, cut_parameter, is_safe, parameter_and_point, point_at
+from engine.clipping.cohen_sutherland import DROPPED, KEPT, LARGE, OPEN
+from engine.clipping.cut_point import is_safe, parameter_and_point, point_at
+from engine.clipping.plane_meeting import T_BOUND
 from engine.clipping.scaling import FloatArray
 from engine.jit import inline, kernel
 from engine.predicates.double_double import U2, dd_add, dd_div
@@ -115,32 +116,6 @@ def dd_value_3d(a: float, b: float, c: float, d: float, x: float, y: float, z: f
     bound = DD_VALUE_BOUND * (abs(ah) + abs(bh) + abs(ch) + abs(d)) + VALUE_TINY
     h, low = two_sum(h, (al + bl) + (cl + first) + (second + third))
     return h, low, bound
-
-
-@inline
-def cut_with(
-    segment: Any, point: Any, sp: tuple[float, float, float], sq: tuple[float, float, float]
-) -> tuple[float, bool]:
-    """Set `point` to where `segment` meets a plane of values `sp`, `sq`; return t and whether all is surely nearest."""
-    sp_h, sp_l, sp_bound = sp
-    sq_h, sq_l, sq_bound = sq
-    if sp_h < 0.0:
-        sp_h, sp_l = -sp_h, -sp_l
-    if sq_h < 0.0:
-        sq_h, sq_l = -sq_h, -sq_l
-    if sp_bound > 0.001 * sp_h or sq_bound > 0.001 * sq_h:
-        return 0.0, False
-    r = 0.0
-    if sp_bound > 0.0:
-        r = 1.01 * sp_bound / sp_h
-    if sq_bound > 0.0:
-        r = max(r, 1.01 * sq_bound / sq_h)
-    sum_h, sum_l = dd_add(sp_h, sp_l, sq_h, sq_l)
-    t, sure = cut_parameter(sp_h, sp_l, sq_h, sq_l, sum_h, sum_l, r)
-    for k in range(point.size):
-        point[k], is_sure = cut_coordinate(segment[0, k], segment[1, k], sp_h, sp_l, sq_h, sq_l, sum_h, sum_l, r)
-        sure = sure and is_sure
-    return t, sure
 
 
 @inline
@@ -256,7 +231,7 @@ def decide_on_rows_2d(
 ) -> None:
     """Decide on ``segments[first:last]`` ((n, 2, 2) float64) where all planes (`as_columns`) are >= 0.
 
-    Outputs: see `decide_on_boxes_2d`.
+    Outputs: see `decide_on_boxes`.
     """
     a, b, d = columns[0], columns[1], columns[2]
     slopes, floors = columns[3], columns[4]
@@ -309,7 +284,7 @@ def decide_on_rows_3d(
 ) -> None:
     """Decide on ``segments[first:last]`` ((n, 2, 3) float64) where all planes (`as_columns`) are >= 0.
 
-    Outputs: see `decide_on_boxes_2d`.
+    Outputs: see `decide_on_boxes`.
     """
     a, b, c, d = columns[0], columns[1], columns[2], columns[3]
     slopes, floors = columns[4], columns[5]
@@ -397,7 +372,7 @@ def fill_on_rows_2d(
     still: Any,
     n: Any,
 ) -> None:
-    """Fill rows first .. last - 1 of the pieces of ``segments`` ((n, 2, 2) float64): see `fill_on_boxes_2d`."""
+    """Fill rows first .. last - 1 of the pieces of ``segments`` ((n, 2, 2) float64): see `fill_on_boxes`."""
     n_open = beyond = 0
     for row in range(first, last):
         if stop[0]:
@@ -455,7 +430,7 @@ def fill_on_rows_3d(
     still: Any,
     n: Any,
 ) -> None:
-    """Fill rows first .. last - 1 of the pieces of ``segments`` ((n, 2, 3) float64): see `fill_on_boxes_2d`."""
+    """Fill rows first .. last - 1 of the pieces of ``segments`` ((n, 2, 3) float64): see `fill_on_boxes`."""
     n_open = beyond = 0
     for row in range(first, last):
         if stop[0]:

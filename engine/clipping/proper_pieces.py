@@ -27,11 +27,11 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.clipping.box_tree import DEEPEST
-from engine.clipping.cohen_sutherland import T_BOUND
 from engine.clipping.contacts import PROPER, gather_edge_contacts
 from engine.clipping.cut_point import is_safe, point_at
 from engine.clipping.cyrus_beck import is_segment_safe
 from engine.clipping.mesh_contacts import STACK, gather_mesh_contacts
+from engine.clipping.plane_meeting import T_BOUND
 from engine.jit import inline, kernel, merged
 from engine.predicates.double_double import U2, dd_div
 from engine.predicates.error_free import two_diff, two_prod, two_sum

@@ -9,13 +9,9 @@ from typing import Literal, overload
 import numpy as np
 import numpy.typing as npt
 
+from engine.clipping.box_pieces import fill_on_boxes
 from engine.clipping.box_planes import box_rows
-from engine.clipping.cohen_sutherland import (
-    decide_on_boxes_2d,
-    decide_on_boxes_3d,
-    fill_on_boxes_2d,
-    fill_on_boxes_3d,
-)
+from engine.clipping.cohen_sutherland import decide_on_boxes
 from engine.clipping.concave import clip_chunk, locator_for
 from engine.clipping.cyrus_beck import (
     as_columns,
@@ -174,7 +170,6 @@ def _method(region: Solid) -> tuple[Task, str]:
 
 def _on_box(region: Aabb) -> Task:
     planes = box_rows(region).tolist()
-    is_flat = region.dimension == 2
 
     def scale(segments: FloatArray) -> Scaled | None:
         exponent = exponent_of(segments, region.min, region.max)
@@ -185,8 +180,8 @@ def _on_box(region: Aabb) -> Task:
 
     return _one_piece(
         Method(
-            decide_on_boxes_2d if is_flat else decide_on_boxes_3d,
-            fill_on_boxes_2d if is_flat else fill_on_boxes_3d,
+            decide_on_boxes,
+            fill_on_boxes,
             (region.min, region.max),
             lambda p, q: clip_by_planes(p, q, planes),
             scale,

@@ -162,7 +162,7 @@ def decide_on_sphere_2d(
     still: Any,
     n: Any,
 ) -> None:
-    """Decide on ``segments[first:last]`` ((n, 2, 2) float64) and the closed ball: see `decide_on_boxes_2d`."""
+    """Decide on ``segments[first:last]`` ((n, 2, 2) float64) and the closed ball: see `decide_on_boxes`."""
     kept, n_open, beyond = first, first, 0
     rr, cx, cy = radius * radius, center[0], center[1]
     for i in range(first, last):
@@ -208,7 +208,7 @@ def decide_on_sphere_3d(
     still: Any,
     n: Any,
 ) -> None:
-    """Decide on ``segments[first:last]`` ((n, 2, 3) float64) and the closed ball: see `decide_on_boxes_2d`."""
+    """Decide on ``segments[first:last]`` ((n, 2, 3) float64) and the closed ball: see `decide_on_boxes`."""
     kept, n_open, beyond = first, first, 0
     rr, cx, cy, cz = radius * radius, center[0], center[1], center[2]
     for i in range(first, last):
@@ -321,7 +321,7 @@ def fill_on_sphere_2d(
     still: Any,
     n: Any,
 ) -> None:
-    """Fill rows first .. last - 1 of the pieces of ``segments`` ((n, 2, 2) float64): see `fill_on_boxes_2d`."""
+    """Fill rows first .. last - 1 of the pieces of ``segments`` ((n, 2, 2) float64): see `fill_on_boxes`."""
     n_open = 0
     rr = radius * radius
     for row in range(first, last):
@@ -414,7 +414,7 @@ def fill_on_sphere_3d(
     still: Any,
     n: Any,
 ) -> None:
-    """Fill rows first .. last - 1 of the pieces of ``segments`` ((n, 2, 3) float64): see `fill_on_boxes_2d`."""
+    """Fill rows first .. last - 1 of the pieces of ``segments`` ((n, 2, 3) float64): see `fill_on_boxes`."""
     n_open = 0
     rr = radius * radius
     for row in range(first, last):

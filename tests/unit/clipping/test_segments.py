@@ -174,6 +174,14 @@ def test_faces_and_touching_points_by_hand() -> None:
     assert len(clip_segments([[[3.0, 3.0], [3.0, 3.0]]], box)) == 0
 
 
+def test_zeros_are_positive() -> None:
+    """Of coordinates that a segment keeps, too, also where another one is settled by exact signs."""
+    segments = [[[-0.0, -1.0], [0.0, -1.8523598966538355]], [[-1.0, -0.0], [-1.4299810403064286, -0.0]]]
+    for region in (Aabb([-1, -1], [1, 1]), Convex([[1, 0, 1], [-1, 0, 1], [0, 1, 1], [0, -1, 1]])):
+        pieces = clip_segments(segments, region)
+        assert not any(np.signbit(array[array == 0.0]).any() for array in (pieces.start, pieces.end, pieces.t))
+
+
 def test_boxes_are_idempotent_and_hold_their_pieces() -> None:
     rng = np.random.default_rng(10)
     box = Aabb(rng.uniform(-1, 0, 3), rng.uniform(0, 1, 3))
