@@ -6,9 +6,11 @@ them into arrays, the peers' rows what their Python calls cost. CGAL's Python pa
 
 from __future__ import annotations
 
+import contextlib
 import math
 import statistics
 import sys
+import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict
 from functools import partial
@@ -45,6 +47,7 @@ def tasks(suite: Suite) -> Iterator[Task]:
     for size in (10,) if suite.options.quick else (10, 100):
         yield f"two threads, batch of stars, {size} vertices", partial(_two_threads, suite, size)
     yield "public pairs, four operations", partial(_public, suite)
+    yield "late after a deadline, combs of 100000 vertices", partial(_deadline, suite)
 
 
 def _prepared(name: str, pair: Any) -> Prepared | str:
@@ -186,8 +189,13 @@ def _two_threads(suite: Suite, size: int, name: str) -> Iterable[Row]:
 
 
 def _public(suite: Suite, name: str) -> Iterable[Row]:
-    """Yield how many outputs of ours are wrong, invalid or missing, and the same of each peer for intersections."""
-    bad, told, n_pairs = 0, dict.fromkeys(list(MAKERS)[1:], 0), 0
+    """Yield how many outputs of ours are wrong, invalid or missing, the same of peers' intersections, and their times.
+
+    A peer's time is that of the pairs that it answers, once warm, against ours for the same pairs.
+    """
+    bad, n_pairs = 0, 0
+    fails = dict.fromkeys(list(MAKERS)[1:], 0)
+    seconds = {peer: [0.0, 0.0] for peer in fails}
     for pair in polygon_pairs.public():
         if sum(map(len, pair[0] + pair[1])) > (300 if suite.options.quick else 5000):
             continue
@@ -198,26 +206,59 @@ def _public(suite: Suite, name: str) -> Iterable[Row]:
         other = engine.overlay(second, first, "difference").area_exact
         bad += (either + both != union) or (only + other != either)
         bad += sum(not shape_of(each).is_valid for each in found.values())
-        for peer in told:
-            told[peer] += _fails(peer, pair, float(both))
-    error = ", ".join(f"{peer} {count}" for peer, count in told.items())
+        ours = clocked(partial(engine.overlay, first, second))[0]
+        for peer in fails:
+            taken = _asked(peer, pair, float(both))
+            if taken is None:
+                fails[peer] += 1
+            else:
+                seconds[peer][0] += ours
+                seconds[peer][1] += taken
+    error = ", ".join(f"{peer} {count}" for peer, count in fails.items())
     yield Row(name, "wrong", 0, 0, bad, error=f"intersections refused or off by 1e-6 (shapely: or invalid): {error}",
               note=f"{n_pairs} pairs; ours: areas that do not add up exactly, outputs invalid for shapely")  # fmt: skip
+    for peer, (ours, theirs) in seconds.items():
+        if theirs:
+            row = Row(f"public pairs, intersection vs {peer}", "x", value=theirs / ours)
+            row.ours, row.peer = f"{ours * 1e3:.3g} ms", f"{theirs * 1e3:.3g} ms"
+            row.note = f"the {n_pairs - fails[peer]} pairs that {peer} answers"
+            yield row
 
 
-def _fails(peer: str, pair: Any, area: float) -> bool:
-    """Tell whether a peer refuses the pair or is clearly wrong, or, for shapely, not valid."""
+def _asked(peer: str, pair: Any, area: float) -> float | None:
+    """Return seconds for a pair, None where a peer refuses it, is clearly wrong, or, for shapely, not valid."""
     try:
         if peer == "shapely":
             import shapely
 
             made = [shapely.Polygon(rings[0], rings[1:]) for rings in pair]
-            shape = shapely.intersection(*made)
-            return not shape.is_valid or abs(shape.area - area) > 1e-6 * area
-        prepared = MAKERS[peer](*pair)
-        return abs(prepared.area(prepared.run()) - area) > 1e-6 * area
+            prepared = Prepared(lambda: shapely.intersection(*made), lambda shape: shape.area)
+        else:
+            prepared = MAKERS[peer](*pair)
+        found = prepared.run()
+        if (peer == "shapely" and not found.is_valid) or abs(prepared.area(found) - area) > 1e-6 * area:
+            return None
+        return clocked(prepared.run)[0]
     except Exception:  # whatever a peer raises: a refusal
-        return True
+        return None
+
+
+def _deadline(suite: Suite, name: str) -> Iterable[Row]:
+    """Yield how long after its deadline a large overlay returns at the latest, for deadlines all over its time."""
+    pair = polygon_pairs.large("comb", 1000 if suite.options.quick else 100_000, suite.options.seed)
+    first, second = map(engine.Polygon, pair)
+    engine.overlay(first, second)
+    whole = clocked(partial(engine.overlay, first, second))[0]
+    late = []
+    for share in np.linspace(0.02, 0.98, 13):
+        start = time.perf_counter()
+        with contextlib.suppress(engine.DeadlineExceededError):
+            engine.overlay(first, second, deadline=whole * share)
+            continue
+        late.append(time.perf_counter() - start - whole * share)
+    yield Row(
+        name, "s", None, None, max(late, default=0.0), note=f"the whole takes {whole:.3g} s; {len(late)} deadlines"
+    )
 
 
 def main(words: list[str] | None = None) -> int:

@@ -16,7 +16,8 @@ Rings = list[np.ndarray]
 def large(family: str, n: int, seed: int) -> tuple[Rings, Rings]:
     """Return a pair of about n vertices each.
 
-    smooth, spiky: closed curves; comb: sqrt(n) teeth upright on as many lying, their sides of many vertices; dense
+    smooth, spiky: closed curves, the spikes 10,000 at most, their sides then of many vertices, since crossings go with
+    the square of their number; comb: sqrt(n) teeth upright on as many lying, their sides of many vertices; dense
     comb: n / 2 straight teeth, so that crossings go with n squared; soup: n / 5 rings of five random points, which
     overlap and cross themselves.
     """
@@ -46,7 +47,12 @@ def _curve(draw: np.random.Generator, n: int, centre: tuple[float, float]) -> np
 
 
 def _spikes(draw: np.random.Generator, n: int, centre: tuple[float, float]) -> np.ndarray:
-    return _around(draw.uniform(0.5, 1.0, n), centre)
+    n_tips = min(n, 10_000)
+    tips = _around(draw.uniform(0.5, 1.0, n_tips), centre)
+    if n_tips == n:
+        return tips
+    places = np.linspace(0, n_tips, n, endpoint=False)
+    return np.stack([np.interp(places, np.arange(n_tips + 1), np.append(axis, axis[0])) for axis in tips.T], axis=1)
 
 
 def _comb(draw: np.random.Generator, n: int, n_teeth: int) -> np.ndarray:
