@@ -113,6 +113,8 @@ class Budget:
                 f"the deadline of {self.deadline!r} s passed before the call was done; "
                 "ask for less in one call or give it more time"
             )
+        if self.flag[0]:
+            raise CancelledError("another part of the call failed")
 
 
 def check_options(workers: object, progress: object) -> None:
@@ -260,8 +262,8 @@ def _run_threaded(
             before = time.perf_counter()
             try:
                 task(first, stop)
-            except BaseException as error:  # the caller's, who gets it
-                failures.append((first, error))
+            except BaseException as error:  # the caller's, who gets it, and not what follows from a raised flag
+                failures.append((n_items if budget.flag[0] else first, error))
                 budget.flag[0] = 1
                 break
             ranges.took(stop - first, time.perf_counter() - before)

@@ -189,3 +189,23 @@ def test_a_raised_flag_never_passes_for_a_finished_call() -> None:
         budget.flag[0] = 1
         with pytest.raises(DeadlineExceededError):
             budget.check()
+
+
+def test_the_error_that_raised_the_flag_reaches_the_caller() -> None:
+    """Not what an earlier chunk says that saw the flag and gave up."""
+    is_at_work = threading.Event()
+
+    def task(start: int, _stop: int) -> None:
+        if start == 0:
+            time.sleep(0.01)  # the others are worth a thread each
+        elif start == 1:
+            is_at_work.set()
+            while not budget.flag[0]:
+                time.sleep(0.001)
+            budget.check()
+        else:
+            is_at_work.wait()
+            raise KeyError(start)
+
+    with Budget() as budget, pytest.raises(KeyError):
+        run_chunks(task, 3, budget=budget, first_chunk=1, workers=2)

@@ -12,6 +12,7 @@ import pytest
 
 from engine.clipping import polygons as polygons_module
 from engine.clipping.exact_contours import MOST_BITS
+from engine.clipping.polygon_batches import clip_chunk, kernel_scene
 from engine.clipping.polygons import ClippedPolygons, PolygonStatus, clip_polygons
 from engine.errors import (
     CancelledError,
@@ -22,7 +23,7 @@ from engine.errors import (
     UnsupportedSolidError,
     WrongDimensionError,
 )
-from engine.parallel import Cancel
+from engine.parallel import Budget, Cancel
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.convex import Convex
@@ -305,3 +306,24 @@ def test_refuses_what_it_cannot_take() -> None:
 
 def test_the_example() -> None:
     assert doctest.testmod(polygons_module) == (0, 3)
+
+
+def test_a_raised_flag_ends_a_chunk() -> None:
+    """The kernel stopping for it does not pass for a lack of room, of which more and more would be made."""
+    region, budget, offsets = Aabb([-1, -1], [1, 1]), Budget(), np.arange(6)
+    contours = polygons_module.as_contours(np.ones((5, 3, 2)), 2)
+    scene = kernel_scene(region, contours.vertices, 1.0, polygons_module._planes(region, budget), budget)
+    assert scene is not None
+    budget.flag[0] = 1
+    with pytest.raises(CancelledError):
+        clip_chunk(
+            scene,
+            contours.ring_offsets,
+            offsets,
+            0,
+            5,
+            budget,
+            np.zeros(5, np.int64),
+            np.zeros(5, np.uint8),
+            offsets > 9,
+        )
