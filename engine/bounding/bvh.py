@@ -61,7 +61,7 @@ def build_bvh(boxes: npt.NDArray[np.float64]) -> Bvh:
     with np.errstate(all="ignore"):  # what underflows here is far below the enlargement of the boxes
         nodes, child, n_nodes, scale = _build(as_read_only(boxes), origin)
     origin.setflags(write=False)
-    return Bvh(_trimmed(nodes, n_nodes), _trimmed(child, n_nodes), origin, scale)
+    return Bvh(on_lines(nodes[:n_nodes]), on_lines(child[:n_nodes]), origin, scale)
 
 
 def as_read_only(array: Any) -> Any:
@@ -71,10 +71,10 @@ def as_read_only(array: Any) -> Any:
     return view
 
 
-def _trimmed(array: Any, n_rows: int) -> Any:
-    """Return the first rows as a read-only array that begins with a line of the cache, unless it is small."""
-    kept = array[:n_rows].copy()
-    if n_rows > _FEW_ROWS:
+def on_lines(array: Any) -> Any:
+    """Return a read-only copy that begins with a line of the cache, unless it is small."""
+    kept = array.copy()
+    if len(array) > _FEW_ROWS:
         room = np.empty(kept.nbytes + 64, np.uint8)
         start = -room.ctypes.data % 64
         aligned = room[start : start + kept.nbytes].view(array.dtype).reshape(kept.shape)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from engine.bounding.bvh import EMPTY, UNUSED, Bvh, as_read_only, build_bvh
+from engine.bounding.bvh import EMPTY, UNUSED, Bvh, as_read_only, build_bvh, on_lines
 from engine.bounding.row_lanes import LANES
 from engine.bounding.triangle_lanes import CORNER_ROWS
 from engine.clipping.box_tree import build_box_tree
@@ -43,9 +43,11 @@ class Mesh(NamedTuple):
     child: npt.NDArray[np.int32]
     origin: FloatArray
     inverse: float
-    """boxes, child, origin, 1 / scale: see `Bvh`."""
+    """boxes, child, origin, 1 / scale: see `Bvh`, but inner nodes stand before all blocks, close to each other."""
+    n_inner: int
+    """How many they are; unless there is but one block, they begin with the root."""
     corners: npt.NDArray[np.float32]
-    """See `corners_of`."""
+    """(n_blocks, 9, 8), see `corners_of`."""
 
 
 def boundary_of(region: Polygon | Polyhedron) -> Outline | Mesh:
@@ -73,17 +75,29 @@ def outline_of(elements: FloatArray, faces: IntArray) -> Outline:
 def mesh_of(elements: FloatArray, faces: IntArray) -> Mesh:
     """Return what the kernels read of some triangles (k, 3, 3)."""
     low, high = elements.min(axis=1), elements.max(axis=1)
-    tree = build_bvh(np.concatenate([low, high], axis=1))
+    tree, n_inner = _inner_first(build_bvh(np.concatenate([low, high], axis=1)))
     return Mesh(
-        as_read_only(elements),
+        on_lines(elements),
         as_read_only(faces),
         as_read_only(_beyond(low, high)),
         tree.boxes,
         tree.child,
         tree.origin,
         1.0 / tree.scale,
-        corners_of(tree, elements),
+        n_inner,
+        corners_of(tree, n_inner, elements),
     )
+
+
+def _inner_first(tree: Bvh) -> tuple[Bvh, int]:
+    """Return a tree with its inner nodes before its blocks, each kind in its old order, and how many they are."""
+    is_block = tree.child[:, 0] < 0
+    order = np.argsort(is_block, kind="stable")
+    place = np.empty(len(order), np.int32)
+    place[order] = np.arange(len(order))
+    child = tree.child[order]
+    child = np.where(child >= 0, place[np.maximum(child, 0)], child)
+    return Bvh(on_lines(tree.boxes[order]), on_lines(child), tree.origin, tree.scale), int((~is_block).sum())
 
 
 def _beyond(low: FloatArray, high: FloatArray) -> FloatArray:
@@ -92,17 +106,17 @@ def _beyond(low: FloatArray, high: FloatArray) -> FloatArray:
         return np.stack([np.nextafter(low.min(axis=0), -np.inf), np.nextafter(high.max(axis=0), np.inf)])
 
 
-def corners_of(tree: Bvh, elements: FloatArray) -> npt.NDArray[np.float32]:
-    """Return the corners (n_nodes, 9, 8) float32 of the triangles in each block of a tree, in its coordinates.
+def corners_of(tree: Bvh, n_inner: int, elements: FloatArray) -> npt.NDArray[np.float32]:
+    """Return the corners (n_blocks, 9, 8) float32 of the triangles in each block of a tree, in its coordinates.
 
-    Rows of inner nodes, and lanes without a triangle, lie far from everything.
+    Lanes without a triangle lie far from everything.
     """
-    is_item = (tree.child < 0) & (tree.child != EMPTY)
-    node, lane = np.nonzero(is_item)
-    corners = np.full((len(is_item), CORNER_ROWS, LANES), -UNUSED, np.float32)
+    child = tree.child[n_inner:]
+    is_item = child != EMPTY
+    block, lane = np.nonzero(is_item)
+    corners = np.full((len(child), CORNER_ROWS, LANES), -UNUSED, np.float32)
     inverse = 1.0 / tree.scale
     with np.errstate(all="ignore"):  # what underflows here is far below what the lanes round
-        local = elements[-1 - tree.child[is_item]] * inverse - tree.origin * inverse
-    corners[node, :, lane] = local.reshape(-1, CORNER_ROWS)
-    corners.setflags(write=False)
-    return corners
+        local = elements[-1 - child[is_item]] * inverse - tree.origin * inverse
+    corners[block, :, lane] = local.reshape(-1, CORNER_ROWS)
+    return on_lines(corners)

@@ -14,10 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.clipping.boundary import Mesh, Outline, boundary_of
-from engine.clipping.contacts import PROPER, find_contacts_2d
+from engine.clipping.contacts import GROUP, PROPER, find_contacts_2d
 from engine.clipping.exact_pieces import pieces_of
 from engine.clipping.exact_segments import Piece
-from engine.clipping.mesh_contacts import find_mesh_contacts, is_clear
+from engine.clipping.mesh_contacts import is_clear
+from engine.clipping.mesh_streams import find_mesh_contacts
 from engine.clipping.proper_pieces import OPEN, SETTLED, UNLOCATED, Rows, cut_on_mesh, cut_on_outline
 from engine.clipping.single_pieces import PieceRows
 from engine.containment.locators import Locator, locator_of
@@ -32,8 +33,8 @@ Locations = npt.NDArray[np.int8]
 
 _LEAST_ROOM: Final = 1 << 8
 """Contacts, or pieces, looked for at once; doubled where one segment has more."""
-_CONTACTS: Final = 64
-"""Of one segment; likewise."""
+_CONTACTS: Final = 4
+"""Of each segment of a group; likewise."""
 
 
 def locator_for(region: Polygon | Polyhedron, n_segments: int, budget: Budget) -> Locator | None:
@@ -89,7 +90,8 @@ def _settle(
     """Return the pieces of those chosen segments that the kernel settles, and the state of each."""
     state = np.full(len(chosen), OPEN, np.uint8)
     kernel: Any = cut_on_mesh if isinstance(boundary, Mesh) else cut_on_outline
-    parts, room, done = [_rows(0, segments.shape[2])], _LEAST_ROOM + len(chosen), np.array([0, 0, _CONTACTS])
+    parts, room = [_rows(0, segments.shape[2])], _LEAST_ROOM + len(chosen)
+    done = np.array([0, 0, _LEAST_ROOM + _CONTACTS * min(GROUP, len(chosen))])
     while done[0] < len(chosen):
         reached, rows = int(done[0]), _rows(room, segments.shape[2])
         with np.errstate(all="ignore"):  # uncompiled kernels: overflow is looked at by their filters

@@ -1,6 +1,6 @@
 """Which elements of a boundary does a segment meet, and how: edges of a polygon, triangles of a polyhedron.
 
-For each segment a tree of boxes (in space: mesh_contacts.py) gives the elements nearby, exact orientation signs sort
+For each segment a tree of boxes (in space: mesh_streams.py) gives the elements nearby, exact orientation signs sort
 them:
 
     edge a b, segment p q in the plane         triangle a b c, segment p q in space
@@ -27,6 +27,8 @@ from engine.predicates.orientation import orient2d
 APART: Final = 0
 PROPER: Final = 1
 DEGENERATE: Final = 2
+GROUP: Final = 2048
+"""Segments that are looked at together at most."""
 
 
 @inline
@@ -74,25 +76,43 @@ def gather_edge_contacts(outline: Any, segment: Any, stack: Any, met: Any, kinds
     return found
 
 
+@inline
+def is_point(segment: Any) -> bool:
+    """Tell whether a segment has no length."""
+    are_equal = True
+    for k in range(segment.shape[1]):
+        are_equal &= segment[0, k] == segment[1, k]
+    return are_equal
+
+
+@inline
+def gather_edges(
+    segments: Any, first: int, last: int, outline: Any, stop: Any, stack: Any, met: Any, kinds: Any, offsets: Any
+) -> int:
+    """Find the contacts of ``segments[first:last]`` with the edges of a polygon: see `find_contacts_2d`."""
+    found = 0
+    offsets[0] = 0
+    for i in range(first, last):
+        if not is_point(segments[i]):
+            after = gather_edge_contacts(outline, segments[i], stack, met, kinds, found)
+            if after < 0:
+                return i
+            found = after
+        offsets[i - first + 1] = found
+        if stop[0]:
+            return i
+    return last
+
+
 @kernel
 def find_contacts_2d(
     segments: Any, first: int, last: int, outline: Any, stop: Any, elements_met: Any, kinds: Any, offsets: Any
 ) -> int:
-    """Find the contacts of ``segments[first:last]`` with the edges of a polygon.
+    """Find the contacts of ``segments[first:last]`` with the edges of a polygon; those of no length have none.
 
     segments: (n, 2, 2) float64. stop: one uint8, polled. elements_met, kinds: int64 and uint8 of equal length, filled
     with the contacts one segment after another; offsets: (last - first + 1,) int64, those of segment i end before
     offsets[i - first + 1]. Returns the index after the last segment that had room for all its contacts.
     """
     stack = np.empty(DEEPEST, np.int64)
-    found = 0
-    offsets[0] = 0
-    for i in range(first, last):
-        after = gather_edge_contacts(outline, segments[i], stack, elements_met, kinds, found)
-        if after < 0:
-            return i
-        found = after
-        offsets[i - first + 1] = found
-        if stop[0]:
-            return i + 1
-    return last
+    return gather_edges(segments, first, last, outline, stop, stack, elements_met, kinds, offsets)

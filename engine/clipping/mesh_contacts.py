@@ -1,7 +1,7 @@
-"""Which triangles of a polyhedron a segment meets, found by a tree of eight children a node; see contacts.py.
+"""A segment in the coordinates of a mesh's tree, with the slack that rounding takes; boxes that meet no triangle.
 
-The tree holds float32 boxes in coordinates of its own. A segment is brought there in doubles, cut to what lies near the
-tree, and stored as its middle and half in float32; the slack covers what all this rounds:
+The tree (bvh.py) holds float32 boxes in coordinates of its own. A segment is brought there in doubles, cut to what lies
+near the tree, and stored as its middle and half in float32; the slack covers what all this rounds:
 
     middle, w = m - c      2^-24 (S + 2) each, S the largest coordinate (the tree's own are at most 2)
     half, products         2^-24 of themselves, so of the bound |e_i| (S + 2), thrice
@@ -20,10 +20,7 @@ from engine.bounding.box_lanes import lowest_bit
 from engine.bounding.bvh import EMPTY, MAX_DEPTH
 from engine.bounding.row_lanes import LANES
 from engine.bounding.segment_lanes import near_segment
-from engine.bounding.triangle_lanes import AXES_BEFORE, longest_axis, near_triangles
-from engine.clipping.contacts import APART
-from engine.clipping.triangle_contact import triangle_contact
-from engine.jit import inline, kernel, merged
+from engine.jit import kernel, merged
 from engine.predicates.loading import as_point3
 from engine.predicates.orientation import orient3d
 from engine.types import Point3
@@ -65,71 +62,6 @@ def local_segment(p: Point3, q: Point3, origin: Any, inverse: float) -> tuple[An
         tiny,
         True,
     )
-
-
-@inline
-def gather_mesh_contacts(mesh: Any, segment: Any, stack: Any, met: Any, kinds: Any, found: int) -> int:
-    """Append the contacts of a segment (2, 3) to the `found` first of met and kinds; return how many these are then.
-
-    -1 where there is no room. stack: (STACK,) int64.
-    """
-    p, q = as_point3(segment, 0), as_point3(segment, 1)
-    middle, half, slack, tiny, is_near = local_segment(p, q, mesh.origin, mesh.inverse)
-    if not is_near:
-        return found
-    k = longest_axis(half)
-    i, j = AXES_BEFORE[k], AXES_BEFORE[k + 1]
-    turned = (middle[i], middle[j], middle[k])
-    r, s = np.float32(half[i] / half[k]), np.float32(half[j] / half[k])
-    double = np.float32(2.0 * slack)  # 32 u (S + 2) of triangle_lanes.py, and twice what cutting loses
-    reach = np.float32(abs(half[k]) + double)
-    stack[0], depth = 0, 1
-    while depth > 0:  # bound: each node enters the stack once
-        depth -= 1
-        node = stack[depth]
-        if mesh.child[node, 0] >= 0:
-            bits = near_segment(mesh.boxes, node, middle, half, np.float32(slack), np.float32(tiny))
-            while bits != 0:
-                lane = lowest_bit(bits)
-                bits &= bits - 1
-                below = mesh.child[node, lane]
-                if below >= 0:
-                    stack[depth] = below
-                    depth += 1
-            continue
-        bits = near_triangles(mesh.corners, node, i, j, k, turned, r, s, reach, double)
-        while bits != 0:
-            lane = lowest_bit(bits)
-            bits &= bits - 1
-            below = mesh.child[node, lane]
-            if below != EMPTY:
-                element = -1 - below
-                kind = triangle_contact(mesh.elements[element], segment)
-                if kind != APART:
-                    if found == met.size:
-                        return -1
-                    met[found], kinds[found] = element, kind
-                    found += 1
-    return found
-
-
-@kernel
-def find_mesh_contacts(
-    segments: Any, first: int, last: int, mesh: Any, stop: Any, elements_met: Any, kinds: Any, offsets: Any
-) -> int:
-    """Find the contacts of ``segments[first:last]``, (n, 2, 3) float64, with triangles: see `find_contacts_2d`."""
-    stack = np.empty(STACK, np.int64)
-    found = 0
-    offsets[0] = 0
-    for i in range(first, last):
-        after = gather_mesh_contacts(mesh, segments[i], stack, elements_met, kinds, found)
-        if after < 0:
-            return i
-        found = after
-        offsets[i - first + 1] = found
-        if stop[0]:
-            return i + 1
-    return last
 
 
 @kernel

@@ -27,12 +27,12 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.clipping.box_tree import DEEPEST
-from engine.clipping.contacts import PROPER, gather_edge_contacts
+from engine.clipping.contacts import GROUP, PROPER, gather_edges
 from engine.clipping.cut_point import is_safe, point_at
-from engine.clipping.cyrus_beck import is_segment_safe
-from engine.clipping.mesh_contacts import STACK, gather_mesh_contacts
+from engine.clipping.mesh_streams import gather_contacts, streams_for
 from engine.clipping.plane_meeting import T_BOUND
-from engine.jit import inline, kernel, merged
+from engine.clipping.triangle_contact import corner
+from engine.jit import called, inline, kernel, merged
 from engine.predicates.double_double import U2, dd_div
 from engine.predicates.error_free import two_diff, two_prod, two_sum
 from engine.types import UNDECIDED
@@ -43,7 +43,6 @@ OPEN: Final = 1
 UNLOCATED: Final = 2
 """The location of the first end must be told."""
 VALUE_BOUND: Final = 80.0 * U2
-FIRST_ROOM: Final = 64
 
 
 @merged
@@ -85,65 +84,57 @@ def dot(
 
 
 @merged
-def line_values(edge: Any, segment: Any) -> tuple[Any, Any]:
-    """Return s(p) and d for an edge of the plane as double-doubles, each with its bound."""
-    u, u_low = two_diff(edge[1, 0], edge[0, 0])
-    v, v_low = two_diff(edge[1, 1], edge[0, 1])
-    x, x_low = two_diff(segment[0, 0], edge[0, 0])
-    y, y_low = two_diff(segment[0, 1], edge[0, 1])
+def line_values(elements: Any, element: int, segments: Any, item: int) -> tuple[Any, Any]:
+    """Return s(p) and d for one of some edges (k, 2, 2) as double-doubles, each with its bound."""
+    ax, ay = elements[element, 0, 0], elements[element, 0, 1]
+    px, py = segments[item, 0, 0], segments[item, 0, 1]
+    u, u_low = two_diff(elements[element, 1, 0], ax)
+    v, v_low = two_diff(elements[element, 1, 1], ay)
+    x, x_low = two_diff(px, ax)
+    y, y_low = two_diff(py, ay)
     h, low, size = minor(u, u_low, y, y_low, v, v_low, x, x_low)
     h, low = two_sum(h, low)
-    x, x_low = two_diff(segment[0, 0], segment[1, 0])
-    y, y_low = two_diff(segment[0, 1], segment[1, 1])
+    x, x_low = two_diff(px, segments[item, 1, 0])
+    y, y_low = two_diff(py, segments[item, 1, 1])
     g, g_low, g_size = minor(u, u_low, y, y_low, v, v_low, x, x_low)
     g, g_low = two_sum(g, g_low)
     return (h, low, VALUE_BOUND * size), (g, g_low, VALUE_BOUND * g_size)
 
 
 @merged
-def plane_values(triangle: Any, segment: Any) -> tuple[Any, Any]:
-    """Return s(p) and d for a triangle of space as double-doubles, each with its bound."""
-    ux, ux_low = two_diff(triangle[1, 0], triangle[0, 0])
-    uy, uy_low = two_diff(triangle[1, 1], triangle[0, 1])
-    uz, uz_low = two_diff(triangle[1, 2], triangle[0, 2])
-    vx, vx_low = two_diff(triangle[2, 0], triangle[0, 0])
-    vy, vy_low = two_diff(triangle[2, 1], triangle[0, 1])
-    vz, vz_low = two_diff(triangle[2, 2], triangle[0, 2])
+def plane_values(elements: Any, element: int, segments: Any, item: int) -> tuple[Any, Any]:
+    """Return s(p) and d for one of some triangles (k, 3, 3) as double-doubles, each with its bound."""
+    a, b, c = corner(elements, element, 0), corner(elements, element, 1), corner(elements, element, 2)
+    p, q = corner(segments, item, 0), corner(segments, item, 1)
+    ux, ux_low = two_diff(b.x, a.x)
+    uy, uy_low = two_diff(b.y, a.y)
+    uz, uz_low = two_diff(b.z, a.z)
+    vx, vx_low = two_diff(c.x, a.x)
+    vy, vy_low = two_diff(c.y, a.y)
+    vz, vz_low = two_diff(c.z, a.z)
     nx = minor(uy, uy_low, vz, vz_low, uz, uz_low, vy, vy_low)
     ny = minor(uz, uz_low, vx, vx_low, ux, ux_low, vz, vz_low)
     nz = minor(ux, ux_low, vy, vy_low, uy, uy_low, vx, vx_low)
-    at_p = dot(
-        nx,
-        ny,
-        nz,
-        two_diff(segment[0, 0], triangle[0, 0]),
-        two_diff(segment[0, 1], triangle[0, 1]),
-        two_diff(segment[0, 2], triangle[0, 2]),
-    )
-    along = dot(
-        nx,
-        ny,
-        nz,
-        two_diff(segment[0, 0], segment[1, 0]),
-        two_diff(segment[0, 1], segment[1, 1]),
-        two_diff(segment[0, 2], segment[1, 2]),
-    )
+    at_p = dot(nx, ny, nz, two_diff(p.x, a.x), two_diff(p.y, a.y), two_diff(p.z, a.z))
+    along = dot(nx, ny, nz, two_diff(p.x, q.x), two_diff(p.y, q.y), two_diff(p.z, q.z))
     return at_p, along
 
 
 @merged
-def is_element_safe(element: Any) -> bool:
-    """Tell whether every coordinate of an element is zero or of a size for which double-doubles keep their bounds."""
+def is_item_safe(items: Any, item: int) -> bool:
+    """Tell whether every coordinate of an item is zero or of a size for which double-doubles keep their bounds."""
     safe = True
-    for corner in range(element.shape[0]):
-        for k in range(element.shape[1]):
-            safe = safe and is_safe(element[corner, k])
+    for place in range(items.shape[1]):
+        for k in range(items.shape[2]):
+            safe &= is_safe(items[item, place, k])
     return safe
 
 
 @merged
-def cut_at(segment: Any, element: Any, at_p: Any, along: Any, point: Any) -> tuple[float, bool]:
-    """Set `point` to where a segment crosses an element; return t and whether all is surely the nearest double."""
+def cut_at(
+    segments: Any, item: int, elements: Any, element: int, at_p: Any, along: Any, points: Any, row: int
+) -> tuple[float, bool]:
+    """Set a row of `points` to where a segment crosses an element; return t and whether all is surely nearest."""
     s, s_low, s_bound = at_p
     d, d_low, d_bound = along
     th, tl = dd_div(s, s_low, d, d_low)
@@ -151,25 +142,23 @@ def cut_at(segment: Any, element: Any, at_p: Any, along: Any, point: Any) -> tup
     sure = (r < 0.001) & (abs(d) >= 2.0**-400) & (abs(d) <= 2.0**400) & (abs(s) >= 2.0**-500)
     bound = (T_BOUND + r) * th
     sure &= th + (tl - bound) == th + (tl + bound)
-    for k in range(point.size):
-        level = element[0, k]
+    for k in range(points.shape[1]):
+        level = elements[element, 0, k]
         is_level = True
-        for corner in range(1, element.shape[0]):
-            is_level &= element[corner, k] == level
+        for place in range(1, elements.shape[1]):
+            is_level &= elements[element, place, k] == level
         if is_level:  # case: a face or edge across an axis, whose coordinate is the point's
-            point[k] = level
+            points[row, k] = level
             continue
-        x, is_x = point_at(segment[0, k], segment[1, k], th, tl, r)
-        point[k] = x + 0.0
+        x, is_x = point_at(segments[item, 0, k], segments[item, 1, k], th, tl, r)
+        points[row, k] = x + 0.0
         sure &= is_x
     return th + tl, sure
 
 
 class Crossings(NamedTuple):
-    """Room for what one segment meets."""
+    """The crossings of a group of segments, those of each in a row; as many of each array as there is room for."""
 
-    met: Any
-    kinds: Any
     t: Any
     points: Any
     order: Any
@@ -185,67 +174,106 @@ class Rows(NamedTuple):
     faces: Any
 
 
+class Group(NamedTuple):
+    """Segments that are cut together, and what is known of their first ends."""
+
+    segments: Any
+    """(m, 2, dim)"""
+    locations: Any
+    """(m,) of first ends, UNDECIDED where they are not known yet."""
+    turns: Any
+    """(m,) where those follow from parity: twice how often the location turns over on the way out, and 1 more where
+    that begins at the last end; else -1."""
+    ways: Any
+    """(n, 2, dim) ways from an end out of the boundary's box."""
+    askers: Any
+    """(n, 2) for each way the place of its segment in the group, and at which end it begins."""
+
+
 @inline
-def crossings_for(n: int, dimension: int) -> Crossings:
-    """Return room for n contacts."""
-    return Crossings(
-        np.empty(n, np.int64), np.empty(n, np.uint8), np.empty(n), np.empty((n, dimension)), np.empty(n, np.int64)
+def group_for(size: int, dimension: int) -> Group:
+    """Return room for a group of so many segments."""
+    shape = (size, 2, dimension)
+    return Group(
+        np.empty(shape),
+        np.empty(size, np.int8),
+        np.empty(size, np.int64),
+        np.empty(shape),
+        np.empty((size, 2), np.int64),
     )
 
 
 @inline
-def sort_crossings(cuts: Crossings, n: int) -> bool:
-    """Set the order of n crossings by t; False where two are equal."""
+def crossings_for(n: int, dimension: int) -> Crossings:
+    """Return room for n contacts."""
+    return Crossings(np.empty(n), np.empty((n, dimension)), np.empty(n, np.int64))
+
+
+@inline
+def sort_crossings(cuts: Crossings, first: int, n: int) -> bool:
+    """Set the order of n crossings from `first` on by t; False where two are equal."""
     t, order = cuts.t, cuts.order
-    for i in range(n):
+    for i in range(first, first + n):
         order[i] = i
     gap = n // 2
     while gap > 0:  # bound: gap is halved; Shell's sort, n^1.5 steps
-        for i in range(gap, n):
+        for i in range(first + gap, first + n):
             moved, j = order[i], i
-            while j >= gap and t[order[j - gap]] > t[moved]:
+            while j >= first + gap and t[order[j - gap]] > t[moved]:
                 order[j] = order[j - gap]
                 j -= gap
             order[j] = moved
         gap //= 2
     differ = True
-    for i in range(1, n):
+    for i in range(first + 1, first + n):
         differ &= t[order[i - 1]] != t[order[i]]
     return differ
 
 
 @inline
-def emit(segment: Any, item: int, is_inside: bool, cuts: Crossings, n: int, faces: Any, row: int, out: Rows) -> int:
+def emit(
+    segments: Any,
+    item: int,
+    source: int,
+    is_inside: bool,
+    cuts: Crossings,
+    first: int,
+    n: int,
+    met: Any,
+    faces: Any,
+    row: int,
+    out: Rows,
+) -> int:
     """Write the pieces between n crossings to the rows of `out` from `row` on; return the row after them."""
     if is_inside:
-        out.source[row], out.t[row, 0], out.faces[row, 0] = item, 0.0, -1
-        for k in range(segment.shape[1]):
-            out.start[row, k] = segment[0, k] + 0.0
-    for place in range(n):
+        out.source[row], out.t[row, 0], out.faces[row, 0] = source, 0.0, -1
+        for k in range(segments.shape[2]):
+            out.start[row, k] = segments[item, 0, k] + 0.0
+    for place in range(first, first + n):
         i = cuts.order[place]
         if is_inside:
-            out.t[row, 1], out.faces[row, 1] = cuts.t[i], faces[cuts.met[i]]
-            for k in range(segment.shape[1]):
+            out.t[row, 1], out.faces[row, 1] = cuts.t[i], faces[met[i]]
+            for k in range(segments.shape[2]):
                 out.end[row, k] = cuts.points[i, k]
             row += 1
         else:
-            out.source[row], out.t[row, 0], out.faces[row, 0] = item, cuts.t[i], faces[cuts.met[i]]
-            for k in range(segment.shape[1]):
+            out.source[row], out.t[row, 0], out.faces[row, 0] = source, cuts.t[i], faces[met[i]]
+            for k in range(segments.shape[2]):
                 out.start[row, k] = cuts.points[i, k]
         is_inside = not is_inside
     if is_inside:
         out.t[row, 1], out.faces[row, 1] = 1.0, -1
-        for k in range(segment.shape[1]):
-            out.end[row, k] = segment[1, k] + 0.0
+        for k in range(segments.shape[2]):
+            out.end[row, k] = segments[item, 1, k] + 0.0
         row += 1
     return row
 
 
 @inline
-def all_proper(kinds: Any, n: int) -> bool:
-    """Tell whether the first n contacts are proper crossings."""
+def all_proper(kinds: Any, first: int, last: int) -> bool:
+    """Tell whether some contacts are proper crossings."""
     are_proper = True
-    for i in range(n):
+    for i in range(first, last):
         are_proper &= kinds[i] == PROPER
     return are_proper
 
@@ -274,12 +302,88 @@ def way_out(segment: Any, beyond: Any, way: Any) -> int:
 
 
 @inline
-def is_point(segment: Any) -> bool:
-    """Tell whether a segment has no length."""
-    are_equal = True
-    for k in range(segment.shape[1]):
-        are_equal &= segment[0, k] == segment[1, k]
-    return are_equal
+def load_group(group: Group, segments: Any, chosen: Any, locations: Any, beyond: Any, first: int, last: int) -> int:
+    """Load the chosen segments first .. last - 1, and ways out where the first end is not known; return how many.
+
+    beyond: see `Mesh`.
+    """
+    n_ways = 0
+    for place in range(first, last):
+        item, segment = place - first, segments[chosen[place]]
+        for k in range(segment.shape[1]):
+            group.segments[item, 0, k], group.segments[item, 1, k] = segment[0, k], segment[1, k]
+        group.locations[item], group.turns[item] = locations[place], -1
+        if locations[place] == UNDECIDED:
+            end = way_out(segment, beyond, group.ways[n_ways])
+            if end >= 0:
+                group.askers[n_ways, 0], group.askers[n_ways, 1] = item, end
+                n_ways += 1
+            elif end == -1:
+                group.locations[item] = -1
+            elif end == -2:
+                group.turns[item] = 1
+    return n_ways
+
+
+@inline
+def count_turns(group: Group, n_ways: int, offsets: Any, kinds: Any) -> None:
+    """Count how often the location turns over on each way, where all its contacts, at these offsets, are proper."""
+    for way in range(n_ways):
+        if all_proper(kinds, offsets[way], offsets[way + 1]):
+            group.turns[group.askers[way, 0]] = 2 * (offsets[way + 1] - offsets[way]) + group.askers[way, 1]
+
+
+@called
+def cut_group(
+    group: Group,
+    chosen: Any,
+    first: int,
+    last: int,
+    elements: Any,
+    faces: Any,
+    offsets: Any,
+    met: Any,
+    kinds: Any,
+    cuts: Crossings,
+    out: Rows,
+    row: int,
+    state: Any,
+) -> tuple[int, int]:
+    """Cut the chosen segments first .. last - 1, a group, at their contacts; return the place reached, and the row.
+
+    Short of the end where there is no room in `out`. See `cut_on_outline`.
+    """
+    segments, dimension = group.segments, group.segments.shape[2]
+    for place in range(first, last):
+        item = place - first
+        location, turns = group.locations[item], group.turns[item]
+        begin, end = offsets[item], offsets[item + 1]
+        found = end - begin
+        if turns >= 0:
+            location = 1 if (turns // 2 + (found if turns % 2 == 1 else 0)) % 2 == 1 else -1
+        state[place] = OPEN
+        if not all_proper(kinds, begin, end) or (found > 0 and location == 0):
+            continue
+        if location == UNDECIDED:
+            state[place] = UNLOCATED
+            continue
+        if row + found // 2 + 1 > out.source.size:
+            return place, row
+        sure = found == 0 or is_item_safe(segments, item)
+        for i in range(begin, end):
+            element = met[i]
+            if not (sure and is_item_safe(elements, element)):
+                sure = False
+                break
+            if dimension == 2:
+                at_p, along = line_values(elements, element, segments, item)
+            else:
+                at_p, along = plane_values(elements, element, segments, item)
+            cuts.t[i], sure = cut_at(segments, item, elements, element, at_p, along, cuts.points, i)
+        if sure and sort_crossings(cuts, begin, found):
+            row = emit(segments, item, chosen[place], location >= 0, cuts, begin, found, met, faces, row, out)
+            state[place] = SETTLED
+    return last, row
 
 
 @kernel
@@ -291,46 +395,41 @@ def cut_on_outline(
     chosen: (m,) int64. locations: (m,) int8 of their first ends, UNDECIDED where they are not known. outline: see
     `Outline`. stop: one uint8, polled. state: (m,) uint8, SETTLED, OPEN or UNLOCATED. n: the place in `chosen` to begin
     with, afterwards where to go on, short of the end where there is no room; how many rows are filled; and for how many
-    contacts of one segment there is to be room.
+    contacts of a group of segments there is to be room.
     """
-    stack, way, cuts, row = np.empty(DEEPEST, np.int64), np.empty((2, 2)), crossings_for(n[2], 2), 0
-    for place in range(n[0], chosen.size):
-        n[0], n[1] = place, row
-        item = chosen[place]
-        segment, location, found = segments[item], locations[place], 0
-        if stop[0]:
+    size, last, row = min(GROUP, chosen.size - n[0]), n[0], 0
+    group, cuts = group_for(size, 2), crossings_for(n[2], 2)
+    met, kinds, offsets = np.empty(n[2], np.int64), np.empty(n[2], np.uint8), np.empty(size + 1, np.int64)
+    stack = np.empty(DEEPEST, np.int64)
+    n[1] = 0
+    while last < chosen.size:
+        first, last = last, min(last + size, chosen.size)
+        n_ways = load_group(group, segments, chosen, locations, outline.beyond, first, last)
+        reached, n_items = gather_edges(group.ways, 0, n_ways, outline, stop, stack, met, kinds, offsets), last - first
+        if reached == n_ways:
+            count_turns(group, n_ways, offsets, kinds)
+            reached = gather_edges(group.segments, 0, n_items, outline, stop, stack, met, kinds, offsets) + n_ways
+        if reached < n_ways + n_items:
+            n[2] *= 2
             return
-        if not is_point(segment):
-            found = gather_edge_contacts(outline, segment, stack, cuts.met, cuts.kinds, 0)
-        if found < 0:
-            n[2] = 2 * cuts.met.size
+        n[0], row = cut_group(
+            group,
+            chosen,
+            first,
+            last,
+            outline.elements,
+            outline.faces,
+            offsets,
+            met,
+            kinds,
+            cuts,
+            out,
+            row,
+            state,
+        )
+        n[1] = row
+        if n[0] < last:
             return
-        state[place] = OPEN
-        if not all_proper(cuts.kinds, found) or (found > 0 and location == 0):
-            continue
-        if location == UNDECIDED:
-            end, turns = way_out(segment, outline.beyond, way), 0
-            if end >= 0:
-                turns = gather_edge_contacts(outline, way, stack, cuts.met[found:], cuts.kinds[found:], 0)
-            if end == -3 or turns < 0 or not all_proper(cuts.kinds[found:], turns):
-                state[place] = UNLOCATED
-                continue
-            turns += found if end == 1 or end == -2 else 0
-            location = 1 if turns % 2 == 1 else -1
-        if row + found // 2 + 1 > out.source.size:
-            return
-        sure = found == 0 or is_segment_safe(segment)
-        for i in range(found):
-            element = outline.elements[cuts.met[i]]
-            if not (sure and is_element_safe(element)):
-                sure = False
-                break
-            at_p, along = line_values(element, segment)
-            cuts.t[i], sure = cut_at(segment, element, at_p, along, cuts.points[i])
-        if sure and sort_crossings(cuts, found):
-            row = emit(segment, item, location >= 0, cuts, found, outline.faces, row, out)
-            state[place] = SETTLED
-    n[0], n[1] = chosen.size, row
 
 
 @kernel
@@ -338,41 +437,34 @@ def cut_on_mesh(
     segments: Any, chosen: Any, locations: Any, mesh: Any, stop: Any, out: Rows, state: Any, n: Any
 ) -> None:
     """Cut the ``chosen`` of some segments (n, 2, 3) float64 on a polyhedron, `Mesh`: see `cut_on_outline`."""
-    stack, way, cuts, row = np.empty(STACK, np.int64), np.empty((2, 3)), crossings_for(n[2], 3), 0
-    for place in range(n[0], chosen.size):
-        n[0], n[1] = place, row
-        item = chosen[place]
-        segment, location, found = segments[item], locations[place], 0
-        if stop[0]:
-            return
-        if not is_point(segment):
-            found = gather_mesh_contacts(mesh, segment, stack, cuts.met, cuts.kinds, 0)
+    size, last, row = min(GROUP, chosen.size - n[0]), n[0], 0
+    group, streams, cuts = group_for(size, 3), streams_for(size, n[2]), crossings_for(n[2], 3)
+    n[1] = 0
+    while last < chosen.size:
+        first, last = last, min(last + size, chosen.size)
+        n_ways = load_group(group, segments, chosen, locations, mesh.beyond, first, last)
+        found = gather_contacts(streams, mesh, group.ways, n_ways, stop)
+        if found >= 0:
+            count_turns(group, n_ways, streams.offsets, streams.kinds)
+            found = gather_contacts(streams, mesh, group.segments, last - first, stop)
         if found < 0:
-            n[2] = 2 * cuts.met.size
+            n[2] *= 2
             return
-        state[place] = OPEN
-        if not all_proper(cuts.kinds, found) or (found > 0 and location == 0):
-            continue
-        if location == UNDECIDED:
-            end, turns = way_out(segment, mesh.beyond, way), 0
-            if end >= 0:
-                turns = gather_mesh_contacts(mesh, way, stack, cuts.met[found:], cuts.kinds[found:], 0)
-            if end == -3 or turns < 0 or not all_proper(cuts.kinds[found:], turns):
-                state[place] = UNLOCATED
-                continue
-            turns += found if end == 1 or end == -2 else 0
-            location = 1 if turns % 2 == 1 else -1
-        if row + found // 2 + 1 > out.source.size:
+        n[0], row = cut_group(
+            group,
+            chosen,
+            first,
+            last,
+            mesh.elements,
+            mesh.faces,
+            streams.offsets,
+            streams.met,
+            streams.kinds,
+            cuts,
+            out,
+            row,
+            state,
+        )
+        n[1] = row
+        if n[0] < last:
             return
-        sure = found == 0 or is_segment_safe(segment)
-        for i in range(found):
-            element = mesh.elements[cuts.met[i]]
-            if not (sure and is_element_safe(element)):
-                sure = False
-                break
-            at_p, along = plane_values(element, segment)
-            cuts.t[i], sure = cut_at(segment, element, at_p, along, cuts.points[i])
-        if sure and sort_crossings(cuts, found):
-            row = emit(segment, item, location >= 0, cuts, found, mesh.faces, row, out)
-            state[place] = SETTLED
-    n[0], n[1] = chosen.size, row

@@ -17,21 +17,18 @@ from __future__ import annotations
 from typing import Any, Final
 
 from engine.clipping.contacts import APART, DEGENERATE, PROPER
-from engine.jit import inline, merged
-from engine.predicates.loading import as_point3
+from engine.jit import called, merged
 from engine.predicates.orientation import orient3d
-from engine.types import UNDECIDED
+from engine.types import UNDECIDED, Point3
 
 EDGE_BOUND: Final = 2.0**-48
 END_BOUND: Final = 2.0**-45
 UNDERFLOW: Final = 2.0**-700
 
 
-@inline
-def exact_contact(triangle: Any, segment: Any) -> int:
-    """Return how a segment (2, 3) and a triangle (3, 3) meet, by exact signs."""
-    a, b, c = as_point3(triangle, 0), as_point3(triangle, 1), as_point3(triangle, 2)
-    p, q = as_point3(segment, 0), as_point3(segment, 1)
+@called
+def exact_contact(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3) -> int:
+    """Return how a segment p q and a triangle a b c meet, by exact signs."""
     of_p, of_q = orient3d(a, b, c, p), orient3d(a, b, c, q)
     if of_p == of_q and (of_p == 1 or of_p == -1):
         return APART
@@ -46,13 +43,12 @@ def exact_contact(triangle: Any, segment: Any) -> int:
 
 
 @merged
-def contact_filter(triangle: Any, segment: Any) -> int:
+def contact_filter(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3) -> int:
     """Return how a segment and a triangle meet where rounding cannot have changed it, else UNDECIDED."""
-    px, py, pz = segment[0, 0], segment[0, 1], segment[0, 2]
-    ex, ey, ez = segment[1, 0] - px, segment[1, 1] - py, segment[1, 2] - pz
-    ax, ay, az = triangle[0, 0] - px, triangle[0, 1] - py, triangle[0, 2] - pz
-    bx, by, bz = triangle[1, 0] - px, triangle[1, 1] - py, triangle[1, 2] - pz
-    cx, cy, cz = triangle[2, 0] - px, triangle[2, 1] - py, triangle[2, 2] - pz
+    ex, ey, ez = q.x - p.x, q.y - p.y, q.z - p.z
+    ax, ay, az = a.x - p.x, a.y - p.y, a.z - p.z
+    bx, by, bz = b.x - p.x, b.y - p.y, b.z - p.z
+    cx, cy, cz = c.x - p.x, c.y - p.y, c.z - p.z
     nx, ny, nz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
     ab = ex * (ay * bz - az * by) + ey * (az * bx - ax * bz) + ez * (ax * by - ay * bx)
     bc = ex * nx + ey * ny + ez * nz
@@ -74,8 +70,18 @@ def contact_filter(triangle: Any, segment: Any) -> int:
     return PROPER if least < -bound and most > bound else UNDECIDED
 
 
-@inline
-def triangle_contact(triangle: Any, segment: Any) -> int:
-    """Return how a segment (2, 3) and a triangle (3, 3) meet."""
-    kind = contact_filter(triangle, segment)
-    return kind if kind != UNDECIDED else exact_contact(triangle, segment)
+@merged
+def triangle_contact(elements: Any, element: int, segments: Any, item: int) -> int:
+    """Return how one of some segments (m, 2, 3) and one of some triangles (k, 3, 3) meet."""
+    a, b, c = corner(elements, element, 0), corner(elements, element, 1), corner(elements, element, 2)
+    p, q = corner(segments, item, 0), corner(segments, item, 1)
+    kind = contact_filter(a, b, c, p, q)
+    return kind if kind != UNDECIDED else exact_contact(a, b, c, p, q)
+
+
+@merged
+def corner(elements: Any, element: int, place: int) -> Point3:
+    """Return a corner of one of some elements (k, corners, 3)."""
+    return Point3(
+        float(elements[element, place, 0]), float(elements[element, place, 1]), float(elements[element, place, 2])
+    )

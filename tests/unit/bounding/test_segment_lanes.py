@@ -8,7 +8,8 @@ from engine.bounding.bvh import build_bvh
 from engine.bounding.segment_lanes import plain_near_segment
 from engine.clipping.boundary import Mesh, mesh_of
 from engine.clipping.contacts import APART
-from engine.clipping.mesh_contacts import find_mesh_contacts, is_clear, local_segment
+from engine.clipping.mesh_contacts import is_clear, local_segment
+from engine.clipping.mesh_streams import find_mesh_contacts
 from engine.clipping.triangle_contact import exact_contact
 from engine.types import Point3
 
@@ -50,7 +51,7 @@ def test_contacts_are_those_of_all_triangles() -> None:
     expected: list[set[tuple[int, int]]] = [set() for _ in segments]
     for i, triangle in enumerate(corners):
         for k, segment in enumerate(segments):
-            kind = exact_contact(triangle, segment)
+            kind = exact_contact(*(Point3(*row) for row in (*triangle.tolist(), *segment.tolist())))
             if kind != APART:
                 expected[k].add((i, kind))
     assert any(expected)

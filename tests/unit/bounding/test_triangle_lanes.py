@@ -45,8 +45,9 @@ def test_triangles_met_are_near(scale: float) -> None:
                 np.float32(half[i] / half[k]), np.float32(half[j] / half[k]), np.float32(abs(half[k]) + double), double,
             )  # fmt: skip
             for node in np.flatnonzero(mesh.child[:, 0] < 0):
-                lanes = plain_near_triangles(mesh.corners, node, *arguments)
-                assert asked(mesh.corners, node, *arguments) == lanes
+                block = node - mesh.n_inner
+                lanes = plain_near_triangles(mesh.corners, block, *arguments)
+                assert asked(mesh.corners, block, *arguments) == lanes
                 for lane, item in enumerate(-1 - mesh.child[node].astype(int)):
                     if item < len(met) and item >= 0 and length <= 1.0:  # longer ones: rounding moves the point off
                         assert lanes >> lane & 1
