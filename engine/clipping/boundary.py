@@ -46,6 +46,8 @@ class Mesh(NamedTuple):
     """boxes, child, origin, 1 / scale: see `Bvh`, but inner nodes stand before all blocks, close to each other."""
     n_inner: int
     """How many they are; unless there is but one block, they begin with the root."""
+    n_levels: int
+    """How many inner nodes stand above one another at most."""
     corners: npt.NDArray[np.float32]
     """(n_blocks, 9, 8), see `corners_of`."""
 
@@ -85,6 +87,7 @@ def mesh_of(elements: FloatArray, faces: IntArray) -> Mesh:
         tree.origin,
         1.0 / tree.scale,
         n_inner,
+        _levels_of(tree.child[:n_inner]),
         corners_of(tree, n_inner, elements),
     )
 
@@ -104,6 +107,17 @@ def _beyond(low: FloatArray, high: FloatArray) -> FloatArray:
     """Return the coordinates next below and next above all boxes, infinite where there are none."""
     with np.errstate(over="ignore"):
         return np.stack([np.nextafter(low.min(axis=0), -np.inf), np.nextafter(high.max(axis=0), np.inf)])
+
+
+def _levels_of(child: npt.NDArray[np.int32]) -> int:
+    """Return on how many levels the inner nodes of a tree stand, from their children."""
+    n_levels = 0
+    level: npt.NDArray[np.int32] = np.zeros(min(len(child), 1), np.int32)
+    while len(level):
+        below = child[level].ravel()
+        level = below[(below >= 0) & (below < len(child))]
+        n_levels += 1
+    return n_levels
 
 
 def corners_of(tree: Bvh, n_inner: int, elements: FloatArray) -> npt.NDArray[np.float32]:

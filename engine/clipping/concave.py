@@ -77,6 +77,8 @@ def clip_chunk(
 
 def _joined(parts: list[Rows], n_beyond: int, n_rational: int) -> PieceRows:
     """Return the rows of some parts by source; pieces of one segment stand together in one part."""
+    if len(parts) == 1:
+        return PieceRows(*parts[0], n_beyond, n_rational)
     rows = Rows(*(np.concatenate(arrays) for arrays in zip(*parts)))
     if (rows.source[1:] < rows.source[:-1]).any():
         order = np.argsort(rows.source, kind="stable")
@@ -90,7 +92,7 @@ def _settle(
     """Return the pieces of those chosen segments that the kernel settles, and the state of each."""
     state = np.full(len(chosen), OPEN, np.uint8)
     kernel: Any = cut_on_mesh if isinstance(boundary, Mesh) else cut_on_outline
-    parts, room = [_rows(0, segments.shape[2])], _LEAST_ROOM + len(chosen)
+    parts, room = [], _LEAST_ROOM + len(chosen)
     done = np.array([0, 0, _LEAST_ROOM + _CONTACTS * min(GROUP, len(chosen))])
     while done[0] < len(chosen):
         reached, rows = int(done[0]), _rows(room, segments.shape[2])
@@ -100,7 +102,7 @@ def _settle(
         if done[0] == reached:
             room *= 2  # of rows, if not of contacts
         parts.append(Rows(*(array[: done[1]] for array in rows)))
-    return parts, state
+    return parts or [_rows(0, segments.shape[2])], state
 
 
 def _rows(n: int, dimension: int) -> Rows:

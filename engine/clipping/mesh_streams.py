@@ -22,7 +22,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.bounding.box_lanes import lowest_bit
-from engine.bounding.bvh import EMPTY, MAX_DEPTH
+from engine.bounding.bvh import EMPTY
 from engine.bounding.prefetching import prefetch
 from engine.bounding.row_lanes import LANES
 from engine.bounding.segment_lanes import near_segment
@@ -38,6 +38,8 @@ NO_ROOM: Final = -1
 STOPPED: Final = -2
 _PAIRS: Final = 16
 """Pairs of block and segment that wait at once, for each segment of a full group: more than one list adds."""
+_TRIANGLES: Final = 4096
+"""Triangles that wait at once: should all need exact signs, a few milliseconds."""
 _SEGMENT: Final = (1 << 16) - 1
 _BITS: Final = (1 << LANES) - 1
 
@@ -55,7 +57,7 @@ class Streams(NamedTuple):
     found: Any
     """(m,) the answers of a node to its list."""
     stack: Any
-    """(STACK, 3) nodes that wait, begin and end of their lists."""
+    """(n, 3) nodes that wait, begin and end of their lists."""
     pairs: Any
     """Blocks and segments that wait, later with the bits of the block's triangles."""
     waiting: Any
@@ -73,17 +75,17 @@ class Streams(NamedTuple):
 
 
 @inline
-def streams_for(n_segments: int, n_contacts: int) -> Streams:
+def streams_for(mesh: Any, n_segments: int, n_contacts: int) -> Streams:
     """Return room for groups of so many segments at most, and so many contacts of a group."""
     n_pairs = _PAIRS * n_segments
     return Streams(
         np.empty((n_segments, 16), np.float32),
         np.empty(n_segments, np.int64),
-        np.empty(n_segments * (1 + LANES * MAX_DEPTH), np.int32),
+        np.empty(n_segments * (1 + LANES * mesh.n_levels), np.int32),
         np.empty(n_segments, np.int64),
-        np.empty((LANES * MAX_DEPTH, 3), np.int64),
+        np.empty((LANES * mesh.n_levels + 1, 3), np.int64),
         np.empty(n_pairs, np.int64),
-        np.empty(LANES * n_pairs, np.int64),
+        np.empty(_TRIANGLES, np.int64),
         np.empty(n_contacts, np.int32),
         np.empty(n_contacts, np.int64),
         np.empty(n_contacts, np.uint8),
@@ -118,8 +120,8 @@ def _load(streams: Any, mesh: Any, segments: Any, n: int) -> int:
 
 
 @inline
-def _settle_pairs(streams: Any, mesh: Any, segments: Any, n_pairs: int, n_contacts: int) -> int:
-    """Append the contacts of the pairs that wait; return how many there are then, NO_ROOM where they have no room."""
+def _settle_pairs(streams: Any, mesh: Any, segments: Any, n_pairs: int, n_contacts: int, stop: Any) -> int:
+    """Append the contacts of the pairs that wait; return how many there are then, or what `gather_contacts` does."""
     corners, pairs, waiting = mesh.corners, streams.pairs, streams.waiting
     n_kept = 0
     for place in range(n_pairs):
@@ -143,21 +145,36 @@ def _settle_pairs(streams: Any, mesh: Any, segments: Any, n_pairs: int, n_contac
         )
         pairs[n_kept] = (pair << LANES) | bits
         n_kept += bits != 0
-    n_waiting = 0
-    for place in range(n_kept):
-        pair = pairs[place]
-        bits, item, block = pair & _BITS, (pair >> LANES) & _SEGMENT, pair >> (16 + LANES)
-        while bits != 0:
-            below = mesh.child[mesh.n_inner + block, lowest_bit(bits)]
-            bits &= bits - 1
-            if below != EMPTY:
-                waiting[n_waiting] = ((-1 - below) << 16) | item
-                n_waiting += 1
+    place = 0
+    while place < n_kept:
+        n_waiting = 0
+        while place < n_kept and n_waiting + LANES <= waiting.size:
+            pair = pairs[place]
+            bits, item, block = pair & _BITS, (pair >> LANES) & _SEGMENT, pair >> (16 + LANES)
+            place += 1
+            while bits != 0:
+                below = mesh.child[mesh.n_inner + block, lowest_bit(bits)]
+                bits &= bits - 1
+                if below != EMPTY:
+                    waiting[n_waiting] = ((-1 - below) << 16) | item
+                    n_waiting += 1
+        n_contacts = _settle_triangles(streams, mesh, segments, n_waiting, n_contacts)
+        if n_contacts < 0:
+            break
+        if stop[0]:
+            return STOPPED
+    return n_contacts
+
+
+@inline
+def _settle_triangles(streams: Any, mesh: Any, segments: Any, n_waiting: int, n_contacts: int) -> int:
+    """Append the contacts of the triangles that wait, as `_settle_pairs` does."""
+    waiting = streams.waiting
     for place in range(n_waiting):
-        coming = (waiting[min(place + AHEAD, n_waiting - 1)] >> 16) * 9
-        prefetch(mesh.elements, coming)
-        prefetch(mesh.elements, coming + 8)
-        prefetch(mesh.faces, waiting[place] >> 16)
+        coming = waiting[min(place + AHEAD, n_waiting - 1)] >> 16
+        prefetch(mesh.elements, coming * 9)
+        prefetch(mesh.elements, coming * 9 + 8)
+        prefetch(mesh.faces, coming)
         item, element = waiting[place] & _SEGMENT, waiting[place] >> 16
         kind = triangle_contact(mesh.elements, element, segments, item)
         if kind != APART:
@@ -209,7 +226,7 @@ def gather_contacts(streams: Any, mesh: Any, segments: Any, n: int, stop: Any) -
         depth -= 1
         node, begin, end = stack[depth, 0], stack[depth, 1], stack[depth, 2]
         if n_pairs + LANES * (end - begin) > pairs.size:
-            n_contacts = _settle_pairs(streams, mesh, segments, n_pairs, n_contacts)
+            n_contacts = _settle_pairs(streams, mesh, segments, n_pairs, n_contacts, stop)
             n_pairs = 0
             if n_contacts < 0:
                 return n_contacts
@@ -241,7 +258,7 @@ def gather_contacts(streams: Any, mesh: Any, segments: Any, n: int, stop: Any) -
             prefetch(mesh.child, below * LANES)
             for line in range(0, 6 * LANES, 16):
                 prefetch(mesh.boxes, below * (6 * LANES) + line)
-    n_contacts = _settle_pairs(streams, mesh, segments, n_pairs, n_contacts)
+    n_contacts = _settle_pairs(streams, mesh, segments, n_pairs, n_contacts, stop)
     if n_contacts >= 0:
         _by_segment(streams, n, n_contacts)
     return n_contacts
@@ -253,7 +270,7 @@ def find_mesh_contacts(
 ) -> int:
     """Find the contacts of ``segments[first:last]``, (n, 2, 3) float64, with triangles: see `find_contacts_2d`."""
     size, found = max(1, min(GROUP, last - first)), 0
-    streams = streams_for(size, elements_met.size)
+    streams = streams_for(mesh, size, elements_met.size)
     offsets[0] = 0
     for start in range(first, last, size):
         n = min(size, last - start)

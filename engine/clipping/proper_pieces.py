@@ -345,13 +345,14 @@ def cut_group(
     met: Any,
     kinds: Any,
     cuts: Crossings,
+    stop: Any,
     out: Rows,
     row: int,
     state: Any,
 ) -> tuple[int, int]:
     """Cut the chosen segments first .. last - 1, a group, at their contacts; return the place reached, and the row.
 
-    Short of the end where there is no room in `out`. See `cut_on_outline`.
+    Short of the end where there is no room in `out`, or `stop` is set. See `cut_on_outline`.
     """
     segments, dimension = group.segments, group.segments.shape[2]
     for place in range(first, last):
@@ -362,6 +363,8 @@ def cut_group(
         if turns >= 0:
             location = 1 if (turns // 2 + (found if turns % 2 == 1 else 0)) % 2 == 1 else -1
         state[place] = OPEN
+        if stop[0]:
+            return place, row
         if not all_proper(kinds, begin, end) or (found > 0 and location == 0):
             continue
         if location == UNDECIDED:
@@ -423,6 +426,7 @@ def cut_on_outline(
             met,
             kinds,
             cuts,
+            stop,
             out,
             row,
             state,
@@ -438,7 +442,7 @@ def cut_on_mesh(
 ) -> None:
     """Cut the ``chosen`` of some segments (n, 2, 3) float64 on a polyhedron, `Mesh`: see `cut_on_outline`."""
     size, last, row = min(GROUP, chosen.size - n[0]), n[0], 0
-    group, streams, cuts = group_for(size, 3), streams_for(size, n[2]), crossings_for(n[2], 3)
+    group, streams, cuts = group_for(size, 3), streams_for(mesh, size, n[2]), crossings_for(n[2], 3)
     n[1] = 0
     while last < chosen.size:
         first, last = last, min(last + size, chosen.size)
@@ -461,6 +465,7 @@ def cut_on_mesh(
             streams.met,
             streams.kinds,
             cuts,
+            stop,
             out,
             row,
             state,
