@@ -11,6 +11,7 @@ from engine.bounding.bvh import EMPTY, UNUSED, Bvh, as_read_only, build_bvh, on_
 from engine.bounding.row_lanes import LANES
 from engine.bounding.triangle_lanes import CORNER_ROWS
 from engine.clipping.box_tree import build_box_tree
+from engine.clipping.cut_point import LARGEST, SMALLEST
 from engine.solids.base import FloatArray, IntArray
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
@@ -21,6 +22,8 @@ class Outline(NamedTuple):
 
     elements: FloatArray
     """(k, 2, 2) the corners of each edge: where one is read, all are."""
+    are_safe: bool
+    """Whether every coordinate is zero or of a size for which kernels keep their bounds."""
     faces: IntArray
     """(k,) what each edge is reported as."""
     beyond: FloatArray
@@ -35,6 +38,8 @@ class Mesh(NamedTuple):
 
     elements: FloatArray
     """(k, 3, 3) the corners of each triangle."""
+    are_safe: bool
+    """See `Outline`."""
     faces: IntArray
     """(k,) the face of the caller that each triangle is reported as."""
     beyond: FloatArray
@@ -70,8 +75,14 @@ def outline_of(elements: FloatArray, faces: IntArray) -> Outline:
     """Return what the kernels read of some edges (k, 2, 2)."""
     low, high = elements.min(axis=1), elements.max(axis=1)
     tree = build_box_tree(low, high)
-    arrays = (elements, faces, _beyond(low, high), tree.order, tree.boxes)
-    return Outline(*(as_read_only(array) for array in arrays))
+    first, *arrays = (as_read_only(a) for a in (elements, faces, _beyond(low, high), tree.order, tree.boxes))
+    return Outline(first, _are_safe(elements), *arrays)
+
+
+def _are_safe(elements: FloatArray) -> bool:
+    """Tell whether every coordinate is what `is_safe` wants."""
+    sizes = np.abs(elements)
+    return bool(((sizes == 0.0) | ((sizes >= SMALLEST) & (sizes <= LARGEST))).all())
 
 
 def mesh_of(elements: FloatArray, faces: IntArray) -> Mesh:
@@ -80,6 +91,7 @@ def mesh_of(elements: FloatArray, faces: IntArray) -> Mesh:
     tree, n_inner = _inner_first(build_bvh(np.concatenate([low, high], axis=1)))
     return Mesh(
         on_lines(elements),
+        _are_safe(elements),
         as_read_only(faces),
         as_read_only(_beyond(low, high)),
         tree.boxes,

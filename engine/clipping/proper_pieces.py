@@ -191,6 +191,13 @@ class Group(NamedTuple):
 
 
 @inline
+def group_size(n: int) -> int:
+    """Return the size of the groups, all about as large, that n segments are cut in."""
+    n_groups = max(1, (n + GROUP - 1) // GROUP)
+    return (n + n_groups - 1) // n_groups
+
+
+@inline
 def group_for(size: int, dimension: int) -> Group:
     """Return room for a group of so many segments."""
     shape = (size, 2, dimension)
@@ -340,6 +347,7 @@ def cut_group(
     first: int,
     last: int,
     elements: Any,
+    are_safe: bool,
     faces: Any,
     offsets: Any,
     met: Any,
@@ -352,7 +360,8 @@ def cut_group(
 ) -> tuple[int, int]:
     """Cut the chosen segments first .. last - 1, a group, at their contacts; return the place reached, and the row.
 
-    Short of the end where there is no room in `out`, or `stop` is set. See `cut_on_outline`.
+    are_safe: whether all elements surely are (`is_item_safe`). Stops short where there is no room in `out`, or
+    `stop` is set. See `cut_on_outline`.
     """
     segments, dimension = group.segments, group.segments.shape[2]
     for place in range(first, last):
@@ -375,7 +384,7 @@ def cut_group(
         sure = found == 0 or is_item_safe(segments, item)
         for i in range(begin, end):
             element = met[i]
-            if not (sure and is_item_safe(elements, element)):
+            if not (sure and (are_safe or is_item_safe(elements, element))):
                 sure = False
                 break
             if dimension == 2:
@@ -400,7 +409,7 @@ def cut_on_outline(
     with, afterwards where to go on, short of the end where there is no room; how many rows are filled; and for how many
     contacts of a group of segments there is to be room.
     """
-    size, last, row = min(GROUP, chosen.size - n[0]), n[0], 0
+    size, last, row = group_size(chosen.size - n[0]), n[0], 0
     group, cuts = group_for(size, 2), crossings_for(n[2], 2)
     met, kinds, offsets = np.empty(n[2], np.int64), np.empty(n[2], np.uint8), np.empty(size + 1, np.int64)
     stack = np.empty(DEEPEST, np.int64)
@@ -421,6 +430,7 @@ def cut_on_outline(
             first,
             last,
             outline.elements,
+            outline.are_safe,
             outline.faces,
             offsets,
             met,
@@ -441,7 +451,7 @@ def cut_on_mesh(
     segments: Any, chosen: Any, locations: Any, mesh: Any, stop: Any, out: Rows, state: Any, n: Any
 ) -> None:
     """Cut the ``chosen`` of some segments (n, 2, 3) float64 on a polyhedron, `Mesh`: see `cut_on_outline`."""
-    size, last, row = min(GROUP, chosen.size - n[0]), n[0], 0
+    size, last, row = group_size(chosen.size - n[0]), n[0], 0
     group, streams, cuts = group_for(size, 3), streams_for(mesh, size, n[2]), crossings_for(n[2], 3)
     n[1] = 0
     while last < chosen.size:
@@ -460,6 +470,7 @@ def cut_on_mesh(
             first,
             last,
             mesh.elements,
+            mesh.are_safe,
             mesh.faces,
             streams.offsets,
             streams.met,

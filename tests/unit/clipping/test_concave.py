@@ -12,8 +12,11 @@ import numpy as np
 import pytest
 
 from engine.clipping.box_tree import LEAF_SIZE, build_box_tree
+from engine.clipping.concave import clip_chunk
+from engine.clipping.contacts import GROUP
 from engine.clipping.proper_pieces import OPEN, Rows
 from engine.clipping.segments import clip_segments
+from engine.parallel import Budget
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.polygon import Polygon
@@ -206,6 +209,21 @@ def test_more_crossings_than_there_is_room_for_at_first() -> None:
         assert len(pieces) == 110 * n
         assert accuracy.n_rational == 0
         assert_exact(clip_segments([line], region), np.array([line]), region)
+
+
+def test_groups_answer_as_a_few_segments_do() -> None:
+    """More segments at once than a group holds, with more contacts than have room or wait at once."""
+    rng = np.random.default_rng(8)
+    boxes = solid_of(union_of(*(box((4 * k, 0, 0), (4 * k + 1.5, 1, 1)) for k in range(40))))
+    n = GROUP + 300
+    segments = rng.uniform((-2, -0.1, -0.1), (164, 1.1, 1.1), (n, 2, 3))
+    segments[::50, 1] = segments[::50, 0]
+    budget = Budget()
+    whole = clip_chunk(segments, 0, n, boxes, None, budget)
+    parts = [clip_chunk(segments, i, min(i + 60, n), boxes, None, budget) for i in range(0, n, 60)]
+    assert len(whole.source) > 3 * n
+    for name in ("source", "start", "end", "t", "faces"):
+        np.testing.assert_array_equal(getattr(whole, name), np.concatenate([getattr(part, name) for part in parts]))
 
 
 def test_box_tree_holds_every_element() -> None:
