@@ -8,11 +8,13 @@ returns early when it is set; slow Python loops call `Budget.check`.
 
 from __future__ import annotations
 
+import heapq
 import os
 import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -60,6 +62,59 @@ class Cancel:
             self._flags = [kept for kept in self._flags if kept is not flag]
 
 
+@dataclass(order=True, slots=True)
+class _Waiting:
+    """A flag and when to raise it."""
+
+    end: float
+    flag: npt.NDArray[np.uint8] | None = field(compare=False)  # None: no longer
+
+
+class _Clock:
+    """Raises flags when their time has come, all from one thread: to start one takes as long as a small call."""
+
+    def __init__(self) -> None:
+        self._heap: list[_Waiting] = []
+        self._n_dropped = 0
+        self._changed = threading.Condition()
+        self._runs = False
+
+    def add(self, end: float, flag: npt.NDArray[np.uint8]) -> _Waiting:
+        """Have `flag` raised at the time `end` of the monotonic clock."""
+        waiting = _Waiting(end, flag)
+        with self._changed:
+            heapq.heappush(self._heap, waiting)
+            if not self._runs:
+                self._runs = True
+                threading.Thread(target=self._run, name="deadlines", daemon=True).start()
+            elif self._heap[0] is waiting:
+                self._changed.notify()
+        return waiting
+
+    def drop(self, waiting: _Waiting) -> None:
+        """Forget a flag, raised or not."""
+        with self._changed:
+            waiting.flag = None
+            self._n_dropped += 1
+            if 2 * self._n_dropped > len(self._heap) + 100:
+                self._heap = [kept for kept in self._heap if kept.flag is not None]
+                heapq.heapify(self._heap)
+                self._n_dropped = 0
+
+    def _run(self) -> None:
+        with self._changed:
+            while True:  # ends with the process
+                now = time.monotonic()
+                while self._heap and (self._heap[0].end <= now or self._heap[0].flag is None):
+                    flag = heapq.heappop(self._heap).flag
+                    if flag is not None:
+                        flag[0] = 1
+                self._changed.wait(self._heap[0].end - now if self._heap else None)
+
+
+_clock = _Clock()
+
+
 class Budget:
     """Deadline and cancel switch of one call; use as a context manager.
 
@@ -81,25 +136,20 @@ class Budget:
         self.flag: npt.NDArray[np.uint8] = np.zeros(1, np.uint8)
         self._cancel = cancel
         self._end = None if self.deadline is None else time.monotonic() + self.deadline
-        self._timer: threading.Timer | None = None
+        self._waiting: _Waiting | None = None
 
     def __enter__(self) -> Budget:
         if self._cancel is not None:
             self._cancel.attach(self.flag)
-        if self.deadline is not None:
-            self._timer = threading.Timer(max(self.deadline, 0.0), self._raise_flag)
-            self._timer.daemon = True
-            self._timer.start()
+        if self._end is not None:
+            self._waiting = _clock.add(self._end, self.flag)
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._timer is not None:
-            self._timer.cancel()
+        if self._waiting is not None:
+            _clock.drop(self._waiting)
         if self._cancel is not None:
             self._cancel.detach(self.flag)
-
-    def _raise_flag(self) -> None:
-        self.flag[0] = 1
 
     def check(self) -> None:
         """Raise `CancelledError` or `DeadlineExceededError` if the call must end; cheap enough for inner loops.
@@ -148,9 +198,9 @@ _n_calls = 0
 
 
 def _forget_pool() -> None:
-    """A forked child has the pool's object but none of its threads."""
-    global _pool, _pool_lock, _n_calls
-    _pool, _pool_lock, _n_calls = None, threading.Lock(), 0
+    """A forked child has the pool's object but none of its threads, and so with the clock."""
+    global _pool, _pool_lock, _n_calls, _clock
+    _pool, _pool_lock, _n_calls, _clock = None, threading.Lock(), 0, _Clock()
 
 
 if hasattr(os, "register_at_fork"):

@@ -38,6 +38,26 @@ def test_a_chunk_that_waits_for_the_flag_ends_at_the_deadline() -> None:
     assert budget.flag[0] == 1
 
 
+def test_each_deadline_passes_at_its_own_time() -> None:
+    with Budget(deadline=1000) as long, Budget(deadline=0.01) as over:
+        with Budget(deadline=0.05) as short:
+            while not short.flag[0]:  # bound: the deadline
+                time.sleep(0.001)
+        assert over.flag[0] == 1
+        assert long.flag[0] == 0
+    with Budget(deadline=0.02) as over:
+        pass
+    time.sleep(0.1)
+    assert over.flag[0] == 0
+
+
+def test_deadlines_of_many_calls_take_no_memory() -> None:
+    for _ in range(2000):
+        with Budget(deadline=1000):
+            pass
+    assert len(parallel._clock._heap) < 200
+
+
 def test_a_deadline_of_zero_does_no_work() -> None:
     with Budget(deadline=0.0) as budget, pytest.raises(DeadlineExceededError):
         run_chunks(lambda *_: pytest.fail("worked"), 10, budget=budget)
