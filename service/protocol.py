@@ -16,6 +16,7 @@ from http import HTTPStatus
 from typing import Any, Final
 
 import httptools
+from uvicorn.protocols.http.flow_control import HIGH_WATER_LIMIT
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
 from service.errors import problem
@@ -93,6 +94,19 @@ class Protocol(HttpToolsProtocol):
         if not self.parser.is_offer():
             self._stop_clock()
             super().on_headers_complete()
+
+    def on_body(self, body: bytes) -> None:
+        """Hand a part of the body on as it is where no other waits: uvicorn copies it into a buffer and out of it."""
+        cycle = self.cycle
+        if cycle.body or cycle.response_complete or self.parser.is_offer():
+            if isinstance(cycle.body, bytes):
+                cycle.body = bytearray(cycle.body)
+            super().on_body(body)
+            return
+        cycle.body = body  # type: ignore[assignment]
+        if len(body) > HIGH_WATER_LIMIT:
+            self.flow.pause_reading()
+        cycle.message_event.set()
 
     def on_message_complete(self) -> None:
         """End the request, unless its headers are to be parsed again."""

@@ -123,6 +123,17 @@ def test_bodies_that_are_too_large_get_their_answer(service: Service) -> None:
         check_problem(answer, 413, "body_too_large")
 
 
+def test_a_body_in_many_parts_arrives_whole(service: Service) -> None:
+    """Some parts wait together, some come one by one."""
+    body = json.dumps(SPHERE).encode()
+    head = (
+        b"POST /v1/solids HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nTransfer-Encoding: chunked\r\n\r\n"
+    )
+    parts = [b"1\r\n" + bytes([byte]) + b"\r\n" for byte in body]
+    answer = service.send(head + b"".join(parts[:20]), *parts[20:25], b"".join(parts[25:]), b"0\r\n\r\n")
+    assert answer.split()[1] in (b"200", b"201"), answer
+
+
 def test_a_client_that_asks_for_h2c_gets_its_answer(service: Service) -> None:
     """As Java's HttpClient does by default: the request itself is complete HTTP/1.1 and must be answered as such."""
     body = json.dumps(SPHERE).encode()
