@@ -31,7 +31,7 @@ def anyio_backend() -> str:
 
 @pytest.fixture
 async def client(monkeypatch: pytest.MonkeyPatch, anyio_backend: str) -> AsyncIterator[httpx.AsyncClient]:
-    monkeypatch.setattr(engine, "warm", lambda: None)
+    monkeypatch.setattr(engine, "warm", lambda **_: None)
     async with client_of(create_app(Settings(max_body_bytes=2**26, deadline_seconds=300))) as client:
         yield client
 

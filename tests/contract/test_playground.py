@@ -33,7 +33,7 @@ ARGUMENTS = [
 
 
 def test_every_part_is_served_and_names_no_outside_address(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(engine, "warm", lambda: None)
+    monkeypatch.setattr(engine, "warm", lambda **_: None)
     names = sorted(path.name for path in FOLDER.iterdir() if path.name != "index.html")
 
     async def ask() -> None:

@@ -37,7 +37,7 @@ def test_every_call_shows_its_answer() -> None:
 
 @pytest.mark.parametrize("number", range(len(CALLS)))
 def test_a_call_has_the_answer_shown(number: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(engine, "warm", lambda: None)
+    monkeypatch.setattr(engine, "warm", lambda **_: None)
     path, body = re.search(r"localhost:8000(\S+).*?-d '(.*?)'", CALLS[number], re.DOTALL).groups()  # type: ignore[union-attr]
 
     async def ask() -> Any:

@@ -16,7 +16,7 @@ SPHERE = {"type": "sphere", "center": [0.0, 0.0, 0.0], "radius": 1.0}
 async def client_of(app: FastAPI) -> AsyncIterator[httpx.AsyncClient]:
     """Start the app, wait until it is warm, and return a client for it."""
     async with app.router.lifespan_context(app):
-        app.state.warm.wait(60)
+        assert app.state.warm.wait(60), app.state.warm_error
         transport = httpx.ASGITransport(app=app, raise_app_exceptions=False)
         async with httpx.AsyncClient(transport=transport, base_url="http://test") as client:
             yield client

@@ -22,7 +22,7 @@ def anyio_backend() -> str:
 @pytest.fixture
 def app(monkeypatch: pytest.MonkeyPatch) -> FastAPI:
     """An app whose kernels compile when first used: warming all of them is a test of its own."""
-    monkeypatch.setattr(engine, "warm", lambda: None)
+    monkeypatch.setattr(engine, "warm", lambda **_: None)
     return create_app(Settings(max_body_bytes=2**20, deadline_seconds=300))
 
 

@@ -22,7 +22,7 @@ pytestmark = pytest.mark.anyio
 
 
 def guarded(monkeypatch: pytest.MonkeyPatch, **settings: Any) -> FastAPI:
-    monkeypatch.setattr(engine, "warm", lambda: None)
+    monkeypatch.setattr(engine, "warm", lambda **_: None)
     return create_app(Settings(deadline_seconds=300, **settings))
 
 
