@@ -64,8 +64,9 @@ def _run(module: str, steps: int, processes: int) -> bool:
         while waiting and len(running) < processes:
             running.append(_start(module, waiting.pop(0)))
         time.sleep(_POLL)
-        done &= not any(process.poll() for process in running)
-        running = [process for process in running if process.poll() is None]
+        states = [process.poll() for process in running]  # asked once: one that ends in between is looked at next time
+        done &= not any(states)
+        running = [process for process, state in zip(running, states, strict=True) if state is None]
     return done
 
 
