@@ -11,7 +11,7 @@ from pathlib import Path
 
 from numba import config as numba_config
 
-from engine.jit import cache_folder, source_digest
+from engine.jit import COMPLETE, cache_folder, source_digest
 
 try:
     import fcntl
@@ -36,9 +36,9 @@ def fill_cache(module: str, steps: int, processes: int) -> None:
     cache (it was killed, the disk is full) is compiled by whoever calls it.
     """
     folder = cache_folder()
-    if folder is None or numba_config.DISABLE_JIT or processes < 2:
+    if folder is None or numba_config.DISABLE_JIT or processes < 2 or not sys.executable:
         return
-    complete = folder / source_digest(module) / "complete"
+    complete = _sign(folder, module)
     with contextlib.suppress(OSError):
         if complete.exists():
             return
@@ -46,6 +46,19 @@ def fill_cache(module: str, steps: int, processes: int) -> None:
         with _alone(complete.with_name("lock")):
             if not complete.exists() and _run(module, steps, processes):
                 complete.touch()
+
+
+def note_full(module: str) -> None:
+    """Note that the cache holds all that the steps of `module` compile: this process has called every one."""
+    folder = cache_folder()
+    if folder is not None and not numba_config.DISABLE_JIT:
+        with contextlib.suppress(OSError):
+            _sign(folder, module).parent.mkdir(parents=True, exist_ok=True)
+            _sign(folder, module).touch()
+
+
+def _sign(folder: Path, module: str) -> Path:
+    return folder / source_digest(module) / COMPLETE
 
 
 @contextlib.contextmanager

@@ -46,6 +46,9 @@ from numba.core.typed_passes import NativeLowering
 KERNELS: list[Any] = []
 """Every kernel of the modules imported so far, for the tests of `engine.warm`."""
 
+COMPLETE = "complete"
+"""Name of the empty file that says of a cache folder that nothing is left to compile (cold_start.py)."""
+
 _OPTIONS: dict[str, Any] = {"nogil": True, "fastmath": False, "error_model": "numpy"}
 _ROOT = Path(__file__).resolve().parent
 _IMPORT = re.compile(
@@ -133,8 +136,8 @@ def cache_folder() -> Path | None:
 
 
 def _copy_seed(seed: Path, folder: Path) -> None:
-    """Copy what `folder` lacks, data files (.nbc) before the indexes (.nbi) that name them, each file in one step."""
-    for source in sorted(seed.rglob("*.nb[ci]"), key=lambda file: (file.suffix, file)):
+    """Copy what `folder` lacks: data (.nbc), the indexes (.nbi) that name them, then the signs, each in one step."""
+    for source in [file for part in ("*.nbc", "*.nbi", COMPLETE) for file in sorted(seed.rglob(part))]:
         target = folder / source.relative_to(seed)
         if not target.exists():
             target.parent.mkdir(parents=True, exist_ok=True)

@@ -15,7 +15,7 @@ import numpy as np
 from engine.clipping.overlay import overlay
 from engine.clipping.polygons import clip_polygons
 from engine.clipping.segments import clip_segments
-from engine.cold_start import fill_cache
+from engine.cold_start import fill_cache, note_full
 from engine.collision.collide import collide
 from engine.collision.collide_poses import collide_poses
 from engine.collision.scene import collide_scene
@@ -61,6 +61,7 @@ def warm(progress: Callable[[int], object] | None = None, *, processes: int = 1)
             step()
             if progress is not None:
                 progress(1)
+        note_full(__name__)
         _is_warm.set()
 
 

@@ -36,9 +36,9 @@ def place(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def fill(place: Path, third: str = "say(2)") -> subprocess.Popen[bytes]:
+def fill(place: Path, third: str = "say(2)", **more: str) -> subprocess.Popen[bytes]:
     (place / "engine" / "work.py").write_text(WORK.format(place=str(place / "done"), third=third))
-    variables = {"PYTHONPATH": str(place), "ENGINE_CACHE_DIR": str(place / "cache")}
+    variables = {"PYTHONPATH": str(place), "ENGINE_CACHE_DIR": str(place / "cache"), **more}
     return subprocess.Popen([sys.executable, "-c", FILL], env={**os.environ, **variables}, cwd=place)
 
 
@@ -51,6 +51,13 @@ def test_each_step_runs_once_in_its_own_process_whoever_asks(place: Path) -> Non
     assert fill(place).wait(120) == 0
     assert steps_done(place) == ["0", "1", "2"]
     assert len({file.name.partition("-")[2] for file in (place / "done").iterdir()}) == 3
+
+
+def test_a_copied_seed_that_is_full_needs_no_step(place: Path) -> None:
+    assert fill(place).wait(120) == 0
+    copy = {"ENGINE_CACHE_DIR": str(place / "copy"), "ENGINE_CACHE_SEED": str(place / "cache")}
+    assert fill(place, **copy).wait(120) == 0
+    assert steps_done(place) == ["0", "1", "2"]
 
 
 def test_a_step_that_fails_is_tried_again(place: Path) -> None:
