@@ -11,6 +11,7 @@ again on numbers times a power of two, if there is one that brings them into tha
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -115,7 +116,8 @@ def _clip(
 ) -> PieceRows | None:
     """Return the pieces; None where more than `most_open` items are left to rational arithmetic."""
     n = len(segments)
-    listed, planes, still = np.empty(n, np.int32), np.empty((n, 2), np.int32), np.empty(n, np.int32)
+    listed, still = np.empty((2, n), np.int32)  # together: a large block gets large pages
+    planes = np.empty((n, 2), np.int32)
     decided: dict[int, IntArray] = {}
     dropped: deque[int] = deque()
 
@@ -137,8 +139,7 @@ def _clip(
         check_finite(segments, ("segments",))  # kernels leave open what is not
         if n_open > most_open:
             return None
-    items = _joined(listed, [(first, int(decided[first][0])) for first in firsts])
-    bounding = _joined(planes, [(first, int(decided[first][0])) for first in firsts])
+    kept = [(first, int(decided[first][0])) for first in firsts]
     left = _joined(still, [(first, int(decided[first][1])) for first in firsts])
     pieces: dict[int, Piece] = {}
     for item in left.tolist():
@@ -148,16 +149,16 @@ def _clip(
             pieces[item] = piece
     tally.add(len(left) - len(pieces))
     if pieces:
-        items = np.append(items, np.array(list(pieces), np.int32))
-        bounding = np.append(bounding, np.full((len(pieces), 2), -1, np.int32), axis=0)
+        items = np.append(_joined(listed, kept), np.array(list(pieces), np.int32))
+        bounding = np.append(_joined(planes, kept), np.full((len(pieces), 2), -1, np.int32), axis=0)
         order = np.argsort(items, kind="stable")
-        items, bounding = items[order], bounding[order]
-    rows, unsure, n_beyond = _fill(scene, method, items, bounding, budget, workers, tally)
+        listed, planes, kept = items[order], bounding[order], [(0, len(items))]
+    rows, unsure, n_beyond = _fill(scene, method, listed, planes, kept, budget, workers, tally)
     if len(unsure) + n_open > most_open:
         return None
     for row in unsure:
         budget.check()
-        item = int(items[row])
+        item = int(rows[0][row])
         piece = method.settle(segments[item, 0].tolist(), segments[item, 1].tolist())
         assert piece is not None
         pieces[item] = piece
@@ -175,25 +176,40 @@ def _fill(
     method: Method,
     items: npt.NDArray[np.int32],
     planes: npt.NDArray[np.int32],
+    kept: list[tuple[int, int]],
     budget: Budget,
     workers: int | None,
     tally: Tally,
 ) -> tuple[Rows, IntArray, int]:
-    """Return the rows of the pieces, which of them are not surely rounded, and how many needed more than one try."""
-    m, dimension = len(items), scene.points.shape[2]
-    source, ends, t = np.empty(m, np.int64), np.empty((2, m, dimension)), np.empty((m, 2))
-    faces, still = np.empty((m, 2), np.int64), np.empty(m, np.int32)
+    """Return the rows of the pieces, which of them are not surely rounded, and how many needed more than one try.
+
+    items, planes: as decided, of the ranges `kept` (first, how many).
+    """
+    ends_of_ranges = np.cumsum([0, *(size for _, size in kept)]).tolist()
+    m, dimension = ends_of_ranges[-1], scene.points.shape[2]
+    floats, integers, still = np.empty(m * (2 * dimension + 2)), np.empty(3 * m, np.int64), np.empty(m, np.int32)
+    ends, t = floats[: 2 * m * dimension].reshape(2, m, dimension), floats[2 * m * dimension :].reshape(m, 2)
+    source, faces = integers[:m], integers[m:].reshape(m, 2)
     counts: dict[int, IntArray] = {}
     unsure: list[IntArray] = []
 
     def fill(first: int, last: int) -> None:
+        i_range = bisect_right(ends_of_ranges, first) - 1
+        while first < last:  # bound: every turn goes on to the next range
+            stop = min(last, ends_of_ranges[i_range + 1])
+            if first < stop:
+                fill_from(kept[i_range][0] - ends_of_ranges[i_range], first, stop)
+            first, i_range = stop, i_range + 1
+
+    def fill_from(shift: int, first: int, last: int) -> None:
+        """Fill rows from the items `shift` places further on."""
         found = counts[first] = np.zeros(2, np.int64)
         with np.errstate(all="ignore"):
             method.fill(
                 scene.points,
                 *scene.region,
-                items,
-                planes,
+                items[shift:],
+                planes[shift:],
                 first,
                 last,
                 budget.flag,

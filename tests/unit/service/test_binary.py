@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 import engine
-from tests.unit.service.asking import SPHERE, check_problem
+from service.app import create_app
+from service.settings import Settings
+from tests.unit.service.asking import SPHERE, check_problem, client_of
 
 pytestmark = pytest.mark.anyio
 OCTETS = {"Content-Type": "application/octet-stream"}
@@ -52,6 +54,25 @@ async def test_clip_segments_answers_with_ends_and_nan(client: httpx.AsyncClient
     assert np.array_equal(ends[pieces.source], np.stack([pieces.start, pieces.end], 1))
     assert np.isnan(np.delete(ends, pieces.source, 0)).all()
     assert "coordinates_ulp=0.5" in answer.headers["geometry-accuracy"]
+
+
+async def test_a_hundred_thousand_segments_on_a_stored_convex_solid(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In one request, within the size that the service takes by default: the same bits as in process."""
+    monkeypatch.setattr(engine, "warm", lambda **_: None)
+    draw = np.random.default_rng(2)
+    normals = draw.normal(size=(20, 3))
+    planes = np.column_stack([normals, np.linalg.norm(normals, axis=1)])  # they touch the unit sphere
+    segments = draw.uniform(-2.0, 2.0, (100_000, 2, 3))
+    async with client_of(create_app(Settings(deadline_seconds=300))) as client:
+        path = await stored(client, {"type": "convex", "planes": planes.tolist()})
+        answer = await send(client, f"{path}/clip/segments", segments)
+    ends = np.frombuffer(answer.content).reshape(-1, 2, 3)
+    pieces = engine.clip_segments(segments, engine.Convex(planes))
+    expected = np.full(segments.shape, np.nan)
+    expected[pieces.source] = np.stack([pieces.start, pieces.end], 1)
+    assert 10_000 < len(pieces) < len(segments)
+    assert np.array_equal(ends.view(np.int64)[pieces.source], expected.view(np.int64)[pieces.source])
+    assert np.array_equal(ends, expected, equal_nan=True)
 
 
 async def test_what_is_refused(client: httpx.AsyncClient) -> None:
