@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import subprocess
 import sys
 import time
@@ -73,16 +74,21 @@ def _run(module: str, steps: int, processes: int) -> bool:
     """Return whether every step ended well."""
     waiting, done = list(range(steps)), True
     running: list[subprocess.Popen[bytes]] = []
-    while waiting or running:
-        while waiting and len(running) < processes:
-            running.append(_start(module, waiting.pop(0)))
-        time.sleep(_POLL)
-        states = [process.poll() for process in running]  # asked once: one that ends in between is looked at next time
-        done &= not any(states)
-        running = [process for process, state in zip(running, states, strict=True) if state is None]
+    theirs, ours = os.pipe()  # nothing is ever written: it ends with this process
+    try:
+        while waiting or running:
+            while waiting and len(running) < processes:
+                running.append(_start(module, waiting.pop(0), theirs))
+            time.sleep(_POLL)
+            states = [process.poll() for process in running]  # once: one that ends in between is looked at next time
+            done &= not any(states)
+            running = [process for process, state in zip(running, states, strict=True) if state is None]
+    finally:
+        os.close(theirs)
+        os.close(ours)
     return done
 
 
-def _start(module: str, step: int) -> subprocess.Popen[bytes]:
+def _start(module: str, step: int, lifeline: int) -> subprocess.Popen[bytes]:
     command = [sys.executable, "-c", _COMPILE, module, str(step), *sys.path]
-    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    return subprocess.Popen(command, stdin=lifeline, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)

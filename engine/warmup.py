@@ -49,9 +49,9 @@ _lock = threading.Lock()
 def warm(progress: Callable[[int], object] | None = None, *, processes: int = 1) -> None:
     """Compile or load every kernel; the second call returns at once.
 
-    Takes minutes where nothing is cached, else a second. Safe to call from several threads (the others wait) and
-    processes (each compiles what it does not find). progress: called with 1 after each of `STEPS` steps. processes:
-    where nothing is cached, up to so many more processes are started that compile (some 500 MB each), and end.
+    Takes some five minutes where nothing is cached, else a second or two. Safe to call from several threads (the others
+    wait) and processes (each compiles what it does not find). progress: called with 1 after each of `STEPS` steps.
+    processes: where nothing is cached, up to so many more are started that compile (some 400 MB each), and end.
     """
     with _lock:
         if _is_warm.is_set():

@@ -39,7 +39,14 @@ def place(tmp_path: Path) -> Path:
 def fill(place: Path, third: str = "say(2)", **more: str) -> subprocess.Popen[bytes]:
     (place / "engine" / "work.py").write_text(WORK.format(place=str(place / "done"), third=third))
     variables = {"PYTHONPATH": str(place), "ENGINE_CACHE_DIR": str(place / "cache"), **more}
-    return subprocess.Popen([sys.executable, "-c", FILL], env={**os.environ, **variables}, cwd=place)
+    command = [sys.executable, "-X", "dev", "-c", FILL]  # says of every file that is left open
+    return subprocess.Popen(command, env={**os.environ, **variables}, cwd=place, stderr=subprocess.PIPE)
+
+
+def end(process: subprocess.Popen[bytes]) -> tuple[int, bytes]:
+    """Return what it ended with, and what it complained of."""
+    said = process.communicate(timeout=120)[1]
+    return process.returncode, said
 
 
 def steps_done(place: Path) -> list[str]:
@@ -47,23 +54,24 @@ def steps_done(place: Path) -> list[str]:
 
 
 def test_each_step_runs_once_in_its_own_process_whoever_asks(place: Path) -> None:
-    assert [process.wait(120) for process in [fill(place), fill(place)]] == [0, 0]
-    assert fill(place).wait(120) == 0
+    together = [fill(place), fill(place)]
+    assert [end(process) for process in together] == [(0, b"")] * 2
+    assert end(fill(place)) == (0, b"")
     assert steps_done(place) == ["0", "1", "2"]
     assert len({file.name.partition("-")[2] for file in (place / "done").iterdir()}) == 3
 
 
 def test_a_copied_seed_that_is_full_needs_no_step(place: Path) -> None:
-    assert fill(place).wait(120) == 0
+    assert end(fill(place)) == (0, b"")
     copy = {"ENGINE_CACHE_DIR": str(place / "copy"), "ENGINE_CACHE_SEED": str(place / "cache")}
-    assert fill(place, **copy).wait(120) == 0
+    assert end(fill(place, **copy)) == (0, b"")
     assert steps_done(place) == ["0", "1", "2"]
 
 
 def test_a_step_that_fails_is_tried_again(place: Path) -> None:
-    assert fill(place, "1 / 0").wait(120) == 0
+    assert end(fill(place, "1 / 0")) == (0, b"")
     assert steps_done(place) == ["0", "1"]
-    assert fill(place, "1 / 0").wait(120) == 0
+    assert end(fill(place, "1 / 0")) == (0, b"")
     assert steps_done(place) == ["0", "0", "1", "1"]
 
 
@@ -73,7 +81,7 @@ def test_steps_end_with_the_process_that_asked(place: Path) -> None:
     while "2" not in steps_done(place):
         assert asked.poll() is None
     asked.kill()
-    asked.wait()
+    asked.communicate()
     (sleeper,) = [int(file.name.partition("-")[2]) for file in (place / "done").glob("2-*")]
     for _ in range(1000):
         if not _lives(sleeper):
