@@ -6,9 +6,10 @@ fractions made then, from the polygons given.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
 from fractions import Fraction
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -18,26 +19,24 @@ from engine.arrangement.exact_area import ExactRings
 from engine.arrangement.nodes import Homogeneous, float_nodes
 
 
-@dataclass(frozen=True, slots=True)
-class RingArrays:
-    """Rings as arrays: vertices (n, 2) float64 and where each ring begins, (n_rings + 1,) int64; may be empty."""
+class RingArrays(NamedTuple):
+    """Rings as read-only arrays: vertices (n, 2) float64, where each ring begins (n_rings + 1,) int64; may be empty."""
 
     vertices: npt.NDArray[np.float64]
     offsets: npt.NDArray[np.int64]
 
 
-@dataclass(frozen=True, slots=True)
-class ImplicitRings:
+class ImplicitRings(NamedTuple):
     """Exact rings over two polygons; the same questions as `ExactRings`, answered when asked.
 
     sources: (n, 2) integers: an input vertex and -1, or the first vertices of two edges that cross; those of `clip` are
-    counted after those of `subject`. sizes: number of vertices of each ring.
+    counted after those of `subject`. offsets: (n_rings + 1,) int64, where each ring begins.
     """
 
     subject: RingArrays
     clip: RingArrays
     sources: npt.NDArray[np.signedinteger]
-    sizes: npt.NDArray[np.int64]
+    offsets: npt.NDArray[np.int64]
 
     @property
     def rings(self) -> tuple[tuple[Homogeneous, ...], ...]:
@@ -73,8 +72,8 @@ class ImplicitRings:
             else:
                 lines = [line_through(points[k], points[len(firsts) + k]) for k in (i, j)]
                 made.append(crossing(*lines))
-        stops = np.cumsum(self.sizes).tolist()
-        return ExactRings(tuple(tuple(made[a:b]) for a, b in zip([0, *stops], stops)), nodes.exponent)
+        stops = self.offsets.tolist()
+        return ExactRings(tuple(tuple(made[a:b]) for a, b in itertools.pairwise(stops)), nodes.exponent)
 
 
 def _end_of_edge(vertices: npt.NDArray[np.float64], offsets: Sequence[int], first: int) -> int:

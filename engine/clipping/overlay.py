@@ -104,16 +104,16 @@ def overlay(
     (4.0, [[2.0, 2.0], [4.0, 2.0], [4.0, 4.0], [2.0, 4.0]])
     """
     check_words(operation, output)
-    rings = [rings_of(solid, name) for solid, name in ((subject, "subject"), (clip, "clip"))]
+    first, second = rings_of(subject, "subject"), rings_of(clip, "clip")
     check_options(workers, progress)
     with Budget(deadline, cancel) as budget:
         budget.check()
-        result, n_exact, n_rational = overlay_rings(rings[0], rings[1], operation, output, budget)
+        result, n_exact, n_rational = overlay_rings(first, second, operation, output, budget)
     if progress is not None:
         progress(1)
     if not report:
         return result
-    n_edges = sum(len(each.vertices) for each in rings)
+    n_edges = len(first.vertices) + len(second.vertices)
     return result, accuracy_of([result], n_edges, n_exact, n_rational)
 
 

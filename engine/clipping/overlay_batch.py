@@ -11,7 +11,17 @@ import numpy.typing as npt
 
 from engine.clipping.implicit_rings import ImplicitRings, RingArrays
 from engine.clipping.overlay import accuracy_of, check_words, overlay_rings, rings_of
-from engine.clipping.overlay_compiled import Found, Operation, Output, Polygons, as_overlay, gathered, run_kernel
+from engine.clipping.overlay_compiled import (
+    Found,
+    Operation,
+    Output,
+    Polygons,
+    as_overlay,
+    chained,
+    gathered,
+    run_kernel,
+    summed,
+)
 from engine.clipping.overlay_result import Overlay
 from engine.errors import InvalidArrayError, NotRepresentableError
 from engine.parallel import Budget, Cancel, Progress, run_chunks
@@ -35,6 +45,8 @@ class OverlayBatch:
     piece_offsets: (n_pieces + 1,) int64 into the rings, a shell before its holes. pair_offsets: (n_pairs + 1,) int64
         into the pieces.
     displacement: (n_pairs,) float64, how far an edge may lie from the exact one, as `Overlay.largest_displacement`.
+    _sources: (n_vertices, 2), as those of `ImplicitRings`, but counted as _bases says. _bases: (n_pairs, 3), what is
+        added to the numbers of the subject's vertices, to those of the clip's, and from where on they are the clip's.
     """
 
     status: npt.NDArray[np.int8]
@@ -46,8 +58,8 @@ class OverlayBatch:
     _subjects: Sequence[Solid] = field(repr=False)
     _clips: Sequence[Solid] = field(repr=False)
     _output: Output = field(repr=False)
-    _sources: npt.NDArray[np.int64] = field(repr=False)
-    _first_vertices: tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]] = field(repr=False)
+    _sources: npt.NDArray[np.int32] = field(repr=False)
+    _bases: npt.NDArray[np.int64] = field(repr=False)
     _apart: dict[int, Overlay] = field(repr=False)
 
     def __len__(self) -> int:
@@ -69,22 +81,14 @@ class OverlayBatch:
         rings = self.piece_offsets[first : last + 1]
         stops = self.ring_offsets[rings[0] : rings[-1] + 1]
         sources = self._sources[stops[0] : stops[-1]].copy()
-        # In the flat arrays clip vertices are counted after those of all subjects, here after those of this one.
         subject, clip = _arrays(self._subjects[pair]), _arrays(self._clips[pair])
-        in_subjects, in_clips = (int(starts[pair]) for starts in self._first_vertices)
-        n_subjects = int(self._first_vertices[0][-1])
+        in_subjects, in_clips, n_subjects = self._bases[pair].tolist()
         is_clip = sources >= n_subjects
         sources[is_clip] += len(subject.vertices) - n_subjects - in_clips
         sources[~is_clip & (sources >= 0)] -= in_subjects
-        exact = ImplicitRings(subject, clip, sources, np.diff(stops))
-        return as_overlay(
-            self.vertices[stops[0] : stops[-1]].copy(),
-            np.diff(stops),
-            np.diff(rings),
-            float(self.displacement[pair]),
-            exact,
-            self._output,
-        )
+        exact = ImplicitRings(subject, clip, sources, stops - stops[0])
+        vertices = self.vertices[stops[0] : stops[-1]].copy()
+        return as_overlay(vertices, rings - rings[0], float(self.displacement[pair]), exact, self._output)
 
     @property
     def overlays(self) -> tuple[Overlay | None, ...]:
@@ -100,6 +104,15 @@ def _arrays(solid: Solid) -> RingArrays:
 def _gathered(solids: Sequence[Solid]) -> Polygons:
     polygons = cast("Sequence[Polygon]", solids)
     return gathered([each.vertices for each in polygons], [each.ring_offsets for each in polygons])
+
+
+def _bases(subjects: Polygons, clips: Polygons) -> npt.NDArray[np.int64]:
+    """Return `OverlayBatch._bases` of pairs that were overlaid together."""
+    bases = np.empty((len(subjects.polygon_offsets) - 1, 3), np.int64)
+    bases[:, 0] = subjects.ring_offsets[subjects.polygon_offsets[:-1]]
+    bases[:, 1] = clips.ring_offsets[clips.polygon_offsets[:-1]]
+    bases[:, 2] = len(subjects.vertices)
+    return bases
 
 
 def overlay_batch(
@@ -133,15 +146,17 @@ def overlay_batch(
         if set(map(type, solids)) - {Polygon}:
             for i_pair, solid in enumerate(solids):
                 rings_of(solid, name, i_pair)
-    sides = [_gathered(subjects), _gathered(clips)]
-    parts: dict[int, Found] = {}
+    parts: dict[int, tuple[Found, npt.NDArray[np.int64]]] = {}
     apart: dict[int, Overlay] = {}
     n_exact: dict[int, int] = {}
     status = np.zeros(len(subjects), np.int8)
     with Budget(deadline, cancel) as budget:
 
         def task(start: int, stop: int) -> None:
-            found = parts[start] = run_kernel(sides[0], sides[1], start, stop, operation, budget)
+            # Gathered here, chunk by chunk: one thread does while another's kernel runs, and what it wrote is near.
+            first, second = _gathered(subjects[start:stop]), _gathered(clips[start:stop])
+            found = run_kernel(first, second, operation, budget)
+            parts[start] = found, _bases(first, second)
             for place in np.flatnonzero(found.status):
                 pair = start + int(place)
                 budget.check()
@@ -153,100 +168,91 @@ def overlay_batch(
                     status[pair] = NOT_REPRESENTABLE
 
         run_chunks(task, len(subjects), budget=budget, first_chunk=_FIRST_CHUNK, workers=workers, progress=progress)
-    firsts = tuple(side.ring_offsets[side.polygon_offsets] for side in sides)
-    batch = _joined(status, [parts[start] for start in sorted(parts)], apart, subjects, clips, output, firsts)
+    chunks = [parts[start] for start in sorted(parts)]
+    batch = _joined(status, chunks, apart, subjects, clips, output)
     if not report:
         return batch
-    n_edges = sum(len(side.vertices) for side in sides)
-    n_beyond = sum(int(part.counts[:, 3].sum()) for part in parts.values()) + sum(n_exact.values())
+    n_edges = sum(len(_arrays(each).vertices) for solids in (subjects, clips) for each in solids)
+    n_beyond = sum(int(found.counts[:, 3].sum()) for found, _ in chunks) + sum(n_exact.values())
     return batch, accuracy_of(list(apart.values()), n_edges, n_beyond, sum(n_exact.values()))
 
 
 def _joined(
     status: npt.NDArray[np.int8],
-    parts: Sequence[Found],
+    chunks: Sequence[tuple[Found, npt.NDArray[np.int64]]],
     apart: dict[int, Overlay],
     subjects: Sequence[Solid],
     clips: Sequence[Solid],
     output: Output,
-    firsts: tuple[npt.NDArray[np.int64], ...],
 ) -> OverlayBatch:
     """Put the flat results of all chunks, and the overlays made apart from them, into one set of arrays."""
-    none = np.zeros(0, np.int64)
-    n_pieces, n_rings, n_vertices = (np.concatenate([none, *(part.counts[:, k] for part in parts)]) for k in range(3))
+    parts = [found for found, _ in chunks]
+    counts = np.concatenate([np.zeros((0, 4), np.int64), *(part.counts for part in parts)])
     displacement = np.concatenate([np.zeros(0), *(part.displacement for part in parts)])
     vertices = np.concatenate([np.zeros((0, 2)), *(part.vertices for part in parts)])
     sources = np.concatenate([np.zeros((0, 2), np.int32), *(part.sources for part in parts)])
-    sizes = np.concatenate([none, *(part.sizes for part in parts)])
-    piece_sizes = np.concatenate([none, *(part.piece_sizes for part in parts)])
+    ring_offsets = chained([part.ring_offsets for part in parts])
+    piece_offsets = chained([part.piece_offsets for part in parts])
     if apart:
         pairs = np.array(sorted(apart), np.int64)
         results = [apart[pair] for pair in pairs.tolist()]
-        n_pieces[pairs] = [result.n_pieces for result in results]
-        n_rings[pairs] = [len(result.ring_offsets) - 1 for result in results]
-        n_vertices[pairs] = [len(result.vertices) for result in results]
+        counts[pairs, 0] = [result.n_pieces for result in results]
+        counts[pairs, 1] = [len(result.ring_offsets) - 1 for result in results]
+        counts[pairs, 2] = [len(result.vertices) for result in results]
         displacement[pairs] = [result.largest_displacement for result in results]
         is_apart = np.zeros(len(status), np.bool_)
         is_apart[pairs] = True
+        by_piece, by_ring, by_vertex = (np.repeat(is_apart, counts[:, k]) for k in range(3))
         added = np.concatenate([result.vertices for result in results])
-        vertices = _woven(np.repeat(is_apart, n_vertices), vertices, added)
-        sources = _woven(np.repeat(is_apart, n_vertices), sources, np.full((len(added), 2), -1))
-        sizes = _woven(np.repeat(is_apart, n_rings), sizes, np.concatenate([np.diff(r.ring_offsets) for r in results]))
-        more = np.concatenate([np.diff(result.piece_offsets) for result in results])
-        piece_sizes = _woven(np.repeat(is_apart, n_pieces), piece_sizes, more)
-    offsets = [np.concatenate([[0], np.cumsum(each)]) for each in (sizes, piece_sizes, n_pieces)]
-    for array in (status, vertices, displacement, *offsets):
+        vertices = _woven(by_vertex, vertices, added)
+        sources = _woven(by_vertex, sources, np.full((len(added), 2), -1))
+        sizes = np.concatenate([np.diff(result.ring_offsets) for result in results])
+        ring_offsets = summed(_woven(by_ring, np.diff(ring_offsets), sizes))
+        sizes = np.concatenate([np.diff(result.piece_offsets) for result in results])
+        piece_offsets = summed(_woven(by_piece, np.diff(piece_offsets), sizes))
+    pair_offsets = summed(counts[:, 0])
+    for array in (status, vertices, displacement, ring_offsets, piece_offsets, pair_offsets):
         array.setflags(write=False)
     return OverlayBatch(
         status=status,
         vertices=vertices,
-        ring_offsets=offsets[0],
-        piece_offsets=offsets[1],
-        pair_offsets=offsets[2],
+        ring_offsets=ring_offsets,
+        piece_offsets=piece_offsets,
+        pair_offsets=pair_offsets,
         displacement=displacement,
         _subjects=tuple(subjects),
         _clips=tuple(clips),
         _output=output,
         _sources=sources,
-        _first_vertices=(firsts[0], firsts[1]),
+        _bases=np.concatenate([np.zeros((0, 3), np.int64), *(bases for _, bases in chunks)]),
         _apart=apart,
     )
 
 
 def join_batches(batches: Sequence[OverlayBatch]) -> OverlayBatch:
     """Return the pairs of some batches, at least one, as one batch."""
-    sizes = np.array([[int(firsts[-1]) for firsts in part._first_vertices] for part in batches])
-    n_subjects = int(sizes[:, 0].sum())
     apart: dict[int, Overlay] = {}
-    sources, n_pairs = [], 0
-    for part, (here, _), (in_subjects, in_clips) in zip(batches, sizes, np.cumsum(sizes, axis=0) - sizes, strict=True):
-        moved = part._sources + np.where(part._sources < here, in_subjects, n_subjects - here + in_clips)
-        sources.append(np.where(part._sources < 0, -1, moved))
+    n_pairs = 0
+    for part in batches:
         apart.update((n_pairs + pair, result) for pair, result in part._apart.items())
         n_pairs += len(part)
-    firsts = [_chained([part._first_vertices[k] for part in batches]) for k in (0, 1)]
     batch = OverlayBatch(
         status=np.concatenate([part.status for part in batches]),
         vertices=np.concatenate([part.vertices for part in batches]),
-        ring_offsets=_chained([part.ring_offsets for part in batches]),
-        piece_offsets=_chained([part.piece_offsets for part in batches]),
-        pair_offsets=_chained([part.pair_offsets for part in batches]),
+        ring_offsets=chained([part.ring_offsets for part in batches]),
+        piece_offsets=chained([part.piece_offsets for part in batches]),
+        pair_offsets=chained([part.pair_offsets for part in batches]),
         displacement=np.concatenate([part.displacement for part in batches]),
         _subjects=tuple(solid for part in batches for solid in part._subjects),
         _clips=tuple(solid for part in batches for solid in part._clips),
         _output=batches[0]._output,
-        _sources=np.concatenate(sources),
-        _first_vertices=(firsts[0], firsts[1]),
+        _sources=np.concatenate([part._sources for part in batches]),
+        _bases=np.concatenate([part._bases for part in batches]),
         _apart=apart,
     )
     for name in ("status", "vertices", "ring_offsets", "piece_offsets", "pair_offsets", "displacement"):
         getattr(batch, name).setflags(write=False)
     return batch
-
-
-def _chained(offsets: Sequence[npt.NDArray[np.int64]]) -> npt.NDArray[np.int64]:
-    """Return the offsets of several arrays put one after another."""
-    return np.concatenate([[0], np.cumsum(np.concatenate([np.diff(each) for each in offsets]))])
 
 
 def _woven(

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Final, Literal, TypeVar
+from types import FunctionType
+from typing import Any, Final, Literal, NamedTuple, TypeVar, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -32,30 +32,31 @@ KEPT: Final = {  # by the label of a face: in neither, in the subject, in the cl
     "difference": (False, True, False, False),
     "symmetric_difference": (False, True, True, False),
 }
+_overlay_pairs: Any = overlay_pairs
+if isinstance(overlay_pairs, FunctionType):  # uncompiled: numpy warns of what overflows
+    _overlay_pairs = np.errstate(all="ignore")(overlay_pairs)
 _KEPT_ARRAYS: Final = {name: np.array(kept, np.uint8) for name, kept in KEPT.items()}
 
 
-@dataclass(frozen=True, slots=True)
-class Polygons:
-    """Many polygons as flat arrays: vertices (n, 2) float64, rings by vertex offsets, polygons by ring offsets.
+class Polygons(NamedTuple):
+    """Some polygons as flat arrays: vertices (n, 2) float64, rings by vertex offsets, polygons by ring offsets.
 
-    n_vertices, n_rings: int64, by polygon.
+    most_vertices, most_rings: of one polygon.
     """
 
     vertices: npt.NDArray[np.float64]
     ring_offsets: npt.NDArray[np.int64]
     polygon_offsets: npt.NDArray[np.int64]
-    n_vertices: npt.NDArray[np.int64]
-    n_rings: npt.NDArray[np.int64]
+    most_vertices: int
+    most_rings: int
 
 
-@dataclass(frozen=True, slots=True)
-class Found:
+class Found(NamedTuple):
     """What the kernel found for some pairs, one after another.
 
     status: (pairs,) int8, DONE or OPEN; counts: (pairs, 4) int64, pieces, rings, vertices and pairs of edges beyond the
-    filter; displacement: (pairs,) float64. vertices, sources: of all pairs that are DONE; sizes: of their rings;
-    piece_sizes: rings of their pieces.
+    filter; displacement: (pairs,) float64. vertices, sources: of all pairs that are DONE; ring_offsets into them;
+    piece_offsets: into the rings.
     """
 
     status: npt.NDArray[np.int8]
@@ -63,24 +64,28 @@ class Found:
     displacement: npt.NDArray[np.float64]
     vertices: npt.NDArray[np.float64]
     sources: npt.NDArray[np.int32]
-    sizes: npt.NDArray[np.int64]
-    piece_sizes: npt.NDArray[np.int64]
+    ring_offsets: npt.NDArray[np.int64]
+    piece_offsets: npt.NDArray[np.int64]
 
 
 def gathered(vertices: Sequence[npt.NDArray[np.float64]], ring_offsets: Sequence[npt.NDArray[np.int64]]) -> Polygons:
-    """Return polygons, given by the arrays of each, as flat arrays."""
-    n_vertices = np.fromiter(map(len, vertices), np.int64, len(vertices))
-    n_rings = np.fromiter(map(len, ring_offsets), np.int64, len(vertices)) - 1
-    first_vertex, first_ring = np.zeros(len(vertices) + 1, np.int64), np.zeros(len(vertices) + 1, np.int64)
-    np.cumsum(n_vertices, out=first_vertex[1:])
-    np.cumsum(n_rings, out=first_ring[1:])
-    if first_ring[-1] == len(vertices) and (n_rings == 1).all():
-        offsets = first_vertex
-    else:
-        offsets = np.zeros(first_ring[-1] + 1, np.int64)
-        offsets[1:] = np.concatenate([each[1:] for each in ring_offsets]) + np.repeat(first_vertex[:-1], n_rings)
-    joined = np.concatenate([np.zeros((0, 2)), *vertices])
-    return Polygons(as_frozen(joined), as_frozen(offsets), as_frozen(first_ring), n_vertices, n_rings)
+    """Return polygons, given by the arrays of each, as flat arrays; at least one polygon, and none without a ring.
+
+    Joined as bytes: numpy takes three times as long to put small arrays one after another.
+    """
+    n = len(vertices)
+    joined = np.frombuffer(b"".join(cast("Sequence[bytes]", vertices))).reshape(-1, 2)
+    offsets = np.frombuffer(b"".join(cast("Sequence[bytes]", ring_offsets)), np.int64)
+    if len(offsets) == 2 * n:  # one ring each
+        sizes = offsets[1::2]
+        return Polygons(joined, summed(sizes), as_frozen(np.arange(n + 1)), int(sizes.max()), 1)
+    starts = np.flatnonzero(offsets == 0)  # of each polygon's: no ring is empty
+    ends = np.append(starts[1:], len(offsets)) - 1
+    sizes, n_rings = offsets[ends], ends - starts
+    first_vertices = np.cumsum(sizes) - sizes
+    ring_starts = np.delete(offsets + np.repeat(first_vertices, n_rings + 1), ends)
+    rings = as_frozen(np.append(ring_starts, len(joined)))
+    return Polygons(joined, rings, summed(n_rings), int(sizes.max()), int(n_rings.max()))
 
 
 def as_frozen(array: npt.NDArray[Scalar]) -> npt.NDArray[Scalar]:
@@ -92,66 +97,71 @@ def as_frozen(array: npt.NDArray[Scalar]) -> npt.NDArray[Scalar]:
     return array
 
 
-def run_kernel(
-    subjects: Polygons, clips: Polygons, start: int, stop: int, operation: Operation, budget: Budget
-) -> Found:
-    """Overlay the pairs start .. stop - 1. Raises as `Budget.check` when the call must end."""
-    sides = [(each.n_vertices[start:stop], each.n_rings[start:stop]) for each in (subjects, clips)]
-    n_vertices, n_rings = (sum(int(side[k].max()) for side in sides) for k in (0, 1))
-    n_in_all = sum(int(side[0].sum()) for side in sides)
-    return _run(_flat(subjects), _flat(clips), start, stop, n_vertices, n_rings, n_in_all, operation, budget)
-
-
-def _flat(polygons: Polygons) -> tuple[npt.NDArray[np.generic], ...]:
-    return polygons.vertices, polygons.ring_offsets, polygons.polygon_offsets
-
-
-def _run(
-    subjects: tuple[npt.NDArray[np.generic], ...],
-    clips: tuple[npt.NDArray[np.generic], ...],
-    start: int,
-    stop: int,
-    n_vertices: int,
-    n_rings: int,
-    n_in_all: int,
-    operation: Operation,
-    budget: Budget,
-) -> Found:
-    """Overlay the pairs start .. stop - 1, none of more vertices and rings than told; all of n_in_all vertices."""
-    n = stop - start
+def run_kernel(subjects: Polygons, clips: Polygons, operation: Operation, budget: Budget) -> Found:
+    """Overlay polygons pair by pair. Raises as `Budget.check` when the call must end."""
+    n = len(subjects.polygon_offsets) - 1
+    n_vertices, n_rings = subjects.most_vertices + clips.most_vertices, subjects.most_rings + clips.most_rings
     status, counts, displacement = np.empty(n, np.int8), np.empty((n, 4), np.int64), np.empty(n)
-    reached, parts = start, []
+    reached = 0
+    parts: list[Found] = []
     n_contacts = max(256, 4 * n_vertices)
-    n_out, n_out_rings = 8 * n + n_in_all, 2 * n
-    while reached < stop:  # bound: each turn goes on, or makes room for one pair, geometrically
+    n_out, n_out_rings = 8 * n + len(subjects.vertices) + len(clips.vertices), 2 * n
+    while reached < n:  # bound: each turn goes on, or makes room for one pair, geometrically
         scratch = scratch_for(n_vertices, n_rings, n_contacts, n_out, n_out_rings)
-        with np.errstate(all="ignore"):
-            reached, needs, filled, n_filled, n_pieces, used = overlay_pairs(
-                *subjects,
-                *clips,
-                start,
-                stop,
-                reached,
-                _KEPT_ARRAYS[operation],
-                budget.flag,
-                scratch.buffers,
-                status,
-                counts,
-                displacement,
-                *scratch.output,
-            )
-        budget.check()
-        vertices, sources, sizes, pieces = scratch.output
-        parts.append(
-            (vertices[:filled].copy(), sources[:filled].copy(), sizes[:n_filled].copy(), pieces[:n_pieces].copy())
+        reached, needs, filled, n_filled, n_pieces, used = _overlay_pairs(
+            *subjects[:3],
+            *clips[:3],
+            0,
+            n,
+            reached,
+            _KEPT_ARRAYS[operation],
+            budget.flag,
+            scratch.buffers,
+            status,
+            counts,
+            displacement,
+            *scratch.output,
         )
+        budget.check()
+        rings, pieces = scratch.sizes
+        part = Found(
+            status,
+            counts,
+            displacement,
+            scratch.output[0][:filled].copy(),
+            scratch.output[1][:filled].copy(),
+            np.add.accumulate(rings[: n_filled + 1]),
+            np.add.accumulate(pieces[: n_pieces + 1]),
+        )
+        parts.append(part)
         keep(scratch, n_vertices, used, filled)
         if needs == NEEDS_CONTACTS:
             n_contacts = 2 * scratch.n_contacts
         elif needs == NEEDS_OUTPUT:
-            n_out_rings, n_out = (max(n, int(counts[reached - start, k])) for k, n in ((1, n_out_rings), (2, n_out)))
-    joined = parts[0] if len(parts) == 1 else [np.concatenate(each) for each in zip(*parts)]
-    return Found(status, counts, displacement, *joined)
+            n_out_rings, n_out = (max(m, int(counts[reached, k])) for k, m in ((1, n_out_rings), (2, n_out)))
+    if len(parts) == 1:
+        return parts[0]
+    return Found(
+        status,
+        counts,
+        displacement,
+        np.concatenate([each.vertices for each in parts]),
+        np.concatenate([each.sources for each in parts]),
+        chained([each.ring_offsets for each in parts]),
+        chained([each.piece_offsets for each in parts]),
+    )
+
+
+def summed(sizes: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """Return where each of some parts put one after another begins, and the end of the last; read-only."""
+    offsets = np.zeros(len(sizes) + 1, np.int64)
+    np.cumsum(sizes, out=offsets[1:])
+    return as_frozen(offsets)
+
+
+def chained(offsets: Sequence[npt.NDArray[np.int64]]) -> npt.NDArray[np.int64]:
+    """Return the offsets of several arrays put one after another."""
+    return summed(np.concatenate([np.zeros(0, np.int64), *(each[1:] - each[:-1] for each in offsets)]))
 
 
 def overlay_compiled(
@@ -161,7 +171,7 @@ def overlay_compiled(
 
     A scene outside of the kernel's range is brought into it by a power of two where that is exact.
     """
-    found, exponent = _run_one(subject, clip, operation, budget), 0
+    found, exponent = run_kernel(_as_one(subject), _as_one(clip), operation, budget), 0
     if found.status[0] != DONE:
         exponent = exponent_of(subject.vertices, clip.vertices)
         if exponent == 0:
@@ -169,7 +179,8 @@ def overlay_compiled(
         first, second = shifted(subject.vertices, -exponent), shifted(clip.vertices, -exponent)
         if first is None or second is None:
             return None
-        found = _run_one(RingArrays(first, subject.offsets), RingArrays(second, clip.offsets), operation, budget)
+        near = RingArrays(first, subject.offsets), RingArrays(second, clip.offsets)
+        found = run_kernel(_as_one(near[0]), _as_one(near[1]), operation, budget)
         if found.status[0] != DONE:
             return None
     vertices, displacement = found.vertices, float(found.displacement[0])
@@ -178,18 +189,14 @@ def overlay_compiled(
         if doubtful.any() or not np.isfinite(vertices).all():
             return None
         displacement = float(np.nextafter(np.ldexp(displacement, exponent), np.inf)) if displacement else 0.0
-    exact = ImplicitRings(subject, clip, found.sources, found.sizes)
-    return as_overlay(vertices, found.sizes, found.piece_sizes, displacement, exact, output), int(found.counts[0, 3])
+    exact = ImplicitRings(subject, clip, found.sources, found.ring_offsets)
+    return as_overlay(vertices, found.piece_offsets, displacement, exact, output), int(found.counts[0, 3])
 
 
-def _run_one(subject: RingArrays, clip: RingArrays, operation: Operation, budget: Budget) -> Found:
-    n_rings = len(subject.offsets) + len(clip.offsets) - 2
-    first, second = (
-        (as_frozen(each.vertices), as_frozen(each.offsets), _one_polygon(len(each.offsets) - 1))
-        for each in (subject, clip)
-    )
-    n_vertices = len(subject.vertices) + len(clip.vertices)
-    return _run(first, second, 0, 1, n_vertices, n_rings, n_vertices, operation, budget)
+def _as_one(rings: RingArrays) -> Polygons:
+    """Return the rings as one polygon."""
+    n_rings = len(rings.offsets) - 1
+    return Polygons(rings.vertices, rings.offsets, _one_polygon(n_rings), len(rings.vertices), n_rings)
 
 
 @functools.lru_cache(64)
@@ -202,34 +209,27 @@ def _one_polygon(n_rings: int) -> npt.NDArray[np.int64]:
 
 def as_overlay(
     vertices: npt.NDArray[np.float64],
-    sizes: npt.NDArray[np.int64],
-    piece_sizes: npt.NDArray[np.int64],
+    piece_offsets: npt.NDArray[np.int64],
     displacement: float,
     exact: ImplicitRings,
     output: Output,
 ) -> Overlay:
     """Return an `Overlay` whose rounded rings have the structure of the exact ones."""
-    ring_offsets, piece_offsets = np.zeros(len(sizes) + 1, np.int64), np.zeros(len(piece_sizes) + 1, np.int64)
-    np.cumsum(sizes, out=ring_offsets[1:])
-    np.cumsum(piece_sizes, out=piece_offsets[1:])
-    for array in (vertices, ring_offsets, piece_offsets):
+    offsets = exact.offsets
+    for array in (vertices, offsets, piece_offsets):
         array.setflags(write=False)
-    return Overlay(
+    n_pieces = len(piece_offsets) - 1
+    result = object.__new__(Overlay)
+    vars(result).update(  # as Overlay(...) does one by one, which takes 2 us
         vertices=vertices,
-        ring_offsets=ring_offsets,
+        ring_offsets=offsets,
         piece_offsets=piece_offsets,
         output=output,
         may_be_invalid=output == "nearest" and displacement > 0.0,
-        n_pieces_exact=len(piece_sizes),
-        n_holes_exact=len(sizes) - len(piece_sizes),
-        collapsed=(),
-        pieces_joined=0,
-        pieces_parted=0,
-        holes_joined=0,
-        holes_parted=0,
-        rounds=int(displacement > 0.0),
-        vertices_moved=0,
-        largest_displacement=displacement,
-        snapped=False,
+        n_pieces_exact=n_pieces,
+        n_holes_exact=len(offsets) - 1 - n_pieces,
         exact=exact,
+        largest_displacement=displacement,
+        rounds=int(displacement > 0.0),
     )
+    return result

@@ -32,7 +32,7 @@ class Collapse:
     near: tuple[float, float]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Overlay:
     """The result of a Boolean operation on two polygons.
 
@@ -61,16 +61,16 @@ class Overlay:
     may_be_invalid: bool
     n_pieces_exact: int
     n_holes_exact: int
-    collapsed: tuple[Collapse, ...]
-    pieces_joined: int
-    pieces_parted: int
-    holes_joined: int
-    holes_parted: int
-    rounds: int
-    vertices_moved: int
-    largest_displacement: float
-    snapped: bool
     exact: ExactRings | ImplicitRings
+    largest_displacement: float = 0.0
+    rounds: int = 0
+    collapsed: tuple[Collapse, ...] = ()
+    pieces_joined: int = 0
+    pieces_parted: int = 0
+    holes_joined: int = 0
+    holes_parted: int = 0
+    vertices_moved: int = 0
+    snapped: bool = False
 
     @property
     def n_pieces(self) -> int:

@@ -105,6 +105,7 @@ class Scratch:
     """What the kernel writes to, for pairs of up to so many vertices, rings and contacts, and for so much output.
 
     output: vertices (m, 2) float64, their sources (m, 2) int32, sizes of rings and of pieces, both (n,) int64.
+    sizes: those of rings and of pieces again, after a zero: summed up they are offsets.
     """
 
     n_vertices: int
@@ -112,6 +113,7 @@ class Scratch:
     n_contacts: int
     buffers: Buffers
     output: tuple[npt.NDArray[np.float64], npt.NDArray[np.int32], npt.NDArray[np.int64], npt.NDArray[np.int64]]
+    sizes: tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]
 
 
 def scratch_for(n_vertices: int, n_rings: int, n_contacts: int, n_out: int, n_out_rings: int) -> Scratch:
@@ -127,13 +129,12 @@ def scratch_for(n_vertices: int, n_rings: int, n_contacts: int, n_out: int, n_ou
     if kept is not None and len(kept.output[0]) >= n_out and len(kept.output[2]) >= n_out_rings:
         return kept
     n_out, n_out_rings = max(n_out, n_vertices + n_contacts), max(n_out_rings, n_contacts)
-    output = (
-        np.empty((n_out, 2)), np.empty((n_out, 2), np.int32),
-        np.empty(n_out_rings, np.int64), np.empty(n_out_rings, np.int64),
-    )  # fmt: skip
+    sizes = np.empty(n_out_rings + 1, np.int64), np.empty(n_out_rings + 1, np.int64)
+    sizes[0][0] = sizes[1][0] = 0
+    output = np.empty((n_out, 2)), np.empty((n_out, 2), np.int32), sizes[0][1:], sizes[1][1:]
     if kept is not None:
-        return Scratch(kept.n_vertices, kept.n_rings, kept.n_contacts, kept.buffers, output)
-    return Scratch(n_vertices, n_rings, n_contacts, buffers_for(n_vertices, n_rings, n_contacts), output)
+        return Scratch(kept.n_vertices, kept.n_rings, kept.n_contacts, kept.buffers, output, sizes)
+    return Scratch(n_vertices, n_rings, n_contacts, buffers_for(n_vertices, n_rings, n_contacts), output, sizes)
 
 
 def keep(scratch: Scratch, n_vertices: int, n_contacts: int, n_out: int) -> None:

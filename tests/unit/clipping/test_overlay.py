@@ -253,6 +253,11 @@ def test_batch_is_flat_and_tells_what_is_no_double() -> None:
         assert here is not None
         assert here.area_exact == alone.area_exact
         assert shape(pickle.loads(pickle.dumps(batch))[pair]) == shape(alone)
+    many = overlay_batch(subjects * 30, clips * 30, "difference", workers=2)  # several chunks
+    for pair, here in enumerate(many):
+        assert here is not None
+        assert shape(here) == shape(batch[pair % 4])
+        assert pair % 8 > 3 or here.area_exact == batch[pair % 4].area_exact
     with pytest.raises(IndexError):
         _ = batch[4]
     empty = overlay_batch([], [])

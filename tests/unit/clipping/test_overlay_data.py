@@ -16,6 +16,7 @@ import pytest
 
 from engine.clipping.implicit_rings import RingArrays
 from engine.clipping.overlay import overlay_rings
+from engine.clipping.overlay_compiled import as_frozen
 from engine.clipping.overlay_result import Overlay
 from engine.parallel import Budget
 from tests.conftest import DATA
@@ -58,7 +59,7 @@ def arrays(rings: list[Any]) -> RingArrays:
     found = [np.array(ring, float) for ring in rings]
     found = [ring[:-1] if len(ring) > 1 and (ring[0] == ring[-1]).all() else ring for ring in found]
     vertices = np.concatenate(found) if found else np.zeros((0, 2))
-    return RingArrays(vertices, np.cumsum([0, *map(len, found)]))
+    return RingArrays(as_frozen(vertices), as_frozen(np.cumsum([0, *map(len, found)])))
 
 
 def run(pair: Pair, operation: Any, swapped: bool = False) -> Overlay:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from engine.clipping.implicit_rings import RingArrays
-from engine.clipping.overlay_compiled import Operation, overlay_compiled
+from engine.clipping.overlay_compiled import Operation, as_frozen, overlay_compiled
 from engine.clipping.overlay_exact import overlay_exactly
 from engine.parallel import Budget
 from tests.unit.clipping.overlay_checks import OPERATIONS, assert_valid
@@ -20,7 +20,7 @@ Rings = list[Any]
 
 def arrays(rings: Rings) -> RingArrays:
     found = [np.asarray(ring, float) for ring in rings]
-    return RingArrays(np.concatenate(found), np.cumsum([0, *map(len, found)]))
+    return RingArrays(as_frozen(np.concatenate(found)), as_frozen(np.cumsum([0, *map(len, found)])))
 
 
 def agree(subject: Rings, clip: Rings, operation: Operation) -> bool:
