@@ -13,6 +13,7 @@ from engine.arrangement.chains import Chains, is_live, leaving_edge, origin
 from engine.arrangement.crossing_signs import Edges, orient, turn_of_edges
 from engine.arrangement.edge_contacts import POLL, root_of, unite
 from engine.arrangement.edge_tree import BENT
+from engine.arrangement.ring_labels import RingLabels, verdict
 from engine.jit import inline, merged
 
 
@@ -29,12 +30,13 @@ class Rings(NamedTuple):
 @inline
 def choose_boundary(
     chains: Chains, n_chains: int, cycle: Any, n_cycles: int, kept: Any, starts: Any, n_nodes: int, parent: Any,
-    label: Any, regions: Any, inside: Any, bounds: Any, fan: Any, stop: Any,
+    label: Any, regions: Any, inside: Any, bounds: Any, fan: Any, sources: RingLabels, stop: Any,
 ) -> None:  # fmt: skip
     """Fill ``inside`` by cycle, ``bounds`` by chain, ``fan`` (boundary chains) by node, and join regions.
 
-    kept: (4,) uint8, whether a face of that label is in the result. parent, label: the joined cycles; entry n_cycles is
-    the unbounded face, whose label is 0. regions: forest of the cycles, those of one face joined already.
+    kept: (4,) uint8, whether a face of that label is in the result, unless ``sources`` has rings; then
+    ``sources.gathered`` is filled by region. parent, label: the joined cycles; entry n_cycles is the unbounded face,
+    whose label is 0. regions: forest of the cycles, those of one face joined already.
     """
     for chain in range(n_chains):
         if chain & POLL == 0 and stop[0]:
@@ -45,7 +47,8 @@ def choose_boundary(
     for i in range(n_cycles):
         if i & POLL == 0 and stop[0]:
             return
-        inside[i] = kept[find_label(parent, label, i)[1] ^ unbounded]
+        mask = find_label(parent, label, i)[1] ^ unbounded
+        inside[i] = verdict(sources, mask)[0] if sources.last > sources.first else kept[mask]
     fan[:n_nodes] = 0
     for chain in range(n_chains):
         if chain & POLL == 0 and stop[0]:
@@ -59,6 +62,14 @@ def choose_boundary(
                 bounds[chain] = 1
                 fan[chains.tail[chain]] += 1
                 fan[chains.head[chain]] += 1
+    if sources.last > sources.first:
+        for i in range(n_cycles):
+            sources.gathered[i] = 0
+        for i in range(n_cycles):
+            if i & POLL == 0 and stop[0]:
+                return
+            mask = find_label(parent, label, i)[1] ^ unbounded
+            sources.gathered[root_of(regions, i)] |= verdict(sources, mask)[1]
 
 
 @merged
@@ -76,10 +87,10 @@ def _following(chains: Chains, half: int, starts: Any, ends: Any, star: Any, pla
 @inline
 def _emit(
     edges: Edges, chains: Chains, nodes: Any, fan: Any, marks: Any, path: Any, first: int, last: int, region: int,
-    rings: Rings, n_rings: int, n_points: int, stop: Any,
+    rings: Rings, n_rings: int, n_points: int, cycle: Any, regions: Any, sources: RingLabels, stop: Any,
 ) -> int:  # fmt: skip
     """Write the ring of the half-chains ``path[first:last]``, straight points left out; return the number of points."""
-    before = path[last - 1]
+    before, beyond = path[last - 1], 0
     for k in range(first, last):
         if k & POLL == 0 and stop[0]:
             return n_points
@@ -104,7 +115,11 @@ def _emit(
                     if marks[v] & BENT or orient(edges, edges.before[v], v, edges.after[v]) != 0:
                         rings.point[n_points], rings.meets[n_points] = v, 0
                         n_points += 1
+        if sources.last > sources.first:
+            beyond |= sources.gathered[root_of(regions, cycle[half ^ 1])]
         before = half
+    if sources.last > sources.first:
+        sources.beyond[n_rings] = beyond
     rings.region[n_rings] = region
     rings.offset[n_rings + 1] = n_points
     return n_points
@@ -114,7 +129,7 @@ def _emit(
 def walk_rings(
     edges: Edges, chains: Chains, n_chains: int, nodes: Any, n_nodes: int, cycle: Any, inside: Any, regions: Any,
     starts: Any, ends: Any, star: Any, place: Any, bounds: Any, fan: Any, marks: Any, seen: Any, path: Any,
-    path_place: Any, rings: Rings, stop: Any,
+    path_place: Any, rings: Rings, sources: RingLabels, stop: Any,
 ) -> tuple[int, int]:  # fmt: skip
     """Write all boundary rings; return how many rings and points.
 
@@ -145,7 +160,8 @@ def walk_rings(
                 first = path_place[node]
                 if first >= 0:
                     n_points = _emit(
-                        edges, chains, nodes, fan, marks, path, first, depth, region, rings, n_rings, n_points, stop
+                        edges, chains, nodes, fan, marks, path, first, depth, region, rings, n_rings, n_points, cycle,
+                        regions, sources, stop,
                     )  # fmt: skip
                     n_rings += 1
                     for k in range(first, depth):
@@ -155,7 +171,10 @@ def walk_rings(
             path[depth] = half
             depth += 1
             half = _following(chains, half, starts, ends, star, place, bounds)
-        n_points = _emit(edges, chains, nodes, fan, marks, path, 0, depth, region, rings, n_rings, n_points, stop)
+        n_points = _emit(
+            edges, chains, nodes, fan, marks, path, 0, depth, region, rings, n_rings, n_points, cycle, regions, sources,
+            stop,
+        )  # fmt: skip
         n_rings += 1
         for k in range(depth):
             path_place[origin(chains, path[k])] = -1

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from engine.arrangement.chain_rings import Rings
 from engine.arrangement.edge_contacts import POLL
 from engine.jit import inline
@@ -76,11 +78,52 @@ def _sort(rings: Rings, ranking: Ranking, x: Any, y: Any, n: int, is_by_piece: b
 
 
 @inline
-def rank_rings(rings: Rings, n_rings: int, x: Any, y: Any, ranking: Ranking, piece_of: Any, stop: Any) -> int:
-    """Fill ``ranking``; return the number of pieces, -1 if a region has not exactly one shell.
+def find_shells(rings: Rings, n_rings: int, x: Any, y: Any, ranking: Ranking, widest: Any, boxes: Any) -> bool:
+    """Fill ``ranking.is_hole`` of rings whose rounded points may turn either way; tell whether it is sure.
 
-    piece_of: scratch by region.
+    Rounding keeps order, so the rounded box of a shell holds those of its holes: the one ring of a region whose box
+    holds all others, and is no other's, is its shell. widest: scratch by region; boxes: by ring.
     """
+    for ring in range(n_rings):
+        x_min = y_min = np.inf
+        x_max = y_max = -np.inf
+        for k in range(rings.offset[ring], rings.offset[ring + 1]):
+            x_min, x_max = min(x_min, x[k]), max(x_max, x[k])
+            y_min, y_max = min(y_min, y[k]), max(y_max, y[k])
+        boxes[ring, 0], boxes[ring, 1], boxes[ring, 2], boxes[ring, 3] = x_min, x_max, y_min, y_max
+        widest[rings.region[ring]] = ring
+    for ring in range(n_rings):
+        if _holds(boxes, ring, widest[rings.region[ring]]):
+            widest[rings.region[ring]] = ring
+    for ring in range(n_rings):
+        shell = widest[rings.region[ring]]
+        if ring != shell and (not _holds(boxes, shell, ring) or _holds(boxes, ring, shell)):
+            return False
+        ranking.is_hole[ring] = ring != shell
+    return True
+
+
+@inline
+def _holds(boxes: Any, i: int, j: int) -> bool:
+    """Tell whether box i holds box j, which may be equal."""
+    return (
+        (boxes[i, 0] <= boxes[j, 0])
+        & (boxes[i, 1] >= boxes[j, 1])
+        & (boxes[i, 2] <= boxes[j, 2])
+        & (boxes[i, 3] >= boxes[j, 3])
+    )
+
+
+@inline
+def rank_rings(
+    rings: Rings, n_rings: int, x: Any, y: Any, ranking: Ranking, is_valid: bool, piece_of: Any, boxes: Any, stop: Any
+) -> int:
+    """Fill ``ranking``; return the number of pieces, -1 if a region has not exactly one shell, or none that is sure.
+
+    is_valid: whether rounding left the rings what they were. piece_of: scratch by region; boxes: by ring.
+    """
+    if not is_valid and not find_shells(rings, n_rings, x, y, ranking, piece_of, boxes):
+        return -1
     n_pieces = 0
     for ring in range(n_rings):
         first, last = rings.offset[ring], rings.offset[ring + 1]
@@ -91,10 +134,11 @@ def rank_rings(rings: Rings, n_rings: int, x: Any, y: Any, ranking: Ranking, pie
         ranking.start[ring], ranking.x[ring] = low, x[low]
         before, after = (low if low > first else last) - 1, low + 1 if low + 1 < last else first
         turn = orient2d(Point2(x[before], y[before]), Point2(x[low], y[low]), Point2(x[after], y[after]))
-        ranking.is_hole[ring] = turn < 0
+        if is_valid:
+            ranking.is_hole[ring] = turn < 0
         ranking.piece[ring] = 0
         piece_of[rings.region[ring]] = -1
-        if turn > 0:
+        if turn > 0 if is_valid else not ranking.is_hole[ring]:
             ranking.order[n_pieces] = ring
             n_pieces += 1
     if n_rings == 1:

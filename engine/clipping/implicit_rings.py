@@ -41,22 +41,23 @@ class ImplicitRings(NamedTuple):
     @property
     def rings(self) -> tuple[tuple[Homogeneous, ...], ...]:
         """The rings as integers."""
-        return self._made().rings
+        return self.exact_rings().rings
 
     @property
     def exponent(self) -> int:
         """A coordinate is ``x / w * 2**exponent``."""
-        return self._made().exponent
+        return self.exact_rings().exponent
 
     def area(self) -> Fraction:
         """Return the exact area; its length grows with the number of crossings."""
-        return self._made().area()
+        return self.exact_rings().area()
 
     def nearest_area(self) -> float:
         """Return the double nearest to the exact area. Raises `NotRepresentableError` beyond the largest double."""
-        return self._made().nearest_area()
+        return self.exact_rings().nearest_area()
 
-    def _made(self) -> ExactRings:
+    def exact_rings(self) -> ExactRings:
+        """Return the rings as integers, with all that can be asked of them."""
         vertices = np.concatenate([self.subject.vertices, self.clip.vertices])
         offsets = [*self.subject.offsets.tolist(), *(self.clip.offsets[1:] + len(self.subject.vertices)).tolist()]
         firsts = np.unique(self.sources[self.sources >= 0])

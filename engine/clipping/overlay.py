@@ -94,8 +94,9 @@ def overlay(
     the result's boundary are left out unless rings meet there, so equal point sets give equal rings.
     Accuracy: topology, counts and area are those of exact arithmetic for every finite input. Rounding may move, join,
     part or lose pieces: the result tells which (`collapsed`, `pieces_joined`, ...) and how far edges moved.
-    Cost: n log n for n edges, plus pairs of edges whose boxes overlap, plus about a microsecond per crossing; some
-    10 us per edge and crossing where rounding comes near other edges, or exponents lie further than 2^240 apart.
+    Cost: n log n for n edges, plus pairs of edges whose boxes overlap, plus about a microsecond per crossing;
+    twice that and more where rounding comes near other edges; some 10 us per edge and crossing where exponents lie
+    further than 2^240 apart, or more than 62 rings come from a rounding that comes near other edges.
     Raises: UnsupportedSolidError, InvalidOperationError, DeadlineExceededError, CancelledError.
 
     >>> from engine import Polygon, overlay

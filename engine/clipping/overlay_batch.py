@@ -19,6 +19,7 @@ from engine.clipping.overlay_compiled import (
     as_overlay,
     chained,
     gathered,
+    only_done,
     run_kernel,
     summed,
 )
@@ -156,8 +157,9 @@ def overlay_batch(
             # Gathered here, chunk by chunk: one thread does while another's kernel runs, and what it wrote is near.
             first, second = _gathered(subjects[start:stop]), _gathered(clips[start:stop])
             found = run_kernel(first, second, operation, budget)
-            parts[start] = found, _bases(first, second)
-            for place in np.flatnonzero(found.status):
+            left = np.flatnonzero(found.status)
+            parts[start] = only_done(found) if len(left) else found, _bases(first, second)
+            for place in left:
                 pair = start + int(place)
                 budget.check()
                 try:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
+from dataclasses import replace
 from types import FunctionType
 from typing import Any, Final, Literal, NamedTuple, TypeVar, cast
 
@@ -15,9 +16,11 @@ from engine.clipping.overlay_kernel import (
     DONE,
     NEEDS_CONTACTS,
     NEEDS_OUTPUT,
+    OPEN,
     overlay_pairs,
 )
 from engine.clipping.overlay_result import Overlay
+from engine.clipping.overlay_rounds import RoundedRings, settle_rings
 from engine.clipping.overlay_workspace import keep, scratch_for
 from engine.clipping.scaling import exponent_of, scaled_back, shifted
 from engine.parallel import Budget
@@ -35,6 +38,7 @@ KEPT: Final = {  # by the label of a face: in neither, in the subject, in the cl
 _overlay_pairs: Any = overlay_pairs
 if isinstance(overlay_pairs, FunctionType):  # uncompiled: numpy warns of what overflows
     _overlay_pairs = np.errstate(all="ignore")(overlay_pairs)
+_NONE: Final = np.zeros(0, np.int64)
 _KEPT_ARRAYS: Final = {name: np.array(kept, np.uint8) for name, kept in KEPT.items()}
 
 
@@ -54,9 +58,9 @@ class Polygons(NamedTuple):
 class Found(NamedTuple):
     """What the kernel found for some pairs, one after another.
 
-    status: (pairs,) int8, DONE or OPEN; counts: (pairs, 4) int64, pieces, rings, vertices and pairs of edges beyond the
-    filter; displacement: (pairs,) float64. vertices, sources: of all pairs that are DONE; ring_offsets into them;
-    piece_offsets: into the rings.
+    status: (pairs,) int8, DONE, OPEN or UNVOUCHED; counts: (pairs, 4) int64, pieces, rings, vertices and pairs of edges
+    beyond the filter; displacement: (pairs,) float64. vertices, sources: of all pairs that are not OPEN; ring_offsets
+    into them; piece_offsets: into the rings. evidence: by ring, of pairs whose rings are sources of their own.
     """
 
     status: npt.NDArray[np.int8]
@@ -66,6 +70,7 @@ class Found(NamedTuple):
     sources: npt.NDArray[np.int32]
     ring_offsets: npt.NDArray[np.int64]
     piece_offsets: npt.NDArray[np.int64]
+    evidence: npt.NDArray[np.int64]
 
 
 def gathered(vertices: Sequence[npt.NDArray[np.float64]], ring_offsets: Sequence[npt.NDArray[np.int64]]) -> Polygons:
@@ -97,8 +102,16 @@ def as_frozen(array: npt.NDArray[Scalar]) -> npt.NDArray[Scalar]:
     return array
 
 
-def run_kernel(subjects: Polygons, clips: Polygons, operation: Operation, budget: Budget) -> Found:
-    """Overlay polygons pair by pair. Raises as `Budget.check` when the call must end."""
+_EMPTY: Final = RingArrays(as_frozen(np.zeros((0, 2))), as_frozen(np.zeros(1, np.int64)))
+
+
+def run_kernel(
+    subjects: Polygons, clips: Polygons, operation: Operation, budget: Budget, shells: npt.NDArray[np.int64] = _NONE
+) -> Found:
+    """Overlay polygons pair by pair. Raises as `Budget.check` when the call must end.
+
+    shells: empty, or of each ring of the subjects the number of its shell: rings are sources of their own then.
+    """
     n = len(subjects.polygon_offsets) - 1
     n_vertices, n_rings = subjects.most_vertices + clips.most_vertices, subjects.most_rings + clips.most_rings
     status, counts, displacement = np.empty(n, np.int8), np.empty((n, 4), np.int64), np.empty(n)
@@ -115,6 +128,7 @@ def run_kernel(subjects: Polygons, clips: Polygons, operation: Operation, budget
             n,
             reached,
             _KEPT_ARRAYS[operation],
+            shells,
             budget.flag,
             scratch.buffers,
             status,
@@ -132,6 +146,7 @@ def run_kernel(subjects: Polygons, clips: Polygons, operation: Operation, budget
             scratch.output[1][:filled].copy(),
             np.add.accumulate(rings[: n_filled + 1]),
             np.add.accumulate(pieces[: n_pieces + 1]),
+            scratch.output[4][:n_filled].copy() if len(shells) else _NONE,
         )
         parts.append(part)
         keep(scratch, n_vertices, used, filled)
@@ -149,6 +164,20 @@ def run_kernel(subjects: Polygons, clips: Polygons, operation: Operation, budget
         np.concatenate([each.sources for each in parts]),
         chained([each.ring_offsets for each in parts]),
         chained([each.piece_offsets for each in parts]),
+        np.concatenate([each.evidence for each in parts]),
+    )
+
+
+def only_done(found: Found) -> Found:
+    """Return what was found for the pairs that are DONE."""
+    counts = np.where(found.status[:, None] == DONE, found.counts, 0)
+    of_piece, of_ring, of_vertex = (np.repeat(found.status == DONE, found.counts[:, k]) for k in range(3))
+    return found._replace(
+        counts=counts,
+        vertices=found.vertices[of_vertex],
+        sources=found.sources[of_vertex],
+        ring_offsets=summed(np.diff(found.ring_offsets)[of_ring]),
+        piece_offsets=summed(np.diff(found.piece_offsets)[of_piece]),
     )
 
 
@@ -172,7 +201,7 @@ def overlay_compiled(
     A scene outside of the kernel's range is brought into it by a power of two where that is exact.
     """
     found, exponent = run_kernel(_as_one(subject), _as_one(clip), operation, budget), 0
-    if found.status[0] != DONE:
+    if found.status[0] == OPEN:
         exponent = exponent_of(subject.vertices, clip.vertices)
         if exponent == 0:
             return None
@@ -181,16 +210,57 @@ def overlay_compiled(
             return None
         near = RingArrays(first, subject.offsets), RingArrays(second, clip.offsets)
         found = run_kernel(_as_one(near[0]), _as_one(near[1]), operation, budget)
-        if found.status[0] != DONE:
+        if found.status[0] == OPEN:
             return None
+    exact = ImplicitRings(subject, clip, found.sources, found.ring_offsets)
+    settled = None
     vertices, displacement = found.vertices, float(found.displacement[0])
+    if found.status[0] != DONE:
+        if output == "valid":
+            settled = settle_rings(_rounded(found), exact, functools.partial(_again, budget))
+        if settled is None:
+            return None
+        vertices, displacement = settled.rings.vertices, settled.displacement
     if exponent:
         vertices, doubtful = scaled_back(vertices, exponent)
         if doubtful.any() or not np.isfinite(vertices).all():
             return None
         displacement = float(np.nextafter(np.ldexp(displacement, exponent), np.inf)) if displacement else 0.0
-    exact = ImplicitRings(subject, clip, found.sources, found.ring_offsets)
-    return as_overlay(vertices, found.piece_offsets, displacement, exact, output), int(found.counts[0, 3])
+    result = as_overlay(vertices, found.piece_offsets, displacement, exact, output)
+    if settled is not None:
+        result = replace(
+            result,
+            ring_offsets=as_frozen(settled.rings.ring_offsets),
+            piece_offsets=as_frozen(settled.rings.piece_offsets),
+            collapsed=settled.collapsed,
+            pieces_joined=settled.pieces_joined,
+            pieces_parted=settled.pieces_parted,
+            holes_joined=settled.holes_joined,
+            holes_parted=settled.holes_parted,
+            rounds=settled.rounds,
+            vertices_moved=settled.vertices_moved,
+        )
+    return result, int(found.counts[0, 3])
+
+
+def _rounded(found: Found) -> RoundedRings:
+    """Return what was found for one pair as the outcome of a round."""
+    return RoundedRings(
+        vertices=found.vertices,
+        ring_offsets=found.ring_offsets,
+        piece_offsets=found.piece_offsets,
+        evidence=found.evidence,
+        displacement=float(found.displacement[0]),
+        is_valid=bool(found.status[0] == DONE),
+        has_crossings=bool((found.sources[:, 1] >= 0).any()),
+    )
+
+
+def _again(budget: Budget, rings: RoundedRings, shells: npt.NDArray[np.int64]) -> RoundedRings | None:
+    """Arrange rounded rings, each a source of its own; None where that is left open."""
+    subject = RingArrays(as_frozen(rings.vertices), as_frozen(rings.ring_offsets))
+    found = run_kernel(_as_one(subject), _as_one(_EMPTY), "union", budget, shells)
+    return None if found.status[0] == OPEN else _rounded(found)
 
 
 def _as_one(rings: RingArrays) -> Polygons:

@@ -7,7 +7,11 @@ number of crossings. Decisions are exact throughout. A pair is left OPEN, for th
 
 - a coordinate is neither zero nor within 2^-120 .. 2^120, so that expansions might lose bits;
 - a coordinate of the result cannot be rounded from double-doubles and exact signs;
-- rounding came so near another edge that neither clearance.py nor ring_certificate.py vouches for the rounded rings.
+- it has rings of which rounding left no sure shell.
+
+A pair is left UNVOUCHED where rounding came so near another edge that neither clearance.py nor ring_certificate.py
+vouches for the rounded rings, or put a vertex on the line of its neighbours: its rounded rings may cross. They come
+back as another pair then, each ring a source of its own (ring_labels.py).
 
 The intersection of two convex rings is overlay_convex.py's where floating point is sure of all that it asks.
 
@@ -31,6 +35,7 @@ from engine.arrangement.edge_crossings import FEW, find_contacts
 from engine.arrangement.edge_events import sort_events
 from engine.arrangement.edge_tree import build_tree
 from engine.arrangement.ring_certificate import certify, has_straight_point
+from engine.arrangement.ring_labels import RingLabels
 from engine.arrangement.ring_order import rank_rings
 from engine.arrangement.rounded_crossings import LOST, round_crossing
 from engine.clipping.cut_point import LARGEST
@@ -41,6 +46,7 @@ from engine.jit import bare_kernel, inline
 
 DONE: Final = 0
 OPEN: Final = 1
+UNVOUCHED: Final = 2
 FINISHED: Final = 0
 NEEDS_CONTACTS: Final = 1
 """The pair reached has more contacts than there is scratch for."""
@@ -111,8 +117,8 @@ def _round_points(w: Workspace, n: int, n_crossings: int, n_points: int, stop: A
 
 @inline
 def _write(
-    w: Workspace, n: int, n_found: int, vertices: Any, sources: Any, sizes: Any, pieces: Any, n_out: int, n_rings: int,
-    n_pieces: int,
+    w: Workspace, n: int, n_found: int, labels: RingLabels, vertices: Any, sources: Any, sizes: Any, pieces: Any,
+    evidence: Any, n_out: int, n_rings: int, n_pieces: int,
 ) -> None:  # fmt: skip
     """Append the rings in their order to the output, from its entries n_out, n_rings and n_pieces on."""
     n_pieces -= 1
@@ -131,6 +137,9 @@ def _write(
             n_out += 1
             i = i + 1 if i + 1 < last else first
         sizes[n_rings + k] = last - first
+        if labels.last > labels.first:
+            is_hole = w.ranking.is_hole[ring]
+            evidence[n_rings + k] = labels.beyond[ring] if is_hole else labels.gathered[w.found.region[ring]]
         if w.ranking.is_hole[ring]:
             pieces[n_pieces] += 1
         else:
@@ -151,17 +160,19 @@ def _write_ring(w: Workspace, m: int, low: int, vertices: Any, sources: Any, n_o
 @bare_kernel
 def overlay_pairs(
     subjects: Any, subject_rings: Any, subject_items: Any, clips: Any, clip_rings: Any, clip_items: Any,
-    first_item: int, last_item: int, begin: int, kept: Any, stop: Any, buffers: Buffers,
-    status: Any, counts: Any, displacement: Any, vertices: Any, sources: Any, sizes: Any, pieces: Any,
+    first_item: int, last_item: int, begin: int, kept: Any, shells: Any, stop: Any, buffers: Buffers,
+    status: Any, counts: Any, displacement: Any, vertices: Any, sources: Any, sizes: Any, pieces: Any, evidence: Any,
 ) -> tuple[int, int, int, int, int, int]:  # fmt: skip
     """Overlay the pairs ``begin`` .. ``last_item - 1`` of those from ``first_item`` on.
 
     subjects, clips: (n, 2) float64 vertices; subject_rings, clip_rings: where each ring begins, and its end;
     subject_items, clip_items: the first ring of each polygon, and the end of the last one's. kept: (4,) uint8 by label.
-    Fills, by pair from first_item on: status, (pairs,) int8, DONE or OPEN; counts, (pairs, 4) int64: pieces, rings,
-    vertices, pairs of edges beyond the filter; displacement, (pairs,) float64: how far rounding moved a vertex at most.
+    shells: empty; or, for rounded rings as subjects, of at most MOST_RINGS rings each, no clips, and kept all but the
+    first, by ring the number of its shell within its polygon.
+    Fills, by pair from first_item on: status, (pairs,) int8; counts, (pairs, 4) int64: pieces, rings, vertices, pairs
+    of edges beyond the filter; displacement, (pairs,) float64: how far rounding moved a vertex at most.
     Fills, pair after pair from the beginning: vertices (m, 2) float64, sources (m, 2) int32, sizes (vertices by ring)
-    and pieces (rings by piece).
+    and pieces (rings by piece); with shells also evidence, by ring int64.
     A source is the input vertex and -1, or the first vertices of the two edges that cross; clip vertices are counted
     after those of all subjects.
     Returns the pair reached, FINISHED or what is needed to go on with it, numbers of vertices, rings, pieces, and how
@@ -180,6 +191,7 @@ def overlay_pairs(
             break
         first, first_end = subject_items[at], subject_items[at + 1]
         second, second_end = clip_items[at], clip_items[at + 1]
+        labels = RingLabels(shells, first, first_end if shells.shape[0] else first, w.following, w.joined)
         x0, x1, y0, y1 = box_of(subjects, subject_rings[first], subject_rings[first_end])
         u0, u1, v0, v1 = box_of(clips, clip_rings[second], clip_rings[second_end])
         common = max(x0, u0), min(x1, u1), max(y0, v0), min(y1, v1)
@@ -206,11 +218,11 @@ def overlay_pairs(
                 continue
         whole = -np.inf, np.inf, -np.inf, np.inf
         n, n_rings, safe = load_rings(
-            subjects, subject_rings, first, first_end, 1, 0, edges, w.origins, w.tops, w.masks,
+            subjects, subject_rings, first, first_end, 1, min(shells.shape[0], 1), 0, edges, w.origins, w.tops, w.masks,
             whole if kept[1] else common, 0, 0, stop,
         )  # fmt: skip
         n, n_rings, also_safe = load_rings(
-            clips, clip_rings, second, second_end, 2, subjects.shape[0], edges, w.origins, w.tops, w.masks,
+            clips, clip_rings, second, second_end, 2, 0, subjects.shape[0], edges, w.origins, w.tops, w.masks,
             whole if kept[2] else common, n, n_rings, stop,
         )  # fmt: skip
         largest = max(magnitude(x0, x1, y0, y1), magnitude(u0, u1, v0, v1))
@@ -264,36 +276,39 @@ def overlay_pairs(
         )  # fmt: skip
         choose_boundary(
             chains, n_chains, w.cycle, n_cycles, kept, w.star_starts, n_nodes, w.joined, w.label, w.regions, w.inside,
-            w.bounds, w.fan, stop,
+            w.bounds, w.fan, labels, stop,
         )  # fmt: skip
         if stop[0]:
             break
         n_found, m = walk_rings(
             edges, chains, n_chains, w.nodes, n_nodes, w.cycle, w.inside, w.regions, w.star_starts, w.star_ends, w.star,
-            w.place, w.bounds, w.fan, w.marks, w.seen, w.path, w.path_place, found, stop,
+            w.place, w.bounds, w.fan, w.marks, w.seen, w.path, w.path_place, found, labels, stop,
         )  # fmt: skip
         if stop[0]:
             break
         moved_by = _round_points(w, n, n_crossings, m, stop)
         if moved_by == LOST:
             continue
+        is_valid = True
         if moved_by > 0.0:
-            if has_straight_point(found, n_found, w.x, w.y, w.moved):
-                continue
-            if not is_clear and not certify(
-                found, n_found, m, w.x, w.y, w.moved, w.boxes, w.marks, w.chain_at, w.tree, w.tree_marks,
-                w.places, w.stack, w.pairs, stop,
-            ):  # fmt: skip
-                continue
-        n_pieces = rank_rings(found, n_found, w.x, w.y, w.ranking, w.label, stop)
+            is_valid = not has_straight_point(found, n_found, w.x, w.y, w.moved) and (
+                is_clear
+                or certify(
+                    found, n_found, m, w.x, w.y, w.moved, w.boxes, w.marks, w.chain_at, w.tree, w.tree_marks,
+                    w.places, w.stack, w.pairs, stop,
+                )
+            )  # fmt: skip
+        n_pieces = rank_rings(found, n_found, w.x, w.y, w.ranking, is_valid, w.label, w.boxes, stop)
         if n_pieces < 0:
             continue
         if n_out + m > vertices.shape[0] or n_out_rings + n_found > sizes.shape[0]:
             counts[item, 1], counts[item, 2] = n_found, m
             return at, NEEDS_OUTPUT, n_out, n_out_rings, n_out_pieces, used
-        _write(w, n, n_found, vertices, sources, sizes, pieces, n_out, n_out_rings, n_out_pieces)
+        _write(
+            w, n, n_found, labels, vertices, sources, sizes, pieces, evidence, n_out, n_out_rings, n_out_pieces
+        )  # fmt: skip
         n_out, n_out_rings, n_out_pieces = n_out + m, n_out_rings + n_found, n_out_pieces + n_pieces
         counts[item, 0], counts[item, 1], counts[item, 2], counts[item, 3] = n_pieces, n_found, m, n_exact
         displacement[item] = moved_by
-        status[item] = DONE
+        status[item] = DONE if is_valid else UNVOUCHED
     return last_item, FINISHED, n_out, n_out_rings, n_out_pieces, used

@@ -104,7 +104,8 @@ class Workspace(NamedTuple):
 class Scratch:
     """What the kernel writes to, for pairs of up to so many vertices, rings and contacts, and for so much output.
 
-    output: vertices (m, 2) float64, their sources (m, 2) int32, sizes of rings and of pieces, both (n,) int64.
+    output: vertices (m, 2) float64, their sources (m, 2) int32, sizes of rings and of pieces, evidence by ring, all
+        (n,) int64.
     sizes: those of rings and of pieces again, after a zero: summed up they are offsets.
     """
 
@@ -112,7 +113,7 @@ class Scratch:
     n_rings: int
     n_contacts: int
     buffers: Buffers
-    output: tuple[npt.NDArray[np.float64], npt.NDArray[np.int32], npt.NDArray[np.int64], npt.NDArray[np.int64]]
+    output: tuple[Any, ...]
     sizes: tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]
 
 
@@ -131,7 +132,8 @@ def scratch_for(n_vertices: int, n_rings: int, n_contacts: int, n_out: int, n_ou
     n_out, n_out_rings = max(n_out, n_vertices + n_contacts), max(n_out_rings, n_contacts)
     sizes = np.empty(n_out_rings + 1, np.int64), np.empty(n_out_rings + 1, np.int64)
     sizes[0][0] = sizes[1][0] = 0
-    output = np.empty((n_out, 2)), np.empty((n_out, 2), np.int32), sizes[0][1:], sizes[1][1:]
+    evidence = np.empty(n_out_rings, np.int64)
+    output = np.empty((n_out, 2)), np.empty((n_out, 2), np.int32), sizes[0][1:], sizes[1][1:], evidence
     if kept is not None:
         return Scratch(kept.n_vertices, kept.n_rings, kept.n_contacts, kept.buffers, output, sizes)
     return Scratch(n_vertices, n_rings, n_contacts, buffers_for(n_vertices, n_rings, n_contacts), output, sizes)

@@ -1,0 +1,183 @@
+"""Rounds of the compiled overlay: rounded rings that nothing vouches for are arranged again, until they are valid.
+
+The rule, and what is told of its outcome, are those of overlay_rounding.py; the kernel does the work of a round. Which
+exact part a part comes from is carried along as bits: its evidence names rings of the round before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from math import inf, nextafter
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from engine.arrangement.nodes import nearest_quotient
+from engine.arrangement.ring_labels import MOST_RINGS
+from engine.clipping.implicit_rings import ImplicitRings
+from engine.clipping.overlay_result import Collapse
+from engine.clipping.overlay_rounding import MAX_ROUNDS, count_changes
+
+
+@dataclass(frozen=True, slots=True)
+class RoundedRings:
+    """What one arrangement left, rounded.
+
+    vertices: (n, 2) float64 of all rings, ring_offsets into them, piece_offsets into the rings, shells first; both
+    int64. evidence: by ring, bits of rings of the round before; empty in the first. displacement: how far rounding
+    moved a vertex at most. is_valid: whether the rings are surely those of the arrangement still. has_crossings: some
+    vertex is none of the round before.
+    """
+
+    vertices: npt.NDArray[np.float64]
+    ring_offsets: npt.NDArray[np.int64]
+    piece_offsets: npt.NDArray[np.int64]
+    evidence: npt.NDArray[np.int64]
+    displacement: float
+    is_valid: bool
+    has_crossings: bool
+
+    @property
+    def n_rings(self) -> int:
+        return len(self.ring_offsets) - 1
+
+    @property
+    def n_pieces(self) -> int:
+        return len(self.piece_offsets) - 1
+
+
+@dataclass(frozen=True, slots=True)
+class Settled:
+    """Valid rings, and what became of the parts of the exact result; the names are those of `Overlay`."""
+
+    rings: RoundedRings
+    rounds: int
+    displacement: float
+    vertices_moved: int
+    collapsed: tuple[Collapse, ...]
+    pieces_joined: int
+    pieces_parted: int
+    holes_joined: int
+    holes_parted: int
+
+
+Again = Callable[[RoundedRings, npt.NDArray[np.int64]], RoundedRings | None]
+
+
+def settle_rings(first: RoundedRings, exact: ImplicitRings, again: Again) -> Settled | None:
+    """Arrange ``first`` until it is valid; None where that takes integers: many rings, or many rounds.
+
+    exact: the exact rings that ``first`` is rounded from. again: arranges rings, given the number of each ring's shell.
+    """
+    n_holes = first.n_rings - first.n_pieces
+    piece_origins = [1 << piece for piece in range(first.n_pieces)]
+    hole_origins = [1 << hole for hole in range(n_holes)]
+    rings, rounds, displacement, has_crossings = first, 1, first.displacement, False
+    while not rings.is_valid:  # bound: MAX_ROUNDS
+        if rounds == MAX_ROUNDS or rings.n_rings > MOST_RINGS:
+            return None
+        found = again(rings, np.repeat(rings.piece_offsets[:-1], np.diff(rings.piece_offsets)))
+        if found is None:
+            return None
+        piece_origins, hole_origins = _origins(rings, found, piece_origins, hole_origins)
+        rings, has_crossings = found, has_crossings or found.has_crossings
+        if rings.displacement:
+            rounds, displacement = rounds + 1, nextafter(displacement + rings.displacement, inf)
+    lost_pieces, pieces_joined, pieces_parted = _changes(first.n_pieces, piece_origins)
+    lost_holes, holes_joined, holes_parted = _changes(n_holes, hole_origins)
+    return Settled(
+        rings=rings,
+        rounds=rounds,
+        displacement=displacement,
+        vertices_moved=_moved(first.vertices, rings.vertices) if has_crossings else 0,
+        collapsed=_collapsed(first, exact, lost_pieces, lost_holes) if lost_pieces or lost_holes else (),
+        pieces_joined=pieces_joined,
+        pieces_parted=pieces_parted,
+        holes_joined=holes_joined,
+        holes_parted=holes_parted,
+    )
+
+
+def _origins(
+    before: RoundedRings, found: RoundedRings, piece_origins: list[int], hole_origins: list[int]
+) -> tuple[list[int], list[int]]:
+    """Return the exact parts, as bits, that pieces and holes come from."""
+    of_ring: list[int] = []
+    holes = iter(hole_origins)
+    for origin, size in zip(piece_origins, np.diff(before.piece_offsets).tolist(), strict=True):
+        of_ring.append(origin)
+        of_ring += [next(holes) for _ in range(size - 1)]
+    collected = []
+    for evidence in found.evidence.tolist():
+        origin = 0
+        for ring in _bits(evidence):
+            origin |= of_ring[ring]
+        collected.append(origin)
+    shells = found.piece_offsets[:-1].tolist()
+    is_shell = set(shells)
+    pieces = [collected[ring] for ring in shells]
+    return pieces, [origin for ring, origin in enumerate(collected) if ring not in is_shell]
+
+
+def _bits(number: int) -> list[int]:
+    """Return the places of the bits that are set."""
+    places = []
+    while number:
+        bit = number & -number
+        places.append(bit.bit_length() - 1)
+        number ^= bit
+    return places
+
+
+def _changes(n_exact: int, origins: Sequence[int]) -> tuple[list[int], int, int]:
+    """Return what `count_changes` does, of origins as bits."""
+    if len(origins) == n_exact and sorted(origins) == [1 << part for part in range(n_exact)]:
+        return [], 0, 0
+    return count_changes(n_exact, [set(_bits(origin)) for origin in origins])
+
+
+def _moved(images: npt.NDArray[np.float64], vertices: npt.NDArray[np.float64]) -> int:
+    """Return how many vertices are none of ``images``."""
+    known = {(x, y) for x, y in images.tolist()}
+    return sum((x, y) not in known for x, y in vertices.tolist())
+
+
+def _collapsed(
+    first: RoundedRings, exact: ImplicitRings, lost_pieces: Sequence[int], lost_holes: Sequence[int]
+) -> tuple[Collapse, ...]:
+    """Return lost pieces, then lost holes, each by the vertices of its exact ring from the first one on."""
+    shells = first.piece_offsets.tolist()
+    piece_of = np.repeat(np.arange(first.n_pieces), np.diff(first.piece_offsets)).tolist()
+    holes = [ring for ring in range(len(piece_of)) if ring != shells[piece_of[ring]]]
+
+    def made(ring: int, end: int) -> ImplicitRings:
+        stops = exact.offsets[ring : end + 1]
+        return exact._replace(sources=exact.sources[stops[0] : stops[-1]], offsets=stops - stops[0])
+
+    def entry(kind: Literal["piece", "hole"], ring: int, end: int) -> tuple[list[_Place], Collapse]:
+        place, near = _first_vertex(made(ring, ring + 1))
+        return place, Collapse(kind, abs(made(ring, end).area()), near)
+
+    pieces = [entry("piece", shells[piece], shells[piece + 1]) for piece in lost_pieces]
+    around = {shells[piece_of[holes[k]]] for k in lost_holes}
+    of_shell = {ring: _first_vertex(made(ring, ring + 1))[0] for ring in around}
+    lost = [(of_shell[shells[piece_of[holes[k]]]], *entry("hole", holes[k], holes[k] + 1)) for k in lost_holes]
+    pieces.sort(key=lambda each: each[0])
+    lost.sort(key=lambda each: each[:2])
+    return (*(each[-1] for each in pieces), *(each[-1] for each in lost))
+
+
+_Place = tuple[Fraction, Fraction]
+
+
+def _first_vertex(ring: ImplicitRings) -> tuple[list[_Place], tuple[float, float]]:
+    """Return a ring from its first vertex on, and the doubles nearest to that vertex."""
+    made = ring.exact_rings()
+    up, down = max(made.exponent, 0), max(-made.exponent, 0)
+    places = [(Fraction(x << up, w << down), Fraction(y << up, w << down)) for x, y, w in made.rings[0]]
+    k = places.index(min(places))
+    x, y, w = made.rings[0][k]
+    return places[k:] + places[:k], (nearest_quotient(x << up, w << down), nearest_quotient(y << up, w << down))

@@ -1,0 +1,67 @@
+"""Rounds of the compiled overlay: what it tells of joined, parted and lost parts is what the integers say."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+import numpy as np
+import pytest
+
+from engine.clipping.overlay_batch import overlay_batch
+from engine.clipping.overlay_compiled import overlay_compiled
+from engine.parallel import Budget
+from engine.solids.polygon import Polygon
+from tests.unit.clipping import overlay_families as families
+from tests.unit.clipping.overlay_checks import OPERATIONS
+from tests.unit.clipping.test_overlay_kernel import agree, arrays
+
+HARD = (
+    families.rotated_lattice,
+    families.nearly_coincident,
+    families.far_lattice,
+    families.pencils,
+    families.slivers,
+    families.combs,
+)
+
+
+@pytest.mark.parametrize("family", HARD, ids=lambda family: family.__name__)
+def test_compiled_rounds_equal_those_in_integers(family: Any) -> None:
+    told: Counter[str] = Counter()
+    for seed in range(6):
+        pair = families.drawn(family, 100 + seed)
+        for operation in OPERATIONS:
+            if agree(*pair, operation):
+                told["settled"] += 1
+                found = overlay_compiled(*map(arrays, pair), operation, "valid", Budget())
+                assert found is not None
+                told["rounded"] += found[0].rounds > 0
+                told["changed"] += bool(found[0].collapsed or found[0].pieces_joined or found[0].pieces_parted)
+    assert told["settled"] >= 20
+    assert told["rounded"] > 0
+    if family in (families.pencils, families.slivers, families.rotated_lattice):
+        assert told["changed"] > 0
+
+
+def test_more_rings_than_a_label_has_bits() -> None:
+    """Triangles whose crossings come near their corners: 80 pieces that must be arranged again are left open."""
+    pair = families.drawn(families.far_lattice, 3)
+    tiles = np.arange(90) * 2.0**8
+    sides = [[ring + np.array([tile, 0.0]) for tile in tiles for ring in each] for each in pair]
+    found = [overlay_compiled(*map(arrays, sides), operation, "valid", Budget()) for operation in OPERATIONS]
+    assert None in found
+
+
+def test_a_batch_equals_single_calls() -> None:
+    pairs = [families.drawn(family, seed) for seed in range(5) for family in HARD]
+    subjects, clips = ([Polygon(pair[k]) for pair in pairs] for k in (0, 1))
+    for operation in OPERATIONS:
+        batch = overlay_batch(subjects, clips, operation, workers=1)
+        for pair, found in zip(pairs, batch, strict=True):
+            single = overlay_batch([Polygon(pair[0])], [Polygon(pair[1])], operation)[0]
+            assert found is not None
+            assert single is not None
+            assert found.vertices.tolist() == single.vertices.tolist()
+            assert found.piece_offsets.tolist() == single.piece_offsets.tolist()
+            assert found.area_exact == single.area_exact
