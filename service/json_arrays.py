@@ -117,6 +117,8 @@ class _Decoder:
     def __init__(self) -> None:
         self._parser = simdjson.Parser()
         self._kind = "i"
+        self._found = np.empty(0, np.int64)
+        self._n_found = 0
 
     def array(self, text: memoryview) -> Any:
         """Return the array that `text` stands for."""
@@ -127,21 +129,40 @@ class _Decoder:
         depth = found[0].count(b"[")
         cut = _CUTS[depth]
         stop = len(text) - len(bytes(text[-64:])) + len(inner) - 1
-        pieces, start = [], 1
+        shape: tuple[int, ...] = ()
+        start = 1
         while start < stop:
             at = cut.search(text, start + PIECE, stop)
             end = at.end() - 1 if at is not None else stop
             if at is None and start == 1 and depth > 2 and stop > PIECE:
                 return self.array(text[1:stop])[None]  # one long item
-            pieces.append(self._piece(b"".join((b"[", text[start:end], b"]")), depth))
+            flat, shape_here = self._piece(b"".join((b"[", text[start:end], b"]")), depth)
+            if shape and shape[1:] != shape_here[1:]:
+                raise Unfit
+            self._append(flat, (stop - start) / (end - start))
+            shape = (shape[0] + shape_here[0] if shape else shape_here[0], *shape_here[1:])
             start = end + 1
-        if len({piece.shape[1:] for piece in pieces}) != 1:
+        if not shape:
             raise Unfit
-        if self._kind == "d" and any(piece.dtype.kind == "i" and not _is_exact(piece) for piece in pieces):
-            raise Unfit
-        return pieces[0] if len(pieces) == 1 else np.concatenate(pieces)
+        return self._found[: self._n_found].reshape(shape)
 
-    def _piece(self, text: bytes, depth: int) -> Any:
+    def _append(self, flat: Any, n_pieces: float) -> None:
+        """Put numbers after those found; there are some n_pieces times as many to come, these among them.
+
+        Into one array: pieces kept until the last would take and give back memory for all threads to wait for.
+        """
+        end = self._n_found + len(flat)
+        if end > len(self._found) or flat.dtype != self._found.dtype:
+            if self._found.dtype.kind == "i" and flat.dtype.kind == "f" and not _is_exact(self._found[: self._n_found]):
+                raise Unfit
+            longer = np.empty(self._n_found + int(1.05 * n_pieces * len(flat)) + 8, flat.dtype)
+            longer[: self._n_found] = self._found[: self._n_found]
+            self._found = longer
+        self._found[self._n_found : end] = flat
+        self._n_found = end
+
+    def _piece(self, text: bytes, depth: int) -> tuple[Any, tuple[int, ...]]:
+        """Return the numbers of a piece, and their shape."""
         try:
             array: Any = self._parser.parse(text)
             shape, item = [len(array)], array
@@ -157,7 +178,7 @@ class _Decoder:
             raise Unfit
         if flat.dtype.kind == "f" and not _is_exact(flat):
             _check_integers(text, flat, depth)
-        return flat.reshape(shape)
+        return flat, tuple(shape)
 
     def _numbers(self, array: Any) -> Any:
         if self._kind == "i":

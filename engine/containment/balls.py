@@ -7,6 +7,9 @@ the rounding of the bound. (3) Differences as exact pairs high + low; where all 
 flush data), r^2 and the squares are exact pairs, and the sign is that of an expansion of at most eight terms. Else
 UNDECIDED. Squares are exact pairs only above 2^-480 in size, smaller ones (but zero) are UNDECIDED too.
 
+The first two stages are taken for a block of points at once, without branches: so the compiler uses vectors, and no
+processor has to foretell which points lie inside. In the plane z is 0 throughout.
+
 Source: two_diff, two_prod and growing expansions of Shewchuk 1997.
 """
 
@@ -14,14 +17,16 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from engine.jit import inline, kernel
-from engine.predicates.error_free import two_diff, two_prod, two_sum
+from engine.jit import inline, kernel, merged
+from engine.predicates.error_free import two_diff, two_prod, two_sum, workspace
 from engine.types import UNDECIDED
 
 _SLACK: Final = 16.0 * 2.0**-53
 _TINY: Final = 1e-320
 _SMALLEST: Final = 2.0**-480
 _LARGEST: Final = 2.0**500
+_BLOCK: Final = 64
+"""Points looked at together: four numbers each stay in the nearest cache."""
 
 
 @inline
@@ -44,44 +49,63 @@ def _add_square(expansion: Any, length: int, value: float, sign: float) -> int:
     return _grow(expansion, _grow(expansion, length, sign * low), sign * high)
 
 
+@merged
+def _located(dx: float, dy: float, dz: float, square: float, reach: float, blur: float) -> float:
+    """Return the location of a point at that difference from the centre, UNDECIDED where the filter is unsure."""
+    ax, ay, az = abs(dx), abs(dy), abs(dz)
+    total = dx * dx + dy * dy + dz * dz
+    excess, bound = square - total, _SLACK * (square + total) + _TINY
+    bound += 4.0 * blur * (ax + ay + az + 2.0 * blur)  # |(d + e)^2 - d^2| <= 2 |d| e + e^2 an axis
+    is_out = (max(ax, max(ay, az)) > reach) | (-excess > bound)
+    return -1.0 if is_out else (1.0 if excess > bound else 2.0)
+
+
+@inline
+def _settle(points: Any, item: int, center: Any, radius: float, expansion: Any) -> int:
+    """Return the location by exact sums; UNDECIDED where differences or squares are no exact pairs."""
+    length = _add_square(expansion, 0, radius, 1.0)
+    for axis in range(len(center)):
+        high, low = two_diff(points[item, axis], center[axis])
+        length = _add_square(expansion, length, high, -1.0) if low == 0.0 else -1
+    if length < 0:
+        return UNDECIDED
+    sign = 0
+    for component in range(length):  # the last component that is not zero outweighs all before it
+        if expansion[component] != 0.0:
+            sign = 1 if expansion[component] > 0.0 else -1
+    return sign
+
+
 @kernel
 def locate_in_ball(
-    points: Any, center: Any, blur: float, radius: float, workspace: Any, locations: Any, flag: Any
+    points: Any, center: Any, blur: float, radius: float, expansion: Any, locations: Any, flag: Any
 ) -> int:
     """Fill `locations` (n,) int8 for points (n, dim); returns how many needed more than the filter.
 
     blur: bound on the error of each coordinate of `center`; 0.0 where it is exact, else what stays open is UNDECIDED.
-    workspace: (8,) float64.
+    expansion: (8,) float64.
     """
-    n_axes, n_beyond = len(center), 0
-    for item in range(len(points)):
+    is_flat, n_beyond = len(center) == 2, 0
+    x, y, z = center[0], center[1], 0.0 if is_flat else center[2]
+    square, reach = radius * radius, radius + 2.0 * blur
+    dx, dy, dz, found = workspace(64), workspace(64), workspace(64), workspace(64)
+    for first in range(0, len(points), _BLOCK):
         if flag[0]:
             break
-        is_far, total, spread = False, 0.0, 0.0
-        for axis in range(n_axes):
-            difference = points[item, axis] - center[axis]
-            is_far |= abs(difference) > radius + 2.0 * blur if blur > 0.0 else abs(difference) > radius
-            total += difference * difference
-            spread += abs(difference)
-        if is_far:
-            locations[item] = -1
+        size = min(_BLOCK, len(points) - first)
+        for j in range(size):
+            dx[j], dy[j] = points[first + j, 0] - x, points[first + j, 1] - y
+            dz[j] = 0.0 if is_flat else points[first + j, 2] - z
+        for j in range(_BLOCK):  # a number of turns that the compiler knows; those past `size` are not looked at
+            found[j] = _located(dx[j], dy[j], dz[j], square, reach, blur)
+        n_open = 0
+        for j in range(size):
+            locations[first + j] = int(found[j])
+            n_open += found[j] == UNDECIDED
+        n_beyond += n_open
+        if n_open == 0 or blur > 0.0:
             continue
-        square = radius * radius
-        excess, bound = square - total, _SLACK * (square + total) + _TINY
-        bound += 4.0 * blur * (spread + 2.0 * blur)  # |(d + e)^2 - d^2| <= 2 |d| e + e^2 an axis
-        if excess > bound or -excess > bound:
-            locations[item] = 1 if excess > 0.0 else -1
-            continue
-        n_beyond += 1
-        length = _add_square(workspace, 0, radius, 1.0) if blur == 0.0 else -1
-        for axis in range(n_axes):
-            high, low = two_diff(points[item, axis], center[axis])
-            length = _add_square(workspace, length, high, -1.0) if low == 0.0 else -1
-        sign = UNDECIDED
-        if length >= 0:
-            sign = 0
-            for component in range(length):  # the last component that is not zero outweighs all before it
-                if workspace[component] != 0.0:
-                    sign = 1 if workspace[component] > 0.0 else -1
-        locations[item] = sign
+        for item in range(first, first + size):
+            if locations[item] == UNDECIDED:
+                locations[item] = _settle(points, item, center, radius, expansion)
     return n_beyond
