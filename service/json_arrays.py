@@ -116,9 +116,9 @@ class _Decoder:
 
     def __init__(self) -> None:
         self._parser = simdjson.Parser()
-        self._kind = "i"
-        self._found = np.empty(0, np.int64)
-        self._n_found = 0
+        self._numbers: Any = np.empty(0, np.int64)
+        self._n_numbers = 0
+        self._ends: list[tuple[int, int]] = []  # of each piece: where its text ends, and how many numbers there were
 
     def array(self, text: memoryview) -> Any:
         """Return the array that `text` stands for."""
@@ -136,33 +136,24 @@ class _Decoder:
             end = at.end() - 1 if at is not None else stop
             if at is None and start == 1 and depth > 2 and stop > PIECE:
                 return self.array(text[1:stop])[None]  # one long item
-            flat, shape_here = self._piece(b"".join((b"[", text[start:end], b"]")), depth)
-            if shape and shape[1:] != shape_here[1:]:
+            length, *rest = self._piece(b"".join((b"[", text[start:end], b"]")), depth, (stop - start) / (end - start))
+            if shape and [*shape[1:]] != rest:
                 raise Unfit
-            self._append(flat, (stop - start) / (end - start))
-            shape = (shape[0] + shape_here[0] if shape else shape_here[0], *shape_here[1:])
+            shape = (shape[0] + length if shape else length, *rest)
+            self._ends.append((end, self._n_numbers))
             start = end + 1
         if not shape:
             raise Unfit
-        return self._found[: self._n_found].reshape(shape)
+        numbers = self._numbers[: self._n_numbers]
+        if numbers.dtype.kind == "f" and not _is_exact(numbers):
+            self._check_integers(text, numbers, depth)
+        return numbers.reshape(shape)
 
-    def _append(self, flat: Any, n_pieces: float) -> None:
-        """Put numbers after those found; there are some n_pieces times as many to come, these among them.
+    def _piece(self, text: bytes, depth: int, n_pieces: float) -> list[int]:
+        """Put the numbers of a piece after those found, and return their shape; n_pieces: how many are left, roughly.
 
-        Into one array: pieces kept until the last would take and give back memory for all threads to wait for.
+        Nothing here lets other threads run, or calls for it: to get the interpreter back takes as long as a piece.
         """
-        end = self._n_found + len(flat)
-        if end > len(self._found) or flat.dtype != self._found.dtype:
-            if self._found.dtype.kind == "i" and flat.dtype.kind == "f" and not _is_exact(self._found[: self._n_found]):
-                raise Unfit
-            longer = np.empty(self._n_found + int(1.05 * n_pieces * len(flat)) + 8, flat.dtype)
-            longer[: self._n_found] = self._found[: self._n_found]
-            self._found = longer
-        self._found[self._n_found : end] = flat
-        self._n_found = end
-
-    def _piece(self, text: bytes, depth: int) -> tuple[Any, tuple[int, ...]]:
-        """Return the numbers of a piece, and their shape."""
         try:
             array: Any = self._parser.parse(text)
             shape, item = [len(array)], array
@@ -170,23 +161,46 @@ class _Decoder:
                 item = item[0]
                 shape.append(len(item))
             del item
-            flat = self._numbers(array)
+            self._append(array, n_pieces)
             del array  # the parser is used again
         except (ValueError, TypeError, IndexError, RuntimeError):
             raise Unfit from None
         if text.translate(None, _NO_TOKENS) != _tokens(shape):
             raise Unfit
-        if flat.dtype.kind == "f" and not _is_exact(flat):
-            _check_integers(text, flat, depth)
-        return flat, tuple(shape)
+        return shape
 
-    def _numbers(self, array: Any) -> Any:
-        if self._kind == "i":
-            try:
-                return np.frombuffer(array.as_buffer(of_type="i"), np.int64)
-            except TypeError:  # there are fractions among them
-                self._kind = "d"
-        return np.frombuffer(array.as_buffer(of_type="d"), np.float64)
+    def _append(self, array: Any, n_pieces: float) -> None:
+        """Put the numbers of `array` after those found: pieces of memory kept to the end would hold up all threads."""
+        kind = self._numbers.dtype.kind
+        try:
+            piece = memoryview(array.as_buffer(of_type="d" if kind == "f" else "i")).cast("B")
+        except TypeError:
+            if kind == "f":
+                raise
+            kind, piece = "f", memoryview(array.as_buffer(of_type="d")).cast("B")  # there are fractions among them
+        n = len(piece) // 8
+        end = self._n_numbers + n
+        if end > len(self._numbers) or kind != self._numbers.dtype.kind:
+            before = self._numbers[: self._n_numbers]
+            if kind != before.dtype.kind and not _is_exact(before):
+                raise Unfit
+            self._numbers = np.empty(self._n_numbers + int(1.05 * n_pieces * n) + 8, f"{kind}8")
+            self._numbers[: len(before)] = before
+        memoryview(self._numbers).cast("B")[8 * self._n_numbers : 8 * end] = piece
+        self._n_numbers = end
+
+    def _check_integers(self, text: memoryview, numbers: Any, depth: int) -> None:
+        """Raise unless integers in `text` are the `numbers` that stand for them, in the pieces that have large ones."""
+        start, n_before = 1, 0
+        for end, n_numbers in self._ends:
+            here = numbers[n_before:n_numbers]
+            if not _is_exact(here):
+                level = from_json(b"".join((b"[", text[start:end], b"]")))
+                for _ in range(depth - 1):
+                    level = list(chain.from_iterable(level))
+                if any(type(value) is int and int(held) != value for value, held in zip(level, here.tolist())):
+                    raise Unfit
+            start, n_before = end + 1, n_numbers
 
 
 def _tokens(shape: list[int]) -> bytes:
@@ -204,11 +218,3 @@ def _tokens(shape: list[int]) -> bytes:
 def _is_exact(numbers: Any) -> bool:
     """Tell whether all are small enough to be exact as int64 and as float64."""
     return not numbers.size or bool(max(numbers.max(), -numbers.min()) < EXACT_INTEGERS)
-
-
-def _check_integers(text: bytes, flat: Any, depth: int) -> None:
-    level = from_json(text)
-    for _ in range(depth - 1):
-        level = list(chain.from_iterable(level))
-    if any(type(value) is int and int(held) != value for value, held in zip(level, flat.tolist())):
-        raise Unfit

@@ -85,6 +85,7 @@ def settled(
 ) -> Fill:
     """Return the fill that runs `kernel` over a chunk and settles what it leaves UNDECIDED one by one.
 
+    kernel: returns how many points needed more than its filter, those left UNDECIDED among them.
     prepare: builds what `kernel` reads, where that takes time and is not there yet.
     Raises what `Budget.check` raises, also when the kernel stopped early.
     """
@@ -95,6 +96,8 @@ def settled(
         with np.errstate(all="ignore"):  # uncompiled, numpy scalars warn where the filter means to overflow
             n_beyond = int(kernel(as_read_only(points), locations, budget.flag))
         budget.check()
+        if not n_beyond:
+            return Counts(0, 0)
         undecided = np.flatnonzero(locations == UNDECIDED)
         for item in undecided:
             locations[item] = settle(points[item].tolist(), budget.check)
