@@ -164,6 +164,9 @@ def _clip(dimension: int) -> None:
 def _warm_overlay() -> None:
     first = Polygon([[[0, 0], [4, 0], [1, 1], [0, 4]]])
     overlay(first, Polygon([[[0.5, 0.3], [5, 1], [1, 5]]]))
+    angles = np.linspace(0.0, 2.0 * np.pi, 2048, endpoint=False)
+    circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    overlay(Polygon([circle]), Polygon([circle + 0.5]))  # large ones, of which few edges are looked at
     # Edges an ulp apart are left to the path in integers, whose kernels look for pairs of boxes.
     near = 1.0 + 2.0**-52
     overlay(Polygon([[[0, 0], [1, 1], [0, 1]]]), Polygon([[[0, 0], [1, near], [near, 0.5]]]), "union")

@@ -14,7 +14,7 @@ from typing import Any, Final
 from engine.arrangement.chains import Chains, is_live, standing
 from engine.arrangement.crossing_signs import Edges, crossing_against, exact_weight, orient, turn_of_edges
 from engine.arrangement.edge_contacts import POLL, Events
-from engine.arrangement.edge_tree import LEAF, leaves_of
+from engine.arrangement.edge_tree import LEAF, RUN, leaves_of
 from engine.jit import inline, merged
 from engine.predicates.error_free import two_diff, workspace
 from engine.predicates.expansion import add_scaled, sign
@@ -135,15 +135,20 @@ def _test_edge(edges: Edges, v: int, e: int, nearest: int) -> int:
 
 
 @inline
-def edge_above(edges: Edges, v: int, n: int, tree: Any, places: Any, has_tree: bool, stack: Any) -> int:
+def edge_above(
+    edges: Edges, v: int, n: int, marks: Any, tree: Any, places: Any, has_tree: bool, stack: Any
+) -> int:  # fmt: skip
     """Return the edge next above vertex v, a step to its right, or NOTHING; no edge of its component is there.
+
+    Edges whose mark has the bit RUN are not looked at: caller guarantees that it is none of what they stand for.
 
     Edges that begin or pass through v are not above it: caller guarantees that none does to the right.
     """
     nearest = NOTHING
     if not has_tree:
         for e in range(n):
-            nearest = _test_edge(edges, v, e, nearest)
+            if not marks[e] & RUN:
+                nearest = _test_edge(edges, v, e, nearest)
         return nearest
     n_leaves = leaves_of(n)
     x, y = edges.x[v], edges.y[v]
@@ -165,7 +170,8 @@ def edge_above(edges: Edges, v: int, n: int, tree: Any, places: Any, has_tree: b
             continue
         first = LEAF * (node - n_leaves)
         for place in range(first, min(first + LEAF, n)):
-            nearest = _test_edge(edges, v, places[place], nearest)
+            if not marks[places[place]] & RUN:
+                nearest = _test_edge(edges, v, places[place], nearest)
     return nearest
 
 

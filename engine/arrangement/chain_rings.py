@@ -6,20 +6,22 @@ and lists the points where the boundary turns or rings meet.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from engine.arrangement.chain_faces import find_label, join
 from engine.arrangement.chains import Chains, is_live, leaving_edge, origin
 from engine.arrangement.crossing_signs import Edges, orient, turn_of_edges
 from engine.arrangement.edge_contacts import POLL, root_of, unite
-from engine.arrangement.edge_tree import BENT
+from engine.arrangement.edge_tree import BENT, RUN
 from engine.arrangement.ring_labels import RingLabels, verdict
 from engine.jit import inline, merged
 
+MEETS: Final = 1
+
 
 class Rings(NamedTuple):
-    """point: united points, ring after ring; meets: whether rings meet there; offset: where each ring begins; region: a
-    number of the region it bounds."""
+    """point: united points, ring after ring; meets: MEETS where rings meet, RUN where those up to the next point are
+    left out; offset: where each ring begins; region: a number of the region it bounds."""
 
     point: Any
     meets: Any
@@ -98,14 +100,14 @@ def _emit(
         chain = half >> 1
         node = origin(chains, half)
         if fan[node] > 2 or turn_of_edges(edges, leaving_edge(chains, before ^ 1), leaving_edge(chains, half)) != 0:
-            rings.point[n_points], rings.meets[n_points] = nodes[node], fan[node] > 2
+            rings.point[n_points], rings.meets[n_points] = nodes[node], MEETS * (fan[node] > 2)
             n_points += 1
         if chains.first[chain] != chains.last[chain]:
             if half & 1:
                 v, end = chains.last[chain], chains.first[chain]
                 while v != end:  # bound: the vertices of the chain
                     if marks[v] & BENT or orient(edges, edges.before[v], v, edges.after[v]) != 0:
-                        rings.point[n_points], rings.meets[n_points] = v, 0
+                        rings.point[n_points], rings.meets[n_points] = v, marks[edges.before[v]] & RUN
                         n_points += 1
                     v = edges.before[v]
             else:
@@ -113,7 +115,7 @@ def _emit(
                 while v != end:  # bound: the vertices of the chain
                     v = edges.after[v]
                     if marks[v] & BENT or orient(edges, edges.before[v], v, edges.after[v]) != 0:
-                        rings.point[n_points], rings.meets[n_points] = v, 0
+                        rings.point[n_points], rings.meets[n_points] = v, marks[v] & RUN
                         n_points += 1
         if sources.last > sources.first:
             beyond |= sources.gathered[root_of(regions, cycle[half ^ 1])]
@@ -133,7 +135,7 @@ def walk_rings(
 ) -> tuple[int, int]:  # fmt: skip
     """Write all boundary rings; return how many rings and points.
 
-    marks: of the edges, BENT where the boundary surely turns at the first vertex.
+    marks: of the edges, BENT where the boundary surely turns at the first vertex, RUN where one stands for many.
     seen: (2 n_chains,) uint8; path: (2 n_chains,) and path_place: (n_nodes,) int64, scratch.
     """
     seen[: 2 * n_chains] = 0

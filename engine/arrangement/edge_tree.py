@@ -32,6 +32,8 @@ ANYWHERE: Final = 2 + 4 + 8 + 16
 """Mark of an edge that ends a run: heading right, left, up and down at once."""
 BENT: Final = 32
 """Mark of an edge at whose first vertex the ring surely turns."""
+RUN: Final = 64
+"""Mark of an edge that stands for many, which meet nothing; see overlay_reducing.py."""
 DEEPEST: Final = 256
 """Places on the stack: a walk through 60 levels holds at most three pairs a level."""
 

@@ -13,9 +13,11 @@ from __future__ import annotations
 
 from typing import Any, Final
 
+import numpy as np
+
 from engine.arrangement.chain_rings import Rings
 from engine.arrangement.edge_contacts import POLL
-from engine.arrangement.edge_tree import ANYWHERE, WANTED, boxes_meet, build_tree, next_pairs
+from engine.arrangement.edge_tree import ANYWHERE, RUN, WANTED, boxes_meet, build_tree, next_pairs
 from engine.jit import inline, merged
 from engine.predicates.orientation import orient2d
 from engine.types import Point2
@@ -129,6 +131,8 @@ def certify(
         marks[k] = ANYWHERE | WANTED * (moved[k] | moved[j])
         boxes[k, 0], boxes[k, 1] = min(x[k], x[j]) - margin, max(x[k], x[j]) + margin
         boxes[k, 2], boxes[k, 3] = min(y[k], y[j]) - margin, max(y[k], y[j]) + margin
+        if rings.meets[k] & RUN:  # what is left out is away from all that moves: a box that meets none
+            boxes[k, 3] = -np.inf
     points = rings.point
     if n <= _FEW:
         for i in range(n):

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.clipping.implicit_rings import ImplicitRings, RingArrays
+from engine.clipping.overlay_blocks import overlay_in_blocks
 from engine.clipping.overlay_kernel import (
     DONE,
     NEEDS_CONTACTS,
@@ -39,7 +40,9 @@ _overlay_pairs: Any = overlay_pairs
 if isinstance(overlay_pairs, FunctionType):  # uncompiled: numpy warns of what overflows
     _overlay_pairs = np.errstate(all="ignore")(overlay_pairs)
 _NONE: Final = np.zeros(0, np.int64)
-_KEPT_ARRAYS: Final = {name: np.array(kept, np.uint8) for name, kept in KEPT.items()}
+_NOT_REDUCED: Final = 0, 0, 0, 0.0
+"""What stands in the place of the result of reduce_pair."""
+KEPT_ARRAYS: Final = {name: np.array(kept, np.uint8) for name, kept in KEPT.items()}
 
 
 class Polygons(NamedTuple):
@@ -127,7 +130,8 @@ def run_kernel(
             0,
             n,
             reached,
-            _KEPT_ARRAYS[operation],
+            *_NOT_REDUCED,
+            KEPT_ARRAYS[operation],
             shells,
             budget.flag,
             scratch.buffers,
@@ -200,7 +204,7 @@ def overlay_compiled(
 
     A scene outside of the kernel's range is brought into it by a power of two where that is exact.
     """
-    found, exponent = run_kernel(_as_one(subject), _as_one(clip), operation, budget), 0
+    found, exponent = _run_one(subject, clip, operation, budget), 0
     if found.status[0] == OPEN:
         exponent = exponent_of(subject.vertices, clip.vertices)
         if exponent == 0:
@@ -209,7 +213,7 @@ def overlay_compiled(
         if first is None or second is None:
             return None
         near = RingArrays(first, subject.offsets), RingArrays(second, clip.offsets)
-        found = run_kernel(_as_one(near[0]), _as_one(near[1]), operation, budget)
+        found = _run_one(*near, operation, budget)
         if found.status[0] == OPEN:
             return None
     exact = ImplicitRings(subject, clip, found.sources, found.ring_offsets)
@@ -259,11 +263,17 @@ def _rounded(found: Found) -> RoundedRings:
 def _again(budget: Budget, rings: RoundedRings, shells: npt.NDArray[np.int64]) -> RoundedRings | None:
     """Arrange rounded rings, each a source of its own; None where that is left open."""
     subject = RingArrays(as_frozen(rings.vertices), as_frozen(rings.ring_offsets))
-    found = run_kernel(_as_one(subject), _as_one(_EMPTY), "union", budget, shells)
+    found = run_kernel(as_one(subject), as_one(_EMPTY), "union", budget, shells)
     return None if found.status[0] == OPEN else _rounded(found)
 
 
-def _as_one(rings: RingArrays) -> Polygons:
+def _run_one(subject: RingArrays, clip: RingArrays, operation: Operation, budget: Budget) -> Found:
+    sides = as_one(subject), as_one(clip)
+    by_blocks = overlay_in_blocks(*sides, KEPT_ARRAYS[operation], budget)
+    return run_kernel(*sides, operation, budget) if by_blocks is None else Found(*by_blocks)
+
+
+def as_one(rings: RingArrays) -> Polygons:
     """Return the rings as one polygon."""
     n_rings = len(rings.offsets) - 1
     return Polygons(rings.vertices, rings.offsets, _one_polygon(n_rings), len(rings.vertices), n_rings)

@@ -33,14 +33,15 @@ from engine.arrangement.crossing_signs import Edges
 from engine.arrangement.edge_contacts import POLL, Events, root_of, unite
 from engine.arrangement.edge_crossings import FEW, find_contacts
 from engine.arrangement.edge_events import sort_events
-from engine.arrangement.edge_tree import build_tree
+from engine.arrangement.edge_tree import RUN, build_tree
 from engine.arrangement.ring_certificate import certify, has_straight_point
 from engine.arrangement.ring_labels import RingLabels
 from engine.arrangement.ring_order import rank_rings
 from engine.arrangement.rounded_crossings import LOST, round_crossing
 from engine.clipping.cut_point import LARGEST
 from engine.clipping.overlay_convex import UNSETTLED, Passages, intersect_convex
-from engine.clipping.overlay_loading import box_of, fill_boxes, load_rings, magnitude
+from engine.clipping.overlay_expanding import LEFT_OUT
+from engine.clipping.overlay_loading import box_of, fill_boxes, load_rings, magnitude, mark_runs
 from engine.clipping.overlay_workspace import Buffers, Workspace, rows_of
 from engine.jit import bare_kernel, inline
 
@@ -60,7 +61,7 @@ _UNKNOWN: Final = -2.0
 def _join_faces(
     edges: Edges, events: Events, chains: Chains, n: int, n_rings: int, rings: Any, tops: Any, highest: Any,
     node_of: Any, points: Any, starts: Any, order: Any, chain_at: Any, star: Any, star_ends: Any, cycle: Any,
-    n_cycles: int, tree: Any, places: Any, stack: Any, joined: Any, label: Any, regions: Any, stop: Any,
+    n_cycles: int, marks: Any, tree: Any, places: Any, stack: Any, joined: Any, label: Any, regions: Any, stop: Any,
 ) -> None:  # fmt: skip
     """Join the outer cycle of each component of rings to the face it lies in; n_cycles is the unbounded face."""
     x, y = edges.x, edges.y
@@ -83,7 +84,7 @@ def _join_faces(
         node = node_of[root_of(points, top)]
         outer = cycle[star[star_ends[node] - 1]]
         beyond = n_cycles
-        above = edge_above(edges, top, n, tree, places, n > FEW, stack)
+        above = edge_above(edges, top, n, marks, tree, places, n > FEW, stack)
         if above != NOTHING:
             beyond = cycle[half_below(edges, events, chains, starts, order, points, chain_at, above, top, n)]
         join(joined, label, outer, beyond, 0)
@@ -130,7 +131,7 @@ def _write(
             point = w.found.point[i]
             vertices[n_out, 0], vertices[n_out, 1] = w.x[i], w.y[i]
             if point < n:
-                sources[n_out, 0], sources[n_out, 1] = w.origins[point], -1
+                sources[n_out, 0], sources[n_out, 1] = w.origins[point], LEFT_OUT if w.found.meets[i] & RUN else -1
             else:
                 sources[n_out, 0] = w.origins[w.events.first[point - n]]
                 sources[n_out, 1] = w.origins[w.events.second[point - n]]
@@ -160,7 +161,8 @@ def _write_ring(w: Workspace, m: int, low: int, vertices: Any, sources: Any, n_o
 @bare_kernel
 def overlay_pairs(
     subjects: Any, subject_rings: Any, subject_items: Any, clips: Any, clip_rings: Any, clip_items: Any,
-    first_item: int, last_item: int, begin: int, kept: Any, shells: Any, stop: Any, buffers: Buffers,
+    first_item: int, last_item: int, begin: int, n_loaded: int, n_loaded_rings: int, n_runs: int, extent: float,
+    kept: Any, shells: Any, stop: Any, buffers: Buffers,
     status: Any, counts: Any, displacement: Any, vertices: Any, sources: Any, sizes: Any, pieces: Any, evidence: Any,
 ) -> tuple[int, int, int, int, int, int]:  # fmt: skip
     """Overlay the pairs ``begin`` .. ``last_item - 1`` of those from ``first_item`` on.
@@ -174,7 +176,8 @@ def overlay_pairs(
     Fills, pair after pair from the beginning: vertices (m, 2) float64, sources (m, 2) int32, sizes (vertices by ring)
     and pieces (rings by piece); with shells also evidence, by ring int64.
     A source is the input vertex and -1, or the first vertices of the two edges that cross; clip vertices are counted
-    after those of all subjects.
+    after those of all subjects. The input vertex and LEFT_OUT where the vertices up to the next source are left out.
+    n_loaded, n_loaded_rings, n_runs, extent: what reduce_pair returned for the only pair; no vertices, no such pair.
     Returns the pair reached, FINISHED or what is needed to go on with it, numbers of vertices, rings, pieces, and how
     many contacts there was scratch used for at most.
     """
@@ -183,6 +186,7 @@ def overlay_pairs(
     room = w.order.shape[0] - 9
     is_intersection = not (kept[0] or kept[1] or kept[2])
     n_out = n_out_rings = n_out_pieces = used = 0
+    n, n_rings, largest = n_loaded, n_loaded_rings, extent
     for at in range(begin, last_item):
         item = at - first_item
         status[item], displacement[item] = OPEN, 0.0
@@ -190,46 +194,48 @@ def overlay_pairs(
         if stop[0]:
             break
         first, first_end = subject_items[at], subject_items[at + 1]
-        second, second_end = clip_items[at], clip_items[at + 1]
         labels = RingLabels(shells, first, first_end if shells.shape[0] else first, w.following, w.joined)
-        x0, x1, y0, y1 = box_of(subjects, subject_rings[first], subject_rings[first_end])
-        u0, u1, v0, v1 = box_of(clips, clip_rings[second], clip_rings[second_end])
-        common = max(x0, u0), min(x1, u1), max(y0, v0), min(y1, v1)
-        if is_intersection and (common[0] > common[1] or common[2] > common[3]):
-            status[item] = DONE
-            continue
-        if is_intersection and first_end - first == 1 and second_end - second == 1:
-            m, low, moved_by = intersect_convex(
-                subjects, subject_rings[first], subject_rings[first_end],
-                clips, clip_rings[second], clip_rings[second_end], subjects.shape[0],
-                edges, w.origins, Passages(w.points, w.node_of), found.point, w.places, w.x, w.y, stop,
-            )  # fmt: skip
-            if m != UNSETTLED:
-                if n_out + m > vertices.shape[0] or n_out_rings + 1 > sizes.shape[0]:
-                    counts[item, 1], counts[item, 2] = 1, m
-                    return at, NEEDS_OUTPUT, n_out, n_out_rings, n_out_pieces, used
-                if m > 0:
-                    _write_ring(w, m, low, vertices, sources, n_out)
-                    sizes[n_out_rings], pieces[n_out_pieces] = m, 1
-                    n_out, n_out_rings, n_out_pieces = n_out + m, n_out_rings + 1, n_out_pieces + 1
-                    counts[item, 0], counts[item, 1], counts[item, 2] = 1, 1, m
-                displacement[item] = moved_by
+        if n_loaded == 0:
+            second, second_end = clip_items[at], clip_items[at + 1]
+            x0, x1, y0, y1 = box_of(subjects, subject_rings[first], subject_rings[first_end])
+            u0, u1, v0, v1 = box_of(clips, clip_rings[second], clip_rings[second_end])
+            common = max(x0, u0), min(x1, u1), max(y0, v0), min(y1, v1)
+            if is_intersection and (common[0] > common[1] or common[2] > common[3]):
                 status[item] = DONE
                 continue
-        whole = -np.inf, np.inf, -np.inf, np.inf
-        n, n_rings, safe = load_rings(
-            subjects, subject_rings, first, first_end, 1, min(shells.shape[0], 1), 0, edges, w.origins, w.tops, w.masks,
-            whole if kept[1] else common, 0, 0, stop,
-        )  # fmt: skip
-        n, n_rings, also_safe = load_rings(
-            clips, clip_rings, second, second_end, 2, 0, subjects.shape[0], edges, w.origins, w.tops, w.masks,
-            whole if kept[2] else common, n, n_rings, stop,
-        )  # fmt: skip
-        largest = max(magnitude(x0, x1, y0, y1), magnitude(u0, u1, v0, v1))
-        if not (safe and also_safe and largest <= LARGEST):
-            continue
+            if is_intersection and first_end - first == 1 and second_end - second == 1:
+                m, low, moved_by = intersect_convex(
+                    subjects, subject_rings[first], subject_rings[first_end],
+                    clips, clip_rings[second], clip_rings[second_end], subjects.shape[0],
+                    edges, w.origins, Passages(w.points, w.node_of), found.point, w.places, w.x, w.y, stop,
+                )  # fmt: skip
+                if m != UNSETTLED:
+                    if n_out + m > vertices.shape[0] or n_out_rings + 1 > sizes.shape[0]:
+                        counts[item, 1], counts[item, 2] = 1, m
+                        return at, NEEDS_OUTPUT, n_out, n_out_rings, n_out_pieces, used
+                    if m > 0:
+                        _write_ring(w, m, low, vertices, sources, n_out)
+                        sizes[n_out_rings], pieces[n_out_pieces] = m, 1
+                        n_out, n_out_rings, n_out_pieces = n_out + m, n_out_rings + 1, n_out_pieces + 1
+                        counts[item, 0], counts[item, 1], counts[item, 2] = 1, 1, m
+                    displacement[item] = moved_by
+                    status[item] = DONE
+                    continue
+            whole = -np.inf, np.inf, -np.inf, np.inf
+            n, n_rings, safe = load_rings(
+                subjects, subject_rings, first, first_end, 1, min(shells.shape[0], 1), 0, edges, w.origins, w.tops,
+                w.masks, whole if kept[1] else common, 0, 0, stop,
+            )  # fmt: skip
+            n, n_rings, also_safe = load_rings(
+                clips, clip_rings, second, second_end, 2, 0, subjects.shape[0], edges, w.origins, w.tops, w.masks,
+                whole if kept[2] else common, n, n_rings, stop,
+            )  # fmt: skip
+            largest = max(magnitude(x0, x1, y0, y1), magnitude(u0, u1, v0, v1))
+            if not (safe and also_safe and largest <= LARGEST):
+                continue
         margin = CLEARANCE * largest
         is_clear = fill_boxes(edges, n, margin, w.boxes, w.marks) > margin
+        mark_runs(edges, w.places, n_runs, w.boxes, w.marks)
         if n > FEW:
             build_tree(w.boxes, w.marks, n, w.tree, w.tree_marks, w.places)
         n_events, n_crossings, n_exact, are_far = find_contacts(
@@ -271,8 +277,8 @@ def overlay_pairs(
             break
         _join_faces(
             edges, events, chains, n, n_rings, w.rings, w.tops, w.highest, w.node_of, w.points, w.starts, w.order,
-            w.chain_at, w.star, w.star_ends, w.cycle, n_cycles, w.tree, w.places, w.stack, w.joined, w.label, w.regions,
-            stop,
+            w.chain_at, w.star, w.star_ends, w.cycle, n_cycles, w.marks, w.tree, w.places, w.stack, w.joined, w.label,
+            w.regions, stop,
         )  # fmt: skip
         choose_boundary(
             chains, n_chains, w.cycle, n_cycles, kept, w.star_starts, n_nodes, w.joined, w.label, w.regions, w.inside,

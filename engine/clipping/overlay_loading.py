@@ -12,7 +12,7 @@ import numpy as np
 
 from engine.arrangement.crossing_signs import Edges
 from engine.arrangement.edge_contacts import POLL
-from engine.arrangement.edge_tree import ANYWHERE, BENT, WANTED, heading
+from engine.arrangement.edge_tree import ANYWHERE, BENT, RUN, WANTED, heading
 from engine.clipping.cut_point import SMALLEST
 from engine.jit import inline
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
@@ -117,3 +117,13 @@ def fill_boxes(edges: Edges, n: int, margin: float, boxes: Any, marks: Any) -> f
             vx, vy = ux, uy
         first = last + 1
     return shortest
+
+
+@inline
+def mark_runs(edges: Edges, runs: Any, n_runs: int, boxes: Any, marks: Any) -> None:
+    """Give the edges that stand for many a mark, and boxes that meet none; the ring turns at the ends of each."""
+    for k in range(n_runs):
+        e = runs[k]
+        marks[e] = ANYWHERE | BENT | RUN
+        marks[edges.after[e]] |= BENT
+        boxes[e, 3] = -np.inf
