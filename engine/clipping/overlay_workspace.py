@@ -153,7 +153,7 @@ def buffers_for(n_vertices: int, n_rings: int, n_contacts: int) -> Buffers:
     while n_leaves * LEAF < m:  # bound: 60 doublings
         n_leaves *= 2
     return Buffers(
-        vertex_floats=np.empty((2, n)),
+        vertex_floats=np.empty((2, n + 1)),
         vertex_integers=np.empty((5, n + 1), np.int64),
         ring_integers=np.empty((4, n_rings + 1), np.int64),
         contact_floats=np.empty((7, k)),
