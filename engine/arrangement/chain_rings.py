@@ -36,7 +36,7 @@ def choose_boundary(
 ) -> None:  # fmt: skip
     """Fill ``inside`` by cycle, ``bounds`` by chain, ``fan`` (boundary chains) by node, and join regions.
 
-    kept: (4,) uint8, whether a face of that label is in the result, unless ``sources`` has rings; then
+    kept: (4,) uint8, whether a face of that label is in the result, unless ``sources`` has shells; then
     ``sources.gathered`` is filled by region. parent, label: the joined cycles; entry n_cycles is the unbounded face,
     whose label is 0. regions: forest of the cycles, those of one face joined already.
     """
@@ -50,7 +50,7 @@ def choose_boundary(
         if i & POLL == 0 and stop[0]:
             return
         mask = find_label(parent, label, i)[1] ^ unbounded
-        inside[i] = verdict(sources, mask)[0] if sources.last > sources.first else kept[mask]
+        inside[i] = verdict(sources.shells, mask)[0] if sources.shells.shape[0] > 0 else kept[mask]
     fan[:n_nodes] = 0
     for chain in range(n_chains):
         if chain & POLL == 0 and stop[0]:
@@ -64,14 +64,14 @@ def choose_boundary(
                 bounds[chain] = 1
                 fan[chains.tail[chain]] += 1
                 fan[chains.head[chain]] += 1
-    if sources.last > sources.first:
+    if sources.shells.shape[0] > 0:
         for i in range(n_cycles):
             sources.gathered[i] = 0
         for i in range(n_cycles):
             if i & POLL == 0 and stop[0]:
                 return
             mask = find_label(parent, label, i)[1] ^ unbounded
-            sources.gathered[root_of(regions, i)] |= verdict(sources, mask)[1]
+            sources.gathered[root_of(regions, i)] |= verdict(sources.shells, mask)[1]
 
 
 @merged
@@ -117,10 +117,10 @@ def _emit(
                     if marks[v] & BENT or orient(edges, edges.before[v], v, edges.after[v]) != 0:
                         rings.point[n_points], rings.meets[n_points] = v, marks[v] & RUN
                         n_points += 1
-        if sources.last > sources.first:
+        if sources.shells.shape[0] > 0:
             beyond |= sources.gathered[root_of(regions, cycle[half ^ 1])]
         before = half
-    if sources.last > sources.first:
+    if sources.shells.shape[0] > 0:
         sources.beyond[n_rings] = beyond
     rings.region[n_rings] = region
     rings.offset[n_rings + 1] = n_points

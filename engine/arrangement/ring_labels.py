@@ -1,8 +1,11 @@
 """Labels of rounded rings that are arranged again: each ring is a source of its own.
 
-Bit k of a label says whether a face lies in ring k, even-odd. A face is inside where it lies in a shell and in no hole
+A bit of a label says whether a face lies in a ring, even-odd. A face is inside where it lies in a shell and in no hole
 of that shell; its evidence names those shells, and that of a face outside the holes that it lies in. Evidence tells,
 part by part, what the result came from (overlay_rounding.py states the same rule over integers of any length).
+
+Rings whose boxes are apart may share a bit: a face is in one of them at most. Shells that share a bit are apart, so the
+holes of one of them are apart from those of another, and these may share bits, for holes of that shell's bit.
 """
 
 from __future__ import annotations
@@ -11,35 +14,31 @@ from typing import Any, Final, NamedTuple
 
 from engine.jit import inline
 
-MOST_RINGS: Final = 62
-"""Rings that the bits of a label can name."""
+MOST_BITS: Final = 62
+"""Bits of a label."""
 
 
 class RingLabels(NamedTuple):
-    """Rings first .. last - 1 are the sources; with none, labels are those of two polygons.
+    """shells: by bit the bit of the shells of its rings, its own where they are shells; empty: labels are those of two
+    polygons. gathered: evidence by region, that is by cycle; beyond: by ring of the result, that of the regions on the
+    other side of it."""
 
-    shell: by ring the number, from ``first`` on, of the shell that it belongs to, its own where it is one. gathered:
-    evidence by region, that is by cycle; beyond: by ring of the result, that of the regions on the other side of it.
-    """
-
-    shell: Any
-    first: Any
-    last: Any
+    shells: Any
     gathered: Any
     beyond: Any
 
 
 @inline
-def verdict(rings: RingLabels, label: int) -> tuple[bool, int]:
+def verdict(shells: Any, label: int) -> tuple[bool, int]:
     """Tell whether a face is inside, and return its evidence."""
-    shells = blocked = holes = 0
-    for ring in range(rings.first, rings.last):
-        if label >> (ring - rings.first) & 1:
-            shell = rings.shell[ring]
-            if rings.first + shell == ring:
-                shells |= 1 << shell
+    found = blocked = holes = 0
+    for bit in range(shells.shape[0]):
+        if label >> bit & 1:
+            shell = shells[bit]
+            if shell == bit:
+                found |= 1 << bit
             else:
                 blocked |= 1 << shell
-                holes |= 1 << (ring - rings.first)
-    inside = shells & ~blocked
+                holes |= 1 << bit
+    inside = found & ~blocked
     return inside != 0, (inside if inside != 0 else holes)

@@ -96,7 +96,7 @@ def overlay(
     part or lose pieces: the result tells which (`collapsed`, `pieces_joined`, ...) and how far edges moved.
     Cost: n log n for n edges, plus pairs of edges whose boxes overlap, plus about a microsecond per crossing;
     twice that and more where rounding comes near other edges; some 10 us per edge and crossing where exponents lie
-    further than 2^240 apart, or more than 62 rings come from a rounding that comes near other edges.
+    further than 2^240 apart, or twelve rounds of rounding do not end.
     Raises: UnsupportedSolidError, InvalidOperationError, DeadlineExceededError, CancelledError.
 
     >>> from engine import Polygon, overlay

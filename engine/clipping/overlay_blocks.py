@@ -76,6 +76,7 @@ def run_reduced(
             *reduced,
             kept,
             _NONE,
+            _NONE,
             budget.flag,
             scratch.buffers,
             status,

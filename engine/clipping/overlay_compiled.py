@@ -23,6 +23,7 @@ from engine.clipping.overlay_kernel import (
 from engine.clipping.overlay_result import Overlay
 from engine.clipping.overlay_rounds import RoundedRings, settle_rings
 from engine.clipping.overlay_workspace import keep, scratch_for
+from engine.clipping.ring_bits import RingBits
 from engine.clipping.scaling import exponent_of, scaled_back, shifted
 from engine.parallel import Budget
 
@@ -40,6 +41,7 @@ _overlay_pairs: Any = overlay_pairs
 if isinstance(overlay_pairs, FunctionType):  # uncompiled: numpy warns of what overflows
     _overlay_pairs = np.errstate(all="ignore")(overlay_pairs)
 _NONE: Final = np.zeros(0, np.int64)
+_NO_LABELS: Final = RingBits(_NONE, _NONE)
 _NOT_REDUCED: Final = 0, 0, 0, 0.0
 """What stands in the place of the result of reduce_pair."""
 KEPT_ARRAYS: Final = {name: np.array(kept, np.uint8) for name, kept in KEPT.items()}
@@ -109,11 +111,11 @@ _EMPTY: Final = RingArrays(as_frozen(np.zeros((0, 2))), as_frozen(np.zeros(1, np
 
 
 def run_kernel(
-    subjects: Polygons, clips: Polygons, operation: Operation, budget: Budget, shells: npt.NDArray[np.int64] = _NONE
+    subjects: Polygons, clips: Polygons, operation: Operation, budget: Budget, labels: RingBits = _NO_LABELS
 ) -> Found:
     """Overlay polygons pair by pair. Raises as `Budget.check` when the call must end.
 
-    shells: empty, or of each ring of the subjects the number of its shell: rings are sources of their own then.
+    labels: bits of the rings of a single subject, to be arranged each as a source of its own.
     """
     n = len(subjects.polygon_offsets) - 1
     n_vertices, n_rings = subjects.most_vertices + clips.most_vertices, subjects.most_rings + clips.most_rings
@@ -132,7 +134,7 @@ def run_kernel(
             reached,
             *_NOT_REDUCED,
             KEPT_ARRAYS[operation],
-            shells,
+            *labels,
             budget.flag,
             scratch.buffers,
             status,
@@ -150,7 +152,7 @@ def run_kernel(
             scratch.output[1][:filled].copy(),
             np.add.accumulate(rings[: n_filled + 1]),
             np.add.accumulate(pieces[: n_pieces + 1]),
-            scratch.output[4][:n_filled].copy() if len(shells) else _NONE,
+            scratch.output[4][:n_filled].copy() if len(labels.bits) else _NONE,
         )
         parts.append(part)
         keep(scratch, n_vertices, used, filled)
@@ -221,7 +223,7 @@ def overlay_compiled(
     vertices, displacement = found.vertices, float(found.displacement[0])
     if found.status[0] != DONE:
         if output == "valid":
-            settled = settle_rings(_rounded(found), exact, functools.partial(_again, budget))
+            settled = settle_rings(_rounded(found), exact, functools.partial(_again, budget), budget)
         if settled is None:
             return None
         vertices, displacement = settled.rings.vertices, settled.displacement
@@ -260,10 +262,10 @@ def _rounded(found: Found) -> RoundedRings:
     )
 
 
-def _again(budget: Budget, rings: RoundedRings, shells: npt.NDArray[np.int64]) -> RoundedRings | None:
+def _again(budget: Budget, rings: RoundedRings, labels: RingBits) -> RoundedRings | None:
     """Arrange rounded rings, each a source of its own; None where that is left open."""
     subject = RingArrays(as_frozen(rings.vertices), as_frozen(rings.ring_offsets))
-    found = run_kernel(as_one(subject), as_one(_EMPTY), "union", budget, shells)
+    found = run_kernel(as_one(subject), as_one(_EMPTY), "union", budget, labels)
     return None if found.status[0] == OPEN else _rounded(found)
 
 

@@ -138,7 +138,7 @@ def _write(
             n_out += 1
             i = i + 1 if i + 1 < last else first
         sizes[n_rings + k] = last - first
-        if labels.last > labels.first:
+        if labels.shells.shape[0] > 0:
             is_hole = w.ranking.is_hole[ring]
             evidence[n_rings + k] = labels.beyond[ring] if is_hole else labels.gathered[w.found.region[ring]]
         if w.ranking.is_hole[ring]:
@@ -162,15 +162,15 @@ def _write_ring(w: Workspace, m: int, low: int, vertices: Any, sources: Any, n_o
 def overlay_pairs(
     subjects: Any, subject_rings: Any, subject_items: Any, clips: Any, clip_rings: Any, clip_items: Any,
     first_item: int, last_item: int, begin: int, n_loaded: int, n_loaded_rings: int, n_runs: int, extent: float,
-    kept: Any, shells: Any, stop: Any, buffers: Buffers,
+    kept: Any, bits: Any, shells: Any, stop: Any, buffers: Buffers,
     status: Any, counts: Any, displacement: Any, vertices: Any, sources: Any, sizes: Any, pieces: Any, evidence: Any,
 ) -> tuple[int, int, int, int, int, int]:  # fmt: skip
     """Overlay the pairs ``begin`` .. ``last_item - 1`` of those from ``first_item`` on.
 
     subjects, clips: (n, 2) float64 vertices; subject_rings, clip_rings: where each ring begins, and its end;
     subject_items, clip_items: the first ring of each polygon, and the end of the last one's. kept: (4,) uint8 by label.
-    shells: empty; or, for rounded rings as subjects, of at most MOST_RINGS rings each, no clips, and kept all but the
-    first, by ring the number of its shell within its polygon.
+    bits, shells: empty; or, for rounded rings as subjects, no clips, and kept all but the first, by ring its bit, and
+    by bit that of its shell (ring_labels.py).
     Fills, by pair from first_item on: status, (pairs,) int8; counts, (pairs, 4) int64: pieces, rings, vertices, pairs
     of edges beyond the filter; displacement, (pairs,) float64: how far rounding moved a vertex at most.
     Fills, pair after pair from the beginning: vertices (m, 2) float64, sources (m, 2) int32, sizes (vertices by ring)
@@ -183,6 +183,7 @@ def overlay_pairs(
     """
     w = rows_of(buffers)
     edges, events, chains, found = w.edges, w.events, w.chains, w.found
+    labels = RingLabels(shells, w.following, w.joined)
     room = w.order.shape[0] - 9
     is_intersection = not (kept[0] or kept[1] or kept[2])
     n_out = n_out_rings = n_out_pieces = used = 0
@@ -194,7 +195,6 @@ def overlay_pairs(
         if stop[0]:
             break
         first, first_end = subject_items[at], subject_items[at + 1]
-        labels = RingLabels(shells, first, first_end if shells.shape[0] else first, w.following, w.joined)
         if n_loaded == 0:
             second, second_end = clip_items[at], clip_items[at + 1]
             x0, x1, y0, y1 = box_of(subjects, subject_rings[first], subject_rings[first_end])
@@ -223,11 +223,11 @@ def overlay_pairs(
                     continue
             whole = -np.inf, np.inf, -np.inf, np.inf
             n, n_rings, safe = load_rings(
-                subjects, subject_rings, first, first_end, 1, min(shells.shape[0], 1), 0, edges, w.origins, w.tops,
-                w.masks, whole if kept[1] else common, 0, 0, stop,
+                subjects, subject_rings, first, first_end, 1, bits, 0, edges, w.origins, w.tops, w.masks,
+                whole if kept[1] else common, 0, 0, stop,
             )  # fmt: skip
             n, n_rings, also_safe = load_rings(
-                clips, clip_rings, second, second_end, 2, 0, subjects.shape[0], edges, w.origins, w.tops, w.masks,
+                clips, clip_rings, second, second_end, 2, bits, subjects.shape[0], edges, w.origins, w.tops, w.masks,
                 whole if kept[2] else common, n, n_rings, stop,
             )  # fmt: skip
             largest = max(magnitude(x0, x1, y0, y1), magnitude(u0, u1, v0, v1))

@@ -20,12 +20,12 @@ from engine.predicates.orientation import BOUND_2D, GUARD_2D
 
 @inline
 def load_rings(
-    vertices: Any, offsets: Any, first_ring: int, last_ring: int, mask: int, step: int, base: int, edges: Edges,
+    vertices: Any, offsets: Any, first_ring: int, last_ring: int, mask: int, bits: Any, base: int, edges: Edges,
     origins: Any, tops: Any, masks: Any, box: tuple[float, float, float, float], n: int, n_rings: int, stop: Any,
 ) -> tuple[int, int, bool]:  # fmt: skip
     """Append rings without repeated points; return the numbers of vertices and rings, and whether none is too small.
 
-    step: by how many bits the mask moves up from ring to ring. base: what is added to the number of a vertex in
+    bits: empty, or by ring the bit that stands for the mask. base: what is added to the number of a vertex in
     ``origins``. box: x_min, x_max, y_min, y_max; of vertices beyond one of its sides, one after another, only the first
     and the last count.
     """
@@ -67,7 +67,7 @@ def load_rings(
         for k in range(start + 1, n):
             if x[k] > px or (x[k] == px and y[k] > py):
                 top, px, py = k, x[k], y[k]
-        tops[n_rings], masks[n_rings] = top, mask << step * (ring - first_ring)
+        tops[n_rings], masks[n_rings] = top, (1 << bits[ring] if bits.shape[0] > 0 else mask)
         n_rings += 1
     return n, n_rings, safe
 

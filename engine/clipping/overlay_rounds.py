@@ -16,10 +16,11 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.arrangement.nodes import nearest_quotient
-from engine.arrangement.ring_labels import MOST_RINGS
 from engine.clipping.implicit_rings import ImplicitRings
 from engine.clipping.overlay_result import Collapse
 from engine.clipping.overlay_rounding import MAX_ROUNDS, count_changes
+from engine.clipping.ring_bits import RingBits, assign_bits, boxes_of, places_of, rings_meant
+from engine.parallel import Budget
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,25 +65,28 @@ class Settled:
     holes_parted: int
 
 
-Again = Callable[[RoundedRings, npt.NDArray[np.int64]], RoundedRings | None]
+Again = Callable[[RoundedRings, RingBits], RoundedRings | None]
 
 
-def settle_rings(first: RoundedRings, exact: ImplicitRings, again: Again) -> Settled | None:
-    """Arrange ``first`` until it is valid; None where that takes integers: many rings, or many rounds.
+def settle_rings(first: RoundedRings, exact: ImplicitRings, again: Again, budget: Budget) -> Settled | None:
+    """Arrange ``first`` until it is valid; None where that takes integers: rings deep in each other, or many rounds.
 
-    exact: the exact rings that ``first`` is rounded from. again: arranges rings, given the number of each ring's shell.
+    exact: the exact rings that ``first`` is rounded from. again: arranges rings, given their bits.
     """
     n_holes = first.n_rings - first.n_pieces
     piece_origins = [1 << piece for piece in range(first.n_pieces)]
     hole_origins = [1 << hole for hole in range(n_holes)]
     rings, rounds, displacement, has_crossings = first, 1, first.displacement, False
     while not rings.is_valid:  # bound: MAX_ROUNDS
-        if rounds == MAX_ROUNDS or rings.n_rings > MOST_RINGS:
+        boxes = boxes_of(rings.vertices, rings.ring_offsets)
+        labels = assign_bits(boxes, rings.piece_offsets, budget) if rounds < MAX_ROUNDS else None
+        found = None if labels is None else again(rings, labels)
+        if labels is None or found is None:
             return None
-        found = again(rings, np.repeat(rings.piece_offsets[:-1], np.diff(rings.piece_offsets)))
-        if found is None:
+        meant = rings_meant(labels, boxes, found.evidence, boxes_of(found.vertices, found.ring_offsets), budget)
+        if meant is None:
             return None
-        piece_origins, hole_origins = _origins(rings, found, piece_origins, hole_origins)
+        piece_origins, hole_origins = _origins(rings, found, meant, piece_origins, hole_origins)
         rings, has_crossings = found, has_crossings or found.has_crossings
         if rings.displacement:
             rounds, displacement = rounds + 1, nextafter(displacement + rings.displacement, inf)
@@ -102,18 +106,25 @@ def settle_rings(first: RoundedRings, exact: ImplicitRings, again: Again) -> Set
 
 
 def _origins(
-    before: RoundedRings, found: RoundedRings, piece_origins: list[int], hole_origins: list[int]
+    before: RoundedRings,
+    found: RoundedRings,
+    meant: Sequence[Sequence[int]],
+    piece_origins: list[int],
+    hole_origins: list[int],
 ) -> tuple[list[int], list[int]]:
-    """Return the exact parts, as bits, that pieces and holes come from."""
+    """Return the exact parts, as bits, that pieces and holes come from.
+
+    meant: for each ring found those of the round before that it comes from.
+    """
     of_ring: list[int] = []
     holes = iter(hole_origins)
     for origin, size in zip(piece_origins, np.diff(before.piece_offsets).tolist(), strict=True):
         of_ring.append(origin)
         of_ring += [next(holes) for _ in range(size - 1)]
     collected = []
-    for evidence in found.evidence.tolist():
+    for rings in meant:
         origin = 0
-        for ring in _bits(evidence):
+        for ring in rings:
             origin |= of_ring[ring]
         collected.append(origin)
     shells = found.piece_offsets[:-1].tolist()
@@ -122,21 +133,11 @@ def _origins(
     return pieces, [origin for ring, origin in enumerate(collected) if ring not in is_shell]
 
 
-def _bits(number: int) -> list[int]:
-    """Return the places of the bits that are set."""
-    places = []
-    while number:
-        bit = number & -number
-        places.append(bit.bit_length() - 1)
-        number ^= bit
-    return places
-
-
 def _changes(n_exact: int, origins: Sequence[int]) -> tuple[list[int], int, int]:
     """Return what `count_changes` does, of origins as bits."""
     if len(origins) == n_exact and sorted(origins) == [1 << part for part in range(n_exact)]:
         return [], 0, 0
-    return count_changes(n_exact, [set(_bits(origin)) for origin in origins])
+    return count_changes(n_exact, [set(places_of(origin)) for origin in origins])
 
 
 def _moved(images: npt.NDArray[np.float64], vertices: npt.NDArray[np.float64]) -> int:

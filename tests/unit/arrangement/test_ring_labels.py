@@ -2,30 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 
 from engine.arrangement.chain_rings import Rings
-from engine.arrangement.ring_labels import MOST_RINGS, RingLabels, verdict
+from engine.arrangement.ring_labels import MOST_BITS, verdict
 from engine.arrangement.ring_order import Ranking, find_shells
-
-NONE: Any = np.zeros(0, np.int64)
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_verdict(seed: int) -> None:
     random = np.random.default_rng(seed)
-    first, n_rings = int(random.integers(0, 5)), int(random.integers(1, MOST_RINGS + 1))
+    n_rings = int(random.integers(1, MOST_BITS + 1))
     shells = np.maximum.accumulate(np.where(random.random(n_rings) < 0.4, np.arange(n_rings), 0))
-    labels = RingLabels(np.concatenate([np.zeros(first, np.int64), shells]), first, first + n_rings, NONE, NONE)
     for share in (0.05, 0.5, 0.95):
         within = set(np.flatnonzero(random.random(n_rings) < share).tolist())
         holes = {ring for ring in within if shells[ring] != ring}
         inside = within - holes - {int(shells[ring]) for ring in holes}
         expected = bool(inside), sum(1 << ring for ring in inside or holes)
-        assert verdict(labels, sum(1 << ring for ring in within)) == expected
+        assert verdict(shells, sum(1 << ring for ring in within)) == expected
 
 
 def holes_among(rings: list[list[tuple[float, float]]]) -> list[bool] | None:

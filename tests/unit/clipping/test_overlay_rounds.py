@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from engine.arrangement.ring_labels import MOST_BITS
 from engine.clipping.overlay_batch import overlay_batch
 from engine.clipping.overlay_compiled import overlay_compiled
 from engine.parallel import Budget
@@ -45,12 +46,18 @@ def test_compiled_rounds_equal_those_in_integers(family: Any) -> None:
 
 
 def test_more_rings_than_a_label_has_bits() -> None:
-    """Triangles whose crossings come near their corners: 80 pieces that must be arranged again are left open."""
-    pair = families.drawn(families.far_lattice, 3)
-    tiles = np.arange(90) * 2.0**8
-    sides = [[ring + np.array([tile, 0.0]) for tile in tiles for ring in each] for each in pair]
-    found = [overlay_compiled(*map(arrays, sides), operation, "valid", Budget()) for operation in OPERATIONS]
-    assert None in found
+    """Two versions of a border an ulp apart: slivers by the hundred, as pieces or as holes, share bits."""
+    random = np.random.default_rng(4)
+    angles = np.linspace(0, 2 * np.pi, 400, endpoint=False)
+    border = np.stack([100 + np.cos(angles), 50 + np.sin(angles)], axis=1)
+    version = border + random.choice([-1, 0, 1], border.shape) * np.spacing(border)
+    frame = np.array([[90.0, 40], [110, 40], [110, 60], [90, 60]])
+    for subject, clip in (([border], [version]), ([frame, border], [version]), ([frame, border], [frame, version])):
+        for operation in ("union", "difference", "symmetric_difference"):
+            assert agree(subject, clip, operation)
+    found = overlay_compiled(arrays([border]), arrays([version]), "symmetric_difference", "valid", Budget())
+    assert found is not None
+    assert found[0].n_pieces_exact > MOST_BITS
 
 
 def test_a_batch_equals_single_calls() -> None:

@@ -1,0 +1,105 @@
+"""Which bit of a label stands for which ring, and which rings are meant by bits: for rings arranged again.
+
+Up to `MOST_BITS` rings each has a bit of its own. Of more, rings whose boxes are apart share bits as ring_labels.py
+allows: the shells of small pieces, and the holes of one shell or of shells that share a bit. A bit in the evidence of a
+part then means the one ring of that bit whose box meets the part's: it lies in that ring, so their boxes do meet.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from engine.arrangement.box_pairs import box_pairs
+from engine.arrangement.ring_labels import MOST_BITS
+from engine.parallel import Budget
+
+_SPREAD: Final = 16
+"""Bits that rings are dealt out to though fewer would do: those of one bit are then further from each other."""
+
+Corners = tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]
+
+
+class RingBits(NamedTuple):
+    """bits: by ring its bit; shells: by bit that of its shells; int64."""
+
+    bits: npt.NDArray[np.int64]
+    shells: npt.NDArray[np.int64]
+
+
+def assign_bits(boxes: Corners, piece_offsets: npt.NDArray[np.int64], budget: Budget) -> RingBits | None:
+    """Return a bit for each ring, None where there are too few.
+
+    boxes: of the rings, as `boxes_of` gives them. piece_offsets: into the rings, the shell of each piece first.
+    """
+    n_rings = int(piece_offsets[-1])
+    shell_of = np.repeat(piece_offsets[:-1], np.diff(piece_offsets))
+    if n_rings <= MOST_BITS:
+        return RingBits(np.arange(n_rings), shell_of)
+    # meeting: the rings before each that it may share no bit with
+    meeting: list[list[int]] = [[] for _ in range(n_rings)]
+    is_shell = shell_of == np.arange(n_rings)
+    for i, j in box_pairs(*boxes, budget).tolist():
+        if is_shell[i] == is_shell[j]:
+            meeting[j].append(i)
+    bits = np.zeros(n_rings, np.int64)
+    shells: list[int] = []
+    groups: dict[int, list[int]] = {}  # by bit of shells those of their holes, longest unused first; at -1 all shells
+    for rings, is_hole in ((np.flatnonzero(is_shell), False), (np.flatnonzero(~is_shell), True)):
+        for ring in rings.tolist():
+            shell = int(bits[shell_of[ring]]) if is_hole else -1
+            taken = {int(bits[other]) for other in meeting[ring]}
+            group = groups.setdefault(shell, [])
+            bit = next((bit for bit in group if bit not in taken), -1)
+            if bit < 0 or (len(group) < _SPREAD and len(shells) < MOST_BITS - _SPREAD):
+                if len(shells) == MOST_BITS:
+                    return None
+                bit = len(shells)
+                shells.append(shell if is_hole else bit)
+            else:
+                group.remove(bit)
+            group.append(bit)
+            bits[ring] = bit
+    return RingBits(bits, np.array(shells))
+
+
+def boxes_of(vertices: npt.NDArray[np.float64], ring_offsets: npt.NDArray[np.int64]) -> Corners:
+    """Return the least and the largest coordinates of each ring, (n_rings, 2) float64 each."""
+    if len(ring_offsets) == 1:
+        return np.zeros((0, 2)), np.zeros((0, 2))
+    starts = ring_offsets[:-1]
+    return np.minimum.reduceat(vertices, starts), np.maximum.reduceat(vertices, starts)
+
+
+def rings_meant(
+    labels: RingBits, boxes: Corners, evidence: npt.NDArray[np.int64], found: Corners, budget: Budget
+) -> list[list[int]] | None:
+    """Return for each ring found which of the rings its evidence names; None where that is not sure.
+
+    boxes: of the rings that ``labels`` are of; found: of those whose evidence it is.
+    """
+    if len(labels.bits) == len(labels.shells):
+        return [places_of(bits) for bits in evidence.tolist()]
+    n_rings = len(labels.bits)
+    low, high = np.concatenate([boxes[0], found[0]]), np.concatenate([boxes[1], found[1]])
+    pairs = box_pairs(low, high, budget)
+    across = (pairs[:, 0] < n_rings) & (pairs[:, 1] >= n_rings)
+    rings, parts = pairs[across, 0], pairs[across, 1] - n_rings
+    is_named = (evidence[parts] >> labels.bits[rings]) & 1 == 1
+    meant: list[list[int]] = [[] for _ in evidence]
+    for ring, part in zip(rings[is_named].tolist(), parts[is_named].tolist(), strict=True):
+        meant[part].append(ring)
+    counts = [bits.bit_count() for bits in evidence.tolist()]
+    return meant if counts == list(map(len, meant)) else None
+
+
+def places_of(number: int) -> list[int]:
+    """Return the places of the bits that are set."""
+    places = []
+    while number:  # bound: each turn clears a bit
+        bit = number & -number
+        places.append(bit.bit_length() - 1)
+        number ^= bit
+    return places
