@@ -46,11 +46,11 @@ def fill_cache(module: str, steps: int, processes: int) -> None:
         complete.parent.mkdir(parents=True, exist_ok=True)
         with _alone(complete.with_name("lock")):
             if not complete.exists() and _run(module, steps, processes):
-                complete.touch()
+                note_full(module)
 
 
 def note_full(module: str) -> None:
-    """Note that the cache holds all that the steps of `module` compile: this process has called every one."""
+    """Note that the cache holds all that the steps of `module` compile: every one of them was called."""
     folder = cache_folder()
     if folder is not None and not numba_config.DISABLE_JIT:
         with contextlib.suppress(OSError):

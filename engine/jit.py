@@ -263,6 +263,32 @@ class _KernelCache(FunctionCache):  # type: ignore[misc]
         return self._load_overload(signature, target_context)
 
 
+class _Kernel:
+    """A kernel whose dispatcher is made when it is first called: to make all of them is a third of the import."""
+
+    def __init__(self, function: Callable[..., Any], **options: Any) -> None:
+        functools.update_wrapper(self, function)
+        self.py_func = function
+        self._options = _OPTIONS | options
+
+    @functools.cached_property
+    def dispatcher(self) -> Any:
+        """What numba makes of it."""
+        compiled = numba.njit(**self._options)(self.py_func)
+        folder = cache_folder()
+        if folder is not None:
+            compiled._cache = _KernelCache(self.py_func, folder)
+        return compiled
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self.dispatcher(*arguments)
+
+    @property
+    def signatures(self) -> list[Any]:
+        """The types of arguments that it is compiled for by now."""
+        return self.dispatcher.signatures if "dispatcher" in vars(self) else []
+
+
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile an outer loop: called from Python, releases the interpreter lock, cached on disk."""
     return _kernel(function)
@@ -277,12 +303,10 @@ def bare_kernel(function: Callable[..., Any]) -> Any:
 
 
 def _kernel(function: Callable[..., Any], **options: Any) -> Any:
-    compiled = numba.njit(**_OPTIONS, **options)(function)
-    folder = cache_folder()
-    if folder is not None and not numba_config.DISABLE_JIT:
-        compiled._cache = _KernelCache(function, folder)
-    KERNELS.append(compiled)
-    return compiled
+    if numba_config.DISABLE_JIT:
+        return function
+    KERNELS.append(_Kernel(function, **options))
+    return KERNELS[-1]
 
 
 class _Inline:

@@ -228,8 +228,7 @@ def run_chunks(
 
     The first chunk runs in the calling thread and is timed; later ones are sized to take `CHUNK_SECONDS`. With one
     worker, or as long as what is left would take less than that, no other thread is involved: to wake one takes half a
-    millisecond. Tasks write to disjoint slices, so the result does
-    not depend on `workers` or on the sizes chosen.
+    millisecond. Tasks write to disjoint slices, so the result does not depend on `workers` or on the sizes chosen.
 
     task: must not call `run_chunks` with more than one worker (the pool is shared and could wait on itself).
     workers: threads at once; None for one per core, 1 for the calling thread only.

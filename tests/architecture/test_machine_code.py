@@ -36,7 +36,8 @@ def name_of(value: Any) -> str:
 
 def code_of(kernel: Any, inputs: list[Any]) -> tuple[str, str]:
     """Return the LLVM code and the assembly of a kernel for these inputs, compiled here (a cached one has no text)."""
-    fresh = type(kernel)(py_func=kernel.py_func, targetoptions=kernel.targetoptions)
+    known = kernel.dispatcher
+    fresh = type(known)(py_func=known.py_func, targetoptions=known.targetoptions)
     fresh(*inputs, SIDES)
     return "\n".join(fresh.inspect_llvm().values()), "\n".join(fresh.inspect_asm().values())
 

@@ -34,7 +34,10 @@ from engine.jit import kernel
 def run(x):
     return step(x)
 """
-USE = "from engine.work import run; print(run(1.0), sum(run.stats.cache_hits.values()), run.stats.cache_path)"
+USE = (
+    "from engine.work import run; found = run(1.0); stats = run.dispatcher.stats; "
+    "print(found, sum(stats.cache_hits.values()), stats.cache_path)"
+)
 
 
 @pytest.fixture
@@ -165,7 +168,7 @@ def test_code_of_another_signature_is_never_taken(project: Path) -> None:
     cache = {"ENGINE_CACHE_DIR": str(project / "cache")}
     code = (
         "from engine.work import run\n"
-        "file = run._cache._cache_file\n"
+        "file = run.dispatcher._cache._cache_file\n"
         "file._load_index = lambda: {{}}\n"  # the index as it was before the other process wrote
         "print(run({0}))"
     )
