@@ -33,7 +33,7 @@ from engine.types import Accuracy
 DONE: Final = 0
 NOT_REPRESENTABLE: Final = 1
 
-_FIRST_CHUNK: Final = 64
+_FIRST_CHUNK: Final = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +60,7 @@ class OverlayBatch:
     _clips: Sequence[Solid] = field(repr=False)
     _output: Output = field(repr=False)
     _sources: npt.NDArray[np.int32] = field(repr=False)
-    _bases: npt.NDArray[np.int64] = field(repr=False)
+    _bases: npt.NDArray[np.int32] = field(repr=False)
     _apart: dict[int, Overlay] = field(repr=False)
 
     def __len__(self) -> int:
@@ -107,9 +107,9 @@ def _gathered(solids: Sequence[Solid]) -> Polygons:
     return gathered([each.vertices for each in polygons], [each.ring_offsets for each in polygons])
 
 
-def _bases(subjects: Polygons, clips: Polygons) -> npt.NDArray[np.int64]:
+def _bases(subjects: Polygons, clips: Polygons) -> npt.NDArray[np.int32]:
     """Return `OverlayBatch._bases` of pairs that were overlaid together."""
-    bases = np.empty((len(subjects.polygon_offsets) - 1, 3), np.int64)
+    bases = np.empty((len(subjects.polygon_offsets) - 1, 3), np.int32)
     bases[:, 0] = subjects.ring_offsets[subjects.polygon_offsets[:-1]]
     bases[:, 1] = clips.ring_offsets[clips.polygon_offsets[:-1]]
     bases[:, 2] = len(subjects.vertices)
@@ -147,7 +147,7 @@ def overlay_batch(
         if set(map(type, solids)) - {Polygon}:
             for i_pair, solid in enumerate(solids):
                 rings_of(solid, name, i_pair)
-    parts: dict[int, tuple[Found, npt.NDArray[np.int64]]] = {}
+    parts: dict[int, tuple[Found, npt.NDArray[np.int32]]] = {}
     apart: dict[int, Overlay] = {}
     n_exact: dict[int, int] = {}
     status = np.zeros(len(subjects), np.int8)
@@ -181,7 +181,7 @@ def overlay_batch(
 
 def _joined(
     status: npt.NDArray[np.int8],
-    chunks: Sequence[tuple[Found, npt.NDArray[np.int64]]],
+    chunks: Sequence[tuple[Found, npt.NDArray[np.int32]]],
     apart: dict[int, Overlay],
     subjects: Sequence[Solid],
     clips: Sequence[Solid],
@@ -189,7 +189,7 @@ def _joined(
 ) -> OverlayBatch:
     """Put the flat results of all chunks, and the overlays made apart from them, into one set of arrays."""
     parts = [found for found, _ in chunks]
-    counts = np.concatenate([np.zeros((0, 4), np.int64), *(part.counts for part in parts)])
+    n_pieces = np.concatenate([np.zeros(0, np.int64), *(part.counts[:, 0] for part in parts)])
     displacement = np.concatenate([np.zeros(0), *(part.displacement for part in parts)])
     vertices = np.concatenate([np.zeros((0, 2)), *(part.vertices for part in parts)])
     sources = np.concatenate([np.zeros((0, 2), np.int32), *(part.sources for part in parts)])
@@ -198,13 +198,14 @@ def _joined(
     if apart:
         pairs = np.array(sorted(apart), np.int64)
         results = [apart[pair] for pair in pairs.tolist()]
-        counts[pairs, 0] = [result.n_pieces for result in results]
-        counts[pairs, 1] = [len(result.ring_offsets) - 1 for result in results]
-        counts[pairs, 2] = [len(result.vertices) for result in results]
+        n_rings, n_vertices = (np.concatenate([part.counts[:, k] for part in parts]) for k in (1, 2))
+        n_pieces[pairs] = [result.n_pieces for result in results]
+        n_rings[pairs] = [len(result.ring_offsets) - 1 for result in results]
+        n_vertices[pairs] = [len(result.vertices) for result in results]
         displacement[pairs] = [result.largest_displacement for result in results]
         is_apart = np.zeros(len(status), np.bool_)
         is_apart[pairs] = True
-        by_piece, by_ring, by_vertex = (np.repeat(is_apart, counts[:, k]) for k in range(3))
+        by_piece, by_ring, by_vertex = (np.repeat(is_apart, each) for each in (n_pieces, n_rings, n_vertices))
         added = np.concatenate([result.vertices for result in results])
         vertices = _woven(by_vertex, vertices, added)
         sources = _woven(by_vertex, sources, np.full((len(added), 2), -1))
@@ -212,7 +213,7 @@ def _joined(
         ring_offsets = summed(_woven(by_ring, np.diff(ring_offsets), sizes))
         sizes = np.concatenate([np.diff(result.piece_offsets) for result in results])
         piece_offsets = summed(_woven(by_piece, np.diff(piece_offsets), sizes))
-    pair_offsets = summed(counts[:, 0])
+    pair_offsets = summed(n_pieces)
     for array in (status, vertices, displacement, ring_offsets, piece_offsets, pair_offsets):
         array.setflags(write=False)
     return OverlayBatch(
@@ -226,7 +227,7 @@ def _joined(
         _clips=tuple(clips),
         _output=output,
         _sources=sources,
-        _bases=np.concatenate([np.zeros((0, 3), np.int64), *(bases for _, bases in chunks)]),
+        _bases=np.concatenate([np.zeros((0, 3), np.int32), *(bases for _, bases in chunks)]),
         _apart=apart,
     )
 
