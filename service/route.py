@@ -1,6 +1,6 @@
 """The route class: reads a body within its limits, decodes and checks it, calls the endpoint, encodes its answer.
 
-A body is JSON for the endpoint's model, or octets that the endpoint takes as they are (the binary lane). Either is
+A body is JSON for the endpoint's model, or octets that the endpoint takes as they are (the binary lane). A large one is
 received into one buffer of the declared length.
 
 FastAPI describes the routes (parameters, models, the OpenAPI document); this class answers them. FastAPI's own handler
@@ -207,30 +207,38 @@ async def _read(receive: Receive, length: bytes, call: Call) -> Body:
     if declared > limit:
         raise _too_large(limit)
     call.take(declared)
-    body, size, is_more = _room(declared), 0, True
+    room = _room(declared) if declared >= LARGE else None
+    parts: list[bytes] = []
+    size, is_more = 0, True
     try:
         async with asyncio.timeout(seconds):
             while is_more:
                 message = await receive()
                 if message["type"] == "http.disconnect":
                     raise ClientDisconnect
-                chunk, is_more = message.get("body", b""), message.get("more_body", False)
-                end = size + len(chunk)
+                part, is_more = message.get("body", b""), message.get("more_body", False)
+                end = size + len(part)
                 if end > limit:
                     raise _too_large(limit)
-                if end > len(body):
-                    call.take(end - len(body))
-                    body = body if isinstance(body, bytearray) else bytearray(body[:size])
-                body[size:end] = chunk
+                if end > declared:
+                    call.take(end - max(size, declared))
+                    if room is not None:  # case: a server that does not hold bodies to their declared length
+                        parts, room = [bytes(room[:size])], None
+                if room is None:
+                    parts.append(part)
+                else:
+                    room[size:end] = part
                 size = end
     except TimeoutError:
         raise ServiceError("slow_body", f"the body did not arrive within {seconds} s; send it faster") from None
-    return body if size == len(body) else body[:size]
+    if room is not None:
+        return room if size == declared else room[:size]
+    return parts[0] if len(parts) == 1 else b"".join(parts)
 
 
 def _room(size: int) -> bytearray | mmap.mmap:
     """Return so many bytes; untouched pages take no memory."""
-    if size < LARGE or not hasattr(mmap, "MADV_HUGEPAGE"):
+    if not hasattr(mmap, "MADV_HUGEPAGE"):
         return bytearray(size)
     room = mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
     with suppress(OSError):  # a kernel without large pages
