@@ -4,7 +4,9 @@ With the weights w_a and w_b of the ends of the first edge (crossing_signs.py), 
 x = (a |w_b| + b |w_a|) / (|w_a| + |w_b|). Products add 2 u^2, their sum and the sum of weights 4 u^2 each, the quotient
 16 u^2: every coordinate is within (28 u^2 + 2 r) max(|a|, |b|) of its value; 40 u^2 + 2.5 r covers what is of higher
 order for r < 0.01. Where the bound leaves two doubles, or the value may be a double itself, signs of the exact
-difference to the double and to the middles between it and its neighbours decide.
+difference to the double and to the middles between it and its neighbours decide. Where the value may be less than
+2^55 bounds, so that the double-double may miss its neighbours, it is first computed from expansions, whose sum loses
+nothing: quotients of their two leading components are within 2^-100 of it.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ from engine.arrangement.crossing_signs import Edges, crossing_against, exact_wei
 from engine.jit import called, inline, merged
 from engine.predicates.double_double import U2, dd_add, dd_div, dd_scale, surely_rounded
 from engine.predicates.error_free import fast_two_sum, workspace
-from engine.predicates.expansion import compress
+from engine.predicates.expansion import add_scaled, compress, sign
 
 CUT_BOUND: Final = 40.0 * U2
 LOST: Final = -1.0
@@ -92,8 +94,8 @@ def _coordinate(
 @called
 def _settle(edges: Edges, e: int, f: int, axis: int, h: float, bound: float) -> tuple[float, float]:
     """Return what `_coordinate` does, by exact signs around h."""
-    if abs(h) <= bound:
-        h = 0.0  # case: a crossing on an axis, which the bound does not tell from what is near it
+    if bound > 2.0**-55 * abs(h):  # case: a crossing on an axis, or so near that h may be many doubles off
+        h = _from_expansions(edges, e, f, axis)
     side = crossing_against(edges, e, f, axis, h, 0.0)
     if side == 0:
         return h + 0.0, 0.0
@@ -113,6 +115,23 @@ def _settle(edges: Edges, e: int, f: int, axis: int, h: float, bound: float) -> 
         if side != beyond:
             return h + 0.0, abs(half)
     return h, LOST
+
+
+@called
+def _from_expansions(edges: Edges, e: int, f: int, axis: int) -> float:
+    """Return a coordinate of a crossing, off by less than a unit in its own last place."""
+    z = edges.x if axis == 0 else edges.y
+    a, b, fb = e, edges.after[e], edges.after[f]
+    wa, wb = workspace(16), workspace(16)
+    na, nb = exact_weight(edges, f, fb, a, wa), exact_weight(edges, f, fb, b, wb)
+    factor = 1.0 if sign(wa, na) > 0 else -1.0  # the weights are of opposite signs
+    above, below = workspace(64), workspace(64)  # 2 * 16 components for each of two products
+    n = add_scaled(above, add_scaled(above, 0, wa, na, factor * z[b]), wb, nb, -factor * z[a])
+    m = add_scaled(below, add_scaled(below, 0, wa, na, factor), wb, nb, -factor)
+    nh, nl = _leading(above, n)
+    dh, dl = _leading(below, m)
+    h, _ = dd_div(nh, nl, dh, dl)
+    return h + 0.0
 
 
 @inline
