@@ -23,6 +23,13 @@ class ExactRings:
     rings: tuple[tuple[Homogeneous, ...], ...]
     exponent: int
 
+    def places(self) -> list[list[tuple[Fraction, Fraction]]]:
+        """Return the coordinates of each ring's vertices."""
+        up, down = max(self.exponent, 0), max(-self.exponent, 0)
+        return [
+            [(Fraction(x << up, w << down), Fraction(y << up, w << down)) for x, y, w in ring] for ring in self.rings
+        ]
+
     def _terms(self) -> list[tuple[int, int]]:
         """Return numerators and denominators that add up to twice the area in units of ``4**exponent``."""
         whole = 0

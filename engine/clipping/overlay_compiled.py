@@ -223,7 +223,7 @@ def overlay_compiled(
     vertices, displacement = found.vertices, float(found.displacement[0])
     if found.status[0] != DONE:
         if output == "valid":
-            settled = settle_rings(_rounded(found), exact, functools.partial(_again, budget), budget)
+            settled = settle_rings(_rounded(found), exact, functools.partial(_again, budget), exponent == 0, budget)
         if settled is None:
             return None
         vertices, displacement = settled.rings.vertices, settled.displacement
@@ -245,6 +245,7 @@ def overlay_compiled(
             holes_parted=settled.holes_parted,
             rounds=settled.rounds,
             vertices_moved=settled.vertices_moved,
+            snapped=settled.snapped,
         )
     return result, int(found.counts[0, 3])
 

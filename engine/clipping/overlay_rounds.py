@@ -1,7 +1,8 @@
 """Rounds of the compiled overlay: rounded rings that nothing vouches for are arranged again, until they are valid.
 
-The rule, and what is told of its outcome, are those of overlay_rounding.py; the kernel does the work of a round. Which
-exact part a part comes from is carried along as bits: its evidence names rings of the round before.
+The rule, and what is told of its outcome, are those of overlay_rounding.py; the kernel does the work of a round, also
+of the last one after snap rounding, where `MAX_ROUNDS` do not end it. Which exact part a part comes from is carried
+along as bits: its evidence names rings of the round before.
 """
 
 from __future__ import annotations
@@ -9,13 +10,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from math import inf, nextafter
+from math import frexp, hypot, inf, nextafter, ulp
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from engine.arrangement.nodes import nearest_quotient
+from engine.arrangement.snap_rounding import snap_rings
 from engine.clipping.implicit_rings import ImplicitRings
 from engine.clipping.overlay_result import Collapse
 from engine.clipping.overlay_rounding import MAX_ROUNDS, count_changes
@@ -57,6 +59,7 @@ class Settled:
     rings: RoundedRings
     rounds: int
     displacement: float
+    snapped: bool
     vertices_moved: int
     collapsed: tuple[Collapse, ...]
     pieces_joined: int
@@ -68,18 +71,21 @@ class Settled:
 Again = Callable[[RoundedRings, RingBits], RoundedRings | None]
 
 
-def settle_rings(first: RoundedRings, exact: ImplicitRings, again: Again, budget: Budget) -> Settled | None:
-    """Arrange ``first`` until it is valid; None where that takes integers: rings deep in each other, or many rounds.
+def settle_rings(
+    first: RoundedRings, exact: ImplicitRings, again: Again, may_snap: bool, budget: Budget
+) -> Settled | None:
+    """Arrange ``first`` until it is valid; None where that takes integers: rings deep in each other, or no snapping.
 
     exact: the exact rings that ``first`` is rounded from. again: arranges rings, given their bits.
+    may_snap: the rings are those of ``exact``, not scaled.
     """
     n_holes = first.n_rings - first.n_pieces
     piece_origins = [1 << piece for piece in range(first.n_pieces)]
     hole_origins = [1 << hole for hole in range(n_holes)]
-    rings, rounds, displacement, has_crossings = first, 1, first.displacement, False
-    while not rings.is_valid:  # bound: MAX_ROUNDS
+    rings, rounds, displacement, has_crossings, snapped = first, 1, first.displacement, False, False
+    while not rings.is_valid:  # bound: MAX_ROUNDS + 1
         boxes = boxes_of(rings.vertices, rings.ring_offsets)
-        labels = assign_bits(boxes, rings.piece_offsets, budget) if rounds < MAX_ROUNDS else None
+        labels = assign_bits(boxes, rings.piece_offsets, budget)
         found = None if labels is None else again(rings, labels)
         if labels is None or found is None:
             return None
@@ -89,13 +95,22 @@ def settle_rings(first: RoundedRings, exact: ImplicitRings, again: Again, budget
         piece_origins, hole_origins = _origins(rings, found, meant, piece_origins, hole_origins)
         rings, has_crossings = found, has_crossings or found.has_crossings
         if rings.displacement:
-            rounds, displacement = rounds + 1, nextafter(displacement + rings.displacement, inf)
+            if snapped or (rounds == MAX_ROUNDS and not may_snap):
+                return None
+            if rounds < MAX_ROUNDS:
+                rounds, displacement = rounds + 1, nextafter(displacement + rings.displacement, inf)
+            else:
+                rings, displacement = _snapped(first, exact, budget)
+                piece_origins = [1 << piece for piece in range(first.n_pieces)]
+                hole_origins = [1 << hole for hole in range(n_holes)]
+                snapped = has_crossings = True
     lost_pieces, pieces_joined, pieces_parted = _changes(first.n_pieces, piece_origins)
     lost_holes, holes_joined, holes_parted = _changes(n_holes, hole_origins)
     return Settled(
         rings=rings,
         rounds=rounds,
         displacement=displacement,
+        snapped=snapped,
         vertices_moved=_moved(first.vertices, rings.vertices) if has_crossings else 0,
         collapsed=_collapsed(first, exact, lost_pieces, lost_holes) if lost_pieces or lost_holes else (),
         pieces_joined=pieces_joined,
@@ -103,6 +118,22 @@ def settle_rings(first: RoundedRings, exact: ImplicitRings, again: Again, budget
         holes_joined=holes_joined,
         holes_parted=holes_parted,
     )
+
+
+def _snapped(first: RoundedRings, exact: ImplicitRings, budget: Budget) -> tuple[RoundedRings, float]:
+    """Return the exact rings snapped to the lattice of their largest coordinate, and half a pixel's diagonal."""
+    spacing = ulp(float(np.abs(first.vertices).max()))
+    snapped = snap_rings(exact.exact_rings().places(), frexp(spacing)[1] - 1, budget)
+    rings = RoundedRings(
+        vertices=np.array([vertex for ring in snapped for vertex in ring]),
+        ring_offsets=np.cumsum([0, *map(len, snapped)]),
+        piece_offsets=first.piece_offsets,
+        evidence=first.evidence,
+        displacement=0.0,
+        is_valid=False,
+        has_crossings=True,
+    )
+    return rings, nextafter(hypot(spacing, spacing) / 2, inf)
 
 
 def _origins(
@@ -176,9 +207,7 @@ _Place = tuple[Fraction, Fraction]
 
 def _first_vertex(ring: ImplicitRings) -> tuple[list[_Place], tuple[float, float]]:
     """Return a ring from its first vertex on, and the doubles nearest to that vertex."""
-    made = ring.exact_rings()
-    up, down = max(made.exponent, 0), max(-made.exponent, 0)
-    places = [(Fraction(x << up, w << down), Fraction(y << up, w << down)) for x, y, w in made.rings[0]]
+    (places,) = ring.exact_rings().places()
     k = places.index(min(places))
-    x, y, w = made.rings[0][k]
-    return places[k:] + places[:k], (nearest_quotient(x << up, w << down), nearest_quotient(y << up, w << down))
+    x, y = (nearest_quotient(*value.as_integer_ratio()) for value in places[k])
+    return places[k:] + places[:k], (x, y)

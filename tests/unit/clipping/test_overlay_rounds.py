@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from engine.arrangement.ring_labels import MOST_BITS
+from engine.clipping import overlay_rounding, overlay_rounds
 from engine.clipping.overlay_batch import overlay_batch
 from engine.clipping.overlay_compiled import overlay_compiled
 from engine.parallel import Budget
@@ -58,6 +59,29 @@ def test_more_rings_than_a_label_has_bits() -> None:
     found = overlay_compiled(arrays([border]), arrays([version]), "symmetric_difference", "valid", Budget())
     assert found is not None
     assert found[0].n_pieces_exact > MOST_BITS
+
+
+def test_rounds_that_do_not_end_are_snapped(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One round instead of twelve is all there is, so that many results are snapped."""
+    for module in (overlay_rounding, overlay_rounds):
+        monkeypatch.setattr(module, "MAX_ROUNDS", 1)
+    n_snapped = 0
+    for seed in range(20):
+        pair = families.drawn(families.slivers, seed)
+        for operation in OPERATIONS:
+            assert agree(*pair, operation)
+            found = overlay_compiled(*map(arrays, pair), operation, "valid", Budget())
+            assert found is not None
+            n_snapped += found[0].snapped
+    assert n_snapped >= 5
+
+
+@pytest.mark.parametrize(
+    ("family", "seed"), [(families.turned_by_less_than_an_ulp, 9), (families.nearly_equal_convex, 11)]
+)
+def test_crossings_next_to_an_axis_are_rounded(family: Any, seed: int) -> None:
+    """A coordinate of some 2^-60 between ends of some 1: more digits than a double-double has are lost."""
+    assert all(agree(*families.drawn(family, seed), operation) for operation in OPERATIONS)
 
 
 def test_a_batch_equals_single_calls() -> None:
