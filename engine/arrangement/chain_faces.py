@@ -31,8 +31,7 @@ def number_cycles(
 
     Both (2 n_chains,) int64; half-chains that another stands for get cycle -1.
     """
-    for half in range(2 * n_chains):
-        cycle[half] = -1
+    cycle[: 2 * n_chains] = -1
     for chain in range(n_chains):
         if chain & POLL == 0 and stop[0]:
             return 0
@@ -48,7 +47,11 @@ def number_cycles(
             if stop[0]:
                 return n_cycles
             half = first
+            steps = 0
             while cycle[half] < 0:  # bound: each turn numbers one half-chain
+                steps += 1
+                if steps & POLL == 0 and stop[0]:
+                    return n_cycles
                 cycle[half] = n_cycles
                 half = following[half]
             n_cycles += 1

@@ -106,6 +106,8 @@ def _emit(
             if half & 1:
                 v, end = chains.last[chain], chains.first[chain]
                 while v != end:  # bound: the vertices of the chain
+                    if v & POLL == 0 and stop[0]:
+                        return n_points
                     if marks[v] & BENT or orient(edges, edges.before[v], v, edges.after[v]) != 0:
                         rings.point[n_points], rings.meets[n_points] = v, marks[edges.before[v]] & RUN
                         n_points += 1
@@ -114,6 +116,8 @@ def _emit(
                 v, end = chains.first[chain], chains.last[chain]
                 while v != end:  # bound: the vertices of the chain
                     v = edges.after[v]
+                    if v & POLL == 0 and stop[0]:
+                        return n_points
                     if marks[v] & BENT or orient(edges, edges.before[v], v, edges.after[v]) != 0:
                         rings.point[n_points], rings.meets[n_points] = v, marks[v] & RUN
                         n_points += 1

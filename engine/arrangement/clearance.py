@@ -21,7 +21,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 from engine.arrangement.crossing_signs import Edges
-from engine.arrangement.edge_contacts import Events
+from engine.arrangement.edge_contacts import POLL, Events
 from engine.arrangement.ring_certificate import segments_are_far
 from engine.jit import inline
 
@@ -51,9 +51,13 @@ def _corner_is_clear(edges: Edges, v: int, share_before: float, share_after: flo
 
 
 @inline
-def ends_are_clear(edges: Edges, events: Events, n: int, starts: Any, order: Any, margin: float) -> bool:
+def ends_are_clear(
+    edges: Edges, events: Events, n: int, starts: Any, order: Any, margin: float, stop: Any
+) -> bool:  # fmt: skip
     """Tell whether the first and the last event of every edge are far enough from its ends, and from its neighbours."""
     for e in range(n):
+        if e & POLL == 0 and stop[0]:
+            return False
         first, last = starts[e], starts[e + 1]
         if first == last:
             continue

@@ -19,6 +19,8 @@ from engine.jit import called, inline, merged
 
 POLL: Final = 0x3FFF
 """Steps of some 10 to 100 ns between two looks at the flag that ends a call, as a mask of their number."""
+OFTEN: Final = 0x3FF
+"""The same for steps of some microseconds."""
 UNSURE_SLACK: Final = 4.0
 """Slack of a parameter known by its sign only: any comparison with it is made exactly."""
 

@@ -93,6 +93,8 @@ def sort_events(
     """
     starts[: n + 1] = 0
     for i in range(n_events):
+        if i & POLL == 0 and stop[0]:
+            return False
         starts[events.edge[i] + 1] += 1
     for e in range(n):
         starts[e + 1] += starts[e]

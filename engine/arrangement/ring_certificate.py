@@ -91,12 +91,14 @@ def _is_apart(points: Any, x: Any, y: Any, a: int, b: int, c: int, d: int, squar
 
 
 @inline
-def has_straight_point(rings: Rings, n_rings: int, x: Any, y: Any, moved: Any) -> bool:
+def has_straight_point(rings: Rings, n_rings: int, x: Any, y: Any, moved: Any, stop: Any) -> bool:
     """Tell whether rounding put a point, one where rings do not meet, on a straight line with its neighbours."""
     for ring in range(n_rings):
         first, last = rings.offset[ring], rings.offset[ring + 1]
         i, j = last - 2, last - 1
         for k in range(first, last):
+            if k & POLL == 0 and stop[0]:
+                return True
             if (moved[i] | moved[j] | moved[k]) and not rings.meets[j]:
                 if orient2d(Point2(x[i], y[i]), Point2(x[j], y[j]), Point2(x[k], y[k])) == 0:
                     return True
@@ -144,7 +146,7 @@ def certify(
                 ):
                     return False
         return True
-    build_tree(boxes, marks, n, tree, tree_marks, places)
+    build_tree(boxes, marks, n, tree, tree_marks, places, stop)
     stack[0, 0], stack[0, 1], depth = 1, 1, 1
     while depth > 0:  # bound: the walk through the tree
         if stop[0]:

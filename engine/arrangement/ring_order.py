@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from engine.arrangement.chain_rings import Rings
-from engine.arrangement.edge_contacts import POLL
+from engine.arrangement.edge_contacts import OFTEN, POLL
 from engine.jit import inline
 from engine.predicates.orientation import orient2d
 from engine.types import Point2
@@ -126,9 +126,13 @@ def rank_rings(
         return -1
     n_pieces = 0
     for ring in range(n_rings):
+        if ring & OFTEN == 0 and stop[0]:
+            return -1
         first, last = rings.offset[ring], rings.offset[ring + 1]
         low = first
         for k in range(first + 1, last):
+            if k & POLL == 0 and stop[0]:
+                return -1
             if x[k] < x[low] or (x[k] == x[low] and y[k] < y[low]):
                 low = k
         ranking.start[ring], ranking.x[ring] = low, x[low]

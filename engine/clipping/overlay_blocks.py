@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 Arrays = tuple[npt.NDArray[Any], ...]
 
-_MANY: Final = 1000
+_MANY: Final = 500
 """Vertices of a pair from which on blocks of edges are looked at first."""
 _MANY_IN_RING: Final = 64
 """The same by ring: blocks of small rings are no better than their edges."""

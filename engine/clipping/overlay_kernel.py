@@ -30,7 +30,7 @@ from engine.arrangement.chain_rings import choose_boundary, walk_rings
 from engine.arrangement.chains import Chains, build_chains, build_stars
 from engine.arrangement.clearance import CLEARANCE, ends_are_clear
 from engine.arrangement.crossing_signs import Edges
-from engine.arrangement.edge_contacts import POLL, Events, root_of, unite
+from engine.arrangement.edge_contacts import OFTEN, POLL, Events, root_of, unite
 from engine.arrangement.edge_crossings import FEW, find_contacts
 from engine.arrangement.edge_events import sort_events
 from engine.arrangement.edge_tree import RUN, build_tree
@@ -66,6 +66,8 @@ def _join_faces(
     """Join the outer cycle of each component of rings to the face it lies in; n_cycles is the unbounded face."""
     x, y = edges.x, edges.y
     for i in range(n_cycles + 1):
+        if i & POLL == 0 and stop[0]:
+            return
         joined[i] = regions[i] = i
         label[i] = 0
     for ring in range(n_rings):
@@ -99,7 +101,7 @@ def _round_points(w: Workspace, n: int, n_crossings: int, n_points: int, stop: A
     farthest = 0.0
     lost = False
     for k in range(n_points):
-        if k & POLL == 0 and stop[0]:
+        if k & OFTEN == 0 and stop[0]:
             return LOST
         point = w.found.point[k]
         if point < n:
@@ -119,7 +121,7 @@ def _round_points(w: Workspace, n: int, n_crossings: int, n_points: int, stop: A
 @inline
 def _write(
     w: Workspace, n: int, n_found: int, labels: RingLabels, vertices: Any, sources: Any, sizes: Any, pieces: Any,
-    evidence: Any, n_out: int, n_rings: int, n_pieces: int,
+    evidence: Any, n_out: int, n_rings: int, n_pieces: int, stop: Any,
 ) -> None:  # fmt: skip
     """Append the rings in their order to the output, from its entries n_out, n_rings and n_pieces on."""
     n_pieces -= 1
@@ -128,6 +130,8 @@ def _write(
         first, last = w.found.offset[ring], w.found.offset[ring + 1]
         i = w.ranking.start[ring]
         for _ in range(last - first):
+            if n_out & POLL == 0 and stop[0]:
+                return
             point = w.found.point[i]
             vertices[n_out, 0], vertices[n_out, 1] = w.x[i], w.y[i]
             if point < n:
@@ -234,14 +238,16 @@ def overlay_pairs(
             if not (safe and also_safe and largest <= LARGEST):
                 continue
         margin = CLEARANCE * largest
-        is_clear = fill_boxes(edges, n, margin, w.boxes, w.marks) > margin
+        is_clear = fill_boxes(edges, n, margin, w.boxes, w.marks, stop) > margin
         mark_runs(edges, w.places, n_runs, w.boxes, w.marks)
         if n > FEW:
-            build_tree(w.boxes, w.marks, n, w.tree, w.tree_marks, w.places)
+            build_tree(w.boxes, w.marks, n, w.tree, w.tree_marks, w.places, stop)
         n_events, n_crossings, n_exact, are_far = find_contacts(
             edges, n, n_rings, margin, events, w.points, w.marked, w.rings, w.boxes, w.marks, w.tree, w.tree_marks,
             w.places, w.stack, w.pairs, stop,
         )  # fmt: skip
+        if stop[0]:
+            break
         most = n_events  # chains and nodes: one for each event, and each vertex that is a node
         if n_events >= 0:
             for ring in range(n_rings):
@@ -256,7 +262,9 @@ def overlay_pairs(
         )
         if stop[0]:
             break
-        is_clear = is_clear and are_far and are_clear and ends_are_clear(edges, events, n, w.starts, w.order, margin)
+        is_clear = (
+            is_clear and are_far and are_clear and ends_are_clear(edges, events, n, w.starts, w.order, margin, stop)
+        )
         w.node_of[: n + n_crossings] = -1
         n_nodes, n_chains = build_chains(
             edges, events, w.points, w.marked, w.starts, w.order, w.tops, w.masks, n_rings, w.node_of, w.nodes, chains,
@@ -297,7 +305,7 @@ def overlay_pairs(
             continue
         is_valid = True
         if moved_by > 0.0:
-            is_valid = not has_straight_point(found, n_found, w.x, w.y, w.moved) and (
+            is_valid = not has_straight_point(found, n_found, w.x, w.y, w.moved, stop) and (
                 is_clear
                 or certify(
                     found, n_found, m, w.x, w.y, w.moved, w.boxes, w.marks, w.chain_at, w.tree, w.tree_marks,
@@ -311,7 +319,7 @@ def overlay_pairs(
             counts[item, 1], counts[item, 2] = n_found, m
             return at, NEEDS_OUTPUT, n_out, n_out_rings, n_out_pieces, used
         _write(
-            w, n, n_found, labels, vertices, sources, sizes, pieces, evidence, n_out, n_out_rings, n_out_pieces
+            w, n, n_found, labels, vertices, sources, sizes, pieces, evidence, n_out, n_out_rings, n_out_pieces, stop
         )  # fmt: skip
         n_out, n_out_rings, n_out_pieces = n_out + m, n_out_rings + n_found, n_out_pieces + n_pieces
         counts[item, 0], counts[item, 1], counts[item, 2], counts[item, 3] = n_pieces, n_found, m, n_exact

@@ -91,7 +91,7 @@ def magnitude(x_min: float, x_max: float, y_min: float, y_max: float) -> float:
 
 
 @inline
-def fill_boxes(edges: Edges, n: int, margin: float, boxes: Any, marks: Any) -> float:
+def fill_boxes(edges: Edges, n: int, margin: float, boxes: Any, marks: Any, stop: Any) -> float:
     """Fill the box of every edge, with a margin around it, and its mark; return the least length of an edge.
 
     Its length is the larger of both coordinates'.
@@ -105,6 +105,8 @@ def fill_boxes(edges: Edges, n: int, margin: float, boxes: Any, marks: Any) -> f
         qx, qy = x[first], y[first]
         vx, vy = qx - px, qy - py
         for i in range(first, last + 1):
+            if i & POLL == 0 and stop[0]:
+                return 0.0
             j = i + 1 if i < last else first
             px, py, qx, qy = qx, qy, x[j], y[j]
             ux, uy = qx - px, qy - py

@@ -213,7 +213,7 @@ def reduce_pair(
     for ring in range(n_rings):
         if blocks.firsts[ring + 1] > blocks.firsts[ring]:
             w.marks[blocks.firsts[ring + 1] - 1] = EVERYWHERE  # what follows is another ring's
-    build_tree(blocks.boxes, w.marks, end, w.tree, w.tree_marks, w.places)
+    build_tree(blocks.boxes, w.marks, end, w.tree, w.tree_marks, w.places, stop)
     if stop[0] or not wake_near(
         blocks, end, 2.0 * margin, w.tree, w.tree_marks, w.places, w.stack, n_most, stop
     ):  # fmt: skip

@@ -24,7 +24,7 @@ _kept = threading.local()
 _MOST_KEPT: Final = 80_000_000
 """Bytes that were written to up to which a thread keeps its scratch."""
 _BY_VERTEX: Final = 200
-_BY_CONTACT: Final = 450
+_BY_CONTACT: Final = 390
 _BY_OUTPUT: Final = 40
 """Bytes of scratch for each vertex, contact, and vertex of the output."""
 
@@ -156,8 +156,8 @@ def buffers_for(n_vertices: int, n_rings: int, n_contacts: int) -> Buffers:
         vertex_floats=np.empty((2, n + 1)),
         vertex_integers=np.empty((5, n + 1), np.int64),
         ring_integers=np.empty((4, n_rings + 1), np.int64),
-        contact_floats=np.empty((7, k)),
-        contact_integers=np.empty((24, k + 1), np.int64),
+        contact_floats=np.empty((5, k)),
+        contact_integers=np.empty((19, k + 1), np.int64),
         half_integers=np.empty((8, 2 * k + 1), np.int64),
         half_octets=np.empty((4, 2 * k + 1), np.uint8),
         point_floats=np.empty((2, m)),
@@ -173,7 +173,7 @@ def buffers_for(n_vertices: int, n_rings: int, n_contacts: int) -> Buffers:
 
 @merged
 def rows_of(buffers: Buffers) -> Workspace:
-    """Return the rows of some buffers by name."""
+    """Return the rows of some buffers by name; those that are in one place are not in use at one time."""
     vx, v, r = buffers.vertex_floats, buffers.vertex_integers, buffers.ring_integers
     cx, c = buffers.contact_floats, buffers.contact_integers
     h, hb = buffers.half_integers, buffers.half_octets
@@ -182,12 +182,12 @@ def rows_of(buffers: Buffers) -> Workspace:
     events = Events(c[0], c[1], c[2], cx[0], cx[1], cx[2], c[3], c[4])
     chains = Chains(c[5], c[6], c[7], c[8], c[9], c[10])
     found = Rings(p[0], pb[0], c[11], c[12])
-    ranking = Ranking(c[13], cx[3], hb[0], c[14], c[15], c[16])
+    ranking = Ranking(c[5], cx[0], hb[0], c[6], c[7], c[8])  # in place of chains, and of parameters of events
     return Workspace(
         edges, v[3], p[1], v[4], pb[1],
         r[0], r[1], r[2], r[3],
         buffers.boxes, pb[2], buffers.tree, buffers.tree_marks, p[2], buffers.stack, buffers.pairs,
-        p[3], p[4], events, c[17], c[18], chains, c[19], c[20], c[21],
+        p[3], p[4], events, c[13], c[14], chains, c[12], c[15], c[16],
         h[0], h[1], h[2], h[3], h[4], h[5], h[6], hb[1], hb[2], hb[3],
-        c[22], h[7], c[23], found, cx[4], cx[5], cx[6], px[0], px[1], pb[3], ranking,
+        c[17], h[7], c[18], found, cx[3], cx[4], cx[1], px[0], px[1], pb[3], ranking,
     )  # fmt: skip

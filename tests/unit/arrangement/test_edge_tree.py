@@ -13,7 +13,7 @@ from engine.jit import kernel
 def pairs_of(boxes, marks, tree, tree_marks, places, stack, portion, found):  # type: ignore[no-untyped-def]
     """Return how many pairs there are, written to `found`."""
     n = len(boxes)
-    edge_tree.build_tree(boxes, marks, n, tree, tree_marks, places)
+    edge_tree.build_tree(boxes, marks, n, tree, tree_marks, places, np.zeros(1, np.uint8))
     stack[0, 0], stack[0, 1] = 1, 1
     depth, total = 1, 0
     while depth > 0:
@@ -23,7 +23,7 @@ def pairs_of(boxes, marks, tree, tree_marks, places, stack, portion, found):  # 
     return total
 
 
-@pytest.mark.parametrize("n", [1, 3, 4, 5, 33, 300])
+@pytest.mark.parametrize("n", [1, 3, 4, 5, 33, 300, 1500])
 @pytest.mark.parametrize("share", [1.0, 0.2])
 @pytest.mark.parametrize("wanders", [True, False])
 def test_every_pair_once(n: int, share: float, wanders: bool) -> None:
