@@ -2,8 +2,8 @@
 
 Points are multiplied by 2^-e, offsets of planes too, and each plane row by a power of two of its own: signs, orders and
 parameters do not change, coordinates of the result are multiplied by 2^e. A scaling that would round any number is not
-done; the kernels then leave items outside of their range open. Results that are subnormal after scaling back would be
-rounded twice, so they are settled again by rational arithmetic.
+done; the kernels then leave items outside of their range open. Results that scaling back rounds to a subnormal number,
+or up to the smallest normal one, would be rounded twice, so they are settled again by rational arithmetic.
 """
 
 from __future__ import annotations
@@ -67,8 +67,12 @@ def balanced_rows(rows: FloatArray, exponent: int) -> FloatArray | None:
 
 
 def scaled_back(points: FloatArray, exponent: int) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
-    """Return points 2^exponent and which of them may have been rounded twice."""
+    """Return points 2^exponent and which of them may have been rounded twice.
+
+    Those are what this rounds: up to the smallest normal number, that one included. Where nothing is rounded here, the
+    nearest double of all exponents is the nearest of those that there are.
+    """
     with np.errstate(all="ignore"):
         result: FloatArray = np.ldexp(points, exponent)
-    doubtful = (np.abs(result) < SMALLEST_NORMAL) & (points != 0.0)
+        doubtful = (np.abs(result) <= SMALLEST_NORMAL) & (np.ldexp(result, -exponent) != points)
     return result, doubtful.any(axis=1)

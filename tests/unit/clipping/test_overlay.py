@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import pickle
 from fractions import Fraction
 from typing import Any
@@ -191,6 +192,15 @@ def test_ends_of_the_exponent_range() -> None:
     assert denormal.area_exact == Fraction(1, 2) * Fraction(tiny) ** 2
     assert_valid(denormal)
     assert_counts_add_up(denormal)
+
+
+def test_rounding_up_to_the_smallest_normal_number() -> None:
+    """A crossing just below the middle of the largest subnormal number and the smallest normal one."""
+    least = 2.0**-1022
+    triangle = [(2 * least, least), (-2 * least, least), (-2 * least, -(3 - 2.0**-51) * least)]
+    result = overlay(Polygon([triangle]), Polygon([box(-least, 0, 4 * least, least)]))
+    assert result.vertices.max() == 2 * least
+    assert result.vertices[1].tolist() == [math.nextafter(least, 0), 0]
 
 
 @pytest.mark.parametrize("output", ["valid", "nearest"])

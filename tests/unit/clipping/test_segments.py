@@ -103,6 +103,16 @@ def test_whole_scenes_of_any_size(kind: str, scale: float) -> None:
                 check(segments, Convex(rows))
 
 
+def test_rounding_up_to_the_smallest_normal_number() -> None:
+    """A crossing just below the middle of the largest subnormal number and the smallest normal one.
+
+    Rounded to 53 bits it is that middle, rounded again the normal number.
+    """
+    least = 2.0**-1022
+    line = [[2 * least, least], [-2 * least, -(3 - 2.0**-51) * least]]
+    check(np.array([line] * 64), Aabb([-least, 0.0], [2 * least, least]))
+
+
 @pytest.mark.parametrize("offset", [1e6, 1e9])
 @pytest.mark.parametrize("kind", REGIONS)
 def test_far_from_the_origin(kind: str, offset: float) -> None:
