@@ -16,6 +16,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from engine.arrangement.exact_area import ExactRings
 from engine.arrangement.nodes import nearest_quotient
 from engine.arrangement.snap_rounding import snap_rings
 from engine.clipping.implicit_rings import ImplicitRings
@@ -112,7 +113,7 @@ def settle_rings(
         displacement=displacement,
         snapped=snapped,
         vertices_moved=_moved(first.vertices, rings.vertices) if has_crossings else 0,
-        collapsed=_collapsed(first, exact, lost_pieces, lost_holes) if lost_pieces or lost_holes else (),
+        collapsed=_collapsed(first, exact, lost_pieces, lost_holes, budget) if lost_pieces or lost_holes else (),
         pieces_joined=pieces_joined,
         pieces_parted=pieces_parted,
         holes_joined=holes_joined,
@@ -178,36 +179,48 @@ def _moved(images: npt.NDArray[np.float64], vertices: npt.NDArray[np.float64]) -
 
 
 def _collapsed(
-    first: RoundedRings, exact: ImplicitRings, lost_pieces: Sequence[int], lost_holes: Sequence[int]
+    first: RoundedRings, exact: ImplicitRings, lost_pieces: Sequence[int], lost_holes: Sequence[int], budget: Budget
 ) -> tuple[Collapse, ...]:
     """Return lost pieces, then lost holes, each by the vertices of its exact ring from the first one on."""
     shells = first.piece_offsets.tolist()
-    piece_of = np.repeat(np.arange(first.n_pieces), np.diff(first.piece_offsets)).tolist()
-    holes = [ring for ring in range(len(piece_of)) if ring != shells[piece_of[ring]]]
+    shell_of = np.repeat(first.piece_offsets[:-1], np.diff(first.piece_offsets)).tolist()
+    holes = [ring for ring, shell in enumerate(shell_of) if ring != shell]
+    holes = [holes[hole] for hole in lost_holes]
+    around = {shell_of[ring] for ring in holes}
+    if len(around) == 1:  # order: of one shell, which may be large, holes need no more than their own vertices
+        around.clear()
+    rings = {ring for piece in lost_pieces for ring in range(shells[piece], shells[piece + 1])}
+    made = _made(exact, sorted(rings.union(holes, around)))
 
-    def made(ring: int, end: int) -> ImplicitRings:
-        stops = exact.offsets[ring : end + 1]
-        return exact._replace(sources=exact.sources[stops[0] : stops[-1]], offsets=stops - stops[0])
+    def entry(kind: Literal["piece", "hole"], rings: Sequence[int]) -> tuple[list[_Place], Collapse]:
+        budget.check()
+        whole = [made[ring] for ring in rings]
+        place, near = _first_vertex(whole[0])
+        area = abs(ExactRings(tuple(ring for each in whole for ring in each.rings), whole[0].exponent).area())
+        return place, Collapse(kind, area, near)
 
-    def entry(kind: Literal["piece", "hole"], ring: int, end: int) -> tuple[list[_Place], Collapse]:
-        place, near = _first_vertex(made(ring, ring + 1))
-        return place, Collapse(kind, abs(made(ring, end).area()), near)
-
-    pieces = [entry("piece", shells[piece], shells[piece + 1]) for piece in lost_pieces]
-    around = {shells[piece_of[holes[k]]] for k in lost_holes}
-    of_shell = {ring: _first_vertex(made(ring, ring + 1))[0] for ring in around}
-    lost = [(of_shell[shells[piece_of[holes[k]]]], *entry("hole", holes[k], holes[k] + 1)) for k in lost_holes]
+    of_shell = {ring: _first_vertex(made[ring])[0] for ring in around}
+    pieces = [entry("piece", range(shells[piece], shells[piece + 1])) for piece in lost_pieces]
+    lost = [(of_shell.get(shell_of[ring], []), *entry("hole", [ring])) for ring in holes]
     pieces.sort(key=lambda each: each[0])
     lost.sort(key=lambda each: each[:2])
     return (*(each[-1] for each in pieces), *(each[-1] for each in lost))
 
 
+def _made(exact: ImplicitRings, rings: Sequence[int]) -> dict[int, ExactRings]:
+    """Return some of the exact rings as integers, by their numbers."""
+    sources = [exact.sources[exact.offsets[ring] : exact.offsets[ring + 1]] for ring in rings]
+    offsets = np.cumsum([0, *map(len, sources)])
+    some = exact._replace(sources=np.concatenate(sources), offsets=offsets).exact_rings()
+    return {ring: ExactRings((points,), some.exponent) for ring, points in zip(rings, some.rings, strict=True)}
+
+
 _Place = tuple[Fraction, Fraction]
 
 
-def _first_vertex(ring: ImplicitRings) -> tuple[list[_Place], tuple[float, float]]:
+def _first_vertex(ring: ExactRings) -> tuple[list[_Place], tuple[float, float]]:
     """Return a ring from its first vertex on, and the doubles nearest to that vertex."""
-    (places,) = ring.exact_rings().places()
+    (places,) = ring.places()
     k = places.index(min(places))
     x, y = (nearest_quotient(*value.as_integer_ratio()) for value in places[k])
     return places[k:] + places[:k], (x, y)
