@@ -11,7 +11,7 @@ import numpy.typing as npt
 from engine.clipping.overlay_expanding import expand_rings, expanded_offsets
 from engine.clipping.overlay_kernel import DONE, FINISHED, NEEDS_CONTACTS, overlay_pairs
 from engine.clipping.overlay_reducing import reduce_pair
-from engine.clipping.overlay_workspace import keep, scratch_for
+from engine.clipping.overlay_workspace import keep, more_contacts, scratch_for
 from engine.parallel import Budget
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def run_reduced(
         if needs == FINISHED:
             break
         if needs == NEEDS_CONTACTS:
-            n_contacts = 2 * scratch.n_contacts
+            n_contacts = more_contacts(scratch.n_contacts)
         else:
             n_out_rings, n_out = int(counts[0, 1]), int(counts[0, 2])
     made = None

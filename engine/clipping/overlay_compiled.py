@@ -22,7 +22,7 @@ from engine.clipping.overlay_kernel import (
 )
 from engine.clipping.overlay_result import Overlay
 from engine.clipping.overlay_rounds import RoundedRings, settle_rings
-from engine.clipping.overlay_workspace import keep, scratch_for
+from engine.clipping.overlay_workspace import keep, more_contacts, scratch_for
 from engine.clipping.ring_bits import RingBits
 from engine.clipping.scaling import exponent_of, scaled_back, shifted
 from engine.parallel import Budget
@@ -157,7 +157,7 @@ def run_kernel(
         parts.append(part)
         keep(scratch, n_vertices, used, filled)
         if needs == NEEDS_CONTACTS:
-            n_contacts = 2 * scratch.n_contacts
+            n_contacts = more_contacts(scratch.n_contacts)
         elif needs == NEEDS_OUTPUT:
             n_out_rings, n_out = (max(m, int(counts[reached, k])) for k, m in ((1, n_out_rings), (2, n_out)))
     if len(parts) == 1:

@@ -23,6 +23,7 @@ from engine.jit import merged
 _kept = threading.local()
 _MOST_KEPT: Final = 80_000_000
 """Bytes that were written to up to which a thread keeps its scratch."""
+_MANY_CONTACTS: Final = 2**18
 _BY_VERTEX: Final = 200
 _BY_CONTACT: Final = 390
 _BY_OUTPUT: Final = 40
@@ -137,6 +138,15 @@ def scratch_for(n_vertices: int, n_rings: int, n_contacts: int, n_out: int, n_ou
     if kept is not None:
         return Scratch(kept.n_vertices, kept.n_rings, kept.n_contacts, kept.buffers, output, sizes)
     return Scratch(n_vertices, n_rings, n_contacts, buffers_for(n_vertices, n_rings, n_contacts), output, sizes)
+
+
+def more_contacts(n: int) -> int:
+    """Return for how many contacts to try next where there was scratch for ``n``.
+
+    Few are multiplied at once, since every try begins anew and pages that are not written to cost nothing; many are
+    doubled, since a system may refuse to promise more memory than it has.
+    """
+    return 8 * n if n < _MANY_CONTACTS else 2 * n
 
 
 def keep(scratch: Scratch, n_vertices: int, n_contacts: int, n_out: int) -> None:
