@@ -83,7 +83,7 @@ def test_a_replica_killed_under_load_loses_nothing(tmp_path: Path) -> None:
         replicas[0].process.kill()
         for worker in workers:
             worker.join()
-        assert not lost
+        assert not lost, (tmp_path / "error.log").read_text()[-2000:]
         assert len(statuses) > 100
         assert set(statuses) <= {200, 201}
         assert not any(wrong)
