@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from engine.arrangement.edge_tree import LEAF, leaves_of
+from engine.arrangement.edge_tree import LEAF, leaves_of, push_children
 from engine.arrangement.ring_blocks import CHORD, EVERYWHERE, NOT_LEFT, NOT_RIGHT, Blocks
 from engine.jit import inline, merged
 
@@ -98,12 +98,7 @@ def wake_above(blocks: Blocks, n: int, x: float, y: float, tree: Any, places: An
             if tree[node, 0] > x or tree[node, 1] <= x or tree[node, 3] < y or tree[node, 2] > ceiling:
                 continue
             if node < n_leaves:
-                # order: the lower child last on the stack, first off: what is found there spares the other
-                low, high = 2 * node, 2 * node + 1
-                if tree[low, 2] > tree[high, 2]:
-                    low, high = high, low
-                stack[depth, 0], stack[depth + 1, 0] = high, low
-                depth += 2
+                depth = push_children(tree, node, stack, depth)
                 continue
             first = LEAF * (node - n_leaves)
             for place in range(first, min(first + LEAF, n)):

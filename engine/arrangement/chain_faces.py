@@ -14,7 +14,7 @@ from typing import Any, Final
 from engine.arrangement.chains import Chains, is_live, standing
 from engine.arrangement.crossing_signs import Edges, crossing_against, exact_weight, orient, turn_of_edges
 from engine.arrangement.edge_contacts import POLL, Events
-from engine.arrangement.edge_tree import LEAF, RUN, leaves_of
+from engine.arrangement.edge_tree import LEAF, RUN, leaves_of, push_children
 from engine.jit import inline, merged
 from engine.predicates.error_free import two_diff, workspace
 from engine.predicates.expansion import add_scaled, sign
@@ -164,12 +164,7 @@ def edge_above(
         if nearest >= 0 and tree[node, 2] > max(edges.y[nearest], edges.y[edges.after[nearest]]):
             continue
         if node < n_leaves:
-            # order: the lower child last on the stack, first off: what is found there spares the other
-            low, high = 2 * node, 2 * node + 1
-            if tree[low, 2] > tree[high, 2]:
-                low, high = high, low
-            stack[depth, 0], stack[depth + 1, 0] = high, low
-            depth += 2
+            depth = push_children(tree, node, stack, depth)
             continue
         first = LEAF * (node - n_leaves)
         for place in range(first, min(first + LEAF, n)):

@@ -160,6 +160,19 @@ def build_tree(boxes: Any, marks: Any, n: int, tree: Any, tree_marks: Any, place
         tree_marks[node] = tree_marks[left] | tree_marks[right]
 
 
+@merged
+def push_children(tree: Any, node: int, stack: Any, depth: int) -> int:
+    """Put the children of a node on the stack of a search upwards; return the depth.
+
+    The lower one is last, so first off: what is found there spares the other.
+    """
+    low, high = 2 * node, 2 * node + 1
+    if tree[low, 2] > tree[high, 2]:
+        low, high = high, low
+    stack[depth, 0], stack[depth + 1, 0] = high, low
+    return depth + 2
+
+
 @inline
 def next_pairs(
     boxes: Any, marks: Any, n: int, tree: Any, tree_marks: Any, places: Any, stack: Any, depth: int,

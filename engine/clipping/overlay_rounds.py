@@ -1,8 +1,8 @@
 """Rounds of the compiled overlay: rounded rings that nothing vouches for are arranged again, until they are valid.
 
 The rule, and what is told of its outcome, are those of overlay_rounding.py; the kernel does the work of a round, also
-of the last one after snap rounding, where `MAX_ROUNDS` do not end it. Which exact part a part comes from is carried
-along as bits: its evidence names rings of the round before.
+of the last one after snap rounding, where `MAX_ROUNDS` do not end it. Which exact parts a part comes from is carried
+along: its evidence names rings of the round before.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from engine.arrangement.snap_rounding import snap_rings
 from engine.clipping.implicit_rings import ImplicitRings
 from engine.clipping.overlay_result import Collapse
 from engine.clipping.overlay_rounding import MAX_ROUNDS, count_changes
-from engine.clipping.ring_bits import RingBits, assign_bits, boxes_of, places_of, rings_meant
+from engine.clipping.ring_bits import RingBits, assign_bits, boxes_of, rings_meant
 from engine.parallel import Budget
 
 
@@ -81,8 +81,8 @@ def settle_rings(
     may_snap: the rings are those of ``exact``, not scaled.
     """
     n_holes = first.n_rings - first.n_pieces
-    piece_origins = [1 << piece for piece in range(first.n_pieces)]
-    hole_origins = [1 << hole for hole in range(n_holes)]
+    own = [{piece} for piece in range(first.n_pieces)], [{hole} for hole in range(n_holes)]
+    piece_origins, hole_origins = own
     rings, rounds, displacement, has_crossings, snapped = first, 1, first.displacement, False, False
     while not rings.is_valid:  # bound: MAX_ROUNDS + 1
         boxes = boxes_of(rings.vertices, rings.ring_offsets)
@@ -102,11 +102,10 @@ def settle_rings(
                 rounds, displacement = rounds + 1, nextafter(displacement + rings.displacement, inf)
             else:
                 rings, displacement = _snapped(first, exact, budget)
-                piece_origins = [1 << piece for piece in range(first.n_pieces)]
-                hole_origins = [1 << hole for hole in range(n_holes)]
+                piece_origins, hole_origins = own
                 snapped = has_crossings = True
-    lost_pieces, pieces_joined, pieces_parted = _changes(first.n_pieces, piece_origins)
-    lost_holes, holes_joined, holes_parted = _changes(n_holes, hole_origins)
+    lost_pieces, pieces_joined, pieces_parted = count_changes(first.n_pieces, piece_origins)
+    lost_holes, holes_joined, holes_parted = count_changes(n_holes, hole_origins)
     return Settled(
         rings=rings,
         rounds=rounds,
@@ -141,35 +140,23 @@ def _origins(
     before: RoundedRings,
     found: RoundedRings,
     meant: Sequence[Sequence[int]],
-    piece_origins: list[int],
-    hole_origins: list[int],
-) -> tuple[list[int], list[int]]:
-    """Return the exact parts, as bits, that pieces and holes come from.
+    piece_origins: list[set[int]],
+    hole_origins: list[set[int]],
+) -> tuple[list[set[int]], list[set[int]]]:
+    """Return the exact parts that pieces and holes come from.
 
     meant: for each ring found those of the round before that it comes from.
     """
-    of_ring: list[int] = []
+    of_ring: list[set[int]] = []
     holes = iter(hole_origins)
     for origin, size in zip(piece_origins, np.diff(before.piece_offsets).tolist(), strict=True):
         of_ring.append(origin)
         of_ring += [next(holes) for _ in range(size - 1)]
-    collected = []
-    for rings in meant:
-        origin = 0
-        for ring in rings:
-            origin |= of_ring[ring]
-        collected.append(origin)
+    collected: list[set[int]] = [set().union(*(of_ring[ring] for ring in rings)) for rings in meant]
     shells = found.piece_offsets[:-1].tolist()
     is_shell = set(shells)
     pieces = [collected[ring] for ring in shells]
     return pieces, [origin for ring, origin in enumerate(collected) if ring not in is_shell]
-
-
-def _changes(n_exact: int, origins: Sequence[int]) -> tuple[list[int], int, int]:
-    """Return what `count_changes` does, of origins as bits."""
-    if len(origins) == n_exact and sorted(origins) == [1 << part for part in range(n_exact)]:
-        return [], 0, 0
-    return count_changes(n_exact, [set(places_of(origin)) for origin in origins])
 
 
 def _moved(images: npt.NDArray[np.float64], vertices: npt.NDArray[np.float64]) -> int:
