@@ -42,6 +42,7 @@ DROPPED: Final = 0
 KEPT: Final = 1
 OPEN: Final = 2
 """The kernel could not settle the item: rational arithmetic must."""
+Triple = tuple[float, float, float]
 LARGE: Final = 2.0**1000
 """Items whose absolute coordinates add up to more, or to nothing (NaN, infinity), are left open."""
 T_GAP: Final = 16.0 * 2.0**-53
@@ -178,9 +179,17 @@ def decide_closely(
 
 
 @merged
-def point_of(segments: Any, item: int, end: int, is_flat: bool) -> tuple[float, float, float]:
+def point_of(segments: Any, item: int, end: int, is_flat: bool) -> Triple:
     """Return an end of a segment, in the plane with z = 0."""
     return segments[item, end, 0], segments[item, end, 1], (0.0 if is_flat else segments[item, end, 2])
+
+
+@merged
+def put_end(ends: Any, row: int, end: int, x: float, y: float, z: float, is_flat: bool) -> None:
+    """Write an end of a piece, without negative zeros; in the plane z does not count."""
+    ends[end, row, 0], ends[end, row, 1] = x + 0.0, y + 0.0
+    if not is_flat:
+        ends[end, row, 2] = z + 0.0
 
 
 @merged

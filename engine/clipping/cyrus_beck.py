@@ -6,8 +6,8 @@ t = s_p / (s_p - s_q); the last plane entered and the first one left bound the p
 looked at once, so the loop ends; all signs and all comparisons are exact and about the original end points: a filter,
 then expansions, then "open" (where exponents leave the range in which expansions are exact).
 
-Plane values are taken for a block of planes at once, from columns, so that the compiler uses vectors; only planes that
-an end is not surely inside of are looked at one by one. Kernels: `decide_*` and `fill_*`, as in cohen_sutherland.py.
+Plane values come from columns; only planes that an end is not surely inside of are looked at again. In the plane z is
+0. As for boxes, one kernel says which planes bound each piece, `fill_on_rows` (row_pieces.py) makes their points.
 
 Source: M. Cyrus, J. Beck, Generalized two- and three-dimensional clipping, 1978; the textbook's exercise:
 Cohen-Sutherland generalised to a convex polyhedron. Changed: exact signs of s, exact order of t, cut points from the
@@ -20,13 +20,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.clipping.cohen_sutherland import DROPPED, KEPT, LARGE, OPEN
-from engine.clipping.cut_point import is_safe, parameter_and_point, point_at
-from engine.clipping.plane_meeting import T_BOUND
+from engine.clipping.cohen_sutherland import DROPPED, KEPT, LARGE, OPEN, point_of
+from engine.clipping.cut_point import is_safe
 from engine.clipping.scaling import FloatArray
 from engine.jit import inline, kernel
-from engine.predicates.double_double import U2, dd_add, dd_div
-from engine.predicates.error_free import two_prod, two_sum, workspace
+from engine.predicates.error_free import workspace
 from engine.predicates.expansion import Components, compress, grow, grow_product, sign
 from engine.predicates.parameters import compare_products, compare_ratios_filter
 from engine.types import UNDECIDED
@@ -38,9 +36,6 @@ Each term carries at most (1 + u)^4, the sum of absolute terms the same; 8 u cov
 """
 VALUE_TINY: Final = 2.0**-1070
 """Products that underflow lose at most 2^-1074 each."""
-DD_VALUE_BOUND: Final = 32.0 * U2
-"""Bound of a plane value in double-double: exact products and sums, whose tails, together below 4 u of the sum of
-absolute terms, are added up with six roundings."""
 T_ROUNDINGS: Final = 8.0 * 2.0**-53
 """Of a parameter in doubles, beside the bounds of its plane values."""
 
@@ -90,32 +85,6 @@ def exact_order(row_i: Any, row_j: Any, segment: Any) -> int:
     n_pi, n_qi = expand_value(row_i, segment[0], p_i), expand_value(row_i, segment[1], q_i)
     n_pj, n_qj = expand_value(row_j, segment[0], p_j), expand_value(row_j, segment[1], q_j)
     return compare_products(p_i, n_pi, q_j, n_qj, p_j, n_pj, q_i, n_qi, e)
-
-
-@inline
-def dd_value_2d(a: float, b: float, d: float, x: float, y: float) -> tuple[float, float, float]:
-    """Return the value of a row at a point as an unevaluated sum of two doubles and a bound of its error."""
-    ah, al = two_prod(a, x)
-    bh, bl = two_prod(b, y)
-    h, first = two_sum(ah, bh)
-    h, second = two_sum(h, d)
-    bound = DD_VALUE_BOUND * (abs(ah) + abs(bh) + abs(d)) + VALUE_TINY
-    h, low = two_sum(h, (al + bl) + (first + second))
-    return h, low, bound
-
-
-@inline
-def dd_value_3d(a: float, b: float, c: float, d: float, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """Return the value of a row at a point: see `dd_value_2d`."""
-    ah, al = two_prod(a, x)
-    bh, bl = two_prod(b, y)
-    ch, cl = two_prod(c, z)
-    h, first = two_sum(ah, bh)
-    h, second = two_sum(h, ch)
-    h, third = two_sum(h, d)
-    bound = DD_VALUE_BOUND * (abs(ah) + abs(bh) + abs(ch) + abs(d)) + VALUE_TINY
-    h, low = two_sum(h, (al + bl) + (cl + first) + (second + third))
-    return h, low, bound
 
 
 @inline
@@ -225,75 +194,30 @@ def decide_by_parameters(s_p: Any, s_q: Any, bounds: Any, chosen: Any, n: int) -
     return (KEPT, entered, left) if is_sure else (OPEN, -1, -1)
 
 
+@inline
+def columns_of(columns: Any) -> tuple[Any, Any, Any, Any]:
+    """Return the columns of a, b, c and d; in the plane any for c, since z is 0."""
+    d = columns.shape[0] - 3
+    return columns[0], columns[1], columns[d - 1], columns[d]
+
+
 @kernel
-def decide_on_rows_2d(
+def decide_on_rows(
     segments: Any, columns: Any, first: int, last: int, stop: Any, items: Any, planes: Any, still: Any, n: Any
 ) -> None:
-    """Decide on ``segments[first:last]`` ((n, 2, 2) float64) where all planes (`as_columns`) are >= 0.
+    """Decide on ``segments[first:last]`` ((n, 2, dim) float64) where all planes (`as_columns`) are >= 0.
 
     Outputs: see `decide_on_boxes`.
     """
-    a, b, d = columns[0], columns[1], columns[2]
-    slopes, floors = columns[3], columns[4]
+    is_flat = segments.shape[2] == 2
+    a, b, c, d = columns_of(columns)
+    slopes, floors = columns[-2], columns[-1]
     m = d.size
     s_p, s_q, bounds, chosen = np.empty(m), np.empty(m), np.empty(m), np.empty(m, np.int64)
     kept, n_open, beyond = first, first, 0
     for i in range(first, last):
-        px, py = segments[i, 0, 0], segments[i, 0, 1]
-        qx, qy = segments[i, 1, 0], segments[i, 1, 1]
-        if not (abs(px) + abs(py) + abs(qx) + abs(qy) < LARGE):
-            still[n_open] = i
-            n_open += 1
-            continue
-        most = max(abs(px), abs(py), abs(qx), abs(qy))
-        n_chosen, is_out = 0, False
-        for j in range(m):
-            p = a[j] * px + b[j] * py + d[j]
-            q = a[j] * qx + b[j] * qy + d[j]
-            bound = slopes[j] * most + floors[j]
-            if min(p, q) > bound:
-                continue
-            if max(p, q) < -bound:
-                is_out = True
-                break
-            s_p[n_chosen], s_q[n_chosen], bounds[n_chosen], chosen[n_chosen] = p, q, bound, j
-            n_chosen += 1
-            if stop[0]:
-                return
-        if is_out:
-            continue
-        state, entered, left = decide_by_parameters(s_p, s_q, bounds, chosen, n_chosen)
-        if state == OPEN:
-            state, entered, left, more = decide_by_rows(segments[i], columns, s_p, s_q, bounds, chosen, n_chosen)
-            beyond += more
-        if state == OPEN:
-            still[n_open] = i
-            n_open += 1
-        if state != KEPT:
-            continue
-        items[kept] = i
-        planes[kept, 0] = chosen[entered] if entered >= 0 else -1
-        planes[kept, 1] = chosen[left] if left >= 0 else -1
-        kept += 1
-    n[0], n[1], n[2] = kept - first, n_open - first, beyond
-
-
-@kernel
-def decide_on_rows_3d(
-    segments: Any, columns: Any, first: int, last: int, stop: Any, items: Any, planes: Any, still: Any, n: Any
-) -> None:
-    """Decide on ``segments[first:last]`` ((n, 2, 3) float64) where all planes (`as_columns`) are >= 0.
-
-    Outputs: see `decide_on_boxes`.
-    """
-    a, b, c, d = columns[0], columns[1], columns[2], columns[3]
-    slopes, floors = columns[4], columns[5]
-    m = d.size
-    s_p, s_q, bounds, chosen = np.empty(m), np.empty(m), np.empty(m), np.empty(m, np.int64)
-    kept, n_open, beyond = first, first, 0
-    for i in range(first, last):
-        px, py, pz = segments[i, 0, 0], segments[i, 0, 1], segments[i, 0, 2]
-        qx, qy, qz = segments[i, 1, 0], segments[i, 1, 1], segments[i, 1, 2]
+        px, py, pz = point_of(segments, i, 0, is_flat)
+        qx, qy, qz = point_of(segments, i, 1, is_flat)
         if not (abs(px) + abs(py) + abs(pz) + abs(qx) + abs(qy) + abs(qz) < LARGE):
             still[n_open] = i
             n_open += 1
@@ -329,146 +253,3 @@ def decide_on_rows_3d(
         planes[kept, 1] = chosen[left] if left >= 0 else -1
         kept += 1
     n[0], n[1], n[2] = kept - first, n_open - first, beyond
-
-
-@inline
-def parameter_of(sp: tuple[float, float, float], sq: tuple[float, float, float]) -> tuple[float, float, float, bool]:
-    """Return t = s_p / (s_p - s_q) as a double-double, how far relative to itself it may be off, and if that holds."""
-    sp_h, sp_l, sp_bound = sp
-    sq_h, sq_l, sq_bound = sq
-    sum_h, sum_l = dd_add(sp_h, sp_l, -sq_h, -sq_l)
-    th, tl = dd_div(sp_h, sp_l, sum_h, sum_l)
-    r = 1.01 * (sp_bound / abs(sp_h) + sq_bound / abs(sq_h))
-    return th, tl, r, (r < 0.001) & (abs(sum_h) >= 2.0**-400) & (abs(sum_h) <= 2.0**400) & (abs(sp_h) >= 2.0**-500)
-
-
-@inline
-def cut_by_signs(row: Any, segment: Any, point: Any) -> tuple[float, bool]:
-    """Set `point` to where `segment` crosses the plane of `row`, by exact signs; return t and whether all is sure."""
-    if not (is_row_safe(row) and is_segment_safe(segment)):
-        return 0.0, False
-    wp, wq, e = workspace(8), workspace(8), workspace(96)
-    n_wp, n_wq = expand_value(row, segment[0], wp), expand_value(row, segment[1], wq)
-    for e_w, n_w in ((wp, n_wp), (wq, n_wq)):
-        if sign(e_w, n_w) < 0:
-            for i in range(n_w):
-                e_w[i] = -e_w[i]
-    return parameter_and_point(segment, wp, n_wp, wq, n_wq, -1, 0.0, point, e)
-
-
-@kernel
-def fill_on_rows_2d(
-    segments: Any,
-    columns: Any,
-    items: Any,
-    planes: Any,
-    first: int,
-    last: int,
-    stop: Any,
-    source: Any,
-    ends: Any,
-    t: Any,
-    faces: Any,
-    still: Any,
-    n: Any,
-) -> None:
-    """Fill rows first .. last - 1 of the pieces of ``segments`` ((n, 2, 2) float64): see `fill_on_boxes`."""
-    n_open = beyond = 0
-    for row in range(first, last):
-        if stop[0]:
-            return
-        i = items[row]
-        source[row] = i
-        all_sure = tried = True
-        px, py = segments[i, 0, 0], segments[i, 0, 1]
-        qx, qy = segments[i, 1, 0], segments[i, 1, 1]
-        for side in range(2):
-            plane = planes[row, side]
-            faces[row, side] = plane
-            if plane < 0:
-                t[row, side] = side
-                ends[side, row, 0], ends[side, row, 1] = (
-                    segments[i, side, 0] + 0.0,
-                    segments[i, side, 1] + 0.0,
-                )
-                continue
-            th, tl, slack, sure = parameter_of(
-                dd_value_2d(columns[0, plane], columns[1, plane], columns[2, plane], px, py),
-                dd_value_2d(columns[0, plane], columns[1, plane], columns[2, plane], qx, qy),
-            )
-            x, is_x = point_at(px, qx, th, tl, slack)
-            y, is_y = point_at(py, qy, th, tl, slack)
-            bound = (T_BOUND + slack) * th
-            if sure & is_x & is_y & (th + (tl - bound) == th + (tl + bound)):
-                t[row, side] = th + tl
-                ends[side, row, 0], ends[side, row, 1] = x + 0.0, y + 0.0
-            else:
-                tried = False
-                t[row, side], sure = cut_by_signs(columns[:-2, plane], segments[i], ends[side, row])
-                all_sure = all_sure and sure
-        if not tried:
-            beyond += 1
-        if not all_sure:
-            still[first + n_open] = row
-            n_open += 1
-    n[0], n[1] = n_open, beyond
-
-
-@kernel
-def fill_on_rows_3d(
-    segments: Any,
-    columns: Any,
-    items: Any,
-    planes: Any,
-    first: int,
-    last: int,
-    stop: Any,
-    source: Any,
-    ends: Any,
-    t: Any,
-    faces: Any,
-    still: Any,
-    n: Any,
-) -> None:
-    """Fill rows first .. last - 1 of the pieces of ``segments`` ((n, 2, 3) float64): see `fill_on_boxes`."""
-    n_open = beyond = 0
-    for row in range(first, last):
-        if stop[0]:
-            return
-        i = items[row]
-        source[row] = i
-        all_sure = tried = True
-        px, py, pz = segments[i, 0, 0], segments[i, 0, 1], segments[i, 0, 2]
-        qx, qy, qz = segments[i, 1, 0], segments[i, 1, 1], segments[i, 1, 2]
-        for side in range(2):
-            plane = planes[row, side]
-            faces[row, side] = plane
-            if plane < 0:
-                t[row, side] = side
-                ends[side, row, 0], ends[side, row, 1], ends[side, row, 2] = (
-                    segments[i, side, 0] + 0.0,
-                    segments[i, side, 1] + 0.0,
-                    segments[i, side, 2] + 0.0,
-                )
-                continue
-            th, tl, slack, sure = parameter_of(
-                dd_value_3d(columns[0, plane], columns[1, plane], columns[2, plane], columns[3, plane], px, py, pz),
-                dd_value_3d(columns[0, plane], columns[1, plane], columns[2, plane], columns[3, plane], qx, qy, qz),
-            )
-            x, is_x = point_at(px, qx, th, tl, slack)
-            y, is_y = point_at(py, qy, th, tl, slack)
-            z, is_z = point_at(pz, qz, th, tl, slack)
-            bound = (T_BOUND + slack) * th
-            if sure & is_x & is_y & is_z & (th + (tl - bound) == th + (tl + bound)):
-                t[row, side] = th + tl
-                ends[side, row, 0], ends[side, row, 1], ends[side, row, 2] = x + 0.0, y + 0.0, z + 0.0
-            else:
-                tried = False
-                t[row, side], sure = cut_by_signs(columns[:-2, plane], segments[i], ends[side, row])
-                all_sure = all_sure and sure
-        if not tried:
-            beyond += 1
-        if not all_sure:
-            still[first + n_open] = row
-            n_open += 1
-    n[0], n[1] = n_open, beyond

@@ -13,22 +13,13 @@ from engine.clipping.box_pieces import fill_on_boxes
 from engine.clipping.box_planes import box_rows
 from engine.clipping.cohen_sutherland import decide_on_boxes
 from engine.clipping.concave import clip_chunk, locator_for
-from engine.clipping.cyrus_beck import (
-    as_columns,
-    decide_on_rows_2d,
-    decide_on_rows_3d,
-    fill_on_rows_2d,
-    fill_on_rows_3d,
-)
+from engine.clipping.cyrus_beck import as_columns, decide_on_rows
 from engine.clipping.exact_segments import clip_by_planes, clip_by_sphere
+from engine.clipping.row_pieces import fill_on_rows
 from engine.clipping.scaling import FloatArray, balanced_rows, exponent_of, shifted
 from engine.clipping.single_pieces import Method, PieceRows, Scaled, clip_on_convex
-from engine.clipping.sphere_interval import (
-    decide_on_sphere_2d,
-    decide_on_sphere_3d,
-    fill_on_sphere_2d,
-    fill_on_sphere_3d,
-)
+from engine.clipping.sphere_interval import decide_on_sphere
+from engine.clipping.sphere_pieces import fill_on_sphere
 from engine.errors import UnsupportedSolidError
 from engine.parallel import Budget, Cancel, Progress, run_chunks
 from engine.solids.aabb import Aabb
@@ -191,7 +182,6 @@ def _on_box(region: Aabb) -> Task:
 
 def _on_rows(rows: FloatArray) -> Task:
     planes = rows.tolist()
-    is_flat = rows.shape[1] == 3
     plain = balanced_rows(rows, 0)
 
     def scale(segments: FloatArray) -> Scaled | None:
@@ -203,8 +193,8 @@ def _on_rows(rows: FloatArray) -> Task:
 
     return _one_piece(
         Method(
-            decide_on_rows_2d if is_flat else decide_on_rows_3d,
-            fill_on_rows_2d if is_flat else fill_on_rows_3d,
+            decide_on_rows,
+            fill_on_rows,
             (as_columns(rows if plain is None else plain),),
             lambda p, q: clip_by_planes(p, q, planes),
             scale,
@@ -225,8 +215,8 @@ def _on_ball(region: Sphere) -> Task:
 
     return _one_piece(
         Method(
-            decide_on_sphere_2d if region.dimension == 2 else decide_on_sphere_3d,
-            fill_on_sphere_2d if region.dimension == 2 else fill_on_sphere_3d,
+            decide_on_sphere,
+            fill_on_sphere,
             (region.center, float(radius)),
             lambda p, q: clip_by_sphere(p, q, center, radius),
             scale,
