@@ -19,7 +19,8 @@ from engine.collision.detail import (
     has_interior,
 )
 from engine.collision.dual_traversal import new_descent
-from engine.collision.mesh_mesh import mesh_mesh, what_to_seek
+from engine.collision.mesh_mesh import mesh_mesh
+from engine.collision.mesh_pair import what_to_seek
 from engine.collision.placement import PoseArrays
 from engine.collision.pose_batch import relate_poses
 from engine.collision.result import Witness, Work

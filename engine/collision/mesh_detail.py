@@ -17,7 +17,9 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.collision.exact_cells import Sides, cells_of, even_sides, sides_at, sides_over
-from engine.collision.mesh_mesh import WITHIN, MeshPair, Patch, simplest
+from engine.collision.face_cells import WITHIN
+from engine.collision.face_contacts import find_all_contacts
+from engine.collision.mesh_pair import MeshPair, Patch, simplest
 from engine.collision.parity import INSIDE, OUTSIDE
 from engine.collision.result import Parts, Work
 from engine.collision.shell import STATE_CLEAN, STATE_STACKED, Shell, shell_of
@@ -61,21 +63,17 @@ class _OverlappingPair(MeshPair):
     def parts(self) -> Parts:
         """Return the answer; what is not needed for it is left out."""
         self._sticks_out = [False, False]
-        contacts, is_crossing = self._contacts()
+        contacts, is_crossing = find_all_contacts(self, looks_at_cells=False)  # overlapping is known
         if is_crossing:
             return Parts(True, True, True)
         self._search(contacts)
         first, second = self._sticks_out
         return Parts(first, second, len(contacts) > 0)
 
-    def _is_overlap_near(self, pairs: IntArray, kinds: npt.NDArray[np.int8]) -> bool:
-        """Overlapping is known: only a crossing ends the search for contacts."""
-        return False
-
     def _search(self, contacts: IntArray) -> None:
         for own in (0, 1):
             for place, theirs in ((INSIDE, _BOTH), (OUTSIDE, _NEITHER)):
-                for patch in self._patches(own, contacts[:, own], place):
+                for patch in self.patches(own, contacts[:, own], place):
                     self._see_patch(own, patch, theirs)
                     if all(self._sticks_out):
                         return
@@ -99,7 +97,7 @@ class _OverlappingPair(MeshPair):
         with_area = patch.faces[shell.arrays.axis[patch.faces] != -1]
         for start in range(0, len(with_area), _BLOCK):
             self.work.budget.check()
-            if (self._states(own, with_area[start : start + _BLOCK]) != STATE_STACKED).any():
+            if (self.states(own, with_area[start : start + _BLOCK]) != STATE_STACKED).any():
                 self._see(own, Sides(True, False, False), theirs)  # case: the body changes across such a face
                 return
         for face in with_area.tolist():
@@ -111,7 +109,7 @@ class _OverlappingPair(MeshPair):
         axis = body.axis(face)
         if axis < 0:
             return
-        is_clean = self._state(own, face) == STATE_CLEAN
+        is_clean = self.state(own, face) == STATE_CLEAN
         if is_clean and self._see_whole_face(own, face, met):
             return
         for q in cells_of(body, face, [other] if is_clean else [other, body], self.work.budget):
