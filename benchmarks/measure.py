@@ -74,7 +74,9 @@ def interleaved(runs: list[Callable[[], object]], rounds: int, seconds: float) -
         timings.append(Timing(cold))
         results.append(result)
     for run in runs:
-        warm = min(clocked(run)[0] for _ in range(2))
+        warm = clocked(run)[0]
+        if warm < LEAST_SECONDS:
+            warm = min(warm, clocked(run)[0])
         repeats.append(max(1, int(LEAST_SECONDS / max(warm, 1e-7))))
     end = time.perf_counter() + seconds
     for round_ in range(rounds):

@@ -28,8 +28,8 @@ Task = tuple[str, Callable[[str], Iterable[Row]]]
 OPERATIONS = ("intersection", "union", "difference", "symmetric_difference")
 SHAPELY_GOALS, CLIPPER_GOALS, CLIPPER_MEAN = (6.0, 15.0), (0.4, 1.0), (1.2, 3.0)
 BATCH_GOALS, GROSS_GOALS, THREAD_GOALS = (5.0, 15.0), (2.0, 5.0), (1.7, 1.9)
-SLOWEST = 30.0
-"""A peer whose first run takes so many times as long as ours, and over a second, is timed once."""
+SLOWEST, LONGEST = 10.0, 20.0
+"""A peer whose first run takes so many times as long as ours, and over a second, or so many seconds, is timed once."""
 
 
 def tasks(suite: Suite) -> Iterator[Task]:
@@ -70,7 +70,8 @@ def _large(suite: Suite, family: str, n: int, against_clipper: list[float], name
         if peer != "ours":
             cold["ours"] = min(cold["ours"], clocked(made["ours"].run)[0])
         made[peer] = prepared
-    timed = [peer for peer in made if cold[peer] < max(1.0, SLOWEST * cold["ours"])]
+    most = min(LONGEST, max(1.0, SLOWEST * cold["ours"]))
+    timed = [peer for peer in made if peer == "ours" or cold[peer] < most]
     timings, results = interleaved([made[peer].run for peer in timed], suite.options.rounds, suite.options.seconds)
     by_name = dict(zip(timed, timings, strict=True))
     notes += [_areas(dict(zip(timed, results, strict=True)), made)]
