@@ -31,6 +31,8 @@ from engine.solids.polygon import Polygon
 from engine.types import Accuracy
 
 _OUTPUTS: Final = ("valid", "nearest")
+_UNLIMITED: Final = Budget()
+"""Shared by all calls without a limit: nothing ever raises its flag."""
 
 
 @overload
@@ -108,8 +110,7 @@ def overlay(
     check_words(operation, output)
     first, second = rings_of(subject, "subject"), rings_of(clip, "clip")
     check_options(workers, progress)
-    with Budget(deadline, cancel) as budget:
-        budget.check()
+    with _UNLIMITED if deadline is None and cancel is None else Budget(deadline, cancel) as budget:
         result, n_exact, n_rational = overlay_rings(first, second, operation, output, budget)
     if progress is not None:
         progress(1)
@@ -120,9 +121,10 @@ def overlay(
 
 
 def check_words(operation: str, output: str) -> None:
-    for value, known, name in ((operation, KEPT, "operation"), (output, _OUTPUTS, "output")):
-        if not isinstance(value, str) or value not in known:
-            raise InvalidOperationError(f"{name} must be one of {', '.join(known)}; got {shown(value)}", (name,))
+    if not (isinstance(operation, str) and operation in KEPT and isinstance(output, str) and output in _OUTPUTS):
+        for value, known, name in ((operation, KEPT, "operation"), (output, _OUTPUTS, "output")):
+            if not isinstance(value, str) or value not in known:
+                raise InvalidOperationError(f"{name} must be one of {', '.join(known)}; got {shown(value)}", (name,))
 
 
 def rings_of(solid: object, *where: str | int) -> RingArrays:

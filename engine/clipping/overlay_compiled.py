@@ -12,7 +12,6 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.clipping.implicit_rings import ImplicitRings, RingArrays
-from engine.clipping.overlay_blocks import overlay_in_blocks
 from engine.clipping.overlay_kernel import (
     DONE,
     NEEDS_CONTACTS,
@@ -20,6 +19,7 @@ from engine.clipping.overlay_kernel import (
     OPEN,
     overlay_pairs,
 )
+from engine.clipping.overlay_pair import NOT_REDUCED, FoundPair, run_pair
 from engine.clipping.overlay_result import Overlay
 from engine.clipping.overlay_rounds import RoundedRings, settle_rings
 from engine.clipping.overlay_workspace import keep, more_contacts, scratch_for
@@ -42,8 +42,6 @@ if isinstance(overlay_pairs, FunctionType):  # uncompiled: numpy warns of what o
     _overlay_pairs = np.errstate(all="ignore")(overlay_pairs)
 _NONE: Final = np.zeros(0, np.int64)
 _NO_LABELS: Final = RingBits(_NONE, _NONE)
-_NOT_REDUCED: Final = 0, 0, 0, 0.0
-"""What stands in the place of the result of reduce_pair."""
 KEPT_ARRAYS: Final = {name: np.array(kept, np.uint8) for name, kept in KEPT.items()}
 
 
@@ -107,7 +105,9 @@ def as_frozen(array: npt.NDArray[Scalar]) -> npt.NDArray[Scalar]:
     return array
 
 
-_EMPTY: Final = RingArrays(as_frozen(np.zeros((0, 2))), as_frozen(np.zeros(1, np.int64)))
+_EMPTY: Final = Polygons(
+    as_frozen(np.zeros((0, 2))), as_frozen(np.zeros(1, np.int64)), as_frozen(np.zeros(2, np.int64)), 0, 0
+)
 
 
 def run_kernel(
@@ -126,13 +126,13 @@ def run_kernel(
     n_out, n_out_rings = 8 * n + len(subjects.vertices) + len(clips.vertices), 2 * n
     while reached < n:  # bound: each turn goes on, or makes room for one pair, geometrically
         scratch = scratch_for(n_vertices, n_rings, n_contacts, n_out, n_out_rings)
-        reached, needs, filled, n_filled, n_pieces, used = _overlay_pairs(
+        reached, needs, filled, n_filled, n_pieces, used, _ = _overlay_pairs(
             *subjects[:3],
             *clips[:3],
             0,
             n,
             reached,
-            *_NOT_REDUCED,
+            *NOT_REDUCED,
             KEPT_ARRAYS[operation],
             *labels,
             budget.flag,
@@ -143,15 +143,14 @@ def run_kernel(
             *scratch.output,
         )
         budget.check()
-        rings, pieces = scratch.sizes
         part = Found(
             status,
             counts,
             displacement,
             scratch.output[0][:filled].copy(),
             scratch.output[1][:filled].copy(),
-            np.add.accumulate(rings[: n_filled + 1]),
-            np.add.accumulate(pieces[: n_pieces + 1]),
+            scratch.output[2][: n_filled + 1].copy(),
+            scratch.output[3][: n_pieces + 1].copy(),
             scratch.output[4][:n_filled].copy() if len(labels.bits) else _NONE,
         )
         parts.append(part)
@@ -206,8 +205,8 @@ def overlay_compiled(
 
     A scene outside of the kernel's range is brought into it by a power of two where that is exact.
     """
-    found, exponent = _run_one(subject, clip, operation, budget), 0
-    if found.status[0] == OPEN:
+    found, exponent = run_pair(subject, clip, KEPT_ARRAYS[operation], budget), 0
+    if found.status == OPEN:
         exponent = exponent_of(subject.vertices, clip.vertices)
         if exponent == 0:
             return None
@@ -215,15 +214,17 @@ def overlay_compiled(
         if first is None or second is None:
             return None
         near = RingArrays(first, subject.offsets), RingArrays(second, clip.offsets)
-        found = _run_one(*near, operation, budget)
-        if found.status[0] == OPEN:
+        found = run_pair(*near, KEPT_ARRAYS[operation], budget)
+        if found.status == OPEN:
             return None
     exact = ImplicitRings(subject, clip, found.sources, found.ring_offsets)
     settled = None
-    vertices, displacement = found.vertices, float(found.displacement[0])
-    if found.status[0] != DONE:
+    vertices, displacement = found.vertices, found.displacement
+    if found.status != DONE:
         if output == "valid":
-            settled = settle_rings(_rounded(found), exact, functools.partial(_again, budget), exponent == 0, budget)
+            settled = settle_rings(
+                _rounded(found, _NONE), exact, functools.partial(_again, budget), exponent == 0, budget
+            )
         if settled is None:
             return None
         vertices, displacement = settled.rings.vertices, settled.displacement
@@ -247,47 +248,34 @@ def overlay_compiled(
             vertices_moved=settled.vertices_moved,
             snapped=settled.snapped,
         )
-    return result, int(found.counts[0, 3])
+    return result, found.n_exact
 
 
-def _rounded(found: Found) -> RoundedRings:
+def _rounded(found: FoundPair, evidence: npt.NDArray[np.int64]) -> RoundedRings:
     """Return what was found for one pair as the outcome of a round."""
     return RoundedRings(
         vertices=found.vertices,
         ring_offsets=found.ring_offsets,
         piece_offsets=found.piece_offsets,
-        evidence=found.evidence,
-        displacement=float(found.displacement[0]),
-        is_valid=bool(found.status[0] == DONE),
+        evidence=evidence,
+        displacement=found.displacement,
+        is_valid=found.status == DONE,
         has_crossings=bool((found.sources[:, 1] >= 0).any()),
     )
 
 
 def _again(budget: Budget, rings: RoundedRings, labels: RingBits) -> RoundedRings | None:
     """Arrange rounded rings, each a source of its own; None where that is left open."""
-    subject = RingArrays(as_frozen(rings.vertices), as_frozen(rings.ring_offsets))
-    found = run_kernel(as_one(subject), as_one(_EMPTY), "union", budget, labels)
-    return None if found.status[0] == OPEN else _rounded(found)
-
-
-def _run_one(subject: RingArrays, clip: RingArrays, operation: Operation, budget: Budget) -> Found:
-    sides = as_one(subject), as_one(clip)
-    by_blocks = overlay_in_blocks(*sides, KEPT_ARRAYS[operation], budget)
-    return run_kernel(*sides, operation, budget) if by_blocks is None else Found(*by_blocks)
-
-
-def as_one(rings: RingArrays) -> Polygons:
-    """Return the rings as one polygon."""
-    n_rings = len(rings.offsets) - 1
-    return Polygons(rings.vertices, rings.offsets, _one_polygon(n_rings), len(rings.vertices), n_rings)
-
-
-@functools.lru_cache(64)
-def _one_polygon(n_rings: int) -> npt.NDArray[np.int64]:
-    """Return the ring offsets of one polygon."""
-    offsets = np.array([0, n_rings])
-    offsets.setflags(write=False)
-    return offsets
+    offsets = as_frozen(rings.ring_offsets)
+    n_vertices, n_rings = len(rings.vertices), len(offsets) - 1
+    subject = Polygons(as_frozen(rings.vertices), offsets, as_frozen(np.array([0, n_rings])), n_vertices, n_rings)
+    status, counts, displacement, vertices, sources, *offsets_found, evidence = run_kernel(
+        subject, _EMPTY, "union", budget, labels
+    )
+    if status[0] == OPEN:
+        return None
+    found = FoundPair(int(status[0]), int(counts[0, 3]), float(displacement[0]), vertices, sources, *offsets_found)
+    return _rounded(found, evidence)
 
 
 def as_overlay(

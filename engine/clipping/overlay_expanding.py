@@ -11,23 +11,14 @@ LEFT_OUT: Final = -2
 """Second source of a vertex after which those up to the next one are left out."""
 
 
-@bare_kernel
-def expanded_offsets(sources: Any, sizes: Any, offsets: Any) -> int:
-    """Fill in where each ring begins with what was left out of it, and the end of the last, which is returned.
-
-    sources, sizes: as overlay_pairs fills them.
-    """
-    first = total = offsets[0] = 0
-    for ring in range(sizes.shape[0]):
-        last = first + sizes[ring]
-        size = sizes[ring]
-        for k in range(first, last):
-            if sources[k, 1] == LEFT_OUT:
-                size += abs(sources[k + 1 if k + 1 < last else first, 0] - sources[k, 0]) - 1
-        total += size
-        offsets[ring + 1] = total
-        first = last
-    return total
+@inline
+def count_left_out(sources: Any, first: int, last: int) -> int:
+    """Return how many vertices are left out of the ring of sources ``first`` .. ``last - 1``."""
+    n = 0
+    for k in range(first, last):
+        if sources[k, 1] == LEFT_OUT:
+            n += abs(sources[k + 1 if k + 1 < last else first, 0] - sources[k, 0]) - 1
+    return n
 
 
 @inline
@@ -48,17 +39,19 @@ def _copy(vertices: Any, source: int, base: int, step: int, n: int, made: Any, m
 
 @bare_kernel
 def expand_rings(
-    vertices: Any, sources: Any, sizes: Any, subjects: Any, clips: Any, stop: Any, made: Any, made_sources: Any
-) -> None:
+    vertices: Any, sources: Any, offsets: Any, subjects: Any, clips: Any, stop: Any, made: Any, made_sources: Any,
+    made_offsets: Any,
+) -> None:  # fmt: skip
     """Fill ``made``, (m, 2) float64, and ``made_sources``, (m, 2) int32, with rings and all that was left out of them.
 
-    vertices, sources, sizes: as overlay_pairs fills them; m: as expanded_offsets returns. subjects, clips: (n, 2)
-    float64 vertices. A run is made of vertices one after another in the input, there or back.
+    vertices, sources, offsets: as overlay_pairs fills them. subjects, clips: (n, 2) float64 vertices. made_offsets:
+    (rings + 1,) int64, filled with where each ring begins in ``made``, and the end of the last.
+    A run is made of vertices one after another in the input, there or back.
     """
     n_subject = subjects.shape[0]
-    first = at = 0
-    for ring in range(sizes.shape[0]):
-        last = first + sizes[ring]
+    at = made_offsets[0] = 0
+    for ring in range(made_offsets.shape[0] - 1):
+        first, last = offsets[ring], offsets[ring + 1]
         for k in range(first, last):
             source, mark = sources[k, 0], sources[k, 1]
             made[at, 0], made[at, 1] = vertices[k, 0], vertices[k, 1]
@@ -78,4 +71,4 @@ def expand_rings(
                 else:
                     _copy(clips, given, n_subject, step, n, made, made_sources, at)
                 at += n
-        first = last
+        made_offsets[ring + 1] = at

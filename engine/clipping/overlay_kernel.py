@@ -40,7 +40,7 @@ from engine.arrangement.ring_order import rank_rings
 from engine.arrangement.rounded_crossings import LOST, round_crossing
 from engine.clipping.cut_point import LARGEST
 from engine.clipping.overlay_convex import UNSETTLED, Passages, intersect_convex
-from engine.clipping.overlay_expanding import LEFT_OUT
+from engine.clipping.overlay_expanding import LEFT_OUT, count_left_out
 from engine.clipping.overlay_loading import box_of, fill_boxes, load_rings, magnitude, mark_runs
 from engine.clipping.overlay_workspace import Buffers, Workspace, rows_of
 from engine.jit import bare_kernel, inline
@@ -120,11 +120,10 @@ def _round_points(w: Workspace, n: int, n_crossings: int, n_points: int, stop: A
 
 @inline
 def _write(
-    w: Workspace, n: int, n_found: int, labels: RingLabels, vertices: Any, sources: Any, sizes: Any, pieces: Any,
+    w: Workspace, n: int, n_found: int, labels: RingLabels, vertices: Any, sources: Any, rings: Any, pieces: Any,
     evidence: Any, n_out: int, n_rings: int, n_pieces: int, stop: Any,
 ) -> None:  # fmt: skip
     """Append the rings in their order to the output, from its entries n_out, n_rings and n_pieces on."""
-    n_pieces -= 1
     for k in range(n_found):
         ring = w.ranking.order[k] if n_found > 1 else 0
         first, last = w.found.offset[ring], w.found.offset[ring + 1]
@@ -141,15 +140,12 @@ def _write(
                 sources[n_out, 1] = w.origins[w.events.second[point - n]]
             n_out += 1
             i = i + 1 if i + 1 < last else first
-        sizes[n_rings + k] = last - first
+        rings[n_rings + k + 1] = n_out
         if labels.shells.shape[0] > 0:
             is_hole = w.ranking.is_hole[ring]
             evidence[n_rings + k] = labels.beyond[ring] if is_hole else labels.gathered[w.found.region[ring]]
-        if w.ranking.is_hole[ring]:
-            pieces[n_pieces] += 1
-        else:
-            n_pieces += 1
-            pieces[n_pieces] = 1
+        n_pieces += int(not w.ranking.is_hole[ring])
+        pieces[n_pieces] = n_rings + k + 1
 
 
 @inline
@@ -167,8 +163,8 @@ def overlay_pairs(
     subjects: Any, subject_rings: Any, subject_items: Any, clips: Any, clip_rings: Any, clip_items: Any,
     first_item: int, last_item: int, begin: int, n_loaded: int, n_loaded_rings: int, n_runs: int, extent: float,
     kept: Any, bits: Any, shells: Any, stop: Any, buffers: Buffers,
-    status: Any, counts: Any, displacement: Any, vertices: Any, sources: Any, sizes: Any, pieces: Any, evidence: Any,
-) -> tuple[int, int, int, int, int, int]:  # fmt: skip
+    status: Any, counts: Any, displacement: Any, vertices: Any, sources: Any, rings: Any, pieces: Any, evidence: Any,
+) -> tuple[int, int, int, int, int, int, int]:  # fmt: skip
     """Overlay the pairs ``begin`` .. ``last_item - 1`` of those from ``first_item`` on.
 
     subjects, clips: (n, 2) float64 vertices; subject_rings, clip_rings: where each ring begins, and its end;
@@ -177,20 +173,22 @@ def overlay_pairs(
     by bit that of its shell (ring_labels.py).
     Fills, by pair from first_item on: status, (pairs,) int8; counts, (pairs, 4) int64: pieces, rings, vertices, pairs
     of edges beyond the filter; displacement, (pairs,) float64: how far rounding moved a vertex at most.
-    Fills, pair after pair from the beginning: vertices (m, 2) float64, sources (m, 2) int32, sizes (vertices by ring)
-    and pieces (rings by piece); with shells also evidence, by ring int64.
+    Fills, pair after pair from the beginning: vertices (m, 2) float64, sources (m, 2) int32; int64, from their second
+    entries on, the first of which are zero: rings, where each ends, and pieces, the end of each one's rings; with
+    shells also evidence, by ring int64.
     A source is the input vertex and -1, or the first vertices of the two edges that cross; clip vertices are counted
     after those of all subjects. The input vertex and LEFT_OUT where the vertices up to the next source are left out.
     n_loaded, n_loaded_rings, n_runs, extent: what reduce_pair returned for the only pair; no vertices, no such pair.
-    Returns the pair reached, FINISHED or what is needed to go on with it, numbers of vertices, rings, pieces, and how
-    many contacts there was scratch used for at most.
+    Returns the pair reached, FINISHED or what is needed to go on with it, numbers of vertices, rings, pieces, how many
+    contacts there was scratch used for at most, and how many vertices are left out.
     """
     w = rows_of(buffers)
     edges, events, chains, found = w.edges, w.events, w.chains, w.found
     labels = RingLabels(shells, w.following, w.joined)
     room = w.order.shape[0] - 9
     is_intersection = not (kept[0] or kept[1] or kept[2])
-    n_out = n_out_rings = n_out_pieces = used = 0
+    n_out = n_out_rings = n_out_pieces = used = n_left_out = 0
+    most_rings = evidence.shape[0]
     n, n_rings, largest = n_loaded, n_loaded_rings, extent
     for at in range(begin, last_item):
         item = at - first_item
@@ -214,13 +212,13 @@ def overlay_pairs(
                     edges, w.origins, Passages(w.points, w.node_of), found.point, w.places, w.x, w.y, stop,
                 )  # fmt: skip
                 if m != UNSETTLED:
-                    if n_out + m > vertices.shape[0] or n_out_rings + 1 > sizes.shape[0]:
+                    if n_out + m > vertices.shape[0] or n_out_rings + 1 > most_rings:
                         counts[item, 1], counts[item, 2] = 1, m
-                        return at, NEEDS_OUTPUT, n_out, n_out_rings, n_out_pieces, used
+                        return at, NEEDS_OUTPUT, n_out, n_out_rings, n_out_pieces, used, 0
                     if m > 0:
                         _write_ring(w, m, low, vertices, sources, n_out)
-                        sizes[n_out_rings], pieces[n_out_pieces] = m, 1
                         n_out, n_out_rings, n_out_pieces = n_out + m, n_out_rings + 1, n_out_pieces + 1
+                        rings[n_out_rings], pieces[n_out_pieces] = n_out, n_out_rings
                         counts[item, 0], counts[item, 1], counts[item, 2] = 1, 1, m
                     displacement[item] = moved_by
                     status[item] = DONE
@@ -255,7 +253,7 @@ def overlay_pairs(
             for i in range(n):
                 most += int(w.marked[i])
         if n_events < 0 or most > room:
-            return at, NEEDS_CONTACTS, n_out, n_out_rings, n_out_pieces, room
+            return at, NEEDS_CONTACTS, n_out, n_out_rings, n_out_pieces, room, 0
         used = max(used, most)
         are_clear = sort_events(
             edges, events, n, n_events, w.points, w.starts, w.order, w.crossing_x, w.crossing_y, w.nodes, stop
@@ -315,14 +313,19 @@ def overlay_pairs(
         n_pieces = rank_rings(found, n_found, w.x, w.y, w.ranking, is_valid, w.label, w.boxes, stop)
         if n_pieces < 0:
             continue
-        if n_out + m > vertices.shape[0] or n_out_rings + n_found > sizes.shape[0]:
+        if n_out + m > vertices.shape[0] or n_out_rings + n_found > most_rings:
             counts[item, 1], counts[item, 2] = n_found, m
-            return at, NEEDS_OUTPUT, n_out, n_out_rings, n_out_pieces, used
+            return at, NEEDS_OUTPUT, n_out, n_out_rings, n_out_pieces, used, 0
         _write(
-            w, n, n_found, labels, vertices, sources, sizes, pieces, evidence, n_out, n_out_rings, n_out_pieces, stop
+            w, n, n_found, labels, vertices, sources, rings, pieces, evidence, n_out, n_out_rings, n_out_pieces, stop
         )  # fmt: skip
+        if stop[0]:
+            break
+        if n_runs > 0:
+            for ring in range(n_found):
+                n_left_out += count_left_out(sources, rings[ring], rings[ring + 1])
         n_out, n_out_rings, n_out_pieces = n_out + m, n_out_rings + n_found, n_out_pieces + n_pieces
         counts[item, 0], counts[item, 1], counts[item, 2], counts[item, 3] = n_pieces, n_found, m, n_exact
         displacement[item] = moved_by
         status[item] = DONE if is_valid else UNVOUCHED
-    return last_item, FINISHED, n_out, n_out_rings, n_out_pieces, used
+    return last_item, FINISHED, n_out, n_out_rings, n_out_pieces, used, n_left_out

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from engine.arrangement.chain_rings import Rings
 from engine.arrangement.chains import Chains
@@ -105,9 +104,9 @@ class Workspace(NamedTuple):
 class Scratch:
     """What the kernel writes to, for pairs of up to so many vertices, rings and contacts, and for so much output.
 
-    output: vertices (m, 2) float64, their sources (m, 2) int32, sizes of rings and of pieces, evidence by ring, all
-        (n,) int64.
-    sizes: those of rings and of pieces again, after a zero: summed up they are offsets.
+    output: vertices (m, 2) float64, their sources (m, 2) int32, ends of rings and of pieces (n + 1,) int64, that begin
+        with 0, evidence by ring (n,) int64.
+    output_of_one: status, counts and displacement of one pair, and the same.
     """
 
     n_vertices: int
@@ -115,7 +114,7 @@ class Scratch:
     n_contacts: int
     buffers: Buffers
     output: tuple[Any, ...]
-    sizes: tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]
+    output_of_one: tuple[Any, ...]
 
 
 def scratch_for(n_vertices: int, n_rings: int, n_contacts: int, n_out: int, n_out_rings: int) -> Scratch:
@@ -128,16 +127,16 @@ def scratch_for(n_vertices: int, n_rings: int, n_contacts: int, n_out: int, n_ou
     kept: Scratch | None = vars(_kept).pop("scratch", None)
     if kept is not None and (kept.n_vertices < n_vertices or kept.n_rings < n_rings or kept.n_contacts < n_contacts):
         kept = None
-    if kept is not None and len(kept.output[0]) >= n_out and len(kept.output[2]) >= n_out_rings:
+    if kept is not None and len(kept.output[0]) >= n_out and len(kept.output[4]) >= n_out_rings:
         return kept
     n_out, n_out_rings = max(n_out, n_vertices + n_contacts), max(n_out_rings, n_contacts)
-    sizes = np.empty(n_out_rings + 1, np.int64), np.empty(n_out_rings + 1, np.int64)
-    sizes[0][0] = sizes[1][0] = 0
-    evidence = np.empty(n_out_rings, np.int64)
-    output = np.empty((n_out, 2)), np.empty((n_out, 2), np.int32), sizes[0][1:], sizes[1][1:], evidence
+    rings, pieces = np.empty(n_out_rings + 1, np.int64), np.empty(n_out_rings + 1, np.int64)
+    rings[0] = pieces[0] = 0
+    output = np.empty((n_out, 2)), np.empty((n_out, 2), np.int32), rings, pieces, np.empty(n_out_rings, np.int64)
+    of_one = np.empty(1, np.int8), np.empty((1, 4), np.int64), np.empty(1), *output
     if kept is not None:
-        return Scratch(kept.n_vertices, kept.n_rings, kept.n_contacts, kept.buffers, output, sizes)
-    return Scratch(n_vertices, n_rings, n_contacts, buffers_for(n_vertices, n_rings, n_contacts), output, sizes)
+        return Scratch(kept.n_vertices, kept.n_rings, kept.n_contacts, kept.buffers, output, of_one)
+    return Scratch(n_vertices, n_rings, n_contacts, buffers_for(n_vertices, n_rings, n_contacts), output, of_one)
 
 
 def more_contacts(n: int) -> int:
