@@ -98,6 +98,7 @@ def _load_ring(
                 px, py = vertices[k, 0], vertices[k, 1]
                 safe &= is_safe(px) & is_safe(py)
                 if n > start and x[n - 1] == px and y[n - 1] == py:
+                    origins[n - 1] = base + k  # case: a chord that ends where it begins; the next edge begins here
                     continue
                 x[n], y[n], origins[n] = px, py, base + k
                 n += 1

@@ -120,6 +120,18 @@ def compare(subject: Rings, clip: Rings, operation: Operation, size: int, has_ar
     return True
 
 
+def test_loop_beyond_the_common_box() -> None:
+    """A block beyond the common box that ends where it begins; the edge after it crosses into the box."""
+    angles = np.linspace(0.0, 2 * np.pi, 64, endpoint=False)
+    circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    clip = np.array([(0.0, -3.0), (4.0, -3.0), (4.0, 3.0), (0.0, 3.0)])
+    for size in (4, 16, 64):
+        loop = circle[:size] - (2.0, 0.0)
+        subject = np.concatenate([loop, loop[:1], [(1.0, -0.5)], circle[:32] * 2.0 + (0.5, 0.5)])
+        for operation in OPERATIONS:
+            assert compare([subject], [clip], operation, size, has_area=True)
+
+
 @pytest.mark.parametrize("make", MAKERS, ids=lambda make: make.__name__)
 def test_equal_to_the_ordinary_way(make: Callable[[Random], tuple[Rings, Rings]]) -> None:
     n_reduced = 0
