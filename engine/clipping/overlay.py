@@ -14,7 +14,6 @@ M. Sharir, Arrangements, Handbook of Discrete and Computational Geometry, 2018.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Final, Literal, overload
 
 import numpy as np
@@ -117,7 +116,7 @@ def overlay(
     if not report:
         return result
     n_edges = len(first.vertices) + len(second.vertices)
-    return result, accuracy_of([result], n_edges, n_exact, n_rational)
+    return result, accuracy_of(ulps_moved(result), n_edges, n_exact, n_rational)
 
 
 def check_words(operation: str, output: str) -> None:
@@ -150,12 +149,15 @@ def overlay_rings(
     return result, n_exact, n_exact
 
 
-def accuracy_of(results: Sequence[Overlay], n_edges: int, n_exact: int, n_rational: int) -> Accuracy:
-    """Return the report of one or many overlays; the worst of them counts."""
-    ulps = 0.5
-    for result in results:
-        if result.vertices_moved:
-            ulps = max(ulps, result.largest_displacement / float(np.spacing(np.abs(result.vertices).max())))
+def ulps_moved(result: Overlay) -> float:
+    """Return by how many units in the last place of the largest coordinate a vertex may be off."""
+    if not result.vertices_moved:
+        return 0.5
+    return max(0.5, result.largest_displacement / float(np.spacing(np.abs(result.vertices).max())))
+
+
+def accuracy_of(ulps: float, n_edges: int, n_exact: int, n_rational: int) -> Accuracy:
+    """Return the report of one or many overlays; ulps: of the worst of them."""
     return Accuracy(
         decisions="exact",
         coordinates_ulp=ulps,

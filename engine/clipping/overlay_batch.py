@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Final, cast
+from typing import Final, NamedTuple, cast
 
 import numpy as np
 import numpy.typing as npt
 
+from engine.clipping.batch_rounds import SettledPairs, found_of, joined, nearest_pairs, settle_pairs, taken
 from engine.clipping.implicit_rings import ImplicitRings, RingArrays
-from engine.clipping.overlay import accuracy_of, check_words, overlay_rings, rings_of
+from engine.clipping.overlay import accuracy_of, check_words, overlay_rings, rings_of, ulps_moved
 from engine.clipping.overlay_compiled import (
     Found,
     Operation,
@@ -19,10 +20,11 @@ from engine.clipping.overlay_compiled import (
     as_overlay,
     chained,
     gathered,
-    only_done,
     run_kernel,
     summed,
 )
+from engine.clipping.overlay_kernel import DONE as SETTLED
+from engine.clipping.overlay_kernel import UNVOUCHED
 from engine.clipping.overlay_result import Overlay
 from engine.errors import InvalidArrayError, NotRepresentableError
 from engine.parallel import Budget, Cancel, Progress, run_chunks
@@ -34,6 +36,18 @@ DONE: Final = 0
 NOT_REPRESENTABLE: Final = 1
 
 _FIRST_CHUNK: Final = 8
+_FIRST_DOUBTFUL: Final = 256
+"""The same of pairs whose rings are arranged again: a call takes as long as some hundred of them."""
+_NO_PAIRS: Final = Found(
+    np.zeros(0, np.int8),
+    np.zeros((0, 4), np.int64),
+    np.zeros(0),
+    np.zeros((0, 2)),
+    np.zeros((0, 2), np.int32),
+    np.zeros(1, np.int64),
+    np.zeros(1, np.int64),
+    np.zeros(0, np.int64),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +62,8 @@ class OverlayBatch:
     displacement: (n_pairs,) float64, how far an edge may lie from the exact one, as `Overlay.largest_displacement`.
     _sources: (n_vertices, 2), as those of `ImplicitRings`, but counted as _bases says. _bases: (n_pairs, 3), what is
         added to the numbers of the subject's vertices, to those of the clip's, and from where on they are the clip's.
+    _is_rounded_again: (n_pairs,) bool, whose rings were not valid once rounded, or without area: such a pair is
+        overlaid again for its object, which tells what became of all parts. _apart: objects made already, by pair.
     """
 
     status: npt.NDArray[np.int8]
@@ -58,9 +74,11 @@ class OverlayBatch:
     displacement: npt.NDArray[np.float64]
     _subjects: Sequence[Solid] = field(repr=False)
     _clips: Sequence[Solid] = field(repr=False)
+    _operation: Operation = field(repr=False)
     _output: Output = field(repr=False)
     _sources: npt.NDArray[np.int32] = field(repr=False)
     _bases: npt.NDArray[np.int32] = field(repr=False)
+    _is_rounded_again: npt.NDArray[np.bool_] = field(repr=False)
     _apart: dict[int, Overlay] = field(repr=False)
 
     def __len__(self) -> int:
@@ -78,6 +96,9 @@ class OverlayBatch:
             return None
         if pair in self._apart:
             return self._apart[pair]
+        if self._is_rounded_again[pair]:
+            both = _arrays(self._subjects[pair]), _arrays(self._clips[pair])
+            return overlay_rings(*both, self._operation, self._output, Budget())[0]
         first, last = self.pair_offsets[pair], self.pair_offsets[pair + 1]
         rings = self.piece_offsets[first : last + 1]
         stops = self.ring_offsets[rings[0] : rings[-1] + 1]
@@ -131,7 +152,8 @@ def overlay_batch(
     """Combine pairs of polygons, subjects[i] with clips[i]; the options are those of `overlay`.
 
     Returns: `OverlayBatch`, in the order of the pairs; with report=True also one `Accuracy` for all.
-    Cost: some microseconds for a pair of a few vertices, on all workers; no object per pair.
+    Cost: some microseconds for a pair of a few vertices, on all workers, several times that where rounding comes near
+    other edges; no object per pair. The object of a pair whose rings were rounded more than once takes an overlay.
     Raises: as `overlay`, and InvalidArrayError where the lengths differ. Every solid is checked before the first is
     overlaid.
     """
@@ -148,88 +170,96 @@ def overlay_batch(
             for i_pair, solid in enumerate(solids):
                 rings_of(solid, name, i_pair)
     parts: dict[int, tuple[Found, npt.NDArray[np.int32]]] = {}
-    apart: dict[int, Overlay] = {}
-    n_exact: dict[int, int] = {}
-    status = np.zeros(len(subjects), np.int8)
     with Budget(deadline, cancel) as budget:
 
         def task(start: int, stop: int) -> None:
             # Gathered here, chunk by chunk: one thread does while another's kernel runs, and what it wrote is near.
             first, second = _gathered(subjects[start:stop]), _gathered(clips[start:stop])
-            found = run_kernel(first, second, operation, budget)
-            left = np.flatnonzero(found.status)
-            parts[start] = only_done(found) if len(left) else found, _bases(first, second)
-            for place in left:
-                pair = start + int(place)
-                budget.check()
-                try:
-                    apart[pair], n_exact[pair], _ = overlay_rings(
-                        _arrays(subjects[pair]), _arrays(clips[pair]), operation, output, budget
-                    )
-                except NotRepresentableError:
-                    status[pair] = NOT_REPRESENTABLE
+            parts[start] = run_kernel(first, second, operation, budget), _bases(first, second)
 
         run_chunks(task, len(subjects), budget=budget, first_chunk=_FIRST_CHUNK, workers=workers, progress=progress)
-    chunks = [parts[start] for start in sorted(parts)]
-    batch = _joined(status, chunks, apart, subjects, clips, output)
+        chunks = [parts[start] for start in sorted(parts)]
+        found = joined([_NO_PAIRS, *(found for found, _ in chunks)])
+        rest = _Rest(np.zeros(len(subjects), np.int8), np.zeros(len(subjects), np.bool_), {})
+        ulps, n_rational = 0.5, 0
+        if found.status.any():
+            found, ulps, n_rational = _settled(found, rest, subjects, clips, operation, output, workers, budget)
+    for array in (rest.status, *found):
+        array.setflags(write=False)
+    batch = OverlayBatch(
+        status=rest.status,
+        vertices=found.vertices,
+        ring_offsets=found.ring_offsets,
+        piece_offsets=found.piece_offsets,
+        pair_offsets=summed(found.counts[:, 0]),
+        displacement=found.displacement,
+        _subjects=tuple(subjects),
+        _clips=tuple(clips),
+        _operation=operation,
+        _output=output,
+        _sources=found.sources,
+        _bases=np.concatenate([np.zeros((0, 3), np.int32), *(bases for _, bases in chunks)]),
+        _is_rounded_again=rest.is_rounded_again,
+        _apart=rest.apart,
+    )
     if not report:
         return batch
     n_edges = sum(len(_arrays(each).vertices) for solids in (subjects, clips) for each in solids)
-    n_beyond = sum(int(found.counts[:, 3].sum()) for found, _ in chunks) + sum(n_exact.values())
-    return batch, accuracy_of(list(apart.values()), n_edges, n_beyond, sum(n_exact.values()))
+    return batch, accuracy_of(ulps, n_edges, int(found.counts[:, 3].sum()), n_rational)
 
 
-def _joined(
-    status: npt.NDArray[np.int8],
-    chunks: Sequence[tuple[Found, npt.NDArray[np.int32]]],
-    apart: dict[int, Overlay],
+class _Rest(NamedTuple):
+    """What becomes of pairs that the first call of the kernel does not settle; the names are those of `OverlayBatch`,
+    without underscores."""
+
+    status: npt.NDArray[np.int8]
+    is_rounded_again: npt.NDArray[np.bool_]
+    apart: dict[int, Overlay]
+
+
+def _settled(
+    found: Found,
+    rest: _Rest,
     subjects: Sequence[Solid],
     clips: Sequence[Solid],
+    operation: Operation,
     output: Output,
-) -> OverlayBatch:
-    """Put the flat results of all chunks, and the overlays made apart from them, into one set of arrays."""
-    parts = [found for found, _ in chunks]
-    n_pieces = np.concatenate([np.zeros(0, np.int64), *(part.counts[:, 0] for part in parts)])
-    displacement = np.concatenate([np.zeros(0), *(part.displacement for part in parts)])
-    vertices = np.concatenate([np.zeros((0, 2)), *(part.vertices for part in parts)])
-    sources = np.concatenate([np.zeros((0, 2), np.int32), *(part.sources for part in parts)])
-    ring_offsets = chained([part.ring_offsets for part in parts])
-    piece_offsets = chained([part.piece_offsets for part in parts])
-    if apart:
-        pairs = np.array(sorted(apart), np.int64)
-        results = [apart[pair] for pair in pairs.tolist()]
-        n_rings, n_vertices = (np.concatenate([part.counts[:, k] for part in parts]) for k in (1, 2))
-        n_pieces[pairs] = [result.n_pieces for result in results]
-        n_rings[pairs] = [len(result.ring_offsets) - 1 for result in results]
-        n_vertices[pairs] = [len(result.vertices) for result in results]
-        displacement[pairs] = [result.largest_displacement for result in results]
-        is_apart = np.zeros(len(status), np.bool_)
-        is_apart[pairs] = True
-        by_piece, by_ring, by_vertex = (np.repeat(is_apart, each) for each in (n_pieces, n_rings, n_vertices))
-        added = np.concatenate([result.vertices for result in results])
-        vertices = _woven(by_vertex, vertices, added)
-        sources = _woven(by_vertex, sources, np.full((len(added), 2), -1))
-        sizes = np.concatenate([np.diff(result.ring_offsets) for result in results])
-        ring_offsets = summed(_woven(by_ring, np.diff(ring_offsets), sizes))
-        sizes = np.concatenate([np.diff(result.piece_offsets) for result in results])
-        piece_offsets = summed(_woven(by_piece, np.diff(piece_offsets), sizes))
-    pair_offsets = summed(n_pieces)
-    for array in (status, vertices, displacement, ring_offsets, piece_offsets, pair_offsets):
-        array.setflags(write=False)
-    return OverlayBatch(
-        status=status,
-        vertices=vertices,
-        ring_offsets=ring_offsets,
-        piece_offsets=piece_offsets,
-        pair_offsets=pair_offsets,
-        displacement=displacement,
-        _subjects=tuple(subjects),
-        _clips=tuple(clips),
-        _output=output,
-        _sources=sources,
-        _bases=np.concatenate([np.zeros((0, 3), np.int32), *(bases for _, bases in chunks)]),
-        _apart=apart,
-    )
+    workers: int | None,
+    budget: Budget,
+) -> tuple[Found, float, int]:
+    """Fill ``rest``; return all pairs settled, `Accuracy.coordinates_ulp`, and how many decisions took rationals."""
+    settled: dict[int, SettledPairs] = {}
+    alone: dict[int, tuple[Overlay, int, int]] = {}
+    doubtful = np.flatnonzero(found.status == UNVOUCHED)
+
+    def settle(start: int, stop: int) -> None:
+        some = doubtful[start:stop]
+        pairs = taken(found, some)
+        more = settle_pairs(pairs, budget) if output == "valid" else nearest_pairs(pairs, budget)
+        settled[start] = more._replace(pairs=some[more.pairs])
+
+    def overlay_alone(start: int, stop: int) -> None:
+        for pair in left[start:stop].tolist():
+            budget.check()
+            both = _arrays(subjects[pair]), _arrays(clips[pair])
+            try:
+                alone[pair] = overlay_rings(*both, operation, output, budget)
+            except NotRepresentableError:
+                rest.status[pair] = NOT_REPRESENTABLE
+
+    run_chunks(settle, len(doubtful), budget=budget, first_chunk=_FIRST_DOUBTFUL, workers=workers)
+    together = [settled[start] for start in sorted(settled)]
+    for each in together:
+        rest.is_rounded_again[each.pairs] = True
+    left = np.flatnonzero((found.status != SETTLED) & ~rest.is_rounded_again)
+    run_chunks(overlay_alone, len(left), budget=budget, first_chunk=1, workers=workers)
+    rest.apart.update((pair, result) for pair, (result, _, _) in alone.items())
+    more = [*(each.found for each in together), *(found_of(result, n_exact) for result, n_exact, _ in alone.values())]
+    pairs = np.concatenate([*(each.pairs for each in together), np.array([*alone], np.int64)])
+    rows = np.arange(len(found.status))
+    rows[pairs] = len(rows) + np.arange(len(pairs))
+    ulps = [0.5, *(each.ulps for each in together), *(ulps_moved(result) for result, _, _ in alone.values())]
+    return taken(joined([found, *more]), rows), max(ulps), sum(n for _, _, n in alone.values())
 
 
 def join_batches(batches: Sequence[OverlayBatch]) -> OverlayBatch:
@@ -248,20 +278,13 @@ def join_batches(batches: Sequence[OverlayBatch]) -> OverlayBatch:
         displacement=np.concatenate([part.displacement for part in batches]),
         _subjects=tuple(solid for part in batches for solid in part._subjects),
         _clips=tuple(solid for part in batches for solid in part._clips),
+        _operation=batches[0]._operation,
         _output=batches[0]._output,
         _sources=np.concatenate([part._sources for part in batches]),
         _bases=np.concatenate([part._bases for part in batches]),
+        _is_rounded_again=np.concatenate([part._is_rounded_again for part in batches]),
         _apart=apart,
     )
     for name in ("status", "vertices", "ring_offsets", "piece_offsets", "pair_offsets", "displacement"):
         getattr(batch, name).setflags(write=False)
     return batch
-
-
-def _woven(
-    is_apart: npt.NDArray[np.bool_], rest: npt.NDArray[np.generic], apart: npt.NDArray[np.generic]
-) -> np.ndarray:
-    """Return the rows of two arrays in one, those of ``apart`` where the mask says."""
-    result = np.empty((len(is_apart), *rest.shape[1:]), rest.dtype)
-    result[~is_apart], result[is_apart] = rest, apart
-    return result

@@ -19,6 +19,7 @@ from engine.clipping.overlay_kernel import (
     OPEN,
     overlay_pairs,
 )
+from engine.clipping.overlay_nearest import leave_nearest
 from engine.clipping.overlay_pair import NOT_REDUCED, FoundPair, run_pair
 from engine.clipping.overlay_result import Overlay
 from engine.clipping.overlay_rounds import RoundedRings, settle_rings
@@ -115,7 +116,7 @@ def run_kernel(
 ) -> Found:
     """Overlay polygons pair by pair. Raises as `Budget.check` when the call must end.
 
-    labels: bits of the rings of a single subject, to be arranged each as a source of its own.
+    labels: bits of the rings of subjects to be arranged each as a source of its own, as `overlay_pairs` takes them.
     """
     n = len(subjects.polygon_offsets) - 1
     n_vertices, n_rings = subjects.most_vertices + clips.most_vertices, subjects.most_rings + clips.most_rings
@@ -173,19 +174,6 @@ def run_kernel(
     )
 
 
-def only_done(found: Found) -> Found:
-    """Return what was found for the pairs that are DONE."""
-    counts = np.where(found.status[:, None] == DONE, found.counts, 0)
-    of_piece, of_ring, of_vertex = (np.repeat(found.status == DONE, found.counts[:, k]) for k in range(3))
-    return found._replace(
-        counts=counts,
-        vertices=found.vertices[of_vertex],
-        sources=found.sources[of_vertex],
-        ring_offsets=summed(np.diff(found.ring_offsets)[of_ring]),
-        piece_offsets=summed(np.diff(found.piece_offsets)[of_piece]),
-    )
-
-
 def summed(sizes: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
     """Return where each of some parts put one after another begins, and the end of the last; read-only."""
     offsets = np.zeros(len(sizes) + 1, np.int64)
@@ -221,10 +209,11 @@ def overlay_compiled(
     settled = None
     vertices, displacement = found.vertices, found.displacement
     if found.status != DONE:
+        rounded = _rounded(found, _NONE)
         if output == "valid":
-            settled = settle_rings(
-                _rounded(found, _NONE), exact, functools.partial(_again, budget), exponent == 0, budget
-            )
+            settled = settle_rings(rounded, exact, functools.partial(_again, budget), exponent == 0, budget)
+        else:
+            settled = leave_nearest(rounded, exact, budget)
         if settled is None:
             return None
         vertices, displacement = settled.rings.vertices, settled.displacement

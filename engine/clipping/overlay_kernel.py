@@ -170,7 +170,8 @@ def overlay_pairs(
     subjects, clips: (n, 2) float64 vertices; subject_rings, clip_rings: where each ring begins, and its end;
     subject_items, clip_items: the first ring of each polygon, and the end of the last one's. kept: (4,) uint8 by label.
     bits, shells: empty; or, for rounded rings as subjects, no clips, and kept all but the first, by ring its bit, and
-    by bit that of its shell (ring_labels.py).
+    by bit that of its shell (ring_labels.py): those of a single pair, or of many of which each ring has a bit of its
+    own, counted from the pair's first ring, one pair after another.
     Fills, by pair from first_item on: status, (pairs,) int8; counts, (pairs, 4) int64: pieces, rings, vertices, pairs
     of edges beyond the filter; displacement, (pairs,) float64: how far rounding moved a vertex at most.
     Fills, pair after pair from the beginning: vertices (m, 2) float64, sources (m, 2) int32; int64, from their second
@@ -184,7 +185,6 @@ def overlay_pairs(
     """
     w = rows_of(buffers)
     edges, events, chains, found = w.edges, w.events, w.chains, w.found
-    labels = RingLabels(shells, w.following, w.joined)
     room = w.order.shape[0] - 9
     is_intersection = not (kept[0] or kept[1] or kept[2])
     n_out = n_out_rings = n_out_pieces = used = n_left_out = 0
@@ -197,6 +197,7 @@ def overlay_pairs(
         if stop[0]:
             break
         first, first_end = subject_items[at], subject_items[at + 1]
+        labels = RingLabels(shells[first:first_end], w.following, w.joined)
         if n_loaded == 0:
             second, second_end = clip_items[at], clip_items[at + 1]
             x0, x1, y0, y1 = box_of(subjects, subject_rings[first], subject_rings[first_end])

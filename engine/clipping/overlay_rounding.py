@@ -54,9 +54,13 @@ class Rounded:
 
 def rounded_ring(nodes: NodeTable, ring: Iterable[int]) -> Ring:
     """Return the nearest doubles of the nodes of `ring`, none repeated in succession."""
+    return without_repeats((nodes.xs[node], nodes.ys[node]) for node in ring)
+
+
+def without_repeats(vertices: Iterable[Vertex]) -> Ring:
+    """Return a ring, none of its vertices repeated in succession."""
     result: Ring = []
-    for node in ring:
-        vertex = (nodes.xs[node], nodes.ys[node])
+    for vertex in vertices:
         if not result or result[-1] != vertex:
             result.append(vertex)
     while len(result) > 1 and result[0] == result[-1]:
@@ -77,16 +81,35 @@ def round_to_nearest(nodes: NodeTable, pieces: Sequence[Piece]) -> Rounded:
     n_holes = 0
     for number, piece in enumerate(pieces):
         rings = [rounded_ring(nodes, ring) for ring in (piece.shell, *piece.holes)]
-        if _has_area(rings[0]):
-            kept = [k for k, ring in enumerate(rings) if k == 0 or _has_area(ring)]
+        if has_area(rings[0]):
+            kept = [k for k, ring in enumerate(rings) if k == 0 or has_area(ring)]
             result.pieces.append([rings[k] for k in kept])
             result.piece_origins.append({number})
             result.hole_origins += [{n_holes + k - 1} for k in kept[1:]]
         n_holes += len(piece.holes)
+    result.pieces = in_order(result.pieces)  # each part has one origin: their order tells nothing
     return result
 
 
-def _has_area(ring: Ring) -> bool:
+def in_order(pieces: Iterable[list[Ring]]) -> list[list[Ring]]:
+    """Return pieces and their holes in lexicographic order, each ring from its leftmost, then lowest vertex.
+
+    A ring that passes that vertex more than once, as rounding may leave it, begins so that it comes first in the order.
+    """
+    turned = [[_from_first(ring) for ring in piece] for piece in pieces]
+    return sorted([shell, *sorted(holes)] for shell, *holes in turned)
+
+
+def _from_first(ring: Ring) -> Ring:
+    first = min(ring)
+    if ring.count(first) == 1:
+        start = ring.index(first)
+    else:
+        start = min((k for k, vertex in enumerate(ring) if vertex == first), key=lambda k: ring[k:] + ring[:k])
+    return ring[start:] + ring[:start]
+
+
+def has_area(ring: Ring) -> bool:
     """Tell whether the signed area of `ring` is not zero, exactly."""
     if len(ring) < 3:
         return False

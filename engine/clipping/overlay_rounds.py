@@ -111,8 +111,8 @@ def settle_rings(
         rounds=rounds,
         displacement=displacement,
         snapped=snapped,
-        vertices_moved=_moved(first.vertices, rings.vertices) if has_crossings else 0,
-        collapsed=_collapsed(first, exact, lost_pieces, lost_holes, budget) if lost_pieces or lost_holes else (),
+        vertices_moved=n_moved(first.vertices, rings.vertices) if has_crossings else 0,
+        collapsed=collapses(first, exact, lost_pieces, lost_holes, budget),
         pieces_joined=pieces_joined,
         pieces_parted=pieces_parted,
         holes_joined=holes_joined,
@@ -159,16 +159,18 @@ def _origins(
     return pieces, [origin for ring, origin in enumerate(collected) if ring not in is_shell]
 
 
-def _moved(images: npt.NDArray[np.float64], vertices: npt.NDArray[np.float64]) -> int:
+def n_moved(images: npt.NDArray[np.float64], vertices: npt.NDArray[np.float64]) -> int:
     """Return how many vertices are none of ``images``."""
     known = {(x, y) for x, y in images.tolist()}
     return sum((x, y) not in known for x, y in vertices.tolist())
 
 
-def _collapsed(
+def collapses(
     first: RoundedRings, exact: ImplicitRings, lost_pieces: Sequence[int], lost_holes: Sequence[int], budget: Budget
 ) -> tuple[Collapse, ...]:
     """Return lost pieces, then lost holes, each by the vertices of its exact ring from the first one on."""
+    if not lost_pieces and not lost_holes:
+        return ()
     shells = first.piece_offsets.tolist()
     shell_of = np.repeat(first.piece_offsets[:-1], np.diff(first.piece_offsets)).tolist()
     holes = [ring for ring, shell in enumerate(shell_of) if ring != shell]

@@ -10,6 +10,7 @@ import pytest
 
 from engine.arrangement.ring_labels import MOST_BITS
 from engine.clipping import overlay_rounding, overlay_rounds
+from engine.clipping.overlay import overlay
 from engine.clipping.overlay_batch import overlay_batch
 from engine.clipping.overlay_compiled import overlay_compiled
 from engine.parallel import Budget
@@ -84,15 +85,27 @@ def test_crossings_next_to_an_axis_are_rounded(family: Any, seed: int) -> None:
     assert all(agree(*families.drawn(family, seed), operation) for operation in OPERATIONS)
 
 
-def test_a_batch_equals_single_calls() -> None:
-    pairs = [families.drawn(family, seed) for seed in range(5) for family in HARD]
+@pytest.mark.parametrize("output", ["valid", "nearest"])
+@pytest.mark.parametrize("n", [4, pytest.param(100, marks=pytest.mark.full)])
+def test_a_batch_equals_single_calls(output: Any, n: int) -> None:
+    """Rings arranged again together are those arranged pair by pair, and the objects made of them later too."""
+    pairs = [families.drawn(family, seed) for seed in range(n) for family in HARD]
     subjects, clips = ([Polygon(pair[k]) for pair in pairs] for k in (0, 1))
     for operation in OPERATIONS:
-        batch = overlay_batch(subjects, clips, operation, workers=1)
-        for pair, found in zip(pairs, batch, strict=True):
-            single = overlay_batch([Polygon(pair[0])], [Polygon(pair[1])], operation)[0]
+        batch, accuracy = overlay_batch(subjects, clips, operation, output=output, workers=1, report=True)
+        ulps = 0.5
+        for number, (subject, clip) in enumerate(zip(subjects, clips, strict=True)):
+            single, told = overlay(subject, clip, operation, output=output, report=True)
+            ulps = max(ulps, told.coordinates_ulp)
+            rings = batch.piece_offsets[batch.pair_offsets[number] : batch.pair_offsets[number + 1] + 1]
+            stops = batch.ring_offsets[rings[0] : rings[-1] + 1]
+            assert batch.vertices[stops[0] : stops[-1]].tolist() == single.vertices.tolist()
+            assert (stops - stops[0]).tolist() == single.ring_offsets.tolist()
+            assert (rings - rings[0]).tolist() == single.piece_offsets.tolist()
+            assert batch.displacement[number] == single.largest_displacement
+            found = batch[number]
             assert found is not None
-            assert single is not None
             assert found.vertices.tolist() == single.vertices.tolist()
-            assert found.piece_offsets.tolist() == single.piece_offsets.tolist()
+            assert (found.collapsed, found.rounds, found.output) == (single.collapsed, single.rounds, output)
             assert found.area_exact == single.area_exact
+        assert accuracy.coordinates_ulp == ulps
