@@ -108,9 +108,12 @@ class OverlayBatch:
         is_clip = sources >= n_subjects
         sources[is_clip] += len(subject.vertices) - n_subjects - in_clips
         sources[~is_clip & (sources >= 0)] -= in_subjects
-        exact = ImplicitRings(subject, clip, sources, stops - stops[0])
         vertices = self.vertices[stops[0] : stops[-1]].copy()
-        return as_overlay(vertices, rings - rings[0], float(self.displacement[pair]), exact, self._output)
+        ring_offsets, piece_offsets = stops - stops[0], rings - rings[0]
+        for array in (vertices, ring_offsets, piece_offsets):
+            array.setflags(write=False)
+        exact = ImplicitRings(subject, clip, sources, ring_offsets)
+        return as_overlay(vertices, piece_offsets, float(self.displacement[pair]), exact, self._output)
 
     @property
     def overlays(self) -> tuple[Overlay | None, ...]:

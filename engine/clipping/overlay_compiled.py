@@ -216,9 +216,10 @@ def overlay_compiled(
             settled = leave_nearest(rounded, exact, budget)
         if settled is None:
             return None
-        vertices, displacement = settled.rings.vertices, settled.displacement
+        vertices, displacement = as_frozen(settled.rings.vertices), settled.displacement
     if exponent:
         vertices, doubtful = scaled_back(vertices, exponent)
+        vertices.setflags(write=False)
         if doubtful.any() or not np.isfinite(vertices).all():
             return None
         displacement = float(np.nextafter(np.ldexp(displacement, exponent), np.inf)) if displacement else 0.0
@@ -274,10 +275,8 @@ def as_overlay(
     exact: ImplicitRings,
     output: Output,
 ) -> Overlay:
-    """Return an `Overlay` whose rounded rings have the structure of the exact ones."""
+    """Return an `Overlay` whose rounded rings have the structure of the exact ones; all arrays are read-only."""
     offsets = exact.offsets
-    for array in (vertices, offsets, piece_offsets):
-        array.setflags(write=False)
     n_pieces = len(piece_offsets) - 1
     result = object.__new__(Overlay)
     vars(result).update(  # as Overlay(...) does one by one, which takes 2 us

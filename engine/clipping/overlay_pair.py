@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import functools
 from types import FunctionType
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -31,7 +31,12 @@ _BLOCKS_GROW: Final = 10_000
 _MOST: Final = 0.5
 """Part of all edges that may be looked at one by one so that leaving out the others pays."""
 _FEW_CONTACTS: Final = 1024
+_FEW_PIECES: Final = 64
+"""Pieces without holes up to which offsets are kept, since many results have the same."""
 _NONE: Final = np.zeros(0, np.int64)
+_INT32: Final = np.dtype(np.int32)
+_INT64: Final = np.dtype(np.int64)
+"""Types that numpy need not look up."""
 _entries: dict[Any, Any] = {}
 
 
@@ -103,7 +108,7 @@ def run_whole(subject: RingArrays, clip: RingArrays, kept: npt.NDArray[np.uint8]
         _copied(vertices, n),
         _copied(sources, n),
         _copied(rings, n_found + 1),
-        _copied(pieces, n_pieces + 1),
+        _counted(n_pieces) if n_pieces == n_found <= _FEW_PIECES else _copied(pieces, n_pieces + 1),
     )
     keep(scratch, n_vertices, used, n)
     return found
@@ -156,21 +161,29 @@ def run_reduced(
     made = None
     if status.item(0) == DONE:
         total = n + n_left_out
-        found = np.empty((total, 2)), np.empty((total, 2), np.int32), np.empty(n_found + 1, np.int64)
+        found = np.empty((total, 2)), np.empty((total, 2), _INT32), np.empty(n_found + 1, _INT64)
         _entry(expand_rings)(vertices, sources, rings, subject.vertices, clip.vertices, budget.flag, *found)
         budget.check()
+        array: Any
         for array in found:
-            array.setflags(write=False)
-        made = FoundPair(DONE, counts.item(3), displacement.item(0), *found, _copied(pieces, n_pieces + 1))
+            array.setflags(False)  # as in _copied
+        piece_offsets = _counted(n_pieces) if n_pieces == n_found <= _FEW_PIECES else _copied(pieces, n_pieces + 1)
+        made = FoundPair(DONE, counts.item(3), displacement.item(0), *found, piece_offsets)
     keep(scratch, reduced[0] + n_vertices // 4, used, n)
     return made
 
 
 def _copied(array: npt.NDArray[Any], n: int) -> npt.NDArray[Any]:
     """Return the first rows of an array, as a read-only array of their own."""
-    made = array[:n].copy()
-    made.setflags(write=False)
-    return made
+    made: Any = array[:n].copy()
+    made.setflags(False)  # write: by its name it takes twice as long
+    return cast("npt.NDArray[Any]", made)
+
+
+@functools.lru_cache(_FEW_PIECES + 1)
+def _counted(n: int) -> npt.NDArray[np.int64]:
+    """Return 0 .. n, the ring offsets of so many pieces without holes; its memory cannot be written to."""
+    return np.frombuffer(np.arange(n + 1).tobytes(), np.int64)
 
 
 @functools.lru_cache(64)
