@@ -16,6 +16,7 @@ from __future__ import annotations
 import mmap
 import re
 from itertools import chain
+from math import prod
 from typing import Any, Final
 
 import numpy as np
@@ -142,7 +143,7 @@ class _Decoder:
             shape = (shape[0] + length if shape else length, *rest)
             self._ends.append((end, self._n_numbers))
             start = end + 1
-        if not shape:
+        if not shape or self._n_numbers != prod(shape):  # case: brackets and commas of [] are those of [1]
             raise Unfit
         numbers = self._numbers[: self._n_numbers]
         if numbers.dtype.kind == "f" and not _is_exact(numbers):
