@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
 from typing import Any, Final
 
@@ -97,9 +98,9 @@ def from_overlay(result: engine.Overlay, accuracy: engine.Accuracy) -> overlay.O
             overlay.OverlayPiece.made(shell=_closed(piece.shell), holes=[_closed(hole) for hole in piece.holes])
             for piece in result.pieces
         ],
-        area=_area(result),
+        area=_area(lambda: result.area),
         collapsed=[
-            overlay.OverlayCollapse.made(kind=part.kind, area=float(part.area), near=part.near)
+            overlay.OverlayCollapse.made(kind=part.kind, area=_area(part.area.__float__), near=part.near)
             for part in result.collapsed
         ],
         rounding=overlay.OverlayRounding.made(
@@ -124,9 +125,10 @@ def _closed(ring: Any) -> Any:
     return np.concatenate([ring, ring[:1]])
 
 
-def _area(result: engine.Overlay) -> float | None:
+def _area(nearest: Callable[[], float]) -> float | None:
+    """Return an area, None where it is beyond float64."""
     try:
-        return result.area
+        return nearest()
     except (engine.NotRepresentableError, OverflowError):
         return None
 

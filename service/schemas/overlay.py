@@ -46,7 +46,7 @@ class OverlayCollapse(Schema):
     """A part of the exact result that rounding lost."""
 
     kind: Literal["piece", "hole"]
-    area: Number = Field(description="Its area, correctly rounded.")
+    area: Number = left_out("Its area, correctly rounded; left out where it is beyond float64.")
     near: Position = Field(description="Its first vertex, rounded.")
 
 

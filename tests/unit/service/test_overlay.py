@@ -77,3 +77,15 @@ async def test_what_is_wrong_is_named(
 ) -> None:
     problem = check_problem(await ask(client, **change), 422, code)
     assert problem["errors"][0]["pointer"] == pointer
+
+
+async def test_lost_area_beyond_float64_is_left_out(client: httpx.AsyncClient) -> None:
+    scale = 2.0**1000
+    sliver = [[scale, scale], [2 * scale, scale], [2 * scale, (1 + 2.0**-52) * scale]]
+    around = [[1.25 * scale, 0], [1.5 * scale, 0], [1.5 * scale, 4 * scale], [1.25 * scale, 4 * scale]]
+    for output in ("valid", "nearest"):
+        answer = await ask(
+            client, subject=polygon(sliver), clip=polygon(around), operation="intersection", output=output
+        )
+        assert answer.status_code == 200, answer.text
+        assert answer.json()["collapsed"] == [{"kind": "piece", "near": [1.25 * scale, scale]}]
