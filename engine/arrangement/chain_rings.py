@@ -12,7 +12,7 @@ from engine.arrangement.chain_faces import find_label, join
 from engine.arrangement.chains import Chains, is_live, leaving_edge, origin
 from engine.arrangement.crossing_signs import Edges, orient, turn_of_edges
 from engine.arrangement.edge_contacts import POLL, root_of, unite
-from engine.arrangement.edge_tree import BENT, RUN
+from engine.arrangement.edge_tree import BENT, DOUBTFUL, RUN
 from engine.arrangement.ring_labels import RingLabels, verdict
 from engine.jit import inline, merged
 
@@ -21,7 +21,8 @@ MEETS: Final = 1
 
 class Rings(NamedTuple):
     """point: united points, ring after ring; meets: MEETS where rings meet, RUN where those up to the next point are
-    left out; offset: where each ring begins; region: a number of the region it bounds."""
+    left out, DOUBTFUL where an edge up to there has that mark; offset: where each ring begins; region: a number of the
+    region it bounds."""
 
     point: Any
     meets: Any
@@ -93,25 +94,37 @@ def _emit(
 ) -> int:  # fmt: skip
     """Write the ring of the half-chains ``path[first:last]``, straight points left out; return the number of points."""
     before, beyond = path[last - 1], 0
+    start, doubt = n_points, 0  # doubt: about what the ring begins with, which goes on from its last point
     for k in range(first, last):
         if k & POLL == 0 and stop[0]:
             return n_points
         half = path[k]
         chain = half >> 1
         node = origin(chains, half)
-        if fan[node] > 2 or turn_of_edges(edges, leaving_edge(chains, before ^ 1), leaving_edge(chains, half)) != 0:
-            rings.point[n_points], rings.meets[n_points] = nodes[node], MEETS * (fan[node] > 2)
+        edge = leaving_edge(chains, half)
+        if fan[node] > 2 or turn_of_edges(edges, leaving_edge(chains, before ^ 1), edge) != 0:
+            rings.point[n_points] = nodes[node]
+            rings.meets[n_points] = MEETS * (fan[node] > 2) | marks[edge] & DOUBTFUL
             n_points += 1
+        elif n_points > start:
+            rings.meets[n_points - 1] |= marks[edge] & DOUBTFUL
+        else:
+            doubt |= marks[edge] & DOUBTFUL
         if chains.first[chain] != chains.last[chain]:
             if half & 1:
                 v, end = chains.last[chain], chains.first[chain]
                 while v != end:  # bound: the vertices of the chain
                     if v & POLL == 0 and stop[0]:
                         return n_points
-                    if marks[v] & BENT or orient(edges, edges.before[v], v, edges.after[v]) != 0:
-                        rings.point[n_points], rings.meets[n_points] = v, marks[edges.before[v]] & RUN
+                    edge = edges.before[v]
+                    if marks[v] & BENT or orient(edges, edge, v, edges.after[v]) != 0:
+                        rings.point[n_points], rings.meets[n_points] = v, marks[edge] & (RUN | DOUBTFUL)
                         n_points += 1
-                    v = edges.before[v]
+                    elif n_points > start:
+                        rings.meets[n_points - 1] |= marks[edge] & DOUBTFUL
+                    else:
+                        doubt |= marks[edge] & DOUBTFUL
+                    v = edge
             else:
                 v, end = chains.first[chain], chains.last[chain]
                 while v != end:  # bound: the vertices of the chain
@@ -119,11 +132,16 @@ def _emit(
                     if v & POLL == 0 and stop[0]:
                         return n_points
                     if marks[v] & BENT or orient(edges, edges.before[v], v, edges.after[v]) != 0:
-                        rings.point[n_points], rings.meets[n_points] = v, marks[v] & RUN
+                        rings.point[n_points], rings.meets[n_points] = v, marks[v] & (RUN | DOUBTFUL)
                         n_points += 1
+                    elif n_points > start:
+                        rings.meets[n_points - 1] |= marks[v] & DOUBTFUL
+                    else:
+                        doubt |= marks[v] & DOUBTFUL
         if sources.shells.shape[0] > 0:
             beyond |= sources.gathered[root_of(regions, cycle[half ^ 1])]
         before = half
+    rings.meets[n_points - 1] |= doubt
     if sources.shells.shape[0] > 0:
         sources.beyond[n_rings] = beyond
     rings.region[n_rings] = region
@@ -139,7 +157,8 @@ def walk_rings(
 ) -> tuple[int, int]:  # fmt: skip
     """Write all boundary rings; return how many rings and points.
 
-    marks: of the edges, BENT where the boundary surely turns at the first vertex, RUN where one stands for many.
+    marks: of the edges, BENT where the boundary surely turns at the first vertex, RUN where one stands for many,
+    DOUBTFUL as clearance.py says.
     seen: (2 n_chains,) uint8; path: (2 n_chains,) and path_place: (n_nodes,) int64, scratch.
     """
     seen[: 2 * n_chains] = 0

@@ -10,7 +10,19 @@ stay what they are if, by a margin of some units,
 
 Then any two stretches between nodes are apart, or meet in a node and the far end of each is away from the other, on the
 whole way to their rounded places: no stretch touches, passes or folds onto another. This holds for all edges, so for
-those of any result; where it fails, ring_certificate.py looks at the rounded rings of the result alone.
+those of any result.
+
+For the stretches of two edges no more is needed than what is said of these two. So where it fails both get the mark
+DOUBTFUL, and ring_certificate.py looks at what is left of edges with that mark in the rounded rings of the result:
+
+- of two edges that are near each other, or whose contact floating point is not sure of, whatever it is, both;
+- of nodes near each other on an edge, or near an end of it, that edge and all that cross it in one of them;
+- of two edges in whose corner a node is near the other, both;
+- an edge shorter than the margin, the one before it, and the one after it: others of a run that heads for one quadrant
+  are not looked at pair by pair (edge_tree.py), and two of them are as far apart as each edge between them is long.
+
+A vertex on an edge is a node whose distance from others is sure: the edges that meet there are in doubt by their
+contact, and its reach is the slack of its parameter.
 
 Distances are computed in floating point. An orientation is off by 3 u in each length that it multiplies, so a distance
 from a line by less than 12 u; with the two vertices that move that makes 14 u. `CLEARANCE` is four times as much.
@@ -21,7 +33,8 @@ from __future__ import annotations
 from typing import Any, Final
 
 from engine.arrangement.crossing_signs import Edges
-from engine.arrangement.edge_contacts import POLL, Events
+from engine.arrangement.edge_contacts import POLL
+from engine.arrangement.edge_tree import DOUBTFUL
 from engine.arrangement.ring_certificate import segments_are_far
 from engine.jit import inline
 
@@ -51,28 +64,30 @@ def _corner_is_clear(edges: Edges, v: int, share_before: float, share_after: flo
 
 
 @inline
-def ends_are_clear(
-    edges: Edges, events: Events, n: int, starts: Any, order: Any, margin: float, stop: Any
-) -> bool:  # fmt: skip
-    """Tell whether the first and the last event of every edge are far enough from its ends, and from its neighbours."""
+def corners_are_clear(edges: Edges, n: int, starts: Any, keys: Any, margin: float, marks: Any, stop: Any) -> bool:
+    """Tell whether the first and the last event of every edge are far enough from the edge that begins or ends there.
+
+    starts, keys: by sort_events. Edges of corners where that is not so get the mark DOUBTFUL.
+    """
+    are_clear = True
     for e in range(n):
         if e & POLL == 0 and stop[0]:
             return False
         first, last = starts[e], starts[e + 1]
         if first == last:
             continue
-        low, high = order[first], order[last - 1]
-        if events.t[low] <= events.reach[low] or 1.0 - events.t[high] <= events.reach[high]:
-            return False
         before, after = edges.before[e], edges.after[e]
         share_before = share_after = 1.0
         if starts[before] < starts[before + 1]:
-            share_before = 1.0 - events.t[order[starts[before + 1] - 1]]
+            share_before = 1.0 - keys[starts[before + 1] - 1]
         if starts[after] < starts[after + 1]:
-            share_after = events.t[order[starts[after]]]
-        if not (
-            _corner_is_clear(edges, e, share_before, events.t[low], margin)
-            and _corner_is_clear(edges, after, 1.0 - events.t[high], share_after, margin)
-        ):
-            return False
-    return True
+            share_after = keys[starts[after]]
+        if not _corner_is_clear(edges, e, share_before, keys[first], margin):
+            are_clear = False
+            marks[before] |= DOUBTFUL
+            marks[e] |= DOUBTFUL
+        if not _corner_is_clear(edges, after, 1.0 - keys[last - 1], share_after, margin):
+            are_clear = False
+            marks[e] |= DOUBTFUL
+            marks[after] |= DOUBTFUL
+    return are_clear

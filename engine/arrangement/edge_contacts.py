@@ -28,7 +28,8 @@ UNSURE_SLACK: Final = 4.0
 class Events(NamedTuple):
     """Points inside edges. edge: the edge; point: its number; other: the edge that crosses there, -1 for a vertex;
     t, slack: parameter along the edge and bound of its error; reach: how far along the edge the other one is nearer
-    than the margin of clearance.py, and the slack. First, second: by crossing, its edges."""
+    than the margin of clearance.py, where that is not in doubt already, and the slack. First, second: by crossing, its
+    edges."""
 
     edge: Any
     point: Any
@@ -62,7 +63,7 @@ def unite(parent: Any, i: int, j: int) -> None:
 @merged
 def _add_event(events: Events, at: int, edge: int, point: int, other: int, t: float, slack: float) -> None:
     events.edge[at], events.point[at], events.other[at] = edge, point, other
-    events.t[at], events.slack[at], events.reach[at] = t, slack, UNSURE_SLACK
+    events.t[at], events.slack[at], events.reach[at] = t, slack, slack
 
 
 @inline

@@ -9,7 +9,7 @@ import numpy as np
 from engine.arrangement.clearance import edges_are_far
 from engine.arrangement.crossing_signs import Edges
 from engine.arrangement.edge_contacts import Events, enter_contact, unite
-from engine.arrangement.edge_tree import boxes_meet, next_pairs
+from engine.arrangement.edge_tree import DOUBTFUL, boxes_meet, encode_boxes, next_pairs
 from engine.jit import inline, merged
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
 
@@ -20,12 +20,13 @@ FEW: Final = 40
 @inline
 def find_contacts(
     edges: Edges, n: int, n_rings: int, margin: float, events: Events, parent: Any, marked: Any, rings: Any, boxes: Any,
-    marks: Any, tree: Any, tree_marks: Any, places: Any, stack: Any, pairs: Any, stop: Any,
+    marks: Any, tree: Any, tree_marks: Any, places: Any, lows: Any, highs: Any, stack: Any, pairs: Any, stop: Any,
 ) -> tuple[int, int, int, bool]:  # fmt: skip
     """Enter all contacts; return the numbers of events (-1: no room), crossings and pairs beyond the filter.
 
-    Returns also whether all edges that do not meet are further apart than ``margin``, and all contacts are crossings.
-    boxes: those of the edges, with the margin around them. rings: filled with the forest of rings that hang together.
+    Returns also whether all edges that do not meet are further apart than ``margin``, and all contacts are crossings;
+    the edges of pairs of which that does not hold get the mark DOUBTFUL. boxes: those of the edges, with the margin
+    around them. lows, highs: scratch for their codes. rings: filled with the forest of rings that hang together.
     """
     for i in range(n):
         parent[i] = i
@@ -38,11 +39,13 @@ def find_contacts(
     is_clear = True
     stack[0, 0], stack[0, 1], depth = 1, 1, 1
     is_small = n <= FEW
+    if not is_small:
+        encode_boxes(boxes, n, tree, places, lows, highs, stop)
     while depth > 0 and not stop[0]:  # bound: the walk through the tree
         if is_small:
             found, depth = _all_pairs(boxes, n, pairs), 0
         else:
-            found, depth = next_pairs(boxes, marks, n, tree, tree_marks, places, stack, depth, pairs)
+            found, depth = next_pairs(lows, highs, n, tree, tree_marks, places, stack, depth, pairs)
         for k in range(found):
             i, j = pairs[k, 0], pairs[k, 1]
             b, d = after[i], after[j]
@@ -50,6 +53,8 @@ def find_contacts(
             nearest = min(abs(turn_c), abs(turn_d))
             is_one_side = (turn_c > 0.0) == (turn_d > 0.0)
             if is_one_side and nearest > margin * length and nearest > bound:
+                continue
+            if not boxes_meet(boxes, i, boxes, j):
                 continue
             if n_events > room:
                 return -1, 0, 0, False
@@ -61,13 +66,15 @@ def find_contacts(
                 )
                 n_exact += 1
                 is_clear = is_clear and not marked[b if b == j else i]  # else they fold
+                _put_in_doubt(marks, i, j)
                 continue
             turn_a, turn_b, bound_ab, length_cd = turns(x, y, j, d, i, b)
             nearest_ab = min(abs(turn_a), abs(turn_b))
             is_one_side_ab = (turn_a > 0.0) == (turn_b > 0.0) and nearest_ab > bound_ab
             if is_one_side_ab or (is_one_side and nearest > bound):
-                if not (is_one_side_ab and nearest_ab > margin * length_cd):
-                    is_clear = is_clear and edges_are_far(edges, i, j, margin)
+                if not (is_one_side_ab and nearest_ab > margin * length_cd) and not edges_are_far(edges, i, j, margin):
+                    _put_in_doubt(marks, i, j)
+                    is_clear = False
                 continue
             if nearest > bound and nearest_ab > bound_ab:
                 unite(rings, edges.ring[i], edges.ring[j])
@@ -81,8 +88,15 @@ def find_contacts(
                 continue
             n_events, n_crossings = enter_contact(edges, events, n_events, n_crossings, n, parent, marked, rings, i, j)
             n_exact += 1
+            _put_in_doubt(marks, i, j)
             is_clear = False
     return n_events, n_crossings, n_exact, is_clear
+
+
+@merged
+def _put_in_doubt(marks: Any, e: int, f: int) -> None:
+    marks[e] |= DOUBTFUL
+    marks[f] |= DOUBTFUL
 
 
 @merged

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from engine.arrangement.crossing_signs import Edges, order_of_crossings, orient
 from engine.arrangement.edge_contacts import POLL, Events, unite
+from engine.arrangement.edge_tree import DOUBTFUL
 from engine.jit import called, inline
 
 _RUN: Final = 16
@@ -81,15 +82,43 @@ def _sort_by_key(keys: Any, order: Any, first: int, last: int, spare_keys: Any, 
         width *= 2
 
 
+@called
+def _mark_near(
+    edges: Edges, events: Events, e: int, order: Any, keys: Any, first: int, last: int, marks: Any
+) -> None:  # fmt: skip
+    """Put in doubt edge e, and those whose crossings with it are within reach of another event, or of an end of e.
+
+    Then also the edge that begins or ends there.
+    """
+    marks[e] |= DOUBTFUL
+    reached = 0.0
+    for k in range(first, last):
+        i = order[k]
+        if not keys[k] - events.reach[i] > reached and events.other[i] >= 0:
+            marks[events.other[i]] |= DOUBTFUL
+        reached = max(reached, keys[k] + events.reach[i])
+        if keys[k] <= events.reach[i]:
+            marks[edges.before[e]] |= DOUBTFUL
+        if 1.0 - keys[k] <= events.reach[i]:
+            marks[edges.after[e]] |= DOUBTFUL
+    reached = 1.0
+    for k in range(last - 1, first - 1, -1):
+        i = order[k]
+        if not keys[k] + events.reach[i] < reached and events.other[i] >= 0:
+            marks[events.other[i]] |= DOUBTFUL
+        reached = min(reached, keys[k] - events.reach[i])
+
+
 @inline
 def sort_events(
     edges: Edges, events: Events, n: int, n_events: int, parent: Any, starts: Any, order: Any, keys: Any,
-    spare_keys: Any, spare: Any, stop: Any,
+    spare_keys: Any, spare: Any, marks: Any, stop: Any,
 ) -> bool:  # fmt: skip
     """Fill ``starts``, (n + 1,), and ``order``: events ``order[starts[e]:starts[e + 1]]`` lie along edge e.
 
     Unites events at one point in ``parent``. Returns whether the events of every edge are further apart than their
-    reaches. keys, spare_keys: float64, spare: int64, scratch by event.
+    reaches, and each is further from the ends than its own; other edges, and those that cross there, get the mark
+    DOUBTFUL. keys: float64 by event, filled with the parameters in that order; spare_keys, spare: scratch.
     """
     starts[: n + 1] = 0
     for i in range(n_events):
@@ -111,23 +140,28 @@ def sort_events(
     are_clear = True
     for e in range(n):
         first, last = starts[e], starts[e + 1]
-        if last - first < 2:
+        if last == first:
             continue
         if stop[0]:
             return False
-        _sort_by_key(keys, order, first, last, spare_keys, spare)
+        if last - first > 1:
+            _sort_by_key(keys, order, first, last, spare_keys, spare)
         is_sorted = True
         slack, reach = events.slack[order[first]], events.reach[order[first]]
+        is_clear = keys[first] > reach
         for k in range(first + 1, last):
             slack_before, slack = slack, events.slack[order[k]]
             reach_before, reach = reach, events.reach[order[k]]
             gap = keys[k] - keys[k - 1]
             is_sorted &= gap > slack + slack_before
-            are_clear &= gap > reach + reach_before
+            is_clear &= gap > reach + reach_before
+        if not (is_clear and 1.0 - keys[last - 1] > reach):
+            _mark_near(edges, events, e, order, keys, first, last, marks)
+            are_clear = False
         if is_sorted:
             continue
         for k in range(first + 1, last):
-            moving = order[k]
+            moving, key = order[k], keys[k]
             at = k
             while at > first:  # bound: the part sorted so far
                 side = compare_events(edges, events, e, order[at - 1], moving)
@@ -135,7 +169,7 @@ def sort_events(
                     unite(parent, events.point[order[at - 1]], events.point[moving])
                 if side <= 0:
                     break
-                order[at] = order[at - 1]
+                order[at], keys[at] = order[at - 1], keys[at - 1]
                 at -= 1
-            order[at] = moving
+            order[at], keys[at] = moving, key
     return are_clear

@@ -3,9 +3,13 @@
 Consecutive edges of a ring lie near each other: four make a leaf, node i has the children 2 i and 2 i + 1, and the
 boxes of a level are found from the one below. Only where one edge lies far from the next (many small rings) are they
 first put in the order of a space-filling curve. The tree is walked against itself. Each box is
-``(x_min, x_max, y_min, y_max)``; a pair counts only where one of its two boxes is WANTED.
+``(x_min, x_max, y_min, y_max)``.
 
-A mark is a sum of bits: WANTED, and the quadrants' sides that the edge heads for. Edges one after another that all head
+Boxes of leaves are looked at in codes: four whole numbers in one, so that one subtraction compares all four sides of
+two boxes. Each coordinate is the number of its strip, of some 16,000 across the whole. Boxes that meet have codes that
+do, since a coordinate that is no larger has no later strip; those of boxes that do not may meet as well.
+
+A mark is a sum of bits: among them the quadrants' sides that the edge heads for. Edges one after another that all head
 for one quadrant meet nowhere but in the vertices they share, so such a node is not walked against itself, nor two that
 follow each other and are one such run together.
 
@@ -32,14 +36,19 @@ _MANY: Final = 1024
 _DIGITS: Final = 2048
 _STEPS: Final = 1 << 16
 """Steps of the walk at once, about a millisecond."""
-WANTED: Final = 1
-"""A pair counts where one of its marks has this bit."""
 ANYWHERE: Final = 2 + 4 + 8 + 16
 """Mark of an edge that ends a run: heading right, left, up and down at once."""
 BENT: Final = 32
 """Mark of an edge at whose first vertex the ring surely turns."""
 RUN: Final = 64
 """Mark of an edge that stands for many, which meet nothing; see overlay_reducing.py."""
+DOUBTFUL: Final = 128
+"""Mark of an edge that something is so near to that rounding may change how they lie; see clearance.py."""
+_BITS: Final = 15
+"""Of a side in a code, the highest for a borrow."""
+_LAST: Final = (1 << (_BITS - 1)) - 1
+"""The largest number of a side; no strip has it, so that of a box that meets nothing it can be."""
+_BORROWS: Final = sum(1 << (_BITS * side + _BITS - 1) for side in range(4))
 DEEPEST: Final = 256
 """Places on the stack: a walk through 60 levels holds at most three pairs a level."""
 
@@ -174,11 +183,38 @@ def push_children(tree: Any, node: int, stack: Any, depth: int) -> int:
 
 
 @inline
+def encode_boxes(boxes: Any, n: int, tree: Any, places: Any, lows: Any, highs: Any, stop: Any) -> None:
+    """Fill the codes of the first n boxes, in the order of the leaves; those with y_max < y_min meet none.
+
+    lows, highs: (n,) int64, what must not be above the other box's, and what must not be below. Caller guarantees that
+    ``tree`` holds the boxes.
+    """
+    x_min, y_min = tree[1, 0], tree[1, 2]
+    wide, high = tree[1, 1] - x_min, tree[1, 3] - y_min
+    by_x, by_y = (_LAST - 1) / wide if wide > 0.0 else 0.0, (_LAST - 1) / high if high > 0.0 else 0.0
+    for place in range(n):
+        if place & POLL == 0 and stop[0]:
+            return
+        k = places[place]
+        if boxes[k, 3] < boxes[k, 2]:
+            lows[place], highs[place] = _BORROWS - (_BORROWS >> (_BITS - 1)), _BORROWS
+            continue
+        left, right = int((boxes[k, 0] - x_min) * by_x), int((boxes[k, 1] - x_min) * by_x)
+        lower, upper = int((boxes[k, 2] - y_min) * by_y), int((boxes[k, 3] - y_min) * by_y)
+        lows[place] = _code(left, _LAST - right, lower, _LAST - upper)
+        highs[place] = _code(right, _LAST - left, upper, _LAST - lower) | _BORROWS
+
+
+@merged
+def _code(a: int, b: int, c: int, d: int) -> int:
+    return a | b << _BITS | c << 2 * _BITS | d << 3 * _BITS
+
+
+@inline
 def next_pairs(
-    boxes: Any, marks: Any, n: int, tree: Any, tree_marks: Any, places: Any, stack: Any, depth: int,
-    pairs: Any,
-) -> tuple[int, int]:  # fmt: skip
-    """Go on with the walk: write pairs of boxes that meet, each once; return how many, and the depth of the stack.
+    lows: Any, highs: Any, n: int, tree: Any, tree_marks: Any, places: Any, stack: Any, depth: int, pairs: Any
+) -> tuple[int, int]:
+    """Go on with the walk: write pairs whose codes meet, each once; return how many, and the depth of the stack.
 
     stack: (DEEPEST, 2) int64; the walk begins with the pair (1, 1) on it and depth 1, and is over at depth 0.
     pairs: (PORTION, 2) int64.
@@ -193,17 +229,13 @@ def next_pairs(
         if i < n_leaves:
             for a in range(2 * i, 2 * i + 2):
                 for b in range(2 * j if i != j else a, 2 * j + 2):
-                    if ((tree_marks[a] | tree_marks[b]) & WANTED) and boxes_meet(tree, a, tree, b):
-                        stack[depth, 0], stack[depth, 1] = a, b
-                        depth += 1
+                    stack[depth, 0], stack[depth, 1] = a, b
+                    depth += boxes_meet(tree, np.uint64(a), tree, np.uint64(b))
             continue
         first, second = LEAF * (i - n_leaves), LEAF * (j - n_leaves)
         for p in range(first, min(first + LEAF, n)):
-            e = np.uint64(places[p])  # unsigned: no look at whether it counts from the end
-            mark = marks[e]
+            e, low = places[np.uint64(p)], lows[np.uint64(p)]  # unsigned: no look at whether it counts from the end
             for q in range(p + 1 if i == j else second, min(second + LEAF, n)):
-                f = np.uint64(places[q])
-                pairs[found, 0], pairs[found, 1] = e, f
-                if ((mark | marks[f]) & WANTED) & boxes_meet(boxes, e, boxes, f):
-                    found += 1
+                pairs[found, 0], pairs[found, 1] = e, places[np.uint64(q)]
+                found += (highs[np.uint64(q)] - low) & _BORROWS == _BORROWS
     return found, depth

@@ -3,7 +3,8 @@
 Every vertex moves by less than the unit u of the largest coordinate, on a straight way. Two edges that have no vertex
 in common cannot touch on that way if they end more than 2 u apart; nor can two edges fold that have one in common, if
 the far end of each ends more than 2 u away from the other. If that holds for every pair with a vertex that moves, the
-rings after rounding are the exact ones deformed without a touch: valid, with the same pieces, holes and turns.
+rings after rounding are the exact ones deformed without a touch: valid, with the same pieces, holes and turns. Where
+clearance.py has no doubt about the edges that two of them are parts of, it does.
 
 Distances are computed in floating point. Differences are off by u each, so the distance from a line by less than 12 u
 more: `MARGIN` = 16 holds both. A pair that fails proves nothing; the caller then arranges the rounded rings anew.
@@ -13,11 +14,9 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-import numpy as np
-
-from engine.arrangement.chain_rings import Rings
+from engine.arrangement.chain_rings import MEETS, Rings
 from engine.arrangement.edge_contacts import POLL
-from engine.arrangement.edge_tree import ANYWHERE, RUN, WANTED, boxes_meet, build_tree, next_pairs
+from engine.arrangement.edge_tree import ANYWHERE, DOUBTFUL, RUN, boxes_meet, build_tree, encode_boxes, next_pairs
 from engine.jit import inline, merged
 from engine.predicates.orientation import orient2d
 from engine.types import Point2
@@ -99,7 +98,7 @@ def has_straight_point(rings: Rings, n_rings: int, x: Any, y: Any, moved: Any, s
         for k in range(first, last):
             if k & POLL == 0 and stop[0]:
                 return True
-            if (moved[i] | moved[j] | moved[k]) and not rings.meets[j]:
+            if (moved[i] | moved[j] | moved[k]) and not rings.meets[j] & (MEETS | RUN):
                 if orient2d(Point2(x[i], y[i]), Point2(x[j], y[j]), Point2(x[k], y[k])) == 0:
                     return True
             i, j = j, k
@@ -108,52 +107,60 @@ def has_straight_point(rings: Rings, n_rings: int, x: Any, y: Any, moved: Any, s
 
 @inline
 def certify(
-    rings: Rings, n_rings: int, n: int, x: Any, y: Any, moved: Any, boxes: Any, marks: Any,
-    after: Any, tree: Any, tree_marks: Any, places: Any, stack: Any, pairs: Any, stop: Any,
+    rings: Rings, n_rings: int, n: int, x: Any, y: Any, moved: Any, boxes: Any, marks: Any, tails: Any, heads: Any,
+    tree: Any, tree_marks: Any, places: Any, lows: Any, highs: Any, stack: Any, pairs: Any, stop: Any,
 ) -> bool:  # fmt: skip
     """Tell whether the rings are certainly valid after rounding, no edges near each other that do not meet.
 
-    x, y: (n,) rounded points of ``rings``; moved: (n,) uint8. The rest is scratch for n boxes.
+    x, y: (n,) rounded points of ``rings``; moved: (n,) uint8. The rest is scratch for n boxes. Only edges with the mark
+    DOUBTFUL are looked at: clearance.py vouches for pairs of which one has not. What is left out (RUN) is away from all
+    that moves.
     """
     largest = 0.0
     for k in range(n):
         largest = max(largest, abs(x[k]), abs(y[k]))
     margin = MARGIN * largest
     square = margin * margin
+    n_edges = 0
     for ring in range(n_rings):
         first, last = rings.offset[ring], rings.offset[ring + 1]
-        before = last - 1
         for k in range(first, last):
-            after[before] = k
-            before = k
-    for k in range(n):
-        if k & POLL == 0 and stop[0]:
-            return False
-        j = after[k]
-        marks[k] = ANYWHERE | WANTED * (moved[k] | moved[j])
-        boxes[k, 0], boxes[k, 1] = min(x[k], x[j]) - margin, max(x[k], x[j]) + margin
-        boxes[k, 2], boxes[k, 3] = min(y[k], y[j]) - margin, max(y[k], y[j]) + margin
-        if rings.meets[k] & RUN:  # what is left out is away from all that moves: a box that meets none
-            boxes[k, 3] = -np.inf
+            if k & POLL == 0 and stop[0]:
+                return False
+            if rings.meets[k] & (DOUBTFUL | RUN) != DOUBTFUL:
+                continue
+            j = k + 1 if k + 1 < last else first
+            tails[n_edges], heads[n_edges], marks[n_edges] = k, j, ANYWHERE
+            boxes[n_edges, 0], boxes[n_edges, 1] = min(x[k], x[j]) - margin, max(x[k], x[j]) + margin
+            boxes[n_edges, 2], boxes[n_edges, 3] = min(y[k], y[j]) - margin, max(y[k], y[j]) + margin
+            n_edges += 1
     points = rings.point
-    if n <= _FEW:
-        for i in range(n):
-            for j in range(i + 1, n):
+    if n_edges <= _FEW:
+        for i in range(n_edges):
+            a, b = tails[i], heads[i]
+            for j in range(i + 1, n_edges):
+                c, d = tails[j], heads[j]
                 if (
-                    ((marks[i] | marks[j]) & WANTED)
+                    (moved[a] | moved[b] | moved[c] | moved[d])
                     and boxes_meet(boxes, i, boxes, j)
-                    and not _is_apart(points, x, y, i, after[i], j, after[j], square)
+                    and not _is_apart(points, x, y, a, b, c, d, square)
                 ):
                     return False
         return True
-    build_tree(boxes, marks, n, tree, tree_marks, places, stop)
+    build_tree(boxes, marks, n_edges, tree, tree_marks, places, stop)
+    encode_boxes(boxes, n_edges, tree, places, lows, highs, stop)
     stack[0, 0], stack[0, 1], depth = 1, 1, 1
     while depth > 0:  # bound: the walk through the tree
         if stop[0]:
             return False
-        found, depth = next_pairs(boxes, marks, n, tree, tree_marks, places, stack, depth, pairs)
+        found, depth = next_pairs(lows, highs, n_edges, tree, tree_marks, places, stack, depth, pairs)
         for k in range(found):
             i, j = pairs[k, 0], pairs[k, 1]
-            if not _is_apart(points, x, y, i, after[i], j, after[j], square):
+            a, b, c, d = tails[i], heads[i], tails[j], heads[j]
+            if (
+                (moved[a] | moved[b] | moved[c] | moved[d])
+                and boxes_meet(boxes, i, boxes, j)
+                and not _is_apart(points, x, y, a, b, c, d, square)
+            ):
                 return False
     return True

@@ -28,7 +28,7 @@ import numpy as np
 from engine.arrangement.chain_faces import NOTHING, edge_above, half_below, join, number_cycles
 from engine.arrangement.chain_rings import choose_boundary, walk_rings
 from engine.arrangement.chains import Chains, build_chains, build_stars
-from engine.arrangement.clearance import CLEARANCE, ends_are_clear
+from engine.arrangement.clearance import CLEARANCE, corners_are_clear
 from engine.arrangement.crossing_signs import Edges
 from engine.arrangement.edge_contacts import OFTEN, POLL, Events, root_of, unite
 from engine.arrangement.edge_crossings import FEW, find_contacts
@@ -41,7 +41,7 @@ from engine.arrangement.rounded_crossings import LOST, round_crossing
 from engine.clipping.cut_point import LARGEST
 from engine.clipping.overlay_convex import UNSETTLED, Passages, intersect_convex
 from engine.clipping.overlay_expanding import LEFT_OUT, count_left_out
-from engine.clipping.overlay_loading import box_of, fill_boxes, load_rings, magnitude, mark_runs
+from engine.clipping.overlay_loading import box_of, fill_boxes, load_rings, magnitude, mark_runs, mark_short
 from engine.clipping.overlay_workspace import Buffers, Workspace, rows_of
 from engine.jit import bare_kernel, inline
 
@@ -239,11 +239,13 @@ def overlay_pairs(
         margin = CLEARANCE * largest
         is_clear = fill_boxes(edges, n, margin, w.boxes, w.marks, stop) > margin
         mark_runs(edges, w.places, n_runs, w.boxes, w.marks)
+        if not is_clear:
+            mark_short(edges, n, margin, w.marks)
         if n > FEW:
             build_tree(w.boxes, w.marks, n, w.tree, w.tree_marks, w.places, stop)
         n_events, n_crossings, n_exact, are_far = find_contacts(
             edges, n, n_rings, margin, events, w.points, w.marked, w.rings, w.boxes, w.marks, w.tree, w.tree_marks,
-            w.places, w.stack, w.pairs, stop,
+            w.places, w.lows, w.highs, w.stack, w.pairs, stop,
         )  # fmt: skip
         if stop[0]:
             break
@@ -257,13 +259,12 @@ def overlay_pairs(
             return at, NEEDS_CONTACTS, n_out, n_out_rings, n_out_pieces, room, 0
         used = max(used, most)
         are_clear = sort_events(
-            edges, events, n, n_events, w.points, w.starts, w.order, w.crossing_x, w.crossing_y, w.nodes, stop
+            edges, events, n, n_events, w.points, w.starts, w.order, w.crossing_x, w.crossing_y, w.nodes, w.marks, stop
         )
         if stop[0]:
             break
-        is_clear = (
-            is_clear and are_far and are_clear and ends_are_clear(edges, events, n, w.starts, w.order, margin, stop)
-        )
+        corners_clear = corners_are_clear(edges, n, w.starts, w.crossing_x, margin, w.marks, stop)
+        is_clear = is_clear and are_far and are_clear and corners_clear
         w.node_of[: n + n_crossings] = -1
         n_nodes, n_chains = build_chains(
             edges, events, w.points, w.marked, w.starts, w.order, w.tops, w.masks, n_rings, w.node_of, w.nodes, chains,
@@ -307,8 +308,8 @@ def overlay_pairs(
             is_valid = not has_straight_point(found, n_found, w.x, w.y, w.moved, stop) and (
                 is_clear
                 or certify(
-                    found, n_found, m, w.x, w.y, w.moved, w.boxes, w.marks, w.chain_at, w.tree, w.tree_marks,
-                    w.places, w.stack, w.pairs, stop,
+                    found, n_found, m, w.x, w.y, w.moved, w.boxes, w.marks, w.chain_at, w.node_of, w.tree, w.tree_marks,
+                    w.places, w.lows, w.highs, w.stack, w.pairs, stop,
                 )
             )  # fmt: skip
         n_pieces = rank_rings(found, n_found, w.x, w.y, w.ranking, is_valid, w.label, w.boxes, stop)

@@ -12,7 +12,7 @@ import numpy as np
 
 from engine.arrangement.crossing_signs import Edges
 from engine.arrangement.edge_contacts import POLL
-from engine.arrangement.edge_tree import ANYWHERE, BENT, RUN, WANTED, heading
+from engine.arrangement.edge_tree import ANYWHERE, BENT, DOUBTFUL, RUN, heading
 from engine.clipping.cut_point import SMALLEST
 from engine.jit import inline
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
@@ -114,7 +114,7 @@ def fill_boxes(edges: Edges, n: int, margin: float, boxes: Any, marks: Any, stop
             boxes[i, 2], boxes[i, 3] = min(py, qy) - margin, max(py, qy) + margin
             left, right = vx * uy, vy * ux
             is_bent = abs(left - right) > BOUND_2D * (abs(left) + abs(right)) + GUARD_2D  # see turn_of_edges
-            marks[i] = WANTED | BENT * is_bent | (heading(ux, uy) if i < last else ANYWHERE)
+            marks[i] = BENT * is_bent | (heading(ux, uy) if i < last else ANYWHERE)
             shortest = min(shortest, max(abs(ux), abs(uy)))
             vx, vy = ux, uy
         first = last + 1
@@ -129,3 +129,15 @@ def mark_runs(edges: Edges, runs: Any, n_runs: int, boxes: Any, marks: Any) -> N
         marks[e] = ANYWHERE | BENT | RUN
         marks[edges.after[e]] |= BENT
         boxes[e, 3] = -np.inf
+
+
+@inline
+def mark_short(edges: Edges, n: int, margin: float, marks: Any) -> None:
+    """Put in doubt edges no longer than ``margin``, their length as `fill_boxes` has it, and those next to them."""
+    x, y = edges.x, edges.y
+    for e in range(n):
+        after = edges.after[e]
+        if max(abs(x[after] - x[e]), abs(y[after] - y[e])) <= margin:
+            marks[edges.before[e]] |= DOUBTFUL
+            marks[e] |= DOUBTFUL
+            marks[after] |= DOUBTFUL

@@ -66,6 +66,8 @@ class Workspace(NamedTuple):
     tree: Any
     tree_marks: Any
     places: Any
+    lows: Any
+    highs: Any
     stack: Any
     pairs: Any
     points: Any
@@ -170,7 +172,7 @@ def buffers_for(n_vertices: int, n_rings: int, n_contacts: int) -> Buffers:
         half_integers=np.empty((8, 2 * k + 1), np.int64),
         half_octets=np.empty((4, 2 * k + 1), np.uint8),
         point_floats=np.empty((2, m)),
-        point_integers=np.empty((5, m), np.int64),
+        point_integers=np.empty((7, m), np.int64),
         point_octets=np.empty((4, m), np.uint8),
         boxes=np.empty((m, 4)),
         tree=np.empty((2 * n_leaves, 4)),
@@ -195,7 +197,7 @@ def rows_of(buffers: Buffers) -> Workspace:
     return Workspace(
         edges, v[3], p[1], v[4], pb[1],
         r[0], r[1], r[2], r[3],
-        buffers.boxes, pb[2], buffers.tree, buffers.tree_marks, p[2], buffers.stack, buffers.pairs,
+        buffers.boxes, pb[2], buffers.tree, buffers.tree_marks, p[2], p[5], p[6], buffers.stack, buffers.pairs,
         p[3], p[4], events, c[13], c[14], chains, c[12], c[15], c[16],
         h[0], h[1], h[2], h[3], h[4], h[5], h[6], hb[1], hb[2], hb[3],
         c[17], h[7], c[18], found, cx[3], cx[4], cx[1], px[0], px[1], pb[3], ranking,
