@@ -57,6 +57,8 @@ def settle_pairs(first: Found, budget: Budget) -> SettledPairs:
         if len(few) < len(pairs):
             pairs, displacement, has_crossings = pairs[few], displacement[few], has_crossings[few]
             rings = taken(rings, few)
+            if not len(few):
+                break
         rings = _arranged_again(rings, budget)
         moved = rings.displacement
         displacement = np.where(moved > 0.0, np.nextafter(displacement + moved, np.inf), displacement)

@@ -47,12 +47,17 @@ def test_compiled_rounds_equal_those_in_integers(family: Any) -> None:
         assert told["changed"] > 0
 
 
-def test_more_rings_than_a_label_has_bits() -> None:
-    """Two versions of a border an ulp apart: slivers by the hundred, as pieces or as holes, share bits."""
+def border_in_two_versions() -> tuple[np.ndarray, np.ndarray]:
+    """Two versions of a border an ulp apart: slivers by the hundred between them."""
     random = np.random.default_rng(4)
     angles = np.linspace(0, 2 * np.pi, 400, endpoint=False)
     border = np.stack([100 + np.cos(angles), 50 + np.sin(angles)], axis=1)
-    version = border + random.choice([-1, 0, 1], border.shape) * np.spacing(border)
+    return border, border + random.choice([-1, 0, 1], border.shape) * np.spacing(border)
+
+
+def test_more_rings_than_a_label_has_bits() -> None:
+    """Slivers by the hundred, as pieces or as holes, share bits."""
+    border, version = border_in_two_versions()
     frame = np.array([[90.0, 40], [110, 40], [110, 60], [90, 60]])
     for subject, clip in (([border], [version]), ([frame, border], [version]), ([frame, border], [frame, version])):
         for operation in ("union", "difference", "symmetric_difference"):
@@ -60,6 +65,14 @@ def test_more_rings_than_a_label_has_bits() -> None:
     found = overlay_compiled(arrays([border]), arrays([version]), "symmetric_difference", "valid", Budget())
     assert found is not None
     assert found[0].n_pieces_exact > MOST_BITS
+
+
+def test_more_rings_than_a_label_has_bits_in_a_batch() -> None:
+    """None of the pairs can be arranged again together with others."""
+    border, version = map(Polygon, ([each] for each in border_in_two_versions()))
+    (found,) = overlay_batch([border], [version], "symmetric_difference")
+    assert found is not None
+    assert found.vertices.tolist() == overlay(border, version, "symmetric_difference").vertices.tolist()
 
 
 def test_rounds_that_do_not_end_are_snapped(monkeypatch: pytest.MonkeyPatch) -> None:
