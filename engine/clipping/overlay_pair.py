@@ -16,7 +16,7 @@ from engine.clipping.implicit_rings import RingArrays
 from engine.clipping.overlay_expanding import expand_rings
 from engine.clipping.overlay_kernel import DONE, FINISHED, NEEDS_CONTACTS, overlay_pairs
 from engine.clipping.overlay_reducing import reduce_pair
-from engine.clipping.overlay_workspace import keep, more_contacts, scratch_for
+from engine.clipping.overlay_workspace import Scratch, keep, more_contacts, scratch_for
 from engine.parallel import Budget
 
 NOT_REDUCED: Final = 0, 0, 0, 0.0
@@ -69,30 +69,12 @@ def run_pair(subject: RingArrays, clip: RingArrays, kept: npt.NDArray[np.uint8],
 
 def run_whole(subject: RingArrays, clip: RingArrays, kept: npt.NDArray[np.uint8], budget: Budget) -> FoundPair:
     """Overlay two polygons edge by edge. Raises as `Budget.check` when the call must end."""
-    n_subject_rings, n_clip_rings = len(subject.offsets) - 1, len(clip.offsets) - 1
-    n_vertices, n_rings = len(subject.vertices) + len(clip.vertices), n_subject_rings + n_clip_rings
+    n_vertices, n_rings = len(subject.vertices) + len(clip.vertices), len(subject.offsets) + len(clip.offsets) - 2
     n_contacts, n_out, n_out_rings = max(256, 4 * n_vertices), 8 + n_vertices, 2
     while True:  # bound: each turn makes room, geometrically
         scratch = scratch_for(n_vertices, n_rings, n_contacts, n_out, n_out_rings)
         status, counts, displacement, vertices, sources, rings, pieces, _ = scratch.output_of_one
-        _, needs, n, n_found, n_pieces, used, _ = _entry(_overlay_pairs)(
-            subject.vertices,
-            subject.offsets,
-            _one_polygon(n_subject_rings),
-            clip.vertices,
-            clip.offsets,
-            _one_polygon(n_clip_rings),
-            0,
-            1,
-            0,
-            *NOT_REDUCED,
-            kept,
-            _NONE,
-            _NONE,
-            budget.flag,
-            scratch.buffers,
-            *scratch.output_of_one,
-        )
+        _, needs, n, n_found, n_pieces, used, _ = _run(subject, clip, NOT_REDUCED, kept, budget, scratch)
         budget.check()
         if needs == FINISHED:
             break
@@ -122,8 +104,7 @@ def run_reduced(
     None where more edges are near others, or where the pair is not DONE: rounded rings that nothing vouches for are to
     be arranged again, with all their vertices. Raises as `Budget.check` when the call must end.
     """
-    n_subject_rings, n_clip_rings = len(subject.offsets) - 1, len(clip.offsets) - 1
-    n_vertices, n_rings = len(subject.vertices) + len(clip.vertices), n_subject_rings + n_clip_rings
+    n_vertices, n_rings = len(subject.vertices) + len(clip.vertices), len(subject.offsets) + len(clip.offsets) - 2
     n_contacts, n_out, n_out_rings = _FEW_CONTACTS, 0, 0
     while True:  # bound: each turn makes room, geometrically
         scratch = scratch_for(n_vertices, n_rings, n_contacts, n_out, n_out_rings)
@@ -133,24 +114,7 @@ def run_reduced(
             budget.check()
             keep(scratch, n_vertices // 4, 0, 0)
             return None
-        _, needs, n, n_found, n_pieces, used, n_left_out = _entry(_overlay_pairs)(
-            subject.vertices,
-            subject.offsets,
-            _one_polygon(n_subject_rings),
-            clip.vertices,
-            clip.offsets,
-            _one_polygon(n_clip_rings),
-            0,
-            1,
-            0,
-            *reduced,
-            kept,
-            _NONE,
-            _NONE,
-            budget.flag,
-            scratch.buffers,
-            *scratch.output_of_one,
-        )
+        _, needs, n, n_found, n_pieces, used, n_left_out = _run(subject, clip, reduced, kept, budget, scratch)
         budget.check()
         if needs == FINISHED:
             break
@@ -171,6 +135,31 @@ def run_reduced(
         made = FoundPair(DONE, counts.item(3), displacement.item(0), *found, piece_offsets)
     keep(scratch, reduced[0] + n_vertices // 4, used, n)
     return made
+
+
+def _run(
+    subject: RingArrays, clip: RingArrays, reduced: Any, kept: npt.NDArray[np.uint8], budget: Budget, scratch: Scratch
+) -> tuple[int, ...]:
+    """Run overlay_pairs on one pair, and return what it does."""
+    found: tuple[int, ...] = _entry(_overlay_pairs)(
+        subject.vertices,
+        subject.offsets,
+        _one_polygon(len(subject.offsets) - 1),
+        clip.vertices,
+        clip.offsets,
+        _one_polygon(len(clip.offsets) - 1),
+        0,
+        1,
+        0,
+        *reduced,
+        kept,
+        _NONE,
+        _NONE,
+        budget.flag,
+        scratch.buffers,
+        *scratch.output_of_one,
+    )
+    return found
 
 
 def _copied(array: npt.NDArray[Any], n: int) -> npt.NDArray[Any]:
