@@ -11,9 +11,10 @@ Rounding arrangements dynamically, 1998.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Sequence
 from fractions import Fraction
-from math import floor, ldexp
+from math import floor, lcm, ldexp
 
 import numpy as np
 
@@ -22,29 +23,48 @@ from engine.parallel import Budget
 Point = tuple[Fraction, Fraction]
 Pixel = tuple[int, int]
 
+Axis = tuple[int, int, int]
+"""Ends of a segment along an axis, and half of the lattice's spacing, as integers in a unit of their own."""
+
 _HALF = Fraction(1, 2)
+_FEW = 16
+"""Pixels up to which each is looked at instead of an array of them."""
 
 
-def _passage(start: Point, end: Point, pixel: Pixel) -> tuple[Fraction, Fraction] | None:
-    """Return the parameters between which the segment is in the half-open pixel, None where it is not."""
-    low, high = Fraction(0), Fraction(1)
-    low_open = high_open = False
-    for a, b, centre in zip(start, end, pixel):
-        near, far = centre - _HALF, centre + _HALF  # near <= value < far
+def _axis(start: Fraction, end: Fraction) -> Axis:
+    half = lcm(start.denominator, end.denominator)
+    return (
+        2 * start.numerator * (half // start.denominator),
+        2 * end.numerator * (half // end.denominator),
+        half,
+    )
+
+
+def _passage(axes: Sequence[Axis], pixel: Pixel) -> tuple[int, int, int, int] | None:
+    """Return the parameters between which the segment is in the half-open pixel, None where it is not.
+
+    Both are numerator and denominator, the latter positive.
+    """
+    low = low_open = high_open = 0
+    low_of = high = high_of = 1
+    for (a, b, half), centre in zip(axes, pixel):
+        near, far = (2 * centre - 1) * half, (2 * centre + 1) * half  # near <= value < far
         if a == b:
             if not near <= a < far:
                 return None
             continue
-        enters, leaves = (near - a) / (b - a), (far - a) / (b - a)
-        enters_open, leaves_open = False, True
-        if b < a:
-            enters, leaves, enters_open, leaves_open = leaves, enters, True, False
-        if enters > low or (enters == low and enters_open):
-            low, low_open = enters, enters_open
-        if leaves < high or (leaves == high and leaves_open):
-            high, high_open = leaves, leaves_open
-    if low < high or (low == high and not low_open and not high_open):
-        return low, high
+        if a < b:
+            enters, leaves, length, is_back = near - a, far - a, b - a, 0
+        else:
+            enters, leaves, length, is_back = a - far, a - near, a - b, 1
+        later, earlier = enters * low_of - low * length, high * length - leaves * high_of
+        if later > 0 or (later == 0 and is_back):
+            low, low_of, low_open = enters, length, is_back
+        if earlier > 0 or (earlier == 0 and not is_back):
+            high, high_of, high_open = leaves, length, 1 - is_back
+    order = high * low_of - low * high_of
+    if order > 0 or (order == 0 and not low_open and not high_open):
+        return low, low_of, high, high_of
     return None
 
 
@@ -59,19 +79,22 @@ def snap_rings(
     budget = budget or Budget()
     unit = Fraction(2) ** spacing_exponent
     scaled = [[(x / unit, y / unit) for x, y in ring] for ring in rings]
-    hot = sorted({(floor(x + _HALF), floor(y + _HALF)) for ring in scaled for x, y in ring})
+    pixels = [[(floor(x + _HALF), floor(y + _HALF)) for x, y in ring] for ring in scaled]
+    hot = sorted({pixel for ring in pixels for pixel in ring})
     centres = np.array(hot, np.float64).reshape(-1, 2)
     result = []
-    for ring in scaled:
+    for ring, own in zip(scaled, pixels):
         chain: list[Pixel] = []
-        for start, end in zip(ring, [*ring[1:], *ring[:1]]):
+        for start, end, first, last in zip(ring, [*ring[1:], *ring[:1]], own, [*own[1:], *own[:1]]):
             budget.check()
+            axes = _axis(start[0], end[0]), _axis(start[1], end[1])
             passed = []
-            for number in _candidates(centres, start, end):
-                through = _passage(start, end, hot[number])
+            for number in _candidates(hot, centres, start, end):
+                pixel = hot[number]
+                through = None if pixel in (first, last) else _passage(axes, pixel)
                 if through is not None:
-                    passed.append((*through, hot[number]))
-            for *_, pixel in sorted(passed):
+                    passed.append((Fraction(*through[:2]), Fraction(*through[2:]), pixel))
+            for pixel in (first, *(pixel for *_, pixel in sorted(passed)), last):
                 if not chain or chain[-1] != pixel:
                     chain.append(pixel)
         while len(chain) > 1 and chain[0] == chain[-1]:
@@ -80,14 +103,22 @@ def snap_rings(
     return result
 
 
-def _candidates(centres: np.ndarray, start: Point, end: Point) -> list[int]:
-    """Return the pixels that the segment may pass: those near its box and near its line, generously."""
+def _candidates(hot: Sequence[Pixel], centres: np.ndarray, start: Point, end: Point) -> list[int]:
+    """Return the pixels that the segment may pass: those near its box, and of many those near its line, generously.
+
+    hot: sorted; centres: the same as floats.
+    """
+    (x0, x1), (y0, y1) = (sorted((floor(a), floor(b))) for a, b in zip(start, end))
+    first, last = bisect_left(hot, (x0 - 1, y0 - 1)), bisect_left(hot, (x1 + 2, y1 + 3))
+    if last - first <= _FEW:
+        return [number for number in range(first, last) if y0 - 1 <= hot[number][1] <= y1 + 2]
     a, b = np.array(start, np.float64), np.array(end, np.float64)
     # bound: below 2**53 the rounded ends are off by at most 1/2, so differences by at most 1 1/2.
-    near = np.flatnonzero(((centres >= np.minimum(a, b) - 2) & (centres <= np.maximum(a, b) + 2)).all(axis=1))
-    along, offset = b - a, centres[near] - a
+    among = centres[first:last]
+    near = np.flatnonzero((among[:, 1] >= y0 - 1) & (among[:, 1] <= y1 + 2))
+    along, offset = b - a, among[near] - a
     distance = np.abs(along[0] * offset[:, 1] - along[1] * offset[:, 0])
     reach = 4 * (np.abs(along).sum() + np.abs(offset).sum(axis=1) + 1) * (1 + 2.0**-40)
     # rounding of the two products: 2**-50 of their size is more than enough.
     reach += 2.0**-50 * (np.abs(along[0] * offset[:, 1]) + np.abs(along[1] * offset[:, 0]))
-    return near[distance <= reach].tolist()
+    return (first + near[distance <= reach]).tolist()

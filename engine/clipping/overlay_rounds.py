@@ -22,7 +22,7 @@ from engine.arrangement.snap_rounding import snap_rings
 from engine.clipping.implicit_rings import ImplicitRings
 from engine.clipping.overlay_result import Collapse
 from engine.clipping.overlay_rounding import MAX_ROUNDS, count_changes
-from engine.clipping.ring_bits import RingBits, assign_bits, boxes_of, rings_meant
+from engine.clipping.ring_bits import Corners, RingBits, assign_bits, boxes_of, rings_meant
 from engine.parallel import Budget
 
 
@@ -90,7 +90,7 @@ def settle_rings(
         found = None if labels is None else again(rings, labels)
         if labels is None or found is None:
             return None
-        meant = rings_meant(labels, boxes, found.evidence, boxes_of(found.vertices, found.ring_offsets), budget)
+        meant = _meant(rings, found, boxes, labels, again, budget)
         if meant is None:
             return None
         piece_origins, hole_origins = _origins(rings, found, meant, piece_origins, hole_origins)
@@ -118,6 +118,19 @@ def settle_rings(
         holes_joined=holes_joined,
         holes_parted=holes_parted,
     )
+
+
+def _meant(
+    before: RoundedRings, found: RoundedRings, boxes: Corners, labels: RingBits, again: Again, budget: Budget
+) -> list[list[int]] | None:
+    """Return for each ring found those of the round before that it comes from; None where that is not sure."""
+
+    def evidence(other: RingBits) -> npt.NDArray[np.int64] | None:
+        same = again(before, other)  # bits decide nothing: these are the same rings
+        return None if same is None else same.evidence
+
+    boxes_found = boxes_of(found.vertices, found.ring_offsets)
+    return rings_meant(labels, found.evidence, boxes, before.piece_offsets, boxes_found, evidence, budget)
 
 
 def _snapped(first: RoundedRings, exact: ImplicitRings, budget: Budget) -> tuple[RoundedRings, float]:

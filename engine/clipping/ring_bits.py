@@ -2,11 +2,14 @@
 
 Up to `MOST_BITS` rings each has a bit of its own. Of more, rings whose boxes are apart share bits as ring_labels.py
 allows: the shells of small pieces, and the holes of one shell or of shells that share a bit. A bit in the evidence of a
-part then means the one ring of that bit whose box meets the part's: it lies in that ring, so their boxes do meet.
+part then means rings of that bit whose boxes meet the part's: it lies in them, so the boxes do meet. Where these are
+several, the rings are arranged once more with bits dealt out in another order. Rings whose bit is missing once are not
+meant; those left alone with a bit, once, are.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -19,6 +22,9 @@ from engine.parallel import Budget
 _SPREAD: Final = 16
 """Bits that rings are dealt out to though fewer would do: those of one bit are then further from each other."""
 
+_MOST_ORDERS: Final = 8
+"""Orders in which bits are dealt out: a ring that is not meant passes for one in each with the part's share of bits."""
+
 Corners = tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]
 
 
@@ -29,25 +35,33 @@ class RingBits(NamedTuple):
     shells: npt.NDArray[np.int64]
 
 
-def assign_bits(boxes: Corners, piece_offsets: npt.NDArray[np.int64], budget: Budget) -> RingBits | None:
+def assign_bits(
+    boxes: Corners, piece_offsets: npt.NDArray[np.int64], budget: Budget, order: int = 0
+) -> RingBits | None:
     """Return a bit for each ring, None where there are too few.
 
-    boxes: of the rings, as `boxes_of` gives them. piece_offsets: into the rings, the shell of each piece first.
+    boxes: of the rings, as `boxes_of` gives them. piece_offsets: into the rings, the shell of each piece first. order:
+    number of the order in which bits are dealt out.
     """
     n_rings = int(piece_offsets[-1])
     shell_of = np.repeat(piece_offsets[:-1], np.diff(piece_offsets))
     if n_rings <= MOST_BITS:
         return RingBits(np.arange(n_rings), shell_of)
-    # meeting: the rings before each that it may share no bit with
+    rank = np.random.default_rng(order).permutation(n_rings) if order else np.arange(n_rings)
+    # meeting: the rings before each, by rank, that it may share no bit with
     meeting: list[list[int]] = [[] for _ in range(n_rings)]
     is_shell = shell_of == np.arange(n_rings)
-    for i, j in box_pairs(*boxes, budget).tolist():
-        if is_shell[i] == is_shell[j]:
-            meeting[j].append(i)
+    pairs = box_pairs(*boxes, budget)
+    pairs = pairs[is_shell[pairs[:, 0]] == is_shell[pairs[:, 1]]]
+    swapped = rank[pairs[:, 0]] > rank[pairs[:, 1]]
+    pairs[swapped] = pairs[swapped, ::-1]
+    for i, j in pairs.tolist():
+        meeting[j].append(i)
+    ranked = np.argsort(rank)
     bits = np.zeros(n_rings, np.int64)
     shells: list[int] = []
     groups: dict[int, list[int]] = {}  # by bit of shells those of their holes, longest unused first; at -1 all shells
-    for rings, is_hole in ((np.flatnonzero(is_shell), False), (np.flatnonzero(~is_shell), True)):
+    for rings, is_hole in ((ranked[is_shell[ranked]], False), (ranked[~is_shell[ranked]], True)):
         for ring in rings.tolist():
             shell = int(bits[shell_of[ring]]) if is_hole else -1
             taken = {int(bits[other]) for other in meeting[ring]}
@@ -74,11 +88,18 @@ def boxes_of(vertices: npt.NDArray[np.float64], ring_offsets: npt.NDArray[np.int
 
 
 def rings_meant(
-    labels: RingBits, boxes: Corners, evidence: npt.NDArray[np.int64], found: Corners, budget: Budget
+    labels: RingBits,
+    evidence: npt.NDArray[np.int64],
+    boxes: Corners,
+    piece_offsets: npt.NDArray[np.int64],
+    found: Corners,
+    again: Callable[[RingBits], npt.NDArray[np.int64] | None],
+    budget: Budget,
 ) -> list[list[int]] | None:
     """Return for each ring found which of the rings its evidence names; None where that is not sure.
 
-    boxes: of the rings that ``labels`` are of; found: of those whose evidence it is.
+    boxes, piece_offsets: of the rings that ``labels`` are of; found: boxes of those whose evidence it is. again:
+    returns their evidence for other labels.
     """
     if len(labels.bits) == len(labels.shells):
         return [places_of(bits) for bits in evidence.tolist()]
@@ -87,12 +108,28 @@ def rings_meant(
     pairs = box_pairs(low, high, budget)
     across = (pairs[:, 0] < n_rings) & (pairs[:, 1] >= n_rings)
     rings, parts = pairs[across, 0], pairs[across, 1] - n_rings
-    is_named = (evidence[parts] >> labels.bits[rings]) & 1 == 1
-    meant: list[list[int]] = [[] for _ in evidence]
-    for ring, part in zip(rings[is_named].tolist(), parts[is_named].tolist(), strict=True):
-        meant[part].append(ring)
-    counts = [bits.bit_count() for bits in evidence.tolist()]
-    return meant if counts == list(map(len, meant)) else None
+    dealt: list[npt.NDArray[np.int64]] = []
+    for order in range(1, _MOST_ORDERS + 1):
+        budget.check()
+        dealt.append(labels.bits)
+        is_named = (evidence[parts] >> labels.bits[rings]) & 1 == 1
+        rings, parts = rings[is_named], parts[is_named]
+        # invariant: all rings that are meant are among these
+        is_sure = np.zeros(len(rings), np.bool_)
+        for bits in dealt:
+            _, which, counts = np.unique(parts * 64 + bits[rings], return_inverse=True, return_counts=True)
+            is_sure |= counts[which] == 1
+        if is_sure.all():
+            meant: list[list[int]] = [[] for _ in evidence]
+            for ring, part in zip(rings.tolist(), parts.tolist(), strict=True):
+                meant[part].append(ring)
+            return meant
+        other = assign_bits(boxes, piece_offsets, budget, order)
+        found_evidence = None if other is None else again(other)
+        if other is None or found_evidence is None:
+            return None
+        labels, evidence = other, found_evidence
+    return None
 
 
 def places_of(number: int) -> list[int]:

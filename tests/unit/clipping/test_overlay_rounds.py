@@ -75,6 +75,24 @@ def test_more_rings_than_a_label_has_bits_in_a_batch() -> None:
     assert found.vertices.tolist() == overlay(border, version, "symmetric_difference").vertices.tolist()
 
 
+@pytest.mark.parametrize("n", [100, pytest.param(500, marks=pytest.mark.full)])
+def test_many_rings_that_join_and_are_snapped(n: int) -> None:
+    """Crowds of rings and a wandering line, each on itself an ulp off: parts near several rings of one bit."""
+    random = np.random.default_rng(1)
+    soup = 1000 + random.random((n // 5, 1, 2)) + random.uniform(-0.05, 0.05, (n // 5, 5, 2))
+    line = 1e6 + np.cumsum(random.uniform(-1, 1, (n, 2)), axis=0)
+    n_pieces = n_snapped = 0
+    for rings in (list(soup), [line]):
+        moved = [ring + random.choice([-1, 0, 1], ring.shape) * np.spacing(ring) for ring in rings]
+        for operation in ("intersection", "difference", "symmetric_difference"):
+            assert agree(rings, moved, operation)
+            found = overlay_compiled(arrays(rings), arrays(moved), operation, "valid", Budget())
+            assert found is not None
+            n_pieces, n_snapped = max(n_pieces, found[0].n_pieces_exact), n_snapped + found[0].snapped
+    assert n_pieces > MOST_BITS
+    assert n < 500 or n_snapped > 0
+
+
 def test_rounds_that_do_not_end_are_snapped(monkeypatch: pytest.MonkeyPatch) -> None:
     """One round instead of twelve is all there is, so that many results are snapped."""
     for module in (overlay_rounding, overlay_rounds):
