@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from engine.arrangement.chains import Chains, is_live, standing
+from engine.arrangement.chains import Chains, is_live, place_before, standing
 from engine.arrangement.crossing_signs import Edges, crossing_against, exact_weight, orient, turn_of_edges
 from engine.arrangement.edge_contacts import POLL, Events
 from engine.arrangement.edge_tree import LEAF, RUN, leaves_of, push_children
@@ -25,8 +25,9 @@ NOTHING: Final = -1
 
 @inline
 def number_cycles(
-    chains: Chains, n_chains: int, starts: Any, ends: Any, star: Any, place: Any, cycle: Any, following: Any, stop: Any
-) -> int:
+    chains: Chains, n_chains: int, n_simple: int, starts: Any, ends: Any, star: Any, place: Any, cycle: Any,
+    following: Any, stop: Any,
+) -> int:  # fmt: skip
     """Fill ``following``, the half-chain that goes on around the face of each, and ``cycle``; return how many cycles.
 
     Both (2 n_chains,) int64; half-chains that another stands for get cycle -1.
@@ -37,10 +38,7 @@ def number_cycles(
             return 0
         if is_live(chains, chain):
             for half in (2 * chain, 2 * chain + 1):
-                twin = half ^ 1
-                node = chains.head[chain] if twin & 1 else chains.tail[chain]
-                at = place[twin]
-                following[half] = star[(at if at > starts[node] else ends[node]) - 1]
+                following[half] = star[place_before(chains, n_simple, starts, ends, place[half ^ 1], half ^ 1)]
     n_cycles = 0
     for first in range(2 * n_chains):
         if cycle[first] < 0 and is_live(chains, first >> 1):

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any, Final, NamedTuple
 
 from engine.arrangement.chain_faces import find_label, join
-from engine.arrangement.chains import Chains, is_live, leaving_edge, origin
+from engine.arrangement.chains import Chains, is_live, leaving_edge, origin, place_before
 from engine.arrangement.crossing_signs import Edges, orient, turn_of_edges
 from engine.arrangement.edge_contacts import POLL, root_of, unite
 from engine.arrangement.edge_tree import BENT, DOUBTFUL, RUN
@@ -76,13 +76,14 @@ def choose_boundary(
 
 
 @merged
-def _following(chains: Chains, half: int, starts: Any, ends: Any, star: Any, place: Any, bounds: Any) -> int:
+def _following(
+    chains: Chains, half: int, n_simple: int, starts: Any, ends: Any, star: Any, place: Any, bounds: Any
+) -> int:  # fmt: skip
     """Return the boundary half-chain that goes on around the region to the left of ``half``."""
     twin = half ^ 1
-    node = origin(chains, twin)
     at = place[twin]
     while True:  # bound: once around the star; the twin itself is on the boundary
-        at = (at if at > starts[node] else ends[node]) - 1
+        at = place_before(chains, n_simple, starts, ends, at, twin)
         if bounds[star[at] >> 1]:
             return star[at]
 
@@ -151,9 +152,9 @@ def _emit(
 
 @inline
 def walk_rings(
-    edges: Edges, chains: Chains, n_chains: int, nodes: Any, n_nodes: int, cycle: Any, inside: Any, regions: Any,
-    starts: Any, ends: Any, star: Any, place: Any, bounds: Any, fan: Any, marks: Any, seen: Any, path: Any,
-    path_place: Any, rings: Rings, sources: RingLabels, stop: Any,
+    edges: Edges, chains: Chains, n_chains: int, nodes: Any, n_nodes: int, n_simple: int, cycle: Any, inside: Any,
+    regions: Any, starts: Any, ends: Any, star: Any, place: Any, bounds: Any, fan: Any, marks: Any, seen: Any,
+    path: Any, path_place: Any, rings: Rings, sources: RingLabels, stop: Any,
 ) -> tuple[int, int]:  # fmt: skip
     """Write all boundary rings; return how many rings and points.
 
@@ -195,7 +196,7 @@ def walk_rings(
                 path_place[node] = depth
             path[depth] = half
             depth += 1
-            half = _following(chains, half, starts, ends, star, place, bounds)
+            half = _following(chains, half, n_simple, starts, ends, star, place, bounds)
         n_points = _emit(
             edges, chains, nodes, fan, marks, path, 0, depth, region, rings, n_rings, n_points, cycle, regions, sources,
             stop,

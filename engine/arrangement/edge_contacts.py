@@ -23,6 +23,10 @@ OFTEN: Final = 0x3FF
 """The same for steps of some microseconds."""
 UNSURE_SLACK: Final = 4.0
 """Slack of a parameter known by its sign only: any comparison with it is made exactly."""
+UNKNOWN: Final = 0
+LEFT: Final = 1
+RIGHT: Final = 2
+"""How the second edge of a crossing leaves, seen along the first; UNKNOWN too where the crossing is not alone."""
 
 
 class Events(NamedTuple):

@@ -8,7 +8,7 @@ import numpy as np
 
 from engine.arrangement.clearance import edges_are_far
 from engine.arrangement.crossing_signs import Edges
-from engine.arrangement.edge_contacts import Events, enter_contact, unite
+from engine.arrangement.edge_contacts import LEFT, RIGHT, UNKNOWN, Events, enter_contact, unite
 from engine.arrangement.edge_tree import DOUBTFUL, boxes_meet, encode_boxes, next_pairs
 from engine.jit import inline, merged
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
@@ -19,14 +19,16 @@ FEW: Final = 40
 
 @inline
 def find_contacts(
-    edges: Edges, n: int, n_rings: int, margin: float, events: Events, parent: Any, marked: Any, rings: Any, boxes: Any,
-    marks: Any, tree: Any, tree_marks: Any, places: Any, lows: Any, highs: Any, stack: Any, pairs: Any, stop: Any,
+    edges: Edges, n: int, n_rings: int, margin: float, events: Events, turn: Any, parent: Any, marked: Any, rings: Any,
+    boxes: Any, marks: Any, tree: Any, tree_marks: Any, places: Any, lows: Any, highs: Any, stack: Any, pairs: Any,
+    stop: Any,
 ) -> tuple[int, int, int, bool]:  # fmt: skip
     """Enter all contacts; return the numbers of events (-1: no room), crossings and pairs beyond the filter.
 
     Returns also whether all edges that do not meet are further apart than ``margin``, and all contacts are crossings;
     the edges of pairs of which that does not hold get the mark DOUBTFUL. boxes: those of the edges, with the margin
     around them. lows, highs: scratch for their codes. rings: filled with the forest of rings that hang together.
+    turn: by crossing, filled with LEFT or RIGHT as its second edge leaves to that side of the first, or UNKNOWN.
     """
     for i in range(n):
         parent[i] = i
@@ -80,12 +82,14 @@ def find_contacts(
                 unite(rings, edges.ring[i], edges.ring[j])
                 crossing = n + n_crossings
                 parent[crossing] = crossing
+                turn[n_crossings] = LEFT if turn_a > 0.0 else RIGHT  # the first edge comes from the other's left
                 events.first[n_crossings], events.second[n_crossings] = i, j
                 _add_crossing(events, n_events, crossing, i, j, turn_a, turn_b, bound_ab, margin * length_cd)
                 _add_crossing(events, n_events + 1, crossing, j, i, turn_c, turn_d, bound, margin * length)
                 n_events += 2
                 n_crossings += 1
                 continue
+            turn[n_crossings] = UNKNOWN
             n_events, n_crossings = enter_contact(edges, events, n_events, n_crossings, n, parent, marked, rings, i, j)
             n_exact += 1
             _put_in_doubt(marks, i, j)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 from engine.arrangement.crossing_signs import Edges, order_of_crossings, orient
-from engine.arrangement.edge_contacts import POLL, Events, unite
+from engine.arrangement.edge_contacts import POLL, UNKNOWN, Events, unite
 from engine.arrangement.edge_tree import DOUBTFUL
 from engine.jit import called, inline
 
@@ -112,13 +112,14 @@ def _mark_near(
 @inline
 def sort_events(
     edges: Edges, events: Events, n: int, n_events: int, parent: Any, starts: Any, order: Any, keys: Any,
-    spare_keys: Any, spare: Any, marks: Any, stop: Any,
+    spare_keys: Any, spare: Any, turn: Any, marks: Any, stop: Any,
 ) -> bool:  # fmt: skip
     """Fill ``starts``, (n + 1,), and ``order``: events ``order[starts[e]:starts[e + 1]]`` lie along edge e.
 
-    Unites events at one point in ``parent``. Returns whether the events of every edge are further apart than their
-    reaches, and each is further from the ends than its own; other edges, and those that cross there, get the mark
-    DOUBTFUL. keys: float64 by event, filled with the parameters in that order; spare_keys, spare: scratch.
+    Unites events at one point in ``parent``, and makes ``turn`` of crossings there UNKNOWN. Returns whether the events
+    of every edge are further apart than their reaches, and each is further from the ends than its own; other edges, and
+    those that cross there, get the mark DOUBTFUL. keys: float64 by event, filled with the parameters in that order;
+    spare_keys, spare: scratch.
     """
     starts[: n + 1] = 0
     for i in range(n_events):
@@ -166,6 +167,9 @@ def sort_events(
             while at > first:  # bound: the part sorted so far
                 side = compare_events(edges, events, e, order[at - 1], moving)
                 if side == 0:
+                    for point in (events.point[order[at - 1]], events.point[moving]):
+                        if point >= n:
+                            turn[point - n] = UNKNOWN
                     unite(parent, events.point[order[at - 1]], events.point[moving])
                 if side <= 0:
                     break

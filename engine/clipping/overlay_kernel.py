@@ -197,7 +197,7 @@ def overlay_pairs(
         if stop[0]:
             break
         first, first_end = subject_items[at], subject_items[at + 1]
-        labels = RingLabels(shells[first:first_end], w.following, w.joined)
+        labels = RingLabels(shells[first:first_end], w.gathered, w.beyond)
         if n_loaded == 0:
             second, second_end = clip_items[at], clip_items[at + 1]
             x0, x1, y0, y1 = box_of(subjects, subject_rings[first], subject_rings[first_end])
@@ -244,8 +244,8 @@ def overlay_pairs(
         if n > FEW:
             build_tree(w.boxes, w.marks, n, w.tree, w.tree_marks, w.places, stop)
         n_events, n_crossings, n_exact, are_far = find_contacts(
-            edges, n, n_rings, margin, events, w.points, w.marked, w.rings, w.boxes, w.marks, w.tree, w.tree_marks,
-            w.places, w.lows, w.highs, w.stack, w.pairs, stop,
+            edges, n, n_rings, margin, events, w.turn, w.points, w.marked, w.rings, w.boxes, w.marks, w.tree,
+            w.tree_marks, w.places, w.lows, w.highs, w.stack, w.pairs, stop,
         )  # fmt: skip
         if stop[0]:
             break
@@ -259,27 +259,28 @@ def overlay_pairs(
             return at, NEEDS_CONTACTS, n_out, n_out_rings, n_out_pieces, room, 0
         used = max(used, most)
         are_clear = sort_events(
-            edges, events, n, n_events, w.points, w.starts, w.order, w.crossing_x, w.crossing_y, w.nodes, w.marks, stop
-        )
+            edges, events, n, n_events, w.points, w.starts, w.order, w.crossing_x, w.crossing_y, w.nodes, w.turn,
+            w.marks, stop,
+        )  # fmt: skip
         if stop[0]:
             break
         corners_clear = corners_are_clear(edges, n, w.starts, w.crossing_x, margin, w.marks, stop)
         is_clear = is_clear and are_far and are_clear and corners_clear
         w.node_of[: n + n_crossings] = -1
-        n_nodes, n_chains = build_chains(
-            edges, events, w.points, w.marked, w.starts, w.order, w.tops, w.masks, n_rings, w.node_of, w.nodes, chains,
-            w.chain_at, stop,
+        n_nodes, n_simple, n_chains, n_loose = build_chains(
+            edges, events, n, w.points, w.turn, w.marked, w.starts, w.order, w.tops, w.masks, n_rings, w.node_of,
+            w.nodes, chains, w.chain_at, w.star_starts, w.star_ends, w.star, w.place, w.following, stop,
         )  # fmt: skip
         if stop[0]:
             break
         build_stars(
-            edges, chains, n_nodes, n_chains, w.star_starts, w.star_ends, w.star, w.place, w.masks_before, w.x, w.y,
-            stop,
+            edges, chains, n_nodes, n_simple, w.following, n_loose, w.star_starts, w.star_ends, w.star, w.place,
+            w.masks_before, w.x, w.y, stop,
         )  # fmt: skip
         if stop[0]:
             break
         n_cycles = number_cycles(
-            chains, n_chains, w.star_starts, w.star_ends, w.star, w.place, w.cycle, w.following, stop
+            chains, n_chains, n_simple, w.star_starts, w.star_ends, w.star, w.place, w.cycle, w.following, stop
         )
         if stop[0]:
             break
@@ -295,8 +296,8 @@ def overlay_pairs(
         if stop[0]:
             break
         n_found, m = walk_rings(
-            edges, chains, n_chains, w.nodes, n_nodes, w.cycle, w.inside, w.regions, w.star_starts, w.star_ends, w.star,
-            w.place, w.bounds, w.fan, w.marks, w.seen, w.path, w.path_place, found, labels, stop,
+            edges, chains, n_chains, w.nodes, n_nodes, n_simple, w.cycle, w.inside, w.regions, w.star_starts,
+            w.star_ends, w.star, w.place, w.bounds, w.fan, w.marks, w.seen, w.path, w.path_place, found, labels, stop,
         )  # fmt: skip
         if stop[0]:
             break

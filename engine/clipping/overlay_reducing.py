@@ -108,7 +108,7 @@ def _load_ring(
         while j < end and not blocks.is_active[j]:  # bound: the blocks
             j += 1
         b = blocks.last[j - 1] - 1
-        low = _low_of(vertices, blocks, i, j)
+        low = np.int64(_low_of(vertices, blocks, i, j))  # of one type with those below
         high = top if a <= top <= b else a
         k = a
         while True:  # bound: the vertices that stay, eleven at most

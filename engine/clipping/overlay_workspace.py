@@ -23,8 +23,8 @@ _kept = threading.local()
 _MOST_KEPT: Final = 80_000_000
 """Bytes that were written to up to which a thread keeps its scratch."""
 _MANY_CONTACTS: Final = 2**18
-_BY_VERTEX: Final = 200
-_BY_CONTACT: Final = 390
+_BY_VERTEX: Final = 180
+_BY_CONTACT: Final = 270
 _BY_OUTPUT: Final = 40
 """Bytes of scratch for each vertex, contact, and vertex of the output."""
 
@@ -38,9 +38,11 @@ class Buffers(NamedTuple):
     contact_floats: Any
     contact_integers: Any
     half_integers: Any
+    half_labels: Any
     half_octets: Any
     point_floats: Any
     point_integers: Any
+    point_codes: Any
     point_octets: Any
     boxes: Any
     tree: Any
@@ -73,6 +75,7 @@ class Workspace(NamedTuple):
     points: Any
     node_of: Any
     events: Events
+    turn: Any
     order: Any
     nodes: Any
     chains: Chains
@@ -86,6 +89,8 @@ class Workspace(NamedTuple):
     joined: Any
     label: Any
     regions: Any
+    gathered: Any
+    beyond: Any
     inside: Any
     bounds: Any
     seen: Any
@@ -156,29 +161,40 @@ def keep(scratch: Scratch, n_vertices: int, n_contacts: int, n_out: int) -> None
         _kept.scratch = scratch
 
 
+def _spread(length: int) -> int:
+    """Return a length of rows, no smaller, whose beginnings do not fall together in the cache.
+
+    A cache finds lines by the last bits of their address: rows a whole number of pages apart, or nearly, would share
+    few places, and small pairs, which use the beginnings only, wait for memory. Rows of a page or less stay close.
+    """
+    return length if length <= 1024 else length + (56 - length) % 1024
+
+
 def buffers_for(n_vertices: int, n_rings: int, n_contacts: int) -> Buffers:
     """Return scratch for pairs of up to so many vertices, rings and contacts."""
-    n, k = n_vertices + 1, n_contacts + 8
-    m = n + 2 * k  # points of all boundary rings: every vertex once, every end of a chain on two sides
+    n, k = n_vertices + 1, _spread(n_contacts + 8)
+    m = _spread(n + 2 * k)  # points of all boundary rings: every vertex once, every end of a chain on two sides
     n_leaves = 1
     while n_leaves * LEAF < m:  # bound: 60 doublings
         n_leaves *= 2
     return Buffers(
         vertex_floats=np.empty((2, n + 1)),
-        vertex_integers=np.empty((5, n + 1), np.int64),
+        vertex_integers=np.empty((5, n + 1), np.int32),
         ring_integers=np.empty((4, n_rings + 1), np.int64),
         contact_floats=np.empty((5, k)),
-        contact_integers=np.empty((19, k + 1), np.int64),
-        half_integers=np.empty((8, 2 * k + 1), np.int64),
+        contact_integers=np.empty((18, k + 1), np.int32),
+        half_integers=np.empty((7, 2 * k + 1), np.int32),
+        half_labels=np.empty((4, 2 * k + 1), np.int64),
         half_octets=np.empty((4, 2 * k + 1), np.uint8),
         point_floats=np.empty((2, m)),
-        point_integers=np.empty((7, m), np.int64),
+        point_integers=np.empty((5, m), np.int32),
+        point_codes=np.empty((2, m), np.int64),
         point_octets=np.empty((4, m), np.uint8),
         boxes=np.empty((m, 4)),
         tree=np.empty((2 * n_leaves, 4)),
         tree_marks=np.empty(2 * n_leaves, np.uint8),
         stack=np.empty((DEEPEST, 2), np.int64),
-        pairs=np.empty((PORTION, 2), np.int64),
+        pairs=np.empty((PORTION, 2), np.int32),
     )
 
 
@@ -187,18 +203,18 @@ def rows_of(buffers: Buffers) -> Workspace:
     """Return the rows of some buffers by name; those that are in one place are not in use at one time."""
     vx, v, r = buffers.vertex_floats, buffers.vertex_integers, buffers.ring_integers
     cx, c = buffers.contact_floats, buffers.contact_integers
-    h, hb = buffers.half_integers, buffers.half_octets
-    px, p, pb = buffers.point_floats, buffers.point_integers, buffers.point_octets
+    h, hl, hb = buffers.half_integers, buffers.half_labels, buffers.half_octets
+    px, p, pb, codes = buffers.point_floats, buffers.point_integers, buffers.point_octets, buffers.point_codes
     edges = Edges(vx[0], vx[1], v[0], v[1], v[2])
     events = Events(c[0], c[1], c[2], cx[0], cx[1], cx[2], c[3], c[4])
-    chains = Chains(c[5], c[6], c[7], c[8], c[9], c[10])
-    found = Rings(p[0], pb[0], c[11], c[12])
+    chains = Chains(c[5], c[6], c[7], c[8], hl[3], c[9])
+    found = Rings(p[0], pb[0], c[10], c[11])
     ranking = Ranking(c[5], cx[0], hb[0], c[6], c[7], c[8])  # in place of chains, and of parameters of events
     return Workspace(
         edges, v[3], p[1], v[4], pb[1],
         r[0], r[1], r[2], r[3],
-        buffers.boxes, pb[2], buffers.tree, buffers.tree_marks, p[2], p[5], p[6], buffers.stack, buffers.pairs,
-        p[3], p[4], events, c[13], c[14], chains, c[12], c[15], c[16],
-        h[0], h[1], h[2], h[3], h[4], h[5], h[6], hb[1], hb[2], hb[3],
-        c[17], h[7], c[18], found, cx[3], cx[4], cx[1], px[0], px[1], pb[3], ranking,
+        buffers.boxes, pb[2], buffers.tree, buffers.tree_marks, p[2], codes[0], codes[1], buffers.stack, buffers.pairs,
+        p[3], p[4], events, hb[0], c[12], c[13], chains, hl[0], c[14], c[15],
+        h[0], h[1], h[2], h[3], h[4], hl[0], h[5], hl[1], hl[2], hb[1], hb[2], hb[3],
+        c[16], h[6], c[17], found, cx[3], cx[4], cx[1], px[0], px[1], pb[3], ranking,
     )  # fmt: skip
