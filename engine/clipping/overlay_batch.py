@@ -36,8 +36,8 @@ DONE: Final = 0
 NOT_REPRESENTABLE: Final = 1
 
 _FIRST_CHUNK: Final = 8
-_FIRST_DOUBTFUL: Final = 256
-"""The same of pairs whose rings are arranged again: a call takes as long as some hundred of them."""
+_DOUBTFUL: Final = 256
+"""Pairs whose rings are arranged again together, whatever their time: a call costs as much as some hundred of them."""
 _NO_PAIRS: Final = Found(
     np.zeros(0, np.int8),
     np.zeros((0, 4), np.int64),
@@ -236,7 +236,7 @@ def _settled(
     doubtful = np.flatnonzero(found.status == UNVOUCHED)
 
     def settle(start: int, stop: int) -> None:
-        some = doubtful[start:stop]
+        some = doubtful[start * _DOUBTFUL : stop * _DOUBTFUL]
         pairs = taken(found, some)
         more = settle_pairs(pairs, budget) if output == "valid" else nearest_pairs(pairs, budget)
         settled[start] = more._replace(pairs=some[more.pairs])
@@ -250,7 +250,7 @@ def _settled(
             except NotRepresentableError:
                 rest.status[pair] = NOT_REPRESENTABLE
 
-    run_chunks(settle, len(doubtful), budget=budget, first_chunk=_FIRST_DOUBTFUL, workers=workers)
+    run_chunks(settle, -(-len(doubtful) // _DOUBTFUL), budget=budget, first_chunk=1, workers=workers)
     together = [settled[start] for start in sorted(settled)]
     for each in together:
         rest.is_rounded_again[each.pairs] = True
