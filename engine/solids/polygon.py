@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import accumulate
 from typing import ClassVar
 
 import numpy as np
@@ -42,10 +43,10 @@ class Polygon(Solid):
             )
         check_not_empty(len(rings), "ring", ("rings",))
         arrays = [_as_ring(ring, ("rings", i_ring)) for i_ring, ring in enumerate(rings)]
-        offsets = np.zeros(len(arrays) + 1, np.int64)
-        np.cumsum([len(ring) for ring in arrays], out=offsets[1:])
+        vertices = frozen(arrays[0]) if len(arrays) == 1 else frozen(np.concatenate(arrays))
+        offsets = np.array([0, *accumulate(map(len, arrays))], np.int64)
         offsets.setflags(write=False)
-        self._set(dimension=2, vertices=frozen(np.concatenate(arrays)), ring_offsets=offsets)
+        self._set(dimension=2, vertices=vertices, ring_offsets=offsets)
 
     @property
     def n_rings(self) -> int:
@@ -59,7 +60,7 @@ class Polygon(Solid):
 def _as_ring(ring: object, where: tuple[str | int, ...]) -> FloatArray:
     """Return the vertices of one ring without a repeated last one."""
     points = as_points(ring, 2, where)
-    repeats = len(points) > 1 and bool((points[0] == points[-1]).all())
+    repeats = len(points) > 1 and points[0].tolist() == points[-1].tolist()
     points = points[:-1] if repeats else points
     if len(points) < 3:
         told = " after its repeated last vertex was dropped" if repeats else ""
