@@ -18,7 +18,8 @@ DEADLINE = 5.0
 
 @pytest.fixture
 def service() -> Iterator[Service]:
-    service = Service(deadline_seconds=DEADLINE, queue_length=16, access_log=False)
+    # room for four: on a slow machine sixty clients do not get more than some twenty requests under way at once
+    service = Service(deadline_seconds=DEADLINE, concurrency=2, queue_length=2, access_log=False)
     try:
         service.wait_until_ready()
         yield service
