@@ -1,17 +1,12 @@
 """Exact answers to four questions about a scene: containment, collision, segment clipping, polygon clipping."""
 
-from engine.clipping.overlay import overlay
-from engine.clipping.overlay_batch import OverlayBatch, overlay_batch
-from engine.clipping.overlay_result import Collapse, Overlay, OverlayPiece
-from engine.clipping.polygons import ClippedPolygons, PolygonStatus, clip_polygons
-from engine.clipping.segments import SegmentPieces, clip_segments
 from engine.collision.collide import collide
 from engine.collision.collide_poses import collide_poses
 from engine.collision.result import Collision, Witness
-from engine.collision.scene import ScenePairs, collide_scene
+from engine.collision.scenes.collide_scene import ScenePairs, collide_scene
 from engine.collision.triangles import collide_triangles
 from engine.containment.locate import contains, locate
-from engine.containment.locate_scene import SceneLocations, locate_scene
+from engine.containment.scene.locate_scene import SceneLocations, locate_scene
 from engine.errors import (
     CancelledError,
     DeadlineExceededError,
@@ -41,6 +36,11 @@ from engine.errors import (
 )
 from engine.files.meshes import read_mesh
 from engine.parallel import Cancel
+from engine.polygon_clipping.clip_polygons import ClippedPolygons, PolygonStatus, clip_polygons
+from engine.polygon_overlay.batch import OverlayBatch, overlay_batch
+from engine.polygon_overlay.overlay import overlay
+from engine.polygon_overlay.result import Collapse, Overlay, OverlayPiece
+from engine.segment_clipping.clip_segments import SegmentPieces, clip_segments
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.bounds import Bounds, bounds

@@ -17,16 +17,16 @@ from typing import Any, get_args
 
 import numpy as np
 
-from engine.clipping.overlay_batch import overlay_batch
-from engine.clipping.overlay_compiled import Operation, Output
-from engine.clipping.polygons import PolygonStatus, clip_polygons
-from engine.clipping.segments import clip_segments
 from engine.collision.collide_poses import collide_poses
 from engine.containment.locate import locate
 from engine.errors import EngineError, InvalidInputError
 from engine.files.solids import read_solid, read_solids
 from engine.files.tables import read_rows, write_geojson, write_table
 from engine.parallel import Progress
+from engine.polygon_clipping.clip_polygons import PolygonStatus, clip_polygons
+from engine.polygon_overlay.batch import overlay_batch
+from engine.polygon_overlay.run import Operation, Output
+from engine.segment_clipping.clip_segments import clip_segments
 from engine.solids.bounds import bounds
 from engine.types import Location, Relation
 from engine.version import __version__

@@ -21,14 +21,14 @@ import numpy as np
 import numpy.typing as npt
 from distributed import Client, Future, as_completed
 
-from engine.clipping import segments as clipping
-from engine.clipping.overlay_batch import OverlayBatch, join_batches
-from engine.clipping.overlay_batch import overlay_batch as overlay_pairs
-from engine.clipping.overlay_compiled import Operation, Output
 from engine.collision import collide_poses as poses
 from engine.containment import locate as containment
 from engine.errors import InvalidArrayError, InvalidInputError
 from engine.parallel import Progress, check_options
+from engine.polygon_overlay.batch import OverlayBatch, join_batches
+from engine.polygon_overlay.batch import overlay_batch as overlay_pairs
+from engine.polygon_overlay.run import Operation, Output
+from engine.segment_clipping import clip_segments as clipping
 from engine.solids.base import Solid
 from engine.solids.checks import as_point_groups, as_points
 

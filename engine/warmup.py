@@ -12,20 +12,20 @@ from collections.abc import Callable
 
 import numpy as np
 
-from engine.clipping.overlay import overlay
-from engine.clipping.polygons import clip_polygons
-from engine.clipping.segments import clip_segments
 from engine.cold_start import fill_cache, note_full
 from engine.collision.collide import collide
 from engine.collision.collide_poses import collide_poses
-from engine.collision.scene import collide_scene
+from engine.collision.scenes.collide_scene import collide_scene
 from engine.collision.triangles import collide_triangles
-from engine.containment.build_cells import cells_if_they_pay
-from engine.containment.cell_order import gathered, order_by_cell
+from engine.containment.cells.build import cells_if_they_pay
+from engine.containment.cells.order import gathered, order_by_cell
 from engine.containment.locate import locate
-from engine.containment.locate_scene import locate_scene
-from engine.containment.posed import posed_locator
+from engine.containment.posed.locators import posed_locator
+from engine.containment.scene.locate_scene import locate_scene
 from engine.parallel import Budget
+from engine.polygon_clipping.clip_polygons import clip_polygons
+from engine.polygon_overlay.overlay import overlay
+from engine.segment_clipping.clip_segments import clip_segments
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.bounds import bounds

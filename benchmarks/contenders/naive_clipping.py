@@ -8,7 +8,7 @@ import numpy as np
 
 import engine
 from benchmarks.contenders import Prepared, in_threads
-from engine.clipping.box_planes import box_rows
+from engine.solids.box_planes import box_rows
 from engine.textbook import clip_batches
 
 NAME, PACKAGE = "naive", None

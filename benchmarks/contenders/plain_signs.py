@@ -20,9 +20,10 @@ import numba
 import numpy as np
 
 from benchmarks.contenders import Prepared
-from engine.collision import dual_traversal, pose_batch, triangle_triangle
-from engine.containment import locators, segment_parity
-from engine.containment.cell_lanes import plain_signs
+from engine.collision.meshes import dual_traversal, pose_batch, triangle_triangle
+from engine.containment import locators
+from engine.containment.cells import locate as segment_parity
+from engine.lanes.cells import plain_signs
 
 _AS_ENGINE: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 """Options of `engine.jit`, without a cache."""

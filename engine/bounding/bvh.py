@@ -8,7 +8,7 @@
 
 Node 0 is the root. Coordinates are those of the tree: x = origin + scale * local with a power of two for scale, so that
 every local coordinate is at most 2 in magnitude and float32 will do. Half widths are enlarged by what the conversion
-may lose: a child's box holds its items. Lanes are asked side by side by `box_lanes.py`; a block of eight items costs
+may lose: a child's box holds its items. Lanes are asked side by side by `lanes/boxes.py`; a block of eight items costs
 what one costs.
 
 The heuristic only decides how fast a query is: where its areas overflow, or many items share one centre, a run of items
@@ -27,13 +27,13 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.jit import inline, kernel
+from engine.lanes.boxes import EMPTY
 
 WIDTH = 8
 N_BINS = 16
 HEURISTIC_DEPTH = 40
 """Below this depth runs are halved, so no block lies deeper than `MAX_DEPTH`."""
 MAX_DEPTH = HEURISTIC_DEPTH + 40  # 2^40 items and more do not fit into memory
-EMPTY = -(2**31)
 UNUSED = np.float32(-1e30)
 ENLARGED = 2.0**-22
 """Added to half widths: a centre rounded to float32 is off by 2^-24 of at most 2, the half width by as much."""

@@ -18,14 +18,14 @@ from engine.collision.detail import (
     details_where_proven,
     has_interior,
 )
-from engine.collision.dual_traversal import new_descent
-from engine.collision.mesh_mesh import mesh_mesh
-from engine.collision.mesh_pair import what_to_seek
-from engine.collision.placement import PoseArrays
-from engine.collision.pose_batch import relate_poses
+from engine.collision.meshes.dual_traversal import new_descent
+from engine.collision.meshes.mesh_arrays import read_only, shell_of
+from engine.collision.meshes.mesh_mesh import mesh_mesh
+from engine.collision.meshes.mesh_pair import what_to_seek
+from engine.collision.meshes.placement import PoseArrays
+from engine.collision.meshes.pose_batch import relate_poses
 from engine.collision.result import Witness, Work
-from engine.collision.shell import read_only, shell_of
-from engine.collision.short_paths import convex_poses
+from engine.collision.scenes.batches import convex_poses
 from engine.errors import InvalidArrayError, WrongDimensionError
 from engine.parallel import Budget, Cancel, Progress, run_chunks
 from engine.solids.base import FloatArray, Solid

@@ -13,16 +13,16 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.arrangement.subdivision import label_faces, subdivide
-from engine.collision.ball_detail import body_ball_parts
-from engine.collision.half_space_detail import half_space_mesh_parts, half_space_outline_parts
-from engine.collision.images import dot, image_half_space, image_point, minus, squared_length
-from engine.collision.live_faces import live_piece
-from engine.collision.mesh_detail import mesh_parts
-from engine.collision.outline import arrange_outlines, live_edges, outline_of, single_points
-from engine.collision.outline_outline import FIRST, SECOND, boundaries_meet
+from engine.collision.exact_images import dot, image_half_space, image_point, minus, squared_length
+from engine.collision.meshes.live_faces import live_piece
+from engine.collision.meshes.mesh_arrays import shell_of
+from engine.collision.meshes.mesh_detail import mesh_parts
 from engine.collision.pairs import MESHES, OUTLINES
+from engine.collision.planar.outline import arrange_outlines, live_edges, outline_of, single_points
+from engine.collision.planar.outline_outline import FIRST, SECOND, boundaries_meet
 from engine.collision.result import Parts, Work
-from engine.collision.shell import shell_of
+from engine.collision.simple.ball_detail import body_ball_parts
+from engine.collision.simple.half_space_detail import half_space_mesh_parts, half_space_outline_parts
 from engine.containment.rational_locate import rational_location
 from engine.errors import InvalidInputError, UnsupportedSolidError
 from engine.parallel import Budget

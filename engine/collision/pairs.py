@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
-from engine.collision.aabb_aabb import collide_aabb_aabb
-from engine.collision.aabb_sphere import collide_aabb_sphere
-from engine.collision.half_space_half_space import collide_half_space_half_space
-from engine.collision.half_space_sphere import collide_half_space_sphere
-from engine.collision.half_space_vertices import collide_half_space_mesh, collide_half_space_outline
-from engine.collision.mesh_mesh import mesh_mesh
-from engine.collision.mesh_sphere import collide_mesh_sphere, collide_outline_sphere
-from engine.collision.outline_outline import collide_outline_outline
+from engine.collision.meshes.mesh_mesh import mesh_mesh
+from engine.collision.planar.outline_outline import collide_outline_outline
 from engine.collision.result import Collision, PairFunction, Work
-from engine.collision.sphere_sphere import collide_sphere_sphere
+from engine.collision.simple.aabb_aabb import collide_aabb_aabb
+from engine.collision.simple.aabb_sphere import collide_aabb_sphere
+from engine.collision.simple.half_space_half_space import collide_half_space_half_space
+from engine.collision.simple.half_space_sphere import collide_half_space_sphere
+from engine.collision.simple.half_space_vertices import collide_half_space_mesh, collide_half_space_outline
+from engine.collision.simple.mesh_sphere import collide_mesh_sphere, collide_outline_sphere
+from engine.collision.simple.sphere_sphere import collide_sphere_sphere
 from engine.solids.pose import Pose
 
 MESHES = ("polyhedron", "surface", "aabb")

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from engine.collision.exact_body import Corners, on_lattice
-from engine.collision.exact_triangles import classify_exact
-from engine.collision.outline_outline import collide_outline_outline
+from engine.collision.meshes.exact_body import Corners, on_lattice
+from engine.collision.meshes.exact_triangles import classify_exact
+from engine.collision.meshes.mesh_arrays import lattice_shift
+from engine.collision.meshes.triangle_triangle import APART
+from engine.collision.meshes.triangle_triangle_3d import relate_triangles_3d
+from engine.collision.planar.outline_outline import collide_outline_outline
+from engine.collision.planar.triangle_triangle_2d import OPEN, relate_triangles_2d
 from engine.collision.result import Work
-from engine.collision.shell import lattice_shift
-from engine.collision.triangle_triangle import APART
-from engine.collision.triangle_triangle_2d import OPEN, relate_triangles_2d
-from engine.collision.triangle_triangle_3d import relate_triangles_3d
 from engine.errors import InvalidArrayError, WrongDimensionError
 from engine.parallel import Budget, Cancel, Progress, run_chunks
 from engine.solids.base import FloatArray

@@ -10,7 +10,7 @@ from typing import Literal, overload
 import numpy as np
 import numpy.typing as npt
 
-from engine.containment.cell_order import gathered
+from engine.containment.cells.order import gathered
 from engine.containment.locators import locator_of
 from engine.errors import NotFiniteError
 from engine.parallel import Budget, Cancel, Progress, run_chunks

@@ -13,21 +13,21 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from engine.containment.balls import locate_in_ball
-from engine.containment.boxes import locate_in_box
-from engine.containment.build_cells import cells_if_they_pay
-from engine.containment.build_ring_cells import ring_cells_if_they_pay
-from engine.containment.cell_order import order_if_it_pays
-from engine.containment.half_spaces import locate_in_half_planes, locate_in_half_spaces
-from engine.containment.polynomials import locate_by_polynomial
+from engine.containment.cells.build import cells_if_they_pay
+from engine.containment.cells.locate import NOT_FINITE, locate_by_cells
+from engine.containment.cells.order import order_if_it_pays
+from engine.containment.methods.ball import locate_in_ball
+from engine.containment.methods.box import locate_in_box
+from engine.containment.methods.half_spaces import locate_in_half_planes, locate_in_half_spaces
+from engine.containment.methods.polygon_ray_parity import locate_in_rings
+from engine.containment.methods.polyhedron_one_pass import locate_few
+from engine.containment.methods.polyhedron_ray_parity import locate_by_columns
+from engine.containment.methods.polynomial import locate_by_polynomial
+from engine.containment.methods.triangle import locate_in_triangle
 from engine.containment.prepared import Columns, Rings, columns_of, columns_pay, rings_of, rounded_rows
 from engine.containment.rational_locate import Check, combine, prism_walls, rational_location, unsupported
-from engine.containment.ray_parity import locate_by_columns
-from engine.containment.ring_cells import locate_by_ring_cells
-from engine.containment.ring_crossing import locate_in_rings
-from engine.containment.segment_parity import NOT_FINITE, locate_by_cells
-from engine.containment.triangle_pass import locate_few
-from engine.containment.triangles import locate_in_triangle
+from engine.containment.ring_cells.build import ring_cells_if_they_pay
+from engine.containment.ring_cells.locate import locate_by_ring_cells
 from engine.errors import InvalidArrayError, NotFiniteError
 from engine.parallel import Budget
 from engine.solids.aabb import Aabb

@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.bounding.grid import BoxGrid, build_box_grid
+from engine.containment.methods.polyhedron_ray_parity import fill_rows
 from engine.containment.rational_locate import Check, next_in_ring, no_check
-from engine.containment.ray_parity import fill_rows
 from engine.predicates.rational import orient2d_rational
 from engine.solids.base import FloatArray, as_read_only
 from engine.solids.polygon import Polygon

@@ -4,7 +4,8 @@ Plain Python: what the compiled kernels leave undecided comes here one point at 
 float64 (exact images under a pose, sample points of an arrangement). Signs do not change when all coordinates are
 multiplied by a common positive denominator, so every decision is a polynomial over Python integers.
 
-Source: the sign rules are those of ray_parity.py and ring_crossing.py; here they have no filter in front.
+Source: the sign rules are those of polyhedron_ray_parity.py and polygon_ray_parity.py; here they have no filter in
+front.
 """
 
 from __future__ import annotations

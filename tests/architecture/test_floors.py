@@ -13,14 +13,17 @@ FLOORS = {
     "engine.errors": 0,
     "engine.types": 0,
     "engine.jit": 0,
-    "engine.cold_start": 1,
     "engine.parallel": 0,
+    "engine.cold_start": 1,
     "engine.predicates": 1,
+    "engine.lanes": 1,
     "engine.bounding": 2,
     "engine.solids": 3,
     "engine.arrangement": 4,
     "engine.containment": 4,
-    "engine.clipping": 5,
+    "engine.segment_clipping": 5,
+    "engine.polygon_clipping": 5,
+    "engine.polygon_overlay": 5,
     "engine.collision": 5,
     "engine.textbook": 5,
     "engine.distributed": 6,
@@ -30,6 +33,9 @@ FLOORS = {
     "engine.__main__": 8,
 }
 SAME_FLOOR_ALLOWED = {("engine.parallel", "engine.errors")}
+SPEAKS_LLVM = {"engine.jit", "engine.predicates.error_free"}
+"""Beside `engine.lanes`: the only modules that may."""
+LLVM = ("llvmlite", "numba.core", "numba.extending", "numba.types")
 SERVICE_LIBRARIES = {"fastapi", "httpx", "pydantic", "pydantic_core", "pydantic_settings", "starlette", "uvicorn"}
 
 
@@ -70,6 +76,11 @@ def test_engine_imports_only_go_down(path: Path) -> None:
             lower = FLOORS[other] < FLOORS[own] or other == own or (own, other) in SAME_FLOOR_ALLOWED
             assert lower, f"{module_name(path)} imports {name}: not below it"
         assert name.split(".")[0] not in SERVICE_LIBRARIES | {"service"}, f"{module_name(path)} imports {name}"
+
+
+def test_only_lanes_jit_and_error_free_speak_llvm() -> None:
+    speakers = {module_name(path) for path in ENGINE_FILES if any(name.startswith(LLVM) for name in imports_of(path))}
+    assert {name for name in speakers if not name.startswith("engine.lanes.")} == SPEAKS_LLVM
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "service").rglob("*.py")), ids=lambda path: module_name(path))

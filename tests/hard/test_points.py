@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from engine import Polyhedron, locate
-from engine.containment import build_cells, prepared
+from engine.containment import prepared
+from engine.containment.cells import build as build_cells
 from tests.hard.points import STORED, generated_solids, hard_points
 from tests.reference.many_points import locate_points
 

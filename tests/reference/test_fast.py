@@ -10,8 +10,8 @@ from tests.reference.overlay import OPERATIONS, overlay
 from tests.reference.segments import clip_segments
 from tests.reference.shapes import polygon
 from tests.reference.sutherland_hodgman import clip_contour, planes_of, rounded, same_cycle
-from tests.unit.clipping.large_scenes import SHAPES, scene_of_contours, scene_of_segments
-from tests.unit.clipping.scenes import as_json
+from tests.unit.segment_clipping.large_scenes import SHAPES, scene_of_contours, scene_of_segments
+from tests.unit.segment_clipping.scenes import as_json
 
 
 @pytest.mark.parametrize("kind", SHAPES)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from engine.bounding.bvh import EMPTY, MAX_DEPTH, UNUSED, WIDTH, Bvh, build_bvh
+from engine.bounding.bvh import MAX_DEPTH, UNUSED, WIDTH, Bvh, build_bvh
+from engine.lanes.boxes import EMPTY
 
 
 def check_tree(boxes: np.ndarray, tree: Bvh) -> None:

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from engine.containment.locate import locate
-from engine.containment.locate_scene import locate_scene
 from engine.containment.locators import locator_of
 from engine.containment.prepared import columns_of, rings_of
+from engine.containment.scene.locate_scene import locate_scene
 from engine.errors import DeadlineExceededError
 from engine.solids.base import Solid
 from engine.solids.polygon import Polygon

@@ -10,14 +10,14 @@ from numba import config as numba_config
 
 import engine
 from engine.bounding.grid import count_boxes, fill_boxes
-from engine.containment.balls import locate_in_ball
-from engine.containment.boxes import locate_in_box
-from engine.containment.half_spaces import locate_in_half_planes, locate_in_half_spaces
-from engine.containment.polynomials import locate_by_polynomial
-from engine.containment.ray_parity import locate_by_columns
-from engine.containment.ring_crossing import locate_in_rings
-from engine.containment.triangle_pass import locate_by_pass, sort_into_cells
-from engine.containment.triangles import locate_in_triangle
+from engine.containment.methods.ball import locate_in_ball
+from engine.containment.methods.box import locate_in_box
+from engine.containment.methods.half_spaces import locate_in_half_planes, locate_in_half_spaces
+from engine.containment.methods.polygon_ray_parity import locate_in_rings
+from engine.containment.methods.polyhedron_one_pass import locate_by_pass, sort_into_cells
+from engine.containment.methods.polyhedron_ray_parity import locate_by_columns
+from engine.containment.methods.polynomial import locate_by_polynomial
+from engine.containment.methods.triangle import locate_in_triangle
 
 VERTICES = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
 TURN = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]

@@ -1,0 +1,347 @@
+"""What lies on either side of a face, cell by cell: the exact answer where contacts alone prove nothing.
+
+The faces of both bodies cut a face T into cells. Within a cell, each body is inside or outside just above T, and just
+below. One point per cell, with rational coordinates, and the line through it along the axis on which T's normal is
+largest, tell all: crossings strictly above the point give the status above T; faces that hold the point lie in T's
+plane there, and each changes the status on the way through.
+
+Cells are sampled by slabs: between two neighbouring abscissas of end points and crossings of the traces no two traces
+cross, so one point between each two neighbours on the middle of every slab meets every cell that has an interior there.
+The line is moved by (eps, eps^2) across itself, so that it meets no edge; a face that holds the point is known by its
+plane, whatever the move.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from fractions import Fraction
+from itertools import pairwise
+from typing import NamedTuple
+
+from engine.collision.meshes.exact_body import (
+    Corners,
+    ExactBody,
+    Plane,
+    Vector,
+    cross,
+    dot,
+    largest_axis,
+    rounded_outward,
+    sign,
+)
+from engine.collision.meshes.exact_triangles import is_in_triangle, value_at
+from engine.parallel import Budget
+
+Rational = int | Fraction  # integers where they suffice: they are ten times faster
+Rational2 = tuple[Rational, Rational]
+Homogeneous = tuple[int, int, int, int]
+"""x, y, z, w: the point (x / w, y / w, z / w), w > 0."""
+
+
+class Sides(NamedTuple):
+    """Status of one body at a point of a face: inside just above, just below, the point itself inside and on no
+    face."""
+
+    above: bool
+    below: bool
+    at: bool
+
+
+def sides_at(body: ExactBody, q: Homogeneous, axis: int) -> Sides:
+    """Return the status of `body` along `axis` at q; a face that holds q must not contain that axis."""
+    sides = sides_over(body, q, axis, None)
+    assert sides is not None
+    return sides
+
+
+def sides_over(body: ExactBody, q: Homogeneous, axis: int, plane: Plane | None) -> Sides | None:
+    """Return the status of `body` along `axis` at q, a point of `plane`; None where a face that holds q and is not
+    parallel to that plane leaves it open (it is not looked at where `plane` is None)."""
+    if not body.shell.has_inside:
+        return Sides(False, False, False)
+    above = changes = is_on_face = False
+    j, k = (axis + 1) % 3, (axis + 2) % 3
+    x, y, w = q[j], q[k], q[3]
+    low, high = _around(body, q)
+    high[axis] = float("inf")
+    for face in body.faces_in(low, high):
+        other = body.plane(face)
+        slope = other[axis]
+        if slope == 0:  # case: a face along the line, or without area
+            continue
+        corners = body.corners(face)
+        if not _moved_line_meets(corners, j, k, x, y, w):
+            continue
+        height = other[0] * q[0] + other[1] * q[1] + other[2] * q[2] + other[3] * w
+        if height == 0:
+            if plane is not None and any(cross(plane[:3], other[:3])):
+                return None
+            is_on_face, changes = True, not changes
+        elif (height < 0) == (slope > 0):  # the face lies above q
+            above = not above
+    return Sides(above, above != changes, above and not is_on_face)
+
+
+def even_sides(corners: Corners, plane: Plane, axis: int, touching: Iterable[Corners]) -> tuple[bool, bool]:
+    """Tell whether a body has one status just above (below) the whole of a face with area; `touching`: all faces of
+    the body that meet the face.
+
+    A face of the body comes between only where it meets the open face and leaves the plane on that side.
+    """
+    flat = [(p[(axis + 1) % 3], p[(axis + 2) % 3], 1) for p in corners]
+    turn = sign(dot(cross(flat[0], flat[1]), flat[2]))
+    lines = [cross(flat[i], flat[(i + 1) % 3]) for i in range(3)]
+    above = below = True
+    for points in touching:
+        values = [value_at(plane, p) for p in points]
+        low, high = min(values), max(values)
+        if (low, high) == (0, 0) or not _meets_open_face(_flat_trace(points, values, axis), flat, lines, turn):
+            continue
+        above = above and (high if plane[axis] > 0 else -low) <= 0
+        below = below and (-low if plane[axis] > 0 else high) <= 0
+    return above, below
+
+
+def _flat_trace(points: Corners, values: list[int], axis: int) -> list[Vector]:
+    """Return the ends (x, y, w), w > 0, of the segment or point in which a face meets a plane that does not hold it."""
+    j, k = (axis + 1) % 3, (axis + 2) % 3
+    ends = [(points[i][j], points[i][k], 1) for i in range(3) if values[i] == 0]
+    for i in range(3):
+        f, g = values[i], values[i - 2]
+        if f * g < 0:
+            p, q = points[i], points[i - 2]
+            x, y, w = f * q[j] - g * p[j], f * q[k] - g * p[k], f - g
+            ends.append((x, y, w) if w > 0 else (-x, -y, -w))
+    return ends
+
+
+def _meets_open_face(ends: list[Vector], flat: list[Vector], lines: list[Vector], turn: int) -> bool:
+    """Tell whether a segment or point of its plane meets an open triangle: no line of an edge, nor its own line, has
+    the two on different closed sides."""
+    if any(max(turn * dot(line, end) for end in ends) <= 0 for line in lines):
+        return False
+    if len(ends) < 2:
+        return True
+    own = cross(ends[0], ends[1])
+    values = [dot(own, p) for p in flat]
+    return not any(own) or min(values) < 0 < max(values)
+
+
+def _around(body: ExactBody, q: Homogeneous) -> tuple[list[float], list[float]]:
+    scale = q[3] << body.shift
+    bounds = [rounded_outward(q[side], scale) for side in range(3)]
+    return [low for low, _ in bounds], [high for _, high in bounds]
+
+
+def _moved_line_meets(corners: Corners, j: int, k: int, x: int, y: int, w: int) -> bool:
+    """Tell whether the line over (x, y) / w, moved by (eps, eps^2), passes through a face that is not upright."""
+    before = 0
+    for index in range(3):
+        a, b = corners[index], corners[(index + 1) % 3]
+        dx, dy = b[j] - a[j], b[k] - a[k]
+        value = dx * (y - a[k] * w) - dy * (x - a[j] * w)
+        turn = (value > 0) - (value < 0)
+        if turn == 0:
+            turn = -sign(dy) or sign(dx)
+        if before * turn < 0:
+            return False
+        before = turn
+    return True
+
+
+def is_inside_exact(body: ExactBody, q: Homogeneous) -> bool:
+    """Tell whether q, any point, lies in the open interior of a body and on no face with area."""
+    return sides_at(body, q, 2).at and not _is_on_face(body, q)
+
+
+def _is_on_face(body: ExactBody, q: Homogeneous) -> bool:
+    """Tell whether some face with area holds q."""
+    low, high = _around(body, q)
+    w = q[3]
+    for face in body.faces_in(low, high):
+        plane = body.plane(face)
+        if not any(plane[:3]) or plane[0] * q[0] + plane[1] * q[1] + plane[2] * q[2] + plane[3] * w != 0:
+            continue
+        a, b, c = body.corners(face)
+        scaled = (_times(a, w), _times(b, w), _times(c, w))
+        if is_in_triangle(q[:3], scaled, (*plane[:3], plane[3] * w)):
+            return True
+    return False
+
+
+def _times(p: Vector, w: int) -> Vector:
+    return p[0] * w, p[1] * w, p[2] * w
+
+
+def cells_of(body: ExactBody, face: int, cutters: list[ExactBody], budget: Budget) -> Iterator[Homogeneous]:
+    """Yield a point in each cell that the faces of `cutters` cut from a face with area; none lies on a trace."""
+    corners, plane = body.corners(face), body.plane(face)
+    axis = largest_axis(plane[:3])
+    segments = _traces(body, face, corners, plane, axis, cutters, budget)
+    own = [_segment(_flat(corners[i], axis), _flat(corners[i - 2], axis)) for i in range(3)]
+    for x, y in _samples(own, segments, budget):
+        yield _lifted(x, y, plane, axis)
+
+
+def _lifted(x: Rational, y: Rational, plane: Plane, axis: int) -> Homogeneous:
+    """Return the point of the plane over (x, y)."""
+    j, k = (axis + 1) % 3, (axis + 2) % 3
+    w = x.denominator * y.denominator
+    xw, yw = x.numerator * y.denominator, y.numerator * x.denominator
+    n = plane[axis]
+    point = [0, 0, 0]
+    point[axis] = -(plane[j] * xw + plane[k] * yw + plane[3] * w)
+    point[j], point[k], w = xw * n, yw * n, w * n
+    if w < 0:
+        return -point[0], -point[1], -point[2], -w
+    return point[0], point[1], point[2], w
+
+
+def _flat(p: Vector, axis: int) -> Rational2:
+    return p[(axis + 1) % 3], p[(axis + 2) % 3]
+
+
+def _segment(p: Rational2, q: Rational2) -> tuple[Rational2, Rational2]:
+    return (p, q) if p <= q else (q, p)
+
+
+def _traces(
+    body: ExactBody, face: int, corners: Corners, plane: Plane, axis: int, cutters: list[ExactBody], budget: Budget
+) -> list[tuple[Rational2, Rational2]]:
+    """Return the segments in which other faces meet the plane of a face, near the face, projected along `axis`."""
+    scale = 1 << body.shift
+    low = [rounded_outward(min(p[side] for p in corners), scale)[0] for side in range(3)]
+    high = [rounded_outward(max(p[side] for p in corners), scale)[1] for side in range(3)]
+    found = set()
+    for cutter in cutters:
+        for other in cutter.faces_in(low, high):
+            budget.check()
+            if cutter is body and other == face:
+                continue
+            if not any(cutter.plane(other)[:3]):
+                continue
+            points = cutter.corners(other)
+            values = [value_at(plane, p) for p in points]
+            for p, q in _trace(points, values, axis):
+                if p != q:
+                    found.add(_segment(p, q))
+    return sorted(found)
+
+
+def _trace(points: Corners, values: list[int], axis: int) -> list[tuple[Rational2, Rational2]]:
+    """Return the segments in which a face meets the plane at which its corners have `values`."""
+    j, k = (axis + 1) % 3, (axis + 2) % 3
+    if not any(values):
+        return [(_flat(points[i], axis), _flat(points[i - 2], axis)) for i in range(3)]
+    ends: list[Rational2] = [_flat(points[i], axis) for i in range(3) if values[i] == 0]
+    for i in range(3):
+        f, g = values[i], values[i - 2]
+        if f * g < 0:
+            p, q = points[i], points[i - 2]
+            ends.append((Fraction(f * q[j] - g * p[j], f - g), Fraction(f * q[k] - g * p[k], f - g)))
+    return [(ends[0], ends[1])] if len(ends) == 2 else []
+
+
+def _samples(
+    own: list[tuple[Rational2, Rational2]], traces: list[tuple[Rational2, Rational2]], budget: Budget
+) -> Iterator[Rational2]:
+    """Yield a point in every cell that `traces` cut from the triangle with the edges `own`."""
+    left, right = min(p[0] for p, _ in own), max(q[0] for _, q in own)
+    segments = [_on_line(s) for s in sorted({*own, *traces}) if s[0][0] <= right and s[1][0] >= left]
+    stops = {end[0] for s in segments for end in s.ends if left <= end[0] <= right}
+    for index, one in enumerate(segments):
+        budget.check()
+        for other in segments[index + 1 :]:
+            if other.ends[0][0] >= one.ends[1][0]:  # invariant: sorted by their left ends
+                break
+            x = _crossing_abscissa(one, other)
+            if x is not None and left < x < right:
+                stops.add(x)
+    edges = [_on_line(s) for s in own]
+    ordered = sorted(stops)
+    for x0, x1 in pairwise(ordered):
+        budget.check()
+        x = Fraction(x0 + x1, 2)
+        ends = [_height(s, x) for s in edges if s.ends[0][0] < x < s.ends[1][0]]
+        low, high = min(ends), max(ends)
+        heights = {_height(s, x) for s in segments if s.ends[0][0] < x < s.ends[1][0]}
+        for y0, y1 in pairwise(sorted(y for y in heights if low <= y <= high)):
+            yield x, (y0 + y1) / 2
+
+
+class _Segment(NamedTuple):
+    """Left and right end, both again as integers (x, y, w), and the line a x + b y + c = 0 through them."""
+
+    ends: tuple[Rational2, Rational2]
+    left: Vector
+    right: Vector
+    line: Vector
+
+
+def _on_line(ends: tuple[Rational2, Rational2]) -> _Segment:
+    left, right = (
+        (x.numerator * y.denominator, y.numerator * x.denominator, x.denominator * y.denominator) for x, y in ends
+    )
+    return _Segment(ends, left, right, cross(left, right))
+
+
+def _height(s: _Segment, x: Fraction) -> Fraction:
+    a, b, c = s.line
+    return Fraction(-(a * x.numerator + c * x.denominator), b * x.denominator)
+
+
+def _crossing_abscissa(s: _Segment, t: _Segment) -> Fraction | None:
+    """Return where two segments cross in a point that is an end of neither; None otherwise (ends are stops already)."""
+    f, g = dot(s.line, t.left), dot(s.line, t.right)
+    if f >= 0 <= g or f <= 0 >= g:
+        return None
+    f, g = dot(t.line, s.left), dot(t.line, s.right)
+    if f >= 0 <= g or f <= 0 >= g:
+        return None
+    x, _, w = cross(s.line, t.line)
+    return Fraction(x, w)
+
+
+def pieces_of_segment(
+    body: ExactBody, ends: tuple[Vector, Vector], cutter: ExactBody, budget: Budget
+) -> Iterator[Homogeneous]:
+    """Yield a point in each piece that the faces of `cutter` cut from a segment; points of a face may be among them."""
+    p, q = ends
+    scale = 1 << body.shift
+    low = [rounded_outward(min(p[side], q[side]), scale)[0] for side in range(3)]
+    high = [rounded_outward(max(p[side], q[side]), scale)[1] for side in range(3)]
+    stops = {Fraction(0), Fraction(1)}
+    for face in cutter.faces_in(low, high):
+        budget.check()
+        for plane in _planes_that_cut(cutter, face):
+            f, g = value_at(plane, p), value_at(plane, q)
+            if f != g:
+                t = Fraction(f, f - g)
+                if 0 < t < 1:
+                    stops.add(t)
+    ordered = sorted(stops)
+    for t0, t1 in pairwise(ordered):
+        t = (t0 + t1) / 2
+        n, w = t.numerator, t.denominator
+        yield (
+            p[0] * (w - n) + q[0] * n,
+            p[1] * (w - n) + q[1] * n,
+            p[2] * (w - n) + q[2] * n,
+            w,
+        )
+
+
+def _planes_that_cut(cutter: ExactBody, face: int) -> Iterator[Plane]:
+    """Yield a face's plane, and the planes through its edges across it: every change along a segment is on one of
+    them."""
+    plane = cutter.plane(face)
+    if not any(plane[:3]):
+        return
+    yield plane
+    corners = cutter.corners(face)
+    n = plane[:3]
+    for i in range(3):
+        a, b = corners[i], corners[i - 2]
+        u = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
+        m = (n[1] * u[2] - n[2] * u[1], n[2] * u[0] - n[0] * u[2], n[0] * u[1] - n[1] * u[0])
+        yield (*m, -(m[0] * a[0] + m[1] * a[1] + m[2] * a[2]))

@@ -1,0 +1,182 @@
+"""How a face lies among the other faces of its own body: clean, crossed or stacked (see `mesh_arrays.py`).
+
+A strict crossing of two faces proves that two interiors overlap if nothing else of the two bodies cancels or fans out
+along it. Near a general point of the crossing line a body whose face is clean there is a half-space; the other body's
+face, not stacked, changes its inside on both sides of the first plane: so one of its two changes lies in that
+half-space. Hence the rule `proves_overlap`. The state of a face does not depend on a pose, is computed on demand from
+exact signs of the unposed coordinates, and kept.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from engine.bounding.bvh import MAX_DEPTH, WIDTH
+from engine.collision.meshes.mesh_arrays import (
+    STATE_CLEAN,
+    STATE_CROSSED,
+    STATE_STACKED,
+    STATE_UNKNOWN,
+    ShellArrays,
+    in_tree,
+    triangle_of,
+)
+from engine.collision.meshes.triangle_triangle import (
+    CROSSING,
+    Triangle3,
+    classify_exactly,
+    classify_near,
+    is_straddling,
+    projected,
+    separation,
+    unposed,
+)
+from engine.jit import inline, kernel
+from engine.lanes.boxes import inside_box, lowest_bit
+from engine.predicates.orientation import orient2d, orient3d
+from engine.types import UNDECIDED, Point3
+
+STACK_ROWS = WIDTH * MAX_DEPTH + WIDTH
+SLACK = 2.0**-20
+"""By how much a box in the tree's coordinates is widened for its rounding to float32."""
+
+
+@inline
+def edge_meets_inside(t: Triangle3, axis: int, a: Point3, b: Point3) -> bool:
+    """Tell whether the segment a b in the plane of t may meet its relative interior (True where unsure)."""
+    p, q, r = projected(t.p, axis), projected(t.q, axis), projected(t.r, axis)
+    s, e = projected(a, axis), projected(b, axis)
+    turn = orient2d(p, q, r)
+    for edge in range(3):
+        if edge == 0:
+            tail, head = p, q
+        elif edge == 1:
+            tail, head = q, r
+        else:
+            tail, head = r, p
+        s_side, e_side = orient2d(tail, head, s), orient2d(tail, head, e)
+        if s_side == UNDECIDED or e_side == UNDECIDED:
+            return True
+        if s_side != turn and e_side != turn:  # the edge has the segment outside or on it
+            return False
+    p_side, q_side, r_side = orient2d(s, e, p), orient2d(s, e, q), orient2d(s, e, r)
+    if p_side == UNDECIDED or q_side == UNDECIDED or r_side == UNDECIDED:
+        return True
+    return is_straddling(p_side, q_side, r_side)
+
+
+@inline
+def side_of_vertex(shell: ShellArrays, face: int, t: Triangle3, vertex: int, p: Point3) -> int:
+    """Return the side of the plane of a face on which a vertex lies, 0 at once for one of its own."""
+    corners = shell.triangles
+    if vertex == corners[face, 0] or vertex == corners[face, 1] or vertex == corners[face, 2]:
+        return 0
+    return orient3d(t.p, t.q, t.r, p)
+
+
+@inline
+def state_by(shell: ShellArrays, face: int, other: int, poses: Any) -> int:
+    """Return what one other face of the body makes of the state of `face` (which has an area)."""
+    if shell.axis[other] == -1:
+        return STATE_CLEAN
+    if shell.axis[other] < 0:
+        return STATE_STACKED
+    t, o = triangle_of(shell, face), triangle_of(shell, other)
+    axis = int(shell.axis[face])
+    p = side_of_vertex(shell, face, t, shell.triangles[other, 0], o.p)
+    q = side_of_vertex(shell, face, t, shell.triangles[other, 1], o.q)
+    r = side_of_vertex(shell, face, t, shell.triangles[other, 2], o.r)
+    if p == UNDECIDED or q == UNDECIDED or r == UNDECIDED:
+        return STATE_STACKED
+    if p == 0 and q == 0 and r == 0:
+        how = separation(poses, unposed(t), unposed(o), axis, 0.0)
+        return STATE_STACKED if (how < 0 or how == UNDECIDED) else STATE_CLEAN
+    if is_straddling(p, q, r):
+        how = classify_near(t, o, 0.0)
+        if how == UNDECIDED:
+            how = classify_exactly(poses, unposed(t), unposed(o), axis, 0.0)
+        if how == UNDECIDED:
+            return STATE_STACKED
+        return STATE_CROSSED if how == CROSSING else STATE_CLEAN
+    a, b = o.p, o.q
+    if p == 0 and q == 0:
+        is_own_edge = is_corner(shell, face, other, 0) and is_corner(shell, face, other, 1)
+    elif q == 0 and r == 0:
+        a, b = o.q, o.r
+        is_own_edge = is_corner(shell, face, other, 1) and is_corner(shell, face, other, 2)
+    elif r == 0 and p == 0:
+        a, b = o.r, o.p
+        is_own_edge = is_corner(shell, face, other, 2) and is_corner(shell, face, other, 0)
+    else:
+        return STATE_CLEAN
+    return STATE_CROSSED if not is_own_edge and edge_meets_inside(t, axis, a, b) else STATE_CLEAN
+
+
+@inline
+def is_corner(shell: ShellArrays, face: int, other: int, corner: int) -> bool:
+    """Tell whether a corner of another face is one of this face too."""
+    vertex, corners = shell.triangles[other, corner], shell.triangles
+    return bool(vertex == corners[face, 0] or vertex == corners[face, 1] or vertex == corners[face, 2])
+
+
+@inline
+def state_of(shell: ShellArrays, face: int, poses: Any) -> int:
+    """Return the state of a face, computed at the first question; a face without area counts as stacked.
+
+    poses: any (n, 12) float64; nothing here has a pose.
+    """
+    known = int(shell.state[face])
+    if known != STATE_UNKNOWN:
+        return known
+    state = STATE_STACKED
+    if shell.axis[face] >= 0:
+        state = STATE_CLEAN
+        t = triangle_of(shell, face)
+        p, q, r = in_tree(shell, t.p), in_tree(shell, t.q), in_tree(shell, t.r)
+        low = (
+            np.float32(min(p.x, q.x, r.x) - SLACK),
+            np.float32(min(p.y, q.y, r.y) - SLACK),
+            np.float32(min(p.z, q.z, r.z) - SLACK),
+        )
+        high = (
+            np.float32(max(p.x, q.x, r.x) + SLACK),
+            np.float32(max(p.y, q.y, r.y) + SLACK),
+            np.float32(max(p.z, q.z, r.z) + SLACK),
+        )
+        stack = np.empty(STACK_ROWS, np.int32)
+        stack[0] = 0
+        n_stack = 1
+        while n_stack > 0 and state != STATE_STACKED:  # bound: each node enters once
+            n_stack -= 1
+            node = int(stack[n_stack])
+            lanes = inside_box(shell.boxes, node, low, high)
+            while lanes != 0:
+                child = int(shell.child[node, lowest_bit(lanes)])
+                lanes &= lanes - 1
+                if child >= 0:
+                    stack[n_stack] = child
+                    n_stack += 1
+                elif -1 - child != face:
+                    state = max(state, state_by(shell, face, -1 - child, poses))
+    shell.state[face] = state
+    return state
+
+
+@inline
+def proves_overlap(first: ShellArrays, i: int, second: ShellArrays, j: int, poses: Any) -> bool:
+    """Tell whether a strict crossing of these two faces proves that the open interiors of two solids meet."""
+    a = state_of(first, i, poses)
+    if a == STATE_STACKED:
+        return False
+    b = state_of(second, j, poses)
+    return b != STATE_STACKED and (a == STATE_CLEAN or b == STATE_CLEAN)
+
+
+@kernel
+def find_states(shell: ShellArrays, faces: Any, states: Any) -> None:
+    """Fill states (n,) with the state of each of `faces` (n,)."""
+    poses = np.zeros((1, 12))
+    for item in range(faces.shape[0]):
+        states[item] = state_of(shell, faces[item], poses)

@@ -1,0 +1,137 @@
+"""The parts of a body's faces that even-odd does not cancel: only beside those lies the body's open interior.
+
+Most faces are whole: no other face of the body covers a part of them. A stacked face (see `face_state.py`) is cut, in
+the plane it shares with those that cover it, into cells; a cell covered an odd number of times is live.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from engine.arrangement.arrange import arrange
+from engine.arrangement.nodes import float_nodes
+from engine.arrangement.subdivision import label_faces, subdivide
+from engine.collision.exact_images import Vector, cross, dot, minus, squared_length
+from engine.collision.meshes.face_state import find_states
+from engine.collision.meshes.mesh_arrays import NO_AREA, STATE_STACKED, Shell
+from engine.collision.simple.feature_distance import segment_distance, triangle_distance
+from engine.parallel import Budget
+from engine.predicates.rational import orient2d_rational, orient3d_rational
+
+Point2 = tuple[Fraction, Fraction]
+IN_FACE, IN_ODD, LIVE = 1, 2, 3
+
+
+@dataclass(frozen=True, slots=True)
+class LivePiece:
+    """What is live of one face: its plane's corners, and the edges around the live cells (None: the whole face)."""
+
+    corners: tuple[Vector, Vector, Vector]
+    edges: list[tuple[Vector, Vector]] | None
+
+    def vertices(self) -> list[Vector]:
+        """Return points whose convex hull is that of the live part."""
+        if self.edges is None:
+            return list(self.corners)
+        return [end for edge in self.edges for end in edge]
+
+    def moved(self, images: dict[Vector, Vector]) -> LivePiece:
+        """Return the piece with every point replaced by its image."""
+        a, b, c = (images[corner] for corner in self.corners)
+        edges = None if self.edges is None else [(images[start], images[end]) for start, end in self.edges]
+        return LivePiece((a, b, c), edges)
+
+    def squared_distance(self, point: Vector) -> Fraction | None:
+        """Return the squared distance from `point` to the live part; None where nothing is live."""
+        if self.edges is None:
+            return triangle_distance(point, *self.corners)
+        if not self.edges:
+            return None
+        a, b, c = self.corners
+        normal = cross(minus(b, a), minus(c, a))
+        height = dot(normal, minus(point, a)) / squared_length(normal)
+        foot = tuple(p - height * n for p, n in zip(point, normal))
+        axis = max(range(3), key=lambda k: abs(normal[k]))
+        if _is_within(_flat(foot, axis), [(_flat(start, axis), _flat(end, axis)) for start, end in self.edges]):
+            return squared_length(minus(point, foot))
+        return min(segment_distance(point, start, end) for start, end in self.edges)
+
+
+def live_piece(shell: Shell, face: int, budget: Budget) -> LivePiece | None:
+    """Return what even-odd leaves of one triangle, in the body's own coordinates; None where nothing is left."""
+    arrays = shell.arrays
+    if arrays.axis[face] == NO_AREA:
+        return None
+    corners = _corners(shell, face)
+    states = np.empty(1, np.int8)
+    with np.errstate(all="ignore"):  # uncompiled runs only
+        find_states(arrays, np.array([face]), states)
+    if states[0] != STATE_STACKED:
+        return LivePiece(corners, None)
+    edges = _live_edges(shell, face, corners, budget)
+    return LivePiece(corners, edges) if edges else None
+
+
+def _corners(shell: Shell, face: int) -> tuple[Vector, Vector, Vector]:
+    a, b, c = (
+        tuple(map(Fraction, shell.arrays.vertices[vertex].tolist())) for vertex in shell.arrays.triangles[face].tolist()
+    )
+    return a, b, c
+
+
+def _live_edges(
+    shell: Shell, face: int, corners: tuple[Vector, Vector, Vector], budget: Budget
+) -> list[tuple[Vector, Vector]]:
+    """Return the edges between live and other cells of a stacked face."""
+    arrays = shell.arrays
+    points = arrays.vertices[arrays.triangles]
+    low, high = points.min(axis=1), points.max(axis=1)
+    near = np.flatnonzero((low <= high[face]).all(axis=1) & (high >= low[face]).all(axis=1))
+    a, b, c = corners
+    normal = cross(minus(b, a), minus(c, a))
+    axis = max(range(3), key=lambda k: abs(normal[k]))
+    covering = [face]
+    for other in near.tolist():
+        budget.check()
+        if other != face and all(orient3d_rational(a, b, c, corner) == 0 for corner in points[other].tolist()):
+            covering.append(other)
+    kept = [k for k in range(3) if k != axis]
+    nodes, numbers = float_nodes(np.ascontiguousarray(points[covering][:, :, kept].reshape(-1, 2)))
+    segments = [(numbers[3 * i + k], numbers[3 * i + (k + 1) % 3]) for i in range(len(covering)) for k in range(3)]
+    masks = [IN_ODD | (IN_FACE if i < 3 else 0) for i in range(len(segments))]
+    subdivision = subdivide(arrange(nodes, segments, masks, budget), budget)
+    labels = label_faces(subdivision)
+    found = []
+    for edge, (tail, head) in enumerate(zip(subdivision.arrangement.tails, subdivision.arrangement.heads)):
+        left, right = labels[subdivision.faces[2 * edge]], labels[subdivision.faces[2 * edge + 1]]
+        if (left == LIVE) != (right == LIVE):
+            ends = (_lifted(nodes.exact(tail), a, normal, axis), _lifted(nodes.exact(head), a, normal, axis))
+            found.append(ends)
+    return found
+
+
+def _lifted(flat: Point2, origin: Vector, normal: Vector, axis: int) -> Vector:
+    """Return the point of the plane through `origin` whose projection along `axis` is `flat`."""
+    kept = [k for k in range(3) if k != axis]
+    rise = -sum((normal[k] * (value - origin[k]) for k, value in zip(kept, flat)), Fraction(0)) / normal[axis]
+    point = dict(zip(kept, flat))
+    point[axis] = origin[axis] + rise
+    return point[0], point[1], point[2]
+
+
+def _flat(point: Vector, axis: int) -> Point2:
+    x, y = (point[k] for k in range(3) if k != axis)
+    return x, y
+
+
+def _is_within(point: Point2, edges: list[tuple[Point2, Point2]]) -> bool:
+    """Tell whether a ray to the right of `point` crosses the closed rings of `edges` an odd number of times."""
+    odd = False
+    for start, end in edges:
+        low, high = (start, end) if start[1] < end[1] else (end, start)
+        if low[1] <= point[1] < high[1] and orient2d_rational(low, high, point) > 0:
+            odd = not odd
+    return odd

@@ -1,0 +1,334 @@
+"""What collision sees of a body: triangles, their tree, and what is known of each face. Built once per solid, lazily.
+
+A polyhedron and a box are closed shells under even-odd; a surface, and a box that is flat on some axis, have nothing
+inside. All arrays are in the body's own coordinates: poses are applied where a query runs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import frexp, ldexp
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from engine.bounding.bvh import WIDTH, build_bvh
+from engine.collision.meshes.placement import NO_ROTATION, NO_TRANSLATION, Extent, PoseArrays
+from engine.collision.meshes.triangle_triangle import Triangle3, projected
+from engine.jit import inline, kernel
+from engine.lanes.boxes import EMPTY
+from engine.lanes.discs import DISC_ROWS, fill_discs
+from engine.lanes.faces import NOWHERE
+from engine.lanes.triangles import CORNER_ROWS
+from engine.predicates.loading import as_point3
+from engine.predicates.orientation import orient2d
+from engine.solids.aabb import Aabb
+from engine.solids.base import FloatArray, IntArray, Solid
+from engine.solids.mesh import Mesh
+from engine.solids.polyhedron import Polyhedron
+from engine.solids.pose import Pose
+from engine.types import Point3
+
+NO_AREA = -1
+UNKNOWN_AXIS = -2
+"""Values in `axis` beside 0, 1, 2: no projection has an area; a predicate was undecided."""
+
+STATE_UNKNOWN = -1
+STATE_CLEAN = 0
+STATE_CROSSED = 1
+STATE_STACKED = 2
+"""Values in `state`: nothing computed yet; no other face of the body meets the relative interior in more than single
+points; some other face crosses it along a segment; some other face of the same plane covers part of it (or unsure)."""
+
+
+STILL = PoseArrays(NO_ROTATION, NO_TRANSLATION, False)
+"""Of a body without a pose."""
+
+
+class ShellArrays(NamedTuple):
+    """What kernels take; boxes to scale: the tree (`bvh.py`); blocks, discs: what its blocks (`lanes/faces.py`) and its
+    inner nodes (`lanes/discs.py`) hold beside boxes, the rows of the other kind not set. `state` is filled by kernels
+    as needed: any thread writes the same values."""
+
+    vertices: FloatArray
+    triangles: IntArray
+    axis: npt.NDArray[np.int8]
+    state: npt.NDArray[np.int8]
+    boxes: npt.NDArray[np.float32]
+    child: npt.NDArray[np.int32]
+    blocks: npt.NDArray[np.float32]
+    discs: npt.NDArray[np.float32]
+    origin: FloatArray
+    scale: float
+    extent: Extent
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shell:
+    """Triangles of one body.
+
+    arrays: for kernels. faces: the caller's face of each triangle. has_inside: False for surfaces and flat boxes.
+    components: of the triangles connected through vertices, one triangle each, ascending. reach: largest magnitude of a
+    coordinate. shift: every coordinate times 2^shift is an integer.
+    """
+
+    arrays: ShellArrays
+    faces: IntArray
+    has_inside: bool
+    components: IntArray
+    reach: float
+    shift: int
+
+    def posed(self, pose: Pose | None) -> PoseArrays:
+        """Return the pose as kernels take it."""
+        if pose is None:
+            return STILL
+        return PoseArrays(read_only(pose.rotation[None]), read_only(pose.translation[None]), True)
+
+
+def shell_of(solid: Solid) -> Shell:
+    """Return the shell of a polyhedron, surface or 3D box, built at the first call."""
+    return solid.prepared("collision_shell", lambda: build_shell(solid))
+
+
+def build_shell(solid: Solid) -> Shell:
+    """Return a new shell of a polyhedron, surface or 3D box."""
+    if isinstance(solid, Aabb):
+        vertices, triangles, faces = _box_triangles(solid)
+        has_inside = bool((solid.min < solid.max).all())
+    else:
+        assert isinstance(solid, Mesh)
+        vertices, triangles, faces = solid.vertices, solid.triangles, solid.triangle_faces
+        has_inside = isinstance(solid, Polyhedron)
+    return shell_of_triangles(vertices, triangles, faces, has_inside)
+
+
+def shell_of_triangles(vertices: FloatArray, triangles: IntArray, faces: IntArray, has_inside: bool) -> Shell:
+    """Return the shell of checked arrays.
+
+    Triangles and vertices are copied in the order of the tree: the faces near a contact then lie side by side in
+    memory, which a large mesh, asked at another place by every pose, needs more than anything else.
+    """
+    vertices, triangles = read_only(vertices), read_only(triangles)
+    n_triangles = len(triangles)
+    boxes = np.empty((n_triangles, 6))
+    _fill_boxes(vertices, triangles, boxes)
+    tree = build_bvh(boxes)
+    child, order = tree.child.copy(), np.empty(n_triangles, np.int64)
+    ordered, axis = np.empty((n_triangles, 3), np.int64), np.empty(n_triangles, np.int8)
+    used, components = np.empty((len(vertices), 3)), np.empty(n_triangles, np.int64)
+    with np.errstate(over="ignore", invalid="ignore", under="ignore"):  # uncompiled runs only
+        n_used, n_components = _lay_out(vertices, triangles, child, order, ordered, used, axis, components)
+        reach, lowest_bit, shift = _lattice_of(used[:n_used])
+    blocks = np.empty((len(child), CORNER_ROWS, WIDTH), np.float32)
+    _fill_blocks(used, ordered, child, tree.origin, tree.scale, blocks)
+    discs = np.empty((len(child), DISC_ROWS, WIDTH), np.float32)
+    fill_discs(blocks, child, tree.boxes, discs)
+    arrays = ShellArrays(
+        read_only(used[:n_used].copy() if n_used < len(used) else used),
+        read_only(ordered),
+        read_only(axis),
+        np.full(n_triangles, STATE_UNKNOWN, np.int8),
+        tree.boxes,
+        read_only(child),
+        read_only(blocks),
+        read_only(discs),
+        tree.origin,
+        tree.scale,
+        Extent(reach, ldexp(1.0, lowest_bit)),
+    )
+    return Shell(arrays, faces[order], has_inside, components[:n_components].copy(), reach, shift)
+
+
+@kernel
+def _fill_boxes(vertices: Any, triangles: Any, boxes: Any) -> None:
+    """Fill boxes (n, 6) with the smallest and the largest coordinates of each triangle."""
+    for item in range(triangles.shape[0]):
+        for k in range(3):
+            p = vertices[triangles[item, 0], k]
+            q = vertices[triangles[item, 1], k]
+            r = vertices[triangles[item, 2], k]
+            boxes[item, k], boxes[item, 3 + k] = min(p, q, r), max(p, q, r)
+
+
+@kernel
+def _lay_out(
+    vertices: Any, triangles: Any, child: Any, order: Any, ordered: Any, used: Any, axis: Any, components: Any
+) -> tuple[int, int]:
+    """Renumber triangles and vertices in the order of the tree; return the numbers of vertices and components.
+
+    child: of the tree, items renumbered. order (n,): the old number of each triangle; ordered (n, 3): its vertices;
+    used (n_vertices, 3): their coordinates; axis (n,): `axis_of`; components: the first triangle of each.
+    """
+    n_triangles = n_used = n_components = 0
+    number = np.full(vertices.shape[0], -1, np.int64)
+    for node in range(child.shape[0]):
+        for lane in range(WIDTH):
+            if child[node, lane] >= 0 or child[node, lane] == EMPTY:
+                continue
+            item = n_triangles
+            order[item] = -1 - child[node, lane]
+            child[node, lane] = -1 - item
+            n_triangles += 1
+            for corner in range(3):
+                vertex = triangles[order[item], corner]
+                if number[vertex] < 0:
+                    number[vertex] = n_used
+                    used[n_used] = vertices[vertex]
+                    n_used += 1
+                ordered[item, corner] = number[vertex]
+            axis[item] = axis_of(
+                as_point3(used, ordered[item, 0]),
+                as_point3(used, ordered[item, 1]),
+                as_point3(used, ordered[item, 2]),
+            )
+    parent = np.empty(n_used, np.int64)
+    _join(ordered, np.zeros(n_triangles, np.bool_), parent)
+    number[:n_used] = 0
+    for item in range(n_triangles):
+        root = parent[ordered[item, 0]]
+        if number[root] == 0:
+            number[root] = 1
+            components[n_components] = item
+            n_components += 1
+    return n_used, n_components
+
+
+@kernel
+def _fill_blocks(vertices: Any, triangles: Any, child: Any, origin: Any, scale: float, blocks: Any) -> None:
+    """Fill blocks (n_nodes, 9, 8) with the corners of the triangles of each block, in the coordinates of the tree."""
+    for node in range(child.shape[0]):
+        if child[node, 0] >= 0:
+            continue
+        for lane in range(WIDTH):
+            if child[node, lane] == EMPTY:
+                blocks[node, :, lane] = NOWHERE
+                continue
+            for corner in range(3):
+                vertex = triangles[-1 - child[node, lane], corner]
+                for k in range(3):
+                    blocks[node, 3 * corner + k, lane] = (vertices[vertex, k] - origin[k]) / scale
+
+
+@kernel
+def _lattice_of(vertices: Any) -> tuple[float, int, int]:
+    """Return the largest magnitude of a coordinate, k of the largest power 2^k that divides all (0 if all are zero),
+    and k >= 0 so that every coordinate times 2^k is an integer, surely."""
+    reach, lowest, smallest = 0.0, 2000, 2000
+    for vertex in range(vertices.shape[0]):
+        for k in range(3):
+            value = abs(vertices[vertex, k])
+            if value == 0.0:
+                continue
+            reach = max(reach, value)
+            mantissa, exponent = frexp(value)
+            whole = int(mantissa * 2.0**53)
+            smallest = min(smallest, exponent)
+            lowest = min(lowest, exponent - 54 + frexp(float(whole & -whole))[1])
+    if smallest == 2000:
+        return 0.0, 0, 0
+    return reach, lowest, max(0, 53 - smallest)
+
+
+def lattice_shift(values: FloatArray) -> int:
+    """Return k so that every value times 2^k is an integer."""
+    exponents = np.frexp(values[values != 0.0])[1]
+    return max(0, 53 - int(exponents.min())) if exponents.size else 0
+
+
+def read_only(array: Any) -> Any:
+    """Return a contiguous read-only array, so that every shell has one compiled type."""
+    if not array.flags.c_contiguous:
+        array = np.ascontiguousarray(array)
+    if array.flags.writeable:
+        array = array.view()
+        array.setflags(write=False)
+    return array
+
+
+def _box_triangles(box: Aabb) -> tuple[FloatArray, IntArray, IntArray]:
+    """Return the triangles of a box by face (xmin, xmax, ymin, ymax, zmin, zmax); of a flat one each place once."""
+    flat = box.min == box.max
+    corners = np.array([[(box.min, box.max)[i >> k & 1][k] for k in range(3)] for i in range(8)])
+    quads = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]]
+    if flat.any():  # the two faces across a flat axis are one: keep that; a segment or point: any face will do
+        quads = [quads[2 * int(np.argmax(flat))]]
+        face_numbers = [2 * int(np.argmax(flat))]
+    else:
+        face_numbers = list(range(6))
+    triangles = np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))])
+    _, first, merged = np.unique(corners, axis=0, return_index=True, return_inverse=True)
+    return corners, first[merged.reshape(-1)][triangles], np.repeat(np.array(face_numbers), 2)
+
+
+@inline
+def axis_of(p: Point3, q: Point3, r: Point3) -> int:
+    """Return an axis along which the projection of a triangle has an area, NO_AREA or UNKNOWN_AXIS."""
+    ux, uy, uz = q.x - p.x, q.y - p.y, q.z - p.z
+    vx, vy, vz = r.x - p.x, r.y - p.y, r.z - p.z
+    nx, ny, nz = abs(uy * vz - uz * vy), abs(uz * vx - ux * vz), abs(ux * vy - uy * vx)
+    best = 0 if (nx >= ny and nx >= nz) else (1 if ny >= nz else 2)
+    found = NO_AREA
+    for turn in range(3):
+        axis = (best + turn) % 3
+        side = orient2d(projected(p, axis), projected(q, axis), projected(r, axis))
+        if side == 1 or side == -1:
+            return axis
+        if side != 0:
+            found = UNKNOWN_AXIS
+    return found
+
+
+@inline
+def triangle_of(shell: ShellArrays, item: int) -> Triangle3:
+    """Load a triangle in the body's own coordinates."""
+    return Triangle3(
+        as_point3(shell.vertices, shell.triangles[item, 0]),
+        as_point3(shell.vertices, shell.triangles[item, 1]),
+        as_point3(shell.vertices, shell.triangles[item, 2]),
+    )
+
+
+@inline
+def in_tree(shell: ShellArrays, p: Point3) -> Point3:
+    """Return a point in the coordinates of the body's tree, rounded."""
+    return Point3(
+        (p.x - shell.origin[0]) / shell.scale,
+        (p.y - shell.origin[1]) / shell.scale,
+        (p.z - shell.origin[2]) / shell.scale,
+    )
+
+
+@inline
+def root_of(parent: Any, vertex: int) -> int:
+    """Return the representative of a vertex's set, halving the path."""
+    while parent[vertex] != vertex:  # bound: parents decrease
+        parent[vertex] = parent[parent[vertex]]
+        vertex = parent[vertex]
+    return vertex
+
+
+@kernel
+def join_vertices(triangles: Any, left_out: Any, parent: Any) -> None:
+    """Set parent (n_vertices,) so that vertices connected by triangles not left out have one representative."""
+    _join(triangles, left_out, parent)
+
+
+@inline
+def _join(triangles: Any, left_out: Any, parent: Any) -> None:
+    for vertex in range(parent.shape[0]):
+        parent[vertex] = vertex
+    for item in range(triangles.shape[0]):
+        if left_out[item]:
+            continue
+        a = root_of(parent, triangles[item, 0])
+        for corner in range(1, 3):
+            b = root_of(parent, triangles[item, corner])
+            if a < b:
+                parent[b] = a
+            elif b < a:
+                parent[a] = b
+                a = b
+    for vertex in range(parent.shape[0]):
+        parent[vertex] = root_of(parent, vertex)

@@ -1,0 +1,163 @@
+"""Two placed shells in one question: their exact coordinates, the states of their faces, where their vertices lie.
+
+Patches: faces without contact, connected through vertices, lie wholly inside or wholly outside the other body, so one
+vertex tells. Without any contact the patches are the components of the surfaces.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from engine.collision.meshes.dual_traversal import (
+    SEEK_CONTACT,
+    SEEK_OVERLAP,
+    SEEK_PIERCING_BY_FIRST,
+    SEEK_PIERCING_BY_SECOND,
+)
+from engine.collision.meshes.exact_body import ExactBody, exact_pair
+from engine.collision.meshes.exact_cells import sides_at
+from engine.collision.meshes.face_state import find_states
+from engine.collision.meshes.mesh_arrays import Shell, join_vertices, shell_of_triangles
+from engine.collision.meshes.parity import INSIDE, OUTSIDE, locate_vertices
+from engine.collision.result import Work
+from engine.solids.base import IntArray
+from engine.solids.pose import Pose
+from engine.types import UNDECIDED
+
+_SAFE_POWER = 300
+
+
+def simplest(
+    first: Shell, first_pose: Pose | None, second: Shell, second_pose: Pose | None
+) -> tuple[Shell, Pose | None, Shell, Pose | None]:
+    """Return a placed pair that has the same relation, scaled into the range of the kernels where that is exact.
+
+    Two equal poses are left out: an invertible affine map, applied to both, changes no relation.
+    """
+    if first_pose is not None and first_pose.is_identity:
+        first_pose = None
+    if second_pose is not None and second_pose.is_identity:
+        second_pose = None
+    if first_pose is not None and first_pose == second_pose:
+        first_pose = second_pose = None
+    return in_range(first, first_pose, second, second_pose)
+
+
+def in_range(
+    first: Shell, first_pose: Pose | None, second: Shell, second_pose: Pose | None
+) -> tuple[Shell, Pose | None, Shell, Pose | None]:
+    """Return posed bodies near the ends of the exponent range scaled by a power of two, where that is exact.
+
+    Without poses the predicates scale by themselves; the filter for rounded posed coordinates does not.
+    """
+    poses = [pose for pose in (first_pose, second_pose) if pose is not None]
+    if not poses:
+        return first, first_pose, second, second_pose
+    largest = max(first.reach, second.reach, *(float(np.abs(pose.translation).max()) for pose in poses), 0.0)
+    power = int(np.frexp(largest)[1])
+    if abs(power) <= _SAFE_POWER or largest == 0.0:
+        return first, first_pose, second, second_pose
+    arrays = [first.arrays.vertices, second.arrays.vertices, *(pose.translation for pose in poses)]
+    scaled = [np.ldexp(array, -power) for array in arrays]
+    if any((np.ldexp(small, power) != array).any() for small, array in zip(scaled, arrays)):
+        return first, first_pose, second, second_pose
+    shells = [
+        shell_of_triangles(vertices, shell.arrays.triangles, shell.faces, shell.has_inside)
+        for vertices, shell in zip(scaled, (first, second))
+    ]
+    moved = [
+        None if pose is None else Pose(pose.rotation, np.ldexp(pose.translation, -power))
+        for pose in (first_pose, second_pose)
+    ]
+    return shells[0], moved[0], shells[1], moved[1]
+
+
+def what_to_seek(first: Shell, second: Shell, work: Work) -> int:
+    """Return what ends the search for contacts early."""
+    if work.boolean or not (first.has_inside or second.has_inside):
+        return SEEK_CONTACT
+    if first.has_inside and second.has_inside:
+        return SEEK_OVERLAP
+    if not work.witness:
+        return SEEK_CONTACT
+    return SEEK_PIERCING_BY_SECOND if first.has_inside else SEEK_PIERCING_BY_FIRST
+
+
+@dataclass(frozen=True, slots=True)
+class Patch:
+    """Faces connected through vertices, none in contact with the other body, all inside it or all outside."""
+
+    faces: IntArray
+
+
+class MeshPair:
+    """One question, and the exact coordinates computed for it so far."""
+
+    def __init__(
+        self, first: Shell, first_pose: Pose | None, second: Shell, second_pose: Pose | None, work: Work
+    ) -> None:
+        self.shells = (first, second)
+        self.poses = (first_pose, second_pose)
+        self.work = work
+        self.seek = what_to_seek(first, second, work)
+        self.is_disjoint = False
+        self._exact: tuple[ExactBody, ExactBody] | None = None
+
+    @property
+    def exact(self) -> tuple[ExactBody, ExactBody]:
+        """Both bodies in exact coordinates."""
+        if self._exact is None:
+            self._exact = exact_pair(self.shells[0], self.poses[0], self.shells[1], self.poses[1])
+        return self._exact
+
+    def states(self, own: int, faces: IntArray) -> npt.NDArray[np.int8]:
+        states = np.empty(len(faces), np.int8)
+        find_states(self.shells[own].arrays, faces, states)
+        return states
+
+    def state(self, own: int, face: int) -> int:
+        return int(self.states(own, np.array([face]))[0])
+
+    def patches(self, own: int, in_contact: IntArray, place: int) -> list[Patch]:
+        """Return the patches of one body, away from its faces in contact, that lie INSIDE or OUTSIDE the other body."""
+        shell, other = self.shells[own], self.shells[1 - own]
+        if not other.has_inside:
+            return []
+        triangles = shell.arrays.triangles
+        if len(in_contact):
+            left_out = np.zeros(len(triangles), np.bool_)
+            left_out[in_contact] = True
+            parent = np.empty(len(shell.arrays.vertices), np.int64)
+            join_vertices(triangles, left_out, parent)
+            kept = np.flatnonzero(~left_out)
+            roots = parent[triangles[kept, 0]]
+            vertices = np.unique(roots)
+        else:
+            vertices = triangles[shell.components, 0]
+        found = self.located(own, vertices)
+        for index in np.flatnonzero(found == UNDECIDED):
+            self.work.budget.check()
+            self.work.n_beyond_filter += 1
+            self.work.n_rational += 1
+            point = self.exact[own].vertex(int(vertices[index]))
+            found[index] = INSIDE if sides_at(self.exact[1 - own], (*point, 1), 2).at else OUTSIDE
+        there = vertices[found == place]
+        if not len(there):
+            return []
+        if not len(in_contact):
+            parent = np.empty(len(shell.arrays.vertices), np.int64)
+            join_vertices(triangles, np.zeros(len(triangles), np.bool_), parent)
+            kept, roots = np.arange(len(triangles)), parent[triangles[:, 0]]
+        return [Patch(kept[roots == parent[vertex]]) for vertex in there]
+
+    def located(self, own: int, vertices: IntArray) -> npt.NDArray[np.int8]:
+        """Return where vertices that are on no face of the other body lie: INSIDE, OUTSIDE or UNDECIDED."""
+        shell, other = self.shells[own], self.shells[1 - own]
+        poses = [body.posed(pose) for body, pose in zip(self.shells, self.poses)]
+        found = np.empty(len(vertices), np.int8)
+        locate_vertices(shell.arrays, poses[own], vertices, other.arrays, poses[1 - own], found, self.work.budget.flag)
+        self.work.budget.check()
+        return found

@@ -1,0 +1,155 @@
+"""Is a vertex of one placed body inside another placed body: crossings of the half-line above it.
+
+The half-line from q upward along the z axis of the other body's own coordinates is moved by (eps, eps^2) in x and y,
+so that it meets no edge and no upright face: an orient2d that is exactly zero takes the sign of the first nonzero
+derivative. A face that the half-line's line meets counts if it lies above q (orient3d); a zero there means q lies on
+it. Caller guarantees that no face of the other body holds q where INSIDE or OUTSIDE is to be relied on; UNDECIDED is
+settled with exact posed coordinates (`exact_cells.py`).
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from engine.collision.meshes.face_state import SLACK, STACK_ROWS
+from engine.collision.meshes.frames import defect_of, largest, turned_back
+from engine.collision.meshes.mesh_arrays import ShellArrays, in_tree, triangle_of
+from engine.collision.meshes.placement import Placement, PoseArrays, orient2d_near, orient3d_near, place_pair, placed
+from engine.collision.meshes.triangle_triangle import Triangle3
+from engine.jit import inline, kernel
+from engine.lanes.boxes import inside_box, lowest_bit
+from engine.predicates.loading import as_point3
+from engine.types import UNDECIDED, Point2, Point3
+
+OUTSIDE = -1
+INSIDE = 1
+ABOVE_ALL = 1e6
+"""In the coordinates of a tree, which are at most 2."""
+MISSED = 3
+"""`half_line_crosses` beside 0 (on the face), 1 (above), -1 (below) and UNDECIDED: the moved line passes by."""
+
+
+@inline
+def moved_side(a: Point3, b: Point3, q: Point3, error: float) -> int:
+    """Return the side of the line a b, seen along z, on which q moved by (eps, eps^2) lies; 0 if a and b coincide
+    there.
+
+    The derivatives of orient2d(a, b, q) are a.y - b.y along x and b.x - a.x along y.
+    """
+    side = orient2d_near(Point2(a.x, a.y), Point2(b.x, b.y), Point2(q.x, q.y), error)
+    if side != 0:
+        return side
+    if a.y != b.y:
+        return 1 if a.y > b.y else -1
+    if a.x != b.x:
+        return 1 if b.x > a.x else -1
+    return 0
+
+
+@inline
+def half_line_crosses(t: Triangle3, q: Point3, error: float) -> int:
+    """Return where the moved vertical line through q meets t: above q 1, below -1, at q 0, else MISSED; or
+    UNDECIDED."""
+    p_side = moved_side(t.p, t.q, q, error)
+    q_side = moved_side(t.q, t.r, q, error)
+    r_side = moved_side(t.r, t.p, q, error)
+    has_left = p_side == 1 or q_side == 1 or r_side == 1
+    has_right = p_side == -1 or q_side == -1 or r_side == -1
+    if has_left and has_right:
+        return MISSED
+    if p_side == UNDECIDED or q_side == UNDECIDED or r_side == UNDECIDED:
+        return UNDECIDED
+    if p_side == 0 or q_side == 0 or r_side == 0:  # case: two corners above one another, an upright face
+        return MISSED
+    side = orient3d_near(t.p, t.q, t.r, q, error)  # counter-clockwise from above: 1 if q is above the face
+    if side == UNDECIDED or side == 0:
+        return side
+    return -side if has_left else side
+
+
+class OwnPoint(NamedTuple):
+    """A point in the own coordinates of a body, each coordinate off by at most `error`."""
+
+    point: Point3
+    error: float
+
+
+@inline
+def brought_back(p: Point3, source: Placement, target: Placement, defect: float) -> OwnPoint:
+    """Return a point of one placed body in the own coordinates of another one placed with it.
+
+    defect: of the target's rotation, `frames.defect_of`; the transpose stands for the inverse, which is off by 3.1
+    defect of the vector it turns. A turned vector has components up to 1.74 times as large, and so has its error.
+    """
+    q = placed(p, source)
+    if not target.is_posed:
+        return OwnPoint(q, source.error)
+    w = Point3(q.x - target.x, q.y - target.y, q.z - target.z)
+    own = turned_back(target, w)
+    if source.error == 0.0 and target.error == 0.0:  # nothing is rounded on a lattice
+        return OwnPoint(own, 0.0)
+    off = source.error + target.error + 2.0**-50 * (largest(q) + largest(w))
+    return OwnPoint(own, 2.0 * off + (8.0 * defect + 2.0**-48) * largest(w) + 2.0**-1060)
+
+
+@inline
+def locate_point(own: OwnPoint, shell: ShellArrays) -> int:
+    """Return INSIDE, OUTSIDE, 0 (on a face) or UNDECIDED for one point."""
+    q, error = own.point, own.error
+    local = in_tree(shell, q)
+    slack = SLACK + error / shell.scale
+    if not (slack < 1.0 and np.isfinite(local.x + local.y + local.z)):  # case: the ends of the exponent range
+        return UNDECIDED
+    if largest(local) > 4.0 + slack:
+        return OUTSIDE
+    low = (np.float32(local.x - slack), np.float32(local.y - slack), np.float32(local.z - slack))
+    high = (np.float32(local.x + slack), np.float32(local.y + slack), np.float32(ABOVE_ALL))
+    stack = np.empty(STACK_ROWS, np.int32)
+    stack[0] = 0
+    n_stack, n_above = 1, 0
+    unsure, on_face = False, False
+    while n_stack > 0:  # bound: each node enters once
+        n_stack -= 1
+        node = int(stack[n_stack])
+        lanes = inside_box(shell.boxes, node, low, high)
+        while lanes != 0:
+            child = int(shell.child[node, lowest_bit(lanes)])
+            lanes &= lanes - 1
+            if child >= 0:
+                stack[n_stack] = child
+                n_stack += 1
+                continue
+            how = half_line_crosses(triangle_of(shell, -1 - child), q, error)
+            if how == UNDECIDED:
+                unsure = True
+            elif how == 0:
+                on_face = True
+            elif how == 1:
+                n_above += 1
+    if on_face:
+        return 0
+    if unsure:
+        return UNDECIDED
+    return INSIDE if n_above % 2 == 1 else OUTSIDE
+
+
+@kernel
+def locate_vertices(
+    source: ShellArrays,
+    source_pose: PoseArrays,
+    vertices: Any,
+    shell: ShellArrays,
+    pose: PoseArrays,
+    found: Any,
+    flag: Any,
+) -> None:
+    """Fill found (n,) int8 for the vertices (n,) of `source` against `shell`, each under its one pose."""
+    a, b = place_pair(source.extent, source_pose, 0, shell.extent, pose, 0)
+    defect = defect_of(b)
+    for item in range(vertices.shape[0]):
+        if flag[0] != 0:
+            return
+        own = brought_back(as_point3(source.vertices, vertices[item]), a, b, defect)
+        found[item] = locate_point(own, shell)

@@ -1,0 +1,143 @@
+"""Planar bodies as exact edges: polygons, triangles and boxes of the plane, posed or not.
+
+Edge k runs from vertex k to the next vertex of its ring, so that an edge's number is that of the vertex it starts from
+(aabb: 0..3 = ymin, xmax, ymax, xmin, counter-clockwise from the lower left corner). A body of even-odd rings may have
+edges, or all of them, cancelled; single points remain where a ring has one position only.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from engine.arrangement.arrange import Arrangement, arrange
+from engine.arrangement.nodes import NodeTable, float_nodes, rational_nodes
+from engine.collision.exact_images import image_points
+from engine.parallel import Budget
+from engine.predicates.rational import orient2d_rational
+from engine.solids.aabb import Aabb
+from engine.solids.base import FloatArray, IntArray, Solid
+from engine.solids.polygon import Polygon
+from engine.solids.pose import Pose
+from engine.solids.triangle import Triangle
+
+Point = tuple[Fraction, Fraction]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outline:
+    """The edges of one planar body.
+
+    points: exact positions of the vertices. ends: (n, 2) the vertices of each edge. low, high: (n, 2) float64 boxes of
+    the edges, by correctly rounded coordinates (rounding is monotone: boxes apart have edges apart).
+    floats: (n_vertices, 2) where every position is a pair of float64 as given, else None.
+    """
+
+    points: list[Point]
+    ends: IntArray
+    low: FloatArray
+    high: FloatArray
+    floats: FloatArray | None
+
+    @property
+    def n_edges(self) -> int:
+        """Number of edges, those of zero length counted."""
+        return len(self.ends)
+
+    def edge(self, number: int) -> tuple[Point, Point]:
+        """Return the two ends of an edge."""
+        start, end = self.ends[number].tolist()
+        return self.points[start], self.points[end]
+
+
+def outline_of(body: Solid, pose: Pose | None, budget: Budget) -> Outline:
+    """Return the edges of a polygon, a triangle or a box of the plane under `pose`."""
+    vertices, offsets = _rings_of(body)
+    ends = np.empty((len(vertices), 2), np.int64)
+    ends[:, 0] = np.arange(len(vertices))
+    ends[:, 1] = ends[:, 0] + 1
+    ends[offsets[1:] - 1, 1] = offsets[:-1]
+    points: list[Point] = [(p[0], p[1]) for p in image_points(vertices, pose, budget.check)]
+    floats = vertices if pose is None else np.array([[rounded(x), rounded(y)] for x, y in points])
+    low, high = np.minimum(floats[ends[:, 0]], floats[ends[:, 1]]), np.maximum(floats[ends[:, 0]], floats[ends[:, 1]])
+    return Outline(points, ends, low, high, vertices if pose is None else None)
+
+
+def rounded(value: Fraction) -> float:
+    """Return the nearest double, an infinity beyond the largest: rounding that keeps the order, for boxes."""
+    try:
+        return value.numerator / value.denominator
+    except OverflowError:
+        return float("inf") if value > 0 else float("-inf")
+
+
+def _rings_of(body: Solid) -> tuple[FloatArray, IntArray]:
+    if isinstance(body, Polygon):
+        return body.vertices, body.ring_offsets
+    if isinstance(body, Triangle):
+        return body.vertices, np.array([0, 3])
+    assert isinstance(body, Aabb)
+    (x0, y0), (x1, y1) = body.min, body.max
+    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]]), np.array([0, 4])
+
+
+def arrange_outlines(outlines: list[Outline], budget: Budget) -> tuple[Arrangement, list[list[int]]]:
+    """Return the arrangement of all edges (bit k of a mask: outline k), and the nodes of each outline's vertices."""
+    nodes, numbers = _nodes_of(outlines, budget)
+    segments: list[tuple[int, int]] = []
+    masks: list[int] = []
+    for k, (outline, own) in enumerate(zip(outlines, numbers)):
+        segments += [(own[start], own[end]) for start, end in outline.ends.tolist()]
+        masks += [1 << k] * outline.n_edges
+    return arrange(nodes, segments, masks, budget), numbers
+
+
+def _nodes_of(outlines: list[Outline], budget: Budget) -> tuple[NodeTable, list[list[int]]]:
+    floats = [outline.floats for outline in outlines if outline.floats is not None]
+    if len(floats) == len(outlines):
+        nodes, flat = float_nodes(np.concatenate(floats), budget)
+    else:
+        nodes, flat = rational_nodes([point for outline in outlines for point in outline.points], budget)
+    numbers, start = [], 0
+    for outline in outlines:
+        numbers.append(flat[start : start + len(outline.points)])
+        start += len(outline.points)
+    return nodes, numbers
+
+
+def live_edges(outline: Outline, budget: Budget) -> list[tuple[Point, Point]]:
+    """Return the pieces of edges that even-odd does not cancel: exactly these have the open interior on one side."""
+    arrangement, _ = arrange_outlines([outline], budget)
+    kept = [edge for edge, mask in enumerate(arrangement.masks) if mask]
+    exact = arrangement.nodes.exact
+    return [(exact(arrangement.tails[edge]), exact(arrangement.heads[edge])) for edge in kept]
+
+
+def is_clean(outline: Outline, number: int) -> bool:
+    """Tell whether edge `number` has a length and no other edge lies along a part of it: then none of it cancels."""
+    a, b = outline.edge(number)
+    if a == b:
+        return False
+    near = (outline.low <= outline.high[number]).all(axis=1) & (outline.high >= outline.low[number]).all(axis=1)
+    near[number] = False
+    axis = 0 if a[0] != b[0] else 1
+    start, stop = sorted((a[axis], b[axis]))
+    for other in np.flatnonzero(near).tolist():
+        c, d = outline.edge(other)
+        if orient2d_rational(a, b, c) == 0 and orient2d_rational(a, b, d) == 0:
+            if max(c[axis], d[axis]) > start and min(c[axis], d[axis]) < stop:
+                return False
+    return True
+
+
+def single_points(outline: Outline) -> list[int]:
+    """Return one vertex of each ring that has one position only."""
+    starts = np.flatnonzero(outline.ends[:, 1] != outline.ends[:, 0] + 1)  # the last edge of each ring
+    result, first = [], 0
+    for last in starts.tolist():
+        if all(outline.points[k] == outline.points[first] for k in range(first, last + 1)):
+            result.append(first)
+        first = last + 1
+    return result

@@ -1,0 +1,124 @@
+"""The batches that decide most pairs of a scene: boxes, balls and convex polyhedra, in kernels for many pairs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from engine.collision.codes import UNSETTLED
+from engine.collision.convex.body import ConvexArrays, ConvexBody, convex_body_of, pooled
+from engine.collision.convex.pair import relate_convex_pairs
+from engine.collision.convex.poses import LEAST_POSES, lane_arrays, relate_in_lanes
+from engine.collision.detail import NO_DETAIL, Details, details_of_boxes, details_where_proven
+from engine.collision.meshes.mesh_arrays import read_only
+from engine.collision.meshes.placement import NO_ROTATION, NO_TRANSLATION, PoseArrays
+from engine.collision.scenes.bodies import SceneBodies
+from engine.collision.scenes.boxes import relate_box_pairs
+from engine.parallel import Budget, run_chunks
+from engine.solids.aabb import Aabb
+from engine.solids.base import FloatArray, IntArray, Solid
+
+Relations = npt.NDArray[np.int8]
+
+
+class ShortPaths:
+    """Which bodies of a scene have a short path, and the arrays that it takes."""
+
+    def __init__(self, bodies: SceneBodies, boolean: bool, budget: Budget) -> None:
+        self._bodies = bodies
+        self._boolean = boolean
+        self._budget = budget
+        is_box = np.array([isinstance(solid, Aabb) for solid in bodies.distinct], np.bool_)
+        self._is_box = is_box[bodies.kinds] & ~bodies.is_posed
+        self._pool: ConvexArrays | None = None
+        self._convex = np.full(len(bodies.solids), -1, np.int64)
+
+    def relations(self, pairs: IntArray, workers: int | None) -> Relations:
+        """Return the relations ``(n,)`` of pairs ``(n, 2)`` of bodies, UNSETTLED where no batch decides."""
+        found = np.full(len(pairs), UNSETTLED, np.int8)
+        bodies, flag = self._bodies, self._budget.flag
+        relate_box_pairs(bodies.low, bodies.high, self._is_box, pairs, found)
+        if bodies.dimension == 3 and (found == UNSETTLED).any():
+            self._prepare()
+        pool = self._pool
+        if pool is None:
+            return found
+        rows = np.append(np.int64(-1), self._convex)
+
+        def task(start: int, stop: int) -> None:
+            with np.errstate(all="ignore"):  # uncompiled runs only
+                relate_convex_pairs(
+                    pool,
+                    rows,
+                    bodies.rotations,
+                    bodies.translations,
+                    pairs[start:stop] + 1,
+                    self._boolean,
+                    found[start:stop],
+                    flag,
+                )
+
+        run_chunks(task, len(pairs), budget=self._budget, workers=workers)
+        return found
+
+    def details(self, pairs: IntArray, relations: Relations) -> Details:
+        """Return the codes of `Rcc8` of pairs of bodies with interiors whose relations are those that `relations`
+        found; NO_DETAIL where these are UNSETTLED."""
+        found = np.where(relations == UNSETTLED, np.int8(NO_DETAIL), details_where_proven(relations))
+        boxes = np.flatnonzero(self._is_box[pairs].all(axis=1))
+        found[boxes] = details_of_boxes(self._bodies.low, self._bodies.high, pairs[boxes], relations[boxes])
+        return found
+
+    def _prepare(self) -> None:
+        """Look at each solid once: is it convex?"""
+        if self._pool is not None:
+            return
+        kinds = np.full(len(self._bodies.distinct), -1, np.int64)
+        convex: list[ConvexBody] = []
+        for kind, solid in enumerate(self._bodies.distinct):
+            self._budget.check()
+            body = convex_body_of(solid)
+            if body is not None:
+                kinds[kind] = len(convex)
+                convex.append(body)
+        self._pool = pooled(convex)
+        self._convex = kinds[self._bodies.kinds]
+
+
+def convex_poses(
+    first: Solid,
+    second: Solid,
+    rotations: FloatArray,
+    translations: FloatArray,
+    relations: Relations,
+    budget: Budget,
+    boolean: bool,
+) -> Callable[[int, int], None] | None:
+    """Return the task that fills relations for a range of poses of `second`, UNSETTLED where float64 does not decide;
+    None unless both solids are convex."""
+    bodies = [body for body in (convex_body_of(first), convex_body_of(second)) if body is not None]
+    if len(bodies) < 2:
+        return None
+    pool, lanes = pooled(bodies), lane_arrays(*bodies) if len(relations) >= LEAST_POSES else None
+    still, turns, moves = PoseArrays(NO_ROTATION, NO_TRANSLATION, False), read_only(rotations), read_only(translations)
+
+    def fill(start: int, stop: int) -> None:
+        found = relations[start:stop]
+        with np.errstate(all="ignore"):  # uncompiled runs only
+            if lanes is not None:
+                poses = PoseArrays(turns[start:stop], moves[start:stop], True)
+                relate_in_lanes(pool, lanes, still, poses, boolean, found, budget.flag)
+            rest = np.flatnonzero(found == UNSETTLED)
+            if len(rest):
+                rows = np.append(np.int64(0), np.ones(len(rest), np.int64))
+                pairs = np.column_stack([np.zeros(len(rest), np.int64), np.arange(1, len(rest) + 1)])
+                placed = np.concatenate([NO_ROTATION, turns[start + rest]])
+                moved = np.concatenate([NO_TRANSLATION, moves[start + rest]])
+                answers = np.full(len(rest), UNSETTLED, np.int8)
+                relate_convex_pairs(pool, rows, placed, moved, pairs, boolean, answers, budget.flag)
+                found[rest] = answers
+        budget.check()
+
+    return fill

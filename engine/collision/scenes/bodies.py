@@ -1,0 +1,106 @@
+"""The bodies of a scene as arrays: which solid, where, and a box around each. No work per body beyond a few lookups."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from engine.collision.collide import check_pose, pair_function
+from engine.collision.scenes.numbering import numbered
+from engine.collision.scenes.posed_boxes import place_boxes
+from engine.collision.scenes.world_box import own_box
+from engine.errors import InvalidArrayError, UnsupportedSolidError, WrongDimensionError
+from engine.solids.base import FloatArray, IntArray, Solid
+from engine.solids.pose import Pose
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SceneBodies:
+    """A checked scene.
+
+    solids, poses: one a body. distinct: each solid object once; kinds: (n,) which of these a body is. is_posed: (n,).
+    rotations (n + 1, d, d), translations (n + 1, d): row 0 the identity, then one row a body. low, high: (n, d) boxes
+    around the posed bodies, exact where there is no pose and the solid is a box.
+    """
+
+    solids: list[Solid]
+    poses: list[Pose | None]
+    distinct: list[Solid]
+    kinds: IntArray
+    is_posed: npt.NDArray[np.bool_]
+    rotations: FloatArray
+    translations: FloatArray
+    low: FloatArray
+    high: FloatArray
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3."""
+        return self.translations.shape[1]
+
+
+def scene_bodies(solids: Sequence[Solid], poses: Sequence[Pose | None] | None) -> SceneBodies:
+    """Return the bodies as arrays; raise with the index of the body that is wrong."""
+    for name, given in (("solids", solids), ("poses", () if poses is None else poses)):
+        if not isinstance(given, (list, tuple)):
+            raise InvalidArrayError(f"{name} must be a list, got {type(given).__name__}", (name,))
+    bodies = list(solids)
+    placed: list[Pose | None] = [None] * len(bodies) if poses is None else list(poses)
+    if len(placed) != len(bodies):
+        raise InvalidArrayError(f"poses must be as many as solids, {len(bodies)}, got {len(placed)}", ("poses",))
+    kinds, firsts = numbered(np.fromiter(map(id, bodies), np.int64, len(bodies)))
+    distinct = [bodies[first] for first in firsts.tolist()]
+    _check_solids(distinct, firsts)
+    dimension = distinct[0].dimension if distinct else 3
+    is_posed, numbers = _pose_numbers(placed, dimension, bodies)
+    rotations, translations = np.empty((len(bodies) + 1, dimension, dimension)), np.zeros((len(bodies) + 1, dimension))
+    rotations[0] = np.eye(dimension)
+    rows: IntArray | slice = slice(1, None)
+    if len(numbers) < len(bodies):
+        rotations[1:], rows = np.eye(dimension), np.flatnonzero(is_posed) + 1
+    rotations[rows] = numbers[:, : dimension**2].reshape(-1, dimension, dimension)
+    translations[rows] = numbers[:, dimension**2 :]
+    own = [own_box(solid) for solid in distinct]
+    boxes, reaches = np.array([box[:2] for box in own]).reshape(-1, 2, dimension), np.array([box[2] for box in own])
+    radii = np.array([getattr(solid, "radius", 0.0) for solid in distinct])
+    low, high = np.empty((len(bodies), dimension)), np.empty((len(bodies), dimension))
+    with np.errstate(all="ignore"):  # uncompiled runs only
+        place_boxes(boxes, reaches, radii, kinds, is_posed, rotations[1:], translations[1:], low, high)
+    return SceneBodies(bodies, placed, distinct, kinds, is_posed, rotations, translations, low, high)
+
+
+def _pose_numbers(
+    placed: list[Pose | None], dimension: int, bodies: list[Solid]
+) -> tuple[npt.NDArray[np.bool_], FloatArray]:
+    """Return which bodies have a pose, and these poses' numbers, one row each: the rotation, then the translation.
+
+    Raises on the first that is no pose, or of another dimension.
+    """
+    types, moving, is_posed = set(map(type, placed)), placed, np.ones(len(placed), np.bool_)
+    if type(None) in types:
+        moving, is_posed = [pose for pose in placed if pose is not None], np.array([p is not None for p in placed])
+    if types <= {Pose, type(None)}:
+        numbers = np.frombuffer(b"".join([pose.numbers for pose in moving]))  # type: ignore[union-attr]
+        if len(numbers) == len(moving) * (dimension**2 + dimension):  # none of 2 rows makes up for one of 3
+            return is_posed, numbers.reshape(-1, dimension**2 + dimension)
+    for index, pose in enumerate(placed):
+        check_pose(pose, bodies[index], f"poses[{index}]")
+    raise AssertionError("unreachable")
+
+
+def _check_solids(distinct: list[Solid], firsts: IntArray) -> None:
+    """Raise unless every solid is one that `collide` takes, all of one dimension."""
+    for index, body in zip(firsts.tolist(), distinct):
+        try:
+            pair_function(body, body)
+        except (UnsupportedSolidError, WrongDimensionError) as error:
+            error.where = ("solids", index)
+            raise
+        if body.dimension != distinct[0].dimension:
+            raise WrongDimensionError(
+                f"solids[{index}] is {body.dimension}D, solids[0] {distinct[0].dimension}D; a scene has one dimension",
+                ("solids", index),
+            )

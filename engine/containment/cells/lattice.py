@@ -1,0 +1,210 @@
+"""The grid of cells over a polyhedron: where cells lie, and which triangles reach into them.
+
+Level 0 is a dense grid; a cell with a long list is cut into a brick of 4 x 4 x 4, and so once more. Sizes are powers
+of two, so an index on the finest level, shifted right, is the index on a coarser one. An index is ``int((x - low) *
+scale)``, each step monotone, so the doubles of a cell are those between two borders; a triangle is listed in every
+cell from the index of its least to that of its largest coordinate, but where a separating axis proves that it stays
+outside.
+
+A border in exact arithmetic may lie off the lattice by the rounding of x - low, at most 2^-53 times the number of
+cells along the axis: far less than `_MARGIN`, by which the separating-axis tests widen the cell. Their own rounding
+is bounded as in entries.py. The lists are conservative.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from engine.jit import inline, kernel
+
+FloatArray = npt.NDArray[np.float64]
+Int32Array = npt.NDArray[np.int32]
+
+LEVELS: Final = 3
+SPLIT: Final = 4
+"""Parts of a cell along each axis."""
+PARTS: Final = SPLIT**3
+_FINEST: Final = 2.0 ** (2 * (LEVELS - 1))
+_MARGIN: Final = 0.5 + 2.0**-20
+_ROUNDING: Final = 16.0 * 2.0**-53
+PLACE: Final = (0.5 + 287.0 / 4096.0, 0.5 - 413.0 / 4096.0, 0.5 + 101.0 / 4096.0)
+"""Where the reference point lies in its cell: no symmetry that faces of a lattice might share."""
+
+
+class Lattice(NamedTuple):
+    """The cells of level 0; sizes are powers of two."""
+
+    low: tuple[float, float, float]
+    scale: tuple[float, float, float]
+    """1 / size."""
+    size: tuple[float, float, float]
+    n: tuple[int, int, int]
+
+
+@inline
+def finest(value: float, low: float, scale: float) -> int:
+    """Return the index on the finest level of a value that is not below `low`."""
+    return int((value - low) * (scale * _FINEST))
+
+
+@inline
+def parts_of(level: int) -> float:
+    """Return how many cells of a level there are to one of level 0 along an axis."""
+    return 1.0 if level == 0 else 4.0 if level == 1 else 16.0
+
+
+@inline
+def share_of(level: int) -> float:
+    """Return 1 / parts_of(level)."""
+    return 1.0 if level == 0 else 0.25 if level == 1 else 0.0625
+
+
+@inline
+def reference_coordinate(low: float, size: float, index: int, place: float) -> float:
+    """Return a coordinate of the reference point of cell `index` of a level with cells of `size`."""
+    return low + (index + place) * size
+
+
+@inline
+def corner(vertices: Any, vertex: int) -> Any:
+    """Return a vertex as a tuple."""
+    return (float(vertices[vertex, 0]), float(vertices[vertex, 1]), float(vertices[vertex, 2]))
+
+
+@inline
+def scaled_difference(a: Any, b: Any, scale: Any, parts: float) -> Any:
+    """Return a - b in units of the cells of a level: one rounding each."""
+    return (
+        (a[0] - b[0]) * (scale[0] * parts),
+        (a[1] - b[1]) * (scale[1] * parts),
+        (a[2] - b[2]) * (scale[2] * parts),
+    )
+
+
+@inline
+def _misses_plane(u: Any, v: Any, w: Any) -> bool:
+    """Tell whether the plane of a triangle surely misses the unit cell about its centre; w: centre less corner a."""
+    size = abs(w[0]) + abs(w[1]) + abs(w[2]) + 2.0
+    nx, ny, nz = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
+    permanent = (abs(u[0]) + abs(u[1]) + abs(u[2])) * (abs(v[0]) + abs(v[1]) + abs(v[2]))
+    distance = abs(nx * w[0] + ny * w[1] + nz * w[2])
+    return distance > _MARGIN * (abs(nx) + abs(ny) + abs(nz)) + _ROUNDING * permanent * size
+
+
+@inline
+def _misses_edge(ex: float, ey: float, wx: float, wy: float, turn: float, error: float) -> bool:
+    """Tell whether a unit square is surely outside an edge (ex, ey), seen from its start by (wx, wy)."""
+    return (ex * wy - ey * wx) * turn < -(_MARGIN * (abs(ex) + abs(ey)) + error)
+
+
+@inline
+def _misses_projection(ux: float, uy: float, vx: float, vy: float, wx: float, wy: float) -> bool:
+    """Tell whether a projected triangle (0, u, v) surely misses the unit square about w."""
+    area = ux * vy - uy * vx
+    if not abs(area) > _ROUNDING * (abs(ux * vy) + abs(uy * vx)):
+        return False
+    turn = 1.0 if area > 0.0 else -1.0
+    size = abs(ux) + abs(uy) + abs(vx) + abs(vy)
+    error = _ROUNDING * size * (abs(wx) + abs(wy) + size + 1.0)  # of differences of u, v, w and of the products
+    if _misses_edge(ux, uy, wx, wy, turn, error) or _misses_edge(-vx, -vy, wx - vx, wy - vy, turn, error):
+        return True
+    return _misses_edge(vx - ux, vy - uy, wx - ux, wy - uy, turn, error)
+
+
+@inline
+def misses_cell(u: Any, v: Any, w: Any) -> bool:
+    """Tell whether a triangle with edges u, v from corner a surely misses the cell whose centre less a is w."""
+    return (
+        _misses_plane(u, v, w)
+        or _misses_projection(u[0], u[1], v[0], v[1], w[0], w[1])
+        or _misses_projection(u[1], u[2], v[1], v[2], w[1], w[2])
+        or _misses_projection(u[2], u[0], v[2], v[0], w[2], w[0])
+    )
+
+
+@kernel
+def list_top(vertices: Any, triangles: Any, lattice: Any, ends: Any, items: Any, is_fill: bool, flag: Any) -> None:
+    """Count (ends[cell] += 1) or list (items[ends[cell]] = triangle) what reaches into each cell of level 0."""
+    low, scale, n = lattice.low, lattice.scale, lattice.n
+    shift = 2 * (LEVELS - 1)
+    for triangle in range(len(triangles)):
+        if flag[0]:
+            break
+        a = corner(vertices, triangles[triangle, 0])
+        b = corner(vertices, triangles[triangle, 1])
+        c = corner(vertices, triangles[triangle, 2])
+        u, v = scaled_difference(b, a, scale, 1.0), scaled_difference(c, a, scale, 1.0)
+        base = scaled_difference(low, a, scale, 1.0)
+        x_first = finest(min(a[0], b[0], c[0]), low[0], scale[0]) >> shift
+        x_last = finest(max(a[0], b[0], c[0]), low[0], scale[0]) >> shift
+        y_first = finest(min(a[1], b[1], c[1]), low[1], scale[1]) >> shift
+        y_last = finest(max(a[1], b[1], c[1]), low[1], scale[1]) >> shift
+        z_first = finest(min(a[2], b[2], c[2]), low[2], scale[2]) >> shift
+        z_last = finest(max(a[2], b[2], c[2]), low[2], scale[2]) >> shift
+        is_small = (x_last - x_first) + (y_last - y_first) + (z_last - z_first) <= 1  # two cells at most: no test helps
+        for z in range(z_first, z_last + 1):
+            for y in range(y_first, y_last + 1):
+                for x in range(x_first, x_last + 1):
+                    w = (base[0] + (x + 0.5), base[1] + (y + 0.5), base[2] + (z + 0.5))
+                    if not is_small and misses_cell(u, v, w):
+                        continue
+                    cell = (z * n[1] + y) * n[0] + x
+                    if is_fill:
+                        items[ends[cell]] = triangle
+                    ends[cell] += 1
+
+
+@kernel
+def list_parts(
+    vertices: Any,
+    triangles: Any,
+    lattice: Any,
+    parents: Any,
+    places: Any,
+    firsts: Any,
+    lists: Any,
+    level: int,
+    ends: Any,
+    items: Any,
+    is_fill: bool,
+    flag: Any,
+) -> None:
+    """Count or list, as `list_top` does, the triangles that reach into the 64 parts of each parent cell.
+
+    parents: (p,) indices into the cells of the level above; places: (cells, 3) their indices on that level;
+    firsts, lists: their lists; level: that of the parts; ends: (p * 64,).
+    """
+    low, scale = lattice.low, lattice.scale
+    parts = parts_of(level)
+    shift = 2 * (LEVELS - 1 - level)
+    for parent in range(len(parents)):
+        if flag[0]:
+            break
+        cell = parents[parent]
+        x0, y0, z0 = places[cell, 0] * SPLIT, places[cell, 1] * SPLIT, places[cell, 2] * SPLIT
+        for entry in range(firsts[cell], firsts[cell + 1]):
+            triangle = lists[entry]
+            a = corner(vertices, triangles[triangle, 0])
+            b = corner(vertices, triangles[triangle, 1])
+            c = corner(vertices, triangles[triangle, 2])
+            u, v = scaled_difference(b, a, scale, parts), scaled_difference(c, a, scale, parts)
+            base = scaled_difference(low, a, scale, parts)
+            x_first = max((finest(min(a[0], b[0], c[0]), low[0], scale[0]) >> shift) - x0, 0)
+            x_last = min((finest(max(a[0], b[0], c[0]), low[0], scale[0]) >> shift) - x0, SPLIT - 1)
+            y_first = max((finest(min(a[1], b[1], c[1]), low[1], scale[1]) >> shift) - y0, 0)
+            y_last = min((finest(max(a[1], b[1], c[1]), low[1], scale[1]) >> shift) - y0, SPLIT - 1)
+            z_first = max((finest(min(a[2], b[2], c[2]), low[2], scale[2]) >> shift) - z0, 0)
+            z_last = min((finest(max(a[2], b[2], c[2]), low[2], scale[2]) >> shift) - z0, SPLIT - 1)
+            for z in range(z_first, z_last + 1):
+                for y in range(y_first, y_last + 1):
+                    for x in range(x_first, x_last + 1):
+                        w = (base[0] + (x0 + x + 0.5), base[1] + (y0 + y + 0.5), base[2] + (z0 + z + 0.5))
+                        if misses_cell(u, v, w):
+                            continue
+                        part = parent * PARTS + (z * SPLIT + y) * SPLIT + x
+                        if is_fill:
+                            items[ends[part]] = triangle
+                        ends[part] += 1

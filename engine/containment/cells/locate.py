@@ -1,0 +1,145 @@
+"""Polyhedron by cells: the parity of the segment from a cell's reference point, beyond the band of the entries.
+
+A point in a cell without triangles has the cell's side; in another one, the side of the reference point, turned by each
+triangle that the segment crosses. Points too close to a plane of an entry are left UNDECIDED, for the vertical ray.
+
+Source: space-partitioned point containment with reference points; the two-level grid after Kalojanov, Billeter and
+Slusallek 2011, "Two-level grids for ray tracing on GPUs". Changed: certified in single precision, exact behind it.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+
+from engine.containment.cells.lattice import LEVELS, PARTS, PLACE, finest, parts_of, reference_coordinate, share_of
+from engine.jit import inline, kernel
+from engine.lanes.cells import ROWS, UNSURE, group_parity, prefetch_group
+from engine.types import UNDECIDED
+
+OUTSIDE_CELL: Final = -4
+INSIDE_CELL: Final = -2
+OPEN_CELL: Final = -1
+"""Codes of cells without entries: their location less 3, UNDECIDED where it is open. From 0 on, a brick's number with
+the lowest bit set, or the place of a leaf's first entry; one bit above is the side of the leaf's reference point."""
+CODE_SHIFT: Final = 3
+NOT_FINITE: Final = -1
+_BLOCK: Final = 256
+"""Points that pass through the first stage together."""
+_FEWEST: Final = 128
+"""Points that go on to the later stages together, at least: of most blocks but a few do. The scratch, for at most
+`_FEWEST + _BLOCK`, fits the first-level cache."""
+_AHEAD: Final = 6
+"""Points between asking for a leaf's group and reading it: some 100 ns."""
+
+
+@inline
+def _first_status(points: Any, start: Any, end: Any, cells: Any, locations: Any, item_of: Any, n_kept: Any) -> Any:
+    """Write the status of level 0 for points start .. end, and append those that are UNDECIDED to item_of.
+
+    Returns how many that makes, and how many lie beyond the lattice. One pass without a branch: a point beyond, or not
+    finite, gets the status behind the last one.
+    """
+    low, scale, n, statuses = cells.lattice.low, cells.lattice.scale, cells.lattice.n, cells.statuses
+    nx, ny, beyond = np.int32(n[0]), np.int32(n[1]), np.uint32(n[0] * n[1] * n[2])
+    x_end, y_end, z_end = float(n[0]), float(n[1]), float(n[2])
+    n_beyond = np.uint64(0)
+    for item in range(start, end):
+        x = (points[item, 0] - low[0]) * scale[0]
+        y = (points[item, 1] - low[1]) * scale[1]
+        z = (points[item, 2] - low[2]) * scale[2]
+        is_within = (x >= 0.0) & (y >= 0.0) & (z >= 0.0) & (x < x_end) & (y < y_end) & (z < z_end)
+        x, y, z = x if is_within else 0.0, y if is_within else 0.0, z if is_within else 0.0
+        cell = np.uint32((np.int32(z) * ny + np.int32(y)) * nx + np.int32(x))
+        status = statuses[cell if is_within else beyond]
+        locations[item] = status
+        item_of[n_kept] = item
+        n_kept += np.uint64(status == UNDECIDED)
+        n_beyond += np.uint64(not is_within)
+    return n_kept, n_beyond
+
+
+@kernel
+def locate_by_cells(points: Any, cells: Any, locations: Any, flag: Any) -> int:
+    """Fill `locations` (n,) int8 for points (n, 3) from a `Cells`; returns how many are left UNDECIDED.
+
+    Points go through one stage after another, many at a time, so that the loads of a stage do not wait for each other:
+    status on level 0, where most points end; codes there and in bricks; first group of the leaf, parity.
+    Returns NOT_FINITE, with the rest undone, where a point is not: it is in no cell, so it costs little to look.
+    """
+    low, scale, size, n = cells.lattice.low, cells.lattice.scale, cells.lattice.size, cells.lattice.n
+    codes, groups = cells.codes, cells.groups
+    n_top, top_shift = n[0] * n[1] * n[2], 2 * (LEVELS - 1)
+    room = _FEWEST + _BLOCK + 1
+    item_of, code_of, level_of = np.empty(room, np.uint64), np.empty(room, np.int32), np.empty(room, np.int32)
+    places, waiting = np.empty((room, 3), np.int32), np.empty(room, np.uint64)
+    n_open, n_kept = 0, np.uint64(0)
+    for start in range(0, len(points), _BLOCK):
+        if flag[0]:
+            break
+        first, end = np.uint64(start), np.uint64(min(start + _BLOCK, len(points)))
+        n_kept, n_beyond = _first_status(points, first, end, cells, locations, item_of, n_kept)
+        if n_beyond > 0:
+            for item in range(first, end):
+                px, py, pz = points[item, 0], points[item, 1], points[item, 2]
+                if (px - px) + (py - py) + (pz - pz) != 0.0:
+                    return NOT_FINITE
+        if n_kept < _FEWEST and end < len(points):
+            continue
+        n_waiting = np.uint64(0)
+        for kept in range(n_kept):
+            item = item_of[kept]
+            x = finest(points[item, 0], low[0], scale[0])
+            y = finest(points[item, 1], low[1], scale[1])
+            z = finest(points[item, 2], low[2], scale[2])
+            places[kept, 0], places[kept, 1], places[kept, 2] = x, y, z
+            code = codes[np.uint64(((z >> top_shift) * n[1] + (y >> top_shift)) * n[0] + (x >> top_shift))]
+            code_of[kept], level_of[kept] = code, 0
+            waiting[n_waiting] = kept
+            n_waiting += np.uint64(code >= 0)
+        n_open += int(n_kept) - int(n_waiting)
+        for level in range(1, LEVELS):
+            n_left, part_shift = np.uint64(0), 2 * (LEVELS - 1 - level)
+            for turn in range(n_waiting):
+                kept = waiting[turn]
+                code = code_of[kept]
+                if code & 1:
+                    x, y, z = (
+                        places[kept, 0] >> part_shift,
+                        places[kept, 1] >> part_shift,
+                        places[kept, 2] >> part_shift,
+                    )
+                    part = ((z & 3) << 4) | ((y & 3) << 2) | (x & 3)
+                    code = codes[np.uint64(n_top + (code >> 1) * PARTS + part)]
+                    locations[item_of[kept]] = min(code, OPEN_CELL) + CODE_SHIFT
+                    code_of[kept], level_of[kept] = code, level
+                    n_open += code == OPEN_CELL
+                waiting[n_left] = kept
+                n_left += np.uint64(code >= 0)
+            n_waiting = n_left
+        for turn in range(min(n_waiting, np.uint64(_AHEAD))):
+            prefetch_group(groups, code_of[waiting[turn]] >> 2)
+        for turn in range(n_waiting):
+            if turn + np.uint64(_AHEAD) < n_waiting:
+                prefetch_group(groups, code_of[waiting[turn + np.uint64(_AHEAD)]] >> 2)
+            kept = waiting[turn]
+            item, level, code = item_of[kept], level_of[kept], code_of[kept]
+            parts, share, part_shift = parts_of(level), share_of(level), 2 * (LEVELS - 1 - level)
+            x, y, z = places[kept, 0] >> part_shift, places[kept, 1] >> part_shift, places[kept, 2] >> part_shift
+            rx = reference_coordinate(low[0], size[0] * share, x, PLACE[0])
+            ry = reference_coordinate(low[1], size[1] * share, y, PLACE[1])
+            rz = reference_coordinate(low[2], size[2] * share, z, PLACE[2])
+            wx = np.float32((points[item, 0] - rx) * (scale[0] * parts))
+            wy = np.float32((points[item, 1] - ry) * (scale[1] * parts))
+            wz = np.float32((points[item, 2] - rz) * (scale[2] * parts))
+            group = code >> 2
+            parity = group_parity(groups, group, wx, wy, wz)
+            while groups[group, ROWS - 1, 0] == 0.0:  # bound: the last group of each leaf says so
+                group += 1
+                found = group_parity(groups, group, wx, wy, wz)
+                parity = ((parity ^ found) & 1) | ((parity | found) & UNSURE)
+            locations[item] = UNDECIDED if parity & UNSURE else ((code ^ (parity << 1)) & 2) - 1
+            n_open += (parity & UNSURE) != 0
+        n_kept = np.uint64(0)
+    return n_open

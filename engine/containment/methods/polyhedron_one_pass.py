@@ -1,0 +1,146 @@
+"""Polyhedron by ray and parity for few points: one pass over the triangles, with nothing prepared.
+
+The points are sorted into a grid over x and y, and each triangle looks up those below it. The decisions are those of
+polyhedron_ray_parity.py, so the answers are too. A pass costs some 20 ns a triangle, where columns cost 1 us a triangle
+to build: it is for a solid that is asked once or a few times.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from engine.bounding.grid import cell_of, make_axis
+from engine.containment.methods.polyhedron_ray_parity import (
+    BEYOND,
+    CROSSED,
+    MISSED,
+    ON_FACE,
+    OPEN,
+    cross_upwards,
+    orient2d,
+    touch_triangle,
+)
+from engine.jit import kernel
+from engine.predicates.loading import as_point3
+from engine.solids.base import FloatArray, IntArray
+from engine.types import UNDECIDED, Point2
+
+_ODD, _ON_FACE, _OPEN, _BEYOND = 1, 2, 4, 8
+"""Bits of what is known of a point."""
+
+
+@kernel
+def sort_into_cells(points: Any, u: Any, v: Any, firsts: Any, order: Any) -> None:
+    """Fill order (n,) int32 with the points (n, 3) by their cell, and firsts (u_cells * v_cells + 1,) with the places.
+
+    u, v: each an `Axis` over x and y of all points. firsts: int64, zero.
+    """
+    for item in range(len(points)):
+        q = as_point3(points, item)
+        cell = cell_of(q.y, v.low, v.cells_per_unit, v.n_cells) * u.n_cells
+        firsts[cell + cell_of(q.x, u.low, u.cells_per_unit, u.n_cells) + 1] += 1
+    for cell in range(1, len(firsts)):
+        firsts[cell] += firsts[cell - 1]
+    for item in range(len(points) - 1, -1, -1):  # from behind: firsts[cell + 1] comes down to the cell's first place
+        q = as_point3(points, item)
+        cell = cell_of(q.y, v.low, v.cells_per_unit, v.n_cells) * u.n_cells
+        cell += cell_of(q.x, u.low, u.cells_per_unit, u.n_cells)
+        firsts[cell + 1] -= 1
+        order[firsts[cell + 1]] = item
+    for cell in range(len(firsts) - 1):
+        firsts[cell] = firsts[cell + 1]
+    firsts[len(firsts) - 1] = len(points)
+
+
+@kernel
+def locate_by_pass(
+    points: Any,
+    z_min: float,
+    u: Any,
+    v: Any,
+    firsts: Any,
+    order: Any,
+    vertices: Any,
+    triangles: Any,
+    states: Any,
+    locations: Any,
+    flag: Any,
+) -> int:
+    """Fill `locations` (n,) int8 for points (n, 3); returns how many needed more than the filter.
+
+    z_min: least of the points. u, v, firsts, order: as `sort_into_cells` leaves them. triangles: (m, 3) int64.
+    states: (n,) uint8, zero. Caller guarantees a surface that is even at each edge.
+    """
+    for triangle in range(len(triangles)):
+        if flag[0]:
+            break
+        a = as_point3(vertices, triangles[triangle, 0])
+        b = as_point3(vertices, triangles[triangle, 1])
+        c = as_point3(vertices, triangles[triangle, 2])
+        x_low, x_high = max(min(a.x, b.x, c.x), u.low), min(max(a.x, b.x, c.x), u.high)
+        y_low, y_high = max(min(a.y, b.y, c.y), v.low), min(max(a.y, b.y, c.y), v.high)
+        z_low, z_high = min(a.z, b.z, c.z), max(a.z, b.z, c.z)
+        if x_low > x_high or y_low > y_high or z_high < z_min:
+            continue
+        area, is_known = 0, False
+        first = cell_of(x_low, u.low, u.cells_per_unit, u.n_cells)
+        last = cell_of(x_high, u.low, u.cells_per_unit, u.n_cells)
+        for row in range(
+            cell_of(y_low, v.low, v.cells_per_unit, v.n_cells), cell_of(y_high, v.low, v.cells_per_unit, v.n_cells) + 1
+        ):
+            for place in range(firsts[row * u.n_cells + first], firsts[row * u.n_cells + last + 1]):
+                item = order[place]
+                q = as_point3(points, item)
+                is_above = q.z > z_high
+                if is_above or q.x < x_low or q.x > x_high or q.y < y_low or q.y > y_high or states[item] & _ON_FACE:
+                    continue
+                if not is_known:
+                    area, is_known = orient2d(Point2(a.x, a.y), Point2(b.x, b.y), Point2(c.x, c.y)), True
+                if area == UNDECIDED:
+                    met = OPEN | BEYOND
+                elif area != 0:
+                    met = cross_upwards(a, b, c, area, z_low, q)
+                elif q.z >= z_low:
+                    met = touch_triangle(a, b, c, q)
+                else:
+                    met = MISSED
+                if met & BEYOND:
+                    states[item] |= _BEYOND
+                met &= 3
+                if met == ON_FACE:
+                    states[item] |= _ON_FACE
+                elif met == OPEN:
+                    states[item] |= _OPEN
+                elif met == CROSSED:
+                    states[item] ^= _ODD
+    n_beyond = 0
+    for item in range(len(points)):
+        state = states[item]
+        n_beyond += (state & _BEYOND) != 0
+        if state & _ON_FACE:
+            locations[item] = 0
+        elif state & _OPEN:
+            locations[item] = UNDECIDED
+        else:
+            locations[item] = 1 if state & _ODD else -1
+    return n_beyond
+
+
+def locate_few(
+    points: FloatArray,
+    vertices: FloatArray,
+    triangles: IntArray,
+    locations: npt.NDArray[np.int8],
+    flag: npt.NDArray[np.uint8],
+) -> int:
+    """Fill `locations` (n,) for points (n, 3), one at least; returns how many needed more than the filter."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    side = max(1, int(len(points) ** 0.5))
+    u, v = make_axis(float(low[0]), float(high[0]), side), make_axis(float(low[1]), float(high[1]), side)
+    firsts, order = np.zeros(u.n_cells * v.n_cells + 1, np.int64), np.empty(len(points), np.int32)
+    sort_into_cells(points, u, v, firsts, order)
+    states = np.zeros(len(points), np.uint8)
+    return int(locate_by_pass(points, float(low[2]), u, v, firsts, order, vertices, triangles, states, locations, flag))

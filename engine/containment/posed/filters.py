@@ -1,0 +1,284 @@
+"""Locations that hold for every point within a blur of a given one: the filters for points in a posed body's frame.
+
+A blurred point stands for all points whose coordinates are at most blur / 2 away. Each kernel answers where one
+location is proven for all of them, else UNDECIDED. Each bound is that of the plain filter plus the largest change
+that the blur can make, taken twice to pay for its own rounding; infinities and NaN compare false and so count as
+unsure.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from engine.bounding.grid import cell_of
+from engine.jit import inline, kernel
+from engine.predicates.loading import as_point2, as_point3
+from engine.predicates.orientation import BOUND_2D, BOUND_3D, GUARD_2D, GUARD_3D
+from engine.types import UNDECIDED, Point2
+
+_SLACK: Final = 8.0 * 2.0**-53
+_TINY: Final = 1e-320
+
+
+@inline
+def _orient2d_blurred(a: Any, b: Any, q: Any, blur: float) -> int:
+    """Return the sign of orient2d(a, b, .) on all of the blurred q, or UNDECIDED."""
+    left = (a.x - q.x) * (b.y - q.y)
+    right = (a.y - q.y) * (b.x - q.x)
+    turn = left - right
+    bound = BOUND_2D * (abs(left) + abs(right)) + GUARD_2D + blur * (abs(b.x - a.x) + abs(b.y - a.y))
+    return 1 if turn > bound else -1 if -turn > bound else UNDECIDED
+
+
+@inline
+def _orient3d_blurred(a: Any, b: Any, c: Any, q: Any, blur: float) -> int:
+    """Return the sign of orient3d(a, b, c, .) on all of the blurred q, or UNDECIDED.
+
+    Taken from a: dot((b - a) x (c - a), q - a), whose change with q is at most the sum of the normal's parts.
+    """
+    ux, uy, uz = b.x - a.x, b.y - a.y, b.z - a.z
+    vx, vy, vz = c.x - a.x, c.y - a.y, c.z - a.z
+    wx, wy, wz = q.x - a.x, q.y - a.y, q.z - a.z
+    uy_vz, uz_vy = uy * vz, uz * vy
+    uz_vx, ux_vz = uz * vx, ux * vz
+    ux_vy, uy_vx = ux * vy, uy * vx
+    side = (uy_vz - uz_vy) * wx + (uz_vx - ux_vz) * wy + (ux_vy - uy_vx) * wz
+    nx, ny, nz = abs(uy_vz) + abs(uz_vy), abs(uz_vx) + abs(ux_vz), abs(ux_vy) + abs(uy_vx)
+    permanent = nx * abs(wx) + ny * abs(wy) + nz * abs(wz)
+    bound = BOUND_3D * permanent + GUARD_3D * (1.0 + (abs(wx) + abs(wy) + abs(wz))) + blur * (nx + ny + nz + GUARD_3D)
+    return 1 if side > bound else -1 if -side > bound else UNDECIDED
+
+
+@kernel
+def locate_in_box_blurred(points: Any, blurs: Any, low: Any, high: Any, locations: Any, flag: Any) -> int:
+    """Fill `locations` (n,) int8 for points (n, dim) with blurs (n,); returns how many stay open."""
+    n_open = 0
+    for item in range(len(points)):
+        if flag[0]:
+            break
+        is_out, is_within = False, True
+        for axis in range(len(low)):
+            least, most = points[item, axis] - blurs[item], points[item, axis] + blurs[item]
+            is_out |= most < low[axis] or least > high[axis]
+            is_within &= low[axis] < least and most < high[axis]
+        locations[item] = -1 if is_out else 1 if is_within else UNDECIDED
+        n_open += locations[item] == UNDECIDED
+    return n_open
+
+
+@kernel
+def locate_in_rows_blurred(points: Any, blurs: Any, rows: Any, locations: Any, flag: Any) -> int:
+    """Fill `locations` (n,) int8 for rows (m, dim + 1), each given or correctly rounded; returns how many stay open."""
+    n_axes, n_open = points.shape[1], 0
+    for item in range(len(points)):
+        if flag[0]:
+            break
+        location = 1
+        for row in range(len(rows)):
+            distance = rows[row, n_axes]
+            size, slope = abs(distance), 0.0
+            for axis in range(n_axes):
+                term = rows[row, axis] * points[item, axis]
+                distance += term
+                size += abs(term)
+                slope += abs(rows[row, axis])
+            bound = _SLACK * size + blurs[item] * slope + _TINY
+            if distance > bound:
+                continue
+            if -distance > bound:
+                location = -1
+                break
+            location = UNDECIDED
+        locations[item] = location
+        n_open += location == UNDECIDED
+    return n_open
+
+
+@kernel
+def locate_by_polynomial_blurred(
+    points: Any, blurs: Any, powers: Any, coefficients: Any, degree: int, locations: Any, flag: Any
+) -> int:
+    """Fill `locations` (n,) int8 with the sign of the polynomial; returns how many stay open.
+
+    A term changes by at most degree times blur times the same term with one factor left out, all factors grown by the
+    blur; each factor is at most the largest grown coordinate or 1, m: the change is below degree |c| m^degree blur. A
+    product that underflows is off by 2^-1075 m^degree; there are at most 16,000.
+    """
+    n_axes, n_open = points.shape[1], 0
+    for item in range(len(points)):
+        if flag[0]:
+            break
+        largest = 1.0
+        for axis in range(n_axes):
+            largest = max(largest, abs(points[item, axis]) + blurs[item])
+        change, grown = blurs[item] * degree, 1.0
+        for _ in range(degree):
+            grown *= largest
+        change *= grown
+        value, size, weight = 0.0, 0.0, 0.0
+        for term in range(len(coefficients)):
+            product = float(coefficients[term])
+            for axis in range(n_axes):
+                for _ in range(powers[term, axis]):
+                    product *= points[item, axis]
+            value += product
+            size += abs(product)
+            weight += abs(coefficients[term])
+        bound = (degree + len(coefficients) + 16) * 2.0**-53 * size + 2.0 * change * weight + 1e-300 * grown
+        locations[item] = 1 if value > bound else -1 if -value > bound else UNDECIDED
+        n_open += locations[item] == UNDECIDED
+    return n_open
+
+
+@kernel
+def locate_in_rings_blurred(
+    points: Any, blurs: Any, starts: Any, ends: Any, x_highs: Any, slabs: Any, box: Any, locations: Any, flag: Any
+) -> int:
+    """Fill `locations` (n,) int8 by ray and parity as polygon_ray_parity.py does; returns how many stay open."""
+    x_min, x_max, y_min, y_max = box
+    n_open = 0
+    for item in range(len(points)):
+        if flag[0]:
+            break
+        q, blur = as_point2(points, item), blurs[item]
+        left, right, below, above = q.x - blur, q.x + blur, q.y - blur, q.y + blur
+        if right < x_min or left > x_max or above < y_min or below > y_max:
+            locations[item] = -1
+            continue
+        location = UNDECIDED
+        if left > x_min and below > y_min:  # false for NaN; the frame's border is left open
+            slab = cell_of(below, slabs.u.low, slabs.u.cells_per_unit, slabs.u.n_cells)
+            if slab == cell_of(above, slabs.u.low, slabs.u.cells_per_unit, slabs.u.n_cells):
+                location = _parity_in_slab(q, blur, slab, starts, ends, x_highs, slabs)
+        locations[item] = location
+        n_open += location == UNDECIDED
+    return n_open
+
+
+@inline
+def _parity_in_slab(q: Any, blur: float, slab: int, starts: Any, ends: Any, x_highs: Any, slabs: Any) -> int:
+    """Return the location of a blurred q within one slab, or UNDECIDED."""
+    left, right, below, above = q.x - blur, q.x + blur, q.y - blur, q.y + blur
+    is_odd = False
+    for entry in range(slabs.offsets[slab], slabs.offsets[slab + 1]):
+        edge = slabs.items[entry]
+        if x_highs[edge] < left:
+            break
+        a, b = as_point2(starts, edge), as_point2(ends, edge)
+        if (a.y < below and b.y < below) or (a.y > above and b.y > above):
+            continue
+        if (below <= a.y and a.y <= above) or (below <= b.y and b.y <= above):
+            return UNDECIDED
+        if a.x > right and b.x > right:
+            is_odd = not is_odd
+            continue
+        turn = _orient2d_blurred(a, b, q, blur)
+        if turn == UNDECIDED:
+            return UNDECIDED
+        if (turn > 0) == (a.y < b.y):
+            is_odd = not is_odd
+    return 1 if is_odd else -1
+
+
+@kernel
+def locate_by_columns_blurred(
+    points: Any,
+    blurs: Any,
+    vertices: Any,
+    triangles: Any,
+    boxes: Any,
+    areas: Any,
+    columns: Any,
+    z_min: float,
+    locations: Any,
+    flag: Any,
+) -> int:
+    """Fill `locations` (n,) int8 by vertical rays as polyhedron_ray_parity.py does; returns how many stay open."""
+    u, v = columns.u, columns.v
+    n_open = 0
+    for item in range(len(points)):
+        if flag[0]:
+            break
+        q, blur = as_point3(points, item), blurs[item]
+        x_low, x_high, y_low, y_high = q.x - blur, q.x + blur, q.y - blur, q.y + blur
+        if x_high < u.low or x_low > u.high or y_high < v.low or y_low > v.high or q.z + blur < z_min:
+            locations[item] = -1
+            continue
+        location = UNDECIDED
+        if x_low > u.low and y_low > v.low:
+            column = cell_of(x_low, u.low, u.cells_per_unit, u.n_cells)
+            row = cell_of(y_low, v.low, v.cells_per_unit, v.n_cells)
+            if column == cell_of(x_high, u.low, u.cells_per_unit, u.n_cells):
+                if row == cell_of(y_high, v.low, v.cells_per_unit, v.n_cells):
+                    cell = row * u.n_cells + column
+                    location = parity_in_column(q, blur, cell, vertices, triangles, boxes, areas, columns, flag)
+        locations[item] = location
+        n_open += location == UNDECIDED
+    return n_open
+
+
+@inline
+def parity_in_column(
+    q: Any,
+    blur: float,
+    cell: int,
+    vertices: Any,
+    triangles: Any,
+    boxes: Any,
+    areas: Any,
+    columns: Any,
+    flag: Any,
+) -> int:
+    """Return the location of a blurred q within one column, or UNDECIDED."""
+    x_low, x_high, y_low, y_high = q.x - blur, q.x + blur, q.y - blur, q.y + blur
+    z_low, z_high = q.z - blur, q.z + blur
+    is_odd = False
+    for entry in range(columns.offsets[cell], columns.offsets[cell + 1]):
+        triangle = columns.items[entry]
+        if boxes[triangle, 5] < z_low:
+            break
+        if entry & 1023 == 1023 and flag[0]:
+            break
+        if (
+            boxes[triangle, 1] < x_low
+            or boxes[triangle, 0] > x_high
+            or boxes[triangle, 3] < y_low
+            or boxes[triangle, 2] > y_high
+        ):
+            continue
+        area, is_below = areas[triangle], z_high < boxes[triangle, 4]
+        if area == 0 and is_below:
+            continue
+        a = as_point3(vertices, triangles[triangle, 0])
+        b = as_point3(vertices, triangles[triangle, 1])
+        c = as_point3(vertices, triangles[triangle, 2])
+        if area == 0:
+            if _orient3d_blurred(a, b, c, q, blur) == UNDECIDED:
+                return UNDECIDED
+            continue
+        turn = _in_projection(a, b, c, q, area, blur)
+        if turn == -1:
+            continue
+        if turn == UNDECIDED:
+            return UNDECIDED
+        if is_below:
+            is_odd = not is_odd
+            continue
+        side = _orient3d_blurred(a, b, c, q, blur)
+        if side == UNDECIDED:
+            return UNDECIDED
+        if side != area:
+            is_odd = not is_odd
+    return 1 if is_odd else -1
+
+
+@inline
+def _in_projection(a: Any, b: Any, c: Any, q: Any, area: int, blur: float) -> int:
+    """Return 1 if all of the blurred q is in the triangle seen from above, -1 if none of it is, else UNDECIDED."""
+    a2, b2, c2, q2 = Point2(a.x, a.y), Point2(b.x, b.y), Point2(c.x, c.y), Point2(q.x, q.y)
+    first = _orient2d_blurred(a2, b2, q2, blur)
+    second = _orient2d_blurred(b2, c2, q2, blur)
+    third = _orient2d_blurred(c2, a2, q2, blur)
+    if first == -area or second == -area or third == -area:
+        return -1
+    return 1 if first == area and second == area and third == area else UNDECIDED

@@ -1,0 +1,181 @@
+"""Locates points in posed solids: filters in the body's own frame, exact on input and transform.
+
+A posed solid is the exact image of the solid under p -> R p + t, but for spheres, which keep their radius about the
+exact image of the centre. Points are moved into the solid's frame with a bound on the rounding (body_frame.py),
+located there where that bound allows (filters.py), and settled in integers where it does not. Pure translations and
+quarter turns whose differences are exact use the unposed kernels, so that flush instances on a lattice never reach
+rationals.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from engine.containment.locators import (
+    Counts,
+    Fill,
+    Flag,
+    Locations,
+    Locator,
+    csg_locator,
+    locator_of,
+    rational_half,
+    settled,
+)
+from engine.containment.methods.ball import locate_in_ball
+from engine.containment.posed.body_frame import move_to_body_frame
+from engine.containment.posed.filters import (
+    locate_by_columns_blurred,
+    locate_by_polynomial_blurred,
+    locate_in_box_blurred,
+    locate_in_rings_blurred,
+    locate_in_rows_blurred,
+)
+from engine.containment.prepared import columns_of, rings_of, rounded_rows
+from engine.containment.rational_locate import prism_walls, to_world_frame
+from engine.parallel import Budget
+from engine.solids.aabb import Aabb
+from engine.solids.base import FloatArray, Solid, as_read_only
+from engine.solids.convex import Convex
+from engine.solids.csg import Csg
+from engine.solids.half_space import HalfSpace
+from engine.solids.implicit import Implicit
+from engine.solids.polygon import Polygon
+from engine.solids.polyhedron import Polyhedron
+from engine.solids.pose import Pose
+from engine.solids.sphere import Sphere
+from engine.solids.triangle import Triangle
+from engine.types import UNDECIDED
+
+Blurred = Callable[[FloatArray, FloatArray, Locations, Flag], int]
+
+
+def posed_locator(solid: Solid, pose: Pose | None) -> Locator:
+    """Return how points are located in `solid` under `pose`. Raises: UnsupportedSolidError."""
+    if pose is None or pose.is_identity:
+        return locator_of(solid)
+    if isinstance(solid, Csg):
+        return csg_locator(solid, lambda leaf: posed_locator(leaf, pose))
+    if isinstance(solid, Sphere):
+        return _in_posed_sphere(solid, pose)
+    unposed = locator_of(solid)
+    inverse, is_turn = inverse_of(pose.rotation)
+    if isinstance(solid, Implicit) and solid.function is not None:
+        return Locator(unposed.method, _through_frame(unposed.fill, inverse, pose), unposed.decisions)
+    return Locator(unposed.method, _filtered(solid, pose, unposed, inverse, is_turn), unposed.decisions)
+
+
+def inverse_of(rotation: FloatArray) -> tuple[FloatArray, bool]:
+    """Return R^-1 with each entry off by less than 32 u, and whether R only turns the axes onto each other."""
+    if np.isin(rotation, (-1.0, 0.0, 1.0)).all() and (np.abs(rotation).sum(axis=0) == 1.0).all():
+        return np.ascontiguousarray(rotation.T), True
+    r = rotation.tolist()
+    if len(r) == 2:
+        determinant = r[0][0] * r[1][1] - r[0][1] * r[1][0]
+        adjugate = [[r[1][1], -r[0][1]], [-r[1][0], r[0][0]]]
+    else:
+        following = (1, 2, 0)
+        adjugate = [
+            [
+                r[following[j]][following[i]] * r[following[following[j]]][following[following[i]]]
+                - r[following[j]][following[following[i]]] * r[following[following[j]]][following[i]]
+                for j in range(3)
+            ]
+            for i in range(3)
+        ]
+        determinant = sum(r[0][k] * adjugate[k][0] for k in range(3))
+    return np.array(adjugate) / determinant, False
+
+
+def _moved(points: FloatArray, inverse: FloatArray, pose: Pose, is_turn: bool) -> tuple[FloatArray, FloatArray]:
+    moved, blurs = np.empty_like(points), np.empty(len(points))
+    with np.errstate(all="ignore"):
+        move_to_body_frame(points, inverse, pose.translation, is_turn, moved, blurs)
+    return moved, blurs
+
+
+def _through_frame(fill: Fill, inverse: FloatArray, pose: Pose) -> Fill:
+    """Return the fill that rounds each point's preimage: for callables, whose decisions are float64 anyway."""
+    return lambda points, locations, budget: fill(_moved(points, inverse, pose, False)[0], locations, budget)
+
+
+def _filtered(solid: Solid, pose: Pose, unposed: Locator, inverse: FloatArray, is_turn: bool) -> Fill:
+    """Return the fill that tries exact preimages, then the blurred filter, then integers."""
+    blurred = _blurred_kernel(solid)
+    settle = rational_half(solid, pose)
+
+    def fill(points: FloatArray, locations: Locations, budget: Budget) -> Counts:
+        moved, blurs = _moved(points, inverse, pose, is_turn)
+        if isinstance(solid, Polyhedron):
+            columns_of(solid, budget.check)
+        elif isinstance(solid, Polygon):
+            rings_of(solid, budget.check)
+        with np.errstate(all="ignore"):
+            n_beyond = int(blurred(moved, blurs, locations, budget.flag))
+        budget.check()
+        n_rational = 0
+        if is_turn:
+            exact = np.flatnonzero((blurs == 0.0) & (locations == UNDECIDED))
+            if len(exact):
+                found = np.empty(len(exact), np.int8)
+                n_rational += unposed.fill(moved[exact], found, budget).rational
+                locations[exact] = found
+        undecided = np.flatnonzero(locations == UNDECIDED)
+        for item in undecided:
+            locations[item] = settle(points[item].tolist(), budget.check)
+        return Counts(n_beyond, n_rational + len(undecided))
+
+    return fill
+
+
+def _blurred_kernel(solid: Solid) -> Blurred:
+    """Return the blurred kernel over the prepared structures of `solid`."""
+    if isinstance(solid, Aabb):
+        low, high = solid.min, solid.max
+        return lambda points, blurs, out, flag: int(locate_in_box_blurred(points, blurs, low, high, out, flag))
+    if isinstance(solid, (HalfSpace, Convex)) or (isinstance(solid, Triangle) and solid.dimension == 3):
+        rows = _rows(solid)
+        return lambda points, blurs, out, flag: int(locate_in_rows_blurred(points, blurs, rows, out, flag))
+    if isinstance(solid, (Polygon, Triangle)):
+        return lambda points, blurs, out, flag: int(locate_in_rings_blurred(points, blurs, *rings_of(solid), out, flag))
+    if isinstance(solid, Polyhedron):
+        return lambda points, blurs, out, flag: int(
+            locate_by_columns_blurred(points, blurs, *columns_of(solid), out, flag)
+        )
+    assert isinstance(solid, Implicit)
+    powers, coefficients, degree = solid.powers, solid.coefficients, int(solid.powers.sum(axis=1).max())
+    return lambda points, blurs, out, flag: int(
+        locate_by_polynomial_blurred(points, blurs, powers, coefficients, degree, out, flag)
+    )
+
+
+def _rows(solid: Solid) -> FloatArray:
+    if isinstance(solid, HalfSpace):
+        return solid.row[None]
+    if isinstance(solid, Convex):
+        return solid.planes
+    assert isinstance(solid, Triangle)
+    return rounded_rows(prism_walls(solid))[0]
+
+
+def posed_center(solid: Sphere, pose: Pose) -> tuple[npt.NDArray[np.float64], float]:
+    """Return the centre's exact image correctly rounded, and a bound on the rounding; infinite beyond float64."""
+    exact = to_world_frame(solid.center.tolist(), pose)
+    try:
+        center = np.array([float(value) for value in exact])
+    except OverflowError:
+        return np.zeros(solid.dimension), np.inf
+    blur = 0.0 if center.tolist() == exact else float(np.spacing(np.abs(center).max()))
+    return as_read_only(center), blur
+
+
+def _in_posed_sphere(solid: Sphere, pose: Pose) -> Locator:
+    center, blur = posed_center(solid, pose)
+
+    def run(points: FloatArray, locations: Locations, flag: Flag) -> int:
+        return int(locate_in_ball(points, center, blur, solid.radius, np.empty(8), locations, flag))
+
+    return Locator("squared_distance", settled(run, rational_half(solid, pose)))

@@ -1,0 +1,157 @@
+"""Settles the candidates that the first pass over a scene left open, grouped by body.
+
+Polyhedra of moderate size are asked all together, by the columns of each (columns.py). What is then still open,
+and what is of other kinds, each body locates by itself as `locate` does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from engine.containment.locators import Counts, Locations
+from engine.containment.prepared import columns_of
+from engine.containment.scene.build_voxels import MOST_FACES, voxels_if_they_pay
+from engine.containment.scene.columns import ColumnTables, locate_groups
+from engine.containment.scene.first_pass import group_by_body
+from engine.containment.scene.tables import Scene
+from engine.parallel import Budget, run_chunks
+from engine.solids.base import FloatArray, IntArray
+from engine.solids.polyhedron import Polyhedron
+from engine.types import UNDECIDED
+
+_MOST_IN_GROUP: Final = 1 << 14
+"""Points that one body locates in one piece of work."""
+_FEWEST_FOR_COLUMNS: Final = 64
+"""Points that columns are built for; fewer are left to what `locate` does with few points."""
+
+
+def settle_rest(
+    points: FloatArray,
+    scene: Scene,
+    owners_of: list[IntArray],
+    bodies_of: list[IntArray],
+    take: list[Callable[[Locations], object]],
+    budget: Budget,
+    workers: int | None,
+) -> Counts:
+    """Locate pairs of a point (owners) and a body, given piece by piece, and hand each piece its locations.
+
+    Returns how many took more than the filter, and how many rational arithmetic.
+    """
+    owners = np.concatenate([np.zeros(0, np.int64), *owners_of])
+    bodies = np.concatenate([np.zeros(0, np.int64), *bodies_of])
+    if not len(owners):
+        return Counts(0, 0)
+    n_bodies = len(scene.owners)
+    found, order = np.full(len(owners), UNDECIDED, np.int8), np.empty(len(owners), np.int64)
+    sizes = np.bincount(bodies, minlength=n_bodies)
+    group_by_body(bodies, np.cumsum(sizes) - sizes, order)
+    tables = _column_tables(scene, sizes, budget, workers)
+    if tables is not None:
+        groups = _groups(sizes)
+
+        def by_columns(start: int, stop: int) -> None:
+            with np.errstate(all="ignore"):
+                locate_groups(
+                    points,
+                    owners,
+                    order,
+                    *(each[start:stop] for each in groups),
+                    scene.tables,
+                    tables,
+                    found,
+                    budget.flag,
+                )
+
+        run_chunks(by_columns, len(groups[0]), budget=budget, first_chunk=4, workers=workers)
+        order = order[found[order] == UNDECIDED]
+        sizes = np.bincount(bodies[order], minlength=n_bodies)
+    counts = []
+    rest = [each.tolist() for each in _groups(sizes)]
+
+    def one_by_one(start: int, stop: int) -> None:
+        for begin, end, body in zip(*(each[start:stop] for each in rest)):
+            places = order[begin:end]
+            located = np.empty(end - begin, np.int8)
+            locator = scene.locator(body).chosen(end - begin, budget)
+            counts.append(locator.fill(points[owners[places]], located, budget))
+            found[places] = located
+
+    run_chunks(one_by_one, len(rest[0]), budget=budget, first_chunk=1, workers=workers)
+    ends = np.cumsum([len(each) for each in owners_of])
+    for piece, part in zip(take, np.split(found, ends[:-1])):
+        piece(part)
+    return Counts(sum(each.beyond for each in counts), sum(each.rational for each in counts))
+
+
+def _groups(sizes: IntArray) -> tuple[IntArray, IntArray, IntArray]:
+    """Return begin, end and body of pieces of work, of pairs that are grouped by body."""
+    bodies = np.flatnonzero(sizes)
+    n_parts = (sizes[bodies] + _MOST_IN_GROUP - 1) // _MOST_IN_GROUP
+    lasts = np.cumsum(sizes)[bodies]
+    part = np.arange(int(n_parts.sum())) - np.repeat(np.cumsum(n_parts) - n_parts, n_parts)
+    begins = np.repeat(lasts - sizes[bodies], n_parts) + part * _MOST_IN_GROUP
+    return begins, np.minimum(begins + _MOST_IN_GROUP, np.repeat(lasts, n_parts)), np.repeat(bodies, n_parts)
+
+
+def _column_tables(scene: Scene, sizes: IntArray, budget: Budget, workers: int | None) -> ColumnTables | None:
+    """Return the columns of the polyhedra that are asked often enough, built where they are not there yet."""
+    asked = np.bincount(scene.owners, weights=sizes, minlength=len(scene.solids))
+    chosen: list[tuple[int, Polyhedron]] = []
+    for index in np.flatnonzero(asked).tolist():
+        solid = scene.solids[index]
+        if isinstance(solid, Polyhedron) and len(solid.triangles) <= MOST_FACES:
+            if asked[index] >= _FEWEST_FOR_COLUMNS or solid.kept("columns") is not None:
+                chosen.append((index, solid))
+    if not chosen:
+        return None
+
+    def build(start: int, stop: int) -> None:
+        for index, solid in chosen[start:stop]:
+            columns_of(solid, budget.check)
+            voxels_if_they_pay(solid, int(asked[index]), budget)
+
+    run_chunks(build, len(chosen), budget=budget, first_chunk=1, workers=workers)
+    rows = np.full(len(scene.solids), -1, np.int32)
+    rows[[index for index, _ in chosen]] = np.arange(len(chosen))
+    lines = [solid.prepared("column_line", _line(solid), budget.check) for _, solid in chosen]
+    voxels = [solid.kept("voxels") for _, solid in chosen]
+    addresses, sizes_of, axes = (np.array(each) for each in zip(*lines))
+    return ColumnTables(
+        rows[scene.owners],
+        addresses,
+        sizes_of,
+        axes,
+        np.array([(0, 0) if each is None else (each.address, each.shift) for each in voxels], np.int64),
+        np.array([_NO_FRAME if each is None else each.frame for each in voxels]),
+    )
+
+
+_NO_FRAME: Final = np.zeros(6)
+
+
+def _line(solid: Polyhedron) -> Callable[[], tuple[tuple[int, ...], tuple[int, ...], tuple[float, ...]]]:
+    """Return what builds a solid's line of the tables: addresses, sizes and axes of its columns."""
+
+    def build() -> tuple[tuple[int, ...], tuple[int, ...], tuple[float, ...]]:
+        columns = columns_of(solid)
+        u, v, offsets, items = columns.grid
+        arrays: list[npt.NDArray[Any]] = [
+            columns.vertices,
+            columns.triangles,
+            columns.boxes,
+            columns.areas,
+            offsets,
+            items,
+        ]
+        return (
+            tuple(array.ctypes.data for array in arrays),
+            (len(columns.vertices), len(columns.triangles), len(items), u.n_cells, v.n_cells),
+            (u.low, u.high, u.cells_per_unit, v.low, v.high, v.cells_per_unit, columns.z_min),
+        )
+
+    return build

@@ -1,0 +1,241 @@
+"""Gathers the bodies of a scene into flat tables, with array operations over all bodies of a kind.
+
+A solid that stands for many bodies is gathered once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from engine.containment.locators import Locator
+from engine.containment.posed.locators import posed_locator
+from engine.containment.scene.bodies import Box, body_box, frames_of, grown_boxes, moved_boxes, own_box
+from engine.containment.scene.build_voxels import Voxels
+from engine.containment.scene.first_pass import BALL, BOX, LATER, RINGS, ROWS, VOXELS, SceneTables
+from engine.containment.scene.grid import SceneGrid, build_scene_grid
+from engine.containment.scene.rings import boxes_of_rings, close_rings
+from engine.errors import EngineError
+from engine.parallel import Budget
+from engine.solids.aabb import Aabb
+from engine.solids.base import FloatArray, IntArray, Solid
+from engine.solids.convex import Convex
+from engine.solids.half_space import HalfSpace
+from engine.solids.polygon import Polygon
+from engine.solids.polyhedron import Polyhedron
+from engine.solids.pose import Pose
+from engine.solids.sphere import Sphere
+from engine.solids.triangle import Triangle
+
+_MOST_EDGES: Final = 128
+"""Of a polygon whose edges are all looked at: above it the lists of single solids are better."""
+_CHECK_EVERY: Final = 256
+_TRIANGLE: Final = np.array([0, 3], np.int64)
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """The bodies as the first pass reads them, and what it takes to ask single ones."""
+
+    tables: SceneTables
+    grid: SceneGrid
+    unbounded: IntArray
+    """Bodies that are asked about every point, ascending."""
+    most: int
+    """Most candidates that a point can have."""
+    solids: list[Solid]
+    """The distinct ones."""
+    owners: IntArray
+    """``(n_bodies,)``: the solid of each body."""
+    poses: list[Pose | None]
+    locators: dict[int, Locator]
+    """Of the bodies that are asked by themselves, made when they are."""
+
+    def locator(self, body: int) -> Locator:
+        """Return how points are located in a body."""
+        if body not in self.locators:
+            self.locators[body] = posed_locator(self.solids[self.owners[body]], self.poses[body])
+        return self.locators[body]
+
+
+def scene_of(solids: Sequence[Solid], poses: Sequence[Pose | None] | None, dimension: int, budget: Budget) -> Scene:
+    """Return the scene of bodies that have been checked. Raises: UnsupportedSolidError, what `Budget.check` raises."""
+    places: dict[int, int] = {}
+    owners = np.array([places.setdefault(id(solid), len(places)) for solid in solids], np.int64)
+    distinct = list({id(solid): solid for solid in solids}.values())
+    given: list[Pose | None] = [None] * len(solids) if poses is None else list(poses)
+    frames = frames_of(given, dimension)
+    budget.check()
+    kinds = _Kinds(distinct, dimension, budget)
+    lows, highs, locators = kinds.lows[owners], kinds.highs[owners], {}
+    is_moved = (frames.rows >= 0) & np.isfinite(lows).all(axis=1)
+    lows[is_moved], highs[is_moved] = moved_boxes(lows[is_moved], highs[is_moved], frames, frames.rows[is_moved])
+    for turn, body in enumerate(np.flatnonzero(kinds.is_other[owners]).tolist()):
+        if turn % _CHECK_EVERY == 0:
+            budget.check()
+        try:
+            locators[body] = posed_locator(distinct[owners[body]], given[body])
+        except EngineError as error:
+            error.where = ("solids", body)
+            raise
+        lows[body, :dimension], highs[body, :dimension] = body_box(distinct[owners[body]], given[body], budget.check)
+    slots = kinds.slots[owners]
+    balls = np.flatnonzero(kinds.kinds[owners] == BALL)
+    centers, radii = _placed_balls(balls, kinds.radii[slots[balls]], lows, highs)
+    slots[balls] = np.arange(len(balls))
+    is_bounded = np.isfinite(lows).all(axis=1) & np.isfinite(highs).all(axis=1)
+    is_empty = (lows > highs).any(axis=1)
+    tables = SceneTables(
+        kinds.kinds[owners],
+        slots,
+        lows,
+        highs,
+        frames.rows,
+        frames.inverses,
+        frames.translations,
+        frames.is_turn,
+        kinds.boxes[0],
+        kinds.boxes[1],
+        centers,
+        radii,
+        kinds.row_offsets,
+        kinds.rows,
+        kinds.polygon_offsets,
+        kinds.ring_offsets,
+        kinds.xs,
+        kinds.ys,
+        kinds.voxel_frames,
+        kinds.voxel_places,
+    )
+    grid = build_scene_grid(np.flatnonzero(is_bounded & ~is_empty), lows, highs)
+    unbounded = np.flatnonzero(~is_bounded & ~is_empty)
+    most = max(1, int(np.diff(grid.offsets).max()) + len(unbounded))
+    return Scene(tables, grid, unbounded, most, distinct, owners, given, locators)
+
+
+def _placed_balls(balls: IntArray, radii: FloatArray, lows: FloatArray, highs: FloatArray) -> tuple[FloatArray, Any]:
+    """Return centres (n, 3), and radius and blur (n, 2); lows and highs of these bodies grow by the radius."""
+    low, high = lows[balls], highs[balls]
+    with np.errstate(over="ignore", invalid="ignore"):
+        centers = low * 0.5 + high * 0.5
+        centers[(low == high).all(axis=1)] = low[(low == high).all(axis=1)]  # halves of subnormals may round
+        blurs = (high - low).max(axis=1, initial=0.0)
+    lows[balls], highs[balls] = grown_boxes(low, radii)[0], grown_boxes(high, radii)[1]
+    return centers, np.stack([radii, blurs], axis=1)
+
+
+class _Kinds:
+    """The tables of the distinct solids, by kind, each in its own frame."""
+
+    kinds: npt.NDArray[np.int8]
+    slots: npt.NDArray[np.int32]
+    lows: FloatArray
+    """``(n, 3)``: boxes, infinite where there may be none; of spheres the centre."""
+    highs: FloatArray
+    is_other: npt.NDArray[np.bool_]
+    """Solids of other kinds, whose bodies are looked at one by one."""
+    boxes: Box
+    radii: FloatArray
+    row_offsets: IntArray
+    rows: FloatArray
+    polygon_offsets: IntArray
+    ring_offsets: IntArray
+    xs: FloatArray
+    ys: FloatArray
+    voxel_frames: FloatArray
+    voxel_places: IntArray
+
+    def __init__(self, solids: list[Solid], dimension: int, budget: Budget) -> None:
+        n = len(solids)
+        self.kinds, self.slots = np.full(n, LATER, np.int8), np.zeros(n, np.int32)
+        self.lows, self.highs = np.full((n, 3), -np.inf), np.full((n, 3), np.inf)
+        if dimension == 2:
+            self.lows[:, 2] = self.highs[:, 2] = 0.0
+        self._solids, self._dimension = solids, dimension
+        by_type: dict[type[Solid], list[int]] = {}
+        for index, solid in enumerate(solids):
+            by_type.setdefault(type(solid), []).append(index)
+        flat = by_type.pop(Triangle, []) if dimension == 2 else []
+        self._set_rings(by_type.pop(Polygon, []) + flat)
+        budget.check()
+        self._set_boxes(by_type.pop(Aabb, []))
+        self._set_balls(by_type.pop(Sphere, []))
+        self._set_rows(by_type.pop(HalfSpace, []) + by_type.pop(Convex, []))
+        self._set_voxels(by_type.pop(Polyhedron, []), budget)
+        self.is_other = np.zeros(n, np.bool_)
+        self.is_other[[index for rest in by_type.values() for index in rest]] = True
+
+    def _chosen(self, indices: list[int], kind: int) -> list[Any]:
+        """Return solids that get a kind, their slots in the order given."""
+        self.kinds[indices], self.slots[indices] = kind, np.arange(len(indices))
+        return [self._solids[index] for index in indices]
+
+    def _vectors(self, values: list[FloatArray]) -> FloatArray:
+        """Return vectors as (n, 3); 0 in the third place in the plane."""
+        vectors = np.zeros((len(values), 3))
+        if values:
+            vectors[:, : self._dimension] = values
+        return vectors
+
+    def _set_rings(self, indices: list[int]) -> None:
+        solids = self._chosen(indices, RINGS)
+        offsets = [_TRIANGLE if isinstance(solid, Triangle) else solid.ring_offsets for solid in solids]
+        n_rings = np.array([len(each) - 1 for each in offsets], np.int64)
+        sizes = np.diff(np.concatenate([*offsets, np.zeros(1, np.int64)]))
+        sizes = np.delete(sizes, np.cumsum(n_rings + 1) - 1)  # the steps from one polygon to the next
+        polygon_offsets, ring_offsets = _offsets(n_rings), _offsets(sizes + 1)
+        vertices = np.concatenate([np.empty((0, 2)), *(solid.vertices for solid in solids)])
+        xs, ys = np.empty(len(vertices) + len(sizes)), np.empty(len(vertices) + len(sizes))
+        close_rings(vertices, sizes, xs, ys)
+        lows, highs = np.zeros((len(solids), 3)), np.zeros((len(solids), 3))
+        boxes_of_rings(xs, ys, ring_offsets, polygon_offsets, lows, highs)
+        self.lows[indices], self.highs[indices] = lows, highs
+        n_edges = ring_offsets[polygon_offsets[1:]] - ring_offsets[polygon_offsets[:-1]]
+        self.kinds[np.array(indices, np.int64)[n_edges > _MOST_EDGES]] = LATER
+        self.polygon_offsets, self.ring_offsets, self.xs, self.ys = polygon_offsets, ring_offsets, xs, ys
+
+    def _set_boxes(self, indices: list[int]) -> None:
+        solids = self._chosen(indices, BOX)
+        self.boxes = self._vectors([solid.min for solid in solids]), self._vectors([solid.max for solid in solids])
+        self.lows[indices], self.highs[indices] = self.boxes
+
+    def _set_balls(self, indices: list[int]) -> None:
+        solids = self._chosen(indices, BALL)
+        self.radii = np.array([solid.radius for solid in solids], np.float64)
+        self.lows[indices] = self.highs[indices] = self._vectors([solid.center for solid in solids])
+
+    def _set_rows(self, indices: list[int]) -> None:
+        solids = self._chosen(indices, ROWS)
+        planes = [solid.planes if isinstance(solid, Convex) else solid.row[None] for solid in solids]
+        offsets = _offsets(np.array([len(each) for each in planes], np.int64))
+        rows = np.zeros((int(offsets[-1]), 4))
+        if planes:
+            together = np.concatenate(planes)
+            rows[:, : self._dimension], rows[:, 3] = together[:, :-1], together[:, -1]
+        self.row_offsets, self.rows = offsets, rows
+
+    def _set_voxels(self, indices: list[int], budget: Budget) -> None:
+        """Take the voxels that are there; a polyhedron without waits for the second pass."""
+        found: list[tuple[int, Voxels]] = []
+        for turn, index in enumerate(indices):
+            if turn % _CHECK_EVERY == 0:
+                budget.check()
+            solid = self._solids[index]
+            self.lows[index], self.highs[index] = own_box(solid, budget.check)
+            voxels = solid.kept("voxels")
+            if voxels is not None:
+                found.append((index, voxels))
+        self._chosen([index for index, _ in found], VOXELS)
+        self.voxel_frames = np.array([voxels.frame for _, voxels in found]).reshape(-1, 6)
+        places = [(voxels.address, voxels.shift) for _, voxels in found]
+        self.voxel_places = np.array(places, np.int64).reshape(-1, 2)
+
+
+def _offsets(sizes: IntArray) -> IntArray:
+    offsets = np.zeros(len(sizes) + 1, np.int64)
+    np.cumsum(sizes, out=offsets[1:])
+    return offsets

@@ -1,0 +1,302 @@
+"""Public: what Sutherland-Hodgman leaves of polygons on a convex region."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any, Literal, NamedTuple, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from engine.errors import EmptyGeometryError, InvalidArrayError, TooComplexError, UnsupportedSolidError
+from engine.parallel import Budget, Cancel, Progress, run_chunks
+from engine.polygon_clipping.batches import clip_chunk, kernel_scene
+from engine.polygon_clipping.convex_planes import convex_planes
+from engine.polygon_clipping.in_doubles import OPEN
+from engine.polygon_clipping.in_integers import Row, clip_polygon, integer_row, reduced
+from engine.predicates.scaling import largest_of
+from engine.solids.aabb import Aabb
+from engine.solids.base import FloatArray, IntArray, Solid
+from engine.solids.box_planes import box_rows
+from engine.solids.checks import as_point_groups, as_points, check_dimension, check_finite
+from engine.solids.convex import Convex
+from engine.solids.half_space import HalfSpace
+from engine.solids.polygon import Polygon
+from engine.solids.polyhedron import Polyhedron
+from engine.types import Accuracy
+
+
+class PolygonStatus(IntEnum):
+    """What became of one polygon of a batch."""
+
+    CLIPPED = 0
+    TOO_COMPLEX = 1
+    """An exact vertex would need more than 131,072 bits; nothing of the polygon is returned."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ClippedPolygons:
+    """What is left of a batch of polygons, polygon by polygon, ring by ring.
+
+    vertices: (m, dim) float64, each coordinate the double nearest to the exact one.
+    ring_offsets: (r + 1,) int64, ring i holds the vertices ``ring_offsets[i]`` up to ``ring_offsets[i + 1]``.
+    polygon_offsets: (n + 1,) int64, polygon i holds the rings ``polygon_offsets[i]`` up to ``polygon_offsets[i + 1]``.
+    contours: (r,) int64, the contour of its polygon that each ring is left of; contours that vanish are missing.
+    status: (n,) int8, a `PolygonStatus` for each polygon.
+    may_have_bridges: (n,) bool, whether edges along a plane may run there and back, or along another contour.
+    """
+
+    vertices: FloatArray
+    ring_offsets: IntArray
+    polygon_offsets: IntArray
+    contours: IntArray
+    status: npt.NDArray[np.int8]
+    may_have_bridges: npt.NDArray[np.bool_]
+
+    def __len__(self) -> int:
+        return len(self.status)
+
+    def rings(self, polygon: int) -> list[FloatArray]:
+        """Return the rings left of one polygon, (k, dim) float64 each; borrowed."""
+        first, last = self.polygon_offsets[polygon : polygon + 2]
+        pairs = zip(self.ring_offsets[first:last], self.ring_offsets[first + 1 : last + 1])
+        return [self.vertices[i:j] for i, j in pairs]
+
+
+Polygons = Sequence[Polygon] | Sequence[Sequence[npt.ArrayLike]] | npt.NDArray[Any]
+
+
+@overload
+def clip_polygons(
+    polygons: Polygons,
+    region: Solid,
+    *,
+    workers: int | None = None,
+    deadline: float | None = None,
+    cancel: Cancel | None = None,
+    progress: Progress | None = None,
+    report: Literal[False] = False,
+) -> ClippedPolygons: ...
+
+
+@overload
+def clip_polygons(
+    polygons: Polygons,
+    region: Solid,
+    *,
+    workers: int | None = None,
+    deadline: float | None = None,
+    cancel: Cancel | None = None,
+    progress: Progress | None = None,
+    report: Literal[True],
+) -> tuple[ClippedPolygons, Accuracy]: ...
+
+
+def clip_polygons(
+    polygons: Polygons,
+    region: Solid,
+    *,
+    workers: int | None = None,
+    deadline: float | None = None,
+    cancel: Cancel | None = None,
+    progress: Progress | None = None,
+    report: bool = False,
+) -> ClippedPolygons | tuple[ClippedPolygons, Accuracy]:
+    """Return what Sutherland-Hodgman leaves of polygons on a convex region.
+
+    Each contour is cut by one plane after another: half_space 0; aabb xmin, xmax, ymin, ymax, zmin, zmax; convex in
+    row order; polyhedron in face order. The result is defined as the exact algorithm on the original input, however
+    long the cascade: a cut vertex stays exact until the end. It is connected: parts of a concave contour that fall
+    apart stay joined by bridge edges along a plane, harmless under the even-odd rule. For separate pieces of polygons
+    in the plane use `overlay`.
+
+    Parameters
+        polygons: `Polygon` solids, or lists of rings ((k, dim) numbers each, in 2D or 3D, planar or not), or an array
+            (n, k, dim) of n polygons of one ring. A ring of one or two vertices is a point or a segment.
+        region: half_space, aabb, convex, or a polyhedron that exact orientation certifies as convex.
+        workers, deadline (seconds), cancel, progress: see `engine.parallel`.
+        report: return ``(clipped, Accuracy)``.
+    Returns
+        `ClippedPolygons`; rings keep the direction of their contour, and start at its first vertex that is left.
+    Boundary
+        Counts as in: a contour in a plane is kept, one that touches in an edge or a point leaves two vertices or one.
+    Degenerate input
+        Vertices that coincide exactly one after another, around the ring, are merged into the first of them; vertices
+        that merely round to the same doubles are not. Spikes, repeated and self-crossing contours are clipped as they
+        are.
+    Bridges
+        `may_have_bridges` is False only where no bridge is possible: nothing is left, or at each plane that dropped a
+        vertex all contours of the polygon together met the plane in at most two points (vertices on it, edges through).
+    Accuracy
+        Decisions exact for every finite input; coordinates are the doubles nearest to the exact values, zero as +0.0.
+        Nothing overflows. An item too complex to finish is marked in `status` and spoils no other.
+    Cost
+        O(vertices x planes) for each polygon.
+    Raises
+        UnsupportedSolidError (a sphere would change the type of the result), InvalidArrayError, WrongDimensionError,
+        NotFiniteError, EmptyGeometryError, DeadlineExceededError, CancelledError.
+
+    >>> from engine.solids.half_space import HalfSpace
+    >>> clipped = clip_polygons([[[[0, 0], [4, 0], [0, 4]]]], HalfSpace(normal=[-1.0, 0.0], offset=1.0))
+    >>> clipped.rings(0)[0].tolist()
+    [[0.0, 0.0], [1.0, 0.0], [1.0, 3.0], [0.0, 4.0]]
+    """
+    with Budget(deadline, cancel) as budget:
+        planes = _planes(region, budget)
+        contours = as_contours(polygons, region.dimension)
+        clipped, n_beyond, n_rational = _clip(contours, region, planes, budget, workers, progress)
+    if not report:
+        return clipped
+    return clipped, Accuracy("exact", 0.5, len(clipped), n_beyond, n_rational, "sutherland_hodgman")
+
+
+def _planes(region: Solid, budget: Budget) -> list[Row]:
+    """Return the planes of a region as integer rows in clipping order, repeated ones once: they cut nothing twice."""
+    match region:
+        case HalfSpace():
+            rows = region.row[None, :]
+        case Aabb():
+            rows = box_rows(region)
+        case Convex():
+            rows = region.planes
+        case Polyhedron():
+            return convex_planes(region, budget.check)
+        case _:
+            raise UnsupportedSolidError(
+                f"clip_polygons does not take a {getattr(region, 'type', type(region).__name__)}; give a half_space, "
+                "aabb, convex or convex polyhedron, or use overlay for polygons in the plane",
+                ("region",),
+            )
+
+    def build() -> list[Row]:
+        found: dict[Row, None] = {}
+        for index, row in enumerate(rows.tolist()):
+            if index % 256 == 0:
+                budget.check()
+            found[reduced(integer_row(row))] = None
+        return list(found)
+
+    return region.prepared("clipping_planes", build, budget.check)
+
+
+class Contours(NamedTuple):
+    """The rings of all polygons."""
+
+    vertices: FloatArray
+    """(m, dim), read-only; zeros of either sign."""
+    ring_offsets: IntArray
+    polygon_offsets: IntArray
+    largest: float
+    """Magnitude of any coordinate."""
+
+
+def as_contours(polygons: Any, dimension: int) -> Contours:
+    """Return all rings; none at all are welcome, an array is borrowed.
+
+    Raises: InvalidArrayError, WrongDimensionError, NotFiniteError, EmptyGeometryError, each naming the element.
+    """
+    if isinstance(polygons, np.ndarray):
+        array = as_point_groups(polygons, None, dimension, ("polygons",), must_be_finite=False)
+        n, size = array.shape[:2]
+        if n and not size:
+            raise EmptyGeometryError("polygons[0] has no vertices; leave it out", ("polygons", 0))
+        largest = largest_of(array)
+        if not np.isfinite(largest):
+            check_finite(array, ("polygons",))
+        return Contours(array.reshape(-1, dimension), size * np.arange(n + 1), np.arange(n + 1), largest)
+    if not isinstance(polygons, (list, tuple)):
+        raise InvalidArrayError(
+            f"polygons must be a list of polygons, got {type(polygons).__name__}; put a single one into a list",
+            ("polygons",),
+        )
+    rings: list[FloatArray] = []
+    counts: list[int] = []
+    for i, polygon in enumerate(polygons):
+        if isinstance(polygon, Polygon):
+            check_dimension(polygon.dimension, dimension, ("polygons", i))
+            found = np.split(polygon.vertices, polygon.ring_offsets[1:-1])
+        elif isinstance(polygon, (list, tuple)) or (isinstance(polygon, np.ndarray) and polygon.ndim == 3):
+            found = [as_points(ring, dimension, ("polygons", i, j)) for j, ring in enumerate(polygon)]
+        else:
+            raise InvalidArrayError(
+                f"polygons[{i}] must be a Polygon or a list of rings, got {type(polygon).__name__}", ("polygons", i)
+            )
+        if not found:
+            raise EmptyGeometryError(f"polygons[{i}] has no rings; leave it out", ("polygons", i))
+        for j, ring in enumerate(found):
+            if not len(ring):
+                raise EmptyGeometryError(f"polygons[{i}][{j}] has no vertices; leave it out", ("polygons", i, j))
+        rings += found
+        counts.append(len(found))
+    vertices = np.concatenate(rings) if rings else np.zeros((0, dimension))
+    vertices.setflags(write=False)
+    return Contours(vertices, _offsets([len(ring) for ring in rings]), _offsets(counts), largest_of(vertices))
+
+
+def _offsets(counts: Sequence[int] | IntArray) -> IntArray:
+    offsets = np.zeros(len(counts) + 1, np.int64)
+    np.cumsum(counts, out=offsets[1:])
+    return offsets
+
+
+def _clip(
+    contours: Contours,
+    region: Solid,
+    planes: list[Row],
+    budget: Budget,
+    workers: int | None,
+    progress: Progress | None,
+) -> tuple[ClippedPolygons, int, int]:
+    """Clip every polygon; return the result, how many polygons needed more than the filter, and rational arithmetic."""
+    vertices, ring_offsets, polygon_offsets, largest = contours
+    n, dimension = len(polygon_offsets) - 1, vertices.shape[1]
+    status, may_have_bridges = np.zeros(n, np.int8), np.zeros(n, np.bool_)
+    sizes = np.zeros(len(ring_offsets) - 1, np.int64)
+    parts: dict[int, FloatArray] = {}
+    scene = kernel_scene(region, vertices, largest, planes, budget)
+    state = np.full(n, OPEN, np.uint8)
+
+    def settle(i: int) -> FloatArray:
+        rings = range(polygon_offsets[i], polygon_offsets[i + 1])
+        points = [vertices[ring_offsets[j] : ring_offsets[j + 1]].tolist() for j in rings]
+        try:
+            found, may_have_bridges[i] = clip_polygon(points, planes, budget.check)
+        except TooComplexError:
+            status[i] = PolygonStatus.TOO_COMPLEX
+            return np.zeros((0, dimension))
+        sizes[rings.start : rings.stop] = [len(contour) for contour in found]
+        return np.array([vertex for contour in found for vertex in contour], np.float64).reshape(-1, dimension)
+
+    def task(first: int, last: int) -> None:
+        settled = np.zeros((0, dimension))
+        if scene is not None:
+            settled = clip_chunk(
+                scene, ring_offsets, polygon_offsets, first, last, budget, sizes, state, may_have_bridges
+            )
+        open_ones = first + np.flatnonzero(state[first:last] == OPEN)
+        if len(open_ones):
+            rings = polygon_offsets[first : last + 1]
+            before = _offsets(sizes[rings[0] : rings[-1]])[rings - rings[0]]  # vertices that the kernel left
+            found, taken = [], 0
+            for i in open_ones:
+                budget.check()
+                found += [settled[taken : before[i - first]], settle(int(i))]
+                taken = int(before[i - first])
+            settled = np.concatenate([*found, settled[taken:]])
+        parts[first] = settled
+
+    run_chunks(task, n, budget=budget, workers=workers, progress=progress, first_chunk=64)
+    left = np.flatnonzero(sizes)
+    counted = np.concatenate([[0], np.cumsum(sizes > 0)])
+    owners = np.repeat(polygon_offsets[:-1], np.diff(polygon_offsets))
+    clipped = ClippedPolygons(
+        np.concatenate([parts[first] for first in sorted(parts)]) if parts else np.zeros((0, dimension)),
+        _offsets(sizes[left]),
+        counted[polygon_offsets],
+        (np.arange(len(sizes)) - owners)[left],
+        status,
+        may_have_bridges,
+    )
+    return clipped, int(np.count_nonzero(state)), int(np.count_nonzero(state == OPEN))

@@ -1,0 +1,100 @@
+"""The planes of a region that Sutherland-Hodgman clips on, and the certificate that a polyhedron is convex.
+
+A polyhedron's planes are rarely rows of doubles, so they stay implicit: three vertices each. It is convex when no
+vertex lies outside of any of its planes (exact orientation) and a point inside of all planes is inside of it. Then all
+faces lie on the hull of the vertices; inside the hull there is no face, so the even-odd location is the same
+everywhere there and INSIDE makes every point of the hull's boundary lie on some face: the solid is the hull. Asking
+every vertex about every face is left to what `engine.solids.convexity`, one question an edge, does not certify: faces
+without area, and solids that are not convex, so that the answer can say why.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from engine.containment.rational_locate import rational_location
+from engine.errors import UnsupportedSolidError
+from engine.polygon_clipping.in_integers import Row, plane_through, reduced
+from engine.predicates.orientation import orient3d_batch
+from engine.predicates.rational import orient3d_rational
+from engine.solids.checks import digits
+from engine.solids.convexity import convexity
+from engine.solids.polyhedron import Polyhedron
+from engine.types import UNDECIDED, Location
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+Check = Callable[[], object]
+
+_BATCH: Final = 1 << 17  # orientations in one kernel call: a few milliseconds
+
+
+def orientations(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> npt.NDArray[np.int8]:
+    """Return the exact orient3d of each row."""
+    signs = np.empty(len(a), np.int8)
+    with np.errstate(all="ignore"):
+        orient3d_batch(*(np.ascontiguousarray(points) for points in (a, b, c, d)), signs)
+    for i in np.flatnonzero(signs == UNDECIDED):
+        signs[i] = orient3d_rational(a[i].tolist(), b[i].tolist(), c[i].tolist(), d[i].tolist())
+    return signs
+
+
+def convex_planes(region: Polyhedron, check: Check) -> list[Row]:
+    """Return the planes of a convex polyhedron as integer rows, in the order of its faces, each plane once.
+
+    Raises: UnsupportedSolidError where the polyhedron is not convex, naming a face and a vertex beyond it.
+    """
+
+    def build() -> list[Row]:
+        corners = region.vertices[_outward_triangles(region, check)].tolist()
+        return list(dict.fromkeys(reduced(plane_through(a, b, c)) for a, b, c in corners))
+
+    return region.prepared("convex_planes", build)
+
+
+def _outward_triangles(region: Polyhedron, check: Check) -> IntArray:
+    """Return the triangles with area, counter-clockwise from outside, or raise if the polyhedron is not convex."""
+    vertices, triangles = region.vertices, region.triangles
+    if (certificate := convexity(region)) is not None:
+        return triangles if certificate.is_outward else triangles[:, ::-1]
+    used = np.unique(triangles)
+    behind, before = np.zeros(len(triangles), bool), np.zeros(len(triangles), bool)
+    step = max(1, _BATCH // len(used))
+    for first in range(0, len(triangles), step):
+        check()
+        part = triangles[first : first + step]
+        a, b, c = (np.repeat(vertices[part[:, k]], len(used), axis=0) for k in range(3))
+        signs = orientations(a, b, c, np.tile(vertices[used], (len(part), 1))).reshape(len(part), len(used))
+        behind[first : first + step], before[first : first + step] = (signs < 0).any(1), (signs > 0).any(1)
+        for row in np.flatnonzero((behind & before)[first : first + step])[:1]:
+            sides = [used[np.argmax(signs[row] == side)] for side in (-1, 1)]
+            told = " and ".join(f"{vertex} at {digits(vertices[vertex])}" for vertex in sides)
+            raise _not_convex(f"vertices {told} lie on both sides of face", region, first + int(row))
+    if not (behind | before).any():
+        raise _not_convex("it has no interior, all vertices lie in the plane of face", region, 0)
+    if behind.any() and before.any():
+        odd = np.argmax(before if behind[np.argmax(behind | before)] else behind)
+        raise _not_convex("other faces are turned the other way round than face", region, int(odd))
+    kept = triangles[behind | before]
+    kept = kept if behind.any() else kept[:, ::-1]
+    a, b, c = (np.tile(vertices[kept[0, k]], (len(used), 1)) for k in range(3))
+    signs = orientations(a, b, c, vertices[used])
+    simplex = [*vertices[kept[0]], vertices[used[np.argmax(signs != 0)]]]
+    middle = [sum(map(Fraction, column)) / 4 for column in np.array(simplex).T.tolist()]
+    if rational_location(middle, region, None, check) != Location.INSIDE:
+        raise _not_convex("its faces cover the hull an even number of times, among them face", region, 0)
+    return kept
+
+
+def _not_convex(what: str, region: Polyhedron, triangle: int) -> UnsupportedSolidError:
+    face = int(region.triangle_faces[triangle])
+    return UnsupportedSolidError(
+        f"the polyhedron is not convex: {what} {face}; clip_polygons takes a half_space, aabb, convex or convex "
+        "polyhedron, clip_segments any polyhedron; overlay clips polygons of the plane on concave ones",
+        ("region", "faces", face),
+    )

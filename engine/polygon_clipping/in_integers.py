@@ -1,0 +1,103 @@
+"""Sutherland-Hodgman in exact integers: the definition of `clip_polygons`, and what settles the kernel's open items.
+
+A vertex is a tuple of integers (x, y[, z], w) with w > 0 and no common divisor, standing for (x / w, y / w, z / w), so
+equal points are equal tuples. A plane is a row of integers; its value at a vertex is one dot product. With values
+s_p > 0 > s_q the edge p q crosses at s_p q - s_q p, again integers.
+
+Numbers grow: where an edge of two cut vertices is cut again and the contour is not planar, digits add up, with many
+planes to thousands of bits and more. `MOST_BITS` caps them.
+
+Source: I. E. Sutherland, G. W. Hodgman, Reentrant polygon clipping, 1974; the textbook's section on clipping polygons.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from math import gcd
+
+from engine.errors import TooComplexError
+from engine.predicates.integers import common_integers, nearest
+
+Vertex = tuple[int, ...]
+Row = tuple[int, ...]
+
+MOST_BITS = 1 << 17
+"""Cap on the size of an exact vertex: at 131,072 bits one cut costs milliseconds, and the next may cost double."""
+
+
+def integer_row(row: Sequence[float]) -> Row:
+    """Return a plane's row as integers, up to a positive factor."""
+    numbers, _ = common_integers(row)
+    return tuple(numbers)
+
+
+def plane_through(a: Sequence[float], b: Sequence[float], c: Sequence[float]) -> Row:
+    """Return the integer row that is positive on the side the normal (b - a) x (c - a) points away from."""
+    n, scale = common_integers([*a, *b, *c])
+    u, v = [n[k + 3] - n[k] for k in range(3)], [n[k + 6] - n[k] for k in range(3)]
+    normal = [v[1] * u[2] - v[2] * u[1], v[2] * u[0] - v[0] * u[2], v[0] * u[1] - v[1] * u[0]]
+    return (*(x * scale for x in normal), -sum(x * y for x, y in zip(normal, n)))
+
+
+def reduced(vertex: Sequence[int]) -> Vertex:
+    """Return the vertex without a common divisor."""
+    divisor = gcd(*vertex)
+    return tuple(x // divisor for x in vertex)
+
+
+def merged(contour: list[Vertex]) -> list[Vertex]:
+    """Return the contour without each vertex that equals the one before it, around the ring; the first one stays."""
+    kept = [vertex for i, vertex in enumerate(contour) if i == 0 or vertex != contour[i - 1]]
+    while len(kept) > 1 and kept[-1] == kept[0]:
+        kept.pop()
+    return kept
+
+
+def clip_contour(contour: list[Vertex], row: Row) -> tuple[list[Vertex], int, bool]:
+    """Return a contour cut by one plane, in how many points it met the plane, and whether a vertex was dropped."""
+    values = [sum(a * x for a, x in zip(row, vertex)) for vertex in contour]
+    if min(values) >= 0:
+        return contour, values.count(0), False
+    kept: list[Vertex] = []
+    n_contacts = values.count(0)
+    for (p, s_p), (q, s_q) in pairwise([*zip(contour, values), (contour[0], values[0])]):
+        if s_p >= 0:
+            kept.append(p)
+        if (s_p > 0 > s_q) or (s_p < 0 < s_q):
+            forward, back = (s_p, s_q) if s_p > 0 else (-s_p, -s_q)
+            cut = reduced([forward * y - back * x for x, y in zip(p, q)])
+            if max(map(int.bit_length, cut)) > MOST_BITS:
+                raise TooComplexError(f"an exact vertex needs more than {MOST_BITS} bits; use fewer planes")
+            kept.append(cut)
+            n_contacts += 1
+    return merged(kept), n_contacts, True
+
+
+def clip_polygon(
+    rings: Sequence[Sequence[Sequence[float]]], planes: Sequence[Row], check: Callable[[], object]
+) -> tuple[list[list[list[float]]], bool]:
+    """Return the contours of one polygon after all planes, correctly rounded, and whether it may hold bridge edges.
+
+    rings: contours of at least one vertex each. planes: integer rows, applied in order. check: called for each plane.
+    An empty list stands for a contour of which nothing is left.
+    Raises: TooComplexError.
+    """
+    contours = []
+    for ring in rings:
+        dimension = len(ring[0])
+        numbers, w = common_integers([x for vertex in ring for x in vertex])
+        contours.append(merged([reduced((*numbers[i : i + dimension], w)) for i in range(0, len(numbers), dimension)]))
+    may_have_bridges = False
+    for row in planes:
+        check()
+        n_contacts, has_dropped = 0, False
+        for i_contour, contour in enumerate(contours):
+            if contour:
+                contours[i_contour], met, dropped = clip_contour(contour, row)
+                n_contacts, has_dropped = n_contacts + met, has_dropped or dropped
+        may_have_bridges = may_have_bridges or (has_dropped and n_contacts > 2)
+    may_have_bridges = may_have_bridges and any(contours)
+    return [[[nearest(x, vertex[-1]) for x in vertex[:-1]] for vertex in contour] for contour in contours], (
+        may_have_bridges
+    )

@@ -1,0 +1,198 @@
+"""Faces of chains and their labels.
+
+The face of a half-chain lies to its left. A cycle of half-chains is one part of the boundary of a face; two parts of
+one face are joined by a stab from the last vertex (rightmost, then topmost) of each component of rings: straight up, an
+infinitesimal step to its right, to the next edge above. That vertex belongs to the input, so the stab decides about
+doubles. Labels (bit k: inside source k, even-odd) spread over the same forest that joins the cycles: crossing a chain
+changes them by its mask.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from engine.jit import inline, merged
+from engine.polygon_overlay.compiled.chains import Chains, is_live, place_before, standing
+from engine.polygon_overlay.compiled.crossing_signs import Edges, crossing_against, exact_weight, orient, turn_of_edges
+from engine.polygon_overlay.compiled.edge_contacts import POLL, Events
+from engine.polygon_overlay.compiled.edge_tree import LEAF, RUN, leaves_of, push_children
+from engine.predicates.error_free import two_diff, workspace
+from engine.predicates.expansion import add_scaled, sign
+from engine.predicates.orientation import BOUND_2D, GUARD_2D
+
+NOTHING: Final = -1
+
+
+@inline
+def number_cycles(
+    chains: Chains, n_chains: int, n_simple: int, starts: Any, ends: Any, star: Any, place: Any, cycle: Any,
+    following: Any, stop: Any,
+) -> int:  # fmt: skip
+    """Fill ``following``, the half-chain that goes on around the face of each, and ``cycle``; return how many cycles.
+
+    Both (2 n_chains,) int64; half-chains that another stands for get cycle -1.
+    """
+    cycle[: 2 * n_chains] = -1
+    for chain in range(n_chains):
+        if chain & POLL == 0 and stop[0]:
+            return 0
+        if is_live(chains, chain):
+            for half in (2 * chain, 2 * chain + 1):
+                following[half] = star[place_before(chains, n_simple, starts, ends, place[half ^ 1], half ^ 1)]
+    n_cycles = 0
+    for first in range(2 * n_chains):
+        if cycle[first] < 0 and is_live(chains, first >> 1):
+            if stop[0]:
+                return n_cycles
+            half = first
+            steps = 0
+            while cycle[half] < 0:  # bound: each turn numbers one half-chain
+                steps += 1
+                if steps & POLL == 0 and stop[0]:
+                    return n_cycles
+                cycle[half] = n_cycles
+                half = following[half]
+            n_cycles += 1
+    return n_cycles
+
+
+@merged
+def find_label(parent: Any, label: Any, i: int) -> tuple[int, int]:
+    """Return the root of i in a forest, and the difference of their labels; halves the path."""
+    difference = 0
+    while parent[i] != i:  # bound: the path, which only gets shorter
+        above = parent[i]
+        label[i] ^= label[above]
+        parent[i] = parent[above]
+        difference ^= label[i]
+        i = parent[i]
+    return i, difference
+
+
+@merged
+def join(parent: Any, label: Any, i: int, j: int, difference: int) -> None:
+    """Join the trees of i and j, whose labels differ by ``difference``."""
+    i, from_i = find_label(parent, label, i)
+    j, from_j = find_label(parent, label, j)
+    if i != j:
+        if i < j:
+            i, j = j, i
+        parent[i] = j
+        label[i] = from_i ^ from_j ^ difference
+
+
+@inline
+def _is_nearer(edges: Edges, v: int, e: int, f: int) -> bool:
+    """Tell whether edge e is nearer to v than f, straight up and a step to the right; both are above v there."""
+    x, y = edges.x, edges.y
+    a, b = (e, edges.after[e]) if x[e] < x[edges.after[e]] else (edges.after[e], e)
+    c, d = (f, edges.after[f]) if x[f] < x[edges.after[f]] else (edges.after[f], f)
+    # The height of ab above v is -orient(a, b, v) / (x_b - x_a).
+    wide_e, wide_f = x[b] - x[a], x[d] - x[c]
+    left, right = (x[a] - x[v]) * (y[b] - y[v]), (y[a] - y[v]) * (x[b] - x[v])
+    high_e, bound_e = right - left, BOUND_2D * (abs(left) + abs(right)) + GUARD_2D
+    left, right = (x[c] - x[v]) * (y[d] - y[v]), (y[c] - y[v]) * (x[d] - x[v])
+    high_f, bound_f = right - left, BOUND_2D * (abs(left) + abs(right)) + GUARD_2D
+    p, q = high_e * wide_f, high_f * wide_e
+    bound = 2.0 * (bound_e * wide_f + bound_f * wide_e) + BOUND_2D * (abs(p) + abs(q))
+    if p - q > bound:
+        return False
+    if q - p > bound:
+        return True
+    side = _compare_heights(edges, v, a, b, c, d)
+    if side != 0:
+        return side < 0
+    turn = turn_of_edges(edges, e, f)  # equal here: the one that falls more, or rises less, is nearer to the right
+    return (turn if (a == e) == (c == f) else -turn) > 0
+
+
+@inline
+def _compare_heights(edges: Edges, v: int, a: int, b: int, c: int, d: int) -> int:
+    x = edges.x
+    first, second, total = workspace(16), workspace(16), workspace(128)  # 2 * 16 * 2 components for each product
+    n, m = exact_weight(edges, a, b, v, first), exact_weight(edges, c, d, v, second)
+    wide, tail = two_diff(x[c], x[d])  # negative: heights are minus the weights
+    k = add_scaled(total, 0, first, n, wide)
+    if tail != 0.0:
+        k = add_scaled(total, k, first, n, tail)
+    wide, tail = two_diff(x[b], x[a])
+    k = add_scaled(total, k, second, m, wide)
+    if tail != 0.0:
+        k = add_scaled(total, k, second, m, tail)
+    return sign(total, k)
+
+
+@merged
+def _test_edge(edges: Edges, v: int, e: int, nearest: int) -> int:
+    """Return e if it is above v and nearer than ``nearest``, else ``nearest``."""
+    x = edges.x
+    b = edges.after[e]
+    if (x[e] <= x[v]) == (x[b] <= x[v]):  # it does not pass from there to the right of there
+        return nearest
+    side = orient(edges, e, b, v) if x[e] < x[b] else orient(edges, b, e, v)
+    if side >= 0:
+        return nearest
+    return e if nearest < 0 or _is_nearer(edges, v, e, nearest) else nearest
+
+
+@inline
+def edge_above(
+    edges: Edges, v: int, n: int, marks: Any, tree: Any, places: Any, has_tree: bool, stack: Any
+) -> int:  # fmt: skip
+    """Return the edge next above vertex v, a step to its right, or NOTHING; no edge of its component is there.
+
+    Edges whose mark has the bit RUN are not looked at: caller guarantees that it is none of what they stand for.
+
+    Edges that begin or pass through v are not above it: caller guarantees that none does to the right.
+    """
+    nearest = NOTHING
+    if not has_tree:
+        for e in range(n):
+            if not marks[e] & RUN:
+                nearest = _test_edge(edges, v, e, nearest)
+        return nearest
+    n_leaves = leaves_of(n)
+    x, y = edges.x[v], edges.y[v]
+    stack[0, 0], depth = 1, 1
+    while depth > 0:  # bound: each node enters the stack once
+        depth -= 1
+        node = stack[depth, 0]
+        if tree[node, 0] > x or tree[node, 1] <= x or tree[node, 3] < y:
+            continue
+        if nearest >= 0 and tree[node, 2] > max(edges.y[nearest], edges.y[edges.after[nearest]]):
+            continue
+        if node < n_leaves:
+            depth = push_children(tree, node, stack, depth)
+            continue
+        first = LEAF * (node - n_leaves)
+        for place in range(first, min(first + LEAF, n)):
+            if not marks[places[place]] & RUN:
+                nearest = _test_edge(edges, v, places[place], nearest)
+    return nearest
+
+
+@inline
+def half_below(
+    edges: Edges, events: Events, chains: Chains, starts: Any, order: Any, parent: Any, chain_at: Any, e: int, v: int,
+    n: int,
+) -> int:  # fmt: skip
+    """Return the half-chain whose face is below edge e, right of vertex v."""
+    x = edges.x
+    runs_right = x[e] < x[edges.after[e]]
+    chain, before = chain_at[e], NOTHING
+    for k in range(starts[e], starts[e + 1]):  # linear: once a component, and ends at v
+        point = events.point[order[k]]
+        root = parent[point]
+        while root != parent[root]:  # bound: the path to the root
+            root = parent[root]
+        if events.other[order[k]] < 0:
+            side = 1 if x[point] > x[v] else -1 if x[point] < x[v] else 0
+        else:
+            side = crossing_against(edges, e, events.other[order[k]], 0, x[v], 0.0)
+        if side > 0 if runs_right else side <= 0:
+            break
+        if root != before:
+            chain += 1
+            before = root
+    half = 2 * chain + 1 if runs_right else 2 * chain
+    return standing(chains, half)

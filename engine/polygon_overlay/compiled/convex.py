@@ -1,0 +1,370 @@
+"""The intersection of two convex polygons: one walk along x for the crossings, one around the result.
+
+    upper  ,-----.        An edge can meet another only where both have the same x: the edges of a lower and an upper
+          /       \\       chain of each polygon, walked from left to right two by two, are n + m pairs for each of four
+    lower '-------'       pairs of chains. Each edge enters the other polygon once at most, and leaves it once.
+
+Only what floating point decides for sure is settled here: strictly convex rings, proper crossings of edges whose
+vertices have different x. Everything else goes the general way, with the same result. Rounded, the ring is valid if it
+is strictly convex still, which is looked at.
+
+A ring is kept counter-clockwise from its first vertex in the order of x, then y, with that vertex again at its end, so
+that both chains are plain ranges: the lower one up from the first vertex, the upper one down from the last.
+
+Source: M. I. Shamos and D. Hoey, Geometric intersection problems, 1976, section 3.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from engine.jit import inline, merged
+from engine.polygon_overlay.compiled.crossing_signs import Edges
+from engine.polygon_overlay.compiled.edge_contacts import POLL
+from engine.polygon_overlay.compiled.edge_crossings import turns
+from engine.polygon_overlay.compiled.rounded_crossings import round_crossing
+from engine.predicates.orientation import BOUND_2D, GUARD_2D
+from engine.predicates.ranges import LARGEST, SMALLEST
+
+UNSETTLED: Final = -1
+"""Goes the general way."""
+_NONE: Final = -1
+
+
+class Passages(NamedTuple):
+    """By edge: the edge of the other polygon at which it enters that, and leaves it, or none."""
+
+    enters: Any
+    leaves: Any
+
+
+class _Points(NamedTuple):
+    """Points of the result: doubles, and where they come from: a vertex of the input and -1, or two edges of it."""
+
+    x: Any
+    y: Any
+    firsts: Any
+    seconds: Any
+
+
+@merged
+def _is_left(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> bool:
+    """Tell whether floating point is sure that the turn a, b, c is to the left."""
+    left, right = (bx - ax) * (cy - ay), (by - ay) * (cx - ax)
+    return bool(left - right > BOUND_2D * (abs(left) + abs(right)) + GUARD_2D)
+
+
+@merged
+def _is_after(ax: float, ay: float, bx: float, by: float) -> bool:
+    """Tell whether b comes after a in the order of x, then y."""
+    return bool((bx > ax) | ((bx == ax) & (by > ay)))
+
+
+@inline
+def _rise_of(x: Any, y: Any, size: int) -> int:
+    """Return how many edges of a ring go up in the order of x, then y; UNSETTLED unless it is surely strictly convex.
+
+    It is if all its turns are to the left, and it turns once: its edges go up once, and down once. x, y: its vertices,
+    counter-clockwise, and the first one again. No branches: the compiler makes vectors of this loop.
+    """
+    n_left = n_rising = n_changes = 0
+    for i in range(size - 1):
+        ax, ay, bx, by, cx, cy = x[i], y[i], x[i + 1], y[i + 1], x[i + 2], y[i + 2]
+        rises = _is_after(ax, ay, bx, by)
+        n_left += _is_left(ax, ay, bx, by, cx, cy)
+        n_rising += rises
+        n_changes += rises != _is_after(bx, by, cx, cy)
+    ax, ay, bx, by, cx, cy = x[size - 1], y[size - 1], x[0], y[0], x[1], y[1]
+    rises = _is_after(ax, ay, bx, by)
+    n_left += _is_left(ax, ay, bx, by, cx, cy)
+    n_rising += rises
+    n_changes += rises != _is_after(bx, by, cx, cy)
+    return n_rising if n_left == size and n_changes == 2 else UNSETTLED
+
+
+@inline
+def _first_of(vertices: Any, first: int, last: int) -> int:
+    """Return which of some vertices is the first in the order of x, then y."""
+    low = first
+    px, py = vertices[first, 0], vertices[first, 1]
+    for k in range(first + 1, last):
+        qx = vertices[k, 0]
+        if qx <= px and (qx < px or vertices[k, 1] < py):
+            low, px, py = k, qx, vertices[k, 1]
+    return low
+
+
+@merged
+def _load_run(
+    vertices: Any, k: int, step: int, base: int, edges: Edges, origins: Any, first: int, last: int
+) -> int:  # fmt: skip
+    """Load the places first .. last - 1 from vertex k on; return how many coordinates are too large or too small."""
+    size = last - first
+    rows = vertices[k : k + size] if step > 0 else vertices[k + 1 - size : k + 1]
+    x, y, names, ends = edges.x[first:last], edges.y[first:last], origins[first:last], edges.after[first:last]
+    n_unsafe = 0
+    for i in range(size):  # three loops: the compiler makes vectors of each
+        at = np.uint64(i if step > 0 else size - 1 - i)
+        px, py = rows[at, 0], rows[at, 1]
+        x[i], y[i] = px, py
+        n_unsafe += (abs(px) > LARGEST) | ((abs(px) < SMALLEST) & (px != 0.0))
+        n_unsafe += (abs(py) > LARGEST) | ((abs(py) < SMALLEST) & (py != 0.0))
+    for i in range(size):
+        names[i] = base + k + step * i
+    for i in range(size):
+        ends[i] = first + 1 + i
+    return n_unsafe
+
+
+@inline
+def load_convex(
+    vertices: Any, first: int, last: int, base: int, edges: Edges, origins: Any, start: int, stop: Any
+) -> tuple[int, int]:
+    """Load a ring to where ``start`` is, counter-clockwise from its first vertex, with that again at its end.
+
+    Returns its last vertex in the order of x, then y, or UNSETTLED if it is not strictly convex, and 1 or -1, along or
+    against the ring as given.
+    """
+    size = last - first
+    low = _first_of(vertices, first, last)
+    after, before = (low + 1 if low + 1 < last else first), (low - 1 if low > first else last - 1)
+    ux, uy = vertices[after, 0] - vertices[low, 0], vertices[after, 1] - vertices[low, 1]
+    wx, wy = vertices[before, 0] - vertices[low, 0], vertices[before, 1] - vertices[low, 1]
+    step = 1 if ux * wy - uy * wx > 0.0 else -1  # a guess: the turns below must all be to the left
+    if size < 3 or stop[0]:
+        return UNSETTLED, step
+    end = start + size + 1
+    if step > 0:
+        middle = start + last - low
+        n_unsafe = _load_run(vertices, low, 1, base, edges, origins, start, middle)
+        n_unsafe += _load_run(vertices, first, 1, base, edges, origins, middle, end)
+    else:
+        middle = start + low + 1 - first
+        n_unsafe = _load_run(vertices, low, -1, base, edges, origins, start, middle)
+        n_unsafe += _load_run(vertices, last - 1, -1, base, edges, origins, middle, end)
+    if n_unsafe or stop[0]:
+        return UNSETTLED, step
+    n_rising = _rise_of(edges.x[start:end], edges.y[start:end], size)
+    return start + n_rising if n_rising > 0 else UNSETTLED, step
+
+
+@inline
+def _are_apart(edges: Edges, i: int, i_end: int, i_step: int, j: int, j_end: int) -> bool:
+    """Tell whether a lower chain is surely under an upper one: it is all along, if it is where both begin and end.
+
+    For the one is convex, the other concave. Edges i and j are the first that have an x in common. Vertical edges are
+    the first of an upper chain and the last of a lower one, so that there too the ends are what counts.
+    """
+    x, y = edges.x, edges.y
+    if i_step < 0:
+        i, i_end, j, j_end = j, j_end, i, i_end
+    if x[i] < x[j]:
+        left_is_sure = _is_left(x[i], y[i], x[i + 1], y[i + 1], x[j], y[j])
+    else:
+        left_is_sure = _is_left(x[j - 1], y[j - 1], x[j], y[j], x[i], y[i])
+    if not left_is_sure:
+        return False
+    p, q = i_end, j_end
+    while x[p - 1] > x[q]:  # bound: edge i begins no further right than chain j ends
+        p -= 1
+    while x[q + 1] > x[p]:
+        q += 1
+    if x[p] < x[q]:
+        return _is_left(x[q], y[q], x[q + 1], y[q + 1], x[p], y[p])
+    return x[q] < x[p] and _is_left(x[p - 1], y[p - 1], x[p], y[p], x[q], y[q])
+
+
+@inline
+def _find_passages(
+    edges: Edges, i: int, i_end: int, i_step: int, j: int, j_end: int, j_step: int, passages: Passages, stop: Any
+) -> int:  # fmt: skip
+    """Enter the crossings of two chains, walked from left to right; return how many, or UNSETTLED.
+
+    i, j: the leftmost vertex of each; a lower chain goes up by steps of 1, an upper one down by -1.
+    """
+    x, y = edges.x, edges.y
+    while i != i_end and x[i + i_step] < x[j]:
+        i += i_step
+    while j != j_end and x[j + j_step] < x[i]:
+        j += j_step
+    if i == i_end or j == j_end:
+        return 0
+    if i_step != j_step and _are_apart(edges, i, i_end, i_step, j, j_end):
+        return 0
+    n_found = 0
+    for k in range((i_end - i) * i_step + (j_end - j) * j_step):  # each turn ends an edge of one chain
+        if k & POLL == POLL and stop[0]:
+            return UNSETTLED
+        p, q = np.uint64(i), np.uint64(j)  # no look at whether they count from the end
+        b, d = np.uint64(i + i_step), np.uint64(j + j_step)
+        if (min(y[p], y[b]) <= max(y[q], y[d])) & (min(y[q], y[d]) <= max(y[p], y[b])):
+            e, f = min(i, i + i_step), min(j, j + j_step)
+            turn_c, turn_d, bound, _ = turns(x, y, e, e + 1, f, f + 1)
+            nearest = min(abs(turn_c), abs(turn_d))
+            if nearest <= bound or (turn_c > 0.0) != (turn_d > 0.0):
+                turn_a, turn_b, bound_ab, _ = turns(x, y, f, f + 1, e, e + 1)
+                nearest_ab = min(abs(turn_a), abs(turn_b))
+                if nearest_ab <= bound_ab or (turn_a > 0.0) != (turn_b > 0.0):
+                    if nearest <= bound or nearest_ab <= bound_ab:
+                        return UNSETTLED
+                    # into the other polygon, to its edge's left, and there the other edge leaves this one
+                    first, second = (
+                        (passages.enters, passages.leaves) if turn_b > 0.0 else (passages.leaves, passages.enters)
+                    )
+                    if first[e] != _NONE or second[f] != _NONE:
+                        return UNSETTLED
+                    first[e], second[f] = f, e
+                    n_found += 1
+        if x[b] == x[d]:
+            return UNSETTLED  # case: what touches there might be passed over
+        is_first = x[b] < x[d]  # no branch: which of both ends first nobody can foresee
+        i += i_step * is_first
+        j += j_step * (not is_first)
+        if i == i_end or j == j_end:
+            break
+    return n_found
+
+
+@inline
+def _holds(edges: Edges, first: int, last: int, v: int) -> int:
+    """Return 1 if vertex v is inside the convex ring of the edges first .. last - 1, -1 if outside, 0 if unsure."""
+    x, y = edges.x, edges.y
+    side = 1
+    for i in range(first, last):
+        if _is_left(x[i + 1], y[i + 1], x[i], y[i], x[v], y[v]):
+            return -1
+        if not _is_left(x[i], y[i], x[i + 1], y[i + 1], x[v], y[v]):
+            side = 0
+    return side
+
+
+@inline
+def _add_vertices(edges: Edges, origins: Any, first: int, last: int, points: _Points, n: int) -> int:
+    """Append the vertices first .. last - 1 to a result of n points; return how many these are then."""
+    size = max(last - first, 0)
+    x, y, names = edges.x[first : first + size], edges.y[first : first + size], origins[first : first + size]
+    u, v, firsts, seconds = points.x[n:], points.y[n:], points.firsts[n:], points.seconds[n:]
+    for k in range(size):
+        u[k], v[k], firsts[k], seconds[k] = x[k], y[k], names[k], _NONE
+    return n + size
+
+
+@inline
+def _add_stretch(
+    edges: Edges, origins: Any, e: int, f: int, first: int, last: int, points: _Points, n: int
+) -> int:  # fmt: skip
+    """Append the vertices between two points on edges e and f of the ring first .. last - 1."""
+    if f >= e:
+        return _add_vertices(edges, origins, e + 1, f + 1, points, n)
+    n = _add_vertices(edges, origins, e + 1, last, points, n)
+    return _add_vertices(edges, origins, first, f + 1, points, n)
+
+
+@inline
+def _add_crossing(edges: Edges, e: int, f: int, e_name: int, f_name: int, points: _Points, n: int) -> float:
+    """Write the crossing of two edges to place n; return how far rounding moved it, infinity if it is not found."""
+    x, y, ex, ey = round_crossing(edges, e, f)
+    points.x[n], points.y[n], points.firsts[n], points.seconds[n] = x, y, e_name, f_name
+    if ex < 0.0 or ey < 0.0:
+        return np.inf
+    return np.sqrt(ex * ex + ey * ey) * (1.0 + 2.0**-50)  # two squares, their sum, a root
+
+
+@inline
+def _walk(
+    edges: Edges, origins: Any, n: int, second: int, end: int, turned: int, turned_second: int, passages: Passages,
+    points: _Points, stop: Any,
+) -> tuple[int, float]:  # fmt: skip
+    """Write the points of the result; return how many, or UNSETTLED, and how far one moved.
+
+    The first polygon is followed where it is inside the other, and the other from where the first leaves to where it
+    enters again. Edges 0 .. n - 1 and second .. end - 1; at least one crossing. turned, turned_second: 1 if the ring
+    was given clockwise: its edges began with their ends.
+    """
+    enters, leaves = passages.enters, passages.leaves
+    start = 0
+    while start < n and enters[start] == _NONE:  # bound: n
+        start += 1
+    if start == n:
+        return UNSETTLED, 0.0
+    n_found, farthest = 0, 0.0
+    e, entered, left_at = start, _NONE, _NONE
+    for k in range(n + 1):  # the last turn closes the ring
+        f = enters[e]
+        if f != _NONE:
+            if k > 0:
+                if left_at == _NONE:
+                    return UNSETTLED, 0.0
+                n_found = _add_stretch(edges, origins, left_at, f, second, end, points, n_found)
+            if k == n:
+                return n_found, farthest
+            moved = _add_crossing(edges, e, f, origins[e + turned], origins[f + turned_second], points, n_found)
+            n_found, farthest = n_found + 1, max(farthest, moved)
+            entered, left_at = e, _NONE
+        f = leaves[e]
+        if f != _NONE:
+            if left_at != _NONE:
+                return UNSETTLED, 0.0
+            n_found = _add_stretch(edges, origins, entered, e, 0, n, points, n_found)
+            moved = _add_crossing(edges, e, f, origins[e + turned], origins[f + turned_second], points, n_found)
+            n_found, farthest = n_found + 1, max(farthest, moved)
+            left_at = f
+        if n_found > 2 * end or (k & POLL == POLL and stop[0]):
+            return UNSETTLED, 0.0
+        e = e + 1 if e + 1 < n else 0
+    return UNSETTLED, 0.0
+
+
+@inline
+def intersect_convex(
+    subjects: Any, first: int, first_end: int, clips: Any, second: int, second_end: int, base: int, edges: Edges,
+    origins: Any, passages: Passages, firsts: Any, seconds: Any, x: Any, y: Any,
+    stop: Any,
+) -> tuple[int, int, float]:  # fmt: skip
+    """Intersect two rings: return the number of points, which of them is first, and how far one moved; or UNSETTLED.
+
+    firsts, seconds: filled with the points: a vertex and -1, or the first vertices of two edges, by their numbers in
+    the input, those of clips counted from ``base``; x, y: with their doubles, counter-clockwise. The arrays of edges,
+    origins and passages need room for two more than all vertices, x .. seconds for four times as many.
+    """
+    top, step = load_convex(subjects, first, first_end, 0, edges, origins, 0, stop)
+    if top == UNSETTLED:
+        return UNSETTLED, 0, 0.0
+    n = first_end - first
+    other = n + 1  # after the first vertex of the first ring once more
+    end = other + second_end - second
+    top_second, step_second = load_convex(clips, second, second_end, base, edges, origins, other, stop)
+    if top_second == UNSETTLED:
+        return UNSETTLED, 0, 0.0
+    passages.enters[:end] = _NONE
+    passages.leaves[:end] = _NONE
+    n_crossings = 0
+    for is_upper in range(2):
+        for is_other_upper in range(2):
+            i, i_step = (n, -1) if is_upper else (0, 1)
+            j, j_step = (end, -1) if is_other_upper else (other, 1)
+            found = _find_passages(edges, i, top, i_step, j, top_second, j_step, passages, stop)
+            if found == UNSETTLED:
+                return UNSETTLED, 0, 0.0
+            n_crossings += found
+    points = _Points(x, y, firsts, seconds)
+    if n_crossings == 0:
+        in_second, in_first = _holds(edges, other, end, 0), _holds(edges, 0, n, other)
+        if in_second > 0:
+            return _add_vertices(edges, origins, 0, n, points, 0), 0, 0.0
+        if in_first > 0 and in_second < 0:
+            return _add_vertices(edges, origins, other, end, points, 0), 0, 0.0
+        return (0 if in_first < 0 and in_second < 0 else UNSETTLED), 0, 0.0
+    m, farthest = _walk(edges, origins, n, other, end, int(step < 0), int(step_second < 0), passages, points, stop)
+    if m < 3 or farthest == np.inf:
+        return UNSETTLED, 0, 0.0
+    x[m], y[m] = x[0], y[0]
+    if _rise_of(x[: m + 1], y[: m + 1], m) == UNSETTLED:
+        return UNSETTLED, 0, 0.0
+    low = 0
+    for k in range(1, m):
+        if x[k] <= x[low] and (x[k] < x[low] or y[k] < y[low]):
+            low = k
+    return m, low, farthest

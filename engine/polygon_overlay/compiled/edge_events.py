@@ -1,0 +1,179 @@
+"""The events of each edge in their order along it: floating point where intervals are apart, else exactly.
+
+Events that turn out to be one point are united, so that lines through one point meet in one node.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from engine.jit import called, inline
+from engine.polygon_overlay.compiled.crossing_signs import Edges, order_of_crossings, orient
+from engine.polygon_overlay.compiled.edge_contacts import POLL, UNKNOWN, Events, unite
+from engine.polygon_overlay.compiled.edge_tree import DOUBTFUL
+
+_RUN: Final = 16
+"""Events that are sorted by insertion; more are merged."""
+
+
+@called
+def compare_events(edges: Edges, events: Events, e: int, i: int, j: int) -> int:
+    """Return -1, 0 or 1 as event i of edge e comes before, with or after event j."""
+    gap = events.t[i] - events.t[j]
+    slack = events.slack[i] + events.slack[j]
+    if gap > slack:
+        return 1
+    if -gap > slack:
+        return -1
+    f, g = events.other[i], events.other[j]
+    if f >= 0 and g >= 0:
+        return 0 if f == g else order_of_crossings(edges, e, f, g)
+    if g >= 0:
+        return _vertex_before_crossing(edges, e, events.point[i], g)
+    if f >= 0:
+        return -_vertex_before_crossing(edges, e, events.point[j], f)
+    return _order_of_vertices(edges, e, events.point[i], events.point[j])
+
+
+@inline
+def _vertex_before_crossing(edges: Edges, e: int, v: int, f: int) -> int:
+    """Return -1, 0 or 1 as vertex v on edge e comes before, at or after the crossing with edge f."""
+    side = orient(edges, f, edges.after[f], v)
+    if side == 0:
+        return 0
+    return -1 if side == orient(edges, f, edges.after[f], e) else 1
+
+
+@inline
+def _order_of_vertices(edges: Edges, e: int, v: int, w: int) -> int:
+    x, y = edges.x, edges.y
+    b = edges.after[e]
+    if x[v] != x[w]:
+        return -1 if (x[v] < x[w]) == (x[e] < x[b]) else 1
+    if y[v] != y[w]:
+        return -1 if (y[v] < y[w]) == (y[e] < y[b]) else 1
+    return 0
+
+
+@inline
+def _sort_by_key(keys: Any, order: Any, first: int, last: int, spare_keys: Any, spare: Any) -> None:
+    """Sort ``keys[first:last]`` and ``order`` with them: runs by insertion, then merged. spare_keys, spare: scratch."""
+    for low in range(first, last, _RUN):
+        for k in range(low + 1, min(low + _RUN, last)):
+            key, moving, at = keys[k], order[k], k
+            while at > low and keys[at - 1] > key:  # bound: the run sorted so far
+                keys[at], order[at] = keys[at - 1], order[at - 1]
+                at -= 1
+            keys[at], order[at] = key, moving
+    width = _RUN
+    while width < last - first:  # bound: doubles
+        for low in range(first, last, 2 * width):
+            middle, high = min(low + width, last), min(low + 2 * width, last)
+            i, j = low, middle
+            for k in range(low, high):
+                if j >= high or (i < middle and keys[i] <= keys[j]):
+                    spare_keys[k], spare[k] = keys[i], order[i]
+                    i += 1
+                else:
+                    spare_keys[k], spare[k] = keys[j], order[j]
+                    j += 1
+        for k in range(first, last):
+            keys[k], order[k] = spare_keys[k], spare[k]
+        width *= 2
+
+
+@called
+def _mark_near(
+    edges: Edges, events: Events, e: int, order: Any, keys: Any, first: int, last: int, marks: Any
+) -> None:  # fmt: skip
+    """Put in doubt edge e, and those whose crossings with it are within reach of another event, or of an end of e.
+
+    Then also the edge that begins or ends there.
+    """
+    marks[e] |= DOUBTFUL
+    reached = 0.0
+    for k in range(first, last):
+        i = order[k]
+        if not keys[k] - events.reach[i] > reached and events.other[i] >= 0:
+            marks[events.other[i]] |= DOUBTFUL
+        reached = max(reached, keys[k] + events.reach[i])
+        if keys[k] <= events.reach[i]:
+            marks[edges.before[e]] |= DOUBTFUL
+        if 1.0 - keys[k] <= events.reach[i]:
+            marks[edges.after[e]] |= DOUBTFUL
+    reached = 1.0
+    for k in range(last - 1, first - 1, -1):
+        i = order[k]
+        if not keys[k] + events.reach[i] < reached and events.other[i] >= 0:
+            marks[events.other[i]] |= DOUBTFUL
+        reached = min(reached, keys[k] - events.reach[i])
+
+
+@inline
+def sort_events(
+    edges: Edges, events: Events, n: int, n_events: int, parent: Any, starts: Any, order: Any, keys: Any,
+    spare_keys: Any, spare: Any, turn: Any, marks: Any, stop: Any,
+) -> bool:  # fmt: skip
+    """Fill ``starts``, (n + 1,), and ``order``: events ``order[starts[e]:starts[e + 1]]`` lie along edge e.
+
+    Unites events at one point in ``parent``, and makes ``turn`` of crossings there UNKNOWN. Returns whether the events
+    of every edge are further apart than their reaches, and each is further from the ends than its own; other edges, and
+    those that cross there, get the mark DOUBTFUL. keys: float64 by event, filled with the parameters in that order;
+    spare_keys, spare: scratch.
+    """
+    starts[: n + 1] = 0
+    for i in range(n_events):
+        if i & POLL == 0 and stop[0]:
+            return False
+        starts[events.edge[i] + 1] += 1
+    for e in range(n):
+        starts[e + 1] += starts[e]
+    for i in range(n_events - 1, -1, -1):  # each edge's part is filled from its end: starts[e + 1] comes down
+        if i & POLL == 0 and stop[0]:
+            return False
+        e = events.edge[i]
+        starts[e + 1] -= 1
+        order[starts[e + 1]] = i
+        keys[starts[e + 1]] = events.t[i]
+    for e in range(n):  # starts[e + 1] has come down to where the part of e begins
+        starts[e] = starts[e + 1]
+    starts[n] = n_events
+    are_clear = True
+    for e in range(n):
+        first, last = starts[e], starts[e + 1]
+        if last == first:
+            continue
+        if stop[0]:
+            return False
+        if last - first > 1:
+            _sort_by_key(keys, order, first, last, spare_keys, spare)
+        is_sorted = True
+        slack, reach = events.slack[order[first]], events.reach[order[first]]
+        is_clear = keys[first] > reach
+        for k in range(first + 1, last):
+            slack_before, slack = slack, events.slack[order[k]]
+            reach_before, reach = reach, events.reach[order[k]]
+            gap = keys[k] - keys[k - 1]
+            is_sorted &= gap > slack + slack_before
+            is_clear &= gap > reach + reach_before
+        if not (is_clear and 1.0 - keys[last - 1] > reach):
+            _mark_near(edges, events, e, order, keys, first, last, marks)
+            are_clear = False
+        if is_sorted:
+            continue
+        for k in range(first + 1, last):
+            moving, key = order[k], keys[k]
+            at = k
+            while at > first:  # bound: the part sorted so far
+                side = compare_events(edges, events, e, order[at - 1], moving)
+                if side == 0:
+                    for point in (events.point[order[at - 1]], events.point[moving]):
+                        if point >= n:
+                            turn[point - n] = UNKNOWN
+                    unite(parent, events.point[order[at - 1]], events.point[moving])
+                if side <= 0:
+                    break
+                order[at], keys[at] = order[at - 1], keys[at - 1]
+                at -= 1
+            order[at], keys[at] = moving, key
+    return are_clear

@@ -1,0 +1,241 @@
+"""Pairs of boxes that meet, by an implicit tree over boxes in the order of the rings they come from.
+
+Consecutive edges of a ring lie near each other: four make a leaf, node i has the children 2 i and 2 i + 1, and the
+boxes of a level are found from the one below. Only where one edge lies far from the next (many small rings) are they
+first put in the order of a space-filling curve. The tree is walked against itself. Each box is
+``(x_min, x_max, y_min, y_max)``.
+
+Boxes of leaves are looked at in codes: four whole numbers in one, so that one subtraction compares all four sides of
+two boxes. Each coordinate is the number of its strip, of some 16,000 across the whole. Boxes that meet have codes that
+do, since a coordinate that is no larger has no later strip; those of boxes that do not may meet as well.
+
+A mark is a sum of bits: among them the quadrants' sides that the edge heads for. Edges one after another that all head
+for one quadrant meet nowhere but in the vertices they share, so such a node is not walked against itself, nor two that
+follow each other and are one such run together.
+
+Pairs come in portions, so that memory does not grow with their number and the caller can look at the clock.
+
+Source: the dual traversal of C. Ericson, Real-time collision detection, 2005, section 6.3; the curve is that of
+G. M. Morton, A computer oriented geodetic data base, 1966.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+
+from engine.jit import allocating, inline, merged
+from engine.polygon_overlay.compiled.edge_contacts import POLL
+
+LEAF: Final = 4
+PORTION: Final = 2048
+"""Pairs at once: some 50 us of exact tests."""
+_MANY: Final = 1024
+"""Boxes from which on sorting by digits is faster than by comparison, and looks at the flag."""
+_DIGITS: Final = 2048
+_STEPS: Final = 1 << 16
+"""Steps of the walk at once, about a millisecond."""
+ANYWHERE: Final = 2 + 4 + 8 + 16
+"""Mark of an edge that ends a run: heading right, left, up and down at once."""
+BENT: Final = 32
+"""Mark of an edge at whose first vertex the ring surely turns."""
+RUN: Final = 64
+"""Mark of an edge that stands for many, which meet nothing; see reducing.py."""
+DOUBTFUL: Final = 128
+"""Mark of an edge that something is so near to that rounding may change how they lie; see clearance.py."""
+_BITS: Final = 15
+"""Of a side in a code, the highest for a borrow."""
+_LAST: Final = (1 << (_BITS - 1)) - 1
+"""The largest number of a side; no strip has it, so that of a box that meets nothing it can be."""
+_BORROWS: Final = sum(1 << (_BITS * side + _BITS - 1) for side in range(4))
+DEEPEST: Final = 256
+"""Places on the stack: a walk through 60 levels holds at most three pairs a level."""
+
+
+@inline
+def leaves_of(n: int) -> int:
+    """Return the number of leaves for n boxes, a power of two."""
+    n_leaves = 1
+    while n_leaves * LEAF < n:  # bound: 60 doublings
+        n_leaves *= 2
+    return n_leaves
+
+
+@merged
+def boxes_meet(boxes: Any, i: int, others: Any, j: int) -> bool:
+    """Tell whether two closed boxes have a common point."""
+    return (  # all four at once: which fails first is not foreseeable, and a branch missed costs more than all
+        (boxes[i, 0] <= others[j, 1])
+        & (others[j, 0] <= boxes[i, 1])
+        & (boxes[i, 2] <= others[j, 3])
+        & (others[j, 2] <= boxes[i, 3])
+    )
+
+
+@merged
+def heading(ux: float, uy: float) -> int:
+    """Return the mark of an edge with the direction u, which is not zero."""
+    return 2 * (ux > 0.0) + 4 * (ux < 0.0) + 8 * (uy > 0.0) + 16 * (uy < 0.0)
+
+
+@merged
+def _is_one_run(mark: int) -> bool:
+    """Tell whether edges that follow each other, with this mark in all, head for one quadrant."""
+    return (mark & 6) != 6 and (mark & 24) != 24
+
+
+@merged
+def _spread(bits: int) -> int:
+    """Return a number below 2^16 with a zero after each of its bits."""
+    bits = (bits | (bits << 8)) & 0x00FF00FF
+    bits = (bits | (bits << 4)) & 0x0F0F0F0F
+    bits = (bits | (bits << 2)) & 0x33333333
+    return (bits | (bits << 1)) & 0x55555555
+
+
+@allocating
+def _order_boxes(boxes: Any, n: int, places: Any, stop: Any) -> bool:
+    """Fill ``places`` with the boxes in the order in which the leaves take them; tell whether it is another order."""
+    x_min = y_min = float("inf")
+    x_max = y_max = float("-inf")
+    way, x_last, y_last = 0.0, boxes[0, 0], boxes[0, 2]
+    for k in range(n):
+        places[k] = k
+        x, y = boxes[k, 0], boxes[k, 2]
+        x_min, x_max, y_min, y_max = min(x_min, x), max(x_max, x), min(y_min, y), max(y_max, y)
+        way += abs(x - x_last) + abs(y - y_last)
+        x_last, y_last = x, y
+    wide, high = x_max - x_min, y_max - y_min
+    if way * way <= 2.0 * n * (wide + high) * (
+        wide + high
+    ):  # the way through n places, well ordered, grows with the root
+        return False
+    keys = np.empty(n, np.int64)
+    by_x, by_y = 65535.0 / wide if wide > 0.0 else 0.0, 65535.0 / high if high > 0.0 else 0.0
+    for k in range(n):
+        x, y = boxes[k, 0] - x_min, boxes[k, 2] - y_min
+        keys[k] = _spread(min(int(x * by_x), 65535)) | (_spread(min(int(y * by_y), 65535)) << 1)
+    if n < _MANY:
+        places[:n] = np.argsort(keys)
+        return True
+    spare_keys, spare, counts = np.empty(n, np.int64), np.empty(n, np.int64), np.empty(_DIGITS + 1, np.int64)
+    for shift in (0, 11, 22):  # the last digit first: each pass keeps the order of those before it
+        counts[:] = 0
+        for k in range(n):
+            if k & POLL == 0 and stop[0]:
+                return True
+            counts[((keys[k] >> shift) & (_DIGITS - 1)) + 1] += 1
+        for digit in range(_DIGITS):
+            counts[digit + 1] += counts[digit]
+        for k in range(n):
+            if k & POLL == 0 and stop[0]:
+                return True
+            digit = (keys[k] >> shift) & (_DIGITS - 1)
+            at = counts[digit]
+            spare_keys[at], spare[at] = keys[k], places[k]
+            counts[digit] = at + 1
+        for k in range(n):
+            keys[k], places[k] = spare_keys[k], spare[k]
+    return True
+
+
+@inline
+def build_tree(boxes: Any, marks: Any, n: int, tree: Any, tree_marks: Any, places: Any, stop: Any) -> None:
+    """Fill ``tree``, (2 n_leaves, 4) float64, and ``tree_marks`` for the first n boxes; empty nodes are inverted.
+
+    places: (n,) int64, filled with the boxes in the order of the leaves.
+    """
+    n_leaves = leaves_of(n)
+    added = ANYWHERE if _order_boxes(boxes, n, places, stop) else 0
+    for leaf in range(n_leaves):
+        if leaf & POLL == 0 and stop[0]:
+            return
+        x_min = y_min = float("inf")
+        x_max = y_max = float("-inf")
+        mark = added
+        for place in range(LEAF * leaf, min(LEAF * leaf + LEAF, n)):
+            k = places[place]
+            x_min, x_max = min(x_min, boxes[k, 0]), max(x_max, boxes[k, 1])
+            y_min, y_max = min(y_min, boxes[k, 2]), max(y_max, boxes[k, 3])
+            mark |= marks[k]
+        node = n_leaves + leaf
+        tree[node, 0], tree[node, 1], tree[node, 2], tree[node, 3] = x_min, x_max, y_min, y_max
+        tree_marks[node] = mark
+    for node in range(n_leaves - 1, 0, -1):
+        left, right = 2 * node, 2 * node + 1
+        tree[node, 0], tree[node, 1] = min(tree[left, 0], tree[right, 0]), max(tree[left, 1], tree[right, 1])
+        tree[node, 2], tree[node, 3] = min(tree[left, 2], tree[right, 2]), max(tree[left, 3], tree[right, 3])
+        tree_marks[node] = tree_marks[left] | tree_marks[right]
+
+
+@merged
+def push_children(tree: Any, node: int, stack: Any, depth: int) -> int:
+    """Put the children of a node on the stack of a search upwards; return the depth.
+
+    The lower one is last, so first off: what is found there spares the other.
+    """
+    low, high = 2 * node, 2 * node + 1
+    if tree[low, 2] > tree[high, 2]:
+        low, high = high, low
+    stack[depth, 0], stack[depth + 1, 0] = high, low
+    return depth + 2
+
+
+@inline
+def encode_boxes(boxes: Any, n: int, tree: Any, places: Any, lows: Any, highs: Any, stop: Any) -> None:
+    """Fill the codes of the first n boxes, in the order of the leaves; those with y_max < y_min meet none.
+
+    lows, highs: (n,) int64, what must not be above the other box's, and what must not be below. Caller guarantees that
+    ``tree`` holds the boxes.
+    """
+    x_min, y_min = tree[1, 0], tree[1, 2]
+    wide, high = tree[1, 1] - x_min, tree[1, 3] - y_min
+    by_x, by_y = (_LAST - 1) / wide if wide > 0.0 else 0.0, (_LAST - 1) / high if high > 0.0 else 0.0
+    for place in range(n):
+        if place & POLL == 0 and stop[0]:
+            return
+        k = places[place]
+        if boxes[k, 3] < boxes[k, 2]:
+            lows[place], highs[place] = _BORROWS - (_BORROWS >> (_BITS - 1)), _BORROWS
+            continue
+        left, right = int((boxes[k, 0] - x_min) * by_x), int((boxes[k, 1] - x_min) * by_x)
+        lower, upper = int((boxes[k, 2] - y_min) * by_y), int((boxes[k, 3] - y_min) * by_y)
+        lows[place] = _code(left, _LAST - right, lower, _LAST - upper)
+        highs[place] = _code(right, _LAST - left, upper, _LAST - lower) | _BORROWS
+
+
+@merged
+def _code(a: int, b: int, c: int, d: int) -> int:
+    return a | b << _BITS | c << 2 * _BITS | d << 3 * _BITS
+
+
+@inline
+def next_pairs(
+    lows: Any, highs: Any, n: int, tree: Any, tree_marks: Any, places: Any, stack: Any, depth: int, pairs: Any
+) -> tuple[int, int]:
+    """Go on with the walk: write pairs whose codes meet, each once; return how many, and the depth of the stack.
+
+    stack: (DEEPEST, 2) int64; the walk begins with the pair (1, 1) on it and depth 1, and is over at depth 0.
+    pairs: (PORTION, 2) int64.
+    """
+    n_leaves, found, steps = leaves_of(n), 0, 0
+    while depth > 0 and found <= PORTION - LEAF * LEAF and steps < _STEPS:
+        depth -= 1
+        steps += 1
+        i, j = stack[depth, 0], stack[depth, 1]
+        if j - i <= 1 and _is_one_run(tree_marks[i] | tree_marks[j]):  # invariant: i <= j, both on one level
+            continue
+        if i < n_leaves:
+            for a in range(2 * i, 2 * i + 2):
+                for b in range(2 * j if i != j else a, 2 * j + 2):
+                    stack[depth, 0], stack[depth, 1] = a, b
+                    depth += boxes_meet(tree, np.uint64(a), tree, np.uint64(b))
+            continue
+        first, second = LEAF * (i - n_leaves), LEAF * (j - n_leaves)
+        for p in range(first, min(first + LEAF, n)):
+            e, low = places[np.uint64(p)], lows[np.uint64(p)]  # unsigned: no look at whether it counts from the end
+            for q in range(p + 1 if i == j else second, min(second + LEAF, n)):
+                pairs[found, 0], pairs[found, 1] = e, places[np.uint64(q)]
+                found += (highs[np.uint64(q)] - low) & _BORROWS == _BORROWS
+    return found, depth

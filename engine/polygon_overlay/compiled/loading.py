@@ -1,0 +1,143 @@
+"""Rings of two polygons as one set of edges: without repeated points, and without what lies beyond the result.
+
+What lies outside of the other polygon's box and cannot be in the result is cut short at once: vertices that follow each
+other beyond one side of the common box give way to the first and the last of them, which moves the boundary there only.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from engine.jit import inline
+from engine.polygon_overlay.compiled.crossing_signs import Edges
+from engine.polygon_overlay.compiled.edge_contacts import POLL
+from engine.polygon_overlay.compiled.edge_tree import ANYWHERE, BENT, DOUBTFUL, RUN, heading
+from engine.predicates.orientation import BOUND_2D, GUARD_2D
+from engine.predicates.ranges import SMALLEST
+
+
+@inline
+def load_rings(
+    vertices: Any, offsets: Any, first_ring: int, last_ring: int, mask: int, bits: Any, base: int, edges: Edges,
+    origins: Any, tops: Any, masks: Any, box: tuple[float, float, float, float], n: int, n_rings: int, stop: Any,
+) -> tuple[int, int, bool]:  # fmt: skip
+    """Append rings without repeated points; return the numbers of vertices and rings, and whether none is too small.
+
+    bits: empty, or by ring the bit that stands for the mask. base: what is added to the number of a vertex in
+    ``origins``. box: x_min, x_max, y_min, y_max; of vertices beyond one of its sides, one after another, only the first
+    and the last count.
+    """
+    x_min, x_max, y_min, y_max = box
+    x, y = edges.x, edges.y
+    safe = True
+    for ring in range(first_ring, last_ring):
+        start = n
+        qx = qy = np.nan  # the last vertex
+        sides = sides_before = 0  # of the last vertex and of the one before it: which sides of the box it is beyond
+        for k in range(offsets[ring], offsets[ring + 1]):
+            if k & POLL == 0 and stop[0]:
+                return 0, 0, False
+            px, py = vertices[k, 0], vertices[k, 1]
+            safe &= ((abs(px) >= SMALLEST) | (px == 0.0)) & ((abs(py) >= SMALLEST) | (py == 0.0))
+            if px == qx and py == qy:
+                continue
+            beyond = 1 * (px < x_min) + 2 * (px > x_max) + 4 * (py < y_min) + 8 * (py > y_max)
+            if beyond & sides & sides_before:  # a triangle beyond that side changes no label in the box
+                n -= 1
+                if x[n - 1] == px and y[n - 1] == py:
+                    origins[n - 1] = base + k  # the next edge begins here
+                    sides, sides_before, qx, qy = sides_before, 0, px, py
+                    continue
+            else:
+                sides_before = sides
+            sides, qx, qy = beyond, px, py
+            x[n], y[n], origins[n] = px, py, base + k
+            n += 1
+        while n > start + 1 and x[n - 1] == x[start] and y[n - 1] == y[start]:
+            n -= 1
+        if n - start < 3:  # a point, or an edge there and back
+            n = start
+            continue
+        for k in range(start, n):
+            edges.after[k], edges.before[k], edges.ring[k] = k + 1, k - 1, n_rings
+        edges.after[n - 1], edges.before[start] = start, n - 1
+        top, px, py = start, x[start], y[start]
+        for k in range(start + 1, n):
+            if x[k] > px or (x[k] == px and y[k] > py):
+                top, px, py = k, x[k], y[k]
+        tops[n_rings], masks[n_rings] = top, (1 << bits[ring] if bits.shape[0] > 0 else mask)
+        n_rings += 1
+    return n, n_rings, safe
+
+
+@inline
+def box_of(vertices: Any, first: int, last: int) -> tuple[float, float, float, float]:
+    """Return x_min, x_max, y_min, y_max of some vertices; inverted where there is none."""
+    x_min = y_min = np.inf
+    x_max = y_max = -np.inf
+    for k in range(first, last):
+        px, py = vertices[k, 0], vertices[k, 1]
+        x_min, x_max = min(x_min, px), max(x_max, px)
+        y_min, y_max = min(y_min, py), max(y_max, py)
+    return x_min, x_max, y_min, y_max
+
+
+@inline
+def magnitude(x_min: float, x_max: float, y_min: float, y_max: float) -> float:
+    """Return the largest coordinate of a box, without its sign; 0 of an inverted one."""
+    return max(-x_min, x_max, -y_min, y_max) if x_min <= x_max else 0.0
+
+
+@inline
+def fill_boxes(edges: Edges, n: int, margin: float, boxes: Any, marks: Any, stop: Any) -> float:
+    """Fill the box of every edge, with a margin around it, and its mark; return the least length of an edge.
+
+    Its length is the larger of both coordinates'.
+    """
+    x, y = edges.x, edges.y
+    shortest = np.inf
+    first = 0
+    while first < n:  # bound: each turn passes one ring
+        last = edges.before[first]
+        px, py = x[last], y[last]
+        qx, qy = x[first], y[first]
+        vx, vy = qx - px, qy - py
+        for i in range(first, last + 1):
+            if i & POLL == 0 and stop[0]:
+                return 0.0
+            j = i + 1 if i < last else first
+            px, py, qx, qy = qx, qy, x[j], y[j]
+            ux, uy = qx - px, qy - py
+            boxes[i, 0], boxes[i, 1] = min(px, qx) - margin, max(px, qx) + margin
+            boxes[i, 2], boxes[i, 3] = min(py, qy) - margin, max(py, qy) + margin
+            left, right = vx * uy, vy * ux
+            is_bent = abs(left - right) > BOUND_2D * (abs(left) + abs(right)) + GUARD_2D  # see turn_of_edges
+            marks[i] = BENT * is_bent | (heading(ux, uy) if i < last else ANYWHERE)
+            shortest = min(shortest, max(abs(ux), abs(uy)))
+            vx, vy = ux, uy
+        first = last + 1
+    return shortest
+
+
+@inline
+def mark_runs(edges: Edges, runs: Any, n_runs: int, boxes: Any, marks: Any) -> None:
+    """Give the edges that stand for many a mark, and boxes that meet none; the ring turns at the ends of each."""
+    for k in range(n_runs):
+        e = runs[k]
+        marks[e] = ANYWHERE | BENT | RUN
+        marks[edges.after[e]] |= BENT
+        boxes[e, 3] = -np.inf
+
+
+@inline
+def mark_short(edges: Edges, n: int, margin: float, marks: Any) -> None:
+    """Put in doubt edges no longer than ``margin``, their length as `fill_boxes` has it, and those next to them."""
+    x, y = edges.x, edges.y
+    for e in range(n):
+        after = edges.after[e]
+        if max(abs(x[after] - x[e]), abs(y[after] - y[e])) <= margin:
+            marks[edges.before[e]] |= DOUBTFUL
+            marks[e] |= DOUBTFUL
+            marks[after] |= DOUBTFUL

@@ -1,0 +1,166 @@
+"""Rings of doubles in their order: pieces by their shells, holes after their shell, each ring from its first vertex.
+
+The first vertex of a ring is its leftmost, then lowest; rings are compared vertex by vertex from there on.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from engine.jit import inline
+from engine.polygon_overlay.compiled.chain_rings import Rings
+from engine.polygon_overlay.compiled.edge_contacts import OFTEN, POLL
+from engine.predicates.orientation import orient2d
+from engine.types import Point2
+
+
+class Ranking(NamedTuple):
+    """By ring: index of its first vertex, its x, whether it is a hole, rank of its piece; order: the rings in order."""
+
+    start: Any
+    x: Any
+    is_hole: Any
+    piece: Any
+    order: Any
+    spare: Any
+
+
+@inline
+def _is_before(rings: Rings, ranking: Ranking, x: Any, y: Any, i: int, j: int) -> bool:
+    """Tell whether ring i stands before ring j."""
+    if ranking.piece[i] != ranking.piece[j]:
+        return ranking.piece[i] < ranking.piece[j]
+    if ranking.is_hole[i] != ranking.is_hole[j]:
+        return ranking.is_hole[i] < ranking.is_hole[j]
+    p, q = ranking.start[i], ranking.start[j]
+    n, m = rings.offset[i + 1] - rings.offset[i], rings.offset[j + 1] - rings.offset[j]
+    for _ in range(min(n, m)):
+        if x[p] != x[q]:
+            return x[p] < x[q]
+        if y[p] != y[q]:
+            return y[p] < y[q]
+        p = p + 1 if p + 1 < rings.offset[i + 1] else rings.offset[i]
+        q = q + 1 if q + 1 < rings.offset[j + 1] else rings.offset[j]
+    return n < m
+
+
+@inline
+def _sort(rings: Rings, ranking: Ranking, x: Any, y: Any, n: int, is_by_piece: bool, stop: Any) -> None:
+    """Sort the first n entries of ``ranking.order``: merging runs of doubling length. is_by_piece: pieces differ."""
+    order, spare, first_x = ranking.order, ranking.spare, ranking.x
+    width = 1
+    while width < n:  # bound: log n turns
+        for low in range(0, n, 2 * width):
+            middle, high = min(low + width, n), min(low + 2 * width, n)
+            i, j = low, middle
+            for k in range(low, high):
+                if k & POLL == 0 and stop[0]:
+                    return
+                if i < middle and j < high:
+                    p, q = order[i], order[j]
+                    if is_by_piece or first_x[p] == first_x[q]:
+                        takes_second = _is_before(rings, ranking, x, y, q, p)
+                    else:
+                        takes_second = first_x[q] < first_x[p]
+                else:
+                    takes_second = i >= middle
+                if not takes_second:
+                    spare[k] = order[i]
+                    i += 1
+                else:
+                    spare[k] = order[j]
+                    j += 1
+        for k in range(n):
+            order[k] = spare[k]
+        width *= 2
+
+
+@inline
+def find_shells(rings: Rings, n_rings: int, x: Any, y: Any, ranking: Ranking, widest: Any, boxes: Any) -> bool:
+    """Fill ``ranking.is_hole`` of rings whose rounded points may turn either way; tell whether it is sure.
+
+    Rounding keeps order, so the rounded box of a shell holds those of its holes: the one ring of a region whose box
+    holds all others, and is no other's, is its shell. widest: scratch by region; boxes: by ring.
+    """
+    for ring in range(n_rings):
+        x_min = y_min = np.inf
+        x_max = y_max = -np.inf
+        for k in range(rings.offset[ring], rings.offset[ring + 1]):
+            x_min, x_max = min(x_min, x[k]), max(x_max, x[k])
+            y_min, y_max = min(y_min, y[k]), max(y_max, y[k])
+        boxes[ring, 0], boxes[ring, 1], boxes[ring, 2], boxes[ring, 3] = x_min, x_max, y_min, y_max
+        widest[rings.region[ring]] = ring
+    for ring in range(n_rings):
+        if _holds(boxes, ring, widest[rings.region[ring]]):
+            widest[rings.region[ring]] = ring
+    for ring in range(n_rings):
+        shell = widest[rings.region[ring]]
+        if ring != shell and (not _holds(boxes, shell, ring) or _holds(boxes, ring, shell)):
+            return False
+        ranking.is_hole[ring] = ring != shell
+    return True
+
+
+@inline
+def _holds(boxes: Any, i: int, j: int) -> bool:
+    """Tell whether box i holds box j, which may be equal."""
+    return (
+        (boxes[i, 0] <= boxes[j, 0])
+        & (boxes[i, 1] >= boxes[j, 1])
+        & (boxes[i, 2] <= boxes[j, 2])
+        & (boxes[i, 3] >= boxes[j, 3])
+    )
+
+
+@inline
+def rank_rings(
+    rings: Rings, n_rings: int, x: Any, y: Any, ranking: Ranking, is_valid: bool, piece_of: Any, boxes: Any, stop: Any
+) -> int:
+    """Fill ``ranking``; return the number of pieces, -1 if a region has not exactly one shell, or none that is sure.
+
+    is_valid: whether rounding left the rings what they were. piece_of: scratch by region; boxes: by ring.
+    """
+    if not is_valid and not find_shells(rings, n_rings, x, y, ranking, piece_of, boxes):
+        return -1
+    n_pieces = 0
+    for ring in range(n_rings):
+        if ring & OFTEN == 0 and stop[0]:
+            return -1
+        first, last = rings.offset[ring], rings.offset[ring + 1]
+        low = first
+        for k in range(first + 1, last):
+            if k & POLL == 0 and stop[0]:
+                return -1
+            if x[k] < x[low] or (x[k] == x[low] and y[k] < y[low]):
+                low = k
+        ranking.start[ring], ranking.x[ring] = low, x[low]
+        before, after = (low if low > first else last) - 1, low + 1 if low + 1 < last else first
+        turn = orient2d(Point2(x[before], y[before]), Point2(x[low], y[low]), Point2(x[after], y[after]))
+        if is_valid:
+            ranking.is_hole[ring] = turn < 0
+        ranking.piece[ring] = 0
+        piece_of[rings.region[ring]] = -1
+        if turn > 0 if is_valid else not ranking.is_hole[ring]:
+            ranking.order[n_pieces] = ring
+            n_pieces += 1
+    if n_rings == 1:
+        return n_pieces if n_pieces == 1 else -1
+    _sort(rings, ranking, x, y, n_pieces, False, stop)
+    if stop[0]:
+        return -1
+    for k in range(n_pieces):
+        region = rings.region[ranking.order[k]]
+        if piece_of[region] >= 0:
+            return -1
+        piece_of[region] = k
+    for ring in range(n_rings):
+        ranking.piece[ring] = piece_of[rings.region[ring]]
+        if ranking.piece[ring] < 0:
+            return -1
+    if n_pieces < n_rings:
+        for ring in range(n_rings):
+            ranking.order[ring] = ring
+        _sort(rings, ranking, x, y, n_rings, True, stop)
+    return n_pieces

@@ -1,0 +1,140 @@
+"""The double nearest to each coordinate of a crossing: double-double with a bound, else exact signs around it.
+
+With the weights w_a and w_b of the ends of the first edge (crossing_signs.py), known to a relative r,
+x = (a |w_b| + b |w_a|) / (|w_a| + |w_b|). Products add 2 u^2, their sum and the sum of weights 4 u^2 each, the quotient
+16 u^2: every coordinate is within (28 u^2 + 2 r) max(|a|, |b|) of its value; 40 u^2 + 2.5 r covers what is of higher
+order for r < 0.01. Where the bound leaves two doubles, or the value may be a double itself, signs of the exact
+difference to the double and to the middles between it and its neighbours decide. Where the value may be less than
+2^55 bounds, so that the double-double may miss its neighbours, it is first computed from expansions, whose sum loses
+nothing: quotients of their two leading components are within 2^-100 of it.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+
+from engine.jit import called, inline, merged
+from engine.polygon_overlay.compiled.crossing_signs import Edges, crossing_against, exact_weight, weight
+from engine.predicates.double_double import U2, dd_add, dd_div, dd_scale, surely_rounded
+from engine.predicates.error_free import fast_two_sum, workspace
+from engine.predicates.expansion import add_scaled, compress, sign
+
+CUT_BOUND: Final = 40.0 * U2
+LOST: Final = -1.0
+"""An error that tells that the double was not found."""
+
+
+@merged
+def _abs2(h: float, low: float) -> tuple[float, float]:
+    return (h, low) if h >= 0.0 else (-h, -low)
+
+
+@called
+def round_crossing(edges: Edges, e: int, f: int) -> tuple[float, float, float, float]:
+    """Return the doubles nearest to the crossing of edges e and f, and a bound of the error of each.
+
+    An error of 0 says that the coordinate is that double exactly; LOST that it could not be found (the caller settles
+    it in rationals).
+    """
+    a, b, fb = e, edges.after[e], edges.after[f]
+    ah, al, ae = weight(edges, f, fb, a)
+    bh, bl, be = weight(edges, f, fb, b)
+    ah, al = _abs2(ah, al)
+    bh, bl = _abs2(bh, bl)
+    if ae > 0.001 * ah or be > 0.001 * bh:
+        ah, al, bh, bl = _weights_from_expansions(edges, a, b, f, fb)
+        ae, be = 4.0 * U2 * ah, 4.0 * U2 * bh
+    relative = 2.5 * max(ae / ah, be / bh)
+    sum_h, sum_l = dd_add(ah, al, bh, bl)
+    x, x_error = _coordinate(edges, e, f, 0, edges.x[a], edges.x[b], ah, al, bh, bl, sum_h, sum_l, relative)
+    y, y_error = _coordinate(edges, e, f, 1, edges.y[a], edges.y[b], ah, al, bh, bl, sum_h, sum_l, relative)
+    return x, y, x_error, y_error
+
+
+@called
+def _weights_from_expansions(edges: Edges, a: int, b: int, f: int, fb: int) -> tuple[float, float, float, float]:
+    """Return the weights of a and b to twice 53 bits, both as positive double-doubles."""
+    first, second = workspace(16), workspace(16)
+    n, m = exact_weight(edges, f, fb, a, first), exact_weight(edges, f, fb, b, second)
+    ah, al = _leading(first, n)
+    bh, bl = _leading(second, m)
+    ah, al = _abs2(ah, al)
+    bh, bl = _abs2(bh, bl)
+    return ah, al, bh, bl
+
+
+@inline
+def _leading(e: Any, n: int) -> tuple[float, float]:
+    n = compress(e, n)
+    if n == 0:
+        return 0.0, 0.0
+    return (e[0], 0.0) if n == 1 else fast_two_sum(e[n - 1], e[n - 2])
+
+
+@merged
+def _coordinate(
+    edges: Edges, e: int, f: int, axis: int, p: float, q: float, ah: float, al: float, bh: float, bl: float,
+    sum_h: float, sum_l: float, relative: float,
+) -> tuple[float, float]:  # fmt: skip
+    """Return the double nearest to one coordinate, and a bound of its error; p and q are those of the ends of e."""
+    if p == q:
+        return p, 0.0
+    rh, rl = dd_scale(bh, bl, p)
+    sh, sl = dd_scale(ah, al, q)
+    nh, nl = dd_add(rh, rl, sh, sl)
+    h, low = dd_div(nh, nl, sum_h, sum_l)
+    bound = (CUT_BOUND + relative) * max(abs(p), abs(q))
+    if abs(low) > bound and surely_rounded(h, low, bound):
+        return h + 0.0, abs(low) + bound
+    return _settle(edges, e, f, axis, h, bound)
+
+
+@called
+def _settle(edges: Edges, e: int, f: int, axis: int, h: float, bound: float) -> tuple[float, float]:
+    """Return what `_coordinate` does, by exact signs around h."""
+    if bound > 2.0**-55 * abs(h):  # case: a crossing on an axis, or so near that h may be many doubles off
+        h = _from_expansions(edges, e, f, axis)
+    side = crossing_against(edges, e, f, axis, h, 0.0)
+    if side == 0:
+        return h + 0.0, 0.0
+    # bound: h is the nearest double or a neighbour of it, else the double is lost
+    for _ in range(2):
+        other = np.nextafter(h, np.inf if side > 0 else -np.inf)
+        half = (other - h) / 2.0
+        beyond = crossing_against(edges, e, f, axis, h, half)
+        if beyond == 0:  # case: a tie; of two neighbours the one with an even last bit is nearer to nothing else
+            return _even(h, other) + 0.0, abs(half)
+        if beyond != side:
+            return h + 0.0, abs(half)
+        h = other
+        side = crossing_against(edges, e, f, axis, h, 0.0)
+        if side == 0:
+            return h + 0.0, 0.0
+        if side != beyond:
+            return h + 0.0, abs(half)
+    return h, LOST
+
+
+@called
+def _from_expansions(edges: Edges, e: int, f: int, axis: int) -> float:
+    """Return a coordinate of a crossing, off by less than a unit in its own last place."""
+    z = edges.x if axis == 0 else edges.y
+    a, b, fb = e, edges.after[e], edges.after[f]
+    wa, wb = workspace(16), workspace(16)
+    na, nb = exact_weight(edges, f, fb, a, wa), exact_weight(edges, f, fb, b, wb)
+    factor = 1.0 if sign(wa, na) > 0 else -1.0  # the weights are of opposite signs
+    above, below = workspace(64), workspace(64)  # 2 * 16 components for each of two products
+    n = add_scaled(above, add_scaled(above, 0, wa, na, factor * z[b]), wb, nb, -factor * z[a])
+    m = add_scaled(below, add_scaled(below, 0, wa, na, factor), wb, nb, -factor)
+    nh, nl = _leading(above, n)
+    dh, dl = _leading(below, m)
+    h, _ = dd_div(nh, nl, dh, dl)
+    return h + 0.0
+
+
+@inline
+def _even(a: float, b: float) -> float:
+    """Return the one of two neighbouring doubles whose last bit is 0."""
+    return (a + b) / 2.0 if abs(a) < 2.0**1022 and abs(b) < 2.0**1022 else a

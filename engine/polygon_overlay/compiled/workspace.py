@@ -1,0 +1,220 @@
+"""Scratch of the compiled overlay: few arrays by size, their rows by name.
+
+The kernel is handed the few arrays and takes their rows itself: handing over eighty costs more than a small overlay.
+"""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from engine.jit import merged
+from engine.polygon_overlay.compiled.chain_rings import Rings
+from engine.polygon_overlay.compiled.chains import Chains
+from engine.polygon_overlay.compiled.crossing_signs import Edges
+from engine.polygon_overlay.compiled.edge_contacts import Events
+from engine.polygon_overlay.compiled.edge_tree import DEEPEST, LEAF, PORTION
+from engine.polygon_overlay.compiled.ring_order import Ranking
+
+_kept = threading.local()
+_MOST_KEPT: Final = 80_000_000
+"""Bytes that were written to up to which a thread keeps its scratch."""
+_MANY_CONTACTS: Final = 2**18
+_BY_VERTEX: Final = 180
+_BY_CONTACT: Final = 270
+_BY_OUTPUT: Final = 40
+"""Bytes of scratch for each vertex, contact, and vertex of the output."""
+
+
+class Buffers(NamedTuple):
+    """Scratch by size: a row for each purpose, by vertex, ring, contact, half-chain and point of a boundary ring."""
+
+    vertex_floats: Any
+    vertex_integers: Any
+    ring_integers: Any
+    contact_floats: Any
+    contact_integers: Any
+    half_integers: Any
+    half_labels: Any
+    half_octets: Any
+    point_floats: Any
+    point_integers: Any
+    point_codes: Any
+    point_octets: Any
+    boxes: Any
+    tree: Any
+    tree_marks: Any
+    stack: Any
+    pairs: Any
+
+
+class Workspace(NamedTuple):
+    """Scratch by name: rows of the arrays of `Buffers`."""
+
+    edges: Edges
+    origins: Any
+    chain_at: Any
+    starts: Any
+    marked: Any
+    tops: Any
+    masks: Any
+    rings: Any
+    highest: Any
+    boxes: Any
+    marks: Any
+    tree: Any
+    tree_marks: Any
+    places: Any
+    lows: Any
+    highs: Any
+    stack: Any
+    pairs: Any
+    points: Any
+    node_of: Any
+    events: Events
+    turn: Any
+    order: Any
+    nodes: Any
+    chains: Chains
+    masks_before: Any
+    star_starts: Any
+    star_ends: Any
+    star: Any
+    place: Any
+    cycle: Any
+    following: Any
+    joined: Any
+    label: Any
+    regions: Any
+    gathered: Any
+    beyond: Any
+    inside: Any
+    bounds: Any
+    seen: Any
+    fan: Any
+    path: Any
+    path_place: Any
+    found: Rings
+    crossing_x: Any
+    crossing_y: Any
+    crossing_error: Any
+    x: Any
+    y: Any
+    moved: Any
+    ranking: Ranking
+
+
+@dataclass(frozen=True, slots=True)
+class Scratch:
+    """What the kernel writes to, for pairs of up to so many vertices, rings and contacts, and for so much output.
+
+    output: vertices (m, 2) float64, their sources (m, 2) int32, ends of rings and of pieces (n + 1,) int64, that begin
+        with 0, evidence by ring (n,) int64.
+    output_of_one: status, counts and displacement of one pair, and the same.
+    """
+
+    n_vertices: int
+    n_rings: int
+    n_contacts: int
+    buffers: Buffers
+    output: tuple[Any, ...]
+    output_of_one: tuple[Any, ...]
+
+
+def scratch_for(n_vertices: int, n_rings: int, n_contacts: int, n_out: int, n_out_rings: int) -> Scratch:
+    """Return scratch of that size at least: what this thread kept if that suffices, or else new.
+
+    It is the caller's until `keep`: a signal handler may overlay while what the kernel left is not copied yet.
+    One pair of that size always finds room in the output: every contact adds a vertex and a ring at most. What is not
+    written to costs nothing; pages that are for the first time cost more than the kernel does.
+    """
+    kept: Scratch | None = vars(_kept).pop("scratch", None)
+    if kept is not None and (kept.n_vertices < n_vertices or kept.n_rings < n_rings or kept.n_contacts < n_contacts):
+        kept = None
+    if kept is not None and len(kept.output[0]) >= n_out and len(kept.output[4]) >= n_out_rings:
+        return kept
+    n_out, n_out_rings = max(n_out, n_vertices + n_contacts), max(n_out_rings, n_contacts)
+    rings, pieces = np.empty(n_out_rings + 1, np.int64), np.empty(n_out_rings + 1, np.int64)
+    rings[0] = pieces[0] = 0
+    output = np.empty((n_out, 2)), np.empty((n_out, 2), np.int32), rings, pieces, np.empty(n_out_rings, np.int64)
+    of_one = np.empty(1, np.int8), np.empty((1, 4), np.int64), np.empty(1), *output
+    if kept is not None:
+        return Scratch(kept.n_vertices, kept.n_rings, kept.n_contacts, kept.buffers, output, of_one)
+    return Scratch(n_vertices, n_rings, n_contacts, buffers_for(n_vertices, n_rings, n_contacts), output, of_one)
+
+
+def more_contacts(n: int) -> int:
+    """Return for how many contacts to try next where there was scratch for ``n``.
+
+    Few are multiplied at once, since every try begins anew and pages that are not written to cost nothing; many are
+    doubled, since a system may refuse to promise more memory than it has.
+    """
+    return 8 * n if n < _MANY_CONTACTS else 2 * n
+
+
+def keep(scratch: Scratch, n_vertices: int, n_contacts: int, n_out: int) -> None:
+    """Let this thread keep scratch of which so much was written to, unless that is too much."""
+    if _BY_VERTEX * n_vertices + _BY_CONTACT * n_contacts + _BY_OUTPUT * n_out <= _MOST_KEPT:
+        _kept.scratch = scratch
+
+
+def _spread(length: int) -> int:
+    """Return a length of rows, no smaller, whose beginnings do not fall together in the cache.
+
+    A cache finds lines by the last bits of their address: rows a whole number of pages apart, or nearly, would share
+    few places, and small pairs, which use the beginnings only, wait for memory. Rows of a page or less stay close.
+    """
+    return length if length <= 1024 else length + (56 - length) % 1024
+
+
+def buffers_for(n_vertices: int, n_rings: int, n_contacts: int) -> Buffers:
+    """Return scratch for pairs of up to so many vertices, rings and contacts."""
+    n, k = n_vertices + 1, _spread(n_contacts + 8)
+    m = _spread(n + 2 * k)  # points of all boundary rings: every vertex once, every end of a chain on two sides
+    n_leaves = 1
+    while n_leaves * LEAF < m:  # bound: 60 doublings
+        n_leaves *= 2
+    return Buffers(
+        vertex_floats=np.empty((2, n + 1)),
+        vertex_integers=np.empty((5, n + 1), np.int32),
+        ring_integers=np.empty((4, n_rings + 1), np.int64),
+        contact_floats=np.empty((5, k)),
+        contact_integers=np.empty((18, k + 1), np.int32),
+        half_integers=np.empty((7, 2 * k + 1), np.int32),
+        half_labels=np.empty((4, 2 * k + 1), np.int64),
+        half_octets=np.empty((4, 2 * k + 1), np.uint8),
+        point_floats=np.empty((2, m)),
+        point_integers=np.empty((5, m), np.int32),
+        point_codes=np.empty((2, m), np.int64),
+        point_octets=np.empty((4, m), np.uint8),
+        boxes=np.empty((m, 4)),
+        tree=np.empty((2 * n_leaves, 4)),
+        tree_marks=np.empty(2 * n_leaves, np.uint8),
+        stack=np.empty((DEEPEST, 2), np.int64),
+        pairs=np.empty((PORTION, 2), np.int32),
+    )
+
+
+@merged
+def rows_of(buffers: Buffers) -> Workspace:
+    """Return the rows of some buffers by name; those that are in one place are not in use at one time."""
+    vx, v, r = buffers.vertex_floats, buffers.vertex_integers, buffers.ring_integers
+    cx, c = buffers.contact_floats, buffers.contact_integers
+    h, hl, hb = buffers.half_integers, buffers.half_labels, buffers.half_octets
+    px, p, pb, codes = buffers.point_floats, buffers.point_integers, buffers.point_octets, buffers.point_codes
+    edges = Edges(vx[0], vx[1], v[0], v[1], v[2])
+    events = Events(c[0], c[1], c[2], cx[0], cx[1], cx[2], c[3], c[4])
+    chains = Chains(c[5], c[6], c[7], c[8], hl[3], c[9])
+    found = Rings(p[0], pb[0], c[10], c[11])
+    ranking = Ranking(c[5], cx[0], hb[0], c[6], c[7], c[8])  # in place of chains, and of parameters of events
+    return Workspace(
+        edges, v[3], p[1], v[4], pb[1],
+        r[0], r[1], r[2], r[3],
+        buffers.boxes, pb[2], buffers.tree, buffers.tree_marks, p[2], codes[0], codes[1], buffers.stack, buffers.pairs,
+        p[3], p[4], events, hb[0], c[12], c[13], chains, hl[0], c[14], c[15],
+        h[0], h[1], h[2], h[3], h[4], hl[0], h[5], hl[1], hl[2], hb[1], hb[2], hb[3],
+        c[16], h[6], c[17], found, cx[3], cx[4], cx[1], px[0], px[1], pb[3], ranking,
+    )  # fmt: skip

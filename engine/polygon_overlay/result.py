@@ -1,0 +1,107 @@
+"""What an overlay returns: pieces with holes, the exact area, and what rounding did to them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Literal, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from engine.arrangement.exact_area import ExactRings
+from engine.polygon_overlay.implicit_rings import ImplicitRings
+
+
+class OverlayPiece(NamedTuple):
+    """One connected part: its shell, counter-clockwise, and its holes, clockwise; each ``(n, 2)`` float64."""
+
+    shell: npt.NDArray[np.float64]
+    holes: tuple[npt.NDArray[np.float64], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Collapse:
+    """A part of the exact result that the rounded output no longer has as a part of its own.
+
+    kind: "piece" (with its holes) or "hole". area: exact. near: its first vertex, rounded.
+    """
+
+    kind: Literal["piece", "hole"]
+    area: Fraction
+    near: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Overlay:
+    """The result of a Boolean operation on two polygons.
+
+    vertices: (n_vertices, 2) float64, all rings one after another, none repeating its first vertex at its end.
+    ring_offsets: (n_rings + 1,) int64 into vertices.
+    piece_offsets: (n_pieces + 1,) int64 into the rings; the first ring of a piece is its shell, counter-clockwise, the
+        others its holes, clockwise. Each ring begins at its leftmost, then lowest vertex; pieces and holes are in
+        lexicographic order.
+    output: "valid" or "nearest", as asked for; may_be_invalid: "nearest" was asked for and rounding moved a vertex.
+    n_pieces_exact, n_holes_exact: how many the exact result has, before rounding.
+    collapsed: parts of the exact result that are lost to rounding, with exact areas.
+    pieces_joined, holes_joined: by how many the count fell because parts closer than rounding grew together.
+    pieces_parted, holes_parted: by how many it rose because parts fell apart, or rounding enclosed a new hole.
+        Always: n_pieces = n_pieces_exact - collapsed pieces - pieces_joined + pieces_parted; likewise for holes.
+    rounds: how often the rings were rounded; 0 where every vertex of the exact result is a double.
+    vertices_moved: output vertices that are not the correctly rounded image of a vertex of the exact result.
+    largest_displacement: proven bound on the distance between an edge of the exact result and its image.
+    snapped: the coarser lattice of snap rounding was needed.
+    exact: the rings of the exact result, from which `area_exact` and `area` are computed when asked for.
+    """
+
+    vertices: npt.NDArray[np.float64]
+    ring_offsets: npt.NDArray[np.int64]
+    piece_offsets: npt.NDArray[np.int64]
+    output: Literal["valid", "nearest"]
+    may_be_invalid: bool
+    n_pieces_exact: int
+    n_holes_exact: int
+    exact: ExactRings | ImplicitRings
+    largest_displacement: float = 0.0
+    rounds: int = 0
+    collapsed: tuple[Collapse, ...] = ()
+    pieces_joined: int = 0
+    pieces_parted: int = 0
+    holes_joined: int = 0
+    holes_parted: int = 0
+    vertices_moved: int = 0
+    snapped: bool = False
+
+    @property
+    def n_pieces(self) -> int:
+        """Number of pieces in the output."""
+        return len(self.piece_offsets) - 1
+
+    @property
+    def n_holes(self) -> int:
+        """Number of holes in the output."""
+        return len(self.ring_offsets) - len(self.piece_offsets)
+
+    @property
+    def rings(self) -> list[npt.NDArray[np.float64]]:
+        """All rings, views of `vertices`."""
+        return [self.vertices[start:stop] for start, stop in zip(self.ring_offsets, self.ring_offsets[1:])]
+
+    @property
+    def pieces(self) -> list[OverlayPiece]:
+        """Shell and holes of each piece, views of `vertices`."""
+        rings = self.rings
+        return [
+            OverlayPiece(rings[start], tuple(rings[start + 1 : stop]))
+            for start, stop in zip(self.piece_offsets, self.piece_offsets[1:])
+        ]
+
+    @property
+    def area_exact(self) -> Fraction:
+        """The exact area of the exact result; as long as all its crossings together, so costly for thousands."""
+        return self.exact.area()
+
+    @property
+    def area(self) -> float:
+        """The double nearest to `area_exact`, without making the fraction."""
+        return self.exact.nearest_area()

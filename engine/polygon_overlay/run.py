@@ -1,0 +1,294 @@
+"""Runs the compiled overlay on pairs of polygons, and gathers what it leaves as flat arrays."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from dataclasses import replace
+from types import FunctionType
+from typing import Any, Final, Literal, NamedTuple, TypeVar, cast
+
+import numpy as np
+import numpy.typing as npt
+
+from engine.parallel import Budget
+from engine.polygon_overlay.compiled.kernel import (
+    DONE,
+    NEEDS_CONTACTS,
+    NEEDS_OUTPUT,
+    OPEN,
+    overlay_pairs,
+)
+from engine.polygon_overlay.compiled.workspace import keep, more_contacts, scratch_for
+from engine.polygon_overlay.implicit_rings import ImplicitRings, RingArrays
+from engine.polygon_overlay.nearest import leave_nearest
+from engine.polygon_overlay.result import Overlay
+from engine.polygon_overlay.ring_bits import RingBits
+from engine.polygon_overlay.rounds import RoundedRings, settle_rings
+from engine.polygon_overlay.run_pair import NOT_REDUCED, FoundPair, run_pair
+from engine.predicates.scaling import exponent_of, scaled_back, shifted
+
+Operation = Literal["intersection", "union", "difference", "symmetric_difference"]
+Output = Literal["valid", "nearest"]
+Scalar = TypeVar("Scalar", bound=np.generic)
+
+KEPT: Final = {  # by the label of a face: in neither, in the subject, in the clip, in both
+    "intersection": (False, False, False, True),
+    "union": (False, True, True, True),
+    "difference": (False, True, False, False),
+    "symmetric_difference": (False, True, True, False),
+}
+_overlay_pairs: Any = overlay_pairs
+if isinstance(overlay_pairs, FunctionType):  # uncompiled: numpy warns of what overflows
+    _overlay_pairs = np.errstate(all="ignore")(overlay_pairs)
+_NONE: Final = np.zeros(0, np.int64)
+_NO_LABELS: Final = RingBits(_NONE, _NONE)
+KEPT_ARRAYS: Final = {name: np.array(kept, np.uint8) for name, kept in KEPT.items()}
+
+
+class Polygons(NamedTuple):
+    """Some polygons as flat arrays: vertices (n, 2) float64, rings by vertex offsets, polygons by ring offsets.
+
+    most_vertices, most_rings: of one polygon.
+    """
+
+    vertices: npt.NDArray[np.float64]
+    ring_offsets: npt.NDArray[np.int64]
+    polygon_offsets: npt.NDArray[np.int64]
+    most_vertices: int
+    most_rings: int
+
+
+class Found(NamedTuple):
+    """What the kernel found for some pairs, one after another.
+
+    status: (pairs,) int8, DONE, OPEN or UNVOUCHED; counts: (pairs, 4) int64, pieces, rings, vertices and pairs of edges
+    beyond the filter; displacement: (pairs,) float64. vertices, sources: of all pairs that are not OPEN; ring_offsets
+    into them; piece_offsets: into the rings. evidence: by ring, of pairs whose rings are sources of their own.
+    """
+
+    status: npt.NDArray[np.int8]
+    counts: npt.NDArray[np.int64]
+    displacement: npt.NDArray[np.float64]
+    vertices: npt.NDArray[np.float64]
+    sources: npt.NDArray[np.int32]
+    ring_offsets: npt.NDArray[np.int64]
+    piece_offsets: npt.NDArray[np.int64]
+    evidence: npt.NDArray[np.int64]
+
+
+def gathered(vertices: Sequence[npt.NDArray[np.float64]], ring_offsets: Sequence[npt.NDArray[np.int64]]) -> Polygons:
+    """Return polygons, given by the arrays of each, as flat arrays; at least one polygon, and none without a ring.
+
+    Joined as bytes: numpy takes three times as long to put small arrays one after another.
+    """
+    n = len(vertices)
+    joined = np.frombuffer(b"".join(cast("Sequence[bytes]", vertices))).reshape(-1, 2)
+    offsets = np.frombuffer(b"".join(cast("Sequence[bytes]", ring_offsets)), np.int64)
+    if len(offsets) == 2 * n:  # one ring each
+        sizes = offsets[1::2]
+        return Polygons(joined, summed(sizes), as_frozen(np.arange(n + 1)), int(sizes.max()), 1)
+    starts = np.flatnonzero(offsets == 0)  # of each polygon's: no ring is empty
+    ends = np.append(starts[1:], len(offsets)) - 1
+    sizes, n_rings = offsets[ends], ends - starts
+    first_vertices = np.cumsum(sizes) - sizes
+    ring_starts = np.delete(offsets + np.repeat(first_vertices, n_rings + 1), ends)
+    rings = as_frozen(np.append(ring_starts, len(joined)))
+    return Polygons(joined, rings, summed(n_rings), int(sizes.max()), int(n_rings.max()))
+
+
+def as_frozen(array: npt.NDArray[Scalar]) -> npt.NDArray[Scalar]:
+    """Return an array of the one kind that kernels are compiled for: itself, a read-only view, or a copy."""
+    array = np.ascontiguousarray(array)
+    if array.flags.writeable:
+        array = array.view()
+        array.setflags(write=False)
+    return array
+
+
+_EMPTY: Final = Polygons(
+    as_frozen(np.zeros((0, 2))), as_frozen(np.zeros(1, np.int64)), as_frozen(np.zeros(2, np.int64)), 0, 0
+)
+
+
+def run_kernel(
+    subjects: Polygons, clips: Polygons, operation: Operation, budget: Budget, labels: RingBits = _NO_LABELS
+) -> Found:
+    """Overlay polygons pair by pair. Raises as `Budget.check` when the call must end.
+
+    labels: bits of the rings of subjects to be arranged each as a source of its own, as `overlay_pairs` takes them.
+    """
+    n = len(subjects.polygon_offsets) - 1
+    n_vertices, n_rings = subjects.most_vertices + clips.most_vertices, subjects.most_rings + clips.most_rings
+    status, counts, displacement = np.empty(n, np.int8), np.empty((n, 4), np.int64), np.empty(n)
+    reached = 0
+    parts: list[Found] = []
+    n_contacts = max(256, 4 * n_vertices)
+    n_out, n_out_rings = 8 * n + len(subjects.vertices) + len(clips.vertices), 2 * n
+    while reached < n:  # bound: each turn goes on, or makes room for one pair, geometrically
+        scratch = scratch_for(n_vertices, n_rings, n_contacts, n_out, n_out_rings)
+        reached, needs, filled, n_filled, n_pieces, used, _ = _overlay_pairs(
+            *subjects[:3],
+            *clips[:3],
+            0,
+            n,
+            reached,
+            *NOT_REDUCED,
+            KEPT_ARRAYS[operation],
+            *labels,
+            budget.flag,
+            scratch.buffers,
+            status,
+            counts,
+            displacement,
+            *scratch.output,
+        )
+        budget.check()
+        part = Found(
+            status,
+            counts,
+            displacement,
+            scratch.output[0][:filled].copy(),
+            scratch.output[1][:filled].copy(),
+            scratch.output[2][: n_filled + 1].copy(),
+            scratch.output[3][: n_pieces + 1].copy(),
+            scratch.output[4][:n_filled].copy() if len(labels.bits) else _NONE,
+        )
+        parts.append(part)
+        keep(scratch, n_vertices, used, filled)
+        if needs == NEEDS_CONTACTS:
+            n_contacts = more_contacts(scratch.n_contacts)
+        elif needs == NEEDS_OUTPUT:
+            n_out_rings, n_out = (max(m, int(counts[reached, k])) for k, m in ((1, n_out_rings), (2, n_out)))
+    if len(parts) == 1:
+        return parts[0]
+    return Found(
+        status,
+        counts,
+        displacement,
+        np.concatenate([each.vertices for each in parts]),
+        np.concatenate([each.sources for each in parts]),
+        chained([each.ring_offsets for each in parts]),
+        chained([each.piece_offsets for each in parts]),
+        np.concatenate([each.evidence for each in parts]),
+    )
+
+
+def summed(sizes: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """Return where each of some parts put one after another begins, and the end of the last; read-only."""
+    offsets = np.zeros(len(sizes) + 1, np.int64)
+    np.cumsum(sizes, out=offsets[1:])
+    return as_frozen(offsets)
+
+
+def chained(offsets: Sequence[npt.NDArray[np.int64]]) -> npt.NDArray[np.int64]:
+    """Return the offsets of several arrays put one after another."""
+    return summed(np.concatenate([np.zeros(0, np.int64), *(each[1:] - each[:-1] for each in offsets)]))
+
+
+def overlay_compiled(
+    subject: RingArrays, clip: RingArrays, operation: Operation, output: Output, budget: Budget
+) -> tuple[Overlay, int] | None:
+    """Return the overlay of one pair and the number of pairs of edges beyond the filter; None where it is left open.
+
+    A scene outside of the kernel's range is brought into it by a power of two where that is exact.
+    """
+    found, exponent = run_pair(subject, clip, KEPT_ARRAYS[operation], budget), 0
+    if found.status == OPEN:
+        exponent = exponent_of(subject.vertices, clip.vertices)
+        if exponent == 0:
+            return None
+        first, second = shifted(subject.vertices, -exponent), shifted(clip.vertices, -exponent)
+        if first is None or second is None:
+            return None
+        near = RingArrays(first, subject.offsets), RingArrays(second, clip.offsets)
+        found = run_pair(*near, KEPT_ARRAYS[operation], budget)
+        if found.status == OPEN:
+            return None
+    exact = ImplicitRings(subject, clip, found.sources, found.ring_offsets)
+    settled = None
+    vertices, displacement = found.vertices, found.displacement
+    if found.status != DONE:
+        rounded = _rounded(found, _NONE)
+        if output == "valid":
+            settled = settle_rings(rounded, exact, functools.partial(_again, budget), exponent == 0, budget)
+        else:
+            settled = leave_nearest(rounded, exact, budget)
+        if settled is None:
+            return None
+        vertices, displacement = as_frozen(settled.rings.vertices), settled.displacement
+    if exponent:
+        vertices, doubtful = scaled_back(vertices, exponent)
+        vertices.setflags(write=False)
+        if doubtful.any() or not np.isfinite(vertices).all():
+            return None
+        displacement = float(np.nextafter(np.ldexp(displacement, exponent), np.inf)) if displacement else 0.0
+    result = as_overlay(vertices, found.piece_offsets, displacement, exact, output)
+    if settled is not None:
+        result = replace(
+            result,
+            ring_offsets=as_frozen(settled.rings.ring_offsets),
+            piece_offsets=as_frozen(settled.rings.piece_offsets),
+            collapsed=settled.collapsed,
+            pieces_joined=settled.pieces_joined,
+            pieces_parted=settled.pieces_parted,
+            holes_joined=settled.holes_joined,
+            holes_parted=settled.holes_parted,
+            rounds=settled.rounds,
+            vertices_moved=settled.vertices_moved,
+            snapped=settled.snapped,
+        )
+    return result, found.n_exact
+
+
+def _rounded(found: FoundPair, evidence: npt.NDArray[np.int64]) -> RoundedRings:
+    """Return what was found for one pair as the outcome of a round."""
+    return RoundedRings(
+        vertices=found.vertices,
+        ring_offsets=found.ring_offsets,
+        piece_offsets=found.piece_offsets,
+        evidence=evidence,
+        displacement=found.displacement,
+        is_valid=found.status == DONE,
+        has_crossings=bool((found.sources[:, 1] >= 0).any()),
+    )
+
+
+def _again(budget: Budget, rings: RoundedRings, labels: RingBits) -> RoundedRings | None:
+    """Arrange rounded rings, each a source of its own; None where that is left open."""
+    offsets = as_frozen(rings.ring_offsets)
+    n_vertices, n_rings = len(rings.vertices), len(offsets) - 1
+    subject = Polygons(as_frozen(rings.vertices), offsets, as_frozen(np.array([0, n_rings])), n_vertices, n_rings)
+    status, counts, displacement, vertices, sources, *offsets_found, evidence = run_kernel(
+        subject, _EMPTY, "union", budget, labels
+    )
+    if status[0] == OPEN:
+        return None
+    found = FoundPair(int(status[0]), int(counts[0, 3]), float(displacement[0]), vertices, sources, *offsets_found)
+    return _rounded(found, evidence)
+
+
+def as_overlay(
+    vertices: npt.NDArray[np.float64],
+    piece_offsets: npt.NDArray[np.int64],
+    displacement: float,
+    exact: ImplicitRings,
+    output: Output,
+) -> Overlay:
+    """Return an `Overlay` whose rounded rings have the structure of the exact ones; all arrays are read-only."""
+    offsets = exact.offsets
+    n_pieces = len(piece_offsets) - 1
+    result = object.__new__(Overlay)
+    vars(result).update(  # as Overlay(...) does one by one, which takes 2 us
+        vertices=vertices,
+        ring_offsets=offsets,
+        piece_offsets=piece_offsets,
+        output=output,
+        may_be_invalid=output == "nearest" and displacement > 0.0,
+        n_pieces_exact=n_pieces,
+        n_holes_exact=len(offsets) - 1 - n_pieces,
+        exact=exact,
+        largest_displacement=displacement,
+        rounds=int(displacement > 0.0),
+    )
+    return result

@@ -1,0 +1,158 @@
+"""The point and the parameter at which a segment p q crosses a plane, correctly rounded, from the end points.
+
+With weights w_p = |s_p| and w_q = |s_q| (distances of the ends from the plane, up to a common factor),
+
+    t = w_p / (w_p + w_q),        x = p + t (q - p) = (p w_q + q w_p) / (w_p + w_q).
+
+Only original end points enter, never a point cut before. Three tries, each dearer and surer than the one before:
+
+1. `point_at`: x = p + t (q - p) with t as a double-double;
+2. `nearest`: first the weighted form as a double-double, which finds an exact zero;
+3. then the double whose midpoints with its neighbours enclose x, by exact signs; ties go to even. Mostly the
+   double-double leaves one midpoint open, so that one sign does.
+
+The first two say whether the double is surely the nearest; where the third has no range, rational arithmetic settles
+the item (exact_segments.py).
+
+Bound of the weighted form. Weights are exact expansions, compressed: two components hold them within 8 u^2. Products
+add 2 u^2, their sum 4 u^2, the sum of the weights 12 u^2, the quotient 16 u^2, the test `surely_rounded` 2 u^2: with
+M = max(|p|, |q|) every coordinate is within 44 u^2 M of its value. Where the weights are doubles, their products are
+exact, and the sum of two double-doubles is within 4 u^2 of itself, however much cancels: then, and where p or q is
+zero, M is |x|.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+
+from engine.jit import inline
+from engine.predicates.double_double import U2, dd_add, dd_div, dd_scale, even_of, surely_rounded
+from engine.predicates.error_free import two_diff, two_prod, two_sum
+from engine.predicates.expansion import Components, grow_product, sign
+from engine.predicates.ranges import LARGEST
+
+CUT_BOUND: Final = 64.0 * U2
+POINT_BOUND: Final = 48.0 * U2
+"""Of `point_at`, times |p| + |t (q - p)|: t carries 18 u^2; the low parts, none above u (|p| + 3.1 |t (q - p)|), lose
+17 u^2 in five sums and two products, their product that is left out 3.1 u^2, the test 6 u^2: below 45 u^2."""
+TINY: Final = 2.0**-1070
+"""Added to bounds for products that underflow: at most four of 2^-1074."""
+_SCALE: Final = 2.0**600
+_NEXT: Final = 4
+"""Neighbours that `nearest` goes on to: a guess is off by one or two units."""
+
+
+@inline
+def point_at(p: float, q: float, th: float, tl: float, slack: float) -> tuple[float, bool]:
+    """Return p + t (q - p) and whether it is surely the nearest double; t is known within 18 u^2 + `slack` of itself.
+
+    Coordinates below 2^1000. A zero is never sure unless p = q.
+    """
+    dh, dl = two_diff(q, p)
+    mh, ml = two_prod(th, dh)
+    sh, sl = two_sum(p, mh)
+    low = (sl + ml) + (tl * dh + th * dl)
+    bound = POINT_BOUND * (abs(p) + abs(mh)) + slack * abs(mh) + TINY
+    return sh + low, (sh + (low - bound) == sh + (low + bound)) | (p == q)
+
+
+@inline
+def side_of(
+    p: float, q: float, wp: Components, n_wp: int, wq: Components, n_wq: int, x: float, step: float, e: Components
+) -> int:
+    """Return the exact sign of (p w_q + q w_p) / (w_p + w_q) - (x + step); `e` has 6 (n_wp + n_wq) places."""
+    n = 0
+    ah, al = two_diff(p, x)
+    bh, bl = two_diff(q, x)
+    for i in range(n_wq):
+        n = grow_product(e, n, wq[i], al)
+        n = grow_product(e, n, wq[i], -step)
+        n = grow_product(e, n, wq[i], ah)
+    for i in range(n_wp):
+        n = grow_product(e, n, wp[i], bl)
+        n = grow_product(e, n, wp[i], -step)
+        n = grow_product(e, n, wp[i], bh)
+    return sign(e, n)
+
+
+@inline
+def nearest(
+    p: float, q: float, wp: Components, n_wp: int, wq: Components, n_wq: int, sum_h: float, sum_l: float, e: Components
+) -> tuple[float, bool]:
+    """Return the double nearest to (p w_q + q w_p) / (w_p + w_q), and False where numbers have no range for that.
+
+    wp, wq: positive compressed expansions (or zero, not both) of components within 2^-240 .. 2^240; sum: of both, to
+    4 u^2. `e`: see `side_of`. p and q must not be so far apart in size that products underflow. Subnormal results are
+    rounded right too: all is done on numbers times 2^600 there.
+    """
+    if p == q or n_wp == 0:
+        return p + 0.0, True
+    if n_wq == 0:
+        return q + 0.0, True
+    scale = _SCALE if max(abs(p), abs(q)) < 1.0 / LARGEST else 1.0
+    p, q = p * scale, q * scale
+    if not ((p == 0.0 or abs(p) >= 2.0**-480) and (q == 0.0 or abs(q) >= 2.0**-480) and max(abs(p), abs(q)) < _SCALE):
+        return 0.0, False
+    wp_l, wq_l = (wp[n_wp - 2] if n_wp > 1 else 0.0), (wq[n_wq - 2] if n_wq > 1 else 0.0)
+    ah, al = dd_scale(wq[n_wq - 1], wq_l, p)
+    bh, bl = dd_scale(wp[n_wp - 1], wp_l, q)
+    h, low = dd_add(ah, al, bh, bl)
+    if h == 0.0 and wp_l == 0.0 and wq_l == 0.0:
+        return 0.0, True  # case: products without error that cancel, a cut exactly at zero (lattices)
+    h, low = dd_div(h, low, sum_h, sum_l)
+    is_whole = (n_wp == 1 and n_wq == 1) or p == 0.0 or q == 0.0  # the products are exact, or nothing cancels
+    bound = CUT_BOUND * (abs(h) if is_whole else max(abs(p), abs(q)))
+    if scale == 1.0 and surely_rounded(h, low, bound):
+        return h, True
+    is_close = scale == 1.0 and bound <= 2.0**-56 * abs(h)
+    if not is_close and side_of(p, q, wp, n_wp, wq, n_wq, 0.0, 0.0, e) == 0:
+        return 0.0, True
+    x = h / scale
+    if scale == 1.0 and abs(x) < 2.0**-500:
+        return x, False
+    # invariant: the nearest double is x or beyond on the side looked at, on both sides until it is settled
+    is_up, is_settled = low > 0.0, is_close
+    for _ in range(_NEXT):
+        other = np.nextafter(x, np.inf if is_up else -np.inf)
+        side = side_of(p, q, wp, n_wp, wq, n_wq, x * scale, 0.5 * ((other - x) * scale), e)
+        if side == 0:
+            return even_of(x * scale, other * scale) / scale + 0.0, True
+        is_beyond = (side > 0) == is_up
+        if is_beyond:
+            x = other
+        elif not is_settled:
+            is_up = not is_up
+        if is_close or (is_settled and not is_beyond):
+            return x + 0.0, True
+        is_settled = True
+    return x, False
+
+
+@inline
+def parameter_and_point(
+    segment: Any, wp: Components, n_wp: int, wq: Components, n_wq: int, axis: int, at: float, point: Any, e: Components
+) -> tuple[float, bool]:
+    """Set `point` to the nearest doubles of the point with these weights; return t and whether all is sure.
+
+    axis, at: an axis whose coordinate is known, -1 for none. Weights and places of `e`: see `nearest`.
+    """
+    sum_h, sum_l = dd_add(
+        wp[n_wp - 1] if n_wp > 0 else 0.0,
+        wp[n_wp - 2] if n_wp > 1 else 0.0,
+        wq[n_wq - 1] if n_wq > 0 else 0.0,
+        wq[n_wq - 2] if n_wq > 1 else 0.0,
+    )
+    t, all_sure = 0.0, True
+    for k in range(-1, point.size):  # -1: t itself, from 0 to 1
+        x, sure = at, True
+        if k != axis or k < 0:
+            p, q = (0.0, 1.0) if k < 0 else (segment[0, k], segment[1, k])
+            x, sure = nearest(p, q, wp, n_wp, wq, n_wq, sum_h, sum_l, e)
+        all_sure = all_sure and sure
+        if k < 0:
+            t = x
+        else:
+            point[k] = x
+    return t, all_sure

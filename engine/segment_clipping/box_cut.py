@@ -1,0 +1,142 @@
+"""The pieces of segments on a box: the points and parameters at which planes cut them, correctly rounded: 2D and 3D.
+
+Both ends of a block of pieces are made at once, cut or not, without branches: see cohen_sutherland.py, which decides
+between which planes each piece lies. Where t as a double-double leaves a number unsure, all of the end is made again
+from exact differences (cut_point.py).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from engine.jit import inline, kernel, merged
+from engine.predicates.cut_point import parameter_and_point, point_at
+from engine.predicates.error_free import two_diff, workspace
+from engine.predicates.ranges import is_safe
+from engine.segment_clipping.cohen_sutherland import BLOCK, corners_of, plane_value, point_of
+from engine.segment_clipping.plane_meeting import LONGEST, SHORTEST, T_BOUND, meeting
+
+
+@merged
+def cut_end(
+    px: float, py: float, pz: float, qx: float, qy: float, qz: float,
+    x0: float, y0: float, z0: float, x1: float, y1: float, z1: float, plane: float, end: float,
+) -> tuple[float, float, float, float, bool]:  # fmt: skip
+    """Return where p q meets a plane, t there, and whether all is sure; for plane -1 the end of p q, 0 or 1."""
+    is_x, is_y, is_z = plane < 1.5, (plane > 1.5) & (plane < 3.5), plane > 3.5
+    is_high = (plane == 1.0) | (plane == 3.0) | (plane == 5.0)
+    low, high = (x0 if is_x else (y0 if is_y else z0)), (x1 if is_x else (y1 if is_y else z1))
+    at = high if is_high else low
+    m = meeting(px if is_x else (py if is_y else pz), qx if is_x else (qy if is_y else qz), at, plane)
+    length, bound = abs(m.d), T_BOUND * m.t
+    x, x_sure = point_at(px, qx, m.t, m.t_low, 0.0)
+    y, y_sure = point_at(py, qy, m.t, m.t_low, 0.0)
+    z, z_sure = point_at(pz, qz, m.t, m.t_low, 0.0)
+    is_start = m.n == 0.0  # p lies on the plane: t = 0 and p itself
+    sure = ((abs(m.n) >= 2.0**-500) | is_start) & (length >= SHORTEST) & (length <= LONGEST)
+    sure = sure & (m.t + (m.t_low - bound) == m.t + (m.t_low + bound))
+    sure = sure & (x_sure | is_x | is_start) & (y_sure | is_y | is_start) & (z_sure | is_z | is_start)
+    x, y, z, t = (at if is_x else x), (at if is_y else y), (at if is_z else z), m.t + m.t_low
+    is_own, is_first = plane < 0.0, end == 0.0
+    x, y, z = (
+        (x if not is_own else px if is_first else qx),
+        (y if not is_own else py if is_first else qy),
+        (z if not is_own else pz if is_first else qz),
+    )
+    return x + 0.0, y + 0.0, z + 0.0, (end if is_own else t + 0.0), sure | is_own
+
+
+@inline
+def cut_by_signs(segment: Any, low: Any, high: Any, plane: int, point: Any) -> tuple[float, bool]:
+    """Set `point` to where `segment` crosses `plane`, settled by exact signs; return t and whether all is sure."""
+    axis, at = plane >> 1, plane_value(low, high, plane)
+    p, q = segment[0, axis], segment[1, axis]
+    if not (is_safe(p) and is_safe(q) and is_safe(at)):
+        return 0.0, False
+    wp, wq, e = workspace(2), workspace(2), workspace(24)
+    flip = 1.0 if q > p else -1.0
+    n_wp, n_wq = difference(flip * at, flip * p, wp), difference(flip * q, flip * at, wq)
+    return parameter_and_point(segment, wp, n_wp, wq, n_wq, axis, at, point, e)
+
+
+@inline
+def difference(a: float, b: float, e: Any) -> int:
+    """Set e to a - b as an expansion; two places."""
+    h, low = two_diff(a, b)
+    n = 0
+    for part in (low, h):
+        if part != 0.0:
+            e[n] = part
+            n += 1
+    return n
+
+
+@kernel
+def fill_on_boxes(
+    segments: Any,
+    low: Any,
+    high: Any,
+    items: Any,
+    planes: Any,
+    first: int,
+    last: int,
+    stop: Any,
+    source: Any,
+    ends: Any,
+    t: Any,
+    faces: Any,
+    still: Any,
+    n: Any,
+) -> None:
+    """Fill rows first .. last - 1 of the pieces of ``segments`` ((n, 2, dim) float64) on the box `low`, `high`.
+
+    items: (m,) int32, planes: (m, 2) int32, as decided. source: (m,) int64. ends: start and end, (m, dim) float64 each.
+    t, faces: (m, 2) float64 and int64. still: from ``still[first]`` on the rows that are not surely rounded. n: how
+    many of them, and how many needed more than the first try. stop: one uint8, polled.
+    """
+    is_flat = low.size == 2
+    x0, y0, z0, x1, y1, z1 = corners_of(low, high)
+    px, py, pz, qx, qy, qz, entered, left, t0, t1, sure = (
+        workspace(64), workspace(64), workspace(64), workspace(64), workspace(64), workspace(64),
+        workspace(64), workspace(64), workspace(64), workspace(64), workspace(64),
+    )  # fmt: skip
+    n_open = beyond = 0
+    for start in range(first, last, BLOCK):
+        if stop[0]:
+            return
+        size = min(BLOCK, last - start)
+        for j in range(size):
+            px[j], py[j], pz[j] = point_of(segments, items[start + j], 0, is_flat)
+            qx[j], qy[j], qz[j] = point_of(segments, items[start + j], 1, is_flat)
+            entered[j], left[j] = planes[start + j, 0], planes[start + j, 1]
+        for j in range(BLOCK):
+            ax, ay, az, t0[j], p_sure = cut_end(
+                px[j], py[j], pz[j], qx[j], qy[j], qz[j], x0, y0, z0, x1, y1, z1, entered[j], 0.0
+            )
+            bx, by, bz, t1[j], q_sure = cut_end(
+                px[j], py[j], pz[j], qx[j], qy[j], qz[j], x0, y0, z0, x1, y1, z1, left[j], 1.0
+            )
+            px[j], py[j], pz[j], qx[j], qy[j], qz[j] = ax, ay, az, bx, by, bz
+            sure[j] = (1.0 if p_sure else 0.0) + (2.0 if q_sure else 0.0)
+        for j in range(size):
+            row = start + j
+            source[row], faces[row, 0], faces[row, 1] = items[row], planes[row, 0], planes[row, 1]
+            t[row, 0], t[row, 1] = t0[j], t1[j]
+            ends[0, row, 0], ends[0, row, 1], ends[1, row, 0], ends[1, row, 1] = px[j], py[j], qx[j], qy[j]
+            if not is_flat:
+                ends[0, row, 2], ends[1, row, 2] = pz[j], qz[j]
+        for j in range(size):
+            if sure[j] == 3.0:
+                continue
+            row, all_sure = start + j, True
+            for side in range(2):
+                if int(sure[j]) >> side & 1 == 0:
+                    t[row, side], is_sure = cut_by_signs(
+                        segments[items[row]], low, high, planes[row, side], ends[side, row]
+                    )
+                    all_sure = all_sure and is_sure
+            beyond += 1
+            if not all_sure:
+                still[first + n_open] = row
+                n_open += 1
+    n[0], n[1] = n_open, beyond

@@ -1,0 +1,260 @@
+"""Public: what remains of segments on a region."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from engine.errors import UnsupportedSolidError
+from engine.parallel import Budget, Cancel, Progress, run_chunks
+from engine.predicates.scaling import FloatArray, balanced_rows, exponent_of, shifted
+from engine.segment_clipping.ball_cut import fill_on_sphere
+from engine.segment_clipping.ball_interval import decide_on_sphere
+from engine.segment_clipping.boundary import clip_chunk, locator_for
+from engine.segment_clipping.box_cut import fill_on_boxes
+from engine.segment_clipping.cohen_sutherland import decide_on_boxes
+from engine.segment_clipping.cyrus_beck import as_columns, decide_on_rows
+from engine.segment_clipping.decide_then_cut import Method, PieceRows, Scaled, clip_on_convex
+from engine.segment_clipping.exact_segments import clip_by_planes, clip_by_sphere
+from engine.segment_clipping.planes_cut import fill_on_rows
+from engine.solids.aabb import Aabb
+from engine.solids.base import Solid
+from engine.solids.box_planes import box_rows
+from engine.solids.checks import as_point_groups, check_finite
+from engine.solids.convex import Convex
+from engine.solids.half_space import HalfSpace
+from engine.solids.polygon import Polygon
+from engine.solids.polyhedron import Polyhedron
+from engine.solids.sphere import Sphere
+from engine.types import Accuracy
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SegmentPieces:
+    """The pieces of a batch of segments within a region, by source and then by t.
+
+    source: (m,) int64, the segment each piece is a part of.
+    start, end: (m, dim) float64, each coordinate the double nearest to the exact one.
+    t: (m, 2) float64, the parameters of both ends, each the nearest double.
+    faces: (m, 2) int64, the plane or face crossed at either end, -1 where the end is the segment's own.
+    """
+
+    source: npt.NDArray[np.int64]
+    start: FloatArray
+    end: FloatArray
+    t: FloatArray
+    faces: npt.NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.source)
+
+
+@overload
+def clip_segments(
+    segments: npt.ArrayLike,
+    region: Solid,
+    *,
+    workers: int | None = None,
+    deadline: float | None = None,
+    cancel: Cancel | None = None,
+    progress: Progress | None = None,
+    report: Literal[False] = False,
+) -> SegmentPieces: ...
+
+
+@overload
+def clip_segments(
+    segments: npt.ArrayLike,
+    region: Solid,
+    *,
+    workers: int | None = None,
+    deadline: float | None = None,
+    cancel: Cancel | None = None,
+    progress: Progress | None = None,
+    report: Literal[True],
+) -> tuple[SegmentPieces, Accuracy]: ...
+
+
+def clip_segments(
+    segments: npt.ArrayLike,
+    region: Solid,
+    *,
+    workers: int | None = None,
+    deadline: float | None = None,
+    cancel: Cancel | None = None,
+    progress: Progress | None = None,
+    report: bool = False,
+) -> SegmentPieces | tuple[SegmentPieces, Accuracy]:
+    """Return the pieces of segments that lie in a region, a closed set.
+
+    A piece is a maximal connected part of a segment within the region or on its boundary. Boxes are clipped by
+    Cohen-Sutherland outcodes, convex regions by their generalisation, spheres by the roots of a quadratic, polygons and
+    polyhedra by the elements of their boundary that a box tree finds; all with exact decisions on the original ends.
+
+    Parameters
+        segments: (n, 2, dim) numbers, two points each; none at all are welcome.
+        region: half_space, aabb, convex (may be empty or unbounded), sphere, polygon or polyhedron of the same
+            dimension. On the last two a segment may have several pieces.
+        workers, deadline (seconds), cancel, progress: see `engine.parallel`.
+        report: return ``(pieces, Accuracy)``.
+    Returns
+        `SegmentPieces`; the parts of [0, 1] that no piece covers are outside of the region.
+    Boundary
+        Counts as in: a segment in a face is kept, one that touches in a single point gives that point (t0 = t1).
+        `faces` at the start is -1 exactly where t0 = 0, at the end where t1 = 1; else the plane crossed there, of
+        several at one point the smallest, those that the segment runs along, or that have no
+        area, last. Indices: half_space 0; aabb xmin,
+        xmax, ymin, ymax, zmin, zmax; convex the row; sphere 0; polyhedron the face as given; polygon the edge, named by
+        the index of its first vertex over all rings.
+    Degenerate input
+        A segment of no length is a point: kept as a whole (t = (0, 1), faces -1) or dropped.
+    Accuracy
+        Decisions exact for every finite input. Coordinates and t are the doubles nearest to the exact values, each on
+        its own, zero as +0.0; so a piece may stick out of a slanted plane by half an ulp, and the ends of a tiny piece
+        may be equal. On an aabb a coordinate cut by a plane is the plane's. No result overflows.
+    Cost
+        O(n planes), or O(n (log faces + contacts)) after one preparation; allocates the outputs.
+    Raises
+        UnsupportedSolidError, InvalidArrayError, WrongDimensionError, NotFiniteError, DeadlineExceededError,
+        CancelledError.
+
+    >>> from engine.solids.aabb import Aabb
+    >>> pieces = clip_segments([[[-1.0, 1.0], [3.0, 1.0]]], Aabb(min=[0.0, 0.0], max=[2.0, 2.0]))
+    >>> pieces.start.tolist(), pieces.end.tolist(), pieces.t.tolist(), pieces.faces.tolist()
+    ([[0.0, 1.0]], [[2.0, 1.0]], [[0.25, 0.75]], [[0, 1]])
+    """
+    task, method = _method(region)
+    array = as_point_groups(segments, 2, region.dimension, ("segments",), must_be_finite=False)  # kernels look at it
+    with Budget(deadline, cancel) as budget:
+        pieces, n_beyond, n_rational = task(array, budget, workers, progress)
+    if not report:
+        return pieces
+    return pieces, Accuracy("exact", 0.5, len(array), n_beyond, n_rational, method)
+
+
+Task = Callable[[FloatArray, Budget, int | None, Progress | None], tuple[SegmentPieces, int, int]]
+
+
+def _method(region: Solid) -> tuple[Task, str]:
+    """Return what clips on this solid, and its name: the one table from type to method."""
+    match region:
+        case HalfSpace():
+            return _on_rows(region.row[None, :]), "cyrus_beck"
+        case Convex():
+            return _on_rows(region.planes), "cyrus_beck"
+        case Aabb():
+            return _on_box(region), "cohen_sutherland"
+        case Sphere():
+            return _on_ball(region), "sphere_interval"
+        case Polygon() | Polyhedron():
+            return _on_boundary(region), "box_tree"
+    kind = getattr(region, "type", type(region).__name__)
+    raise UnsupportedSolidError(
+        f"clip_segments does not take a {kind}; give a half_space, aabb, convex, sphere, polygon or polyhedron",
+        ("region",),
+    )
+
+
+def _on_box(region: Aabb) -> Task:
+    planes = box_rows(region).tolist()
+
+    def scale(segments: FloatArray) -> Scaled | None:
+        exponent = exponent_of(segments, region.min, region.max)
+        points, low, high = (shifted(array, -exponent) for array in (segments, region.min, region.max))
+        if exponent == 0 or points is None or low is None or high is None:
+            return None
+        return Scaled(points, (low, high), exponent)
+
+    return _one_piece(
+        Method(
+            decide_on_boxes,
+            fill_on_boxes,
+            (region.min, region.max),
+            lambda p, q: clip_by_planes(p, q, planes),
+            scale,
+        )
+    )
+
+
+def _on_rows(rows: FloatArray) -> Task:
+    planes = rows.tolist()
+    plain = balanced_rows(rows, 0)
+
+    def scale(segments: FloatArray) -> Scaled | None:
+        exponent = exponent_of(segments)
+        points, balanced = shifted(segments, -exponent), balanced_rows(rows, exponent)
+        if exponent == 0 or points is None or balanced is None:
+            return None
+        return Scaled(points, (as_columns(balanced),), exponent)
+
+    return _one_piece(
+        Method(
+            decide_on_rows,
+            fill_on_rows,
+            (as_columns(rows if plain is None else plain),),
+            lambda p, q: clip_by_planes(p, q, planes),
+            scale,
+        )
+    )
+
+
+def _on_ball(region: Sphere) -> Task:
+    center, radius = region.center.tolist(), region.radius
+
+    def scale(segments: FloatArray) -> Scaled | None:
+        ball = np.append(region.center, radius)
+        exponent = exponent_of(segments, ball)
+        points, scaled = shifted(segments, -exponent), shifted(ball, -exponent)
+        if exponent == 0 or points is None or scaled is None:
+            return None
+        return Scaled(points, (scaled[:-1], float(scaled[-1])), exponent)
+
+    return _one_piece(
+        Method(
+            decide_on_sphere,
+            fill_on_sphere,
+            (region.center, float(radius)),
+            lambda p, q: clip_by_sphere(p, q, center, radius),
+            scale,
+        )
+    )
+
+
+def _one_piece(method: Method) -> Task:
+    def task(
+        segments: FloatArray, budget: Budget, workers: int | None, progress: Progress | None
+    ) -> tuple[SegmentPieces, int, int]:
+        rows = clip_on_convex(segments, method, budget, workers, progress)
+        pieces = SegmentPieces(rows.source, rows.start, rows.end, rows.t, rows.faces)
+        return pieces, rows.n_beyond, rows.n_rational
+
+    return task
+
+
+def _on_boundary(region: Polygon | Polyhedron) -> Task:
+    def task(
+        segments: FloatArray, budget: Budget, workers: int | None, progress: Progress | None
+    ) -> tuple[SegmentPieces, int, int]:
+        check_finite(segments, ("segments",))
+        chunks: dict[int, PieceRows] = {}
+        locator = locator_for(region, len(segments), budget)
+
+        def chunk(first: int, last: int) -> None:
+            chunks[first] = clip_chunk(segments, first, last, region, locator, budget)
+
+        run_chunks(chunk, len(segments), budget=budget, workers=workers, progress=progress, first_chunk=16)
+        parts = [chunks[first] for first in sorted(chunks)] or [clip_chunk(segments, 0, 0, region, locator, budget)]
+        pieces = SegmentPieces(
+            np.concatenate([part.source for part in parts]),
+            np.concatenate([part.start for part in parts]),
+            np.concatenate([part.end for part in parts]),
+            np.concatenate([part.t for part in parts]),
+            np.concatenate([part.faces for part in parts]),
+        )
+        return pieces, sum(part.n_beyond for part in parts), sum(part.n_rational for part in parts)
+
+    return task

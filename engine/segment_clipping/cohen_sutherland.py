@@ -1,0 +1,252 @@
+"""Segments on an axis-parallel box by outcodes, decided exactly: 2D and 3D.
+
+                 |        |                One bit for each plane a point lies outside of, in the order
+        0101     |  0100  |   0110         xmin, xmax, ymin, ymax, zmin, zmax (drawn: ymax ymin xmax xmin
+       ----------+--------+----------      would be 1000, 0100, 0010, 0001). Codes that share a bit: the
+        0001     |  0000  |   0010         segment misses the box. Both zero: it lies inside. Else it is
+       ----------+--------+----------      cut by planes it crosses, of which at most one per axis is
+        1001     |  1000  |   1010         entered and one left.
+
+The textbook cuts the outside end at one plane after another until the codes say accept or reject. Two departures:
+
+1. Its loop can run for ever by rounding, (1, 1)-(-1, -1) on the box [1e-9, 3]^2. Here each plane is looked at once:
+   the last plane entered and the first one left bound the piece, if in this order.
+2. It decides from rounded points. Here the parameters of the planes, quotients of differences of original coordinates,
+   are compared in doubles beyond their bound, then in double-doubles, else exactly: n_i / d_i against n_j / d_j as
+   n_i d_j against n_j d_i. The cut coordinate is the plane's own value.
+
+The first two comparisons are made for a block of segments at once, without branches: so the compiler uses vectors, and
+no processor has to foretell on which side of a plane a point lies. In the plane z is 0 throughout.
+
+Two kernels: `decide_on_boxes` says which planes bound each piece, `fill_on_boxes` (box_cut.py) makes the points of
+the pieces that there are.
+
+Source: Cohen and Sutherland in W. M. Newman, R. F. Sproull, Principles of Interactive Computer Graphics, 1979; the
+textbook's section on clipping segments on an AABB.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+
+from engine.jit import called, inline, kernel, merged
+from engine.predicates.error_free import workspace
+from engine.predicates.parameters import compare_differences, compare_differences_filter
+from engine.predicates.ranges import is_safe
+from engine.segment_clipping.plane_meeting import gap_between, meetings
+from engine.types import UNDECIDED
+
+DROPPED: Final = 0
+KEPT: Final = 1
+OPEN: Final = 2
+"""The kernel could not settle the item: rational arithmetic must."""
+Triple = tuple[float, float, float]
+LARGE: Final = 2.0**1000
+"""Items whose absolute coordinates add up to more, or to nothing (NaN, infinity), are left open."""
+T_GAP: Final = 16.0 * 2.0**-53
+"""Parameters t are quotients of two differences, within 3 u (1 + u)^2 of themselves; two of them and this test: 8 u."""
+T_TINY: Final = 2.0**-1060
+"""Parameters that underflow."""
+BLOCK: Final = 64
+"""Segments looked at together: fifteen numbers each stay in the nearest cache."""
+
+
+@inline
+def plane_outside(value: float, low: float, high: float, axis: int) -> int:
+    """Return the plane of `axis` that `value` lies outside of, -1 if none: 2 axis for low, 2 axis + 1 for high."""
+    if value < low:
+        return 2 * axis
+    if value > high:
+        return 2 * axis + 1
+    return -1
+
+
+@inline
+def plane_value(low: Any, high: Any, plane: int) -> float:
+    """Return the coordinate at which `plane` cuts its axis."""
+    return high[plane >> 1] if plane & 1 else low[plane >> 1]
+
+
+@called
+def compare_planes(p_i: float, q_i: float, c_i: float, p_j: float, q_j: float, c_j: float) -> int:
+    """Return the sign of t_i - t_j for two planes that a segment meets: at c, from p to q on their axes."""
+    # n and d of one plane have one sign, so absolute values keep the ratio and make the products comparable
+    order = compare_differences_filter(abs(c_i - p_i), abs(q_j - p_j), abs(c_j - p_j), abs(q_i - p_i))
+    if order != UNDECIDED:
+        return order
+    if not (is_safe(p_i) and is_safe(q_i) and is_safe(c_i) and is_safe(p_j) and is_safe(q_j) and is_safe(c_j)):
+        return UNDECIDED
+    e = workspace(16)
+    order = compare_differences(c_i, p_i, q_j, p_j, c_j, p_j, q_i, p_i, e)
+    return order if (q_i > p_i) == (q_j > p_j) else -order
+
+
+@inline
+def decide_exactly(segments: Any, item: int, low: Any, high: Any) -> tuple[int, int, int]:
+    """Decide on a segment whose outcodes share no bit: state, plane entered, plane left."""
+    entered = left = -1
+    size, dimension = 0.0, low.size
+    for axis in range(dimension):
+        size += abs(segments[item, 0, axis]) + abs(segments[item, 1, axis])
+    if not (size < LARGE):
+        return OPEN, -1, -1
+    for turn in range(2 * dimension + 1):
+        axis, side = turn >> 1, turn & 1
+        if axis < dimension:
+            plane = plane_outside(segments[item, side, axis], low[axis], high[axis], axis)
+            other = left if side else entered
+        else:  # at last the last plane entered and the first one left
+            plane, other = left, entered
+        order = 0
+        if plane >= 0 and other >= 0:
+            i, j = plane >> 1, other >> 1
+            order = compare_planes(
+                segments[item, 0, i],
+                segments[item, 1, i],
+                plane_value(low, high, plane),
+                segments[item, 0, j],
+                segments[item, 1, j],
+                plane_value(low, high, other),
+            )
+            if order == UNDECIDED:
+                return OPEN, -1, -1
+        if axis == dimension:
+            return (DROPPED, -1, -1) if order < 0 else (KEPT, entered, left)
+        if side == 0 and (other < 0 or order > 0) and plane >= 0:  # equal: the smaller plane stays
+            entered = plane
+        if side == 1 and (other < 0 or order < 0) and plane >= 0:
+            left = plane
+    return OPEN, -1, -1  # not reached
+
+
+@merged
+def slab(p: float, q: float, low: float, high: float, not_entered: float, not_left: float) -> tuple[float, float]:
+    """Return the parameters at which p q, on one axis, enters and leaves low .. high, or those given."""
+    d = q - p if p != q else 1.0  # not met: any number
+    enters, leaves = ((low if p < low else high) - p) / d, ((low if q < low else high) - p) / d
+    return (enters if (p < low) | (p > high) else not_entered), (leaves if (q < low) | (q > high) else not_left)
+
+
+@merged
+def decide_roughly(
+    px: float, py: float, pz: float, qx: float, qy: float, qz: float,
+    x0: float, y0: float, z0: float, x1: float, y1: float, z1: float,
+) -> tuple[float, float, float]:  # fmt: skip
+    """Decide on the segment p q and a box, state OPEN where doubles do not suffice, plane entered, plane left."""
+    misses = (max(px, qx) < x0) | (min(px, qx) > x1) | (max(py, qy) < y0) | (min(py, qy) > y1)
+    misses = misses | (max(pz, qz) < z0) | (min(pz, qz) > z1)  # the outcodes share a bit
+    # planes that are not met stand in an order of their own, far from all others
+    a, d = slab(px, qx, x0, x1, -1.0, 2.0)
+    b, e = slab(py, qy, y0, y1, -2.0, 3.0)
+    c, f = slab(pz, qz, z0, z1, -3.0, 4.0)
+    start, end = max(a, max(b, c)), min(d, min(e, f))
+    before, after = max(min(a, b), min(max(a, b), c)), min(max(d, e), max(min(d, e), f))  # the second of three
+    gap = T_GAP * max(start, end) + T_TINY
+    drops = misses | (start - end > gap)
+    keeps = (end - start > gap) & (start - before > gap) & (after - end > gap)
+    x_entered, y_entered, z_entered = (1.0 if px > x1 else 0.0), (3.0 if py > y1 else 2.0), (5.0 if pz > z1 else 4.0)
+    entered = x_entered if a == start else (y_entered if b == start else z_entered)
+    x_left, y_left, z_left = (1.0 if qx > x1 else 0.0), (3.0 if qy > y1 else 2.0), (5.0 if qz > z1 else 4.0)
+    left = x_left if d == end else (y_left if e == end else z_left)
+    is_plain = abs(px) + abs(py) + abs(pz) + abs(qx) + abs(qy) + abs(qz) < LARGE
+    state = 0.0 if drops else (1.0 if keeps else 2.0)
+    return (state if is_plain else 2.0), (entered if start >= 0.0 else -1.0), (left if end <= 1.5 else -1.0)
+
+
+@merged
+def decide_closely(
+    px: float, py: float, pz: float, qx: float, qy: float, qz: float,
+    x0: float, y0: float, z0: float, x1: float, y1: float, z1: float,
+) -> tuple[float, float, float]:  # fmt: skip
+    """Decide as `decide_roughly` does, with double-doubles."""
+    a, d, is_x = meetings(px, qx, x0, x1, 0.0)
+    b, e, is_y = meetings(py, qy, y0, y1, 1.0)
+    c, f, is_z = meetings(pz, qz, z0, z1, 2.0)
+    gap, sure_1 = gap_between(a, b)
+    entered = a if gap >= 0.0 else b  # equal: the smaller plane stays
+    gap, sure_2 = gap_between(entered, c)
+    entered = entered if gap >= 0.0 else c
+    gap, sure_3 = gap_between(d, e)
+    left = d if gap <= 0.0 else e
+    gap, sure_4 = gap_between(left, f)
+    left = left if gap <= 0.0 else f
+    gap, sure_5 = gap_between(entered, left)
+    is_plain = abs(px) + abs(py) + abs(pz) + abs(qx) + abs(qy) + abs(qz) < LARGE
+    sure = is_plain & is_x & is_y & is_z & sure_1 & sure_2 & sure_3 & sure_4 & sure_5
+    return (2.0 if not sure else (0.0 if gap > 0.0 else 1.0)), entered.plane, left.plane
+
+
+@merged
+def point_of(segments: Any, item: int, end: int, is_flat: bool) -> Triple:
+    """Return an end of a segment, in the plane with z = 0."""
+    return segments[item, end, 0], segments[item, end, 1], (0.0 if is_flat else segments[item, end, 2])
+
+
+@merged
+def put_end(ends: Any, row: int, end: int, x: float, y: float, z: float, is_flat: bool) -> None:
+    """Write an end of a piece, without negative zeros; in the plane z does not count."""
+    ends[end, row, 0], ends[end, row, 1] = x + 0.0, y + 0.0
+    if not is_flat:
+        ends[end, row, 2] = z + 0.0
+
+
+@merged
+def corners_of(low: Any, high: Any) -> tuple[float, float, float, float, float, float]:
+    """Return the coordinates of a box, low ones first, in the plane with z from -1 to 1."""
+    is_flat = low.size == 2
+    return low[0], low[1], (-1.0 if is_flat else low[2]), high[0], high[1], (1.0 if is_flat else high[2])
+
+
+@kernel
+def decide_on_boxes(
+    segments: Any, low: Any, high: Any, first: int, last: int, stop: Any, items: Any, planes: Any, still: Any, n: Any
+) -> None:
+    """Decide on ``segments[first:last]`` ((n, 2, dim) float64) and the box `low`, `high`.
+
+    items: from ``items[first]`` on the segments that are kept, in order, in planes (n, 2) the planes entered and left,
+    -1 for an end of the segment. still: likewise the segments left open. n: how many are kept, open, and went beyond
+    the filter. stop: one uint8, polled.
+    """
+    is_flat = low.size == 2
+    x0, y0, z0, x1, y1, z1 = corners_of(low, high)
+    px, py, pz, qx, qy, qz = (
+        workspace(64), workspace(64), workspace(64), workspace(64), workspace(64), workspace(64),
+    )  # fmt: skip
+    state, entered, left, unsure = workspace(64), workspace(64), workspace(64), np.empty(BLOCK, np.int64)
+    kept, n_open, beyond = first, first, 0
+    for start in range(first, last, BLOCK):
+        if stop[0]:
+            return
+        size = min(BLOCK, last - start)
+        for j in range(size):
+            px[j], py[j], pz[j] = point_of(segments, start + j, 0, is_flat)
+            qx[j], qy[j], qz[j] = point_of(segments, start + j, 1, is_flat)
+        for j in range(BLOCK):  # a number of turns that the compiler knows; those past `size` are not looked at
+            state[j], entered[j], left[j] = decide_roughly(
+                px[j], py[j], pz[j], qx[j], qy[j], qz[j], x0, y0, z0, x1, y1, z1
+            )
+        n_unsure = 0
+        for j in range(size):
+            if state[j] == OPEN:
+                unsure[n_unsure] = j
+                n_unsure += 1
+        for k in range(n_unsure):
+            px[k], py[k], pz[k] = point_of(segments, start + unsure[k], 0, is_flat)
+            qx[k], qy[k], qz[k] = point_of(segments, start + unsure[k], 1, is_flat)
+        for k in range((n_unsure + 7) >> 3 << 3):  # whole vectors
+            px[k], py[k], pz[k] = decide_closely(px[k], py[k], pz[k], qx[k], qy[k], qz[k], x0, y0, z0, x1, y1, z1)
+        for k in range(n_unsure):
+            j = unsure[k]
+            state[j], entered[j], left[j] = px[k], py[k], pz[k]
+            if state[j] == OPEN:
+                state[j], entered[j], left[j] = decide_exactly(segments, start + j, low, high)
+            if state[j] == OPEN:
+                still[n_open] = start + j
+                n_open += 1
+        beyond += n_unsure
+        for j in range(size):  # kept <= start + j: what is not kept is written over
+            items[kept], planes[kept, 0], planes[kept, 1] = start + j, int(entered[j]), int(left[j])
+            kept += state[j] == KEPT
+    n[0], n[1], n[2] = kept - first, n_open - first, beyond

@@ -1,0 +1,142 @@
+"""Where a segment p q crosses an edge a b of the plane or a triangle a b c of space: t and point, surely rounded.
+
+With s(x) = ((b - a) x (c - a)) . (x - a), in the plane (b - a) x (x - a), the crossing is at
+
+    t = s(p) / d,    d = s(p) - s(q) = ((b - a) x (c - a)) . (p - q),    x = p + t (q - p),
+
+all in double-double with a running bound.
+
+**The bound.** With u = 2^-53, differences of coordinates are pairs without error, tails below u of the head. A
+component n = U V - X Y of the normal is kept as h + low, with m = |u v| + |x y|: products of two tails are left out
+(2 u^2 m), products with one tail are rounded (2 u^2 m), and so are the six sums of terms below u m, 2 u m, 3 u m and
+4 u m (12 u^2 m): 16 u^2 m, and |low| <= 4.1 u m. Its product with a difference w leaves out low w' (4.1 u^2), rounds
+the other two products (5.1 u^2), their sum (5.1 u^2) and that with the head's tail (6.1 u^2), and carries the normal's
+error (16.1 u^2): below 37 u^2 m |w|. Three of them are added up with exact heads, their tails, below 6.2 u m |w| each,
+in four sums (29 u^2): 66 u^2 of the sum of m |w|. `VALUE_BOUND` has room for the rounding of that sum and for terms of
+third order.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from engine.jit import merged
+from engine.predicates.cut_point import point_at
+from engine.predicates.double_double import U2, dd_div
+from engine.predicates.error_free import two_diff, two_prod, two_sum
+from engine.predicates.ranges import is_safe
+from engine.segment_clipping.plane_meeting import T_BOUND
+from engine.segment_clipping.triangle_contact import corner
+
+VALUE_BOUND: Final = 80.0 * U2
+
+
+@merged
+def minor(
+    u: float, u_low: float, v: float, v_low: float, x: float, x_low: float, y: float, y_low: float
+) -> tuple[float, float, float]:
+    """Return U V - X Y for pairs without error as a sum of two doubles, and |u v| + |x y|."""
+    ph, pl = two_prod(u, v)
+    qh, ql = two_prod(x, y)
+    h, tail = two_diff(ph, qh)
+    low = tail + ((pl - ql) + ((u * v_low + u_low * v) - (x * y_low + x_low * y)))
+    return h, low, abs(ph) + abs(qh)
+
+
+@merged
+def product(n: tuple[float, float, float], w: float, w_low: float) -> tuple[float, float, float]:
+    """Return (h + low) (w + w_low) for what `minor` returns as a sum of two doubles, and its size m |w|."""
+    g, tail = two_prod(n[0], w)
+    return g, tail + (n[0] * w_low + n[1] * w), n[2] * abs(w)
+
+
+@merged
+def dot(
+    nx: tuple[float, float, float],
+    ny: tuple[float, float, float],
+    nz: tuple[float, float, float],
+    wx: tuple[float, float],
+    wy: tuple[float, float],
+    wz: tuple[float, float],
+) -> tuple[float, float, float]:
+    """Return n . w as a double-double, and its bound."""
+    x, x_low, x_size = product(nx, wx[0], wx[1])
+    y, y_low, y_size = product(ny, wy[0], wy[1])
+    z, z_low, z_size = product(nz, wz[0], wz[1])
+    h, first = two_sum(x, y)
+    h, second = two_sum(h, z)
+    h, low = two_sum(h, ((x_low + y_low) + (z_low + first)) + second)
+    return h, low, VALUE_BOUND * (x_size + y_size + z_size)
+
+
+@merged
+def line_values(elements: Any, element: int, segments: Any, item: int) -> tuple[Any, Any]:
+    """Return s(p) and d for one of some edges (k, 2, 2) as double-doubles, each with its bound."""
+    ax, ay = elements[element, 0, 0], elements[element, 0, 1]
+    px, py = segments[item, 0, 0], segments[item, 0, 1]
+    u, u_low = two_diff(elements[element, 1, 0], ax)
+    v, v_low = two_diff(elements[element, 1, 1], ay)
+    x, x_low = two_diff(px, ax)
+    y, y_low = two_diff(py, ay)
+    h, low, size = minor(u, u_low, y, y_low, v, v_low, x, x_low)
+    h, low = two_sum(h, low)
+    x, x_low = two_diff(px, segments[item, 1, 0])
+    y, y_low = two_diff(py, segments[item, 1, 1])
+    g, g_low, g_size = minor(u, u_low, y, y_low, v, v_low, x, x_low)
+    g, g_low = two_sum(g, g_low)
+    return (h, low, VALUE_BOUND * size), (g, g_low, VALUE_BOUND * g_size)
+
+
+@merged
+def plane_values(elements: Any, element: int, segments: Any, item: int) -> tuple[Any, Any]:
+    """Return s(p) and d for one of some triangles (k, 3, 3) as double-doubles, each with its bound."""
+    a, b, c = corner(elements, element, 0), corner(elements, element, 1), corner(elements, element, 2)
+    p, q = corner(segments, item, 0), corner(segments, item, 1)
+    ux, ux_low = two_diff(b.x, a.x)
+    uy, uy_low = two_diff(b.y, a.y)
+    uz, uz_low = two_diff(b.z, a.z)
+    vx, vx_low = two_diff(c.x, a.x)
+    vy, vy_low = two_diff(c.y, a.y)
+    vz, vz_low = two_diff(c.z, a.z)
+    nx = minor(uy, uy_low, vz, vz_low, uz, uz_low, vy, vy_low)
+    ny = minor(uz, uz_low, vx, vx_low, ux, ux_low, vz, vz_low)
+    nz = minor(ux, ux_low, vy, vy_low, uy, uy_low, vx, vx_low)
+    at_p = dot(nx, ny, nz, two_diff(p.x, a.x), two_diff(p.y, a.y), two_diff(p.z, a.z))
+    along = dot(nx, ny, nz, two_diff(p.x, q.x), two_diff(p.y, q.y), two_diff(p.z, q.z))
+    return at_p, along
+
+
+@merged
+def is_item_safe(items: Any, item: int) -> bool:
+    """Tell whether every coordinate of an item is zero or of a size for which double-doubles keep their bounds."""
+    safe = True
+    for place in range(items.shape[1]):
+        for k in range(items.shape[2]):
+            safe &= is_safe(items[item, place, k])
+    return safe
+
+
+@merged
+def cut_at(
+    segments: Any, item: int, elements: Any, element: int, at_p: Any, along: Any, points: Any, row: int
+) -> tuple[float, bool]:
+    """Set a row of `points` to where a segment crosses an element; return t and whether all is surely nearest."""
+    s, s_low, s_bound = at_p
+    d, d_low, d_bound = along
+    th, tl = dd_div(s, s_low, d, d_low)
+    r = 1.01 * (s_bound / abs(s) + d_bound / abs(d))
+    sure = (r < 0.001) & (abs(d) >= 2.0**-400) & (abs(d) <= 2.0**400) & (abs(s) >= 2.0**-500)
+    bound = (T_BOUND + r) * th
+    sure &= th + (tl - bound) == th + (tl + bound)
+    for k in range(points.shape[1]):
+        level = elements[element, 0, k]
+        is_level = True
+        for place in range(1, elements.shape[1]):
+            is_level &= elements[element, place, k] == level
+        if is_level:  # case: a face or edge across an axis, whose coordinate is the point's
+            points[row, k] = level
+            continue
+        x, is_x = point_at(segments[item, 0, k], segments[item, 1, k], th, tl, r)
+        points[row, k] = x + 0.0
+        sure &= is_x
+    return th + tl, sure

@@ -1,0 +1,104 @@
+"""A segment in the coordinates of a mesh's tree, with the slack that rounding takes; boxes that meet no triangle.
+
+The tree (bvh.py) holds float32 boxes in coordinates of its own. A segment is brought there in doubles, cut to what lies
+near the tree, and stored as its middle and half in float32; the slack covers what all this rounds:
+
+    middle, w = m - c      2^-24 (S + 2) each, S the largest coordinate (the tree's own are at most 2)
+    half, products         2^-24 of themselves, so of the bound |e_i| (S + 2), thrice
+    cutting                2^-50 of the segment's coordinates before, in either end
+
+16 * 2^-24 (S + 2) for half widths is more than their sum.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+
+from engine.bounding.bvh import MAX_DEPTH
+from engine.jit import kernel, merged
+from engine.lanes.boxes import EMPTY, lowest_bit
+from engine.lanes.rows import LANES
+from engine.lanes.segments import near_segment
+from engine.predicates.loading import as_point3
+from engine.predicates.orientation import orient3d
+from engine.types import Point3
+
+STACK: Final = LANES * MAX_DEPTH
+SLACK: Final = 2.0**-20
+CUT_SLACK: Final = 2.0**-45
+LIMIT: Final = 4.0
+"""Segments are cut to this cube, in coordinates of the tree, that is: far outside of every box."""
+
+NOWHERE: Final = (np.float32(0.0), np.float32(0.0), np.float32(0.0))
+
+
+@merged
+def local_segment(p: Point3, q: Point3, origin: Any, inverse: float) -> tuple[Any, Any, float, float, bool]:
+    """Return middle, half, slack and tiny (`near_segment`) of a segment, and whether it comes near the tree at all."""
+    ox, oy, oz = origin[0] * inverse, origin[1] * inverse, origin[2] * inverse
+    px, py, pz = p.x * inverse - ox, p.y * inverse - oy, p.z * inverse - oz
+    dx, dy, dz = q.x * inverse - p.x * inverse, q.y * inverse - p.y * inverse, q.z * inverse - p.z * inverse
+    size = max(abs(px), abs(py), abs(pz), abs(px + dx), abs(py + dy), abs(pz + dz))
+    start, end = 0.0, 1.0
+    tiny = CUT_SLACK * (size + 2.0)
+    if size > LIMIT and size < 2.0**40:
+        for at, step in ((px, dx), (py, dy), (pz, dz)):
+            if abs(step) < 2.0**-40:
+                if abs(at) > LIMIT:
+                    return NOWHERE, NOWHERE, 0.0, 0.0, False
+                continue
+            first, last = (-LIMIT - at) / step, (LIMIT - at) / step
+            start, end = max(start, min(first, last)), min(end, max(first, last))
+        if start > end:
+            return NOWHERE, NOWHERE, 0.0, 0.0, False
+        size = LIMIT + 1.0
+    middle, half = 0.5 * (start + end), 0.5 * (end - start)
+    return (
+        (np.float32(px + middle * dx), np.float32(py + middle * dy), np.float32(pz + middle * dz)),
+        (np.float32(half * dx), np.float32(half * dy), np.float32(half * dz)),
+        SLACK * (size + 2.0) + tiny,
+        tiny,
+        True,
+    )
+
+
+@kernel
+def is_clear(corners: Any, mesh: Any, stop: Any) -> bool:
+    """Tell whether a box surely meets no triangle: exact signs of all its corners; False where that is not known.
+
+    corners: (8, 3) float64, those of the box, the last opposite to the first.
+    """
+    stack = np.empty(STACK, np.int64)
+    middle, half, slack, tiny, is_near = local_segment(
+        as_point3(corners, 0), as_point3(corners, 7), mesh.origin, mesh.inverse
+    )
+    if not is_near:
+        return True
+    # the box reaches as far from its diagonal as that is long
+    slack += 2.0 * (abs(half[0]) + abs(half[1]) + abs(half[2]))
+    stack[0], depth = 0, 1
+    while depth > 0:
+        depth -= 1
+        node = stack[depth]
+        bits = near_segment(mesh.boxes, node, middle, half, np.float32(slack), np.float32(tiny))
+        while bits != 0:
+            lane = lowest_bit(bits)
+            bits &= bits - 1
+            below = mesh.child[node, lane]
+            if below >= 0:
+                stack[depth] = below
+                depth += 1
+            elif below != EMPTY:
+                triangle = mesh.elements[-1 - below]
+                a, b, c = as_point3(triangle, 0), as_point3(triangle, 1), as_point3(triangle, 2)
+                side = orient3d(a, b, c, as_point3(corners, 0))
+                for k in range(1, 8):
+                    if orient3d(a, b, c, as_point3(corners, k)) != side:
+                        return False
+                if abs(side) != 1:
+                    return False
+        if stop[0]:
+            return False
+    return True

@@ -1,0 +1,120 @@
+"""The points where segments cross planes, each coordinate the nearest double: what `decide_on_rows` has chosen is cut.
+
+t = s_p / (s_p - s_q) and the point are taken in double-double with a bound; where that leaves a coordinate open, from
+expansions of both plane values (cut_point.py). In the plane z is 0.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from engine.jit import inline, kernel
+from engine.predicates.cut_point import parameter_and_point, point_at
+from engine.predicates.double_double import U2, dd_add, dd_div
+from engine.predicates.error_free import two_prod, two_sum, workspace
+from engine.predicates.expansion import sign
+from engine.segment_clipping.cohen_sutherland import Triple, point_of, put_end
+from engine.segment_clipping.cyrus_beck import VALUE_TINY, columns_of, expand_value, is_row_safe, is_segment_safe
+from engine.segment_clipping.plane_meeting import T_BOUND
+
+DD_VALUE_BOUND: Final = 32.0 * U2
+"""Bound of a plane value in double-double: exact products and sums, whose tails, together below 4 u of the sum of
+absolute terms, are added up with six roundings."""
+
+
+@inline
+def dd_value(a: float, b: float, c: float, d: float, point: Triple) -> Triple:
+    """Return the value of a row at a point as an unevaluated sum of two doubles and a bound of its error."""
+    x, y, z = point
+    ah, al = two_prod(a, x)
+    bh, bl = two_prod(b, y)
+    ch, cl = two_prod(c, z)
+    h, first = two_sum(ah, bh)
+    h, second = two_sum(h, ch)
+    h, third = two_sum(h, d)
+    bound = DD_VALUE_BOUND * (abs(ah) + abs(bh) + abs(ch) + abs(d)) + VALUE_TINY
+    h, low = two_sum(h, (al + bl) + (cl + first) + (second + third))
+    return h, low, bound
+
+
+@inline
+def parameter_of(sp: Triple, sq: Triple) -> tuple[float, float, float, bool]:
+    """Return t = s_p / (s_p - s_q) as a double-double, how far relative to itself it may be off, and if that holds."""
+    sp_h, sp_l, sp_bound = sp
+    sq_h, sq_l, sq_bound = sq
+    sum_h, sum_l = dd_add(sp_h, sp_l, -sq_h, -sq_l)
+    th, tl = dd_div(sp_h, sp_l, sum_h, sum_l)
+    r = 1.01 * (sp_bound / abs(sp_h) + sq_bound / abs(sq_h))
+    return th, tl, r, (r < 0.001) & (abs(sum_h) >= 2.0**-400) & (abs(sum_h) <= 2.0**400) & (abs(sp_h) >= 2.0**-500)
+
+
+@inline
+def cut_by_signs(row: Any, segment: Any, point: Any) -> tuple[float, bool]:
+    """Set `point` to where `segment` crosses the plane of `row`, by exact signs; return t and whether all is sure."""
+    if not (is_row_safe(row) and is_segment_safe(segment)):
+        return 0.0, False
+    wp, wq, e = workspace(8), workspace(8), workspace(96)
+    n_wp, n_wq = expand_value(row, segment[0], wp), expand_value(row, segment[1], wq)
+    for e_w, n_w in ((wp, n_wp), (wq, n_wq)):
+        if sign(e_w, n_w) < 0:
+            for i in range(n_w):
+                e_w[i] = -e_w[i]
+    return parameter_and_point(segment, wp, n_wp, wq, n_wq, -1, 0.0, point, e)
+
+
+@kernel
+def fill_on_rows(
+    segments: Any,
+    columns: Any,
+    items: Any,
+    planes: Any,
+    first: int,
+    last: int,
+    stop: Any,
+    source: Any,
+    ends: Any,
+    t: Any,
+    faces: Any,
+    still: Any,
+    n: Any,
+) -> None:
+    """Fill rows first .. last - 1 of the pieces of ``segments`` ((n, 2, dim) float64): see `fill_on_boxes`."""
+    is_flat = segments.shape[2] == 2
+    a, b, c, d = columns_of(columns)
+    n_open = beyond = 0
+    for row in range(first, last):
+        if stop[0]:
+            return
+        i = items[row]
+        source[row] = i
+        all_sure = tried = True
+        p, q = point_of(segments, i, 0, is_flat), point_of(segments, i, 1, is_flat)
+        for side in range(2):
+            plane = planes[row, side]
+            faces[row, side] = plane
+            if plane < 0:
+                t[row, side] = side
+                x, y, z = point_of(segments, i, side, is_flat)
+                put_end(ends, row, side, x, y, z, is_flat)
+                continue
+            th, tl, slack, sure = parameter_of(
+                dd_value(a[plane], b[plane], c[plane], d[plane], p),
+                dd_value(a[plane], b[plane], c[plane], d[plane], q),
+            )
+            x, is_x = point_at(p[0], q[0], th, tl, slack)
+            y, is_y = point_at(p[1], q[1], th, tl, slack)
+            z, is_z = point_at(p[2], q[2], th, tl, slack)
+            bound = (T_BOUND + slack) * th
+            if sure & is_x & is_y & is_z & (th + (tl - bound) == th + (tl + bound)):
+                t[row, side] = th + tl
+                put_end(ends, row, side, x, y, z, is_flat)
+            else:
+                tried = False
+                t[row, side], sure = cut_by_signs(columns[:-2, plane], segments[i], ends[side, row])
+                all_sure = all_sure and sure
+        if not tried:
+            beyond += 1
+        if not all_sure:
+            still[first + n_open] = row
+            n_open += 1
+    n[0], n[1] = n_open, beyond

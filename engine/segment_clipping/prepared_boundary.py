@@ -1,0 +1,149 @@
+"""What the kernels read of a polygon or polyhedron whose boundary segments are cut on, prepared once a solid."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from engine.bounding.bvh import UNUSED, Bvh, as_read_only, build_bvh, on_lines
+from engine.lanes.boxes import EMPTY
+from engine.lanes.rows import LANES
+from engine.lanes.triangles import CORNER_ROWS
+from engine.predicates.ranges import LARGEST, SMALLEST
+from engine.segment_clipping.box_tree import build_box_tree
+from engine.solids.base import FloatArray, IntArray
+from engine.solids.polygon import Polygon
+from engine.solids.polyhedron import Polyhedron
+
+
+class Outline(NamedTuple):
+    """The edges of all rings of a polygon."""
+
+    elements: FloatArray
+    """(k, 2, 2) the corners of each edge: where one is read, all are."""
+    are_safe: bool
+    """Whether every coordinate is zero or of a size for which kernels keep their bounds."""
+    faces: IntArray
+    """(k,) what each edge is reported as."""
+    beyond: FloatArray
+    """(2, 2) the coordinates next below and next above those of all edges."""
+    order: IntArray
+    boxes: FloatArray
+    """order, boxes: see `BoxTree`."""
+
+
+class Mesh(NamedTuple):
+    """The triangles of a polyhedron."""
+
+    elements: FloatArray
+    """(k, 3, 3) the corners of each triangle."""
+    are_safe: bool
+    """See `Outline`."""
+    faces: IntArray
+    """(k,) the face of the caller that each triangle is reported as."""
+    beyond: FloatArray
+    """(2, 3) the coordinates next below and next above those of all triangles."""
+    boxes: npt.NDArray[np.float32]
+    child: npt.NDArray[np.int32]
+    origin: FloatArray
+    inverse: float
+    """boxes, child, origin, 1 / scale: see `Bvh`, but inner nodes stand before all blocks, close to each other."""
+    n_inner: int
+    """How many they are; unless there is but one block, they begin with the root."""
+    n_levels: int
+    """How many inner nodes stand above one another at most."""
+    corners: npt.NDArray[np.float32]
+    """(n_blocks, 9, 8), see `corners_of`."""
+
+
+def boundary_of(region: Polygon | Polyhedron) -> Outline | Mesh:
+    """Return the prepared boundary of a region."""
+
+    def build() -> Outline | Mesh:
+        if isinstance(region, Polyhedron):
+            return mesh_of(region.vertices[region.triangles], region.triangle_faces)
+        following = np.arange(1, len(region.vertices) + 1, dtype=np.int64)
+        following[region.ring_offsets[1:] - 1] = region.ring_offsets[:-1]
+        first = np.arange(len(following), dtype=np.int64)  # an edge is named by its first vertex
+        return outline_of(region.vertices[np.stack([first, following], axis=1)], first)
+
+    return region.prepared("clipping_boundary", build)
+
+
+def outline_of(elements: FloatArray, faces: IntArray) -> Outline:
+    """Return what the kernels read of some edges (k, 2, 2)."""
+    low, high = elements.min(axis=1), elements.max(axis=1)
+    tree = build_box_tree(low, high)
+    first, *arrays = (as_read_only(a) for a in (elements, faces, _beyond(low, high), tree.order, tree.boxes))
+    return Outline(first, _are_safe(elements), *arrays)
+
+
+def _are_safe(elements: FloatArray) -> bool:
+    """Tell whether every coordinate is what `is_safe` wants."""
+    sizes = np.abs(elements)
+    return bool(((sizes == 0.0) | ((sizes >= SMALLEST) & (sizes <= LARGEST))).all())
+
+
+def mesh_of(elements: FloatArray, faces: IntArray) -> Mesh:
+    """Return what the kernels read of some triangles (k, 3, 3)."""
+    low, high = elements.min(axis=1), elements.max(axis=1)
+    tree, n_inner = _inner_first(build_bvh(np.concatenate([low, high], axis=1)))
+    return Mesh(
+        on_lines(elements),
+        _are_safe(elements),
+        as_read_only(faces),
+        as_read_only(_beyond(low, high)),
+        tree.boxes,
+        tree.child,
+        tree.origin,
+        1.0 / tree.scale,
+        n_inner,
+        _levels_of(tree.child[:n_inner]),
+        corners_of(tree, n_inner, elements),
+    )
+
+
+def _inner_first(tree: Bvh) -> tuple[Bvh, int]:
+    """Return a tree with its inner nodes before its blocks, each kind in its old order, and how many they are."""
+    is_block = tree.child[:, 0] < 0
+    order = np.argsort(is_block, kind="stable")
+    place = np.empty(len(order), np.int32)
+    place[order] = np.arange(len(order))
+    child = tree.child[order]
+    child = np.where(child >= 0, place[np.maximum(child, 0)], child)
+    return Bvh(on_lines(tree.boxes[order]), on_lines(child), tree.origin, tree.scale), int((~is_block).sum())
+
+
+def _beyond(low: FloatArray, high: FloatArray) -> FloatArray:
+    """Return the coordinates next below and next above all boxes, infinite where there are none."""
+    with np.errstate(over="ignore"):
+        return np.stack([np.nextafter(low.min(axis=0), -np.inf), np.nextafter(high.max(axis=0), np.inf)])
+
+
+def _levels_of(child: npt.NDArray[np.int32]) -> int:
+    """Return on how many levels the inner nodes of a tree stand, from their children."""
+    n_levels = 0
+    level: npt.NDArray[np.int32] = np.zeros(min(len(child), 1), np.int32)
+    while len(level):
+        below = child[level].ravel()
+        level = below[(below >= 0) & (below < len(child))]
+        n_levels += 1
+    return n_levels
+
+
+def corners_of(tree: Bvh, n_inner: int, elements: FloatArray) -> npt.NDArray[np.float32]:
+    """Return the corners (n_blocks, 9, 8) float32 of the triangles in each block of a tree, in its coordinates.
+
+    Lanes without a triangle lie far from everything.
+    """
+    child = tree.child[n_inner:]
+    is_item = child != EMPTY
+    block, lane = np.nonzero(is_item)
+    corners = np.full((len(child), CORNER_ROWS, LANES), -UNUSED, np.float32)
+    inverse = 1.0 / tree.scale
+    with np.errstate(all="ignore"):  # what underflows here is far below what the lanes round
+        local = elements[-1 - child[is_item]] * inverse - tree.origin * inverse
+    corners[block, :, lane] = local.reshape(-1, CORNER_ROWS)
+    return on_lines(corners)

@@ -1,0 +1,87 @@
+"""How a segment and a triangle of space meet: see contacts.py.
+
+**The filter.** Seen from p, with A = a - p and so on, E = q - p, every sign comes from the same three products:
+
+    edges    E . (A x B), E . (B x C), E . (C x A)        the line passes the edge on one side or the other
+    ends     s(p) = -A . (B x C), s(q) = s(p) + the sum of the edges          p, q on either side of the plane
+
+Let u = 2^-53, S the largest |coordinate| of A, B, C and L = |E_x| + |E_y| + |E_z|. An edge is within (7 u + 56 u^2) of
+its permanent, at most 2 S^2 L (orientation.py): 2^-49 S^2 L; s(p) likewise, its permanent at most 6 S^3: 2^-47 S^3.
+s(q) carries both, thrice that of an edge, and three roundings of at most 6 S^2 L + 6 S^3: below 2^-46 S^2 (S + L). The
+bounds used are twice that, so their own rounding is covered, and 2^-700 more for products that underflow: where S is
+below 2^300 they lose less, where it is not the relative part is more. What overflows is unsure.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from engine.jit import called, merged
+from engine.predicates.orientation import orient3d
+from engine.segment_clipping.contacts import APART, DEGENERATE, PROPER
+from engine.types import UNDECIDED, Point3
+
+EDGE_BOUND: Final = 2.0**-48
+END_BOUND: Final = 2.0**-45
+UNDERFLOW: Final = 2.0**-700
+
+
+@called
+def exact_contact(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3) -> int:
+    """Return how a segment p q and a triangle a b c meet, by exact signs."""
+    of_p, of_q = orient3d(a, b, c, p), orient3d(a, b, c, q)
+    if of_p == of_q and (of_p == 1 or of_p == -1):
+        return APART
+    ab, bc, ca = orient3d(p, q, a, b), orient3d(p, q, b, c), orient3d(p, q, c, a)
+    if of_p != 0 or of_q != 0:  # case: in the plane of the triangle the edge signs are all zero and say nothing
+        has_left, has_right = ab == 1 or bc == 1 or ca == 1, ab == -1 or bc == -1 or ca == -1
+        if has_left and has_right:
+            return APART
+    if ab == bc and bc == ca and abs(ab) == 1 and abs(of_p) == 1 and abs(of_q) == 1:
+        return PROPER
+    return DEGENERATE
+
+
+@merged
+def contact_filter(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3) -> int:
+    """Return how a segment and a triangle meet where rounding cannot have changed it, else UNDECIDED."""
+    ex, ey, ez = q.x - p.x, q.y - p.y, q.z - p.z
+    ax, ay, az = a.x - p.x, a.y - p.y, a.z - p.z
+    bx, by, bz = b.x - p.x, b.y - p.y, b.z - p.z
+    cx, cy, cz = c.x - p.x, c.y - p.y, c.z - p.z
+    nx, ny, nz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
+    ab = ex * (ay * bz - az * by) + ey * (az * bx - ax * bz) + ez * (ax * by - ay * bx)
+    bc = ex * nx + ey * ny + ez * nz
+    ca = ex * (cy * az - cz * ay) + ey * (cz * ax - cx * az) + ez * (cx * ay - cy * ax)
+    size = max(abs(ax), abs(ay), abs(az), abs(bx), abs(by), abs(bz), abs(cx), abs(cy), abs(cz))
+    length = abs(ex) + abs(ey) + abs(ez)
+    bound = EDGE_BOUND * (size * size * length) + UNDERFLOW
+    least, most = min(ab, bc, ca), max(ab, bc, ca)
+    if least < -bound and most > bound:
+        return APART
+    if not (least > bound or most < -bound):
+        return UNDECIDED
+    of_p = -(ax * nx + ay * ny + az * nz)
+    of_q = of_p + (ab + bc + ca)
+    bound = END_BOUND * (size * size * (size + length)) + UNDERFLOW
+    least, most = min(of_p, of_q), max(of_p, of_q)
+    if least > bound or most < -bound:
+        return APART
+    return PROPER if least < -bound and most > bound else UNDECIDED
+
+
+@merged
+def triangle_contact(elements: Any, element: int, segments: Any, item: int) -> int:
+    """Return how one of some segments (m, 2, 3) and one of some triangles (k, 3, 3) meet."""
+    a, b, c = corner(elements, element, 0), corner(elements, element, 1), corner(elements, element, 2)
+    p, q = corner(segments, item, 0), corner(segments, item, 1)
+    kind = contact_filter(a, b, c, p, q)
+    return kind if kind != UNDECIDED else exact_contact(a, b, c, p, q)
+
+
+@merged
+def corner(elements: Any, element: int, place: int) -> Point3:
+    """Return a corner of one of some elements (k, corners, 3)."""
+    return Point3(
+        float(elements[element, place, 0]), float(elements[element, place, 1]), float(elements[element, place, 2])
+    )

@@ -1,0 +1,124 @@
+"""What the short path for convex bodies answers is what the exact path answers; it may only leave pairs open."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from engine import Aabb, Polyhedron, Pose, Relation, Solid, Sphere
+from engine.collision.codes import UNSETTLED
+from engine.collision.collide import collide_pair
+from engine.collision.convex.body import convex_body_of, pooled
+from engine.collision.convex.pair import relate_convex_pairs
+from engine.collision.result import Work
+
+CUBE = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]]
+FLAG = np.zeros(1, np.uint8)
+
+
+def ball_of_belts(n_around: int, n_belts: int) -> Polyhedron:
+    """A convex solid of n_around * n_belts + 2 vertices; few: all are looked at, many: a walk uphill."""
+    vertices, faces = [[0.0, 0.0, -1.0]], []
+    for belt in range(n_belts):
+        z = -np.cos(np.pi * (belt + 1) / (n_belts + 1))
+        for k in range(n_around):
+            turn = 2 * np.pi * (k + belt / 2) / n_around
+            vertices.append([np.sqrt(1 - z * z) * np.cos(turn), np.sqrt(1 - z * z) * np.sin(turn), z])
+    vertices.append([0.0, 0.0, 1.0])
+    top = len(vertices) - 1
+    for k in range(n_around):
+        following = (k + 1) % n_around
+        faces.append([0, 1 + following, 1 + k])
+        faces.append([top, top - n_around + k, top - n_around + following])
+        for belt in range(n_belts - 1):
+            a, b = 1 + belt * n_around + k, 1 + belt * n_around + following
+            faces += [[a, b, a + n_around], [b, b + n_around, a + n_around]]
+    return Polyhedron(vertices, faces)
+
+
+def poses(n: int, spread: float, seed: int) -> list[Pose]:
+    rng = np.random.default_rng(seed)
+    quaternions = rng.normal(size=(n, 4))
+    quaternions /= np.linalg.norm(quaternions, axis=1)[:, None]
+    result = []
+    for w, x, y, z in quaternions:
+        turn = [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+        result.append(Pose(turn, rng.normal(size=3) * spread))
+    return result
+
+
+def short_answers(first: Solid, second: Solid, placed: list[Pose | None], boolean: bool = False) -> list[int]:
+    bodies = [convex_body_of(first), convex_body_of(second)]
+    assert bodies[0] is not None
+    assert bodies[1] is not None
+    n = len(placed)
+    rotations, translations = np.broadcast_to(np.eye(3), (n + 1, 3, 3)).copy(), np.zeros((n + 1, 3))
+    for row, pose in enumerate(placed, 1):
+        if pose is not None:
+            rotations[row], translations[row] = pose.rotation, pose.translation
+    pairs = np.column_stack([np.zeros(n, np.int64), np.arange(1, n + 1)])
+    rows, found = np.append(0, np.ones(n, np.int64)), np.full(n, UNSETTLED, np.int8)
+    with np.errstate(all="ignore"):
+        pool = pooled([body for body in bodies if body is not None])
+        relate_convex_pairs(pool, rows, rotations, translations, pairs, boolean, found, FLAG)
+    return found.tolist()
+
+
+BODIES: dict[str, Solid] = {
+    "box": Aabb([-1, -0.5, -0.25], [1, 0.5, 0.25]),
+    "corner": Polyhedron([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]),
+    "small": ball_of_belts(5, 2),
+    "large": ball_of_belts(12, 6),
+    "inward": Polyhedron(np.array([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)]) * 0.3, [f[::-1] for f in CUBE]),
+    "ball": Sphere([0.1, 0.2, 0.3], 0.4),
+    "point": Sphere([0.1, 0.2, 0.3], 1e-3),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("second", sorted(BODIES))
+@pytest.mark.parametrize("first", sorted(BODIES))
+def test_answers_are_those_of_the_exact_path(first: str, second: str) -> None:
+    one, other = BODIES[first], BODIES[second]
+    slow = "ball" in (first, second) or "point" in (first, second)
+    placed: list[Pose | None] = [*poses(3 if slow else 12, 0.5, 1), *poses(3 if slow else 12, 0.05, 2), None]
+    found = short_answers(one, other, placed)
+    for pose, relation in zip(placed, found):
+        exact = collide_pair(one, other, None, pose, Work(witness=False)).relation
+        assert relation in (exact, UNSETTLED), pose
+    assert found.count(UNSETTLED) <= 3
+
+
+@pytest.mark.parametrize("shift", [2.0, np.nextafter(2.0, 3.0), np.nextafter(2.0, 1.0)])
+def test_contact_and_its_neighbours_are_left_open(shift: float) -> None:
+    turn = Pose(np.eye(3), [shift, 0.25, 0.125])
+    assert short_answers(BODIES["box"], BODIES["box"], [turn]) == [UNSETTLED]
+
+
+def test_boxes_that_share_a_symmetry_are_decided() -> None:
+    cube = Aabb([-1, -1, -1], [1, 1, 1])
+    steps = [[1, 0, 0], [0, 1.5, 0], [1, 1, 0], [1, 1, 1], [3, 0, 0], [3, 3, 3], [0, 0, 0]]
+    placed: list[Pose | None] = [Pose(np.eye(3), step) for step in steps]
+    found = short_answers(cube, cube, placed)
+    over, apart = Relation.OVERLAPPING, Relation.DISJOINT
+    assert found[:6] == [over, over, over, over, apart, apart]
+    assert short_answers(cube, Aabb([-3, -3, -3], [3, 3, 3]), [None]) == [Relation.FIRST_INSIDE_SECOND]
+    assert short_answers(cube, cube, placed, True)[:6] == found[:6]
+
+
+@pytest.mark.parametrize("scale", [5e-324, 1e-310, 1e-200, 1e-100, 1e100, 1e200, 1e307])
+def test_the_ends_of_the_exponent_range_prove_nothing_wrong(scale: float) -> None:
+    corners = np.array([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)], float) * scale
+    cube = Polyhedron(corners, CUBE)
+    if convex_body_of(cube) is not None:
+        found = short_answers(cube, cube, [None, Pose(np.eye(3), [2 * scale if scale < 1e300 else 0.0, 0, 0])])
+        assert found[0] in (UNSETTLED, Relation.OVERLAPPING)
+        assert found[1] in (UNSETTLED, Relation.DISJOINT if scale < 1e300 else Relation.OVERLAPPING)
+
+
+def test_bodies_without_interior_or_not_convex_have_no_short_path() -> None:
+    flat, point = Aabb([0, 0, 0], [1, 1, 0]), Sphere([0, 0, 0], 0.0)
+    assert convex_body_of(flat) is convex_body_of(point) is None

@@ -1,0 +1,74 @@
+"""Eight boxes against a segment: no contact is missed, and the intrinsic is its plain twin."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from engine.bounding.bvh import build_bvh
+from engine.lanes.segments import plain_near_segment
+from engine.segment_clipping.contacts import APART
+from engine.segment_clipping.mesh_contacts import is_clear, local_segment
+from engine.segment_clipping.mesh_streams import find_mesh_contacts
+from engine.segment_clipping.prepared_boundary import Mesh, mesh_of
+from engine.segment_clipping.triangle_contact import exact_contact
+from engine.types import Point3
+
+Floats = np.ndarray
+
+
+def test_touching_boxes_are_near() -> None:
+    """Points of a segment make boxes that it touches, however long or short it is."""
+    rng = np.random.default_rng(1)
+    for size in (1e-9, 1.0, 1e3, 1e9):
+        p, q = rng.uniform(-1, 1, 3), rng.uniform(-1, 1, 3)
+        inside = p + rng.uniform(0, 1, (64, 1)) * (q - p)
+        low, high = inside - rng.uniform(0, 0.1, (64, 3)), inside + rng.uniform(0, 0.1, (64, 3))
+        p, q = p - size * (q - p), q + size * (q - p)
+        tree = build_bvh(np.concatenate([low, high], axis=1))
+        middle, half, slack, tiny, is_near = local_segment(Point3(*p), Point3(*q), tree.origin, 1.0 / tree.scale)
+        assert is_near
+        for node in range(len(tree.child)):
+            used = sum(1 << lane for lane in np.flatnonzero(tree.boxes[node, 3] >= 0))
+            assert plain_near_segment(tree.boxes, node, middle, half, np.float32(slack), np.float32(tiny)) == used
+
+
+def test_contacts_are_those_of_all_triangles() -> None:
+    rng = np.random.default_rng(2)
+    vertices = rng.integers(-8, 9, (400, 3)) / 4
+    triangles = rng.integers(0, 400, (300, 3))
+    triangles = triangles[[len({tuple(vertices[k]) for k in triangle}) == 3 for triangle in triangles]]
+    corners = vertices[triangles]
+    segments = np.concatenate([rng.integers(-12, 13, (40, 2, 3)) / 4, rng.uniform(-3, 3, (40, 2, 3))])
+    segments = np.concatenate([segments, segments[:5] * 1e6])
+    stop, room = np.zeros(1, np.uint8), 100_000
+
+    def found(mesh: Mesh) -> tuple[Floats, Floats, Floats]:
+        met, kinds, offsets = np.empty(room, np.int64), np.empty(room, np.uint8), np.empty(len(segments) + 1, np.int64)
+        assert find_mesh_contacts(segments, 0, len(segments), mesh, stop, met, kinds, offsets) == len(segments)
+        return met, kinds, offsets
+
+    met, kinds, offsets = found(mesh_of(corners, np.arange(len(corners))))
+    expected: list[set[tuple[int, int]]] = [set() for _ in segments]
+    for i, triangle in enumerate(corners):
+        for k, segment in enumerate(segments):
+            kind = exact_contact(*(Point3(*row) for row in (*triangle.tolist(), *segment.tolist())))
+            if kind != APART:
+                expected[k].add((i, kind))
+    assert any(expected)
+    for k, pairs in enumerate(expected):
+        mine = slice(offsets[k], offsets[k + 1])
+        assert set(zip(met[mine].tolist(), kinds[mine].tolist())) == pairs
+
+
+def test_clear_boxes_hold_no_triangle() -> None:
+    mesh = mesh_of(np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]]), np.zeros(1, np.int64))
+
+    def clear(low: list[float], high: list[float]) -> bool:
+        corners = np.array(np.meshgrid(*zip(low, high), indexing="ij")).reshape(3, 8).T.copy()
+        return bool(is_clear(corners, mesh, np.zeros(1, np.uint8)))
+
+    above = float(np.nextafter(0.0, 1.0))
+    assert clear([0.25, 0.25, above], [0.5, 0.5, 1.0])
+    assert not clear([0.25, 0.25, 0.0], [0.5, 0.5, 1.0])
+    assert not clear([0.25, 0.25, -above], [0.5, 0.5, above])
+    assert clear([9.0, 9.0, 9.0], [9.5, 9.5, 9.5])
