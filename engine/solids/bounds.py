@@ -7,6 +7,7 @@ from typing import Literal, overload
 
 import numpy as np
 
+from engine.arrays import FloatArray
 from engine.bounding.aabb import box_of_points, corners_of_box
 from engine.bounding.double_description import corners_of_half_spaces
 from engine.bounding.minimal_sphere import MinimalSphere, minimal_sphere, minimal_sphere_of_rationals
@@ -14,7 +15,7 @@ from engine.errors import EmptyGeometryError, NotRepresentableError, Unsupported
 from engine.parallel import Budget, Cancel, Progress, check_options
 from engine.predicates.rational import nearest_float
 from engine.solids.aabb import Aabb
-from engine.solids.base import FloatArray, Solid
+from engine.solids.base import Solid
 from engine.solids.convex import Convex
 from engine.solids.mesh import Mesh
 from engine.solids.polygon import Polygon
