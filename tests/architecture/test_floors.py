@@ -33,7 +33,7 @@ FLOORS = {
     "engine": 7,
     "engine.__main__": 8,
 }
-SAME_FLOOR_ALLOWED = {("engine.parallel", "engine.errors")}
+SAME_FLOOR_ALLOWED = {("engine.parallel", "engine.errors"), ("engine.parallel", "engine.arrays")}
 SPEAKS_LLVM = {"engine.jit", "engine.predicates.error_free"}
 """Beside `engine.lanes`: the only modules that may."""
 LLVM = ("llvmlite", "numba.core", "numba.extending", "numba.types")
