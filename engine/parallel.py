@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, TypedDict
 
 import numpy as np
 
@@ -113,6 +113,15 @@ class _Clock:
 
 
 _clock = _Clock()
+
+
+class Options(TypedDict, total=False):
+    """What every public function takes by keyword, as its overloads spell it."""
+
+    workers: int | None
+    deadline: float | None
+    cancel: Cancel | None
+    progress: Progress | None
 
 
 class Budget:
