@@ -190,7 +190,7 @@ def _named(draw: Draw, n: int, n_pairs: int) -> Array:
 
 @family("collide_scene", 12)
 def scenes_with_all_options(draw: Draw) -> Iterator[Question]:
-    for dimension, n in ((2, 12), (3, 10), (2, 40), (3, 20)):
+    for dimension, n in (draw.pick([(2, 12), (2, 40)]), draw.pick([(3, 10), (3, 20)])):
         bounded = [maker for maker in solids.COLLIDED[dimension] if maker is not solids.surface]
         bodies, poses = _bodies(draw, dimension, n, bounded)
         for options in ({"detail": True}, {"skip": _named(draw, n, 20)}, {"only": _named(draw, n, 60), "detail": True},

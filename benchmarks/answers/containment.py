@@ -130,7 +130,7 @@ def few_bodies(draw: Draw) -> Iterator[Question]:
 @family("locate_scene", 8)
 def many_bodies(draw: Draw) -> Iterator[Question]:
     for dimension in (2, 3):
-        yield _scene(draw, dimension, draw.pick([60, 200, 700]), draw.pick(NEAR_PLACES), 9, 1500)
+        yield _scene(draw, dimension, draw.pick([60, 200, 700]), draw.pick(NEAR_PLACES), 9, 300)
 
 
 @family("locate_scene", 8)

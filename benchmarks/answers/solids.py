@@ -115,7 +115,8 @@ def implicit(draw: Draw, dimension: int, place: Place = HOME) -> Shape:
 
 
 def _inside_disc(points: Array) -> Array:
-    return 9.0 - (points[:, 0] * points[:, 0] + points[:, 1] * points[:, 1])
+    with np.errstate(over="ignore"):
+        return 9.0 - (points[:, 0] * points[:, 0] + points[:, 1] * points[:, 1])
 
 
 def csg(draw: Draw, dimension: int, place: Place = HOME) -> Shape:
