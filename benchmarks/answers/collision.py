@@ -165,6 +165,13 @@ def posed_pairs_of_any_types(draw: Draw) -> Iterator[Question]:
                 yield partial(posed_in_detail, *pair, *_poses(draw, dimension, 5))
 
 
+@family("witnesses", 4)
+def faces_of_many_vertices(draw: Draw) -> Iterator[Question]:
+    for _ in range(12):
+        pair = solids.prism(draw).solid, draw.pick([solids.prism, solids.polyhedron, solids.sphere])(draw, 3).solid
+        yield partial(witnessed, *pair, (None, solids.pose(draw, 3) if draw.chance(0.5) else None))
+
+
 @family("witnesses", 6)
 def posed_witnesses(draw: Draw) -> Iterator[Question]:
     for dimension in (2, 3):

@@ -67,8 +67,16 @@ def polygons_asked_again_and_again(draw: Draw) -> Iterator[Question]:
 
 @family("locate", 1)
 def large_mesh(draw: Draw) -> Iterator[Question]:
-    """So large that points are asked in the order of their cells."""
-    yield from _about(draw, solids.polyhedron_of(shapes.ball(draw, 6, 0.05)), (140_000,))
+    """So large, and points so near to it, that they are asked in the order of their cells."""
+    shape = solids.polyhedron_of(shapes.ball(draw, 6, 0.05))
+    near = shape.targets[draw.whole(0, len(shape.targets) - 1, 190_000)]
+    yield partial(located, near * draw.uniform(0.99, 1.01, len(near), 1), shape.solid)
+
+
+@family("locate", 6)
+def faces_of_many_vertices(draw: Draw) -> Iterator[Question]:
+    for _ in range(4):
+        yield from _about(draw, solids.prism(draw, 3, draw.pick(NEAR_PLACES)), (300,))
 
 
 @family("locate", 6)

@@ -49,6 +49,9 @@ INF, NAN = float("inf"), float("nan")
 CORNERS = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 FACES = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
 BALL = engine.Sphere([0.0, 0.0, 0.0], 1.0)
+APART = engine.Polyhedron(
+    CORNERS + [[x + 2.0, y, z] for x, y, z in CORNERS], FACES + [[a + 4, b + 4, c + 4] for a, b, c in FACES]
+)
 DISC = engine.Sphere([0.0, 0.0], 1.0)
 REFUSED: dict[str, tuple[tuple[Any, ...], ...]] = {
     "Aabb": (([0, 0], [1, -1]), ([0, 0], [1, 1, 1]), ([0], [1]), ([NAN, 0], [1, 1]), ("ab", [1, 1]),
@@ -91,7 +94,8 @@ REFUSED: dict[str, tuple[tuple[Any, ...], ...]] = {
                 ([[[0, NAN]] * 3], [[[0, 0]] * 3])),
     "clip_segments": (([[[0, 0], [1, 1]]], BALL), ([[[0, 0, 0]]], BALL), ([[[0, 0, 0], [1, 1, INF]]], BALL),
                       ([[[0, 0, 0], [1, 1, 1]]], engine.Csg("union", [BALL])), ([[0, 0, 0]], BALL)),
-    "clip_polygons": (([[CORNERS]], BALL), ([[]], engine.Aabb([0, 0], [1, 1])), ([[[]]], engine.Aabb([0, 0], [1, 1])),
+    "clip_polygons": (([[CORNERS]], APART), ([[CORNERS]], BALL), ([[]], engine.Aabb([0, 0], [1, 1])),
+                      ([[[]]], engine.Aabb([0, 0], [1, 1])),
                       ([[CORNERS]], engine.Aabb([0, 0], [1, 1])), (3, engine.Aabb([0, 0], [1, 1])),
                       ([[[[0, NAN], [1, 1]]]], engine.Aabb([0, 0], [1, 1]))),
     "overlay": ((DISC, DISC),

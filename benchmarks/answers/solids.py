@@ -98,6 +98,20 @@ def polyhedron_of(mesh: shapes.Mesh, place: Place = HOME, kind: Any = engine.Pol
     return Shape(kind(vertices, faces), np.concatenate([vertices, a * 0.5 + b * 0.5, a * 0.5 + b * 0.25 + c * 0.25]))
 
 
+def prism(draw: Draw, dimension: int = 3, place: Place = HOME) -> Shape:
+    """A prism over a comb or a star: faces of many vertices, mostly not convex."""
+    ring = shapes.comb(draw) if draw.chance(0.5) else shapes.coast(draw, draw.one(5, 12))
+    n = len(ring)
+    walls = [[k, (k + 1) % n, (k + 1) % n + n, k + n] for k in range(n)]
+    vertices = np.concatenate(
+        [np.pad(ring, ((0, 0), (0, 1)), constant_values=z) for z in (-1.0, draw.pick([1.0, 1 / 3]))]
+    )
+    order = draw.order(3)
+    solid = engine.Polyhedron(put(vertices[:, order], place), [list(range(n))[::-1], list(range(n, 2 * n)), *walls])
+    a, b = solid.vertices, np.roll(solid.vertices, 1, axis=0)
+    return Shape(solid, np.concatenate([a, a * 0.5 + b * 0.5]))
+
+
 def surface(draw: Draw, dimension: int = 3, place: Place = HOME) -> Shape:
     """An open surface: part of a mesh."""
     vertices, faces = draw.pick(shapes.MESHES)(draw)

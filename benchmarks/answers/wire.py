@@ -191,6 +191,18 @@ def _id_of(solid: dict[str, Any]) -> str:
     return str(body["id"])
 
 
+@family("http", 2)
+def long_lists(draw: Draw) -> Iterator[Question]:
+    """So many items that they are encoded in parts."""
+    shape = solids.aabb(draw, 2)
+    points = draw.uniform(-4.0, 4.0, 42_000, 2)
+    box = as_json(shape.solid)
+    requests: list[Request] = [("/v1/contains", {"solid": box, "points": points.tolist()})]
+    requests.append(("/v1/contains/scene", {"bodies": [{"solid": box}], "points": points.tolist()}))
+    requests.append(("/v1/clip/segments", {"region": box, "segments": points.reshape(-1, 2, 2).tolist()}))
+    yield partial(answers_to, requests)
+
+
 @family("http", 1)
 def mesh_files(draw: Draw) -> Iterator[Question]:
     """A file of the format that needs nothing but numbers (extra `formats`)."""
