@@ -1,0 +1,78 @@
+"""Families of questions, cut into chunks that are drawn, asked and hashed each by itself."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import engine
+from benchmarks.answers.digest import digest
+from benchmarks.answers.draws import Draw
+
+Question = Callable[[int | None], tuple[int, Any]]
+"""Asked with a number of workers, returns how many questions it was and what goes into the hash."""
+Drawn = Callable[[Draw], Iterator[Question]]
+
+
+class Chunk(NamedTuple):
+    """Some questions of a family; its name is all that they depend on."""
+
+    operation: str
+    name: str
+    drawn: Drawn
+
+    def asked(self, workers: int | None = None) -> tuple[int, str]:
+        """Return how many questions there are and the digest of the answers."""
+        n_questions, answers = 0, []
+        with np.errstate(over="ignore", invalid="ignore", under="ignore"):
+            for question in self.drawn(Draw(f"{self.operation}/{self.name}")):
+                n, answer = answered(question, workers)
+                n_questions += n
+                answers.append(answer)
+        return n_questions, digest(answers)
+
+    @property
+    def tenth(self) -> int:
+        """Which tenth of its operation's chunks this one is in."""
+        return (
+            sorted(CHUNKS[self.operation], key=lambda name: hashlib.sha256(name.encode()).digest()).index(self.name)
+            % 10
+        )
+
+
+CHUNKS: dict[str, dict[str, Chunk]] = {}
+"""By operation and name, in the order of the table."""
+
+
+def answered(question: Question, workers: int | None) -> tuple[int, Any]:
+    """Return the answer, an error's name, place and message if it is refused."""
+    try:
+        return question(workers)
+    except engine.EngineError as error:
+        return 1, [type(error).__name__, error.code, list(error.where), str(error)]
+
+
+def family(operation: str, n_chunks: int) -> Callable[[Drawn], Drawn]:
+    """Enter a family of questions; its name is that of the function."""
+
+    def enter(drawn: Drawn) -> Drawn:
+        for number in range(n_chunks):
+            name = f"{drawn.__name__}/{number}"
+            CHUNKS.setdefault(operation, {})[name] = Chunk(operation, name, drawn)
+        return drawn
+
+    return enter
+
+
+class OrderMattersError(Exception):
+    """The same geometry, its faces or vertices named in another order, has another answer."""
+
+
+def same(found: Any, expected: Any, what: str) -> Any:
+    """Return `found` if it is as expected."""
+    if digest(found) != digest(expected):
+        raise OrderMattersError(f"{what} in another order: another answer")
+    return found

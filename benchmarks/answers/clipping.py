@@ -1,0 +1,117 @@
+"""Questions to clip_segments and clip_polygons."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+import engine
+from benchmarks.answers import shapes, solids
+from benchmarks.answers.asking import Question, family
+from benchmarks.answers.draws import FAR_PLACES, NEAR_PLACES, Array, Draw, Place
+from benchmarks.answers.solids import Shape, points_about
+
+
+def segments_clipped(segments: Array, region: Any, workers: int | None) -> tuple[int, Any]:
+    pieces, accuracy = engine.clip_segments(segments, region, workers=workers, report=True)
+    found = [pieces.source, pieces.start, pieces.end, pieces.t, pieces.faces]
+    return len(segments), [*found, accuracy.decisions, accuracy.coordinates_ulp]
+
+
+def polygons_clipped(polygons: Any, region: Any, workers: int | None) -> tuple[int, Any]:
+    found, accuracy = engine.clip_polygons(polygons, region, workers=workers, report=True)
+    rings = [found.vertices, found.ring_offsets, found.polygon_offsets, found.contours]
+    return len(polygons), [*rings, found.status, found.may_have_bridges, accuracy.decisions, accuracy.coordinates_ulp]
+
+
+def _segments(draw: Draw, targets: Array, n: int) -> Array:
+    """Return segments between points about the targets, through targets, along axes, and some without length."""
+    a, b = points_about(draw, targets, n), points_about(draw, targets, n)
+    on = targets[draw.whole(0, len(targets) - 1, n)]
+    direction = np.where(draw.unit(n, 1) < 0.5, draw.whole(-2, 2, *on.shape), draw.uniform(-1.0, 1.0, *on.shape))
+    reach = direction * (np.abs(on).max() * 0.5)
+    through = [on - reach * draw.pick([0.0, 0.5, 1.0]), on + reach]
+    ways = np.stack(
+        [[a, b], [a, b], through, draw.nudged(np.stack(through)), [a, np.where(draw.unit(*a.shape) < 0.5, a, b)]]
+    )
+    return ways[draw.whole(0, len(ways) - 1, n), :, np.arange(n)]
+
+
+def _on_regions(draw: Draw, places: tuple[Place, ...], n: int) -> Iterator[Question]:
+    for dimension, makers in solids.REGIONS.items():
+        for maker in makers:
+            shape = maker(draw, dimension, draw.pick(places))
+            some = n // 4 if maker in (solids.polygon, solids.polyhedron) else n
+            yield partial(segments_clipped, _segments(draw, shape.targets, some), shape.solid)
+
+
+@family("clip_segments", 20)
+def on_all_regions(draw: Draw) -> Iterator[Question]:
+    yield from _on_regions(draw, NEAR_PLACES, 600)
+
+
+@family("clip_segments", 10)
+def on_regions_far_away(draw: Draw) -> Iterator[Question]:
+    yield from _on_regions(draw, FAR_PLACES, 24)
+
+
+@family("clip_segments", 6)
+def batches(draw: Draw) -> Iterator[Question]:
+    """Long batches of easy segments, on convex regions and on boundaries that the first batch prepares cells for."""
+    for maker in (solids.aabb, solids.convex, solids.sphere):
+        shape = maker(draw, draw.pick([2, 3]))
+        yield partial(segments_clipped, draw.uniform(-6.0, 6.0, 5000, 2, shape.solid.dimension), shape.solid)
+    mesh = solids.polyhedron_of(draw.pick([shapes.bumpy, lambda draw: shapes.ball(draw, 4, 0.1)])(draw))
+    yield partial(segments_clipped, draw.uniform(-3.0, 3.0, 18_000, 2, 3), mesh.solid)
+    yield partial(segments_clipped, _segments(draw, mesh.targets, 20), mesh.solid)
+    rings = solids.polygon_of(draw.pick([shapes.large_coast(draw), shapes.squares(draw, 15, 0.5)]))
+    yield partial(segments_clipped, draw.uniform(-4.0, 4.0, 5000, 2, 2), rings.solid)
+    yield partial(segments_clipped, _segments(draw, rings.targets, 20), rings.solid)
+
+
+def _small_ball(draw: Draw) -> shapes.Mesh:
+    return shapes.ball(draw, draw.one(0, 1))
+
+
+def _cutters(draw: Draw, dimension: int, place: Place) -> Shape:
+    makers = [solids.half_space, solids.aabb, solids.convex, solids.aabb]
+    if dimension == 3 and draw.chance(0.3):
+        return solids.polyhedron_of(draw.pick([shapes.box, shapes.tetrahedron, _small_ball])(draw), place)
+    return draw.pick(makers)(draw, dimension, place)
+
+
+def _contours(draw: Draw, shape: Shape, n: int) -> list[list[Array]]:
+    """Return polygons of one to three rings, in space neither plane nor simple as a rule."""
+    sizes = [[draw.one(1, 9) for _ in range(draw.one(1, 3))] for _ in range(n)]
+    return [[points_about(draw, shape.targets, size) for size in row] for row in sizes]
+
+
+@family("clip_polygons", 20)
+def contours_about_regions(draw: Draw) -> Iterator[Question]:
+    for dimension in (2, 3):
+        for _ in range(4):
+            shape = _cutters(draw, dimension, draw.pick(NEAR_PLACES))
+            yield partial(polygons_clipped, _contours(draw, shape, 14), shape.solid)
+
+
+@family("clip_polygons", 8)
+def contours_far_away(draw: Draw) -> Iterator[Question]:
+    for dimension in (2, 3):
+        shape = _cutters(draw, dimension, draw.pick(FAR_PLACES))
+        yield partial(polygons_clipped, _contours(draw, shape, 12), shape.solid)
+
+
+@family("clip_polygons", 12)
+def flat_polygons(draw: Draw) -> Iterator[Question]:
+    """Arrays of triangles and quads, mostly plane; polygons as solids."""
+    for dimension in (2, 3):
+        size = draw.pick([3, 4])
+        flat = draw.uniform(-4.0, 4.0, 3000, 1, dimension) + np.pad(shapes.SQUARE[:size], ((0, 0), (0, dimension - 2)))
+        yield partial(polygons_clipped, flat, _cutters(draw, dimension, (1.0, 0.0)).solid)
+    rings = [solids.polygon(draw).solid for _ in range(40)]
+    yield partial(polygons_clipped, rings, _cutters(draw, 2, (1.0, 0.0)).solid)
+    triangles = np.stack([draw.spots(3, 3) for _ in range(80)])
+    yield partial(polygons_clipped, triangles, _cutters(draw, 3, (1.0, 0.0)).solid)

@@ -1,0 +1,191 @@
+"""Questions to overlay and overlay_batch."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import Any, Literal
+
+import numpy as np
+
+import engine
+from benchmarks.answers import shapes
+from benchmarks.answers.asking import Question, family, same
+from benchmarks.answers.draws import FAR_PLACES, NEAR_PLACES, Array, Draw, Place, around, put, turned
+
+Operation = Literal["intersection", "union", "difference", "symmetric_difference"]
+Output = Literal["valid", "nearest"]
+OPERATIONS: tuple[Operation, ...] = ("intersection", "union", "difference", "symmetric_difference")
+OUTPUTS: tuple[Output, ...] = ("valid", "valid", "nearest")
+Rings = list[Array]
+Pair = tuple[Rings, Rings]
+
+
+def said(found: engine.Overlay | None) -> Any:
+    """Return an overlay as a list, without the bound on displacements, which depends on the order of edges."""
+    if found is None:
+        return None
+    return [
+        found.vertices, found.ring_offsets, found.piece_offsets, found.area_exact, found.n_pieces_exact,
+        found.n_holes_exact, [(part.kind, part.area, list(part.near)) for part in found.collapsed],
+        found.pieces_joined, found.pieces_parted, found.holes_joined, found.holes_parted, found.rounds,
+        found.vertices_moved, found.snapped, found.may_be_invalid,
+    ]  # fmt: skip
+
+
+def overlaid(pair: Pair, output: Output, workers: int | None) -> tuple[int, Any]:
+    subject, clip = (engine.Polygon(rings) for rings in pair)
+    return 4, [said(engine.overlay(subject, clip, name, output=output, workers=workers)) for name in OPERATIONS]
+
+
+def overlaid_in_order(pair: Pair, other: Pair, workers: int | None) -> tuple[int, Any]:
+    """Ask also with rings and vertices named in another order: the same rings."""
+    n, found = overlaid(pair, "valid", workers)
+    return 2 * n, same(overlaid(other, "valid", workers)[1], found, "rings and vertices")
+
+
+def batch_overlaid(pairs: list[Pair], output: Output, workers: int | None) -> tuple[int, Any]:
+    subjects, clips = ([engine.Polygon(rings) for rings in side] for side in zip(*pairs))
+    answers = []
+    for name in OPERATIONS:
+        found = engine.overlay_batch(subjects, clips, name, output=output, workers=workers)
+        flat = [found.status, found.vertices, found.ring_offsets, found.piece_offsets, found.pair_offsets]
+        answers.append([*flat, [said(found[pair]) for pair in range(0, len(found), 9)]])
+    return 4 * len(pairs), answers
+
+
+def any_rings(draw: Draw) -> Pair:
+    return draw.pick(shapes.RINGS)(draw), draw.pick(shapes.RINGS)(draw)
+
+
+def lattice(draw: Draw) -> Pair:
+    """Hardly an edge that touches no other."""
+    size = draw.pick([2, 3, 8])
+    rings = [draw.whole(0, size, draw.one(4, 9), 2).astype(float) for _ in range(3)]
+    return rings[:2], rings[2:]
+
+
+def turned_lattice(draw: Draw) -> Pair:
+    subject, clip = lattice(draw)
+    rotation, scale = draw.rotation(2), draw.pick([1.0, 1 / 3, 1e-9])
+    return [turned(ring, rotation) * scale for ring in subject], [turned(ring, rotation) * scale for ring in clip]
+
+
+def coincident(draw: Draw) -> Pair:
+    """Return a ring, and one made of its vertices and middles of its edges, some an ulp off."""
+    first = draw.spots(draw.one(4, 9), 2)
+    second = np.where(draw.unit(len(first), 1) < 0.4, first * 0.5 + np.roll(first, 1, axis=0) * 0.5, first)
+    return [first], [draw.nudged(second) if draw.chance(0.5) else second]
+
+
+def shared_border(draw: Draw) -> Pair:
+    n = draw.one(3, 9)
+    border = np.stack([draw.unit(n) * 0.3, np.sort(draw.unit(n))], axis=1)
+    copy = draw.nudged(border, 1)[::-1] if draw.chance(0.5) else border[::-1]
+    return [np.concatenate([border, [[-1.0, 1.0], [-1.0, 0.0]]])], [np.concatenate([copy, [[1.0, 0.0], [1.0, 1.0]]])]
+
+
+def pencil(draw: Draw) -> Pair:
+    """Long edges that pass one point within an ulp or two: hot pixels."""
+
+    def ring() -> Array:
+        ends = around(np.sort(draw.unit(draw.one(3, 5))) * 2.0)
+        both = np.stack([ends, -ends * (0.5 + draw.unit(len(ends), 1))], axis=1)
+        both[1::2] = both[1::2, ::-1]
+        return both.reshape(-1, 2) + 1 / 3
+
+    return [ring()], [ring()]
+
+
+def turned_a_little(draw: Draw) -> Pair:
+    first = shapes.star(draw, draw.one(5, 14))
+    t = draw.pick([1e-3, 1e-8, 1e-12, 1e-15, 1e-16])
+    x, y = around(np.array([t]))[0]
+    return [first], [turned(first, np.array([[x, -y], [y, x]]))]
+
+
+def convex_pair(draw: Draw) -> Pair:
+    return [shapes.round_ring(draw)], [shapes.round_ring(draw)]
+
+
+def stars(draw: Draw) -> Pair:
+    return [shapes.star(draw, draw.one(5, 30))], [shapes.star(draw, draw.one(5, 30))]
+
+
+KINDS: tuple[Callable[[Draw], Pair], ...] = (
+    any_rings, lattice, turned_lattice, coincident, shared_border, pencil, turned_a_little, convex_pair, stars,
+)  # fmt: skip
+
+
+def _drawn(draw: Draw, places: tuple[Place, ...], kind: Callable[[Draw], Pair] | None = None) -> Pair:
+    """Return a pair all of whose rings have three vertices left when a repeated last one is dropped."""
+    place = draw.pick(places)
+    while True:  # bound: lattices draw such a pair at every second try at least
+        pair = (kind or draw.pick(KINDS))(draw)
+        subject, clip = ([put(ring, place) for ring in rings] for rings in pair)
+        if all(len(ring) - int((ring[0] == ring[-1]).all()) >= 3 for ring in (*subject, *clip)):
+            return subject, clip
+
+
+@family("overlay", 24)
+def pairs_of_all_kinds(draw: Draw) -> Iterator[Question]:
+    for kind in KINDS * 3:
+        yield partial(overlaid, _drawn(draw, NEAR_PLACES, kind), draw.pick(OUTPUTS))
+
+
+@family("overlay", 10)
+def pairs_far_away(draw: Draw) -> Iterator[Question]:
+    for kind in KINDS:
+        yield partial(overlaid, _drawn(draw, FAR_PLACES, kind), draw.pick(OUTPUTS))
+
+
+@family("overlay", 6)
+def rings_in_another_order(draw: Draw) -> Iterator[Question]:
+    for kind in KINDS:
+        pair = _drawn(draw, NEAR_PLACES, kind)
+        subject, clip = ([np.roll(ring, 1, axis=0)[::-1] for ring in rings[::-1]] for rings in pair)
+        yield partial(overlaid_in_order, pair, (subject, clip))
+
+
+def displaced(pair: Pair, workers: int | None) -> tuple[int, Any]:
+    """Ask how far rounding moved edges at most."""
+    subject, clip = (engine.Polygon(rings) for rings in pair)
+    found, accuracy = engine.overlay(subject, clip, "union", report=True, workers=workers)
+    batch = engine.overlay_batch([subject, subject], [clip, clip], "difference", workers=workers)
+    return 3, [found.largest_displacement, accuracy.coordinates_ulp, batch.displacement]
+
+
+@family("displacements", 10)
+def bounds_on_displacement(draw: Draw) -> Iterator[Question]:
+    for kind in KINDS * 3:
+        yield partial(displaced, _drawn(draw, NEAR_PLACES, kind))
+
+
+@family("overlay", 4)
+def large_rings(draw: Draw) -> Iterator[Question]:
+    """Rings of thousands of vertices, of which most are near nothing; hundreds of rings; dense crossings."""
+    coasts = [shapes.coast(draw, 3000), shapes.coast(draw, 2500) + draw.pick([0.1, 1.0, 3.5])]
+    yield partial(overlaid, (coasts[:1], coasts[1:]), "valid")
+    yield partial(overlaid, (coasts[:1], [shapes.star(draw, 9)]), "valid")
+    holes = shapes.many_holes(draw)
+    yield partial(overlaid, (holes, [ring + draw.pick([0.0, 0.1, 0.25]) for ring in holes]), draw.pick(OUTPUTS))
+    yield partial(overlaid, (holes, coasts[1:]), "valid")
+    yield partial(overlaid, ([shapes.star(draw, 60)], [shapes.star(draw, 80)]), draw.pick(OUTPUTS))
+
+
+@family("overlay_batch", 20)
+def batches_of_all_kinds(draw: Draw) -> Iterator[Question]:
+    places = draw.pick([NEAR_PLACES, ((1.0, 0.0),), ((1 / 3, 1e6),)])
+    yield partial(batch_overlaid, [_drawn(draw, places) for _ in range(draw.pick([3, 40, 150]))], draw.pick(OUTPUTS))
+
+
+@family("overlay_batch", 10)
+def batches_of_one_kind(draw: Draw) -> Iterator[Question]:
+    kind = draw.pick([convex_pair, stars, lattice, turned_lattice])
+    yield partial(batch_overlaid, [_drawn(draw, NEAR_PLACES, kind) for _ in range(500)], draw.pick(OUTPUTS))
+
+
+@family("overlay_batch", 6)
+def batches_far_away(draw: Draw) -> Iterator[Question]:
+    pairs = [_drawn(draw, FAR_PLACES + NEAR_PLACES[:2]) for _ in range(10)]
+    yield partial(batch_overlaid, [*pairs, *[_drawn(draw, NEAR_PLACES) for _ in range(10)]], draw.pick(OUTPUTS))

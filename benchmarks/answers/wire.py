@@ -1,0 +1,216 @@
+"""Questions to the service, in this process: every POST endpoint, JSON and octets, good requests and broken ones."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Iterator
+from functools import partial
+from typing import Any
+from unittest import mock
+
+import httpx
+import numpy as np
+
+import engine
+from benchmarks.answers import overlays, shapes, solids
+from benchmarks.answers.asking import Question, family
+from benchmarks.answers.draws import NEAR_PLACES, Array, Draw
+from benchmarks.answers.solids import points_about
+from service.app import create_app
+from service.settings import Settings
+
+Request = tuple[str, Any]
+"""Path and body: a value for JSON, bytes for octets."""
+_KEPT_HEADERS = ("location", "etag", "allow", "accept-post", "content-type")
+_LEFT_OUT = ("memory", "largest_displacement")
+"""Members of answers that tell of structures, and a bound that depends on the order of edges."""
+
+
+def answers_to(requests: list[Request], workers: int | None) -> tuple[int, Any]:
+    """Return status, some headers and body of the answers of a new service, asked one request after another."""
+    with mock.patch.object(engine, "warm", return_value=None):  # kernels load when they are first used
+        return len(requests), asyncio.run(_ask(requests))
+
+
+async def _ask(requests: list[Request]) -> list[Any]:
+    app = create_app(Settings(deadline_seconds=300.0, access_log=False))
+    answers = []
+    async with app.router.lifespan_context(app):
+        app.state.warm.wait(60)
+        transport = httpx.ASGITransport(app=app)
+        async with httpx.AsyncClient(transport=transport, base_url="http://test", timeout=None) as client:
+            for path, body in requests:
+                kind = "application/octet-stream" if isinstance(body, bytes) else "application/json"
+                content = body if isinstance(body, bytes | str) else json.dumps(body)
+                answers.append(_said(await client.post(path, content=content, headers={"content-type": kind})))
+    return answers
+
+
+def _said(answer: httpx.Response) -> Any:
+    headers = {name: answer.headers[name] for name in _KEPT_HEADERS if name in answer.headers}
+    is_json = "json" in headers.get("content-type", "")
+    return [answer.status_code, headers, _without_costs(answer.json()) if is_json else answer.content]
+
+
+def _without_costs(body: Any) -> Any:
+    if not isinstance(body, dict):
+        return body
+    kept = {name: _without_costs(value) for name, value in body.items() if name not in _LEFT_OUT}
+    if "accuracy" in kept:
+        kept["accuracy"] = kept["accuracy"]["decisions"]
+    return kept
+
+
+def as_json(solid: Any) -> dict[str, Any]:
+    """Return a solid as requests have it."""
+    found: dict[str, Any] = {"type": solid.type}
+    match solid:
+        case engine.HalfSpace():
+            found |= {"normal": solid.normal.tolist(), "offset": solid.offset}
+        case engine.Sphere():
+            found |= {"center": solid.center.tolist(), "radius": solid.radius}
+        case engine.Aabb():
+            found |= {"min": solid.min.tolist(), "max": solid.max.tolist()}
+        case engine.Convex():
+            found |= {"planes": solid.planes.tolist()}
+        case engine.Polygon():
+            found |= {"rings": [ring.tolist() for ring in np.split(solid.vertices, solid.ring_offsets[1:-1])]}
+        case engine.Triangle():
+            found |= {"vertices": solid.vertices.tolist()}
+        case engine.Implicit():
+            terms = zip(solid.powers.tolist(), solid.coefficients.tolist())
+            found |= {"terms": [{"powers": powers, "coefficient": factor} for powers, factor in terms]}
+        case engine.Csg():
+            found |= {"operation": solid.operation, "operands": [as_json(operand) for operand in solid.operands]}
+        case _:
+            faces = np.split(solid.face_indices, solid.face_offsets[1:-1])
+            found |= {"vertices": solid.vertices.tolist(), "faces": [face.tolist() for face in faces]}
+    return found
+
+
+def _pose(draw: Draw, dimension: int) -> dict[str, Any]:
+    pose = solids.pose(draw, dimension)
+    return {"rotation": pose.rotation.tolist(), "translation": pose.translation.tolist()}
+
+
+def _shape(draw: Draw, makers: Any, dimension: int) -> tuple[dict[str, Any], Array]:
+    """Return a solid that JSON can name, and its targets."""
+    while True:  # bound: a callable is rare
+        shape = draw.pick(makers)(draw, dimension, draw.pick(NEAR_PLACES))
+        if not _holds_callable(shape.solid):
+            return as_json(shape.solid), shape.targets
+
+
+def _holds_callable(solid: Any) -> bool:
+    if isinstance(solid, engine.Csg):
+        return any(map(_holds_callable, solid.operands))
+    return isinstance(solid, engine.Implicit) and solid.function is not None
+
+
+def _good(draw: Draw, dimension: int) -> Iterator[Request]:
+    n = draw.pick([3, 40, 400])
+    solid, targets = _shape(draw, solids.LOCATED[dimension], dimension)
+    yield "/v1/contains", {"solid": solid, "points": points_about(draw, targets, n).tolist()}
+    scene = [_shape(draw, solids.LOCATED[dimension], dimension)[0] for _ in range(4)]
+    bodies = [{"solid": body} | ({"pose": _pose(draw, dimension)} if draw.chance(0.5) else {}) for body in scene]
+    yield "/v1/contains/scene", {"bodies": bodies, "points": points_about(draw, targets, n).tolist()}
+    first, second = (_shape(draw, solids.COLLIDED[dimension], dimension)[0] for _ in range(2))
+    yield "/v1/collide", {"first": first, "second": second}
+    poses = [_pose(draw, dimension) for _ in range(5)]
+    yield "/v1/collide", {"first": first, "second": second, "poses": poses, "detail": True}
+    scene = [_shape(draw, solids.COLLIDED[dimension], dimension)[0] for _ in range(6)]
+    bodies = [{"solid": body} | ({"pose": _pose(draw, dimension)} if draw.chance(0.3) else {}) for body in scene]
+    yield "/v1/collide/scene", {"bodies": bodies, "skip": [[0, 1]], "detail": draw.chance(0.5)}
+    region, targets = _shape(draw, solids.REGIONS[dimension], dimension)
+    segments = points_about(draw, targets, 2 * n).reshape(n, 2, dimension)
+    yield "/v1/clip/segments", {"region": region, "segments": segments.tolist()}
+    region, targets = _shape(draw, (solids.half_space, solids.aabb, solids.convex), dimension)
+    polygons = [[points_about(draw, targets, draw.one(3, 6)).tolist()] for _ in range(5)]
+    yield "/v1/clip/polygons", {"region": region, "polygons": polygons}
+    subject, clip = (
+        {"type": "polygon", "rings": [ring.tolist() for ring in rings]} for rings in overlays.any_rings(draw)
+    )
+    for name in overlays.OPERATIONS:
+        yield (
+            "/v1/overlay",
+            {"subject": subject, "clip": clip, "operation": name, "output": draw.pick(overlays.OUTPUTS)},
+        )
+    yield "/v1/bounds", {"solid": region if draw.chance(0.3) else first}
+    yield "/v1/solids", solid
+
+
+def _broken(draw: Draw, request: Request) -> Request:
+    """Return a request with one thing wrong with it."""
+    path, body = request
+    match draw.one(0, 4):
+        case 0:
+            return path, json.dumps(body)[: draw.one(1, 60)]
+        case 1:
+            return path, {**body, "unknown": 1}
+        case 2:
+            return path, dict(list(body.items())[1:])
+        case 3:
+            return path, json.dumps(body).replace("0,", draw.pick(["null,", '"0",', "1e999,", "true,", "[],"]), 1)
+    return path, json.dumps(body).encode()
+
+
+@family("http", 20)
+def json_requests(draw: Draw) -> Iterator[Question]:
+    requests = [request for dimension in (2, 3) for request in _good(draw, dimension)]
+    yield partial(answers_to, requests + [_broken(draw, request) for request in requests])
+
+
+@family("http", 10)
+def stored_solids(draw: Draw) -> Iterator[Question]:
+    """Solids put twice, named by their id in JSON, asked by octets; octets that do not fit."""
+    requests: list[Request] = []
+    for dimension in (2, 3):
+        for makers in (solids.LOCATED[dimension], solids.REGIONS[dimension][:-1]):
+            solid, targets = _shape(draw, makers, dimension)
+            name = _id_of(solid)
+            points = points_about(draw, targets, 200).astype("<f8")
+            requests += [
+                (f"/v1/solids/{name}/contains", points.tobytes()),
+                ("/v1/solids", solid),
+                ("/v1/solids", solid),
+            ]
+            requests += [(f"/v1/solids/{name}/contains", points.tobytes()), (f"/v1/solids/{name}/contains", b"1234567")]
+            requests += [(f"/v1/solids/{name}/clip/segments", points.tobytes())]
+            stored = {"type": "stored", "id": name}
+            requests += [
+                ("/v1/contains", {"solid": stored, "points": points.tolist()}),
+                ("/v1/bounds", {"solid": stored}),
+            ]
+    yield partial(answers_to, requests)
+
+
+def _id_of(solid: dict[str, Any]) -> str:
+    """Return the id that the service gives a solid."""
+    _, [[_, _, body]] = answers_to([("/v1/solids", solid)], None)
+    return str(body["id"])
+
+
+@family("http", 2)
+def long_lists(draw: Draw) -> Iterator[Question]:
+    """So many items that they are encoded in parts."""
+    shape = solids.aabb(draw, 2)
+    points = draw.uniform(-4.0, 4.0, 42_000, 2)
+    box = as_json(shape.solid)
+    requests: list[Request] = [("/v1/contains", {"solid": box, "points": points.tolist()})]
+    requests.append(("/v1/contains/scene", {"bodies": [{"solid": box}], "points": points.tolist()}))
+    requests.append(("/v1/clip/segments", {"region": box, "segments": points.reshape(-1, 2, 2).tolist()}))
+    yield partial(answers_to, requests)
+
+
+@family("http", 1)
+def mesh_files(draw: Draw) -> Iterator[Question]:
+    """A file of the format that needs nothing but numbers (extra `formats`)."""
+    requests: list[Request] = []
+    for make in shapes.MESHES:
+        vertices, faces = make(draw)
+        rows = [" ".join(map(repr, row)) for row in vertices.tolist()]
+        rows += [" ".join(map(str, [3, *row])) for row in faces.tolist()]
+        text = "\n".join(["OFF", f"{len(vertices)} {len(faces)} 0", *rows, ""])
+        requests.append(("/v1/solids/import?format=off", text.encode()))
+    yield partial(answers_to, requests)
