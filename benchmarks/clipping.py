@@ -66,25 +66,6 @@ def tasks(suite: Suite) -> Iterator[Task]:
     yield "two threads, segments on 20 planes", partial(_two_threads, suite, planes)
 
 
-def segments_of(kind: str, region: engine.Solid, n: int, seed: int) -> np.ndarray:
-    """Return n segments near a region of about the size of the cube from -1 to 1.
-
-    random: ends in a cube of twice the size. corner, edge: through corners or places on edges, missed by about 1e-16.
-    ulp: ends on the planes and up to four units in the last place off, on a lattice.
-    """
-    draw, dim = workloads.generator(f"segments/{kind}", seed), region.dimension
-    if kind == "random":
-        return draw.uniform(-2.0, 2.0, (n, 2, dim))
-    if kind == "ulp":
-        ends = draw.integers(-4, 5, (n, 2, dim)) * 0.5
-        return ends + draw.integers(-4, 5, ends.shape) * np.spacing(np.maximum(np.abs(ends), 0.5))
-    targets = draw.choice([-1.0, 1.0], (n, dim))
-    if kind == "edge":
-        targets[np.arange(n), draw.integers(0, dim, n)] = draw.uniform(-1.0, 1.0, n)
-    directions = draw.uniform(-1.0, 1.0, (n, 1, dim))
-    return targets[:, None] + directions * draw.uniform(0.5, 2.0, (n, 2, 1)) * np.array([[-1.0], [1.0]])
-
-
 def _our_segments(region: engine.Solid, threads: int) -> Prepared:
     def ask(segments: np.ndarray) -> engine.SegmentPieces:
         return engine.clip_segments(segments, region, workers=threads)
@@ -95,7 +76,7 @@ def _our_segments(region: engine.Solid, threads: int) -> Prepared:
 def _segments(
     suite: Suite, region: engine.Solid, peer: str, kind: str, n: int, goals: Goals, name: str
 ) -> Iterable[Row]:
-    segments = segments_of(kind, region, n, suite.options.seed)
+    segments = workloads.segments_of(kind, region.dimension, n, suite.options.seed)
     yield _row(suite, name, goals, _our_segments(region, 1), peer, "segments", region, segments, _check_segments)
 
 
@@ -147,20 +128,13 @@ def _polygons(
     suite: Suite, region: engine.Aabb, peer: str, size: int, n_vertices: int, goals: Goals, name: str
 ) -> Iterable[Row]:
     """Polygons of one ring: stars in the plane, turned anyhow in space (so hardly ever planar)."""
-    draw = workloads.generator(f"polygons/{size}/{region.dimension}", suite.options.seed)
-    n = n_vertices // 4 // size
-    angles = np.sort(draw.uniform(0.0, 2.0 * np.pi, (n, size)), axis=1)
-    rings = np.stack([np.cos(angles), np.sin(angles)], axis=2) * draw.uniform(0.6, 1.0, (n, size, 1))
-    if region.dimension == 3:
-        turns = np.linalg.qr(draw.normal(size=(n, 3, 3)))[0]
-        rings = rings @ turns[:, :2]
-    rings += draw.uniform(-1.2, 1.2, (n, 1, region.dimension))
+    rings = workloads.star_rings(size, region.dimension, n_vertices // 4 // size, suite.options.seed)
 
     def ask(polygons: np.ndarray) -> engine.ClippedPolygons:
         return engine.clip_polygons(polygons, region, workers=1)
 
     ours = Prepared(lambda polygons: polygons, ask, lambda found: np.diff(found.polygon_offsets) > 0)
-    yield _row(suite, name, goals, ours, peer, "polygons", region, np.ascontiguousarray(rings), _check_polygons)
+    yield _row(suite, name, goals, ours, peer, "polygons", region, rings, _check_polygons)
 
 
 def _check_polygons(suite: Suite, region: engine.Solid, rings: np.ndarray, ours: Any, peer: Any) -> str:
@@ -177,7 +151,7 @@ def _check_polygons(suite: Suite, region: engine.Solid, rings: np.ndarray, ours:
 
 
 def _two_threads(suite: Suite, region: engine.Solid, name: str) -> Iterable[Row]:
-    segments = segments_of("random", region, suite.options.n_points, suite.options.seed)
+    segments = workloads.segments_of("random", region.dimension, suite.options.n_points, suite.options.seed)
     one, two = _our_segments(region, 1), _our_segments(region, 2)
     runs = [lambda: two.ask(segments), lambda: one.ask(segments)]
     (a, b), _ = interleaved(runs, suite.options.rounds, suite.options.seconds)

@@ -212,3 +212,33 @@ def near_points(subject: Mesh | Rings, n_points: int, seed: int) -> np.ndarray:
     points = (corners[chosen] * weights[:, :, None]).sum(axis=1)
     low, high = extent_of(subject)
     return points + random.normal(size=points.shape) * (NEAR * (high - low).max())
+
+
+def segments_of(kind: str, dimension: int, n: int, seed: int) -> np.ndarray:
+    """Return n segments near the cube from -1 to 1, or a region of about its size.
+
+    random: ends in a cube of twice the size. corner, edge: through corners or places on edges, missed by about 1e-16.
+    ulp: ends on the planes and up to four units in the last place off, on a lattice.
+    """
+    draw = generator(f"segments/{kind}", seed)
+    if kind == "random":
+        return draw.uniform(-2.0, 2.0, (n, 2, dimension))
+    if kind == "ulp":
+        ends = draw.integers(-4, 5, (n, 2, dimension)) * 0.5
+        return ends + draw.integers(-4, 5, ends.shape) * np.spacing(np.maximum(np.abs(ends), 0.5))
+    targets = draw.choice([-1.0, 1.0], (n, dimension))
+    if kind == "edge":
+        targets[np.arange(n), draw.integers(0, dimension, n)] = draw.uniform(-1.0, 1.0, n)
+    directions = draw.uniform(-1.0, 1.0, (n, 1, dimension))
+    return targets[:, None] + directions * draw.uniform(0.5, 2.0, (n, 2, 1)) * np.array([[-1.0], [1.0]])
+
+
+def star_rings(size: int, dimension: int, n_rings: int, seed: int) -> np.ndarray:
+    """Return rings (n_rings, size, dimension): stars in the plane, turned anyhow in space, so hardly ever planar."""
+    draw = generator(f"polygons/{size}/{dimension}", seed)
+    angles = np.sort(draw.uniform(0.0, 2.0 * np.pi, (n_rings, size)), axis=1)
+    rings = np.stack([np.cos(angles), np.sin(angles)], axis=2) * draw.uniform(0.6, 1.0, (n_rings, size, 1))
+    if dimension == 3:
+        turns = np.linalg.qr(draw.normal(size=(n_rings, 3, 3)))[0]
+        rings = rings @ turns[:, :2]
+    return np.ascontiguousarray(rings + draw.uniform(-1.2, 1.2, (n_rings, 1, dimension)))

@@ -5,15 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-import engine
-from benchmarks import clipping
-
-CUBE = engine.Aabb([-1.0] * 3, [1.0] * 3)
+from benchmarks import clipping, workloads
 
 
 @pytest.mark.parametrize("kind", ["random", "corner", "edge", "ulp"])
 def test_segments_are_seeded(kind: str) -> None:
-    first, second, other = (clipping.segments_of(kind, CUBE, 40, seed) for seed in (0, 0, 1))
+    first, second, other = (workloads.segments_of(kind, 3, 40, seed) for seed in (0, 0, 1))
     assert np.array_equal(first, second)
     assert not np.array_equal(first, other)
 
