@@ -18,9 +18,9 @@ from typing import Any
 
 import dask.config
 import numpy as np
-import numpy.typing as npt
 from distributed import Client, Future, as_completed
 
+from engine.arrays import Int8Array
 from engine.collision import collide_poses as poses
 from engine.containment import locate as containment
 from engine.errors import InvalidArrayError, InvalidInputError
@@ -40,7 +40,7 @@ Function = Callable[..., Any]
 
 def locate(
     client: Client, points: object, solid: Solid, *, part: int = 200_000, progress: Progress | None = None
-) -> npt.NDArray[np.int8]:
+) -> Int8Array:
     """Locate points in a solid, see `engine.locate`."""
     rows = as_points(points, solid.dimension)
     result = np.empty(len(rows), np.int8)
@@ -58,7 +58,7 @@ def collide_poses(
     *,
     part: int = 2_000,
     progress: Progress | None = None,
-) -> npt.NDArray[np.int8]:
+) -> Int8Array:
     """Decide how `first` lies to `second` under many poses, see `engine.collide_poses`."""
     turns, moves = poses.as_poses(rotations, translations, first.dimension)
     result = np.empty(len(turns), np.int8)

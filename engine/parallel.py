@@ -15,11 +15,11 @@ import time
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, TypedDict
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import FlagArray
 from engine.errors import CancelledError, DeadlineExceededError, InvalidInputError
 
 Progress = Callable[[int], object]
@@ -39,7 +39,7 @@ class Cancel:
 
     def __init__(self) -> None:
         self.is_set = False
-        self._flags: list[npt.NDArray[np.uint8]] = []
+        self._flags: list[FlagArray] = []
         self._lock = threading.Lock()
 
     def set(self) -> None:
@@ -49,14 +49,14 @@ class Cancel:
             for flag in self._flags:
                 flag[0] = 1
 
-    def attach(self, flag: npt.NDArray[np.uint8]) -> None:
+    def attach(self, flag: FlagArray) -> None:
         """Have `flag` raised when the switch is thrown."""
         with self._lock:
             self._flags.append(flag)
             if self.is_set:
                 flag[0] = 1
 
-    def detach(self, flag: npt.NDArray[np.uint8]) -> None:
+    def detach(self, flag: FlagArray) -> None:
         """Forget `flag`."""
         with self._lock:
             self._flags = [kept for kept in self._flags if kept is not flag]
@@ -67,7 +67,7 @@ class _Waiting:
     """A flag and when to raise it."""
 
     end: float
-    flag: npt.NDArray[np.uint8] | None = field(compare=False)  # None: no longer
+    flag: FlagArray | None = field(compare=False)  # None: no longer
 
 
 class _Clock:
@@ -79,7 +79,7 @@ class _Clock:
         self._changed = threading.Condition()
         self._runs = False
 
-    def add(self, end: float, flag: npt.NDArray[np.uint8]) -> _Waiting:
+    def add(self, end: float, flag: FlagArray) -> _Waiting:
         """Have `flag` raised at the time `end` of the monotonic clock."""
         waiting = _Waiting(end, flag)
         with self._changed:
@@ -115,6 +115,15 @@ class _Clock:
 _clock = _Clock()
 
 
+class Options(TypedDict, total=False):
+    """What every public function takes by keyword, as its overloads spell it."""
+
+    workers: int | None
+    deadline: float | None
+    cancel: Cancel | None
+    progress: Progress | None
+
+
 class Budget:
     """Deadline and cancel switch of one call; use as a context manager.
 
@@ -133,7 +142,7 @@ class Budget:
             raise InvalidInputError(f"cancel must be an engine.Cancel or None, got {_shown(cancel)}", ("cancel",))
         longest = threading.TIMEOUT_MAX  # of the timer, some centuries: more than that is no limit
         self.deadline = None if deadline is None or deadline > longest else float(max(deadline, -longest))
-        self.flag: npt.NDArray[np.uint8] = np.zeros(1, np.uint8)
+        self.flag: FlagArray = np.zeros(1, np.uint8)
         self._cancel = cancel
         self._end = None if self.deadline is None else time.monotonic() + self.deadline
         self._waiting: _Waiting | None = None

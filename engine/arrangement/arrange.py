@@ -18,11 +18,11 @@ from functools import cmp_to_key
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
 from engine.arrangement.box_pairs import box_pairs
 from engine.arrangement.float_filter import CROSS, MISS, UNSURE, classify_pairs
 from engine.arrangement.nodes import Homogeneous, NodeTable, Rational, float_nodes, rational_nodes, reduced
+from engine.arrays import FloatArray
 from engine.parallel import Budget
 
 Line = tuple[int, int, int]
@@ -217,7 +217,7 @@ def arrange_segments(
 
 
 def arrange_rings(
-    coordinates: npt.NDArray[np.float64],
+    coordinates: FloatArray,
     ring_offsets: Sequence[int],
     ring_masks: Sequence[int],
     budget: Budget | None = None,

@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import FloatArray, IntArray
 from engine.errors import CancelledError
 from engine.jit import kernel
 from engine.parallel import Budget
@@ -46,7 +46,7 @@ def _sweep(x_min: Any, x_max: Any, y_min: Any, y_max: Any, order: Any, pairs: An
     return found
 
 
-def box_pairs(low: npt.NDArray[np.float64], high: npt.NDArray[np.float64], budget: Budget) -> npt.NDArray[np.int64]:
+def box_pairs(low: FloatArray, high: FloatArray, budget: Budget) -> IntArray:
     """Return the pairs of boxes that have a common point, (n_pairs, 2) int64, smaller index first.
 
     low, high: (n, 2) float64, the corners of closed boxes.

@@ -11,8 +11,8 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import FloatArray, Int8Array, IntArray
 from engine.parallel import Budget
 
 _ERROR: Final = 3.3306690738754716e-16  # (3 + 16 u) u with u = 2**-53
@@ -24,10 +24,8 @@ MISS: Final = 0
 CROSS: Final = 1
 UNSURE: Final = 2
 
-Floats = npt.NDArray[np.float64]
 
-
-def _orientation(a: Floats, b: Floats, c: Floats) -> npt.NDArray[np.int8]:
+def _orientation(a: FloatArray, b: FloatArray, c: FloatArray) -> Int8Array:
     """Return the sign of the turn a, b, c for rows of points, `_UNSURE` where the bound does not settle it."""
     left = (a[:, 0] - c[:, 0]) * (b[:, 1] - c[:, 1])
     right = (a[:, 1] - c[:, 1]) * (b[:, 0] - c[:, 0])
@@ -39,9 +37,7 @@ def _orientation(a: Floats, b: Floats, c: Floats) -> npt.NDArray[np.int8]:
     return sign
 
 
-def classify_pairs(
-    coordinates: Floats, segments: npt.NDArray[np.int64], pairs: npt.NDArray[np.int64], budget: Budget
-) -> npt.NDArray[np.int8]:
+def classify_pairs(coordinates: FloatArray, segments: IntArray, pairs: IntArray, budget: Budget) -> Int8Array:
     """Return for each of `pairs` whether its segments MISS, CROSS in a point inside both, or are UNSURE.
 
     coordinates: (n_nodes, 2) float64, exact. segments: (n_segments, 2) int64 nodes. pairs: (n_pairs, 2) int64 segments.

@@ -15,9 +15,7 @@ from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from math import gcd, hypot, inf, lcm, nextafter
 
-import numpy as np
-import numpy.typing as npt
-
+from engine.arrays import FloatArray
 from engine.errors import NotRepresentableError
 from engine.parallel import Budget
 
@@ -131,7 +129,7 @@ class NodeTable:
         return nextafter(nextafter(nextafter(distance, inf), inf), inf)
 
 
-def float_nodes(coordinates: npt.NDArray[np.float64], budget: Budget | None = None) -> tuple[NodeTable, list[int]]:
+def float_nodes(coordinates: FloatArray, budget: Budget | None = None) -> tuple[NodeTable, list[int]]:
     """Return a table holding the rows of `coordinates`, (n, 2) float64, finite, and the number of each row."""
     doubles = [value for row in coordinates.tolist() for value in row]
     ratios = [value.as_integer_ratio() for value in doubles]

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from engine.arrays import FloatArray
 
 
 def box_of_points(points: FloatArray) -> tuple[FloatArray, FloatArray]:

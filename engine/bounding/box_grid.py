@@ -20,13 +20,10 @@ from collections.abc import Iterator
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import FloatArray, Int32Array, IntArray
 from engine.bounding.sweep import BLOCK, meeting_boxes
 from engine.jit import inline, kernel
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 _FEWEST: Final = 256
 _LARGE: Final = 64
@@ -45,7 +42,7 @@ class BoxGrid(NamedTuple):
     boxes: FloatArray
     numbers: IntArray
     cells: IntArray
-    starts: npt.NDArray[np.int32]
+    starts: Int32Array
     row: int
     layer: int
 

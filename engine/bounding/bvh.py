@@ -24,8 +24,8 @@ from math import frexp, ldexp
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import Float32Array, FloatArray, Int32Array, read_only
 from engine.jit import inline, kernel
 from engine.lanes.boxes import EMPTY
 
@@ -45,30 +45,23 @@ _FEW_ROWS = 64
 class Bvh(NamedTuple):
     """The arrays of the picture above."""
 
-    boxes: npt.NDArray[np.float32]
-    child: npt.NDArray[np.int32]
-    origin: npt.NDArray[np.float64]
+    boxes: Float32Array
+    child: Int32Array
+    origin: FloatArray
     """(3,)"""
     scale: float
 
 
-def build_bvh(boxes: npt.NDArray[np.float64]) -> Bvh:
+def build_bvh(boxes: FloatArray) -> Bvh:
     """Return the tree over `boxes` (n_items, 6) float64: xmin ymin zmin xmax ymax zmax; n_items >= 1.
 
     Cost: n log n; two arrays are kept, of some 45 bytes an item.
     """
     origin = np.empty(3)
     with np.errstate(all="ignore"):  # what underflows here is far below the enlargement of the boxes
-        nodes, child, n_nodes, scale = _build(as_read_only(boxes), origin)
+        nodes, child, n_nodes, scale = _build(read_only(boxes), origin)
     origin.setflags(write=False)
     return Bvh(on_lines(nodes[:n_nodes]), on_lines(child[:n_nodes]), origin, scale)
-
-
-def as_read_only(array: Any) -> Any:
-    """Return a contiguous view that kernels cannot write to, so that each is compiled for one kind of array."""
-    view = np.ascontiguousarray(array).view()
-    view.setflags(write=False)
-    return view
 
 
 def on_lines(array: Any) -> Any:

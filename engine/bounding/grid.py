@@ -14,11 +14,9 @@ from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import FloatArray, Int32Array, IntArray
 from engine.jit import inline, kernel
-
-FloatArray = npt.NDArray[np.float64]
 
 _FASTEST: Final = 1e300
 """Most cells per unit: keeps the product finite where all values of an axis lie within some subnormals."""
@@ -38,8 +36,8 @@ class BoxGrid(NamedTuple):
 
     u: Axis
     v: Axis
-    offsets: npt.NDArray[np.int64]
-    items: npt.NDArray[np.int32]
+    offsets: IntArray
+    items: Int32Array
 
 
 @inline

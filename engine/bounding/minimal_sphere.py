@@ -24,12 +24,12 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from engine.arrays import FloatArray
 from engine.bounding.support_ball import smallest_ball
 from engine.errors import NotRepresentableError
 from engine.parallel import Budget
 from engine.predicates.rational import nearest_float
 
-FloatArray = npt.NDArray[np.float64]
 Rational = tuple[Fraction, ...]
 
 _UNIT: Final = 2.0**-53

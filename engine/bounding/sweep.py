@@ -13,12 +13,9 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import FloatArray, IntArray
 from engine.jit import inline, kernel
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 BLOCK = 1 << 18
 """Pairs given out at once: a scene in which all meet all has n^2 / 2, which need not fit into memory. Sorting one block

@@ -5,21 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import FloatArray, Int8Array, read_only
 from engine.collision.codes import UNSETTLED
 from engine.collision.collide import collide_pair, pair_function
-from engine.collision.detail import (
-    NO_DETAIL,
-    Details,
-    check_has_detail,
-    code_of,
-    detail_of,
-    details_where_proven,
-    has_interior,
-)
+from engine.collision.detail import NO_DETAIL, check_has_detail, code_of, detail_of, details_where_proven, has_interior
 from engine.collision.meshes.dual_traversal import new_descent
-from engine.collision.meshes.mesh_arrays import read_only, shell_of
+from engine.collision.meshes.mesh_arrays import shell_of
 from engine.collision.meshes.mesh_mesh import mesh_mesh
 from engine.collision.meshes.mesh_pair import what_to_seek
 from engine.collision.meshes.placement import PoseArrays
@@ -28,16 +20,15 @@ from engine.collision.result import Witness, Work
 from engine.collision.scenes.batches import convex_poses
 from engine.errors import InvalidArrayError, WrongDimensionError
 from engine.parallel import Budget, Cancel, Progress, run_chunks
-from engine.solids.base import FloatArray, Solid
+from engine.solids.base import Solid
 from engine.solids.checks import as_floats
 from engine.solids.pose import Pose, check_rotations
 from engine.types import Accuracy, Relation
 
-Relations = npt.NDArray[np.int8]
 _ROOM = 64
 Witnesses = list[Witness | None]
 PoseCollisions = (
-    Relations | tuple[Relations, Witnesses] | tuple[Relations, Details] | tuple[Relations, Witnesses, Details]
+    Int8Array | tuple[Int8Array, Witnesses] | tuple[Int8Array, Int8Array] | tuple[Int8Array, Witnesses, Int8Array]
 )
 
 
@@ -154,7 +145,7 @@ def _mesh_task(
     second: Solid,
     turns: FloatArray,
     moves: FloatArray,
-    relations: Relations,
+    relations: Int8Array,
     budget: Budget,
     boolean: bool,
 ) -> Callable[[int, int], None]:

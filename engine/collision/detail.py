@@ -10,9 +10,9 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from engine.arrangement.subdivision import label_faces, subdivide
+from engine.arrays import FloatArray, Int8Array, IntArray
 from engine.collision.exact_images import dot, image_half_space, image_point, minus, squared_length
 from engine.collision.meshes.live_faces import live_piece
 from engine.collision.meshes.mesh_arrays import shell_of
@@ -27,7 +27,7 @@ from engine.containment.rational_locate import rational_location
 from engine.errors import InvalidInputError, UnsupportedSolidError
 from engine.parallel import Budget
 from engine.solids.aabb import Aabb
-from engine.solids.base import FloatArray, IntArray, Solid
+from engine.solids.base import Solid
 from engine.solids.checks import spell
 from engine.solids.half_space import HalfSpace
 from engine.solids.pose import Pose
@@ -36,7 +36,6 @@ from engine.solids.surface import Surface
 from engine.types import Location, Rcc8, Relation
 
 PartsFunction = Callable[[Any, Any, Pose | None, Pose | None, Work], Parts]
-Details = npt.NDArray[np.int8]
 
 NO_DETAIL = -1
 """In place of a code of `Rcc8`: a body without interior."""
@@ -63,13 +62,13 @@ def check_has_detail(named: Iterable[tuple[tuple[str | int, ...], Solid]], boole
             )
 
 
-def details_where_proven(relations: npt.NDArray[np.int8]) -> Details:
+def details_where_proven(relations: Int8Array) -> Int8Array:
     """Return the codes for pairs that a batch of meshes or convex bodies decided: one that finds overlapping does so by
     a crossing, or by a point of either body outside the other, so that is PO."""
     return _WHERE_PROVEN[relations]
 
 
-def details_of_boxes(low: FloatArray, high: FloatArray, pairs: IntArray, relations: npt.NDArray[np.int8]) -> Details:
+def details_of_boxes(low: FloatArray, high: FloatArray, pairs: IntArray, relations: Int8Array) -> Int8Array:
     """Return the codes for pairs (n, 2) of boxes (n_boxes, d) that are not flat."""
     i, j = pairs.T
     i_sticks_out = ((low[i] < low[j]) | (high[j] < high[i])).any(axis=1)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from fractions import Fraction
 
-from engine.solids.base import FloatArray
+from engine.arrays import FloatArray
 from engine.solids.pose import Pose
 
 Vector = tuple[Fraction, ...]

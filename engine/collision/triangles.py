@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import FloatArray, Int8Array
 from engine.collision.meshes.exact_body import Corners, on_lattice
 from engine.collision.meshes.exact_triangles import classify_exact
 from engine.collision.meshes.mesh_arrays import lattice_shift
@@ -15,12 +15,9 @@ from engine.collision.planar.triangle_triangle_2d import OPEN, relate_triangles_
 from engine.collision.result import Work
 from engine.errors import InvalidArrayError, WrongDimensionError
 from engine.parallel import Budget, Cancel, Progress, run_chunks
-from engine.solids.base import FloatArray
 from engine.solids.checks import as_point_groups
 from engine.solids.triangle import Triangle
 from engine.types import Accuracy, Relation
-
-Relations = npt.NDArray[np.int8]
 
 
 def collide_triangles(
@@ -32,7 +29,7 @@ def collide_triangles(
     cancel: Cancel | None = None,
     progress: Progress | None = None,
     report: bool = False,
-) -> Relations | tuple[Relations, Accuracy]:
+) -> Int8Array | tuple[Int8Array, Accuracy]:
     """Decide how each of many triangles lies to its partner, exactly.
 
     In the plane triangles are solids, with all five relations; in space they are surfaces: disjoint or touching.

@@ -8,8 +8,8 @@ from __future__ import annotations
 from typing import Literal, overload
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import BoolArray, Int8Array
 from engine.containment.cells.order import gathered
 from engine.containment.locators import locator_of
 from engine.errors import NotFiniteError
@@ -17,8 +17,6 @@ from engine.parallel import Budget, Cancel, Progress, run_chunks
 from engine.solids.base import Solid
 from engine.solids.checks import as_points, check_finite
 from engine.types import Accuracy
-
-Locations = npt.NDArray[np.int8]
 
 
 @overload
@@ -31,7 +29,7 @@ def locate(
     cancel: Cancel | None = ...,
     progress: Progress | None = ...,
     report: Literal[False] = ...,
-) -> Locations: ...
+) -> Int8Array: ...
 @overload
 def locate(
     points: object,
@@ -42,7 +40,7 @@ def locate(
     cancel: Cancel | None = ...,
     progress: Progress | None = ...,
     report: Literal[True],
-) -> tuple[Locations, Accuracy]: ...
+) -> tuple[Int8Array, Accuracy]: ...
 def locate(
     points: object,
     solid: Solid,
@@ -52,7 +50,7 @@ def locate(
     cancel: Cancel | None = None,
     progress: Progress | None = None,
     report: bool = False,
-) -> Locations | tuple[Locations, Accuracy]:
+) -> Int8Array | tuple[Int8Array, Accuracy]:
     """Locate points in a solid: `Location` INSIDE 1, BOUNDARY 0 or OUTSIDE -1 for each.
 
     Polygons and polyhedra by ray and parity, convex solids by their planes, spheres by squared distance, implicit
@@ -124,7 +122,7 @@ def contains(
     cancel: Cancel | None = ...,
     progress: Progress | None = ...,
     report: Literal[False] = ...,
-) -> npt.NDArray[np.bool_]: ...
+) -> BoolArray: ...
 @overload
 def contains(
     points: object,
@@ -135,7 +133,7 @@ def contains(
     cancel: Cancel | None = ...,
     progress: Progress | None = ...,
     report: Literal[True],
-) -> tuple[npt.NDArray[np.bool_], Accuracy]: ...
+) -> tuple[BoolArray, Accuracy]: ...
 def contains(
     points: object,
     solid: Solid,
@@ -145,7 +143,7 @@ def contains(
     cancel: Cancel | None = None,
     progress: Progress | None = None,
     report: bool = False,
-) -> npt.NDArray[np.bool_] | tuple[npt.NDArray[np.bool_], Accuracy]:
+) -> BoolArray | tuple[BoolArray, Accuracy]:
     """Tell for each point whether a solid, a closed set, holds it: `locate` is INSIDE or BOUNDARY.
 
     Parameters, cost, accuracy and errors are those of `locate`.

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import FlagArray, FloatArray, Int8Array, IntArray, read_only
 from engine.containment.cells.build import cells_if_they_pay
 from engine.containment.cells.locate import NOT_FINITE, locate_by_cells
 from engine.containment.cells.order import order_if_it_pays
@@ -31,7 +31,7 @@ from engine.containment.ring_cells.locate import locate_by_ring_cells
 from engine.errors import InvalidArrayError, NotFiniteError
 from engine.parallel import Budget
 from engine.solids.aabb import Aabb
-from engine.solids.base import FloatArray, Solid, as_read_only
+from engine.solids.base import Solid
 from engine.solids.convex import Convex
 from engine.solids.csg import Csg
 from engine.solids.half_space import HalfSpace
@@ -43,9 +43,7 @@ from engine.solids.sphere import Sphere
 from engine.solids.triangle import Triangle
 from engine.types import UNDECIDED
 
-Locations = npt.NDArray[np.int8]
-Flag = npt.NDArray[np.uint8]
-Fill = Callable[[FloatArray, Locations, Budget], "Counts"]
+Fill = Callable[[FloatArray, Int8Array, Budget], "Counts"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +66,7 @@ class Locator:
     for_batch: Callable[[int, Budget], Locator] | None = None
     """Returns the locator to use for so many points, where that depends: it may build a structure that pays."""
 
-    order: Callable[[FloatArray, Budget], npt.NDArray[np.int64] | None] | None = None
+    order: Callable[[FloatArray, Budget], IntArray | None] | None = None
     """Returns the order in which a large batch is best asked, None for as it is."""
     sees_not_finite: bool = False
     """Whether `fill` raises NotFiniteError for points that are not finite; otherwise the caller guarantees them."""
@@ -79,7 +77,7 @@ class Locator:
 
 
 def settled(
-    kernel: Callable[[FloatArray, Locations, Flag], int],
+    kernel: Callable[[FloatArray, Int8Array, FlagArray], int],
     settle: Callable[[Sequence[float], Check], int],
     prepare: Callable[[Check], object] | None = None,
 ) -> Fill:
@@ -90,11 +88,11 @@ def settled(
     Raises what `Budget.check` raises, also when the kernel stopped early.
     """
 
-    def fill(points: FloatArray, locations: Locations, budget: Budget) -> Counts:
+    def fill(points: FloatArray, locations: Int8Array, budget: Budget) -> Counts:
         if prepare is not None:
             prepare(budget.check)
         with np.errstate(all="ignore"):  # uncompiled, numpy scalars warn where the filter means to overflow
-            n_beyond = int(kernel(as_read_only(points), locations, budget.flag))
+            n_beyond = int(kernel(read_only(points), locations, budget.flag))
         budget.check()
         if not n_beyond:
             return Counts(0, 0)
@@ -127,21 +125,21 @@ def _in_rows(solid: HalfSpace | Convex) -> Locator:
     is_exact = np.ones(len(rows), np.bool_)
     kernel = locate_in_half_planes if solid.dimension == 2 else locate_in_half_spaces
 
-    def run(points: FloatArray, locations: Locations, flag: Flag) -> int:
+    def run(points: FloatArray, locations: Int8Array, flag: FlagArray) -> int:
         return int(kernel(points, rows, is_exact, locations, flag))
 
     return Locator("half_spaces", settled(run, rational_half(solid)))
 
 
 def _in_sphere(solid: Sphere) -> Locator:
-    def run(points: FloatArray, locations: Locations, flag: Flag) -> int:
+    def run(points: FloatArray, locations: Int8Array, flag: FlagArray) -> int:
         return int(locate_in_ball(points, solid.center, 0.0, solid.radius, np.empty(8), locations, flag))
 
     return Locator("squared_distance", settled(run, rational_half(solid)))
 
 
 def _in_aabb(solid: Aabb) -> Locator:
-    def run(points: FloatArray, locations: Locations, flag: Flag) -> int:
+    def run(points: FloatArray, locations: Int8Array, flag: FlagArray) -> int:
         return int(locate_in_box(points, solid.min, solid.max, locations, flag))
 
     return Locator("comparison", settled(run, rational_half(solid)))
@@ -152,14 +150,14 @@ def _in_triangle(solid: Triangle) -> Locator:
         return _in_prism(solid)
     low, high = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
 
-    def run(points: FloatArray, locations: Locations, flag: Flag) -> int:
+    def run(points: FloatArray, locations: Int8Array, flag: FlagArray) -> int:
         return int(locate_in_triangle(points, solid.vertices, low, high, locations, flag))
 
     return Locator("same_side", settled(run, rational_half(solid)))
 
 
 def _in_prism(solid: Triangle) -> Locator:
-    def run(points: FloatArray, locations: Locations, flag: Flag) -> int:
+    def run(points: FloatArray, locations: Int8Array, flag: FlagArray) -> int:
         walls = prism_walls(solid)
         if not any(any(wall) for wall in walls):  # no area: every product of the formula is zero
             locations[:] = 0
@@ -171,7 +169,7 @@ def _in_prism(solid: Triangle) -> Locator:
 
 
 def _in_polygon(solid: Polygon) -> Locator:
-    def run(points: FloatArray, locations: Locations, flag: Flag) -> int:
+    def run(points: FloatArray, locations: Int8Array, flag: FlagArray) -> int:
         rings: Rings = rings_of(solid)
         return int(locate_in_rings(points, *rings, locations, flag))
 
@@ -190,11 +188,11 @@ def _in_polygon(solid: Polygon) -> Locator:
 
 
 def _in_polyhedron(solid: Polyhedron) -> Locator:
-    def run(points: FloatArray, locations: Locations, flag: Flag) -> int:
+    def run(points: FloatArray, locations: Int8Array, flag: FlagArray) -> int:
         columns: Columns = columns_of(solid)
         return int(locate_by_columns(points, *columns, locations, flag))
 
-    def run_once(points: FloatArray, locations: Locations, flag: Flag) -> int:
+    def run_once(points: FloatArray, locations: Int8Array, flag: FlagArray) -> int:
         return locate_few(points, solid.vertices, solid.triangles, locations, flag)
 
     by_rays = settled(run, rational_half(solid), lambda check: columns_of(solid, check))
@@ -215,12 +213,12 @@ def _in_polyhedron(solid: Polyhedron) -> Locator:
     return plain
 
 
-def _in_cells(by_cells: Callable[[FloatArray, Locations, Flag], int], by_rays: Fill) -> Fill:
+def _in_cells(by_cells: Callable[[FloatArray, Int8Array, FlagArray], int], by_rays: Fill) -> Fill:
     """Return the fill that asks the cells, and casts rays for the points that are too close to a plane for them."""
 
-    def fill(points: FloatArray, locations: Locations, budget: Budget) -> Counts:
+    def fill(points: FloatArray, locations: Int8Array, budget: Budget) -> Counts:
         with np.errstate(all="ignore"):
-            n_open = by_cells(as_read_only(points), locations, budget.flag)
+            n_open = by_cells(read_only(points), locations, budget.flag)
         if n_open == NOT_FINITE:
             raise NotFiniteError("a point is not finite", ("points",))
         if n_open == 0:
@@ -240,7 +238,7 @@ def _in_implicit(solid: Implicit) -> Locator:
         return Locator("callable", _call(solid), "float64")
     degree = int(solid.powers.sum(axis=1).max())
 
-    def run(points: FloatArray, locations: Locations, flag: Flag) -> int:
+    def run(points: FloatArray, locations: Int8Array, flag: FlagArray) -> int:
         return int(locate_by_polynomial(points, solid.powers, solid.coefficients, degree, locations, flag))
 
     return Locator("polynomial", settled(run, rational_half(solid)))
@@ -251,7 +249,7 @@ def _call(solid: Implicit) -> Fill:
     function = solid.function
     assert function is not None
 
-    def fill(points: FloatArray, locations: Locations, budget: Budget) -> Counts:
+    def fill(points: FloatArray, locations: Int8Array, budget: Budget) -> Counts:
         values = np.asarray(function(points), np.float64)
         if values.shape != (len(points),):
             raise InvalidArrayError(
@@ -288,11 +286,11 @@ def csg_locator(solid: Csg, leaf_locator: Callable[[Solid], Locator]) -> Locator
 
     gather(solid)
 
-    def fill(points: FloatArray, locations: Locations, budget: Budget) -> Counts:
-        located: dict[int, Locations] = {}
+    def fill(points: FloatArray, locations: Int8Array, budget: Budget) -> Counts:
+        located: dict[int, Int8Array] = {}
         n_beyond = n_rational = 0
 
-        def visit(node: Solid) -> Locations:
+        def visit(node: Solid) -> Int8Array:
             nonlocal n_beyond, n_rational
             if id(node) not in located:
                 if isinstance(node, Csg):

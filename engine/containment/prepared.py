@@ -7,13 +7,12 @@ from fractions import Fraction
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import BoolArray, FloatArray, Int8Array, Int32Array, read_only
 from engine.bounding.grid import BoxGrid, build_box_grid
 from engine.containment.methods.polyhedron_ray_parity import fill_rows
 from engine.containment.rational_locate import Check, next_in_ring, no_check
 from engine.predicates.rational import orient2d_rational
-from engine.solids.base import FloatArray, as_read_only
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
 from engine.solids.triangle import Triangle
@@ -30,11 +29,11 @@ class Columns(NamedTuple):
 
     vertices: FloatArray
     """``(n, 3)``: the solid's."""
-    triangles: npt.NDArray[np.int32]
+    triangles: Int32Array
     """``(m, 3)``, by falling zmax."""
     boxes: FloatArray
     """``(m, 6)``: xmin, xmax, ymin, ymax, zmin, zmax."""
-    areas: npt.NDArray[np.int8]
+    areas: Int8Array
     """``(m,)``: exact sign of the area seen from above."""
     grid: BoxGrid
     z_min: float
@@ -120,7 +119,7 @@ def _build_rings(starts: FloatArray, ends: FloatArray, check: Check) -> Rings:
     return Rings(starts, ends, np.ascontiguousarray(high[:, 0]), slabs, box)
 
 
-def rounded_rows(rows: Sequence[Sequence[int | Fraction]]) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
+def rounded_rows(rows: Sequence[Sequence[int | Fraction]]) -> tuple[FloatArray, BoolArray]:
     """Return rational rows, each scaled to a largest coefficient near 1 and correctly rounded, and whether exactly so.
 
     A coefficient that is smaller than 2^-900 of the largest, and not zero, could underflow: such a row becomes NaN,
@@ -136,4 +135,4 @@ def rounded_rows(rows: Sequence[Sequence[int | Fraction]]) -> tuple[FloatArray, 
         if any(value != 0 and abs(value) < Fraction(1, 1 << 900) for value in scaled):
             rounded[i_row] = np.nan
         is_exact[i_row] = all(Fraction(float(value)) == value for value in scaled)
-    return as_read_only(rounded), is_exact & ~np.isnan(rounded[:, 0])
+    return read_only(rounded), is_exact & ~np.isnan(rounded[:, 0])

@@ -17,8 +17,8 @@ from fractions import Fraction
 from typing import Any, TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import FloatArray, IntArray
 from engine.errors import UnsupportedSolidError
 from engine.predicates.rational import Number, polynomial_sign_rational, scaled_integers, side_rational, sign_of
 from engine.solids.aabb import Aabb
@@ -112,10 +112,10 @@ def _around(value: Number) -> tuple[float, float]:
     return math.nextafter(near, -math.inf), math.nextafter(near, math.inf)
 
 
-def triangle_boxes(solid: Polyhedron) -> npt.NDArray[np.float64]:
+def triangle_boxes(solid: Polyhedron) -> FloatArray:
     """Return the six rows xmin, xmax, ymin, ymax, zmin, zmax over the triangles of `solid`, prepared once."""
 
-    def build() -> npt.NDArray[np.float64]:
+    def build() -> FloatArray:
         corners = solid.vertices[solid.triangles]
         low, high = corners.min(axis=1), corners.max(axis=1)
         return np.ascontiguousarray(np.stack([low, high], axis=2).reshape(len(low), 6).T)
@@ -141,10 +141,10 @@ def _in_polyhedron(point: Sequence[Number], solid: Polyhedron, check: Check) -> 
     return INSIDE if odd else OUTSIDE
 
 
-def next_in_ring(polygon: Polygon) -> npt.NDArray[np.int64]:
+def next_in_ring(polygon: Polygon) -> IntArray:
     """Return for each vertex of `polygon` the index of the one after it in its ring, prepared once."""
 
-    def build() -> npt.NDArray[np.int64]:
+    def build() -> IntArray:
         following = np.arange(1, len(polygon.vertices) + 1, dtype=np.int64)
         following[polygon.ring_offsets[1:] - 1] = polygon.ring_offsets[:-1]
         return following

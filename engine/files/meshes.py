@@ -7,8 +7,8 @@ from typing import IO, Any, Final
 
 import numpy as np
 
+from engine.arrays import FloatArray, IntArray
 from engine.errors import EmptyGeometryError, IndexOutOfRangeError, InvalidInputError
-from engine.solids.base import FloatArray, IntArray
 from engine.solids.mesh import first_equal_points
 from engine.solids.polyhedron import Polyhedron
 

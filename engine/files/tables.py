@@ -11,6 +11,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from engine.arrays import FloatArray
 from engine.errors import InvalidArrayError, InvalidInputError
 
 POSITIONS: Final = {
@@ -19,7 +20,7 @@ POSITIONS: Final = {
 """What makes a list of items of the coordinates of a GeoJSON geometry."""
 
 
-def read_rows(source: str, shape: tuple[int, ...]) -> npt.NDArray[np.float64]:
+def read_rows(source: str, shape: tuple[int, ...]) -> FloatArray:
     """Return an array ``(n, *shape)``; in `shape` a -1 stands for the dimension that the file tells.
 
     .npy: any array of that many numbers a row. .csv: a row a line, a header is skipped. .geojson: points, or line
@@ -44,7 +45,7 @@ def read_rows(source: str, shape: tuple[int, ...]) -> npt.NDArray[np.float64]:
         ) from None
 
 
-def _read_csv(path: Path) -> npt.NDArray[np.float64]:
+def _read_csv(path: Path) -> FloatArray:
     with path.open(encoding="utf-8") as file:
         try:
             [float(cell) for cell in file.readline().split(",")]

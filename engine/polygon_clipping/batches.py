@@ -7,8 +7,8 @@ from fractions import Fraction
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import BoolArray, FlagArray, FloatArray, IntArray
 from engine.parallel import Budget
 from engine.polygon_clipping.in_doubles import OPEN
 from engine.polygon_clipping.in_integers import Row
@@ -17,7 +17,7 @@ from engine.predicates.digits import packed_numbers
 from engine.predicates.integers import nearest
 from engine.predicates.ranges import LARGEST, SMALLEST
 from engine.predicates.scaling import exponent_above, scaled_back, shifted
-from engine.solids.base import FloatArray, IntArray, Solid
+from engine.solids.base import Solid
 
 _DEEPEST: Final = -900
 """Scenes below 2^-900 have subnormal results, which the kernel would round twice."""
@@ -116,8 +116,8 @@ def clip_chunk(
     last: int,
     budget: Budget,
     sizes: IntArray,
-    state: npt.NDArray[np.uint8],
-    may_have_bridges: npt.NDArray[np.bool_],
+    state: FlagArray,
+    may_have_bridges: BoolArray,
 ) -> FloatArray:
     """Clip polygons first .. last - 1 as far as the kernel can; return the vertices of those it settled, in order.
 

@@ -10,6 +10,7 @@ from typing import Any, Literal, NamedTuple, overload
 import numpy as np
 import numpy.typing as npt
 
+from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray
 from engine.errors import EmptyGeometryError, InvalidArrayError, TooComplexError, UnsupportedSolidError
 from engine.parallel import Budget, Cancel, Progress, run_chunks
 from engine.polygon_clipping.batches import clip_chunk, kernel_scene
@@ -18,7 +19,7 @@ from engine.polygon_clipping.in_doubles import OPEN
 from engine.polygon_clipping.in_integers import Row, clip_polygon, integer_row, reduced
 from engine.predicates.scaling import largest_of
 from engine.solids.aabb import Aabb
-from engine.solids.base import FloatArray, IntArray, Solid
+from engine.solids.base import Solid
 from engine.solids.box_planes import box_rows
 from engine.solids.checks import as_point_groups, as_points, check_dimension, check_finite
 from engine.solids.convex import Convex
@@ -52,8 +53,8 @@ class ClippedPolygons:
     ring_offsets: IntArray
     polygon_offsets: IntArray
     contours: IntArray
-    status: npt.NDArray[np.int8]
-    may_have_bridges: npt.NDArray[np.bool_]
+    status: Int8Array
+    may_have_bridges: BoolArray
 
     def __len__(self) -> int:
         return len(self.status)

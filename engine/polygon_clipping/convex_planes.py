@@ -15,8 +15,8 @@ from fractions import Fraction
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import FloatArray, Int8Array, IntArray
 from engine.containment.rational_locate import rational_location
 from engine.errors import UnsupportedSolidError
 from engine.polygon_clipping.in_integers import Row, plane_through, reduced
@@ -27,14 +27,12 @@ from engine.solids.convexity import convexity
 from engine.solids.polyhedron import Polyhedron
 from engine.types import UNDECIDED, Location
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 Check = Callable[[], object]
 
 _BATCH: Final = 1 << 17  # orientations in one kernel call: a few milliseconds
 
 
-def orientations(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> npt.NDArray[np.int8]:
+def orientations(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> Int8Array:
     """Return the exact orient3d of each row."""
     signs = np.empty(len(a), np.int8)
     with np.errstate(all="ignore"):

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import Final, NamedTuple, cast
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import BoolArray, FloatArray, Int8Array, Int32Array, IntArray
 from engine.errors import InvalidArrayError, NotRepresentableError
 from engine.parallel import Budget, Cancel, Progress, run_chunks
 from engine.polygon_overlay.compiled.kernel import DONE as SETTLED
@@ -73,19 +73,19 @@ class OverlayBatch:
         overlaid again for its object, which tells what became of all parts. _apart: objects made already, by pair.
     """
 
-    status: npt.NDArray[np.int8]
-    vertices: npt.NDArray[np.float64]
-    ring_offsets: npt.NDArray[np.int64]
-    piece_offsets: npt.NDArray[np.int64]
-    pair_offsets: npt.NDArray[np.int64]
-    displacement: npt.NDArray[np.float64]
+    status: Int8Array
+    vertices: FloatArray
+    ring_offsets: IntArray
+    piece_offsets: IntArray
+    pair_offsets: IntArray
+    displacement: FloatArray
     _subjects: Sequence[Solid] = field(repr=False)
     _clips: Sequence[Solid] = field(repr=False)
     _operation: Operation = field(repr=False)
     _output: Output = field(repr=False)
-    _sources: npt.NDArray[np.int32] = field(repr=False)
-    _bases: npt.NDArray[np.int32] = field(repr=False)
-    _is_rounded_again: npt.NDArray[np.bool_] = field(repr=False)
+    _sources: Int32Array = field(repr=False)
+    _bases: Int32Array = field(repr=False)
+    _is_rounded_again: BoolArray = field(repr=False)
     _apart: dict[int, Overlay] = field(repr=False)
 
     def __len__(self) -> int:
@@ -138,7 +138,7 @@ def _gathered(solids: Sequence[Solid]) -> Polygons:
     return gathered([each.vertices for each in polygons], [each.ring_offsets for each in polygons])
 
 
-def _bases(subjects: Polygons, clips: Polygons) -> npt.NDArray[np.int32]:
+def _bases(subjects: Polygons, clips: Polygons) -> Int32Array:
     """Return `OverlayBatch._bases` of pairs that were overlaid together."""
     bases = np.empty((len(subjects.polygon_offsets) - 1, 3), np.int32)
     bases[:, 0] = subjects.ring_offsets[subjects.polygon_offsets[:-1]]
@@ -179,7 +179,7 @@ def overlay_batch(
         if set(map(type, solids)) - {Polygon}:
             for i_pair, solid in enumerate(solids):
                 rings_of(solid, name, i_pair)
-    parts: dict[int, tuple[Found, npt.NDArray[np.int32]]] = {}
+    parts: dict[int, tuple[Found, Int32Array]] = {}
     with Budget(deadline, cancel) as budget:
 
         def task(start: int, stop: int) -> None:
@@ -222,8 +222,8 @@ class _Rest(NamedTuple):
     """What becomes of pairs that the first call of the kernel does not settle; the names are those of `OverlayBatch`,
     without underscores."""
 
-    status: npt.NDArray[np.int8]
-    is_rounded_again: npt.NDArray[np.bool_]
+    status: Int8Array
+    is_rounded_again: BoolArray
     apart: dict[int, Overlay]
 
 

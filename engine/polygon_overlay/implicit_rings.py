@@ -17,13 +17,14 @@ import numpy.typing as npt
 from engine.arrangement.arrange import crossing, line_through
 from engine.arrangement.exact_area import ExactRings
 from engine.arrangement.nodes import Homogeneous, float_nodes
+from engine.arrays import FloatArray, IntArray
 
 
 class RingArrays(NamedTuple):
     """Rings as read-only arrays: vertices (n, 2) float64, where each ring begins (n_rings + 1,) int64; may be empty."""
 
-    vertices: npt.NDArray[np.float64]
-    offsets: npt.NDArray[np.int64]
+    vertices: FloatArray
+    offsets: IntArray
 
 
 class ImplicitRings(NamedTuple):
@@ -36,7 +37,7 @@ class ImplicitRings(NamedTuple):
     subject: RingArrays
     clip: RingArrays
     sources: npt.NDArray[np.signedinteger]
-    offsets: npt.NDArray[np.int64]
+    offsets: IntArray
 
     @property
     def rings(self) -> tuple[tuple[Homogeneous, ...], ...]:
@@ -77,7 +78,7 @@ class ImplicitRings(NamedTuple):
         return ExactRings(tuple(tuple(made[a:b]) for a, b in itertools.pairwise(stops)), nodes.exponent)
 
 
-def _end_of_edge(vertices: npt.NDArray[np.float64], offsets: Sequence[int], first: int) -> int:
+def _end_of_edge(vertices: FloatArray, offsets: Sequence[int], first: int) -> int:
     """Return the next vertex of the ring that is not at the place of `first` (itself if there is none)."""
     ring = int(np.searchsorted(offsets, first, side="right")) - 1
     start, stop = offsets[ring], offsets[ring + 1]

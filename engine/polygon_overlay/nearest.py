@@ -9,8 +9,8 @@ import itertools
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.parallel import Budget
 from engine.polygon_overlay.exact.rounding import Ring, has_area, in_order, without_repeats
 from engine.polygon_overlay.implicit_rings import ImplicitRings
@@ -27,7 +27,7 @@ class NearestRings(NamedTuple):
     lost_pieces: list[int]
     lost_holes: list[int]
 
-    def arrays(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    def arrays(self) -> tuple[FloatArray, IntArray, IntArray]:
         """Return vertices, ring offsets and piece offsets, as those of `Overlay`."""
         rings = [ring for piece in self.pieces for ring in piece]
         vertices = np.array([vertex for ring in rings for vertex in ring], np.float64).reshape(-1, 2)
@@ -35,9 +35,9 @@ class NearestRings(NamedTuple):
 
 
 def nearest_rings(
-    vertices: npt.NDArray[np.float64],
-    ring_offsets: npt.NDArray[np.int64],
-    piece_offsets: npt.NDArray[np.int64],
+    vertices: FloatArray,
+    ring_offsets: IntArray,
+    piece_offsets: IntArray,
     budget: Budget,
 ) -> NearestRings:
     """Return rounded rings, as `RoundedRings` has them, without those that have no area; with a shell its holes go."""
@@ -88,7 +88,7 @@ def leave_nearest(first: RoundedRings, exact: ImplicitRings, budget: Budget) -> 
     )
 
 
-def _surely_have_area(vertices: npt.NDArray[np.float64], ring_offsets: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
+def _surely_have_area(vertices: FloatArray, ring_offsets: IntArray) -> BoolArray:
     """Tell of each ring whether its signed area is not zero; False where floating point does not tell.
 
     Twice the area is the sum of x_i y_j - x_j y_i over its edges, coordinates counted from its first vertex. Each is

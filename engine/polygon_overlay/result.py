@@ -6,18 +6,16 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Literal, NamedTuple
 
-import numpy as np
-import numpy.typing as npt
-
 from engine.arrangement.exact_area import ExactRings
+from engine.arrays import FloatArray, IntArray
 from engine.polygon_overlay.implicit_rings import ImplicitRings
 
 
 class OverlayPiece(NamedTuple):
     """One connected part: its shell, counter-clockwise, and its holes, clockwise; each ``(n, 2)`` float64."""
 
-    shell: npt.NDArray[np.float64]
-    holes: tuple[npt.NDArray[np.float64], ...]
+    shell: FloatArray
+    holes: tuple[FloatArray, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,9 +52,9 @@ class Overlay:
     exact: the rings of the exact result, from which `area_exact` and `area` are computed when asked for.
     """
 
-    vertices: npt.NDArray[np.float64]
-    ring_offsets: npt.NDArray[np.int64]
-    piece_offsets: npt.NDArray[np.int64]
+    vertices: FloatArray
+    ring_offsets: IntArray
+    piece_offsets: IntArray
     output: Literal["valid", "nearest"]
     may_be_invalid: bool
     n_pieces_exact: int
@@ -83,7 +81,7 @@ class Overlay:
         return len(self.ring_offsets) - len(self.piece_offsets)
 
     @property
-    def rings(self) -> list[npt.NDArray[np.float64]]:
+    def rings(self) -> list[FloatArray]:
         """All rings, views of `vertices`."""
         return [self.vertices[start:stop] for start, stop in zip(self.ring_offsets, self.ring_offsets[1:])]
 

@@ -13,9 +13,9 @@ from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from engine.arrangement.box_pairs import box_pairs
+from engine.arrays import FloatArray, IntArray
 from engine.parallel import Budget
 from engine.polygon_overlay.compiled.ring_labels import MOST_BITS
 
@@ -25,19 +25,17 @@ _SPREAD: Final = 16
 _MOST_ORDERS: Final = 8
 """Orders in which bits are dealt out: a ring that is not meant passes for one in each with the part's share of bits."""
 
-Corners = tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]
+Corners = tuple[FloatArray, FloatArray]
 
 
 class RingBits(NamedTuple):
     """bits: by ring its bit; shells: by bit that of its shells; int64."""
 
-    bits: npt.NDArray[np.int64]
-    shells: npt.NDArray[np.int64]
+    bits: IntArray
+    shells: IntArray
 
 
-def assign_bits(
-    boxes: Corners, piece_offsets: npt.NDArray[np.int64], budget: Budget, order: int = 0
-) -> RingBits | None:
+def assign_bits(boxes: Corners, piece_offsets: IntArray, budget: Budget, order: int = 0) -> RingBits | None:
     """Return a bit for each ring, None where there are too few.
 
     boxes: of the rings, as `boxes_of` gives them. piece_offsets: into the rings, the shell of each piece first. order:
@@ -79,7 +77,7 @@ def assign_bits(
     return RingBits(bits, np.array(shells))
 
 
-def boxes_of(vertices: npt.NDArray[np.float64], ring_offsets: npt.NDArray[np.int64]) -> Corners:
+def boxes_of(vertices: FloatArray, ring_offsets: IntArray) -> Corners:
     """Return the least and the largest coordinates of each ring, (n_rings, 2) float64 each."""
     if len(ring_offsets) == 1:
         return np.zeros((0, 2)), np.zeros((0, 2))
@@ -89,11 +87,11 @@ def boxes_of(vertices: npt.NDArray[np.float64], ring_offsets: npt.NDArray[np.int
 
 def rings_meant(
     labels: RingBits,
-    evidence: npt.NDArray[np.int64],
+    evidence: IntArray,
     boxes: Corners,
-    piece_offsets: npt.NDArray[np.int64],
+    piece_offsets: IntArray,
     found: Corners,
-    again: Callable[[RingBits], npt.NDArray[np.int64] | None],
+    again: Callable[[RingBits], IntArray | None],
     budget: Budget,
 ) -> list[list[int]] | None:
     """Return for each ring found which of the rings its evidence names; None where that is not sure.
@@ -108,7 +106,7 @@ def rings_meant(
     pairs = box_pairs(low, high, budget)
     across = (pairs[:, 0] < n_rings) & (pairs[:, 1] >= n_rings)
     rings, parts = pairs[across, 0], pairs[across, 1] - n_rings
-    dealt: list[npt.NDArray[np.int64]] = []
+    dealt: list[IntArray] = []
     for order in range(1, _MOST_ORDERS + 1):
         budget.check()
         dealt.append(labels.bits)

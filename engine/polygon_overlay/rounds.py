@@ -14,11 +14,11 @@ from math import frexp, hypot, inf, nextafter, ulp
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from engine.arrangement.exact_area import ExactRings
 from engine.arrangement.nodes import nearest_quotient
 from engine.arrangement.snap_rounding import snap_rings
+from engine.arrays import FloatArray, IntArray
 from engine.parallel import Budget
 from engine.polygon_overlay.exact.rounding import MAX_ROUNDS, count_changes
 from engine.polygon_overlay.implicit_rings import ImplicitRings
@@ -36,10 +36,10 @@ class RoundedRings:
     vertex is none of the round before.
     """
 
-    vertices: npt.NDArray[np.float64]
-    ring_offsets: npt.NDArray[np.int64]
-    piece_offsets: npt.NDArray[np.int64]
-    evidence: npt.NDArray[np.int64]
+    vertices: FloatArray
+    ring_offsets: IntArray
+    piece_offsets: IntArray
+    evidence: IntArray
     displacement: float
     is_valid: bool
     has_crossings: bool
@@ -125,7 +125,7 @@ def _meant(
 ) -> list[list[int]] | None:
     """Return for each ring found those of the round before that it comes from; None where that is not sure."""
 
-    def evidence(other: RingBits) -> npt.NDArray[np.int64] | None:
+    def evidence(other: RingBits) -> IntArray | None:
         same = again(before, other)  # bits decide nothing: these are the same rings
         return None if same is None else same.evidence
 
@@ -172,7 +172,7 @@ def _origins(
     return pieces, [origin for ring, origin in enumerate(collected) if ring not in is_shell]
 
 
-def n_moved(images: npt.NDArray[np.float64], vertices: npt.NDArray[np.float64]) -> int:
+def n_moved(images: FloatArray, vertices: FloatArray) -> int:
     """Return how many vertices are none of ``images``."""
     known = {(x, y) for x, y in images.tolist()}
     return sum((x, y) not in known for x, y in vertices.tolist())

@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import FloatArray, IntArray, read_only
 from engine.parallel import Budget
 from engine.polygon_overlay.compiled.kernel import DONE, OPEN, UNVOUCHED
 from engine.polygon_overlay.compiled.ring_labels import MOST_BITS
@@ -19,14 +19,7 @@ from engine.polygon_overlay.nearest import nearest_rings
 from engine.polygon_overlay.result import Overlay
 from engine.polygon_overlay.ring_bits import RingBits
 from engine.polygon_overlay.rounds import n_moved
-from engine.polygon_overlay.run import (
-    Found,
-    Polygons,
-    as_frozen,
-    chained,
-    run_kernel,
-    summed,
-)
+from engine.polygon_overlay.run import Found, Polygons, chained, run_kernel, summed
 
 _NONE: Final = np.zeros(0, np.int64)
 
@@ -35,7 +28,7 @@ class SettledPairs(NamedTuple):
     """pairs: (n,) int64, their numbers; found: their rings, one pair after another; ulps: by how many units in the last
     place of the largest coordinate a vertex of one of them may be off."""
 
-    pairs: npt.NDArray[np.int64]
+    pairs: IntArray
     found: Found
     ulps: float
 
@@ -85,7 +78,7 @@ def settle_pairs(first: Found, budget: Budget) -> SettledPairs:
     )
 
 
-def _ulps_moved(first: Found, pairs: npt.NDArray[np.int64], valid: Found, doubtful: npt.NDArray[np.int64]) -> float:
+def _ulps_moved(first: Found, pairs: IntArray, valid: Found, doubtful: IntArray) -> float:
     """Return `SettledPairs.ulps` of ``valid``, the ``pairs`` of ``first``, some of which may have other vertices."""
     ulps = 0.5
     for k in range(len(doubtful)):
@@ -103,9 +96,9 @@ def _arranged_again(rings: Found, budget: Budget) -> Found:
     before = np.repeat(items[:-1], n_rings)
     labels = RingBits(np.arange(len(shells)) - before, shells - before)
     largest = (int(rings.counts[:, k].max(initial=0)) for k in (2, 1))
-    subjects = Polygons(as_frozen(rings.vertices), as_frozen(rings.ring_offsets), items, *largest)
+    subjects = Polygons(read_only(rings.vertices), read_only(rings.ring_offsets), items, *largest)
     clips = Polygons(
-        as_frozen(np.zeros((0, 2))), as_frozen(np.zeros(1, np.int64)), as_frozen(np.zeros_like(items)), 0, 0
+        read_only(np.zeros((0, 2))), read_only(np.zeros(1, np.int64)), read_only(np.zeros_like(items)), 0, 0
     )
     return run_kernel(subjects, clips, "union", budget, labels)
 
@@ -128,9 +121,9 @@ def found_of(result: Overlay, n_exact: int) -> Found:
 
 
 def _one(
-    vertices: npt.NDArray[np.float64],
-    ring_offsets: npt.NDArray[np.int64],
-    piece_offsets: npt.NDArray[np.int64],
+    vertices: FloatArray,
+    ring_offsets: IntArray,
+    piece_offsets: IntArray,
     displacement: float,
     n_exact: int,
 ) -> Found:
@@ -140,7 +133,7 @@ def _one(
     return Found(status, counts, moved, vertices, sources, ring_offsets, piece_offsets, _NONE)
 
 
-def taken(found: Found, items: npt.NDArray[np.int64]) -> Found:
+def taken(found: Found, items: IntArray) -> Found:
     """Return some of the pairs found, in the order of ``items``; no evidence."""
     of_pieces, of_rings, of_vertices = (_places(summed(found.counts[:, k]), items) for k in range(3))
     return Found(
@@ -155,7 +148,7 @@ def taken(found: Found, items: npt.NDArray[np.int64]) -> Found:
     )
 
 
-def _places(offsets: npt.NDArray[np.int64], items: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+def _places(offsets: IntArray, items: IntArray) -> IntArray:
     """Return the places that belong to ``items``, one item after another, those of item k from offsets[k] on."""
     sizes = offsets[items + 1] - offsets[items]
     ends = np.cumsum(sizes)

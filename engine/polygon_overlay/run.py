@@ -6,11 +6,11 @@ import functools
 from collections.abc import Sequence
 from dataclasses import replace
 from types import FunctionType
-from typing import Any, Final, Literal, NamedTuple, TypeVar, cast
+from typing import Any, Final, Literal, NamedTuple, cast
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import FloatArray, Int8Array, Int32Array, IntArray, read_only
 from engine.parallel import Budget
 from engine.polygon_overlay.compiled.kernel import (
     DONE,
@@ -30,7 +30,6 @@ from engine.predicates.scaling import exponent_of, scaled_back, shifted
 
 Operation = Literal["intersection", "union", "difference", "symmetric_difference"]
 Output = Literal["valid", "nearest"]
-Scalar = TypeVar("Scalar", bound=np.generic)
 
 KEPT: Final = {  # by the label of a face: in neither, in the subject, in the clip, in both
     "intersection": (False, False, False, True),
@@ -52,9 +51,9 @@ class Polygons(NamedTuple):
     most_vertices, most_rings: of one polygon.
     """
 
-    vertices: npt.NDArray[np.float64]
-    ring_offsets: npt.NDArray[np.int64]
-    polygon_offsets: npt.NDArray[np.int64]
+    vertices: FloatArray
+    ring_offsets: IntArray
+    polygon_offsets: IntArray
     most_vertices: int
     most_rings: int
 
@@ -67,17 +66,17 @@ class Found(NamedTuple):
     into them; piece_offsets: into the rings. evidence: by ring, of pairs whose rings are sources of their own.
     """
 
-    status: npt.NDArray[np.int8]
-    counts: npt.NDArray[np.int64]
-    displacement: npt.NDArray[np.float64]
-    vertices: npt.NDArray[np.float64]
-    sources: npt.NDArray[np.int32]
-    ring_offsets: npt.NDArray[np.int64]
-    piece_offsets: npt.NDArray[np.int64]
-    evidence: npt.NDArray[np.int64]
+    status: Int8Array
+    counts: IntArray
+    displacement: FloatArray
+    vertices: FloatArray
+    sources: Int32Array
+    ring_offsets: IntArray
+    piece_offsets: IntArray
+    evidence: IntArray
 
 
-def gathered(vertices: Sequence[npt.NDArray[np.float64]], ring_offsets: Sequence[npt.NDArray[np.int64]]) -> Polygons:
+def gathered(vertices: Sequence[FloatArray], ring_offsets: Sequence[IntArray]) -> Polygons:
     """Return polygons, given by the arrays of each, as flat arrays; at least one polygon, and none without a ring.
 
     Joined as bytes: numpy takes three times as long to put small arrays one after another.
@@ -87,27 +86,18 @@ def gathered(vertices: Sequence[npt.NDArray[np.float64]], ring_offsets: Sequence
     offsets = np.frombuffer(b"".join(cast("Sequence[bytes]", ring_offsets)), np.int64)
     if len(offsets) == 2 * n:  # one ring each
         sizes = offsets[1::2]
-        return Polygons(joined, summed(sizes), as_frozen(np.arange(n + 1)), int(sizes.max()), 1)
+        return Polygons(joined, summed(sizes), read_only(np.arange(n + 1)), int(sizes.max()), 1)
     starts = np.flatnonzero(offsets == 0)  # of each polygon's: no ring is empty
     ends = np.append(starts[1:], len(offsets)) - 1
     sizes, n_rings = offsets[ends], ends - starts
     first_vertices = np.cumsum(sizes) - sizes
     ring_starts = np.delete(offsets + np.repeat(first_vertices, n_rings + 1), ends)
-    rings = as_frozen(np.append(ring_starts, len(joined)))
+    rings = read_only(np.append(ring_starts, len(joined)))
     return Polygons(joined, rings, summed(n_rings), int(sizes.max()), int(n_rings.max()))
 
 
-def as_frozen(array: npt.NDArray[Scalar]) -> npt.NDArray[Scalar]:
-    """Return an array of the one kind that kernels are compiled for: itself, a read-only view, or a copy."""
-    array = np.ascontiguousarray(array)
-    if array.flags.writeable:
-        array = array.view()
-        array.setflags(write=False)
-    return array
-
-
 _EMPTY: Final = Polygons(
-    as_frozen(np.zeros((0, 2))), as_frozen(np.zeros(1, np.int64)), as_frozen(np.zeros(2, np.int64)), 0, 0
+    read_only(np.zeros((0, 2))), read_only(np.zeros(1, np.int64)), read_only(np.zeros(2, np.int64)), 0, 0
 )
 
 
@@ -174,14 +164,14 @@ def run_kernel(
     )
 
 
-def summed(sizes: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+def summed(sizes: IntArray) -> IntArray:
     """Return where each of some parts put one after another begins, and the end of the last; read-only."""
     offsets = np.zeros(len(sizes) + 1, np.int64)
     np.cumsum(sizes, out=offsets[1:])
-    return as_frozen(offsets)
+    return read_only(offsets)
 
 
-def chained(offsets: Sequence[npt.NDArray[np.int64]]) -> npt.NDArray[np.int64]:
+def chained(offsets: Sequence[IntArray]) -> IntArray:
     """Return the offsets of several arrays put one after another."""
     return summed(np.concatenate([np.zeros(0, np.int64), *(each[1:] - each[:-1] for each in offsets)]))
 
@@ -216,7 +206,7 @@ def overlay_compiled(
             settled = leave_nearest(rounded, exact, budget)
         if settled is None:
             return None
-        vertices, displacement = as_frozen(settled.rings.vertices), settled.displacement
+        vertices, displacement = read_only(settled.rings.vertices), settled.displacement
     if exponent:
         vertices, doubtful = scaled_back(vertices, exponent)
         vertices.setflags(write=False)
@@ -227,8 +217,8 @@ def overlay_compiled(
     if settled is not None:
         result = replace(
             result,
-            ring_offsets=as_frozen(settled.rings.ring_offsets),
-            piece_offsets=as_frozen(settled.rings.piece_offsets),
+            ring_offsets=read_only(settled.rings.ring_offsets),
+            piece_offsets=read_only(settled.rings.piece_offsets),
             collapsed=settled.collapsed,
             pieces_joined=settled.pieces_joined,
             pieces_parted=settled.pieces_parted,
@@ -241,7 +231,7 @@ def overlay_compiled(
     return result, found.n_exact
 
 
-def _rounded(found: FoundPair, evidence: npt.NDArray[np.int64]) -> RoundedRings:
+def _rounded(found: FoundPair, evidence: IntArray) -> RoundedRings:
     """Return what was found for one pair as the outcome of a round."""
     return RoundedRings(
         vertices=found.vertices,
@@ -256,9 +246,9 @@ def _rounded(found: FoundPair, evidence: npt.NDArray[np.int64]) -> RoundedRings:
 
 def _again(budget: Budget, rings: RoundedRings, labels: RingBits) -> RoundedRings | None:
     """Arrange rounded rings, each a source of its own; None where that is left open."""
-    offsets = as_frozen(rings.ring_offsets)
+    offsets = read_only(rings.ring_offsets)
     n_vertices, n_rings = len(rings.vertices), len(offsets) - 1
-    subject = Polygons(as_frozen(rings.vertices), offsets, as_frozen(np.array([0, n_rings])), n_vertices, n_rings)
+    subject = Polygons(read_only(rings.vertices), offsets, read_only(np.array([0, n_rings])), n_vertices, n_rings)
     status, counts, displacement, vertices, sources, *offsets_found, evidence = run_kernel(
         subject, _EMPTY, "union", budget, labels
     )
@@ -269,8 +259,8 @@ def _again(budget: Budget, rings: RoundedRings, labels: RingBits) -> RoundedRing
 
 
 def as_overlay(
-    vertices: npt.NDArray[np.float64],
-    piece_offsets: npt.NDArray[np.int64],
+    vertices: FloatArray,
+    piece_offsets: IntArray,
     displacement: float,
     exact: ImplicitRings,
     output: Output,

@@ -12,6 +12,7 @@ from typing import Any, Final, NamedTuple, cast
 import numpy as np
 import numpy.typing as npt
 
+from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
 from engine.parallel import Budget
 from engine.polygon_overlay.compiled.expanding import expand_rings
 from engine.polygon_overlay.compiled.kernel import DONE, FINISHED, NEEDS_CONTACTS, overlay_pairs
@@ -50,13 +51,13 @@ class FoundPair(NamedTuple):
     status: int
     n_exact: int
     displacement: float
-    vertices: npt.NDArray[np.float64]
-    sources: npt.NDArray[np.int32]
-    ring_offsets: npt.NDArray[np.int64]
-    piece_offsets: npt.NDArray[np.int64]
+    vertices: FloatArray
+    sources: Int32Array
+    ring_offsets: IntArray
+    piece_offsets: IntArray
 
 
-def run_pair(subject: RingArrays, clip: RingArrays, kept: npt.NDArray[np.uint8], budget: Budget) -> FoundPair:
+def run_pair(subject: RingArrays, clip: RingArrays, kept: FlagArray, budget: Budget) -> FoundPair:
     """Overlay two polygons. Raises as `Budget.check` when the call must end."""
     n_vertices = len(subject.vertices) + len(clip.vertices)
     if n_vertices >= _MANY and n_vertices >= _MANY_IN_RING * (len(subject.offsets) + len(clip.offsets) - 2):
@@ -67,7 +68,7 @@ def run_pair(subject: RingArrays, clip: RingArrays, kept: npt.NDArray[np.uint8],
     return run_whole(subject, clip, kept, budget)
 
 
-def run_whole(subject: RingArrays, clip: RingArrays, kept: npt.NDArray[np.uint8], budget: Budget) -> FoundPair:
+def run_whole(subject: RingArrays, clip: RingArrays, kept: FlagArray, budget: Budget) -> FoundPair:
     """Overlay two polygons edge by edge. Raises as `Budget.check` when the call must end."""
     n_vertices, n_rings = len(subject.vertices) + len(clip.vertices), len(subject.offsets) + len(clip.offsets) - 2
     n_contacts, n_out, n_out_rings = max(256, 4 * n_vertices), 8 + n_vertices, 2
@@ -97,7 +98,7 @@ def run_whole(subject: RingArrays, clip: RingArrays, kept: npt.NDArray[np.uint8]
 
 
 def run_reduced(
-    subject: RingArrays, clip: RingArrays, size: int, n_most: int, kept: npt.NDArray[np.uint8], budget: Budget
+    subject: RingArrays, clip: RingArrays, size: int, n_most: int, kept: FlagArray, budget: Budget
 ) -> FoundPair | None:
     """Overlay two polygons in blocks of ``size`` edges, of which fewer than n_most may be looked at one by one.
 
@@ -138,7 +139,7 @@ def run_reduced(
 
 
 def _run(
-    subject: RingArrays, clip: RingArrays, reduced: Any, kept: npt.NDArray[np.uint8], budget: Budget, scratch: Scratch
+    subject: RingArrays, clip: RingArrays, reduced: Any, kept: FlagArray, budget: Budget, scratch: Scratch
 ) -> tuple[int, ...]:
     """Run overlay_pairs on one pair, and return what it does."""
     found: tuple[int, ...] = _entry(_overlay_pairs)(
@@ -170,13 +171,13 @@ def _copied(array: npt.NDArray[Any], n: int) -> npt.NDArray[Any]:
 
 
 @functools.lru_cache(_FEW_PIECES + 1)
-def _counted(n: int) -> npt.NDArray[np.int64]:
+def _counted(n: int) -> IntArray:
     """Return 0 .. n, the ring offsets of so many pieces without holes; its memory cannot be written to."""
     return np.frombuffer(np.arange(n + 1).tobytes(), np.int64)
 
 
 @functools.lru_cache(64)
-def _one_polygon(n_rings: int) -> npt.NDArray[np.int64]:
+def _one_polygon(n_rings: int) -> IntArray:
     """Return the ring offsets of one polygon."""
     offsets = np.array([0, n_rings])
     offsets.setflags(write=False)

@@ -6,14 +6,12 @@ provided nothing overflows or underflows (callers bring their input into a safe 
     dd_add    3 u^2 of |a + b|  (4 u^2 kept below, for the terms of third order)
     dd_mul    5 u^2 of |a b|
     dd_div   16 u^2 of |a / b|
-    dd_sqrt   4 u^2 of sqrt(a)
 
 These bounds are the input to the running bounds of the callers, who end with `surely_rounded`: it says whether the
 double nearest to the true value is certain. A double-double never decides anything by itself.
 
 Source: M. Joldes, J.-M. Muller, V. Popescu, Tight and rigorous error bounds for basic building blocks of double-word
-arithmetic, 2017 (algorithms AccurateDWPlusDW, DWTimesDW2, DWDivDW2); V. Lefevre, N. Louvet, J.-M. Muller, J. Picot,
-L. Rideau, Accurate calculation of Euclidean norms using double-word arithmetic, 2023 (SQRTDWtoDW).
+arithmetic, 2017 (algorithms AccurateDWPlusDW, DWTimesDW2, DWDivDW2).
 """
 
 from __future__ import annotations
@@ -63,15 +61,6 @@ def dd_div(ah: float, al: float, bh: float, bl: float) -> tuple[float, float]:
     th = ah / bh
     rh, rl = dd_scale(bh, bl, th)
     return fast_two_sum(th, ((ah - rh) + (al - rl)) / bh)
-
-
-@inline
-def dd_sqrt(ah: float, al: float) -> tuple[float, float]:
-    """Return the square root of a >= 0."""
-    if ah == 0.0:
-        return 0.0, 0.0
-    sh = math.sqrt(ah)
-    return fast_two_sum(sh, (fma(-sh, sh, ah) + al) / (2.0 * sh))
 
 
 @inline

@@ -26,7 +26,7 @@ from typing import Any
 from engine.jit import inline, kernel
 from engine.predicates.error_free import two_diff, workspace
 from engine.predicates.expansion import Components, add_scaled, grow_product, sign
-from engine.predicates.loading import as_point2, as_point3
+from engine.predicates.loading import as_point3
 from engine.types import UNDECIDED, Point2, Point3
 
 BOUND_2D = 2.0**-51  # 4u
@@ -233,28 +233,7 @@ def _add_times(e: Components, n: int, m: Components, length: int, z: float, z_ta
 
 
 @kernel
-def orient2d_batch(a: Any, b: Any, c: Any, sides: Any) -> None:
-    """Fill sides (n,) int8 with orient2d of the rows of a, b, c (n, 2) float64."""
-    for item in range(sides.shape[0]):
-        sides[item] = orient2d(as_point2(a, item), as_point2(b, item), as_point2(c, item))
-
-
-@kernel
 def orient3d_batch(a: Any, b: Any, c: Any, d: Any, sides: Any) -> None:
     """Fill sides (n,) int8 with orient3d of the rows of a, b, c, d (n, 3) float64."""
     for item in range(sides.shape[0]):
         sides[item] = orient3d(as_point3(a, item), as_point3(b, item), as_point3(c, item), as_point3(d, item))
-
-
-@kernel
-def orient2d_filter_batch(a: Any, b: Any, c: Any, sides: Any) -> None:
-    """Fill sides (n,) int8 with orient2d_filter of the rows of a, b, c (n, 2) float64."""
-    for item in range(sides.shape[0]):
-        sides[item] = orient2d_filter(as_point2(a, item), as_point2(b, item), as_point2(c, item))
-
-
-@kernel
-def orient3d_filter_batch(a: Any, b: Any, c: Any, d: Any, sides: Any) -> None:
-    """Fill sides (n,) int8 with orient3d_filter of the rows of a, b, c, d (n, 3) float64."""
-    for item in range(sides.shape[0]):
-        sides[item] = orient3d_filter(as_point3(a, item), as_point3(b, item), as_point3(c, item), as_point3(d, item))

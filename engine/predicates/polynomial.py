@@ -16,7 +16,7 @@ from __future__ import annotations
 from math import frexp, ldexp
 from typing import Any
 
-from engine.jit import inline, kernel
+from engine.jit import inline
 from engine.predicates.error_free import workspace
 from engine.predicates.expansion import Components, compress, grow, scale, sign
 from engine.types import UNDECIDED
@@ -136,10 +136,3 @@ def sign_of_polynomial_exact(powers: Any, coefficients: Any, points: Any, row: i
     if is_incomplete and (n == 0 or abs(total[n - 1]) < CLEAR):
         return UNDECIDED
     return sign(total, n)
-
-
-@kernel
-def sign_of_polynomial_batch(powers: Any, coefficients: Any, degree: int, points: Any, sides: Any) -> None:
-    """Fill sides (n,) int8 with sign_of_polynomial at the rows of points (n, dim) float64."""
-    for item in range(sides.shape[0]):
-        sides[item] = sign_of_polynomial(powers, coefficients, degree, points, item)

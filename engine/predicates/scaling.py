@@ -11,9 +11,8 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from engine.arrays import BoolArray, FloatArray, IntArray
 
 COMFORTABLE: Final = 64
 """Scenes whose largest coordinate lies within 2^-64 .. 2^64 stay as they are; kernels are exact to 2^-120 .. 2^120."""
@@ -36,7 +35,7 @@ def exponent_above(largest: float) -> int:
     return 0 if largest == 0.0 or abs(exponent) <= COMFORTABLE else exponent
 
 
-def shifted(array: FloatArray, exponent: int | npt.NDArray[np.int64]) -> FloatArray | None:
+def shifted(array: FloatArray, exponent: int | IntArray) -> FloatArray | None:
     """Return array 2^exponent, read-only as the arrays of callers are, if that is exact for every number, else None."""
     if isinstance(exponent, int) and exponent == 0:
         same = array.view()
@@ -66,7 +65,7 @@ def balanced_rows(rows: FloatArray, exponent: int) -> FloatArray | None:
     return result
 
 
-def scaled_back(points: FloatArray, exponent: int) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
+def scaled_back(points: FloatArray, exponent: int) -> tuple[FloatArray, BoolArray]:
     """Return points 2^exponent and which of them may have been rounded twice.
 
     Those are what this rounds: up to the smallest normal number, that one included. Where nothing is rounded here, the

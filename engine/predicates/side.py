@@ -14,12 +14,10 @@ settles it).
 from __future__ import annotations
 
 from math import frexp, ldexp
-from typing import Any
 
-from engine.jit import inline, kernel
+from engine.jit import inline
 from engine.predicates.error_free import two_prod, workspace
 from engine.predicates.expansion import Components, grow, grow_product, sign
-from engine.predicates.loading import as_half_space2, as_half_space3, as_point2, as_point3
 from engine.types import UNDECIDED, HalfSpace2, HalfSpace3, Point2, Point3
 
 BOUND_LINE = 2.0**-51  # 4u
@@ -142,17 +140,3 @@ def grow_shifted_product(e: Components, n: int, a: float, b: float, exponent: in
     if tail != 0.0:
         n = grow(e, n, ldexp(tail, exponent))
     return grow(e, n, ldexp(p, exponent))
-
-
-@kernel
-def side_of_line_batch(rows: Any, points: Any, sides: Any) -> None:
-    """Fill sides (n,) int8 with side_of_line of the rows (n, 3) and the points (n, 2) float64."""
-    for item in range(sides.shape[0]):
-        sides[item] = side_of_line(as_half_space2(rows, item), as_point2(points, item))
-
-
-@kernel
-def side_of_plane_batch(rows: Any, points: Any, sides: Any) -> None:
-    """Fill sides (n,) int8 with side_of_plane of the rows (n, 4) and the points (n, 3) float64."""
-    for item in range(sides.shape[0]):
-        sides[item] = side_of_plane(as_half_space3(rows, item), as_point3(points, item))

@@ -11,8 +11,8 @@ from fractions import Fraction
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import FlagArray, FloatArray, Int8Array, IntArray
 from engine.containment.locators import Locator, locator_of
 from engine.containment.rational_locate import rational_location
 from engine.parallel import Budget
@@ -24,12 +24,9 @@ from engine.segment_clipping.exact_segments import Piece
 from engine.segment_clipping.mesh_contacts import is_clear
 from engine.segment_clipping.mesh_streams import find_mesh_contacts
 from engine.segment_clipping.prepared_boundary import Mesh, Outline, boundary_of
-from engine.solids.base import FloatArray, IntArray
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
 from engine.types import UNDECIDED
-
-Locations = npt.NDArray[np.int8]
 
 _LEAST_ROOM: Final = 1 << 8
 """Contacts, or pieces, looked for at once; doubled where one segment has more."""
@@ -87,8 +84,8 @@ def _joined(parts: list[Rows], n_beyond: int, n_rational: int) -> PieceRows:
 
 
 def _settle(
-    segments: FloatArray, chosen: IntArray, locations: Locations, boundary: Outline | Mesh, budget: Budget
-) -> tuple[list[Rows], npt.NDArray[np.uint8]]:
+    segments: FloatArray, chosen: IntArray, locations: Int8Array, boundary: Outline | Mesh, budget: Budget
+) -> tuple[list[Rows], FlagArray]:
     """Return the pieces of those chosen segments that the kernel settles, and the state of each."""
     state = np.full(len(chosen), OPEN, np.uint8)
     kernel: Any = cut_on_mesh if isinstance(boundary, Mesh) else cut_on_outline
@@ -114,7 +111,7 @@ def _rows(n: int, dimension: int) -> Rows:
 def _exact(
     segments: FloatArray,
     chosen: IntArray,
-    locations: Locations,
+    locations: Int8Array,
     region: Polygon | Polyhedron,
     boundary: Outline | Mesh,
     budget: Budget,
@@ -149,9 +146,7 @@ def _points(pieces: list[Piece], field: int, width: int) -> FloatArray:
     return np.array([piece[field] for piece in pieces], np.float64).reshape(-1, width) + 0.0
 
 
-def _contacts(
-    segments: FloatArray, boundary: Outline | Mesh, budget: Budget
-) -> tuple[IntArray, IntArray, npt.NDArray[np.uint8]]:
+def _contacts(segments: FloatArray, boundary: Outline | Mesh, budget: Budget) -> tuple[IntArray, IntArray, FlagArray]:
     """Return the offsets (n + 1,) of each segment's contacts, their elements, and their kinds."""
     kernel: Any = find_mesh_contacts if isinstance(boundary, Mesh) else find_contacts_2d
     last = len(segments)
@@ -176,7 +171,7 @@ def _contacts(
 def _pieces(
     segment: FloatArray,
     elements: IntArray,
-    kinds: npt.NDArray[np.uint8],
+    kinds: FlagArray,
     location: int,
     region: Polygon | Polyhedron,
     boundary: Outline | Mesh,

@@ -17,8 +17,8 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from engine.arrays import FloatArray, IntArray
 from engine.jit import inline
-from engine.solids.base import FloatArray, IntArray
 
 LEAF_SIZE: Final = 4
 DEEPEST: Final = 64

@@ -9,9 +9,10 @@ from typing import Literal, overload
 import numpy as np
 import numpy.typing as npt
 
+from engine.arrays import FloatArray, IntArray
 from engine.errors import UnsupportedSolidError
 from engine.parallel import Budget, Cancel, Progress, run_chunks
-from engine.predicates.scaling import FloatArray, balanced_rows, exponent_of, shifted
+from engine.predicates.scaling import balanced_rows, exponent_of, shifted
 from engine.segment_clipping.ball_cut import fill_on_sphere
 from engine.segment_clipping.ball_interval import decide_on_sphere
 from engine.segment_clipping.boundary import clip_chunk, locator_for
@@ -43,11 +44,11 @@ class SegmentPieces:
     faces: (m, 2) int64, the plane or face crossed at either end, -1 where the end is the segment's own.
     """
 
-    source: npt.NDArray[np.int64]
+    source: IntArray
     start: FloatArray
     end: FloatArray
     t: FloatArray
-    faces: npt.NDArray[np.int64]
+    faces: IntArray
 
     def __len__(self) -> int:
         return len(self.source)

@@ -20,12 +20,12 @@ from typing import Any, Final
 
 import numpy as np
 
+from engine.arrays import FloatArray
 from engine.jit import inline, kernel
 from engine.predicates.error_free import workspace
 from engine.predicates.expansion import Components, compress, grow, grow_product, sign
 from engine.predicates.parameters import compare_products, compare_ratios_filter
 from engine.predicates.ranges import is_safe
-from engine.predicates.scaling import FloatArray
 from engine.segment_clipping.cohen_sutherland import DROPPED, KEPT, LARGE, OPEN, point_of
 from engine.types import UNDECIDED
 

@@ -18,14 +18,13 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import FloatArray, Int32Array, IntArray
 from engine.parallel import Budget, Progress, check_options, run_chunks
-from engine.predicates.scaling import FloatArray, scaled_back
+from engine.predicates.scaling import scaled_back
 from engine.segment_clipping.exact_segments import Piece
 from engine.solids.checks import check_finite
 
-IntArray = npt.NDArray[np.int64]
 Settle = Callable[[list[float], list[float]], Piece | None]
 
 _FEW: Final = 32
@@ -174,8 +173,8 @@ Rows = tuple[IntArray, FloatArray, FloatArray, FloatArray, IntArray]
 def _fill(
     scene: Scaled,
     method: Method,
-    items: npt.NDArray[np.int32],
-    planes: npt.NDArray[np.int32],
+    items: Int32Array,
+    planes: Int32Array,
     kept: list[tuple[int, int]],
     budget: Budget,
     workers: int | None,
@@ -233,7 +232,7 @@ def _fill(
     return rows, np.unique(np.concatenate([np.zeros(0, np.int64), *unsure])), sum(int(c[1]) for c in counts.values())
 
 
-def _joined(array: npt.NDArray[np.int32], parts: list[tuple[int, int]]) -> npt.NDArray[np.int32]:
+def _joined(array: Int32Array, parts: list[tuple[int, int]]) -> Int32Array:
     """Return the parts (first, how many) of an array one after another."""
     if len(parts) == 1:
         return array[parts[0][0] : parts[0][0] + parts[0][1]]

@@ -5,15 +5,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from engine.bounding.bvh import UNUSED, Bvh, as_read_only, build_bvh, on_lines
+from engine.arrays import Float32Array, FloatArray, Int32Array, IntArray, read_only
+from engine.bounding.bvh import UNUSED, Bvh, build_bvh, on_lines
 from engine.lanes.boxes import EMPTY
 from engine.lanes.rows import LANES
 from engine.lanes.triangles import CORNER_ROWS
 from engine.predicates.ranges import LARGEST, SMALLEST
 from engine.segment_clipping.box_tree import build_box_tree
-from engine.solids.base import FloatArray, IntArray
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
 
@@ -45,8 +44,8 @@ class Mesh(NamedTuple):
     """(k,) the face of the caller that each triangle is reported as."""
     beyond: FloatArray
     """(2, 3) the coordinates next below and next above those of all triangles."""
-    boxes: npt.NDArray[np.float32]
-    child: npt.NDArray[np.int32]
+    boxes: Float32Array
+    child: Int32Array
     origin: FloatArray
     inverse: float
     """boxes, child, origin, 1 / scale: see `Bvh`, but inner nodes stand before all blocks, close to each other."""
@@ -54,7 +53,7 @@ class Mesh(NamedTuple):
     """How many they are; unless there is but one block, they begin with the root."""
     n_levels: int
     """How many inner nodes stand above one another at most."""
-    corners: npt.NDArray[np.float32]
+    corners: Float32Array
     """(n_blocks, 9, 8), see `corners_of`."""
 
 
@@ -76,8 +75,10 @@ def outline_of(elements: FloatArray, faces: IntArray) -> Outline:
     """Return what the kernels read of some edges (k, 2, 2)."""
     low, high = elements.min(axis=1), elements.max(axis=1)
     tree = build_box_tree(low, high)
-    first, *arrays = (as_read_only(a) for a in (elements, faces, _beyond(low, high), tree.order, tree.boxes))
-    return Outline(first, _are_safe(elements), *arrays)
+    order, boxes = read_only(tree.order), read_only(tree.boxes)
+    return Outline(
+        read_only(elements), _are_safe(elements), read_only(faces), read_only(_beyond(low, high)), order, boxes
+    )
 
 
 def _are_safe(elements: FloatArray) -> bool:
@@ -93,8 +94,8 @@ def mesh_of(elements: FloatArray, faces: IntArray) -> Mesh:
     return Mesh(
         on_lines(elements),
         _are_safe(elements),
-        as_read_only(faces),
-        as_read_only(_beyond(low, high)),
+        read_only(faces),
+        read_only(_beyond(low, high)),
         tree.boxes,
         tree.child,
         tree.origin,
@@ -122,10 +123,10 @@ def _beyond(low: FloatArray, high: FloatArray) -> FloatArray:
         return np.stack([np.nextafter(low.min(axis=0), -np.inf), np.nextafter(high.max(axis=0), np.inf)])
 
 
-def _levels_of(child: npt.NDArray[np.int32]) -> int:
+def _levels_of(child: Int32Array) -> int:
     """Return on how many levels the inner nodes of a tree stand, from their children."""
     n_levels = 0
-    level: npt.NDArray[np.int32] = np.zeros(min(len(child), 1), np.int32)
+    level: Int32Array = np.zeros(min(len(child), 1), np.int32)
     while len(level):
         below = child[level].ravel()
         level = below[(below >= 0) & (below < len(child))]
@@ -133,7 +134,7 @@ def _levels_of(child: npt.NDArray[np.int32]) -> int:
     return n_levels
 
 
-def corners_of(tree: Bvh, n_inner: int, elements: FloatArray) -> npt.NDArray[np.float32]:
+def corners_of(tree: Bvh, n_inner: int, elements: FloatArray) -> Float32Array:
     """Return the corners (n_blocks, 9, 8) float32 of the triangles in each block of a tree, in its coordinates.
 
     Lanes without a triangle lie far from everything.

@@ -6,8 +6,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from engine.arrays import FloatArray
 from engine.errors import MinAboveMaxError
-from engine.solids.base import FloatArray, Solid
+from engine.solids.base import Solid
 from engine.solids.checks import as_vector, digits
 
 

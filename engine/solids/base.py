@@ -12,10 +12,7 @@ from dataclasses import fields, is_dataclass
 from typing import Any, ClassVar, Final, TypeVar, cast
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 T = TypeVar("T")
 
 _WAIT: Final = 0.005
@@ -96,13 +93,6 @@ class Solid:
 
     def __deepcopy__(self, _memo: object) -> Solid:
         return self
-
-
-def as_read_only(array: FloatArray) -> FloatArray:
-    """Return a read-only view: a kernel is compiled once for what callers pass, whether it may be written to or not."""
-    view = array.view()
-    view.setflags(write=False)
-    return view
 
 
 def _restored(kind: Any, values: dict[str, Any]) -> Solid:

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, overload
+from typing import Literal, Unpack, overload
 
 import numpy as np
 
+from engine.arrays import FloatArray
 from engine.bounding.aabb import box_of_points, corners_of_box
 from engine.bounding.double_description import corners_of_half_spaces
 from engine.bounding.minimal_sphere import MinimalSphere, minimal_sphere, minimal_sphere_of_rationals
 from engine.errors import EmptyGeometryError, NotRepresentableError, UnsupportedSolidError
-from engine.parallel import Budget, Cancel, Progress, check_options
+from engine.parallel import Budget, Cancel, Options, Progress, check_options
 from engine.predicates.rational import nearest_float
 from engine.solids.aabb import Aabb
-from engine.solids.base import FloatArray, Solid
+from engine.solids.base import Solid
 from engine.solids.convex import Convex
 from engine.solids.mesh import Mesh
 from engine.solids.polygon import Polygon
@@ -34,25 +35,9 @@ class Bounds:
 
 
 @overload
-def bounds(
-    solid: Solid,
-    *,
-    workers: int | None = None,
-    deadline: float | None = None,
-    cancel: Cancel | None = None,
-    progress: Progress | None = None,
-    report: Literal[False] = False,
-) -> Bounds: ...
+def bounds(solid: Solid, *, report: Literal[False] = False, **options: Unpack[Options]) -> Bounds: ...
 @overload
-def bounds(
-    solid: Solid,
-    *,
-    workers: int | None = None,
-    deadline: float | None = None,
-    cancel: Cancel | None = None,
-    progress: Progress | None = None,
-    report: Literal[True],
-) -> tuple[Bounds, Accuracy]: ...
+def bounds(solid: Solid, *, report: Literal[True], **options: Unpack[Options]) -> tuple[Bounds, Accuracy]: ...
 def bounds(
     solid: Solid,
     *,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from engine.arrays import FloatArray
 from engine.solids.aabb import Aabb
-from engine.solids.base import FloatArray
 
 
 def box_rows(region: Aabb) -> FloatArray:

@@ -15,13 +15,13 @@ from typing import Any, Final, cast
 import numpy as np
 import numpy.typing as npt
 
+from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.errors import (
     EmptyGeometryError,
     InvalidArrayError,
     NotFiniteError,
     WrongDimensionError,
 )
-from engine.solids.base import FloatArray
 
 Where = tuple[str | int, ...]
 
@@ -170,7 +170,7 @@ def check_finite(array: FloatArray, where: Where) -> None:
     """Raise on the first NaN or infinity."""
     flat = array.reshape(-1)
     for start in range(0, len(flat), _AT_ONCE):
-        finite: npt.NDArray[np.bool_] = np.isfinite(flat[start : start + _AT_ONCE])
+        finite: BoolArray = np.isfinite(flat[start : start + _AT_ONCE])
         if not finite.all():
             index = start + int(finite.argmin())
             path = _path(index, list(array.shape), where)
@@ -244,7 +244,7 @@ def frozen(array: FloatArray) -> FloatArray:
     return copy
 
 
-def frozen_integers(array: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
+def frozen_integers(array: npt.NDArray[Any]) -> IntArray:
     """Return a read-only C-contiguous int64 copy."""
     copy = np.array(array, np.int64, order="C")
     copy.setflags(write=False)

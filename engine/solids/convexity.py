@@ -20,10 +20,10 @@ from typing import Any
 
 import numpy as np
 
+from engine.arrays import FloatArray, IntArray, read_only
 from engine.jit import inline, kernel
 from engine.predicates.loading import as_point3
 from engine.predicates.orientation import orient3d
-from engine.solids.base import FloatArray, IntArray, as_read_only
 from engine.solids.polyhedron import Polyhedron
 from engine.types import Point3
 
@@ -56,7 +56,7 @@ def _certified(solid: Polyhedron) -> Convexity | None:
         center = solid.vertices[solid.triangles.ravel()].mean(axis=0)
         if not np.isfinite(center).all():
             return None
-        side = _certify(as_read_only(solid.vertices), _shared(solid.triangles), center)
+        side = _certify(read_only(solid.vertices), _shared(solid.triangles), center)
     return None if side == 0 else Convexity(center, bool(side < 0))
 
 

@@ -28,10 +28,9 @@ from itertools import pairwise
 from typing import Final, cast
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.errors import FaceNotSimpleError, TooComplexError
-from engine.solids.base import FloatArray, IntArray
 from engine.solids.checks import digits
 
 IntPoint = tuple[int, int]
@@ -71,7 +70,7 @@ def cut_faces(
     return merged[corners.ravel()], triangle_faces
 
 
-def _certify_convex(rings: FloatArray) -> npt.NDArray[np.bool_]:
+def _certify_convex(rings: FloatArray) -> BoolArray:
     """Tell for each ring ``(m, k, 3)`` whether it is certainly strictly convex in its projection; False: unsure or not.
 
     Where rounding leaves open along which axis the area is largest, it must be convex along each that may be: the fan
@@ -81,7 +80,7 @@ def _certify_convex(rings: FloatArray) -> npt.NDArray[np.bool_]:
     # bound: brought to size 1 by a power of two; what that takes from tiny coordinates, 2^-1075, is far below _TINY
     rings = np.ldexp(rings, -np.frexp(np.abs(rings).max())[1])
     area, bound = np.empty((2, 3, len(rings)))
-    result: npt.NDArray[np.bool_] = np.ones(len(rings), np.bool_)
+    result: BoolArray = np.ones(len(rings), np.bool_)
     spokes = rings[:, 1:] - rings[:, :1]
     for axis in range(3):
         u, v = spokes[:, :, (axis + 1) % 3], spokes[:, :, (axis + 2) % 3]
@@ -98,7 +97,7 @@ def _certify_convex(rings: FloatArray) -> npt.NDArray[np.bool_]:
     return result
 
 
-def _turns_once(u: FloatArray, v: FloatArray, way: FloatArray) -> npt.NDArray[np.bool_]:
+def _turns_once(u: FloatArray, v: FloatArray, way: FloatArray) -> BoolArray:
     """Tell whether each plane ring certainly turns strictly one way at every corner, and around once.
 
     way: 1 for left turns, -1 for right turns. Around once: the first coordinate rises and falls once (comparisons of
@@ -113,7 +112,7 @@ def _turns_once(u: FloatArray, v: FloatArray, way: FloatArray) -> npt.NDArray[np
     for i_corner in range(1, u.shape[1]):  # a vertical side goes on as the one before it did
         rises[:, i_corner] = np.where(rises[:, i_corner] == 0.0, rises[:, i_corner - 1], rises[:, i_corner])
     rises = np.where(rises == 0.0, rises[:, -1:], rises)  # vertical sides at the start follow the last one
-    result: npt.NDArray[np.bool_] = is_strict & ((rises != np.roll(rises, 1, axis=1)).sum(axis=1) == 2)
+    result: BoolArray = is_strict & ((rises != np.roll(rises, 1, axis=1)).sum(axis=1) == 2)
     return result
 
 
@@ -236,7 +235,7 @@ class _Ring:
         first = is_there.index(True)
         return [*ears, (before[first], first, after[first])]
 
-    def _blocker(self, left: int, tip: int, right: int, is_blunt: npt.NDArray[np.bool_]) -> int | None:
+    def _blocker(self, left: int, tip: int, right: int, is_blunt: BoolArray) -> int | None:
         """Return a vertex in the closed triangle of a strictly convex corner, None if there is none.
 
         Only corners that are not strictly convex need a look: of the vertices in the triangle the one nearest the tip

@@ -8,8 +8,9 @@ from typing import Any, ClassVar, Final
 import numpy as np
 import numpy.typing as npt
 
+from engine.arrays import FloatArray, IntArray
 from engine.errors import InvalidArrayError, InvalidPolynomialError, WrongDimensionError
-from engine.solids.base import FloatArray, IntArray, Solid
+from engine.solids.base import Solid
 from engine.solids.checks import (
     DIMENSIONS,
     as_floats,

@@ -13,8 +13,9 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from engine.arrays import FloatArray, IntArray
 from engine.errors import IndexOutOfRangeError, InvalidArrayError, RepeatedIndexError, RingTooShortError
-from engine.solids.base import FloatArray, IntArray, Solid
+from engine.solids.base import Solid
 from engine.solids.checks import as_points, check_not_empty, frozen, shown
 from engine.solids.ear_cutting import cut_faces
 from engine.solids.sound_triangles import MOST_CORNERS, MOST_VERTICES, are_sound

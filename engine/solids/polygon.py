@@ -7,8 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from engine.arrays import FloatArray, IntArray
 from engine.errors import InvalidArrayError, RingTooShortError
-from engine.solids.base import FloatArray, IntArray, Solid
+from engine.solids.base import Solid
 from engine.solids.checks import as_points, check_not_empty, frozen
 
 

@@ -6,8 +6,8 @@ from typing import ClassVar, Final
 
 import numpy as np
 
+from engine.arrays import FloatArray, IntArray
 from engine.errors import InconsistentOrientationError, NotClosedError
-from engine.solids.base import FloatArray, IntArray
 from engine.solids.checks import digits
 from engine.solids.mesh import Mesh
 

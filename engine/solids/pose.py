@@ -7,8 +7,8 @@ from typing import Any, Final
 
 import numpy as np
 
+from engine.arrays import FloatArray
 from engine.errors import InvalidArrayError, NotRigidError, WrongDimensionError
-from engine.solids.base import FloatArray
 from engine.solids.checks import as_floats, as_vector, check_dimension, check_given_dimension, digits, frozen, spell
 from engine.solids.rotations import find_suspects
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from engine.arrays import FloatArray
 from engine.errors import InvalidArrayError
-from engine.solids.base import FloatArray, Solid
+from engine.solids.base import Solid
 from engine.solids.checks import as_floats, check_dimension, digits, frozen
 
 

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from numba import config as numba_config
 
-from engine.predicates.orientation import (
+from engine.predicates.orientation import orient3d_batch
+from tests.unit.predicates.batches import (
     orient2d_batch,
     orient2d_filter_batch,
-    orient3d_batch,
     orient3d_filter_batch,
+    side_of_plane_batch,
 )
-from engine.predicates.side import side_of_plane_batch
 
 pytestmark = pytest.mark.skipif(bool(numba_config.DISABLE_JIT), reason="the compiler is disabled")
 
@@ -35,8 +35,8 @@ def name_of(value: Any) -> str:
 
 
 def code_of(kernel: Any, inputs: list[Any]) -> tuple[str, str]:
-    """Return the LLVM code and the assembly of a kernel for these inputs, compiled here (a cached one has no text)."""
-    known = kernel.dispatcher
+    """Return the LLVM code and the assembly of a kernel for these inputs, compiled here."""
+    known = getattr(kernel, "dispatcher", kernel)
     fresh = type(known)(py_func=known.py_func, targetoptions=known.targetoptions)
     fresh(*inputs, SIDES)
     return "\n".join(fresh.inspect_llvm().values()), "\n".join(fresh.inspect_asm().values())

@@ -12,9 +12,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from engine.arrays import FloatArray, IntArray
 from engine.jit import kernel
 from engine.solids.aabb import Aabb
-from engine.solids.base import FloatArray, IntArray, Solid
+from engine.solids.base import Solid
 from engine.solids.convexity import convexity
 from engine.solids.polyhedron import Polyhedron
 from engine.solids.sphere import Sphere

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import Float32Array
 from engine.collision.codes import DISJOINT, OVERLAPPING, UNSETTLED
 from engine.collision.convex.body import ASIDE, CENTER, RADIUS, ConvexArrays, ConvexBody
 from engine.collision.convex.pair import LARGEST_ERROR, inner_point, is_farther, relate_meeting
@@ -39,8 +39,8 @@ _ALL_LANES = (1 << N_LANES) - 1
 class LaneArrays(NamedTuple):
     """What the lanes see of a pair: vertices (3, n) float32 of either body, in units of scale."""
 
-    first: npt.NDArray[np.float32]
-    second: npt.NDArray[np.float32]
+    first: Float32Array
+    second: Float32Array
     scale: float
 
 

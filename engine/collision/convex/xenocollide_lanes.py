@@ -20,8 +20,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import Float32Array
 from engine.collision.convex.body import ConvexBody
 from engine.collision.convex.xenocollide import Frame, cross, dot, minus, negative
 from engine.jit import inline, merged
@@ -51,7 +51,7 @@ def lane_scale(first: ConvexBody, first_middle: Any, second: ConvexBody, second_
     return float(2.0 ** np.frexp(reach)[1]) if 2.0**-900 < reach < 2.0**250 else 0.0
 
 
-def lane_points(body: ConvexBody, middle: Any, scale: float) -> npt.NDArray[np.float32]:
+def lane_points(body: ConvexBody, middle: Any, scale: float) -> Float32Array:
     """Return the vertices (3, n) from a point inside the body, in units of `scale`."""
     return np.ascontiguousarray((body.points - middle[:, None]) / scale, np.float32)
 

@@ -13,8 +13,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import Float32Array, FloatArray, Int32Array, IntArray
 from engine.bounding.bvh import MAX_DEPTH
 from engine.collision.meshes.face_state import proves_overlap, state_of
 from engine.collision.meshes.frames import defect_of, set_frame
@@ -71,11 +71,11 @@ class Descent(NamedTuple):
     12) float64: rotation and translation of either body, for exact signs.
     """
 
-    stack: npt.NDArray[np.int32]
-    rest: npt.NDArray[np.int64]
-    frames: npt.NDArray[np.float32]
-    work: npt.NDArray[np.float32]
-    poses: npt.NDArray[np.float64]
+    stack: Int32Array
+    rest: IntArray
+    frames: Float32Array
+    work: Float32Array
+    poses: FloatArray
 
 
 class Place(NamedTuple):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from engine.arrays import IntArray
 from engine.collision.meshes.exact_body import ExactBody, Vector
 from engine.collision.meshes.exact_cells import (
     cells_of,
@@ -21,7 +22,6 @@ from engine.collision.meshes.exact_triangles import as_simplex, is_in_triangle
 from engine.collision.meshes.mesh_arrays import STATE_CLEAN
 from engine.collision.meshes.mesh_pair import MeshPair
 from engine.collision.meshes.parity import OUTSIDE
-from engine.solids.base import IntArray
 
 WITHIN = ((1, 1, 1), (1, 1, 2), (2, 1, 1), (3, 5, 4), (7, 11, 5))
 """Weights of the corners for points within a face."""

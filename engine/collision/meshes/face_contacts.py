@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import Int8Array, IntArray
 from engine.collision.meshes.dual_traversal import (
     FULL,
     SEEK_CONTACT,
@@ -20,7 +20,6 @@ from engine.collision.meshes.mesh_arrays import STATE_CLEAN, STATE_CROSSED
 from engine.collision.meshes.mesh_pair import MeshPair
 from engine.collision.meshes.pose_batch import find_contacts
 from engine.collision.meshes.triangle_triangle import APART, COPLANAR, CROSSING
-from engine.solids.base import IntArray
 from engine.types import UNDECIDED, Relation
 
 _ROOM = 1024
@@ -37,7 +36,7 @@ def find_all_contacts(pair: MeshPair, *, looks_at_cells: bool = True) -> tuple[I
     pairs, kinds = np.empty((_ROOM, 2), np.int64), np.empty(_ROOM, np.int8)
     descent = new_descent()
     found_pairs: list[IntArray] = []
-    found_kinds: list[npt.NDArray[np.int8]] = []
+    found_kinds: list[Int8Array] = []
     how = FULL
     while how == FULL:  # bound: each turn finds new pairs
         how, n_pairs, apart = find_contacts(
@@ -85,7 +84,7 @@ def find_all_contacts(pair: MeshPair, *, looks_at_cells: bool = True) -> tuple[I
     return pairs[meet], False
 
 
-def _is_overlap_near(pair: MeshPair, pairs: IntArray, kinds: npt.NDArray[np.int8]) -> bool:
+def _is_overlap_near(pair: MeshPair, pairs: IntArray, kinds: Int8Array) -> bool:
     """Tell whether the cells of a few faces in contact prove overlapping; such a pair is put first."""
     sure = np.flatnonzero(kinds != UNDECIDED)
     for index in sure[:: max(1, len(sure) // _PROBED)].tolist():
@@ -95,7 +94,7 @@ def _is_overlap_near(pair: MeshPair, pairs: IntArray, kinds: npt.NDArray[np.int8
     return False
 
 
-def _in_order(pair: MeshPair, pairs: IntArray, kinds: npt.NDArray[np.int8]) -> tuple[IntArray, npt.NDArray[np.int8]]:
+def _in_order(pair: MeshPair, pairs: IntArray, kinds: Int8Array) -> tuple[IntArray, Int8Array]:
     """Sort pairs by the caller's faces, then by triangle."""
     faces = [pair.shells[own].faces[pairs[:, own]] for own in (0, 1)]
     order = np.lexsort((pairs[:, 1], pairs[:, 0], faces[1], faces[0]))

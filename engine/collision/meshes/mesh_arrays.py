@@ -11,8 +11,8 @@ from math import frexp, ldexp
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import Float32Array, FloatArray, Int8Array, Int32Array, IntArray, read_only
 from engine.bounding.bvh import WIDTH, build_bvh
 from engine.collision.meshes.placement import NO_ROTATION, NO_TRANSLATION, Extent, PoseArrays
 from engine.collision.meshes.triangle_triangle import Triangle3, projected
@@ -24,7 +24,7 @@ from engine.lanes.triangles import CORNER_ROWS
 from engine.predicates.loading import as_point3
 from engine.predicates.orientation import orient2d
 from engine.solids.aabb import Aabb
-from engine.solids.base import FloatArray, IntArray, Solid
+from engine.solids.base import Solid
 from engine.solids.mesh import Mesh
 from engine.solids.polyhedron import Polyhedron
 from engine.solids.pose import Pose
@@ -53,12 +53,12 @@ class ShellArrays(NamedTuple):
 
     vertices: FloatArray
     triangles: IntArray
-    axis: npt.NDArray[np.int8]
-    state: npt.NDArray[np.int8]
-    boxes: npt.NDArray[np.float32]
-    child: npt.NDArray[np.int32]
-    blocks: npt.NDArray[np.float32]
-    discs: npt.NDArray[np.float32]
+    axis: Int8Array
+    state: Int8Array
+    boxes: Float32Array
+    child: Int32Array
+    blocks: Float32Array
+    discs: Float32Array
     origin: FloatArray
     scale: float
     extent: Extent
@@ -235,16 +235,6 @@ def lattice_shift(values: FloatArray) -> int:
     """Return k so that every value times 2^k is an integer."""
     exponents = np.frexp(values[values != 0.0])[1]
     return max(0, 53 - int(exponents.min())) if exponents.size else 0
-
-
-def read_only(array: Any) -> Any:
-    """Return a contiguous read-only array, so that every shell has one compiled type."""
-    if not array.flags.c_contiguous:
-        array = np.ascontiguousarray(array)
-    if array.flags.writeable:
-        array = array.view()
-        array.setflags(write=False)
-    return array
 
 
 def _box_triangles(box: Aabb) -> tuple[FloatArray, IntArray, IntArray]:

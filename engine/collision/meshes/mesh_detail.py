@@ -14,8 +14,8 @@ The search ends as soon as each body is known to stick out.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import FloatArray, IntArray
 from engine.collision.meshes.exact_cells import Sides, cells_of, even_sides, sides_at, sides_over
 from engine.collision.meshes.face_cells import WITHIN
 from engine.collision.meshes.face_contacts import find_all_contacts
@@ -23,7 +23,7 @@ from engine.collision.meshes.mesh_arrays import STATE_CLEAN, STATE_STACKED, Shel
 from engine.collision.meshes.mesh_pair import MeshPair, Patch, simplest
 from engine.collision.meshes.parity import INSIDE, OUTSIDE
 from engine.collision.result import Parts, Work
-from engine.solids.base import IntArray, Solid
+from engine.solids.base import Solid
 from engine.solids.pose import Pose
 
 _BLOCK = 64
@@ -49,7 +49,7 @@ def _have_equal_faces(first: Shell, second: Shell) -> bool:
     return bool((a == b).all())
 
 
-def _sorted_faces(shell: Shell) -> npt.NDArray[np.float64]:
+def _sorted_faces(shell: Shell) -> FloatArray:
     """Return the triangles (n, 9), corners in ascending order, rows too."""
     corners = shell.arrays.vertices[shell.arrays.triangles]
     order = np.lexsort(tuple(np.moveaxis(corners, 2, 0)[::-1]), axis=1)

@@ -18,6 +18,7 @@ from typing import Literal
 
 import numpy as np
 
+from engine.arrays import IntArray
 from engine.collision.meshes.dual_traversal import SEEK_CONTACT, SEEK_OVERLAP
 from engine.collision.meshes.exact_cells import cells_of, sides_at
 from engine.collision.meshes.exact_triangles import is_flush, kind_of_contact
@@ -28,7 +29,7 @@ from engine.collision.meshes.mesh_pair import MeshPair, Patch, simplest
 from engine.collision.meshes.parity import INSIDE
 from engine.collision.meshes.separating_plane import is_separated
 from engine.collision.result import Collision, Kind, Witness, Work
-from engine.solids.base import IntArray, Solid
+from engine.solids.base import Solid
 from engine.solids.pose import Pose
 from engine.types import Relation
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import Int8Array, IntArray
 from engine.collision.meshes.dual_traversal import (
     SEEK_CONTACT,
     SEEK_OVERLAP,
@@ -23,7 +23,6 @@ from engine.collision.meshes.face_state import find_states
 from engine.collision.meshes.mesh_arrays import Shell, join_vertices, shell_of_triangles
 from engine.collision.meshes.parity import INSIDE, OUTSIDE, locate_vertices
 from engine.collision.result import Work
-from engine.solids.base import IntArray
 from engine.solids.pose import Pose
 from engine.types import UNDECIDED
 
@@ -113,7 +112,7 @@ class MeshPair:
             self._exact = exact_pair(self.shells[0], self.poses[0], self.shells[1], self.poses[1])
         return self._exact
 
-    def states(self, own: int, faces: IntArray) -> npt.NDArray[np.int8]:
+    def states(self, own: int, faces: IntArray) -> Int8Array:
         states = np.empty(len(faces), np.int8)
         find_states(self.shells[own].arrays, faces, states)
         return states
@@ -153,7 +152,7 @@ class MeshPair:
             kept, roots = np.arange(len(triangles)), parent[triangles[:, 0]]
         return [Patch(kept[roots == parent[vertex]]) for vertex in there]
 
-    def located(self, own: int, vertices: IntArray) -> npt.NDArray[np.int8]:
+    def located(self, own: int, vertices: IntArray) -> Int8Array:
         """Return where vertices that are on no face of the other body lie: INSIDE, OUTSIDE or UNDECIDED."""
         shell, other = self.shells[own], self.shells[1 - own]
         poses = [body.posed(pose) for body, pose in zip(self.shells, self.poses)]

@@ -21,8 +21,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import FloatArray
 from engine.jit import inline
 from engine.predicates.orientation import orient2d, orient3d
 from engine.types import UNDECIDED, Point2, Point3
@@ -31,8 +31,8 @@ from engine.types import UNDECIDED, Point2, Point3
 class PoseArrays(NamedTuple):
     """One or many poses of one body for kernels: rotations (n, 3, 3), translations (n, 3); are there any."""
 
-    rotations: npt.NDArray[np.float64]
-    translations: npt.NDArray[np.float64]
+    rotations: FloatArray
+    translations: FloatArray
     is_posed: bool
 
 

@@ -14,11 +14,12 @@ import numpy as np
 
 from engine.arrangement.arrange import Arrangement, arrange
 from engine.arrangement.nodes import NodeTable, float_nodes, rational_nodes
+from engine.arrays import FloatArray, IntArray
 from engine.collision.exact_images import image_points
 from engine.parallel import Budget
 from engine.predicates.rational import orient2d_rational
 from engine.solids.aabb import Aabb
-from engine.solids.base import FloatArray, IntArray, Solid
+from engine.solids.base import Solid
 from engine.solids.polygon import Polygon
 from engine.solids.pose import Pose
 from engine.solids.triangle import Triangle

@@ -5,22 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import FloatArray, Int8Array, IntArray, read_only
 from engine.collision.codes import UNSETTLED
 from engine.collision.convex.body import ConvexArrays, ConvexBody, convex_body_of, pooled
 from engine.collision.convex.pair import relate_convex_pairs
 from engine.collision.convex.poses import LEAST_POSES, lane_arrays, relate_in_lanes
-from engine.collision.detail import NO_DETAIL, Details, details_of_boxes, details_where_proven
-from engine.collision.meshes.mesh_arrays import read_only
+from engine.collision.detail import NO_DETAIL, details_of_boxes, details_where_proven
 from engine.collision.meshes.placement import NO_ROTATION, NO_TRANSLATION, PoseArrays
 from engine.collision.scenes.bodies import SceneBodies
 from engine.collision.scenes.boxes import relate_box_pairs
 from engine.parallel import Budget, run_chunks
 from engine.solids.aabb import Aabb
-from engine.solids.base import FloatArray, IntArray, Solid
-
-Relations = npt.NDArray[np.int8]
+from engine.solids.base import Solid
 
 
 class ShortPaths:
@@ -35,7 +32,7 @@ class ShortPaths:
         self._pool: ConvexArrays | None = None
         self._convex = np.full(len(bodies.solids), -1, np.int64)
 
-    def relations(self, pairs: IntArray, workers: int | None) -> Relations:
+    def relations(self, pairs: IntArray, workers: int | None) -> Int8Array:
         """Return the relations ``(n,)`` of pairs ``(n, 2)`` of bodies, UNSETTLED where no batch decides."""
         found = np.full(len(pairs), UNSETTLED, np.int8)
         bodies, flag = self._bodies, self._budget.flag
@@ -63,7 +60,7 @@ class ShortPaths:
         run_chunks(task, len(pairs), budget=self._budget, workers=workers)
         return found
 
-    def details(self, pairs: IntArray, relations: Relations) -> Details:
+    def details(self, pairs: IntArray, relations: Int8Array) -> Int8Array:
         """Return the codes of `Rcc8` of pairs of bodies with interiors whose relations are those that `relations`
         found; NO_DETAIL where these are UNSETTLED."""
         found = np.where(relations == UNSETTLED, np.int8(NO_DETAIL), details_where_proven(relations))
@@ -92,7 +89,7 @@ def convex_poses(
     second: Solid,
     rotations: FloatArray,
     translations: FloatArray,
-    relations: Relations,
+    relations: Int8Array,
     budget: Budget,
     boolean: bool,
 ) -> Callable[[int, int], None] | None:

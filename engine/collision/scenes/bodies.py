@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.collision.collide import check_pose, pair_function
 from engine.collision.scenes.numbering import numbered
 from engine.collision.scenes.posed_boxes import place_boxes
 from engine.collision.scenes.world_box import own_box
 from engine.errors import InvalidArrayError, UnsupportedSolidError, WrongDimensionError
-from engine.solids.base import FloatArray, IntArray, Solid
+from engine.solids.base import Solid
 from engine.solids.pose import Pose
 
 
@@ -30,7 +30,7 @@ class SceneBodies:
     poses: list[Pose | None]
     distinct: list[Solid]
     kinds: IntArray
-    is_posed: npt.NDArray[np.bool_]
+    is_posed: BoolArray
     rotations: FloatArray
     translations: FloatArray
     low: FloatArray
@@ -72,9 +72,7 @@ def scene_bodies(solids: Sequence[Solid], poses: Sequence[Pose | None] | None) -
     return SceneBodies(bodies, placed, distinct, kinds, is_posed, rotations, translations, low, high)
 
 
-def _pose_numbers(
-    placed: list[Pose | None], dimension: int, bodies: list[Solid]
-) -> tuple[npt.NDArray[np.bool_], FloatArray]:
+def _pose_numbers(placed: list[Pose | None], dimension: int, bodies: list[Solid]) -> tuple[BoolArray, FloatArray]:
     """Return which bodies have a pose, and these poses' numbers, one row each: the rotation, then the translation.
 
     Raises on the first that is no pose, or of another dimension.

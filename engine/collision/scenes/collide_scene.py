@@ -7,23 +7,21 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import BoolArray, Int8Array, IntArray
 from engine.bounding.box_grid import pairs_of_boxes
 from engine.bounding.sweep import BLOCK
 from engine.collision.codes import UNSETTLED
 from engine.collision.collide import collide_pair
-from engine.collision.detail import NO_DETAIL, Details, check_has_detail, code_of, detail_of, has_interior
+from engine.collision.detail import NO_DETAIL, check_has_detail, code_of, detail_of, has_interior
 from engine.collision.result import Witness, Work
 from engine.collision.scenes.batches import ShortPaths
 from engine.collision.scenes.bodies import SceneBodies, scene_bodies
 from engine.errors import IndexOutOfRangeError, InvalidArrayError
 from engine.parallel import Budget, Cancel, Progress, check_options, run_chunks
-from engine.solids.base import IntArray, Solid
+from engine.solids.base import Solid
 from engine.solids.pose import Pose
 from engine.types import Accuracy, Relation
-
-Relations = npt.NDArray[np.int8]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,9 +36,9 @@ class ScenePairs:
 
     first: IntArray
     second: IntArray
-    relation: npt.NDArray[np.int8]
+    relation: Int8Array
     witnesses: tuple[Witness | None, ...] | None = None
-    detail: Details | None = None
+    detail: Int8Array | None = None
 
 
 def collide_scene(
@@ -115,9 +113,9 @@ def collide_scene(
                 stop: int,
                 pairs: IntArray = pairs,
                 open_ones: IntArray = open_ones,
-                relations: Relations = relations,
+                relations: Int8Array = relations,
                 found: list[Witness | None] = found,
-                details: Details | None = details,
+                details: Int8Array | None = details,
             ) -> None:
                 work = Work(budget, witness=witnesses, boolean=boolean)
                 works.append(work)
@@ -150,7 +148,7 @@ def collide_scene(
     return result, Accuracy("exact", None, n_candidates, max(beyond, n_open), rational, how)
 
 
-_Part = tuple[IntArray, Relations, list[Witness | None], Details | None]
+_Part = tuple[IntArray, Int8Array, list[Witness | None], Int8Array | None]
 """Of a block of candidates those that collide: pairs, relations, witnesses and details, these where asked for."""
 
 
@@ -169,7 +167,7 @@ def _joined(parts: list[_Part], witnesses: bool, detail: bool) -> ScenePairs:
     return ScenePairs(pairs[:, 0].copy(), pairs[:, 1].copy(), relations, named, details)
 
 
-def _have_interiors(bodies: SceneBodies, pairs: IntArray, budget: Budget) -> npt.NDArray[np.bool_]:
+def _have_interiors(bodies: SceneBodies, pairs: IntArray, budget: Budget) -> BoolArray:
     """Tell for pairs of bodies whether both have an interior."""
     kinds, places = np.unique(bodies.kinds[pairs], return_inverse=True)
     solid = np.array([has_interior(bodies.distinct[kind], budget) for kind in kinds.tolist()], np.bool_)

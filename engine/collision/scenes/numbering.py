@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from engine.arrays import IntArray
 from engine.jit import kernel
-from engine.solids.base import IntArray
 
 
 def numbered(keys: IntArray) -> tuple[IntArray, IntArray]:

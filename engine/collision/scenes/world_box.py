@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from engine.arrays import FloatArray
 from engine.solids.aabb import Aabb
-from engine.solids.base import FloatArray, Solid
+from engine.solids.base import Solid
 from engine.solids.half_space import HalfSpace
 from engine.solids.mesh import Mesh
 from engine.solids.polygon import Polygon

@@ -9,8 +9,8 @@ from fractions import Fraction
 
 import numpy as np
 
+from engine.arrays import FloatArray
 from engine.collision.exact_images import Vector, cross, dot, minus, squared_length
-from engine.solids.base import FloatArray
 
 
 def segment_distance(point: Vector, a: Vector, b: Vector) -> Fraction:

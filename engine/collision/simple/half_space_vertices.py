@@ -10,15 +10,15 @@ from collections.abc import Callable
 from fractions import Fraction
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import FloatArray, Int8Array
 from engine.collision.exact_images import Vector, dot, image_half_space
 from engine.collision.meshes.live_faces import live_piece
 from engine.collision.meshes.mesh_arrays import shell_of
 from engine.collision.planar.outline import is_clean, live_edges, outline_of
 from engine.collision.result import Collision, Witness, Work
 from engine.predicates.rational import sign_of
-from engine.solids.base import FloatArray, Solid
+from engine.solids.base import Solid
 from engine.solids.half_space import HalfSpace
 from engine.solids.pose import Pose
 from engine.types import Relation
@@ -69,7 +69,7 @@ def collide_half_space_outline(
     return _relation(signs, reaches_inside, edge)
 
 
-def _relation(signs: npt.NDArray[np.int8], reaches_inside: Callable[[], bool], face: int) -> Collision:
+def _relation(signs: Int8Array, reaches_inside: Callable[[], bool], face: int) -> Collision:
     if (signs < 0).all():
         return Collision(Relation.DISJOINT)
     if (signs > 0).all():
@@ -89,7 +89,7 @@ def value_at_image(plane: tuple[Vector, Fraction], point: Vector, pose: Pose | N
     return dot(normal, point) + offset
 
 
-def signs_of(plane: tuple[Vector, Fraction], points: FloatArray, pose: Pose | None, work: Work) -> npt.NDArray[np.int8]:
+def signs_of(plane: tuple[Vector, Fraction], points: FloatArray, pose: Pose | None, work: Work) -> Int8Array:
     """Return the exact sign of the plane at the image of each of ``(n, 3)`` points.
 
     The function is pulled back: with N = n R and D = n . t + d, both rational, it is N . p + D. Scaled so that the

@@ -15,6 +15,7 @@ from fractions import Fraction
 
 import numpy as np
 
+from engine.arrays import FloatArray
 from engine.collision.exact_images import Vector, image_point, minus, squared_length
 from engine.collision.meshes.live_faces import LivePiece, live_piece
 from engine.collision.meshes.mesh_arrays import Shell, shell_of
@@ -22,7 +23,7 @@ from engine.collision.planar.outline import is_clean, live_edges, outline_of, ro
 from engine.collision.result import Collision, Witness, Work
 from engine.collision.simple.feature_distance import box_distance_bounds, segment_distance, triangle_distance
 from engine.containment.rational_locate import rational_location
-from engine.solids.base import FloatArray, Solid
+from engine.solids.base import Solid
 from engine.solids.pose import Pose
 from engine.solids.sphere import Sphere
 from engine.solids.surface import Surface

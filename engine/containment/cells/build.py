@@ -10,9 +10,9 @@ from math import frexp, ldexp
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from engine.containment.cells.lattice import LEVELS, PARTS, SPLIT, FloatArray, Int32Array, Lattice, list_parts, list_top
+from engine.arrays import Float32Array, FloatArray, Int8Array, Int32Array, IntArray, read_only
+from engine.containment.cells.lattice import LEVELS, PARTS, SPLIT, Lattice, list_parts, list_top
 from engine.containment.cells.locate import CODE_SHIFT, INSIDE_CELL, OPEN_CELL, OUTSIDE_CELL
 from engine.containment.cells.status import (
     OPEN,
@@ -25,10 +25,7 @@ from engine.containment.methods.polyhedron_ray_parity import locate_by_columns
 from engine.containment.prepared import Columns, columns_of
 from engine.lanes.cells import LANES, groups_of
 from engine.parallel import Budget
-from engine.solids.base import IntArray, as_read_only
 from engine.solids.polyhedron import Polyhedron
-
-Int8Array = npt.NDArray[np.int8]
 
 _LONG: Final = (8, 32)
 """Lists longer than this are cut into parts, on levels 0 and 1: more than one group, or four: finer
@@ -57,7 +54,7 @@ class Cells(NamedTuple):
     points beyond the lattice; small enough to stay in the cache."""
     codes: Int32Array
     """Level 0, then 64 a brick."""
-    groups: npt.NDArray[np.float32]
+    groups: Float32Array
     """(n, 14, 8): what leaves keep of their triangles (lanes/cells.py)."""
 
 
@@ -177,7 +174,7 @@ def _by_rays(columns: Columns, points: FloatArray, budget: Budget) -> Int8Array:
     found = np.empty(len(points), np.int8)
     for start in range(0, len(points), _AT_ONCE):
         stop = start + _AT_ONCE
-        locate_by_columns(as_read_only(points[start:stop]), *columns, found[start:stop], budget.flag)
+        locate_by_columns(read_only(points[start:stop]), *columns, found[start:stop], budget.flag)
         budget.check()
     found[np.abs(found) != 1] = OPEN
     return found

@@ -15,13 +15,7 @@ from __future__ import annotations
 
 from typing import Any, Final, NamedTuple
 
-import numpy as np
-import numpy.typing as npt
-
 from engine.jit import inline, kernel
-
-FloatArray = npt.NDArray[np.float64]
-Int32Array = npt.NDArray[np.int32]
 
 LEVELS: Final = 3
 SPLIT: Final = 4

@@ -9,13 +9,12 @@ from __future__ import annotations
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import FloatArray, IntArray
 from engine.containment.cells.build import Cells
 from engine.containment.cells.lattice import LEVELS, finest
 from engine.jit import kernel
 from engine.parallel import Budget
-from engine.solids.base import FloatArray
 
 _FEWEST_POINTS: Final = 1 << 17
 _FEWEST_GROUPS: Final = 1 << 14
@@ -72,7 +71,7 @@ def _gather(points: Any, order: Any, gathered: Any) -> None:
         gathered[item, 0], gathered[item, 1], gathered[item, 2] = points[row, 0], points[row, 1], points[row, 2]
 
 
-def order_if_it_pays(points: FloatArray, cells: Cells, budget: Budget) -> npt.NDArray[np.int64] | None:
+def order_if_it_pays(points: FloatArray, cells: Cells, budget: Budget) -> IntArray | None:
     """Return an order of the points that keeps memory near, None where it would cost more than it saves."""
     if len(points) < _FEWEST_POINTS or len(cells.groups) < _FEWEST_GROUPS:
         return None
@@ -83,7 +82,7 @@ def order_if_it_pays(points: FloatArray, cells: Cells, budget: Budget) -> npt.ND
     return order_by_cell(points, cells, budget)
 
 
-def order_by_cell(points: FloatArray, cells: Cells, budget: Budget) -> npt.NDArray[np.int64]:
+def order_by_cell(points: FloatArray, cells: Cells, budget: Budget) -> IntArray:
     """Return the order of points (n, 3), read-only, by their cells of level 0, equal ones as they stand."""
     nx, ny, nz = cells.lattice.n
     keys, order = np.empty(len(points), np.int32), np.empty(len(points), np.int64)
@@ -95,7 +94,7 @@ def order_by_cell(points: FloatArray, cells: Cells, budget: Budget) -> npt.NDArr
     return order
 
 
-def gathered(points: FloatArray, places: npt.NDArray[np.int64]) -> FloatArray:
+def gathered(points: FloatArray, places: IntArray) -> FloatArray:
     """Return the rows of points (n, 3) at `places`, read-only."""
     rows = np.empty((len(places), 3))
     _gather(points, places, rows)

@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import FlagArray, FloatArray, Int8Array, IntArray
 from engine.bounding.grid import cell_of, make_axis
 from engine.containment.methods.polyhedron_ray_parity import (
     BEYOND,
@@ -25,7 +25,6 @@ from engine.containment.methods.polyhedron_ray_parity import (
 )
 from engine.jit import kernel
 from engine.predicates.loading import as_point3
-from engine.solids.base import FloatArray, IntArray
 from engine.types import UNDECIDED, Point2
 
 _ODD, _ON_FACE, _OPEN, _BEYOND = 1, 2, 4, 8
@@ -133,8 +132,8 @@ def locate_few(
     points: FloatArray,
     vertices: FloatArray,
     triangles: IntArray,
-    locations: npt.NDArray[np.int8],
-    flag: npt.NDArray[np.uint8],
+    locations: Int8Array,
+    flag: FlagArray,
 ) -> int:
     """Fill `locations` (n,) for points (n, 3), one at least; returns how many needed more than the filter."""
     low, high = points.min(axis=0), points.max(axis=0)

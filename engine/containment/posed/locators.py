@@ -12,19 +12,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-import numpy.typing as npt
 
-from engine.containment.locators import (
-    Counts,
-    Fill,
-    Flag,
-    Locations,
-    Locator,
-    csg_locator,
-    locator_of,
-    rational_half,
-    settled,
-)
+from engine.arrays import FlagArray, FloatArray, Int8Array, read_only
+from engine.containment.locators import Counts, Fill, Locator, csg_locator, locator_of, rational_half, settled
 from engine.containment.methods.ball import locate_in_ball
 from engine.containment.posed.body_frame import move_to_body_frame
 from engine.containment.posed.filters import (
@@ -38,7 +28,7 @@ from engine.containment.prepared import columns_of, rings_of, rounded_rows
 from engine.containment.rational_locate import prism_walls, to_world_frame
 from engine.parallel import Budget
 from engine.solids.aabb import Aabb
-from engine.solids.base import FloatArray, Solid, as_read_only
+from engine.solids.base import Solid
 from engine.solids.convex import Convex
 from engine.solids.csg import Csg
 from engine.solids.half_space import HalfSpace
@@ -50,7 +40,7 @@ from engine.solids.sphere import Sphere
 from engine.solids.triangle import Triangle
 from engine.types import UNDECIDED
 
-Blurred = Callable[[FloatArray, FloatArray, Locations, Flag], int]
+Blurred = Callable[[FloatArray, FloatArray, Int8Array, FlagArray], int]
 
 
 def posed_locator(solid: Solid, pose: Pose | None) -> Locator:
@@ -107,7 +97,7 @@ def _filtered(solid: Solid, pose: Pose, unposed: Locator, inverse: FloatArray, i
     blurred = _blurred_kernel(solid)
     settle = rational_half(solid, pose)
 
-    def fill(points: FloatArray, locations: Locations, budget: Budget) -> Counts:
+    def fill(points: FloatArray, locations: Int8Array, budget: Budget) -> Counts:
         moved, blurs = _moved(points, inverse, pose, is_turn)
         if isinstance(solid, Polyhedron):
             columns_of(solid, budget.check)
@@ -161,7 +151,7 @@ def _rows(solid: Solid) -> FloatArray:
     return rounded_rows(prism_walls(solid))[0]
 
 
-def posed_center(solid: Sphere, pose: Pose) -> tuple[npt.NDArray[np.float64], float]:
+def posed_center(solid: Sphere, pose: Pose) -> tuple[FloatArray, float]:
     """Return the centre's exact image correctly rounded, and a bound on the rounding; infinite beyond float64."""
     exact = to_world_frame(solid.center.tolist(), pose)
     try:
@@ -169,13 +159,13 @@ def posed_center(solid: Sphere, pose: Pose) -> tuple[npt.NDArray[np.float64], fl
     except OverflowError:
         return np.zeros(solid.dimension), np.inf
     blur = 0.0 if center.tolist() == exact else float(np.spacing(np.abs(center).max()))
-    return as_read_only(center), blur
+    return read_only(center), blur
 
 
 def _in_posed_sphere(solid: Sphere, pose: Pose) -> Locator:
     center, blur = posed_center(solid, pose)
 
-    def run(points: FloatArray, locations: Locations, flag: Flag) -> int:
+    def run(points: FloatArray, locations: Int8Array, flag: FlagArray) -> int:
         return int(locate_in_ball(points, center, blur, solid.radius, np.empty(8), locations, flag))
 
     return Locator("squared_distance", settled(run, rational_half(solid, pose)))

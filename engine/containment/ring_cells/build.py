@@ -10,13 +10,12 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import FloatArray, Int8Array, Int32Array, IntArray, read_only
 from engine.containment.rational_locate import next_in_ring
 from engine.containment.ring_cells.lists import choose_cuts, count_level, fill_level, place_edges
-from engine.containment.ring_cells.locate import FINE_BITS, LAST, SPLIT_BITS, Integers, RingCells
+from engine.containment.ring_cells.locate import FINE_BITS, LAST, SPLIT_BITS, RingCells
 from engine.parallel import Budget
-from engine.solids.base import FloatArray, IntArray, as_read_only
 from engine.solids.polygon import Polygon
 
 _PAYS_FROM: Final = 1 << 12
@@ -65,7 +64,7 @@ def build_ring_cells(solid: Polygon, budget: Budget) -> RingCells:
         scales = np.where(halves > 0.0, np.minimum((2.0**FINE_BITS - 2.0) / halves, _FASTEST), 0.0)
     edges, places = np.empty(4 * len(starts) + 4), np.zeros((len(starts) + 1, 4))
     edges[:4] = 0.0, -np.inf, np.inf, np.nan
-    ends = as_read_only(np.ascontiguousarray(starts[next_in_ring(solid)]))
+    ends = read_only(np.ascontiguousarray(starts[next_in_ring(solid)]))
     with np.errstate(all="ignore"):
         place_edges(starts, ends, low * 0.5, scales, edges, places)
     budget.check()
@@ -78,7 +77,7 @@ def build_ring_cells(solid: Polygon, budget: Budget) -> RingCells:
 
 def _cut(
     edges: FloatArray, places: FloatArray, halves: FloatArray, budget: Budget
-) -> tuple[Integers, Integers, tuple[int, int]]:
+) -> tuple[Int32Array, Int32Array, tuple[int, int]]:
     """Return words, items and the bits of the topmost columns and rows."""
     n_edges, flag = len(places) - 1, budget.flag
     is_tight = bool(((halves == 0.0) | (halves >= _NORMAL)).all())
@@ -130,7 +129,7 @@ def _crowded_nodes(
     cuts: IntArray,
     bases: IntArray,
     owners: IntArray,
-    sides: npt.NDArray[np.int8],
+    sides: Int8Array,
     firsts: IntArray,
     stops: IntArray,
 ) -> IntArray:

@@ -34,14 +34,11 @@ from __future__ import annotations
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import FloatArray, Int32Array
 from engine.jit import inline, kernel
 from engine.predicates.loading import as_point2
-from engine.solids.base import FloatArray
 from engine.types import UNDECIDED
-
-Integers = npt.NDArray[np.int32]
 
 FINE_BITS: Final = 30
 """Depth of the finest grid."""
@@ -62,9 +59,9 @@ class RingCells(NamedTuple):
 
     edges: FloatArray
     """``(4 m,)``: x, low, high, slope of each; edge 0 is one that is never sure."""
-    words: Integers
+    words: Int32Array
     """Those of the topmost cells, row by row, one for the points out of the box, then those below."""
-    items: Integers
+    items: Int32Array
     """Listed edges, each list ended by LAST; list 0 is not read, list 1 is never sure."""
     box: tuple[float, float, float, float]
     """xmin, xmax, ymin, ymax."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import BoolArray, FloatArray, Int32Array
 from engine.containment.rational_locate import Check
 from engine.solids.aabb import Aabb
-from engine.solids.base import FloatArray, Solid
+from engine.solids.base import Solid
 from engine.solids.csg import Csg
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
@@ -27,14 +27,14 @@ _TINY: Final = 1e-320
 class Frames(NamedTuple):
     """The poses of many bodies; those of the plane in the upper left."""
 
-    rows: npt.NDArray[np.int32]
+    rows: Int32Array
     """Row of each body's pose in what follows, -1 for a body that stays where it is."""
     rotations: FloatArray
     """``(n, 3, 3)``."""
     inverses: FloatArray
     """``(n, 3, 3)``: each entry off by less than 32 units of rounding (posed/body_frame.py)."""
     translations: FloatArray
-    is_turn: npt.NDArray[np.bool_]
+    is_turn: BoolArray
     """Whether a rotation only turns the axes onto each other."""
 
 
@@ -54,9 +54,9 @@ def frames_of(poses: list[Pose | None], dimension: int) -> Frames:
     return Frames(rows, rotations, _inverses(rotations), translations, _is_turn(rotations))
 
 
-def _is_turn(rotations: FloatArray) -> npt.NDArray[np.bool_]:
+def _is_turn(rotations: FloatArray) -> BoolArray:
     is_unit = np.isin(rotations, (-1.0, 0.0, 1.0)).all(axis=(1, 2))
-    found: npt.NDArray[np.bool_] = is_unit & (np.abs(rotations).sum(axis=1) == 1.0).all(axis=1)
+    found: BoolArray = is_unit & (np.abs(rotations).sum(axis=1) == 1.0).all(axis=1)
     return found
 
 
@@ -72,7 +72,7 @@ def _inverses(rotations: FloatArray) -> FloatArray:
     return np.ascontiguousarray(adjugates / determinants[:, None, None]) + 0.0
 
 
-def moved_boxes(lows: FloatArray, highs: FloatArray, frames: Frames, rows: npt.NDArray[np.int32]) -> Box:
+def moved_boxes(lows: FloatArray, highs: FloatArray, frames: Frames, rows: Int32Array) -> Box:
     """Return boxes (n, 3) around the images of finite boxes under poses: least and largest sums over the axes.
 
     Infinite where the sums are out of range.

@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import FlagArray, FloatArray, Int8Array, read_only
 from engine.containment.methods.polyhedron_ray_parity import locate_by_columns
 from engine.containment.prepared import Columns, columns_of
 from engine.containment.scene.voxels import OPEN, list_seeds, mark_met, spread_sides
 from engine.parallel import Budget
-from engine.solids.base import FloatArray, as_read_only
 from engine.solids.polyhedron import Polyhedron
 
 MOST_FACES: Final = 1 << 14
@@ -33,7 +32,7 @@ class Voxels(NamedTuple):
     """``(6,)``: the low corner of the box, and voxels to a unit."""
     shift: int
     """2^shift voxels along each axis."""
-    packed: npt.NDArray[np.uint8]
+    packed: FlagArray
     address: int
     """Of `packed`."""
 
@@ -63,7 +62,7 @@ def build_voxels(solid: Polyhedron, budget: Budget) -> Voxels | None:
     wanted = _WANTED * len(solid.triangles) ** (1.0 / 3.0)
     shift = min(max(round(float(np.log2(wanted))), _SHIFTS[0]), _SHIFTS[1])
     # a trifle below 2^shift voxels, so that the largest coordinate lies in the last one
-    frame = as_read_only(np.concatenate([low, (1 << shift) * (1.0 - 2.0**-45) / extent]))
+    frame = read_only(np.concatenate([low, (1 << shift) * (1.0 - 2.0**-45) / extent]))
     is_met = np.zeros(1 << (3 * shift), np.uint8)
     mark_met(columns.vertices, columns.triangles, frame, shift, is_met, budget.flag)
     budget.check()
@@ -80,13 +79,13 @@ def build_voxels(solid: Polyhedron, budget: Budget) -> Voxels | None:
     return Voxels(frame, shift, packed, packed.ctypes.data)
 
 
-def _by_rays(columns: Columns, points: FloatArray, budget: Budget) -> npt.NDArray[np.int8]:
+def _by_rays(columns: Columns, points: FloatArray, budget: Budget) -> Int8Array:
     """Return locations by vertical rays, OPEN where they are not decided."""
     found = np.empty(len(points), np.int8)
     for start in range(0, len(points), _AT_ONCE):
         stop = start + _AT_ONCE
         with np.errstate(all="ignore"):
-            locate_by_columns(as_read_only(points[start:stop]), *columns, found[start:stop], budget.flag)
+            locate_by_columns(read_only(points[start:stop]), *columns, found[start:stop], budget.flag)
         budget.check()
     found[np.abs(found) != 1] = OPEN
     return found

@@ -9,22 +9,21 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import FloatArray, Int32Array, IntArray
 from engine.bounding.grid import Axis, BoxGrid, cell_of
 from engine.containment.posed.filters import parity_in_column
 from engine.containment.scene.first_pass import LATER, to_frame
 from engine.containment.scene.voxels import side_in_voxels
 from engine.jit import inline, kernel
 from engine.lanes.addresses import array_at
-from engine.solids.base import FloatArray, IntArray
 from engine.types import UNDECIDED, Point3
 
 
 class ColumnTables(NamedTuple):
     """The prepared structures of the polyhedra of a scene, a row for each solid."""
 
-    rows: npt.NDArray[np.int32]
+    rows: Int32Array
     """Row of each body's solid, -1 for bodies that are not asked here."""
     addresses: IntArray
     """``(n, 6)``: of vertices, triangles, boxes, areas, offsets and items of the columns."""

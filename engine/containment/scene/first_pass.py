@@ -11,15 +11,12 @@ from __future__ import annotations
 
 from typing import Any, Final, NamedTuple
 
-import numpy as np
-import numpy.typing as npt
-
+from engine.arrays import BoolArray, FloatArray, Int8Array, Int32Array, IntArray
 from engine.containment.scene.grid import cell_at
 from engine.containment.scene.rings import locate_in_small_rings
 from engine.containment.scene.voxels import side_in_voxels
 from engine.jit import inline, kernel
 from engine.predicates.error_free import two_diff
-from engine.solids.base import FloatArray, IntArray
 from engine.types import UNDECIDED
 
 LATER: Final = 0
@@ -39,17 +36,17 @@ _ROW_SLACK: Final = 8.0 * 2.0**-53
 class SceneTables(NamedTuple):
     """What the first pass reads of the bodies; a body's row in the tables of its kind is its slot."""
 
-    kinds: npt.NDArray[np.int8]
-    slots: npt.NDArray[np.int32]
+    kinds: Int8Array
+    slots: Int32Array
     lows: FloatArray
     """``(n_bodies, 3)``: boxes, rounded outward; the third axis of a scene of the plane is 0."""
     highs: FloatArray
-    frames: npt.NDArray[np.int32]
+    frames: Int32Array
     """Row of a body's pose in the next three, -1 for none."""
     inverses: FloatArray
     """``(n_poses, 3, 3)``: R^-1 rounded (posed/body_frame.py); the plane's in the upper left."""
     translations: FloatArray
-    is_turn: npt.NDArray[np.bool_]
+    is_turn: BoolArray
     box_lows: FloatArray
     """``(n, 3)``: of boxes in their own frame."""
     box_highs: FloatArray

@@ -9,11 +9,10 @@ from __future__ import annotations
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import FloatArray, Int32Array, IntArray
 from engine.bounding.grid import Axis, cell_of, make_axis
 from engine.jit import inline, kernel
-from engine.solids.base import FloatArray, IntArray
 
 _CELLS_A_BOX: Final = 8.0
 _ENTRIES_A_BOX: Final = 48
@@ -28,7 +27,7 @@ class SceneGrid(NamedTuple):
     v: Axis
     w: Axis
     offsets: IntArray
-    items: npt.NDArray[np.int32]
+    items: Int32Array
 
 
 @inline

@@ -12,14 +12,14 @@ from functools import partial
 from typing import Final, Literal, overload
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray
 from engine.containment.scene.first_pass import drop_outside, put_in_order, scan_points, sort_by_cell
 from engine.containment.scene.second_pass import settle_rest
 from engine.containment.scene.tables import Scene, scene_of
 from engine.errors import InvalidArrayError, WrongDimensionError
 from engine.parallel import Budget, Cancel, Progress, check_options, run_chunks
-from engine.solids.base import FloatArray, IntArray, Solid
+from engine.solids.base import Solid
 from engine.solids.checks import as_points
 from engine.solids.pose import Pose
 from engine.types import Accuracy
@@ -40,7 +40,7 @@ class SceneLocations:
     """``(n_points + 1,)`` int64."""
     indices: IntArray
     """``(n_held,)`` int64: positions in the list of solids."""
-    on_boundary: npt.NDArray[np.bool_]
+    on_boundary: BoolArray
     """``(n_held,)``: True where the point is on the body's boundary, False where it is inside."""
 
 
@@ -51,7 +51,7 @@ class _Piece:
     start: int
     counts: IntArray
     bodies: IntArray
-    located: npt.NDArray[np.int8]
+    located: Int8Array
     places: IntArray
     owners: IntArray
     n_beyond: int

@@ -12,14 +12,14 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from engine.containment.locators import Counts, Locations
+from engine.arrays import FloatArray, Int8Array, IntArray
+from engine.containment.locators import Counts
 from engine.containment.prepared import columns_of
 from engine.containment.scene.build_voxels import MOST_FACES, voxels_if_they_pay
 from engine.containment.scene.columns import ColumnTables, locate_groups
 from engine.containment.scene.first_pass import group_by_body
 from engine.containment.scene.tables import Scene
 from engine.parallel import Budget, run_chunks
-from engine.solids.base import FloatArray, IntArray
 from engine.solids.polyhedron import Polyhedron
 from engine.types import UNDECIDED
 
@@ -34,7 +34,7 @@ def settle_rest(
     scene: Scene,
     owners_of: list[IntArray],
     bodies_of: list[IntArray],
-    take: list[Callable[[Locations], object]],
+    take: list[Callable[[Int8Array], object]],
     budget: Budget,
     workers: int | None,
 ) -> Counts:

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
+from engine.arrays import BoolArray, FloatArray, Int8Array, Int32Array, IntArray
 from engine.containment.locators import Locator
 from engine.containment.posed.locators import posed_locator
 from engine.containment.scene.bodies import Box, body_box, frames_of, grown_boxes, moved_boxes, own_box
@@ -22,7 +22,7 @@ from engine.containment.scene.rings import boxes_of_rings, close_rings
 from engine.errors import EngineError
 from engine.parallel import Budget
 from engine.solids.aabb import Aabb
-from engine.solids.base import FloatArray, IntArray, Solid
+from engine.solids.base import Solid
 from engine.solids.convex import Convex
 from engine.solids.half_space import HalfSpace
 from engine.solids.polygon import Polygon
@@ -131,12 +131,12 @@ def _placed_balls(balls: IntArray, radii: FloatArray, lows: FloatArray, highs: F
 class _Kinds:
     """The tables of the distinct solids, by kind, each in its own frame."""
 
-    kinds: npt.NDArray[np.int8]
-    slots: npt.NDArray[np.int32]
+    kinds: Int8Array
+    slots: Int32Array
     lows: FloatArray
     """``(n, 3)``: boxes, infinite where there may be none; of spheres the centre."""
     highs: FloatArray
-    is_other: npt.NDArray[np.bool_]
+    is_other: BoolArray
     """Solids of other kinds, whose bodies are looked at one by one."""
     boxes: Box
     radii: FloatArray

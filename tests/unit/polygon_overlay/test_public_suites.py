@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from engine.arrays import read_only
 from engine.parallel import Budget
 from engine.polygon_overlay.implicit_rings import RingArrays
 from engine.polygon_overlay.overlay import overlay_rings
 from engine.polygon_overlay.result import Overlay
-from engine.polygon_overlay.run import as_frozen
 from tests.conftest import DATA
 from tests.unit.polygon_overlay.checks import (
     OPERATIONS,
@@ -59,7 +59,7 @@ def arrays(rings: list[Any]) -> RingArrays:
     found = [np.array(ring, float) for ring in rings]
     found = [ring[:-1] if len(ring) > 1 and (ring[0] == ring[-1]).all() else ring for ring in found]
     vertices = np.concatenate(found) if found else np.zeros((0, 2))
-    return RingArrays(as_frozen(vertices), as_frozen(np.cumsum([0, *map(len, found)])))
+    return RingArrays(read_only(vertices), read_only(np.cumsum([0, *map(len, found)])))
 
 
 def run(pair: Pair, operation: Any, swapped: bool = False) -> Overlay:

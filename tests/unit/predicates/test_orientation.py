@@ -11,14 +11,10 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from engine.predicates.orientation import (
-    orient2d_batch,
-    orient2d_filter_batch,
-    orient3d_batch,
-    orient3d_filter_batch,
-)
+from engine.predicates.orientation import orient3d_batch
 from engine.predicates.rational import orient2d_rational, orient3d_rational
 from engine.types import UNDECIDED
+from tests.unit.predicates.batches import orient2d_batch, orient2d_filter_batch, orient3d_filter_batch
 
 Array = npt.NDArray[np.float64]
 Signs = npt.NDArray[np.int8]

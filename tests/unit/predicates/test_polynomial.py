@@ -6,9 +6,9 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from engine.predicates.polynomial import sign_of_polynomial_batch
 from engine.predicates.rational import polynomial_sign_rational
 from engine.types import UNDECIDED
+from tests.unit.predicates.batches import sign_of_polynomial_batch
 
 Array = npt.NDArray[np.float64]
 

@@ -9,8 +9,8 @@ import numpy.typing as npt
 import pytest
 
 from engine.predicates.rational import side_rational
-from engine.predicates.side import side_of_line_batch, side_of_plane_batch
 from engine.types import UNDECIDED
+from tests.unit.predicates.batches import side_of_line_batch, side_of_plane_batch
 
 Array = npt.NDArray[np.float64]
 

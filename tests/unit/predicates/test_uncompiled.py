@@ -11,10 +11,14 @@ import numpy as np
 import pytest
 from numba import config as numba_config
 
-from engine.predicates.orientation import orient2d_batch, orient3d_batch
-from engine.predicates.polynomial import sign_of_polynomial_batch
+from engine.predicates.orientation import orient3d_batch
 from engine.predicates.posed import orient3d_posed_batch
-from engine.predicates.side import side_of_line_batch, side_of_plane_batch
+from tests.unit.predicates.batches import (
+    orient2d_batch,
+    side_of_line_batch,
+    side_of_plane_batch,
+    sign_of_polynomial_batch,
+)
 
 
 def all_signs() -> str:

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from engine import Polyhedron, Pose, Relation, collide_poses
+from engine.arrays import read_only
 from engine.collision.codes import UNSETTLED
 from engine.collision.collide import collide_pair
 from engine.collision.convex.body import convex_body_of, pooled
 from engine.collision.convex.poses import lane_arrays, relate_in_lanes
-from engine.collision.meshes.mesh_arrays import read_only
 from engine.collision.meshes.placement import NO_ROTATION, NO_TRANSLATION, PoseArrays
 from engine.collision.result import Work
 from tests.unit.collision.convex.test_pair import BODIES, ball_of_belts, poses

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from engine import Cancel, CancelledError, locate
+from engine.arrays import read_only
 from engine.containment import prepared
 from engine.containment.methods.polyhedron_one_pass import locate_few
 from engine.containment.methods.polyhedron_ray_parity import locate_by_columns
 from engine.containment.prepared import columns_of
 from engine.parallel import Budget
-from engine.solids.base import as_read_only
 from tests.unit.containment.scenes import box_mesh, lattice_points, made, merged
 
 
@@ -22,7 +22,7 @@ def test_any_number_of_points_in_any_box(n_points: int, scale: tuple[float, floa
     solid = made(merged(box_mesh([0, 0, 0], [3, 3, 3]), box_mesh([1, 1, 1], [4, 4, 2]), box_mesh([0, 0, 3], [1, 4, 4])))
     random = np.random.default_rng(n_points)
     points = np.concatenate([lattice_points(3), random.uniform(-1, 5, (200, 3))])
-    points = as_read_only(points[random.permutation(len(points))[:n_points]] * scale)
+    points = read_only(points[random.permutation(len(points))[:n_points]] * scale)
     found, expected, flag = np.empty(n_points, np.int8), np.empty(n_points, np.int8), np.zeros(1, np.uint8)
     locate_few(points, solid.vertices, solid.triangles, found, flag)
     locate_by_columns(points, *columns_of(solid), expected, flag)
@@ -52,5 +52,5 @@ def test_a_pass_ends_when_the_call_must() -> None:
         locate(np.zeros((10, 3)), solid, cancel=cancel)
     locations = np.zeros(10, np.int8)
     with Budget(None, cancel) as budget:
-        locate_few(as_read_only(np.zeros((10, 3))), solid.vertices, solid.triangles, locations, budget.flag)
+        locate_few(read_only(np.zeros((10, 3))), solid.vertices, solid.triangles, locations, budget.flag)
     assert locate(np.zeros((10, 3)), solid).tolist() == [0] * 10

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from engine import Polygon, locate
+from engine.arrays import read_only
 from engine.containment.methods.polygon_ray_parity import locate_in_rings
 from engine.containment.prepared import rings_of
 from engine.containment.rational_locate import no_check, rational_location
 from engine.containment.ring_cells.build import build_ring_cells
 from engine.containment.ring_cells.locate import RingCells, locate_by_ring_cells
 from engine.parallel import Budget
-from engine.solids.base import as_read_only
 from engine.solids.checks import as_points
 from engine.types import UNDECIDED
 
@@ -171,7 +171,7 @@ def test_cells_are_built_when_they_pay() -> None:
     again, accuracy = locate(points, solid, report=True)
     assert accuracy.method == "ring_cells"
     assert (first == again).all()
-    far = Polygon([as_read_only(solid.vertices * 1e300)])
+    far = Polygon([read_only(solid.vertices * 1e300)])
     for _ in range(2):
         found, accuracy = locate(points * 1e300, far, report=True)
         assert accuracy.method == "ring_crossing"

@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from engine.arrays import read_only
 from engine.parallel import Budget
 from engine.polygon_overlay.exact.in_integers import overlay_exactly
 from engine.polygon_overlay.implicit_rings import RingArrays
-from engine.polygon_overlay.run import Operation, as_frozen, overlay_compiled
+from engine.polygon_overlay.run import Operation, overlay_compiled
 from tests.unit.polygon_overlay.checks import OPERATIONS, assert_valid
 from tests.unit.polygon_overlay.families import FAMILIES, star
 from tests.unit.polygon_overlay.test_overlay import PAIRS
@@ -20,7 +21,7 @@ Rings = list[Any]
 
 def arrays(rings: Rings) -> RingArrays:
     found = [np.asarray(ring, float) for ring in rings]
-    return RingArrays(as_frozen(np.concatenate(found)), as_frozen(np.cumsum([0, *map(len, found)])))
+    return RingArrays(read_only(np.concatenate(found)), read_only(np.cumsum([0, *map(len, found)])))
 
 
 def agree(subject: Rings, clip: Rings, operation: Operation) -> bool:

@@ -7,10 +7,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from engine.arrays import read_only
 from engine.parallel import Budget
 from engine.polygon_overlay.compiled.kernel import DONE
 from engine.polygon_overlay.implicit_rings import ImplicitRings, RingArrays
-from engine.polygon_overlay.run import KEPT_ARRAYS, Operation, as_frozen
+from engine.polygon_overlay.run import KEPT_ARRAYS, Operation
 from engine.polygon_overlay.run_pair import run_reduced, run_whole
 from tests.unit.polygon_overlay.checks import OPERATIONS
 from tests.unit.polygon_overlay.families import FAMILIES
@@ -20,7 +21,7 @@ Rings = list[np.ndarray]
 
 
 def arrays(rings: Rings) -> RingArrays:
-    return RingArrays(as_frozen(np.concatenate(rings)), as_frozen(np.cumsum([0, *map(len, rings)])))
+    return RingArrays(read_only(np.concatenate(rings)), read_only(np.cumsum([0, *map(len, rings)])))
 
 
 def curve(random: Random, n: int, waves: int = 6) -> np.ndarray:

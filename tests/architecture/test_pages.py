@@ -1,0 +1,39 @@
+"""What the pages for newcomers name is there."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+NAMED = re.compile(r"`([\w./]+(?:\.py|/|\.md|\.json))`")
+PLACES = ("", "engine", "tests", "service", "tests/contract", "engine/collision/meshes", "engine/collision/scenes")
+
+
+def names_in(page: str) -> set[str]:
+    return set(NAMED.findall((ROOT / page).read_text("utf-8")))
+
+
+@pytest.mark.parametrize("page", ["docs/architecture.md", "CONTRIBUTING.md"])
+def test_every_file_and_folder_named_exists(page: str) -> None:
+    files = {
+        path.relative_to(ROOT).as_posix()
+        for part in ("engine", "service", "tests")
+        for path in (ROOT / part).rglob("*.py")
+    }
+    missing = []
+    for name in names_in(page):
+        known = any((ROOT / place / name).exists() for place in PLACES)
+        if not known and not any(("/" + file).endswith("/" + name) for file in files):
+            if not any(f"/{name}" in f"/{file}" for file in files if name.endswith("/")):
+                missing.append(name)
+    assert not missing
+
+
+def test_the_glossary_names_constants_that_exist() -> None:
+    words = re.findall(r"^\| ([A-Z]+) \|", (ROOT / "docs/architecture.md").read_text("utf-8"), re.MULTILINE)
+    sources = "\n".join(path.read_text("utf-8") for path in (ROOT / "engine").rglob("*.py"))
+    assert len(words) == 4
+    assert all(re.search(rf"^{word}(: Final)? = ", sources, re.MULTILINE) for word in words)

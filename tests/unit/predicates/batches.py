@@ -1,0 +1,57 @@
+"""Predicates over arrays, for tests alone: one answer a row, compiled as the engine's kernels are."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba
+
+from engine.jit import _OPTIONS
+from engine.predicates.loading import as_half_space2, as_half_space3, as_point2, as_point3
+from engine.predicates.orientation import orient2d, orient2d_filter, orient3d_filter
+from engine.predicates.polynomial import sign_of_polynomial
+from engine.predicates.side import side_of_line, side_of_plane
+
+kernel = numba.njit(**_OPTIONS)
+
+
+@kernel
+def orient2d_batch(a: Any, b: Any, c: Any, sides: Any) -> None:
+    """Fill sides (n,) int8 with orient2d of the rows of a, b, c (n, 2) float64."""
+    for item in range(sides.shape[0]):
+        sides[item] = orient2d(as_point2(a, item), as_point2(b, item), as_point2(c, item))
+
+
+@kernel
+def orient2d_filter_batch(a: Any, b: Any, c: Any, sides: Any) -> None:
+    """Fill sides (n,) int8 with orient2d_filter of the rows of a, b, c (n, 2) float64."""
+    for item in range(sides.shape[0]):
+        sides[item] = orient2d_filter(as_point2(a, item), as_point2(b, item), as_point2(c, item))
+
+
+@kernel
+def orient3d_filter_batch(a: Any, b: Any, c: Any, d: Any, sides: Any) -> None:
+    """Fill sides (n,) int8 with orient3d_filter of the rows of a, b, c, d (n, 3) float64."""
+    for item in range(sides.shape[0]):
+        sides[item] = orient3d_filter(as_point3(a, item), as_point3(b, item), as_point3(c, item), as_point3(d, item))
+
+
+@kernel
+def sign_of_polynomial_batch(powers: Any, coefficients: Any, degree: int, points: Any, sides: Any) -> None:
+    """Fill sides (n,) int8 with sign_of_polynomial at the rows of points (n, dim) float64."""
+    for item in range(sides.shape[0]):
+        sides[item] = sign_of_polynomial(powers, coefficients, degree, points, item)
+
+
+@kernel
+def side_of_line_batch(rows: Any, points: Any, sides: Any) -> None:
+    """Fill sides (n,) int8 with side_of_line of the rows (n, 3) and the points (n, 2) float64."""
+    for item in range(sides.shape[0]):
+        sides[item] = side_of_line(as_half_space2(rows, item), as_point2(points, item))
+
+
+@kernel
+def side_of_plane_batch(rows: Any, points: Any, sides: Any) -> None:
+    """Fill sides (n,) int8 with side_of_plane of the rows (n, 4) and the points (n, 3) float64."""
+    for item in range(sides.shape[0]):
+        sides[item] = side_of_plane(as_half_space3(rows, item), as_point3(points, item))
