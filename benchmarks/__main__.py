@@ -5,19 +5,25 @@ from __future__ import annotations
 import importlib
 import sys
 
-NAMES = {
+from benchmarks import table
+
+TABLES = {
+    "calls": "single calls of 1, 10 and 100 items",
+    "collision": "poses, pairs, scenes and triangles, against peers",
+    "containment": "points in every kind of solid, against peers",
+    "overlay": "polygons on polygons, against GEOS and Clipper",
+    "polygons": "polygons clipped on convex regions, against peers",
+    "segments": "segments clipped on every region, against peers",
+}
+NAMES = TABLES | {
     "checkouts": "two checkouts of the engine, every row of ours in turns",
-    "clipping": "the table of clipping: segments and polygons, against peers",
-    "collision": "the table of collision, against peers",
     "collision_cost": "what each way out of the quadratic cost of collision saves: docs/collision_cost.md",
     "compare": "two stored reports, side by side",
-    "containment": "the table of containment, against peers",
+    "filed": "inputs that users of the peers filed, replayed",
     "hard_cases": "who gets which hard family wrong: the figures of docs/hard_cases.md",
-    "overlay": "the table of overlay, against GEOS and Clipper",
     "report": "every operation, speed against error: docs/speed_and_error.md and the README's table",
     "wire": "what HTTP adds to a kernel, and what overload does",
 }
-ELSEWHERE = {"filed": "benchmarks.fields.filed"}
 
 
 def main(words: list[str]) -> int:
@@ -28,7 +34,9 @@ def main(words: list[str]) -> int:
         return int(bool(words) and words[0] not in ("-h", "--help"))
     name, *rest = words
     sys.argv[0] = f"benchmarks {name}"
-    return int(importlib.import_module(ELSEWHERE.get(name, f"benchmarks.{name}")).main(rest) or 0)
+    if name in TABLES:
+        return table.main(rest, name)
+    return int(importlib.import_module(f"benchmarks.{name}").main(rest))
 
 
 if __name__ == "__main__":

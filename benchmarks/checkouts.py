@@ -4,12 +4,12 @@
     python -m benchmarks checkouts ../before --quick     # small sizes, two or three
     python -m benchmarks checkouts ../before --only "overlay" --minutes 3
 
-Two processes, one with the engine of the other checkout, one with this one's; both make the rows of benchmarks/rows of
-this checkout. They run in turns, the order swapped from round to round, and never at the same time. A figure is the
-median over all rounds of the time of the other over the time of this one: above 1, this one is faster; beside it the
-same by CPU time, the steadier one where other processes share the machine. Each pass has new processes: where arrays
-happen to lie in memory can be worth some percent. Rows that look slower get one pass more. The first run compiles,
-untimed.
+Two processes, one with the engine of the other checkout, one with this one's; both make ours of every contest of the
+tables (fields/) of this checkout. They run in turns, the order swapped from round to round, and never at the same time.
+A figure is the median over all rounds of the time of the other over the time of this one: above 1, this one is faster;
+beside it the same by CPU time, the steadier one where other processes share the machine. Each pass has new processes:
+where arrays happen to lie in memory can be worth some percent. Rows that look slower get one pass more. The first run
+compiles, untimed.
 """
 
 from __future__ import annotations
@@ -51,20 +51,23 @@ DOUBTFUL = 0.96
 def serve() -> None:
     """Answer the lines of the standard input, one JSON each: what to make, or how often to run it."""
     import engine
-    from benchmarks.rows import Question, Run, Size, questions
+    from benchmarks.contest import Contest, run_of_ours
+    from benchmarks.fields import Size, tasks
 
     answers, sys.stdout = sys.stdout, sys.stderr
-    known: dict[str, Question] = {}
-    run: Run | None = None
+    known: dict[str, Callable[[], Any]] = {}
+    run: Callable[[], Any] | None = None
     for line in sys.stdin:
         asked = json.loads(line)
         try:
             if "seed" in asked:
-                known = {each.name: each for each in questions(Size(asked["seed"], asked["quick"]))}
+                known = dict(tasks(Size(asked["seed"], asked["quick"]), has_figures=False))
                 found: Any = str(Path(engine.__file__).resolve().parents[1])
             elif "make" in asked:
                 run = None  # what the row before holds goes first
-                run = known[asked["make"]].make()
+                made = known[asked["make"]]()
+                assert isinstance(made, Contest)
+                run = run_of_ours(made)
                 run()
                 found = min(clocked(run)[0] for _ in range(2))
             else:
@@ -168,9 +171,10 @@ def compare(row: Compared, sides: tuple[Side, Side], rounds: int, seconds: float
 
 def run(other: Path, given: argparse.Namespace) -> list[Compared]:
     """Return all rows, measured in several passes of new processes, doubtful rows once more."""
-    from benchmarks.rows import Size, questions
+    from benchmarks.fields import Size, tasks
 
-    rows = [Compared(each.name) for each in questions(Size(given.seed, given.quick), given.only)]
+    names = [name for name, _ in tasks(Size(given.seed, given.quick), has_figures=False)]
+    rows = [Compared(name) for name in names if given.only in name]
     n_left, end = len(rows) * given.passes, time.perf_counter() + 60 * given.minutes
     for pass_ in range(given.passes):
         n_left = _pass(rows, other, given, end, n_left, is_swapped=bool(pass_ % 2))
