@@ -199,12 +199,12 @@ def _asked(contest: Contest, each: Contender, row: Row, prepared: Prepared, seco
 
 def settle(prepared: Prepared, items: Any) -> None:
     """Ask until the method no longer changes: structures that pay only after many questions are then there."""
-    if prepared.method is None:
+    if prepared.method is None and prepared.memory is None:
         return
     before = None
     for number in range(12):
         prepared.ask(items)
-        now = (prepared.method(), prepared.memory() if prepared.memory else 0)
+        now = (prepared.method() if prepared.method else "", prepared.memory() if prepared.memory else 0)
         if now == before and number >= 3:
             return
         before = now

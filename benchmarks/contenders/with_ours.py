@@ -63,7 +63,11 @@ def _scene(bodies: Bodies, threads: int) -> Prepared:
         owners = np.repeat(np.arange(len(found.offsets) - 1), np.diff(found.offsets))
         return owners * len(solids) + found.indices
 
-    return Prepared(lambda points: engine.locate_scene(points, solids, workers=threads), answer=answer)
+    return Prepared(
+        lambda points: engine.locate_scene(points, solids, workers=threads),
+        answer=answer,
+        memory=lambda: sum(solid.memory for solid in solids),
+    )
 
 
 def _segments(subject: Any, threads: int) -> Prepared:

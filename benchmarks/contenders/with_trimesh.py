@@ -66,7 +66,7 @@ def _kept_polygons(region: engine.Aabb, threads: int) -> Prepared:
             mesh = mesh.slice_plane(origin, normal)
         return mesh
 
-    return Prepared(ask, native, lambda found: np.zeros(0, bool))
+    return Prepared(ask, native, lambda found: None)
 
 
 MAKERS = {"points": _points, "hits": _hits, "pieces": _pieces, "kept polygons": _kept_polygons}

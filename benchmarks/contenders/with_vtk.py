@@ -67,7 +67,7 @@ def _kept_polygons(region: engine.Aabb, threads: int) -> Prepared:
                 data = clip.GetOutput()
         return data
 
-    return Prepared(ask, native, lambda found: np.zeros(0, bool))
+    return Prepared(ask, native, lambda found: None)
 
 
 MAKERS = {"points": _points, "pair": _pair, "kept polygons": _kept_polygons}

@@ -364,7 +364,10 @@ def _summed(one: Contender, n_bodies: int) -> Prepared:
         return np.stack([np.bincount(owners, weights, found[0]) for weights in (None, held)], axis=1)
 
     return Prepared(
-        lambda asked: (asked[0], made.ask(asked[1])), lambda points: (len(points), made.native(points)), answer
+        lambda asked: (asked[0], made.ask(asked[1])),
+        lambda points: (len(points), made.native(points)),
+        answer,
+        made.memory,
     )
 
 
