@@ -89,7 +89,7 @@ SUITES = ("clipper2_cases", "geos_pairs", "mfogel_cases")
 def public(suites: tuple[str, ...] = SUITES, n_most: int | None = None) -> Iterator[tuple[Rings, Rings]]:
     """Yield the pairs of public test suites whose polygons have rings of at least three vertices.
 
-    n_most: of the geometries of a case; all but the first are the second of the pair.
+    n_most: of the geometries of a case, none with an empty ring; all but the first are the second of the pair.
     """
     folder = DATA / "clipping"
     if not folder.is_dir():
@@ -101,6 +101,8 @@ def public(suites: tuple[str, ...] = SUITES, n_most: int | None = None) -> Itera
             else:
                 first, *rest = case["geoms"][:n_most] if "geoms" in case else (case["a"], case["b"])
                 pair = _flat([first]), _flat(rest)
+            if n_most is not None and not all(ring for rings in pair for ring in rings):
+                continue
             subject, clip = ([_ring(ring) for ring in rings if ring] for rings in pair)
             if subject and clip and min(map(len, subject + clip)) >= 3:
                 yield subject, clip
