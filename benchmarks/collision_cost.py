@@ -1,19 +1,19 @@
 """What each way of reducing the quadratic cost of collision saves: the table of docs/collision_cost.md.
 
-python -m benchmarks.collision_cost [--quick]
+python -m benchmarks collision_cost [--quick]
 
 One thread, two generated bodies near contact; every figure is the best of three runs. Nothing needs peers or data.
 """
 
 from __future__ import annotations
 
-import sys
+import argparse
 from collections.abc import Callable, Iterator
 
 import numpy as np
 
 import engine
-from benchmarks.collision_scenes import belted_ball, crowd
+from benchmarks.crowds import belted_ball, crowd
 from benchmarks.measure import clocked
 from benchmarks.poses import Pair, near_contact
 from benchmarks.workloads import Mesh, bumpy_sphere
@@ -111,7 +111,11 @@ def lines(is_quick: bool) -> Iterator[Line]:
             yield f"{n_bodies:,} bodies, {how}", shown(run), "every colliding pair, exact"
 
 
-if __name__ == "__main__":
+def main(words: list[str] | None = None) -> int:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="small bodies, seconds")
     print("| approach | time | settles |\n|---|---|---|", flush=True)
-    for line in lines("--quick" in sys.argv):
+    for line in lines(parser.parse_args(words).quick):
         print(f"| {' | '.join(line)} |", flush=True)
+    return 0

@@ -1,4 +1,4 @@
-"""Compare two stored reports: ``python -m benchmarks.compare old.json new.json``, of two machines or two commits.
+"""Compare two stored reports: ``python -m benchmarks compare old.json new.json``, of two machines or two commits.
 
 Prints, for each row of both, how many times faster the second is, and every change in wrong answers. Exit code 1 if the
 second has more wrong answers of ours.
@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +38,3 @@ def main(words: list[str] | None = None) -> int:
 
 def _by_key(found: dict[str, Any]) -> dict[tuple[str, str, str], dict[str, Any]]:
     return {(row["operation"], row["contest"], row["contender"]): row for row in found["rows"]}
-
-
-if __name__ == "__main__":
-    sys.exit(main())

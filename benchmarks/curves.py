@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.contest import Contender
+from benchmarks.errors import locations
 from benchmarks.fields import containment
 from benchmarks.measure import clocked
 from benchmarks.workloads import Mesh, Rings, bumpy_sphere, generator, uniform_points
@@ -27,11 +28,11 @@ def by_distance(seed: int, n_points: int) -> dict[str, Any]:
     found: dict[str, Any] = {"ulps": list(ULPS), "containment 2D": {}, "containment 3D": {}}
     for ulps in ULPS:
         signs = source.choice([-1, 1], n_points)
+        rings = Rings("flower", [ring])
         plane = containment.beside_edges(ring, n_points, ulps * signs, source)
-        _count(found["containment 2D"], containment.polygon_contenders(ring), plane, plane, Rings("flower", [ring]))
+        _count(found["containment 2D"], containment.on_polygon(rings), plane, rings)
         space = _beside_faces(mesh, n_points, ulps * signs, source)
-        contenders = containment.on_meshes([mesh], np.zeros(n_points, int), space)
-        _count(found["containment 3D"], contenders, np.arange(n_points), space, mesh)
+        _count(found["containment 3D"], containment.on_mesh(mesh), space, mesh)
     return found
 
 
@@ -42,15 +43,14 @@ def _beside_faces(mesh: Mesh, n_points: int, ulps: np.ndarray, source: np.random
     return points
 
 
-def _count(
-    table: dict[str, list[float]], contenders: list[Contender], items: Any, points: np.ndarray, subject: Any
-) -> None:
-    exact = containment.exact_locations(points, subject)
+def _count(table: dict[str, list[float]], contenders: list[Contender], points: np.ndarray, subject: Any) -> None:
+    exact = locations(points, subject)
     for contender in contenders:
         try:
-            answers = contender.make()(items)
+            made = contender.make()
         except (ImportError, OSError):
             continue
+        answers = made.answer(made.ask(made.native(points)))
         table.setdefault(contender.name, []).append(float((answers.astype(bool) != exact).mean()))
 
 
@@ -60,25 +60,29 @@ def by_size(seed: int, quick: bool) -> dict[str, Any]:
     for times in (*SIZES[:2], *(() if quick else (*SIZES[2:], LARGEST))):
         mesh = bumpy_sphere("report size", seed, times)
         points = uniform_points(mesh, 2_000 if quick else 50_000, seed)
-        for contender in containment.on_meshes([mesh], np.zeros(len(points), int), points):
+        for contender in containment.on_mesh(mesh):
             if contender.name.startswith("textbook") and times > 4:
                 continue
-            _time(found["faces"], contender, np.arange(len(points)), len(mesh.faces))
+            _time(found["faces"], contender, points, len(mesh.faces))
     mesh = bumpy_sphere("report size", seed, 2 if quick else 5)
     points = uniform_points(mesh, 100_000, seed)
-    contenders = containment.on_meshes([mesh], np.zeros(len(points), int), points)
+    contenders = containment.on_mesh(mesh)
     for n_points in (1, 10, 100, 1_000, *(() if quick else (10_000, 100_000))):
         for contender in contenders:
             if not contender.name.startswith(("textbook", "CGAL")):
-                _time(found["batch"], contender, np.arange(n_points), n_points)
+                _time(found["batch"], contender, points[:n_points], n_points)
     return found
 
 
 def _time(table: dict[str, list[list[float]]], contender: Contender, items: np.ndarray, place: int) -> None:
     try:
-        ask = contender.make()
+        made = contender.make()
     except (ImportError, OSError):
         return
+
+    def ask(asked: np.ndarray) -> object:
+        return made.answer(made.ask(made.native(asked)))
+
     if clocked(partial(ask, items[:100]))[0] * len(items) > 3000:  # a contender of 30 ms a point is given 100 points
         items = items[:100]
     seconds = []

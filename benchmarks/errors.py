@@ -1,7 +1,7 @@
 """Wrong answers, counted against exact ones.
 
-Hard sets carry their exact locations. On workloads made for speed, every point on which two contenders disagree, and a
-random sample of the others, is settled by tests/reference: rational arithmetic that shares nothing with the engine.
+Hard sets carry their exact answers. On workloads made for speed, what contenders disagree on, and a random sample of
+the others, is settled by tests/reference: rational arithmetic that shares nothing with the engine.
 The exact location of a point in a large mesh is found with a nearly axial half-line, whose box throws out, by plain
 comparisons, all but the few faces that it could meet.
 """
@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.workloads import Bodies, Mesh, Planes, Rings
+from benchmarks.workloads import Mesh, Planes, Rings
 
 try:
     from tests.reference import containment as reference
@@ -82,37 +82,58 @@ def _in_rings(point: np.ndarray, rings: list[np.ndarray]) -> int:
     return 1 if parity else -1
 
 
-def _in_scene(key: int, points: np.ndarray, bodies: Bodies) -> bool:
-    point, body = points[key // len(bodies.bodies)], bodies.bodies[key % len(bodies.bodies)]
-    return contained(point, body)[0]
+def locations(points: np.ndarray, subject: Any) -> np.ndarray:
+    """Return whether each point is in the closed subject, by rational arithmetic."""
+    return np.array([contained(point, subject)[0] for point in points], bool)
 
 
-def compare(
-    points: np.ndarray, subject: Any, ours: np.ndarray, peer: np.ndarray, seed: int, n_sample: int, most: int
-) -> dict[str, Any]:
-    """Return how many answers of each are wrong among those settled, and how many were settled.
+# --- judging ----------------------------------------------------------------------------------------------------------
 
-    All disagreements are settled, up to `most` of them, and `n_sample` of the rest. Boundary points count as contained.
-    """
-    if REASON:
-        return {"unchecked": REASON}
-    if isinstance(subject, Bodies):
-        n_items = len(points) * len(subject.bodies)
-        differing = np.setxor1d(ours, peer)
-        is_ours = np.isin(differing, ours)
-        settle = [(bool(a), not a, _in_scene(int(k), points, subject)) for k, a in list(zip(differing, is_ours))[:most]]
-        sample = np.random.default_rng(seed).choice(np.intersect1d(ours, peer), min(n_sample, len(ours)))
-        settle += [(True, True, _in_scene(int(k), points, subject)) for k in sample]
-    else:
-        n_items = len(points)
-        differing = np.flatnonzero(ours != peer)
-        sample = np.random.default_rng(seed).choice(len(points), min(n_sample, len(points)), replace=False)
-        chosen = [*differing[:most], *np.setdiff1d(sample, differing)]
-        settle = [(bool(ours[i]), bool(peer[i]), contained(points[i], subject)[0]) for i in chosen]
+REFUSED = -9
+"""In place of an answer: the contender raised an error for this item."""
+AREA_TOLERANCE = 2.0**-20
+"""Of the largest area of the pair: more than rounding coordinates does, less than any piece anyone would miss."""
+
+
+def same(answers: np.ndarray, exact: np.ndarray) -> dict[str, Any]:
+    """Judge answers that are labels: equal or wrong."""
+    answers, exact = np.asarray(answers).astype(np.int64), np.asarray(exact).astype(np.int64)
+    refused = answers == REFUSED
     return {
-        "items": n_items,
-        "disagreements": len(differing),
-        "settled": len(settle),
-        "wrong_ours": sum(a != exact for a, _, exact in settle),
-        "wrong_peer": sum(b != exact for _, b, exact in settle),
+        "judged": len(exact),
+        "wrong": int(((answers != exact) & ~refused).sum()),
+        "refused": int(refused.sum()),
+    }
+
+
+def coordinates(answers: np.ndarray, exact: np.ndarray) -> dict[str, Any]:
+    """Judge rows of coordinates, NaN where nothing remains: wrong where that differs; else their errors in ulps."""
+    kept, should = ~np.isnan(answers).any(axis=1), ~np.isnan(exact).any(axis=1)
+    both = kept & should
+    ulps = np.abs(answers[both] - exact[both]) / np.spacing(np.maximum(np.abs(exact[both]), np.finfo(float).tiny))
+    values = ulps.ravel()
+    return {
+        "judged": len(exact),
+        "wrong": int((kept != should).sum()),
+        "refused": 0,
+        "ulp_largest": float(values.max(initial=0.0)),
+        "ulp_median": float(np.median(values)) if len(values) else 0.0,
+        "ulp_histogram": np.bincount(np.minimum(np.ceil(np.log2(values + 1)).astype(int), 20), minlength=21).tolist(),
+        "off": int((values > 0).sum()),
+        "coordinates": len(values),
+    }
+
+
+def areas(answers: np.ndarray, exact: np.ndarray) -> dict[str, Any]:
+    """Judge (area, scale) pairs: NaN is a refusal; wrong is an area off by more than `AREA_TOLERANCE` of the scale."""
+    answers = np.asarray(answers, float)
+    refused = np.isnan(answers)
+    error = np.abs(answers - exact[:, 0]) / exact[:, 1]
+    good = error[~refused & (error <= AREA_TOLERANCE)] * 2.0**53
+    return {
+        "judged": len(exact),
+        "wrong": int((error > AREA_TOLERANCE).sum()),
+        "refused": int(refused.sum()),
+        "ulp_largest": float(good.max(initial=0.0)),
+        "ulp_median": float(np.median(good)) if len(good) else 0.0,
     }

@@ -1,7 +1,7 @@
 """Who gets the hard cases wrong: the figures and the drawings of docs/hard_cases.md.
 
-    python -m benchmarks.hard_cases            # measures, and writes figures and drawings into docs
-    python -m benchmarks.hard_cases --dry      # prints the figures only; --only WORD: of marks with this word
+    python -m benchmarks hard_cases            # measures, and writes figures and drawings into docs
+    python -m benchmarks hard_cases --dry      # prints the figures only; --only WORD: of marks with this word
 
 In the page, a line ``<!-- measured: points vertex; pairs d_ulp -->`` names sets; the paragraph after it is replaced by
 the share of wrong or refused answers of every contender on each set. A set is
@@ -9,28 +9,28 @@ the share of wrong or refused answers of every contender on each set. A set is
 - ``points FAMILY``: points of that family (tests/hard/points.py) in a bumpy ball on a lattice, or in the solid after a
   colon, exact answers by tests/reference;
 - ``pairs FAMILY``: pairs of closed bodies of the shared hard set; left as it stands where there are no data;
-- ``cases OPERATION/FAMILY``: the stored cases of tests/hard/cases, put to the peers of benchmarks/filed;
+- ``cases OPERATION/FAMILY``: the stored cases of tests/hard/cases, put to the peers as the filed cases are;
 - ``contest OPERATION, NAME``: a contest of the report, with fewer items.
 """
 
 from __future__ import annotations
 
 import argparse
-import gzip
 import json
 import re
-import sys
 from collections import defaultdict
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks import hard_pictures
-from benchmarks.contest import Contest, hold, same
-from benchmarks.fields import collision, containment, filed, overlay, polygons, segments
-from benchmarks.workloads import DATA, Mesh, bumpy_sphere
+from benchmarks import filed, hard_pictures
+from benchmarks.contest import Contest, hold
+from benchmarks.errors import same
+from benchmarks.fields import collision, containment, overlay, polygons, segments
+from benchmarks.workloads import Mesh, MissingDataError, bumpy_sphere, hard_pairs
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "hard_cases.md"
@@ -69,28 +69,15 @@ def points(words: str) -> Shares:
     drawn = dict(hard_points(f"hard cases {mesh.name}", mesh.vertices, mesh.faces, N_POINTS))
     asked = np.concatenate(list(drawn.values())) if family == "all" else drawn[family]
     exact = locate_points(asked, mesh.vertices, mesh.faces) >= 0
-    contenders = containment.on_meshes([mesh], np.zeros(len(asked), int), asked)
-    return _held(Contest("containment", family, True, np.arange(len(asked)), exact, same, contenders))
-
-
-@cache
-def _stored_pairs() -> list[dict]:
-    path = DATA / "hard_collision" / "cases.json.gz"
-    return json.loads(gzip.decompress(path.read_bytes())) if path.is_file() else []
+    return _held(Contest("containment", family, True, asked, exact, same, containment.on_mesh(mesh)))
 
 
 def pairs(family: str) -> Shares:
     """Return the shares on the stored pairs of a family."""
-    cases = [case for case in _stored_pairs() if case["family"] == family]
-    if not cases:
-        return {}
-    bodies = [
-        tuple(Mesh(key, np.array(case[key]["vertices"], float), np.array(case[key]["faces"], np.int64)) for key in
-              ("first", "second"))
-        for case in cases
-    ]  # fmt: skip
-    exact = np.array([case["relation"] != "disjoint" for case in cases])
-    return _held(Contest("collision", family, True, np.arange(len(cases)), exact, same, collision.contenders(bodies)))
+    with suppress(MissingDataError):
+        if cases := [case for case in hard_pairs() if case["family"] == family]:
+            return _held(collision.stored(family, cases))
+    return {}
 
 
 def cases(words: str) -> Shares:
@@ -171,7 +158,3 @@ def main(words: list[str] | None = None) -> int:
     if not options.dry:
         PAGE.write_text(MARK.sub(lambda mark: _paragraph(mark, lines), text), "utf-8")
     return int(any("**ours 0**" not in line for every in lines.values() for line in every.splitlines()))
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -14,7 +14,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from benchmarks.contenders import load
+from benchmarks.contenders import make
 from benchmarks.workloads import bumpy_sphere, mesh_of_size, uniform_points
 
 
@@ -29,19 +29,18 @@ def _status(field: str) -> int:
 
 
 def _measure(contender: str, size: str, seed: int, threads: int) -> dict[str, Any]:
-    make = load(contender).MAKERS["polyhedron"]
     small = bumpy_sphere("warm", 0, 3)
-    warm = make(small, threads)
+    warm = make(contender, "points", small, threads)
     for _ in range(3):
         warm.ask(warm.native(uniform_points(small, points_that_pay(len(small.faces)), seed)))
     mesh = mesh_of_size(size, seed)
     points = uniform_points(mesh, points_that_pay(len(mesh.faces)), seed)
-    prepared_points = load(contender).MAKERS["polyhedron"](small, threads).native(points)
+    native = warm.native(points)
     gc.collect()
     Path("/proc/self/clear_refs").write_text("5")  # the high-water mark starts anew
     before = _status("VmRSS")
-    prepared = make(mesh, threads)
-    prepared.ask(prepared_points)
+    prepared = make(contender, "points", mesh, threads)
+    prepared.ask(native)
     peak = _status("VmHWM") - before
     gc.collect()
     return {

@@ -83,25 +83,33 @@ def small(family: str, size: int, n_pairs: int, seed: int) -> tuple[np.ndarray, 
     return rings(), rings()
 
 
-def public() -> Iterator[tuple[Rings, Rings]]:
-    """Yield the pairs of public test suites whose polygons have rings of at least three vertices."""
+SUITES = ("clipper2_cases", "geos_pairs", "mfogel_cases")
+
+
+def public(suites: tuple[str, ...] = SUITES, n_most: int | None = None) -> Iterator[tuple[Rings, Rings]]:
+    """Yield the pairs of public test suites whose polygons have rings of at least three vertices.
+
+    n_most: of the geometries of a case, none with an empty ring; all but the first are the second of the pair.
+    """
     folder = DATA / "clipping"
     if not folder.is_dir():
         raise MissingDataError("public pairs are in the shared data folder, which is not here")
+    for suite in suites:
+        for case in json.loads(gzip.decompress((folder / f"{suite}.json.gz").read_bytes())):
+            if "subj" in case:
+                pair = case["subj"], case["clip"]
+            else:
+                first, *rest = case["geoms"][:n_most] if "geoms" in case else (case["a"], case["b"])
+                pair = _flat([first]), _flat(rest)
+            if n_most is not None and not all(ring for rings in pair for ring in rings):
+                continue
+            subject, clip = ([_ring(ring) for ring in rings if ring] for rings in pair)
+            if subject and clip and min(map(len, subject + clip)) >= 3:
+                yield subject, clip
 
-    def load(name: str) -> list[dict]:
-        return json.loads(gzip.decompress((folder / f"{name}.json.gz").read_bytes()))
 
-    def flat(shape: list) -> list:
-        return [ring for polygon in shape for ring in polygon]
-
-    pairs = [(case["subj"], case["clip"]) for case in load("clipper2_cases")]
-    pairs += [(flat(case["a"]), flat(case["b"])) for case in load("geos_pairs")]
-    pairs += [(flat(first), flat(flat(rest))) for first, *rest in (case["geoms"] for case in load("mfogel_cases"))]
-    for pair in pairs:
-        first, second = ([_ring(ring) for ring in rings if ring] for rings in pair)
-        if first and second and min(map(len, first + second)) >= 3:
-            yield first, second
+def _flat(shapes: list) -> list:
+    return [ring for shape in shapes for polygon in shape for ring in polygon]
 
 
 def _ring(positions: list[list[float]]) -> np.ndarray:

@@ -1,9 +1,9 @@
 """The report of speed against error: every operation, ours beside the textbook and the peers, easy and hard apart.
 
-    python -m benchmarks.report             # the record: page, pictures, results/<machine>/report.json
-    python -m benchmarks.report --quick     # minutes: every contender runs, ours has 0 wrong; writes nothing
-    python -m benchmarks.report --pages     # the page and its pictures again from the stored results
-    python -m benchmarks.compare a.json b.json
+    python -m benchmarks report             # the record: page, pictures, results/<machine>/report.json
+    python -m benchmarks report --quick     # minutes: every contender runs, ours has 0 wrong; writes nothing
+    python -m benchmarks report --pages     # the page and its pictures again from the stored results
+    python -m benchmarks compare a.json b.json
 
 A figure is items a second at the median of interleaved rounds. Errors are counted against exact answers by rational
 arithmetic that shares nothing with the engine (tests/reference).
@@ -16,20 +16,19 @@ import json
 import sys
 import time
 from collections.abc import Iterator
-from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from benchmarks import curves, machine, page, pictures
+from benchmarks import curves, filed, machine, page, pictures
 from benchmarks.contest import Contest, Row, hold
-from benchmarks.fields import collision, containment, filed, overlay, polygons, primitives, segments
-from benchmarks.suite import RESULTS
+from benchmarks.fields import collision, containment, overlay, polygons, primitives, segments
+from benchmarks.table import RESULTS, as_json
 
 FIELDS = (containment, collision, segments, polygons, overlay, primitives)
 ROOT = Path(__file__).resolve().parents[1]
 DOCS, README = ROOT / "docs", ROOT / "README.md"
-BEGIN, END = "<!-- benchmarks.report writes this table -->", "<!-- to here -->"
+BEGIN, END = "<!-- benchmarks report writes this table -->", "<!-- to here -->"
 
 
 def main(words: list[str] | None = None) -> int:
@@ -48,7 +47,7 @@ def main(words: list[str] | None = None) -> int:
         for row in hold(contest, rounds, seconds):
             rows.append(row)
             print(_line(row), flush=True)
-    found["rows"] = [asdict(row) | {"rate": row.rate, "net_rate": row.net_rate} for row in rows]
+    found["rows"] = [as_json(row) for row in rows]
     if not options.only:
         measure = partial(curves.by_distance, options.seed, 100 if options.quick else 2000)
         found["curves"] = {"distance": measure(), "size": curves.by_size(options.seed, options.quick)}
@@ -104,7 +103,3 @@ def _options(words: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--seconds", type=float, default=3.0, help="of each contender in each contest (3)")
     parser.add_argument("--seed", type=int, default=0)
     return parser.parse_args(words)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,7 +1,7 @@
 """The wire and the service under load: what HTTP adds to a kernel, what a batch does to others, what too much does.
 
-    python -m benchmarks.wire            # about five minutes
-    python -m benchmarks.wire --quick    # about a minute
+    python -m benchmarks wire            # about five minutes
+    python -m benchmarks wire --quick    # about a minute
 
 Loopback only. The load generator (load.py) shares the cores with the service. Requests and answers of both sides are
 counted whole; contenders take turns.
@@ -9,6 +9,7 @@ counted whole; contenders take turns.
 
 from __future__ import annotations
 
+import argparse
 import contextlib
 import json
 import os
@@ -18,7 +19,8 @@ import statistics
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,10 +28,10 @@ import numpy as np
 import orjson
 
 import engine
-from benchmarks import load
+from benchmarks import load, table
+from benchmarks.fields import Figure
 from benchmarks.load import Connection, free_port, in_process, memory_of, percentile, request, wait_until
-from benchmarks.measure import spread
-from benchmarks.suite import Row, Suite, options
+from benchmarks.measure import clocked
 from service.settings import Settings
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -59,7 +61,7 @@ def rate(port: int, message: bytes, seconds: float, n_connections: int) -> float
     return seen.statuses[200] / seen.span
 
 
-def rates(row: Row, sides: list[tuple[int, bytes]], seconds: float, rounds: int, n_connections: int) -> Row:
+def rates(row: Figure, sides: list[tuple[int, bytes]], seconds: float, rounds: int, n_connections: int) -> Figure:
     """Fill a row with how many times as many requests the first side answers, side by side in turns."""
     found: list[list[float]] = [[], []]
     for port, message in sides:
@@ -67,8 +69,7 @@ def rates(row: Row, sides: list[tuple[int, bytes]], seconds: float, rounds: int,
     for round_ in range(rounds):
         for i_side in (0, 1) if round_ % 2 == 0 else (1, 0):
             found[i_side].append(in_process(rate, *sides[i_side], seconds, n_connections)())
-    middle = spread([ours / peer for ours, peer in zip(*found)])
-    row.value, row.low, row.high = middle.median, middle.low, middle.high
+    row.values = [ours / peer for ours, peer in zip(*found)]
     row.ours, row.peer = (f"{statistics.median(one):.4g}/s" for one in found)
     row.raw["rates"] = found
     return row
@@ -77,67 +78,57 @@ def rates(row: Row, sides: list[tuple[int, bytes]], seconds: float, rounds: int,
 class Wire:
     """The rows, on one service and one contender that run throughout."""
 
-    def __init__(self, suite: Suite, ours: int, plain: int, process: subprocess.Popen[bytes]) -> None:
-        self.quick = suite.options.quick
-        self.rounds = suite.options.rounds
-        self.random = np.random.default_rng(suite.options.seed)
+    def __init__(self, given: argparse.Namespace, ours: int, plain: int, process: subprocess.Popen[bytes]) -> None:
+        self.quick, self.rounds, self.random = given.quick, given.rounds, np.random.default_rng(given.seed)
         self.ours, self.plain, self.process = ours, plain, process
 
-    def binary(self, name: str) -> Iterable[Row]:
+    def binary(self, name: str, solid: engine.Solid, document: dict[str, Any]) -> Figure:
         """1e6 points as octets against kernel and bare loopback."""
-        planes = self.random.normal(size=(32, 4))
-        planes[:, 3] = 1 + np.abs(planes[:, 3])
         points = self.random.random((1_000_000, 3)) - 0.5
-        for label, solid, document in (
-            ("sphere", engine.Sphere([0, 0, 0], 0.5), {"type": "sphere", "center": [0, 0, 0], "radius": 0.5}),
-            ("convex of 32 planes", engine.Convex(planes), {"type": "convex", "planes": planes.tolist()}),
-        ):
-            connection = Connection(self.ours)
-            stored = json.loads(connection.ask(request("/v1/solids", orjson.dumps(document)))[1])
-            message = request(f"/v1/solids/{stored['id']}/contains", points.tobytes(), OCTETS)
-            expected = engine.locate(points, solid).tobytes()
-            with echo() as echo_port:
-                echoed = Connection(echo_port)
-                runs: list[Callable[[], Any]] = [
-                    lambda c=connection, m=message: c.ask(m),  # type: ignore[misc]
-                    lambda s=solid: engine.locate(points, s, report=True),  # type: ignore[misc]
-                    lambda c=echoed, m=message: c.ask(m),  # type: ignore[misc]
-                ]
-                took: list[list[float]] = [[], [], []]
-                wrong = int(runs[0]() != (200, expected))
-                for _ in range(3 + (10 if self.quick else 40)):
-                    for run, seconds in zip(runs, took):
-                        before = time.perf_counter()
-                        run()
-                        seconds.append(time.perf_counter() - before)
-                echoed.close()
-            connection.close()
-            middle = spread([ours / (kernel + bare) for ours, kernel, bare in zip(*(one[3:] for one in took))])
-            row = Row(f"{name}, {label}", "over", 1.35, 1.15, middle.median, middle.low, middle.high)
-            medians = [1e3 * statistics.median(one[3:]) for one in took]
-            row.ours, row.peer = f"{medians[0]:.4g} ms", f"{medians[1] + medians[2]:.4g} ms"
-            row.error, row.note = f"wrong: {wrong}", f"kernel {medians[1]:.3g} ms, loopback {medians[2]:.3g} ms"
-            row.raw["seconds"] = took
-            yield row
+        connection = Connection(self.ours)
+        stored = json.loads(connection.ask(request("/v1/solids", orjson.dumps(document)))[1])
+        message = request(f"/v1/solids/{stored['id']}/contains", points.tobytes(), OCTETS)
+        expected = engine.locate(points, solid).tobytes()
+        with echo() as echo_port:
+            echoed = Connection(echo_port)
+            runs: list[Callable[[], Any]] = [
+                lambda: connection.ask(message),
+                lambda: engine.locate(points, solid, report=True),
+                lambda: echoed.ask(message),
+            ]
+            took: list[list[float]] = [[], [], []]
+            wrong = int(runs[0]() != (200, expected))
+            for _ in range(3 + (10 if self.quick else 40)):
+                for run, seconds in zip(runs, took):
+                    seconds.append(clocked(run)[0])
+            echoed.close()
+        connection.close()
+        values = [ours / (kernel + bare) for ours, kernel, bare in zip(*(one[3:] for one in took))]
+        row = Figure(name, "over", values, 1.35, 1.15)
+        medians = [1e3 * statistics.median(one[3:]) for one in took]
+        row.ours, row.peer = f"{medians[0]:.4g} ms", f"{medians[1] + medians[2]:.4g} ms"
+        row.error, row.note = f"wrong: {wrong}", f"kernel {medians[1]:.3g} ms, loopback {medians[2]:.3g} ms"
+        row.raw["seconds"] = took
+        return row
 
-    def ten_thousand(self, name: str) -> Iterable[Row]:
+    def ten_thousand(self, name: str) -> Figure:
         """1e4 points as JSON against the model of tuples."""
         points = self.random.random((10_000, 3)).tolist()
         ours = request("/v1/contains", json.dumps({"solid": SPHERE, "points": points}).encode())
         plain = {"center": SPHERE["center"], "radius": SPHERE["radius"], "points": points}
         sides = [(self.ours, ours), (self.plain, request("/plain", json.dumps(plain).encode()))]
         answers = [json.loads(Connection(port).ask(message)[1])["contained"] for port, message in sides]
-        row = rates(Row(name, "x", 8, 12), sides, 1.0 if self.quick else 3.0, self.rounds, 2)
+        row = rates(Figure(name, "x", [], 8, 12), sides, 1.0 if self.quick else 3.0, self.rounds, 2)
         row.error = f"wrong: {int(answers[0] != answers[1])}"
-        yield row
+        return row
 
-    def one(self, name: str) -> Iterable[Row]:
+    def one(self, name: str) -> Figure:
         """One point as JSON against an async endpoint with the same model."""
         body = json.dumps({"solid": SPHERE, "points": [[0.1, 0.2, 0.3]]}).encode()
         sides = [(self.ours, request("/v1/contains", body)), (self.plain, request("/same-model", body))]
-        yield rates(Row(name, "x", 0.8, 1.2), sides, 1.0 if self.quick else 3.0, self.rounds, 4)
+        return rates(Figure(name, "x", [], 0.8, 1.2), sides, 1.0 if self.quick else 3.0, self.rounds, 4)
 
-    def beside_batches(self, name: str) -> Iterable[Row]:
+    def beside_batches(self, name: str) -> Figure:
         """One-point requests while two clients loop the largest JSON that is taken."""
         limit = Settings().max_body_bytes
         n_points = int(limit / 61)
@@ -151,18 +142,16 @@ class Wire:
         one = request("/v1/contains", json.dumps({"solid": SPHERE, "points": [[0.1, 0.2, 0.3]]}).encode())
         seen = in_process(load.loop, self.ours, one, seconds - 2, 0.005)()
         batch = [waiting() for waiting in batches]
-        row = Row(name, "ms", 25, 12, 1e3 * percentile(seen.seconds, 0.99))
-        row.low, row.high = 1e3 * percentile(seen.seconds, 0.5), 1e3 * max(seen.seconds)
+        row = Figure(name, "ms", [1e3 * percentile(seen.seconds, 0.99)], 25, 12)
         row.ours = f"{len(seen.seconds)} asked"
         statuses = sum((other.statuses for other in batch), seen.statuses)
         took = statistics.median([second for other in batch for second in other.seconds] or [float("nan")])
-        row.note = (
-            f"beside it: median, longest; batches of {len(body) / 2**20:.0f} MB took {took:.2f} s; {dict(statuses)}"
-        )
+        waited = f"median {1e3 * percentile(seen.seconds, 0.5):.3g}, longest {1e3 * max(seen.seconds):.3g}"
+        row.note = f"{waited}; batches of {len(body) / 2**20:.0f} MB took {took:.2f} s; {dict(statuses)}"
         row.raw["seconds"] = seen.seconds
-        yield row
+        return row
 
-    def overload(self, name: str) -> Iterable[Row]:
+    def overload(self, name: str) -> Figure:
         """Ten times the load that can be sustained, batches of 1e4 points."""
         body = {"solid": SPHERE, "points": self.random.random((10_000, 3)).tolist()}
         message, seconds = request("/v1/contains", json.dumps(body).encode()), 5.0 if self.quick else 60.0
@@ -175,17 +164,18 @@ class Wire:
         statuses = sum((one.statuses for one in seen), load.Seen().statuses)
         accepted = [second for one in seen for second in one.seconds]
         offered = sum(statuses.values()) / seconds
-        row = Row(name, "s", 30, 30, percentile(accepted, 0.99), statistics.median(accepted), max(accepted))
+        row = Figure(name, "s", [percentile(accepted, 0.99)], 30, 30)
         row.ours, row.raw["statuses"] = f"{len(accepted) / seconds:.3g}/s", dict(statuses)
         odd = sum(count for status, count in statuses.items() if status not in (200, 503))
         lost = sum(one.lost for one in seen)
         row.error = f"neither 200 nor 503: {odd}, lost: {lost}"
         row.note = (
-            f"p99 of accepted (median, longest beside it), deadline 30 s; {n_clients * n_connections} connections ask "
+            f"p99 of accepted, median {statistics.median(accepted):.3g}, longest {max(accepted):.3g}, deadline 30 s; "
+            f"{n_clients * n_connections} connections ask "
             f"{offered:.0f}/s, {sustainable:.0f}/s are sustainable; {dict(statuses)}; "
             f"memory {before:.0f} to {after:.0f} MB; {'runs' if self.process.poll() is None else 'CRASHED'}"
         )
-        yield row
+        return row
 
 
 @contextlib.contextmanager
@@ -209,53 +199,50 @@ def _echo(server: socket.socket) -> None:
             connection.sendall(answer)
 
 
-def start(suite: Suite, name: str) -> Iterable[Row]:
+def start(is_quick: bool, name: str) -> Figure:
     """From the start of the process to /readyz, with the compile cache filled."""
     seconds = []
-    for _ in range(3 if suite.options.quick else 9):
+    for _ in range(3 if is_quick else 9):
         before = time.perf_counter()
         with serving("service", ready="/readyz"):
             seconds.append(time.perf_counter() - before)
-    middle = spread(seconds)
-    yield Row(name, "s", 2.5, 1.5, middle.median, middle.low, middle.high)
+    return Figure(name, "s", seconds, 2.5, 1.5)
 
 
-def imports(suite: Suite, name: str) -> Iterable[Row]:
+def imports(is_quick: bool, name: str) -> Figure:
     """`import engine` over `import numba` alone, in processes of their own, in turns."""
     took: dict[str, list[float]] = {"engine": [], "numba": []}
-    for _ in range(5 if suite.options.quick else 15):
+    for _ in range(5 if is_quick else 15):
         for module, seconds in took.items():
             code = f"import time; t = time.perf_counter(); import {module}; print(time.perf_counter() - t)"
             done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
             seconds.append(float(done.stdout))
-    middle = spread([ours - peer for ours, peer in zip(took["engine"], took["numba"])])
-    row = Row(name, "s", 0.2, 0.1, middle.median, middle.low, middle.high)
+    row = Figure(name, "s", [ours - peer for ours, peer in zip(took["engine"], took["numba"])], 0.2, 0.1)
     row.ours, row.peer = (f"{statistics.median(took[module]):.3g} s" for module in ("engine", "numba"))
-    yield row
+    return row
 
 
 def main(words: list[str] | None = None) -> int:
     """Print the table; return the number of rows below their must."""
-    suite = Suite("wire", options(words, __doc__ or ""))
-    suite.facts["load_generator"] = load.NAME
+    given = table.options(words, __doc__ or "")
     print(f"load generator: {load.NAME}, on the same cores; loopback")
+    planes = np.random.default_rng(given.seed).normal(size=(32, 4))
+    planes[:, 3] = 1 + np.abs(planes[:, 3])
+    ball = engine.Sphere([0, 0, 0], 0.5), {"type": "sphere", "center": [0, 0, 0], "radius": 0.5}
+    convex = engine.Convex(planes), {"type": "convex", "planes": planes.tolist()}
     with (
         serving("service", ready="/readyz", access_log="true") as (ours, process),
         serving("benchmarks.contenders.plain_fastapi", ready="/openapi.json") as (plain, _),
     ):
-        wire = Wire(suite, ours, plain, process)
-        return suite.run(
-            [
-                ("1e6 points, octets, over kernel + loopback", wire.binary),
-                ("1e4 points, JSON, against tuples", wire.ten_thousand),
-                ("one point, JSON, against the same model", wire.one),
-                ("p99 of one point beside two batches", wire.beside_batches),
-                ("overload", wire.overload),
-                ("start to ready, warm cache", lambda name: start(suite, name)),
-                ("import engine over numba", lambda name: imports(suite, name)),
-            ]
-        )
-
-
-if __name__ == "__main__":
-    sys.exit(main() > 0)
+        wire = Wire(given, ours, plain, process)
+        rows: dict[str, Callable[[str], Figure]] = {
+            "1e6 points, octets, over kernel + loopback, sphere": lambda name: wire.binary(name, *ball),
+            "1e6 points, octets, over kernel + loopback, 32 planes": lambda name: wire.binary(name, *convex),
+            "1e4 points, JSON, against tuples": wire.ten_thousand,
+            "one point, JSON, against the same model": wire.one,
+            "p99 of one point beside two batches": wire.beside_batches,
+            "overload": wire.overload,
+            "start to ready, warm cache": partial(start, given.quick),
+            "import engine over numba": partial(imports, given.quick),
+        }
+        return int(table.run("wire", [(name, partial(make, name)) for name, make in rows.items()], given) > 0)

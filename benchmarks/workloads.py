@@ -6,12 +6,18 @@ size stands in, under its own name. Nothing is fetched.
 
 from __future__ import annotations
 
+import gzip
+import json
 import zlib
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+
+import engine
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 NEAR = 1e-4
@@ -75,6 +81,15 @@ def hard_sets() -> list[Path]:
     if not found:
         raise MissingDataError("the hard sets are in the shared data folder, which is not here")
     return found
+
+
+@cache
+def hard_pairs() -> list[dict[str, Any]]:
+    """Return the pairs of bodies of the hard set, with their exact relations."""
+    path = DATA / "hard_collision" / "cases.json.gz"
+    if not path.is_file():
+        raise MissingDataError("the hard sets are in the shared data folder, which is not here")
+    return json.loads(gzip.decompress(path.read_bytes()))
 
 
 def subdivided(mesh: Mesh, times: int) -> Mesh:
@@ -212,3 +227,68 @@ def near_points(subject: Mesh | Rings, n_points: int, seed: int) -> np.ndarray:
     points = (corners[chosen] * weights[:, :, None]).sum(axis=1)
     low, high = extent_of(subject)
     return points + random.normal(size=points.shape) * (NEAR * (high - low).max())
+
+
+def segments_of(kind: str, dimension: int, n: int, seed: int) -> np.ndarray:
+    """Return n segments near the cube from -1 to 1, or a region of about its size.
+
+    random: ends in a cube of twice the size. corner, edge: through corners or places on edges, missed by about 1e-16.
+    ulp: ends on the planes and up to four units in the last place off, on a lattice.
+    """
+    draw = generator(f"segments/{kind}", seed)
+    if kind == "random":
+        return draw.uniform(-2.0, 2.0, (n, 2, dimension))
+    if kind == "ulp":
+        ends = draw.integers(-4, 5, (n, 2, dimension)) * 0.5
+        return ends + draw.integers(-4, 5, ends.shape) * np.spacing(np.maximum(np.abs(ends), 0.5))
+    targets = draw.choice([-1.0, 1.0], (n, dimension))
+    if kind == "edge":
+        targets[np.arange(n), draw.integers(0, dimension, n)] = draw.uniform(-1.0, 1.0, n)
+    directions = draw.uniform(-1.0, 1.0, (n, 1, dimension))
+    return targets[:, None] + directions * draw.uniform(0.5, 2.0, (n, 2, 1)) * np.array([[-1.0], [1.0]])
+
+
+def star_rings(size: int, dimension: int, n_rings: int, seed: int) -> np.ndarray:
+    """Return rings (n_rings, size, dimension): stars in the plane, turned anyhow in space, so hardly ever planar."""
+    draw = generator(f"polygons/{size}/{dimension}", seed)
+    angles = np.sort(draw.uniform(0.0, 2.0 * np.pi, (n_rings, size)), axis=1)
+    rings = np.stack([np.cos(angles), np.sin(angles)], axis=2) * draw.uniform(0.6, 1.0, (n_rings, size, 1))
+    if dimension == 3:
+        turns = np.linalg.qr(draw.normal(size=(n_rings, 3, 3)))[0]
+        rings = rings @ turns[:, :2]
+    return np.ascontiguousarray(rings + draw.uniform(-1.2, 1.2, (n_rings, 1, dimension)))
+
+
+def _box_without_a_ball() -> engine.Solid:
+    return engine.Csg("difference", [engine.Aabb([-1.0] * 3, [1.0] * 3), engine.Sphere([0.0] * 3, 1.0)])
+
+
+def _ellipsoid() -> engine.Solid:
+    powers = [[2, 0, 0], [0, 2, 0], [0, 0, 2], [0, 0, 0]]
+    return engine.Implicit(powers=powers, coefficients=[-1.0, -2.0, -0.5, 1.0])
+
+
+SIMPLE: dict[str, Callable[[], engine.Solid]] = {
+    "aabb 2D": lambda: engine.Aabb([-1.0] * 2, [1.0] * 2),
+    "aabb 3D": lambda: engine.Aabb([-1.0] * 3, [1.0] * 3),
+    "sphere 2D": lambda: engine.Sphere([0.0] * 2, 1.0),
+    "sphere 3D": lambda: engine.Sphere([0.0] * 3, 1.0),
+    "half-space 2D": lambda: engine.HalfSpace([1.0, 2.0], 0.5),
+    "half-space 3D": lambda: engine.HalfSpace([1.0, 2.0, 3.0], 0.5),
+    "convex 2D": lambda: engine.Convex(_planes_2d(12)),
+    "triangle 2D": lambda: engine.Triangle([[-1.0, -1], [1, -0.5], [0, 1]]),
+    "triangle 3D": lambda: engine.Triangle([[-1.0, -1, 0], [1, -0.5, 0.5], [0, 1, -0.5]]),
+    "implicit 3D": _ellipsoid,
+    "csg 3D": _box_without_a_ball,
+}
+"""A solid of every type without faces, each about the cube from -1 to 1."""
+
+
+def simple_solids() -> dict[str, engine.Solid]:
+    """Return one of each."""
+    return {name: make() for name, make in SIMPLE.items()}
+
+
+def _planes_2d(n_lines: int) -> np.ndarray:
+    angles = np.linspace(0.0, 2.0 * np.pi, n_lines, endpoint=False)
+    return np.stack([np.cos(angles), np.sin(angles), np.ones(n_lines)], axis=1)

@@ -2,31 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
 
 import engine
-from benchmarks import errors
-from benchmarks.contenders import Prepared
-from benchmarks.contenders.plain_signs import with_plain_signs
-from benchmarks.contest import REFUSED, Ask, Contender, Contest, same
-from benchmarks.workloads import Mesh, MissingDataError, Planes, Rings, bumpy_sphere, generator, hard_sets, stored_mesh
-from engine.textbook import (
-    convex,
-    polygon_angle_sum,
-    polygon_ray_parity,
-    polygon_same_side,
-    polyhedron_ray_parity,
-    polyhedron_recast,
-    triangle_cross_dot,
-    triangle_projection,
+from benchmarks import memory, workloads
+from benchmarks.contenders import Prepared, make
+from benchmarks.contest import Contender, Contest, Goals, contender
+from benchmarks.errors import REFUSED, locations, same
+from benchmarks.fields import Figure, Size, Task
+from benchmarks.workloads import (
+    Bodies,
+    Mesh,
+    MissingDataError,
+    Planes,
+    Rings,
+    bumpy_sphere,
+    extent_of,
+    generator,
+    hard_sets,
+    stored_mesh,
 )
 
 N_EXACT = 2000
-OBLIQUE = np.array([0.5773, 0.2113, 0.7886])
-"""A direction without zero components for the textbook's half-line."""
 
 
 def contests(seed: int, scale: float) -> Iterator[Contest]:
@@ -40,9 +41,8 @@ def contests(seed: int, scale: float) -> Iterator[Contest]:
     yield _triangle(seed, scale)
 
 
-def exact_locations(points: np.ndarray, subject: Any) -> np.ndarray:
-    """Return whether each point is in the closed subject, by rational arithmetic."""
-    return np.array([errors.contained(point, subject)[0] for point in points])
+def _n_exact(scale: float) -> int:
+    return int(N_EXACT * min(1, 4 * scale))
 
 
 # --- polyhedra --------------------------------------------------------------------------------------------------------
@@ -55,10 +55,9 @@ def _easy_3d(seed: int, scale: float) -> Contest:
         mesh = bumpy_sphere("bumpy", seed, 4)
     source = generator("report containment 3d", seed)
     points = source.uniform(mesh.vertices.min(0), mesh.vertices.max(0), (int(200_000 * scale), 3))
-    exact = exact_locations(points[: int(N_EXACT * min(1, 4 * scale))], mesh)
-    contenders = on_meshes([mesh], np.zeros(len(points), int), points)
+    exact = locations(points[: _n_exact(scale)], mesh)
     about = f"uniform in the box of {mesh.name}, {len(mesh.faces):,} faces"
-    return Contest("containment 3D", "uniform", False, np.arange(len(points)), exact, same, contenders, about)
+    return Contest("containment 3D", "uniform", False, points, exact, same, on_mesh(mesh), about)
 
 
 def _hard_3d(scale: float) -> Contest | None:
@@ -76,163 +75,59 @@ def _hard_3d(scale: float) -> Contest | None:
         exact.append(arrays["location"][::step] >= 0)
     mixed = np.random.default_rng(0).permutation(sum(map(len, points)))  # so that the first items are of every mesh
     owner, rows = np.concatenate(owners)[mixed], np.concatenate(points)[mixed]
-    contenders = on_meshes(meshes, owner, rows)
     about = "on vertices, edges and faces and ulps beside them, offsets to 1e9, slivers, non-manifold meshes"
     return Contest(
-        "containment 3D", "boundary", True, np.arange(len(rows)), np.concatenate(exact)[mixed], same, contenders, about
-    )
+        "containment 3D", "boundary", True, np.arange(len(rows)), np.concatenate(exact)[mixed], same,
+        [_on_many(each, meshes, owner, rows) for each in on_mesh(meshes[0])], about,
+    )  # fmt: skip
 
 
-def on_meshes(meshes: list[Mesh], owner: np.ndarray, points: np.ndarray) -> list[Contender]:
-    """Return the contenders; items are rows of `points`, each asked of the mesh that owns it."""
-    share: list[float] = []
-
-    def grouped(build: Callable[[Mesh], Ask]) -> Callable[[], Ask]:
-        def make() -> Ask:
-            asks = [_or_refusal(build, mesh) for mesh in meshes]
-
-            def ask(rows: np.ndarray) -> np.ndarray:
-                found = np.empty(len(rows), np.int8)
-                for i_mesh, one in enumerate(asks):
-                    mine = np.flatnonzero(owner[rows] == i_mesh) if len(asks) > 1 else slice(None)
-                    chosen = points[rows[mine]]
-                    if len(chosen):
-                        found[mine] = one(chosen)
-                return found
-
-            return ask
-
-        return make
-
-    def ours(mesh: Mesh) -> Ask:
-        solid = engine.Polyhedron(mesh.vertices, mesh.faces)
-
-        def ask(chosen: np.ndarray) -> np.ndarray:
-            found, accuracy = engine.locate(chosen, solid, report=True)
-            share.append(accuracy.n_beyond_filter / max(1, accuracy.n_items))
-            return found >= 0
-
-        return ask
-
-    def plain(mesh: Mesh) -> Ask:
-        """The same kernel without its bands and without what is exact behind it; where it is small, there is none."""
-        solid = engine.Polyhedron(mesh.vertices, mesh.faces)
-        prepared = Prepared(lambda rows: rows, lambda rows: engine.locate(rows, solid), lambda found: found >= 0)
-        signs = with_plain_signs(prepared)
-        return lambda chosen: signs.ask(chosen) >= 0
-
-    return [
-        Contender("ours", grouped(ours), exact_share=lambda: share[-1]),
-        Contender("ours, plain signs in cells", grouped(plain)),
-        Contender("textbook: half-line", grouped(_textbook_parity)),
-        Contender("textbook: another half-line", grouped(_textbook_recast)),
-        Contender("Open3D occupancy", grouped(_open3d), "open3d"),
-        Contender("trimesh + embreex", grouped(_trimesh), "trimesh"),
-        Contender("libigl winding number", grouped(_libigl), "libigl"),
-        Contender("VTK enclosed points", grouped(_vtk), "vtk"),
-        Contender("CGAL side of mesh", grouped(_cgal), "cgal"),
-    ]
+MESH_PEERS = (
+    ("ours", "ours", "points"),
+    ("ours, plain signs in cells", "plain_signs", "points"),
+    ("textbook: half-line", "textbook", "points"),
+    ("textbook: another half-line", "textbook", "recast"),
+    ("Open3D occupancy", "open3d", "points"),
+    ("trimesh + embreex", "trimesh", "points"),
+    ("libigl winding number", "igl", "points"),
+    ("VTK enclosed points", "vtk", "points"),
+    ("CGAL side of mesh", "cgal", "points"),
+)
 
 
-def _or_refusal(build: Callable[[Mesh], Ask], mesh: Mesh) -> Ask:
-    """Return what `build` makes; where it refuses the mesh, what refuses every point."""
+def on_mesh(mesh: Mesh) -> list[Contender]:
+    """Return the contenders on one mesh."""
+    return [contender(*names, mesh) for names in MESH_PEERS]
+
+
+def _on_many(one: Contender, meshes: list[Mesh], owner: np.ndarray, points: np.ndarray) -> Contender:
+    """Return a contender whose items are rows of `points`, each asked of the mesh that owns it."""
+    module, kind = next(names[1:] for names in MESH_PEERS if names[0] == one.name)
+
+    def build() -> Prepared:
+        made = [_or_refusal(module, kind, mesh) for mesh in meshes]
+
+        def ask(rows: np.ndarray) -> np.ndarray:
+            found = np.empty(len(rows), np.int8)
+            for i_mesh, prepared in enumerate(made):
+                mine = np.flatnonzero(owner[rows] == i_mesh)
+                if len(mine):
+                    found[mine] = prepared.answer(prepared.ask(prepared.native(points[rows[mine]])))
+            return found
+
+        return Prepared(ask, share=made[-1].share)
+
+    return Contender(one.name, build, one.package)
+
+
+def _or_refusal(module: str, kind: str, mesh: Mesh) -> Prepared:
+    """Return a contender on a mesh; where it refuses the mesh, what refuses every point."""
     try:
-        return build(mesh)
+        return make(module, kind, mesh)
     except (ImportError, OSError):
         raise
     except Exception:  # whatever a peer raises
-        return lambda points: np.full(len(points), REFUSED)
-
-
-def _textbook_parity(mesh: Mesh) -> Ask:
-    return lambda points: polyhedron_ray_parity.contains(points, mesh.vertices, mesh.faces, OBLIQUE)
-
-
-def _textbook_recast(mesh: Mesh) -> Ask:
-    directions = np.random.default_rng(1).normal(size=(16, 3))
-
-    def ask(points: np.ndarray) -> np.ndarray:
-        contained, unfinished = polyhedron_recast.contains(points, mesh.vertices, mesh.faces, directions, 1e-9)
-        return np.where(unfinished, REFUSED, contained)
-
-    return ask
-
-
-def _open3d(mesh: Mesh) -> Ask:
-    import open3d
-    from open3d.core import Tensor
-
-    open3d.utility.set_verbosity_level(open3d.utility.VerbosityLevel.Error)
-    scene = open3d.t.geometry.RaycastingScene()
-    scene.add_triangles(Tensor(mesh.vertices.astype(np.float32)), Tensor(mesh.faces.astype(np.uint32)))
-    return lambda points: scene.compute_occupancy(Tensor(points.astype(np.float32))).numpy() > 0.5
-
-
-def _trimesh(mesh: Mesh) -> Ask:
-    import embreex  # noqa: F401, without it trimesh would use a slower method
-    import trimesh
-
-    body = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
-    return body.contains
-
-
-def _libigl(mesh: Mesh) -> Ask:
-    import igl
-
-    faces = mesh.faces.astype(np.int64)
-    return lambda points: igl.fast_winding_number(mesh.vertices, faces, points) > 0.5
-
-
-def _vtk(mesh: Mesh) -> Ask:
-    import vtk
-    from vtk.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
-
-    def surface_of(vertices: np.ndarray) -> Any:
-        corners, data = vtk.vtkPoints(), vtk.vtkPolyData()
-        corners.SetData(numpy_to_vtk(np.ascontiguousarray(vertices), deep=True))
-        data.SetPoints(corners)
-        return data
-
-    body, cells = surface_of(mesh.vertices), vtk.vtkCellArray()
-    rows = np.hstack([np.full((len(mesh.faces), 1), 3), mesh.faces]).astype(np.int64)
-    cells.SetCells(len(rows), numpy_to_vtkIdTypeArray(rows.ravel(), deep=True))
-    body.SetPolys(cells)
-
-    def ask(points: np.ndarray) -> np.ndarray:
-        tester = vtk.vtkSelectEnclosedPoints()
-        tester.SetInputData(surface_of(points))
-        tester.SetSurfaceData(body)
-        tester.SetTolerance(0.0)
-        tester.Update()
-        return vtk_to_numpy(tester.GetOutput().GetPointData().GetArray("SelectedPoints")) > 0
-
-    return ask
-
-
-def _cgal(mesh: Mesh) -> Ask:
-    from CGAL.CGAL_Kernel import Point_3
-    from CGAL.CGAL_Polygon_mesh_processing import Side_of_triangle_mesh
-    from CGAL.CGAL_Polyhedron_3 import Polyhedron_3, Polyhedron_modifier
-
-    modifier = Polyhedron_modifier()
-    modifier.begin_surface(len(mesh.vertices), len(mesh.faces))
-    for vertex in mesh.vertices.tolist():
-        modifier.add_vertex(Point_3(*vertex))
-    for face in mesh.faces.tolist():
-        modifier.begin_facet()
-        for corner in face:
-            modifier.add_vertex_to_facet(corner)
-        modifier.end_facet()
-    body = Polyhedron_3()
-    body.delegate(modifier)
-    if body.size_of_facets() != len(mesh.faces) or not body.is_closed():
-        raise ValueError("CGAL's Polyhedron_3 takes closed manifolds only")
-    side = Side_of_triangle_mesh(body)
-
-    def ask(points: np.ndarray, kept: Any = body) -> np.ndarray:  # `side` borrows the body
-        return np.array([side.bounded_side(Point_3(*point)) >= 0 for point in points.tolist()])
-
-    return ask
+        return Prepared(lambda points: np.full(len(points), REFUSED))
 
 
 # --- polygons ---------------------------------------------------------------------------------------------------------
@@ -269,90 +164,49 @@ def _plane(seed: int, scale: float) -> Iterator[Contest]:
         (True, _hard_2d(ring, n_points // 10, source)),
     ):
         name = "boundary" if is_hard else "uniform"
-        exact = exact_locations(points[: int(N_EXACT * min(1, 4 * scale))], rings)
+        exact = locations(points[: _n_exact(scale)], rings)
         about = f"a gear of {len(ring)} vertices" + (", on its edges, vertices and level with them" if is_hard else "")
-        yield Contest("containment 2D", name, is_hard, points, exact, same, polygon_contenders(ring), about)
+        yield Contest("containment 2D", name, is_hard, points, exact, same, on_polygon(rings), about)
 
 
-def polygon_contenders(ring: np.ndarray) -> list[Contender]:
-    """Return those that take any simple polygon; items are points."""
-    share: list[float] = []
-
-    def ours() -> Ask:
-        solid = engine.Polygon([ring])
-
-        def ask(points: np.ndarray) -> np.ndarray:
-            found, accuracy = engine.locate(points, solid, report=True)
-            share.append(accuracy.n_beyond_filter / max(1, accuracy.n_items))
-            return found >= 0
-
-        return ask
-
-    def textbook() -> Ask:
-        offsets = np.array([0, len(ring)])
-        return lambda points: polygon_ray_parity.contains(points, ring, offsets)
-
-    def with_shapely() -> Ask:
-        import shapely
-
-        shape = shapely.Polygon(ring)
-        shapely.prepare(shape)
-        return lambda points: shapely.intersects_xy(shape, points[:, 0], points[:, 1])
-
-    def with_matplotlib() -> Ask:
-        from matplotlib.path import Path
-
-        path = Path(np.concatenate([ring, ring[:1]]), closed=True)
-        return path.contains_points
-
+def on_polygon(rings: Rings) -> list[Contender]:
+    """Return those that take any simple polygon."""
     return [
-        Contender("ours", ours, exact_share=lambda: share[-1]),
-        Contender("textbook: half-line", textbook),
-        Contender("shapely, prepared", with_shapely, "shapely"),
-        Contender("matplotlib Path", with_matplotlib, "matplotlib"),
+        contender("ours", "ours", "points", rings),
+        contender("textbook: half-line", "textbook", "points", rings),
+        contender("shapely, prepared", "shapely", "points", rings, 1),
+        contender("matplotlib Path", "matplotlib", "points", rings),
     ]
 
 
 def _convex(seed: int, scale: float) -> Iterator[Contest]:
     source = generator("report convex", seed)
     angles = np.linspace(0, 2 * np.pi, 16, endpoint=False)
-    ring, n_points = np.stack([np.cos(angles), np.sin(angles)], axis=1), int(100_000 * scale)
-    near = beside_edges(ring, n_points // 10, source.integers(-2, 3, n_points // 10), source)
+    rings = Rings("16-gon", [np.stack([np.cos(angles), np.sin(angles)], axis=1)])
+    n_points = int(100_000 * scale)
+    near = beside_edges(rings.rings[0], n_points // 10, source.integers(-2, 3, n_points // 10), source)
+    books = {"signed angles": "signed angles", "unsigned angles, 1e-6": "unsigned angles", "same side": "same side"}
     for is_hard, asked in ((False, source.uniform(-1, 1, (n_points, 2))), (True, near)):
-        exact = exact_locations(asked[: int(N_EXACT * min(1, 4 * scale))], Rings("16-gon", [ring]))
-        contenders = [
-            polygon_contenders(ring)[0],
-            Contender(
-                "textbook: signed angles", lambda: lambda points: polygon_angle_sum.contains_signed(points, ring)
-            ),
-            Contender(
-                "textbook: unsigned angles, 1e-6",
-                lambda: lambda points: polygon_angle_sum.contains_unsigned(points, ring, 1e-6),
-            ),
-            Contender("textbook: same side", lambda: lambda points: polygon_same_side.contains(points, ring)),
-        ]
+        exact = locations(asked[: _n_exact(scale)], rings)
+        contenders = [contender("ours", "ours", "points", rings)]
+        contenders += [contender(f"textbook: {name}", "textbook", kind, rings) for name, kind in books.items()]
         name = "boundary" if is_hard else "uniform"
         yield Contest("containment, convex polygon", name, is_hard, asked, exact, same, contenders, "16 vertices")
     normals = source.normal(size=(20, 3))
-    rows = np.hstack([normals, np.ones((20, 1))])
+    planes = Planes("20 planes", np.hstack([normals, np.ones((20, 1))]))
     points = source.uniform(-1, 1, (n_points, 3))
     onto = points - normals[:1] * ((points @ normals[0] + 1) / (normals[0] @ normals[0]))[:, None]
     for is_hard, asked in ((False, points), (True, onto[: n_points // 10])):
-        exact = exact_locations(asked[: int(N_EXACT * min(1, 4 * scale))], Planes("20 planes", rows))
+        exact = locations(asked[: _n_exact(scale)], planes)
         yield Contest(
             "containment, half-spaces", "on a plane" if is_hard else "uniform", is_hard, asked, exact, same,
             [
-                Contender("ours", lambda: _ours_convex(rows)),
-                Contender("textbook: half-spaces", lambda: lambda points: convex.contains(points, rows)),
-                Contender("numpy", lambda: lambda points: (points @ normals.T + 1 >= 0).all(axis=1), "numpy"),
+                contender("ours", "ours", "points", planes),
+                contender("textbook: half-spaces", "textbook", "points", planes),
+                contender("numpy", "numpy", "points", planes),
             ],
             "20 random planes",
         )  # fmt: skip
-
-
-def _ours_convex(rows: np.ndarray) -> Ask:
-    solid = engine.Convex(rows)
-    return lambda points: engine.contains(points, solid)
 
 
 def _triangle(seed: int, scale: float) -> Contest:
@@ -365,15 +219,13 @@ def _triangle(seed: int, scale: float) -> Contest:
     points = (weights / weights.sum(axis=1, keepdims=True)) @ corners
     points += source.integers(-2, 3, (n_points, 1)) * np.cross(corners[1] - corners[0], corners[2] - corners[0])
     solid = engine.Triangle(corners)
-    exact = _exact_prism(points[: int(N_EXACT * min(1, 4 * scale))], corners)
+    exact = _exact_prism(points[: _n_exact(scale)], corners)
     return Contest(
         "containment, triangle in space", "on its walls", True, points, exact, same,
         [
-            Contender("ours", lambda: lambda points: engine.contains(points, solid)),
-            Contender(
-                "textbook: cross and dot", lambda: lambda points: triangle_cross_dot.contains(points, corners)
-            ),
-            Contender("textbook: projection", lambda: lambda points: triangle_projection.contains(points, corners)),
+            contender("ours", "ours", "points", solid),
+            contender("textbook: cross and dot", "textbook", "cross and dot", solid),
+            contender("textbook: projection", "textbook", "projection", solid),
         ],
         "the prism over a triangle; half of the points beside its walls",
     )  # fmt: skip
@@ -384,3 +236,158 @@ def _exact_prism(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
 
     solid = {"type": "triangle", "vertices": corners.tolist()}
     return np.array([locate(point, solid) >= 0 for point in points.tolist()])
+
+
+# --- the table --------------------------------------------------------------------------------------------------------
+
+MESHES = {  # against Open3D: uniform points, points near the surface
+    "1k": ((10.0, 20.0), (6.0, 12.0)),
+    "86k": ((20.0, 30.0), (6.0, 12.0)),
+    "1.38M": ((30.0, 50.0), (7.0, 12.0)),
+}
+POLYGONS = {10: (12.0, 25.0), 1_000: (20.0, 25.0), 100_000: (15.0, 25.0)}
+
+
+def table(size: Size) -> Iterator[Task]:
+    """Yield the rows of the table."""
+    for faces, goals in list(MESHES.items())[: size.of(3, 1)]:
+        for place, goal in zip(("uniform", "near"), goals, strict=True):
+            yield f"{faces} faces, {place}", partial(_mesh, size, faces, place, goal)
+    faces = "1k" if size.is_quick else "86k"
+    yield f"build, {faces} faces", partial(_from_arrays, size, faces, 0)
+    for n_points in (1, 1_000):
+        yield f"first {n_points}, {faces} faces", partial(_from_arrays, size, faces, n_points)
+    for n_vertices, goal in list(POLYGONS.items())[: size.of(3, 2)]:
+        for place in ("uniform", "near"):
+            yield f"polygon of {n_vertices:,}, {place}", partial(_polygon, size, n_vertices, place, goal)
+    for n_planes in (6, 20, 100):
+        yield f"convex of {n_planes} planes", partial(_planes, size, n_planes)
+    for what, n_bodies in (("polygons", size.of(10_000, 1_000)), ("polyhedra", size.of(1_000, 27))):
+        yield f"scene of {n_bodies:,} {what}", partial(_scene, size, what, n_bodies, False)
+        yield f"scene of {n_bodies:,} {what}, first time", partial(_scene, size, what, n_bodies, True)
+    for name in workloads.simple_solids():
+        for place in ("uniform", "boundary"):
+            yield f"{name}, {place}", partial(_simple, size, name, place)
+
+
+def figures(size: Size) -> Iterator[Task]:
+    """Yield what is no contest."""
+    for faces in ("1k",) if size.is_quick else ("86k", "1.38M"):
+        yield f"memory of the build, {faces} faces", partial(_memory, size, faces)
+
+
+def _contest(
+    name: str, points: np.ndarray, subject: Any, contenders: list[Contender], is_judged: bool = True
+) -> Contest:
+    settle = (lambda rows: locations(points[rows], subject)) if is_judged else None
+    return Contest("containment", name, False, points, settle, same, contenders)
+
+
+def _points(size: Size, subject: Mesh | Rings, place: str) -> np.ndarray:
+    draw = workloads.uniform_points if place == "uniform" else workloads.near_points
+    return draw(subject, size.of(1_000_000, 50_000), size.seed)
+
+
+def _mesh(size: Size, faces: str, place: str, goals: Goals) -> Contest:
+    mesh = workloads.mesh_of_size(faces, size.seed)
+    contenders = [
+        contender("ours", "ours", "points", mesh),
+        contender("Open3D occupancy", "open3d", "points", mesh, goals=goals),
+        contender("ours, plain signs in cells", "plain_signs", "points", mesh),
+    ]
+    return _contest(f"{faces} faces, {place}", _points(size, mesh, place), mesh, contenders)
+
+
+def _from_arrays(size: Size, faces: str, n_points: int) -> Contest:
+    """Everything from arrays; the build: asked so much that every structure is built."""
+    mesh = workloads.mesh_of_size(faces, size.seed)
+    points = workloads.uniform_points(mesh, n_points or memory.points_that_pay(len(mesh.faces)), size.seed)
+    name = f"first {n_points}, {faces} faces" if n_points else f"build, {faces} faces"
+    contenders = [contender("ours", "ours", "points", mesh, is_new=True)]
+    contenders.append(contender("Open3D occupancy", "open3d", "points", mesh, is_new=True))
+    return Contest("containment", name, False, points, None, same, contenders, count=len(points))
+
+
+def _polygon(size: Size, n_vertices: int, place: str, goals: Goals) -> Contest:
+    rings = workloads.star_polygon(n_vertices, size.seed)
+    goals = goals if place == "uniform" else (5.0, 10.0)
+    contenders = [contender("ours", "ours", "points", rings)]
+    contenders.append(contender("shapely, prepared", "shapely", "points", rings, goals=goals))
+    return _contest(f"polygon of {n_vertices:,}, {place}", _points(size, rings, place), rings, contenders)
+
+
+def _planes(size: Size, n_planes: int) -> Contest:
+    planes = workloads.convex_planes(n_planes, size.seed)
+    points = workloads.uniform_points(planes, size.of(1_000_000, 50_000), size.seed)
+    contenders = [contender("ours", "ours", "points", planes)]
+    contenders.append(contender("numpy", "numpy", "points", planes, goals=(4.0, 8.0)))
+    return _contest(f"convex of {n_planes} planes", points, planes, contenders)
+
+
+@cache
+def _bodies(what: str, n_bodies: int, seed: int) -> Bodies:
+    return (workloads.polygon_scene if what == "polygons" else workloads.polyhedron_scene)(n_bodies, seed)
+
+
+def _scene(size: Size, what: str, n_bodies: int, is_new: bool) -> Contest:
+    """Answers are told apart by how many bodies hold a point, and the sum of their numbers."""
+    bodies = _bodies(what, n_bodies, size.seed)
+    points = workloads.uniform_points(bodies, size.of(1_000_000, 30_000), size.seed)
+    peer, goals = {"polygons": ("shapely", (3.0, 10.0)), "polyhedra": ("open3d", (5.0, 20.0))}[what]
+    name = {"shapely": "shapely STRtree", "open3d": "Open3D occupancy"}[peer]
+    each = [("ours", "ours", (None, None)), (name, peer, (None, None) if is_new else goals)]
+    contenders = [
+        contender(shown, module, "scene", bodies, goals=goal, is_new=is_new) for shown, module, goal in each
+    ]  # fmt: skip
+    told = [Contender(one.name, partial(_summed, one, n_bodies), one.package, goals=one.goals) for one in contenders]
+    boxes = np.array([extent_of(body) for body in bodies.bodies])
+
+    def exact(rows: np.ndarray) -> np.ndarray:
+        found = []
+        for point in points[rows]:
+            near = np.flatnonzero(((boxes[:, 0] <= point) & (point <= boxes[:, 1])).all(axis=1)).tolist()
+            held = [number for number in near if locations(point[None], bodies.bodies[number])[0]]
+            found.append((len(held), sum(held)))
+        return np.array(found)
+
+    shown = f"scene of {n_bodies:,} {what}" + (", first time" if is_new else "")
+    return Contest(
+        "containment", shown, False, points, None if is_new else exact, _same_rows, told, count=len(points) * is_new
+    )
+
+
+def _summed(one: Contender, n_bodies: int) -> Prepared:
+    made = one.make()
+
+    def answer(found: tuple[int, Any]) -> np.ndarray:
+        owners, held = np.divmod(made.answer(found[1]), n_bodies)
+        return np.stack([np.bincount(owners, weights, found[0]) for weights in (None, held)], axis=1)
+
+    return Prepared(
+        lambda asked: (asked[0], made.ask(asked[1])),
+        lambda points: (len(points), made.native(points)),
+        answer,
+        made.memory,
+    )
+
+
+def _same_rows(answers: np.ndarray, exact: np.ndarray) -> dict[str, Any]:
+    return same((answers != exact).any(axis=1), np.zeros(len(exact)))
+
+
+def _simple(size: Size, name: str, place: str) -> Contest:
+    """Points of the cube; on the boundary: of a lattice of quarters, and ulps off it. Ours alone."""
+    solid, draw = workloads.simple_solids()[name], generator(f"rows/{name}", size.seed)
+    n_points = size.of(500_000, 50_000) // (1 if place == "uniform" else 5)
+    points = draw.uniform(-1.5, 1.5, (n_points, solid.dimension))
+    if place == "boundary":
+        points = np.round(points * 4) / 4
+        points += draw.integers(-2, 3, points.shape) * np.spacing(np.maximum(np.abs(points), 0.25))
+    return _contest(f"{name}, {place}", points, solid, [contender("ours", "ours", "points", solid)], False)
+
+
+def _memory(size: Size, faces: str) -> Figure:
+    found, peer = (memory.of_build(module, faces, size.seed, 2) for module in ("ours", "open3d"))
+    note = ", ".join(f"{key} {value}" for key, value in found.items() if key != "peak") + f"; Open3D: {peer}"
+    must, aim = (640.0, 250.0) if faces == "1.38M" else (None, None)
+    return Figure(f"memory of the build, {faces} faces", "MB", [found.get("peak", np.nan) / 1e6], must, aim, note)

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-import gzip
-import json
-from collections.abc import Callable, Iterator
+import contextlib
+import time
+from collections.abc import Iterator
 from fractions import Fraction
-from typing import Any
+from functools import partial
 
 import numpy as np
 
 import engine
-from benchmarks.contest import Ask, Contender, Contest, areas
-from benchmarks.workloads import DATA, generator
-from engine.textbook import greiner_hormann
+from benchmarks import polygon_pairs
+from benchmarks.contenders import Prepared
+from benchmarks.contest import Contender, Contest, Goals, contender
+from benchmarks.errors import areas
+from benchmarks.fields import Figure, Size, Task
+from benchmarks.measure import clocked
+from benchmarks.workloads import MissingDataError, generator
 
 Pair = tuple[list[np.ndarray], list[np.ndarray]]
 MOST_VERTICES = 40
@@ -49,135 +53,181 @@ def _lattice_ring(source: np.random.Generator) -> np.ndarray:
 
 
 def _public_pairs() -> Iterator[Pair]:
-    for name, fields in (("geos_pairs", ("a", "b")), ("mfogel_cases", None)):
-        path = DATA / "clipping" / f"{name}.json.gz"
-        if not path.is_file():
-            continue
-        for case in json.loads(gzip.decompress(path.read_bytes())):
-            both = [case[field] for field in fields] if fields else case["geoms"][:2]
-            if len(both) < 2:
-                continue
-            rings = [[_ring(ring) for polygon in shape for ring in polygon] for shape in both]
-            sizes = [len(ring) for shape in rings for ring in shape]
-            if all(rings) and min(sizes) >= 3 and sum(sizes) <= MOST_VERTICES:
-                yield rings[0], rings[1]
+    with contextlib.suppress(MissingDataError):
+        for pair in polygon_pairs.public(("geos_pairs", "mfogel_cases"), n_most=2):
+            if sum(len(ring) for rings in pair for ring in rings) <= MOST_VERTICES:
+                yield pair
 
 
-def _ring(positions: list[list[float]]) -> np.ndarray:
-    ring = np.array([position[:2] for position in positions], float)
-    return ring[:-1] if len(ring) > 1 and (ring[0] == ring[-1]).all() else ring
+def _scale(pair: Pair) -> float:
+    return max(*(float(np.prod(np.ptp(np.concatenate(rings), axis=0))) for rings in pair), 1e-300)
+
+
+def _exact_area(pair: Pair) -> tuple[float, float]:
+    from tests.reference import overlay as reference
+
+    solids = [{"type": "polygon", "rings": [ring.tolist() for ring in rings]} for rings in pair]
+    return float(Fraction(reference.overlay(*solids, "intersection").area)), _scale(pair)
 
 
 def _contest(name: str, is_hard: bool, pairs: list[Pair], about: str) -> Contest:
-    from tests.reference import overlay as reference
-
-    exact = np.empty((len(pairs), 2))
-    for row, (first, second) in zip(exact, pairs, strict=True):
-        solids = [{"type": "polygon", "rings": [ring.tolist() for ring in rings]} for rings in (first, second)]
-        area = reference.overlay(*solids, "intersection").area
-        scale = max(float(np.prod(np.ptp(np.concatenate(rings), axis=0))) for rings in (first, second))
-        row[:] = float(Fraction(area)), max(scale, 1e-300)
-    return Contest("overlay", name, is_hard, np.arange(len(pairs)), exact, areas, contenders(pairs), about)
+    exact = np.array([_exact_area(pair) for pair in pairs])
+    return Contest("overlay", name, is_hard, pairs, exact, areas, contenders(), about)
 
 
-def contenders(pairs: list[Pair]) -> list[Contender]:
-    """Return the contenders; items are indices of pairs; rings are under even-odd."""
-
-    def each(build: Callable[[], Callable[[Pair], float]]) -> Callable[[], Ask]:
-        def make() -> Ask:
-            one = build()
-
-            def called(pair: Pair) -> float:
-                try:
-                    return one(pair)
-                except Exception:  # whatever a peer raises: a refusal
-                    return np.nan
-
-            return lambda rows: np.array([called(pairs[row]) for row in rows])
-
-        return make
-
+def contenders(kind: str = "overlay", goals: dict[str, Goals] | None = None, threads: int = 2) -> list[Contender]:
+    """Return the contenders; items are pairs of lists of rings under even-odd."""
+    shown = {
+        "ours": "ours", "textbook: Greiner-Hormann": "textbook", "shapely (GEOS)": "shapely", "pyclipper": "pyclipper",
+        "Clipper2 by manifold3d": "manifold3d",
+    }  # fmt: skip
     return [
-        Contender("ours", lambda: _ours(pairs)),
-        Contender("textbook: Greiner-Hormann", each(_textbook)),
-        Contender("shapely (GEOS)", each(_shapely), "shapely"),
-        Contender("pyclipper", each(_pyclipper), "pyclipper"),
-        Contender("Clipper2 by manifold3d", each(_manifold), "manifold3d"),
+        contender(name, module, kind, "intersection", threads, (goals or {}).get(module, (None, None)))
+        for name, module in shown.items()
+        if module != "textbook" or kind == "overlay"
     ]
 
 
-def _ours(pairs: list[Pair]) -> Ask:
-    def ask(rows: np.ndarray) -> np.ndarray:  # polygons are made here, as the peers make theirs
-        subjects, clips = ([engine.Polygon(pairs[row][side]) for row in rows] for side in range(2))
-        return areas_of(engine.overlay_batch(subjects, clips))
+# --- the table --------------------------------------------------------------------------------------------------------
 
-    return ask
-
-
-def areas_of(batch: engine.OverlayBatch) -> np.ndarray:
-    """Return the areas of the rounded outputs in plain float64, shells less holes, like those of the peers."""
-    n, rings = len(batch), batch.piece_offsets[batch.pair_offsets]
-    if not len(batch.vertices):
-        return np.zeros(n)
-    starts, ends = batch.ring_offsets[:-1], batch.ring_offsets[1:]
-    x, y = (batch.vertices - np.repeat(batch.vertices[starts], ends - starts, axis=0)).T
-    following = np.arange(1, len(x) + 1)
-    following[ends - 1] = starts
-    twice = np.add.reduceat(x * y[following] - y * x[following], starts)
-    return 0.5 * np.bincount(np.repeat(np.arange(n), np.diff(rings)), weights=twice, minlength=n)
+LARGE = {"shapely": (6.0, 15.0), "pyclipper": (0.4, 1.0), "manifold3d": (0.4, 1.0)}
+SMALL = {"shapely": (5.0, 15.0), "pyclipper": (2.0, 5.0)}
+OPERATIONS = ("union", "difference", "symmetric_difference")
 
 
-def signed(ring: np.ndarray) -> float:
-    """Return the signed area of a ring in plain float64."""
-    x, y = ring[:, 0] - ring[0, 0], ring[:, 1] - ring[0, 1]
-    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+def table(size: Size) -> Iterator[Task]:
+    """Yield the rows of the table: one thread, intersections unless a row says otherwise, polygons made before."""
+    for n in (1_000, 10_000, 100_000)[: size.of(3, 1)]:
+        for family in ("smooth", "spiky", "comb", "soup"):
+            if (family, n) != ("soup", 100_000):
+                yield f"{family} of {n:,}", partial(_large, size, family, n)
+    yield "soup of 30,000", partial(_large, size, "soup", size.of(30_000, 2_000))
+    yield "dense comb of 300", partial(_large, size, "dense comb", 300)
+    for family in ("star", "convex"):
+        for n in (4, 10, 30, 100):
+            yield f"batch of {family}s of {n}", partial(_batch, size, family, n)
+    for n in (10, 100):
+        yield f"batch of stars of {n}, two threads", partial(_two_threads, size, n)
+    for operation in OPERATIONS:
+        name = f"batch of stars of 10, {operation}"
+        yield name, partial(_batch, size, "star", 10, operation)
+    yield "batch on a lattice", partial(_on_lattice, size)
+    yield "public pairs", partial(_public, size)
+    yield "exact area", partial(_area, size)
 
 
-def _textbook() -> Callable[[Pair], float]:
-    def one(pair: Pair) -> float:
-        if len(pair[0]) > 1 or len(pair[1]) > 1:
-            raise ValueError("single rings only")
-        return sum(abs(signed(ring)) for ring in greiner_hormann.intersection(pair[0][0], pair[1][0]) if len(ring) > 2)
-
-    return one
+def figures(size: Size) -> Iterator[Task]:
+    """Yield what is no contest."""
+    yield "public pairs, four operations", partial(_identities, size)
+    yield "late after a deadline", partial(_deadline, size)
 
 
-def _shapely() -> Callable[[Pair], float]:
-    import shapely
-
-    def shape(rings: list[np.ndarray]) -> Any:
-        polygons = [shapely.Polygon(ring) for ring in rings]
-        polygons = [polygon if polygon.is_valid else shapely.make_valid(polygon) for polygon in polygons]
-        made = polygons[0]
-        for polygon in polygons[1:]:
-            made = made.symmetric_difference(polygon)
-        return made
-
-    return lambda pair: shape(pair[0]).intersection(shape(pair[1])).area
+def _exact_areas(pairs: list[Pair], rows: np.ndarray) -> np.ndarray:
+    """Return exact areas and scales: by the reference where it is quick, else by our exact rings, which tests prove."""
+    found = []
+    for row in rows:
+        rings = [polygon for side in pairs[row] for polygon in side]
+        is_small = sum(map(len, rings)) <= MOST_VERTICES
+        found.append(_exact_area(pairs[row]) if is_small else _ours_exactly(pairs[row]))
+    return np.array(found)
 
 
-def _pyclipper() -> Callable[[Pair], float]:
-    import pyclipper
-
-    def one(pair: Pair) -> float:
-        every = np.concatenate([ring for rings in pair for ring in rings])
-        middle = every.mean(axis=0)
-        scale = 2.0 ** np.floor(50 - np.log2(max(np.abs(every - middle).max(), 1e-300)))
-        clipper = pyclipper.Pyclipper()
-        for rings, kind in zip(pair, (pyclipper.PT_SUBJECT, pyclipper.PT_CLIP), strict=True):
-            paths = [np.rint((ring - middle) * scale).astype(np.int64).tolist() for ring in rings]
-            clipper.AddPaths(paths, kind, True)
-        found = clipper.Execute(pyclipper.CT_INTERSECTION, pyclipper.PFT_EVENODD, pyclipper.PFT_EVENODD)
-        return sum(pyclipper.Area(path) for path in found) / scale**2
-
-    return one
+def _ours_exactly(pair: Pair) -> tuple[float, float]:
+    return float(engine.overlay(*map(engine.Polygon, pair)).area_exact), _scale(pair)
 
 
-def _manifold() -> Callable[[Pair], float]:
-    from manifold3d import CrossSection, FillRule
+def _large(size: Size, family: str, n: int) -> Contest:
+    pairs = [polygon_pairs.large(family, n, size.seed)]
+    return Contest(
+        "overlay", f"{family} of {n:,}", False, pairs, partial(_exact_areas, pairs), areas,
+        contenders("overlay of made", LARGE, 1), count=1,
+    )  # fmt: skip
 
-    def one(pair: Pair) -> float:
-        first, second = (CrossSection(list(rings), FillRule.EvenOdd) for rings in pair)
-        return (first ^ second).area()
 
-    return one
+def _small(size: Size, family: str, n: int) -> list[Pair]:
+    sides = polygon_pairs.small(family, n, max(1000, size.of(120_000, 12_000) // n), size.seed)
+    return [([first], [second]) for first, second in zip(*sides, strict=True)]
+
+
+def _batch(size: Size, family: str, n: int, operation: str = "intersection") -> Contest:
+    """All polygons are simple: shapely is given them at once, pyclipper one by one, their areas are read untimed."""
+    pairs, name = _small(size, family, n), f"batch of {family}s of {n}"
+    if operation != "intersection":
+        ours = [contender("ours", "ours", "overlay of made", operation, 1)]
+        return Contest("overlay", f"{name}, {operation}", False, pairs, None, areas, ours, count=len(pairs))
+    ours, *_ = contenders("overlay of made", None, 1)
+    others = [
+        contender("shapely (GEOS)", "shapely", "small pairs", None, 1, SMALL["shapely"]),
+        contender("pyclipper, gross", "pyclipper", "small pairs", True, 1, SMALL["pyclipper"]),
+        contender("pyclipper, only made and filled", "pyclipper", "small pairs", False, 1),
+    ]
+    n_sample = max(3, min(60, 1500 // n**2))
+    exact = partial(_exact_areas, pairs)
+    return Contest(
+        "overlay", name, False, pairs, exact, areas, [ours, *others], n_sample=n_sample, most=0, count=len(pairs)
+    )
+
+
+def _two_threads(size: Size, n: int) -> Contest:
+    pairs = _small(size, "star", n)
+    two, one = (contender(name, "ours", "overlay of made", "intersection", threads, goals) for name, threads, goals in
+                (("ours", 2, (None, None)), ("ours, one thread", 1, (1.7, 1.9))))  # fmt: skip
+    name = f"batch of stars of {n}, two threads"
+    return Contest("overlay", name, False, pairs, None, areas, [two, one], count=len(pairs))
+
+
+def _on_lattice(size: Size) -> Contest:
+    source = generator("rows/lattice", size.seed)
+    pairs = [([_lattice_ring(source)], [_lattice_ring(source)]) for _ in range(size.of(1_000, 200))]
+    ours = contenders("overlay of made", None, 1)[:1]
+    return Contest("overlay", "batch on a lattice", True, pairs, None, areas, ours, count=len(pairs))
+
+
+def _filed(size: Size) -> list[Pair]:
+    most = size.of(5_000, 300)
+    return [pair for pair in polygon_pairs.public() if sum(map(len, pair[0] + pair[1])) <= most]
+
+
+def _public(size: Size) -> Contest:
+    """Pairs of public suites, polygons made while the clock runs."""
+    pairs = _filed(size)
+    found = [each for each in contenders("overlay", None, 1) if not each.name.startswith("textbook")]
+    exact = np.array([_ours_exactly(pair) for pair in pairs])
+    return Contest("overlay", "public pairs", True, pairs, exact, areas, found, count=len(pairs))
+
+
+def _identities(size: Size) -> Figure:
+    """How many areas of ours do not add up exactly over the four operations."""
+    wrong, pairs = 0, _filed(size)
+    for pair in pairs:
+        first, second = map(engine.Polygon, pair)
+        both, union, only, either = (
+            engine.overlay(first, second, operation).area_exact  # type: ignore[call-overload]
+            for operation in ("intersection", *OPERATIONS)
+        )
+        other = engine.overlay(second, first, "difference").area_exact
+        wrong += (either + both != union) or (only + other != either)
+    return Figure("public pairs, four operations", "wrong", [wrong], 0, 0, f"{len(pairs)} pairs")
+
+
+def _area(size: Size) -> Contest:
+    pairs = [polygon_pairs.large("spiky", 300, size.seed)]
+    first, second = map(engine.Polygon, pairs[0])
+    ours = Contender("ours", lambda: Prepared(lambda _: engine.overlay(first, second, workers=1).area_exact))
+    return Contest("overlay", "exact area", False, pairs, None, areas, [ours], count=1)
+
+
+def _deadline(size: Size) -> Figure:
+    """How long after its deadline a large overlay returns at the latest, for deadlines all over its time."""
+    first, second = map(engine.Polygon, polygon_pairs.large("comb", size.of(100_000, 1_000), size.seed))
+    engine.overlay(first, second)
+    whole = clocked(partial(engine.overlay, first, second))[0]
+    late = [0.0]
+    for share in np.linspace(0.02, 0.98, 13):
+        start = time.perf_counter()
+        with contextlib.suppress(engine.DeadlineExceededError):
+            engine.overlay(first, second, deadline=whole * share)
+            continue
+        late.append(time.perf_counter() - start - whole * share)
+    note = f"the longest of {len(late) - 1} deadlines; the whole takes {whole:.3g} s"
+    return Figure("late after a deadline", "s", [max(late)], note=note)

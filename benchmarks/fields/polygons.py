@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from fractions import Fraction
+from functools import partial
 
 import numpy as np
 
 import engine
-from benchmarks.contest import Ask, Contender, Contest, areas
-from benchmarks.workloads import generator
-from engine.textbook import sutherland_hodgman
+from benchmarks import workloads
+from benchmarks.contest import Contender, Contest, contender
+from benchmarks.errors import areas, same
+from benchmarks.fields import Size, Task
+from benchmarks.fields.segments import as_json
+from benchmarks.workloads import generator, simple_solids
 
 BOX = np.array([[1.0, 0.0, 1.0], [-1.0, 0.0, 1.0], [0.0, 1.0, 1.0], [0.0, -1.0, 1.0]])
 """The square [-1, 1]^2 by rows, in the order of an aabb."""
@@ -29,7 +33,17 @@ def contests(seed: int, scale: float) -> Iterator[Contest]:
         about = "12 vertices each on the square [-1, 1]^2" + (
             ", on a lattice of halves, some an ulp off" if is_hard else ""
         )
-        yield Contest("clipping polygons", name, is_hard, rings, exact, areas, CONTENDERS, about)
+        yield Contest("clipping polygons", name, is_hard, rings, exact, areas, contenders(), about)
+
+
+def contenders() -> list[Contender]:
+    """Return those that clip on a box of the plane."""
+    box = engine.Aabb((-1, -1), (1, 1))
+    shown = {
+        "ours": "ours", "textbook: Sutherland-Hodgman": "textbook", "shapely clip_by_rect": "shapely",
+        "pyclipper": "pyclipper",
+    }  # fmt: skip
+    return [contender(name, module, "polygon areas", box) for name, module in shown.items()]
 
 
 def _stars(source: np.random.Generator, n_polygons: int, size: int) -> np.ndarray:
@@ -55,74 +69,48 @@ def _exact(rings: np.ndarray) -> np.ndarray:
     )
 
 
-def ring_areas(vertices: np.ndarray, offsets: np.ndarray) -> np.ndarray:
-    """Return the signed areas of rings of three or more vertices in plain float64."""
-    starts = np.repeat(offsets[:-1], np.diff(offsets))
-    following = np.arange(1, len(vertices) + 1)
-    following[offsets[1:] - 1] = offsets[:-1]
-    a, b = vertices - vertices[starts], vertices[following] - vertices[starts]
-    return 0.5 * np.add.reduceat(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], offsets[:-1])
+# --- the table --------------------------------------------------------------------------------------------------------
+
+RINGS = (3, 4, 10, 30, 100)
+Peers = dict[str, tuple[float, float]]
 
 
-def _ours() -> Ask:
-    region = engine.Aabb((-1, -1), (1, 1))
-
-    def ask(rings: np.ndarray) -> np.ndarray:
-        clipped = engine.clip_polygons(rings, region)
-        counts, found = np.diff(clipped.polygon_offsets), np.zeros(len(rings))
-        found[counts > 0] = np.abs(ring_areas(clipped.vertices, clipped.ring_offsets))  # one ring each at most
-        return found
-
-    return ask
-
-
-def _textbook() -> Ask:
-    def ask(rings: np.ndarray) -> np.ndarray:
-        clipped = [next(iter(sutherland_hodgman.clip_on_convex([ring], BOX)), np.empty((0, 2))) for ring in rings]
-        found, sizes = np.zeros(len(rings)), np.array([len(ring) for ring in clipped])
-        kept = sizes > 0
-        found[kept] = np.abs(ring_areas(np.concatenate(clipped), np.append(0, np.cumsum(sizes[kept]))))
-        return found
-
-    return ask
+def table(size: Size) -> Iterator[Task]:
+    """Yield the rows of the table; one thread, unless a row says otherwise."""
+    solids = simple_solids()
+    naive, six_times = (0.5, 0.65), (15.0, 25.0)
+    for n_vertices in RINGS:
+        for dimension in (2, 3):
+            peers: Peers = {"textbook": naive} | ({"shapely": (4.0, 8.0)} if dimension == 2 else {})
+            if (n_vertices, dimension) == (3, 3):
+                peers |= {"trimesh": six_times, "vtk": six_times}
+            name = f"{n_vertices} vertices, aabb {dimension}D"
+            yield name, partial(_row, size, name, solids[f"aabb {dimension}D"], n_vertices, peers)
+    planes = engine.Convex(workloads.convex_planes(20, size.seed).rows)
+    for name in ("half-space 2D", "half-space 3D", "convex 2D", "20 planes"):
+        yield f"10 vertices, {name}", partial(_row, size, f"10 vertices, {name}", solids.get(name, planes), 10, {})
+    for name in ("aabb 2D", "aabb 3D"):
+        shown = f"10 vertices, {name}, on the planes"
+        yield shown, partial(_row, size, shown, solids[name], 10, {}, True)
 
 
-def _shapely() -> Ask:
-    import shapely
-
-    def ask(rings: np.ndarray) -> np.ndarray:
-        try:
-            return shapely.area(shapely.clip_by_rect(shapely.polygons(rings), -1, -1, 1, 1))
-        except shapely.GEOSException:  # one polygon it cannot clip ends the whole call
-            return np.nan if len(rings) == 1 else np.hstack([ask(ring[None]) for ring in rings])
-
-    return ask
-
-
-def _pyclipper() -> Ask:
-    import pyclipper
-
-    scale = 2.0**40
-
-    def ask(rings: np.ndarray) -> np.ndarray:
-        box = [[int(x * scale), int(y * scale)] for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-        found = np.empty(len(rings))
-        for i, ring in enumerate(np.rint(rings * scale).astype(np.int64).tolist()):
-            clipper = pyclipper.Pyclipper()
-            try:
-                clipper.AddPath(ring, pyclipper.PT_SUBJECT, True)
-                clipper.AddPath(box, pyclipper.PT_CLIP, True)
-                found[i] = sum(pyclipper.Area(path) for path in clipper.Execute(pyclipper.CT_INTERSECTION)) / scale**2
-            except pyclipper.ClipperException:
-                found[i] = np.nan
-        return found
-
-    return ask
+def _row(
+    size: Size, name: str, region: engine.Solid, n_vertices: int, peers: Peers, is_rounded: bool = False
+) -> Contest:
+    n_rings = size.of(250_000, 20_000) // n_vertices
+    rings = workloads.star_rings(n_vertices, region.dimension, n_rings, size.seed)
+    if is_rounded:
+        rings = np.round(rings * 2.0) / 2.0
+    shown = {"textbook": "naive", "shapely": "shapely clip_by_rect"}
+    contenders = [contender("ours", "ours", "kept polygons", region, 1)]
+    for module, goals in peers.items():
+        contenders.append(contender(shown.get(module, module), module, "kept polygons", region, 1, goals))
+    exact = (lambda rows: _exact_kept(rings[rows], region)) if peers else None
+    return Contest("polygons", name, is_rounded, rings, exact, same, contenders, n_sample=100, most=100)
 
 
-CONTENDERS = [
-    Contender("ours", _ours),
-    Contender("textbook: Sutherland-Hodgman", _textbook),
-    Contender("shapely clip_by_rect", _shapely, "shapely"),
-    Contender("pyclipper", _pyclipper, "pyclipper"),
-]
+def _exact_kept(rings: np.ndarray, region: engine.Solid) -> np.ndarray:
+    from tests.reference.sutherland_hodgman import clip_contour, planes_of
+
+    planes = planes_of(as_json(region))
+    return np.array([len(clip_contour(ring, planes)) > 0 for ring in rings.tolist()])

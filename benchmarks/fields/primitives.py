@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.contest import Ask, Contender, Contest, same
+from benchmarks.contenders import Prepared
+from benchmarks.contest import Contender, Contest, contender
+from benchmarks.errors import same
 from benchmarks.workloads import generator
 from engine.jit import kernel
 from engine.predicates.orientation import orient2d, orient3d
@@ -38,9 +40,9 @@ def contests(seed: int, scale: float) -> Iterator[Contest]:
 def _contenders(dimension: int) -> list[Contender]:
     return [
         Contender("ours", lambda: _ours(dimension)),
-        Contender("numpy determinant", lambda: _determinant(dimension), "numpy"),
-        Contender("numpy.linalg.det", lambda: _linalg, "numpy"),
-        Contender("fractions", lambda: lambda items: np.array([_sign(rows) for rows in items.tolist()])),
+        contender("numpy determinant", "numpy", "determinant", dimension),
+        contender("numpy.linalg.det", "numpy", "linalg", dimension),
+        Contender("fractions", lambda: Prepared(lambda items: np.array([_sign(rows) for rows in items.tolist()]))),
     ]
 
 
@@ -57,7 +59,7 @@ def _sign(rows: list[list[float]]) -> int:
     return (value > 0) - (value < 0)
 
 
-def _ours(dimension: int) -> Ask:
+def _ours(dimension: int) -> Prepared:
     signs: Any = _signs_2d if dimension == 2 else _signs_3d
 
     def ask(items: np.ndarray) -> np.ndarray:
@@ -65,7 +67,7 @@ def _ours(dimension: int) -> Ask:
         signs(items, found)
         return found
 
-    return ask
+    return Prepared(ask)
 
 
 @kernel
@@ -81,17 +83,3 @@ def _signs_3d(items, found):
         p = items[i]
         a, b = Point3(p[0, 0], p[0, 1], p[0, 2]), Point3(p[1, 0], p[1, 1], p[1, 2])
         found[i] = orient3d(a, b, Point3(p[2, 0], p[2, 1], p[2, 2]), Point3(p[3, 0], p[3, 1], p[3, 2]))
-
-
-def _determinant(dimension: int) -> Ask:
-    def ask(items: np.ndarray) -> np.ndarray:
-        u, v = items[:, 1] - items[:, 0], items[:, 2] - items[:, 0]
-        if dimension == 2:
-            return np.sign(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
-        return np.sign((np.cross(u, v) * (items[:, 3] - items[:, 0])).sum(axis=1))
-
-    return ask
-
-
-def _linalg(items: np.ndarray) -> np.ndarray:
-    return np.sign(np.linalg.det(items[:, 1:] - items[:, :1]))

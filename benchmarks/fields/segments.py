@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from functools import partial
+from typing import Any
 
 import numpy as np
 
 import engine
-from benchmarks.contest import Ask, Contender, Contest, coordinates
-from benchmarks.workloads import generator
-from engine.textbook import cohen_sutherland, convex_cohen_sutherland, segment_sphere
+from benchmarks import workloads
+from benchmarks.contest import Contest, contender
+from benchmarks.errors import coordinates, same
+from benchmarks.fields import Size, Task
+from benchmarks.workloads import generator, simple_solids
 
 LOW, HIGH = -1.0, 1.0
 
@@ -49,81 +53,25 @@ def exact_ends(segments: np.ndarray, region: dict) -> np.ndarray:
     return rows
 
 
-def ours_on(region: engine.Solid, share: list[float]) -> Callable[[], Ask]:
-    """Return the maker of ours."""
-
-    def ask(segments: np.ndarray) -> np.ndarray:
-        pieces, accuracy = engine.clip_segments(segments, region, report=True)
-        share.append(accuracy.n_beyond_filter / max(1, accuracy.n_items))
-        rows = np.full((len(segments), segments[0].size), np.nan)
-        rows[pieces.source] = np.hstack([pieces.start, pieces.end])
-        return rows
-
-    return lambda: ask
-
-
-def rows_of(found: np.ndarray, kept: np.ndarray) -> np.ndarray:
-    """Return clipped segments as rows, NaN where not kept."""
-    return np.where(kept[:, None], found.reshape(len(found), -1), np.nan)
-
-
 def _contest(
-    name: str, is_hard: bool, segments: np.ndarray, n_exact: int, region: dict, share: list, rest: list, about: str
+    name: str, is_hard: bool, segments: np.ndarray, n_exact: int, region: dict, rest: list, about: str
 ) -> Contest:
     solid = {"aabb": engine.Aabb, "convex": engine.Convex, "sphere": engine.Sphere}[region["type"]]
     made = solid(**{name: value for name, value in region.items() if name != "type"})
-    contenders = [Contender("ours", ours_on(made, share), exact_share=lambda: share[-1]), *rest]
+    contenders = [contender(shown, *how, made, 1) for shown, *how in [("ours", "ours", "segments"), *rest]]
     exact = exact_ends(segments[:n_exact], region)
     return Contest("clipping segments", name, is_hard, segments, exact, coordinates, contenders, about)
 
 
 def _on_box(segments: np.ndarray, dimension: int, is_hard: bool, n_exact: int) -> Contest:
-    low, high = np.full(dimension, LOW), np.full(dimension, HIGH)
-
-    def textbook(asked: np.ndarray) -> np.ndarray:
-        found, kept = cohen_sutherland.clip(asked, low, high)
-        return rows_of(found, kept == 1)
-
-    rest = [Contender("textbook: Cohen-Sutherland", lambda: textbook)]
+    rest = [("textbook: Cohen-Sutherland", "textbook", "segments")]
     if dimension == 2:
-        rest += [
-            Contender("shapely clip_by_rect", _shapely, "shapely"),
-            Contender("numba_celltree", _celltree, "numba-celltree"),
-        ]
-    region = {"type": "aabb", "min": low.tolist(), "max": high.tolist()}
+        rest.append(("shapely clip_by_rect", "shapely", "segments"))
+        rest.append(("numba_celltree", "celltree", "segments one by one"))
+    region = {"type": "aabb", "min": [LOW] * dimension, "max": [HIGH] * dimension}
     name = f"box {dimension}D, {'corners' if is_hard else 'random'}"
     about = "through corners and edges of the box, give or take 2 ulps" if is_hard else "random in twice the box"
-    return _contest(name, is_hard, segments, n_exact, region, [], rest, about)
-
-
-def _shapely() -> Ask:
-    import shapely
-
-    def ask(segments: np.ndarray) -> np.ndarray:
-        clipped = shapely.clip_by_rect(shapely.linestrings(segments), LOW, LOW, HIGH, HIGH)
-        rows = np.full((len(segments), 4), np.nan)
-        lines = np.flatnonzero(shapely.get_num_coordinates(clipped) == 2)
-        rows[lines] = shapely.get_coordinates(clipped[lines]).reshape(-1, 4)
-        return rows
-
-    return ask
-
-
-def _celltree() -> Ask:
-    from numba_celltree.algorithms.cohen_sutherland import cohen_sutherland_line_box_clip
-    from numba_celltree.constants import Box, Point
-
-    box = Box(LOW, HIGH, LOW, HIGH)
-
-    def ask(segments: np.ndarray) -> np.ndarray:
-        rows = np.full((len(segments), 4), np.nan)
-        for row, (a, b) in zip(rows, segments.tolist(), strict=True):
-            kept, start, end = cohen_sutherland_line_box_clip(Point(*a), Point(*b), box)
-            if kept:
-                row[:] = (*start, *end)
-        return rows
-
-    return ask
+    return _contest(name, is_hard, segments, n_exact, region, rest, about)
 
 
 def _on_planes(source: np.random.Generator, n_segments: int, n_exact: int) -> Contest:
@@ -138,14 +86,9 @@ def _on_planes(source: np.random.Generator, n_segments: int, n_exact: int) -> Co
         direction = source.normal(size=3)
         segment[:] = at - direction, at + direction
     region = {"type": "convex", "planes": planes.tolist()}
-
-    def textbook(asked: np.ndarray) -> np.ndarray:
-        found, kept = convex_cohen_sutherland.clip(asked, planes)
-        return rows_of(found, kept == 1)
-
-    rest = [Contender("textbook: Cohen-Sutherland by planes", lambda: textbook)]
+    rest = [("textbook: Cohen-Sutherland by planes", "textbook", "segments")]
     about = "through the common line of two of 20 planes"
-    return _contest("20 planes, edges", True, segments, n_exact, region, [], rest, about)
+    return _contest("20 planes, edges", True, segments, n_exact, region, rest, about)
 
 
 def _on_sphere(source: np.random.Generator, n_segments: int, n_exact: int) -> Contest:
@@ -153,11 +96,84 @@ def _on_sphere(source: np.random.Generator, n_segments: int, n_exact: int) -> Co
     touch /= np.linalg.norm(touch, axis=1, keepdims=True)
     along = np.cross(touch, source.normal(size=(n_segments, 3)))
     segments = np.stack([touch - along, touch + along * source.uniform(0.5, 2, (n_segments, 1))], axis=1)
-    center = np.zeros(3)
+    rest = [("textbook: quadratic", "textbook", "segments")]
+    region = {"type": "sphere", "center": [0.0] * 3, "radius": 1.0}
+    return _contest("sphere, tangents", True, segments, n_exact, region, rest, "tangents, as near as doubles come")
 
-    def textbook(asked: np.ndarray) -> np.ndarray:
-        return rows_of(*segment_sphere.clip(asked, center, 1.0))
 
-    rest = [Contender("textbook: quadratic", lambda: textbook)]
-    region = {"type": "sphere", "center": center.tolist(), "radius": 1.0}
-    return _contest("sphere, tangents", True, segments, n_exact, region, [], rest, "tangents, as near as doubles come")
+# --- the table --------------------------------------------------------------------------------------------------------
+
+NAIVE = {"random": (0.65, 1.0), "corner": (0.3, 0.6), "edge": (0.3, 0.6), "ulp": (0.3, 0.6)}
+Peers = dict[str, tuple[float, float]]
+KINDS = {"textbook": "naive segments"}
+
+
+def table(size: Size) -> Iterator[Task]:
+    """Yield the rows of the table; one thread, unless a row says otherwise."""
+    solids = simple_solids()
+    square, cube = solids["aabb 2D"], solids["aabb 3D"]
+    planes = engine.Convex(workloads.convex_planes(20, size.seed).rows)
+    peers: Peers = {"celltree": (0.7, 1.0), "shapely": (10.0, 20.0)}
+    yield "aabb 2D, random", partial(_row, size, "aabb 2D, random", square, "random", peers)
+    for kind, goals in NAIVE.items():
+        yield f"aabb 3D, {kind}", partial(_row, size, f"aabb 3D, {kind}", cube, kind, {"textbook": goals})
+    for kind in ("corner", "edge", "ulp"):
+        yield f"aabb 2D, {kind}", partial(_row, size, f"aabb 2D, {kind}", square, kind, {})
+    of_planes, of_sphere = {"textbook": (0.37, 0.7)}, {"textbook": (0.1, 0.3)}
+    yield "20 planes", partial(_row, size, "20 planes", planes, "random", of_planes)
+    yield "sphere 3D", partial(_row, size, "sphere 3D", solids["sphere 3D"], "random", of_sphere)
+    for name in ("sphere 2D", "half-space 2D", "half-space 3D", "convex 2D"):
+        yield name, partial(_row, size, name, solids[name], "random", {})
+    for n_vertices in (10, 1_000):
+        polygon = engine.Polygon(workloads.star_polygon(n_vertices, size.seed).rings)
+        for kind in ("random", "ulp"):
+            name = f"polygon of {n_vertices:,}, {kind}"
+            yield name, partial(_row, size, name, polygon, kind, {}, 20)
+    for region, name in ((cube, "aabb 3D, two threads"), (planes, "20 planes, two threads")):
+        yield name, partial(_two_threads, size, name, region)
+    for faces in ("1k", "86k")[: size.of(2, 1)]:
+        yield f"{faces} faces", partial(_mesh, size, faces, False)
+    yield "first 100, 1k faces", partial(_mesh, size, "1k", True)
+
+
+def as_json(region: engine.Solid) -> dict[str, Any] | None:
+    """Return a region as the reference reads it."""
+    match region:
+        case engine.Aabb():
+            return {"type": "aabb", "min": region.min.tolist(), "max": region.max.tolist()}
+        case engine.Convex():
+            return {"type": "convex", "planes": region.planes.tolist()}
+        case engine.Sphere():
+            return {"type": "sphere", "center": region.center.tolist(), "radius": region.radius}
+    return None
+
+
+def _row(size: Size, name: str, region: engine.Solid, kind: str, peers: Peers, share: int = 1) -> Contest:
+    segments = workloads.segments_of(kind, region.dimension, size.of(1_000_000, 50_000) // share, size.seed)
+    contenders = [contender("ours", "ours", "segments", region, 1)]
+    for module, goals in peers.items():
+        shown = {"textbook": "naive", "shapely": "shapely clip_by_rect", "celltree": "numba_celltree"}[module]
+        contenders.append(contender(shown, module, KINDS.get(module, "segments"), region, 1, goals))
+    told = as_json(region)
+    exact = None if told is None or not peers else lambda rows: exact_ends(segments[rows], told)
+    return Contest("segments", name, kind != "random", segments, exact, coordinates, contenders, n_sample=100)
+
+
+def _two_threads(size: Size, name: str, region: engine.Solid) -> Contest:
+    segments = workloads.segments_of("random", region.dimension, size.of(1_000_000, 50_000), size.seed)
+    one = contender("ours, one thread", "ours", "segments", region, 1, (1.7, 1.9))
+    two = contender("ours", "ours", "segments", region, 2)
+    return Contest("segments", name, False, segments, None, coordinates, [two, one])
+
+
+def _mesh(size: Size, faces: str, is_new: bool) -> Contest:
+    """Segments between two random points of the mesh's box, of about its size: do they meet a face?"""
+    mesh = workloads.mesh_of_size(faces, size.seed)
+    n_segments = 100 if is_new else size.of(100_000, 5_000)
+    segments = np.ascontiguousarray(workloads.uniform_points(mesh, 2 * n_segments, size.seed).reshape(-1, 2, 3))
+    contenders = [
+        contender("ours", "ours", "hits", mesh, 1, is_new=is_new),
+        contender("trimesh + embreex", "trimesh", "hits", mesh, 1, (3.0, 10.0), is_new=is_new),
+    ]
+    name = f"first 100, {faces} faces" if is_new else f"{faces} faces"
+    return Contest("segments", name, False, segments, None, same, contenders, count=n_segments)

@@ -1,0 +1,338 @@
+"""Cases that users of other libraries filed (benchmarks/filed), replayed on ours and on every peer.
+
+    python -m benchmarks filed                 # the tables; --cases: also one line for each case
+    python -m benchmarks filed --answers       # compute the exact answers anew and write them into cases.json
+
+Each contender runs in a process of its own, so that one that crashes or never returns costs its own case only. Points
+on a boundary count as contained, bodies that touch as meeting. An area is wrong when it is off by more than a millionth
+of the extent, a piece of a segment likewise; ours must equal the exact answer to the last bit. Nothing is timed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import multiprocessing
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from importlib.metadata import PackageNotFoundError, version
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import engine
+from benchmarks.contenders import PACKAGES, NotApplicable, Placed, answers
+from benchmarks.workloads import Mesh, Rings
+
+PATH = Path(__file__).resolve().parent / "cases.json"
+OUTCOMES = ("right", "wrong", "refused", "crashed", "no answer in time", "not applicable")
+LIMIT = 20.0
+"""Seconds for one case; imports count towards the first."""
+COMPILING = 600.0
+"""The same for ours, which may have to compile its kernels."""
+TOLERANCE = 2.0**-20
+"""Of the extent: more than rounding coordinates does, less than any piece anyone would miss."""
+Case = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Peer:
+    """One contender: its module, and for each kind of question what its maker is called."""
+
+    name: str
+    module: str
+    calls: dict[str, str]
+
+
+POINTS, PIECES, PAIR = {"locate 3D": "points"}, {"clip_segments 3D": "pieces"}, {"collide 3D": "pair"}
+OVERLAY, CLIPPING = {"overlay 2D": "overlay of made"}, {"clip_polygons 2D": "area by rectangle"}
+PLANE = {"locate 2D": "points", "clip_segments 2D": "pieces", **OVERLAY}
+PEERS = (
+    Peer("ours", "", {}),
+    Peer("shapely", "shapely", PLANE | {"collide 2D": "pair"}),
+    Peer("shapely clip_by_rect", "shapely", {"clip_segments 2D": "pieces by rectangle", **CLIPPING}),
+    Peer("matplotlib", "matplotlib", {"locate 2D": "points"}),
+    Peer("pyclipper", "pyclipper", PLANE | CLIPPING),
+    Peer("Clipper2 by manifold3d", "manifold3d", CLIPPING | OVERLAY),
+    Peer("numba_celltree", "celltree", {"clip_segments 2D": "pieces"}),
+    Peer("Open3D", "open3d", POINTS | PAIR),
+    Peer("trimesh + embreex", "trimesh", POINTS | PIECES),
+    Peer("libigl", "igl", POINTS | PAIR),
+    Peer("VTK", "vtk", POINTS | PAIR),
+    Peer("CGAL", "cgal", POINTS),
+    Peer("coal", "coal", PAIR),
+    Peer("fcl", "fcl", PAIR),
+    Peer("manifold3d", "manifold3d", PAIR),
+)
+
+
+def load() -> list[Case]:
+    """Return the cases."""
+    return json.loads(PATH.read_text("utf-8"))
+
+
+def kind_of(case: Case) -> str:
+    """Return the operation and the dimension."""
+    from tests.reference.solids import dimension
+
+    data = case["input"]
+    solids = (data[key] for key in ("solid", "region", "first", "subject") if key in data)
+    return f"{case['operation']} {dimension(next(solids, None) or data['bodies'][0]['solid'])}D"
+
+
+# --- judging ----------------------------------------------------------------------------------------------------------
+
+
+def is_right(case: Case, answer: Any) -> bool:
+    """Say whether a peer's answer is the exact one, up to rounding."""
+    exact = case["answer"]
+    match case["operation"]:
+        case "locate":
+            return [bool(held) for held in answer] == [location >= 0 for location in exact]
+        case "collide":
+            return bool(answer) == (exact != "disjoint")
+        case "overlay":
+            size = np.prod(np.maximum(*(_extent(case["input"][key]["rings"]) for key in ("subject", "clip"))))
+            area = Fraction(*(int(part, 16) for part in exact["area"].split("/")))
+            return abs(answer - float(area)) <= TOLERANCE * size
+        case "clip_polygons":
+            size = np.prod(_extent([ring for rings in case["input"]["polygons"] for ring in rings]))
+            return abs(answer - sum(abs(area_of(ring)) for rings in exact for ring in rings)) <= TOLERANCE * size
+    slack = TOLERANCE * _extent([case["input"]["segments"]]).max()
+    pieces = _long_pieces([(piece["segment"], piece["start"], piece["end"]) for piece in exact], slack)
+    found = _long_pieces(answer, slack)
+    return len(pieces) == len(found) and all(
+        i == j and np.abs(ends - others).max() <= slack
+        for (i, ends), (j, others) in zip(pieces, found, strict=True)
+    )  # fmt: skip
+
+
+def area_of(ring: Any) -> float:
+    """Return the signed area of a ring in plain float64."""
+    x, y = np.asarray(ring, float).T
+    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+
+
+def _extent(rings: list[Any]) -> np.ndarray:
+    every = np.concatenate([np.array(ring, float).reshape(-1, np.shape(ring)[-1]) for ring in rings])
+    return np.ptp(every, axis=0)
+
+
+def _long_pieces(pieces: Sequence[Any], slack: float) -> list[tuple[int, np.ndarray]]:
+    """Return the pieces that are more than a point, in order, each from its least end."""
+    rows = [(int(i), np.array(sorted([tuple(start), tuple(end)]), float)) for i, start, end in pieces]
+    rows = [row for row in rows if np.abs(row[1][1] - row[1][0]).max() > slack]
+    return sorted(rows, key=lambda row: (row[0], row[1].tolist()))
+
+
+# --- replaying --------------------------------------------------------------------------------------------------------
+
+
+def _rings(solid: dict[str, Any]) -> list[np.ndarray]:
+    """Return the rings of a polygon or a box of the plane."""
+    if solid["type"] == "aabb":
+        (x0, y0), (x1, y1) = solid["min"], solid["max"]
+        return [np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)], float)]
+    return [np.array(ring, float) for ring in solid["rings"]]
+
+
+def _subject(solid: dict[str, Any]) -> Any:
+    """Return a solid as the contenders take it."""
+    match solid["type"]:
+        case "polyhedron" | "surface":
+            return Mesh("case", np.array(solid["vertices"], float), np.array(solid["faces"], np.int64))
+        case "sphere":
+            return engine.Sphere(solid["center"], solid["radius"])
+        case "aabb" if len(solid["min"]) == 3:
+            return engine.Aabb(solid["min"], solid["max"])
+        case "polygon" | "aabb":
+            return Rings("case", _rings(solid))
+    raise NotApplicable(solid["type"])
+
+
+def _region(solid: dict[str, Any]) -> Any:
+    match solid["type"]:
+        case "polyhedron":
+            return engine.Polyhedron(solid["vertices"], solid["faces"])
+        case "polygon":
+            return Rings("region", _rings(solid))
+        case "aabb":
+            return engine.Aabb(solid["min"], solid["max"])
+    raise NotApplicable(solid["type"])
+
+
+def _placed(data: dict[str, Any], key: str) -> Placed:
+    pose = data.get(f"{key}_pose")
+    placed = None if pose is None else tuple(np.array(pose[part], float) for part in ("rotation", "translation"))
+    return Placed(_subject(data[key]), placed, data[key]["type"] != "surface")  # type: ignore[arg-type]
+
+
+def _asked(module: str, kind: str, operation: str, data: dict[str, Any]) -> Any:
+    """Return a contender's answer to a case."""
+    match operation:
+        case "locate":
+            return answers(module, kind, _subject(data["solid"]), np.array(data["points"], float))
+        case "clip_segments":
+            return answers(module, kind, _region(data["region"]), np.array(data["segments"], float))
+        case "clip_polygons":
+            polygons = [[np.array(ring, float) for ring in rings] for rings in data["polygons"]]
+            return answers(module, kind, _region(data["region"]), polygons)
+        case "overlay":
+            return answers(module, kind, data["operation"], [(_rings(data["subject"]), _rings(data["clip"]))])[0]
+    return answers(module, kind, (_placed(data, "first"), _placed(data, "second")), None)
+
+
+def _answer(peer: Peer, case: Case) -> str:
+    """Return the outcome of one case; in the contender's own process."""
+    if peer.name == "ours":
+        from tests.hard.operations import OPERATIONS
+
+        return "right" if OPERATIONS[case["operation"]].by_engine(case["input"]) == case["answer"] else "wrong"
+    try:
+        answer = _asked(peer.module, peer.calls[kind_of(case)], case["operation"], case["input"])
+        return "right" if is_right(case, answer) else "wrong"
+    except NotApplicable:
+        return "not applicable"
+
+
+def _serve(pipe: Connection, name: str) -> None:
+    """Answer cases until there are no more."""
+    peer = next(peer for peer in PEERS if peer.name == name)
+    while (case := pipe.recv()) is not None:
+        try:
+            pipe.send((_answer(peer, case), ""))
+        except (ImportError, OSError) as error:
+            pipe.send(("absent", f"{type(error).__name__}: {error}".splitlines()[0]))
+        except Exception as error:  # whatever a peer raises
+            pipe.send(("refused", f"{type(error).__name__}: {error}".splitlines()[0]))
+
+
+def replay(names: Sequence[str] = (), limit: float = LIMIT, cases: list[Case] | None = None) -> list[dict[str, str]]:
+    """Return one row for each contender and case: `case`, `kind`, `contender`, `version`, `outcome`, `note`.
+
+    A contender that cannot be imported has one row, with the outcome `absent`. cases: those that users filed, if None.
+    """
+    asked = load() if cases is None else cases
+    return [row for peer in PEERS if not names or peer.name in names for row in _replay_one(peer, asked, limit)]
+
+
+def _replay_one(peer: Peer, cases: list[Case], limit: float) -> list[dict[str, str]]:
+    context, rows = multiprocessing.get_context("spawn"), []
+    process, pipe = None, None
+    for case in cases:
+        kind = kind_of(case)
+        row = {
+            "case": case["id"],
+            "kind": kind,
+            "contender": peer.name,
+            "version": _version(PACKAGES.get(peer.module, "")),
+        }
+        if peer.name != "ours" and kind not in peer.calls:
+            rows.append(row | {"outcome": "not applicable", "note": ""})
+            continue
+        if process is None:
+            pipe, other = context.Pipe()
+            process = context.Process(target=_serve, args=(other, peer.name), daemon=True)
+            process.start()
+            other.close()
+        outcome, note = _ask(pipe, case, limit if peer.module else COMPILING)
+        if outcome == "absent":
+            rows = [{**row, "case": "", "kind": "", "outcome": outcome, "note": note}]
+            break
+        if outcome in ("crashed", "no answer in time"):
+            process.kill()
+            process.join()
+            note, process = note or f"exit code {process.exitcode}", None
+        rows.append(row | {"outcome": outcome, "note": note})
+    if process is not None:
+        process.kill()
+        process.join()
+    return rows
+
+
+def _ask(pipe: Connection, case: Case, limit: float) -> tuple[str, str]:
+    try:
+        pipe.send(case)
+        return pipe.recv() if pipe.poll(limit) else ("no answer in time", f"{limit:g} s")
+    except (EOFError, ConnectionError):
+        return "crashed", ""
+
+
+# --- writing ----------------------------------------------------------------------------------------------------------
+
+
+def section(rows: list[dict[str, str]]) -> str:
+    """Return the section of the report: contenders and their counts, then every case that a peer does not pass."""
+    cases = {case["id"]: case for case in load()}
+    threads = len({case["thread"] for case in cases.values()})
+    lines = [
+        "## Cases that users filed\n",
+        f"{len(cases)} inputs from {threads} public threads about peers and other libraries, replayed on the installed "
+        "versions ([benchmarks/filed](../benchmarks/filed/README.md)). A boundary counts as contained, contact as "
+        "meeting; areas and pieces may be off by a millionth of the extent; ours must be exact to the last bit.\n",
+        "| contender | version | asked | " + " | ".join(OUTCOMES[:-1]) + " |",
+        "|---|---|---|" + "---|" * (len(OUTCOMES) - 1),
+    ]
+    for name in dict.fromkeys(row["contender"] for row in rows):
+        mine = [row for row in rows if row["contender"] == name]
+        if mine[0]["outcome"] == "absent":
+            lines.append(f"| {name} | not installed: {mine[0]['note']} |" + " |" * len(OUTCOMES))
+            continue
+        count = Counter(row["outcome"] for row in mine)
+        asked = len(mine) - count["not applicable"]
+        cells = " | ".join(str(count[outcome]) for outcome in OUTCOMES[:-1])
+        lines.append(f"| {name} | {mine[0]['version']} | {asked} | {cells} |")
+    failed: dict[str, list[str]] = {}
+    for row in rows:
+        if row["outcome"] not in ("right", "not applicable", "absent"):
+            how = "" if row["outcome"] == "wrong" else f" ({row['outcome']})"
+            failed.setdefault(row["case"], []).append(row["contender"] + how)
+    passed = len(cases) - len(failed)
+    lines += [f"\nAll contenders pass {passed} of the cases today; not these:\n", "| case | reported | wrong today |"]
+    lines.append("|---|---|---|")
+    for name, contenders in failed.items():
+        case = cases[name]
+        repository, number = case["thread"].split("#")
+        link = f"[{name}](https://github.com/{repository}/issues/{number})"
+        lines.append(f"| {link} | {case['about']} | {', '.join(contenders)} |")
+    return "\n".join(lines) + "\n"
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package) if package else ""
+    except PackageNotFoundError:
+        return "?"
+
+
+def write_answers() -> None:
+    """Compute every exact answer by the rational reference."""
+    from tests.hard.operations import OPERATIONS
+
+    cases = load()
+    for case in cases:
+        case["answer"] = OPERATIONS[case["operation"]].exact(case["input"])
+    PATH.write_text("[\n" + ",\n".join(json.dumps(case) for case in cases) + "\n]\n", "utf-8")
+
+
+def main(words: list[str] | None = None) -> int:
+    """Replay and print; 1 if an answer of ours is not right."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--answers", action="store_true", help="write the exact answers into cases.json")
+    parser.add_argument("--only", nargs="*", default=(), metavar="NAME", help="only these contenders")
+    parser.add_argument("--cases", action="store_true", help="print every answer that is not right, with its note")
+    options = parser.parse_args(words)
+    if options.answers:
+        write_answers()
+        return 0
+    rows = replay(options.only)
+    if options.cases:
+        for row in rows:
+            if row["outcome"] not in ("right", "not applicable"):
+                print(f"{row['contender']:<24} {row['outcome']:<18} {row['case']:<50} {row['note']}")
+    print(section(rows))
+    return int(any(row["contender"] == "ours" and row["outcome"] != "right" for row in rows))

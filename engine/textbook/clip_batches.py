@@ -1,7 +1,7 @@
 """The textbook's clipping as careful code without exactness has it: scalars in the loop, nothing allocated there.
 
 The same steps as cohen_sutherland.py, segment_sphere.py and sutherland_hodgman.py, written out for speed; on planes one
-pass over the rows (Cyrus and Beck) in place of a code word after every cut. The yardstick of benchmarks/clipping.py:
+pass over the rows (Cyrus and Beck) in place of a code word after every cut. The yardstick of the tables of clipping:
 what exact decisions and correct rounding cost is the time of these.
 What goes wrong: the same as there.
 """

@@ -6,7 +6,7 @@ import multiprocessing
 
 import pytest
 
-from benchmarks.fields import filed
+from benchmarks import filed
 
 CASES = {case["id"]: case for case in filed.load()}
 

@@ -8,7 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import compare, contest, page
+from benchmarks import compare, errors, page
+from benchmarks.contenders import Prepared
+from benchmarks.contenders.with_ours import ring_areas
 from benchmarks.contest import Contender, Contest, Row, hold
 from benchmarks.fields import polygons, primitives, segments
 
@@ -18,8 +20,8 @@ pytest.importorskip("gmpy2", reason="exact answers need gmpy2")
 def held(**answers: object) -> list[Row]:
     """Return the rows of a contest on the numbers 0..99: is a number even?"""
     items = np.arange(100)
-    contenders = [Contender(name, lambda ask=ask: ask) for name, ask in answers.items()]
-    return hold(Contest("numbers", "even", True, items, items % 2 == 0, contest.same, contenders), 3, 0.1)
+    contenders = [Contender(name, lambda ask=ask: Prepared(ask)) for name, ask in answers.items()]
+    return hold(Contest("numbers", "even", True, items, items % 2 == 0, errors.same, contenders), 3, 0.1)
 
 
 def test_right_wrong_refused_and_absent_are_told_apart() -> None:
@@ -29,25 +31,25 @@ def test_right_wrong_refused_and_absent_are_told_apart() -> None:
     right, wrong, refused = held(
         ours=lambda items: items % 2 == 0,
         never=lambda items: np.zeros(len(items)),
-        odd=lambda items: np.where(items % 2, contest.REFUSED, 1),
+        odd=lambda items: np.where(items % 2, errors.REFUSED, 1),
     )
     assert (right.errors["wrong"], right.errors["refused"], right.errors["judged"]) == (0, 0, 100)
     assert (wrong.errors["wrong"], refused.errors["refused"], refused.errors["wrong"]) == (50, 50, 0)
     assert right.rate > 0
-    rows = hold(Contest("n", "e", True, np.arange(3), np.ones(3), contest.same, [Contender("x", absent)]), 1, 0.1)
+    rows = hold(Contest("n", "e", True, np.arange(3), np.ones(3), errors.same, [Contender("x", absent)]), 1, 0.1)
     assert rows[0].absent == "ImportError: no such package"
 
 
 def test_coordinates_are_judged_in_ulps() -> None:
     exact = np.array([[1.0, 2.0], [np.nan, np.nan], [1.0, 1.0]])
     answers = np.array([[1.0, 2.0 + 2**-50], [0.0, 0.0], [1.0, 1.0]])
-    found = contest.coordinates(answers, exact)
+    found = errors.coordinates(answers, exact)
     assert (found["wrong"], found["off"], found["coordinates"], found["ulp_largest"]) == (1, 1, 4, 2.0)
 
 
 def test_areas_are_wrong_beyond_a_millionth() -> None:
     exact = np.array([[1.0, 1.0], [1.0, 1.0], [1.0, 1.0]])
-    found = contest.areas(np.array([1.0, 1.001, np.nan]), exact)
+    found = errors.areas(np.array([1.0, 1.001, np.nan]), exact)
     assert (found["wrong"], found["refused"], found["ulp_largest"]) == (1, 1, 0.0)
 
 
@@ -63,7 +65,7 @@ def test_ours_has_no_wrong_answer(field: object) -> None:
 
 def test_ring_areas() -> None:
     square, triangle = [[1, 1], [3, 1], [3, 3], [1, 3]], [[0, 0], [0, 2], [2, 0]]
-    assert polygons.ring_areas(np.array(square + triangle, float), np.array([0, 4, 7])).tolist() == [4.0, -2.0]
+    assert ring_areas(np.array(square + triangle, float), np.array([0, 4, 7])).tolist() == [4.0, -2.0]
 
 
 def stored(path: Path, rate: float, wrong: int) -> str:

@@ -8,12 +8,11 @@ from __future__ import annotations
 import fcl
 import numpy as np
 
-from benchmarks.collision_scenes import Crowd
-from benchmarks.contenders import Prepared
+import engine
+from benchmarks.contenders import Couple, NotApplicable, Placed, Prepared
+from benchmarks.crowds import Crowd
 from benchmarks.poses import Pair
 from benchmarks.workloads import Mesh
-
-NAME, PACKAGE = "fcl", "python-fcl"
 
 
 def model(mesh: Mesh) -> fcl.BVHModel:
@@ -25,7 +24,7 @@ def model(mesh: Mesh) -> fcl.BVHModel:
     return made
 
 
-def _mesh_pair(pair: Pair, threads: int) -> Prepared:
+def _poses(pair: Pair, threads: int) -> Prepared:
     first = fcl.CollisionObject(model(pair.first), fcl.Transform())
     second = fcl.CollisionObject(model(pair.second), fcl.Transform())
     request = fcl.CollisionRequest(num_max_contacts=1, enable_contact=False)
@@ -40,7 +39,7 @@ def _mesh_pair(pair: Pair, threads: int) -> Prepared:
     def native(rows: np.ndarray) -> list[fcl.Transform]:
         return [fcl.Transform(pair.rotations[row], pair.translations[row]) for row in rows]
 
-    return Prepared(native, ask, np.array)
+    return Prepared(ask, native, np.array)
 
 
 class _Manager:
@@ -84,15 +83,12 @@ def _transforms(crowd: Crowd) -> list[fcl.Transform]:
 
 
 def _crowd(crowd: Crowd, threads: int) -> Prepared:
-    manager = _Manager(crowd)
-    return Prepared(lambda rows: rows, lambda _: manager.pairs(), manager.answer)
-
-
-def _moving_crowd(crowd: Crowd, threads: int) -> Prepared:
-    """Every body gets a new pose, the tree is updated, then asked: once for each of the poses of `Crowd.frames`."""
+    """Asked as the crowd stands; where frames are given, every body gets a new pose before, and the tree is updated."""
     manager = _Manager(crowd)
 
     def ask(frames: list[list[fcl.Transform]]) -> list[tuple[fcl.CollisionObject, fcl.CollisionObject]]:
+        if not frames:
+            return manager.pairs()
         for poses in frames:
             for item, pose in zip(manager.objects, poses, strict=True):
                 item.setTransform(pose)
@@ -100,7 +96,31 @@ def _moving_crowd(crowd: Crowd, threads: int) -> Prepared:
             found = manager.pairs()
         return found
 
-    return Prepared(lambda rows: [_transforms(frame) for frame in crowd.frames()], ask, manager.answer)
+    return Prepared(ask, lambda frames: [_transforms(frame) for frame in frames], manager.answer)
 
 
-MAKERS = {"mesh_pair": _mesh_pair, "crowd": _crowd, "moving_crowd": _moving_crowd}
+def _object(body: Placed) -> fcl.CollisionObject:
+    match body.shape:
+        case Mesh():
+            return fcl.CollisionObject(model(body.shape), fcl.Transform(*body.pose) if body.pose else fcl.Transform())
+        case engine.Aabb() | engine.Sphere() if body.pose is not None or body.shape.dimension == 2:
+            raise NotApplicable("poses of meshes only, and space only")
+        case engine.Aabb(min=low, max=high):
+            return fcl.CollisionObject(fcl.Box(*(high - low)), fcl.Transform((low + high) / 2))
+        case engine.Sphere(center=center, radius=radius):
+            return fcl.CollisionObject(fcl.Sphere(radius), fcl.Transform(center))
+    raise NotApplicable(type(body.shape).__name__)
+
+
+def _pair(pair: Couple, threads: int) -> Prepared:
+    first, second = (_object(body) for body in pair)
+    request = fcl.CollisionRequest(num_max_contacts=1)
+    return Prepared(lambda _: fcl.collide(first, second, request, fcl.CollisionResult()) > 0)
+
+
+MAKERS = {
+    "poses": _poses,
+    "crowd": _crowd,
+    "pair": _pair,
+    "tree": lambda mesh, threads: Prepared(lambda _: model(mesh)),
+}

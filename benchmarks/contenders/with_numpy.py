@@ -10,12 +10,11 @@ import numpy as np
 from benchmarks.contenders import Prepared, in_threads
 from benchmarks.workloads import Planes
 
-NAME, PACKAGE = "numpy", "numpy"
 BLOCK = 1 << 15
 """Signed distances held at once: 256 KB, and products too small for the BLAS to start threads of its own."""
 
 
-def _convex(planes: Planes, threads: int) -> Prepared:
+def _points(planes: Planes, threads: int) -> Prepared:
     normals, offsets = np.ascontiguousarray(planes.rows[:, :-1].T), planes.rows[:, -1]
 
     def ask(points: np.ndarray) -> np.ndarray:
@@ -30,7 +29,21 @@ def _convex(planes: Planes, threads: int) -> Prepared:
         in_threads(part_of, len(points), threads)
         return held
 
-    return Prepared(lambda points: points, ask, lambda held: held)
+    return Prepared(ask)
 
 
-MAKERS = {"convex": _convex}
+def _determinant(dimension: int, threads: int) -> Prepared:
+    def ask(items: np.ndarray) -> np.ndarray:
+        u, v = items[:, 1] - items[:, 0], items[:, 2] - items[:, 0]
+        if dimension == 2:
+            return np.sign(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+        return np.sign((np.cross(u, v) * (items[:, 3] - items[:, 0])).sum(axis=1))
+
+    return Prepared(ask)
+
+
+def _linalg(dimension: int, threads: int) -> Prepared:
+    return Prepared(lambda items: np.sign(np.linalg.det(items[:, 1:] - items[:, :1])))
+
+
+MAKERS = {"points": _points, "determinant": _determinant, "linalg": _linalg}

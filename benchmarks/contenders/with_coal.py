@@ -6,14 +6,15 @@ once and reused.
 
 from __future__ import annotations
 
+from typing import Any
+
 import coal
 import numpy as np
 
-from benchmarks.contenders import Prepared
+import engine
+from benchmarks.contenders import Couple, NotApplicable, Placed, Prepared
 from benchmarks.poses import Pair
 from benchmarks.workloads import Mesh
-
-NAME, PACKAGE = "coal", "coal"
 
 
 def model(mesh: Mesh) -> coal.BVHModelOBBRSS:
@@ -36,14 +37,6 @@ def convex(mesh: Mesh) -> coal.Convex:
     return coal.Convex(points, triangles)
 
 
-def _mesh_pair(pair: Pair, threads: int) -> Prepared:
-    return _calls(model(pair.first), model(pair.second), pair)
-
-
-def _convex_pair(pair: Pair, threads: int) -> Prepared:
-    return _calls(convex(pair.first), convex(pair.second), pair)
-
-
 def _calls(first: coal.CollisionGeometry, second: coal.CollisionGeometry, pair: Pair) -> Prepared:
     request, result = coal.CollisionRequest(), coal.CollisionResult()
     request.enable_contact = False
@@ -60,7 +53,40 @@ def _calls(first: coal.CollisionGeometry, second: coal.CollisionGeometry, pair: 
     def native(rows: np.ndarray) -> list[coal.Transform3s]:
         return [coal.Transform3s(pair.rotations[row], pair.translations[row]) for row in rows]
 
-    return Prepared(native, ask, np.array)
+    return Prepared(ask, native, np.array)
 
 
-MAKERS = {"mesh_pair": _mesh_pair, "convex_pair": _convex_pair}
+def _shape(body: Placed) -> tuple[Any, Any]:
+    place = coal.Transform3s() if body.pose is None else coal.Transform3s(*body.pose)
+    match body.shape:
+        case Mesh():
+            return model(body.shape), place
+        case engine.Aabb() | engine.Sphere() if body.pose is not None or body.shape.dimension == 2:
+            raise NotApplicable("poses of meshes only, and space only")
+        case engine.Aabb(min=low, max=high):
+            place.setTranslation((low + high) / 2)
+            return coal.Box(*(high - low)), place
+        case engine.Sphere(center=center, radius=radius):
+            place.setTranslation(center)
+            return coal.Sphere(radius), place
+    raise NotApplicable(type(body.shape).__name__)
+
+
+def _pair(pair: Couple, threads: int) -> Prepared:
+    first, second = (_shape(body) for body in pair)
+    request, result = coal.CollisionRequest(), coal.CollisionResult()
+    request.num_max_contacts = 1
+
+    def ask(_: object) -> bool:
+        result.clear()
+        return coal.collide(*first, *second, request, result) > 0
+
+    return Prepared(ask)
+
+
+MAKERS = {
+    "poses": lambda pair, threads: _calls(model(pair.first), model(pair.second), pair),
+    "convex poses": lambda pair, threads: _calls(convex(pair.first), convex(pair.second), pair),
+    "pair": _pair,
+    "tree": lambda mesh, threads: Prepared(lambda _: model(mesh)),
+}

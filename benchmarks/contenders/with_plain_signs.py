@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import inspect
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache
 from textwrap import dedent
@@ -19,7 +17,8 @@ from typing import Any
 import numba
 import numpy as np
 
-from benchmarks.contenders import Prepared
+from benchmarks.contenders import Prepared, make
+from benchmarks.poses import Pair
 from engine.collision.meshes import dual_traversal, pose_batch, triangle_triangle
 from engine.containment import locators
 from engine.containment.cells import locate as segment_parity
@@ -36,9 +35,9 @@ def _same_but_for_signs() -> object:
     return numba.njit(**_AS_ENGINE)(changed)
 
 
-def with_plain_signs(ours: Prepared) -> Prepared:
-    """Return our own contender, whose cells are built, with plain signs."""
-    plain = _same_but_for_signs()
+def _points(subject: Any, threads: int) -> Prepared:
+    """As ours, but for the signs in cells; where a mesh is small, it has none."""
+    ours, plain = make("ours", "points", subject, threads), _same_but_for_signs()
 
     def ask(points: np.ndarray) -> np.ndarray:
         exact, locators.locate_by_cells = locators.locate_by_cells, plain
@@ -47,7 +46,7 @@ def with_plain_signs(ours: Prepared) -> Prepared:
         finally:
             locators.locate_by_cells = exact
 
-    return replace(ours, ask=ask)
+    return replace(ours, ask=ask, share=None)
 
 
 @cache
@@ -65,12 +64,19 @@ def _compiled(function: FunctionType, **replaced: object) -> Any:
     return numba.njit(**_AS_ENGINE)(FunctionType(function.__code__, {**function.__globals__, **replaced}))
 
 
-@contextmanager
-def poses_by_plain_signs() -> Iterator[None]:
-    """Have `collide_poses` decide pairs of faces by the bare sign of a float64 determinant: no bound on its error."""
-    module: Any = sys.modules["engine.collision.collide_poses"]  # the package's name stands for the function
-    exact, module.relate_poses = module.relate_poses, _poses_by_plain_signs()
-    try:
-        yield
-    finally:
-        module.relate_poses = exact
+def _poses(pair: Pair, threads: int) -> Prepared:
+    """Pairs of faces are decided by the bare sign of a float64 determinant: no bound on its error."""
+    ours, module = make("ours", "poses", pair, threads), sys.modules["engine.collision.collide_poses"]
+    changed: Any = module  # the package's name stands for the function
+
+    def ask(poses: Any) -> Any:
+        exact, changed.relate_poses = changed.relate_poses, _poses_by_plain_signs()
+        try:
+            return ours.ask(poses)
+        finally:
+            changed.relate_poses = exact
+
+    return replace(ours, ask=ask)
+
+
+MAKERS = {"points": _points, "poses": _poses}

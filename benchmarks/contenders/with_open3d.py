@@ -1,4 +1,4 @@
-"""Open3D's `RaycastingScene.compute_occupancy` (Embree): float32, one ray a point, parity of the hits.
+"""Open3D: `RaycastingScene.compute_occupancy` (Embree): float32, one ray a point, parity of the hits; meshes that meet.
 
 For a scene of bodies it is given one raycasting scene a body, each asked about the points in the body's box. The boxes
 are found as a careful user would: points sorted along x once, a binary search for each body, then y and z.
@@ -6,15 +6,16 @@ are found as a careful user would: points sorted along x once, a binary search f
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import open3d
 from open3d.core import Tensor
 from open3d.t.geometry import RaycastingScene
 
-from benchmarks.contenders import Prepared
+from benchmarks.contenders import Couple, Prepared, meshes_of
 from benchmarks.workloads import Bodies, Mesh
 
-NAME, PACKAGE = "Open3D", "open3d"
 open3d.utility.set_verbosity_level(open3d.utility.VerbosityLevel.Error)
 
 
@@ -26,16 +27,16 @@ def _scene_of(mesh: Mesh, threads: int) -> RaycastingScene:
     return scene
 
 
-def _polyhedron(mesh: Mesh, threads: int) -> Prepared:
+def _points(mesh: Mesh, threads: int) -> Prepared:
     scene = _scene_of(mesh, threads)
     return Prepared(
-        lambda points: Tensor(points.astype(np.float32)),
         lambda points: scene.compute_occupancy(points, nthreads=threads),
+        lambda points: Tensor(points.astype(np.float32)),
         lambda found: found.numpy() > 0.5,
     )
 
 
-def _scene_polyhedra(bodies: Bodies, threads: int) -> Prepared:
+def _scene(bodies: Bodies, threads: int) -> Prepared:
     scenes = [_scene_of(body, threads) for body in bodies.bodies]
     lows = np.array([body.vertices.min(axis=0) for body in bodies.bodies], np.float32)
     highs = np.array([body.vertices.max(axis=0) for body in bodies.bodies], np.float32)
@@ -56,10 +57,17 @@ def _scene_polyhedra(bodies: Bodies, threads: int) -> Prepared:
                 found.append(order[starts[i_body] + near[held]] * len(scenes) + i_body)
         return found
 
-    def answer(found: list[np.ndarray]) -> np.ndarray:
-        return np.sort(np.concatenate(found))
-
-    return Prepared(lambda points: points.astype(np.float32), ask, answer)
+    return Prepared(ask, lambda points: points.astype(np.float32), lambda found: np.sort(np.concatenate(found)))
 
 
-MAKERS = {"polyhedron": _polyhedron, "scene_polyhedra": _scene_polyhedra}
+def _pair(pair: Couple, threads: int) -> Prepared:
+    vector = open3d.utility
+    make: Callable = open3d.geometry.TriangleMesh
+    first, second = (
+        make(vector.Vector3dVector(mesh.vertices), vector.Vector3iVector(mesh.faces.astype(np.int32)))
+        for mesh in meshes_of(pair)
+    )
+    return Prepared(lambda _: first.is_intersecting(second))
+
+
+MAKERS = {"points": _points, "scene": _scene, "pair": _pair}

@@ -1,0 +1,58 @@
+"""numba_celltree: its Cohen-Sutherland, compiled, called for each segment of the plane from a compiled loop."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba
+import numpy as np
+from numba_celltree.algorithms.cohen_sutherland import cohen_sutherland_line_box_clip
+from numba_celltree.constants import Box, Point
+
+import engine
+from benchmarks.contenders import NotApplicable, Prepared, rows_of
+
+
+@numba.njit(nogil=True)
+def _clip(segments: Any, low: Any, high: Any) -> tuple[Any, Any]:
+    box = Box(low[0], high[0], low[1], high[1])
+    clipped, kept = np.empty_like(segments), np.zeros(len(segments), np.bool_)
+    for i in range(len(segments)):
+        p, q = Point(segments[i, 0, 0], segments[i, 0, 1]), Point(segments[i, 1, 0], segments[i, 1, 1])
+        kept[i], p, q = cohen_sutherland_line_box_clip(p, q, box)
+        clipped[i, 0, 0], clipped[i, 0, 1], clipped[i, 1, 0], clipped[i, 1, 1] = p.x, p.y, q.x, q.y
+    return clipped, kept
+
+
+def _segments(region: engine.Aabb, threads: int) -> Prepared:
+    return Prepared(lambda segments: _clip(segments, region.min, region.max), answer=lambda found: rows_of(*found))
+
+
+def _one_by_one(region: engine.Solid, threads: int) -> Prepared:
+    """Called from Python for each segment."""
+    if not isinstance(region, engine.Aabb):
+        raise NotApplicable("boxes only")
+    (x0, y0), (x1, y1) = region.min.tolist(), region.max.tolist()
+    box = Box(x0, x1, y0, y1)
+
+    def ask(segments: np.ndarray) -> np.ndarray:
+        rows = np.full((len(segments), 4), np.nan)
+        for row, (a, b) in zip(rows, np.array(segments, float).tolist(), strict=True):
+            kept, start, end = cohen_sutherland_line_box_clip(Point(*a), Point(*b), box)
+            if kept:
+                row[:] = (*start, *end)
+        return rows
+
+    return Prepared(ask)
+
+
+def _pieces(region: engine.Solid, threads: int) -> Prepared:
+    asked = _one_by_one(region, threads).ask
+
+    def ask(segments: np.ndarray) -> list[Any]:
+        return [(i, row[:2], row[2:]) for i, row in enumerate(asked(segments)) if not np.isnan(row[0])]
+
+    return Prepared(ask)
+
+
+MAKERS = {"segments": _segments, "segments one by one": _one_by_one, "pieces": _pieces}

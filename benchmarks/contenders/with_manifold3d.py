@@ -1,0 +1,53 @@
+"""manifold3d: Clipper2 inside its `CrossSection`, and solids that meet."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from manifold3d import CrossSection, Error, FillRule, Manifold, Mesh64
+
+import engine
+from benchmarks.contenders import Couple, NotApplicable, Prepared, meshes_of, overlays, rings_of
+
+
+def _combined(pair: Any, operation: str) -> Any:
+    first, second = pair
+    found = {
+        "intersection": lambda: first ^ second,
+        "union": lambda: first + second,
+        "difference": lambda: first - second,
+        "symmetric_difference": lambda: (first - second) + (second - first),
+    }[operation]()
+    found.num_vert()  # a CrossSection may put its work off until asked
+    return found
+
+
+def _read(pair: Any) -> Any:
+    return [CrossSection(list(rings), FillRule.EvenOdd) for rings in pair]
+
+
+def _area_by_rectangle(region: engine.Aabb, threads: int) -> Prepared:
+    """Of a polygon of several rings."""
+    return Prepared(lambda polygons: _combined(_read((polygons[0], rings_of(region))), "intersection").area())
+
+
+def _pair(pair: Couple, threads: int) -> Prepared:
+    if not all(body.is_closed for body in pair):
+        raise NotApplicable("solids only")
+    first, second = (Manifold(Mesh64(mesh.vertices, mesh.faces.astype(np.uint64))) for mesh in meshes_of(pair))
+
+    def ask(_: object) -> bool:
+        for solid in (first, second):
+            if solid.status() != Error.NoError:
+                raise ValueError(solid.status())
+        return not (first ^ second).is_empty()
+
+    return Prepared(ask)
+
+
+MAKERS = {
+    "pair": _pair,
+    "area by rectangle": _area_by_rectangle,
+    **overlays(_read, _combined, lambda made, found: found.area()),
+}

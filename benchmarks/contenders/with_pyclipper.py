@@ -1,0 +1,125 @@
+"""pyclipper (Clipper): integers, so coordinates are moved and scaled by a power of two to 50 bits."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pyclipper
+
+import engine
+from benchmarks.contenders import Prepared, overlays, rings_of
+from benchmarks.workloads import Rings
+
+OPERATIONS = {
+    "intersection": pyclipper.CT_INTERSECTION, "union": pyclipper.CT_UNION, "difference": pyclipper.CT_DIFFERENCE,
+    "symmetric_difference": pyclipper.CT_XOR,
+}  # fmt: skip
+Groups = list[list[np.ndarray]]
+
+
+def _integers(groups: Groups) -> tuple[list[list[Any]], float, np.ndarray]:
+    """Return the groups in integers, the scale, and the point that became the origin."""
+    every = np.concatenate([ring for rings in groups for ring in rings])
+    middle = np.round((every.min(axis=0) + every.max(axis=0)) / 2)
+    scale = 2.0 ** np.floor(50 - np.log2(max(np.abs(every - middle).max(), 1e-300)))
+    integers = [[np.rint((ring - middle) * scale).astype(np.int64).tolist() for ring in rings] for rings in groups]
+    return integers, scale, middle
+
+
+def _filled(subject: list[Any], clip: list[Any], are_closed: bool = True) -> Any:
+    clipper = pyclipper.Pyclipper()
+    clipper.AddPaths(subject, pyclipper.PT_SUBJECT, are_closed)
+    clipper.AddPaths(clip, pyclipper.PT_CLIP, True)
+    return clipper
+
+
+def _clipped(subject: list[Any], clip: list[Any], operation: str = "intersection") -> Any:
+    fill = pyclipper.PFT_EVENODD
+    return _filled(subject, clip).Execute(OPERATIONS[operation], fill, fill)
+
+
+def _points(subject: Rings, threads: int) -> Prepared:
+    def ask(points: np.ndarray) -> np.ndarray:
+        (rings, asked), *_ = _integers([subject.rings, [np.array(points, float)]])
+        found = np.array([[pyclipper.PointInPolygon(point, ring) for ring in rings] for point in asked[0]])
+        return (found < 0).any(axis=1) | ((found > 0).sum(axis=1) % 2 == 1)  # -1 is its boundary
+
+    return Prepared(ask)
+
+
+def _pieces(region: engine.Solid, threads: int) -> Prepared:
+    fill = pyclipper.PFT_EVENODD
+
+    def ask(segments: np.ndarray) -> list[Any]:
+        found = []
+        for i, segment in enumerate(np.array(segments, float)):
+            (clip, line), scale, middle = _integers([rings_of(region), [segment]])
+            tree = _filled(line, clip, are_closed=False).Execute2(OPERATIONS["intersection"], fill, fill)
+            for path in pyclipper.OpenPathsFromPolyTree(tree):
+                found.append((i, *(np.array([path[0], path[-1]]) / scale + middle)))
+        return found
+
+    return Prepared(ask)
+
+
+def _polygon_areas(region: engine.Aabb, threads: int) -> Prepared:
+    scale = 2.0**40
+    box = np.rint(rings_of(region)[0] * scale).astype(np.int64).tolist()
+
+    def one(ring: list[Any]) -> float:
+        try:
+            found = _clipped([ring], [box])
+        except pyclipper.ClipperException:
+            return np.nan
+        return sum(map(pyclipper.Area, found)) / scale**2
+
+    return Prepared(lambda rings: np.array([one(ring) for ring in np.rint(rings * scale).astype(np.int64).tolist()]))
+
+
+def _area_by_rectangle(region: engine.Aabb, threads: int) -> Prepared:
+    """Of a polygon of several rings."""
+
+    def ask(polygons: list[list[np.ndarray]]) -> float:
+        (subject, clip), scale, _ = _integers([polygons[0], rings_of(region)])
+        return abs(sum(map(pyclipper.Area, _clipped(subject, clip)))) / scale**2
+
+    return Prepared(ask)
+
+
+def _small_pairs(executes: bool, threads: int) -> Prepared:
+    """Pairs of single rings, called one by one: with the operation, or only making and filling a Clipper."""
+
+    def ask(paths: tuple[list[Any], list[Any]]) -> list[Any]:
+        found = []
+        for subject, clip in zip(*paths, strict=True):
+            clipper = pyclipper.Pyclipper()
+            clipper.AddPath(subject, pyclipper.PT_SUBJECT, True)
+            clipper.AddPath(clip, pyclipper.PT_CLIP, True)
+            if executes:
+                found.append(clipper.Execute(pyclipper.CT_INTERSECTION))
+        return found
+
+    def native(pairs: list[Any]) -> list[Any]:
+        return [np.rint(np.array([pair[side][0] for pair in pairs]) * 2.0**50).astype(np.int64).tolist()
+                for side in range(2)]  # fmt: skip
+
+    def answer(found: list[Any]) -> np.ndarray | None:
+        areas = [sum(map(pyclipper.Area, paths)) / 2.0**100 for paths in found]
+        return np.array(areas) if executes else None
+
+    return Prepared(ask, native, answer)
+
+
+MAKERS = {
+    "points": _points,
+    "pieces": _pieces,
+    "polygon areas": _polygon_areas,
+    "area by rectangle": _area_by_rectangle,
+    "small pairs": _small_pairs,
+    **overlays(
+        lambda pair: _integers(list(pair)),
+        lambda made, operation: _clipped(*made[0], operation),
+        lambda made, found: abs(sum(map(pyclipper.Area, found))) / made[1] ** 2,
+    ),
+}

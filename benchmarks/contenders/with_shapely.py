@@ -1,0 +1,160 @@
+"""Shapely (GEOS): prepared points, `STRtree.query` for a scene, `clip_by_rect`, `intersection`. No threads of its own.
+
+It lets go of the interpreter lock, so points are split over as many threads as we have: what a careful user would do.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import shapely
+
+import engine
+from benchmarks.contenders import Couple, NotApplicable, Prepared, in_threads, overlays, without_poses
+from benchmarks.workloads import Bodies, Rings
+
+
+def _made(rings: list[np.ndarray]) -> shapely.Polygon:
+    return shapely.Polygon(rings[0], rings[1:])
+
+
+def even_odd(rings: list[np.ndarray]) -> Any:
+    """Return the rings as one geometry under even-odd: as given where that is valid, else repaired ring by ring."""
+    polygons = [shapely.Polygon(ring) for ring in rings]
+    for made in (_made(rings), shapely.MultiPolygon(polygons)):
+        if made.is_valid:
+            return made
+    return shapely.symmetric_difference_all([shapely.make_valid(polygon) for polygon in polygons])
+
+
+def _points(subject: Rings, threads: int) -> Prepared:
+    polygon = _made(subject.rings)  # not repaired: as its users call it
+    shapely.prepare(polygon)
+    shapely.contains_xy(polygon, *np.mean(subject.rings[0][:64], axis=0).repeat(4).reshape(2, 4))
+    # the index is made lazily, at the second question or so: by two threads at once, the process may crash
+
+    def ask(points: np.ndarray) -> np.ndarray:
+        def part_of(part: slice) -> np.ndarray:
+            return shapely.intersects_xy(polygon, points[part, 0], points[part, 1])
+
+        return np.concatenate(in_threads(part_of, len(points), threads))
+
+    return Prepared(ask)
+
+
+def _scene(bodies: Bodies, threads: int) -> Prepared:
+    tree = shapely.STRtree([_made(body.rings) for body in bodies.bodies])
+    tree.query(shapely.Point(0, 0))
+
+    def ask(points: np.ndarray) -> list[np.ndarray]:
+        def part_of(part: slice) -> np.ndarray:
+            found = tree.query(points[part], predicate="intersects")
+            found[0] += part.start
+            return found
+
+        return in_threads(part_of, len(points), threads)
+
+    def answer(found: list[np.ndarray]) -> np.ndarray:
+        owners, indices = np.concatenate(found, axis=1)
+        return np.sort(owners * len(bodies.bodies) + indices)
+
+    return Prepared(ask, shapely.points, answer)
+
+
+def _bounds(region: engine.Solid) -> tuple[float, ...]:
+    if not isinstance(region, engine.Aabb):
+        raise NotApplicable("boxes only")
+    return (*region.min.tolist(), *region.max.tolist())
+
+
+def _segments(region: engine.Aabb, threads: int) -> Prepared:
+    bounds = _bounds(region)
+
+    def answer(clipped: np.ndarray) -> np.ndarray:
+        rows = np.full((len(clipped), 4), np.nan)
+        lines = np.flatnonzero(shapely.get_num_coordinates(clipped) == 2)
+        rows[lines] = shapely.get_coordinates(clipped[lines]).reshape(-1, 4)
+        return rows
+
+    return Prepared(lambda lines: shapely.clip_by_rect(lines, *bounds), shapely.linestrings, answer)
+
+
+def _pieces_of(found: Any) -> list[Any]:
+    lines, owners = shapely.get_parts(found, return_index=True)
+    kept = (shapely.get_type_id(lines) == shapely.GeometryType.LINESTRING) & ~shapely.is_empty(lines)
+    return [(int(i), line.coords[0], line.coords[-1]) for line, i in zip(lines[kept], owners[kept], strict=True)]
+
+
+def _pieces(region: Rings | engine.Solid, threads: int) -> Prepared:
+    shape = even_odd(region.rings) if isinstance(region, Rings) else shapely.box(*_bounds(region))
+    return Prepared(lambda lines: shapely.intersection(lines, shape), shapely.linestrings, _pieces_of)
+
+
+def _pieces_by_rectangle(region: engine.Solid, threads: int) -> Prepared:
+    bounds = _bounds(region)
+    return Prepared(lambda lines: shapely.clip_by_rect(lines, *bounds), shapely.linestrings, _pieces_of)
+
+
+def _kept_polygons(region: engine.Aabb, threads: int) -> Prepared:
+    bounds = _bounds(region)
+    return Prepared(
+        lambda shapes: shapely.clip_by_rect(shapes, *bounds), shapely.polygons, lambda found: ~shapely.is_empty(found)
+    )
+
+
+def _polygon_areas(region: engine.Aabb, threads: int) -> Prepared:
+    bounds = _bounds(region)
+
+    def ask(rings: np.ndarray) -> np.ndarray:
+        try:
+            return shapely.area(shapely.clip_by_rect(shapely.polygons(rings), *bounds))
+        except shapely.GEOSException:  # one polygon it cannot clip ends the whole call
+            return np.nan if len(rings) == 1 else np.hstack([ask(ring[None]) for ring in rings])
+
+    return Prepared(ask)
+
+
+def _area_by_rectangle(region: engine.Aabb, threads: int) -> Prepared:
+    """Of polygons of several rings."""
+    bounds = _bounds(region)
+    return Prepared(lambda polygons: sum(shapely.clip_by_rect(even_odd(rings), *bounds).area for rings in polygons))
+
+
+def _pair(pair: Couple, threads: int) -> Prepared:
+    first, second = (body.shape for body in without_poses(pair))
+    if not isinstance(first, Rings) or not isinstance(second, Rings | engine.Sphere):
+        raise NotApplicable("polygons, and a polygon with a disc")
+    if isinstance(second, engine.Sphere):
+        shape = even_odd(first.rings)
+        return Prepared(lambda _: shape.distance(shapely.Point(second.center)) <= second.radius)
+    shapes = [_made(shape.rings) for shape in (first, second)]  # not repaired: as given
+    return Prepared(lambda _: shapely.intersects(*shapes))
+
+
+def _small_pairs(subject: object, threads: int) -> Prepared:
+    """Simple polygons, vectorised."""
+
+    def native(pairs: list[Any]) -> list[np.ndarray]:
+        return [shapely.polygons(np.array([pair[side][0] for pair in pairs])) for side in range(2)]
+
+    return Prepared(lambda shapes: shapely.intersection(*shapes), native, shapely.area)
+
+
+MAKERS = {
+    "small pairs": _small_pairs,
+    "points": _points,
+    "scene": _scene,
+    "segments": _segments,
+    "pieces": _pieces,
+    "pieces by rectangle": _pieces_by_rectangle,
+    "kept polygons": _kept_polygons,
+    "polygon areas": _polygon_areas,
+    "area by rectangle": _area_by_rectangle,
+    "pair": _pair,
+    **overlays(
+        lambda pair: [even_odd(rings) for rings in pair],
+        lambda made, operation: getattr(shapely, operation)(*made),
+        lambda made, found: found.area,
+    ),
+}

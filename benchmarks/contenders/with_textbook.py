@@ -1,0 +1,167 @@
+"""The book's own plain float64 formulas (engine/textbook), compiled like ours: what exactness is worth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+import engine
+from benchmarks.contenders import Couple, Prepared, each_pair, in_threads, meshes_of, rows_of
+from benchmarks.contenders.with_ours import ring_areas
+from benchmarks.workloads import Mesh, Planes, Rings
+from engine.textbook import (
+    clip_batches,
+    cohen_sutherland,
+    collide_by_edges,
+    collide_by_vertices,
+    collide_by_volumes,
+    convex,
+    convex_cohen_sutherland,
+    greiner_hormann,
+    polygon_angle_sum,
+    polygon_ray_parity,
+    polygon_same_side,
+    polyhedron_ray_parity,
+    polyhedron_recast,
+    segment_sphere,
+    sutherland_hodgman,
+    triangle_cross_dot,
+    triangle_projection,
+)
+
+OBLIQUE = np.array([0.5773, 0.2113, 0.7886])
+"""A direction without zero components for the textbook's half-line."""
+REFUSED = -9
+"""In place of an answer."""
+Ask = Callable[[np.ndarray], Any]
+
+
+def box_rows(box: engine.Aabb) -> np.ndarray:
+    """Return the half-spaces of a box, axis by axis: lower side, upper side."""
+    axes = np.repeat(np.eye(box.dimension), 2, axis=0)
+    axes[1::2] *= -1.0
+    return np.column_stack([axes, np.stack([-box.min, box.max], axis=1).ravel()])
+
+
+def _points(subject: Any) -> Ask:
+    """A half-line from the point."""
+    match subject:
+        case Mesh(vertices=vertices, faces=faces):
+            return lambda points: polyhedron_ray_parity.contains(points, vertices, faces, OBLIQUE)
+        case Rings(rings=[ring]):
+            return lambda points: polygon_ray_parity.contains(points, ring, np.array([0, len(ring)]))
+        case Planes(rows=rows):
+            return lambda points: convex.contains(points, rows)
+    raise TypeError(type(subject))
+
+
+def _recast(mesh: Mesh) -> Ask:
+    directions = np.random.default_rng(1).normal(size=(16, 3))
+
+    def ask(points: np.ndarray) -> np.ndarray:
+        contained, unfinished = polyhedron_recast.contains(points, mesh.vertices, mesh.faces, directions, 1e-9)
+        return np.where(unfinished, REFUSED, contained)
+
+    return ask
+
+
+def _segments(region: Any) -> Ask:
+    match region:
+        case engine.Aabb():
+            return lambda segments: _kept(cohen_sutherland.clip(segments, region.min, region.max))
+        case engine.Convex():
+            return lambda segments: _kept(convex_cohen_sutherland.clip(segments, region.planes))
+        case engine.Sphere():
+            return lambda segments: _kept(segment_sphere.clip(segments, region.center, region.radius))
+    raise TypeError(region.type)
+
+
+def _kept(found: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    return rows_of(found[0], found[1] == 1)
+
+
+def _naive_segments(region: Any, threads: int) -> Prepared:
+    """All segments in one compiled pass over the rows (Cyrus and Beck), on threads."""
+    match region:
+        case engine.Aabb():
+            kernel = clip_batches.clip_on_box_2d if region.dimension == 2 else clip_batches.clip_on_box_3d
+            rest: tuple[Any, ...] = (region.min, region.max)
+        case engine.Convex():
+            kernel, rest = clip_batches.clip_on_planes_3d, (region.planes,)
+        case _:
+            kernel, rest = clip_batches.clip_on_sphere_3d, (region.center, region.radius)
+
+    def ask(segments: np.ndarray) -> list[Any]:
+        return in_threads(lambda part: kernel(segments[part], *rest), len(segments), threads)
+
+    return Prepared(ask, answer=lambda found: np.concatenate([_kept(part) for part in found]))
+
+
+def _naive_polygons(region: engine.Aabb, threads: int) -> Prepared:
+    rows = box_rows(region)
+
+    def native(polygons: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        n, size, dimension = polygons.shape
+        return polygons.reshape(-1, dimension), size * np.arange(n + 1)
+
+    def ask(rings: tuple[np.ndarray, np.ndarray]) -> Any:
+        return clip_batches.clip_rings_on_planes(*rings, rows)
+
+    return Prepared(ask, native, lambda found: np.diff(found[1]) > 0)
+
+
+def _polygon_areas(region: engine.Aabb) -> Ask:
+    rows = box_rows(region)
+
+    def ask(rings: np.ndarray) -> np.ndarray:
+        clipped = [next(iter(sutherland_hodgman.clip_on_convex([ring], rows)), np.empty((0, 2))) for ring in rings]
+        found, sizes = np.zeros(len(rings)), np.array([len(ring) for ring in clipped])
+        kept = sizes > 0
+        found[kept] = np.abs(ring_areas(np.concatenate(clipped), np.append(0, np.cumsum(sizes[kept]))))
+        return found
+
+    return ask
+
+
+def _overlay(operation: str) -> Ask:
+    def area(pair: Any) -> float:
+        if len(pair[0]) > 1 or len(pair[1]) > 1:
+            raise ValueError("single rings only")
+        found = [ring for ring in greiner_hormann.intersection(pair[0][0], pair[1][0]) if len(ring) > 2]
+        return sum(abs(float(ring_areas(np.array(ring), np.array([0, len(ring)]))[0])) for ring in found)
+
+    return each_pair(area, lambda _, found: found)
+
+
+def _pair(collide: Callable[..., bool]) -> Callable[[Couple, int], Prepared]:
+    def make(pair: Couple, threads: int) -> Prepared:
+        a, b = meshes_of(pair)
+        return Prepared(lambda _: collide(a.vertices, a.faces, b.vertices, b.faces))
+
+    return make
+
+
+ASKS: dict[str, Callable[[Any], Ask]] = {
+    "points": _points,
+    "recast": _recast,
+    "signed angles": lambda subject: lambda points: polygon_angle_sum.contains_signed(points, subject.rings[0]),
+    "unsigned angles": lambda subject: (
+        lambda points: polygon_angle_sum.contains_unsigned(points, subject.rings[0], 1e-6)
+    ),
+    "same side": lambda subject: lambda points: polygon_same_side.contains(points, subject.rings[0]),
+    "cross and dot": lambda solid: lambda points: triangle_cross_dot.contains(points, solid.vertices),
+    "projection": lambda solid: lambda points: triangle_projection.contains(points, solid.vertices),
+    "segments": _segments,
+    "polygon areas": _polygon_areas,
+    "overlay": _overlay,
+}
+MAKERS: dict[str, Callable[[Any, int], Prepared]] = {
+    **{kind: lambda subject, threads, make=make: Prepared(make(subject)) for kind, make in ASKS.items()},
+    "naive segments": _naive_segments,
+    "kept polygons": _naive_polygons,
+    "pair by vertices": _pair(collide_by_vertices.collide),
+    "pair by edges": _pair(collide_by_edges.collide),
+    "pair by volumes": _pair(collide_by_volumes.collide),
+}

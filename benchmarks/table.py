@@ -1,0 +1,168 @@
+"""The tables: contests and figures of one operation, printed row by row, stored as JSON.
+
+A contender's figure is how many times as long as ours it takes, net of what its calls cost by themselves, with what
+that must be and what it aims at. Speed and error stand in the same row.
+"""
+
+from __future__ import annotations
+
+import argparse
+import gc
+import json
+import sys
+import time
+from collections.abc import Iterable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks import machine
+from benchmarks.contest import Contest, Row, hold
+from benchmarks.fields import Figure, Size, Task, tasks
+from benchmarks.measure import Spread, spread
+from benchmarks.workloads import MissingDataError
+
+RESULTS = Path(__file__).resolve().parent / "results"
+SHOWN = ("wrong", "refused", "off", "ulp_largest", "differ")
+
+
+def options(words: list[str] | None, description: str) -> argparse.Namespace:
+    """Read the command line."""
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="small sizes and few rounds: about a minute")
+    parser.add_argument("--rounds", type=int, help="interleaved rounds a row (15; quick: 3)")
+    parser.add_argument("--seconds", type=float, help="of each contender in each row (3; quick: 0.3)")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--only", default="", metavar="WORD", help="only rows whose name contains WORD")
+    parser.add_argument("--dry", action="store_true", help="write no results file")
+    given = parser.parse_args(words)
+    given.rounds = given.rounds or (3 if given.quick else 15)
+    given.seconds = given.seconds or (0.3 if given.quick else 3.0)
+    given.writes = not (given.dry or given.quick or given.only)
+    return given
+
+
+def ratio(ours: Row, other: Row) -> tuple[Spread, float]:
+    """Return how many times faster ours is, round by round: by the clock, net of bare calls, and by CPU time."""
+    bare = other.call_overhead * other.n_items
+    per_item = ours.n_items / max(other.n_items, 1)
+    wall = [max(b - bare, 1e-12) / a * per_item for a, b in zip(ours.seconds, other.seconds)]
+    cpu = [b / max(a, 1e-9) * per_item for a, b in zip(ours.cpu, other.cpu)]
+    return spread(wall), spread(cpu).median
+
+
+def verdict(value: float, must: float | None, aim: float | None, is_ratio: bool) -> str:
+    """Return `aim`, `must`, `MISS` or, where there is no goal, nothing: larger ratios are better, smaller figures."""
+    sign = 1 if is_ratio else -1
+    if must is None:
+        return ""
+    if aim is not None and sign * value >= sign * aim:
+        return "aim"
+    return "must" if sign * value >= sign * must else "MISS"
+
+
+def lines_of(made: list[Row] | Figure) -> Iterable[str]:
+    """Yield the printed lines of a contest's rows or of a figure."""
+    if isinstance(made, Figure):
+        found = spread(made.values)
+        said = verdict(found.median, made.must, made.aim, made.unit == "x")
+        between = f"{found.low:.3g} - {found.high:.3g}" if len(made.values) > 1 else ""
+        about = "; ".join(part for part in (made.ours, made.peer, made.error, made.note) if part)
+        figure = f"{made.name:<54} {found.median:>9.4g} {made.unit:<5} {between:>17}"
+        yield f"{figure} {_goals(made.must, made.aim)} {said}  {about}"
+        return
+    ours = next(row for row in made if row.contender == "ours")
+    for row in made:
+        name = f"{row.contest:<40} {row.contender:<26}"
+        if row.absent:
+            yield f"{name} absent: {row.absent}"
+            continue
+        figures = f"{_rate(row):>11}"
+        if row is not ours:
+            found, cpu = ratio(ours, row)
+            between, said = f"{found.low:.3g} - {found.high:.3g}", verdict(found.median, *row.goals, is_ratio=True)
+            figures += f" {found.median:>7.3g}x {between:>15} {cpu:>7.3g}x {_goals(*row.goals)} {said:<4}"
+        errors = ", ".join(f"{key} {row.errors[key]:.3g}" for key in SHOWN if row.errors.get(key))
+        judged = f"of {row.errors['judged']} judged: {errors or 'all right'}" if "judged" in row.errors else errors
+        yield "  ".join(part for part in (name + figures, judged, row.method) if part)
+
+
+def _goals(must: float | None, aim: float | None) -> str:
+    return f"{'' if must is None else f'{must:g}':>6} {'' if aim is None else f'{aim:g}':>6}"
+
+
+def _rate(row: Row) -> str:
+    if row.rate >= 1e3:
+        return next(f"{row.rate / size:.3g} {unit}/s" for size, unit in ((1e6, "M"), (1e3, "k")) if row.rate >= size)
+    return f"{1e3 / row.rate:.4g} ms"
+
+
+def run(name: str, chosen: Iterable[Task], given: argparse.Namespace) -> int:
+    """Hold the contests and take the figures; print; write; return how many are below their must."""
+    facts = machine.facts(given.seed, 2)
+    print(head(name, facts))
+    started, rows, figures, missed = time.perf_counter(), [], [], 0
+    for shown, make in chosen:
+        if given.only not in shown:
+            continue
+        if sys.stderr.isatty():
+            print(f"  ... {shown}", end="\r", file=sys.stderr, flush=True)
+        try:
+            made = make()
+            held = hold(made, given.rounds, given.seconds) if isinstance(made, Contest) else made
+        except MissingDataError as error:
+            print(f"{shown}: skipped: {error}", flush=True)
+            continue
+        if isinstance(held, Figure):
+            figures.append(held)
+        else:
+            rows += held
+        for line in lines_of(held):
+            missed += " MISS" in line
+            print(line, flush=True)
+        del made
+        gc.collect()
+    facts |= {"load_after": machine.load(), "seconds": round(time.perf_counter() - started, 1)}
+    print(f"{len(rows)} rows, {len(figures)} figures, {missed} below their must, {facts['seconds']} s, "
+          f"load {facts['load_before']} before and {facts['load_after']} after")  # fmt: skip
+    if given.writes:
+        store(name, facts, rows, figures)
+    return missed
+
+
+def store(name: str, facts: dict[str, Any], rows: list[Row], figures: list[Figure]) -> None:
+    """Write results/<machine>/<name>.json."""
+    folder = RESULTS / machine.name()
+    folder.mkdir(parents=True, exist_ok=True)
+    found = facts | {"rows": [as_json(row) for row in rows], "figures": [asdict(figure) for figure in figures]}
+    (folder / f"{name}.json").write_text(json.dumps(found, indent=1, default=_plain) + "\n")
+
+
+def as_json(row: Row) -> dict[str, Any]:
+    """Return a row as it is stored."""
+    return asdict(row) | {"rate": row.rate, "net_rate": row.net_rate}
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if isinstance(value, np.generic) else str(value)
+
+
+def head(name: str, facts: dict[str, Any]) -> str:
+    """Return what is printed above the table."""
+    versions = ", ".join(f"{k} {v}" for k, v in facts["versions"].items() if v != "not installed")
+    absent = ", ".join(k for k, v in facts["versions"].items() if v == "not installed")
+    return (
+        f"{name}: commit {facts['commit']}, seed {facts['seed']}, {facts['processor']}, {facts['cores']} cores, "
+        f"load {facts['load_before']}\n{versions}"
+        + (f"\nnot installed: {absent}" if absent else "")
+        + "\nrow, contender, its speed; ours is faster by, quartiles, by CPU; must, aim; errors; method"
+    )
+
+
+def main(words: list[str] | None = None, name: str = "containment") -> int:
+    """Run a table; the exit code is 0 also where a row misses its goal: the table says so."""
+    given = options(words, __doc__ or "")
+    run(name, tasks(Size(given.seed, given.quick), (name,)), given)
+    return 0

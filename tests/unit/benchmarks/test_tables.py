@@ -1,0 +1,96 @@
+"""The smallest row of a table runs, and the parts of the tables are right. Nothing here is timed."""
+
+from __future__ import annotations
+
+import json
+from functools import partial
+
+import numpy as np
+import pytest
+
+from benchmarks import errors, machine, measure, table, workloads
+from benchmarks.contenders import Prepared, split
+from benchmarks.contest import Contender, Contest, Row, contender, hold
+from benchmarks.fields import Figure, Size, tasks
+
+
+def test_exact_answers_of_each_subject() -> None:
+    mesh = workloads.bumpy_sphere("bumpy", 0, 1)
+    assert errors.contained(np.zeros(3), mesh) == (True, False)
+    assert errors.contained(mesh.vertices[3], mesh) == (True, True)
+    assert errors.contained(mesh.vertices[3] * 1.01, mesh) == (False, False)
+    square = workloads.Rings("square", [np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]])])
+    assert [errors.contained(np.array(p), square) for p in ([1.0, 1.0], [2.0, 1.0], [3.0, 1.0])] == [
+        (True, False),
+        (True, True),
+        (False, False),
+    ]
+    cube = workloads.convex_planes(6, 0)
+    assert errors.contained(np.array([1.0, 0.5, 0.0]), cube) == (True, True)
+
+
+def test_answers_that_differ_are_settled() -> None:
+    square = workloads.Rings("square", [np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]])])
+    points = np.array([[1.0, 1.0], [3.0, 1.0], [1.0, 0.5]])
+    asked = {"ours": [True, False, True], "peer": [True, True, False]}
+    contenders = [Contender(name, lambda said=said: Prepared(lambda _: np.array(said))) for name, said in asked.items()]
+    exact = partial(lambda rows: errors.locations(points[rows], square))
+    ours, peer = hold(Contest("o", "c", False, points, exact, errors.same, contenders), 2, 0.01)
+    assert (ours.errors["differ"], ours.errors["wrong"], peer.errors["wrong"]) == (2, 0, 2)
+
+
+def test_a_median_has_quartiles() -> None:
+    assert measure.spread([3.0, 1.0, 2.0]) == measure.Spread(2.0, 1.5, 2.5)
+    assert measure.spread([1.0, 2.0]) == measure.Spread(1.5, 1.0, 2.0)
+
+
+@pytest.mark.parametrize(("unit", "value", "said"), [("x", 3.0, "MISS"), ("x", 5.0, "must"), ("s", 1.0, "aim")])
+def test_verdicts(unit: str, value: float, said: str) -> None:
+    figure = Figure("row", unit, [value], *((4.0, 8.0) if unit == "x" else (4.0, 2.0)))
+    assert said in next(iter(table.lines_of(figure)))
+
+
+def test_a_ratio_is_net_of_calls_and_for_the_same_items() -> None:
+    ours = Row("o", "c", False, "ours", n_items=10, seconds=[1.0, 1.0], cpu=[1.0, 1.0])
+    peer = Row("o", "c", False, "peer", n_items=5, seconds=[2.0, 2.0], cpu=[1.0, 1.0], call_overhead=0.1)
+    found, cpu = table.ratio(ours, peer)
+    assert (found.median, cpu) == (3.0, 2.0)
+
+
+def test_parts_cover_all_items() -> None:
+    assert split(7, 3) == [slice(0, 2), slice(2, 4), slice(4, 7)]
+
+
+def test_a_missing_peer_says_why() -> None:
+    missing = contender("peer", "no_such_peer", "points", None)
+    row = hold(Contest("o", "c", False, np.arange(3), None, errors.same, [missing]), 1, 0.01)[0]
+    assert row.absent.startswith("ModuleNotFoundError")
+
+
+def test_facts_name_what_figures_depend_on() -> None:
+    facts = machine.facts(3, 2)
+    assert facts["seed"] == 3
+    assert facts["versions"]["numpy"] == np.__version__
+    json.dumps(facts)
+
+
+def test_every_row_has_its_own_name() -> None:
+    for is_quick in (False, True):
+        names = [name for name, _ in tasks(Size(0, is_quick))]
+        assert len(names) == len(set(names))
+
+
+def test_a_row_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["--quick", "--dry", "--rounds", "2", "--seconds", "0.01", "--only"]
+    assert table.main([*words, "sphere 3D"], "segments") == 0
+    printed = capsys.readouterr().out
+    ours = next(line for line in printed.splitlines() if line.startswith("sphere 3D") and " ours " in line)
+    assert "judged" in ours
+    assert "wrong" not in ours
+    assert "off" not in ours
+
+
+@pytest.mark.full
+def test_quick_run(capsys: pytest.CaptureFixture[str]) -> None:
+    assert table.main(["--quick", "--only", "polygon of 10", "--rounds", "3", "--seconds", "1"], "containment") == 0
+    assert "shapely, prepared" in capsys.readouterr().out
