@@ -16,6 +16,7 @@ TABLES = {
     "segments": "segments clipped on every region, against peers",
 }
 NAMES = TABLES | {
+    "answers": "a fixed set of questions: one hash an operation, compared with those stored",
     "checkouts": "two checkouts of the engine, every row of ours in turns",
     "collision_cost": "what each way out of the quadratic cost of collision saves: docs/collision_cost.md",
     "compare": "two stored reports, side by side",

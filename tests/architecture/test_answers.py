@@ -1,6 +1,6 @@
 """The same answers as stored, bit for bit, whoever restructured what: a tenth of benchmarks/answers.
 
-`python -m benchmarks.answers --check` asks all of it.
+`python -m benchmarks answers --check` asks all of it.
 """
 
 from __future__ import annotations
