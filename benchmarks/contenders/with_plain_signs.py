@@ -22,10 +22,19 @@ from benchmarks.poses import Pair
 from engine.collision.meshes import dual_traversal, pose_batch, triangle_triangle
 from engine.containment import locators
 from engine.containment.cells import locate as segment_parity
-from engine.lanes.cells import plain_signs
+from engine.lanes.cells import planes_of
+from engine.lanes.lanes import bits_of, count_bits
+from engine.lanes.tracing import Number, Rows, traced
 
 _AS_ENGINE: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 """Options of `engine.jit`, without a cache."""
+
+
+@traced
+def plain_signs(groups: Rows, group: int, x: Number, y: Number, z: Number) -> int:
+    """Return what `group_parity` would be if rounding did not matter: parity without a band."""
+    side, least, most = planes_of(groups, group, (x, y, z))
+    return count_bits(bits_of((side < 0.0) & ((least > 0.0) | (most < 0.0)))) & 1
 
 
 @cache

@@ -1,177 +1,203 @@
 """Eight float32 numbers as one value: arithmetic on `Lanes` is eight items at once, one to a lane.
 
 Code on lanes is written like code on numbers (+, -, *, comparisons, `abs`), and what would be a branch becomes
-`select`. A comparison gives a `Mask` of eight truth values (&, |, ~). Compiled, a value is one vector register; with
-the compiler disabled it is an array of eight numbers, with the same results.
+`select`. A comparison gives a `Mask` of eight truth values (&, |, ~); what is no number compares false. Constants are
+written as they are. Compiled, a value is one vector register; in Python it is an array of eight numbers, with the same
+results (`tracing.py`). Rows of an array are counted through all its axes but the last: row k of item i of (n, m, 8) is
+m i + k.
 """
 
 from __future__ import annotations
 
-import operator
-from collections.abc import Callable
-from typing import Any, Final
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import config as numba_config
-from numba import types
-from numba.extending import intrinsic, lower_builtin, models, register_model, type_callable
+from numba.core import cgutils
 
-N_LANES: Final = 8
-_FLOAT: Final = ir.FloatType()
-_WORD: Final = ir.IntType(64)
-_VECTOR: Final = ir.VectorType(_FLOAT, N_LANES)
-_BITS: Final = ir.VectorType(ir.IntType(1), N_LANES)
+from engine.jit import inline
+from engine.lanes.tracing import (
+    LANES,
+    VECTOR,
+    WORD,
+    EmittedArray,
+    EmittedLanes,
+    EmittedMask,
+    EmittedWord,
+    Lanes,
+    Mask,
+    Number,
+    Rows,
+    instruction,
+)
 
-
-class _Lanes(types.Type):  # type: ignore[misc] # numba carries no types
-    def __init__(self) -> None:
-        super().__init__(name="Lanes")
-
-
-class _Mask(types.Type):  # type: ignore[misc]
-    def __init__(self) -> None:
-        super().__init__(name="Mask")
-
-
-LANES: Final = _Lanes()
-MASK: Final = _Mask()
+_ALIGNED = 4  # of a float: numpy promises no more
 
 
-@register_model(_Lanes)
-class _LanesModel(models.PrimitiveModel):  # type: ignore[misc]
-    def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, _VECTOR)
-
-
-@register_model(_Mask)
-class _MaskModel(models.PrimitiveModel):  # type: ignore[misc]
-    def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, _BITS)
-
-
-def _define(operation: Any, operands: list[Any], result: Any, emit: Callable[..., Any]) -> None:
-    """Give an operator its meaning on lanes or masks: emit(builder, *operands)."""
-
-    def typed(context: Any) -> Callable[..., Any]:
-        if len(operands) == 1:
-            return lambda a: result if a == operands[0] else None
-        return lambda a, b: result if (a, b) == tuple(operands) else None
-
-    def lowered(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return emit(builder, *arguments)
-
-    type_callable(operation)(typed)
-    lower_builtin(operation, *operands)(lowered)
-
-
-def _magnitude(builder: Any, a: Any) -> Any:
-    sign = ir.Constant(ir.VectorType(ir.IntType(32), N_LANES), [0x7FFFFFFF] * N_LANES)
-    return builder.bitcast(builder.and_(builder.bitcast(a, sign.type), sign), _VECTOR)
-
-
-def _compared(word: str) -> Callable[..., Any]:
-    return lambda builder, a, b: builder.fcmp_ordered(word, a, b)
-
-
-_define(operator.add, [LANES, LANES], LANES, lambda builder, a, b: builder.fadd(a, b))
-_define(operator.sub, [LANES, LANES], LANES, lambda builder, a, b: builder.fsub(a, b))
-_define(operator.mul, [LANES, LANES], LANES, lambda builder, a, b: builder.fmul(a, b))
-_define(operator.neg, [LANES], LANES, lambda builder, a: builder.fneg(a))
-_define(abs, [LANES], LANES, _magnitude)
-for _operation, _word in ((operator.gt, ">"), (operator.lt, "<"), (operator.ge, ">="), (operator.le, "<=")):
-    _define(_operation, [LANES, LANES], MASK, _compared(_word))
-_define(operator.and_, [MASK, MASK], MASK, lambda builder, a, b: builder.and_(a, b))
-_define(operator.or_, [MASK, MASK], MASK, lambda builder, a, b: builder.or_(a, b))
-_define(operator.invert, [MASK], MASK, lambda builder, a: builder.not_(a))
-
-
-def plain_spread(value: float) -> Any:
+@instruction(lambda value: value)
+def spread(value: Number) -> Lanes:
     """Return a number in all lanes."""
-    return np.full(N_LANES, value, np.float32)
+    return np.full(LANES, value, np.float32)
 
 
-def plain_load(rows: Any, row: int) -> Any:
-    """Return a row of rows (n, 8) float32, C-contiguous."""
-    return rows[row].copy()
+def _emit_load(rows: EmittedArray, row: Any) -> EmittedLanes:
+    there = rows.builder.bitcast(rows.address(row * LANES), VECTOR.as_pointer())
+    return EmittedLanes(rows.builder, rows.builder.load(there, align=_ALIGNED))
 
 
-def plain_store(rows: Any, row: int, value: Any) -> None:
-    """Set a row of rows (n, 8) float32, C-contiguous."""
-    rows[row] = value
+@instruction(_emit_load)
+def load(rows: Rows, row: int) -> Lanes:
+    """Return a row."""
+    return rows.reshape(-1, LANES)[row].copy()
 
 
-def plain_select(mask: Any, a: Any, b: Any) -> Any:
+def _emit_load_lane(rows: EmittedArray, row: Any, lane: Any) -> EmittedLanes:
+    number = rows.builder.load(rows.address(row * LANES + lane))
+    one = rows.builder.insert_element(ir.Constant(VECTOR, ir.Undefined), number, ir.Constant(ir.IntType(32), 0))
+    return _emit_lane_of(EmittedLanes(rows.builder, one), 0)
+
+
+@instruction(_emit_load_lane)
+def load_lane(rows: Rows, row: int, lane: int) -> Lanes:
+    """Return one number of a row in all lanes."""
+    return spread(rows.reshape(-1, LANES)[row, lane])
+
+
+def _emit_store(rows: EmittedArray, row: Any, value: EmittedLanes) -> None:
+    there = rows.builder.bitcast(rows.address(row * LANES), VECTOR.as_pointer())
+    rows.builder.store(value.value, there, align=_ALIGNED)
+
+
+@instruction(_emit_store)
+def store(rows: Rows, row: int, value: Lanes) -> None:
+    """Set a row."""
+    rows.reshape(-1, LANES)[row] = value
+
+
+def _emit_lane_of(value: EmittedLanes, lane: int) -> EmittedLanes:
+    places = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [lane] * LANES)
+    return EmittedLanes(
+        value.builder, value.builder.shuffle_vector(value.value, ir.Constant(VECTOR, ir.Undefined), places)
+    )
+
+
+@instruction(_emit_lane_of)
+def lane_of(value: Lanes, lane: int) -> Lanes:
+    """Return one lane, known when the code is written, in all lanes."""
+    return spread(value[lane])
+
+
+def _emit_select(mask: EmittedMask, a: Any, b: Any) -> EmittedLanes:
+    a, b = (EmittedLanes.of(mask.builder, value).value for value in (a, b))
+    return EmittedLanes(mask.builder, mask.builder.select(mask.value, a, b))
+
+
+@instruction(_emit_select)
+def select(mask: Mask, a: Lanes, b: Lanes) -> Lanes:
     """Return a where the mask is true, else b."""
-    return np.where(mask, a, b)
+    return np.where(mask, np.float32(a), np.float32(b))
 
 
-def plain_bits(mask: Any) -> int:
+def _emit_root(value: EmittedLanes) -> EmittedLanes:
+    function = cgutils.get_or_insert_function(
+        value.builder.module, ir.FunctionType(VECTOR, [VECTOR]), f"llvm.sqrt.v{LANES}f32"
+    )
+    return EmittedLanes(value.builder, value.builder.call(function, [value.value]))
+
+
+@instruction(_emit_root)
+def root(value: Lanes) -> Lanes:
+    """Return square roots."""
+    return np.sqrt(value)
+
+
+def _emit_bits(mask: EmittedMask) -> EmittedWord:
+    return EmittedWord(mask.builder, mask.builder.zext(mask.builder.bitcast(mask.value, ir.IntType(LANES)), WORD))
+
+
+@instruction(_emit_bits)
+def bits_of(mask: Mask) -> int:
     """Return a mask as a number, lane k as bit k."""
-    return sum(1 << lane for lane in np.flatnonzero(mask).tolist())
+    return int(np.packbits(mask, bitorder="little")[0])
 
 
-def _spread_intrinsic(typing_context: Any, value: Any) -> Any:
-    """Return what `plain_spread` does."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        number = context.cast(builder, arguments[0], signature.args[0], types.float32)
-        word = ir.IntType(32)
-        one = builder.insert_element(ir.Constant(_VECTOR, ir.Undefined), number, ir.Constant(word, 0))
-        zeros = ir.Constant(ir.VectorType(word, N_LANES), [0] * N_LANES)
-        return builder.shuffle_vector(one, ir.Constant(_VECTOR, ir.Undefined), zeros)
-
-    return LANES(value), generate
+def _emit_any(mask: EmittedMask) -> EmittedWord:
+    bits = mask.builder.bitcast(mask.value, ir.IntType(LANES))
+    is_some = mask.builder.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
+    return EmittedWord(mask.builder, mask.builder.zext(is_some, WORD))
 
 
-def _address(context: Any, builder: Any, rows_type: Any, rows: Any, row: Any) -> Any:
-    data = builder.bitcast(context.make_array(rows_type)(context, builder, rows).data, _FLOAT.as_pointer())
-    there = builder.gep(data, [builder.mul(row, ir.Constant(_WORD, N_LANES))])
-    return builder.bitcast(there, _VECTOR.as_pointer())
+@instruction(_emit_any)
+def any_of(mask: Mask) -> int:
+    """Return 1 where the mask is true in some lane, else 0."""
+    return int(np.any(mask))
 
 
-def _load_intrinsic(typing_context: Any, rows: Any, row: Any) -> Any:
-    """Return what `plain_load` does."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        loaded = builder.load(_address(context, builder, signature.args[0], *arguments))
-        loaded.align = 4  # of a float: numpy promises no more
-        return loaded
-
-    return LANES(rows, types.int64), generate
+def _emit_lowest_bit(bits: EmittedWord) -> EmittedWord:
+    return EmittedWord(bits.builder, bits.builder.cttz(bits.value, ir.Constant(ir.IntType(1), 1)))
 
 
-def _store_intrinsic(typing_context: Any, rows: Any, row: Any, value: Any) -> Any:
-    """Do what `plain_store` does."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        stored = builder.store(arguments[2], _address(context, builder, signature.args[0], *arguments[:2]))
-        stored.align = 4
-        return context.get_dummy_value()
-
-    return types.none(rows, types.int64, value), generate
+@instruction(_emit_lowest_bit)
+def lowest_bit(bits: int) -> int:
+    """Return the place of the lowest bit set; bits > 0."""
+    return (int(bits) & -int(bits)).bit_length() - 1
 
 
-def _select_intrinsic(typing_context: Any, mask: Any, a: Any, b: Any) -> Any:
-    """Return what `plain_select` does."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.select(*arguments)
-
-    return LANES(mask, a, b), generate
+def _emit_count(bits: EmittedWord) -> EmittedWord:
+    return EmittedWord(bits.builder, bits.builder.ctpop(bits.value))
 
 
-def _bits_intrinsic(typing_context: Any, mask: Any) -> Any:
-    """Return what `plain_bits` does."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.zext(builder.bitcast(arguments[0], ir.IntType(N_LANES)), _WORD)
-
-    return types.int64(mask), generate
+@instruction(_emit_count)
+def count_bits(bits: int) -> int:
+    """Return how many bits are set."""
+    return int(bits).bit_count()
 
 
-spread: Any = plain_spread if numba_config.DISABLE_JIT else intrinsic(_spread_intrinsic)
-load: Any = plain_load if numba_config.DISABLE_JIT else intrinsic(_load_intrinsic)
-store: Any = plain_store if numba_config.DISABLE_JIT else intrinsic(_store_intrinsic)
-select: Any = plain_select if numba_config.DISABLE_JIT else intrinsic(_select_intrinsic)
-bits_of: Any = plain_bits if numba_config.DISABLE_JIT else intrinsic(_bits_intrinsic)
+@inline
+def sift(bits: int, first_lane: int, remaining: Any, arguments: Any) -> int:
+    """Return those of four lanes' pairs (`bytes_of`) of which ``remaining(lane, *arguments)`` leaves the second."""
+    kept = 0
+    while bits != 0:  # bound: each turn ends a lane
+        shift = lowest_bit(bits) & -LANES
+        lane_bits = bits & 255 << shift
+        bits ^= lane_bits
+        kept |= lane_bits & remaining(first_lane + shift // LANES, *arguments) << shift
+    return kept
+
+
+# ---- for traced functions -------------------------------------------------------------------------------------------
+
+
+def lesser(a: Lanes, b: Lanes) -> Lanes:
+    """Return a where a < b, else b."""
+    return select(a < b, a, b)
+
+
+def greater(a: Lanes, b: Lanes) -> Lanes:
+    """Return a where a > b, else b."""
+    return select(a > b, a, b)
+
+
+def dot(a: Sequence[Lanes], b: Sequence[Lanes]) -> Lanes:
+    """Return the products of two triples, summed from the first."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def any_above(pairs: Sequence[tuple[Lanes, Lanes]]) -> Mask:
+    """Tell whether the first of some pair is greater than the second."""
+    found = pairs[0][0] > pairs[0][1]
+    for above, below in pairs[1:]:
+        found |= above > below
+    return found
+
+
+def bytes_of(masks: Sequence[Mask]) -> tuple[int, int]:
+    """Return eight masks as two numbers, each of four bytes, the first mask lowest."""
+    halves = []
+    for first in (0, LANES // 2):
+        bits = bits_of(masks[first])
+        for place in range(1, LANES // 2):
+            bits |= bits_of(masks[first + place]) << LANES * place
+        halves.append(bits)
+    return halves[0], halves[1]

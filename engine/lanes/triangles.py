@@ -16,7 +16,7 @@ there where it exceeds 17 u (S + 2) times the edge's length in |x| + |y|, and 8.
 own rounding. `slack` = 32 u (S + 2) times the sum of |x| + |y| of all corners is more than both. Products that
 underflow are far below: no sign exceeds the bound unless that sum exceeds 2^-18.
 
-What is no number separates nothing. A plain twin serves when the compiler is disabled.
+What is no number separates nothing.
 
 Source: T. Moller, B. Trumbore, Fast, minimum storage ray/triangle intersection, 1997; the shear is that of S. Woop,
 C. Benthin, I. Wald, Watertight ray/triangle intersection, 2013. Changed: conservative, exact signs decide behind it.
@@ -26,23 +26,9 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-import numpy as np
-from llvmlite import ir
-from numba import config as numba_config
-from numba import types
-from numba.extending import intrinsic
-
 from engine.jit import inline
-from engine.lanes.rows import (
-    LANES,
-    VECTOR,
-    WORD,
-    absolute,
-    bits_without,
-    first_row,
-    load_row,
-    spread_number,
-)
+from engine.lanes.lanes import bits_of, load
+from engine.lanes.tracing import Number, Rows, Triple, traced
 
 CORNER_ROWS: Final = 9
 """ax ay az bx by bz cx cy cz."""
@@ -59,80 +45,26 @@ def longest_axis(half: Any) -> int:
     return 1 if y >= z else 2
 
 
-def plain_near_triangles(
-    corners: Any, node: int, i: int, j: int, k: int, middle: Any, r: Any, s: Any, reach: Any, slack: Any
+@traced
+def near_triangles(
+    corners: Rows, node: int, i: int, j: int, k: int, middle: Triple, r: Number, s: Number, reach: Number, slack: Number
 ) -> int:
     """Return the lanes of a block, a bit each, that the segment may meet. All numbers are float32.
 
     middle: on the axes i, j, k; reach: |e_k| + slack.
     """
-    rows = corners[node]
-    with np.errstate(all="ignore"):
-        z = [rows[3 * corner + k] - middle[2] for corner in range(3)]
-        x = [(rows[3 * corner + i] - middle[0]) - r * z[corner] for corner in range(3)]
-        y = [(rows[3 * corner + j] - middle[1]) - s * z[corner] for corner in range(3)]
-        size = (abs(x[0]) + abs(y[0])) + (abs(x[1]) + abs(y[1])) + (abs(x[2]) + abs(y[2]))
-        bound = slack * size
-        edges = [x[a] * y[b] - y[a] * x[b] for a, b in ((0, 1), (1, 2), (2, 0))]
-        is_left, is_right = ([side * edge > bound for edge in edges] for side in (np.float32(1), np.float32(-1)))
-        apart = (is_left[0] | is_left[1] | is_left[2]) & (is_right[0] | is_right[1] | is_right[2])
-        apart |= (z[0] > reach) & (z[1] > reach) & (z[2] > reach)
-        apart |= (z[0] < -reach) & (z[1] < -reach) & (z[2] < -reach)
-    return sum(1 << lane for lane in np.flatnonzero(~apart).tolist())
 
+    def away(axis: int, place: int) -> Any:
+        return [load(corners, CORNER_ROWS * node + axis + 3 * corner) - middle[place] for corner in range(3)]
 
-def _near_triangles_intrinsic(
-    typing_context: Any,
-    corners: Any,
-    node: Any,
-    i: Any,
-    j: Any,
-    k: Any,
-    middle: Any,
-    r: Any,
-    s: Any,
-    reach: Any,
-    slack: Any,
-) -> Any:
-    """Return what `plain_near_triangles` does."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        words = ir.VectorType(ir.IntType(32), LANES)
-        sign = ir.Constant(words, [0x80000000] * LANES)
-
-        def negative(vector: Any) -> Any:
-            return builder.bitcast(builder.xor(builder.bitcast(vector, words), sign), VECTOR)
-
-        def any_of(found: list[Any]) -> Any:
-            return builder.or_(builder.or_(found[0], found[1]), found[2])
-
-        def all_of(found: list[Any]) -> Any:
-            return builder.and_(builder.and_(found[0], found[1]), found[2])
-
-        data = first_row(context, builder, signature.args[0], arguments[0], arguments[1], CORNER_ROWS)
-        first = [builder.gep(data, [builder.mul(arguments[place], ir.Constant(WORD, LANES))]) for place in (2, 3, 4)]
-
-        def row(corner: int, axis: int) -> Any:
-            return load_row(builder, first[axis], 3 * corner)
-
-        m = [spread_number(builder, builder.extract_value(arguments[5], axis)) for axis in range(3)]
-        r, s, reach, slack = (spread_number(builder, arguments[place]) for place in (6, 7, 8, 9))
-        z = [builder.fsub(row(corner, 2), m[2]) for corner in range(3)]
-        x = [builder.fsub(builder.fsub(row(c, 0), m[0]), builder.fmul(r, z[c])) for c in range(3)]
-        y = [builder.fsub(builder.fsub(row(c, 1), m[1]), builder.fmul(s, z[c])) for c in range(3)]
-        sizes = [builder.fadd(absolute(builder, x[c]), absolute(builder, y[c])) for c in range(3)]
-        bound = builder.fmul(slack, builder.fadd(builder.fadd(sizes[0], sizes[1]), sizes[2]))
-        edges = [builder.fsub(builder.fmul(x[a], y[b]), builder.fmul(y[a], x[b])) for a, b in ((0, 1), (1, 2), (2, 0))]
-        lower, before = negative(bound), negative(reach)
-        is_left = any_of([builder.fcmp_ordered(">", edge, bound) for edge in edges])
-        is_right = any_of([builder.fcmp_ordered("<", edge, lower) for edge in edges])
-        apart = builder.and_(is_left, is_right)
-        apart = builder.or_(apart, all_of([builder.fcmp_ordered(">", z[c], reach) for c in range(3)]))
-        apart = builder.or_(apart, all_of([builder.fcmp_ordered("<", z[c], before) for c in range(3)]))
-        return bits_without(builder, apart)
-
-    triple, number, word = types.UniTuple(types.float32, 3), types.float32, types.int64
-    return types.int64(corners, word, word, word, word, triple, number, number, number, number), generate
-
-
-near_triangles: Any = plain_near_triangles if numba_config.DISABLE_JIT else intrinsic(_near_triangles_intrinsic)
+    z = away(k, 2)
+    x = [along - r * z[corner] for corner, along in enumerate(away(i, 0))]
+    y = [along - s * z[corner] for corner, along in enumerate(away(j, 1))]
+    sizes = [abs(x[corner]) + abs(y[corner]) for corner in range(3)]
+    bound = slack * (sizes[0] + sizes[1] + sizes[2])
+    edges = [x[a] * y[b] - y[a] * x[b] for a, b in ((0, 1), (1, 2), (2, 0))]
+    is_left = (edges[0] > bound) | (edges[1] > bound) | (edges[2] > bound)
+    is_right = (edges[0] < -bound) | (edges[1] < -bound) | (edges[2] < -bound)
+    is_before = (z[0] < -reach) & (z[1] < -reach) & (z[2] < -reach)
+    is_beyond = (z[0] > reach) & (z[1] > reach) & (z[2] > reach)
+    return bits_of(~((is_left & is_right) | is_beyond | is_before))

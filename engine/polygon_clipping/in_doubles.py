@@ -25,7 +25,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 from engine.jit import merged
-from engine.lanes.copying import move
+from engine.lanes.memory import move
 from engine.polygon_clipping.cut_vertices import (
     TINY,
     VALUE_BOUND,

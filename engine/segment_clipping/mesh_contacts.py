@@ -18,9 +18,10 @@ import numpy as np
 
 from engine.bounding.bvh import MAX_DEPTH
 from engine.jit import kernel, merged
-from engine.lanes.boxes import EMPTY, lowest_bit
-from engine.lanes.rows import LANES
+from engine.lanes.boxes import EMPTY
+from engine.lanes.lanes import lowest_bit
 from engine.lanes.segments import near_segment
+from engine.lanes.tracing import LANES
 from engine.predicates.loading import as_point3
 from engine.predicates.orientation import orient3d
 from engine.types import Point3

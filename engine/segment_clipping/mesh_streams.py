@@ -22,10 +22,11 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.jit import called, inline, kernel
-from engine.lanes.boxes import EMPTY, lowest_bit
-from engine.lanes.prefetching import prefetch
-from engine.lanes.rows import LANES
+from engine.lanes.boxes import EMPTY
+from engine.lanes.lanes import lowest_bit
+from engine.lanes.memory import prefetch
 from engine.lanes.segments import near_segment
+from engine.lanes.tracing import LANES
 from engine.lanes.triangles import AXES_BEFORE, CORNER_ROWS, longest_axis, near_triangles
 from engine.segment_clipping.contacts import APART, GROUP, is_point
 from engine.segment_clipping.mesh_contacts import local_segment

@@ -9,7 +9,7 @@ import numpy as np
 from engine.arrays import Float32Array, FloatArray, Int32Array, IntArray, read_only
 from engine.bounding.bvh import UNUSED, Bvh, build_bvh, on_lines
 from engine.lanes.boxes import EMPTY
-from engine.lanes.rows import LANES
+from engine.lanes.tracing import LANES
 from engine.lanes.triangles import CORNER_ROWS
 from engine.predicates.ranges import LARGEST, SMALLEST
 from engine.segment_clipping.box_tree import build_box_tree

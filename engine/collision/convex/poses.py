@@ -26,14 +26,14 @@ from engine.collision.convex.xenocollide_lanes import (
 )
 from engine.collision.meshes.placement import PoseArrays
 from engine.jit import inline, kernel
-from engine.lanes.boxes import lowest_bit
-from engine.lanes.lanes import N_LANES
+from engine.lanes.lanes import lowest_bit
+from engine.lanes.tracing import LANES
 from engine.types import Point3
 
 LEAST_POSES = 32
 """What the lanes need is made in the time that they spare on so many poses."""
 
-_ALL_LANES = (1 << N_LANES) - 1
+_ALL_LANES = (1 << LANES) - 1
 
 
 class LaneArrays(NamedTuple):
@@ -100,7 +100,7 @@ def relate_in_lanes(
     still: the identity. A lane whose search has ended takes the next pose. Returns early when the flag is raised.
     """
     a = frame_of(pool, 0, still.rotations, still.translations, 0)
-    state, items = np.zeros((N_ROWS, N_LANES), np.float32), np.zeros(N_LANES, np.int64)
+    state, items = np.zeros((N_ROWS, LANES), np.float32), np.zeros(LANES, np.int64)
     n_poses, following, busy, per_unit = relations.shape[0], 0, 0, 1.0 / lanes.scale
     while flag[0] == 0:
         idle = _ALL_LANES & ~busy

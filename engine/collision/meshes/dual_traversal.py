@@ -36,10 +36,11 @@ from engine.collision.meshes.triangle_triangle import (
     unposed,
 )
 from engine.jit import inline
-from engine.lanes.boxes import FRAME_ROWS, lowest_bit, meeting
+from engine.lanes.boxes import FRAME_ROWS, meeting
 from engine.lanes.discs import discs_meeting
 from engine.lanes.faces import WORK_ROWS, faces_meeting
-from engine.lanes.rows import LANES
+from engine.lanes.lanes import lowest_bit
+from engine.lanes.tracing import LANES
 from engine.predicates.loading import as_point3
 from engine.predicates.posed import UNPOSED, PosedPoint3, posed_error
 from engine.types import UNDECIDED

@@ -34,7 +34,8 @@ from engine.collision.meshes.triangle_triangle import (
     unposed,
 )
 from engine.jit import inline, kernel
-from engine.lanes.boxes import inside_box, lowest_bit
+from engine.lanes.boxes import inside_box
+from engine.lanes.lanes import lowest_bit
 from engine.predicates.orientation import orient2d, orient3d
 from engine.types import UNDECIDED, Point3
 

@@ -14,11 +14,12 @@ import numpy as np
 
 from engine.arrays import Float32Array, FloatArray, Int8Array, Int32Array, IntArray, read_only
 from engine.bounding.bvh import WIDTH, build_bvh
+from engine.bounding.disc_tree import fill_discs
 from engine.collision.meshes.placement import NO_ROTATION, NO_TRANSLATION, Extent, PoseArrays
 from engine.collision.meshes.triangle_triangle import Triangle3, projected
 from engine.jit import inline, kernel
 from engine.lanes.boxes import EMPTY
-from engine.lanes.discs import DISC_ROWS, fill_discs
+from engine.lanes.discs import DISC_ROWS
 from engine.lanes.faces import NOWHERE
 from engine.lanes.triangles import CORNER_ROWS
 from engine.predicates.loading import as_point3

@@ -19,7 +19,8 @@ from engine.collision.meshes.mesh_arrays import ShellArrays, in_tree, triangle_o
 from engine.collision.meshes.placement import Placement, PoseArrays, orient2d_near, orient3d_near, place_pair, placed
 from engine.collision.meshes.triangle_triangle import Triangle3
 from engine.jit import inline, kernel
-from engine.lanes.boxes import inside_box, lowest_bit
+from engine.lanes.boxes import inside_box
+from engine.lanes.lanes import lowest_bit
 from engine.predicates.loading import as_point3
 from engine.types import UNDECIDED, Point2, Point3
 
