@@ -1,4 +1,4 @@
-"""Eight discs against eight: they hold their faces, lanes and plain twins agree, and nothing that meets is parted."""
+"""Eight discs against eight: compiled lanes say what Python says, and part nothing that meets."""
 
 from __future__ import annotations
 
@@ -9,17 +9,16 @@ import pytest
 
 from engine import Surface, collide_triangles
 from engine.collision.meshes.dual_traversal import new_descent, start_descent
-from engine.collision.meshes.mesh_arrays import STILL, Shell, shell_of
+from engine.collision.meshes.mesh_arrays import STILL, shell_of
 from engine.collision.meshes.placement import PoseArrays
 from engine.jit import kernel
-from engine.lanes.boxes import EMPTY, plain_meeting
+from engine.lanes.boxes import meeting
 from engine.lanes.discs import (
     beside_disc,
     discs_meeting,
     place_discs,
-    plain_beside_disc,
-    plain_place_discs,
 )
+from tests.unit.bounding.test_disc_tree import faces_below, surfaces
 
 TURNED = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
 
@@ -28,7 +27,7 @@ TURNED = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
 def ask(first: Any, second: Any, frames: Any, scales: Any, work: Any, found: Any) -> None:
     place_discs(second, 0, frames, np.float32(scales[1] / scales[0]), np.float32(scales[0] / scales[1]), work)
     for lane in range(8):
-        found[lane] = beside_disc(first, 0, lane, work)
+        found[lane] = beside_disc(lane, first, 0, work)
     low, high = found[8], found[9]
     found[8], found[9] = discs_meeting(low, high, first, 0, second, 0, frames, (scales[0], scales[1]), work)
 
@@ -38,52 +37,9 @@ def place(first: Any, still: Any, second: Any, poses: Any, descent: Any) -> None
     start_descent(first, still, 0, second, poses, 0, descent)
 
 
-def faces_below(shell: Shell, node: int) -> list[int]:
-    """Return the triangles below a node."""
-    child = shell.arrays.child[node]
-    if child[0] < 0:
-        return [-1 - int(item) for item in child if item != EMPTY]
-    return [face for below in child if below != EMPTY for face in faces_below(shell, int(below))]
-
-
-def surfaces() -> dict[str, Surface]:
-    rng = np.random.default_rng(5)
-    x, y = (values.ravel() for values in np.meshgrid(np.linspace(-1, 1, 9), np.linspace(-1, 1, 9)))
-    cells = np.array([9 * row + column for row in range(8) for column in range(8)])
-    faces = np.concatenate([np.stack([cells, cells + 1, cells + 10], 1), np.stack([cells, cells + 10, cells + 9], 1)])
-    across, up = np.pi * x, 0.5 * np.pi * y
-    sphere = np.stack([np.cos(up) * np.cos(across), np.cos(up) * np.sin(across), np.sin(up)], 1)
-    return {
-        "flat": Surface(np.stack([x, y, x + 2 * y], 1), faces),
-        "waves": Surface(np.stack([x, y, 0.1 * np.sin(5 * x) * np.cos(4 * y)], 1), faces),
-        "line": Surface(np.stack([x, 2 * x, 3 * x], 1), faces),
-        "soup": Surface(rng.normal(size=(300, 3)), np.arange(300).reshape(-1, 3)),
-        "sphere": Surface(sphere, faces),
-    }
-
-
-@pytest.mark.parametrize("name", surfaces())
-def test_a_disc_holds_the_faces_of_its_child(name: str) -> None:
-    shell = shell_of(surfaces()[name])
-    arrays = shell.arrays
-    local = (arrays.vertices - arrays.origin) / arrays.scale
-    for node in range(len(arrays.child)):
-        for lane in range(8):
-            below = int(arrays.child[node, lane])
-            if below < 0:
-                continue
-            disc = arrays.discs[node, :, lane].astype(float)
-            n = disc[3:6] / np.linalg.norm(disc[3:6])
-            away = local[arrays.triangles[faces_below(shell, below)]].reshape(-1, 3) - disc[:3]
-            along = away @ n
-            assert (np.abs(along) <= disc[7]).all()
-            assert (np.linalg.norm(away - along[:, None] * n, axis=1) <= disc[6]).all()
-            assert name != "flat" or disc[7] < 1e-5
-
-
 @pytest.mark.parametrize("names", [("flat", "flat"), ("sphere", "waves"), ("waves", "soup"), ("line", "sphere")])
 @pytest.mark.parametrize("size", [1.0, 2.0**-9])
-def test_lanes_equal_their_twins_and_keep_what_meets(names: tuple[str, str], size: float) -> None:
+def test_compiled_lanes_equal_python_and_keep_what_meets(names: tuple[str, str], size: float) -> None:
     first, second = surfaces()[names[0]], surfaces()[names[1]]
     second = Surface(size * second.vertices, second.triangles)
     a, b = shell_of(first), shell_of(second)
@@ -92,13 +48,13 @@ def test_lanes_equal_their_twins_and_keep_what_meets(names: tuple[str, str], siz
         gap = 1e-4 * (item - 4)
         move = first.vertices[rng.integers(len(first.vertices))] - TURNED @ second.vertices[0] + [0.0, 0.0, gap]
         place(a.arrays, STILL, b.arrays, PoseArrays(TURNED[None], move[None], True), descent)
-        boxes = plain_meeting(a.arrays.boxes, 0, b.arrays.boxes, 0, descent.frames)
+        boxes = meeting(a.arrays.boxes, 0, b.arrays.boxes, 0, descent.frames)
         found = np.array([0] * 8 + list(boxes), np.int64)
         scales = np.array([a.arrays.scale, b.arrays.scale])
         ask(a.arrays.discs, b.arrays.discs, descent.frames, scales, descent.work, found)
         work, ratio = np.zeros_like(descent.work), np.float32(scales[1] / scales[0])
-        plain_place_discs(b.arrays.discs, 0, descent.frames, ratio, np.float32(1.0) / ratio, work)
-        lanes = [plain_beside_disc(a.arrays.discs, 0, lane, work) for lane in range(8)]
+        place_discs(b.arrays.discs, 0, descent.frames, ratio, np.float32(1.0) / ratio, work)
+        lanes = [beside_disc(lane, a.arrays.discs, 0, work) for lane in range(8)]
         assert found[:8].tolist() == lanes
         before, kept = (low | high << 32 for low, high in (boxes, (int(found[8]), int(found[9]))))
         assert kept == before & sum(bits << (8 * lane) for lane, bits in enumerate(lanes))

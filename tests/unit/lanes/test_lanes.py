@@ -1,52 +1,144 @@
-"""Eight numbers as one value: compiled, lanes do what arrays of eight numbers do."""
+"""Eight numbers as one value: every operation is what exact arithmetic rounded to float32 says, compiled and in Python.
+
+A float64 holds sums and products of two float32 closely enough that rounding it again gives the float32 nearest to the
+exact result; roots too.
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import pytest
 
 from engine.jit import kernel
 from engine.lanes.lanes import (
-    N_LANES,
+    any_above,
+    any_of,
     bits_of,
+    bytes_of,
+    count_bits,
+    dot,
+    greater,
+    lane_of,
+    lesser,
     load,
-    plain_bits,
-    plain_load,
-    plain_select,
-    plain_spread,
-    plain_store,
+    load_lane,
+    lowest_bit,
+    root,
     select,
+    sift,
     spread,
     store,
 )
+from engine.lanes.tracing import LANES, Rows, traced
+
+SPECIAL = [0.0, -0.0, math.inf, -math.inf, math.nan, 1e-45, -1e-45, 1.1754942e-38, -1.1754944e-38, 3.4e38, -3.4e38]
+SPECIAL += [1.0, -1.0, 1.0000001, 0.1, -7.5]
+PAIRS = np.array([(a, b) for a in SPECIAL for b in SPECIAL], np.float32).reshape(-1, LANES, 2)
+LEFT, RIGHT = np.ascontiguousarray(PAIRS[..., 0]), np.ascontiguousarray(PAIRS[..., 1])
+N_RESULTS, N_MASKS = 14, 7
+
+
+@traced
+def operate(left: Rows, right: Rows, row: int, found: Rows) -> None:
+    """Write the result of every operation on a pair of rows, in a traced function."""
+    a, b = load(left, row), load(right, row)
+    results = [a + b, a - b, a * b, -a, abs(a), root(a), lesser(a, b), greater(a, b), 0.5 - a, a * 0.5]
+    results += [select(a < b, a, 1.5), lane_of(a, 3), load_lane(left, row, 5), dot((a, b, a), (b, a, a))]
+    for place, result in enumerate(results):
+        store(found, N_RESULTS * row + place, result)
 
 
 @kernel
-def compute(rows: Any, number: float) -> tuple[int, int]:
-    a, b = load(rows, 0), load(rows, 1)
-    is_greater = (a > b) & ~(a >= spread(number))
-    is_less = (a < b) | (b <= spread(0.0))
-    store(rows, 2, select(is_greater, a * b - spread(number), -a + abs(b)))
-    return bits_of(is_greater), bits_of(is_less)
+def operate_all(left: Any, right: Any, found: Any, bits: Any) -> None:
+    """Write the same, and masks, with lanes as values of a compiled function too."""
+    for row in range(len(left)):
+        operate(left, right, row, found)
+        a, b = load(left, row), load(right, row)
+        bits[row, 0], bits[row, 1] = bits_of(a > b), bits_of(a < b)
+        bits[row, 2], bits[row, 3] = bits_of(a >= b), bits_of(a <= b)
+        bits[row, 4], bits[row, 5] = bits_of((a > b) & ~(a >= spread(0.5))), bits_of((a < b) | (b <= spread(0.0)))
+        bits[row, 6] = 2 * any_of(a > b) + (count_bits(bits_of(a < b)) & 1)
+        store(found, N_RESULTS * row + 10, select(a < b, a, spread(1.5)))
+        store(found, N_RESULTS * row, a + b)
+        store(found, N_RESULTS * row + 1, a - b)
+        store(found, N_RESULTS * row + 2, a * b)
+        store(found, N_RESULTS * row + 3, -a)
+        store(found, N_RESULTS * row + 4, abs(a))
 
 
-def expected(rows: Any, number: float) -> tuple[int, int]:
-    a, b = plain_load(rows, 0), plain_load(rows, 1)
-    is_greater = (a > b) & ~(a >= plain_spread(number))
-    is_less = (a < b) | (b <= plain_spread(0.0))
-    plain_store(rows, 2, plain_select(is_greater, a * b - plain_spread(number), -a + abs(b)))
-    return plain_bits(is_greater), plain_bits(is_less)
+def expected_results(a: np.ndarray, b: np.ndarray) -> list[np.ndarray]:
+    """Return what `operate` writes: in float64 where that is exact enough, else lane by lane."""
+    x, y = a.astype(float), b.astype(float)
+    wide = [x + y, x - y, x * y, np.copysign(x, np.where(np.signbit(x), 1.0, -1.0)), np.copysign(x, 1.0), np.sqrt(x)]
+    lanes = [[p if p < q else q for p, q in zip(a, b)], [p if p > q else q for p, q in zip(a, b)]]
+    wide += [np.array(lanes[0], float), np.array(lanes[1], float), 0.5 - x, x * 0.5]
+    wide += [np.array([p if p < q else 1.5 for p, q in zip(a, b)], float), np.full(LANES, x[3]), np.full(LANES, x[5])]
+    ab, aa = (x * y).astype(np.float32).astype(float), (x * x).astype(np.float32).astype(float)
+    wide.append((ab + ab).astype(np.float32).astype(float) + aa)
+    return [result.astype(np.float32) for result in wide]
 
 
-def test_lanes_equal_their_twins() -> None:
-    random = np.random.default_rng(1)
-    special = np.array([0.0, -0.0, np.inf, -np.inf, np.nan, 1e-45, 3e38, 1.0], np.float32)
-    for turn in range(40):
-        rows = random.normal(size=(3, N_LANES)).astype(np.float32)
-        rows[0] = special if turn % 4 == 0 else rows[0]
-        rows[1] = random.permutation(special) if turn % 5 == 0 else rows[1]
-        twin = rows.copy()
-        with np.errstate(all="ignore"):
-            assert compute(rows, 0.75) == expected(twin, 0.75)
-        np.testing.assert_array_equal(rows, twin)
+def same_bits(found: np.ndarray, expected: np.ndarray) -> None:
+    is_number = ~np.isnan(expected)
+    assert (np.isnan(found) == ~is_number).all()
+    assert (found[is_number].view(np.uint32) == expected[is_number].view(np.uint32)).all()
+
+
+@pytest.mark.parametrize("run", [operate_all, getattr(operate_all, "py_func", operate_all)], ids=["compiled", "python"])
+def test_operations_round_the_exact_result(run: Callable[..., None]) -> None:
+    found, bits = np.empty((len(LEFT), N_RESULTS, LANES), np.float32), np.empty((len(LEFT), N_MASKS), np.int64)
+    with np.errstate(all="ignore"):
+        run(LEFT, RIGHT, found, bits)
+        expected = np.array([expected_results(a, b) for a, b in zip(LEFT, RIGHT)])
+    same_bits(found, expected)
+    for row, (a, b) in enumerate(zip(LEFT.tolist(), RIGHT.tolist())):
+        for place, told in enumerate(
+            (
+                [p > q for p, q in zip(a, b)],
+                [p < q for p, q in zip(a, b)],
+                [p >= q for p, q in zip(a, b)],
+                [p <= q for p, q in zip(a, b)],
+                [p > q and not p >= 0.5 for p, q in zip(a, b)],
+                [p < q or q <= 0.0 for p, q in zip(a, b)],
+            )
+        ):
+            assert bits[row, place] == sum(is_true << lane for lane, is_true in enumerate(told))
+        assert bits[row, 6] == 2 * any(p > q for p, q in zip(a, b)) + sum(p < q for p, q in zip(a, b)) % 2
+
+
+@traced
+def table(rows: Rows) -> tuple[int, int]:
+    """Return in which lanes row 0 exceeds each lane of row 1, or row 2 row 3."""
+    return bytes_of(
+        [any_above([(load(rows, 0), load_lane(rows, 1, k)), (load(rows, 2), load(rows, 3))]) for k in range(8)]
+    )
+
+
+@traced
+def above(lane: int, rows: Rows) -> int:
+    """Return in which lanes row 0 exceeds one lane of row 1."""
+    return bits_of(load(rows, 0) > load_lane(rows, 1, lane))
+
+
+@kernel
+def ask(rows: Any, words: Any) -> None:
+    words[0], words[1] = table(rows)
+    words[2], words[3] = sift(words[0], 0, above, (rows,)), sift(words[1], LANES // 2, above, (rows,))
+    words[4] = lowest_bit(words[5])
+
+
+def test_tables_of_bits() -> None:
+    rng = np.random.default_rng(2)
+    for bit in range(63):
+        rows, words = rng.choice([0.0, 1.0, 2.0, np.nan], (4, LANES)).astype(np.float32), np.zeros(6, np.int64)
+        words[5] = 1 << bit | 1 << 62
+        ask(rows, words)
+        is_above = rows[0][None, :] > rows[1][:, None]
+        for first, bits in ((0, is_above | (rows[2] > rows[3])), (2, is_above)):
+            number = sum(1 << place for place in np.flatnonzero(bits).tolist())
+            assert words[first : first + 2].tolist() == [number & 0xFFFFFFFF, number >> 32]
+        assert words[4] == bit

@@ -1,11 +1,14 @@
-"""Eight boxes against a segment: no contact is missed, and the intrinsic is its plain twin."""
+"""Eight boxes against a segment: no contact is missed, and each lane says what its axes say."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 
 from engine.bounding.bvh import build_bvh
-from engine.lanes.segments import plain_near_segment
+from engine.jit import kernel
+from engine.lanes.segments import near_segment
 from engine.segment_clipping.contacts import APART
 from engine.segment_clipping.mesh_contacts import is_clear, local_segment
 from engine.segment_clipping.mesh_streams import find_mesh_contacts
@@ -29,7 +32,40 @@ def test_touching_boxes_are_near() -> None:
         assert is_near
         for node in range(len(tree.child)):
             used = sum(1 << lane for lane in np.flatnonzero(tree.boxes[node, 3] >= 0))
-            assert plain_near_segment(tree.boxes, node, middle, half, np.float32(slack), np.float32(tiny)) == used
+            assert near_segment(tree.boxes, node, middle, half, np.float32(slack), np.float32(tiny)) == used
+
+
+@kernel
+def asked(boxes: Any, numbers: Any, found: Any) -> None:
+    m, e, rest = numbers[0], numbers[1], numbers[2]
+    for node in range(len(boxes)):
+        found[node] = near_segment(boxes, node, (m[0], m[1], m[2]), (e[0], e[1], e[2]), rest[0], rest[1])
+
+
+def is_apart(box: Floats, m: Floats, e: Floats, slack: float, tiny: float) -> bool:
+    """Tell whether one of six axes separates a segment from a box."""
+    w, h = m - box[:3], box[3:] + slack
+    pairs = [(0, 1), (1, 2), (2, 0)]
+    return any(abs(w[k]) > h[k] + abs(e[k]) for k in range(3)) or any(
+        abs(e[i] * w[j] - e[j] * w[i]) > h[i] * abs(e[j]) + h[j] * abs(e[i]) + tiny for i, j in pairs
+    )
+
+
+def test_each_lane_says_what_its_axes_say() -> None:
+    rng = np.random.default_rng(4)
+    boxes = rng.uniform(-1, 1, (300, 6, 8)).astype(np.float32)
+    boxes[::9, 1] = [np.nan, np.inf, -np.inf, 0.0, -0.0, 1e-45, 3e38, -1e30]
+    numbers, found = rng.uniform(-1, 1, (3, 3)).astype(np.float32) * np.float32(0.3), np.zeros(300, np.int64)
+    for turn in range(4):
+        numbers[1, turn - 1] = [0.0, 1e-45, np.inf, np.nan][turn]
+        asked(boxes, numbers, found)
+        with np.errstate(all="ignore"):
+            for node, lanes in enumerate(found.tolist()):
+                apart = [is_apart(box, numbers[0], numbers[1], *numbers[2, :2]) for box in boxes[node].T]
+                assert lanes == sum(1 << lane for lane, parted in enumerate(apart) if not parted)
+                if node % 16 == 0:
+                    assert near_segment(boxes, node, tuple(numbers[0]), tuple(numbers[1]), *numbers[2, :2]) == lanes
+        assert len(set(found.tolist())) > 5
 
 
 def test_contacts_are_those_of_all_triangles() -> None:
