@@ -134,21 +134,13 @@ def any_of(mask: Mask) -> int:
     return int(np.any(mask))
 
 
-def _emit_lowest_bit(bits: EmittedWord) -> EmittedWord:
-    return EmittedWord(bits.builder, bits.builder.cttz(bits.value, ir.Constant(ir.IntType(1), 1)))
-
-
-@instruction(_emit_lowest_bit)
+@instruction(lambda bits: EmittedWord(bits.builder, bits.builder.cttz(bits.value, ir.Constant(ir.IntType(1), 1))))
 def lowest_bit(bits: int) -> int:
     """Return the place of the lowest bit set; bits > 0."""
     return (int(bits) & -int(bits)).bit_length() - 1
 
 
-def _emit_count(bits: EmittedWord) -> EmittedWord:
-    return EmittedWord(bits.builder, bits.builder.ctpop(bits.value))
-
-
-@instruction(_emit_count)
+@instruction(lambda bits: EmittedWord(bits.builder, bits.builder.ctpop(bits.value)))
 def count_bits(bits: int) -> int:
     """Return how many bits are set."""
     return int(bits).bit_count()
