@@ -59,7 +59,7 @@ def _count_crossings(xs: Any, ys: Any, first: int, last: int, x: float, y: float
         bound += blur * (abs(bx - ax) + abs(by - ay))
         is_passed = (ay <= y) != (by <= y)
         n_crossed += is_passed & ((turn > 0.0) == (ay < by))
-        n_unsure += (is_passed & (not abs(turn) > bound)) | (abs(above) <= blur)
+        n_unsure += (is_passed & (not abs(turn) > bound)) | (not abs(above) > blur)  # NaN is not sure
     return n_crossed, n_unsure
 
 
