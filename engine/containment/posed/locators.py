@@ -127,7 +127,9 @@ def _blurred_kernel(solid: Solid) -> Blurred:
         low, high = solid.min, solid.max
         return lambda points, blurs, out, flag: int(locate_in_box_blurred(points, blurs, low, high, out, flag))
     if isinstance(solid, (HalfSpace, Convex)) or (isinstance(solid, Triangle) and solid.dimension == 3):
-        rows = _rows(solid)
+        planes = _rows(solid)
+        rows = np.zeros((len(planes), 4))
+        rows[:, : planes.shape[1] - 1], rows[:, 3] = planes[:, :-1], planes[:, -1]
         return lambda points, blurs, out, flag: int(locate_in_rows_blurred(points, blurs, rows, out, flag))
     if isinstance(solid, (Polygon, Triangle)):
         return lambda points, blurs, out, flag: int(locate_in_rings_blurred(points, blurs, *rings_of(solid), out, flag))
