@@ -219,15 +219,6 @@ def put_in_order(
 
 
 @kernel
-def group_by_body(bodies: Any, ends: Any, order: Any) -> None:
-    """Fill order with the places of `bodies`, grouped by body; ends (n_bodies,) holds each group's first place."""
-    for place in range(len(bodies)):
-        body = bodies[place]
-        order[ends[body]] = place
-        ends[body] += 1
-
-
-@kernel
 def drop_outside(counts: Any, bodies: Any, located: Any) -> int:
     """Close up over the bodies that turned out not to hold their point; returns how many are left."""
     place = kept = 0

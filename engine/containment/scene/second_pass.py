@@ -13,11 +13,11 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.arrays import FloatArray, Int8Array, IntArray
+from engine.containment.cells.order import counting_sort
 from engine.containment.cells.top import MOST_FACES, top_cells_if_they_pay
 from engine.containment.locators import Counts
 from engine.containment.prepared import columns_of
 from engine.containment.scene.columns import ColumnTables, locate_groups
-from engine.containment.scene.first_pass import group_by_body
 from engine.containment.scene.tables import Scene
 from engine.parallel import Budget, run_chunks
 from engine.solids.polyhedron import Polyhedron
@@ -49,7 +49,8 @@ def settle_rest(
     n_bodies = len(scene.owners)
     found, order = np.full(len(owners), UNDECIDED, np.int8), np.empty(len(owners), np.int64)
     sizes = np.bincount(bodies, minlength=n_bodies)
-    group_by_body(bodies, np.cumsum(sizes) - sizes, order)
+    counting_sort(bodies, np.cumsum(sizes) - sizes, order, budget.flag)
+    budget.check()
     tables = _column_tables(scene, sizes, budget, workers)
     if tables is not None:
         groups = _groups(sizes)

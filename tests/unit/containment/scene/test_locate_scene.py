@@ -152,7 +152,7 @@ def test_nothing_and_errors() -> None:
 
 
 def test_a_scene_asked_often_answers_alike() -> None:
-    """Polyhedra are asked by rays first, by level 0 of the cells when it pays: same answers, walls and vertices included."""
+    """Polyhedra are asked by rays first, then by level 0 of the cells: same answers, walls and vertices included."""
     random = np.random.default_rng(3)
     shifts = np.array([[0, 0, 0], [4, 0, 0], [4, 4, 1], [1e6, 0, 0]])
     meshes = [merged(box_mesh([0, 0, 0], [4, 4, 4]), box_mesh([1, 1, 1], [2, 3, 5])) for _ in shifts]
