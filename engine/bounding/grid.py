@@ -90,7 +90,9 @@ def list_in_cells(
     """List boxes, given by their sides on three axes, in a grid of about `n_cells` cells along them over all of them.
 
     An axis on which all boxes are alike may be given by one of them. Cells are halved in number, along the axis with
-    most of them, until the entries are at most `limit`: long boxes cannot fill the memory. Returns axes, offsets, items.
+    most of them, until the entries are at most `limit`: long boxes cannot fill the memory.
+
+    Returns axes, offsets, items.
     """
     lows = [np.ascontiguousarray(low) for low in lows]  # columns of a table: one signature
     highs = [np.ascontiguousarray(high) for high in highs]

@@ -107,7 +107,7 @@ def touch_triangle(a: Any, b: Any, c: Any, q: Any) -> int:
 
 @inline
 def cross_upwards(a: Any, b: Any, c: Any, area: int, z_low: float, q: Any) -> int:
-    """Return CROSSED if the ray up from the moved q meets the triangle, ON_FACE if q is on it, else MISSED, or UNDECIDED.
+    """Return CROSSED if the ray up from the moved q meets the face, ON_FACE if q is on it, else MISSED, or UNDECIDED.
 
     area: exact sign of the projected area, not 0. Caller guarantees that q is in the box in x and y, and not above it.
     """
