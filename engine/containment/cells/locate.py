@@ -110,7 +110,7 @@ def _descend(cells: Any, kept_points: Any, n_waiting: Any, level: int, locations
 
 
 @merged
-def _across(groups: Any, group: int, wx: Any, wy: Any, wz: Any) -> int:
+def parity_across(groups: Any, group: int, wx: Any, wy: Any, wz: Any) -> int:
     """Return the parity of the segment from the reference point to w, over all groups of a leaf, plus UNSURE."""
     parity = group_parity(groups, group, wx, wy, wz)
     while groups[group, ROWS - 1, 0] == 0.0:  # bound: the last group of each leaf says so
@@ -121,7 +121,7 @@ def _across(groups: Any, group: int, wx: Any, wy: Any, wz: Any) -> int:
 
 
 @merged
-def _ask_leaves(points: Any, cells: Any, kept_points: Any, n_waiting: Any, locations: Any) -> None:
+def ask_leaves(points: Any, cells: Any, kept_points: Any, n_waiting: Any, locations: Any) -> None:
     """Locate the points that wait, in their leaves."""
     low, scale, size, groups = cells.lattice.low, cells.lattice.scale, cells.lattice.size, cells.groups
     item_of, code_of, level_of, places, waiting = kept_points
@@ -140,7 +140,7 @@ def _ask_leaves(points: Any, cells: Any, kept_points: Any, n_waiting: Any, locat
         wx = np.float32((points[item, 0] - rx) * (scale[0] * parts))
         wy = np.float32((points[item, 1] - ry) * (scale[1] * parts))
         wz = np.float32((points[item, 2] - rz) * (scale[2] * parts))
-        parity = _across(groups, code >> 2, wx, wy, wz)
+        parity = parity_across(groups, code >> 2, wx, wy, wz)
         locations[item] = UNDECIDED if parity & UNSURE else ((code ^ (parity << 1)) & 2) - 1
 
 
@@ -177,7 +177,7 @@ def locate_by_cells(points: Any, cells: Any, locations: Any, flag: Any) -> int:
         n_waiting = _enter(points, cells, kept_points, n_kept)
         for level in range(1, LEVELS):
             n_waiting = _descend(cells, kept_points, n_waiting, level, locations)
-        _ask_leaves(points, cells, kept_points, n_waiting, locations)
+        ask_leaves(points, cells, kept_points, n_waiting, locations)
         n_open += _count_open(locations, item_of, n_kept)
         n_kept = np.uint64(0)
     return n_open

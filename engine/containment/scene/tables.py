@@ -11,11 +11,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray, Int8Array, Int32Array, IntArray
+from engine.arrays import FloatArray, IntArray
 from engine.containment.cells.top import TopCells
 from engine.containment.locators import Locator
 from engine.containment.posed.locators import posed_locator
-from engine.containment.scene.bodies import Box, body_box, frames_of, grown_boxes, moved_boxes, own_box
+from engine.containment.scene.bodies import body_box, frames_of, grown_boxes, moved_boxes, own_box
 from engine.containment.scene.first_pass import BALL, BOX, CELLS, RINGS, ROWS, SECOND_PASS, SceneTables
 from engine.containment.scene.grid import SceneGrid, build_scene_grid
 from engine.containment.scene.rings import boxes_of_rings, close_rings
@@ -129,25 +129,11 @@ def _placed_balls(balls: IntArray, radii: FloatArray, lows: FloatArray, highs: F
 
 
 class _Kinds:
-    """The tables of the distinct solids, by kind, each in its own frame."""
+    """The tables of the distinct solids, by kind, each in its own frame, named as in `SceneTables`.
 
-    kinds: Int8Array
-    slots: Int32Array
-    lows: FloatArray
-    """``(n, 3)``: boxes, infinite where there may be none; of spheres the centre."""
-    highs: FloatArray
-    is_other: BoolArray
-    """Solids of other kinds, whose bodies are looked at one by one."""
-    boxes: Box
-    radii: FloatArray
-    row_offsets: IntArray
-    rows: FloatArray
-    polygon_offsets: IntArray
-    ring_offsets: IntArray
-    xs: FloatArray
-    ys: FloatArray
-    cell_frames: FloatArray
-    cell_places: IntArray
+    lows, highs: (n, 3), infinite where there may be no bounds; of spheres the centre. is_other: solids of other kinds,
+    whose bodies are looked at one by one.
+    """
 
     def __init__(self, solids: list[Solid], dimension: int, budget: Budget) -> None:
         n = len(solids)
