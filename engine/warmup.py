@@ -114,7 +114,7 @@ def _warm_cells() -> None:
     many = np.random.default_rng(0).uniform(-1.2, 1.2, (_MANY, 3))
     ball = Polyhedron(vertices, faces)
     locate(many, ball)
-    locate_scene(many, [ball])  # so many that its voxels pay
+    locate_scene(many, [ball])  # so many that level 0 of its cells pays
     points = as_points(many, 3)
     with Budget() as budget:  # large batches near large meshes are asked in the order of their cells
         cells = cells_if_they_pay(ball, len(points), budget)

@@ -39,9 +39,9 @@ def plain_signs(groups: Rows, group: int, x: Number, y: Number, z: Number) -> in
 
 @cache
 def _same_but_for_signs() -> object:
-    exact = segment_parity.locate_by_cells.py_func
-    changed = FunctionType(exact.__code__, {**exact.__globals__, "group_parity": plain_signs}, "locate_by_plain_signs")
-    return numba.njit(**_AS_ENGINE)(changed)
+    across = _compiled(segment_parity.parity_across.py_func, group_parity=plain_signs)
+    leaves = _compiled(segment_parity.ask_leaves.py_func, parity_across=across)
+    return _compiled(segment_parity.locate_by_cells.py_func, ask_leaves=leaves)
 
 
 def _points(subject: Any, threads: int) -> Prepared:

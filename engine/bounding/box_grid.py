@@ -32,7 +32,7 @@ _CROWD: Final = 48
 """Boxes that share a cell with one box, on average, beyond which a sweep is no worse."""
 
 
-class BoxGrid(NamedTuple):
+class CornerGrid(NamedTuple):
     """Boxes by cell, the large ones last.
 
     boxes (n, 6): low, then high. numbers (n,): which box each is. cells (n,): its cell, -1 where it is large. starts
@@ -65,7 +65,7 @@ def pairs_of_boxes(low: FloatArray, high: FloatArray, flag: Any, block: int = BL
 
 
 @np.errstate(all="ignore")
-def _grid_of(low: FloatArray, high: FloatArray) -> BoxGrid | None:
+def _grid_of(low: FloatArray, high: FloatArray) -> CornerGrid | None:
     """Return the grid of boxes (n, d), None where a sweep is better."""
     n_boxes, dimension = low.shape
     extent = np.empty(n_boxes)
@@ -86,7 +86,7 @@ def _grid_of(low: FloatArray, high: FloatArray) -> BoxGrid | None:
     row, layer = int(counts[0]), int(counts[0] * counts[1])
     boxes, numbers, cells = np.zeros((n_boxes, 6)), np.empty(n_boxes, np.int64), np.empty(n_boxes, np.int64)
     starts = np.zeros(layer * int(counts[2]) + 1, np.int32)
-    grid = BoxGrid(boxes, numbers, cells, starts, row, layer)
+    grid = CornerGrid(boxes, numbers, cells, starts, row, layer)
     if _sort_into_cells(low, high, extent, widest, least, width, grid) > _CROWD * n_boxes:
         return None
     return grid
@@ -115,7 +115,7 @@ def _spread(low: Any, extent: Any, widest: float, span: Any) -> None:
 
 
 @kernel
-def _sort_into_cells(low: Any, high: Any, extent: Any, widest: float, least: Any, width: Any, grid: BoxGrid) -> int:
+def _sort_into_cells(low: Any, high: Any, extent: Any, widest: float, least: Any, width: Any, grid: CornerGrid) -> int:
     """Fill the arrays of the grid, boxes and starts zero before; return the sum of the squares of how many share a
     cell."""
     starts, n_boxes, n_cells, dimension = grid.starts, low.shape[0], grid.starts.shape[0] - 1, low.shape[1]
@@ -176,7 +176,7 @@ def _add_run(boxes: Any, numbers: Any, box: int, start: int, stop: int, keys: An
 
 
 @kernel
-def _collect(grid: BoxGrid, start: int, enough: int, keys: Any, flag: Any) -> tuple[int, int]:
+def _collect(grid: CornerGrid, start: int, enough: int, keys: Any, flag: Any) -> tuple[int, int]:
     """Write first * n + second of the pairs of boxes from place `start` on with those after them, until `enough` are
     found; return their number and the place to go on from."""
     boxes, numbers, starts, row, layer = grid.boxes, grid.numbers, grid.starts, grid.row, grid.layer

@@ -1,4 +1,4 @@
-"""Uniform grids: which boxes reach into which cell, listed per cell, in one or two dimensions.
+"""Uniform grids: which boxes reach into which cell, listed per cell, in one to three dimensions.
 
 A value's cell is ``int((x / 2 - low / 2) * cells_per_unit)``, cut off at the last cell. Each of these steps is monotone
 in floating point, so a box listed from the cell of its lower side to the cell of its upper side is found from every
@@ -54,34 +54,70 @@ def make_axis(low: float, high: float, n_cells: int) -> Axis:
     return Axis(low, high, min(n_cells / extent, _FASTEST), n_cells)
 
 
-@kernel
-def count_boxes(u_low: Any, u_high: Any, u: Any, v_low: Any, v_high: Any, v: Any, counts: Any) -> None:
-    """Add to counts (n_cells,) int64 how many boxes reach into each cell."""
-    for box in range(len(u_low)):
-        first = cell_of(u_low[box], u.low, u.cells_per_unit, u.n_cells)
-        last = cell_of(u_high[box], u.low, u.cells_per_unit, u.n_cells)
-        for row in range(
-            cell_of(v_low[box], v.low, v.cells_per_unit, v.n_cells),
-            cell_of(v_high[box], v.low, v.cells_per_unit, v.n_cells) + 1,
-        ):
-            for column in range(first, last + 1):
-                counts[row * u.n_cells + column] += 1
+@inline
+def _span(lows: Any, highs: Any, box: int, axis: Any) -> tuple[int, int]:
+    """Return the first and last cell of a box along an axis; an axis of one cell is not looked up."""
+    if axis.n_cells == 1:
+        return 0, 0
+    return (
+        cell_of(lows[box], axis.low, axis.cells_per_unit, axis.n_cells),
+        cell_of(highs[box], axis.low, axis.cells_per_unit, axis.n_cells),
+    )
 
 
 @kernel
-def fill_boxes(u_low: Any, u_high: Any, u: Any, v_low: Any, v_high: Any, v: Any, ends: Any, items: Any) -> None:
-    """List the boxes by cell; ends (n_cells,) int64 holds each cell's first place and is moved behind its last."""
-    for box in range(len(u_low)):
-        first = cell_of(u_low[box], u.low, u.cells_per_unit, u.n_cells)
-        last = cell_of(u_high[box], u.low, u.cells_per_unit, u.n_cells)
-        for row in range(
-            cell_of(v_low[box], v.low, v.cells_per_unit, v.n_cells),
-            cell_of(v_high[box], v.low, v.cells_per_unit, v.n_cells) + 1,
-        ):
-            for column in range(first, last + 1):
-                cell = row * u.n_cells + column
-                items[ends[cell]] = box
-                ends[cell] += 1
+def list_boxes(lows: Any, highs: Any, axes: Any, ends: Any, items: Any, is_fill: bool) -> None:
+    """Count (ends[cell] += 1) or list (items[ends[cell]] = box) the boxes that reach into each cell.
+
+    lows, highs: (n,) of each of three axes, where not all boxes are alike there.
+    """
+    u, v, w = axes
+    for box in range(len(lows[0])):
+        first, last = _span(lows[0], highs[0], box, u)
+        line, last_line = _span(lows[1], highs[1], box, v)
+        layer, last_layer = _span(lows[2], highs[2], box, w)
+        for row in range(layer * v.n_cells + line, last_layer * v.n_cells + line + 1, v.n_cells):
+            for head in range(row * u.n_cells, (row + last_line - line + 1) * u.n_cells, u.n_cells):
+                for cell in range(head + first, head + last + 1):
+                    if is_fill:
+                        items[ends[cell]] = box
+                    ends[cell] += 1
+
+
+def list_in_cells(
+    lows: list[FloatArray], highs: list[FloatArray], n_cells: list[int], limit: int, check: Callable[[], object]
+) -> tuple[list[Axis], IntArray, Int32Array]:
+    """List boxes, given by their sides on three axes, in a grid of about `n_cells` cells along them over all of them.
+
+    An axis on which all boxes are alike may be given by one of them. Cells are halved in number, along the axis with
+    most of them, until the entries are at most `limit`: long boxes cannot fill the memory.
+
+    Returns axes, offsets, items.
+    """
+    lows = [np.ascontiguousarray(low) for low in lows]  # columns of a table: one signature
+    highs = [np.ascontiguousarray(high) for high in highs]
+    ends = [(float(low.min()), float(high.max())) for low, high in zip(lows, highs)]
+    while True:  # bound: every turn halves a number of cells, and one cell lists each box once
+        axes = [make_axis(*ends[k], n_cells[k]) for k in range(3)]
+        if max(n_cells) == 1 or _estimate(lows, highs, axes) <= limit:
+            break
+        check()
+        longest = n_cells.index(max(n_cells))
+        n_cells[longest] = (n_cells[longest] + 1) // 2
+    check()
+    offsets = np.zeros(axes[0].n_cells * axes[1].n_cells * axes[2].n_cells + 1, np.int64)
+    list_boxes(tuple(lows), tuple(highs), tuple(axes), offsets[1:], np.empty(0, np.int32), False)
+    check()
+    np.cumsum(offsets, out=offsets)
+    items = np.empty(offsets[-1], np.int32)
+    list_boxes(tuple(lows), tuple(highs), tuple(axes), offsets[:-1].copy(), items, True)
+    return axes, offsets, items
+
+
+def _estimate(lows: list[FloatArray], highs: list[FloatArray], axes: list[Axis]) -> float:
+    """Return about how many entries the lists would have."""
+    along = [(high * 0.5 - low * 0.5) * axis.cells_per_unit + 1.0 for low, high, axis in zip(lows, highs, axes)]
+    return float((along[0] * along[1] * along[2]).sum())
 
 
 def build_box_grid(
@@ -95,37 +131,12 @@ def build_box_grid(
 ) -> BoxGrid:
     """List boxes, given by their four sides (n,), in a grid of about u_cells x v_cells cells over all of them.
 
-    Cost: linear in the boxes and the entries; cells are halved, the longer row of them first, until the entries are at
-    most four for each box and cell together, so long boxes cannot fill the memory.
+    Cost: linear in the boxes and the entries, at most four for each box and cell together.
 
     check: called between the steps; what it raises ends the building.
     """
-    u_low, u_high = np.ascontiguousarray(u_low), np.ascontiguousarray(u_high)  # columns of a table: one signature
-    v_low, v_high = np.ascontiguousarray(v_low), np.ascontiguousarray(v_high)
-    limit = 4 * (len(u_low) + u_cells * v_cells) + 64
-    while True:  # bound: every turn halves a number of cells, and one cell lists each box once
-        u = make_axis(float(u_low.min()), float(u_high.max()), u_cells)
-        v = make_axis(float(v_low.min()), float(v_high.max()), v_cells)
-        counts = np.zeros(u.n_cells * v.n_cells, np.int64)
-        if u_cells * v_cells == 1 or _estimate(u_low, u_high, u, v_low, v_high, v) <= limit:
-            break
-        check()
-        if u_cells >= v_cells:
-            u_cells = (u_cells + 1) // 2
-        else:
-            v_cells = (v_cells + 1) // 2
-    check()
-    count_boxes(u_low, u_high, u, v_low, v_high, v, counts)
-    check()
-    offsets = np.zeros(len(counts) + 1, np.int64)
-    np.cumsum(counts, out=offsets[1:])
-    items = np.empty(offsets[-1], np.int32)
-    fill_boxes(u_low, u_high, u, v_low, v_high, v, offsets[:-1].copy(), items)
-    return BoxGrid(u, v, offsets, items)
-
-
-def _estimate(u_low: FloatArray, u_high: FloatArray, u: Axis, v_low: FloatArray, v_high: FloatArray, v: Axis) -> float:
-    """Return about how many entries the lists would have."""
-    columns = (u_high * 0.5 - u_low * 0.5) * u.cells_per_unit + 1.0
-    rows = (v_high * 0.5 - v_low * 0.5) * v.cells_per_unit + 1.0
-    return float(np.dot(columns, rows))
+    flat, limit = np.zeros(1), 4 * (len(u_low) + u_cells * v_cells) + 64
+    axes, offsets, items = list_in_cells(
+        [u_low, v_low, flat], [u_high, v_high, flat], [u_cells, v_cells, 1], limit, check
+    )
+    return BoxGrid(axes[0], axes[1], offsets, items)

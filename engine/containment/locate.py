@@ -5,7 +5,7 @@ The table of methods is locators.py. Here the arguments are checked, the batch i
 
 from __future__ import annotations
 
-from typing import Literal, overload
+from typing import Literal, Unpack, overload
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from engine.arrays import BoolArray, Int8Array
 from engine.containment.cells.order import gathered
 from engine.containment.locators import locator_of
 from engine.errors import NotFiniteError
-from engine.parallel import Budget, Cancel, Progress, run_chunks
+from engine.parallel import Budget, Cancel, Options, Progress, run_chunks
 from engine.solids.base import Solid
 from engine.solids.checks import as_points, check_finite
 from engine.types import Accuracy
@@ -21,25 +21,11 @@ from engine.types import Accuracy
 
 @overload
 def locate(
-    points: object,
-    solid: Solid,
-    *,
-    workers: int | None = ...,
-    deadline: float | None = ...,
-    cancel: Cancel | None = ...,
-    progress: Progress | None = ...,
-    report: Literal[False] = ...,
+    points: object, solid: Solid, *, report: Literal[False] = False, **options: Unpack[Options]
 ) -> Int8Array: ...
 @overload
 def locate(
-    points: object,
-    solid: Solid,
-    *,
-    workers: int | None = ...,
-    deadline: float | None = ...,
-    cancel: Cancel | None = ...,
-    progress: Progress | None = ...,
-    report: Literal[True],
+    points: object, solid: Solid, *, report: Literal[True], **options: Unpack[Options]
 ) -> tuple[Int8Array, Accuracy]: ...
 def locate(
     points: object,
@@ -114,25 +100,11 @@ def locate(
 
 @overload
 def contains(
-    points: object,
-    solid: Solid,
-    *,
-    workers: int | None = ...,
-    deadline: float | None = ...,
-    cancel: Cancel | None = ...,
-    progress: Progress | None = ...,
-    report: Literal[False] = ...,
+    points: object, solid: Solid, *, report: Literal[False] = False, **options: Unpack[Options]
 ) -> BoolArray: ...
 @overload
 def contains(
-    points: object,
-    solid: Solid,
-    *,
-    workers: int | None = ...,
-    deadline: float | None = ...,
-    cancel: Cancel | None = ...,
-    progress: Progress | None = ...,
-    report: Literal[True],
+    points: object, solid: Solid, *, report: Literal[True], **options: Unpack[Options]
 ) -> tuple[BoolArray, Accuracy]: ...
 def contains(
     points: object,

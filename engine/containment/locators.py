@@ -24,7 +24,7 @@ from engine.containment.methods.polyhedron_one_pass import locate_few
 from engine.containment.methods.polyhedron_ray_parity import locate_by_columns
 from engine.containment.methods.polynomial import locate_by_polynomial
 from engine.containment.methods.triangle import locate_in_triangle
-from engine.containment.prepared import Columns, Rings, columns_of, columns_pay, rings_of, rounded_rows
+from engine.containment.prepared import columns_of, columns_pay, rings_of, rounded_rows
 from engine.containment.rational_locate import Check, combine, prism_walls, rational_location, unsupported
 from engine.containment.ring_cells.build import ring_cells_if_they_pay
 from engine.containment.ring_cells.locate import locate_by_ring_cells
@@ -120,15 +120,18 @@ def rational_half(solid: Solid, pose: Pose | None = None) -> Callable[[Sequence[
     return lambda point, check: rational_location(point, solid, pose, check)
 
 
+def _by_kernel(method: str, kernel: Callable[..., int], solid: Solid, *prepared: object) -> Locator:
+    """Return the locator by a kernel that takes points, what is prepared of the solid, locations and flag."""
+    return Locator(
+        method,
+        settled(lambda points, out, flag: int(kernel(points, *prepared, out, flag)), rational_half(solid)),
+    )
+
+
 def _in_rows(solid: HalfSpace | Convex) -> Locator:
     rows = solid.row[None] if isinstance(solid, HalfSpace) else solid.planes
-    is_exact = np.ones(len(rows), np.bool_)
     kernel = locate_in_half_planes if solid.dimension == 2 else locate_in_half_spaces
-
-    def run(points: FloatArray, locations: Int8Array, flag: FlagArray) -> int:
-        return int(kernel(points, rows, is_exact, locations, flag))
-
-    return Locator("half_spaces", settled(run, rational_half(solid)))
+    return _by_kernel("half_spaces", kernel, solid, rows, np.ones(len(rows), np.bool_))
 
 
 def _in_sphere(solid: Sphere) -> Locator:
@@ -139,21 +142,14 @@ def _in_sphere(solid: Sphere) -> Locator:
 
 
 def _in_aabb(solid: Aabb) -> Locator:
-    def run(points: FloatArray, locations: Int8Array, flag: FlagArray) -> int:
-        return int(locate_in_box(points, solid.min, solid.max, locations, flag))
-
-    return Locator("comparison", settled(run, rational_half(solid)))
+    return _by_kernel("comparison", locate_in_box, solid, solid.min, solid.max)
 
 
 def _in_triangle(solid: Triangle) -> Locator:
     if solid.dimension == 3:
         return _in_prism(solid)
     low, high = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
-
-    def run(points: FloatArray, locations: Int8Array, flag: FlagArray) -> int:
-        return int(locate_in_triangle(points, solid.vertices, low, high, locations, flag))
-
-    return Locator("same_side", settled(run, rational_half(solid)))
+    return _by_kernel("same_side", locate_in_triangle, solid, solid.vertices, low, high)
 
 
 def _in_prism(solid: Triangle) -> Locator:
@@ -170,8 +166,7 @@ def _in_prism(solid: Triangle) -> Locator:
 
 def _in_polygon(solid: Polygon) -> Locator:
     def run(points: FloatArray, locations: Int8Array, flag: FlagArray) -> int:
-        rings: Rings = rings_of(solid)
-        return int(locate_in_rings(points, *rings, locations, flag))
+        return int(locate_in_rings(points, *rings_of(solid), locations, flag))
 
     by_rays = settled(run, rational_half(solid), lambda check: rings_of(solid, check))
 
@@ -189,8 +184,7 @@ def _in_polygon(solid: Polygon) -> Locator:
 
 def _in_polyhedron(solid: Polyhedron) -> Locator:
     def run(points: FloatArray, locations: Int8Array, flag: FlagArray) -> int:
-        columns: Columns = columns_of(solid)
-        return int(locate_by_columns(points, *columns, locations, flag))
+        return int(locate_by_columns(points, *columns_of(solid), locations, flag))
 
     def run_once(points: FloatArray, locations: Int8Array, flag: FlagArray) -> int:
         return locate_few(points, solid.vertices, solid.triangles, locations, flag)
@@ -237,11 +231,7 @@ def _in_implicit(solid: Implicit) -> Locator:
     if solid.function is not None:
         return Locator("callable", _call(solid), "float64")
     degree = int(solid.powers.sum(axis=1).max())
-
-    def run(points: FloatArray, locations: Int8Array, flag: FlagArray) -> int:
-        return int(locate_by_polynomial(points, solid.powers, solid.coefficients, degree, locations, flag))
-
-    return Locator("polynomial", settled(run, rational_half(solid)))
+    return _by_kernel("polynomial", locate_by_polynomial, solid, solid.powers, solid.coefficients, degree)
 
 
 def _call(solid: Implicit) -> Fill:
@@ -263,10 +253,6 @@ def _call(solid: Implicit) -> Fill:
         return Counts(0, 0)
 
     return fill
-
-
-def _in_csg(solid: Csg) -> Locator:
-    return csg_locator(solid, locator_of)
 
 
 def csg_locator(solid: Csg, leaf_locator: Callable[[Solid], Locator]) -> Locator:
@@ -318,5 +304,5 @@ _MAKERS: dict[type[Solid], Callable[..., Locator]] = {
     Polygon: _in_polygon,
     Polyhedron: _in_polyhedron,
     Implicit: _in_implicit,
-    Csg: _in_csg,
+    Csg: lambda solid: csg_locator(solid, locator_of),
 }

@@ -113,7 +113,7 @@ def _build_rings(starts: FloatArray, ends: FloatArray, check: Check) -> Rings:
     starts, ends = np.ascontiguousarray(starts[order]), np.ascontiguousarray(ends[order])
     check()
     low, high = np.minimum(starts, ends), np.maximum(starts, ends)
-    flat = np.zeros(len(order))
+    flat = np.zeros(1)
     slabs = build_box_grid(low[:, 1], high[:, 1], flat, flat, max(1, min(1 << 20, len(order))), 1, check)
     box = (float(low[:, 0].min()), float(high[:, 0].max()), float(low[:, 1].min()), float(high[:, 1].max()))
     return Rings(starts, ends, np.ascontiguousarray(high[:, 0]), slabs, box)

@@ -225,22 +225,24 @@ def _in_implicit(solid: Implicit, point: Sequence[Number]) -> int:
     return polynomial_sign_rational(solid.powers.tolist(), solid.coefficients.tolist(), point)
 
 
+def adjugate(r: Sequence[Sequence[Any]]) -> tuple[list[list[Any]], Any]:
+    """Return adj(R) and det(R) of a matrix of floats or of rationals; R^-1 is their quotient."""
+    if len(r) == 2:
+        return [[r[1][1], -r[0][1]], [-r[1][0], r[0][0]]], r[0][0] * r[1][1] - r[0][1] * r[1][0]
+
+    def cofactor(i: int, j: int) -> Any:
+        (i1, i2), (j1, j2) = ((i + 1) % 3, (i + 2) % 3), ((j + 1) % 3, (j + 2) % 3)
+        return r[i1][j1] * r[i2][j2] - r[i1][j2] * r[i2][j1]
+
+    found = [[cofactor(j, i) for j in range(3)] for i in range(3)]
+    return found, sum(r[0][k] * found[k][0] for k in range(3))
+
+
 def to_body_frame(point: Sequence[Number], pose: Pose) -> list[Fraction]:
     """Return R^-1 (point - t), the exact preimage of `point` under `pose`."""
     moved = [Fraction(value) - Fraction(shift) for value, shift in zip(point, pose.translation.tolist())]
-    r = [[Fraction(entry) for entry in row] for row in pose.rotation.tolist()]
-    if len(moved) == 2:
-        determinant = r[0][0] * r[1][1] - r[0][1] * r[1][0]
-        adjugate = [[r[1][1], -r[0][1]], [-r[1][0], r[0][0]]]
-    else:
-
-        def cofactor(i: int, j: int) -> Fraction:
-            (i1, i2), (j1, j2) = ((i + 1) % 3, (i + 2) % 3), ((j + 1) % 3, (j + 2) % 3)
-            return r[i1][j1] * r[i2][j2] - r[i1][j2] * r[i2][j1]
-
-        adjugate = [[cofactor(j, i) for j in range(3)] for i in range(3)]
-        determinant = sum((r[0][k] * adjugate[k][0] for k in range(3)), Fraction(0))
-    return [sum((a * x for a, x in zip(row, moved)), Fraction(0)) / determinant for row in adjugate]
+    rows, determinant = adjugate([[Fraction(entry) for entry in row] for row in pose.rotation.tolist()])
+    return [sum((a * x for a, x in zip(row, moved)), Fraction(0)) / determinant for row in rows]
 
 
 def to_world_frame(point: Sequence[Number], pose: Pose) -> list[Fraction]:

@@ -169,6 +169,13 @@ SCENE = {
                      {"solid": sphere((0, 0, 0), 1), "pose": TURN}],
              points=[[0.7, 1.0, 0.3], [0.1, 0.2, 0.3], [0.2, 0.7, 0.4], [0.4, 0.6, 0.5], [0.1, 0.2, 1.3]]),
     ],
+    "huge_and_tiny": [
+        case("preimage of no number", "0 times a difference that overflows: NaN in the body's frame, which no comparison holds for",
+             bodies=[{"solid": solid, "pose": {"rotation": [[1, -(2.0**-41)], [0, 1]], "translation": [-HUGE * 2.0**-43] * 2}}
+                     for solid in (polygon([[-HUGE, -HUGE], [HUGE, -HUGE], [HUGE, HUGE], [-HUGE, HUGE]]),
+                                   {"type": "triangle", "vertices": [[-HUGE, -HUGE], [HUGE, -HUGE], [HUGE, HUGE]]})],
+             points=[[HUGE, -HUGE / 2], [HUGE, HUGE / 2], [0, 0], [-HUGE, HUGE / 2]]),
+    ],
 }  # fmt: skip
 
 COLLIDE = {

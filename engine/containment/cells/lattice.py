@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from typing import Any, Final, NamedTuple
 
+from engine.arrays import FloatArray, Int8Array, Int32Array, IntArray
 from engine.jit import inline, kernel
 
 LEVELS: Final = 3
@@ -24,6 +25,8 @@ PARTS: Final = SPLIT**3
 _FINEST: Final = 2.0 ** (2 * (LEVELS - 1))
 _MARGIN: Final = 0.5 + 2.0**-20
 _ROUNDING: Final = 16.0 * 2.0**-53
+UNKNOWN: Final = 0
+"""Status of a cell that is not known, or whose reference point lies on the surface or in another cell."""
 PLACE: Final = (0.5 + 287.0 / 4096.0, 0.5 - 413.0 / 4096.0, 0.5 + 101.0 / 4096.0)
 """Where the reference point lies in its cell: no symmetry that faces of a lattice might share."""
 
@@ -36,6 +39,40 @@ class Lattice(NamedTuple):
     """1 / size."""
     size: tuple[float, float, float]
     n: tuple[int, int, int]
+
+
+class Mesh(NamedTuple):
+    """A polyhedron and its lattice."""
+
+    vertices: FloatArray
+    triangles: Int32Array
+    lattice: Lattice
+
+
+class Level(NamedTuple):
+    """The cells of one level that have lists."""
+
+    depth: int
+    places: Int32Array
+    """``(m, 3)`` indices on the level."""
+    statuses: Int8Array
+    """``(m,)`` side of the reference point: -1, 1, or UNKNOWN."""
+    firsts: IntArray
+    """``(m + 1,)``: where each cell's triangles begin in `lists`."""
+    lists: Int32Array
+
+
+class Block(NamedTuple):
+    """Cells of a level side by side: from which index on, how many along the axes, the number of the first."""
+
+    depth: int
+    x: int
+    y: int
+    z: int
+    nx: int
+    ny: int
+    nz: int
+    first: int
 
 
 @inline
@@ -66,6 +103,16 @@ def reference_coordinate(low: float, size: float, index: int, place: float) -> f
 def corner(vertices: Any, vertex: int) -> Any:
     """Return a vertex as a tuple."""
     return (float(vertices[vertex, 0]), float(vertices[vertex, 1]), float(vertices[vertex, 2]))
+
+
+@inline
+def corners(vertices: Any, triangles: Any, triangle: int) -> Any:
+    """Return the corners of a triangle."""
+    return (
+        corner(vertices, triangles[triangle, 0]),
+        corner(vertices, triangles[triangle, 1]),
+        corner(vertices, triangles[triangle, 2]),
+    )
 
 
 @inline
@@ -119,86 +166,55 @@ def misses_cell(u: Any, v: Any, w: Any) -> bool:
     )
 
 
+@inline
+def _list_triangle(mesh: Any, triangle: int, block: Any, ends: Any, items: Any, is_fill: bool) -> None:
+    """Count or list a triangle in the cells of a block that it reaches into, in scanning order."""
+    low, scale, (depth, x_low, y_low, z_low, nx, ny, nz, first_cell) = mesh.lattice.low, mesh.lattice.scale, block
+    parts, shift = parts_of(depth), 2 * (LEVELS - 1 - depth)
+    a, b, c = corners(mesh.vertices, mesh.triangles, triangle)
+    u, v = scaled_difference(b, a, scale, parts), scaled_difference(c, a, scale, parts)
+    base = scaled_difference(low, a, scale, parts)
+    x_first = max((finest(min(a[0], b[0], c[0]), low[0], scale[0]) >> shift) - x_low, 0)
+    x_last = min((finest(max(a[0], b[0], c[0]), low[0], scale[0]) >> shift) - x_low, nx - 1)
+    y_first = max((finest(min(a[1], b[1], c[1]), low[1], scale[1]) >> shift) - y_low, 0)
+    y_last = min((finest(max(a[1], b[1], c[1]), low[1], scale[1]) >> shift) - y_low, ny - 1)
+    z_first = max((finest(min(a[2], b[2], c[2]), low[2], scale[2]) >> shift) - z_low, 0)
+    z_last = min((finest(max(a[2], b[2], c[2]), low[2], scale[2]) >> shift) - z_low, nz - 1)
+    # on level 0 no test helps a triangle in two cells at most
+    is_small = depth == 0 and (x_last - x_first) + (y_last - y_first) + (z_last - z_first) <= 1
+    for z in range(z_first, z_last + 1):
+        for y in range(y_first, y_last + 1):
+            for x in range(x_first, x_last + 1):
+                w = (base[0] + (x_low + x + 0.5), base[1] + (y_low + y + 0.5), base[2] + (z_low + z + 0.5))
+                if not is_small and misses_cell(u, v, w):
+                    continue
+                cell = first_cell + (z * ny + y) * nx + x
+                if is_fill:
+                    items[ends[cell]] = triangle
+                ends[cell] += 1
+
+
 @kernel
-def list_top(vertices: Any, triangles: Any, lattice: Any, ends: Any, items: Any, is_fill: bool, flag: Any) -> None:
+def list_top(mesh: Any, ends: Any, items: Any, is_fill: bool, flag: Any) -> None:
     """Count (ends[cell] += 1) or list (items[ends[cell]] = triangle) what reaches into each cell of level 0."""
-    low, scale, n = lattice.low, lattice.scale, lattice.n
-    shift = 2 * (LEVELS - 1)
-    for triangle in range(len(triangles)):
+    nx, ny, nz = mesh.lattice.n
+    for triangle in range(len(mesh.triangles)):
         if flag[0]:
             break
-        a = corner(vertices, triangles[triangle, 0])
-        b = corner(vertices, triangles[triangle, 1])
-        c = corner(vertices, triangles[triangle, 2])
-        u, v = scaled_difference(b, a, scale, 1.0), scaled_difference(c, a, scale, 1.0)
-        base = scaled_difference(low, a, scale, 1.0)
-        x_first = finest(min(a[0], b[0], c[0]), low[0], scale[0]) >> shift
-        x_last = finest(max(a[0], b[0], c[0]), low[0], scale[0]) >> shift
-        y_first = finest(min(a[1], b[1], c[1]), low[1], scale[1]) >> shift
-        y_last = finest(max(a[1], b[1], c[1]), low[1], scale[1]) >> shift
-        z_first = finest(min(a[2], b[2], c[2]), low[2], scale[2]) >> shift
-        z_last = finest(max(a[2], b[2], c[2]), low[2], scale[2]) >> shift
-        is_small = (x_last - x_first) + (y_last - y_first) + (z_last - z_first) <= 1  # two cells at most: no test helps
-        for z in range(z_first, z_last + 1):
-            for y in range(y_first, y_last + 1):
-                for x in range(x_first, x_last + 1):
-                    w = (base[0] + (x + 0.5), base[1] + (y + 0.5), base[2] + (z + 0.5))
-                    if not is_small and misses_cell(u, v, w):
-                        continue
-                    cell = (z * n[1] + y) * n[0] + x
-                    if is_fill:
-                        items[ends[cell]] = triangle
-                    ends[cell] += 1
+        _list_triangle(mesh, triangle, Block(0, 0, 0, 0, nx, ny, nz, 0), ends, items, is_fill)
 
 
 @kernel
-def list_parts(
-    vertices: Any,
-    triangles: Any,
-    lattice: Any,
-    parents: Any,
-    places: Any,
-    firsts: Any,
-    lists: Any,
-    level: int,
-    ends: Any,
-    items: Any,
-    is_fill: bool,
-    flag: Any,
-) -> None:
+def list_parts(mesh: Any, level: Any, parents: Any, ends: Any, items: Any, is_fill: bool, flag: Any) -> None:
     """Count or list, as `list_top` does, the triangles that reach into the 64 parts of each parent cell.
 
-    parents: (p,) indices into the cells of the level above; places: (cells, 3) their indices on that level;
-    firsts, lists: their lists; level: that of the parts; ends: (p * 64,).
+    level: that of the parents; parents: (p,) some of its cells; ends: (p * 64,).
     """
-    low, scale = lattice.low, lattice.scale
-    parts = parts_of(level)
-    shift = 2 * (LEVELS - 1 - level)
     for parent in range(len(parents)):
         if flag[0]:
             break
         cell = parents[parent]
-        x0, y0, z0 = places[cell, 0] * SPLIT, places[cell, 1] * SPLIT, places[cell, 2] * SPLIT
-        for entry in range(firsts[cell], firsts[cell + 1]):
-            triangle = lists[entry]
-            a = corner(vertices, triangles[triangle, 0])
-            b = corner(vertices, triangles[triangle, 1])
-            c = corner(vertices, triangles[triangle, 2])
-            u, v = scaled_difference(b, a, scale, parts), scaled_difference(c, a, scale, parts)
-            base = scaled_difference(low, a, scale, parts)
-            x_first = max((finest(min(a[0], b[0], c[0]), low[0], scale[0]) >> shift) - x0, 0)
-            x_last = min((finest(max(a[0], b[0], c[0]), low[0], scale[0]) >> shift) - x0, SPLIT - 1)
-            y_first = max((finest(min(a[1], b[1], c[1]), low[1], scale[1]) >> shift) - y0, 0)
-            y_last = min((finest(max(a[1], b[1], c[1]), low[1], scale[1]) >> shift) - y0, SPLIT - 1)
-            z_first = max((finest(min(a[2], b[2], c[2]), low[2], scale[2]) >> shift) - z0, 0)
-            z_last = min((finest(max(a[2], b[2], c[2]), low[2], scale[2]) >> shift) - z0, SPLIT - 1)
-            for z in range(z_first, z_last + 1):
-                for y in range(y_first, y_last + 1):
-                    for x in range(x_first, x_last + 1):
-                        w = (base[0] + (x0 + x + 0.5), base[1] + (y0 + y + 0.5), base[2] + (z0 + z + 0.5))
-                        if misses_cell(u, v, w):
-                            continue
-                        part = parent * PARTS + (z * SPLIT + y) * SPLIT + x
-                        if is_fill:
-                            items[ends[part]] = triangle
-                        ends[part] += 1
+        x, y, z = level.places[cell, 0] * SPLIT, level.places[cell, 1] * SPLIT, level.places[cell, 2] * SPLIT
+        block = Block(level.depth + 1, x, y, z, SPLIT, SPLIT, SPLIT, parent * PARTS)
+        for entry in range(level.firsts[cell], level.firsts[cell + 1]):
+            _list_triangle(mesh, level.lists[entry], block, ends, items, is_fill)

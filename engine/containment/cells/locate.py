@@ -14,15 +14,16 @@ from typing import Any, Final
 import numpy as np
 
 from engine.containment.cells.lattice import LEVELS, PARTS, PLACE, finest, parts_of, reference_coordinate, share_of
-from engine.jit import inline, kernel
+from engine.jit import inline, kernel, merged
 from engine.lanes.cells import ROWS, UNSURE, group_parity, prefetch_group
 from engine.types import UNDECIDED
 
 OUTSIDE_CELL: Final = -4
 INSIDE_CELL: Final = -2
-OPEN_CELL: Final = -1
-"""Codes of cells without entries: their location less 3, UNDECIDED where it is open. From 0 on, a brick's number with
-the lowest bit set, or the place of a leaf's first entry; one bit above is the side of the leaf's reference point."""
+MIXED_CELL: Final = -1
+"""Codes of cells without entries: their location less 3, UNDECIDED for a mixed one, of which no side is known. From 0
+on, a brick's number with the lowest bit set, or the place of a leaf's first entry; one bit above is the side of the
+leaf's reference point."""
 CODE_SHIFT: Final = 3
 NOT_FINITE: Final = -1
 _BLOCK: Final = 256
@@ -60,6 +61,97 @@ def _first_status(points: Any, start: Any, end: Any, cells: Any, locations: Any,
     return n_kept, n_beyond
 
 
+@inline
+def _has_not_finite(points: Any, start: Any, end: Any) -> bool:
+    for item in range(start, end):
+        px, py, pz = points[item, 0], points[item, 1], points[item, 2]
+        if (px - px) + (py - py) + (pz - pz) != 0.0:
+            return True
+    return False
+
+
+@merged
+def _enter(points: Any, cells: Any, kept_points: Any, n_kept: Any) -> Any:
+    """Look up the codes of level 0 of the points kept; returns how many have a list or a brick, and so wait."""
+    low, scale, n, codes = cells.lattice.low, cells.lattice.scale, cells.lattice.n, cells.codes
+    item_of, code_of, level_of, places, waiting = kept_points
+    top_shift, n_waiting = 2 * (LEVELS - 1), np.uint64(0)
+    for kept in range(n_kept):
+        item = item_of[kept]
+        x = finest(points[item, 0], low[0], scale[0])
+        y = finest(points[item, 1], low[1], scale[1])
+        z = finest(points[item, 2], low[2], scale[2])
+        places[kept, 0], places[kept, 1], places[kept, 2] = x, y, z
+        code = codes[np.uint64(((z >> top_shift) * n[1] + (y >> top_shift)) * n[0] + (x >> top_shift))]
+        code_of[kept], level_of[kept] = code, 0
+        waiting[n_waiting] = kept
+        n_waiting += np.uint64(code >= 0)
+    return n_waiting
+
+
+@merged
+def _descend(cells: Any, kept_points: Any, n_waiting: Any, level: int, locations: Any) -> Any:
+    """Look up the codes of a level for the points that wait in a brick; returns how many wait after it."""
+    n, codes = cells.lattice.n, cells.codes
+    item_of, code_of, level_of, places, waiting = kept_points
+    n_top, part_shift, n_left = n[0] * n[1] * n[2], 2 * (LEVELS - 1 - level), np.uint64(0)
+    for turn in range(n_waiting):
+        kept = waiting[turn]
+        code = code_of[kept]
+        if code & 1:
+            x, y, z = places[kept, 0] >> part_shift, places[kept, 1] >> part_shift, places[kept, 2] >> part_shift
+            part = ((z & 3) << 4) | ((y & 3) << 2) | (x & 3)
+            code = codes[np.uint64(n_top + (code >> 1) * PARTS + part)]
+            locations[item_of[kept]] = min(code, MIXED_CELL) + CODE_SHIFT
+            code_of[kept], level_of[kept] = code, level
+        waiting[n_left] = kept
+        n_left += np.uint64(code >= 0)
+    return n_left
+
+
+@merged
+def parity_across(groups: Any, group: int, wx: Any, wy: Any, wz: Any) -> int:
+    """Return the parity of the segment from the reference point to w, over all groups of a leaf, plus UNSURE."""
+    parity = group_parity(groups, group, wx, wy, wz)
+    while groups[group, ROWS - 1, 0] == 0.0:  # bound: the last group of each leaf says so
+        group += 1
+        found = group_parity(groups, group, wx, wy, wz)
+        parity = ((parity ^ found) & 1) | ((parity | found) & UNSURE)
+    return parity
+
+
+@merged
+def ask_leaves(points: Any, cells: Any, kept_points: Any, n_waiting: Any, locations: Any) -> None:
+    """Locate the points that wait, in their leaves."""
+    low, scale, size, groups = cells.lattice.low, cells.lattice.scale, cells.lattice.size, cells.groups
+    item_of, code_of, level_of, places, waiting = kept_points
+    for turn in range(min(n_waiting, np.uint64(_AHEAD))):
+        prefetch_group(groups, code_of[waiting[turn]] >> 2)
+    for turn in range(n_waiting):
+        if turn + np.uint64(_AHEAD) < n_waiting:
+            prefetch_group(groups, code_of[waiting[turn + np.uint64(_AHEAD)]] >> 2)
+        kept = waiting[turn]
+        item, level, code = item_of[kept], level_of[kept], code_of[kept]
+        parts, share, part_shift = parts_of(level), share_of(level), 2 * (LEVELS - 1 - level)
+        x, y, z = places[kept, 0] >> part_shift, places[kept, 1] >> part_shift, places[kept, 2] >> part_shift
+        rx = reference_coordinate(low[0], size[0] * share, x, PLACE[0])
+        ry = reference_coordinate(low[1], size[1] * share, y, PLACE[1])
+        rz = reference_coordinate(low[2], size[2] * share, z, PLACE[2])
+        wx = np.float32((points[item, 0] - rx) * (scale[0] * parts))
+        wy = np.float32((points[item, 1] - ry) * (scale[1] * parts))
+        wz = np.float32((points[item, 2] - rz) * (scale[2] * parts))
+        parity = parity_across(groups, code >> 2, wx, wy, wz)
+        locations[item] = UNDECIDED if parity & UNSURE else ((code ^ (parity << 1)) & 2) - 1
+
+
+@inline
+def _count_open(locations: Any, item_of: Any, n_kept: Any) -> int:
+    n_open = 0
+    for kept in range(n_kept):
+        n_open += locations[item_of[kept]] == UNDECIDED
+    return n_open
+
+
 @kernel
 def locate_by_cells(points: Any, cells: Any, locations: Any, flag: Any) -> int:
     """Fill `locations` (n,) int8 for points (n, 3) from a `Cells`; returns how many are left UNDECIDED.
@@ -68,78 +160,24 @@ def locate_by_cells(points: Any, cells: Any, locations: Any, flag: Any) -> int:
     status on level 0, where most points end; codes there and in bricks; first group of the leaf, parity.
     Returns NOT_FINITE, with the rest undone, where a point is not: it is in no cell, so it costs little to look.
     """
-    low, scale, size, n = cells.lattice.low, cells.lattice.scale, cells.lattice.size, cells.lattice.n
-    codes, groups = cells.codes, cells.groups
-    n_top, top_shift = n[0] * n[1] * n[2], 2 * (LEVELS - 1)
     room = _FEWEST + _BLOCK + 1
     item_of, code_of, level_of = np.empty(room, np.uint64), np.empty(room, np.int32), np.empty(room, np.int32)
     places, waiting = np.empty((room, 3), np.int32), np.empty(room, np.uint64)
+    kept_points = item_of, code_of, level_of, places, waiting
     n_open, n_kept = 0, np.uint64(0)
     for start in range(0, len(points), _BLOCK):
         if flag[0]:
             break
         first, end = np.uint64(start), np.uint64(min(start + _BLOCK, len(points)))
         n_kept, n_beyond = _first_status(points, first, end, cells, locations, item_of, n_kept)
-        if n_beyond > 0:
-            for item in range(first, end):
-                px, py, pz = points[item, 0], points[item, 1], points[item, 2]
-                if (px - px) + (py - py) + (pz - pz) != 0.0:
-                    return NOT_FINITE
+        if n_beyond > 0 and _has_not_finite(points, first, end):
+            return NOT_FINITE
         if n_kept < _FEWEST and end < len(points):
             continue
-        n_waiting = np.uint64(0)
-        for kept in range(n_kept):
-            item = item_of[kept]
-            x = finest(points[item, 0], low[0], scale[0])
-            y = finest(points[item, 1], low[1], scale[1])
-            z = finest(points[item, 2], low[2], scale[2])
-            places[kept, 0], places[kept, 1], places[kept, 2] = x, y, z
-            code = codes[np.uint64(((z >> top_shift) * n[1] + (y >> top_shift)) * n[0] + (x >> top_shift))]
-            code_of[kept], level_of[kept] = code, 0
-            waiting[n_waiting] = kept
-            n_waiting += np.uint64(code >= 0)
-        n_open += int(n_kept) - int(n_waiting)
+        n_waiting = _enter(points, cells, kept_points, n_kept)
         for level in range(1, LEVELS):
-            n_left, part_shift = np.uint64(0), 2 * (LEVELS - 1 - level)
-            for turn in range(n_waiting):
-                kept = waiting[turn]
-                code = code_of[kept]
-                if code & 1:
-                    x, y, z = (
-                        places[kept, 0] >> part_shift,
-                        places[kept, 1] >> part_shift,
-                        places[kept, 2] >> part_shift,
-                    )
-                    part = ((z & 3) << 4) | ((y & 3) << 2) | (x & 3)
-                    code = codes[np.uint64(n_top + (code >> 1) * PARTS + part)]
-                    locations[item_of[kept]] = min(code, OPEN_CELL) + CODE_SHIFT
-                    code_of[kept], level_of[kept] = code, level
-                    n_open += code == OPEN_CELL
-                waiting[n_left] = kept
-                n_left += np.uint64(code >= 0)
-            n_waiting = n_left
-        for turn in range(min(n_waiting, np.uint64(_AHEAD))):
-            prefetch_group(groups, code_of[waiting[turn]] >> 2)
-        for turn in range(n_waiting):
-            if turn + np.uint64(_AHEAD) < n_waiting:
-                prefetch_group(groups, code_of[waiting[turn + np.uint64(_AHEAD)]] >> 2)
-            kept = waiting[turn]
-            item, level, code = item_of[kept], level_of[kept], code_of[kept]
-            parts, share, part_shift = parts_of(level), share_of(level), 2 * (LEVELS - 1 - level)
-            x, y, z = places[kept, 0] >> part_shift, places[kept, 1] >> part_shift, places[kept, 2] >> part_shift
-            rx = reference_coordinate(low[0], size[0] * share, x, PLACE[0])
-            ry = reference_coordinate(low[1], size[1] * share, y, PLACE[1])
-            rz = reference_coordinate(low[2], size[2] * share, z, PLACE[2])
-            wx = np.float32((points[item, 0] - rx) * (scale[0] * parts))
-            wy = np.float32((points[item, 1] - ry) * (scale[1] * parts))
-            wz = np.float32((points[item, 2] - rz) * (scale[2] * parts))
-            group = code >> 2
-            parity = group_parity(groups, group, wx, wy, wz)
-            while groups[group, ROWS - 1, 0] == 0.0:  # bound: the last group of each leaf says so
-                group += 1
-                found = group_parity(groups, group, wx, wy, wz)
-                parity = ((parity ^ found) & 1) | ((parity | found) & UNSURE)
-            locations[item] = UNDECIDED if parity & UNSURE else ((code ^ (parity << 1)) & 2) - 1
-            n_open += (parity & UNSURE) != 0
+            n_waiting = _descend(cells, kept_points, n_waiting, level, locations)
+        ask_leaves(points, cells, kept_points, n_waiting, locations)
+        n_open += _count_open(locations, item_of, n_kept)
         n_kept = np.uint64(0)
     return n_open

@@ -7,7 +7,7 @@ what that test leaves open, by vertical rays.
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +17,8 @@ from engine.containment.cells.lattice import (
     PARTS,
     PLACE,
     SPLIT,
-    corner,
+    UNKNOWN,
+    corners,
     finest,
     parts_of,
     reference_coordinate,
@@ -27,33 +28,28 @@ from engine.containment.cells.lattice import (
 from engine.jit import inline, kernel
 from engine.lanes.cells import LANES, ROWS, UNSURE, group_parity
 
-OPEN: Final = 0
-"""Status of a cell that is not known, or whose reference point lies on the surface or in another cell."""
+
+@inline
+def _empty_before(counts: Any, first: int, place: int, nx: int, ny: int) -> int:
+    """Return an empty cell of a block that shares a wall with this one and comes before it, -1 if there is none."""
+    if place % nx > 0 and counts[first + place - 1] == 0:
+        return first + place - 1
+    if place // nx % ny > 0 and counts[first + place - nx] == 0:
+        return first + place - nx
+    if place >= nx * ny and counts[first + place - nx * ny] == 0:
+        return first + place - nx * ny
+    return -1
 
 
 @kernel
-def label_empty(counts: Any, nx: int, ny: int, nz: int, labels: Any) -> int:
+def label_empty(counts: Any, nx: int, ny: int, labels: Any) -> None:
     """Fill labels (nz * ny * nx,) int64 with the cell that each empty cell copies from, itself for one that is asked.
 
-    Cells with a list label themselves. Returns how many empty cells are asked.
+    Cells with a list label themselves.
     """
-    n_asked = 0
-    for z in range(nz):
-        for y in range(ny):
-            for x in range(nx):
-                cell = (z * ny + y) * nx + x
-                labels[cell] = cell
-                if counts[cell] > 0:
-                    continue
-                if x > 0 and counts[cell - 1] == 0:
-                    labels[cell] = labels[cell - 1]
-                elif y > 0 and counts[cell - nx] == 0:
-                    labels[cell] = labels[cell - nx]
-                elif z > 0 and counts[cell - nx * ny] == 0:
-                    labels[cell] = labels[cell - nx * ny]
-                else:
-                    n_asked += 1
-    return n_asked
+    for cell in range(len(counts)):
+        before = _empty_before(counts, 0, cell, nx, ny) if counts[cell] == 0 else -1
+        labels[cell] = labels[before] if before >= 0 else cell
 
 
 @inline
@@ -88,23 +84,13 @@ def reference_points(lattice: Any, places: Any, level: int, points: Any, is_vali
 
 
 @inline
-def fill_groups(
-    groups: Any,
-    first_group: int,
-    vertices: Any,
-    triangles: Any,
-    lists: Any,
-    first: int,
-    last: int,
-    lattice: Any,
-    reference: Any,
-    parts: float,
-) -> int:
-    """Write the groups of the triangles lists[first:last] about a reference point, in units of the cells of a level.
+def _fill_groups(groups: Any, first_group: int, mesh: Any, level: Any, cell: int, reference: Any) -> int:
+    """Write the groups of a cell's triangles about its reference point, in units of the cells of its level.
 
-    Returns the group after the last one written.
+    Returns how many they are.
     """
-    scale = lattice.scale
+    scale, parts = mesh.lattice.scale, parts_of(level.depth)
+    first, last = level.firsts[cell], level.firsts[cell + 1]
     n_groups = (last - first + LANES - 1) // LANES
     for group in range(first_group, first_group + n_groups):
         for lane in range(LANES):
@@ -113,10 +99,7 @@ def fill_groups(
         set_nothing(groups[first_group + place // LANES, :, place % LANES])
     for place in range(last - first):
         row = groups[first_group + place // LANES, :, place % LANES]
-        triangle = lists[first + place]
-        a = corner(vertices, triangles[triangle, 0])
-        b = corner(vertices, triangles[triangle, 1])
-        c = corner(vertices, triangles[triangle, 2])
+        a, b, c = corners(mesh.vertices, mesh.triangles, level.lists[first + place])
         set_entry(
             row,
             scaled_difference(a, reference, scale, parts),
@@ -125,94 +108,56 @@ def fill_groups(
             scaled_difference(b, a, scale, parts),
             scaled_difference(c, a, scale, parts),
         )
-    return first_group + n_groups
+    return n_groups
+
+
+@inline
+def _across(groups: Any, n_groups: int, w: Any, status: int) -> int:
+    """Return the status of a point w from that of the reference point of the groups, UNKNOWN where they cannot tell."""
+    wx, wy, wz = np.float32(w[0]), np.float32(w[1]), np.float32(w[2])
+    parity = 0
+    for group in range(n_groups):
+        parity ^= group_parity(groups, group, wx, wy, wz)
+        if parity & UNSURE:
+            return UNKNOWN
+    return -status if parity & 1 else status
 
 
 @kernel
-def locate_parts(
-    vertices: Any,
-    triangles: Any,
-    lattice: Any,
-    parents: Any,
-    places: Any,
-    statuses: Any,
-    firsts: Any,
-    lists: Any,
-    level: int,
-    counts: Any,
-    groups: Any,
-    found: Any,
-    flag: Any,
-) -> None:
+def locate_parts(mesh: Any, level: Any, parents: Any, counts: Any, groups: Any, found: Any, flag: Any) -> None:
     """Fill found (p * 64,) int8 with the status of each part: of its reference point, or of all of it if it is empty.
 
-    parents, places, firsts, lists, level: as for `list_parts`; statuses: (cells,) int8; counts: (p * 64,) lengths of
-    the parts' lists; groups: workspace for the longest
-    list of a parent.
+    level, parents: as for `list_parts`; counts: (p * 64,) lengths of the parts' lists; groups: workspace for the
+    longest list of a parent.
     """
-    scale = lattice.scale
-    parts = parts_of(level - 1)
-    shift = 2 * (LEVELS - 1 - level)
+    lattice, below = mesh.lattice, level.depth + 1
+    parts, shift = parts_of(level.depth), 2 * (LEVELS - 1 - below)
     for parent in range(len(parents)):
         if flag[0]:
             break
-        cell = parents[parent]
-        x0, y0, z0 = places[cell, 0], places[cell, 1], places[cell, 2]
-        reference = reference_point(lattice, x0, y0, z0, share_of(level - 1))
-        n_groups = fill_groups(
-            groups, 0, vertices, triangles, lists, firsts[cell], firsts[cell + 1], lattice, reference, parts
-        )
+        cell, first = parents[parent], parent * PARTS
+        x0, y0, z0 = level.places[cell, 0], level.places[cell, 1], level.places[cell, 2]
+        reference = reference_point(lattice, x0, y0, z0, share_of(level.depth))
+        n_groups = _fill_groups(groups, 0, mesh, level, cell, reference)
         for part in range(PARTS):
-            place = parent * PARTS + part
-            x, y, z = part % SPLIT, part // SPLIT % SPLIT, part // (SPLIT * SPLIT)
-            if counts[place] == 0:
-                if x > 0 and counts[place - 1] == 0:
-                    found[place] = found[place - 1]
-                    continue
-                if y > 0 and counts[place - SPLIT] == 0:
-                    found[place] = found[place - SPLIT]
-                    continue
-                if z > 0 and counts[place - SPLIT * SPLIT] == 0:
-                    found[place] = found[place - SPLIT * SPLIT]
-                    continue
-            x, y, z = x0 * SPLIT + x, y0 * SPLIT + y, z0 * SPLIT + z
-            point = reference_point(lattice, x, y, z, share_of(level))
-            status = statuses[cell] if _is_in_cell(lattice, point, x, y, z, shift) else OPEN
-            if status != OPEN:
-                w = scaled_difference(point, reference, scale, parts)
-                wx, wy, wz = np.float32(w[0]), np.float32(w[1]), np.float32(w[2])
-                parity = 0
-                for group in range(n_groups):
-                    parity ^= group_parity(groups, group, wx, wy, wz)
-                    if parity & UNSURE:
-                        status = OPEN
-                        break
-                if parity & 1:
-                    status = -status
-            found[place] = status
+            before = _empty_before(counts, first, part, SPLIT, SPLIT) if counts[first + part] == 0 else -1
+            if before >= 0:
+                found[first + part] = found[before]
+                continue
+            x, y, z = x0 * SPLIT + part % SPLIT, y0 * SPLIT + part // SPLIT % SPLIT, z0 * SPLIT + part // SPLIT**2
+            point, status = reference_point(lattice, x, y, z, share_of(below)), UNKNOWN
+            if level.statuses[cell] != UNKNOWN and _is_in_cell(lattice, point, x, y, z, shift):
+                w = scaled_difference(point, reference, lattice.scale, parts)
+                status = _across(groups, n_groups, w, level.statuses[cell])
+            found[first + part] = status
 
 
 @kernel
-def fill_leaves(
-    vertices: Any,
-    triangles: Any,
-    lattice: Any,
-    cells: Any,
-    places: Any,
-    firsts: Any,
-    lists: Any,
-    level: int,
-    starts: Any,
-    groups: Any,
-    flag: Any,
-) -> None:
-    """Fill groups (n, 14, 8) float32 with the lists of `cells`, each from the group in starts."""
-    parts = parts_of(level)
-    for item in range(len(cells)):
+def fill_leaves(mesh: Any, level: Any, leaves: Any, starts: Any, groups: Any, flag: Any) -> None:
+    """Fill groups (n, 14, 8) float32 with the lists of `leaves`, cells of a level, each from the group in starts."""
+    for item in range(len(leaves)):
         if flag[0]:
             break
-        cell = cells[item]
-        reference = reference_point(lattice, places[cell, 0], places[cell, 1], places[cell, 2], share_of(level))
-        fill_groups(
-            groups, starts[item], vertices, triangles, lists, firsts[cell], firsts[cell + 1], lattice, reference, parts
-        )
+        x, y, z = level.places[leaves[item], 0], level.places[leaves[item], 1], level.places[leaves[item], 2]
+        reference = reference_point(mesh.lattice, x, y, z, share_of(level.depth))
+        _fill_groups(groups, starts[item], mesh, level, leaves[item], reference)

@@ -18,12 +18,11 @@ from engine.containment.methods.polyhedron_ray_parity import (
     CROSSED,
     MISSED,
     ON_FACE,
-    OPEN,
     cross_upwards,
     orient2d,
     touch_triangle,
 )
-from engine.jit import kernel
+from engine.jit import inline, kernel
 from engine.predicates.loading import as_point3
 from engine.types import UNDECIDED, Point2
 
@@ -38,15 +37,11 @@ def sort_into_cells(points: Any, u: Any, v: Any, firsts: Any, order: Any) -> Non
     u, v: each an `Axis` over x and y of all points. firsts: int64, zero.
     """
     for item in range(len(points)):
-        q = as_point3(points, item)
-        cell = cell_of(q.y, v.low, v.cells_per_unit, v.n_cells) * u.n_cells
-        firsts[cell + cell_of(q.x, u.low, u.cells_per_unit, u.n_cells) + 1] += 1
+        firsts[_cell_at(points, item, u, v) + 1] += 1
     for cell in range(1, len(firsts)):
         firsts[cell] += firsts[cell - 1]
     for item in range(len(points) - 1, -1, -1):  # from behind: firsts[cell + 1] comes down to the cell's first place
-        q = as_point3(points, item)
-        cell = cell_of(q.y, v.low, v.cells_per_unit, v.n_cells) * u.n_cells
-        cell += cell_of(q.x, u.low, u.cells_per_unit, u.n_cells)
+        cell = _cell_at(points, item, u, v)
         firsts[cell + 1] -= 1
         order[firsts[cell + 1]] = item
     for cell in range(len(firsts) - 1):
@@ -54,25 +49,65 @@ def sort_into_cells(points: Any, u: Any, v: Any, firsts: Any, order: Any) -> Non
     firsts[len(firsts) - 1] = len(points)
 
 
+@inline
+def _cell_at(points: Any, item: int, u: Any, v: Any) -> int:
+    row = cell_of(points[item, 1], v.low, v.cells_per_unit, v.n_cells)
+    return row * u.n_cells + cell_of(points[item, 0], u.low, u.cells_per_unit, u.n_cells)
+
+
+@inline
+def _meet(a: Any, b: Any, c: Any, area: int, z_low: float, q: Any) -> int:
+    """Return how the ray up from q meets a triangle, q being in its box in x and y and not above it.
+
+    area: sign of the triangle's area seen from above.
+    """
+    if area == UNDECIDED:
+        return UNDECIDED | BEYOND
+    if area != 0:
+        return int(cross_upwards(a, b, c, area, z_low, q))
+    return int(touch_triangle(a, b, c, q)) if q.z >= z_low else MISSED
+
+
+@inline
+def _take_down(states: Any, item: int, met: int) -> None:
+    """Enter in a point's state how its ray met a triangle."""
+    if met & BEYOND:
+        states[item] |= _BEYOND
+    met &= 3
+    if met == ON_FACE:
+        states[item] |= _ON_FACE
+    elif met == UNDECIDED:
+        states[item] |= _OPEN
+    elif met == CROSSED:
+        states[item] ^= _ODD
+
+
+@inline
+def _conclude(states: Any, locations: Any) -> int:
+    """Fill the locations from the states; returns how many points needed more than the filter."""
+    n_beyond = 0
+    for item in range(len(states)):
+        state = states[item]
+        n_beyond += (state & _BEYOND) != 0
+        if state & _ON_FACE:
+            locations[item] = 0
+        elif state & _OPEN:
+            locations[item] = UNDECIDED
+        else:
+            locations[item] = 1 if state & _ODD else -1
+    return n_beyond
+
+
 @kernel
 def locate_by_pass(
-    points: Any,
-    z_min: float,
-    u: Any,
-    v: Any,
-    firsts: Any,
-    order: Any,
-    vertices: Any,
-    triangles: Any,
-    states: Any,
-    locations: Any,
-    flag: Any,
+    points: Any, cells: Any, vertices: Any, triangles: Any, z_min: float, states: Any, locations: Any, flag: Any
 ) -> int:
     """Fill `locations` (n,) int8 for points (n, 3); returns how many needed more than the filter.
 
-    z_min: least of the points. u, v, firsts, order: as `sort_into_cells` leaves them. triangles: (m, 3) int64.
+    cells: u, v, firsts, order as `sort_into_cells` leaves them. triangles: (m, 3) int64. z_min: least of the points.
     states: (n,) uint8, zero. Caller guarantees a surface that is even at each edge.
     """
+    u, v, firsts, order = cells
     for triangle in range(len(triangles)):
         if flag[0]:
             break
@@ -87,10 +122,10 @@ def locate_by_pass(
         area, is_known = 0, False
         first = cell_of(x_low, u.low, u.cells_per_unit, u.n_cells)
         last = cell_of(x_high, u.low, u.cells_per_unit, u.n_cells)
-        for row in range(
-            cell_of(y_low, v.low, v.cells_per_unit, v.n_cells), cell_of(y_high, v.low, v.cells_per_unit, v.n_cells) + 1
-        ):
-            for place in range(firsts[row * u.n_cells + first], firsts[row * u.n_cells + last + 1]):
+        row = cell_of(y_low, v.low, v.cells_per_unit, v.n_cells)
+        last_row = cell_of(y_high, v.low, v.cells_per_unit, v.n_cells)
+        for line in range(row * u.n_cells, (last_row + 1) * u.n_cells, u.n_cells):
+            for place in range(firsts[line + first], firsts[line + last + 1]):
                 item = order[place]
                 q = as_point3(points, item)
                 is_above = q.z > z_high
@@ -98,42 +133,12 @@ def locate_by_pass(
                     continue
                 if not is_known:
                     area, is_known = orient2d(Point2(a.x, a.y), Point2(b.x, b.y), Point2(c.x, c.y)), True
-                if area == UNDECIDED:
-                    met = OPEN | BEYOND
-                elif area != 0:
-                    met = cross_upwards(a, b, c, area, z_low, q)
-                elif q.z >= z_low:
-                    met = touch_triangle(a, b, c, q)
-                else:
-                    met = MISSED
-                if met & BEYOND:
-                    states[item] |= _BEYOND
-                met &= 3
-                if met == ON_FACE:
-                    states[item] |= _ON_FACE
-                elif met == OPEN:
-                    states[item] |= _OPEN
-                elif met == CROSSED:
-                    states[item] ^= _ODD
-    n_beyond = 0
-    for item in range(len(points)):
-        state = states[item]
-        n_beyond += (state & _BEYOND) != 0
-        if state & _ON_FACE:
-            locations[item] = 0
-        elif state & _OPEN:
-            locations[item] = UNDECIDED
-        else:
-            locations[item] = 1 if state & _ODD else -1
-    return n_beyond
+                _take_down(states, item, _meet(a, b, c, area, z_low, q))
+    return int(_conclude(states, locations))
 
 
 def locate_few(
-    points: FloatArray,
-    vertices: FloatArray,
-    triangles: IntArray,
-    locations: Int8Array,
-    flag: FlagArray,
+    points: FloatArray, vertices: FloatArray, triangles: IntArray, locations: Int8Array, flag: FlagArray
 ) -> int:
     """Fill `locations` (n,) for points (n, 3), one at least; returns how many needed more than the filter."""
     low, high = points.min(axis=0), points.max(axis=0)
@@ -142,4 +147,5 @@ def locate_few(
     firsts, order = np.zeros(u.n_cells * v.n_cells + 1, np.int64), np.empty(len(points), np.int32)
     sort_into_cells(points, u, v, firsts, order)
     states = np.zeros(len(points), np.uint8)
-    return int(locate_by_pass(points, float(low[2]), u, v, firsts, order, vertices, triangles, states, locations, flag))
+    cells = (u, v, firsts, order)
+    return int(locate_by_pass(points, cells, vertices, triangles, float(low[2]), states, locations, flag))

@@ -29,11 +29,10 @@ from engine.types import UNDECIDED, Point2
 
 MISSED: Final = 0
 CROSSED: Final = 1
-ON_FACE: Final = 2
-OPEN: Final = 3
-"""The sign is out of the compiled range: settled by rational arithmetic."""
+ON_FACE: Final = 3
+"""How a ray meets a triangle; UNDECIDED where a sign is out of the compiled range, for rational arithmetic."""
 BEYOND: Final = 4
-"""Added to one of the above where the filter was not enough."""
+"""Added to one of these where the filter was not enough."""
 
 
 @inline
@@ -65,12 +64,12 @@ def _is_astride(first: int, second: int, third: int) -> bool:
 
 @inline
 def touch_in_plane(a: Any, b: Any, c: Any, q: Any) -> int:
-    """Return ON_FACE, MISSED or OPEN for 2D points: q among the signs of all three edges never on both sides."""
+    """Return ON_FACE, MISSED or UNDECIDED for 2D points: q among the signs of all three edges never on both sides."""
     first, second, third = orient2d(a, b, q), orient2d(b, c, q), orient2d(c, a, q)
     if _is_astride(first, second, third):
         return MISSED
     if first == UNDECIDED or second == UNDECIDED or third == UNDECIDED:
-        return OPEN
+        return UNDECIDED
     return ON_FACE
 
 
@@ -82,7 +81,7 @@ def orient2d(a: Any, b: Any, c: Any) -> int:
 
 @inline
 def touch_triangle(a: Any, b: Any, c: Any, q: Any) -> int:
-    """Return ON_FACE if q lies on the closed triangle a, b, c, which may be degenerate; else MISSED, or OPEN.
+    """Return ON_FACE if q lies on the closed triangle a, b, c, which may be degenerate; else MISSED, or UNDECIDED.
 
     Caller guarantees that q lies in the triangle's box.
     """
@@ -102,13 +101,13 @@ def touch_triangle(a: Any, b: Any, c: Any, q: Any) -> int:
             met = touch_in_plane(Point2(a.x, a.y), Point2(b.x, b.y), Point2(c.x, c.y), Point2(q.x, q.y))
         if met == MISSED:
             return MISSED | BEYOND
-        is_open |= met == OPEN
-    return (OPEN if is_open else ON_FACE) | BEYOND
+        is_open |= met == UNDECIDED
+    return (UNDECIDED if is_open else ON_FACE) | BEYOND
 
 
 @inline
 def cross_upwards(a: Any, b: Any, c: Any, area: int, z_low: float, q: Any) -> int:
-    """Return CROSSED if the ray up from the moved q meets the triangle, ON_FACE if q lies on it, else MISSED, or OPEN.
+    """Return CROSSED if the ray up from the moved q meets the face, ON_FACE if q is on it, else MISSED, or UNDECIDED.
 
     area: exact sign of the projected area, not 0. Caller guarantees that q is in the box in x and y, and not above it.
     """
@@ -130,7 +129,7 @@ def cross_upwards(a: Any, b: Any, c: Any, area: int, z_low: float, q: Any) -> in
         elif turn == 0:
             is_inside &= moved_sign(0, start, end) == area
     if is_open:
-        return OPEN | beyond
+        return UNDECIDED | beyond
     if q.z < z_low:
         return (CROSSED if is_inside else MISSED) | beyond
     side = orient3d_filter(a, b, c, q)
@@ -140,7 +139,7 @@ def cross_upwards(a: Any, b: Any, c: Any, area: int, z_low: float, q: Any) -> in
     if side == 0:
         return ON_FACE | beyond
     if side == UNDECIDED:
-        return OPEN | beyond
+        return UNDECIDED | beyond
     return (CROSSED if is_inside and side != area else MISSED) | beyond
 
 
@@ -221,7 +220,7 @@ def locate_by_columns(
             if met == ON_FACE:
                 location = 0
                 break
-            is_open |= met == OPEN
+            is_open |= met == UNDECIDED
             is_odd ^= met == CROSSED
         if location != 0:
             location = UNDECIDED if is_open else 1 if is_odd else -1

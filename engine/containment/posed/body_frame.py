@@ -16,7 +16,7 @@ from typing import Any, Final
 from engine.jit import kernel
 from engine.predicates.error_free import two_diff
 
-_BLUR: Final = 128.0 * 2.0**-53
+BLUR: Final = 128.0 * 2.0**-53
 _TINY: Final = 1e-320
 
 
@@ -37,4 +37,4 @@ def move_to_body_frame(points: Any, inverse: Any, translation: Any, is_turn: boo
             is_exact &= tail == 0.0
             for row in range(n_axes):
                 moved[item, row] += inverse[row, axis] * difference
-        blurs[item] = 0.0 if is_exact else _BLUR * size + _TINY
+        blurs[item] = 0.0 if is_exact else BLUR * size + _TINY

@@ -18,6 +18,8 @@ from engine.types import UNDECIDED, Point2
 
 _SLACK: Final = 8.0 * 2.0**-53
 _TINY: Final = 1e-320
+BESIDE, ACROSS = -1, -2
+"""No column: the ray from all of the point misses all columns; it lies over several, or over the edge of all."""
 
 
 @inline
@@ -49,48 +51,71 @@ def _orient3d_blurred(a: Any, b: Any, c: Any, q: Any, blur: float) -> int:
     return 1 if side > bound else -1 if -side > bound else UNDECIDED
 
 
+@inline
+def side_of_box(low: Any, high: Any, is_flat: bool, p: Any, blur: float) -> int:
+    """Return the location of a blurred point (x, y, z) in a box; in the plane all z are 0."""
+    is_out = (p[0] + blur < low[0]) | (p[0] - blur > high[0])
+    is_out |= (p[1] + blur < low[1]) | (p[1] - blur > high[1])
+    is_out |= (p[2] + blur < low[2]) | (p[2] - blur > high[2])
+    if is_out:
+        return -1
+    is_within = (low[0] < p[0] - blur) & (p[0] + blur < high[0])
+    is_within &= (low[1] < p[1] - blur) & (p[1] + blur < high[1])
+    is_within &= is_flat | ((low[2] < p[2] - blur) & (p[2] + blur < high[2]))
+    if is_within:
+        return 1
+    return 0 if blur == 0.0 else UNDECIDED
+
+
+@inline
+def side_of_rows(rows: Any, first: int, last: int, p: Any, blur: float) -> int:
+    """Return the location of a blurred point (x, y, z) by the rows first ... last of rows (n, 4)."""
+    location = 1
+    for row in range(first, last):
+        ax, by, cz, d = rows[row, 0] * p[0], rows[row, 1] * p[1], rows[row, 2] * p[2], rows[row, 3]
+        distance = ax + by + cz + d
+        bound = _SLACK * (abs(ax) + abs(by) + abs(cz) + abs(d)) + _TINY
+        bound += blur * (abs(rows[row, 0]) + abs(rows[row, 1]) + abs(rows[row, 2]))
+        if distance > bound:
+            continue
+        if -distance > bound:
+            return -1
+        location = UNDECIDED
+    return location
+
+
+@inline
+def in_space(points: Any, item: int) -> Any:
+    """Return a row of points (n, 2 or 3) as (x, y, z); z is 0 in the plane."""
+    return float(points[item, 0]), float(points[item, 1]), 0.0 if points.shape[1] == 2 else float(points[item, 2])
+
+
 @kernel
 def locate_in_box_blurred(points: Any, blurs: Any, low: Any, high: Any, locations: Any, flag: Any) -> int:
-    """Fill `locations` (n,) int8 for points (n, dim) with blurs (n,); returns how many stay open."""
-    n_open = 0
+    """Fill `locations` (n,) int8 for points (n, dim) with blurs (n,); returns how many are not clearly in or out."""
+    n_open, is_flat = 0, len(low) == 2
+    least = low[0], low[1], 0.0 if is_flat else low[2]
+    most = high[0], high[1], 0.0 if is_flat else high[2]
     for item in range(len(points)):
         if flag[0]:
             break
-        is_out, is_within = False, True
-        for axis in range(len(low)):
-            least, most = points[item, axis] - blurs[item], points[item, axis] + blurs[item]
-            is_out |= most < low[axis] or least > high[axis]
-            is_within &= low[axis] < least and most < high[axis]
-        locations[item] = -1 if is_out else 1 if is_within else UNDECIDED
-        n_open += locations[item] == UNDECIDED
+        locations[item] = side_of_box(least, most, is_flat, in_space(points, item), blurs[item])
+        n_open += abs(locations[item]) != 1
     return n_open
 
 
 @kernel
 def locate_in_rows_blurred(points: Any, blurs: Any, rows: Any, locations: Any, flag: Any) -> int:
-    """Fill `locations` (n,) int8 for rows (m, dim + 1), each given or correctly rounded; returns how many stay open."""
-    n_axes, n_open = points.shape[1], 0
+    """Fill `locations` (n,) int8 for rows (m, 4), each given or correctly rounded; returns how many stay open.
+
+    Those of the plane have 0 in the third place.
+    """
+    n_open = 0
     for item in range(len(points)):
         if flag[0]:
             break
-        location = 1
-        for row in range(len(rows)):
-            distance = rows[row, n_axes]
-            size, slope = abs(distance), 0.0
-            for axis in range(n_axes):
-                term = rows[row, axis] * points[item, axis]
-                distance += term
-                size += abs(term)
-                slope += abs(rows[row, axis])
-            bound = _SLACK * size + blurs[item] * slope + _TINY
-            if distance > bound:
-                continue
-            if -distance > bound:
-                location = -1
-                break
-            location = UNDECIDED
-        locations[item] = location
-        n_open += location == UNDECIDED
+        locations[item] = side_of_rows(rows, 0, len(rows), in_space(points, item), blurs[item])
+        n_open += locations[item] == UNDECIDED
     return n_open
 
 
@@ -180,6 +205,23 @@ def _parity_in_slab(q: Any, blur: float, slab: int, starts: Any, ends: Any, x_hi
     return 1 if is_odd else -1
 
 
+@inline
+def column_of(q: Any, blur: float, u: Any, v: Any, z_min: float) -> int:
+    """Return the column over x and y that holds all of a blurred q; BESIDE or ACROSS where there is none."""
+    x_low, x_high, y_low, y_high = q.x - blur, q.x + blur, q.y - blur, q.y + blur
+    if (x_high < u.low) | (x_low > u.high) | (y_high < v.low) | (y_low > v.high) | (q.z + blur < z_min):
+        return BESIDE
+    if not ((x_low >= u.low) & (y_low >= v.low)):  # false for NaN
+        return ACROSS
+    column = cell_of(x_low, u.low, u.cells_per_unit, u.n_cells)
+    row = cell_of(y_low, v.low, v.cells_per_unit, v.n_cells)
+    if blur > 0.0:
+        is_one = column == cell_of(x_high, u.low, u.cells_per_unit, u.n_cells)
+        if not (is_one & (row == cell_of(y_high, v.low, v.cells_per_unit, v.n_cells))):
+            return ACROSS
+    return row * u.n_cells + column
+
+
 @kernel
 def locate_by_columns_blurred(
     points: Any,
@@ -194,57 +236,40 @@ def locate_by_columns_blurred(
     flag: Any,
 ) -> int:
     """Fill `locations` (n,) int8 by vertical rays as polyhedron_ray_parity.py does; returns how many stay open."""
-    u, v = columns.u, columns.v
+    lists = vertices, triangles, boxes, areas, columns.offsets, columns.items
     n_open = 0
     for item in range(len(points)):
         if flag[0]:
             break
         q, blur = as_point3(points, item), blurs[item]
-        x_low, x_high, y_low, y_high = q.x - blur, q.x + blur, q.y - blur, q.y + blur
-        if x_high < u.low or x_low > u.high or y_high < v.low or y_low > v.high or q.z + blur < z_min:
-            locations[item] = -1
-            continue
-        location = UNDECIDED
-        if x_low > u.low and y_low > v.low:
-            column = cell_of(x_low, u.low, u.cells_per_unit, u.n_cells)
-            row = cell_of(y_low, v.low, v.cells_per_unit, v.n_cells)
-            if column == cell_of(x_high, u.low, u.cells_per_unit, u.n_cells):
-                if row == cell_of(y_high, v.low, v.cells_per_unit, v.n_cells):
-                    cell = row * u.n_cells + column
-                    location = parity_in_column(q, blur, cell, vertices, triangles, boxes, areas, columns, flag)
+        column = column_of(q, blur, columns.u, columns.v, z_min)
+        location = -1 if column == BESIDE else UNDECIDED
+        if column >= 0:
+            location = parity_in_column(q, blur, column, lists, flag)
         locations[item] = location
         n_open += location == UNDECIDED
     return n_open
 
 
 @inline
-def parity_in_column(
-    q: Any,
-    blur: float,
-    cell: int,
-    vertices: Any,
-    triangles: Any,
-    boxes: Any,
-    areas: Any,
-    columns: Any,
-    flag: Any,
-) -> int:
-    """Return the location of a blurred q within one column, or UNDECIDED."""
+def parity_in_column(q: Any, blur: float, column: int, lists: Any, flag: Any) -> int:
+    """Return the location of a blurred q within one column, or UNDECIDED.
+
+    lists: vertices, triangles, boxes, areas as for `locate_by_columns`, offsets and items of the columns.
+    """
+    vertices, triangles, boxes, areas, offsets, items = lists
     x_low, x_high, y_low, y_high = q.x - blur, q.x + blur, q.y - blur, q.y + blur
     z_low, z_high = q.z - blur, q.z + blur
     is_odd = False
-    for entry in range(columns.offsets[cell], columns.offsets[cell + 1]):
-        triangle = columns.items[entry]
+    for entry in range(offsets[column], offsets[column + 1]):
+        triangle = items[entry]
         if boxes[triangle, 5] < z_low:
             break
         if entry & 1023 == 1023 and flag[0]:
             break
-        if (
-            boxes[triangle, 1] < x_low
-            or boxes[triangle, 0] > x_high
-            or boxes[triangle, 3] < y_low
-            or boxes[triangle, 2] > y_high
-        ):
+        if boxes[triangle, 1] < x_low or boxes[triangle, 0] > x_high:
+            continue
+        if boxes[triangle, 3] < y_low or boxes[triangle, 2] > y_high:
             continue
         area, is_below = areas[triangle], z_high < boxes[triangle, 4]
         if area == 0 and is_below:
@@ -252,24 +277,26 @@ def parity_in_column(
         a = as_point3(vertices, triangles[triangle, 0])
         b = as_point3(vertices, triangles[triangle, 1])
         c = as_point3(vertices, triangles[triangle, 2])
-        if area == 0:
-            if _orient3d_blurred(a, b, c, q, blur) == UNDECIDED:
-                return UNDECIDED
-            continue
-        turn = _in_projection(a, b, c, q, area, blur)
-        if turn == -1:
-            continue
-        if turn == UNDECIDED:
+        met = _met_by_ray(a, b, c, q, area, is_below, blur)
+        if met == UNDECIDED:
             return UNDECIDED
-        if is_below:
-            is_odd = not is_odd
-            continue
-        side = _orient3d_blurred(a, b, c, q, blur)
-        if side == UNDECIDED:
-            return UNDECIDED
-        if side != area:
-            is_odd = not is_odd
+        is_odd ^= met == 1
     return 1 if is_odd else -1
+
+
+@inline
+def _met_by_ray(a: Any, b: Any, c: Any, q: Any, area: int, is_below: bool, blur: float) -> int:
+    """Return 1 if the rays up from all of the blurred q meet the triangle, 0 if none does, else UNDECIDED."""
+    if area != 0:
+        turn = _in_projection(a, b, c, q, area, blur)
+        if turn != 1:
+            return UNDECIDED if turn == UNDECIDED else 0
+        if is_below:
+            return 1
+    side = _orient3d_blurred(a, b, c, q, blur)
+    if side == UNDECIDED:
+        return UNDECIDED
+    return 1 if area != 0 and side != area else 0
 
 
 @inline

@@ -25,7 +25,7 @@ from engine.containment.posed.filters import (
     locate_in_rows_blurred,
 )
 from engine.containment.prepared import columns_of, rings_of, rounded_rows
-from engine.containment.rational_locate import prism_walls, to_world_frame
+from engine.containment.rational_locate import adjugate, prism_walls, to_world_frame
 from engine.parallel import Budget
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
@@ -62,22 +62,8 @@ def inverse_of(rotation: FloatArray) -> tuple[FloatArray, bool]:
     """Return R^-1 with each entry off by less than 32 u, and whether R only turns the axes onto each other."""
     if np.isin(rotation, (-1.0, 0.0, 1.0)).all() and (np.abs(rotation).sum(axis=0) == 1.0).all():
         return np.ascontiguousarray(rotation.T), True
-    r = rotation.tolist()
-    if len(r) == 2:
-        determinant = r[0][0] * r[1][1] - r[0][1] * r[1][0]
-        adjugate = [[r[1][1], -r[0][1]], [-r[1][0], r[0][0]]]
-    else:
-        following = (1, 2, 0)
-        adjugate = [
-            [
-                r[following[j]][following[i]] * r[following[following[j]]][following[following[i]]]
-                - r[following[j]][following[following[i]]] * r[following[following[j]]][following[i]]
-                for j in range(3)
-            ]
-            for i in range(3)
-        ]
-        determinant = sum(r[0][k] * adjugate[k][0] for k in range(3))
-    return np.array(adjugate) / determinant, False
+    found, determinant = adjugate(rotation.tolist())
+    return np.array(found) / determinant, False
 
 
 def _moved(points: FloatArray, inverse: FloatArray, pose: Pose, is_turn: bool) -> tuple[FloatArray, FloatArray]:
@@ -127,7 +113,9 @@ def _blurred_kernel(solid: Solid) -> Blurred:
         low, high = solid.min, solid.max
         return lambda points, blurs, out, flag: int(locate_in_box_blurred(points, blurs, low, high, out, flag))
     if isinstance(solid, (HalfSpace, Convex)) or (isinstance(solid, Triangle) and solid.dimension == 3):
-        rows = _rows(solid)
+        planes = _rows(solid)
+        rows = np.zeros((len(planes), 4))
+        rows[:, : planes.shape[1] - 1], rows[:, 3] = planes[:, :-1], planes[:, -1]
         return lambda points, blurs, out, flag: int(locate_in_rows_blurred(points, blurs, rows, out, flag))
     if isinstance(solid, (Polygon, Triangle)):
         return lambda points, blurs, out, flag: int(locate_in_rings_blurred(points, blurs, *rings_of(solid), out, flag))

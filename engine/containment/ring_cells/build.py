@@ -13,7 +13,7 @@ import numpy as np
 
 from engine.arrays import FloatArray, Int8Array, Int32Array, IntArray, read_only
 from engine.containment.rational_locate import next_in_ring
-from engine.containment.ring_cells.lists import choose_cuts, count_level, fill_level, place_edges
+from engine.containment.ring_cells.lists import LevelOfNodes, choose_cuts, count_level, fill_level, place_edges
 from engine.containment.ring_cells.locate import FINE_BITS, LAST, SPLIT_BITS, RingCells
 from engine.parallel import Budget
 from engine.solids.polygon import Polygon
@@ -94,7 +94,8 @@ def _cut(
         sizes = 1 << cuts.sum(axis=1)
         bases = np.cumsum(sizes) - sizes
         counts, sides = np.zeros(sizes.sum(), np.int64), np.zeros(sizes.sum(), np.int8)
-        count_level(nodes, cuts, bases, edges_of, edges, places, is_tight, counts, sides, flag)
+        level = LevelOfNodes(nodes, cuts, bases, edges_of, edges, places, is_tight)
+        count_level(level, counts, sides, flag)
         budget.check()
         n_entries += int(counts.sum())
         is_crowded = (counts > _CROWDED << len(levels)) & np.repeat(sizes > 1, sizes)
@@ -103,7 +104,7 @@ def _cut(
         firsts = np.where(is_crowded, np.cumsum(passed) - passed, np.cumsum(kept) - kept)
         stops = firsts.copy()
         items, next_edges = np.empty(kept.sum(), np.int32), np.empty(passed.sum(), np.int32)
-        fill_level(nodes, cuts, bases, edges_of, edges, places, is_tight, is_crowded, stops, items, next_edges, flag)
+        fill_level(level, is_crowded, stops, items, next_edges, flag)
         budget.check()
         items[stops[kept > 0] - 1] |= LAST
         words = np.where(kept > 0, (firsts + n_items) << 1, 0).astype(np.int64) + sides

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from engine.arrays import FloatArray, Int32Array, IntArray
 from engine.containment.ring_cells.locate import EDGE_SHIFT, GOES_ON_DOWN, GOES_ON_UP, as_edge
 from engine.jit import inline, kernel
 from engine.predicates.loading import as_point2
@@ -32,6 +33,35 @@ class Node(NamedTuple):
     side: int
     first: int
     stop: int
+
+
+class LevelOfNodes(NamedTuple):
+    """The nodes of one level and how they are cut."""
+
+    nodes: IntArray
+    """``(n, 7)`` of `Node`."""
+    cuts: IntArray
+    """``(n, 2)``: a node becomes 2^a by 2^b cells."""
+    bases: IntArray
+    """First word of each node."""
+    edges_of: Int32Array
+    """The level's list."""
+    edges: FloatArray
+    places: FloatArray
+    is_tight: bool
+    """Whether places are off by no more than rounding."""
+
+
+class Cut(NamedTuple):
+    """The cells of one node: column and row of the first, and where fine places are shifted so, numbers, first word."""
+
+    left: int
+    bottom: int
+    u_shift: int
+    v_shift: int
+    n_columns: int
+    n_rows: int
+    base: int
 
 
 class Ends(NamedTuple):
@@ -138,80 +168,112 @@ def choose_cuts(
         cuts[i_node, 0], cuts[i_node, 1] = a, b
 
 
+@inline
+def _cut_of(level: Any, i_node: int) -> Cut:
+    """Return how a node of a level is cut."""
+    node, a, b = as_node(level.nodes, i_node), level.cuts[i_node, 0], level.cuts[i_node, 1]
+    return Cut(node.column << a, node.row << b, node.u_shift - a, node.v_shift - b, 1 << a, 1 << b, level.bases[i_node])
+
+
+@inline
+def _rows_of(ends: Any, cut: Any) -> tuple[int, int]:
+    """Return the first and last row of the cut that an edge reaches into, beyond the node's own if it does."""
+    return (int(ends.lower_v) >> cut.v_shift) - cut.bottom, (int(ends.upper_v) >> cut.v_shift) - cut.bottom
+
+
+@inline
+def _columns_of(ends: Any, cut: Any, row: int, is_tight: bool) -> tuple[int, int]:
+    """Return the first and last column of a row of the cut that an edge may touch, beyond the node's own if it does."""
+    first, last = _columns_in_row(ends, cut.bottom + row, cut.u_shift, cut.v_shift, is_tight)
+    return first - cut.left, last - cut.left
+
+
+@inline
+def _note_beyond(turns: Any, node: Any, cut: Any, e: Any, ends: Any) -> None:
+    """Note from which rows on an edge changes what lies to the right of the node."""
+    low, high = _rows_of(ends, cut)
+    if int(ends.upper_u) >> node.u_shift > node.column:
+        turns[max(0, min(high + 1, cut.n_rows))] ^= 1
+    elif e.low != e.high and int(ends.lower_u) >> node.u_shift > node.column:
+        turns[0] ^= 1
+        turns[max(0, min(low + 1, cut.n_rows))] ^= 1
+
+
+@inline
+def _note_in_row(sides: Any, head: int, cut: Any, columns: Any, goes_on: int, is_passed: bool) -> None:
+    """Note what an edge changes in the cells of a row, at the last cell of those that it changes.
+
+    columns: the first and last in which the edge is listed. goes_on: those before it lie left of where it goes on down.
+    is_passed: it passes the lowest height of the row, so it is right of all columns before the first.
+    """
+    first, last = columns
+    if is_passed:
+        if first > 0:
+            sides[head + min(first, cut.n_columns) - 1] ^= 1
+        return
+    stop = min(min(last + 1, goes_on), cut.n_columns)
+    if max(0, first) < stop:
+        sides[head + stop - 1] ^= 1
+        if first > 0:
+            sides[head + first - 1] ^= 1
+
+
+@inline
+def _add_up(sides: Any, turns: Any, cut: Any) -> None:
+    """Add up what was noted: at a column it holds for it and all before it, beyond the node for all rows above."""
+    beyond = 0
+    for row in range(cut.n_rows):
+        beyond ^= turns[row]
+        side = beyond
+        for word in range(cut.base + (row + 1) * cut.n_columns - 1, cut.base + row * cut.n_columns - 1, -1):
+            side ^= sides[word]
+            sides[word] = side
+
+
 @kernel
-def count_level(
-    nodes: Any, cuts: Any, bases: Any, edges_of: Any, edges: Any, places: Any, is_tight: bool, counts: Any, sides: Any,
-    flag: Any,
-) -> None:  # fmt: skip
-    """Fill counts and sides (n_words,) of the cells of all nodes; both zero before. bases: first word of each node."""
-    for i_node in range(len(nodes)):
+def count_level(level: Any, counts: Any, sides: Any, flag: Any) -> None:
+    """Fill counts and sides (n_words,) of the cells of all nodes of a `LevelOfNodes`; both zero before."""
+    for i_node in range(len(level.nodes)):
         if flag[0]:
             break
-        node, a, b, base = as_node(nodes, i_node), cuts[i_node, 0], cuts[i_node, 1], bases[i_node]
-        u_shift, v_shift, n_columns, n_rows = node.u_shift - a, node.v_shift - b, 1 << a, 1 << b
-        left, bottom = node.column << a, node.row << b
-        turns = np.zeros(n_rows + 1, np.int8)  # of what lies beyond the node, from each row on
+        node, cut = as_node(level.nodes, i_node), _cut_of(level, i_node)
+        turns = np.zeros(cut.n_rows + 1, np.int8)  # of what lies beyond the node, from each row on
         turns[0] = node.side
         for place in range(node.first, node.stop):
             if place & 4095 == 4095 and flag[0]:
                 break
-            i_edge = edges_of[place]
-            e, ends = as_edge(edges, i_edge), as_ends(places, i_edge)
-            low, high = (int(ends.lower_v) >> v_shift) - bottom, (int(ends.upper_v) >> v_shift) - bottom
-            if int(ends.upper_u) >> node.u_shift > node.column:
-                turns[max(0, min(high + 1, n_rows))] ^= 1
-            elif e.low != e.high and int(ends.lower_u) >> node.u_shift > node.column:
-                turns[0] ^= 1
-                turns[max(0, min(low + 1, n_rows))] ^= 1
-            goes_on = (int(ends.lower_u) >> u_shift) - left if e.low != e.high else -1  # in the columns before
-            for row in range(max(0, low), min(high, n_rows - 1) + 1):
-                first, last = _columns_in_row(ends, bottom + row, u_shift, v_shift, is_tight)
-                first, last = first - left, last - left
-                head = base + (row << a)
-                for column in range(max(0, first), min(last, n_columns - 1) + 1):
+            i_edge = level.edges_of[place]
+            e, ends = as_edge(level.edges, i_edge), as_ends(level.places, i_edge)
+            _note_beyond(turns, node, cut, e, ends)
+            low, high = _rows_of(ends, cut)
+            goes_on = (int(ends.lower_u) >> cut.u_shift) - cut.left if e.low != e.high else -1  # in the columns before
+            for row in range(max(0, low), min(high, cut.n_rows - 1) + 1):
+                columns, head = _columns_of(ends, cut, row, level.is_tight), cut.base + row * cut.n_columns
+                for column in range(max(0, columns[0]), min(columns[1], cut.n_columns - 1) + 1):
                     counts[head + column] += 1
-                if row > low:  # passes the lowest height of the row: right of all columns before the first
-                    if first > 0:
-                        sides[head + min(first, n_columns) - 1] ^= 1
-                else:
-                    stop = min(min(last + 1, goes_on), n_columns)
-                    if max(0, first) < stop:
-                        sides[head + stop - 1] ^= 1
-                        if first > 0:
-                            sides[head + first - 1] ^= 1
-        beyond = 0
-        for row in range(n_rows):  # what was noted at a column holds for it and all before it
-            beyond ^= turns[row]
-            side = beyond
-            for column in range(n_columns - 1, -1, -1):
-                side ^= sides[base + (row << a) + column]
-                sides[base + (row << a) + column] = side
+                _note_in_row(sides, head, cut, columns, goes_on, row > low)
+        _add_up(sides, turns, cut)
 
 
 @kernel
-def fill_level(
-    nodes: Any, cuts: Any, bases: Any, edges_of: Any, edges: Any, places: Any, is_tight: bool, is_crowded: Any,
-    next_places: Any, items: Any, next_edges: Any, flag: Any,
-) -> None:  # fmt: skip
+def fill_level(level: Any, is_crowded: Any, next_places: Any, items: Any, next_edges: Any, flag: Any) -> None:
     """List the edges in items, or in next_edges where is_crowded (n_words,), from next_places (n_words,) on."""
-    for i_node in range(len(nodes)):
+    for i_node in range(len(level.nodes)):
         if flag[0]:
             break
-        node, a, b, base = as_node(nodes, i_node), cuts[i_node, 0], cuts[i_node, 1], bases[i_node]
-        u_shift, v_shift, n_columns, n_rows = node.u_shift - a, node.v_shift - b, 1 << a, 1 << b
-        left, bottom = node.column << a, node.row << b
+        node, cut = as_node(level.nodes, i_node), _cut_of(level, i_node)
         for place in range(node.first, node.stop):
             if place & 4095 == 4095 and flag[0]:
                 break
-            i_edge = edges_of[place]
-            e, ends = as_edge(edges, i_edge), as_ends(places, i_edge)
-            low, high = (int(ends.lower_v) >> v_shift) - bottom, (int(ends.upper_v) >> v_shift) - bottom
-            upper = (int(ends.upper_u) >> u_shift) - left
-            lower = (int(ends.lower_u) >> u_shift) - left if e.low != e.high else -1
-            for row in range(max(0, low), min(high, n_rows - 1) + 1):
-                first, last = _columns_in_row(ends, bottom + row, u_shift, v_shift, is_tight)
-                for column in range(max(0, first - left), min(last - left, n_columns - 1) + 1):
-                    word = base + (row << a) + column
+            i_edge = level.edges_of[place]
+            e, ends = as_edge(level.edges, i_edge), as_ends(level.places, i_edge)
+            low, high = _rows_of(ends, cut)
+            upper = (int(ends.upper_u) >> cut.u_shift) - cut.left
+            lower = (int(ends.lower_u) >> cut.u_shift) - cut.left if e.low != e.high else -1
+            for row in range(max(0, low), min(high, cut.n_rows - 1) + 1):
+                first, last = _columns_of(ends, cut, row, level.is_tight)
+                for column in range(max(0, first), min(last, cut.n_columns - 1) + 1):
+                    word = cut.base + row * cut.n_columns + column
                     there = next_places[word]
                     next_places[word] = there + 1
                     if is_crowded[word]:

@@ -13,6 +13,13 @@ even there, so that
 holds with one constant for the whole cell (build.py finds it by counting, without any arithmetic that
 rounds). A horizontal edge has its right end as the upper one.
 
+      |  cell   |   b
+      | q- - - -|- / - ; - ->     Of a and b, which share a vertex v, only a is listed in the cell. Below v the ray
+      |         | v  ;            meets a. Above v it meets b, but the list knows a only, made longer (;): it is met
+      | q- - - -|/- - - - - ->    once at either height, so the side kept of the cell is the same for both.
+      |        a|
+      |       / |
+
 **The filter.** An edge is (x, low, high, slope): x at its lower end, slope = dx / dy. q is to its left if
 p = slope (q.y - low) is above s = q.x - x. With u = 2^-53 the slope carries 3 u, so p is off by less than 5.1 u |p| and
 s by u |s|. |s| <= W, the width of the polygon's box, for every q in the box. Between low and high |p| <= W too, and
@@ -35,8 +42,8 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FloatArray, Int32Array
-from engine.jit import inline, kernel
+from engine.arrays import FlagArray, FloatArray, Int32Array
+from engine.jit import inline, kernel, merged
 from engine.predicates.loading import as_point2
 from engine.types import UNDECIDED
 
@@ -83,6 +90,21 @@ class Edge(NamedTuple):
     slope: float
 
 
+class _Block(NamedTuple):
+    """Points that go together, (256,) each: their coordinates, fine places, words found and states."""
+
+    xs: FloatArray
+    ys: FloatArray
+    us: Int32Array
+    vs: Int32Array
+    found: Int32Array
+    states: FlagArray
+    """Side, and one bit above for a point that is not sure."""
+    waiting: Any
+    """uint32: the points that wait for the next step, and the place in `items` of each."""
+    places: Any
+
+
 @inline
 def as_edge(edges: Any, row: int) -> Edge:
     """Return edge `row` of edges (4 m,) float64. An unsigned row saves the compiler the care for negative ones."""
@@ -95,67 +117,96 @@ def as_edge(edges: Any, row: int) -> Edge:
     )
 
 
-@kernel
-def locate_by_ring_cells(points: Any, cells: Any, locations: Any, flag: Any) -> int:
-    """Fill `locations` (n,) int8 for points (n, 2) from a `RingCells`; returns how many are left UNDECIDED."""
-    edges, words, items, band = cells.edges, cells.words, cells.items, cells.band
+@merged
+def _place(cells: Any, block: Any, count: int) -> None:
+    """Find the fine place of each point of a block, and the number of its topmost cell."""
     x_min, x_max, y_min, y_max = cells.box
     x_half, y_half, u_scale, v_scale = x_min * 0.5, y_min * 0.5, cells.u_scale, cells.v_scale
     u_bits, u_shift, v_shift = cells.u_bits, FINE_BITS - cells.u_bits, FINE_BITS - cells.v_bits
     outside = 1 << cells.u_bits + cells.v_bits
+    for k in range(count):
+        x, y = block.xs[k], block.ys[k]
+        is_out = (x < x_min) | (x > x_max) | (y < y_min) | (y > y_max)
+        u = np.int32((min(max(x, x_min), x_max) * 0.5 - x_half) * u_scale)
+        v = np.int32((min(max(y, y_min), y_max) * 0.5 - y_half) * v_scale)
+        block.us[k], block.vs[k] = u, v
+        block.found[k] = outside if is_out else ((v >> v_shift) << u_bits) + (u >> u_shift)
+
+
+@merged
+def _enter(cells: Any, block: Any, count: int) -> int:
+    """Look up the words of the topmost cells; returns how many points wait for more than the side kept there."""
+    words, found, states, waiting = cells.words, block.found, block.states, block.waiting
+    n_waiting = 0
+    for k in range(count):
+        word = words[np.uint32(found[k])]
+        found[k], states[k] = word, word & SIDE
+        waiting[np.uint32(n_waiting)] = k
+        n_waiting += (word < 0) | (word > SIDE)
+    return n_waiting
+
+
+@merged
+def _walk_down(cells: Any, block: Any, n_waiting: int) -> int:
+    """Go down to the leaf of each point that waits; returns how many of the leaves have a list."""
+    words, waiting, places, us, vs = cells.words, block.waiting, block.places, block.us, block.vs
+    u_shift, v_shift = FINE_BITS - cells.u_bits, FINE_BITS - cells.v_bits
+    n_listed = 0
+    for i_waiting in range(n_waiting):
+        k = waiting[i_waiting]
+        word, u_below, v_below = block.found[k], u_shift, v_shift
+        while word < 0:  # bound: each turn takes at least one bit of 60
+            a, b = ~word & 7, ~word >> SPLIT_BITS & 7
+            u_below -= a
+            v_below -= b
+            row, column = vs[k] >> v_below & (1 << b) - 1, us[k] >> u_below & (1 << a) - 1
+            word = words[np.uint32((~word >> 2 * SPLIT_BITS) + (row << a) + column)]
+        block.states[k] = word & SIDE
+        waiting[np.uint32(n_listed)], places[np.uint32(n_listed)] = k, word >> 1
+        n_listed += word > SIDE
+    return n_listed
+
+
+@merged
+def _take_edges(cells: Any, block: Any, n_waiting: int) -> int:
+    """Let one listed edge change the state of each point that waits; returns how many have more to come."""
+    edges, items, band = cells.edges, cells.items, cells.band
+    xs, ys, states, waiting, places = block.xs, block.ys, block.states, block.waiting, block.places
+    n_listed = 0
+    for i_waiting in range(n_waiting):
+        k, place = waiting[i_waiting], places[i_waiting]
+        item = items[place]
+        e, x, y = as_edge(edges, item >> EDGE_SHIFT), xs[k], ys[k]
+        ahead = e.slope * (y - e.low) - (x - e.x)
+        is_above = (y >= e.low) | (item & GOES_ON_DOWN != 0)
+        is_below = (y < e.high) | (item & GOES_ON_UP != 0)
+        is_passed = is_above & is_below & (ahead > 0.0)
+        is_unsure = is_above & (is_below | (y == e.high)) & (not abs(ahead) > band)
+        states[k] = (states[k] ^ np.uint8(is_passed)) | (np.uint8(is_unsure) << 1)
+        waiting[np.uint32(n_listed)], places[np.uint32(n_listed)] = k, place + np.uint32(1)
+        n_listed += item & LAST == 0
+    return n_listed
+
+
+@kernel
+def locate_by_ring_cells(points: Any, cells: Any, locations: Any, flag: Any) -> int:
+    """Fill `locations` (n,) int8 for points (n, 2) from a `RingCells`; returns how many are left UNDECIDED."""
     xs, ys, states = np.empty(_BLOCK), np.empty(_BLOCK), np.empty(_BLOCK, np.uint8)
     us, vs, found = np.empty(_BLOCK, np.int32), np.empty(_BLOCK, np.int32), np.empty(_BLOCK, np.int32)
     waiting, places = np.empty(_BLOCK, np.uint32), np.empty(_BLOCK, np.uint32)
+    block = _Block(xs, ys, us, vs, found, states, waiting, places)
     n_open = 0
     for start in range(0, len(points), _BLOCK):
         count = min(_BLOCK, len(points) - start)
         for k in range(count):
             q = as_point2(points, start + k)
             xs[k], ys[k] = q.x, q.y
-        for k in range(count):
-            x, y = xs[k], ys[k]
-            is_out = (x < x_min) | (x > x_max) | (y < y_min) | (y > y_max)
-            u = np.int32((min(max(x, x_min), x_max) * 0.5 - x_half) * u_scale)
-            v = np.int32((min(max(y, y_min), y_max) * 0.5 - y_half) * v_scale)
-            us[k], vs[k] = u, v
-            found[k] = outside if is_out else ((v >> v_shift) << u_bits) + (u >> u_shift)
-        n_waiting = 0
-        for k in range(count):
-            word = words[np.uint32(found[k])]
-            found[k], states[k] = word, word & SIDE
-            waiting[np.uint32(n_waiting)] = k
-            n_waiting += (word < 0) | (word > SIDE)
-        n_listed = 0
-        for i_waiting in range(n_waiting):
-            k = waiting[i_waiting]
-            word, u_below, v_below = found[k], u_shift, v_shift
-            while word < 0:  # bound: each turn takes at least one bit of 60
-                a, b = ~word & 7, ~word >> SPLIT_BITS & 7
-                u_below -= a
-                v_below -= b
-                row, column = vs[k] >> v_below & (1 << b) - 1, us[k] >> u_below & (1 << a) - 1
-                word = words[np.uint32((~word >> 2 * SPLIT_BITS) + (row << a) + column)]
-            states[k] = word & SIDE
-            waiting[np.uint32(n_listed)], places[np.uint32(n_listed)] = k, word >> 1
-            n_listed += word > SIDE
-        n_waiting = n_listed
+        _place(cells, block, count)
+        n_waiting = _walk_down(cells, block, _enter(cells, block, count))
         while n_waiting > 0:  # bound: the length of the longest list
             if flag[0]:
                 return n_open
-            n_listed = 0
-            for i_waiting in range(n_waiting):
-                k, place = waiting[i_waiting], places[i_waiting]
-                item = items[place]
-                e, x, y = as_edge(edges, item >> EDGE_SHIFT), xs[k], ys[k]
-                ahead = e.slope * (y - e.low) - (x - e.x)
-                is_above = (y >= e.low) | (item & GOES_ON_DOWN != 0)
-                is_below = (y < e.high) | (item & GOES_ON_UP != 0)
-                is_passed = is_above & is_below & (ahead > 0.0)
-                is_unsure = is_above & (is_below | (y == e.high)) & (not abs(ahead) > band)
-                states[k] = (states[k] ^ np.uint8(is_passed)) | (np.uint8(is_unsure) << 1)
-                waiting[np.uint32(n_listed)], places[np.uint32(n_listed)] = k, place + np.uint32(1)
-                n_listed += item & LAST == 0
-            n_waiting = n_listed
+            n_waiting = _take_edges(cells, block, n_waiting)
         for k in range(count):
             is_unsure = states[k] > SIDE
             locations[start + k] = UNDECIDED if is_unsure else 2 * np.int8(states[k]) - 1

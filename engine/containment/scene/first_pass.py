@@ -2,7 +2,7 @@
 
 A point's candidates are the bodies whose boxes hold it, by the cells of a grid, and the bodies without bounds, merged
 in ascending order. A candidate is decided by what its solid has: the sides of a box, squared distance, rows of planes,
-the edges of a small polygon, the voxels of a polyhedron. A body under a pose is asked in its own frame, where the point
+the edges of a small polygon, the cells of a polyhedron. A body under a pose is asked in its own frame, where the point
 carries a blur (posed/body_frame.py). Filters decide with proven bounds (those of half_spaces.py, ball.py and
 posed/filters.py), what they leave is UNDECIDED and listed for the methods of single solids.
 """
@@ -12,25 +12,25 @@ from __future__ import annotations
 from typing import Any, Final, NamedTuple
 
 from engine.arrays import BoolArray, FloatArray, Int8Array, Int32Array, IntArray
+from engine.containment.cells.side import side_in_cell
+from engine.containment.posed.body_frame import BLUR
+from engine.containment.posed.filters import in_space, side_of_box, side_of_rows
 from engine.containment.scene.grid import cell_at
 from engine.containment.scene.rings import locate_in_small_rings
-from engine.containment.scene.voxels import side_in_voxels
-from engine.jit import inline, kernel
+from engine.jit import bare_kernel, inline, kernel, merged
 from engine.predicates.error_free import two_diff
 from engine.types import UNDECIDED
 
-LATER: Final = 0
+SECOND_PASS: Final = 0
 BOX: Final = 1
 BALL: Final = 2
 ROWS: Final = 3
 RINGS: Final = 4
-VOXELS: Final = 5
+CELLS: Final = 5
 """Kinds of bodies: how a candidate is decided in the first pass."""
 
-FRAME_BLUR: Final = 128.0 * 2.0**-53
 _TINY: Final = 1e-320
 _SLACK: Final = 16.0 * 2.0**-53
-_ROW_SLACK: Final = 8.0 * 2.0**-53
 
 
 class SceneTables(NamedTuple):
@@ -64,43 +64,31 @@ class SceneTables(NamedTuple):
     xs: FloatArray
     """The vertices of all rings, each ended by its first one."""
     ys: FloatArray
-    voxel_frames: FloatArray
-    voxel_places: IntArray
-    """``(n, 2)``: address of the packed sides, and shift."""
+    cell_frames: FloatArray
+    cell_places: IntArray
+    """``(n, 6)`` and ``(n, 4)``: what `TopCells` has of a polyhedron."""
 
 
 @inline
-def to_frame(inverses: Any, translations: Any, is_turn: Any, frame: int, px: float, py: float, pz: float) -> Any:
-    """Return a point in the frame of a pose, and its blur: what `move_to_body_frame` does."""
-    dx, x_tail = two_diff(px, float(translations[frame, 0]))
-    dy, y_tail = two_diff(py, float(translations[frame, 1]))
-    dz, z_tail = two_diff(pz, float(translations[frame, 2]))
+def to_frame(tables: Any, frame: int, p: Any) -> Any:
+    """Return a point (x, y, z) in the frame of a pose, and its blur: what `move_to_body_frame` does."""
+    if frame < 0:
+        return p, 0.0
+    inverses, translations = tables.inverses, tables.translations
+    dx, x_tail = two_diff(p[0], float(translations[frame, 0]))
+    dy, y_tail = two_diff(p[1], float(translations[frame, 1]))
+    dz, z_tail = two_diff(p[2], float(translations[frame, 2]))
     x = inverses[frame, 0, 0] * dx + inverses[frame, 0, 1] * dy + inverses[frame, 0, 2] * dz
     y = inverses[frame, 1, 0] * dx + inverses[frame, 1, 1] * dy + inverses[frame, 1, 2] * dz
     z = inverses[frame, 2, 0] * dx + inverses[frame, 2, 1] * dy + inverses[frame, 2, 2] * dz
-    if is_turn[frame] and x_tail == 0.0 and y_tail == 0.0 and z_tail == 0.0:
-        return x, y, z, 0.0
-    return x, y, z, FRAME_BLUR * (abs(dx) + abs(dy) + abs(dz)) + _TINY
+    if tables.is_turn[frame] and x_tail == 0.0 and y_tail == 0.0 and z_tail == 0.0:
+        return (x, y, z), 0.0
+    return (x, y, z), BLUR * (abs(dx) + abs(dy) + abs(dz)) + _TINY
 
 
 @inline
-def _in_box(low: Any, high: Any, slot: int, is_flat: bool, x: float, y: float, z: float, blur: float) -> int:
-    is_out = (x + blur < low[slot, 0]) | (x - blur > high[slot, 0])
-    is_out |= (y + blur < low[slot, 1]) | (y - blur > high[slot, 1])
-    is_out |= (z + blur < low[slot, 2]) | (z - blur > high[slot, 2])
-    if is_out:
-        return -1
-    is_within = (low[slot, 0] < x - blur) & (x + blur < high[slot, 0])
-    is_within &= (low[slot, 1] < y - blur) & (y + blur < high[slot, 1])
-    is_within &= is_flat | ((low[slot, 2] < z - blur) & (z + blur < high[slot, 2]))
-    if is_within:
-        return 1
-    return 0 if blur == 0.0 else UNDECIDED
-
-
-@inline
-def _in_ball(centers: Any, balls: Any, slot: int, px: float, py: float, pz: float) -> int:
-    dx, dy, dz = px - centers[slot, 0], py - centers[slot, 1], pz - centers[slot, 2]
+def _in_ball(centers: Any, balls: Any, slot: int, p: Any) -> int:
+    dx, dy, dz = p[0] - centers[slot, 0], p[1] - centers[slot, 1], p[2] - centers[slot, 2]
     radius, blur = balls[slot, 0], balls[slot, 1]
     square, total = radius * radius, dx * dx + dy * dy + dz * dz
     bound = _SLACK * (square + total) + _TINY + 4.0 * blur * (abs(dx) + abs(dy) + abs(dz) + 2.0 * blur)
@@ -108,20 +96,34 @@ def _in_ball(centers: Any, balls: Any, slot: int, px: float, py: float, pz: floa
     return 1 if excess > bound else -1 if -excess > bound else UNDECIDED
 
 
-@inline
-def _in_rows(rows: Any, first: int, last: int, x: float, y: float, z: float, blur: float) -> int:
-    location = 1
-    for row in range(first, last):
-        ax, by, cz, d = rows[row, 0] * x, rows[row, 1] * y, rows[row, 2] * z, rows[row, 3]
-        distance = ax + by + cz + d
-        bound = _ROW_SLACK * (abs(ax) + abs(by) + abs(cz) + abs(d)) + _TINY
-        bound += blur * (abs(rows[row, 0]) + abs(rows[row, 1]) + abs(rows[row, 2]))
-        if distance > bound:
-            continue
-        if -distance > bound:
-            return -1
-        location = UNDECIDED
-    return location
+@merged
+def _is_in_bounds(tables: Any, body: int, p: Any) -> bool:
+    lows, highs = tables.lows, tables.highs
+    is_out = (p[0] < lows[body, 0]) | (p[0] > highs[body, 0])
+    is_out |= (p[1] < lows[body, 1]) | (p[1] > highs[body, 1])
+    is_out |= (p[2] < lows[body, 2]) | (p[2] > highs[body, 2])
+    return not is_out
+
+
+@merged
+def _locate_in_body(tables: Any, body: int, is_flat: bool, p: Any) -> tuple[int, bool]:
+    """Return the location of a point in a body, and whether it took more than a filter."""
+    kind, slot = tables.kinds[body], tables.slots[body]
+    q, blur = to_frame(tables, tables.frames[body], p)
+    if kind == RINGS:
+        rings = tables.polygon_offsets[slot], tables.polygon_offsets[slot + 1]
+        location, is_beyond = locate_in_small_rings(tables.xs, tables.ys, tables.ring_offsets, rings, q, blur)
+        return location, is_beyond
+    location = UNDECIDED
+    if kind == CELLS:
+        location = side_in_cell(tables.cell_frames, tables.cell_places, slot, q, blur)
+    elif kind == BOX:
+        location = side_of_box(in_space(tables.box_lows, slot), in_space(tables.box_highs, slot), is_flat, q, blur)
+    elif kind == BALL:
+        location = _in_ball(tables.centers, tables.balls, slot, p)
+    elif kind == ROWS:
+        location = side_of_rows(tables.rows, tables.row_offsets[slot], tables.row_offsets[slot + 1], q, blur)
+    return location, False
 
 
 @kernel
@@ -148,16 +150,9 @@ def sort_by_cell(points: Any, grid: Any, shift: int, keys: Any, ends: Any, order
             gathered[place, axis] = points[item, axis]
 
 
-@kernel
+@bare_kernel
 def scan_points(
-    points: Any,
-    tables: Any,
-    grid: Any,
-    unbounded: Any,
-    counts: Any,
-    bodies: Any,
-    located: Any,
-    flag: Any,
+    points: Any, tables: Any, grid: Any, unbounded: Any, counts: Any, bodies: Any, located: Any, flag: Any
 ) -> Any:
     """List the bodies that hold the points (n, 2 or 3), as far as the room goes.
 
@@ -165,61 +160,30 @@ def scan_points(
     for each, where they are not surely outside. unbounded: bodies that are asked about every point, ascending.
     Returns the numbers of points done, bodies listed, and those that took more than a filter.
     """
-    is_flat = points.shape[1] == 2
-    # taken out of the tuples once: within the loop each would be counted up and down as an object of its own
-    kinds, slots, lows, highs, frames = tables.kinds, tables.slots, tables.lows, tables.highs, tables.frames
-    inverses, translations, is_turn = tables.inverses, tables.translations, tables.is_turn
-    box_lows, box_highs, centers, balls = tables.box_lows, tables.box_highs, tables.centers, tables.balls
-    row_offsets, rows = tables.row_offsets, tables.rows
-    polygon_offsets, ring_offsets, xs, ys = tables.polygon_offsets, tables.ring_offsets, tables.xs, tables.ys
-    voxel_frames, voxel_places = tables.voxel_frames, tables.voxel_places
-    u, v, w, offsets, items = grid.u, grid.v, grid.w, grid.offsets, grid.items
-    n_bodies = n_beyond = 0
-    done = 0
+    is_flat, n_unbounded, items = points.shape[1] == 2, len(unbounded), grid.items
+    n_bodies = n_beyond = done = 0
     for item in range(len(points)):
         if flag[0]:
             break
-        px, py, pz = float(points[item, 0]), float(points[item, 1]), 0.0 if is_flat else float(points[item, 2])
+        p = in_space(points, item)
         entry = last = waiting = 0
-        cell = cell_at(px, py, pz, u, v, w)
+        cell = cell_at(p[0], p[1], p[2], grid.u, grid.v, grid.w)
         if cell >= 0:
-            entry, last = offsets[cell], offsets[cell + 1]
-        if n_bodies + (last - entry) + len(unbounded) > len(bodies):
+            entry, last = grid.offsets[cell], grid.offsets[cell + 1]
+        if n_bodies + (last - entry) + n_unbounded > len(bodies):
             break
         before = n_bodies
-        while entry < last or waiting < len(unbounded):  # bound: each turn takes one from one of the lists
-            if waiting == len(unbounded) or (entry < last and items[entry] < unbounded[waiting]):
-                body = items[entry]
-                entry += 1
-                is_out = (px < lows[body, 0]) | (px > highs[body, 0])
-                is_out |= (py < lows[body, 1]) | (py > highs[body, 1])
-                is_out |= (pz < lows[body, 2]) | (pz > highs[body, 2])
-                if is_out:
-                    continue
-            else:
-                body = unbounded[waiting]
-                waiting += 1
-            kind, slot, frame = kinds[body], slots[body], frames[body]
-            x, y, z, blur, location = px, py, pz, 0.0, UNDECIDED
-            if frame >= 0:
-                x, y, z, blur = to_frame(inverses, translations, is_turn, frame, px, py, pz)
-            if kind == RINGS:
-                first_ring, last_ring = polygon_offsets[slot], polygon_offsets[slot + 1]
-                location, is_beyond = locate_in_small_rings(xs, ys, ring_offsets, first_ring, last_ring, x, y, blur)
-                n_beyond += is_beyond
-            elif kind == VOXELS:
-                address, shift = voxel_places[slot, 0], voxel_places[slot, 1]
-                location = side_in_voxels(voxel_frames, slot, address, shift, x, y, z, blur)
-            elif kind == BOX:
-                location = _in_box(box_lows, box_highs, slot, is_flat, x, y, z, blur)
-            elif kind == BALL:
-                location = _in_ball(centers, balls, slot, px, py, pz)
-            elif kind == ROWS:
-                location = _in_rows(rows, row_offsets[slot], row_offsets[slot + 1], x, y, z, blur)
-            if location == -1:
+        while entry < last or waiting < n_unbounded:  # bound: each turn takes one from one of the lists
+            is_listed = waiting == n_unbounded or (entry < last and items[entry] < unbounded[waiting])
+            body = items[entry] if is_listed else unbounded[waiting]
+            entry, waiting = entry + is_listed, waiting + (not is_listed)
+            if is_listed and not _is_in_bounds(tables, body, p):
                 continue
-            bodies[n_bodies], located[n_bodies] = body, location
-            n_bodies += 1
+            location, is_beyond = _locate_in_body(tables, body, is_flat, p)
+            n_beyond += is_beyond
+            if location != -1:
+                bodies[n_bodies], located[n_bodies] = body, location
+                n_bodies += 1
         counts[item] = n_bodies - before
         done = item + 1
     return done, n_bodies, n_beyond
@@ -252,15 +216,6 @@ def put_in_order(
                 n_open += 1
             pair += 1
     return n_open
-
-
-@kernel
-def group_by_body(bodies: Any, ends: Any, order: Any) -> None:
-    """Fill order with the places of `bodies`, grouped by body; ends (n_bodies,) holds each group's first place."""
-    for place in range(len(bodies)):
-        body = bodies[place]
-        order[ends[body]] = place
-        ends[body] += 1
 
 
 @kernel

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Final, Literal, overload
+from typing import Final, Literal, Unpack, overload
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from engine.containment.scene.first_pass import drop_outside, put_in_order, scan
 from engine.containment.scene.second_pass import settle_rest
 from engine.containment.scene.tables import Scene, scene_of
 from engine.errors import InvalidArrayError, WrongDimensionError
-from engine.parallel import Budget, Cancel, Progress, check_options, run_chunks
+from engine.parallel import Budget, Cancel, Options, Progress, check_options, run_chunks
 from engine.solids.base import Solid
 from engine.solids.checks import as_points
 from engine.solids.pose import Pose
@@ -61,25 +61,19 @@ class _Piece:
 def locate_scene(
     points: object,
     solids: Sequence[Solid],
-    poses: Sequence[Pose | None] | None = ...,
+    poses: Sequence[Pose | None] | None = None,
     *,
-    workers: int | None = ...,
-    deadline: float | None = ...,
-    cancel: Cancel | None = ...,
-    progress: Progress | None = ...,
-    report: Literal[False] = ...,
+    report: Literal[False] = False,
+    **options: Unpack[Options],
 ) -> SceneLocations: ...
 @overload
 def locate_scene(
     points: object,
     solids: Sequence[Solid],
-    poses: Sequence[Pose | None] | None = ...,
+    poses: Sequence[Pose | None] | None = None,
     *,
-    workers: int | None = ...,
-    deadline: float | None = ...,
-    cancel: Cancel | None = ...,
-    progress: Progress | None = ...,
     report: Literal[True],
+    **options: Unpack[Options],
 ) -> tuple[SceneLocations, Accuracy]: ...
 def locate_scene(
     points: object,

@@ -59,7 +59,7 @@ def _count_crossings(xs: Any, ys: Any, first: int, last: int, x: float, y: float
         bound += blur * (abs(bx - ax) + abs(by - ay))
         is_passed = (ay <= y) != (by <= y)
         n_crossed += is_passed & ((turn > 0.0) == (ay < by))
-        n_unsure += (is_passed & (not abs(turn) > bound)) | (abs(above) <= blur)
+        n_unsure += (is_passed & (not abs(turn) > bound)) | (not abs(above) > blur)  # NaN is not sure
     return n_crossed, n_unsure
 
 
@@ -91,9 +91,10 @@ def _one_by_one(xs: Any, ys: Any, first: int, last: int, q: Any) -> int:
 
 @inline
 def locate_in_small_rings(
-    xs: Any, ys: Any, ring_offsets: Any, first_ring: int, last_ring: int, x: float, y: float, blur: float
-) -> Any:
-    """Return the location of q = (x, y) and whether it needed more than the filter."""
+    xs: Any, ys: Any, ring_offsets: Any, rings: tuple[int, int], q: Any, blur: float
+) -> tuple[int, bool]:
+    """Return the location of q = (x, y, ...) in the rings from rings[0] on, and whether it took more than a filter."""
+    x, y, first_ring, last_ring = q[0], q[1], rings[0], rings[1]
     n_crossed = n_unsure = 0
     for ring in range(first_ring, last_ring):
         crossed, unsure = _count_crossings(xs, ys, ring_offsets[ring], ring_offsets[ring + 1], x, y, blur)

@@ -13,11 +13,11 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.arrays import FloatArray, Int8Array, IntArray
+from engine.containment.cells.order import counting_sort
+from engine.containment.cells.top import MOST_FACES, top_cells_if_they_pay
 from engine.containment.locators import Counts
 from engine.containment.prepared import columns_of
-from engine.containment.scene.build_voxels import MOST_FACES, voxels_if_they_pay
 from engine.containment.scene.columns import ColumnTables, locate_groups
-from engine.containment.scene.first_pass import group_by_body
 from engine.containment.scene.tables import Scene
 from engine.parallel import Budget, run_chunks
 from engine.solids.polyhedron import Polyhedron
@@ -49,7 +49,8 @@ def settle_rest(
     n_bodies = len(scene.owners)
     found, order = np.full(len(owners), UNDECIDED, np.int8), np.empty(len(owners), np.int64)
     sizes = np.bincount(bodies, minlength=n_bodies)
-    group_by_body(bodies, np.cumsum(sizes) - sizes, order)
+    counting_sort(bodies, np.cumsum(sizes) - sizes, order, budget.flag)
+    budget.check()
     tables = _column_tables(scene, sizes, budget, workers)
     if tables is not None:
         groups = _groups(sizes)
@@ -113,21 +114,21 @@ def _column_tables(scene: Scene, sizes: IntArray, budget: Budget, workers: int |
     def build(start: int, stop: int) -> None:
         for index, solid in chosen[start:stop]:
             columns_of(solid, budget.check)
-            voxels_if_they_pay(solid, int(asked[index]), budget)
+            top_cells_if_they_pay(solid, int(asked[index]), budget)
 
     run_chunks(build, len(chosen), budget=budget, first_chunk=1, workers=workers)
     rows = np.full(len(scene.solids), -1, np.int32)
     rows[[index for index, _ in chosen]] = np.arange(len(chosen))
     lines = [solid.prepared("column_line", _line(solid), budget.check) for _, solid in chosen]
-    voxels = [solid.kept("voxels") for _, solid in chosen]
+    cells = [solid.kept("top_cells") for _, solid in chosen]
     addresses, sizes_of, axes = (np.array(each) for each in zip(*lines))
     return ColumnTables(
         rows[scene.owners],
         addresses,
         sizes_of,
         axes,
-        np.array([(0, 0) if each is None else (each.address, each.shift) for each in voxels], np.int64),
-        np.array([_NO_FRAME if each is None else each.frame for each in voxels]),
+        np.array([(0, 0, 0, 0) if each is None else each.place for each in cells], np.int64),
+        np.array([_NO_FRAME if each is None else each.frame for each in cells]),
     )
 
 

@@ -11,12 +11,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray, Int8Array, Int32Array, IntArray
+from engine.arrays import FloatArray, IntArray
+from engine.containment.cells.top import TopCells
 from engine.containment.locators import Locator
 from engine.containment.posed.locators import posed_locator
-from engine.containment.scene.bodies import Box, body_box, frames_of, grown_boxes, moved_boxes, own_box
-from engine.containment.scene.build_voxels import Voxels
-from engine.containment.scene.first_pass import BALL, BOX, LATER, RINGS, ROWS, VOXELS, SceneTables
+from engine.containment.scene.bodies import body_box, frames_of, grown_boxes, moved_boxes, own_box
+from engine.containment.scene.first_pass import BALL, BOX, CELLS, RINGS, ROWS, SECOND_PASS, SceneTables
 from engine.containment.scene.grid import SceneGrid, build_scene_grid
 from engine.containment.scene.rings import boxes_of_rings, close_rings
 from engine.errors import EngineError
@@ -108,8 +108,8 @@ def scene_of(solids: Sequence[Solid], poses: Sequence[Pose | None] | None, dimen
         kinds.ring_offsets,
         kinds.xs,
         kinds.ys,
-        kinds.voxel_frames,
-        kinds.voxel_places,
+        kinds.cell_frames,
+        kinds.cell_places,
     )
     grid = build_scene_grid(np.flatnonzero(is_bounded & ~is_empty), lows, highs)
     unbounded = np.flatnonzero(~is_bounded & ~is_empty)
@@ -129,29 +129,15 @@ def _placed_balls(balls: IntArray, radii: FloatArray, lows: FloatArray, highs: F
 
 
 class _Kinds:
-    """The tables of the distinct solids, by kind, each in its own frame."""
+    """The tables of the distinct solids, by kind, each in its own frame, named as in `SceneTables`.
 
-    kinds: Int8Array
-    slots: Int32Array
-    lows: FloatArray
-    """``(n, 3)``: boxes, infinite where there may be none; of spheres the centre."""
-    highs: FloatArray
-    is_other: BoolArray
-    """Solids of other kinds, whose bodies are looked at one by one."""
-    boxes: Box
-    radii: FloatArray
-    row_offsets: IntArray
-    rows: FloatArray
-    polygon_offsets: IntArray
-    ring_offsets: IntArray
-    xs: FloatArray
-    ys: FloatArray
-    voxel_frames: FloatArray
-    voxel_places: IntArray
+    lows, highs: (n, 3), infinite where there may be no bounds; of spheres the centre. is_other: solids of other kinds,
+    whose bodies are looked at one by one.
+    """
 
     def __init__(self, solids: list[Solid], dimension: int, budget: Budget) -> None:
         n = len(solids)
-        self.kinds, self.slots = np.full(n, LATER, np.int8), np.zeros(n, np.int32)
+        self.kinds, self.slots = np.full(n, SECOND_PASS, np.int8), np.zeros(n, np.int32)
         self.lows, self.highs = np.full((n, 3), -np.inf), np.full((n, 3), np.inf)
         if dimension == 2:
             self.lows[:, 2] = self.highs[:, 2] = 0.0
@@ -165,7 +151,7 @@ class _Kinds:
         self._set_boxes(by_type.pop(Aabb, []))
         self._set_balls(by_type.pop(Sphere, []))
         self._set_rows(by_type.pop(HalfSpace, []) + by_type.pop(Convex, []))
-        self._set_voxels(by_type.pop(Polyhedron, []), budget)
+        self._set_cells(by_type.pop(Polyhedron, []), budget)
         self.is_other = np.zeros(n, np.bool_)
         self.is_other[[index for rest in by_type.values() for index in rest]] = True
 
@@ -195,7 +181,7 @@ class _Kinds:
         boxes_of_rings(xs, ys, ring_offsets, polygon_offsets, lows, highs)
         self.lows[indices], self.highs[indices] = lows, highs
         n_edges = ring_offsets[polygon_offsets[1:]] - ring_offsets[polygon_offsets[:-1]]
-        self.kinds[np.array(indices, np.int64)[n_edges > _MOST_EDGES]] = LATER
+        self.kinds[np.array(indices, np.int64)[n_edges > _MOST_EDGES]] = SECOND_PASS
         self.polygon_offsets, self.ring_offsets, self.xs, self.ys = polygon_offsets, ring_offsets, xs, ys
 
     def _set_boxes(self, indices: list[int]) -> None:
@@ -218,21 +204,20 @@ class _Kinds:
             rows[:, : self._dimension], rows[:, 3] = together[:, :-1], together[:, -1]
         self.row_offsets, self.rows = offsets, rows
 
-    def _set_voxels(self, indices: list[int], budget: Budget) -> None:
-        """Take the voxels that are there; a polyhedron without waits for the second pass."""
-        found: list[tuple[int, Voxels]] = []
+    def _set_cells(self, indices: list[int], budget: Budget) -> None:
+        """Take the cells that are there; a polyhedron without waits for the second pass."""
+        found: list[tuple[int, TopCells]] = []
         for turn, index in enumerate(indices):
             if turn % _CHECK_EVERY == 0:
                 budget.check()
             solid = self._solids[index]
             self.lows[index], self.highs[index] = own_box(solid, budget.check)
-            voxels = solid.kept("voxels")
-            if voxels is not None:
-                found.append((index, voxels))
-        self._chosen([index for index, _ in found], VOXELS)
-        self.voxel_frames = np.array([voxels.frame for _, voxels in found]).reshape(-1, 6)
-        places = [(voxels.address, voxels.shift) for _, voxels in found]
-        self.voxel_places = np.array(places, np.int64).reshape(-1, 2)
+            cells = solid.kept("top_cells")
+            if cells is not None:
+                found.append((index, cells))
+        self._chosen([index for index, _ in found], CELLS)
+        self.cell_frames = np.array([cells.frame for _, cells in found]).reshape(-1, 6)
+        self.cell_places = np.array([cells.place for _, cells in found], np.int64).reshape(-1, 4)
 
 
 def _offsets(sizes: IntArray) -> IntArray:

@@ -9,7 +9,7 @@ import pytest
 from numba import config as numba_config
 
 import engine
-from engine.bounding.grid import count_boxes, fill_boxes
+from engine.bounding.grid import list_boxes
 from engine.containment.methods.ball import locate_in_ball
 from engine.containment.methods.box import locate_in_box
 from engine.containment.methods.half_spaces import locate_in_half_planes, locate_in_half_spaces
@@ -50,7 +50,7 @@ def test_a_kernel_sees_one_kind_of_array(solid: engine.Solid, kernels: list[Any]
         engine.locate_scene(given, [solid, solid], [turn, None])
     if isinstance(solid, engine.Polyhedron):
         engine.locate(np.random.default_rng(1).random((1 << 15, 3)), solid)  # more than a few passes
-    for kernel in (*kernels, count_boxes, fill_boxes):
+    for kernel in (*kernels, list_boxes):
         layouts = {
             tuple((each.ndim, each.layout, each.mutable) for each in signature if hasattr(each, "layout"))
             for signature in kernel.signatures

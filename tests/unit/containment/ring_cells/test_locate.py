@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine import Polygon, locate
-from engine.arrays import read_only
+from engine import Polygon
 from engine.containment.methods.polygon_ray_parity import locate_in_rings
 from engine.containment.prepared import rings_of
 from engine.containment.rational_locate import no_check, rational_location
@@ -132,18 +131,6 @@ def test_flat_and_thin_rings() -> None:
     assert_certified(np.random.default_rng(3).uniform([0, -1e-12], [2, 1e-12], (200, 2)), thin, is_small=True)
 
 
-def test_many_edges_through_one_point_fill_no_memory() -> None:
-    random = np.random.default_rng(4)
-    ends = rough(3000, random)
-    bundle = Polygon([np.insert(ends, np.arange(0, 3000, 2), [0.0, 0.0], axis=0)])
-    cells = cells_of(bundle)
-    assert len(cells.items) < 64 * len(bundle.vertices) + 10_000
-    assert_certified(random.normal(size=(300, 2)) * 1e-9, bundle)
-    same = Polygon([np.tile(rough(5, random), (400, 1))])
-    assert len(cells_of(same).items) < 64 * len(same.vertices) + 10_000
-    assert_certified(random.uniform(-1, 1, (300, 2)), same)
-
-
 @pytest.mark.full
 @pytest.mark.parametrize("seed", range(300))
 def test_random_small_rings(seed: int) -> None:
@@ -161,18 +148,3 @@ def test_random_small_rings(seed: int) -> None:
     move = random.choice([0.0, 1.0, 1e9], 2)
     scale = random.choice([1.0, 3.0**-40, 2.0**-1000, 2.0**450], 2)
     assert_certified((points + move) * scale, Polygon([(ring + move) * scale for ring in rings]), is_small=True)
-
-
-def test_cells_are_built_when_they_pay() -> None:
-    solid = Polygon([rough(50, np.random.default_rng(4))])
-    points = np.random.default_rng(5).uniform(-1.5, 1.5, (3000, 2))
-    first, accuracy = locate(points, solid, report=True)
-    assert accuracy.method == "ring_crossing"
-    again, accuracy = locate(points, solid, report=True)
-    assert accuracy.method == "ring_cells"
-    assert (first == again).all()
-    far = Polygon([read_only(solid.vertices * 1e300)])
-    for _ in range(2):
-        found, accuracy = locate(points * 1e300, far, report=True)
-        assert accuracy.method == "ring_crossing"
-    assert (first == found).all()

@@ -1,0 +1,39 @@
+"""Filters of blurred points: what they tell holds at every corner of the blur."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from engine import Aabb, Convex, HalfSpace, Implicit, Polygon, Solid
+from engine.containment.posed.locators import _blurred_kernel
+from engine.containment.rational_locate import rational_location
+from tests.unit.containment.scenes import box_mesh, made
+
+SOLIDS: list[Callable[[], Solid]] = [
+    lambda: Aabb([0, 0, 0], [2, 1, 3]),
+    lambda: Aabb([0, 0], [2, 1]),
+    lambda: HalfSpace([1, -2], 0.5),
+    lambda: Convex([[1, 0, 0, 0], [0, 1, 0.5, 0], [-1, -1, -1, 3]]),
+    lambda: Implicit([{"powers": [2, 0], "coefficient": -1.0}, {"powers": [0, 1], "coefficient": 1.0}]),
+    lambda: Polygon([[[0, 0], [2, 0], [2, 2], [1, 0.5], [0, 2]]]),
+    lambda: made(box_mesh([0, 0, 0], [2, 1, 2])),
+]
+
+
+@pytest.mark.parametrize("make", SOLIDS)
+def test_an_answer_holds_all_over_the_blur(make: Callable[[], Any]) -> None:
+    solid = make()
+    points = np.random.default_rng(0).integers(-2, 12, (150, solid.dimension)) / 4.0
+    blurs = np.where(np.arange(len(points)) % 2, 0.25, 2.0**-40)
+    found = np.empty(len(points), np.int8)
+    with np.errstate(all="ignore"):
+        _blurred_kernel(solid)(points, blurs, found, np.zeros(1, np.uint8))
+    assert (np.abs(found) == 1).mean() > 0.2
+    corners = np.stack(np.meshgrid(*[[-0.5, 0.0, 0.5]] * solid.dimension), axis=-1).reshape(-1, solid.dimension)
+    for point, blur, location in zip(points, blurs, found.tolist()):
+        if abs(location) == 1:
+            assert {rational_location(each, solid) for each in (point + blur * corners).tolist()} == {location}
