@@ -482,3 +482,11 @@ def called(function: Callable[..., Any]) -> Any:
 def allocating(function: Callable[..., Any]) -> Any:
     """Compile as `called` does, for a function below a bare kernel that makes arrays of its own and returns none."""
     return function if numba_config.DISABLE_JIT else _Inline(function, _CalledCompiler, forceinline=False, _nrt=True)
+
+
+def bare(function: Callable[..., Any]) -> Any:
+    """Compile as `called` does, for a function below a counting kernel that, with all that it calls, counts nothing.
+
+    It holds to what `bare_kernel` asks for; the kernel makes the arrays.
+    """
+    return function if numba_config.DISABLE_JIT else _Inline(function, _CalledCompiler, forceinline=False, _nrt=False)

@@ -15,26 +15,25 @@ import numpy as np
 
 from engine.lanes.lanes import any_of, bits_of, count_bits, dot, greater, lesser, load
 from engine.lanes.memory import prefetch
-from engine.lanes.tracing import LANES as LANES
-from engine.lanes.tracing import Lanes, Number, Rows, traced
+from engine.lanes.tracing import LANES, Lanes, Number, Rows, traced
+from engine.types import UNDECIDED
 
 BAND: Final = np.float32(2.0**-18)
 """Planes of an entry are this far from a point at least where they decide: derived in cells/entries.py."""
 ROWS: Final = 14
 """Numbers a triangle: those of an entry, and 1.0 in the last group of a leaf, else 0.0."""
-UNSURE: Final = 2
-"""Bit of the answer that is set where a lane is within the band."""
 _LINE: Final = 16
 """Numbers that a line of the cache holds."""
 
 
 @traced
 def group_parity(groups: Rows, group: int, x: Number, y: Number, z: Number) -> int:
-    """Return the parity of the segment from R to (x, y, z) over a group of (n, 14, 8) float32, plus UNSURE."""
+    """Return the parity of the segment from R to (x, y, z) over a group of (n, 14, 8) float32, with the bit
+    UNDECIDED where a lane is within the band."""
     side, least, most = planes_of(groups, group, (x, y, z))
     is_crossed = (side < -BAND) & ((least > BAND) | (most < -BAND))
     is_apart = (side > BAND) | ((least < -BAND) & (most > BAND))
-    return (count_bits(bits_of(is_crossed)) & 1) | any_of(~(is_apart | is_crossed)) * UNSURE
+    return (count_bits(bits_of(is_crossed)) & 1) | any_of(~(is_apart | is_crossed)) * UNDECIDED
 
 
 def planes_of(groups: Rows, group: int, point: Sequence[Lanes]) -> tuple[Lanes, Lanes, Lanes]:

@@ -4,38 +4,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
 from engine.arrays import BoolArray, FlagArray, FloatArray, IntArray
 from engine.parallel import Budget
-from engine.polygon_clipping.in_doubles import OPEN
 from engine.polygon_clipping.in_integers import Row
+from engine.polygon_clipping.rings import PlaneTables
 from engine.polygon_clipping.sutherland_hodgman import clip_rings
 from engine.predicates.digits import packed_numbers
 from engine.predicates.integers import nearest
 from engine.predicates.ranges import LARGEST, SMALLEST
 from engine.predicates.scaling import exponent_above, scaled_back, shifted
 from engine.solids.base import Solid
+from engine.types import OPEN
 
 _DEEPEST: Final = -900
 """Scenes below 2^-900 have subnormal results, which the kernel would round twice."""
-
-
-class PlaneTables(NamedTuple):
-    """Planes as the kernel takes them, see `clip_rings`; prepared once a region where nothing is scaled.
-
-    high, low: (planes, dim + 1) float64; axes: (planes,) int64, the axis that a plane cuts across in one known double
-    `at`, else -1; row_heap, row_places: the rows in whole numbers, see digits.py.
-    """
-
-    high: FloatArray
-    low: FloatArray
-    axes: IntArray
-    at: FloatArray
-    row_heap: IntArray
-    row_places: IntArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +118,7 @@ def clip_chunk(
                 scene.vertices.reshape(-1),
                 ring_offsets,
                 polygon_offsets,
-                *scene.tables,
+                scene.tables,
                 done,
                 last,
                 budget.flag,

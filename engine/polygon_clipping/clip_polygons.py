@@ -5,17 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any, Literal, NamedTuple, overload
+from typing import Any, Literal, NamedTuple, Unpack, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray
 from engine.errors import EmptyGeometryError, InvalidArrayError, TooComplexError, UnsupportedSolidError
-from engine.parallel import Budget, Cancel, Progress, run_chunks
+from engine.parallel import Budget, Cancel, Options, Progress, run_chunks
 from engine.polygon_clipping.batches import clip_chunk, kernel_scene
 from engine.polygon_clipping.convex_planes import convex_planes
-from engine.polygon_clipping.in_doubles import OPEN
 from engine.polygon_clipping.in_integers import Row, clip_polygon, integer_row, reduced
 from engine.predicates.scaling import largest_of
 from engine.solids.aabb import Aabb
@@ -26,7 +25,7 @@ from engine.solids.convex import Convex
 from engine.solids.half_space import HalfSpace
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
-from engine.types import Accuracy
+from engine.types import OPEN, Accuracy
 
 
 class PolygonStatus(IntEnum):
@@ -71,27 +70,13 @@ Polygons = Sequence[Polygon] | Sequence[Sequence[npt.ArrayLike]] | npt.NDArray[A
 
 @overload
 def clip_polygons(
-    polygons: Polygons,
-    region: Solid,
-    *,
-    workers: int | None = None,
-    deadline: float | None = None,
-    cancel: Cancel | None = None,
-    progress: Progress | None = None,
-    report: Literal[False] = False,
+    polygons: Polygons, region: Solid, *, report: Literal[False] = False, **options: Unpack[Options]
 ) -> ClippedPolygons: ...
 
 
 @overload
 def clip_polygons(
-    polygons: Polygons,
-    region: Solid,
-    *,
-    workers: int | None = None,
-    deadline: float | None = None,
-    cancel: Cancel | None = None,
-    progress: Progress | None = None,
-    report: Literal[True],
+    polygons: Polygons, region: Solid, *, report: Literal[True], **options: Unpack[Options]
 ) -> tuple[ClippedPolygons, Accuracy]: ...
 
 

@@ -1,4 +1,4 @@
-"""Sutherland-Hodgman in exact whole numbers, compiled: settles the polygons that in_doubles.py gives up.
+"""Sutherland-Hodgman in exact whole numbers, compiled: settles the polygons that in_doubles.py leaves open.
 
 It is in_integers.py once more, with two things that keep it fast. A vertex that was cut holds whole numbers
 (x, y[, z], w) for the point (x / w, y / w, z / w) and also the doubles nearest to it. Rounding keeps order, so a plane
@@ -16,9 +16,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from engine.jit import inline
+from engine.jit import bare, inline
 from engine.polygon_clipping.cut_vertices import VALUE_BOUND
-from engine.polygon_clipping.in_doubles import GIVEN_UP, NO_ROOM
+from engine.polygon_clipping.rings import EXACT, NO_ROOM, Clipped, Cutting, Plane, Polygons, has_bridges, plane_of
 from engine.predicates.digits import (
     MOST,
     SLOT,
@@ -28,7 +28,10 @@ from engine.predicates.digits import (
     sign_of,
     sum_products,
 )
+from engine.types import OPEN
 
+TOO_LONG = -1
+"""Instead of a number of vertices: exact numbers are too long for digits.py."""
 _ONE = 0
 _VALUES = SLOT
 _FREE = 3 * SLOT
@@ -46,7 +49,7 @@ class ExactScratch(NamedTuple):
     points: (room, dim) float64, the doubles nearest to vertices; places: (room, dim + 1) int64, numbers of cut ones.
     rings: (2, room) int64, a ring as numbers of vertices. edges, along: (room,) int64, the original edge that goes on
     from a vertex, by its first vertex, and the plane that it runs along, else -1. signs: (room,) int64. on_plane:
-    (room,) bool, for places of the ring made.
+    (room,) bool, for places of the ring made. used: (2,) int64, how many vertices there are, and numbers of the heap.
     """
 
     heap: Any
@@ -61,6 +64,7 @@ class ExactScratch(NamedTuple):
     along: Any
     signs: Any
     on_plane: Any
+    used: Any
 
 
 @inline
@@ -84,6 +88,7 @@ def exact_scratch(room: int, dimension: int, row_heap: Any, row_places: Any) -> 
         np.empty(room, np.int64),
         np.empty(room, np.int64),
         np.empty(room, np.bool_),
+        np.empty(2, np.int64),
     )
 
 
@@ -111,24 +116,24 @@ def value_at(s: Any, plane: int, side: int, place: int) -> bool:
 
 
 @inline
-def sign_of_vertex(s: Any, high: Any, axis: int, at: float, plane: int, v: int, n_ring: int) -> tuple[int, bool]:
+def sign_of_vertex(s: Any, plane: Plane, v: int, n_ring: int) -> tuple[int, bool]:
     """Return the exact sign of a plane at vertex v; False where numbers are too long."""
-    d = s.points.shape[1]
+    d, number, axis = s.points.shape[1], plane.number, plane.axis
     if axis >= 0:
         x = s.points[v, axis]
-        if x != at or v < n_ring:
-            sign = 1 if x > at else (-1 if x < at else 0)
-            return (sign if high[plane, axis] > 0.0 else -sign), True
+        if x != plane.place or v < n_ring:
+            sign = 1 if x > plane.place else (-1 if x < plane.place else 0)
+            return (sign if plane.high[number, axis] > 0.0 else -sign), True
     else:
-        value, size = high[plane, d], abs(high[plane, d])
+        value, size = plane.high[number, d], abs(plane.high[number, d])
         for k in range(d):
-            term = high[plane, k] * s.points[v, k]
+            term = plane.high[number, k] * s.points[v, k]
             value += term
             size += abs(term)
         if abs(value) > VALUE_BOUND * size + _TINY:
             return (1 if value > 0.0 else -1), True
     load_vertex(s, v, n_ring, 0)
-    is_made = value_at(s, plane, 0, _VALUES)
+    is_made = value_at(s, number, 0, _VALUES)
     return sign_of(s.heap, _VALUES), is_made
 
 
@@ -154,115 +159,131 @@ def are_same(s: Any, v: int, u: int, n_ring: int) -> tuple[bool, bool]:
 
 
 @inline
-def cut_edge(s: Any, plane: int, p: int, q: int, n_ring: int, j: int, top: int) -> int:
-    """Make vertex j where the edge p q crosses a plane, its numbers at `top`; return the new top, -1 if too long."""
-    d = s.points.shape[1]
-    load_vertex(s, p, n_ring, 0)
-    load_vertex(s, q, n_ring, 1)
-    if not (value_at(s, plane, 0, _VALUES) and value_at(s, plane, 1, _VALUES + SLOT)):
-        return -1
-    factor = sign_of(s.heap, _VALUES)
-    for k in range(d + 1):  # |s_p| q + |s_q| p, with values of two signs
-        s.terms[0, 0], s.terms[0, 1], s.terms[0, 2] = _VALUES, s.loaded[1, k], factor
-        s.terms[1, 0], s.terms[1, 1], s.terms[1, 2] = _VALUES + SLOT, s.loaded[0, k], -factor
-        if top + SLOT > s.heap.size or not sum_products(s.heap, s.terms, 2, top) or s.heap[top] > MOST:
-            return -1
-        s.places[j, k] = top
-        top += 2 + s.heap[top]
-    return top
+def put_sums(s: Any, place: int, k: int, carry: int) -> bool:
+    """Make number k of the vertex at `place` of two terms, on top of the heap; False where it is too long."""
+    top = s.used[1]
+    if top + SLOT > s.heap.size or not sum_products(s.heap, s.terms, 2, top) or s.heap[top] > MOST:
+        return False
+    s.places[place, k] = top
+    s.used[1] = top + 2 + carry + s.heap[top]
+    return True
 
 
 @inline
-def cut_corner(s: Any, plane: int, other: int, j: int, top: int) -> int:
-    """Make vertex j where two lines of the plane meet, its numbers at `top`; return the new top, -1 if too long."""
+def cut_edge(s: Any, plane: int, p: int, q: int, n_ring: int, j: int) -> bool:
+    """Make the numbers of vertex j, where the edge p q crosses a plane; False where they are too long."""
+    load_vertex(s, p, n_ring, 0)
+    load_vertex(s, q, n_ring, 1)
+    if not (value_at(s, plane, 0, _VALUES) and value_at(s, plane, 1, _VALUES + SLOT)):
+        return False
+    factor = sign_of(s.heap, _VALUES)
+    for k in range(s.places.shape[1]):  # |s_p| q + |s_q| p, with values of two signs
+        s.terms[0, 0], s.terms[0, 1], s.terms[0, 2] = _VALUES, s.loaded[1, k], factor
+        s.terms[1, 0], s.terms[1, 1], s.terms[1, 2] = _VALUES + SLOT, s.loaded[0, k], -factor
+        if not put_sums(s, j, k, 0):
+            return False
+    return True
+
+
+@inline
+def cut_corner(s: Any, plane: int, other: int, j: int) -> bool:
+    """Make the numbers of vertex j, where two lines of the plane meet; False where they are too long."""
     for k in range(3):  # the cross product of both rows
         a, b = (k + 1) % 3, (k + 2) % 3
         s.terms[0, 0], s.terms[0, 1], s.terms[0, 2] = s.rows[plane, a], s.rows[other, b], 1
         s.terms[1, 0], s.terms[1, 1], s.terms[1, 2] = s.rows[plane, b], s.rows[other, a], -1
-        if top + SLOT > s.heap.size or not sum_products(s.heap, s.terms, 2, top) or s.heap[top] > MOST:
-            return -1
-        s.places[j, k] = top
-        top += 3 + s.heap[top]  # one place more, for a carry
+        if not put_sums(s, j, k, 1):  # one place more, for a carry
+            return False
     if sign_of(s.heap, s.places[j, 2]) < 0:
         for k in range(3):
             negate(s.heap, s.places[j, k])
-    return top
+    return True
 
 
 @inline
-def cut_ring(
-    s: Any, high: Any, axis: int, at: float, plane: int, now: int, n: int, n_ring: int, size: int, top: int
-) -> tuple[int, int, bool, int, int]:
-    """Cut the ring ``rings[now]`` of n vertices by a plane into the other one.
+def cut(s: Any, plane: int, v: int, w: int, is_left: bool, n_ring: int) -> int:
+    """Return the vertex made where the edge v w crosses a plane, leaving its inner side or not; TOO_LONG."""
+    j, edge, d = s.used[0], s.edges[v], s.points.shape[1]
+    if j + 1 >= s.points.shape[0]:
+        return TOO_LONG
+    if edge >= 0:
+        is_made = cut_edge(s, plane, edge, edge + 1 if edge + 1 < n_ring else 0, n_ring, j)
+    elif d == 2:
+        is_made = cut_corner(s, plane, s.along[v], j)
+    else:
+        is_made = cut_edge(s, plane, v, w, n_ring, j)
+    for k in range(d):
+        if is_made:
+            x, is_made = nearest_quotient(s.heap, s.terms, s.places[j, k], s.places[j, d], _ONE, _FREE)
+            s.points[j, k] = x + 0.0
+    s.used[0] = j + 1
+    s.edges[j], s.along[j] = (-1, plane) if is_left else (edge, s.along[v])
+    return j if is_made else TOO_LONG
 
-    size, top: how many vertices and how much of the heap are in use. Returns the vertices left (-1: too long; the ring
-    stays where it is if nothing is dropped), in how many points the plane was met, whether a vertex was dropped, and
-    the new size and top.
+
+@inline
+def push(s: Any, made: Any, kept: int, v: int, is_on: bool, n_ring: int) -> int:
+    """Append a vertex, on the plane or not, to the `kept` ones of a ring; return how many there are then, or TOO_LONG.
+
+    One that is the same point as the vertex before hands its edge on to that one.
     """
-    n_contacts, has_dropped, d = 0, False, s.points.shape[1]
-    for i in range(n):
-        s.signs[i], is_known = sign_of_vertex(s, high, axis, at, plane, s.rings[now, i], n_ring)
+    s.on_plane[kept] = is_on
+    if kept > 0 and is_on and s.on_plane[kept - 1]:
+        before = made[kept - 1]
+        is_same, is_known = are_same(s, v, before, n_ring)
         if not is_known:
-            return -1, 0, False, size, top
-        n_contacts += s.signs[i] == 0
-        has_dropped = has_dropped or s.signs[i] < 0
-    if not has_dropped:
-        return n, n_contacts, False, size, top
-    kept, other = 0, 1 - now
-    for i in range(n):
-        following = i + 1 if i + 1 < n else 0
-        v, w = s.rings[now, i], s.rings[now, following]
-        for step in range(2):
-            if step == 0:
-                if s.signs[i] < 0:
-                    continue
-                made = v
-                s.on_plane[kept] = s.signs[i] == 0
-                if s.signs[i] == 0 and s.signs[following] < 0:
-                    s.edges[v], s.along[v] = -1, plane
-            else:
-                if s.signs[i] * s.signs[following] >= 0:
-                    continue
-                n_contacts += 1
-                made, edge = size, s.edges[v]
-                if size + 1 >= s.points.shape[0]:
-                    return -1, 0, False, size, top
-                if edge >= 0:
-                    top = cut_edge(s, plane, edge, edge + 1 if edge + 1 < n_ring else 0, n_ring, made, top)
-                elif d == 2:
-                    top = cut_corner(s, plane, s.along[v], made, top)
-                else:
-                    top = cut_edge(s, plane, v, w, n_ring, made, top)
-                if top < 0:
-                    return -1, 0, False, size, top
-                for k in range(d):
-                    x, is_known = nearest_quotient(s.heap, s.terms, s.places[made, k], s.places[made, d], _ONE, _FREE)
-                    s.points[made, k] = x + 0.0
-                    if not is_known:
-                        return -1, 0, False, size, top
-                size += 1
-                s.on_plane[kept] = True
-                s.edges[made], s.along[made] = (-1, plane) if s.signs[i] > 0 else (edge, s.along[v])
-            if kept > 0 and s.on_plane[kept] and s.on_plane[kept - 1]:
-                before = s.rings[other, kept - 1]
-                is_same, is_known = are_same(s, made, before, n_ring)
-                if not is_known:
-                    return -1, 0, False, size, top
-                if is_same:
-                    s.edges[before], s.along[before] = s.edges[made], s.along[made]
-                    continue
-            s.rings[other, kept] = made
-            kept += 1
-            if kept >= s.points.shape[0]:
-                return -1, 0, False, size, top
+            return TOO_LONG
+        if is_same:
+            s.edges[before], s.along[before] = s.edges[v], s.along[v]
+            return kept
+    made[kept] = v
+    return kept + 1 if kept + 1 < s.points.shape[0] else TOO_LONG
+
+
+@inline
+def close_ring(s: Any, made: Any, kept: int, n_ring: int) -> int:
+    """Return how many vertices of a ring stay, without last ones that are the first point; TOO_LONG."""
     while kept > 1 and s.on_plane[kept - 1] and s.on_plane[0]:
-        is_same, is_known = are_same(s, s.rings[other, kept - 1], s.rings[other, 0], n_ring)
+        is_same, is_known = are_same(s, made[kept - 1], made[0], n_ring)
         if not is_known:
-            return -1, 0, False, size, top
+            return TOO_LONG
         if not is_same:
             break
         kept -= 1
-    return kept, n_contacts, True, size, top
+    return kept
+
+
+@inline
+def classify(s: Any, plane: Plane, ring: Any, n: int, n_ring: int) -> tuple[int, int]:
+    """Set the signs of the n vertices of a ring; return how many are outside (TOO_LONG), and on the plane."""
+    n_out, n_on = 0, 0
+    for i in range(n):
+        s.signs[i], is_known = sign_of_vertex(s, plane, ring[i], n_ring)
+        if not is_known:
+            return TOO_LONG, 0
+        n_out += s.signs[i] < 0
+        n_on += s.signs[i] == 0
+    return n_out, n_on
+
+
+@inline
+def cut_ring(s: Any, plane: int, ring: Any, n: int, made: Any, n_ring: int) -> tuple[int, int]:
+    """Cut a ring of n vertices with signs by a plane into `made`; return how many are left (TOO_LONG), and are cuts."""
+    kept, n_cuts = 0, 0
+    for i in range(n):
+        following = i + 1 if i + 1 < n else 0
+        v, sign, sign_after = ring[i], s.signs[i], s.signs[following]
+        if sign >= 0:
+            if sign == 0 and sign_after < 0:
+                s.edges[v], s.along[v] = -1, plane
+            kept = push(s, made, kept, v, sign == 0, n_ring)
+        if sign * sign_after < 0 and kept >= 0:
+            n_cuts += 1
+            j = cut(s, plane, v, ring[following], sign > 0, n_ring)
+            kept = push(s, made, kept, j, True, n_ring) if j >= 0 else TOO_LONG
+        if kept < 0:
+            return TOO_LONG, 0
+    return close_ring(s, made, kept, n_ring), n_cuts
 
 
 @inline
@@ -283,54 +304,68 @@ def load_ring(s: Any, vertices: Any, first: int, last: int) -> int:
         if not is_same:
             break
         n -= 1
+    s.used[0], s.used[1] = n, _ROWS + s.n_rows
     return n
 
 
 @inline
+def cut_by_planes(s: Any, planes: Any, cutting: Cutting, n_cutting: int, n_ring: int, stop: Any) -> tuple[int, int]:
+    """Cut the ring that is loaded by one plane after another; return how many vertices are left, in which of `rings`.
+
+    TOO_LONG or NO_ROOM instead. Adds to the contacts of the planes, and to which dropped a vertex.
+    """
+    n, now = n_ring, 0
+    for i_plane in range(n_cutting):
+        if n <= 0:
+            break
+        if stop[0]:
+            return NO_ROOM, now
+        plane, n_cuts = plane_of(planes, cutting.planes[i_plane]), 0
+        n_out, n_on = classify(s, plane, s.rings[now], n, n_ring)
+        if n_out > 0:
+            n, n_cuts = cut_ring(s, plane.number, s.rings[now], n, s.rings[1 - now], n_ring)
+            cutting.dropped[i_plane], now = True, 1 - now
+        elif n_out < 0:
+            return TOO_LONG, now
+        cutting.contacts[i_plane] += n_on + n_cuts
+    return n, now
+
+
+@bare
 def clip_exactly(
     s: Any,
-    vertices: Any,
-    ring_offsets: Any,
-    first: int,
-    last: int,
-    high: Any,
-    axes: Any,
-    at: Any,
-    cutting: Any,
+    polygons: Polygons,
+    polygon: int,
+    planes: Any,
+    cutting: Cutting,
     n_cutting: int,
-    contacts: Any,
-    dropped: Any,
     stop: Any,
-    out: Any,
+    clipped: Clipped,
     written: int,
-    sizes: Any,
 ) -> int:
-    """Clip rings first .. last - 1, one polygon, by the planes of `cutting` into ``out[written:]``; fills their sizes.
+    """Clip a polygon by the planes of `cutting`, whose contacts begin anew; `written` vertices are there already.
 
-    Adds to contacts, dropped. Returns the vertices left, GIVEN_UP or NO_ROOM.
+    Returns the vertices written then, or NO_ROOM. What is too long is left OPEN.
     """
     begun, d = written, s.points.shape[1]
-    for ring in range(first, last):
-        n = load_ring(s, vertices, ring_offsets[ring], ring_offsets[ring + 1])
-        n_ring, size, now, top = n, n, 0, _ROWS + s.n_rows
-        for i_plane in range(n_cutting):
-            if n <= 0:
-                break
-            if stop[0]:
-                return NO_ROOM
-            plane = cutting[i_plane]
-            n, met, has_dropped, size, top = cut_ring(s, high, axes[plane], at[plane], plane, now, n, n_ring, size, top)
-            contacts[i_plane] += met
-            if has_dropped:
-                dropped[i_plane] = True
-                now = 1 - now
-        if n < 0:
-            return GIVEN_UP
-        if (written + n) * d > out.size:
+    first_ring, last_ring = polygons.polygon_offsets[polygon], polygons.polygon_offsets[polygon + 1]
+    for i in range(n_cutting):
+        cutting.contacts[i], cutting.dropped[i] = 0, False
+    clipped.state[polygon] = EXACT
+    for ring in range(first_ring, last_ring):
+        n_ring = load_ring(s, polygons.vertices, polygons.ring_offsets[ring], polygons.ring_offsets[ring + 1])
+        n, now = cut_by_planes(s, planes, cutting, n_cutting, n_ring, stop)
+        if n == TOO_LONG:
+            clipped.state[polygon] = OPEN
+            for other in range(first_ring, last_ring):
+                clipped.sizes[other] = 0
+            return begun
+        if n == NO_ROOM or (written + n) * d > clipped.vertices.size:
             return NO_ROOM
         for i in range(n):
             for k in range(d):
-                out[(written + i) * d + k] = s.points[s.rings[now, i], k]
-        sizes[ring] = n
+                clipped.vertices[(written + i) * d + k] = s.points[s.rings[now, i], k]
+        clipped.sizes[ring] = n
         written += n
-    return written - begun
+    clipped.may_have_bridges[polygon] = written > begun and has_bridges(cutting, n_cutting)
+    return written

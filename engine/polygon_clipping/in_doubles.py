@@ -1,17 +1,12 @@
 """Sutherland-Hodgman on rings whose every decision and coordinate doubles and double-doubles prove.
 
 That is nearly every ring, so the work is that of careless code: vertices stay where they are and a ring is a list of
-their numbers; only cuts are made in double-double. A cut is kept only where its doubles are surely the nearest ones.
-Rounding keeps order: where such a double lies beside a wall of a box so does the vertex, and vertices whose doubles
-differ are two. Original vertices are doubles, so on a wall they are decided too. At the first doubt the polygon is
-given up, and in_digits.py begins anew.
+their numbers; only cuts are made in double-double (cut_vertices.py). A cut is kept only where its doubles are surely
+the nearest ones. Rounding keeps order: where such a double lies beside a wall of a box so does the vertex, and vertices
+whose doubles differ are two. Original vertices are doubles, so on a wall they are decided too. At the first doubt the
+polygon is left open, and in_digits.py begins anew.
 
-One long function, and arrays of one dimension: compiled code counts references to each array that it hands to another
-function, and that was two fifths of the time. The functions that it calls take numbers.
-
-pool: (room * dim,) float64, the doubles of vertices, those of the ring first. rests: (room * dim * 2,) float64, for
-each coordinate of a cut what its double leaves over, and the bound of its error. edges: (room,) int32, the original
-edge that goes on from a vertex, -1 for one along a plane.
+    load a ring -> take it as runs -> for each plane: classify, cut -> emit
 
 Neighbours on the same side of every plane stay and go together: a long ring is first taken as runs of them, each
 standing as its first vertex, up to ``ends`` of it.
@@ -22,31 +17,17 @@ Slack of planes across no axis: every vertex lies in the box of its polygon, so 
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
-from engine.jit import merged
+import numpy as np
+
+from engine.jit import bare, inline, merged
 from engine.lanes.memory import move
-from engine.polygon_clipping.cut_vertices import (
-    TINY,
-    VALUE_BOUND,
-    WIDEST,
-    between,
-    distance_across,
-    is_at,
-    on_edge,
-    plus_term,
-    share_of_edge,
-    value_bound,
-)
-from engine.predicates.double_double import dd_add, dd_div, surely_rounded
+from engine.polygon_clipping.cut_vertices import TINY, VALUE_BOUND, Vertices, are_same, cut_edge
+from engine.polygon_clipping.rings import CLIPPED, NO_ROOM, Clipped, Cutting, Plane, Polygons, has_bridges, plane_of
 
-DONE: Final = 0
-GIVEN_UP: Final = -1
-NO_ROOM: Final = -2
-CLIPPED: Final = 0
-OPEN: Final = 1
-EXACT: Final = 2
-"""States of a polygon: settled by doubles, by nothing yet, by whole numbers."""
+DOUBT: Final = -1
+"""Instead of a number of vertices: doubles do not prove something."""
 _SLACK: Final = 2.0**-45
 LONG: Final = 8
 """Vertices from which on a ring is taken as runs: of fewer, nearly every one is a run of its own."""
@@ -55,14 +36,49 @@ ALONE: Final = 1 << MOST_BITS
 """Mark of a vertex on a plane (or near it): a run of its own."""
 
 
+class Scratch(NamedTuple):
+    """What rings are clipped in.
+
+    rings: (2, room) int32, a ring as numbers of vertices, and the one that is made of it. signs: (room,) int8, of its
+    vertices. ends, codes: (room,) int32, of original vertices the last one of the run, and the planes that it is
+    outside of. lows, highs: (3,) float64, the box of a polygon.
+    """
+
+    vertices: Vertices
+    cutting: Cutting
+    rings: Any
+    signs: Any
+    ends: Any
+    codes: Any
+    lows: Any
+    highs: Any
+
+
+@inline
+def scratch_for(room: int, n_planes: int, names: Any) -> Scratch:
+    """Return what to clip in, for rings that grow to `room` vertices, those that were dropped included."""
+    d = len(names)
+    return Scratch(
+        Vertices(np.empty(room * d), np.empty(2 * room * d), np.empty(room, np.int32), names),
+        Cutting(
+            np.empty(n_planes, np.int64), np.empty(n_planes), np.empty(n_planes, np.int64), np.empty(n_planes, np.bool_)
+        ),
+        np.empty((2, room), np.int32),
+        np.empty(room, np.int8),
+        np.empty(room, np.int32),
+        np.empty(room, np.int32),
+        np.empty(3),
+        np.empty(3),
+    )
+
+
 @merged
-def load_ring(
-    vertices: Any, begin: int, end: int, d: int, pool: Any
-) -> tuple[int, float, float, float, float, float, float]:
-    """Load a ring into `pool` without vertices equal to the one before; return how many, and the bounds of each axis.
+def load_ring(s: Scratch, vertices: Any, begin: int, end: int) -> tuple[int, float, float, float, float, float, float]:
+    """Load a ring without vertices equal to the one before; return how many, and the bounds of each axis.
 
     Zeros become +0.0. The first vertex may still be repeated at the end.
     """
+    pool, d = s.vertices.pool, len(s.vertices.names)
     x, y, z = vertices[begin * d], vertices[begin * d + 1], 0.0 if d == 2 else vertices[begin * d + 2]
     pool[0], pool[1] = x + 0.0, y + 0.0
     if d == 3:
@@ -82,312 +98,246 @@ def load_ring(
 
 
 @merged
-def clip_plainly(
-    vertices: Any,
-    ring_offsets: Any,
-    polygon_offsets: Any,
-    high: Any,
-    low: Any,
-    axes: Any,
-    at: Any,
-    first: int,
-    last: int,
-    stop: Any,
-    out: Any,
-    written: int,
-    sizes: Any,
-    state: Any,
-    may_have_bridges: Any,
-    names: Any,
-    pool: Any,
-    rests: Any,
-    edges: Any,
-    ends: Any,
-    codes: Any,
-    rings: Any,
-    signs: Any,
-    contacts: Any,
-    dropped: Any,
-    cutting: Any,
-    slack: Any,
-    lows: Any,
-    highs: Any,
-) -> tuple[int, int, int, int]:
-    """Clip polygons from `first` on as `clip_rings` does, up to one that needs care.
+def load_box(s: Scratch, polygons: Polygons, first: int, last: int) -> int:
+    """Set the box of the polygon of rings first .. last - 1; returns how many vertices of the last one are loaded."""
+    vertices, offsets = polygons.vertices, polygons.ring_offsets
+    n, x_low, x_high, y_low, y_high, z_low, z_high = load_ring(s, vertices, offsets[first], offsets[first + 1])
+    for ring in range(first + 1, last):
+        n, x, x_most, y, y_most, z, z_most = load_ring(s, vertices, offsets[ring], offsets[ring + 1])
+        x_low, x_high = min(x, x_low), max(x_most, x_high)
+        y_low, y_high = min(y, y_low), max(y_most, y_high)
+        z_low, z_high = min(z, z_low), max(z_most, z_high)
+    s.lows[0], s.lows[1], s.lows[2] = x_low, y_low, z_low
+    s.highs[0], s.highs[1], s.highs[2] = x_high, y_high, z_high
+    return n
 
-    vertices, out: as one row of numbers. names: a tuple of as many numbers as there are axes, so that their count is
-    known when this is compiled. pool .. highs: scratch. Returns the polygon reached, the vertices written, NO_ROOM (or
-    stopped), GIVEN_UP or DONE, and how many planes of `cutting` may cut the polygon reached.
+
+@merged
+def choose_planes(s: Scratch, planes: Any) -> tuple[int, bool]:
+    """List the planes that may cut a polygon; return how many, and whether one has all of it outside.
+
+    A plane that has all vertices inside cuts nothing: what later planes see are points between the vertices.
     """
-    d, n_planes = len(names), high.shape[0]
+    cutting, lows, highs, d = s.cutting, s.lows, s.highs, len(s.vertices.names)
+    n, is_outside = 0, False
+    for number in range(planes.high.shape[0]):
+        plane = plane_of(planes, number)
+        axis, place = plane.axis, plane.place
+        if axis >= 0:
+            is_up, low, high, size = plane.high[number, axis] > 0.0, lows[axis], highs[axis], 0.0
+            is_cut = (low < place) if is_up else (high > place)
+            is_outside = (high < place) if is_up else (low > place)
+        else:
+            least = most = plane.high[number, d]
+            size = abs(least)
+            for k in range(d):
+                x, y = plane.high[number, k] * lows[k], plane.high[number, k] * highs[k]
+                least, most, size = least + min(x, y), most + max(x, y), size + max(abs(x), abs(y))
+            is_cut, is_outside = not least > VALUE_BOUND * size, -most > VALUE_BOUND * size + TINY
+        cutting.planes[n], cutting.slack[n] = number, _SLACK * size + TINY
+        cutting.contacts[n], cutting.dropped[n] = 0, False
+        n += is_cut
+        if is_outside:
+            break
+    return n, is_outside
+
+
+@merged
+def value_at(s: Scratch, plane: Plane, v: int) -> float:
+    """Return the value of a plane at a vertex in doubles."""
+    d = len(s.vertices.names)
+    value = plane.high[plane.number, d]
+    for k in range(d):
+        value += plane.high[plane.number, k] * s.vertices.pool[v * d + k]
+    return value
+
+
+@merged
+def mark_sides(s: Scratch, planes: Any, n_cutting: int, n: int) -> None:
+    """Set the codes of n vertices: a bit for each plane that one is outside of, ALONE where it is on one or near it."""
+    pool, codes, d = s.vertices.pool, s.codes, len(s.vertices.names)
+    for i in range(n):
+        codes[i] = 0
+    for i_plane in range(n_cutting):
+        plane, near, bit = plane_of(planes, s.cutting.planes[i_plane]), s.cutting.slack[i_plane], 1 << i_plane
+        axis, place = plane.axis, plane.place
+        if axis >= 0:
+            for i in range(n):
+                x = pool[i * d + axis]
+                codes[i] |= bit if x < place else (ALONE if x == place else 0)
+        else:
+            for i in range(n):
+                value = value_at(s, plane, i)
+                codes[i] |= bit if value < -near else (ALONE if value <= near else 0)
+
+
+@merged
+def take_runs(s: Scratch, planes: Any, n_cutting: int, n_ring: int) -> int:
+    """List the ring that is loaded as runs of vertices that stay and go together; return how many."""
+    ring, edges, ends, codes = s.rings[0], s.vertices.edges, s.ends, s.codes
+    if n_cutting == 0:
+        ring[0], ends[0] = 0, n_ring - 1
+        return 1
+    if n_ring < LONG or n_cutting > MOST_BITS:
+        for i in range(n_ring):
+            ring[i] = edges[i] = ends[i] = i
+        return n_ring
+    mark_sides(s, planes, n_cutting, n_ring)
+    n, before = 0, -1
+    for i in range(n_ring):
+        ring[n] = i
+        n += (codes[i] != before) | (codes[i] >= ALONE)
+        before = codes[i]
+    ring[n] = n_ring
+    for i in range(n):
+        edges[ring[i]] = ends[ring[i]] = ring[i + 1] - 1
+    return n
+
+
+@merged
+def classify_across(s: Scratch, plane: Plane, ring: Any, n: int, n_ring: int) -> tuple[int, int]:
+    """Set the signs of n vertices at a plane across an axis; return how many are not outside (DOUBT), and on it."""
+    pool, rests, d, axis, place = s.vertices.pool, s.vertices.rests, len(s.vertices.names), plane.axis, plane.place
+    sense, n_in, n_on = 1 if plane.high[plane.number, axis] > 0.0 else -1, 0, 0
+    for i in range(n):
+        v = ring[i]
+        x = pool[v * d + axis]
+        sign = sense * (int(x > place) - int(x < place))
+        if sign == 0 and v >= n_ring:
+            rest, bound = rests[2 * (v * d + axis)], rests[2 * (v * d + axis) + 1]
+            if abs(rest) > bound:
+                sign = sense if rest > 0.0 else -sense
+            elif bound > 0.0:
+                return DOUBT, 0
+        s.signs[i] = sign
+        n_in += sign >= 0
+        n_on += sign == 0
+    return n_in, n_on
+
+
+@merged
+def classify_by_value(s: Scratch, plane: Plane, near: float, ring: Any, n: int) -> tuple[int, int]:
+    """Set the signs of n vertices at a plane across no axis; see `classify_across`. None is on it for sure."""
+    n_in = 0
+    for i in range(n):
+        value = value_at(s, plane, ring[i])
+        if abs(value) <= near:
+            return DOUBT, 0
+        s.signs[i] = 1 if value > 0.0 else -1
+        n_in += value > 0.0
+    return n_in, 0
+
+
+@merged
+def cut_ring(s: Scratch, plane: Plane, ring: Any, n: int, made: Any, n_ring: int, n_made: int) -> tuple[int, int]:
+    """Cut a ring of n vertices by a plane at which they have their signs, into `made`: keep, cross or drop each edge.
+
+    n_made: how many vertices there are, cut ones included. Returns how many are left (DOUBT), and how many there are.
+    """
+    signs, edges = s.signs, s.vertices.edges
+    kept, was_on, first_on = 0, False, False
+    signs[n] = signs[0]
+    for i in range(n):
+        v, sign, sign_after = ring[i], signs[i], signs[i + 1]
+        if sign >= 0:
+            if sign == 0 and was_on and are_same(s.vertices, v, made[kept - 1]):
+                return DOUBT, n_made
+            was_on = sign == 0
+            first_on = was_on if kept == 0 else first_on
+            if was_on and sign_after < 0:
+                edges[v] = -1
+            made[kept] = v
+            kept += 1
+        if sign * sign_after >= 0:
+            continue
+        if not cut_edge(s.vertices, plane, v, ring[i + 1] if i + 1 < n else ring[0], n_ring, n_made):
+            return DOUBT, n_made
+        if was_on and are_same(s.vertices, n_made, made[kept - 1]):
+            return DOUBT, n_made
+        was_on, first_on = True, first_on or kept == 0
+        edges[n_made] = -1 if sign > 0 else edges[v]
+        made[kept] = n_made
+        kept += 1
+        n_made += 1
+    if kept > 1 and was_on and first_on and are_same(s.vertices, made[kept - 1], made[0]):
+        return DOUBT, n_made
+    return kept, n_made
+
+
+@merged
+def cut_by_planes(s: Scratch, planes: Any, n_cutting: int, n: int, n_ring: int) -> tuple[int, int]:
+    """Cut the ring of n runs by one plane after another; return how many are left (DOUBT), and in which of `rings`."""
+    n_made, now, cutting = n_ring, 0, s.cutting
+    for i_plane in range(n_cutting):
+        plane = plane_of(planes, cutting.planes[i_plane])
+        ring = s.rings[now]
+        if plane.axis >= 0:
+            n_in, n_on = classify_across(s, plane, ring, n, n_ring)
+        else:
+            n_in, n_on = classify_by_value(s, plane, cutting.slack[i_plane], ring, n)
+        cutting.contacts[i_plane] += n_on
+        if n_in == n:
+            continue
+        if n_in == DOUBT or n_made + n > s.signs.size:
+            return DOUBT, now
+        cutting.dropped[i_plane] = True
+        n_before = n_made
+        n, n_made = cut_ring(s, plane, ring, n, s.rings[1 - now], n_ring, n_made)
+        cutting.contacts[i_plane] += n_made - n_before
+        now = 1 - now
+        if n <= 0:
+            break
+    return n, now
+
+
+@merged
+def emit(s: Scratch, ring: Any, n: int, n_ring: int, out: Any, place: int) -> int:
+    """Write the vertices of n runs to ``out[place:]``; return the place after them."""
+    d = len(s.vertices.names)
+    for i in range(n):
+        v = ring[i]
+        last = s.ends[v] if v < n_ring else v
+        n_numbers = (last + 1 - v) * d
+        move(out, place, s.vertices.pool, v * d, n_numbers)
+        place += n_numbers
+    return place
+
+
+@bare
+def clip_plainly(
+    polygons: Polygons, planes: Any, first: int, last: int, stop: Any, clipped: Clipped, written: int, s: Scratch
+) -> tuple[int, int, int, int]:
+    """Clip polygons from `first` on, up to one that needs care; `written` vertices are there already.
+
+    Returns the polygon reached, the vertices written, 0, DOUBT or NO_ROOM, and how many planes may cut the polygon
+    reached.
+    """
+    d, offsets = len(s.vertices.names), polygons.ring_offsets
     for polygon in range(first, last):
         if stop[0]:
             return polygon, written, NO_ROOM, 0
-        first_ring, last_ring = polygon_offsets[polygon], polygon_offsets[polygon + 1]
-        state[polygon], may_have_bridges[polygon] = CLIPPED, False
-        n_loaded, x_low, x_high, y_low, y_high, z_low, z_high = load_ring(
-            vertices, ring_offsets[first_ring], ring_offsets[first_ring + 1], d, pool
-        )
-        for ring in range(first_ring + 1, last_ring):
-            n_loaded, x, x_most, y, y_most, z, z_most = load_ring(
-                vertices, ring_offsets[ring], ring_offsets[ring + 1], d, pool
-            )
-            x_low, x_high = min(x, x_low), max(x_most, x_high)
-            y_low, y_high = min(y, y_low), max(y_most, y_high)
-            z_low, z_high = min(z, z_low), max(z_most, z_high)
-        lows[0], lows[1], lows[2], highs[0], highs[1], highs[2] = x_low, y_low, z_low, x_high, y_high, z_high
-        # a plane that has all vertices inside cuts nothing: what later planes see are points between the vertices
-        n_cutting, is_outside = 0, False
-        for plane in range(n_planes):
-            axis = axes[plane]
-            if axis >= 0:
-                place, is_up = at[plane], high[plane, axis] > 0.0
-                low_k, high_k, size = lows[axis], highs[axis], 0.0
-                is_cut = (low_k < place) if is_up else (high_k > place)
-                is_outside = (high_k < place) if is_up else (low_k > place)
-            else:
-                least = most = high[plane, d]
-                size = abs(least)
-                for k in range(d):
-                    x, y = high[plane, k] * lows[k], high[plane, k] * highs[k]
-                    least, most, size = least + min(x, y), most + max(x, y), size + max(abs(x), abs(y))
-                is_cut, is_outside = not least > VALUE_BOUND * size, -most > VALUE_BOUND * size + TINY
-            cutting[n_cutting], slack[n_cutting] = plane, _SLACK * size + TINY
-            contacts[n_cutting], dropped[n_cutting] = 0, False
-            n_cutting += is_cut
-            if is_outside:
-                break
+        first_ring, last_ring = polygons.polygon_offsets[polygon], polygons.polygon_offsets[polygon + 1]
+        clipped.state[polygon], clipped.may_have_bridges[polygon] = CLIPPED, False
+        n_ring = load_box(s, polygons, first_ring, last_ring)
+        n_cutting, is_outside = choose_planes(s, planes)
         if is_outside:
             for ring in range(first_ring, last_ring):
-                sizes[ring] = 0
+                clipped.sizes[ring] = 0
             continue
-        begun, most = written, edges.size  # two rings of at most as many vertices as there is room for
+        begun = written
         for ring in range(first_ring, last_ring):
-            here, there = 0, most
             if last_ring > first_ring + 1:
-                n_loaded, _, _, _, _, _, _ = load_ring(vertices, ring_offsets[ring], ring_offsets[ring + 1], d, pool)
-            n = n_loaded
-            while n > 1:
-                is_same = True
-                for k in range(d):
-                    is_same = is_same & (pool[(n - 1) * d + k] == pool[k])
-                if not is_same:
-                    break
-                n -= 1
-            size_pool, n_ring = n, n
-            if n_cutting == 0:
-                rings[0], ends[0], n = 0, n - 1, 1
-            elif n >= LONG and n_cutting <= MOST_BITS:
-                for i in range(n):
-                    codes[i] = 0
-                for i_plane in range(n_cutting):
-                    plane, near, bit = cutting[i_plane], slack[i_plane], 1 << i_plane
-                    axis, place = axes[plane], at[plane]
-                    if axis >= 0:
-                        for i in range(n):
-                            x = pool[i * d + axis]
-                            codes[i] |= bit if x < place else (ALONE if x == place else 0)
-                    else:
-                        for i in range(n):
-                            value = high[plane, d]
-                            for k in range(d):
-                                value += high[plane, k] * pool[i * d + k]
-                            codes[i] |= bit if value < -near else (ALONE if value <= near else 0)
-                n, before = 0, -1
-                for i in range(n_ring):
-                    code = codes[i]
-                    rings[n] = i
-                    n += (code != before) | (code >= ALONE)
-                    before = code
-                rings[n] = n_ring
-                for i in range(n):
-                    edges[rings[i]] = ends[rings[i]] = rings[i + 1] - 1
-            else:
-                for i in range(n):
-                    rings[i] = edges[i] = ends[i] = i
-            for i_plane in range(n_cutting):
-                plane, near = cutting[i_plane], slack[i_plane]
-                axis, place = axes[plane], at[plane]
-                n_in, n_on = 0, 0
-                if axis >= 0:
-                    sense = 1 if high[plane, axis] > 0.0 else -1
-                    for i in range(n):
-                        v = rings[here + i]
-                        x = pool[v * d + axis]
-                        sign = sense * (int(x > place) - int(x < place))
-                        if sign == 0 and v >= n_ring:
-                            rest, bound = rests[2 * (v * d + axis)], rests[2 * (v * d + axis) + 1]
-                            if abs(rest) > bound:
-                                sign = sense if rest > 0.0 else -sense
-                            elif bound > 0.0:
-                                return polygon, begun, GIVEN_UP, n_cutting
-                        signs[i] = sign
-                        n_in += sign >= 0
-                        n_on += sign == 0
-                else:
-                    for i in range(n):
-                        v = rings[here + i]
-                        value = high[plane, d]
-                        for k in range(d):
-                            value += high[plane, k] * pool[v * d + k]
-                        if abs(value) <= near:
-                            return polygon, begun, GIVEN_UP, n_cutting
-                        signs[i] = 1 if value > 0.0 else -1
-                        n_in += value > 0.0
-                contacts[i_plane] += n_on
-                if n_in == n:
-                    continue
-                dropped[i_plane] = True
-                if size_pool + n > most:
-                    return polygon, begun, GIVEN_UP, n_cutting
-                kept, size_before, was_on, first_on = 0, size_pool, False, False
-                signs[n] = signs[0]
-                for i in range(n):
-                    v, sign, sign_after = rings[here + i], signs[i], signs[i + 1]
-                    if sign >= 0:
-                        if sign == 0 and was_on:
-                            is_same, b = True, rings[there + kept - 1]
-                            for k in range(d):
-                                is_same = is_same & (pool[v * d + k] == pool[b * d + k])
-                            if is_same:
-                                return polygon, begun, GIVEN_UP, n_cutting
-                        was_on = sign == 0
-                        first_on = was_on if kept == 0 else first_on
-                        if was_on and sign_after < 0:
-                            edges[v] = -1
-                        rings[there + kept] = v
-                        kept += 1
-                    if sign * sign_after >= 0:
-                        continue
-                    w = rings[here + i + 1] if i + 1 < n else rings[here]
-                    edge, j, is_sure = edges[v], size_pool, True
-                    if axis >= 0 and edge >= 0:
-                        p, q = edge, edge + 1 if edge + 1 < n_ring else 0
-                        a, b = pool[p * d + axis], pool[q * d + axis]
-                        th, tl, is_sure = share_of_edge(a, b, place)
-                        for k in range(d):
-                            if k == axis:
-                                h, rest, bound = place, 0.0, 0.0
-                            else:
-                                x, y = pool[p * d + k], pool[q * d + k]
-                                h, rest, bound = on_edge(x, y, th, tl)
-                                if abs(rest) <= bound:
-                                    near_double = h if abs(h) > bound else 0.0
-                                    if is_at(x, y, a, b, place, near_double):
-                                        h, rest, bound = near_double, 0.0, 0.0
-                                is_sure = is_sure & surely_rounded(h, rest, bound)
-                            pool[j * d + k] = h
-                            rests[2 * (j * d + k)], rests[2 * (j * d + k) + 1] = rest, bound
-                    else:
-                        p, q = v, w
-                        if edge >= 0:
-                            p, q = edge, edge + 1 if edge + 1 < n_ring else 0
-                        is_known = axis >= 0  # case: along a plane across another axis, to a corner of a box
-                        for k in range(d):
-                            is_double = (p < n_ring or rests[2 * (p * d + k) + 1] == 0.0) and (
-                                q < n_ring or rests[2 * (q * d + k) + 1] == 0.0
-                            )
-                            is_same = is_double and pool[p * d + k] == pool[q * d + k]
-                            is_known = is_known and (k == axis or is_same)
-                        if is_known:
-                            for k in range(d):
-                                pool[j * d + k] = place if k == axis else pool[p * d + k]
-                                rests[2 * (j * d + k)], rests[2 * (j * d + k) + 1] = 0.0, 0.0
-                        else:
-                            if axis >= 0:
-                                x, y = p * d + axis, q * d + axis
-                                rest, bound = (rests[2 * x], rests[2 * x + 1]) if p >= n_ring else (0.0, 0.0)
-                                ph, pl, p_bound = distance_across(pool[x], rest, bound, place)
-                                rest, bound = (rests[2 * y], rests[2 * y + 1]) if q >= n_ring else (0.0, 0.0)
-                                qh, ql, q_bound = distance_across(pool[y], rest, bound, place)
-                            else:
-                                ph, pl, p_size, p_moved = high[plane, d], low[plane, d], abs(high[plane, d]), 0.0
-                                qh, ql, q_size, q_moved = ph, pl, p_size, 0.0
-                                for k in range(d):
-                                    a, a_low, x, y = high[plane, k], low[plane, k], p * d + k, q * d + k
-                                    rest, bound = (rests[2 * x], rests[2 * x + 1]) if p >= n_ring else (0.0, 0.0)
-                                    ph, pl, p_size, p_moved = plus_term(
-                                        ph, pl, p_size, p_moved, a, a_low, pool[x], rest, bound
-                                    )
-                                    rest, bound = (rests[2 * y], rests[2 * y + 1]) if q >= n_ring else (0.0, 0.0)
-                                    qh, ql, q_size, q_moved = plus_term(
-                                        qh, ql, q_size, q_moved, a, a_low, pool[y], rest, bound
-                                    )
-                                p_bound, q_bound = value_bound(p_size, p_moved), value_bound(q_size, q_moved)
-                            if ph < 0.0:
-                                ph, pl = -ph, -pl
-                            if qh < 0.0:
-                                qh, ql = -qh, -ql
-                            least = min(ph, qh)
-                            if not (p_bound < 0.001 * ph and q_bound < 0.001 * qh and least > WIDEST):
-                                return polygon, begun, GIVEN_UP, n_cutting
-                            r = 0.0
-                            if p_bound > 0.0 or q_bound > 0.0:
-                                r = 1.01 * max(p_bound / ph, q_bound / qh)
-                            sum_h, sum_l = dd_add(ph, pl, qh, ql)
-                            th, tl = dd_div(ph, pl, sum_h, sum_l)
-                            for k in range(d):
-                                h, rest, bound = place, 0.0, 0.0
-                                if k != axis:
-                                    x, y = p * d + k, q * d + k
-                                    x_low, x_bound = (rests[2 * x], rests[2 * x + 1]) if p >= n_ring else (0.0, 0.0)
-                                    y_low, y_bound = (rests[2 * y], rests[2 * y + 1]) if q >= n_ring else (0.0, 0.0)
-                                    h, rest, bound = between(
-                                        pool[x],
-                                        x_low,
-                                        x_bound,
-                                        pool[y],
-                                        y_low,
-                                        y_bound,
-                                        ph,
-                                        pl,
-                                        qh,
-                                        ql,
-                                        sum_h,
-                                        sum_l,
-                                        th,
-                                        tl,
-                                        r,
-                                    )
-                                is_sure = is_sure & surely_rounded(h, rest, bound)
-                                pool[j * d + k] = h
-                                rests[2 * (j * d + k)], rests[2 * (j * d + k) + 1] = rest, bound
-                    if not is_sure:
-                        return polygon, begun, GIVEN_UP, n_cutting
-                    if was_on:
-                        is_same, b = True, rings[there + kept - 1]
-                        for k in range(d):
-                            is_same = is_same & (pool[j * d + k] == pool[b * d + k])
-                        if is_same:
-                            return polygon, begun, GIVEN_UP, n_cutting
-                    was_on = True
-                    first_on = True if kept == 0 else first_on
-                    edges[j] = -1 if sign > 0 else edge
-                    rings[there + kept] = j
-                    kept += 1
-                    size_pool += 1
-                contacts[i_plane] += size_pool - size_before
-                if kept > 1 and was_on and first_on:
-                    is_same, a, b = True, rings[there + kept - 1], rings[there]
-                    for k in range(d):
-                        is_same = is_same & (pool[a * d + k] == pool[b * d + k])
-                    if is_same:
-                        return polygon, begun, GIVEN_UP, n_cutting
-                n, here, there = kept, there, here
-                if n == 0:
-                    break
-            if (written + n_ring + n) * d > out.size:
+                n_ring = load_ring(s, polygons.vertices, offsets[ring], offsets[ring + 1])[0]
+            while n_ring > 1 and are_same(s.vertices, n_ring - 1, 0):
+                n_ring -= 1
+            n = take_runs(s, planes, n_cutting, n_ring)
+            n, now = cut_by_planes(s, planes, n_cutting, n, n_ring)
+            if n == DOUBT:
+                return polygon, begun, DOUBT, n_cutting
+            if (written + n_ring + n) * d > clipped.vertices.size:
                 return polygon, begun, NO_ROOM, n_cutting
-            place_out = written * d
-            for i in range(n):
-                j = rings[here + i]
-                last_of_run = ends[j] if j < n_ring else j
-                n_numbers = (last_of_run + 1 - j) * d
-                move(out, place_out, pool, j * d, n_numbers)
-                place_out += n_numbers
-            sizes[ring] = place_out // d - written
-            written = place_out // d
-        for i in range(n_cutting):
-            if written > begun and dropped[i] and contacts[i] > 2:
-                may_have_bridges[polygon] = True
-    return last, written, DONE, 0
+            end = emit(s, s.rings[now], n, n_ring, clipped.vertices, written * d) // d
+            clipped.sizes[ring], written = end - written, end
+        if written > begun:
+            clipped.may_have_bridges[polygon] = has_bridges(s.cutting, n_cutting)
+    return last, written, 0, 0

@@ -12,12 +12,12 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
-from engine.jit import inline, kernel
+from engine.jit import bare_kernel, inline, merged
 from engine.predicates.cut_point import TINY as CUT_TINY
 from engine.predicates.double_double import U2, dd_add, dd_mul
 from engine.predicates.error_free import fast_two_sum, two_diff, two_prod, two_sum
 from engine.segment_clipping.ball_interval import TINY, axis_terms, center_of
-from engine.segment_clipping.cohen_sutherland import Triple, point_of, put_end
+from engine.segment_clipping.pieces import Pieces, Triple, point_of, put_end, put_own_end
 
 RESIDUAL_BOUND: Final = 48.0 * U2
 """Of F, times the sum of (|p - c| + |t d|)^2 and r^2: a place carries 8 u^2 of its size, from three roundings of tails,
@@ -28,14 +28,19 @@ SLOPE_BOUND: Final = 16.0 * 2.0**-53
 """Of F' = 2 d.(x - c) in doubles, times the sum of absolute terms."""
 
 
-@inline
-def root_in_doubles(ff: float, dd: float, df: float, cross: float, rr: float, side: int) -> float:
+@merged
+def root_in_doubles(p: Triple, q: Triple, c: Triple, rr: float, side: int) -> float:
     """Return one root of the quadratic in doubles, by the form of it that does not cancel."""
+    fx, _, dx = axis_terms(p[0], q[0], c[0])
+    fy, _, dy = axis_terms(p[1], q[1], c[1])
+    fz, _, dz = axis_terms(p[2], q[2], c[2])
+    x, y, z = dy * fz - dz * fy, dz * fx - dx * fz, dx * fy - dy * fx
+    dd, df, cross = dx * dx + dy * dy + dz * dz, dx * fx + dy * fy + dz * fz, x * x + y * y + z * z
     root = math.sqrt(max(0.0, dd * rr - cross))
     outer = -df - root if df > 0.0 else root - df  # the root of larger size, times A
     if (side == 1) == (df <= 0.0):
         return outer / dd
-    return (ff - rr) / outer
+    return (fx * fx + fy * fy + fz * fz - rr) / outer
 
 
 @inline
@@ -91,7 +96,19 @@ def newton_step(p: Triple, q: Triple, c: Triple, radius: float, t: float, side: 
     return step, slack, steepness > 2.0 * slope_bound
 
 
-@kernel
+@merged
+def cut_by_ball(p: Triple, q: Triple, c: Triple, radius: float, side: int) -> tuple[float, float, float, float, bool]:
+    """Return where p q enters the ball (side 0) or leaves it, t there, and whether all is surely nearest."""
+    guess = root_in_doubles(p, q, c, radius * radius, side)
+    step, slack, sure = newton_step(p, q, c, radius, guess, side)
+    x, is_x = coordinate_at(p[0], q[0], guess, step, slack)
+    y, is_y = coordinate_at(p[1], q[1], guess, step, slack)
+    z, is_z = coordinate_at(p[2], q[2], guess, step, slack)
+    is_t = guess + (step - slack) == guess + (step + slack)
+    return x, y, z, guess + step + 0.0, sure & is_x & is_y & is_z & is_t
+
+
+@bare_kernel
 def fill_on_sphere(
     segments: Any,
     center: Any,
@@ -101,52 +118,28 @@ def fill_on_sphere(
     first: int,
     last: int,
     stop: Any,
-    source: Any,
-    ends: Any,
-    t: Any,
-    faces: Any,
+    pieces: Pieces,
     still: Any,
     n: Any,
 ) -> None:
     """Fill rows first .. last - 1 of the pieces of ``segments`` ((n, 2, dim) float64): see `fill_on_boxes`."""
     is_flat = center.size == 2
-    n_open = 0
-    rr, c = radius * radius, center_of(center, is_flat)
+    n_open, c = 0, center_of(center, is_flat)
     for row in range(first, last):
         if stop[0]:
             return
         i = items[row]
-        source[row] = i
+        pieces.source[row] = i
         all_sure = True
         p, q = point_of(segments, i, 0, is_flat), point_of(segments, i, 1, is_flat)
-        for side in range(2):
-            plane = planes[row, side]
-            faces[row, side] = plane
-            if plane < 0:
-                t[row, side] = side
-                x, y, z = point_of(segments, i, side, is_flat)
-                put_end(ends, row, side, x, y, z, is_flat)
+        for end in range(2):
+            if planes[row, end] < 0:
+                put_own_end(pieces, row, end, segments, i, is_flat)
                 continue
-            fx, _, dx = axis_terms(p[0], q[0], c[0])
-            fy, _, dy = axis_terms(p[1], q[1], c[1])
-            fz, _, dz = axis_terms(p[2], q[2], c[2])
-            x, y, z = dy * fz - dz * fy, dz * fx - dx * fz, dx * fy - dy * fx
-            cross = x * x + y * y + z * z
-            guess = root_in_doubles(
-                fx * fx + fy * fy + fz * fz,
-                dx * dx + dy * dy + dz * dz,
-                dx * fx + dy * fy + dz * fz,
-                cross,
-                rr,
-                side,
-            )
-            step, slack, sure = newton_step(p, q, c, radius, guess, side)
-            t[row, side] = guess + step + 0.0
-            x, is_x = coordinate_at(p[0], q[0], guess, step, slack)
-            y, is_y = coordinate_at(p[1], q[1], guess, step, slack)
-            z, is_z = coordinate_at(p[2], q[2], guess, step, slack)
-            put_end(ends, row, side, x, y, z, is_flat)
-            all_sure &= sure & is_x & is_y & is_z & (guess + (step - slack) == guess + (step + slack))
+            pieces.faces[row, end] = planes[row, end]
+            x, y, z, pieces.t[row, end], sure = cut_by_ball(p, q, c, radius, end)
+            put_end(pieces, row, end, (x, y, z), is_flat)
+            all_sure &= sure
         if not all_sure:
             still[first + n_open] = row
             n_open += 1

@@ -16,17 +16,18 @@ from engine.arrays import FlagArray, FloatArray, Int8Array, IntArray
 from engine.containment.locators import Locator, locator_of
 from engine.containment.rational_locate import rational_location
 from engine.parallel import Budget
-from engine.segment_clipping.boundary_cut import OPEN, SETTLED, UNLOCATED, Rows, cut_on_mesh, cut_on_outline
-from engine.segment_clipping.contacts import GROUP, PROPER, find_contacts_2d
-from engine.segment_clipping.decide_then_cut import PieceRows
+from engine.segment_clipping.boundary_cut import NEEDS_LOCATION, SETTLED, cut_on_mesh, cut_on_outline
+from engine.segment_clipping.contacts import GROUP, NO_ROOM, PROPER, find_contacts_2d
+from engine.segment_clipping.decide_then_cut import Clipped
 from engine.segment_clipping.exact_pieces import pieces_of
 from engine.segment_clipping.exact_segments import Piece
 from engine.segment_clipping.mesh_contacts import is_clear
 from engine.segment_clipping.mesh_streams import find_mesh_contacts
+from engine.segment_clipping.pieces import Pieces, joined, room_for
 from engine.segment_clipping.prepared_boundary import Mesh, Outline, boundary_of
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
-from engine.types import UNDECIDED
+from engine.types import OPEN, UNDECIDED
 
 _LEAST_ROOM: Final = 1 << 8
 """Contacts, or pieces, looked for at once; doubled where one segment has more."""
@@ -50,7 +51,7 @@ def clip_chunk(
     region: Polygon | Polyhedron,
     locator: Locator | None,
     budget: Budget,
-) -> PieceRows:
+) -> Clipped:
     """Return the pieces of ``segments[first:last]``, (n, 2, dim) float64, in order of source and t."""
     boundary = boundary_of(region)
     chosen = np.arange(first, last)
@@ -60,52 +61,39 @@ def clip_chunk(
     parts, state = _settle(segments, chosen, locations, boundary, budget)
     left = np.flatnonzero(state != SETTLED)
     if not len(left):
-        return _joined(parts, 0, 0)
+        return parts[0] if len(parts) == 1 else joined(parts), 0, 0
     locator_of(region).fill(segments[chosen[left], 0], locations_left := np.empty(len(left), np.int8), budget)
-    unlocated = state[left] == UNLOCATED
+    unlocated = state[left] == NEEDS_LOCATION
     again = chosen[left[unlocated]]
     more, state_again = _settle(segments, again, locations_left[unlocated], boundary, budget)
     is_open = ~unlocated
     is_open[unlocated] = state_again != SETTLED
     parts += more
     parts.append(_exact(segments, chosen[left[is_open]], locations_left[is_open], region, boundary, budget))
-    return _joined(parts, len(left), int(is_open.sum()))
-
-
-def _joined(parts: list[Rows], n_beyond: int, n_rational: int) -> PieceRows:
-    """Return the rows of some parts by source; pieces of one segment stand together in one part."""
-    if len(parts) == 1:
-        return PieceRows(*parts[0], n_beyond, n_rational)
-    rows = Rows(*(np.concatenate(arrays) for arrays in zip(*parts)))
-    if (rows.source[1:] < rows.source[:-1]).any():
-        order = np.argsort(rows.source, kind="stable")
-        rows = Rows(*(array[order] for array in rows))
-    return PieceRows(*rows, n_beyond, n_rational)
+    pieces = joined(parts)
+    order = np.argsort(pieces.source, kind="stable")  # pieces of one segment stand together in one part
+    pieces = Pieces(pieces.source[order], pieces.ends[:, order], pieces.t[order], pieces.faces[order])
+    return pieces, len(left), int(is_open.sum())
 
 
 def _settle(
     segments: FloatArray, chosen: IntArray, locations: Int8Array, boundary: Outline | Mesh, budget: Budget
-) -> tuple[list[Rows], FlagArray]:
+) -> tuple[list[Pieces], FlagArray]:
     """Return the pieces of those chosen segments that the kernel settles, and the state of each."""
     state = np.full(len(chosen), OPEN, np.uint8)
     kernel: Any = cut_on_mesh if isinstance(boundary, Mesh) else cut_on_outline
     parts, room = [], _LEAST_ROOM + len(chosen)
     done = np.array([0, 0, _LEAST_ROOM + _CONTACTS * min(GROUP, len(chosen))])
     while done[0] < len(chosen):
-        reached, rows = int(done[0]), _rows(room, segments.shape[2])
+        reached, pieces = int(done[0]), room_for(room, segments.shape[2])
         with np.errstate(all="ignore"):  # uncompiled kernels: overflow is looked at by their filters
-            kernel(segments, chosen, locations, boundary, budget.flag, rows, state, done)
+            kernel(segments, chosen, locations, boundary, budget.flag, pieces, state, done)
         budget.check()
         if done[0] == reached:
             room *= 2  # of rows, if not of contacts
-        parts.append(Rows(*(array[: done[1]] for array in rows)))
-    return parts or [_rows(0, segments.shape[2])], state
-
-
-def _rows(n: int, dimension: int) -> Rows:
-    """Return room for n pieces."""
-    ends = np.empty((2, n, dimension))
-    return Rows(np.empty(n, np.int64), ends[0], ends[1], np.empty((n, 2)), np.empty((n, 2), np.int64))
+        m = int(done[1])
+        parts.append(Pieces(pieces.source[:m], pieces.ends[:, :m], pieces.t[:m], pieces.faces[:m]))
+    return parts or [room_for(0, segments.shape[2])], state
 
 
 def _exact(
@@ -115,7 +103,7 @@ def _exact(
     region: Polygon | Polyhedron,
     boundary: Outline | Mesh,
     budget: Budget,
-) -> Rows:
+) -> Pieces:
     """Return the pieces of the chosen segments by exact arithmetic."""
     part = segments[chosen]
     offsets, elements, kinds = _contacts(part, boundary, budget)
@@ -132,39 +120,29 @@ def _exact(
             found = _pieces(segment, elements[mine], kinds[mine], int(locations[i]), region, boundary, budget)
         sources += [int(chosen[i])] * len(found)
         pieces += found
-    dimension = segments.shape[2]
-    return Rows(
+    ends = np.array([(piece.start, piece.end) for piece in pieces], np.float64).reshape(-1, 2, segments.shape[2]) + 0.0
+    return Pieces(
         np.array(sources, np.int64),
-        _points(pieces, 1, dimension),
-        _points(pieces, 2, dimension),
-        _points(pieces, 0, 2),
+        np.ascontiguousarray(ends.swapaxes(0, 1)),
+        np.array([piece.t for piece in pieces], np.float64).reshape(-1, 2) + 0.0,
         np.array([piece.faces for piece in pieces], np.int64).reshape(-1, 2),
     )
-
-
-def _points(pieces: list[Piece], field: int, width: int) -> FloatArray:
-    return np.array([piece[field] for piece in pieces], np.float64).reshape(-1, width) + 0.0
 
 
 def _contacts(segments: FloatArray, boundary: Outline | Mesh, budget: Budget) -> tuple[IntArray, IntArray, FlagArray]:
     """Return the offsets (n + 1,) of each segment's contacts, their elements, and their kinds."""
     kernel: Any = find_mesh_contacts if isinstance(boundary, Mesh) else find_contacts_2d
-    last = len(segments)
-    room, done = max(_LEAST_ROOM, 8 * last), 0
     ends, elements, kinds = [np.zeros(1, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0, np.uint8)]
-    while done < last:
-        met, kind, offsets = np.empty(room, np.int64), np.empty(room, np.uint8), np.empty(last - done + 1, np.int64)
-        with np.errstate(all="ignore"):
-            reached = kernel(segments, done, last, boundary, budget.flag, met, kind, offsets)
-        budget.check()
-        if reached == done:
+    for first in range(0, len(segments), GROUP):
+        room, found = _LEAST_ROOM + 8 * min(GROUP, len(segments)), NO_ROOM
+        while found == NO_ROOM:  # bound: room is doubled, and a segment meets an element once
+            with np.errstate(all="ignore"):
+                found, met, kind, offsets = kernel(segments[first : first + GROUP], boundary, budget.flag, room)
+            budget.check()
             room *= 2
-            continue
-        found = int(offsets[reached - done])
-        ends.append(ends[-1][-1] + offsets[1 : reached - done + 1])
+        ends.append(ends[-1][-1] + offsets[1:])
         elements.append(met[:found])
         kinds.append(kind[:found])
-        done = reached
     return np.concatenate(ends), np.concatenate(elements), np.concatenate(kinds)
 
 

@@ -13,18 +13,16 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.jit import called, inline, kernel
-from engine.segment_clipping.box_tree import DEEPEST
-from engine.segment_clipping.contacts import GROUP, PROPER, gather_edges
+from engine.jit import bare, inline, kernel
+from engine.segment_clipping.contacts import GROUP, PROPER, edge_contacts_for, gather_edges
 from engine.segment_clipping.crossing_values import cut_at, is_item_safe, line_values, plane_values
 from engine.segment_clipping.mesh_streams import gather_contacts, streams_for
-from engine.types import UNDECIDED
+from engine.segment_clipping.pieces import Pieces, put_own_end
+from engine.types import OPEN, UNDECIDED
 
 SETTLED: Final = 0
-OPEN: Final = 1
-"""Exact arithmetic must cut the segment."""
-UNLOCATED: Final = 2
-"""The location of the first end must be told."""
+NEEDS_LOCATION: Final = 1
+"""States of a segment, beside OPEN: the location of the first end must be told."""
 
 
 class Crossings(NamedTuple):
@@ -32,17 +30,8 @@ class Crossings(NamedTuple):
 
     t: Any
     points: Any
-    order: Any
-
-
-class Rows(NamedTuple):
-    """Where pieces are written, see `SegmentPieces`."""
-
-    source: Any
-    start: Any
-    end: Any
-    t: Any
     faces: Any
+    order: Any
 
 
 class Group(NamedTuple):
@@ -84,7 +73,7 @@ def group_for(size: int, dimension: int) -> Group:
 @inline
 def crossings_for(n: int, dimension: int) -> Crossings:
     """Return room for n contacts."""
-    return Crossings(np.empty(n), np.empty((n, dimension)), np.empty(n, np.int64))
+    return Crossings(np.empty(n), np.empty((n, dimension)), np.empty(n, np.int64), np.empty(n, np.int64))
 
 
 @inline
@@ -110,39 +99,21 @@ def sort_crossings(cuts: Crossings, first: int, n: int) -> bool:
 
 @inline
 def emit(
-    segments: Any,
-    item: int,
-    source: int,
-    is_inside: bool,
-    cuts: Crossings,
-    first: int,
-    n: int,
-    met: Any,
-    faces: Any,
-    row: int,
-    out: Rows,
+    segments: Any, item: int, source: int, is_inside: bool, cuts: Crossings, first: int, n: int, out: Pieces, row: int
 ) -> int:
     """Write the pieces between n crossings to the rows of `out` from `row` on; return the row after them."""
+    is_flat, end = segments.shape[2] == 2, 1 if is_inside else 0
     if is_inside:
-        out.source[row], out.t[row, 0], out.faces[row, 0] = source, 0.0, -1
-        for k in range(segments.shape[2]):
-            out.start[row, k] = segments[item, 0, k] + 0.0
+        out.source[row] = source
+        put_own_end(out, row, 0, segments, item, is_flat)
     for place in range(first, first + n):
         i = cuts.order[place]
-        if is_inside:
-            out.t[row, 1], out.faces[row, 1] = cuts.t[i], faces[met[i]]
-            for k in range(segments.shape[2]):
-                out.end[row, k] = cuts.points[i, k]
-            row += 1
-        else:
-            out.source[row], out.t[row, 0], out.faces[row, 0] = source, cuts.t[i], faces[met[i]]
-            for k in range(segments.shape[2]):
-                out.start[row, k] = cuts.points[i, k]
-        is_inside = not is_inside
-    if is_inside:
-        out.t[row, 1], out.faces[row, 1] = 1.0, -1
+        out.source[row], out.t[row, end], out.faces[row, end] = source, cuts.t[i], cuts.faces[i]
         for k in range(segments.shape[2]):
-            out.end[row, k] = segments[item, 1, k] + 0.0
+            out.ends[end, row, k] = cuts.points[i, k]
+        row, end = row + end, 1 - end
+    if end == 1:
+        put_own_end(out, row, 1, segments, item, is_flat)
         row += 1
     return row
 
@@ -179,7 +150,7 @@ def way_out(segment: Any, beyond: Any, way: Any) -> int:
     return nearest
 
 
-@inline
+@bare
 def load_group(group: Group, segments: Any, chosen: Any, locations: Any, beyond: Any, first: int, last: int) -> int:
     """Load the chosen segments first .. last - 1, and ways out where the first end is not known; return how many.
 
@@ -211,121 +182,114 @@ def count_turns(group: Group, n_ways: int, offsets: Any, kinds: Any) -> None:
             group.turns[group.askers[way, 0]] = 2 * (offsets[way + 1] - offsets[way]) + group.askers[way, 1]
 
 
-@called
+@inline
+def location_of(group: Group, item: int, n_crossings: int) -> int:
+    """Return the location of a first end, from parity where that is known, else UNDECIDED."""
+    turns = group.turns[item]
+    if turns < 0:
+        return int(group.locations[item])
+    return 1 if (turns // 2 + (n_crossings if turns % 2 == 1 else 0)) % 2 == 1 else -1
+
+
+@inline
+def cut_segment(segments: Any, item: int, boundary: Any, contacts: Any, cuts: Crossings) -> bool:
+    """Make the crossings of a segment, in order along it; False where not all is surely rounded, or two are one."""
+    first, last = contacts.offsets[item], contacts.offsets[item + 1]
+    if first < last and not is_item_safe(segments, item):
+        return False
+    for i in range(first, last):
+        element = contacts.met[i]
+        if not (boundary.are_safe or is_item_safe(boundary.elements, element)):
+            return False
+        if segments.shape[2] == 2:
+            at_p, along = line_values(boundary.elements, element, segments, item)
+        else:
+            at_p, along = plane_values(boundary.elements, element, segments, item)
+        cuts.faces[i] = boundary.faces[element]
+        cuts.t[i], is_sure = cut_at(segments, item, boundary.elements, element, at_p, along, cuts.points, i)
+        if not is_sure:
+            return False
+    return sort_crossings(cuts, first, last - first)
+
+
+@bare
 def cut_group(
     group: Group,
     chosen: Any,
     first: int,
     last: int,
-    elements: Any,
-    are_safe: bool,
-    faces: Any,
-    offsets: Any,
-    met: Any,
-    kinds: Any,
+    boundary: Any,
+    contacts: Any,
     cuts: Crossings,
     stop: Any,
-    out: Rows,
+    out: Pieces,
     row: int,
     state: Any,
 ) -> tuple[int, int]:
     """Cut the chosen segments first .. last - 1, a group, at their contacts; return the place reached, and the row.
 
-    are_safe: whether all elements surely are (`is_item_safe`). Stops short where there is no room in `out`, or
-    `stop` is set. See `cut_on_outline`.
+    Stops short where there is no room in `out`, or `stop` is set. See `cut_on_outline`.
     """
-    segments, dimension = group.segments, group.segments.shape[2]
     for place in range(first, last):
         item = place - first
-        location, turns = group.locations[item], group.turns[item]
-        begin, end = offsets[item], offsets[item + 1]
-        found = end - begin
-        if turns >= 0:
-            location = 1 if (turns // 2 + (found if turns % 2 == 1 else 0)) % 2 == 1 else -1
+        begin, end = contacts.offsets[item], contacts.offsets[item + 1]
+        location = location_of(group, item, end - begin)
         state[place] = OPEN
         if stop[0]:
             return place, row
-        if not all_proper(kinds, begin, end) or (found > 0 and location == 0):
+        if not all_proper(contacts.kinds, begin, end) or (end > begin and location == 0):
             continue
         if location == UNDECIDED:
-            state[place] = UNLOCATED
+            state[place] = NEEDS_LOCATION
             continue
-        if row + found // 2 + 1 > out.source.size:
+        if row + (end - begin) // 2 + 1 > out.source.size:
             return place, row
-        sure = found == 0 or is_item_safe(segments, item)
-        for i in range(begin, end):
-            element = met[i]
-            if not (sure and (are_safe or is_item_safe(elements, element))):
-                sure = False
-                break
-            if dimension == 2:
-                at_p, along = line_values(elements, element, segments, item)
-            else:
-                at_p, along = plane_values(elements, element, segments, item)
-            cuts.t[i], sure = cut_at(segments, item, elements, element, at_p, along, cuts.points, i)
-        if sure and sort_crossings(cuts, begin, found):
-            row = emit(segments, item, chosen[place], location >= 0, cuts, begin, found, met, faces, row, out)
+        if cut_segment(group.segments, item, boundary, contacts, cuts):
+            row = emit(group.segments, item, chosen[place], location >= 0, cuts, begin, end - begin, out, row)
             state[place] = SETTLED
     return last, row
 
 
 @kernel
 def cut_on_outline(
-    segments: Any, chosen: Any, locations: Any, outline: Any, stop: Any, out: Rows, state: Any, n: Any
+    segments: Any, chosen: Any, locations: Any, outline: Any, stop: Any, out: Pieces, state: Any, n: Any
 ) -> None:
     """Cut the ``chosen`` of some segments (n, 2, 2) float64 on a polygon, as far as double-doubles and filters go.
 
     chosen: (m,) int64. locations: (m,) int8 of their first ends, UNDECIDED where they are not known. outline: see
-    `Outline`. stop: one uint8, polled. state: (m,) uint8, SETTLED, OPEN or UNLOCATED. n: the place in `chosen` to begin
-    with, afterwards where to go on, short of the end where there is no room; how many rows are filled; and for how many
-    contacts of a group of segments there is to be room.
+    `Outline`. stop: one uint8, polled. state: (m,) uint8, SETTLED, NEEDS_LOCATION or OPEN. n: the place in `chosen` to
+    begin with, afterwards where to go on, short of the end where there is no room; how many rows are filled; and for
+    how many contacts of a group of segments there is to be room.
     """
-    size, last, row = group_size(chosen.size - n[0]), n[0], 0
-    group, cuts = group_for(size, 2), crossings_for(n[2], 2)
-    met, kinds, offsets = np.empty(n[2], np.int64), np.empty(n[2], np.uint8), np.empty(size + 1, np.int64)
-    stack = np.empty(DEEPEST, np.int64)
+    size = group_size(chosen.size - n[0])
+    contacts = edge_contacts_for(size, n[2])
+    group, cuts, last = group_for(size, 2), crossings_for(n[2], 2), n[0]
     n[1] = 0
-    while last < chosen.size:
+    while last < chosen.size:  # bound: every turn takes a group
         first, last = last, min(last + size, chosen.size)
         n_ways = load_group(group, segments, chosen, locations, outline.beyond, first, last)
-        reached, n_items = gather_edges(group.ways, 0, n_ways, outline, stop, stack, met, kinds, offsets), last - first
-        if reached == n_ways:
-            count_turns(group, n_ways, offsets, kinds)
-            reached = gather_edges(group.segments, 0, n_items, outline, stop, stack, met, kinds, offsets) + n_ways
-        if reached < n_ways + n_items:
+        found = gather_edges(contacts, outline, group.ways, n_ways, stop)
+        if found >= 0:
+            count_turns(group, n_ways, contacts.offsets, contacts.kinds)
+            found = gather_edges(contacts, outline, group.segments, last - first, stop)
+        if found < 0:
             n[2] *= 2
             return
-        n[0], row = cut_group(
-            group,
-            chosen,
-            first,
-            last,
-            outline.elements,
-            outline.are_safe,
-            outline.faces,
-            offsets,
-            met,
-            kinds,
-            cuts,
-            stop,
-            out,
-            row,
-            state,
-        )
-        n[1] = row
+        n[0], n[1] = cut_group(group, chosen, first, last, outline, contacts, cuts, stop, out, n[1], state)
         if n[0] < last:
             return
 
 
 @kernel
 def cut_on_mesh(
-    segments: Any, chosen: Any, locations: Any, mesh: Any, stop: Any, out: Rows, state: Any, n: Any
+    segments: Any, chosen: Any, locations: Any, mesh: Any, stop: Any, out: Pieces, state: Any, n: Any
 ) -> None:
     """Cut the ``chosen`` of some segments (n, 2, 3) float64 on a polyhedron, `Mesh`: see `cut_on_outline`."""
-    size, last, row = group_size(chosen.size - n[0]), n[0], 0
-    group, streams, cuts = group_for(size, 3), streams_for(mesh, size, n[2]), crossings_for(n[2], 3)
+    size = group_size(chosen.size - n[0])
+    streams = streams_for(mesh, size, n[2])
+    group, cuts, last = group_for(size, 3), crossings_for(n[2], 3), n[0]
     n[1] = 0
-    while last < chosen.size:
+    while last < chosen.size:  # bound: every turn takes a group
         first, last = last, min(last + size, chosen.size)
         n_ways = load_group(group, segments, chosen, locations, mesh.beyond, first, last)
         found = gather_contacts(streams, mesh, group.ways, n_ways, stop)
@@ -335,23 +299,6 @@ def cut_on_mesh(
         if found < 0:
             n[2] *= 2
             return
-        n[0], row = cut_group(
-            group,
-            chosen,
-            first,
-            last,
-            mesh.elements,
-            mesh.are_safe,
-            mesh.faces,
-            streams.offsets,
-            streams.met,
-            streams.kinds,
-            cuts,
-            stop,
-            out,
-            row,
-            state,
-        )
-        n[1] = row
+        n[0], n[1] = cut_group(group, chosen, first, last, mesh, streams, cuts, stop, out, n[1], state)
         if n[0] < last:
             return

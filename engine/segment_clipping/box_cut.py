@@ -9,20 +9,21 @@ from __future__ import annotations
 
 from typing import Any
 
-from engine.jit import inline, kernel, merged
+from engine.jit import bare_kernel, inline, merged
 from engine.predicates.cut_point import parameter_and_point, point_at
 from engine.predicates.error_free import two_diff, workspace
 from engine.predicates.ranges import is_safe
-from engine.segment_clipping.cohen_sutherland import BLOCK, corners_of, plane_value, point_of
+from engine.segment_clipping.cohen_sutherland import BLOCK, corners_of, plane_value
+from engine.segment_clipping.pieces import Pieces, Triple, point_of, put_end
 from engine.segment_clipping.plane_meeting import LONGEST, SHORTEST, T_BOUND, meeting
 
 
 @merged
 def cut_end(
-    px: float, py: float, pz: float, qx: float, qy: float, qz: float,
-    x0: float, y0: float, z0: float, x1: float, y1: float, z1: float, plane: float, end: float,
-) -> tuple[float, float, float, float, bool]:  # fmt: skip
+    p: Triple, q: Triple, lowest: Triple, highest: Triple, plane: float, end: float
+) -> tuple[float, float, float, float, bool]:
     """Return where p q meets a plane, t there, and whether all is sure; for plane -1 the end of p q, 0 or 1."""
+    (px, py, pz), (qx, qy, qz), (x0, y0, z0), (x1, y1, z1) = p, q, lowest, highest
     is_x, is_y, is_z = plane < 1.5, (plane > 1.5) & (plane < 3.5), plane > 3.5
     is_high = (plane == 1.0) | (plane == 3.0) | (plane == 5.0)
     low, high = (x0 if is_x else (y0 if is_y else z0)), (x1 if is_x else (y1 if is_y else z1))
@@ -71,7 +72,19 @@ def difference(a: float, b: float, e: Any) -> int:
     return n
 
 
-@kernel
+@inline
+def cut_again(segments: Any, low: Any, high: Any, planes: Any, row: int, unsure: int, pieces: Pieces) -> bool:
+    """Make those ends of a piece again whose bit of `unsure` is set, by exact signs; return whether all is sure."""
+    all_sure = True
+    for end in range(2):
+        if unsure >> end & 1 == 1:
+            segment, point = segments[pieces.source[row]], pieces.ends[end, row]
+            pieces.t[row, end], is_sure = cut_by_signs(segment, low, high, planes[row, end], point)
+            all_sure = all_sure and is_sure
+    return all_sure
+
+
+@bare_kernel
 def fill_on_boxes(
     segments: Any,
     low: Any,
@@ -81,22 +94,18 @@ def fill_on_boxes(
     first: int,
     last: int,
     stop: Any,
-    source: Any,
-    ends: Any,
-    t: Any,
-    faces: Any,
+    pieces: Pieces,
     still: Any,
     n: Any,
 ) -> None:
     """Fill rows first .. last - 1 of the pieces of ``segments`` ((n, 2, dim) float64) on the box `low`, `high`.
 
-    items: (m,) int32, planes: (m, 2) int32, as decided. source: (m,) int64. ends: start and end, (m, dim) float64 each.
-    t, faces: (m, 2) float64 and int64. still: from ``still[first]`` on the rows that are not surely rounded. n: how
-    many of them, and how many needed more than the first try. stop: one uint8, polled.
+    items: (m,) int32, planes: (m, 2) int32, as decided. still: from ``still[first]`` on the rows that are not surely
+    rounded. n: how many of them, and how many needed more than the first try. stop: one uint8, polled.
     """
     is_flat = low.size == 2
-    x0, y0, z0, x1, y1, z1 = corners_of(low, high)
-    px, py, pz, qx, qy, qz, entered, left, t0, t1, sure = (
+    lowest, highest = corners_of(low, high)
+    px, py, pz, qx, qy, qz, entered, left, t0, t1, unsure = (
         workspace(64), workspace(64), workspace(64), workspace(64), workspace(64), workspace(64),
         workspace(64), workspace(64), workspace(64), workspace(64), workspace(64),
     )  # fmt: skip
@@ -110,33 +119,20 @@ def fill_on_boxes(
             qx[j], qy[j], qz[j] = point_of(segments, items[start + j], 1, is_flat)
             entered[j], left[j] = planes[start + j, 0], planes[start + j, 1]
         for j in range(BLOCK):
-            ax, ay, az, t0[j], p_sure = cut_end(
-                px[j], py[j], pz[j], qx[j], qy[j], qz[j], x0, y0, z0, x1, y1, z1, entered[j], 0.0
-            )
-            bx, by, bz, t1[j], q_sure = cut_end(
-                px[j], py[j], pz[j], qx[j], qy[j], qz[j], x0, y0, z0, x1, y1, z1, left[j], 1.0
-            )
-            px[j], py[j], pz[j], qx[j], qy[j], qz[j] = ax, ay, az, bx, by, bz
-            sure[j] = (1.0 if p_sure else 0.0) + (2.0 if q_sure else 0.0)
+            p, q = (px[j], py[j], pz[j]), (qx[j], qy[j], qz[j])
+            px[j], py[j], pz[j], t0[j], p_sure = cut_end(p, q, lowest, highest, entered[j], 0.0)
+            qx[j], qy[j], qz[j], t1[j], q_sure = cut_end(p, q, lowest, highest, left[j], 1.0)
+            unsure[j] = (0.0 if p_sure else 1.0) + (0.0 if q_sure else 2.0)
         for j in range(size):
             row = start + j
-            source[row], faces[row, 0], faces[row, 1] = items[row], planes[row, 0], planes[row, 1]
-            t[row, 0], t[row, 1] = t0[j], t1[j]
-            ends[0, row, 0], ends[0, row, 1], ends[1, row, 0], ends[1, row, 1] = px[j], py[j], qx[j], qy[j]
-            if not is_flat:
-                ends[0, row, 2], ends[1, row, 2] = pz[j], qz[j]
+            pieces.source[row], pieces.faces[row, 0], pieces.faces[row, 1] = items[row], planes[row, 0], planes[row, 1]
+            pieces.t[row, 0], pieces.t[row, 1] = t0[j], t1[j]
+            put_end(pieces, row, 0, (px[j], py[j], pz[j]), is_flat)
+            put_end(pieces, row, 1, (qx[j], qy[j], qz[j]), is_flat)
         for j in range(size):
-            if sure[j] == 3.0:
-                continue
-            row, all_sure = start + j, True
-            for side in range(2):
-                if int(sure[j]) >> side & 1 == 0:
-                    t[row, side], is_sure = cut_by_signs(
-                        segments[items[row]], low, high, planes[row, side], ends[side, row]
-                    )
-                    all_sure = all_sure and is_sure
-            beyond += 1
-            if not all_sure:
-                still[first + n_open] = row
-                n_open += 1
+            if unsure[j] != 0.0:
+                beyond += 1
+                if not cut_again(segments, low, high, planes, start + j, int(unsure[j]), pieces):
+                    still[first + n_open] = start + j
+                    n_open += 1
     n[0], n[1] = n_open, beyond

@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Literal, overload
+from dataclasses import dataclass, replace
+from typing import Literal, Unpack, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from engine.arrays import FloatArray, IntArray
 from engine.errors import UnsupportedSolidError
-from engine.parallel import Budget, Cancel, Progress, run_chunks
-from engine.predicates.scaling import balanced_rows, exponent_of, shifted
+from engine.parallel import Budget, Cancel, Options, Progress, run_chunks
+from engine.predicates.scaling import balanced_rows
 from engine.segment_clipping.ball_cut import fill_on_sphere
 from engine.segment_clipping.ball_interval import decide_on_sphere
 from engine.segment_clipping.boundary import clip_chunk, locator_for
 from engine.segment_clipping.box_cut import fill_on_boxes
 from engine.segment_clipping.cohen_sutherland import decide_on_boxes
 from engine.segment_clipping.cyrus_beck import as_columns, decide_on_rows
-from engine.segment_clipping.decide_then_cut import Method, PieceRows, Scaled, clip_on_convex
+from engine.segment_clipping.decide_then_cut import Clipped, Method, Scaled, clip_on_convex, scaled
 from engine.segment_clipping.exact_segments import clip_by_planes, clip_by_sphere
+from engine.segment_clipping.pieces import joined
 from engine.segment_clipping.planes_cut import fill_on_rows
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
@@ -56,27 +57,13 @@ class SegmentPieces:
 
 @overload
 def clip_segments(
-    segments: npt.ArrayLike,
-    region: Solid,
-    *,
-    workers: int | None = None,
-    deadline: float | None = None,
-    cancel: Cancel | None = None,
-    progress: Progress | None = None,
-    report: Literal[False] = False,
+    segments: npt.ArrayLike, region: Solid, *, report: Literal[False] = False, **options: Unpack[Options]
 ) -> SegmentPieces: ...
 
 
 @overload
 def clip_segments(
-    segments: npt.ArrayLike,
-    region: Solid,
-    *,
-    workers: int | None = None,
-    deadline: float | None = None,
-    cancel: Cancel | None = None,
-    progress: Progress | None = None,
-    report: Literal[True],
+    segments: npt.ArrayLike, region: Solid, *, report: Literal[True], **options: Unpack[Options]
 ) -> tuple[SegmentPieces, Accuracy]: ...
 
 
@@ -131,13 +118,14 @@ def clip_segments(
     task, method = _method(region)
     array = as_point_groups(segments, 2, region.dimension, ("segments",), must_be_finite=False)  # kernels look at it
     with Budget(deadline, cancel) as budget:
-        pieces, n_beyond, n_rational = task(array, budget, workers, progress)
+        found, n_beyond, n_rational = task(array, budget, workers, progress)
+    pieces = SegmentPieces(found.source, found.ends[0], found.ends[1], found.t, found.faces)
     if not report:
         return pieces
     return pieces, Accuracy("exact", 0.5, len(array), n_beyond, n_rational, method)
 
 
-Task = Callable[[FloatArray, Budget, int | None, Progress | None], tuple[SegmentPieces, int, int]]
+Task = Callable[[FloatArray, Budget, int | None, Progress | None], Clipped]
 
 
 def _method(region: Solid) -> tuple[Task, str]:
@@ -162,21 +150,13 @@ def _method(region: Solid) -> tuple[Task, str]:
 
 def _on_box(region: Aabb) -> Task:
     planes = box_rows(region).tolist()
-
-    def scale(segments: FloatArray) -> Scaled | None:
-        exponent = exponent_of(segments, region.min, region.max)
-        points, low, high = (shifted(array, -exponent) for array in (segments, region.min, region.max))
-        if exponent == 0 or points is None or low is None or high is None:
-            return None
-        return Scaled(points, (low, high), exponent)
-
     return _one_piece(
         Method(
             decide_on_boxes,
             fill_on_boxes,
             (region.min, region.max),
             lambda p, q: clip_by_planes(p, q, planes),
-            scale,
+            lambda segments: scaled(segments, region.min, region.max),
         )
     )
 
@@ -186,11 +166,9 @@ def _on_rows(rows: FloatArray) -> Task:
     plain = balanced_rows(rows, 0)
 
     def scale(segments: FloatArray) -> Scaled | None:
-        exponent = exponent_of(segments)
-        points, balanced = shifted(segments, -exponent), balanced_rows(rows, exponent)
-        if exponent == 0 or points is None or balanced is None:
-            return None
-        return Scaled(points, (as_columns(balanced),), exponent)
+        found = scaled(segments)
+        balanced = None if found is None else balanced_rows(rows, found.exponent)
+        return None if found is None or balanced is None else replace(found, region=(as_columns(balanced),))
 
     return _one_piece(
         Method(
@@ -204,21 +182,17 @@ def _on_rows(rows: FloatArray) -> Task:
 
 
 def _on_ball(region: Sphere) -> Task:
-    center, radius = region.center.tolist(), region.radius
+    center, radius = region.center.tolist(), float(region.radius)
 
     def scale(segments: FloatArray) -> Scaled | None:
-        ball = np.append(region.center, radius)
-        exponent = exponent_of(segments, ball)
-        points, scaled = shifted(segments, -exponent), shifted(ball, -exponent)
-        if exponent == 0 or points is None or scaled is None:
-            return None
-        return Scaled(points, (scaled[:-1], float(scaled[-1])), exponent)
+        found = scaled(segments, region.center, np.array([radius]))
+        return found and replace(found, region=(found.region[0], float(found.region[1][0])))
 
     return _one_piece(
         Method(
             decide_on_sphere,
             fill_on_sphere,
-            (region.center, float(radius)),
+            (region.center, radius),
             lambda p, q: clip_by_sphere(p, q, center, radius),
             scale,
         )
@@ -226,22 +200,13 @@ def _on_ball(region: Sphere) -> Task:
 
 
 def _one_piece(method: Method) -> Task:
-    def task(
-        segments: FloatArray, budget: Budget, workers: int | None, progress: Progress | None
-    ) -> tuple[SegmentPieces, int, int]:
-        rows = clip_on_convex(segments, method, budget, workers, progress)
-        pieces = SegmentPieces(rows.source, rows.start, rows.end, rows.t, rows.faces)
-        return pieces, rows.n_beyond, rows.n_rational
-
-    return task
+    return lambda segments, budget, workers, progress: clip_on_convex(segments, method, budget, workers, progress)
 
 
 def _on_boundary(region: Polygon | Polyhedron) -> Task:
-    def task(
-        segments: FloatArray, budget: Budget, workers: int | None, progress: Progress | None
-    ) -> tuple[SegmentPieces, int, int]:
+    def task(segments: FloatArray, budget: Budget, workers: int | None, progress: Progress | None) -> Clipped:
         check_finite(segments, ("segments",))
-        chunks: dict[int, PieceRows] = {}
+        chunks: dict[int, Clipped] = {}
         locator = locator_for(region, len(segments), budget)
 
         def chunk(first: int, last: int) -> None:
@@ -249,13 +214,7 @@ def _on_boundary(region: Polygon | Polyhedron) -> Task:
 
         run_chunks(chunk, len(segments), budget=budget, workers=workers, progress=progress, first_chunk=16)
         parts = [chunks[first] for first in sorted(chunks)] or [clip_chunk(segments, 0, 0, region, locator, budget)]
-        pieces = SegmentPieces(
-            np.concatenate([part.source for part in parts]),
-            np.concatenate([part.start for part in parts]),
-            np.concatenate([part.end for part in parts]),
-            np.concatenate([part.t for part in parts]),
-            np.concatenate([part.faces for part in parts]),
-        )
-        return pieces, sum(part.n_beyond for part in parts), sum(part.n_rational for part in parts)
+        pieces, n_beyond, n_rational = zip(*parts)
+        return joined(pieces), sum(n_beyond), sum(n_rational)
 
     return task

@@ -35,14 +35,12 @@ from engine.jit import called, inline, kernel, merged
 from engine.predicates.error_free import workspace
 from engine.predicates.parameters import compare_differences, compare_differences_filter
 from engine.predicates.ranges import is_safe
+from engine.segment_clipping.pieces import Triple, point_of
 from engine.segment_clipping.plane_meeting import gap_between, meetings
-from engine.types import UNDECIDED
+from engine.types import OPEN, UNDECIDED
 
 DROPPED: Final = 0
 KEPT: Final = 1
-OPEN: Final = 2
-"""The kernel could not settle the item: rational arithmetic must."""
-Triple = tuple[float, float, float]
 LARGE: Final = 2.0**1000
 """Items whose absolute coordinates add up to more, or to nothing (NaN, infinity), are left open."""
 T_GAP: Final = 16.0 * 2.0**-53
@@ -130,11 +128,9 @@ def slab(p: float, q: float, low: float, high: float, not_entered: float, not_le
 
 
 @merged
-def decide_roughly(
-    px: float, py: float, pz: float, qx: float, qy: float, qz: float,
-    x0: float, y0: float, z0: float, x1: float, y1: float, z1: float,
-) -> tuple[float, float, float]:  # fmt: skip
+def decide_roughly(p: Triple, q: Triple, low: Triple, high: Triple) -> Triple:
     """Decide on the segment p q and a box, state OPEN where doubles do not suffice, plane entered, plane left."""
+    (px, py, pz), (qx, qy, qz), (x0, y0, z0), (x1, y1, z1) = p, q, low, high
     misses = (max(px, qx) < x0) | (min(px, qx) > x1) | (max(py, qy) < y0) | (min(py, qy) > y1)
     misses = misses | (max(pz, qz) < z0) | (min(pz, qz) > z1)  # the outcodes share a bit
     # planes that are not met stand in an order of their own, far from all others
@@ -150,20 +146,16 @@ def decide_roughly(
     entered = x_entered if a == start else (y_entered if b == start else z_entered)
     x_left, y_left, z_left = (1.0 if qx > x1 else 0.0), (3.0 if qy > y1 else 2.0), (5.0 if qz > z1 else 4.0)
     left = x_left if d == end else (y_left if e == end else z_left)
-    is_plain = abs(px) + abs(py) + abs(pz) + abs(qx) + abs(qy) + abs(qz) < LARGE
     state = 0.0 if drops else (1.0 if keeps else 2.0)
-    return (state if is_plain else 2.0), (entered if start >= 0.0 else -1.0), (left if end <= 1.5 else -1.0)
+    return (state if is_plain(p, q) else 2.0), (entered if start >= 0.0 else -1.0), (left if end <= 1.5 else -1.0)
 
 
 @merged
-def decide_closely(
-    px: float, py: float, pz: float, qx: float, qy: float, qz: float,
-    x0: float, y0: float, z0: float, x1: float, y1: float, z1: float,
-) -> tuple[float, float, float]:  # fmt: skip
+def decide_closely(p: Triple, q: Triple, low: Triple, high: Triple) -> Triple:
     """Decide as `decide_roughly` does, with double-doubles."""
-    a, d, is_x = meetings(px, qx, x0, x1, 0.0)
-    b, e, is_y = meetings(py, qy, y0, y1, 1.0)
-    c, f, is_z = meetings(pz, qz, z0, z1, 2.0)
+    a, d, is_x = meetings(p[0], q[0], low[0], high[0], 0.0)
+    b, e, is_y = meetings(p[1], q[1], low[1], high[1], 1.0)
+    c, f, is_z = meetings(p[2], q[2], low[2], high[2], 2.0)
     gap, sure_1 = gap_between(a, b)
     entered = a if gap >= 0.0 else b  # equal: the smaller plane stays
     gap, sure_2 = gap_between(entered, c)
@@ -173,30 +165,21 @@ def decide_closely(
     gap, sure_4 = gap_between(left, f)
     left = left if gap <= 0.0 else f
     gap, sure_5 = gap_between(entered, left)
-    is_plain = abs(px) + abs(py) + abs(pz) + abs(qx) + abs(qy) + abs(qz) < LARGE
-    sure = is_plain & is_x & is_y & is_z & sure_1 & sure_2 & sure_3 & sure_4 & sure_5
+    sure = is_plain(p, q) & is_x & is_y & is_z & sure_1 & sure_2 & sure_3 & sure_4 & sure_5
     return (2.0 if not sure else (0.0 if gap > 0.0 else 1.0)), entered.plane, left.plane
 
 
 @merged
-def point_of(segments: Any, item: int, end: int, is_flat: bool) -> Triple:
-    """Return an end of a segment, in the plane with z = 0."""
-    return segments[item, end, 0], segments[item, end, 1], (0.0 if is_flat else segments[item, end, 2])
+def is_plain(p: Triple, q: Triple) -> bool:
+    """Tell whether no coordinate of a segment is too large, or none."""
+    return abs(p[0]) + abs(p[1]) + abs(p[2]) + abs(q[0]) + abs(q[1]) + abs(q[2]) < LARGE
 
 
 @merged
-def put_end(ends: Any, row: int, end: int, x: float, y: float, z: float, is_flat: bool) -> None:
-    """Write an end of a piece, without negative zeros; in the plane z does not count."""
-    ends[end, row, 0], ends[end, row, 1] = x + 0.0, y + 0.0
-    if not is_flat:
-        ends[end, row, 2] = z + 0.0
-
-
-@merged
-def corners_of(low: Any, high: Any) -> tuple[float, float, float, float, float, float]:
-    """Return the coordinates of a box, low ones first, in the plane with z from -1 to 1."""
+def corners_of(low: Any, high: Any) -> tuple[Triple, Triple]:
+    """Return the corners of a box, in the plane with z from -1 to 1."""
     is_flat = low.size == 2
-    return low[0], low[1], (-1.0 if is_flat else low[2]), high[0], high[1], (1.0 if is_flat else high[2])
+    return (low[0], low[1], (-1.0 if is_flat else low[2])), (high[0], high[1], (1.0 if is_flat else high[2]))
 
 
 @kernel
@@ -210,7 +193,7 @@ def decide_on_boxes(
     the filter. stop: one uint8, polled.
     """
     is_flat = low.size == 2
-    x0, y0, z0, x1, y1, z1 = corners_of(low, high)
+    lowest, highest = corners_of(low, high)
     px, py, pz, qx, qy, qz = (
         workspace(64), workspace(64), workspace(64), workspace(64), workspace(64), workspace(64),
     )  # fmt: skip
@@ -224,9 +207,8 @@ def decide_on_boxes(
             px[j], py[j], pz[j] = point_of(segments, start + j, 0, is_flat)
             qx[j], qy[j], qz[j] = point_of(segments, start + j, 1, is_flat)
         for j in range(BLOCK):  # a number of turns that the compiler knows; those past `size` are not looked at
-            state[j], entered[j], left[j] = decide_roughly(
-                px[j], py[j], pz[j], qx[j], qy[j], qz[j], x0, y0, z0, x1, y1, z1
-            )
+            p, q = (px[j], py[j], pz[j]), (qx[j], qy[j], qz[j])
+            state[j], entered[j], left[j] = decide_roughly(p, q, lowest, highest)
         n_unsure = 0
         for j in range(size):
             if state[j] == OPEN:
@@ -236,7 +218,8 @@ def decide_on_boxes(
             px[k], py[k], pz[k] = point_of(segments, start + unsure[k], 0, is_flat)
             qx[k], qy[k], qz[k] = point_of(segments, start + unsure[k], 1, is_flat)
         for k in range((n_unsure + 7) >> 3 << 3):  # whole vectors
-            px[k], py[k], pz[k] = decide_closely(px[k], py[k], pz[k], qx[k], qy[k], qz[k], x0, y0, z0, x1, y1, z1)
+            p, q = (px[k], py[k], pz[k]), (qx[k], qy[k], qz[k])
+            px[k], py[k], pz[k] = decide_closely(p, q, lowest, highest)
         for k in range(n_unsure):
             j = unsure[k]
             state[j], entered[j], left[j] = px[k], py[k], pz[k]

@@ -15,11 +15,11 @@ location of its first end.
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.jit import inline, kernel
+from engine.jit import bare, inline, kernel
 from engine.predicates.loading import as_point2
 from engine.predicates.orientation import orient2d
 from engine.segment_clipping.box_tree import DEEPEST, LEAF_SIZE, may_meet
@@ -29,6 +29,31 @@ PROPER: Final = 1
 DEGENERATE: Final = 2
 GROUP: Final = 2048
 """Segments that are looked at together at most."""
+NO_ROOM: Final = -1
+STOPPED: Final = -2
+"""Instead of a number of contacts."""
+
+
+class EdgeContacts(NamedTuple):
+    """Room for the contacts of a group of segments: elements and kinds one segment after another, and offsets."""
+
+    met: Any
+    kinds: Any
+    offsets: Any
+    """(m + 1,) where those of each segment begin."""
+    stack: Any
+    """(DEEPEST,) int64, nodes that wait."""
+
+
+@inline
+def edge_contacts_for(n_segments: int, n_contacts: int) -> EdgeContacts:
+    """Return room for groups of so many segments at most, and so many contacts of a group."""
+    return EdgeContacts(
+        np.empty(n_contacts, np.int64),
+        np.empty(n_contacts, np.uint8),
+        np.empty(n_segments + 1, np.int64),
+        np.empty(DEEPEST, np.int64),
+    )
 
 
 @inline
@@ -48,12 +73,9 @@ def edge_contact(edge: Any, segment: Any) -> int:
 
 
 @inline
-def gather_edge_contacts(outline: Any, segment: Any, stack: Any, met: Any, kinds: Any, found: int) -> int:
-    """Append the contacts of a segment (2, 2) to the `found` first of met and kinds; return how many these are then.
-
-    -1 where there is no room. stack: (DEEPEST,) int64.
-    """
-    n_leaves, n_edges = outline.boxes.shape[0] // 2, outline.order.size
+def append_edges(contacts: EdgeContacts, outline: Any, segment: Any, found: int) -> int:
+    """Append the contacts of a segment (2, 2) to the `found` first ones; return how many these are then, or NO_ROOM."""
+    n_leaves, n_edges, stack = outline.boxes.shape[0] // 2, outline.order.size, contacts.stack
     stack[0], depth = 1, 1
     while depth > 0:  # bound: each node enters the stack once
         depth -= 1
@@ -69,9 +91,9 @@ def gather_edge_contacts(outline: Any, segment: Any, stack: Any, met: Any, kinds
             element = outline.order[place]
             kind = edge_contact(outline.elements[element], segment)
             if kind != APART:
-                if found == met.size:
-                    return -1
-                met[found], kinds[found] = element, kind
+                if found == contacts.met.size:
+                    return NO_ROOM
+                contacts.met[found], contacts.kinds[found] = element, kind
                 found += 1
     return found
 
@@ -85,34 +107,32 @@ def is_point(segment: Any) -> bool:
     return are_equal
 
 
-@inline
-def gather_edges(
-    segments: Any, first: int, last: int, outline: Any, stop: Any, stack: Any, met: Any, kinds: Any, offsets: Any
-) -> int:
-    """Find the contacts of ``segments[first:last]`` with the edges of a polygon: see `find_contacts_2d`."""
+@bare
+def gather_edges(contacts: EdgeContacts, outline: Any, segments: Any, n: int, stop: Any) -> int:
+    """Fill met, kinds and offsets with the contacts of the first n of some segments (m, 2, 2); return how many.
+
+    Those of no length have none. NO_ROOM where they have no room, STOPPED where `stop` (one uint8) is set.
+    """
     found = 0
-    offsets[0] = 0
-    for i in range(first, last):
+    contacts.offsets[0] = 0
+    for i in range(n):
         if not is_point(segments[i]):
-            after = gather_edge_contacts(outline, segments[i], stack, met, kinds, found)
-            if after < 0:
-                return i
-            found = after
-        offsets[i - first + 1] = found
+            found = append_edges(contacts, outline, segments[i], found)
+        contacts.offsets[i + 1] = found
+        if found < 0:
+            return NO_ROOM
         if stop[0]:
-            return i
-    return last
+            return STOPPED
+    return found
 
 
 @kernel
-def find_contacts_2d(
-    segments: Any, first: int, last: int, outline: Any, stop: Any, elements_met: Any, kinds: Any, offsets: Any
-) -> int:
-    """Find the contacts of ``segments[first:last]`` with the edges of a polygon; those of no length have none.
+def find_contacts_2d(segments: Any, outline: Any, stop: Any, room: int) -> tuple[int, Any, Any, Any]:
+    """Return how many contacts segments (n, 2, 2) float64 have with the edges of a polygon, and these.
 
-    segments: (n, 2, 2) float64. stop: one uint8, polled. elements_met, kinds: int64 and uint8 of equal length, filled
-    with the contacts one segment after another; offsets: (last - first + 1,) int64, those of segment i end before
-    offsets[i - first + 1]. Returns the index after the last segment that had room for all its contacts.
+    elements met and kinds, int64 and uint8, one segment after another; offsets (n + 1,) int64, where those of each
+    begin. NO_ROOM where there are more than `room`. stop: one uint8, polled.
     """
-    stack = np.empty(DEEPEST, np.int64)
-    return gather_edges(segments, first, last, outline, stop, stack, elements_met, kinds, offsets)
+    contacts = edge_contacts_for(segments.shape[0], room)
+    found = gather_edges(contacts, outline, segments, segments.shape[0], stop)
+    return found, contacts.met, contacts.kinds, contacts.offsets

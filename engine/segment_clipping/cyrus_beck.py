@@ -26,8 +26,9 @@ from engine.predicates.error_free import workspace
 from engine.predicates.expansion import Components, compress, grow, grow_product, sign
 from engine.predicates.parameters import compare_products, compare_ratios_filter
 from engine.predicates.ranges import is_safe
-from engine.segment_clipping.cohen_sutherland import DROPPED, KEPT, LARGE, OPEN, point_of
-from engine.types import UNDECIDED
+from engine.segment_clipping.cohen_sutherland import DROPPED, KEPT, is_plain
+from engine.segment_clipping.pieces import point_of
+from engine.types import OPEN, UNDECIDED
 
 VALUE_BOUND: Final = 8.0 * 2.0**-53
 """Bound of a plane value a x + b y + c z + d in doubles, relative to the sum of absolute terms.
@@ -218,7 +219,7 @@ def decide_on_rows(
     for i in range(first, last):
         px, py, pz = point_of(segments, i, 0, is_flat)
         qx, qy, qz = point_of(segments, i, 1, is_flat)
-        if not (abs(px) + abs(py) + abs(pz) + abs(qx) + abs(qy) + abs(qz) < LARGE):
+        if not is_plain((px, py, pz), (qx, qy, qz)):
             still[n_open] = i
             n_open += 1
             continue

@@ -21,11 +21,14 @@ import numpy as np
 
 from engine.arrays import FloatArray, Int32Array, IntArray
 from engine.parallel import Budget, Progress, check_options, run_chunks
-from engine.predicates.scaling import scaled_back
+from engine.predicates.scaling import exponent_of, scaled_back, shifted
 from engine.segment_clipping.exact_segments import Piece
+from engine.segment_clipping.pieces import Pieces
 from engine.solids.checks import check_finite
 
 Settle = Callable[[list[float], list[float]], Piece | None]
+Clipped = tuple[Pieces, int, int]
+"""Pieces, how many items needed more than the filter, and how many rational arithmetic."""
 
 _FEW: Final = 32
 """Open items that rational arithmetic settles in the time in which a batch is looked through for its exponent."""
@@ -38,6 +41,16 @@ class Scaled:
     points: FloatArray
     region: tuple[Any, ...]
     exponent: int
+
+
+def scaled(points: FloatArray, *region: FloatArray) -> Scaled | None:
+    """Return a batch and the arrays of its region scaled, None where they are well as they are or it is not exact."""
+    exponent = exponent_of(points, *region)
+    arrays = [shifted(array, -exponent) for array in (points, *region)]
+    exact = [array for array in arrays if array is not None]
+    if exponent == 0 or len(exact) < len(arrays):
+        return None
+    return Scaled(exact[0], tuple(exact[1:]), exponent)
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,19 +66,6 @@ class Method:
     region: tuple[Any, ...]
     settle: Settle
     scale: Callable[[FloatArray], Scaled | None]
-
-
-@dataclass(frozen=True, slots=True)
-class PieceRows:
-    """Pieces in order, see `SegmentPieces`, and how many items needed more than the filter, and rational arithmetic."""
-
-    source: IntArray
-    start: FloatArray
-    end: FloatArray
-    t: FloatArray
-    faces: IntArray
-    n_beyond: int
-    n_rational: int
 
 
 class Tally:
@@ -88,7 +88,7 @@ class Tally:
 
 def clip_on_convex(
     segments: FloatArray, method: Method, budget: Budget, workers: int | None, progress: Progress | None
-) -> PieceRows:
+) -> Clipped:
     """Return the piece of each segment that has one. segments: (n, 2, dim) float64, not yet looked at for NaN.
 
     Raises: NotFiniteError.
@@ -112,7 +112,7 @@ def _clip(
     budget: Budget,
     workers: int | None,
     tally: Tally,
-) -> PieceRows | None:
+) -> Clipped | None:
     """Return the pieces; None where more than `most_open` items are left to rational arithmetic."""
     n = len(segments)
     listed, still = np.empty((2, n), np.int32)  # together: a large block gets large pages
@@ -152,22 +152,19 @@ def _clip(
         bounding = np.append(_joined(planes, kept), np.full((len(pieces), 2), -1, np.int32), axis=0)
         order = np.argsort(items, kind="stable")
         listed, planes, kept = items[order], bounding[order], [(0, len(items))]
-    rows, unsure, n_beyond = _fill(scene, method, listed, planes, kept, budget, workers, tally)
+    filled, unsure, n_beyond = _fill(scene, method, listed, planes, kept, budget, workers, tally)
     if len(unsure) + n_open > most_open:
         return None
     for row in unsure:
         budget.check()
-        item = int(rows[0][row])
+        item = int(filled.source[row])
         piece = method.settle(segments[item, 0].tolist(), segments[item, 1].tolist())
         assert piece is not None
         pieces[item] = piece
     if pieces:
-        _put(rows, pieces)
+        _put(filled, pieces)
     beyond = sum(int(decided[first][2]) for first in firsts)
-    return PieceRows(*rows, min(n, beyond + n_beyond + n_open), n_open + len(unsure))
-
-
-Rows = tuple[IntArray, FloatArray, FloatArray, FloatArray, IntArray]
+    return filled, min(n, beyond + n_beyond + n_open), n_open + len(unsure)
 
 
 def _fill(
@@ -179,8 +176,8 @@ def _fill(
     budget: Budget,
     workers: int | None,
     tally: Tally,
-) -> tuple[Rows, IntArray, int]:
-    """Return the rows of the pieces, which of them are not surely rounded, and how many needed more than one try.
+) -> tuple[Pieces, IntArray, int]:
+    """Return the pieces, which of them are not surely rounded, and how many needed more than one try.
 
     items, planes: as decided, of the ranges `kept` (first, how many).
     """
@@ -188,7 +185,7 @@ def _fill(
     m, dimension = ends_of_ranges[-1], scene.points.shape[2]
     floats, integers, still = np.empty(m * (2 * dimension + 2)), np.empty(3 * m, np.int64), np.empty(m, np.int32)
     ends, t = floats[: 2 * m * dimension].reshape(2, m, dimension), floats[2 * m * dimension :].reshape(m, 2)
-    source, faces = integers[:m], integers[m:].reshape(m, 2)
+    pieces = Pieces(integers[:m], ends, t, integers[m:].reshape(m, 2))
     counts: dict[int, IntArray] = {}
     unsure: list[IntArray] = []
 
@@ -212,15 +209,12 @@ def _fill(
                 first,
                 last,
                 budget.flag,
-                source,
-                ends,
-                t,
-                faces,
+                pieces,
                 still,
                 found,
             )
         if scene.exponent:
-            is_cut = faces[first:last] >= 0
+            is_cut = pieces.faces[first:last] >= 0
             for side in range(2):
                 points, doubtful = scaled_back(ends[side, first:last], scene.exponent)
                 ends[side, first:last] = points
@@ -228,8 +222,7 @@ def _fill(
 
     run_chunks(fill, m, budget=budget, workers=workers, progress=tally.add)
     unsure += [still[first : first + found[0]].astype(np.int64) for first, found in counts.items()]
-    rows = (source, ends[0], ends[1], t, faces)
-    return rows, np.unique(np.concatenate([np.zeros(0, np.int64), *unsure])), sum(int(c[1]) for c in counts.values())
+    return pieces, np.unique(np.concatenate([np.zeros(0, np.int64), *unsure])), sum(int(c[1]) for c in counts.values())
 
 
 def _joined(array: Int32Array, parts: list[tuple[int, int]]) -> Int32Array:
@@ -239,9 +232,8 @@ def _joined(array: Int32Array, parts: list[tuple[int, int]]) -> Int32Array:
     return np.concatenate([array[:0], *(array[first : first + n] for first, n in parts)])
 
 
-def _put(rows: Rows, pieces: dict[int, Piece]) -> None:
+def _put(filled: Pieces, pieces: dict[int, Piece]) -> None:
     """Write settled pieces to their rows."""
-    source, start, end, t, faces = rows
-    places = np.searchsorted(source, np.array(list(pieces), np.int64))
-    for place, piece in zip(places, pieces.values()):
-        t[place], start[place], end[place], faces[place] = piece
+    rows = np.searchsorted(filled.source, np.array(list(pieces), np.int64))
+    for row, piece in zip(rows, pieces.values()):
+        filled.t[row], filled.ends[:, row], filled.faces[row] = piece.t, (piece.start, piece.end), piece.faces

@@ -10,7 +10,7 @@ All coordinates of a segment and of the elements it meets are integers over one 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
@@ -99,6 +99,41 @@ def triangle_stretch(
     return (first, last, s_p == s_q) if first <= last else None
 
 
+def contacts_of(
+    start: Integers, end: Integers, elements: Sequence[tuple[int, Sequence[Integers]]]
+) -> Iterator[Contact]:
+    """Yield the contacts of a segment with elements, the face and the corners (two or three) of each."""
+    for face, corners in elements:
+        stretch = (edge_stretch if len(corners) == 2 else triangle_stretch)(start, end, *corners)
+        if stretch is not None:
+            yield Contact(stretch[0], stretch[1], face, stretch[2])
+
+
+def spans_of(contacts: Sequence[Contact], is_kept: Callable[[Fraction, Fraction], bool]) -> list[list[Fraction]]:
+    """Return the first and the last parameter of each piece; is_kept: whether a span between elements is inside."""
+    touched = {t for contact in contacts for t in contact[:2]}
+    along = [contact for contact in contacts if contact.first < contact.last]
+    cuts = sorted({ZERO, ONE} | touched)
+    spans: list[list[Fraction]] = []
+    is_open = False  # was the span before this cut kept
+    for t, following in zip(cuts, [*cuts[1:], None]):
+        goes_on = following is not None and (
+            any(contact.first <= t and following <= contact.last for contact in along) or is_kept(t, following)
+        )
+        if is_open:
+            spans[-1][1] = t
+        elif goes_on or t in touched:
+            spans.append([t, t])
+        is_open = goes_on
+    return spans
+
+
+def face_at(contacts: Sequence[Contact], t: Fraction) -> int:
+    """Return the face of the contacts at t: the smallest, those that the segment runs along last."""
+    met = [contact for contact in contacts if t in contact[:2] or contact.first < t < contact.last]
+    return min(met, key=lambda contact: (contact.is_along, contact.face)).face
+
+
 def pieces_of(
     p: Sequence[float],
     q: Sequence[float],
@@ -115,48 +150,17 @@ def pieces_of(
     """
     n = len(p)
     flat, scale = common_integers([*p, *q, *(x for _, corners in elements for corner in corners for x in corner)])
-    points = [flat[i : i + n] for i in range(0, len(flat), n)]
-    start, end = points[:2]
-    contacts, place = [], 2
-    for face, corners in elements:
-        k = len(corners)
-        if k == 2:
-            stretch = edge_stretch(start, end, points[place], points[place + 1])
-        else:
-            stretch = triangle_stretch(start, end, points[place], points[place + 1], points[place + 2])
-        place += k
-        if stretch is not None:
-            contacts.append(Contact(stretch[0], stretch[1], face, stretch[2]))
-    cuts = sorted({ZERO, ONE} | {t for contact in contacts for t in contact[:2]})
-    touched = {t for contact in contacts for t in contact[:2]}
-    along = [(contact.first, contact.last) for contact in contacts if contact.first < contact.last]
+    points = iter([flat[i : i + n] for i in range(0, len(flat), n)])
+    start, end = next(points), next(points)
+    contacts = list(contacts_of(start, end, [(face, [next(points) for _ in corners]) for face, corners in elements]))
 
     def at(t: Fraction) -> list[Fraction]:
         return [Fraction(x, scale) + t * Fraction(y - x, scale) for x, y in zip(start, end)]
 
-    spans: list[list[Fraction]] = []
-    is_open = False  # was the span before this cut kept
-    n_crossed = 0
-    for i, t in enumerate(cuts):
-        n_crossed += sum(contact.first == t for contact in contacts) if is_proper else 0
-        following = cuts[i + 1] if i + 1 < len(cuts) else None
-        if following is None:
-            goes_on = False
-        elif any(first <= t and following <= last for first, last in along):
-            goes_on = True
-        elif is_proper:
-            goes_on = location * (-1) ** n_crossed > 0
-        else:
-            goes_on = locate(at((t + following) / 2)) >= 0
-        if is_open:
-            spans[-1][1] = t
-        elif goes_on or t in touched:
-            spans.append([t, t])
-        is_open = goes_on
-
-    def face_at(t: Fraction) -> int:
-        met = [contact for contact in contacts if t in contact[:2] or contact.first < t < contact.last]
-        return min((contact for contact in met), key=lambda contact: (contact.is_along, contact.face)).face
+    def is_kept(t: Fraction, following: Fraction) -> bool:
+        if is_proper:
+            return location * (-1) ** sum(contact.first <= t for contact in contacts) > 0
+        return locate(at((t + following) / 2)) >= 0
 
     def rounded(t: Fraction) -> list[float]:
         return [nearest(x.numerator, x.denominator) for x in at(t)]
@@ -166,7 +170,7 @@ def pieces_of(
             (nearest(*first.as_integer_ratio()), nearest(*last.as_integer_ratio())),
             rounded(first),
             rounded(last),
-            (-1 if first == 0 else face_at(first), -1 if last == 1 else face_at(last)),
+            (-1 if first == 0 else face_at(contacts, first), -1 if last == 1 else face_at(contacts, last)),
         )
-        for first, last in spans
+        for first, last in spans_of(contacts, is_kept)
     ]

@@ -17,7 +17,7 @@ from typing import Any, Final
 import numpy as np
 
 from engine.bounding.bvh import MAX_DEPTH
-from engine.jit import kernel, merged
+from engine.jit import inline, kernel, merged
 from engine.lanes.boxes import EMPTY
 from engine.lanes.lanes import lowest_bit
 from engine.lanes.segments import near_segment
@@ -65,6 +65,17 @@ def local_segment(p: Point3, q: Point3, origin: Any, inverse: float) -> tuple[An
     )
 
 
+@inline
+def is_beside(corners: Any, triangle: Any) -> bool:
+    """Tell whether all corners of a box surely lie on one side of the plane of a triangle."""
+    a, b, c = as_point3(triangle, 0), as_point3(triangle, 1), as_point3(triangle, 2)
+    side = orient3d(a, b, c, as_point3(corners, 0))
+    for k in range(1, 8):
+        if orient3d(a, b, c, as_point3(corners, k)) != side:
+            return False
+    return abs(side) == 1
+
+
 @kernel
 def is_clear(corners: Any, mesh: Any, stop: Any) -> bool:
     """Tell whether a box surely meets no triangle: exact signs of all its corners; False where that is not known.
@@ -91,15 +102,8 @@ def is_clear(corners: Any, mesh: Any, stop: Any) -> bool:
             if below >= 0:
                 stack[depth] = below
                 depth += 1
-            elif below != EMPTY:
-                triangle = mesh.elements[-1 - below]
-                a, b, c = as_point3(triangle, 0), as_point3(triangle, 1), as_point3(triangle, 2)
-                side = orient3d(a, b, c, as_point3(corners, 0))
-                for k in range(1, 8):
-                    if orient3d(a, b, c, as_point3(corners, k)) != side:
-                        return False
-                if abs(side) != 1:
-                    return False
+            elif below != EMPTY and not is_beside(corners, mesh.elements[-1 - below]):
+                return False
         if stop[0]:
             return False
     return True

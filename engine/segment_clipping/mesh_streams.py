@@ -21,21 +21,19 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.jit import called, inline, kernel
+from engine.jit import bare, inline, kernel
 from engine.lanes.boxes import EMPTY
 from engine.lanes.lanes import lowest_bit
 from engine.lanes.memory import prefetch
 from engine.lanes.segments import near_segment
 from engine.lanes.tracing import LANES
 from engine.lanes.triangles import AXES_BEFORE, CORNER_ROWS, longest_axis, near_triangles
-from engine.segment_clipping.contacts import APART, GROUP, is_point
+from engine.segment_clipping.contacts import APART, NO_ROOM, STOPPED, is_point
 from engine.segment_clipping.mesh_contacts import local_segment
 from engine.segment_clipping.triangle_contact import corner, triangle_contact
 
 AHEAD: Final = 8
 """Items between the one that memory is asked for and the one worked on."""
-NO_ROOM: Final = -1
-STOPPED: Final = -2
 _PAIRS: Final = 16
 """Pairs of block and segment that wait at once, for each segment of a full group: more than one list adds."""
 _TRIANGLES: Final = 4096
@@ -205,7 +203,7 @@ def _by_segment(streams: Any, n: int, n_contacts: int) -> None:
     offsets[n] = n_contacts
 
 
-@called
+@bare
 def gather_contacts(streams: Any, mesh: Any, segments: Any, n: int, stop: Any) -> int:
     """Fill met, kinds and offsets with the contacts of the first n of some segments (m, 2, 3); return how many.
 
@@ -265,21 +263,8 @@ def gather_contacts(streams: Any, mesh: Any, segments: Any, n: int, stop: Any) -
 
 
 @kernel
-def find_mesh_contacts(
-    segments: Any, first: int, last: int, mesh: Any, stop: Any, elements_met: Any, kinds: Any, offsets: Any
-) -> int:
-    """Find the contacts of ``segments[first:last]``, (n, 2, 3) float64, with triangles: see `find_contacts_2d`."""
-    size, found = max(1, min(GROUP, last - first)), 0
-    streams = streams_for(mesh, size, elements_met.size)
-    offsets[0] = 0
-    for start in range(first, last, size):
-        n = min(size, last - start)
-        n_here = gather_contacts(streams, mesh, segments[start : start + n], n, stop)
-        if n_here < 0 or found + n_here > elements_met.size:
-            return start
-        for contact in range(n_here):
-            elements_met[found + contact], kinds[found + contact] = streams.met[contact], streams.kinds[contact]
-        for item in range(n):
-            offsets[start - first + item + 1] = found + streams.offsets[item + 1]
-        found += n_here
-    return last
+def find_mesh_contacts(segments: Any, mesh: Any, stop: Any, room: int) -> tuple[int, Any, Any, Any]:
+    """Return the contacts of segments (n, 2, 3) float64, GROUP at most, with triangles: see `find_contacts_2d`."""
+    streams = streams_for(mesh, segments.shape[0], room)
+    found = gather_contacts(streams, mesh, segments, segments.shape[0], stop)
+    return found, streams.met, streams.kinds, streams.offsets

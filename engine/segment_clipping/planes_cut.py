@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from engine.jit import inline, kernel
+from engine.jit import bare_kernel, inline
 from engine.predicates.cut_point import parameter_and_point, point_at
 from engine.predicates.double_double import U2, dd_add, dd_div
 from engine.predicates.error_free import two_prod, two_sum, workspace
 from engine.predicates.expansion import sign
-from engine.segment_clipping.cohen_sutherland import Triple, point_of, put_end
 from engine.segment_clipping.cyrus_beck import VALUE_TINY, columns_of, expand_value, is_row_safe, is_segment_safe
+from engine.segment_clipping.pieces import Pieces, Triple, point_of, put_end, put_own_end
 from engine.segment_clipping.plane_meeting import T_BOUND
 
 DD_VALUE_BOUND: Final = 32.0 * U2
@@ -62,7 +62,18 @@ def cut_by_signs(row: Any, segment: Any, point: Any) -> tuple[float, bool]:
     return parameter_and_point(segment, wp, n_wp, wq, n_wq, -1, 0.0, point, e)
 
 
-@kernel
+@inline
+def cut_by_values(p: Triple, q: Triple, sp: Triple, sq: Triple) -> tuple[float, float, float, float, bool]:
+    """Return where p q crosses a plane that has these values there, t, and whether all is surely nearest."""
+    th, tl, slack, sure = parameter_of(sp, sq)
+    x, is_x = point_at(p[0], q[0], th, tl, slack)
+    y, is_y = point_at(p[1], q[1], th, tl, slack)
+    z, is_z = point_at(p[2], q[2], th, tl, slack)
+    bound = (T_BOUND + slack) * th
+    return x, y, z, th + tl, sure & is_x & is_y & is_z & (th + (tl - bound) == th + (tl + bound))
+
+
+@bare_kernel
 def fill_on_rows(
     segments: Any,
     columns: Any,
@@ -71,10 +82,7 @@ def fill_on_rows(
     first: int,
     last: int,
     stop: Any,
-    source: Any,
-    ends: Any,
-    t: Any,
-    faces: Any,
+    pieces: Pieces,
     still: Any,
     n: Any,
 ) -> None:
@@ -86,34 +94,25 @@ def fill_on_rows(
         if stop[0]:
             return
         i = items[row]
-        source[row] = i
+        pieces.source[row] = i
         all_sure = tried = True
         p, q = point_of(segments, i, 0, is_flat), point_of(segments, i, 1, is_flat)
-        for side in range(2):
-            plane = planes[row, side]
-            faces[row, side] = plane
-            if plane < 0:
-                t[row, side] = side
-                x, y, z = point_of(segments, i, side, is_flat)
-                put_end(ends, row, side, x, y, z, is_flat)
+        for end in range(2):
+            j = planes[row, end]
+            if j < 0:
+                put_own_end(pieces, row, end, segments, i, is_flat)
                 continue
-            th, tl, slack, sure = parameter_of(
-                dd_value(a[plane], b[plane], c[plane], d[plane], p),
-                dd_value(a[plane], b[plane], c[plane], d[plane], q),
-            )
-            x, is_x = point_at(p[0], q[0], th, tl, slack)
-            y, is_y = point_at(p[1], q[1], th, tl, slack)
-            z, is_z = point_at(p[2], q[2], th, tl, slack)
-            bound = (T_BOUND + slack) * th
-            if sure & is_x & is_y & is_z & (th + (tl - bound) == th + (tl + bound)):
-                t[row, side] = th + tl
-                put_end(ends, row, side, x, y, z, is_flat)
+            pieces.faces[row, end] = j
+            sp, sq = dd_value(a[j], b[j], c[j], d[j], p), dd_value(a[j], b[j], c[j], d[j], q)
+            x, y, z, t, sure = cut_by_values(p, q, sp, sq)
+            if sure:
+                pieces.t[row, end] = t
+                put_end(pieces, row, end, (x, y, z), is_flat)
             else:
                 tried = False
-                t[row, side], sure = cut_by_signs(columns[:-2, plane], segments[i], ends[side, row])
+                pieces.t[row, end], sure = cut_by_signs(columns[:-2, j], segments[i], pieces.ends[end, row])
                 all_sure = all_sure and sure
-        if not tried:
-            beyond += 1
+        beyond += not tried
         if not all_sure:
             still[first + n_open] = row
             n_open += 1

@@ -16,7 +16,8 @@ from engine.containment.cells.locate import CODE_SHIFT, INSIDE_CELL, MIXED_CELL,
 from engine.containment.cells.status import fill_leaves, locate_parts
 from engine.containment.cells.top import ask_cells, can_have_cells, make_lattice, top_places, top_statuses
 from engine.containment.prepared import Columns, columns_of
-from engine.lanes.cells import LANES, groups_of
+from engine.lanes.cells import groups_of
+from engine.lanes.tracing import LANES
 from engine.parallel import Budget
 from engine.solids.polyhedron import Polyhedron
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from engine.containment.cells.lattice import LEVELS, PARTS, PLACE, finest, parts_of, reference_coordinate, share_of
 from engine.jit import inline, kernel, merged
-from engine.lanes.cells import ROWS, UNSURE, group_parity, prefetch_group
+from engine.lanes.cells import ROWS, group_parity, prefetch_group
 from engine.types import UNDECIDED
 
 OUTSIDE_CELL: Final = -4
@@ -111,12 +111,12 @@ def _descend(cells: Any, kept_points: Any, n_waiting: Any, level: int, locations
 
 @merged
 def parity_across(groups: Any, group: int, wx: Any, wy: Any, wz: Any) -> int:
-    """Return the parity of the segment from the reference point to w, over all groups of a leaf, plus UNSURE."""
+    """Return the parity of the segment from the reference point to w, over all groups of a leaf, plus UNDECIDED."""
     parity = group_parity(groups, group, wx, wy, wz)
     while groups[group, ROWS - 1, 0] == 0.0:  # bound: the last group of each leaf says so
         group += 1
         found = group_parity(groups, group, wx, wy, wz)
-        parity = ((parity ^ found) & 1) | ((parity | found) & UNSURE)
+        parity = ((parity ^ found) & 1) | ((parity | found) & UNDECIDED)
     return parity
 
 
@@ -141,7 +141,7 @@ def ask_leaves(points: Any, cells: Any, kept_points: Any, n_waiting: Any, locati
         wy = np.float32((points[item, 1] - ry) * (scale[1] * parts))
         wz = np.float32((points[item, 2] - rz) * (scale[2] * parts))
         parity = parity_across(groups, code >> 2, wx, wy, wz)
-        locations[item] = UNDECIDED if parity & UNSURE else ((code ^ (parity << 1)) & 2) - 1
+        locations[item] = UNDECIDED if parity & UNDECIDED else ((code ^ (parity << 1)) & 2) - 1
 
 
 @inline

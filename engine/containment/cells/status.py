@@ -26,7 +26,9 @@ from engine.containment.cells.lattice import (
     share_of,
 )
 from engine.jit import inline, kernel
-from engine.lanes.cells import LANES, ROWS, UNSURE, group_parity
+from engine.lanes.cells import ROWS, group_parity
+from engine.lanes.tracing import LANES
+from engine.types import UNDECIDED
 
 
 @inline
@@ -118,7 +120,7 @@ def _across(groups: Any, n_groups: int, w: Any, status: int) -> int:
     parity = 0
     for group in range(n_groups):
         parity ^= group_parity(groups, group, wx, wy, wz)
-        if parity & UNSURE:
+        if parity & UNDECIDED:
             return UNKNOWN
     return -status if parity & 1 else status
 

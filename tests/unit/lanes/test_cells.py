@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 
 from engine.jit import kernel
-from engine.lanes.cells import BAND, UNSURE, group_parity, groups_of, prefetch_group
+from engine.lanes.cells import BAND, group_parity, groups_of, prefetch_group
 from engine.lanes.tracing import LANES
+from engine.types import UNDECIDED
 
 
 def one_by_one(group: np.ndarray, point: np.ndarray) -> int:
-    """Return the parity over the lanes, in numbers of numpy, with UNSURE where one is within the band."""
+    """Return the parity over the lanes, in numbers of numpy, with UNDECIDED where one is within the band."""
     answer = 0
     for n in group.T:
         side, *edges = (n[k] * point[0] + n[k + 1] * point[1] + n[k + 2] * point[2] for k in (0, 4, 7, 10))
@@ -22,7 +23,7 @@ def one_by_one(group: np.ndarray, point: np.ndarray) -> int:
         if side < -BAND and is_same:
             answer ^= 1
         elif not (side > BAND or is_split):
-            answer |= UNSURE
+            answer |= UNDECIDED
     return answer
 
 
@@ -48,9 +49,9 @@ def test_a_group_answers_as_its_triangles_one_by_one() -> None:
     expected = [one_by_one(groups[item], points[item]) for item in range(n)]
     assert [group_parity(groups, item, *points[item]) for item in range(n)] == expected
     assert found.tolist() == expected
-    assert {0, 1, UNSURE} <= set(expected)
+    assert {0, 1, UNDECIDED} <= set(expected)
     assert not (found[2::14] & 1).any()
-    assert (found[::7] & UNSURE).all()
+    assert (found[::7] & UNDECIDED).all()
 
 
 def test_groups_begin_with_a_line_of_the_cache() -> None:

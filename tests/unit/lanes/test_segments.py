@@ -79,8 +79,8 @@ def test_contacts_are_those_of_all_triangles() -> None:
     stop, room = np.zeros(1, np.uint8), 100_000
 
     def found(mesh: Mesh) -> tuple[Floats, Floats, Floats]:
-        met, kinds, offsets = np.empty(room, np.int64), np.empty(room, np.uint8), np.empty(len(segments) + 1, np.int64)
-        assert find_mesh_contacts(segments, 0, len(segments), mesh, stop, met, kinds, offsets) == len(segments)
+        n_contacts, met, kinds, offsets = find_mesh_contacts(segments, mesh, stop, room)
+        assert n_contacts == offsets[-1]
         return met, kinds, offsets
 
     met, kinds, offsets = found(mesh_of(corners, np.arange(len(corners))))

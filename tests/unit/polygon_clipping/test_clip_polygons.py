@@ -19,11 +19,9 @@ from engine.errors import (
     UnsupportedSolidError,
     WrongDimensionError,
 )
-from engine.parallel import Budget, Cancel
+from engine.parallel import Cancel
 from engine.polygon_clipping import clip_polygons as polygons_module
-from engine.polygon_clipping.batches import clip_chunk, kernel_scene
 from engine.polygon_clipping.clip_polygons import ClippedPolygons, PolygonStatus, clip_polygons
-from engine.polygon_clipping.in_integers import MOST_BITS
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.convex import Convex
@@ -119,32 +117,6 @@ def test_long_cascades_are_about_the_original_input() -> None:
     check([square, square + rng.normal(size=(4, 3)) * 0.3], region)
 
 
-@pytest.mark.parametrize("dimension", [2, 3])
-def test_long_rings_are_taken_in_runs(dimension: int) -> None:
-    """Many vertices on one side of all planes, and single ones on the planes between them; the ends of a ring equal."""
-    rng = np.random.default_rng(6)
-    walks = np.cumsum(rng.integers(-1, 2, (12, 40, dimension)) / 4, axis=1)
-    walks[6:] += rng.uniform(-0.1, 0.1, (6, 40, dimension))
-    walks[:3, -1] = walks[:3, 0]
-    for region in (
-        Aabb([-0.5] * dimension, [0.5] * dimension),
-        Convex(np.c_[np.eye(dimension) + 1, np.ones(dimension)]),
-    ):
-        check(walks, region)
-
-
-def test_too_complex_is_marked_and_spoils_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
-    rng = np.random.default_rng(4)
-    monkeypatch.setattr("engine.polygon_clipping.in_integers.MOST_BITS", 400)
-    assert MOST_BITS == 1 << 17
-    box = Aabb([-0.5] * 3, [0.5] * 3)
-    easy = [[0.0, 0.0, 0.0], [0.25, 0.0, 0.0], [0.0, 0.25, 0.0]]
-    hard = rng.uniform(-1, 1, (6, 3)).tolist()
-    clipped = clip_polygons([[easy], [hard, easy], [easy]], box)
-    assert clipped.status.tolist() in ([0, 1, 0], [0, 0, 0])  # a kernel may settle what exact arithmetic would not
-    assert clipped.rings(0)[0].tolist() == clipped.rings(2)[0].tolist() == easy
-
-
 def test_degenerate_contours_by_hand() -> None:
     box = Aabb([0, 0], [2, 2])
     cases: list[tuple[Any, Any]] = [
@@ -201,40 +173,6 @@ def test_arrays_of_triangles_and_any_workers() -> None:
             np.testing.assert_array_equal(getattr(results[0], name), getattr(other, name))
     again = clip_polygons([results[0].rings(i) for i in range(300) if results[0].rings(i)], box)
     np.testing.assert_array_equal(again.vertices, results[0].vertices)
-
-
-@pytest.mark.parametrize("dimension", [2, 3])
-def test_contours_through_corners_stay_in_the_kernel(dimension: int) -> None:
-    """Exact zeros that geometry explains need no integers: corners of a box, corners and edges of an octahedron."""
-    rng = np.random.default_rng(dimension)
-    contours = rng.integers(-20, 21, (60, 5, dimension)) / 8
-    contours[:20] = rng.uniform(-2, 2, (20, 5, dimension))
-    offset = rng.integers(-8, 9, (20, dimension)) / 8
-    contours[:20, 0], contours[:20, 1] = 1 + offset, 1 - offset  # an edge through the corner of the box
-    contours[20:30, 1:3, 0] = 1.0  # an edge on a plane
-    signs = np.array(list(itertools.product([-1.0, 1.0], repeat=dimension)))
-    for region in (Aabb([-1] * dimension, [1] * dimension), Convex(np.c_[signs, np.full(len(signs), 1.5)])):
-        clipped, accuracy = clip_polygons(contours, region, report=True)
-        assert accuracy.n_rational < 6
-        check(contours, region, clipped)
-
-
-def test_kernel_and_exact_integers_agree(monkeypatch: pytest.MonkeyPatch, pytestconfig: pytest.Config) -> None:
-    """What the kernel settles is what exact integers settle, bit by bit, bridges included."""
-    n = 3000 if pytestconfig.getoption("--full") else 60
-    for dimension in (2, 3):
-        rng = np.random.default_rng(dimension)
-        polygons = [
-            [ring[j : j + 4] for j in range(0, len(ring), 4)]
-            for ring in itertools.chain(*rings_of(rng, n, dimension).values())
-        ]
-        for region in regions_of(rng, dimension):
-            both = [clip_polygons(polygons, region)]
-            with monkeypatch.context() as patch:
-                patch.setattr("engine.polygon_clipping.clip_polygons.kernel_scene", lambda *_: None)
-                both.append(clip_polygons(polygons, region))
-            for name in ClippedPolygons.__slots__:
-                np.testing.assert_array_equal(getattr(both[0], name), getattr(both[1], name), err_msg=str(region))
 
 
 def test_convex_polyhedra_are_certified() -> None:
@@ -306,24 +244,3 @@ def test_refuses_what_it_cannot_take() -> None:
 
 def test_the_example() -> None:
     assert doctest.testmod(polygons_module) == (0, 3)
-
-
-def test_a_raised_flag_ends_a_chunk() -> None:
-    """The kernel stopping for it does not pass for a lack of room, of which more and more would be made."""
-    region, budget, offsets = Aabb([-1, -1], [1, 1]), Budget(), np.arange(6)
-    contours = polygons_module.as_contours(np.ones((5, 3, 2)), 2)
-    scene = kernel_scene(region, contours.vertices, 1.0, polygons_module._planes(region, budget), budget)
-    assert scene is not None
-    budget.flag[0] = 1
-    with pytest.raises(CancelledError):
-        clip_chunk(
-            scene,
-            contours.ring_offsets,
-            offsets,
-            0,
-            5,
-            budget,
-            np.zeros(5, np.int64),
-            np.zeros(5, np.uint8),
-            offsets > 9,
-        )

@@ -11,12 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.parallel import Budget
-from engine.segment_clipping.boundary import clip_chunk
-from engine.segment_clipping.boundary_cut import OPEN, Rows
-from engine.segment_clipping.box_tree import LEAF_SIZE, build_box_tree
 from engine.segment_clipping.clip_segments import clip_segments
-from engine.segment_clipping.contacts import GROUP
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.polygon import Polygon
@@ -172,73 +167,6 @@ def test_large_meshes_agree_with_point_location(data: Path) -> None:
     for source, (first, last) in zip(pieces.source, pieces.t):
         inside[source] |= (first <= t[source]) & (t[source] <= last)
     assert (inside.ravel() == (locate(points.reshape(-1, 3), spot) >= 0)).all()
-
-
-def nothing_settled(
-    segments: Any, chosen: Any, locations: Any, boundary: Any, budget: Any
-) -> tuple[list[Rows], np.ndarray]:
-    return [], np.full(len(chosen), OPEN, np.uint8)
-
-
-def test_kernel_and_exact_integers_agree(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Proper crossings cut by the kernel are what exact integers give, bit by bit."""
-    for dimension, regions in REGIONS.items():
-        rng = np.random.default_rng(dimension)
-        for region in regions():
-            segments = np.concatenate([random_segments(rng, 40, dimension), through(rng, vertices_of(region), 40)])
-            both = [clip_segments(segments, region)]
-            with monkeypatch.context() as patch:
-                patch.setattr("engine.segment_clipping.boundary._settle", nothing_settled)
-                both.append(clip_segments(segments, region))
-            for name in ("source", "start", "end", "t", "faces"):
-                np.testing.assert_array_equal(getattr(both[0], name), getattr(both[1], name))
-
-
-def test_more_crossings_than_there_is_room_for_at_first() -> None:
-    """A comb of 50 teeth and 40 boxes in a row, cut lengthwise, again and again."""
-    teeth = np.arange(100.0)
-    tips = np.stack([teeth, np.where(teeth % 2, 1.0, 5.0)], axis=1)
-    comb = Polygon([[*tips.tolist(), [99.0, 0.0], [0.0, 0.0]]])
-    boxes = solid_of(union_of(*(box((4 * k, 0, 0), (4 * k + 1.5, 1, 1)) for k in range(40))))
-    along: list[tuple[Solid, Any, int]] = [
-        (comb, [[-1.3, 2.9], [100.1, 3.1]], 50),
-        (boxes, [[-1, 0.3, 0.4], [163.7, 0.6, 0.7]], 40),
-    ]
-    for region, line, n in along:
-        pieces, accuracy = clip_segments(np.array([line] * 110), region, report=True)
-        assert len(pieces) == 110 * n
-        assert accuracy.n_rational == 0
-        assert_exact(clip_segments([line], region), np.array([line]), region)
-
-
-def test_groups_answer_as_a_few_segments_do() -> None:
-    """More segments at once than a group holds, with more contacts than have room or wait at once."""
-    rng = np.random.default_rng(8)
-    boxes = solid_of(union_of(*(box((4 * k, 0, 0), (4 * k + 1.5, 1, 1)) for k in range(40))))
-    n = GROUP + 300
-    segments = rng.uniform((-2, -0.1, -0.1), (164, 1.1, 1.1), (n, 2, 3))
-    segments[::50, 1] = segments[::50, 0]
-    budget = Budget()
-    whole = clip_chunk(segments, 0, n, boxes, None, budget)
-    parts = [clip_chunk(segments, i, min(i + 60, n), boxes, None, budget) for i in range(0, n, 60)]
-    assert len(whole.source) > 3 * n
-    for name in ("source", "start", "end", "t", "faces"):
-        np.testing.assert_array_equal(getattr(whole, name), np.concatenate([getattr(part, name) for part in parts]))
-
-
-def test_box_tree_holds_every_element() -> None:
-    rng = np.random.default_rng(4)
-    for n in (1, 2, LEAF_SIZE, LEAF_SIZE + 1, 100):
-        low = rng.uniform(-1, 1, (n, 3)) * 10.0 ** rng.integers(-300, 300, (n, 1))
-        high = low + rng.uniform(0, 1, (n, 3))
-        tree = build_box_tree(low, high)
-        assert sorted(tree.order.tolist()) == list(range(n))
-        for place, element in enumerate(tree.order):
-            node = tree.first_leaf + place // LEAF_SIZE
-            while node:
-                assert (tree.boxes[node, 0] <= low[element]).all()
-                assert (tree.boxes[node, 1] >= high[element]).all()
-                node //= 2
 
 
 def test_uncompiled_is_the_same() -> None:

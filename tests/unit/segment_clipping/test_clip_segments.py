@@ -5,12 +5,10 @@ from __future__ import annotations
 import doctest
 import itertools
 import math
-import os
 import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -32,7 +30,7 @@ from engine.solids.convex import Convex
 from engine.solids.half_space import HalfSpace
 from engine.solids.sphere import Sphere
 from engine.solids.triangle import Triangle
-from tests.unit.segment_clipping.scenes import check, families, lattice_segments, nudged, random_segments, through
+from tests.unit.segment_clipping.scenes import check, families, lattice_segments, random_segments, through
 
 FAMILIES = ["random", "lattice", "targets", "tiny", "long", "mixed", "denormal"]
 CORNERS = {n: np.array(list(itertools.product([-1.0, 2.0], repeat=n))) for n in (2, 3)}
@@ -103,16 +101,6 @@ def test_whole_scenes_of_any_size(kind: str, scale: float) -> None:
                 check(segments, Convex(rows))
 
 
-def test_rounding_up_to_the_smallest_normal_number() -> None:
-    """A crossing just below the middle of the largest subnormal number and the smallest normal one.
-
-    Rounded to 53 bits it is that middle, rounded again the normal number.
-    """
-    least = 2.0**-1022
-    line = [[2 * least, least], [-2 * least, -(3 - 2.0**-51) * least]]
-    check(np.array([line] * 64), Aabb([-least, 0.0], [2 * least, least]))
-
-
 @pytest.mark.parametrize("offset", [1e6, 1e9])
 @pytest.mark.parametrize("kind", REGIONS)
 def test_far_from_the_origin(kind: str, offset: float) -> None:
@@ -127,90 +115,12 @@ def test_far_from_the_origin(kind: str, offset: float) -> None:
             check(segments, HalfSpace(side.normal, side.offset - side.normal.sum() * offset))
 
 
-def test_tangent_to_the_sphere() -> None:
-    rng = np.random.default_rng(7)
-    for dimension in (2, 3):
-        center = rng.integers(-3, 4, dimension).astype(float)
-        touch = np.array([[3, 4, 0], [-4, 3, 0], [0, 5, 0], [5, 0, 0]], float)[:, :dimension]
-        along = np.array([[-4, 3, 1], [3, 4, 0], [1, 0, 2], [0, 2, -1]], float)[:, :dimension]
-        segments = np.stack([center + touch - along, center + touch + 2 * along], axis=1)
-        check(segments, Sphere(center, 5.0))
-        pieces = clip_segments(segments, Sphere(center, 5.0))
-        if dimension == 2:
-            assert (pieces.start == pieces.end).all()
-        check(nudged(rng, np.repeat(segments, 30, axis=0)), Sphere(center, 5.0))
-        check(np.stack([segments[:, 0], (segments[:, 0] + 2 * segments[:, 1]) / 3], axis=1), Sphere(center, 5.0))
-
-
-def test_ends_on_the_sphere() -> None:
-    rng = np.random.default_rng(8)
-    points = np.array([[3, 4, 0], [0, 3, 4], [-5, 0, 0], [0, -5, 0], [8, 6, 0], [0, 0, 0]], float)
-    segments = np.array(list(itertools.product(points, points)))
-    check(segments, Sphere([0, 0, 0], 5))
-    check(nudged(rng, segments), Sphere([0, 0, 0], 5))
-
-
-def test_nearly_parallel_to_planes() -> None:
-    rng = np.random.default_rng(9)
-    base = np.stack([rng.uniform(-1, 1, (60, 3)), rng.uniform(-1, 1, (60, 3))], axis=1)
-    base[:, :, 2] = 0.3
-    base = nudged(rng, base)
-    check(base, Aabb([-0.5, -0.5, -1], [0.5, 0.5, 0.3]))
-    check(base, Convex([[0, 0, -1, 0.3], [1e-17, 0, -1, 0.3], [1, 1, 0, 0.5]]))
-
-
-def test_the_textbook_loop_that_never_ends() -> None:
-    pieces = clip_segments([[[1.0, 1.0], [-1.0, -1.0]]], Aabb([1e-9, 1e-9], [3, 3]))
-    assert pieces.end.tolist() == [[1e-9, 1e-9]]
-    assert pieces.faces.tolist() == [[-1, 0]]
-
-
-def test_faces_and_touching_points_by_hand() -> None:
-    box = Aabb([0, 0], [2, 2])
-    cases: list[tuple[Any, Any, Any]] = [
-        ([[-1, -1], [3, 3]], (0.25, 0.75), (0, 1)),  # through two corners: smallest plane
-        ([[-1, 1], [1, -1]], (0.5, 0.5), (0, 2)),  # touches a corner
-        ([[0, 0], [-1, 0]], (0.0, 0.0), (-1, 0)),  # leaves at once
-        ([[-1, 0], [0, 0]], (1.0, 1.0), (0, -1)),  # arrives at the end
-        ([[-1, 0], [3, 0]], (0.25, 0.75), (0, 1)),  # in a face
-        ([[1, 1], [1, 1]], (0.0, 1.0), (-1, -1)),  # a point inside
-        ([[2, 2], [2, 2]], (0.0, 1.0), (-1, -1)),  # a point on a corner
-    ]
-    for region in (box, Convex([[1, 0, 0], [-1, 0, 2], [0, 1, 0], [0, -1, 2]])):
-        pieces = clip_segments(np.array([case[0] for case in cases], float), region)
-        assert pieces.source.tolist() == list(range(len(cases)))
-        assert [tuple(t) for t in pieces.t] == [case[1] for case in cases]
-        assert [tuple(faces) for faces in pieces.faces] == [case[2] for case in cases]
-    assert len(clip_segments([[[3.0, 3.0], [3.0, 3.0]]], box)) == 0
-
-
 def test_zeros_are_positive() -> None:
     """Of coordinates that a segment keeps, too, also where another one is settled by exact signs."""
     segments = [[[-0.0, -1.0], [0.0, -1.8523598966538355]], [[-1.0, -0.0], [-1.4299810403064286, -0.0]]]
     for region in (Aabb([-1, -1], [1, 1]), Convex([[1, 0, 1], [-1, 0, 1], [0, 1, 1], [0, -1, 1]])):
         pieces = clip_segments(segments, region)
         assert not any(np.signbit(array[array == 0.0]).any() for array in (pieces.start, pieces.end, pieces.t))
-
-
-def test_boxes_are_idempotent_and_hold_their_pieces() -> None:
-    rng = np.random.default_rng(10)
-    box = Aabb(rng.uniform(-1, 0, 3), rng.uniform(0, 1, 3))
-    segments = through(rng, np.array([box.min, box.max]), 3000)
-    pieces = clip_segments(segments, box)
-    assert ((pieces.start >= box.min) & (pieces.start <= box.max)).all()
-    again = clip_segments(np.stack([pieces.start, pieces.end], axis=1), box)
-    assert again.source.tolist() == list(range(len(pieces)))
-    np.testing.assert_array_equal(again.start, pieces.start)
-    np.testing.assert_array_equal(again.end, pieces.end)
-    assert (again.faces == -1).all()
-
-
-def test_the_same_for_any_workers_and_chunks() -> None:
-    rng = np.random.default_rng(11)
-    segments = through(rng, CORNERS[3], 20000)
-    one, many = (clip_segments(segments, Aabb([-1] * 3, [2] * 3), workers=workers) for workers in (1, 3))
-    for name in ("source", "start", "end", "t", "faces"):
-        np.testing.assert_array_equal(getattr(one, name), getattr(many, name))
 
 
 def test_empty_queries_and_report() -> None:
@@ -222,19 +132,6 @@ def test_empty_queries_and_report() -> None:
     flat = Aabb([0, 0, 0], [1e-310, 1, 1])
     _, accuracy = clip_segments([[[0, 0, 0], [3e-310, 1, 1]]], flat, report=True)
     assert accuracy.n_rational == accuracy.n_beyond_filter == 1
-
-
-@pytest.mark.skipif(os.environ.get("NUMBA_DISABLE_JIT") == "1", reason="about compiled speed")
-@pytest.mark.parametrize("scale", [1.0, 2.0**900])  # the second is done twice: as it is, then scaled
-def test_progress_counts_each_segment_once(scale: float) -> None:
-    draw = np.random.default_rng(12)
-    segments = draw.integers(-3, 4, (20_000, 2, 3)) * 0.5 * scale
-    region = Convex(np.array([[1.0, 1, 1, 2 * scale], [-1.0, 0.5, 0, scale], [0, 0, -1.0, scale]]))
-    for workers in (1, 2):
-        counts: list[int] = []
-        clip_segments(segments, region, workers=workers, progress=counts.append)
-        assert sum(counts) == len(segments)
-        assert min(counts) > 0
 
 
 def test_kernels_see_the_deadline() -> None:

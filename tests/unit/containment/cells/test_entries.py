@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 
 from engine.containment.cells.entries import set_entry, set_nothing
-from engine.lanes.cells import LANES, UNSURE, groups_of, plain_parity
+from engine.lanes.cells import group_parity, groups_of
+from engine.lanes.tracing import LANES
+from engine.types import UNDECIDED
 
 
 def exact_crossing(a: Any, b: Any, c: Any, x: Any) -> int | None:
@@ -48,8 +50,8 @@ def test_entries_are_right_beyond_their_band() -> None:
             for other in range(LANES):
                 set_nothing(groups[0, :, other])
             set_entry(groups[0, :, lane], tuple(a), tuple(b), tuple(c), tuple(b - a), tuple(c - a))
-            found = plain_parity(groups, 0, *x.astype(np.float32))
-        if found < UNSURE:
+            found = group_parity(groups, 0, *x.astype(np.float32))
+        if found < UNDECIDED:
             n_sure += 1
             n_crossed += found
             assert found == exact_crossing(a, b, c, x)

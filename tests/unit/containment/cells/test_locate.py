@@ -11,8 +11,6 @@ import pytest
 from engine import NotFiniteError, Polyhedron, locate
 from engine.containment.cells.build import build_cells
 from engine.containment.cells.locate import locate_by_cells
-from engine.jit import kernel
-from engine.lanes.cells import LANES, UNSURE, group_parity, groups_of, plain_parity, prefetch_group
 from engine.parallel import Budget
 from engine.types import UNDECIDED
 from tests.unit.containment.methods.test_polyhedron_ray_parity import HARD
@@ -112,36 +110,3 @@ def test_the_first_of_the_points_that_are_not_finite_is_named(bad: float, worker
         locate(points, solid, workers=workers)
     far = np.array([[1e308, -1e308, 1e308], [0.5, 0.5, 0.5]] * 300)  # finite, though their sum is not
     assert locate(far, solid).tolist() == [-1, 1] * 300
-
-
-@kernel
-def parities(groups: Any, points: Any, found: Any) -> None:
-    for item in range(len(groups)):
-        prefetch_group(groups, item)
-        found[item] = group_parity(groups, item, points[item, 0], points[item, 1], points[item, 2])
-
-
-def test_lanes_answer_as_their_plain_twin() -> None:
-    random = np.random.default_rng(10)
-    n = 3000
-    groups = groups_of(n)
-    groups[:] = random.uniform(-1, 1, groups.shape)
-    groups[:, 3] = random.choice([-4.0, -0.1, -1e-4], (n, LANES))
-    groups[::2, :, 1:] = groups[::2, :, :1]  # eight times one triangle: crossed by all or none, never odd
-    groups[::7, :, 3] = np.nan  # one lane
-    points = random.uniform(-0.6, 0.6, (n, 3)).astype(np.float32)
-    points[::5] *= np.float32(1e-5)  # within the band of the edges
-    found = np.empty(n, np.int64)
-    parities(groups, points, found)
-    expected = [plain_parity(groups, item, *points[item]) for item in range(n)]
-    assert found.tolist() == expected
-    assert {0, 1, UNSURE} <= set(expected)
-    assert not (found[2::14] & 1).any()
-    assert (found[::7] & UNSURE).all()
-
-
-def test_groups_begin_with_a_line_of_the_cache() -> None:
-    for n in (0, 1, 5):
-        assert groups_of(n).shape == (n, 14, LANES)
-        assert groups_of(n).flags.c_contiguous
-        assert n == 0 or groups_of(n).ctypes.data % 64 == 0

@@ -1,0 +1,88 @@
+"""What the compiled clipping of polygons hands on: polygons, planes, results, and which planes cut."""
+
+from __future__ import annotations
+
+from typing import Any, Final, NamedTuple
+
+from engine.jit import merged
+
+CLIPPED: Final = 0
+EXACT: Final = 1
+"""States of a polygon, beside OPEN: settled by doubles, by whole numbers."""
+NO_ROOM: Final = -2
+"""Instead of a number of vertices: they have no room, or the kernel was stopped."""
+
+
+class Polygons(NamedTuple):
+    """vertices: (m * dim,) float64, as one row of numbers; offsets of rings and of polygons: see `ClippedPolygons`."""
+
+    vertices: Any
+    ring_offsets: Any
+    polygon_offsets: Any
+
+
+class PlaneTables(NamedTuple):
+    """Planes as the kernel takes them; prepared once a region where nothing is scaled.
+
+    high, low: (planes, dim + 1) float64, rows as double-doubles, every number zero or in the safe range. axes:
+    (planes,) int64, the axis that a plane cuts across in one known double `at`, else -1. row_heap, row_places: the
+    rows in whole numbers, see digits.py.
+    """
+
+    high: Any
+    low: Any
+    axes: Any
+    at: Any
+    row_heap: Any
+    row_places: Any
+
+
+class Plane(NamedTuple):
+    """One of the planes: its number, and the axis that it cuts across at `place`, else -1."""
+
+    high: Any
+    low: Any
+    number: int
+    axis: int
+    place: float
+
+
+class Clipped(NamedTuple):
+    """What is left of polygons.
+
+    vertices: (room * dim,) float64, rings one after another. sizes: (n_rings,) int64, vertices left of each. state:
+    (n,) uint8, CLIPPED, EXACT or OPEN; an open polygon has sizes 0 and no vertices. may_have_bridges: (n,) bool.
+    """
+
+    vertices: Any
+    sizes: Any
+    state: Any
+    may_have_bridges: Any
+
+
+class Cutting(NamedTuple):
+    """The planes that may cut a polygon, in order.
+
+    planes: their numbers. slack: how far values in doubles may be wrong. contacts: in how many points all rings
+    together met a plane. dropped: whether one lost a vertex to it.
+    """
+
+    planes: Any
+    slack: Any
+    contacts: Any
+    dropped: Any
+
+
+@merged
+def plane_of(planes: Any, number: int) -> Plane:
+    """Return one of the planes."""
+    return Plane(planes.high, planes.low, number, planes.axes[number], planes.at[number])
+
+
+@merged
+def has_bridges(cutting: Any, n_cutting: int) -> bool:
+    """Tell whether a plane that dropped a vertex was met in more than two points."""
+    may_have = False
+    for i in range(n_cutting):
+        may_have |= cutting.dropped[i] and cutting.contacts[i] > 2
+    return may_have

@@ -1,0 +1,53 @@
+"""Pieces of segments as kernels write them, and the ends of segments as they read them; in the plane z is 0."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from engine.jit import merged
+
+Triple = tuple[float, float, float]
+
+
+class Pieces(NamedTuple):
+    """Pieces in order, see `SegmentPieces`: source (m,), ends (2, m, dim), t and faces (m, 2)."""
+
+    source: Any
+    ends: Any
+    t: Any
+    faces: Any
+
+
+def room_for(m: int, dimension: int) -> Pieces:
+    """Return room for m pieces."""
+    return Pieces(np.empty(m, np.int64), np.empty((2, m, dimension)), np.empty((m, 2)), np.empty((m, 2), np.int64))
+
+
+def joined(parts: Sequence[Pieces]) -> Pieces:
+    """Return the pieces of some parts one after another."""
+    source, ends, t, faces = zip(*parts)
+    return Pieces(np.concatenate(source), np.concatenate(ends, axis=1), np.concatenate(t), np.concatenate(faces))
+
+
+@merged
+def point_of(segments: Any, item: int, end: int, is_flat: bool) -> Triple:
+    """Return an end of a segment."""
+    return segments[item, end, 0], segments[item, end, 1], (0.0 if is_flat else segments[item, end, 2])
+
+
+@merged
+def put_end(pieces: Pieces, row: int, end: int, point: Triple, is_flat: bool) -> None:
+    """Write an end of a piece, without negative zeros."""
+    pieces.ends[end, row, 0], pieces.ends[end, row, 1] = point[0] + 0.0, point[1] + 0.0
+    if not is_flat:
+        pieces.ends[end, row, 2] = point[2] + 0.0
+
+
+@merged
+def put_own_end(pieces: Pieces, row: int, end: int, segments: Any, item: int, is_flat: bool) -> None:
+    """Write an end of a piece that is the segment's own."""
+    pieces.t[row, end], pieces.faces[row, end] = end, -1
+    put_end(pieces, row, end, point_of(segments, item, end, is_flat), is_flat)

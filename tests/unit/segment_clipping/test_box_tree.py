@@ -1,0 +1,22 @@
+"""The tree of boxes over a boundary: nothing is lost, whatever its size."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from engine.segment_clipping.box_tree import LEAF_SIZE, build_box_tree
+
+
+def test_box_tree_holds_every_element() -> None:
+    rng = np.random.default_rng(4)
+    for n in (1, 2, LEAF_SIZE, LEAF_SIZE + 1, 100):
+        low = rng.uniform(-1, 1, (n, 3)) * 10.0 ** rng.integers(-300, 300, (n, 1))
+        high = low + rng.uniform(0, 1, (n, 3))
+        tree = build_box_tree(low, high)
+        assert sorted(tree.order.tolist()) == list(range(n))
+        for place, element in enumerate(tree.order):
+            node = tree.first_leaf + place // LEAF_SIZE
+            while node:
+                assert (tree.boxes[node, 0] <= low[element]).all()
+                assert (tree.boxes[node, 1] >= high[element]).all()
+                node //= 2

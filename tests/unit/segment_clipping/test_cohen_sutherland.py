@@ -1,0 +1,50 @@
+"""Segments on boxes: the loop ends, ties go to the smaller plane, pieces stay in the box."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from engine.segment_clipping.clip_segments import clip_segments
+from engine.solids.aabb import Aabb
+from engine.solids.convex import Convex
+from tests.unit.segment_clipping.scenes import through
+
+
+def test_the_textbook_loop_that_never_ends() -> None:
+    pieces = clip_segments([[[1.0, 1.0], [-1.0, -1.0]]], Aabb([1e-9, 1e-9], [3, 3]))
+    assert pieces.end.tolist() == [[1e-9, 1e-9]]
+    assert pieces.faces.tolist() == [[-1, 0]]
+
+
+def test_faces_and_touching_points_by_hand() -> None:
+    box = Aabb([0, 0], [2, 2])
+    cases: list[tuple[Any, Any, Any]] = [
+        ([[-1, -1], [3, 3]], (0.25, 0.75), (0, 1)),  # through two corners: smallest plane
+        ([[-1, 1], [1, -1]], (0.5, 0.5), (0, 2)),  # touches a corner
+        ([[0, 0], [-1, 0]], (0.0, 0.0), (-1, 0)),  # leaves at once
+        ([[-1, 0], [0, 0]], (1.0, 1.0), (0, -1)),  # arrives at the end
+        ([[-1, 0], [3, 0]], (0.25, 0.75), (0, 1)),  # in a face
+        ([[1, 1], [1, 1]], (0.0, 1.0), (-1, -1)),  # a point inside
+        ([[2, 2], [2, 2]], (0.0, 1.0), (-1, -1)),  # a point on a corner
+    ]
+    for region in (box, Convex([[1, 0, 0], [-1, 0, 2], [0, 1, 0], [0, -1, 2]])):
+        pieces = clip_segments(np.array([case[0] for case in cases], float), region)
+        assert pieces.source.tolist() == list(range(len(cases)))
+        assert [tuple(t) for t in pieces.t] == [case[1] for case in cases]
+        assert [tuple(faces) for faces in pieces.faces] == [case[2] for case in cases]
+    assert len(clip_segments([[[3.0, 3.0], [3.0, 3.0]]], box)) == 0
+
+
+def test_boxes_are_idempotent_and_hold_their_pieces() -> None:
+    rng = np.random.default_rng(10)
+    box = Aabb(rng.uniform(-1, 0, 3), rng.uniform(0, 1, 3))
+    segments = through(rng, np.array([box.min, box.max]), 3000)
+    pieces = clip_segments(segments, box)
+    assert ((pieces.start >= box.min) & (pieces.start <= box.max)).all()
+    again = clip_segments(np.stack([pieces.start, pieces.end], axis=1), box)
+    assert again.source.tolist() == list(range(len(pieces)))
+    np.testing.assert_array_equal(again.start, pieces.start)
+    np.testing.assert_array_equal(again.end, pieces.end)
+    assert (again.faces == -1).all()

@@ -1,0 +1,29 @@
+"""What kernels read of a boundary: every triangle once, inner nodes first."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from engine.segment_clipping.prepared_boundary import mesh_of, outline_of
+
+
+def test_blocks_hold_every_triangle_once_behind_all_inner_nodes() -> None:
+    rng = np.random.default_rng(1)
+    for n in (1, 8, 9, 500):
+        elements = rng.uniform(-1, 1, (n, 3, 3))
+        mesh = mesh_of(elements, np.arange(n))
+        inner, blocks = mesh.child[: mesh.n_inner], mesh.child[mesh.n_inner :]
+        items = blocks[(blocks < 0) & (blocks >= -n)]
+        assert sorted(-1 - items) == list(range(n))
+        assert len(mesh.corners) == len(blocks)
+        below = np.concatenate([[0], inner[(inner >= 0) & (inner < len(mesh.child))]])
+        assert sorted(below) == list(range(len(mesh.child)))  # each node has one parent, but the first
+        assert (mesh.beyond[0] < elements.min(axis=(0, 1))).all()
+        assert (mesh.beyond[1] > elements.max(axis=(0, 1))).all()
+
+
+def test_numbers_out_of_range_are_not_safe() -> None:
+    edges = np.array([[[0.0, 1.0], [1.0, 2.0]], [[1.0, 2.0], [0.0, 1.0]]])
+    assert outline_of(edges, np.arange(2)).are_safe
+    for number in (1e-40, 1e40):
+        assert not outline_of(np.where(edges == 2.0, number, edges), np.arange(2)).are_safe
