@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from engine import Surface, collide_triangles
-from engine.collision.meshes.dual_traversal import new_descent, start_descent
-from engine.collision.meshes.mesh_arrays import STILL, Shell, shell_of
+from engine.collision.meshes.dual_traversal import new_descent, place_bodies
+from engine.collision.meshes.mesh_arrays import STILL, MeshBody, mesh_body_of
 from engine.collision.meshes.placement import PoseArrays
 from engine.jit import kernel
 from engine.lanes.boxes import EMPTY, plain_meeting
@@ -35,15 +35,15 @@ def ask(first: Any, second: Any, frames: Any, scales: Any, work: Any, found: Any
 
 @kernel
 def place(first: Any, still: Any, second: Any, poses: Any, descent: Any) -> None:
-    start_descent(first, still, 0, second, poses, 0, descent)
+    place_bodies(first, still, 0, second, poses, 0, descent)
 
 
-def faces_below(shell: Shell, node: int) -> list[int]:
+def faces_below(mesh: MeshBody, node: int) -> list[int]:
     """Return the triangles below a node."""
-    child = shell.arrays.child[node]
+    child = mesh.arrays.child[node]
     if child[0] < 0:
         return [-1 - int(item) for item in child if item != EMPTY]
-    return [face for below in child if below != EMPTY for face in faces_below(shell, int(below))]
+    return [face for below in child if below != EMPTY for face in faces_below(mesh, int(below))]
 
 
 def surfaces() -> dict[str, Surface]:
@@ -64,8 +64,8 @@ def surfaces() -> dict[str, Surface]:
 
 @pytest.mark.parametrize("name", surfaces())
 def test_a_disc_holds_the_faces_of_its_child(name: str) -> None:
-    shell = shell_of(surfaces()[name])
-    arrays = shell.arrays
+    mesh = mesh_body_of(surfaces()[name])
+    arrays = mesh.arrays
     local = (arrays.vertices - arrays.origin) / arrays.scale
     for node in range(len(arrays.child)):
         for lane in range(8):
@@ -74,7 +74,7 @@ def test_a_disc_holds_the_faces_of_its_child(name: str) -> None:
                 continue
             disc = arrays.discs[node, :, lane].astype(float)
             n = disc[3:6] / np.linalg.norm(disc[3:6])
-            away = local[arrays.triangles[faces_below(shell, below)]].reshape(-1, 3) - disc[:3]
+            away = local[arrays.triangles[faces_below(mesh, below)]].reshape(-1, 3) - disc[:3]
             along = away @ n
             assert (np.abs(along) <= disc[7]).all()
             assert (np.linalg.norm(away - along[:, None] * n, axis=1) <= disc[6]).all()
@@ -86,7 +86,7 @@ def test_a_disc_holds_the_faces_of_its_child(name: str) -> None:
 def test_lanes_equal_their_twins_and_keep_what_meets(names: tuple[str, str], size: float) -> None:
     first, second = surfaces()[names[0]], surfaces()[names[1]]
     second = Surface(size * second.vertices, second.triangles)
-    a, b = shell_of(first), shell_of(second)
+    a, b = mesh_body_of(first), mesh_body_of(second)
     rng, descent, n_boxes, n_kept = np.random.default_rng(3), new_descent(), 0, 0
     for item in range(12):
         gap = 1e-4 * (item - 4)
