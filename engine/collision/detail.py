@@ -14,6 +14,7 @@ import numpy as np
 
 from engine.arrangement.subdivision import label_faces, subdivide
 from engine.arrays import FloatArray, Int8Array, IntArray
+from engine.collision.codes import UNSETTLED
 from engine.collision.exact_images import image_half_space, image_point, value_at
 from engine.collision.meshes.live_faces import live_piece
 from engine.collision.meshes.mesh_arrays import mesh_body_of
@@ -66,8 +67,8 @@ def check_has_detail(named: Iterable[tuple[tuple[str | int, ...], Solid]], boole
 
 def details_where_proven(relations: Int8Array) -> Int8Array:
     """Return the codes for pairs that a batch of meshes or convex bodies decided: one that finds overlapping does so by
-    a crossing, or by a point of either body outside the other, so that is PO."""
-    return _WHERE_PROVEN[relations]
+    a crossing, or by a point of either body outside the other, so that is PO; NO_DETAIL where it left UNSETTLED."""
+    return np.where(relations == UNSETTLED, np.int8(NO_DETAIL), _WHERE_PROVEN[relations])
 
 
 def details_of_boxes(low: FloatArray, high: FloatArray, pairs: IntArray, relations: Int8Array) -> Int8Array:

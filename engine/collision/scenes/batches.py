@@ -11,7 +11,7 @@ from engine.collision.codes import UNSETTLED
 from engine.collision.convex.body import ConvexArrays, ConvexBody, convex_body_of, pooled
 from engine.collision.convex.pair import relate_convex_pairs
 from engine.collision.convex.poses import LEAST_POSES, lane_arrays, relate_in_lanes
-from engine.collision.detail import NO_DETAIL, details_of_boxes, details_where_proven
+from engine.collision.detail import details_of_boxes, details_where_proven
 from engine.collision.meshes.mesh_arrays import STILL
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.scenes.bodies import SceneBodies
@@ -55,7 +55,7 @@ class SceneBatches:
     def details(self, pairs: IntArray, relations: Int8Array) -> Int8Array:
         """Return the codes of `Rcc8` of pairs of bodies with interiors whose relations are those that `relations`
         found; NO_DETAIL where these are UNSETTLED."""
-        found = np.where(relations == UNSETTLED, np.int8(NO_DETAIL), details_where_proven(relations))
+        found = details_where_proven(relations)
         boxes = np.flatnonzero(self._is_box[pairs].all(axis=1))
         found[boxes] = details_of_boxes(self._bodies.low, self._bodies.high, pairs[boxes], relations[boxes])
         return found
