@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal, overload
+from typing import Literal, Unpack, overload
 
 from engine.collision.detail import check_has_detail, detail_of
 from engine.collision.pairs import PAIRS
@@ -13,7 +13,7 @@ from engine.errors import (
     UnsupportedSolidError,
     WrongDimensionError,
 )
-from engine.parallel import Budget, Cancel, Progress, check_options
+from engine.parallel import Budget, Cancel, Options, Progress, check_options
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
 from engine.types import Accuracy
@@ -79,40 +79,23 @@ def collide_pair(
     return function(first, second, first_pose, second_pose, work)
 
 
+class CollideOptions(Options, total=False):
+    """What `collide` takes by name, but for `report`, which changes what it returns."""
+
+    first_pose: Pose | None
+    second_pose: Pose | None
+    boolean: bool
+    detail: bool
+
+
 @overload
 def collide(
-    first: Solid,
-    second: Solid,
-    *,
-    first_pose: Pose | None = None,
-    second_pose: Pose | None = None,
-    boolean: bool = False,
-    detail: bool = False,
-    workers: int | None = None,
-    deadline: float | None = None,
-    cancel: Cancel | None = None,
-    progress: Progress | None = None,
-    report: Literal[False] = False,
+    first: Solid, second: Solid, *, report: Literal[False] = False, **options: Unpack[CollideOptions]
 ) -> Collision: ...
-
-
 @overload
 def collide(
-    first: Solid,
-    second: Solid,
-    *,
-    first_pose: Pose | None = None,
-    second_pose: Pose | None = None,
-    boolean: bool = False,
-    detail: bool = False,
-    workers: int | None = None,
-    deadline: float | None = None,
-    cancel: Cancel | None = None,
-    progress: Progress | None = None,
-    report: Literal[True],
+    first: Solid, second: Solid, *, report: Literal[True], **options: Unpack[CollideOptions]
 ) -> tuple[Collision, Accuracy]: ...
-
-
 def collide(
     first: Solid,
     second: Solid,

@@ -3,30 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from engine.arrays import FloatArray, Int8Array, read_only
+from engine.collision.answers import Answers, Witnesses, accuracy_of
 from engine.collision.codes import UNSETTLED
-from engine.collision.collide import collide_pair, pair_function
-from engine.collision.detail import NO_DETAIL, check_has_detail, code_of, detail_of, details_where_proven, has_interior
-from engine.collision.meshes.dual_traversal import new_descent
-from engine.collision.meshes.mesh_arrays import shell_of
+from engine.collision.collide import pair_function
+from engine.collision.detail import NO_DETAIL, check_has_detail, details_where_proven, has_interior
+from engine.collision.meshes.dual_traversal import new_descent, new_found
+from engine.collision.meshes.mesh_arrays import STILL, mesh_body_of
 from engine.collision.meshes.mesh_mesh import mesh_mesh
 from engine.collision.meshes.mesh_pair import what_to_seek
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.meshes.pose_batch import relate_poses
-from engine.collision.result import Witness, Work
+from engine.collision.result import Work
 from engine.collision.scenes.batches import convex_poses
 from engine.errors import InvalidArrayError, WrongDimensionError
 from engine.parallel import Budget, Cancel, Progress, run_chunks
 from engine.solids.base import Solid
 from engine.solids.checks import as_floats
 from engine.solids.pose import Pose, check_rotations
-from engine.types import Accuracy, Relation
+from engine.types import Accuracy
 
 _ROOM = 64
-Witnesses = list[Witness | None]
 PoseCollisions = (
     Int8Array | tuple[Int8Array, Witnesses] | tuple[Int8Array, Int8Array] | tuple[Int8Array, Witnesses, Int8Array]
 )
@@ -67,56 +68,36 @@ def collide_poses(
     >>> collide_poses(box, box, turns, [[0.5, 0, 0], [1, 0, 0], [2, 0, 0]]).tolist()
     [3, 4, 0]
     """
-    function, _ = pair_function(first, second)
+    pair_function(first, second)
     if detail:
         check_has_detail(((("first",), first), (("second",), second)), boolean)
-    turns, moves = as_poses(rotations, translations, first.dimension)
-    n_poses = len(turns)
-    relations = np.full(n_poses, UNSETTLED, np.int8)
-    found: Witnesses = [None] * n_poses
-    details = np.full(n_poses, NO_DETAIL, np.int8)
+    poses = PoseArrays(*as_poses(rotations, translations, first.dimension), True)
+    n_poses = len(poses.rotations)
     with Budget(deadline, cancel) as budget:
         budget.check()
         has_detail = detail and has_interior(first, budget) and has_interior(second, budget)
-        works: list[Work] = []
+        details = np.full(n_poses, NO_DETAIL, np.int8)
+        relations = np.full(n_poses, UNSETTLED, np.int8)
+        found: Witnesses | None = [None] * n_poses if witnesses else None
+        answers = Answers(budget, boolean, relations, found, details if has_detail else None)
+        fill = _batch(first, second, poses, answers)
 
-        def one_by_one(start: int, stop: int) -> None:
-            work = Work(budget, witness=witnesses, boolean=boolean)
-            works.append(work)
-            is_open = relations[start:stop] == UNSETTLED
+        def task(start: int, stop: int) -> None:
+            if fill is not None:
+                fill(start, stop)
             if has_detail:
-                details[start:stop] = np.where(is_open, NO_DETAIL, details_where_proven(relations[start:stop]))
-            if witnesses:
-                is_open |= relations[start:stop] != Relation.DISJOINT
-            for item in (start + np.flatnonzero(is_open)).tolist():
-                budget.check()
-                pose = Pose(turns[item], moves[item])
-                answer = collide_pair(first, second, None, pose, work)
-                relations[item], found[item] = answer.relation, answer.witness
-                if has_detail and details[item] == NO_DETAIL:
-                    details[item] = code_of(detail_of(first, second, None, pose, answer.relation, work))
-
-        task = one_by_one
-        if function is mesh_mesh:
-            batch = convex_poses(first, second, turns, moves, relations, budget, boolean)
-            if batch is None:
-                batch = _mesh_task(first, second, turns, moves, relations, budget, boolean)
-
-            def task(start: int, stop: int) -> None:
-                batch(start, stop)
-                one_by_one(start, stop)
+                details[start:stop] = details_where_proven(relations[start:stop])
+            answers.settle(
+                answers.left(start, stop),
+                lambda item: (first, second, None, Pose(poses.rotations[item], poses.translations[item])),
+            )
 
         run_chunks(task, n_poses, budget=budget, first_chunk=8, workers=workers, progress=progress)
-    result: PoseCollisions = relations
-    if detail:
-        result = (relations, found, details) if witnesses else (relations, details)
-    elif witnesses:
-        result = (relations, found)
+    parts = (relations, *([] if found is None else [found]), *([details] if detail else []))
+    result: Any = parts if len(parts) > 1 else relations
     if not report:
         return result
-    method = "+".join(sorted({first.type, second.type}))
-    beyond, rational = sum(work.n_beyond_filter for work in works), sum(work.n_rational for work in works)
-    return result, Accuracy("exact", None, n_poses, beyond, rational, method)
+    return result, accuracy_of(n_poses, 0, answers.works, "+".join(sorted({first.type, second.type})))
 
 
 def as_poses(rotations: object, translations: object, dimension: int) -> tuple[FloatArray, FloatArray]:
@@ -140,41 +121,23 @@ def as_poses(rotations: object, translations: object, dimension: int) -> tuple[F
     return turns, moves
 
 
-def _mesh_task(
-    first: Solid,
-    second: Solid,
-    turns: FloatArray,
-    moves: FloatArray,
-    relations: Int8Array,
-    budget: Budget,
-    boolean: bool,
-) -> Callable[[int, int], None]:
-    """Return the task that lets the kernel decide a range of poses."""
-    a, b = shell_of(first), shell_of(second)
-    still = a.posed(None)
-    turns, moves = read_only(turns), read_only(moves)
-    seek = what_to_seek(a, b, Work(budget, witness=False, boolean=boolean))
+def _batch(first: Solid, second: Solid, poses: PoseArrays, answers: Answers) -> Callable[[int, int], None] | None:
+    """Return the function that lets kernels answer a range of poses, UNSETTLED where they cannot; None without one."""
+    if pair_function(first, second)[0] is not mesh_mesh:
+        return None
+    budget, relations = answers.budget, answers.relations
+    poses = PoseArrays(read_only(poses.rotations), read_only(poses.translations), True)
+    convex = convex_poses(first, second, poses, relations, budget, answers.boolean)
+    if convex is not None:
+        return convex
+    a, b = mesh_body_of(first), mesh_body_of(second)
+    seek = what_to_seek(a, b, Work(budget, witness=False, boolean=answers.boolean))
 
-    def batch(start: int, stop: int) -> None:
-        pairs, kinds = np.empty((_ROOM, 2), np.int64), np.empty(_ROOM, np.int8)
-        poses = PoseArrays(turns[start:stop], moves[start:stop], True)
+    def fill(start: int, stop: int) -> None:
+        some = PoseArrays(poses.rotations[start:stop], poses.translations[start:stop], True)
+        descent, room = new_descent(), new_found(_ROOM)
         with np.errstate(all="ignore"):
-            relate_poses(
-                a.arrays,
-                a.components,
-                a.has_inside,
-                b.arrays,
-                b.components,
-                b.has_inside,
-                still,
-                poses,
-                seek,
-                new_descent(),
-                pairs,
-                kinds,
-                relations[start:stop],
-                budget.flag,
-            )
+            relate_poses(a.arrays, b.arrays, STILL, some, seek, descent, room, relations[start:stop], budget.flag)
         budget.check()
 
-    return batch
+    return fill

@@ -7,15 +7,17 @@ does, TPP or NTPP by whether the boundaries meet; both do, PO.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
 from engine.arrangement.subdivision import label_faces, subdivide
 from engine.arrays import FloatArray, Int8Array, IntArray
-from engine.collision.exact_images import dot, image_half_space, image_point, minus, squared_length
+from engine.collision.codes import UNSETTLED
+from engine.collision.exact_images import image_half_space, image_point, value_at
 from engine.collision.meshes.live_faces import live_piece
-from engine.collision.meshes.mesh_arrays import shell_of
+from engine.collision.meshes.mesh_arrays import mesh_body_of
 from engine.collision.meshes.mesh_detail import mesh_parts
 from engine.collision.pairs import MESHES, OUTLINES
 from engine.collision.planar.outline import arrange_outlines, live_edges, outline_of, single_points
@@ -26,6 +28,7 @@ from engine.collision.simple.half_space_detail import half_space_mesh_parts, hal
 from engine.containment.rational_locate import rational_location
 from engine.errors import InvalidInputError, UnsupportedSolidError
 from engine.parallel import Budget
+from engine.predicates.exact_vectors import largest_axis, minus, squared_length
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.checks import spell
@@ -64,8 +67,8 @@ def check_has_detail(named: Iterable[tuple[tuple[str | int, ...], Solid]], boole
 
 def details_where_proven(relations: Int8Array) -> Int8Array:
     """Return the codes for pairs that a batch of meshes or convex bodies decided: one that finds overlapping does so by
-    a crossing, or by a point of either body outside the other, so that is PO."""
-    return _WHERE_PROVEN[relations]
+    a crossing, or by a point of either body outside the other, so that is PO; NO_DETAIL where it left UNSETTLED."""
+    return np.where(relations == UNSETTLED, np.int8(NO_DETAIL), _WHERE_PROVEN[relations])
 
 
 def details_of_boxes(low: FloatArray, high: FloatArray, pairs: IntArray, relations: Int8Array) -> Int8Array:
@@ -122,15 +125,15 @@ def _has_interior(solid: Solid, budget: Budget) -> bool:
         return bool((solid.min < solid.max).all())
     if solid.dimension == 2:
         return bool(live_edges(outline_of(solid, None, budget), budget))
-    shell = shell_of(solid)
-    return shell.has_inside and any(live_piece(shell, face, budget) is not None for face in range(len(shell.faces)))
+    mesh = mesh_body_of(solid)
+    return mesh.has_inside and any(live_piece(mesh, face, budget) is not None for face in range(len(mesh.faces)))
 
 
 def _sphere_sphere(
     first: Sphere, second: Sphere, first_pose: Pose | None, second_pose: Pose | None, work: Work
 ) -> Parts:
     between = squared_length(minus(image_point(first.center, first_pose), image_point(second.center, second_pose)))
-    r, s = image_point([first.radius, second.radius], None)
+    r, s = Fraction(first.radius), Fraction(second.radius)
     return Parts(r > s or between > (s - r) ** 2, s > r or between > (s - r) ** 2, True)
 
 
@@ -140,7 +143,7 @@ def _half_spaces(
     """Overlapping half-spaces are equal, or their planes cross, or each holds the plane of the other."""
     n, d = image_half_space(first.normal, first.offset, first_pose)
     m, e = image_half_space(second.normal, second.offset, second_pose)
-    axis = max(range(len(n)), key=lambda k: abs(n[k]))
+    axis = largest_axis(n)
     factor = m[axis] / n[axis]
     is_equal = factor > 0 and all(q == factor * p for p, q in zip((*n, d), (*m, e)))
     return Parts(not is_equal, not is_equal, True)
@@ -150,10 +153,10 @@ def _half_space_sphere(
     half_space: HalfSpace, sphere: Sphere, half_space_pose: Pose | None, sphere_pose: Pose | None, work: Work
 ) -> Parts:
     """A ball that overlaps a half-space reaches its plane."""
-    normal, offset = image_half_space(half_space.normal, half_space.offset, half_space_pose)
-    height = dot(normal, image_point(sphere.center, sphere_pose)) + offset
-    (radius,) = image_point([sphere.radius], None)
-    return Parts(True, height < 0 or height**2 < radius**2 * squared_length(normal), True)
+    plane = image_half_space(half_space.normal, half_space.offset, half_space_pose)
+    height = value_at(plane, image_point(sphere.center, sphere_pose))
+    reach = Fraction(sphere.radius) ** 2 * squared_length(plane[0])
+    return Parts(True, height < 0 or height**2 < reach, True)
 
 
 def _outlines(first: Solid, second: Solid, first_pose: Pose | None, second_pose: Pose | None, work: Work) -> Parts:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from engine.arrays import FloatArray, Int8Array
+from engine.collision.codes import UNSETTLED
 from engine.collision.meshes.exact_body import Corners, on_lattice
 from engine.collision.meshes.exact_triangles import classify_exact
 from engine.collision.meshes.mesh_arrays import lattice_shift
 from engine.collision.meshes.triangle_triangle import APART
 from engine.collision.meshes.triangle_triangle_3d import relate_triangles_3d
 from engine.collision.planar.outline_outline import collide_outline_outline
-from engine.collision.planar.triangle_triangle_2d import OPEN, relate_triangles_2d
+from engine.collision.planar.triangle_triangle_2d import relate_triangles_2d
 from engine.collision.result import Work
 from engine.errors import InvalidArrayError, WrongDimensionError
 from engine.parallel import Budget, Cancel, Progress, run_chunks
@@ -62,7 +63,7 @@ def collide_triangles(
             part = relations[start:stop]
             with np.errstate(all="ignore"):  # uncompiled runs only
                 (relate_triangles_2d if is_planar else relate_triangles_3d)(a[start:stop], b[start:stop], part)
-            still_open = start + np.flatnonzero(part == OPEN)
+            still_open = start + np.flatnonzero(part == UNSETTLED)
             n_open.append(len(still_open))
             for item in still_open.tolist():
                 budget.check()
@@ -85,5 +86,5 @@ def _settled(t: FloatArray, u: FloatArray, budget: Budget) -> Relation:
 
 
 def _on_lattice(triangle: FloatArray, shift: int) -> Corners:
-    a, b, c = ((on_lattice(x, shift), on_lattice(y, shift), on_lattice(z, shift)) for x, y, z in triangle.tolist())
+    a, b, c = (tuple(on_lattice(x, shift) for x in corner) for corner in triangle.tolist())
     return a, b, c

@@ -22,10 +22,9 @@ from __future__ import annotations
 from math import frexp, ldexp
 from typing import Any, NamedTuple
 
-from engine.jit import inline, kernel
+from engine.jit import inline
 from engine.predicates.error_free import workspace
 from engine.predicates.expansion import Components, add_scaled, compress, grow_product, sign
-from engine.predicates.loading import as_point3
 from engine.predicates.orientation import (
     BOUND_3D,
     GUARD_3D,
@@ -237,22 +236,3 @@ def _common_shift(poses: Any, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d:
 def exponent_of(magnitude: float) -> int:
     """Return k with 2^k <= magnitude < 2^(k + 1), for a positive magnitude."""
     return frexp(magnitude)[1] - 1
-
-
-@kernel
-def orient3d_posed_batch(poses: Any, points: Any, bodies: Any, error: float, is_exact: bool, sides: Any) -> None:
-    """Fill sides (n,) int8 for points (4, n, 3) float64 with poses bodies (4, n) int64; is_exact: skip the filter."""
-    for item in range(sides.shape[0]):
-        a, b = posed_row(points[0], bodies[0], item), posed_row(points[1], bodies[1], item)
-        c, d = posed_row(points[2], bodies[2], item), posed_row(points[3], bodies[3], item)
-        if is_exact:
-            sides[item] = orient3d_posed_exact(poses, a, b, c, d)
-        else:
-            sides[item] = orient3d_posed(poses, a, b, c, d, error)
-
-
-@inline
-def posed_row(points: Any, bodies: Any, row: int) -> PosedPoint3:
-    """Return row `row` of points (n, 3) with its pose bodies[row]."""
-    p = as_point3(points, row)
-    return PosedPoint3(p.x, p.y, p.z, int(bodies[row]))

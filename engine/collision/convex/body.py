@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
+from engine.collision.meshes.mesh_arrays import BOX_TRIANGLES, box_corners
 from engine.jit import kernel
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
@@ -22,12 +23,6 @@ from engine.solids.sphere import Sphere
 
 MOST_FACES = 1 << 16
 """Beyond this many triangles the question whether a polyhedron is convex is not asked: milliseconds, mostly for no."""
-
-BOX_TRIANGLES = np.array(
-    [t for a, b, c, d in ([0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6])
-     for t in ((a, b, c), (a, c, d))]
-)  # fmt: skip
-"""Counter-clockwise from outside; bit k of a corner's number says low or high on axis k."""
 
 CENTER, ASIDE = 0, 3
 RADIUS, REACH, ROUND = 6, 7, 8
@@ -85,11 +80,10 @@ def _described(solid: Solid) -> ConvexBody | None:
     if isinstance(solid, Sphere) and solid.dimension == 3 and solid.radius > 0.0:
         return _ball(solid)
     if isinstance(solid, Aabb) and solid.dimension == 3 and bool((solid.min < solid.max).all()):
-        corners = np.array([[(solid.min, solid.max)[i >> k & 1][k] for k in range(3)] for i in range(8)])
         with np.errstate(all="ignore"):
             center = 0.5 * solid.min + 0.5 * solid.max
         if bool(((solid.min < center) & (center < solid.max)).all()):
-            return _hull(corners, BOX_TRIANGLES, center)
+            return _hull(box_corners(solid), BOX_TRIANGLES.reshape(-1, 3), center)
     if isinstance(solid, Polyhedron) and len(solid.triangles) <= MOST_FACES:
         certificate = convexity(solid)
         if certificate is not None:

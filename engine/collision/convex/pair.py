@@ -21,28 +21,27 @@ from engine.collision.convex.body import ASIDE, CENTER, RADIUS, ConvexArrays
 from engine.collision.convex.xenocollide import (
     APART,
     MEETING,
-    Frame,
-    dot,
-    frame_of,
+    PlacedBody,
     largest,
     meet_or_apart,
-    minus,
-    placed,
-    turned,
+    placed_body,
+    point_of,
 )
+from engine.collision.meshes.placement import PoseArrays, placed, turned
 from engine.jit import inline, kernel, merged
-from engine.types import Point3
+from engine.predicates.vectors import dot, minus
+from engine.types import UNDECIDED, Point3
 
-_OUT, _WITHIN, _OPEN = range(3)
+_OUT, _WITHIN = 0, 1
 _POLL_EVERY = 256
 LARGEST_ERROR = 2.0**250
 """Reached where coordinates are about 2^299: products of four lengths stay finite below it."""
 
 
 @inline
-def relate_convex(pool: ConvexArrays, first: int, second: int, a: Frame, b: Frame, is_boolean: bool) -> int:
+def relate_convex(pool: ConvexArrays, first: int, second: int, a: PlacedBody, b: PlacedBody, is_boolean: bool) -> int:
     """Return the relation of two convex bodies, or UNSETTLED; is_boolean: OVERLAPPING for all that is not disjoint."""
-    error = a.error + b.error
+    error = a.place.error + b.place.error
     if not error < LARGEST_ERROR:
         return UNSETTLED
     start = minus(inner_point(pool.numbers, first, a, CENTER), inner_point(pool.numbers, second, b, ASIDE))
@@ -61,9 +60,9 @@ def relate_convex(pool: ConvexArrays, first: int, second: int, a: Frame, b: Fram
 
 
 @inline
-def relate_meeting(pool: ConvexArrays, first: int, second: int, a: Frame, b: Frame, square: float) -> int:
+def relate_meeting(pool: ConvexArrays, first: int, second: int, a: PlacedBody, b: PlacedBody, square: float) -> int:
     """Return the relation of two bodies whose open interiors meet, or UNSETTLED; square: of how far they are."""
-    error = a.error + b.error
+    error = a.place.error + b.place.error
     first_lies = second_lies = _OUT
     if not is_farther(square, pool.numbers[second, RADIUS], error):
         first_lies = _lies(pool, first, second, a, b, square)
@@ -93,9 +92,9 @@ def _relate_balls(distance: float, first_radius: float, second_radius: float, er
 
 
 @merged
-def inner_point(numbers: Any, body: int, f: Frame, which: int) -> Point3:
+def inner_point(numbers: Any, body: int, f: PlacedBody, which: int) -> Point3:
     """Return one of the two points inside a body, posed: CENTER or ASIDE."""
-    return placed(f, numbers[body, which], numbers[body, which + 1], numbers[body, which + 2])
+    return placed(Point3(numbers[body, which], numbers[body, which + 1], numbers[body, which + 2]), f.place)
 
 
 @merged
@@ -106,39 +105,38 @@ def is_farther(square: float, distance: float, error: float) -> bool:
 
 
 @inline
-def _lies(pool: ConvexArrays, inner: int, outer: int, a: Frame, b: Frame, square: float) -> int:
-    """Return whether a body lies within the open interior of another: _WITHIN, _OUT (some of it outside) or _OPEN."""
-    error = 8.0 * (a.error + b.error)
+def _lies(pool: ConvexArrays, inner: int, outer: int, a: PlacedBody, b: PlacedBody, square: float) -> int:
+    """Return whether a body lies within the open interior of another: _WITHIN, _OUT (some of it not) or UNDECIDED."""
+    error = 8.0 * (a.place.error + b.place.error)
     first, stop = pool.firsts[1, outer], pool.firsts[1, outer + 1]
     if first == stop:
         return _lies_in_ball(pool.points, a, inner_point(pool.numbers, outer, b, CENTER), b.round, error)
     extent = np.sqrt(square) + pool.numbers[inner, RADIUS] + pool.numbers[outer, RADIUS]
     result = _WITHIN
     for face in range(first, stop):
-        n = turned(b, pool.normals[0, face], pool.normals[1, face], pool.normals[2, face])
-        anchor = pool.anchors[face]
-        level = dot(n, placed(b, pool.points[0, anchor], pool.points[1, anchor], pool.points[2, anchor]))
+        n = turned(b.place, point_of(pool.normals, face))
+        level = dot(n, placed(point_of(pool.points, pool.anchors[face]), b.place))
         height = largest(pool.points, a, n) - level
         slack = extent * (1e-11 + pool.normals[3, face]) + error
         if height > slack:
             return _OUT
         if not height < -slack:
-            result = _OPEN
+            result = UNDECIDED
     return result
 
 
 @inline
-def _lies_in_ball(points: Any, a: Frame, center: Point3, radius: float, error: float) -> int:
+def _lies_in_ball(points: Any, a: PlacedBody, center: Point3, radius: float, error: float) -> int:
     """Return the same for a ball: its centre and the farthest point of the other body."""
     most = 0.0
     for point in range(a.first, a.stop):
-        v = minus(placed(a, points[0, point], points[1, point], points[2, point]), center)
+        v = minus(placed(point_of(points, point), a.place), center)
         most = max(most, dot(v, v))
     reach = np.sqrt(most) + a.round
     slack = 2.0**-40 * (reach + radius) + error + 2.0**-400
     if reach > radius + slack:
         return _OUT
-    return _WITHIN if reach < radius - slack else _OPEN
+    return _WITHIN if reach < radius - slack else UNDECIDED
 
 
 @merged
@@ -158,8 +156,7 @@ def _has_equal_pose(rotations: Any, translations: Any, i: int, j: int) -> bool:
 def relate_convex_pairs(
     pool: ConvexArrays,
     bodies: Any,
-    rotations: Any,
-    translations: Any,
+    poses: PoseArrays,
     pairs: Any,
     is_boolean: bool,
     relations: Any,
@@ -167,7 +164,7 @@ def relate_convex_pairs(
 ) -> None:
     """Fill what is UNSETTLED in relations (n,) int8 for pairs (n, 2) of rows; bodies: of each row its body, or -1.
 
-    rotations (n_rows, 3, 3), translations (n_rows, 3): row 0 holds the identity, which also stands for no pose.
+    poses: n_rows; row 0 holds the identity, which also stands for no pose.
     Returns early when the flag is raised.
     """
     for item in range(pairs.shape[0]):
@@ -177,8 +174,8 @@ def relate_convex_pairs(
         first, second = bodies[i], bodies[j]
         if relations[item] != UNSETTLED or first < 0 or second < 0:
             continue
-        if _has_equal_pose(rotations, translations, i, j):
+        if _has_equal_pose(poses.rotations, poses.translations, i, j):
             i = j = 0
-        a = frame_of(pool, first, rotations, translations, i)
-        b = frame_of(pool, second, rotations, translations, j)
+        a = placed_body(pool, first, poses, i)
+        b = placed_body(pool, second, poses, j)
         relations[item] = relate_convex(pool, first, second, a, b, is_boolean)

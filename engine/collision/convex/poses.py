@@ -10,7 +10,7 @@ from engine.arrays import Float32Array
 from engine.collision.codes import DISJOINT, OVERLAPPING, UNSETTLED
 from engine.collision.convex.body import ASIDE, CENTER, RADIUS, ConvexArrays, ConvexBody
 from engine.collision.convex.pair import LARGEST_ERROR, inner_point, is_farther, relate_meeting
-from engine.collision.convex.xenocollide import Frame, dot, frame_of, is_around_origin, minus
+from engine.collision.convex.xenocollide import PlacedBody, is_around_origin, placed_body
 from engine.collision.convex.xenocollide_lanes import (
     MARGIN,
     N_ROWS,
@@ -28,6 +28,7 @@ from engine.collision.meshes.placement import PoseArrays
 from engine.jit import inline, kernel
 from engine.lanes.lanes import lowest_bit
 from engine.lanes.tracing import LANES
+from engine.predicates.vectors import dot, minus
 from engine.types import Point3
 
 LEAST_POSES = 32
@@ -54,16 +55,18 @@ def lane_arrays(first: ConvexBody, second: ConvexBody) -> LaneArrays | None:
 
 
 @inline
-def _start(pool: ConvexArrays, per_unit: float, a: Frame, poses: PoseArrays, item: int, state: Any, lane: int) -> int:
+def _start(
+    pool: ConvexArrays, per_unit: float, a: PlacedBody, poses: PoseArrays, item: int, state: Any, lane: int
+) -> int:
     """Begin the search of a pose in a lane and return UNSETTLED; DISJOINT where the balls around the bodies tell."""
-    b = frame_of(pool, 1, poses.rotations, poses.translations, item)
+    b = placed_body(pool, 1, poses, item)
     start = minus(inner_point(pool.numbers, 0, a, CENTER), inner_point(pool.numbers, 1, b, ASIDE))
-    error, square = a.error + b.error, dot(start, start)
+    error, square = a.place.error + b.place.error, dot(start, start)
     if error < LARGEST_ERROR and is_farther(square, pool.numbers[0, RADIUS] + pool.numbers[1, RADIUS], error):
         return DISJOINT
     v0 = Point3(start.x * per_unit, start.y * per_unit, start.z * per_unit)
     shift = max(abs(v0.x), abs(v0.y), abs(v0.z))
-    start_lane(state, lane, b, v0, 2.0**-19 * (1.0 + 0.25 * shift) + error * per_unit)
+    start_lane(state, lane, b.place, v0, 2.0**-19 * (1.0 + 0.25 * shift) + error * per_unit)
     return UNSETTLED
 
 
@@ -77,7 +80,7 @@ def _meets(state: Any, lane: int) -> bool:
 
 
 @inline
-def _relate_met(pool: ConvexArrays, a: Frame, b: Frame, is_boolean: bool) -> int:
+def _relate_met(pool: ConvexArrays, a: PlacedBody, b: PlacedBody, is_boolean: bool) -> int:
     """Return the relation of the two bodies, whose open interiors meet."""
     if is_boolean:
         return OVERLAPPING
@@ -99,7 +102,7 @@ def relate_in_lanes(
 
     still: the identity. A lane whose search has ended takes the next pose. Returns early when the flag is raised.
     """
-    a = frame_of(pool, 0, still.rotations, still.translations, 0)
+    a = placed_body(pool, 0, still, 0)
     state, items = np.zeros((N_ROWS, LANES), np.float32), np.zeros(LANES, np.int64)
     n_poses, following, busy, per_unit = relations.shape[0], 0, 0, 1.0 / lanes.scale
     while flag[0] == 0:
@@ -124,5 +127,5 @@ def relate_in_lanes(
             if is_apart >> lane & 1:
                 relations[item] = DISJOINT
             elif meets >> lane & 1 and _meets(state, lane):
-                b = frame_of(pool, 1, poses.rotations, poses.translations, item)
+                b = placed_body(pool, 1, poses, item)
                 relations[item] = _relate_met(pool, a, b, is_boolean)

@@ -14,8 +14,8 @@ of two rounded posed points, of which a coordinate is off by at most `error` = e
 less than e (|p x q|_1 + |p x r|_1 + |q x r|_1) + 18 e^2 m + 6 e^3 where no coordinate exceeds m, and by 2^-50 of six
 products at most m^3 for rounding. Bodies with an interior then share an interior point.
 
-What neither proves (contact, or almost) is UNSURE and decided elsewhere. Exponents: the caller keeps coordinates below
-2^300 (`convex_pair`), so no product of four lengths overflows; a direction or a determinant of at most 2^-900 proves
+What neither proves (contact, or almost) is UNSETTLED and decided elsewhere. Exponents: the caller keeps coordinates
+below 2^300 (`pair.py`), so no product of four lengths overflows; a direction or a determinant of at most 2^-900 proves
 nothing, so what underflow loses is below the margins.
 
 Source: G. Snethen, XenoCollide: complex collision made simple, Game Programming Gems 7, 2008. Changed: both answers are
@@ -28,37 +28,29 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from engine.collision.codes import UNSETTLED
 from engine.collision.convex.body import REACH, ROUND, ConvexArrays
+from engine.collision.meshes.placement import Placement, PoseArrays, as_placement, placed, turned_back
 from engine.jit import inline, merged
+from engine.predicates.vectors import cross, dot, length, minus, negative
 from engine.types import Point3
 
-APART, MEETING, UNSURE = range(3)
+APART, MEETING = 0, 1
 
 _FEW = 24
 _TURNS = 48
 _GUARD = 2.0**-900
 
 
-class Frame(NamedTuple):
-    """One body of a pool and where it stands: rotation by rows, translation, and what of the pool concerns it.
+class PlacedBody(NamedTuple):
+    """One body of a pool and where it stands, and what of the pool concerns it.
 
-    error: of a rounded posed coordinate, twice the bound of `placement.py`, so that it covers the rounding of a
-    difference and of the point `aside` too. first, stop: its vertices. outermost: where the graph names 8 of them.
+    place: its error is twice the bound of `placement.py`, so that it covers the rounding of a difference of two such
+    coordinates and of a ball's. round: radius of a ball, 0.0 for others. first, stop: its vertices. outermost: where
+    its 8 vertices on the diagonals stand in `graph`.
     """
 
-    xx: float
-    xy: float
-    xz: float
-    yx: float
-    yy: float
-    yz: float
-    zx: float
-    zy: float
-    zz: float
-    x: float
-    y: float
-    z: float
-    error: float
+    place: Placement
     round: float
     first: int
     stop: int
@@ -66,84 +58,23 @@ class Frame(NamedTuple):
 
 
 @merged
-def frame_of(pool: ConvexArrays, body: int, rotations: Any, translations: Any, item: int) -> Frame:
+def placed_body(pool: ConvexArrays, body: int, poses: PoseArrays, item: int) -> PlacedBody:
     """Return body `body` of the pool under pose `item`."""
-    x, y, z = translations[item, 0], translations[item, 1], translations[item, 2]
-    return Frame(
-        rotations[item, 0, 0],
-        rotations[item, 0, 1],
-        rotations[item, 0, 2],
-        rotations[item, 1, 0],
-        rotations[item, 1, 1],
-        rotations[item, 1, 2],
-        rotations[item, 2, 0],
-        rotations[item, 2, 1],
-        rotations[item, 2, 2],
-        x,
-        y,
-        z,
-        2.0**-49 * (3.0 * pool.numbers[body, REACH] + max(abs(x), abs(y), abs(z))) + 2.0**-1060,
-        pool.numbers[body, ROUND],
-        pool.firsts[0, body],
-        pool.firsts[0, body + 1],
-        pool.firsts[2, body],
-    )
+    x, y, z = poses.translations[item, 0], poses.translations[item, 1], poses.translations[item, 2]
+    error = 2.0**-49 * (3.0 * pool.numbers[body, REACH] + max(abs(x), abs(y), abs(z))) + 2.0**-1060
+    place = as_placement(poses, item, x, y, z, error)
+    numbers, firsts = pool.numbers, pool.firsts
+    return PlacedBody(place, numbers[body, ROUND], firsts[0, body], firsts[0, body + 1], firsts[2, body])
 
 
 @merged
-def placed(f: Frame, x: float, y: float, z: float) -> Point3:
-    """Return the rounded posed point."""
-    return Point3(
-        f.xx * x + f.xy * y + f.xz * z + f.x, f.yx * x + f.yy * y + f.yz * z + f.y, f.zx * x + f.zy * y + f.zz * z + f.z
-    )
+def point_of(points: Any, point: int) -> Point3:
+    """Load a vertex of points (3, n)."""
+    return Point3(points[0, point], points[1, point], points[2, point])
 
 
 @merged
-def turned(f: Frame, x: float, y: float, z: float) -> Point3:
-    """Return a direction of the body turned by its pose."""
-    return Point3(f.xx * x + f.xy * y + f.xz * z, f.yx * x + f.yy * y + f.yz * z, f.zx * x + f.zy * y + f.zz * z)
-
-
-@merged
-def into_body(f: Frame, d: Point3) -> Point3:
-    """Return a direction in the body's own coordinates: the transposed rotation times d."""
-    return Point3(
-        f.xx * d.x + f.yx * d.y + f.zx * d.z, f.xy * d.x + f.yy * d.y + f.zy * d.z, f.xz * d.x + f.yz * d.y + f.zz * d.z
-    )
-
-
-@merged
-def minus(a: Point3, b: Point3) -> Point3:
-    """Return a - b."""
-    return Point3(a.x - b.x, a.y - b.y, a.z - b.z)
-
-
-@merged
-def dot(a: Point3, b: Point3) -> float:
-    """Return a . b."""
-    return a.x * b.x + a.y * b.y + a.z * b.z
-
-
-@merged
-def cross(a: Point3, b: Point3) -> Point3:
-    """Return a x b."""
-    return Point3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
-
-
-@merged
-def negative(a: Point3) -> Point3:
-    """Return -a."""
-    return Point3(-a.x, -a.y, -a.z)
-
-
-@merged
-def length(a: Point3) -> float:
-    """Return |a|."""
-    return float(np.sqrt(dot(a, a)))
-
-
-@merged
-def farthest(points: Any, graph: Any, f: Frame, local: Point3, hint: int) -> int:
+def farthest(points: Any, graph: Any, f: PlacedBody, local: Point3, hint: int) -> int:
     """Return a vertex about farthest along a local direction: all of few, else uphill from `hint`, -1 for none."""
     if f.stop - f.first <= _FEW:
         best, found = -np.inf, f.first
@@ -170,9 +101,9 @@ def farthest(points: Any, graph: Any, f: Frame, local: Point3, hint: int) -> int
 
 
 @inline
-def largest(points: Any, f: Frame, d: Point3) -> float:
+def largest(points: Any, f: PlacedBody, d: Point3) -> float:
     """Return the largest d . p of all points p of a posed body."""
-    local = into_body(f, d)
+    local = turned_back(f.place, d)
     best, other = -np.inf, -np.inf
     for point in range(f.first, f.stop - 1, 2):  # two chains: a maximum waits for the one before
         value = points[0, point] * local.x + points[1, point] * local.y + points[2, point] * local.z
@@ -184,15 +115,15 @@ def largest(points: Any, f: Frame, d: Point3) -> float:
     best = max(value, best, other)
     if f.round > 0.0:
         best += f.round * length(d)
-    return best + (d.x * f.x + d.y * f.y + d.z * f.z)
+    return best + (d.x * f.place.x + d.y * f.place.y + d.z * f.place.z)
 
 
 @inline
-def is_apart_along(points: Any, a: Frame, b: Frame, d: Point3) -> bool:
+def is_apart_along(points: Any, a: PlacedBody, b: PlacedBody, d: Point3) -> bool:
     """Tell whether all of the first body surely lies below all of the second one along d."""
     size = abs(d.x) + abs(d.y) + abs(d.z)
     gap = -(largest(points, a, d) + largest(points, b, negative(d)))
-    return size > _GUARD and gap > 2.25 * (a.error + b.error) * size + _GUARD
+    return size > _GUARD and gap > 2.25 * (a.place.error + b.place.error) * size + _GUARD
 
 
 @inline
@@ -223,29 +154,27 @@ def _size(a: Point3) -> float:
 
 
 @inline
-def meet_or_apart(points: Any, graph: Any, a: Frame, b: Frame, v0: Point3) -> int:
-    """Return APART, MEETING (the open interiors) or UNSURE. v0: a point of M, better not one of its symmetry.
+def meet_or_apart(points: Any, graph: Any, a: PlacedBody, b: PlacedBody, v0: Point3) -> int:
+    """Return APART, MEETING (the open interiors) or UNSETTLED. v0: a point of M, better not one of its symmetry.
 
     Stages: 0 and 1 find the first two corners, 2 the third, until the half-line from v0 to the origin passes between
     all three; 3 moves the corners outward.
     """
-    error = a.error + b.error
+    error = a.place.error + b.place.error
     rounding = a.round + b.round
     d, v1, v2, v3 = negative(v0), v0, v0, v0
     i = j = -1
     stage = 0
     for _ in range(_TURNS):
-        i = farthest(points, graph, a, into_body(a, d), i)
-        j = farthest(points, graph, b, into_body(b, negative(d)), j)
-        v = minus(
-            placed(a, points[0, i], points[1, i], points[2, i]), placed(b, points[0, j], points[1, j], points[2, j])
-        )
+        i = farthest(points, graph, a, turned_back(a.place, d), i)
+        j = farthest(points, graph, b, turned_back(b.place, negative(d)), j)
+        v = minus(placed(point_of(points, i), a.place), placed(point_of(points, j), b.place))
         if rounding > 0.0:
             scale = rounding / length(d)
             v = Point3(v.x + scale * d.x, v.y + scale * d.y, v.z + scale * d.z)
         height = dot(v, d)
         if not height > 0.0:
-            return APART if is_apart_along(points, a, b, d) else UNSURE
+            return APART if is_apart_along(points, a, b, d) else UNSETTLED
         if stage == 0:
             v1, d, stage = v, cross(v0, v), 1
             continue
@@ -267,7 +196,7 @@ def meet_or_apart(points: Any, graph: Any, a: Frame, b: Frame, v0: Point3) -> in
                 continue
         else:
             if not height - dot(v1, d) > 4.0 * error * (abs(d.x) + abs(d.y) + abs(d.z)):
-                return UNSURE  # the portal is on the border of M already, and the origin not beyond it
+                return UNSETTLED  # the portal is on the border of M already, and the origin not beyond it
             side = cross(v, v0)
             if dot(v1, side) > 0.0:
                 if dot(v2, side) > 0.0:
@@ -280,5 +209,5 @@ def meet_or_apart(points: Any, graph: Any, a: Frame, b: Frame, v0: Point3) -> in
                 v1 = v
         d = cross(minus(v2, v1), minus(v3, v1))
         if dot(d, v1) >= 0.0:
-            return MEETING if is_around_origin(v0, v1, v2, v3, error) else UNSURE
-    return UNSURE
+            return MEETING if is_around_origin(v0, v1, v2, v3, error) else UNSETTLED
+    return UNSETTLED

@@ -23,9 +23,10 @@ import numpy as np
 
 from engine.arrays import Float32Array
 from engine.collision.convex.body import ConvexBody
-from engine.collision.convex.xenocollide import Frame, cross, dot, minus, negative
+from engine.collision.meshes.placement import Placement
 from engine.jit import inline, merged
 from engine.lanes.lanes import bits_of, load, select, spread, store
+from engine.predicates.vectors import cross, dot, minus, negative
 from engine.types import Point3
 
 MOST_VERTICES = 512
@@ -92,7 +93,7 @@ def _farthest(points: Any, d: Point3) -> tuple[Point3, Any]:
 def step(first: Any, second: Any, state: Any) -> tuple[int, int, int]:
     """Move every lane by one support point; return lanes that are proven apart, that may meet, that ended, a bit each.
 
-    A lane that may meet has its proof in V0 to V3, to be checked. Stages as in `portal.meet_or_apart`.
+    A lane that may meet has its proof in V0 to V3, to be checked. Stages as in `xenocollide.meet_or_apart`.
     """
     v0, d, v1 = _point(state, V0), _point(state, D), _point(state, V1)
     xx, xy, xz = load(state, TURN), load(state, TURN + 1), load(state, TURN + 2)
@@ -148,7 +149,7 @@ def step(first: Any, second: Any, state: Any) -> tuple[int, int, int]:
 
 
 @merged
-def start_lane(state: Any, lane: int, f: Frame, v0: Point3, margin: float) -> None:
+def start_lane(state: Any, lane: int, f: Placement, v0: Point3, margin: float) -> None:
     """Begin the search of a pose in a lane; v0 and margin in units of the pair."""
     state[TURN, lane], state[TURN + 1, lane], state[TURN + 2, lane] = f.xx, f.xy, f.xz
     state[TURN + 3, lane], state[TURN + 4, lane], state[TURN + 5, lane] = f.yx, f.yy, f.yz

@@ -14,11 +14,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from engine.arrays import Float32Array, FloatArray, Int32Array, IntArray
+from engine.arrays import FlagArray, Float32Array, FloatArray, Int8Array, Int32Array, IntArray
 from engine.bounding.bvh import MAX_DEPTH
 from engine.collision.meshes.face_state import proves_overlap, state_of
 from engine.collision.meshes.frames import defect_of, set_frame
-from engine.collision.meshes.mesh_arrays import STATE_CLEAN, ShellArrays, triangle_of
+from engine.collision.meshes.mesh_arrays import STATE_CLEAN, MeshArrays, triangle_of
 from engine.collision.meshes.placement import (
     Placement,
     PoseArrays,
@@ -29,20 +29,18 @@ from engine.collision.meshes.placement import (
 from engine.collision.meshes.triangle_triangle import (
     APART,
     CROSSING,
-    PosedTriangle,
     Triangle3,
     classify_exactly,
     classify_near,
-    unposed,
+    with_pose,
 )
-from engine.jit import inline
+from engine.jit import called, inline, merged
 from engine.lanes.boxes import FRAME_ROWS, meeting
 from engine.lanes.discs import discs_meeting
 from engine.lanes.faces import WORK_ROWS, faces_meeting
 from engine.lanes.lanes import lowest_bit
 from engine.lanes.tracing import LANES
-from engine.predicates.loading import as_point3
-from engine.predicates.posed import UNPOSED, PosedPoint3, posed_error
+from engine.predicates.posed import UNPOSED, posed_error
 from engine.types import UNDECIDED
 
 SEEK_OVERLAP = 0
@@ -79,6 +77,13 @@ class Descent(NamedTuple):
     poses: FloatArray
 
 
+class Found(NamedTuple):
+    """Room for pairs of faces that are not apart: pairs (room, 2) and their classes kinds (room,), room >= 1."""
+
+    pairs: IntArray
+    kinds: Int8Array
+
+
 class Place(NamedTuple):
     """Where the two bodies are: rounded placements (`place_pair`), are they posed, and the error of exact signs."""
 
@@ -86,6 +91,18 @@ class Place(NamedTuple):
     b: Placement
     error: float
     posed_error: float
+
+
+class Search(NamedTuple):
+    """One question to two bodies: where they are, what ends it early (SEEK_...), and where its answer goes."""
+
+    first: MeshArrays
+    second: MeshArrays
+    place: Place
+    descent: Descent
+    seek: int
+    found: Found
+    flag: FlagArray
 
 
 def new_descent() -> Descent:
@@ -99,6 +116,11 @@ def new_descent() -> Descent:
     )
 
 
+def new_found(room: int) -> Found:
+    """Return room for pairs."""
+    return Found(np.empty((room, 2), np.int64), np.empty(room, np.int8))
+
+
 @inline
 def store_pose(poses: Any, row: int, pose: PoseArrays, item: int) -> None:
     """Write one pose as exact signs take it: rotation by rows, then translation."""
@@ -109,24 +131,21 @@ def store_pose(poses: Any, row: int, pose: PoseArrays, item: int) -> None:
 
 
 @inline
-def start_descent(
-    first: ShellArrays,
+def place_bodies(
+    first: MeshArrays,
     first_pose: PoseArrays,
     first_item: int,
-    second: ShellArrays,
+    second: MeshArrays,
     second_pose: PoseArrays,
     second_item: int,
     descent: Descent,
-) -> Place:
-    """Place two bodies and begin a search with their roots; nothing is left to do where they are surely apart."""
+) -> tuple[Place, bool]:
+    """Place two bodies and fill the frames and poses of a search; tell whether they are surely apart."""
     a, b = place_pair(first.extent, first_pose, first_item, second.extent, second_pose, second_item)
     defect = defect_of(a) + defect_of(b)
     is_apart = set_frame(descent.frames[0], a, first.origin, first.scale, b, second.origin, second.scale, defect)
     if not is_apart:
         is_apart = set_frame(descent.frames[1], b, second.origin, second.scale, a, first.origin, first.scale, defect)
-    descent.stack[0, 0], descent.stack[0, 1] = 0, 0
-    descent.rest[:] = 0
-    descent.rest[0] = 0 if is_apart else 1
     error = max(a.error, b.error)
     exact_error = 0.0
     if error != 0.0:
@@ -136,7 +155,15 @@ def start_descent(
             exact_error = posed_error(descent.poses, 0, first.extent.reach)
         if second_pose.is_posed:
             exact_error = max(exact_error, posed_error(descent.poses, 1, second.extent.reach))
-    return Place(a, b, error, exact_error)
+    return Place(a, b, error, exact_error), is_apart
+
+
+@inline
+def begin(descent: Descent, is_apart: bool) -> None:
+    """Begin with the two roots; nothing is left to do where the bodies are surely apart."""
+    descent.stack[0, 0], descent.stack[0, 1] = 0, 0
+    descent.rest[:] = 0
+    descent.rest[0] = 0 if is_apart else 1
 
 
 @inline
@@ -145,137 +172,129 @@ def placed_triangle(t: Triangle3, place: Placement) -> Triangle3:
     return Triangle3(placed(t.p, place), placed(t.q, place), placed(t.r, place))
 
 
-@inline
-def with_pose(t: Triangle3, pose: int) -> PosedTriangle:
-    """Return the triangle before pose number `pose`."""
-    return PosedTriangle(
-        PosedPoint3(t.p.x, t.p.y, t.p.z, pose),
-        PosedPoint3(t.q.x, t.q.y, t.q.z, pose),
-        PosedPoint3(t.r.x, t.r.y, t.r.z, pose),
-    )
-
-
-@inline
-def corners_of(vertices: Any, triangles: Any, item: int) -> Triangle3:
-    """Load a triangle; from arrays, since handing a whole `ShellArrays` on costs more than the test that follows."""
-    return Triangle3(
-        as_point3(vertices, triangles[item, 0]),
-        as_point3(vertices, triangles[item, 1]),
-        as_point3(vertices, triangles[item, 2]),
-    )
-
-
-@inline
-def settle_class(first: ShellArrays, i: int, second: ShellArrays, j: int, place: Place, poses: Any) -> int:
+@called
+def settle_class(s: Search, i: int, j: int) -> int:
     """Return the class of two faces that `classify_near` leaves open; UNDECIDED where one has no area or exponents
     leave the range."""
-    if first.axis[i] < 0 or second.axis[j] < 0:
+    place, poses = s.place, s.descent.poses
+    if s.first.axis[i] < 0 or s.second.axis[j] < 0:
         return UNDECIDED
-    t, u = triangle_of(first, i), triangle_of(second, j)
+    t, u = triangle_of(s.first, i), triangle_of(s.second, j)
     if place.error == 0.0:  # the rounded points are the points
         t, u = placed_triangle(t, place.a), placed_triangle(u, place.b)
-        return classify_exactly(poses, unposed(t), unposed(u), placed_axis(int(first.axis[i]), place.a), 0.0)
+        return classify_exactly(poses, with_pose(t), with_pose(u), placed_axis(int(s.first.axis[i]), place.a), 0.0)
     t_posed = with_pose(t, 0 if place.a.is_posed else UNPOSED)
     u_posed = with_pose(u, 1 if place.b.is_posed else UNPOSED)
-    return classify_exactly(poses, t_posed, u_posed, int(first.axis[i]), place.posed_error)
+    return classify_exactly(poses, t_posed, u_posed, int(s.first.axis[i]), place.posed_error)
 
 
 @inline
-def settles(seek: int, kind: int, first: ShellArrays, i: int, second: ShellArrays, j: int, poses: Any) -> bool:
+def settles(s: Search, kind: int, i: int, j: int) -> bool:
     """Tell whether a contact of class `kind` answers what is sought."""
-    if seek == SEEK_CONTACT:
+    if s.seek == SEEK_CONTACT:
         return True
     if kind != CROSSING:
         return False
-    if seek == SEEK_OVERLAP:
-        return proves_overlap(first, i, second, j, poses)
-    if seek == SEEK_PIERCING_BY_FIRST:
-        return state_of(second, j, poses) == STATE_CLEAN
-    return state_of(first, i, poses) == STATE_CLEAN
+    if s.seek == SEEK_OVERLAP:
+        return proves_overlap(s.first, i, s.second, j, s.descent.poses)
+    if s.seek == SEEK_PIERCING_BY_FIRST:
+        return state_of(s.second, j, s.descent.poses) == STATE_CLEAN
+    return state_of(s.first, i, s.descent.poses) == STATE_CLEAN
+
+
+@merged
+def take_bit(low: int, high: int) -> tuple[int, int, int]:
+    """Return the number of the lowest of 64 bits, given as two halves that are not both 0, and the halves without."""
+    if low != 0:
+        return lowest_bit(low), low & (low - 1), high
+    return 32 + lowest_bit(high), low, high & (high - 1)
 
 
 @inline
-def search(
-    first: ShellArrays,
-    second: ShellArrays,
-    place: Place,
-    descent: Descent,
-    seek: int,
-    pairs: Any,
-    kinds: Any,
-    flag: Any,
-) -> tuple[int, int]:
-    """Write the pairs (i, j) that are not apart and their classes; return how the search ended and their number.
+def classify_faces(s: Search, i: int, j: int, low: int, high: int, n_pairs: int) -> tuple[int, int, int, int]:
+    """Classify the pairs of faces of blocks i and j that the bits low and high name; write those that are not apart.
 
-    pairs (room, 2), kinds (room,), room >= 1. A pair that settles what is sought is written to row 0.
+    Returns DONE, or what ended it early; the number of pairs written; the bits not looked at yet.
     """
-    stack, rest, poses = descent.stack, descent.rest, descent.poses
-    vertices, triangles, child = first.vertices, first.triangles, first.child
-    their_vertices, their_triangles, their_child = second.vertices, second.triangles, second.child
-    boxes, their_boxes, frames = first.boxes, second.boxes, descent.frames
-    blocks, their_blocks, work = first.blocks, second.blocks, descent.work
-    discs, their_discs, scales = first.discs, second.discs, (first.scale, second.scale)
+    pairs, kinds = s.found
+    while low != 0 or high != 0:  # bound: each turn takes a bit
+        bit, low, high = take_bit(low, high)
+        i_face, j_face = -1 - int(s.first.child[i, bit >> 3]), -1 - int(s.second.child[j, bit & 7])
+        t = placed_triangle(triangle_of(s.first, i_face), s.place.a)
+        u = placed_triangle(triangle_of(s.second, j_face), s.place.b)
+        kind = classify_near(t, u, s.place.error)
+        if kind == UNDECIDED:
+            kind = settle_class(s, i_face, j_face)
+        if kind == APART:
+            continue
+        if kind != UNDECIDED and settles(s, kind, i_face, j_face):
+            pairs[0, 0], pairs[0, 1], kinds[0] = i_face, j_face, kind
+            return SETTLED, 1, low, high
+        pairs[n_pairs, 0], pairs[n_pairs, 1], kinds[n_pairs] = i_face, j_face, kind
+        n_pairs += 1
+        if s.flag[0] != 0:
+            return INTERRUPTED, n_pairs, low, high
+        if n_pairs == kinds.shape[0]:
+            return FULL, n_pairs, low, high
+    return DONE, n_pairs, low, high
+
+
+@merged
+def replace_pair(s: Search, i: int, j: int, n_stack: int) -> tuple[int, int, int]:
+    """Put the pairs of children of nodes i and j that may meet in their place on the stack; of two blocks, nothing.
+
+    Returns the height of the stack, and of two blocks the bits of their pairs of faces that may meet.
+    """
+    stack, child, their_child, frames, work = (
+        s.descent.stack,
+        s.first.child,
+        s.second.child,
+        s.descent.frames,
+        s.descent.work,
+    )
+    i_block, j_block = child[i, 0] < 0, their_child[j, 0] < 0
+    if i_block and j_block:
+        low, high = faces_meeting(s.first.blocks, i, s.second.blocks, j, frames, work)
+        return n_stack, low, high
+    low, high = meeting(s.first.boxes, i, s.second.boxes, j, frames)
+    if j_block:  # only the lanes of i count
+        for lane in range(LANES):
+            if (low if lane < 4 else high) >> (8 * (lane & 3)) & 255 != 0:
+                stack[n_stack, 0], stack[n_stack, 1] = child[i, lane], j
+                n_stack += 1
+    elif i_block:
+        low |= high
+        bits = (low | low >> 8 | low >> 16 | low >> 24) & 255
+        while bits != 0:
+            stack[n_stack, 0], stack[n_stack, 1] = i, their_child[j, lowest_bit(bits)]
+            bits &= bits - 1
+            n_stack += 1
+    else:
+        scales = (s.first.scale, s.second.scale)
+        low, high = discs_meeting(low, high, s.first.discs, i, s.second.discs, j, frames, scales, work)
+        while low != 0 or high != 0:
+            bit, low, high = take_bit(low, high)
+            stack[n_stack, 0], stack[n_stack, 1] = child[i, bit >> 3], their_child[j, bit & 7]
+            n_stack += 1
+    return n_stack, 0, 0
+
+
+@inline
+def search(s: Search) -> tuple[int, int]:
+    """Write the pairs of faces that are not apart and their classes; return how the search ended and their number.
+
+    A pair that settles what is sought is written to row 0.
+    """
+    stack, rest = s.descent.stack, s.descent.rest
     n_stack, n_pairs = rest[0], 0
     i, j, low, high = rest[1], rest[2], rest[3], rest[4]
     while True:  # bound: each pair of nodes, and each pair of faces, enters once
-        for half in range(2):
-            bits = low if half == 0 else high
-            while bits != 0:
-                bit = lowest_bit(bits)
-                bits &= bits - 1
-                i_face = -1 - int(child[i, 4 * half + (bit >> 3)])
-                j_face = -1 - int(their_child[j, bit & 7])
-                t = placed_triangle(corners_of(vertices, triangles, i_face), place.a)
-                u = placed_triangle(corners_of(their_vertices, their_triangles, j_face), place.b)
-                kind = classify_near(t, u, place.error)
-                if kind == UNDECIDED:
-                    kind = settle_class(first, i_face, second, j_face, place, poses)
-                if kind == APART:
-                    continue
-                if kind != UNDECIDED and settles(seek, kind, first, i_face, second, j_face, poses):
-                    pairs[0, 0], pairs[0, 1], kinds[0] = i_face, j_face, kind
-                    return SETTLED, 1
-                pairs[n_pairs, 0], pairs[n_pairs, 1], kinds[n_pairs] = i_face, j_face, kind
-                n_pairs += 1
-                if flag[0] != 0:
-                    return INTERRUPTED, n_pairs
-                if n_pairs == kinds.shape[0]:
-                    rest[0], rest[1], rest[2] = n_stack, i, j
-                    rest[3], rest[4] = (bits, high) if half == 0 else (0, bits)
-                    return FULL, n_pairs
-        low = high = 0
-        if n_stack == 0:
-            rest[0], rest[3], rest[4] = 0, 0, 0
-            return DONE, n_pairs
-        if flag[0] != 0:
-            return INTERRUPTED, n_pairs
+        how = DONE if n_stack == 0 or s.flag[0] == 0 else INTERRUPTED
+        if low != 0 or high != 0:
+            how, n_pairs, low, high = classify_faces(s, i, j, low, high, n_pairs)
+        if how != DONE or n_stack == 0:
+            rest[0], rest[1], rest[2], rest[3], rest[4] = n_stack, i, j, low, high
+            return how, n_pairs
         n_stack -= 1
         i, j = int(stack[n_stack, 0]), int(stack[n_stack, 1])
-        i_block, j_block = child[i, 0] < 0, their_child[j, 0] < 0
-        if i_block and j_block:
-            low, high = faces_meeting(blocks, i, their_blocks, j, frames, work)
-            continue
-        low, high = meeting(boxes, i, their_boxes, j, frames)
-        if j_block:  # only the lanes of i count
-            for lane in range(LANES):
-                if (low if lane < 4 else high) >> (8 * (lane & 3)) & 255 != 0:
-                    stack[n_stack, 0], stack[n_stack, 1] = child[i, lane], j
-                    n_stack += 1
-        elif i_block:
-            low |= high
-            bits = (low | low >> 8 | low >> 16 | low >> 24) & 255
-            while bits != 0:
-                stack[n_stack, 0], stack[n_stack, 1] = i, their_child[j, lowest_bit(bits)]
-                bits &= bits - 1
-                n_stack += 1
-        else:
-            low, high = discs_meeting(low, high, discs, i, their_discs, j, frames, scales, work)
-            for half in range(2):
-                bits = low if half == 0 else high
-                while bits != 0:
-                    bit = lowest_bit(bits)
-                    bits &= bits - 1
-                    stack[n_stack, 0] = child[i, 4 * half + (bit >> 3)]
-                    stack[n_stack, 1] = their_child[j, bit & 7]
-                    n_stack += 1
-        low = high = 0
+        n_stack, low, high = replace_pair(s, i, j, n_stack)

@@ -12,36 +12,17 @@ import numpy as np
 
 from engine.bounding.bvh import WIDTH
 from engine.collision.meshes.face_state import STACK_ROWS
-from engine.collision.meshes.mesh_arrays import Shell, ShellArrays, lattice_shift
+from engine.collision.meshes.mesh_arrays import MeshArrays, MeshBody, lattice_shift
 from engine.collision.meshes.placement import PoseArrays
 from engine.jit import inline, kernel
 from engine.lanes.boxes import EMPTY
+from engine.predicates.exact_vectors import cross, dot, largest_axis, minus
 from engine.solids.pose import Pose
 
-Vector = tuple[int, int, int]
-Plane = tuple[int, int, int, int]
+Vector = tuple[int, ...]
+Plane = tuple[int, ...]
 """(a, b, c, d): a x + b y + c z + d = 0, the normal (a, b, c) as the face is oriented."""
 Corners = tuple[Vector, Vector, Vector]
-
-
-def cross(u: Vector, v: Vector) -> Vector:
-    """Return u x v."""
-    return u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
-
-
-def minus(u: Vector, v: Vector) -> Vector:
-    """Return u - v."""
-    return u[0] - v[0], u[1] - v[1], u[2] - v[2]
-
-
-def dot(u: Vector, v: Vector) -> int:
-    """Return u . v."""
-    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
-
-
-def sign(value: int) -> int:
-    """Return -1, 0 or 1."""
-    return (value > 0) - (value < 0)
 
 
 def plane_through(corners: Corners) -> Plane:
@@ -49,13 +30,6 @@ def plane_through(corners: Corners) -> Plane:
     p, q, r = corners
     n = cross(minus(q, p), minus(r, p))
     return (*n, -dot(n, p))
-
-
-def largest_axis(n: Vector) -> int:
-    """Return the axis of the largest component, -1 for the zero vector."""
-    sizes = [abs(component) for component in n]
-    largest = max(sizes)
-    return sizes.index(largest) if largest else -1
 
 
 def on_lattice(value: float, shift: int) -> int:
@@ -67,15 +41,15 @@ def on_lattice(value: float, shift: int) -> int:
 class ExactBody:
     """One placed body on the lattice of a pair."""
 
-    def __init__(self, shell: Shell, pose: Pose | None, shift: int) -> None:
-        self.shell = shell
-        self.pose = shell.posed(pose)
+    def __init__(self, mesh: MeshBody, pose: Pose | None, shift: int) -> None:
+        self.mesh = mesh
+        self.pose = mesh.posed(pose)
         self.shift = shift
         self._rotation: list[Vector] | None = None
         if pose is not None:
             self._r_shift = lattice_shift(pose.rotation)
-            rows = [[on_lattice(value, self._r_shift) for value in row] for row in pose.rotation.tolist()]
-            self._rotation = [(row[0], row[1], row[2]) for row in rows]
+            rows = pose.rotation.tolist()
+            self._rotation = [tuple(on_lattice(value, self._r_shift) for value in row) for row in rows]
             self._translation = [on_lattice(value, shift) for value in pose.translation.tolist()]
         self._vertices: dict[int, Vector] = {}
         self._planes: dict[int, Plane] = {}
@@ -84,21 +58,18 @@ class ExactBody:
         """Return the exact placed vertex."""
         found = self._vertices.get(index)
         if found is None:
-            p = self.shell.arrays.vertices[index].tolist()
+            p = self.mesh.arrays.vertices[index].tolist()
             if self._rotation is None:
-                x, y, z = (on_lattice(value, self.shift) for value in p)
+                found = tuple(on_lattice(value, self.shift) for value in p)
             else:
                 q = [on_lattice(value, self.shift - self._r_shift) for value in p]
-                x, y, z = (
-                    row[0] * q[0] + row[1] * q[1] + row[2] * q[2] + t
-                    for row, t in zip(self._rotation, self._translation)
-                )
-            found = self._vertices[index] = (x, y, z)
+                found = tuple(dot(row, q) + t for row, t in zip(self._rotation, self._translation))
+            self._vertices[index] = found
         return found
 
     def corners(self, face: int) -> Corners:
         """Return the three exact corners of a triangle."""
-        a, b, c = self.shell.arrays.triangles[face].tolist()
+        a, b, c = self.mesh.arrays.triangles[face].tolist()
         return self.vertex(a), self.vertex(b), self.vertex(c)
 
     def plane(self, face: int) -> Plane:
@@ -114,7 +85,7 @@ class ExactBody:
 
     def faces_in(self, low: list[float], high: list[float]) -> list[int]:
         """Return, ascending, at least the triangles that meet the closed box; bounds may be infinite."""
-        arrays = self.shell.arrays
+        arrays = self.mesh.arrays
         box = np.array([*low, *high])
         found = np.empty(256, np.int64)
         with np.errstate(all="ignore"):  # uncompiled runs only
@@ -127,12 +98,12 @@ class ExactBody:
 
 
 def exact_pair(
-    first: Shell, first_pose: Pose | None, second: Shell, second_pose: Pose | None
+    first: MeshBody, first_pose: Pose | None, second: MeshBody, second_pose: Pose | None
 ) -> tuple[ExactBody, ExactBody]:
     """Return both bodies on one lattice."""
     shift = 0
-    for shell, pose in ((first, first_pose), (second, second_pose)):
-        own = shell.shift
+    for mesh, pose in ((first, first_pose), (second, second_pose)):
+        own = mesh.shift
         if pose is not None:
             own = max(own + lattice_shift(pose.rotation), lattice_shift(pose.translation))
         shift = max(shift, own)
@@ -149,25 +120,25 @@ def rounded_outward(numerator: int, denominator: int) -> tuple[float, float]:
 
 
 @inline
-def _is_lane_apart(shell: ShellArrays, node: int, lane: int, pose: PoseArrays, margin: float, bounds: Any) -> bool:
+def _is_lane_apart(mesh: MeshArrays, node: int, lane: int, pose: PoseArrays, margin: float, bounds: Any) -> bool:
     """Tell whether a placed child box surely has no common point with bounds (6,); NaN is never apart."""
     r, t = pose.rotations[0], pose.translations[0]
     for i in range(3):
         centre, half = t[i], margin
         for k in range(3):
-            centre += r[i, k] * (shell.origin[k] + shell.scale * float(shell.boxes[node, k, lane]))
-            half += abs(r[i, k]) * (shell.scale * float(shell.boxes[node, 3 + k, lane]))
+            centre += r[i, k] * (mesh.origin[k] + mesh.scale * float(mesh.boxes[node, k, lane]))
+            half += abs(r[i, k]) * (mesh.scale * float(mesh.boxes[node, 3 + k, lane]))
         if centre - half > bounds[3 + i] or centre + half < bounds[i]:
             return True
     return False
 
 
 @kernel
-def _faces_in_box(shell: ShellArrays, pose: PoseArrays, bounds: Any, found: Any) -> int:
+def _faces_in_box(mesh: MeshArrays, pose: PoseArrays, bounds: Any, found: Any) -> int:
     """Write the triangles whose placed boxes may meet bounds (6,) into found (room,); return their number."""
     t = pose.translations[0]
     shift = max(abs(t[0]), abs(t[1]), abs(t[2]))
-    margin = 2.0**-47 * (3.0 * shell.extent.reach + shift) + 2.0**-1060  # 8 times the error of `placement.py`
+    margin = 2.0**-47 * (3.0 * mesh.extent.reach + shift) + 2.0**-1060  # 8 times the error of `placement.py`
     stack = np.empty(STACK_ROWS, np.int32)
     stack[0] = 0
     n_stack, n_found = 1, 0
@@ -175,8 +146,8 @@ def _faces_in_box(shell: ShellArrays, pose: PoseArrays, bounds: Any, found: Any)
         n_stack -= 1
         node = int(stack[n_stack])
         for lane in range(WIDTH):
-            child = int(shell.child[node, lane])
-            if child == EMPTY or _is_lane_apart(shell, node, lane, pose, margin, bounds):
+            child = int(mesh.child[node, lane])
+            if child == EMPTY or _is_lane_apart(mesh, node, lane, pose, margin, bounds):
                 continue
             if child >= 0:
                 stack[n_stack] = child

@@ -6,19 +6,11 @@ out of range) and names the kind of a witness. A face without area is its longes
 
 from __future__ import annotations
 
-from engine.collision.meshes.exact_body import (
-    Corners,
-    Plane,
-    Vector,
-    cross,
-    dot,
-    largest_axis,
-    minus,
-    plane_through,
-    sign,
-)
+from engine.collision.meshes.exact_body import Corners, Plane, Vector, plane_through
 from engine.collision.meshes.triangle_triangle import APART, CONTACT, COPLANAR, CROSSING
 from engine.collision.result import Kind
+from engine.predicates.exact_vectors import cross, dot, largest_axis, minus
+from engine.predicates.rational import sign_of
 
 Flat = tuple[int, int]
 
@@ -35,12 +27,12 @@ def without_axis(p: Vector, axis: int) -> Flat:
 
 def turn(a: Flat, b: Flat, c: Flat) -> int:
     """Return the sign of orient2d."""
-    return sign((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+    return sign_of((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
 
 
 def side(a: Vector, b: Vector, c: Vector, d: Vector) -> int:
     """Return the sign of orient3d."""
-    return sign(dot(cross(minus(b, a), minus(c, a)), minus(d, a)))
+    return sign_of(dot(cross(minus(b, a), minus(c, a)), minus(d, a)))
 
 
 def as_simplex(t: Corners) -> tuple[Vector, ...]:
@@ -86,7 +78,7 @@ def segments_meet(a: Vector, b: Vector, c: Vector, d: Vector) -> bool:
 
 def segment_meets_triangle(a: Vector, b: Vector, t: Corners, plane: Plane) -> bool:
     """Tell whether a closed segment of positive length meets a closed triangle with area."""
-    a_side, b_side = sign(value_at(plane, a)), sign(value_at(plane, b))
+    a_side, b_side = sign_of(value_at(plane, a)), sign_of(value_at(plane, b))
     if a_side * b_side > 0:
         return False
     if a_side == 0 and b_side == 0:
@@ -116,10 +108,10 @@ def classify_exact(t1: Corners, t2: Corners, plane1: Plane | None = None, plane2
     plane1, plane2 = plane1 or plane_through(t1), plane2 or plane_through(t2)
     if not any(plane1) or not any(plane2):
         return CONTACT if simplices_meet(as_simplex(t1), as_simplex(t2)) else APART
-    sides2 = [sign(value_at(plane1, p)) for p in t2]
+    sides2 = [sign_of(value_at(plane1, p)) for p in t2]
     if abs(sum(sides2)) == 3:
         return APART
-    sides1 = [sign(value_at(plane2, p)) for p in t1]
+    sides1 = [sign_of(value_at(plane2, p)) for p in t1]
     if abs(sum(sides1)) == 3:
         return APART
     if not any(sides2):
@@ -230,7 +222,7 @@ def _edge_meets_open_face(s: tuple[Vector, ...], values: list[int], t: tuple[Vec
         return False
     for i in range(len(s) if len(s) == 3 else len(s) - 1):
         a, b = s[i], s[i - 1]
-        a_side, b_side = sign(values[i]), sign(values[i - 1])
+        a_side, b_side = sign_of(values[i]), sign_of(values[i - 1])
         if a_side * b_side < 0:
             if len({side(a, b, t[k], t[(k + 1) % 3]) for k in range(3)}) == 1:
                 return True

@@ -1,4 +1,4 @@
-"""All pairs of faces of two shells with a common point, or the one pair that settles the question."""
+"""All pairs of faces of two meshes with a common point, or the one pair that settles the question."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from engine.collision.meshes.dual_traversal import (
     SEEK_PIERCING_BY_SECOND,
     SETTLED,
     new_descent,
+    new_found,
 )
 from engine.collision.meshes.exact_triangles import classify_exact
-from engine.collision.meshes.face_cells import look_at_cells
+from engine.collision.meshes.face_regions import look_at_regions
 from engine.collision.meshes.mesh_arrays import STATE_CLEAN, STATE_CROSSED
 from engine.collision.meshes.mesh_pair import MeshPair
 from engine.collision.meshes.pose_batch import find_contacts
@@ -26,58 +27,44 @@ _ROOM = 1024
 _PROBED = 8
 
 
-def find_all_contacts(pair: MeshPair, *, looks_at_cells: bool = True) -> tuple[IntArray, bool]:
+def find_all_contacts(pair: MeshPair, *, looks_at_regions: bool = True) -> tuple[IntArray, bool]:
     """Return the pairs of faces (n, 2) with a common point, ascending, or the one that settles all; tell if it does.
 
-    looks_at_cells: whether cells that prove overlapping settle it too; without, only a crossing does.
+    looks_at_regions: whether regions that prove overlapping settle it too; without, only a crossing does.
     """
-    (first, second), flag = pair.shells, pair.work.budget.flag
-    first_pose, second_pose = first.posed(pair.poses[0]), second.posed(pair.poses[1])
-    pairs, kinds = np.empty((_ROOM, 2), np.int64), np.empty(_ROOM, np.int8)
-    descent = new_descent()
+    found, descent, budget = new_found(_ROOM), new_descent(), pair.work.budget
     found_pairs: list[IntArray] = []
     found_kinds: list[Int8Array] = []
+    (first, second), (first_pose, second_pose) = (mesh.arrays for mesh in pair.meshes), pair.posed
     how = FULL
     while how == FULL:  # bound: each turn finds new pairs
         how, n_pairs, apart = find_contacts(
-            first.arrays,
-            first.components,
-            first.has_inside,
-            first_pose,
-            second.arrays,
-            second.components,
-            second.has_inside,
-            second_pose,
-            pair.seek,
-            not found_pairs,
-            descent,
-            pairs,
-            kinds,
-            flag,
+            first, first_pose, second, second_pose, pair.seek, not found_pairs, descent, found, budget.flag
         )
-        pair.work.budget.check()
+        budget.check()
         if how == SETTLED:
-            return pairs[:1], True
+            return found.pairs[:1], True
         if apart == Relation.DISJOINT:
             pair.is_disjoint = True
-            return pairs[:0], False
-        found_pairs.append(pairs[:n_pairs].copy())
-        found_kinds.append(kinds[:n_pairs].copy())
+            return found.pairs[:0], False
+        found_pairs.append(found.pairs[:n_pairs].copy())
+        found_kinds.append(found.kinds[:n_pairs].copy())
         is_first = how == FULL and len(found_pairs) == 1
-        if is_first and looks_at_cells and pair.seek == SEEK_OVERLAP and _is_overlap_near(pair, pairs, kinds):
-            return pairs[:1], True
-    pairs, kinds = np.concatenate(found_pairs), np.concatenate(found_kinds)
-    n_pairs = len(pairs)
-    pairs, kinds = _in_order(pair, pairs, kinds)
+        if is_first and looks_at_regions and pair.seek == SEEK_OVERLAP and _is_overlap_near(pair, *found):
+            return found.pairs[:1], True
+    return _settled(pair, *_in_order(pair, np.concatenate(found_pairs), np.concatenate(found_kinds)))
+
+
+def _settled(pair: MeshPair, pairs: IntArray, kinds: Int8Array) -> tuple[IntArray, bool]:
+    """Find the classes that kernels left open; return the pairs with a common point, or the one that settles all."""
     open_ones = np.flatnonzero(kinds == UNDECIDED)
-    pair.work.n_beyond_filter += n_pairs
+    pair.work.n_beyond_filter += len(pairs)
     pair.work.n_rational += len(open_ones)
     for index in open_ones:
         pair.work.budget.check()
         i, j = int(pairs[index, 0]), int(pairs[index, 1])
-        kinds[index] = classify_exact(
-            pair.exact[0].corners(i), pair.exact[1].corners(j), pair.exact[0].plane(i), pair.exact[1].plane(j)
-        )
+        a, b = pair.exact
+        kinds[index] = classify_exact(a.corners(i), b.corners(j), a.plane(i), b.plane(j))
         if kinds[index] != APART and _is_settled_by(pair, int(kinds[index]), i, j):
             return pairs[index : index + 1], True
     meet = np.concatenate([np.flatnonzero(kinds == COPLANAR), np.flatnonzero((kinds != APART) & (kinds != COPLANAR))])
@@ -85,10 +72,10 @@ def find_all_contacts(pair: MeshPair, *, looks_at_cells: bool = True) -> tuple[I
 
 
 def _is_overlap_near(pair: MeshPair, pairs: IntArray, kinds: Int8Array) -> bool:
-    """Tell whether the cells of a few faces in contact prove overlapping; such a pair is put first."""
+    """Tell whether the regions of a few faces in contact prove overlapping; such a pair is put first."""
     sure = np.flatnonzero(kinds != UNDECIDED)
     for index in sure[:: max(1, len(sure) // _PROBED)].tolist():
-        if look_at_cells(pair, 0, int(pairs[index, 0]), None)[0]:
+        if look_at_regions(pair, 0, int(pairs[index, 0]), None)[0]:
             pairs[0] = pairs[index]
             return True
     return False
@@ -96,7 +83,7 @@ def _is_overlap_near(pair: MeshPair, pairs: IntArray, kinds: Int8Array) -> bool:
 
 def _in_order(pair: MeshPair, pairs: IntArray, kinds: Int8Array) -> tuple[IntArray, Int8Array]:
     """Sort pairs by the caller's faces, then by triangle."""
-    faces = [pair.shells[own].faces[pairs[:, own]] for own in (0, 1)]
+    faces = [pair.meshes[own].faces[pairs[:, own]] for own in (0, 1)]
     order = np.lexsort((pairs[:, 1], pairs[:, 0], faces[1], faces[0]))
     return pairs[order], kinds[order]
 

@@ -4,7 +4,7 @@ A strict crossing of two faces proves that two interiors overlap if nothing else
 along it. Near a general point of the crossing line a body whose face is clean there is a half-space; the other body's
 face, not stacked, changes its inside on both sides of the first plane: so one of its two changes lies in that
 half-space. Hence the rule `proves_overlap`. The state of a face does not depend on a pose, is computed on demand from
-exact signs of the unposed coordinates, and kept.
+exact signs of the with_pose coordinates, and kept.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from engine.collision.meshes.mesh_arrays import (
     STATE_CROSSED,
     STATE_STACKED,
     STATE_UNKNOWN,
-    ShellArrays,
+    MeshArrays,
     in_tree,
     triangle_of,
 )
@@ -31,9 +31,9 @@ from engine.collision.meshes.triangle_triangle import (
     is_straddling,
     projected,
     separation,
-    unposed,
+    with_pose,
 )
-from engine.jit import inline, kernel
+from engine.jit import allocating, inline, kernel
 from engine.lanes.boxes import inside_box
 from engine.lanes.lanes import lowest_bit
 from engine.predicates.orientation import orient2d, orient3d
@@ -69,104 +69,105 @@ def edge_meets_inside(t: Triangle3, axis: int, a: Point3, b: Point3) -> bool:
 
 
 @inline
-def side_of_vertex(shell: ShellArrays, face: int, t: Triangle3, vertex: int, p: Point3) -> int:
+def side_of_vertex(mesh: MeshArrays, face: int, t: Triangle3, vertex: int, p: Point3) -> int:
     """Return the side of the plane of a face on which a vertex lies, 0 at once for one of its own."""
-    corners = shell.triangles
+    corners = mesh.triangles
     if vertex == corners[face, 0] or vertex == corners[face, 1] or vertex == corners[face, 2]:
         return 0
     return orient3d(t.p, t.q, t.r, p)
 
 
 @inline
-def state_by(shell: ShellArrays, face: int, other: int, poses: Any) -> int:
+def state_by(mesh: MeshArrays, face: int, other: int, poses: Any) -> int:
     """Return what one other face of the body makes of the state of `face` (which has an area)."""
-    if shell.axis[other] == -1:
+    if mesh.axis[other] == -1:
         return STATE_CLEAN
-    if shell.axis[other] < 0:
+    if mesh.axis[other] < 0:
         return STATE_STACKED
-    t, o = triangle_of(shell, face), triangle_of(shell, other)
-    axis = int(shell.axis[face])
-    p = side_of_vertex(shell, face, t, shell.triangles[other, 0], o.p)
-    q = side_of_vertex(shell, face, t, shell.triangles[other, 1], o.q)
-    r = side_of_vertex(shell, face, t, shell.triangles[other, 2], o.r)
+    t, o = triangle_of(mesh, face), triangle_of(mesh, other)
+    axis = int(mesh.axis[face])
+    p = side_of_vertex(mesh, face, t, mesh.triangles[other, 0], o.p)
+    q = side_of_vertex(mesh, face, t, mesh.triangles[other, 1], o.q)
+    r = side_of_vertex(mesh, face, t, mesh.triangles[other, 2], o.r)
     if p == UNDECIDED or q == UNDECIDED or r == UNDECIDED:
         return STATE_STACKED
     if p == 0 and q == 0 and r == 0:
-        how = separation(poses, unposed(t), unposed(o), axis, 0.0)
+        how = separation(poses, with_pose(t), with_pose(o), axis, 0.0)
         return STATE_STACKED if (how < 0 or how == UNDECIDED) else STATE_CLEAN
     if is_straddling(p, q, r):
         how = classify_near(t, o, 0.0)
         if how == UNDECIDED:
-            how = classify_exactly(poses, unposed(t), unposed(o), axis, 0.0)
+            how = classify_exactly(poses, with_pose(t), with_pose(o), axis, 0.0)
         if how == UNDECIDED:
             return STATE_STACKED
         return STATE_CROSSED if how == CROSSING else STATE_CLEAN
     a, b = o.p, o.q
     if p == 0 and q == 0:
-        is_own_edge = is_corner(shell, face, other, 0) and is_corner(shell, face, other, 1)
+        is_own_edge = is_corner(mesh, face, other, 0) and is_corner(mesh, face, other, 1)
     elif q == 0 and r == 0:
         a, b = o.q, o.r
-        is_own_edge = is_corner(shell, face, other, 1) and is_corner(shell, face, other, 2)
+        is_own_edge = is_corner(mesh, face, other, 1) and is_corner(mesh, face, other, 2)
     elif r == 0 and p == 0:
         a, b = o.r, o.p
-        is_own_edge = is_corner(shell, face, other, 2) and is_corner(shell, face, other, 0)
+        is_own_edge = is_corner(mesh, face, other, 2) and is_corner(mesh, face, other, 0)
     else:
         return STATE_CLEAN
     return STATE_CROSSED if not is_own_edge and edge_meets_inside(t, axis, a, b) else STATE_CLEAN
 
 
 @inline
-def is_corner(shell: ShellArrays, face: int, other: int, corner: int) -> bool:
+def is_corner(mesh: MeshArrays, face: int, other: int, corner: int) -> bool:
     """Tell whether a corner of another face is one of this face too."""
-    vertex, corners = shell.triangles[other, corner], shell.triangles
+    vertex, corners = mesh.triangles[other, corner], mesh.triangles
     return bool(vertex == corners[face, 0] or vertex == corners[face, 1] or vertex == corners[face, 2])
 
 
 @inline
-def state_of(shell: ShellArrays, face: int, poses: Any) -> int:
+def state_of(mesh: MeshArrays, face: int, poses: Any) -> int:
     """Return the state of a face, computed at the first question; a face without area counts as stacked.
 
     poses: any (n, 12) float64; nothing here has a pose.
     """
-    known = int(shell.state[face])
-    if known != STATE_UNKNOWN:
-        return known
-    state = STATE_STACKED
-    if shell.axis[face] >= 0:
-        state = STATE_CLEAN
-        t = triangle_of(shell, face)
-        p, q, r = in_tree(shell, t.p), in_tree(shell, t.q), in_tree(shell, t.r)
-        low = (
-            np.float32(min(p.x, q.x, r.x) - SLACK),
-            np.float32(min(p.y, q.y, r.y) - SLACK),
-            np.float32(min(p.z, q.z, r.z) - SLACK),
-        )
-        high = (
-            np.float32(max(p.x, q.x, r.x) + SLACK),
-            np.float32(max(p.y, q.y, r.y) + SLACK),
-            np.float32(max(p.z, q.z, r.z) + SLACK),
-        )
-        stack = np.empty(STACK_ROWS, np.int32)
-        stack[0] = 0
-        n_stack = 1
-        while n_stack > 0 and state != STATE_STACKED:  # bound: each node enters once
-            n_stack -= 1
-            node = int(stack[n_stack])
-            lanes = inside_box(shell.boxes, node, low, high)
-            while lanes != 0:
-                child = int(shell.child[node, lowest_bit(lanes)])
-                lanes &= lanes - 1
-                if child >= 0:
-                    stack[n_stack] = child
-                    n_stack += 1
-                elif -1 - child != face:
-                    state = max(state, state_by(shell, face, -1 - child, poses))
-    shell.state[face] = state
+    if mesh.state[face] == STATE_UNKNOWN:
+        mesh.state[face] = state_among(mesh, face, poses) if mesh.axis[face] >= 0 else STATE_STACKED
+    return int(mesh.state[face])
+
+
+@allocating
+def state_among(mesh: MeshArrays, face: int, poses: Any) -> int:
+    """Return what the other faces of the body make of the state of a face with area."""
+    t = triangle_of(mesh, face)
+    p, q, r = in_tree(mesh, t.p), in_tree(mesh, t.q), in_tree(mesh, t.r)
+    low = (
+        np.float32(min(p.x, q.x, r.x) - SLACK),
+        np.float32(min(p.y, q.y, r.y) - SLACK),
+        np.float32(min(p.z, q.z, r.z) - SLACK),
+    )
+    high = (
+        np.float32(max(p.x, q.x, r.x) + SLACK),
+        np.float32(max(p.y, q.y, r.y) + SLACK),
+        np.float32(max(p.z, q.z, r.z) + SLACK),
+    )
+    stack = np.empty(STACK_ROWS, np.int32)
+    stack[0] = 0
+    n_stack, state = 1, STATE_CLEAN
+    while n_stack > 0 and state != STATE_STACKED:  # bound: each node enters once
+        n_stack -= 1
+        node = int(stack[n_stack])
+        lanes = inside_box(mesh.boxes, node, low, high)
+        while lanes != 0:
+            child = int(mesh.child[node, lowest_bit(lanes)])
+            lanes &= lanes - 1
+            if child >= 0:
+                stack[n_stack] = child
+                n_stack += 1
+            elif -1 - child != face:
+                state = max(state, state_by(mesh, face, -1 - child, poses))
     return state
 
 
 @inline
-def proves_overlap(first: ShellArrays, i: int, second: ShellArrays, j: int, poses: Any) -> bool:
+def proves_overlap(first: MeshArrays, i: int, second: MeshArrays, j: int, poses: Any) -> bool:
     """Tell whether a strict crossing of these two faces proves that the open interiors of two solids meet."""
     a = state_of(first, i, poses)
     if a == STATE_STACKED:
@@ -176,8 +177,8 @@ def proves_overlap(first: ShellArrays, i: int, second: ShellArrays, j: int, pose
 
 
 @kernel
-def find_states(shell: ShellArrays, faces: Any, states: Any) -> None:
+def find_states(mesh: MeshArrays, faces: Any, states: Any) -> None:
     """Fill states (n,) with the state of each of `faces` (n,)."""
     poses = np.zeros((1, 12))
     for item in range(faces.shape[0]):
-        states[item] = state_of(shell, faces[item], poses)
+        states[item] = state_of(mesh, faces[item], poses)

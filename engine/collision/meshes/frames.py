@@ -17,40 +17,15 @@ from typing import Any
 
 import numpy as np
 
-from engine.collision.meshes.placement import Placement
+from engine.collision.meshes.placement import Placement, turned, turned_back
 from engine.jit import inline
+from engine.predicates.vectors import largest_of
 from engine.types import Point3
 
 WIDEST_RATIO = 2.0**60
 WIDEST_MARGIN = 1e15
 NEVER_APART = 1e20
 """Margin of a map that is left out: far above all boxes, far below `bvh.UNUSED`, which stays apart from everything."""
-
-
-@inline
-def turned(place: Placement, v: Point3) -> Point3:
-    """Return R v."""
-    return Point3(
-        place.xx * v.x + place.xy * v.y + place.xz * v.z,
-        place.yx * v.x + place.yy * v.y + place.yz * v.z,
-        place.zx * v.x + place.zy * v.y + place.zz * v.z,
-    )
-
-
-@inline
-def turned_back(place: Placement, v: Point3) -> Point3:
-    """Return the product of the transpose of R with v."""
-    return Point3(
-        place.xx * v.x + place.yx * v.y + place.zx * v.z,
-        place.xy * v.x + place.yy * v.y + place.zy * v.z,
-        place.xz * v.x + place.yz * v.y + place.zz * v.z,
-    )
-
-
-@inline
-def largest(v: Point3) -> float:
-    """Return the largest magnitude of a component."""
-    return max(abs(v.x), abs(v.y), abs(v.z))
 
 
 @inline
@@ -77,8 +52,8 @@ def set_frame(
     v = turned_back(a, Point3(there.x + shift.x, there.y + shift.y, there.z + shift.z))
     t = Point3((v.x - a_origin[0]) / a_scale, (v.y - a_origin[1]) / a_scale, (v.z - a_origin[2]) / a_scale)
     a_reach = max(abs(a_origin[0]), abs(a_origin[1]), abs(a_origin[2]))
-    sizes = (a_reach + largest(origin) + largest(shift)) / a_scale + 2.0 + 2.0 * ratio
-    margin = 2.0**-19 * (2.0 + 3.5 * ratio + largest(t)) + (32.0 * defect + 2.0**-46) * sizes
+    sizes = (a_reach + largest_of(origin) + largest_of(shift)) / a_scale + 2.0 + 2.0 * ratio
+    margin = 2.0**-19 * (2.0 + 3.5 * ratio + largest_of(t)) + (32.0 * defect + 2.0**-46) * sizes
     if not (ratio <= WIDEST_RATIO and margin <= WIDEST_MARGIN and np.isfinite(t.x + t.y + t.z)):
         for row in range(21):
             frame[row, :] = 1.0 if 9 <= row < 18 else 0.0
@@ -90,4 +65,4 @@ def set_frame(
         frame[9 + k, :], frame[12 + k, :], frame[15 + k, :] = ratio * abs(m.x), ratio * abs(m.y), ratio * abs(m.z)
     frame[18, :], frame[19, :], frame[20, :] = t.x, t.y, t.z
     frame[21, :] = margin
-    return largest(t) > 2.0 + 3.5 * ratio + margin
+    return largest_of(t) > 2.0 + 3.5 * ratio + margin

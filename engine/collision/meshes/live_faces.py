@@ -1,7 +1,7 @@
 """The parts of a body's faces that even-odd does not cancel: only beside those lies the body's open interior.
 
 Most faces are whole: no other face of the body covers a part of them. A stacked face (see `face_state.py`) is cut, in
-the plane it shares with those that cover it, into cells; a cell covered an odd number of times is live.
+the plane it shares with those that cover it, into regions; a region covered an odd number of times is live.
 """
 
 from __future__ import annotations
@@ -14,11 +14,12 @@ import numpy as np
 from engine.arrangement.arrange import arrange
 from engine.arrangement.nodes import float_nodes
 from engine.arrangement.subdivision import label_faces, subdivide
-from engine.collision.exact_images import Vector, cross, dot, minus, squared_length
+from engine.collision.exact_images import Vector
 from engine.collision.meshes.face_state import find_states
-from engine.collision.meshes.mesh_arrays import NO_AREA, STATE_STACKED, Shell
+from engine.collision.meshes.mesh_arrays import NO_AREA, STATE_STACKED, MeshBody
 from engine.collision.simple.feature_distance import segment_distance, triangle_distance
 from engine.parallel import Budget
+from engine.predicates.exact_vectors import cross, dot, largest_axis, minus, squared_length
 from engine.predicates.rational import orient2d_rational, orient3d_rational
 
 Point2 = tuple[Fraction, Fraction]
@@ -27,7 +28,7 @@ IN_FACE, IN_ODD, LIVE = 1, 2, 3
 
 @dataclass(frozen=True, slots=True)
 class LivePiece:
-    """What is live of one face: its plane's corners, and the edges around the live cells (None: the whole face)."""
+    """What is live of one face: its plane's corners, and the edges around the live regions (None: the whole face)."""
 
     corners: tuple[Vector, Vector, Vector]
     edges: list[tuple[Vector, Vector]] | None
@@ -54,45 +55,45 @@ class LivePiece:
         normal = cross(minus(b, a), minus(c, a))
         height = dot(normal, minus(point, a)) / squared_length(normal)
         foot = tuple(p - height * n for p, n in zip(point, normal))
-        axis = max(range(3), key=lambda k: abs(normal[k]))
+        axis = largest_axis(normal)
         if _is_within(_flat(foot, axis), [(_flat(start, axis), _flat(end, axis)) for start, end in self.edges]):
             return squared_length(minus(point, foot))
         return min(segment_distance(point, start, end) for start, end in self.edges)
 
 
-def live_piece(shell: Shell, face: int, budget: Budget) -> LivePiece | None:
+def live_piece(mesh: MeshBody, face: int, budget: Budget) -> LivePiece | None:
     """Return what even-odd leaves of one triangle, in the body's own coordinates; None where nothing is left."""
-    arrays = shell.arrays
+    arrays = mesh.arrays
     if arrays.axis[face] == NO_AREA:
         return None
-    corners = _corners(shell, face)
+    corners = _corners(mesh, face)
     states = np.empty(1, np.int8)
     with np.errstate(all="ignore"):  # uncompiled runs only
         find_states(arrays, np.array([face]), states)
     if states[0] != STATE_STACKED:
         return LivePiece(corners, None)
-    edges = _live_edges(shell, face, corners, budget)
+    edges = _live_edges(mesh, face, corners, budget)
     return LivePiece(corners, edges) if edges else None
 
 
-def _corners(shell: Shell, face: int) -> tuple[Vector, Vector, Vector]:
+def _corners(mesh: MeshBody, face: int) -> tuple[Vector, Vector, Vector]:
     a, b, c = (
-        tuple(map(Fraction, shell.arrays.vertices[vertex].tolist())) for vertex in shell.arrays.triangles[face].tolist()
+        tuple(map(Fraction, mesh.arrays.vertices[vertex].tolist())) for vertex in mesh.arrays.triangles[face].tolist()
     )
     return a, b, c
 
 
 def _live_edges(
-    shell: Shell, face: int, corners: tuple[Vector, Vector, Vector], budget: Budget
+    mesh: MeshBody, face: int, corners: tuple[Vector, Vector, Vector], budget: Budget
 ) -> list[tuple[Vector, Vector]]:
-    """Return the edges between live and other cells of a stacked face."""
-    arrays = shell.arrays
+    """Return the edges between live and other regions of a stacked face."""
+    arrays = mesh.arrays
     points = arrays.vertices[arrays.triangles]
     low, high = points.min(axis=1), points.max(axis=1)
     near = np.flatnonzero((low <= high[face]).all(axis=1) & (high >= low[face]).all(axis=1))
     a, b, c = corners
     normal = cross(minus(b, a), minus(c, a))
-    axis = max(range(3), key=lambda k: abs(normal[k]))
+    axis = largest_axis(normal)
     covering = [face]
     for other in near.tolist():
         budget.check()

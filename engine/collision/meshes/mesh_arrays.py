@@ -1,6 +1,6 @@
 """What collision sees of a body: triangles, their tree, and what is known of each face. Built once per solid, lazily.
 
-A polyhedron and a box are closed shells under even-odd; a surface, and a box that is flat on some axis, have nothing
+A polyhedron and a box are closed meshes under even-odd; a surface, and a box that is flat on some axis, have nothing
 inside. All arrays are in the body's own coordinates: poses are applied where a query runs.
 """
 
@@ -15,7 +15,7 @@ import numpy as np
 from engine.arrays import Float32Array, FloatArray, Int8Array, Int32Array, IntArray, read_only
 from engine.bounding.bvh import WIDTH, build_bvh
 from engine.bounding.disc_tree import fill_discs
-from engine.collision.meshes.placement import NO_ROTATION, NO_TRANSLATION, Extent, PoseArrays
+from engine.collision.meshes.placement import Extent, PoseArrays
 from engine.collision.meshes.triangle_triangle import Triangle3, projected
 from engine.jit import inline, kernel
 from engine.lanes.boxes import EMPTY
@@ -43,14 +43,20 @@ STATE_STACKED = 2
 points; some other face crosses it along a segment; some other face of the same plane covers part of it (or unsure)."""
 
 
-STILL = PoseArrays(NO_ROTATION, NO_TRANSLATION, False)
+STILL = PoseArrays(read_only(np.eye(3)[None]), read_only(np.zeros((1, 3))), False)
 """Of a body without a pose."""
 
 
-class ShellArrays(NamedTuple):
+BOX_TRIANGLES = np.array([[(a, b, c), (a, c, d)] for a, b, c, d in
+    ([0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6])])  # fmt: skip
+"""Of each face of a box (6, 2, 3), counter-clockwise from outside; numbers of corners as in `box_corners`."""
+
+
+class MeshArrays(NamedTuple):
     """What kernels take; boxes to scale: the tree (`bvh.py`); blocks, discs: what its blocks (`lanes/faces.py`) and its
     inner nodes (`lanes/discs.py`) hold beside boxes, the rows of the other kind not set. `state` is filled by kernels
-    as needed: any thread writes the same values."""
+    as needed: any thread writes the same values. components: of the triangles connected through vertices, one triangle
+    each, ascending. has_inside: False for surfaces and flat boxes."""
 
     vertices: FloatArray
     triangles: IntArray
@@ -63,23 +69,30 @@ class ShellArrays(NamedTuple):
     origin: FloatArray
     scale: float
     extent: Extent
+    components: IntArray
+    has_inside: bool
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Shell:
+class MeshBody:
     """Triangles of one body.
 
-    arrays: for kernels. faces: the caller's face of each triangle. has_inside: False for surfaces and flat boxes.
-    components: of the triangles connected through vertices, one triangle each, ascending. reach: largest magnitude of a
-    coordinate. shift: every coordinate times 2^shift is an integer.
+    arrays: for kernels. faces: the caller's face of each triangle. shift: every coordinate times 2^shift is an integer.
     """
 
-    arrays: ShellArrays
+    arrays: MeshArrays
     faces: IntArray
-    has_inside: bool
-    components: IntArray
-    reach: float
     shift: int
+
+    @property
+    def has_inside(self) -> bool:
+        """False for surfaces and flat boxes."""
+        return self.arrays.has_inside
+
+    @property
+    def reach(self) -> float:
+        """Largest magnitude of a coordinate."""
+        return self.arrays.extent.reach
 
     def posed(self, pose: Pose | None) -> PoseArrays:
         """Return the pose as kernels take it."""
@@ -88,13 +101,13 @@ class Shell:
         return PoseArrays(read_only(pose.rotation[None]), read_only(pose.translation[None]), True)
 
 
-def shell_of(solid: Solid) -> Shell:
-    """Return the shell of a polyhedron, surface or 3D box, built at the first call."""
-    return solid.prepared("collision_shell", lambda: build_shell(solid))
+def mesh_body_of(solid: Solid) -> MeshBody:
+    """Return the mesh of a polyhedron, surface or 3D box, built at the first call."""
+    return solid.prepared("mesh_body", lambda: build_mesh_body(solid))
 
 
-def build_shell(solid: Solid) -> Shell:
-    """Return a new shell of a polyhedron, surface or 3D box."""
+def build_mesh_body(solid: Solid) -> MeshBody:
+    """Return a new mesh of a polyhedron, surface or 3D box."""
     if isinstance(solid, Aabb):
         vertices, triangles, faces = _box_triangles(solid)
         has_inside = bool((solid.min < solid.max).all())
@@ -102,11 +115,11 @@ def build_shell(solid: Solid) -> Shell:
         assert isinstance(solid, Mesh)
         vertices, triangles, faces = solid.vertices, solid.triangles, solid.triangle_faces
         has_inside = isinstance(solid, Polyhedron)
-    return shell_of_triangles(vertices, triangles, faces, has_inside)
+    return mesh_body_of_triangles(vertices, triangles, faces, has_inside)
 
 
-def shell_of_triangles(vertices: FloatArray, triangles: IntArray, faces: IntArray, has_inside: bool) -> Shell:
-    """Return the shell of checked arrays.
+def mesh_body_of_triangles(vertices: FloatArray, triangles: IntArray, faces: IntArray, has_inside: bool) -> MeshBody:
+    """Return the mesh of checked arrays.
 
     Triangles and vertices are copied in the order of the tree: the faces near a contact then lie side by side in
     memory, which a large mesh, asked at another place by every pose, needs more than anything else.
@@ -126,7 +139,7 @@ def shell_of_triangles(vertices: FloatArray, triangles: IntArray, faces: IntArra
     _fill_blocks(used, ordered, child, tree.origin, tree.scale, blocks)
     discs = np.empty((len(child), DISC_ROWS, WIDTH), np.float32)
     fill_discs(blocks, child, tree.boxes, discs)
-    arrays = ShellArrays(
+    arrays = MeshArrays(
         read_only(used[:n_used].copy() if n_used < len(used) else used),
         read_only(ordered),
         read_only(axis),
@@ -138,8 +151,10 @@ def shell_of_triangles(vertices: FloatArray, triangles: IntArray, faces: IntArra
         tree.origin,
         tree.scale,
         Extent(reach, ldexp(1.0, lowest_bit)),
+        components[:n_components].copy(),
+        has_inside,
     )
-    return Shell(arrays, faces[order], has_inside, components[:n_components].copy(), reach, shift)
+    return MeshBody(arrays, faces[order], shift)
 
 
 @kernel
@@ -238,19 +253,20 @@ def lattice_shift(values: FloatArray) -> int:
     return max(0, 53 - int(exponents.min())) if exponents.size else 0
 
 
+def box_corners(box: Aabb) -> FloatArray:
+    """Return the corners (8, 3) of a box; bit k of a corner's number says low or high on axis k."""
+    return np.array([[(box.min, box.max)[i >> k & 1][k] for k in range(3)] for i in range(8)])
+
+
 def _box_triangles(box: Aabb) -> tuple[FloatArray, IntArray, IntArray]:
     """Return the triangles of a box by face (xmin, xmax, ymin, ymax, zmin, zmax); of a flat one each place once."""
     flat = box.min == box.max
-    corners = np.array([[(box.min, box.max)[i >> k & 1][k] for k in range(3)] for i in range(8)])
-    quads = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]]
+    corners = box_corners(box)
+    faces = np.arange(6)
     if flat.any():  # the two faces across a flat axis are one: keep that; a segment or point: any face will do
-        quads = [quads[2 * int(np.argmax(flat))]]
-        face_numbers = [2 * int(np.argmax(flat))]
-    else:
-        face_numbers = list(range(6))
-    triangles = np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))])
+        faces = faces[2 * int(np.argmax(flat)) :][:1]
     _, first, merged = np.unique(corners, axis=0, return_index=True, return_inverse=True)
-    return corners, first[merged.reshape(-1)][triangles], np.repeat(np.array(face_numbers), 2)
+    return corners, first[merged.reshape(-1)][BOX_TRIANGLES[faces].reshape(-1, 3)], np.repeat(faces, 2)
 
 
 @inline
@@ -272,22 +288,22 @@ def axis_of(p: Point3, q: Point3, r: Point3) -> int:
 
 
 @inline
-def triangle_of(shell: ShellArrays, item: int) -> Triangle3:
+def triangle_of(mesh: MeshArrays, item: int) -> Triangle3:
     """Load a triangle in the body's own coordinates."""
     return Triangle3(
-        as_point3(shell.vertices, shell.triangles[item, 0]),
-        as_point3(shell.vertices, shell.triangles[item, 1]),
-        as_point3(shell.vertices, shell.triangles[item, 2]),
+        as_point3(mesh.vertices, mesh.triangles[item, 0]),
+        as_point3(mesh.vertices, mesh.triangles[item, 1]),
+        as_point3(mesh.vertices, mesh.triangles[item, 2]),
     )
 
 
 @inline
-def in_tree(shell: ShellArrays, p: Point3) -> Point3:
+def in_tree(mesh: MeshArrays, p: Point3) -> Point3:
     """Return a point in the coordinates of the body's tree, rounded."""
     return Point3(
-        (p.x - shell.origin[0]) / shell.scale,
-        (p.y - shell.origin[1]) / shell.scale,
-        (p.z - shell.origin[2]) / shell.scale,
+        (p.x - mesh.origin[0]) / mesh.scale,
+        (p.y - mesh.origin[1]) / mesh.scale,
+        (p.z - mesh.origin[2]) / mesh.scale,
     )
 
 

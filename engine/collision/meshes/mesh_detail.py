@@ -5,8 +5,8 @@ of what they share has a piece with area on some face of either body: beside it,
 
 1. A crossing that proves overlapping (`face_state.py`) shows all four combinations around it: partial overlap.
 2. Faces without contact, in patches, have one status of the other body on both sides.
-3. Each face in contact is cut into cells; either side of each cell tells (`exact_cells.py`). A face with nothing of the
-   other body beside it but faces of its own plane is one cell.
+3. Each face in contact is cut into regions; either side of each region tells (`exact_regions.py`). A face with nothing
+   of the other body beside it but faces of its own plane is one region.
 
 The search ends as soon as each body is known to stick out.
 """
@@ -16,31 +16,29 @@ from __future__ import annotations
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
-from engine.collision.meshes.exact_cells import Sides, cells_of, even_sides, sides_at, sides_over
-from engine.collision.meshes.face_cells import WITHIN
+from engine.collision.meshes.exact_regions import Sides, even_sides, regions_of, sides_at, sides_within
 from engine.collision.meshes.face_contacts import find_all_contacts
-from engine.collision.meshes.mesh_arrays import STATE_CLEAN, STATE_STACKED, Shell, shell_of
-from engine.collision.meshes.mesh_pair import MeshPair, Patch, simplest
+from engine.collision.meshes.mesh_arrays import STATE_CLEAN, MeshBody, mesh_body_of
+from engine.collision.meshes.mesh_pair import MeshPair, simplest
 from engine.collision.meshes.parity import INSIDE, OUTSIDE
 from engine.collision.result import Parts, Work
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
 
-_BLOCK = 64
 _BOTH, _NEITHER = Sides(True, True, True), Sides(False, False, False)
 
 
 def mesh_parts(first: Solid, second: Solid, first_pose: Pose | None, second_pose: Pose | None, work: Work) -> Parts:
     """Return what of two overlapping polyhedra or boxes lies outside the other."""
     with np.errstate(all="ignore"):  # kernels, where they run uncompiled
-        pair = simplest(shell_of(first), first_pose, shell_of(second), second_pose)
+        pair = simplest(mesh_body_of(first), first_pose, mesh_body_of(second), second_pose)
         if pair[1] is None and pair[3] is None and _have_equal_faces(pair[0], pair[2]):
             return Parts(False, False, True)
         return _OverlappingPair(*pair, Work(work.budget, witness=False)).parts()
 
 
-def _have_equal_faces(first: Shell, second: Shell) -> bool:
-    """Tell whether two shells have the same triangles, in any order and orientation."""
+def _have_equal_faces(first: MeshBody, second: MeshBody) -> bool:
+    """Tell whether two meshes have the same triangles, in any order and orientation."""
     if first is second:
         return True
     if len(first.faces) != len(second.faces) or first.reach != second.reach:
@@ -49,9 +47,9 @@ def _have_equal_faces(first: Shell, second: Shell) -> bool:
     return bool((a == b).all())
 
 
-def _sorted_faces(shell: Shell) -> FloatArray:
+def _sorted_faces(mesh: MeshBody) -> FloatArray:
     """Return the triangles (n, 9), corners in ascending order, rows too."""
-    corners = shell.arrays.vertices[shell.arrays.triangles]
+    corners = mesh.arrays.vertices[mesh.arrays.triangles]
     order = np.lexsort(tuple(np.moveaxis(corners, 2, 0)[::-1]), axis=1)
     rows = np.take_along_axis(corners, order[:, :, None], axis=1).reshape(-1, 9)
     return rows[np.lexsort(rows.T[::-1])]
@@ -63,7 +61,7 @@ class _OverlappingPair(MeshPair):
     def parts(self) -> Parts:
         """Return the answer; what is not needed for it is left out."""
         self._sticks_out = [False, False]
-        contacts, is_crossing = find_all_contacts(self, looks_at_cells=False)  # overlapping is known
+        contacts, is_crossing = find_all_contacts(self, looks_at_regions=False)  # overlapping is known
         if is_crossing:
             return Parts(True, True, True)
         self._search(contacts)
@@ -74,7 +72,8 @@ class _OverlappingPair(MeshPair):
         for own in (0, 1):
             for place, theirs in ((INSIDE, _BOTH), (OUTSIDE, _NEITHER)):
                 for patch in self.patches(own, contacts[:, own], place):
-                    self._see_patch(own, patch, theirs)
+                    for ours in self.sides_beside(own, patch):
+                        self._see(own, ours, theirs)
                     if all(self._sticks_out):
                         return
         for own in (0, 1):
@@ -85,24 +84,12 @@ class _OverlappingPair(MeshPair):
                     return
 
     def _see(self, own: int, ours: Sides, theirs: Sides) -> None:
-        """Take note of what lies on either side of a cell of body `own`."""
+        """Take note of what lies on either side of a region of body `own`."""
         for mine, other in ((ours.above, theirs.above), (ours.below, theirs.below)):
             if mine and not other:
                 self._sticks_out[own] = True
             if other and not mine:
                 self._sticks_out[1 - own] = True
-
-    def _see_patch(self, own: int, patch: Patch, theirs: Sides) -> None:
-        shell, body = self.shells[own], self.exact[own]
-        with_area = patch.faces[shell.arrays.axis[patch.faces] != -1]
-        for start in range(0, len(with_area), _BLOCK):
-            self.work.budget.check()
-            if (self.states(own, with_area[start : start + _BLOCK]) != STATE_STACKED).any():
-                self._see(own, Sides(True, False, False), theirs)  # case: the body changes across such a face
-                return
-        for face in with_area.tolist():
-            for q in cells_of(body, face, [body], self.work.budget):
-                self._see(own, sides_at(body, q, body.axis(face)), theirs)
 
     def _see_face(self, own: int, face: int, met: IntArray) -> None:
         body, other = self.exact[own], self.exact[1 - own]
@@ -110,24 +97,12 @@ class _OverlappingPair(MeshPair):
         if axis < 0:
             return
         is_clean = self.state(own, face) == STATE_CLEAN
-        if is_clean and self._see_whole_face(own, face, met):
-            return
-        for q in cells_of(body, face, [other] if is_clean else [other, body], self.work.budget):
+        if is_clean and all(even_sides(body, face, other, met)):
+            sides = sides_within(body, face, other)
+            if sides is not None:
+                self._see(own, *sides)
+                return
+        for q in regions_of(body, face, [other] if is_clean else [other, body], self.work.budget):
             self._see(own, sides_at(body, q, axis), sides_at(other, q, axis))
             if all(self._sticks_out):
                 return
-
-    def _see_whole_face(self, own: int, face: int, met: IntArray) -> bool:
-        """Look at one point of a clean face, if the other body has one status above all of it, and one below."""
-        body, other = self.exact[own], self.exact[1 - own]
-        corners, plane, axis = body.corners(face), body.plane(face), body.axis(face)
-        if not all(even_sides(corners, plane, axis, (other.corners(i) for i in met.tolist()))):
-            return False
-        for weights in WITHIN:
-            x, y, z = (sum(w * p[side] for w, p in zip(weights, corners)) for side in range(3))
-            q = (x, y, z, sum(weights))
-            ours, theirs = sides_over(body, q, axis, plane), sides_over(other, q, axis, plane)
-            if ours is not None and theirs is not None:
-                self._see(own, ours, theirs)
-                return True
-        return False

@@ -1,13 +1,13 @@
-"""Polyhedra, surfaces and boxes against each other in 3D: the relation, by contacts, then locations, then cells.
+"""Polyhedra, surfaces and boxes against each other in 3D: the relation, by contacts, then locations, then regions.
 
 1. **Contacts** (face_contacts.py): every pair of faces with a common point. A strict crossing that `face_state.py`
    accepts proves that the open interiors meet, and ends the search.
 2. **Patches** (mesh_pair.py): faces without contact, connected through vertices, lie wholly inside or wholly outside
    the other body, so one vertex tells. Without any contact disjoint or inside follow. A patch inside the other body
    proves overlapping, if some face of it has an inside of its own body beside it.
-3. **Cells** (face_cells.py): what is left are weak contacts (a vertex on a face, flush faces, edges that touch). If the
-   open interiors meet, the border of their intersection has a piece with area on some face of either body; on patches
-   that is settled, so look at every cell that the two bodies cut from each face in contact.
+3. **Regions** (face_regions.py): what is left are weak contacts (a vertex on a face, flush faces, edges that touch). If
+   the open interiors meet, the border of their intersection has a piece with area on some face of either body; on
+   patches that is settled, so look at every region that the two bodies cut from each face in contact.
 
 Faces that cancel under even-odd (stacked) have nothing to show for themselves; their patches go through step 3 too.
 """
@@ -20,12 +20,16 @@ import numpy as np
 
 from engine.arrays import IntArray
 from engine.collision.meshes.dual_traversal import SEEK_CONTACT, SEEK_OVERLAP
-from engine.collision.meshes.exact_cells import cells_of, sides_at
 from engine.collision.meshes.exact_triangles import is_flush, kind_of_contact
-from engine.collision.meshes.face_cells import has_corner_outside, look_at_cells, pierces_without_area, vertices_outside
 from engine.collision.meshes.face_contacts import find_all_contacts
-from engine.collision.meshes.mesh_arrays import STATE_CLEAN, STATE_STACKED, Shell, shell_of
-from engine.collision.meshes.mesh_pair import MeshPair, Patch, simplest
+from engine.collision.meshes.face_regions import (
+    has_corner_outside,
+    look_at_regions,
+    pierces_without_area,
+    vertices_outside,
+)
+from engine.collision.meshes.mesh_arrays import STATE_CLEAN, mesh_body_of
+from engine.collision.meshes.mesh_pair import MeshPair, simplest
 from engine.collision.meshes.parity import INSIDE
 from engine.collision.meshes.separating_plane import is_separated
 from engine.collision.result import Collision, Kind, Witness, Work
@@ -33,7 +37,6 @@ from engine.solids.base import Solid
 from engine.solids.pose import Pose
 from engine.types import Relation
 
-_BLOCK = 64
 _NAMED = 32
 STRENGTH: tuple[Kind, ...] = ("face_face", "edge_face", "vertex_face", "edge_edge", "vertex_edge", "vertex_vertex")
 """Of several contacts the witness is the one of the kind that stands first here; at most `_NAMED` are looked at."""
@@ -41,17 +44,13 @@ STRENGTH: tuple[Kind, ...] = ("face_face", "edge_face", "vertex_face", "edge_edg
 
 def mesh_mesh(first: Solid, second: Solid, first_pose: Pose | None, second_pose: Pose | None, work: Work) -> Collision:
     """Return the relation of two polyhedra, surfaces or 3D boxes."""
-    return relate(shell_of(first), first_pose, shell_of(second), second_pose, work)
-
-
-def relate(first: Shell, first_pose: Pose | None, second: Shell, second_pose: Pose | None, work: Work) -> Collision:
-    """Return the relation of two placed shells."""
     with np.errstate(all="ignore"):  # kernels, where they run uncompiled
-        return _relation(MeshPair(*simplest(first, first_pose, second, second_pose), work))
+        pair = simplest(mesh_body_of(first), first_pose, mesh_body_of(second), second_pose)
+        return _relation(MeshPair(*pair, work))
 
 
 def _relation(pair: MeshPair) -> Collision:
-    """Return the answer: by contacts, by patches, by cells."""
+    """Return the answer: by contacts, by patches, by regions."""
     contacts, is_settled = find_all_contacts(pair)
     if pair.is_disjoint:
         return Collision(Relation.DISJOINT)
@@ -63,11 +62,11 @@ def _relation(pair: MeshPair) -> Collision:
         return _touch(pair, Relation.TOUCHING, contacts)
     patches = [pair.patches(own, contacts[:, own], INSIDE) for own in (0, 1)]
     if not len(contacts):
-        n_inside = [sum(len(patch.faces) for patch in found) for found in patches]
+        n_inside = [sum(map(len, found)) for found in patches]
         if n_inside == [0, 0]:
             return Collision(Relation.DISJOINT)
         for own in (0, 1):
-            if n_inside[own] == len(pair.shells[own].faces) and n_inside[1 - own] == 0:
+            if n_inside[own] == len(pair.meshes[own].faces) and n_inside[1 - own] == 0:
                 relation = (Relation.FIRST_INSIDE_SECOND, Relation.SECOND_INSIDE_FIRST)[own]
                 return _contain(pair, relation, own, patches[own][0])
     return _overlap_or_touch(pair, contacts, patches)
@@ -75,25 +74,24 @@ def _relation(pair: MeshPair) -> Collision:
 
 def _is_separated(pair: MeshPair, contacts: IntArray) -> bool:
     """Tell whether a plane is known that separates the two bodies."""
-    (first, second), flag = pair.shells, pair.work.budget.flag
-    first_pose, second_pose = first.posed(pair.poses[0]), second.posed(pair.poses[1])
-    found = is_separated(first.arrays, first_pose, second.arrays, second_pose, contacts, flag)
+    (first, second), (first_pose, second_pose) = pair.meshes, pair.posed
+    found = is_separated(first.arrays, first_pose, second.arrays, second_pose, contacts, pair.work.budget.flag)
     pair.work.budget.check()
     return bool(found)
 
 
-def _overlap_or_touch(pair: MeshPair, contacts: IntArray, patches: list[list[Patch]]) -> Collision:
+def _overlap_or_touch(pair: MeshPair, contacts: IntArray, patches: list[list[IntArray]]) -> Collision:
     """Return overlapping or touching, where no crossing has proven the first."""
     piercing = bool(patches[0] or patches[1])
-    both = pair.shells[0].has_inside and pair.shells[1].has_inside
+    both = pair.meshes[0].has_inside and pair.meshes[1].has_inside
     for own in (0, 1):
         for patch in patches[own]:
-            if both and _has_inside_beside(pair, own, patch):
+            if both and any(sides.above or sides.below for sides in pair.sides_beside(own, patch)):
                 if len(contacts):
                     return _touch(pair, Relation.OVERLAPPING, contacts)
                 return _contain(pair, Relation.OVERLAPPING, own, patch)
     for own in (0, 1):
-        if not both and (piercing or not pair.work.witness or not pair.shells[1 - own].has_inside):
+        if not both and (piercing or not pair.work.witness or not pair.meshes[1 - own].has_inside):
             continue
         faces = np.unique(contacts[:, own])
         outside = vertices_outside(pair, own, faces)
@@ -101,8 +99,8 @@ def _overlap_or_touch(pair: MeshPair, contacts: IntArray, patches: list[list[Pat
             met = contacts[contacts[:, own] == face, 1 - own]
             is_outlying = has_corner_outside(pair, own, face, met, outside)
             if own == 1 and both and is_outlying and state == STATE_CLEAN:
-                continue  # case: a common cell without any face of the first is one of the second, in the first
-            overlaps, pierces = look_at_cells(pair, own, face, met, is_outlying)
+                continue  # case: a common region without any face of the first is one of the second, in the first
+            overlaps, pierces = look_at_regions(pair, own, face, met, is_outlying)
             if overlaps:
                 return _touch(pair, Relation.OVERLAPPING, contacts)
             piercing = piercing or pierces
@@ -114,23 +112,6 @@ def _overlap_or_touch(pair: MeshPair, contacts: IntArray, patches: list[list[Pat
         return _touch(pair, Relation.TOUCHING, contacts, piercing=piercing)
     own = 0 if patches[0] else 1
     return _contain(pair, Relation.TOUCHING, own, patches[own][0], piercing=piercing)
-
-
-def _has_inside_beside(pair: MeshPair, own: int, patch: Patch) -> bool:
-    """Tell whether the body's own inside comes up to some face of a patch."""
-    shell, body = pair.shells[own], None
-    with_area = patch.faces[shell.arrays.axis[patch.faces] != -1]
-    for start in range(0, len(with_area), _BLOCK):
-        pair.work.budget.check()
-        if (pair.states(own, with_area[start : start + _BLOCK]) != STATE_STACKED).any():
-            return True
-    for face in with_area.tolist():
-        body = pair.exact[own]
-        for q in cells_of(body, face, [body], pair.work.budget):
-            sides = sides_at(body, q, body.axis(face))
-            if sides.above or sides.below:
-                return True
-    return False
 
 
 def _touch(pair: MeshPair, relation: Relation, contacts: IntArray, *, piercing: bool = False) -> Collision:
@@ -146,18 +127,18 @@ def _touch(pair: MeshPair, relation: Relation, contacts: IntArray, *, piercing: 
             if is_short and not is_flush(*faces):
                 continue
             kind = STRENGTH[0] if is_short else kind_of_contact(*faces)
-            named.append((STRENGTH.index(kind), int(pair.shells[0].faces[i]), int(pair.shells[1].faces[j])))
+            named.append((STRENGTH.index(kind), int(pair.meshes[0].faces[i]), int(pair.meshes[1].faces[j])))
             if is_short:  # coplanar pairs stand first, in the order of the caller's faces
                 break
     strength, first_face, second_face = min(named)
     return Collision(relation, Witness(STRENGTH[strength], first_face, second_face, "", piercing))
 
 
-def _contain(pair: MeshPair, relation: Relation, own: int, patch: Patch, *, piercing: bool = False) -> Collision:
+def _contain(pair: MeshPair, relation: Relation, own: int, patch: IntArray, *, piercing: bool = False) -> Collision:
     """Return a relation with a part of body `own` inside the other one as its witness."""
     if not pair.work.witness:
         return Collision(relation)
-    face = int(pair.shells[own].faces[patch.faces].min())
+    face = int(pair.meshes[own].faces[patch].min())
     containing: Literal["first", "second"] = "second" if own == 0 else "first"
     return Collision(
         relation, Witness("containment", face if own == 0 else -1, face if own == 1 else -1, containing, piercing)

@@ -1,4 +1,4 @@
-"""Two placed shells in one question: their exact coordinates, the states of their faces, where their vertices lie.
+"""Two placed meshes in one question: their exact coordinates, the states of their faces, where their vertices lie.
 
 Patches: faces without contact, connected through vertices, lie wholly inside or wholly outside the other body, so one
 vertex tells. Without any contact the patches are the components of the surfaces.
@@ -6,7 +6,7 @@ vertex tells. Without any contact the patches are the components of the surfaces
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -18,20 +18,21 @@ from engine.collision.meshes.dual_traversal import (
     SEEK_PIERCING_BY_SECOND,
 )
 from engine.collision.meshes.exact_body import ExactBody, exact_pair
-from engine.collision.meshes.exact_cells import sides_at
+from engine.collision.meshes.exact_regions import Sides, regions_of, sides_at
 from engine.collision.meshes.face_state import find_states
-from engine.collision.meshes.mesh_arrays import Shell, join_vertices, shell_of_triangles
+from engine.collision.meshes.mesh_arrays import NO_AREA, STATE_STACKED, MeshBody, join_vertices, mesh_body_of_triangles
 from engine.collision.meshes.parity import INSIDE, OUTSIDE, locate_vertices
 from engine.collision.result import Work
 from engine.solids.pose import Pose
 from engine.types import UNDECIDED
 
 _SAFE_POWER = 300
+_BLOCK = 64
 
 
 def simplest(
-    first: Shell, first_pose: Pose | None, second: Shell, second_pose: Pose | None
-) -> tuple[Shell, Pose | None, Shell, Pose | None]:
+    first: MeshBody, first_pose: Pose | None, second: MeshBody, second_pose: Pose | None
+) -> tuple[MeshBody, Pose | None, MeshBody, Pose | None]:
     """Return a placed pair that has the same relation, scaled into the range of the kernels where that is exact.
 
     Two equal poses are left out: an invertible affine map, applied to both, changes no relation.
@@ -46,8 +47,8 @@ def simplest(
 
 
 def in_range(
-    first: Shell, first_pose: Pose | None, second: Shell, second_pose: Pose | None
-) -> tuple[Shell, Pose | None, Shell, Pose | None]:
+    first: MeshBody, first_pose: Pose | None, second: MeshBody, second_pose: Pose | None
+) -> tuple[MeshBody, Pose | None, MeshBody, Pose | None]:
     """Return posed bodies near the ends of the exponent range scaled by a power of two, where that is exact.
 
     Without poses the predicates scale by themselves; the filter for rounded posed coordinates does not.
@@ -63,18 +64,18 @@ def in_range(
     scaled = [np.ldexp(array, -power) for array in arrays]
     if any((np.ldexp(small, power) != array).any() for small, array in zip(scaled, arrays)):
         return first, first_pose, second, second_pose
-    shells = [
-        shell_of_triangles(vertices, shell.arrays.triangles, shell.faces, shell.has_inside)
-        for vertices, shell in zip(scaled, (first, second))
+    meshes = [
+        mesh_body_of_triangles(vertices, mesh.arrays.triangles, mesh.faces, mesh.has_inside)
+        for vertices, mesh in zip(scaled, (first, second))
     ]
     moved = [
         None if pose is None else Pose(pose.rotation, np.ldexp(pose.translation, -power))
         for pose in (first_pose, second_pose)
     ]
-    return shells[0], moved[0], shells[1], moved[1]
+    return meshes[0], moved[0], meshes[1], moved[1]
 
 
-def what_to_seek(first: Shell, second: Shell, work: Work) -> int:
+def what_to_seek(first: MeshBody, second: MeshBody, work: Work) -> int:
     """Return what ends the search for contacts early."""
     if work.boolean or not (first.has_inside or second.has_inside):
         return SEEK_CONTACT
@@ -85,21 +86,15 @@ def what_to_seek(first: Shell, second: Shell, work: Work) -> int:
     return SEEK_PIERCING_BY_SECOND if first.has_inside else SEEK_PIERCING_BY_FIRST
 
 
-@dataclass(frozen=True, slots=True)
-class Patch:
-    """Faces connected through vertices, none in contact with the other body, all inside it or all outside."""
-
-    faces: IntArray
-
-
 class MeshPair:
     """One question, and the exact coordinates computed for it so far."""
 
     def __init__(
-        self, first: Shell, first_pose: Pose | None, second: Shell, second_pose: Pose | None, work: Work
+        self, first: MeshBody, first_pose: Pose | None, second: MeshBody, second_pose: Pose | None, work: Work
     ) -> None:
-        self.shells = (first, second)
+        self.meshes = (first, second)
         self.poses = (first_pose, second_pose)
+        self.posed = (first.posed(first_pose), second.posed(second_pose))
         self.work = work
         self.seek = what_to_seek(first, second, work)
         self.is_disjoint = False
@@ -109,33 +104,36 @@ class MeshPair:
     def exact(self) -> tuple[ExactBody, ExactBody]:
         """Both bodies in exact coordinates."""
         if self._exact is None:
-            self._exact = exact_pair(self.shells[0], self.poses[0], self.shells[1], self.poses[1])
+            self._exact = exact_pair(self.meshes[0], self.poses[0], self.meshes[1], self.poses[1])
         return self._exact
 
     def states(self, own: int, faces: IntArray) -> Int8Array:
         states = np.empty(len(faces), np.int8)
-        find_states(self.shells[own].arrays, faces, states)
+        find_states(self.meshes[own].arrays, faces, states)
         return states
 
     def state(self, own: int, face: int) -> int:
         return int(self.states(own, np.array([face]))[0])
 
-    def patches(self, own: int, in_contact: IntArray, place: int) -> list[Patch]:
-        """Return the patches of one body, away from its faces in contact, that lie INSIDE or OUTSIDE the other body."""
-        shell, other = self.shells[own], self.shells[1 - own]
+    def patches(self, own: int, in_contact: IntArray, place: int) -> list[IntArray]:
+        """Return the patches of one body, away from its faces in contact, that lie INSIDE or OUTSIDE the other body.
+
+        A patch: faces (n,) connected through vertices.
+        """
+        mesh, other = self.meshes[own], self.meshes[1 - own]
         if not other.has_inside:
             return []
-        triangles = shell.arrays.triangles
+        triangles = mesh.arrays.triangles
         if len(in_contact):
             left_out = np.zeros(len(triangles), np.bool_)
             left_out[in_contact] = True
-            parent = np.empty(len(shell.arrays.vertices), np.int64)
+            parent = np.empty(len(mesh.arrays.vertices), np.int64)
             join_vertices(triangles, left_out, parent)
             kept = np.flatnonzero(~left_out)
             roots = parent[triangles[kept, 0]]
             vertices = np.unique(roots)
         else:
-            vertices = triangles[shell.components, 0]
+            vertices = triangles[mesh.arrays.components, 0]
         found = self.located(own, vertices)
         for index in np.flatnonzero(found == UNDECIDED):
             self.work.budget.check()
@@ -147,16 +145,29 @@ class MeshPair:
         if not len(there):
             return []
         if not len(in_contact):
-            parent = np.empty(len(shell.arrays.vertices), np.int64)
+            parent = np.empty(len(mesh.arrays.vertices), np.int64)
             join_vertices(triangles, np.zeros(len(triangles), np.bool_), parent)
             kept, roots = np.arange(len(triangles)), parent[triangles[:, 0]]
-        return [Patch(kept[roots == parent[vertex]]) for vertex in there]
+        return [kept[roots == parent[vertex]] for vertex in there]
+
+    def sides_beside(self, own: int, patch: IntArray) -> Iterator[Sides]:
+        """Yield the status of a body beside each region of a patch of it; one that changes across a face says all."""
+        body = self.exact[own]
+        with_area = patch[body.mesh.arrays.axis[patch] != NO_AREA]
+        for start in range(0, len(with_area), _BLOCK):
+            self.work.budget.check()
+            if (self.states(own, with_area[start : start + _BLOCK]) != STATE_STACKED).any():
+                yield Sides(True, False, False)
+                return
+        for face in with_area.tolist():
+            for q in regions_of(body, face, [body], self.work.budget):
+                yield sides_at(body, q, body.axis(face))
 
     def located(self, own: int, vertices: IntArray) -> Int8Array:
         """Return where vertices that are on no face of the other body lie: INSIDE, OUTSIDE or UNDECIDED."""
-        shell, other = self.shells[own], self.shells[1 - own]
-        poses = [body.posed(pose) for body, pose in zip(self.shells, self.poses)]
+        mesh, other = self.meshes[own], self.meshes[1 - own]
         found = np.empty(len(vertices), np.int8)
-        locate_vertices(shell.arrays, poses[own], vertices, other.arrays, poses[1 - own], found, self.work.budget.flag)
+        posed, theirs = self.posed[own], self.posed[1 - own]
+        locate_vertices(mesh.arrays, posed, vertices, other.arrays, theirs, found, self.work.budget.flag)
         self.work.budget.check()
         return found

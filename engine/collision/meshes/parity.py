@@ -4,7 +4,7 @@ The half-line from q upward along the z axis of the other body's own coordinates
 so that it meets no edge and no upright face: an orient2d that is exactly zero takes the sign of the first nonzero
 derivative. A face that the half-line's line meets counts if it lies above q (orient3d); a zero there means q lies on
 it. Caller guarantees that no face of the other body holds q where INSIDE or OUTSIDE is to be relied on; UNDECIDED is
-settled with exact posed coordinates (`exact_cells.py`).
+settled with exact posed coordinates (`exact_regions.py`).
 """
 
 from __future__ import annotations
@@ -14,14 +14,23 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from engine.collision.meshes.face_state import SLACK, STACK_ROWS
-from engine.collision.meshes.frames import defect_of, largest, turned_back
-from engine.collision.meshes.mesh_arrays import ShellArrays, in_tree, triangle_of
-from engine.collision.meshes.placement import Placement, PoseArrays, orient2d_near, orient3d_near, place_pair, placed
+from engine.collision.meshes.frames import defect_of
+from engine.collision.meshes.mesh_arrays import MeshArrays, in_tree, triangle_of
+from engine.collision.meshes.placement import (
+    Placement,
+    PoseArrays,
+    orient2d_near,
+    orient3d_near,
+    place_pair,
+    placed,
+    turned_back,
+)
 from engine.collision.meshes.triangle_triangle import Triangle3
-from engine.jit import inline, kernel
+from engine.jit import allocating, inline, kernel
 from engine.lanes.boxes import inside_box
 from engine.lanes.lanes import lowest_bit
 from engine.predicates.loading import as_point3
+from engine.predicates.vectors import largest_of
 from engine.types import UNDECIDED, Point2, Point3
 
 OUTSIDE = -1
@@ -91,19 +100,19 @@ def brought_back(p: Point3, source: Placement, target: Placement, defect: float)
     own = turned_back(target, w)
     if source.error == 0.0 and target.error == 0.0:  # nothing is rounded on a lattice
         return OwnPoint(own, 0.0)
-    off = source.error + target.error + 2.0**-50 * (largest(q) + largest(w))
-    return OwnPoint(own, 2.0 * off + (8.0 * defect + 2.0**-48) * largest(w) + 2.0**-1060)
+    off = source.error + target.error + 2.0**-50 * (largest_of(q) + largest_of(w))
+    return OwnPoint(own, 2.0 * off + (8.0 * defect + 2.0**-48) * largest_of(w) + 2.0**-1060)
 
 
-@inline
-def locate_point(own: OwnPoint, shell: ShellArrays) -> int:
+@allocating
+def locate_point(own: OwnPoint, mesh: MeshArrays) -> int:
     """Return INSIDE, OUTSIDE, 0 (on a face) or UNDECIDED for one point."""
     q, error = own.point, own.error
-    local = in_tree(shell, q)
-    slack = SLACK + error / shell.scale
+    local = in_tree(mesh, q)
+    slack = SLACK + error / mesh.scale
     if not (slack < 1.0 and np.isfinite(local.x + local.y + local.z)):  # case: the ends of the exponent range
         return UNDECIDED
-    if largest(local) > 4.0 + slack:
+    if largest_of(local) > 4.0 + slack:
         return OUTSIDE
     low = (np.float32(local.x - slack), np.float32(local.y - slack), np.float32(local.z - slack))
     high = (np.float32(local.x + slack), np.float32(local.y + slack), np.float32(ABOVE_ALL))
@@ -114,15 +123,15 @@ def locate_point(own: OwnPoint, shell: ShellArrays) -> int:
     while n_stack > 0:  # bound: each node enters once
         n_stack -= 1
         node = int(stack[n_stack])
-        lanes = inside_box(shell.boxes, node, low, high)
+        lanes = inside_box(mesh.boxes, node, low, high)
         while lanes != 0:
-            child = int(shell.child[node, lowest_bit(lanes)])
+            child = int(mesh.child[node, lowest_bit(lanes)])
             lanes &= lanes - 1
             if child >= 0:
                 stack[n_stack] = child
                 n_stack += 1
                 continue
-            how = half_line_crosses(triangle_of(shell, -1 - child), q, error)
+            how = half_line_crosses(triangle_of(mesh, -1 - child), q, error)
             if how == UNDECIDED:
                 unsure = True
             elif how == 0:
@@ -138,19 +147,19 @@ def locate_point(own: OwnPoint, shell: ShellArrays) -> int:
 
 @kernel
 def locate_vertices(
-    source: ShellArrays,
+    source: MeshArrays,
     source_pose: PoseArrays,
     vertices: Any,
-    shell: ShellArrays,
+    mesh: MeshArrays,
     pose: PoseArrays,
     found: Any,
     flag: Any,
 ) -> None:
-    """Fill found (n,) int8 for the vertices (n,) of `source` against `shell`, each under its one pose."""
-    a, b = place_pair(source.extent, source_pose, 0, shell.extent, pose, 0)
+    """Fill found (n,) int8 for the vertices (n,) of `source` against `mesh`, each under its one pose."""
+    a, b = place_pair(source.extent, source_pose, 0, mesh.extent, pose, 0)
     defect = defect_of(b)
     for item in range(vertices.shape[0]):
         if flag[0] != 0:
             return
         own = brought_back(as_point3(source.vertices, vertices[item]), a, b, defect)
-        found[item] = locate_point(own, shell)
+        found[item] = locate_point(own, mesh)

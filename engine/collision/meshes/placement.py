@@ -9,11 +9,6 @@ lattice into itself (`is_lattice_pose`) rounds nothing: error 0, and so does a b
 **error.** Four rounded terms of a coordinate, and the rounded difference of two translations: |rounded - exact| <=
 g4 (|R| |p| + |t|) + u |t| + 4h with u = 2^-53, g4 = 4u / (1 - 4u), h = 2^-1075. With |R| <= 1 + 1e-12 and |p| <= reach
 that is below 2^-50 (3 reach + max |t|) + 2^-1060, with room for the rounding of the bound itself.
-
-**sign.** With u, v, w the rounded differences of three points from the first, M their largest component, and e twice
-the error (both ends of a difference), the exact determinant differs from that of the exact differences of the rounded
-points by at most 18 e M'^2 + 18 e^2 M' + 6 e^3 <= 18 e (M' + e)^2 (nine entries, each with a cofactor of at most 2
-M'^2), M' = M (1 + u). The bound of `orient3d_filter` is added.
 """
 
 from __future__ import annotations
@@ -23,8 +18,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from engine.arrays import FloatArray
-from engine.jit import inline
+from engine.jit import inline, merged
 from engine.predicates.orientation import orient2d, orient3d
+from engine.predicates.posed import orient3d_rounded
 from engine.types import UNDECIDED, Point2, Point3
 
 
@@ -62,12 +58,13 @@ class Extent(NamedTuple):
     grain: float
 
 
-@inline
+@merged
 def as_placement(pose: PoseArrays, item: int, x: float, y: float, z: float, error: float) -> Placement:
     """Load the rotation of pose `item`, with a translation of the caller's."""
-    r = pose.rotations[item]
+    r, i = pose.rotations, item
     return Placement(
-        r[0, 0], r[0, 1], r[0, 2], r[1, 0], r[1, 1], r[1, 2], r[2, 0], r[2, 1], r[2, 2], x, y, z, pose.is_posed, error
+        r[i, 0, 0], r[i, 0, 1], r[i, 0, 2], r[i, 1, 0], r[i, 1, 1], r[i, 1, 2], r[i, 2, 0], r[i, 2, 1], r[i, 2, 2],
+        x, y, z, pose.is_posed, error,
     )  # fmt: skip
 
 
@@ -113,7 +110,7 @@ def place_pair(
     return as_placement(a_pose, a_item, s[0], s[1], s[2], a_error), as_placement(b_pose, b_item, 0.0, 0.0, 0.0, 0.0)
 
 
-@inline
+@merged
 def placed(p: Point3, place: Placement) -> Point3:
     """Return the rounded posed point, the point itself where there is no pose."""
     x, y, z = p
@@ -126,28 +123,31 @@ def placed(p: Point3, place: Placement) -> Point3:
     )
 
 
+@merged
+def turned(place: Placement, v: Point3) -> Point3:
+    """Return R v."""
+    return Point3(
+        place.xx * v.x + place.xy * v.y + place.xz * v.z,
+        place.yx * v.x + place.yy * v.y + place.yz * v.z,
+        place.zx * v.x + place.zy * v.y + place.zz * v.z,
+    )
+
+
+@merged
+def turned_back(place: Placement, v: Point3) -> Point3:
+    """Return the product of the transpose of R with v."""
+    return Point3(
+        place.xx * v.x + place.yx * v.y + place.zx * v.z,
+        place.xy * v.x + place.yy * v.y + place.zy * v.z,
+        place.xz * v.x + place.yz * v.y + place.zz * v.z,
+    )
+
+
 @inline
 def orient3d_near(a: Point3, b: Point3, c: Point3, d: Point3, error: float) -> int:
     """Return orient3d of the exact points behind rounded ones; UNDECIDED where `error` per coordinate could change
     it."""
-    if error == 0.0:
-        return orient3d(a, b, c, d)
-    ux, uy, uz = b.x - a.x, b.y - a.y, b.z - a.z
-    vx, vy, vz = c.x - a.x, c.y - a.y, c.z - a.z
-    wx, wy, wz = d.x - a.x, d.y - a.y, d.z - a.z
-    yz, zy = uy * vz, uz * vy
-    zx, xz = uz * vx, ux * vz
-    xy, yx = ux * vy, uy * vx
-    det = (yz - zy) * wx + (zx - xz) * wy + (xy - yx) * wz
-    permanent = (abs(yz) + abs(zy)) * abs(wx) + (abs(zx) + abs(xz)) * abs(wy) + (abs(xy) + abs(yx)) * abs(wz)
-    m = max(max(abs(ux), abs(uy), abs(uz)), max(abs(vx), abs(vy), abs(vz)), max(abs(wx), abs(wy), abs(wz)))
-    e = 2.0 * error
-    threshold = 2.0**-50 * permanent + 18.5 * e * ((m + e) * (m + e)) + 2.0**-1070 * (1.0 + 3.0 * m)
-    if det > threshold:
-        return 1
-    if -det > threshold:
-        return -1
-    return UNDECIDED
+    return orient3d(a, b, c, d) if error == 0.0 else orient3d_rounded(a, b, c, d, error)
 
 
 @inline
@@ -183,9 +183,3 @@ def placed_axis(axis: int, place: Placement) -> int:
     elif axis == 2:
         x, y = place.xz, place.yz
     return 0 if x != 0.0 else (1 if y != 0.0 else 2)
-
-
-NO_ROTATION = np.eye(3).reshape(1, 3, 3)
-NO_TRANSLATION = np.zeros((1, 3))
-for _array in (NO_ROTATION, NO_TRANSLATION):
-    _array.setflags(write=False)

@@ -12,137 +12,101 @@ from engine.collision.meshes.dual_traversal import (
     SEEK_OVERLAP,
     SETTLED,
     Descent,
+    Found,
     Place,
+    Search,
+    begin,
+    place_bodies,
     search,
-    start_descent,
 )
 from engine.collision.meshes.frames import defect_of
-from engine.collision.meshes.mesh_arrays import ShellArrays
+from engine.collision.meshes.mesh_arrays import MeshArrays
 from engine.collision.meshes.parity import INSIDE, OUTSIDE, brought_back, locate_point
 from engine.collision.meshes.placement import Placement, PoseArrays
-from engine.jit import inline, kernel
+from engine.jit import bare_kernel, inline
 from engine.predicates.loading import as_point3
-
-_NONE, _ALL, _SOME, _UNSURE = range(4)
 
 
 @inline
-def components_inside(
-    source: ShellArrays,
-    components: Any,
-    source_place: Placement,
-    shell: ShellArrays,
-    place: Placement,
-    has_inside: bool,
-) -> int:
-    """Return whether none, all or some of the components lie inside a shell that none of them meets, or `_UNSURE`."""
-    if not has_inside:
-        return _NONE
+def n_components_inside(source: MeshArrays, source_place: Placement, mesh: MeshArrays, place: Placement) -> int:
+    """Return how many components lie inside a mesh that none of them meets, or UNSETTLED."""
     n_inside, defect = 0, defect_of(place)
-    for item in range(components.shape[0]):
-        p = as_point3(source.vertices, source.triangles[components[item], 0])
-        where = locate_point(brought_back(p, source_place, place, defect), shell)
+    for item in range(source.components.shape[0] if mesh.has_inside else 0):
+        p = as_point3(source.vertices, source.triangles[source.components[item], 0])
+        where = locate_point(brought_back(p, source_place, place, defect), mesh)
         if where == INSIDE:
             n_inside += 1
         elif where != OUTSIDE:
-            return _UNSURE
-    if n_inside == 0:
-        return _NONE
-    return _ALL if n_inside == components.shape[0] else _SOME
+            return UNSETTLED
+    return n_inside
 
 
 @inline
-def relation_apart(
-    first: ShellArrays,
-    first_components: Any,
-    first_has_inside: bool,
-    second: ShellArrays,
-    second_components: Any,
-    second_has_inside: bool,
-    place: Place,
-) -> int:
-    """Return the relation of two bodies without contact, or UNSETTLED."""
-    in_second = components_inside(first, first_components, place.a, second, place.b, second_has_inside)
-    in_first = components_inside(second, second_components, place.b, first, place.a, first_has_inside)
-    if in_second == _NONE and in_first == _NONE:
+def relation_apart(first: MeshArrays, second: MeshArrays, place: Place) -> int:
+    """Return the relation of two bodies without contact, or UNSETTLED: none or all of one lies inside the other."""
+    in_second = n_components_inside(first, place.a, second, place.b)
+    in_first = n_components_inside(second, place.b, first, place.a)
+    if in_second == 0 and in_first == 0:
         return DISJOINT
-    if in_second == _ALL and in_first == _NONE:
+    if in_second == first.components.shape[0] and in_first == 0:
         return FIRST_INSIDE_SECOND
-    if in_second == _NONE and in_first == _ALL:
+    if in_second == 0 and in_first == second.components.shape[0]:
         return SECOND_INSIDE_FIRST
     return UNSETTLED
 
 
-@kernel
+@bare_kernel
 def find_contacts(
-    first: ShellArrays,
-    first_components: Any,
-    first_has_inside: bool,
+    first: MeshArrays,
     first_pose: PoseArrays,
-    second: ShellArrays,
-    second_components: Any,
-    second_has_inside: bool,
+    second: MeshArrays,
     second_pose: PoseArrays,
     seek: int,
     is_start: bool,
     descent: Descent,
-    pairs: Any,
-    kinds: Any,
+    found: Found,
     flag: Any,
 ) -> tuple[int, int, int]:
     """Run `search` for one pose of each body, from the start or from where it was left.
 
     Returns how it ended, the number of pairs, and, of a search from the start without any, `relation_apart`.
     """
-    rest, bottom = descent.rest.copy(), descent.stack[0].copy()
-    place = start_descent(first, first_pose, 0, second, second_pose, 0, descent)
-    if not is_start:
-        descent.rest[:] = rest
-        descent.stack[0, 0], descent.stack[0, 1] = bottom[0], bottom[1]
-    how, n_pairs = search(first, second, place, descent, seek, pairs, kinds, flag)
+    place, is_apart = place_bodies(first, first_pose, 0, second, second_pose, 0, descent)
+    if is_start:
+        begin(descent, is_apart)
+    how, n_pairs = search(Search(first, second, place, descent, seek, found, flag))
     relation = UNSETTLED
     if is_start and how == DONE and n_pairs == 0:
-        relation = relation_apart(
-            first, first_components, first_has_inside, second, second_components, second_has_inside, place
-        )
+        relation = relation_apart(first, second, place)
     return how, n_pairs, relation
 
 
-@kernel
+@bare_kernel
 def relate_poses(
-    first: ShellArrays,
-    first_components: Any,
-    first_has_inside: bool,
-    second: ShellArrays,
-    second_components: Any,
-    second_has_inside: bool,
+    first: MeshArrays,
+    second: MeshArrays,
     still: PoseArrays,
     poses: PoseArrays,
     seek: int,
     descent: Descent,
-    pairs: Any,
-    kinds: Any,
+    found: Found,
     relations: Any,
     flag: Any,
 ) -> None:
     """Fill relations (n,) int8 for the poses (n) of the second body; still: of the first, which has none.
 
-    `descent`, `pairs` and `kinds` (some rows) are work space.
+    `descent` and `found` (of a few rows) are work space.
     """
     for item in range(relations.shape[0]):
-        place = start_descent(first, still, 0, second, poses, item, descent)
-        how, n_pairs = search(first, second, place, descent, seek, pairs, kinds, flag)
-        has_contact = n_pairs > 0
+        place, is_apart = place_bodies(first, still, 0, second, poses, item, descent)
+        begin(descent, is_apart)
+        how, n_pairs, has_contact = FULL, 0, False
         while how == FULL:  # weak contacts so far: a later one may settle the question
-            how, _ = search(first, second, place, descent, seek, pairs, kinds, flag)
+            how, n_pairs = search(Search(first, second, place, descent, seek, found, flag))
+            has_contact |= n_pairs > 0
         if how == INTERRUPTED:
             return
         if how == SETTLED:
             relations[item] = OVERLAPPING if seek == SEEK_OVERLAP else TOUCHING
-            continue
-        relations[item] = UNSETTLED
-        if has_contact:
-            continue
-        relations[item] = relation_apart(
-            first, first_components, first_has_inside, second, second_components, second_has_inside, place
-        )
+        else:
+            relations[item] = UNSETTLED if has_contact else relation_apart(first, second, place)

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from engine.collision.meshes.dual_traversal import store_pose, with_pose
-from engine.collision.meshes.mesh_arrays import ShellArrays, triangle_of
+from engine.collision.meshes.dual_traversal import store_pose
+from engine.collision.meshes.mesh_arrays import MeshArrays, triangle_of
 from engine.collision.meshes.placement import PoseArrays
-from engine.collision.meshes.triangle_triangle import PosedTriangle
+from engine.collision.meshes.triangle_triangle import PosedTriangle, with_pose
 from engine.jit import inline, kernel
 from engine.predicates.posed import UNPOSED, PosedPoint3, orient3d_posed, posed_error
 from engine.types import UNDECIDED
@@ -71,7 +71,7 @@ def corner(t: PosedTriangle, index: int) -> PosedPoint3:
 
 @kernel
 def is_separated(
-    first: ShellArrays, first_pose: PoseArrays, second: ShellArrays, second_pose: PoseArrays, contacts: Any, flag: Any
+    first: MeshArrays, first_pose: PoseArrays, second: MeshArrays, second_pose: PoseArrays, contacts: Any, flag: Any
 ) -> bool:
     """Tell whether a plane through faces or edges of contacts (n, 2) is known to separate the two bodies."""
     poses = np.zeros((2, 12))

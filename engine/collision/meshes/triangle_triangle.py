@@ -19,9 +19,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from engine.jit import inline
+from engine.jit import called, inline
 from engine.predicates.orientation import orient2d
 from engine.predicates.posed import UNPOSED, PosedPoint3, orient3d_posed
+from engine.predicates.vectors import cross, dot, largest_of, minus
 from engine.types import UNDECIDED, Point2, Point3
 
 APART = 0
@@ -49,12 +50,12 @@ class PosedTriangle(NamedTuple):
 
 
 @inline
-def unposed(t: Triangle3) -> PosedTriangle:
-    """Return the triangle as one without a pose."""
+def with_pose(t: Triangle3, pose: int = UNPOSED) -> PosedTriangle:
+    """Return the triangle before pose number `pose`, or UNPOSED."""
     return PosedTriangle(
-        PosedPoint3(t.p.x, t.p.y, t.p.z, UNPOSED),
-        PosedPoint3(t.q.x, t.q.y, t.q.z, UNPOSED),
-        PosedPoint3(t.r.x, t.r.y, t.r.z, UNPOSED),
+        PosedPoint3(t.p.x, t.p.y, t.p.z, pose),
+        PosedPoint3(t.q.x, t.q.y, t.q.z, pose),
+        PosedPoint3(t.r.x, t.r.y, t.r.z, pose),
     )
 
 
@@ -96,33 +97,9 @@ def is_straddling(p: int, q: int, r: int) -> bool:
 
 
 @inline
-def minus(a: Point3, b: Point3) -> Point3:
-    """Return a - b."""
-    return Point3(a.x - b.x, a.y - b.y, a.z - b.z)
-
-
-@inline
-def cross(u: Point3, v: Point3) -> Point3:
-    """Return u x v."""
-    return Point3(u.y * v.z - u.z * v.y, u.z * v.x - u.x * v.z, u.x * v.y - u.y * v.x)
-
-
-@inline
-def dot(u: Point3, v: Point3) -> float:
-    """Return u . v."""
-    return u.x * v.x + u.y * v.y + u.z * v.z
-
-
-@inline
-def size_of(v: Point3) -> float:
-    """Return the largest magnitude of a component."""
-    return max(abs(v.x), abs(v.y), abs(v.z))
-
-
-@inline
 def with_lone_first(t: Triangle3, p: float, q: float, r: float) -> Triangle3:
     """Return a triangle with the vertex first that is alone on its side of a plane; p, q, r: values, none near 0."""
-    above = (p > 0.0) + (q > 0.0) + (r > 0.0) == 1
+    above = int(p > 0.0) + int(q > 0.0) + int(r > 0.0) == 1
     if (p > 0.0) == above:
         return t
     if (q > 0.0) == above:
@@ -140,7 +117,7 @@ def classify_near(t1: Triangle3, t2: Triangle3, error: float) -> int:
     """
     u, v = minus(t1.q, t1.p), minus(t1.r, t1.p)
     p2, q2, r2 = minus(t2.p, t1.p), minus(t2.q, t1.p), minus(t2.r, t1.p)
-    m = 2.0 * max(max(size_of(u), size_of(v)), max(size_of(p2), size_of(q2), size_of(r2)))
+    m = 2.0 * max(max(largest_of(u), largest_of(v)), max(largest_of(p2), largest_of(q2), largest_of(r2)))
     e = 2.0 * error
     bound = 2.0**-46 * (m * m * m) + 18.5 * e * ((m + e) * (m + e)) + 2.0**-1068 * (1.0 + m)
     n1 = cross(u, v)
@@ -157,9 +134,9 @@ def classify_near(t1: Triangle3, t2: Triangle3, error: float) -> int:
         return UNDECIDED
     # the lone vertices first, each above the plane of the other triangle
     s, t = with_lone_first(t1, d, f, g), with_lone_first(t2, a, b, c)
-    if (d > 0.0) + (f > 0.0) + (g > 0.0) == 2:  # the lone one is below: turn the other triangle over
+    if int(d > 0.0) + int(f > 0.0) + int(g > 0.0) == 2:  # the lone one is below: turn the other triangle over
         t = Triangle3(t.p, t.r, t.q)
-    if (a > 0.0) + (b > 0.0) + (c > 0.0) == 2:
+    if int(a > 0.0) + int(b > 0.0) + int(c > 0.0) == 2:
         s = Triangle3(s.p, s.r, s.q)
     from_p = minus(t.p, s.p)
     first = dot(cross(minus(s.q, s.p), from_p), minus(t.q, s.p))  # orient3d(s.q, t.p, s.p, t.q)
@@ -184,7 +161,7 @@ def turned(t: PosedTriangle, lone: int) -> PosedTriangle:
     return PosedTriangle(t.r, t.p, t.q)
 
 
-@inline
+@called
 def classify_exactly(poses: Any, t1: PosedTriangle, t2: PosedTriangle, axis: int, error: float) -> int:
     """Return the class of two triangles that both have an area; UNDECIDED only where exponents leave the range.
 

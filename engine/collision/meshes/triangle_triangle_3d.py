@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from engine.collision.codes import DISJOINT, TOUCHING, UNSETTLED
 from engine.collision.meshes.mesh_arrays import NO_AREA, UNKNOWN_AXIS, axis_of
-from engine.collision.meshes.triangle_triangle import APART, Triangle3, classify_exactly, classify_near, unposed
-from engine.collision.planar.triangle_triangle_2d import DISJOINT, OPEN, TOUCHING
+from engine.collision.meshes.triangle_triangle import APART, Triangle3, classify_exactly, classify_near, with_pose
 from engine.jit import inline, kernel
 from engine.predicates.loading import as_point3
 from engine.types import UNDECIDED
@@ -35,11 +35,11 @@ def are_boxes_apart(t: Triangle3, u: Triangle3) -> bool:
 
 @kernel
 def relate_triangles_3d(first: Any, second: Any, relations: Any) -> None:
-    """Fill relations (n,) int8 for the pairs of rows of two (n, 3, 3) float64 arrays; degenerate ones stay OPEN."""
+    """Fill relations (n,) int8 for the pairs of rows of two (n, 3, 3) float64 arrays, degenerate ones UNSETTLED."""
     poses = np.zeros((1, 12))  # nothing here has one
     for item in range(relations.shape[0]):
         t, u = as_triangle3(first, item), as_triangle3(second, item)
-        relations[item] = OPEN
+        relations[item] = UNSETTLED
         if are_boxes_apart(t, u):
             relations[item] = DISJOINT
             continue
@@ -48,6 +48,6 @@ def relate_triangles_3d(first: Any, second: Any, relations: Any) -> None:
             continue
         how = classify_near(t, u, 0.0)
         if how == UNDECIDED:
-            how = classify_exactly(poses, unposed(t), unposed(u), axis, 0.0)
+            how = classify_exactly(poses, with_pose(t), with_pose(u), axis, 0.0)
         if how != UNDECIDED:
             relations[item] = DISJOINT if how == APART else TOUCHING

@@ -13,13 +13,10 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
 from engine.jit import inline, kernel
 from engine.predicates.orientation import orient2d
 from engine.types import UNDECIDED, Point2
-
-DISJOINT, FIRST_INSIDE_SECOND, SECOND_INSIDE_FIRST, OVERLAPPING, TOUCHING = range(5)  # as in `Relation`
-OPEN = 5
-"""Written for a pair with an UNDECIDED sign: rational arithmetic settles it."""
 
 
 class Triangle2(NamedTuple):
@@ -66,19 +63,19 @@ def against_edges(t: Triangle2, u: Triangle2) -> int:
     """
     low, high = side_range(t.p, t.q, u)
     if low == UNDECIDED:
-        return OPEN
+        return UNSETTLED
     if high < 0:
         return DISJOINT
     inside, apart = low > 0, high == 0
     low, high = side_range(t.q, t.r, u)
     if low == UNDECIDED:
-        return OPEN
+        return UNSETTLED
     if high < 0:
         return DISJOINT
     inside, apart = inside and low > 0, apart or high == 0
     low, high = side_range(t.r, t.p, u)
     if low == UNDECIDED:
-        return OPEN
+        return UNSETTLED
     if high < 0:
         return DISJOINT
     if inside and low > 0:
@@ -105,13 +102,13 @@ def segment_of(t: Triangle2) -> tuple[Point2, Point2]:
 def segment_in_triangle(a: Point2, b: Point2, u: Triangle2) -> int:
     """Return DISJOINT, FIRST_INSIDE_SECOND or TOUCHING for the segment a b (maybe a point) and u, counter-clockwise."""
     how = against_edges(u, Triangle2(a, b, b))
-    if how in (OPEN, DISJOINT):
+    if how in (UNSETTLED, DISJOINT):
         return how
     if how == SECOND_INSIDE_FIRST:
         return FIRST_INSIDE_SECOND
     low, high = side_range(a, b, u)  # of a point: 0, 0
     if low == UNDECIDED:
-        return OPEN
+        return UNSETTLED
     return DISJOINT if low > 0 or high < 0 else TOUCHING
 
 
@@ -124,18 +121,18 @@ def segments_meet(a: Point2, b: Point2, c: Point2, d: Point2) -> int:
     c_side, d_side = orient2d(a, b, c), orient2d(a, b, d)
     a_side, b_side = orient2d(c, d, a), orient2d(c, d, b)
     if c_side == UNDECIDED or d_side == UNDECIDED or a_side == UNDECIDED or b_side == UNDECIDED:
-        return OPEN
+        return UNSETTLED
     return TOUCHING if c_side * d_side <= 0 and a_side * b_side <= 0 else DISJOINT
 
 
 @inline
 def relation_of_triangles(t: Triangle2, u: Triangle2) -> int:
-    """Return the relation of two closed triangles of the plane, degenerate ones included, or OPEN."""
+    """Return the relation of two closed triangles of the plane, degenerate ones included, or UNSETTLED."""
     if are_boxes_apart(t, u):
         return DISJOINT
     t_turn, u_turn = orient2d(t.p, t.q, t.r), orient2d(u.p, u.q, u.r)
     if t_turn == UNDECIDED or u_turn == UNDECIDED:
-        return OPEN
+        return UNSETTLED
     if t_turn < 0:
         t = Triangle2(t.p, t.r, t.q)
     if u_turn < 0:
@@ -151,10 +148,10 @@ def relation_of_triangles(t: Triangle2, u: Triangle2) -> int:
         how = segment_in_triangle(c, d, t)
         return SECOND_INSIDE_FIRST if how == FIRST_INSIDE_SECOND else how
     first = against_edges(t, u)
-    if first in (OPEN, DISJOINT, SECOND_INSIDE_FIRST):
+    if first in (UNSETTLED, DISJOINT, SECOND_INSIDE_FIRST):
         return first
     second = against_edges(u, t)
-    if second in (OPEN, DISJOINT):
+    if second in (UNSETTLED, DISJOINT):
         return second
     if second == SECOND_INSIDE_FIRST:
         return FIRST_INSIDE_SECOND

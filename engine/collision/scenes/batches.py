@@ -6,13 +6,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from engine.arrays import FloatArray, Int8Array, IntArray, read_only
+from engine.arrays import Int8Array, IntArray
 from engine.collision.codes import UNSETTLED
 from engine.collision.convex.body import ConvexArrays, ConvexBody, convex_body_of, pooled
 from engine.collision.convex.pair import relate_convex_pairs
 from engine.collision.convex.poses import LEAST_POSES, lane_arrays, relate_in_lanes
-from engine.collision.detail import NO_DETAIL, details_of_boxes, details_where_proven
-from engine.collision.meshes.placement import NO_ROTATION, NO_TRANSLATION, PoseArrays
+from engine.collision.detail import details_of_boxes, details_where_proven
+from engine.collision.meshes.mesh_arrays import STILL
+from engine.collision.meshes.placement import PoseArrays
 from engine.collision.scenes.bodies import SceneBodies
 from engine.collision.scenes.boxes import relate_box_pairs
 from engine.parallel import Budget, run_chunks
@@ -20,8 +21,8 @@ from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 
 
-class ShortPaths:
-    """Which bodies of a scene have a short path, and the arrays that it takes."""
+class SceneBatches:
+    """Which bodies of a scene the batches take, and the arrays that they want."""
 
     def __init__(self, bodies: SceneBodies, boolean: bool, budget: Budget) -> None:
         self._bodies = bodies
@@ -42,20 +43,11 @@ class ShortPaths:
         pool = self._pool
         if pool is None:
             return found
-        rows = np.append(np.int64(-1), self._convex)
+        rows, poses = np.append(np.int64(-1), self._convex), PoseArrays(bodies.rotations, bodies.translations, True)
 
         def task(start: int, stop: int) -> None:
             with np.errstate(all="ignore"):  # uncompiled runs only
-                relate_convex_pairs(
-                    pool,
-                    rows,
-                    bodies.rotations,
-                    bodies.translations,
-                    pairs[start:stop] + 1,
-                    self._boolean,
-                    found[start:stop],
-                    flag,
-                )
+                relate_convex_pairs(pool, rows, poses, pairs[start:stop] + 1, self._boolean, found[start:stop], flag)
 
         run_chunks(task, len(pairs), budget=self._budget, workers=workers)
         return found
@@ -63,7 +55,7 @@ class ShortPaths:
     def details(self, pairs: IntArray, relations: Int8Array) -> Int8Array:
         """Return the codes of `Rcc8` of pairs of bodies with interiors whose relations are those that `relations`
         found; NO_DETAIL where these are UNSETTLED."""
-        found = np.where(relations == UNSETTLED, np.int8(NO_DETAIL), details_where_proven(relations))
+        found = details_where_proven(relations)
         boxes = np.flatnonzero(self._is_box[pairs].all(axis=1))
         found[boxes] = details_of_boxes(self._bodies.low, self._bodies.high, pairs[boxes], relations[boxes])
         return found
@@ -85,13 +77,7 @@ class ShortPaths:
 
 
 def convex_poses(
-    first: Solid,
-    second: Solid,
-    rotations: FloatArray,
-    translations: FloatArray,
-    relations: Int8Array,
-    budget: Budget,
-    boolean: bool,
+    first: Solid, second: Solid, poses: PoseArrays, relations: Int8Array, budget: Budget, boolean: bool
 ) -> Callable[[int, int], None] | None:
     """Return the task that fills relations for a range of poses of `second`, UNSETTLED where float64 does not decide;
     None unless both solids are convex."""
@@ -99,22 +85,22 @@ def convex_poses(
     if len(bodies) < 2:
         return None
     pool, lanes = pooled(bodies), lane_arrays(*bodies) if len(relations) >= LEAST_POSES else None
-    still, turns, moves = PoseArrays(NO_ROTATION, NO_TRANSLATION, False), read_only(rotations), read_only(translations)
+    turns, moves, _ = poses
 
     def fill(start: int, stop: int) -> None:
         found = relations[start:stop]
         with np.errstate(all="ignore"):  # uncompiled runs only
             if lanes is not None:
-                poses = PoseArrays(turns[start:stop], moves[start:stop], True)
-                relate_in_lanes(pool, lanes, still, poses, boolean, found, budget.flag)
+                some = PoseArrays(turns[start:stop], moves[start:stop], True)
+                relate_in_lanes(pool, lanes, STILL, some, boolean, found, budget.flag)
             rest = np.flatnonzero(found == UNSETTLED)
             if len(rest):
                 rows = np.append(np.int64(0), np.ones(len(rest), np.int64))
                 pairs = np.column_stack([np.zeros(len(rest), np.int64), np.arange(1, len(rest) + 1)])
-                placed = np.concatenate([NO_ROTATION, turns[start + rest]])
-                moved = np.concatenate([NO_TRANSLATION, moves[start + rest]])
-                answers = np.full(len(rest), UNSETTLED, np.int8)
-                relate_convex_pairs(pool, rows, placed, moved, pairs, boolean, answers, budget.flag)
+                placed = np.concatenate([STILL.rotations, turns[start + rest]])
+                moved = np.concatenate([STILL.translations, moves[start + rest]])
+                some, answers = PoseArrays(placed, moved, True), np.full(len(rest), UNSETTLED, np.int8)
+                relate_convex_pairs(pool, rows, some, pairs, boolean, answers, budget.flag)
                 found[rest] = answers
         budget.check()
 

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, IntArray
+from engine.bounding.posed_boxes import place_boxes
 from engine.collision.collide import check_pose, pair_function
 from engine.collision.scenes.numbering import numbered
-from engine.collision.scenes.posed_boxes import place_boxes
-from engine.collision.scenes.world_box import own_box
 from engine.errors import InvalidArrayError, UnsupportedSolidError, WrongDimensionError
 from engine.solids.base import Solid
+from engine.solids.own_box import own_box
 from engine.solids.pose import Pose
 
 
@@ -65,10 +65,11 @@ def scene_bodies(solids: Sequence[Solid], poses: Sequence[Pose | None] | None) -
     translations[rows] = numbers[:, dimension**2 :]
     own = [own_box(solid) for solid in distinct]
     boxes, reaches = np.array([box[:2] for box in own]).reshape(-1, 2, dimension), np.array([box[2] for box in own])
+    pose_rows = np.where(is_posed, np.arange(1, len(bodies) + 1), -1)
     radii = np.array([getattr(solid, "radius", 0.0) for solid in distinct])
     low, high = np.empty((len(bodies), dimension)), np.empty((len(bodies), dimension))
     with np.errstate(all="ignore"):  # uncompiled runs only
-        place_boxes(boxes, reaches, radii, kinds, is_posed, rotations[1:], translations[1:], low, high)
+        place_boxes(boxes, reaches, radii, kinds, pose_rows, rotations, translations, low, high)
     return SceneBodies(bodies, placed, distinct, kinds, is_posed, rotations, translations, low, high)
 
 

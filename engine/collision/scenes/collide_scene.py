@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from engine.arrays import BoolArray, Int8Array, IntArray
+from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray
 from engine.bounding.box_grid import pairs_of_boxes
 from engine.bounding.sweep import BLOCK
+from engine.collision.answers import Answers, PlacedPair, Witnesses, accuracy_of
 from engine.collision.codes import UNSETTLED
-from engine.collision.collide import collide_pair
-from engine.collision.detail import NO_DETAIL, check_has_detail, code_of, detail_of, has_interior
+from engine.collision.detail import NO_DETAIL, check_has_detail, has_interior
 from engine.collision.result import Witness, Work
-from engine.collision.scenes.batches import ShortPaths
+from engine.collision.scenes.batches import SceneBatches
 from engine.collision.scenes.bodies import SceneBodies, scene_bodies
 from engine.errors import IndexOutOfRangeError, InvalidArrayError
 from engine.parallel import Budget, Cancel, Progress, check_options, run_chunks
@@ -88,77 +88,73 @@ def collide_scene(
         budget.check()
         skipped = None if skip is None else _keys(skip, len(bodies.solids), "skip")
         wanted = None if only is None else _keys(only, len(bodies.solids), "only")
-        short_paths = ShortPaths(bodies, boolean, budget)
+        batches = SceneBatches(bodies, boolean, budget)
         parts: list[_Part] = []
         works: list[Work] = []
         n_candidates = n_open = 0
-        for pairs in _candidates(bodies, wanted, budget):
+        for pairs in _candidates(bodies, wanted, skipped, budget):
             budget.check()
-            if skipped is not None:
-                pairs = pairs[~np.isin(pairs[:, 0] * len(bodies.solids) + pairs[:, 1], skipped)]
+            relations = batches.relations(pairs, workers)
             n_candidates += len(pairs)
-            relations = short_paths.relations(pairs, workers)
-            is_open = relations == UNSETTLED
-            n_open += int(is_open.sum())
-            details = short_paths.details(pairs, relations) if detail else None
-            if witnesses:
-                is_open |= relations != Relation.DISJOINT
-            open_ones = np.flatnonzero(is_open)
-            if progress is not None and len(open_ones) < len(pairs):
-                progress(len(pairs) - len(open_ones))
-            found: list[Witness | None] = [None] * len(pairs) if witnesses else []
-
-            def task(
-                start: int,
-                stop: int,
-                pairs: IntArray = pairs,
-                open_ones: IntArray = open_ones,
-                relations: Int8Array = relations,
-                found: list[Witness | None] = found,
-                details: Int8Array | None = details,
-            ) -> None:
-                work = Work(budget, witness=witnesses, boolean=boolean)
-                works.append(work)
-                for item in open_ones[start:stop].tolist():
-                    budget.check()
-                    i, j = pairs[item].tolist()
-                    pair = bodies.solids[i], bodies.solids[j], bodies.poses[i], bodies.poses[j]
-                    answer = collide_pair(*pair, work)
-                    relations[item] = answer.relation
-                    if details is not None and details[item] == NO_DETAIL:
-                        details[item] = code_of(detail_of(*pair, answer.relation, work))
-                    if witnesses:
-                        found[item] = answer.witness
-
-            run_chunks(task, len(open_ones), budget=budget, first_chunk=4, workers=workers, progress=progress)
-            kept = np.flatnonzero(relations != Relation.DISJOINT)
-            if boolean:
-                relations[kept] = Relation.TOUCHING
-            if details is not None:
-                details = details[kept]
-                details[~_have_interiors(bodies, pairs[kept], budget)] = NO_DETAIL
-            named = [found[item] for item in kept.tolist()] if witnesses else []
-            parts.append((pairs[kept], relations[kept], named, details))
+            n_open += int((relations == UNSETTLED).sum())
+            details = batches.details(pairs, relations) if detail else None
+            answers = Answers(budget, boolean, relations, [None] * len(pairs) if witnesses else None, details)
+            _settle(bodies, pairs, answers, workers, progress)
+            works += answers.works
+            parts.append(_colliding(bodies, pairs, answers))
         budget.check()
     result = _joined(parts, witnesses, detail)
     if not report:
         return result
-    beyond, rational = sum(work.n_beyond_filter for work in works), sum(work.n_rational for work in works)
-    how = "boxes" if only is None else "named pairs"
-    return result, Accuracy("exact", None, n_candidates, max(beyond, n_open), rational, how)
+    return result, accuracy_of(n_candidates, n_open, works, "boxes" if only is None else "named pairs")
 
 
-_Part = tuple[IntArray, Int8Array, list[Witness | None], Int8Array | None]
-"""Of a block of candidates those that collide: pairs, relations, witnesses and details, these where asked for."""
+class _Part(NamedTuple):
+    """Of a block of candidates those that collide; witnesses and details where asked for."""
+
+    pairs: IntArray
+    relations: Int8Array
+    witnesses: Witnesses
+    details: Int8Array
+
+
+def _settle(
+    bodies: SceneBodies, pairs: IntArray, answers: Answers, workers: int | None, progress: Progress | None
+) -> None:
+    """Settle the pairs of a block that the batches left, one by one, in parallel chunks."""
+    left = answers.left()
+    if progress is not None and len(left) < len(pairs):
+        progress(len(pairs) - len(left))
+
+    def pair_of(item: int) -> PlacedPair:
+        i, j = pairs[item].tolist()
+        return bodies.solids[i], bodies.solids[j], bodies.poses[i], bodies.poses[j]
+
+    def task(start: int, stop: int) -> None:
+        answers.settle(left[start:stop], pair_of)
+
+    run_chunks(task, len(left), budget=answers.budget, first_chunk=4, workers=workers, progress=progress)
+
+
+def _colliding(bodies: SceneBodies, pairs: IntArray, answers: Answers) -> _Part:
+    """Return the pairs of a block that collide."""
+    kept = np.flatnonzero(answers.relations != Relation.DISJOINT)
+    relations = np.full(len(kept), Relation.TOUCHING, np.int8) if answers.boolean else answers.relations[kept]
+    named = [] if answers.witnesses is None else [answers.witnesses[item] for item in kept.tolist()]
+    details = np.empty(0, np.int8)
+    if answers.details is not None:
+        details = answers.details[kept]
+        details[~_have_interiors(bodies, pairs[kept], answers.budget)] = NO_DETAIL
+    return _Part(pairs[kept], relations, named, details)
 
 
 def _joined(parts: list[_Part], witnesses: bool, detail: bool) -> ScenePairs:
     """Return the colliding pairs of all blocks as one, sorted; each block is."""
     none = np.empty(0, np.int8)
-    pairs = np.concatenate([np.empty((0, 2), np.int64), *(part[0] for part in parts)])
-    relations = np.concatenate([none, *(part[1] for part in parts)])
-    named = tuple(witness for part in parts for witness in part[2]) if witnesses else None
-    details = np.concatenate([none, *(part[3] for part in parts if part[3] is not None)]) if detail else None
+    pairs = np.concatenate([np.empty((0, 2), np.int64), *(part.pairs for part in parts)])
+    relations = np.concatenate([none, *(part.relations for part in parts)])
+    named = tuple(witness for part in parts for witness in part.witnesses) if witnesses else None
+    details = np.concatenate([none, *(part.details for part in parts)]) if detail else None
     if len(parts) > 1:
         order = np.lexsort((pairs[:, 1], pairs[:, 0]))
         pairs, relations = pairs[order], relations[order]
@@ -175,17 +171,23 @@ def _have_interiors(bodies: SceneBodies, pairs: IntArray, budget: Budget) -> Boo
     return solid[first] & solid[second]
 
 
-def _candidates(bodies: SceneBodies, wanted: IntArray | None, budget: Budget) -> Iterator[IntArray]:
-    """Yield the pairs whose boxes meet, of those wanted (keys first * n + second), in blocks, each of them
-    sorted."""
+def _candidates(
+    bodies: SceneBodies, wanted: IntArray | None, skipped: IntArray | None, budget: Budget
+) -> Iterator[IntArray]:
+    """Yield the pairs whose boxes meet, of those wanted and not skipped (keys first * n + second), in blocks, each of
+    them sorted."""
     n_bodies = len(bodies.solids)
     if n_bodies < 2 or (wanted is not None and not len(wanted)):
         return
     low, high = bodies.low, bodies.high
-    if wanted is None:
-        yield from pairs_of_boxes(low, high, budget.flag)
-        return
-    pairs = np.stack(np.divmod(np.unique(wanted), n_bodies), axis=1)
+    blocks = pairs_of_boxes(low, high, budget.flag) if wanted is None else _wanted_pairs(low, high, wanted)
+    for pairs in blocks:
+        yield pairs if skipped is None else pairs[~np.isin(pairs[:, 0] * n_bodies + pairs[:, 1], skipped)]
+
+
+def _wanted_pairs(low: FloatArray, high: FloatArray, wanted: IntArray) -> Iterator[IntArray]:
+    """Yield the pairs with the keys wanted whose boxes meet, in blocks."""
+    pairs = np.stack(np.divmod(np.unique(wanted), len(low)), axis=1)
     pairs = pairs[pairs[:, 0] < pairs[:, 1]]
     for start in range(0, len(pairs), BLOCK):
         first, second = pairs[start : start + BLOCK].T

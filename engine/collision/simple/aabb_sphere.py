@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from engine.collision.exact_images import as_vector, image_point, squared_length
+from engine.collision.exact_images import as_vector, image_point
 from engine.collision.result import Collision, Witness, Work
+from engine.predicates.exact_vectors import squared_length
 from engine.solids.aabb import Aabb
 from engine.solids.pose import Pose
 from engine.solids.sphere import Sphere

@@ -11,13 +11,13 @@ from fractions import Fraction
 
 import numpy as np
 
-from engine.collision.exact_images import Vector, image_point, minus, squared_length
+from engine.collision.exact_images import Vector, image_point
 from engine.collision.meshes.live_faces import live_piece
-from engine.collision.meshes.mesh_arrays import shell_of
+from engine.collision.meshes.mesh_arrays import mesh_body_of
 from engine.collision.planar.outline import live_edges, outline_of, rounded
 from engine.collision.result import Parts, Work
-from engine.collision.simple.feature_distance import box_distance_bounds
 from engine.collision.simple.mesh_sphere import Features, mesh_features, moved_piece, outline_features
+from engine.predicates.exact_vectors import minus, squared_length
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
 from engine.solids.sphere import Sphere
@@ -29,11 +29,9 @@ def body_ball_parts(body: Solid, sphere: Sphere, body_pose: Pose | None, sphere_
     center = image_point(sphere.center, sphere_pose)
     limit = Fraction(sphere.radius) ** 2
     features = (mesh_features if body.dimension == 3 else outline_features)(body, body_pose, center, work)
-    around = np.array([rounded(value) for value in center])
-    slack = features.error + 2.0**-50 * float(np.abs(around).max()) + 2.0**-1070
-    nearest, farthest = box_distance_bounds(around, features.low - slack, features.high + slack)
-    candidates = np.flatnonzero(nearest <= rounded(limit) * (1.0 + 2.0**-50) + 2.0**-1000)
-    ball_sticks_out = features.reaches_inside(candidates[np.argsort(nearest[candidates])].tolist(), limit)
+    nearest, farthest = features.bounds(features.low, features.high)
+    candidates = features.candidates(nearest, limit)
+    ball_sticks_out = features.reaches_inside(candidates.tolist(), limit)
     beyond = np.flatnonzero(farthest >= rounded(limit) * (1.0 - 2.0**-50) - 2.0**-1000)
     beyond = beyond[np.argsort(-nearest[beyond], kind="stable")]
     vertices = _live_vertices(body, body_pose, beyond.tolist(), work)
@@ -57,9 +55,9 @@ def _live_vertices(body: Solid, pose: Pose | None, faces: list[int], work: Work)
         for piece in live_edges(outline_of(body, pose, work.budget), work.budget):
             yield from piece
         return
-    shell = shell_of(body)
+    mesh = mesh_body_of(body)
     for face in faces:
         work.budget.check()
-        piece3 = live_piece(shell, face, work.budget)
+        piece3 = live_piece(mesh, face, work.budget)
         if piece3 is not None:
             yield from moved_piece(piece3, pose).vertices()

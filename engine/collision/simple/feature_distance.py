@@ -10,7 +10,8 @@ from fractions import Fraction
 import numpy as np
 
 from engine.arrays import FloatArray
-from engine.collision.exact_images import Vector, cross, dot, minus, squared_length
+from engine.collision.exact_images import Vector
+from engine.predicates.exact_vectors import cross, dot, minus, squared_length
 
 
 def segment_distance(point: Vector, a: Vector, b: Vector) -> Fraction:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from engine.collision.exact_images import image_half_space
 from engine.collision.result import Collision, Witness, Work
+from engine.predicates.exact_vectors import largest_axis
 from engine.solids.half_space import HalfSpace
 from engine.solids.pose import Pose
 from engine.types import Relation
@@ -19,7 +20,7 @@ def collide_half_space_half_space(
     """
     n, d = image_half_space(first.normal, first.offset, first_pose)
     m, e = image_half_space(second.normal, second.offset, second_pose)
-    axis = max(range(len(n)), key=lambda k: abs(n[k]))
+    axis = largest_axis(n)
     factor = m[axis] / n[axis]  # m = factor n if parallel
     if any(m[k] != factor * n[k] for k in range(len(n))):
         return Collision(Relation.OVERLAPPING, Witness("surface"))

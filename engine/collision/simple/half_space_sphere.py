@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from engine.collision.exact_images import dot, image_half_space, image_point, squared_length
+from engine.collision.exact_images import image_half_space, image_point, value_at
 from engine.collision.result import Collision, Witness, Work
+from engine.predicates.exact_vectors import squared_length
 from engine.solids.half_space import HalfSpace
 from engine.solids.pose import Pose
 from engine.solids.sphere import Sphere
@@ -17,7 +18,7 @@ def collide_half_space_sphere(
 ) -> Collision:
     """Return the relation of a half-space (first) and a ball (second), exact; a half-space is never inside."""
     normal, offset = image_half_space(half_space.normal, half_space.offset, half_space_pose)
-    value = dot(normal, image_point(sphere.center, sphere_pose)) + offset
+    value = value_at((normal, offset), image_point(sphere.center, sphere_pose))
     reach = Fraction(sphere.radius) ** 2 * squared_length(normal)
     if value**2 > reach:
         if value < 0:

@@ -7,16 +7,16 @@ once; what it leaves open, and every vertex under a pose that it leaves open, is
 from __future__ import annotations
 
 from collections.abc import Callable
-from fractions import Fraction
 
 import numpy as np
 
-from engine.arrays import FloatArray, Int8Array
-from engine.collision.exact_images import Vector, dot, image_half_space
+from engine.arrays import FloatArray, Int8Array, IntArray
+from engine.collision.exact_images import HalfSpaceImage, as_vector, image_half_space, image_map, value_at
 from engine.collision.meshes.live_faces import live_piece
-from engine.collision.meshes.mesh_arrays import shell_of
-from engine.collision.planar.outline import is_clean, live_edges, outline_of
+from engine.collision.meshes.mesh_arrays import MeshBody, mesh_body_of
+from engine.collision.planar.outline import Outline, is_clean, live_edges, outline_of
 from engine.collision.result import Collision, Witness, Work
+from engine.predicates.exact_vectors import dot
 from engine.predicates.rational import sign_of
 from engine.solids.base import Solid
 from engine.solids.half_space import HalfSpace
@@ -28,26 +28,22 @@ def collide_half_space_mesh(
     half_space: HalfSpace, body: Solid, half_space_pose: Pose | None, body_pose: Pose | None, work: Work
 ) -> Collision:
     """Return the relation of a half-space (first) and a polyhedron, surface or 3D box (second), exact."""
-    shell = shell_of(body)
-    used = np.unique(shell.arrays.triangles)
+    mesh = mesh_body_of(body)
+    used = np.unique(mesh.arrays.triangles)
     plane = image_half_space(half_space.normal, half_space.offset, half_space_pose)
-    signs = signs_of(plane, shell.arrays.vertices[used], body_pose, work)
+    signs = signs_of(plane, mesh.arrays.vertices[used], body_pose, work)
 
     def reaches_inside() -> bool:
-        if not shell.has_inside:
+        if not mesh.has_inside:
             return False
-        positive = np.zeros(len(shell.arrays.vertices), np.bool_)
+        positive = np.zeros(len(mesh.arrays.vertices), np.bool_)
         positive[used[signs > 0]] = True
-        for face in np.flatnonzero(positive[shell.arrays.triangles].any(axis=1)).tolist():
-            work.budget.check()
-            piece = live_piece(shell, face, work.budget)
-            if piece is not None and any(value_at_image(plane, p, body_pose) > 0 for p in piece.vertices()):
-                return True
-        return False
+        faces = np.flatnonzero(positive[mesh.arrays.triangles].any(axis=1))
+        return live_faces_reach(mesh, faces, plane, 1, body_pose, work)
 
     lowest = int(np.argmax(signs > 0)) if (signs > 0).any() else int(np.argmax(signs == 0))
-    face = int(np.argmax((shell.arrays.triangles == used[lowest]).any(axis=1)))
-    return _relation(signs, reaches_inside, int(shell.faces[face]))
+    face = int(np.argmax((mesh.arrays.triangles == used[lowest]).any(axis=1)))
+    return _relation(signs, reaches_inside, int(mesh.faces[face]))
 
 
 def collide_half_space_outline(
@@ -56,14 +52,14 @@ def collide_half_space_outline(
     """Return the relation of a half-plane (first) and a polygon, triangle or 2D box (second), exact."""
     outline = outline_of(body, body_pose, work.budget)
     plane = image_half_space(half_space.normal, half_space.offset, half_space_pose)
-    signs = np.array([sign_of(dot(plane[0], point) + plane[1]) for point in outline.points], np.int8)
+    signs = signs_of_outline(outline, plane)
 
     def reaches_inside() -> bool:
         for edge in np.flatnonzero((signs[outline.ends] > 0).any(axis=1)).tolist():
             work.budget.check()
             if is_clean(outline, edge):
                 return True
-        return any(dot(plane[0], end) + plane[1] > 0 for piece in live_edges(outline, work.budget) for end in piece)
+        return live_edges_reach(outline, plane, 1, work)
 
     edge = int(np.argmax(signs > 0)) if (signs > 0).any() else int(np.argmax(signs == 0))
     return _relation(signs, reaches_inside, edge)
@@ -80,16 +76,30 @@ def _relation(signs: Int8Array, reaches_inside: Callable[[], bool], face: int) -
     return Collision(Relation.TOUCHING, Witness("surface", second_face=face, piercing=enters))
 
 
-def value_at_image(plane: tuple[Vector, Fraction], point: Vector, pose: Pose | None) -> Fraction:
-    """Return normal . image(point) + offset for a point of rational coordinates."""
-    normal, offset = plane
-    if pose is not None:
-        rows = [tuple(map(Fraction, row)) for row in pose.rotation.tolist()]
-        point = tuple(dot(row, point) + Fraction(shift) for row, shift in zip(rows, pose.translation.tolist()))
-    return dot(normal, point) + offset
+def live_faces_reach(
+    mesh: MeshBody, faces: IntArray, plane: HalfSpaceImage, side: int, pose: Pose | None, work: Work
+) -> bool:
+    """Tell whether some of what is live of these faces lies on one side, 1 or -1, of a plane."""
+    image = image_map(pose)
+    for face in faces.tolist():
+        work.budget.check()
+        piece = live_piece(mesh, face, work.budget)
+        if piece is not None and any(side * value_at(plane, image(p)) > 0 for p in piece.vertices()):
+            return True
+    return False
 
 
-def signs_of(plane: tuple[Vector, Fraction], points: FloatArray, pose: Pose | None, work: Work) -> Int8Array:
+def live_edges_reach(outline: Outline, plane: HalfSpaceImage, side: int, work: Work) -> bool:
+    """Tell whether some of what is live of an outline lies on one side, 1 or -1, of a line."""
+    return any(side * value_at(plane, end) > 0 for piece in live_edges(outline, work.budget) for end in piece)
+
+
+def signs_of_outline(outline: Outline, plane: HalfSpaceImage) -> Int8Array:
+    """Return the exact sign of a line at each vertex."""
+    return np.array([sign_of(value_at(plane, point)) for point in outline.points], np.int8)
+
+
+def signs_of(plane: HalfSpaceImage, points: FloatArray, pose: Pose | None, work: Work) -> Int8Array:
     """Return the exact sign of the plane at the image of each of ``(n, 3)`` points.
 
     The function is pulled back: with N = n R and D = n . t + d, both rational, it is N . p + D. Scaled so that the
@@ -112,14 +122,13 @@ def signs_of(plane: tuple[Vector, Fraction], points: FloatArray, pose: Pose | No
     for count, item in enumerate(open_items.tolist()):
         if count % 64 == 0:
             work.budget.check()
-        signs[item] = sign_of(dot(normal, tuple(map(Fraction, points[item].tolist()))) + offset)
+        signs[item] = sign_of(dot(normal, as_vector(points[item].tolist())) + offset)
     return signs
 
 
-def _pulled_back(plane: tuple[Vector, Fraction], pose: Pose | None) -> tuple[Vector, Fraction]:
+def _pulled_back(plane: HalfSpaceImage, pose: Pose | None) -> HalfSpaceImage:
     if pose is None:
         return plane
     normal, offset = plane
-    columns = [tuple(map(Fraction, column)) for column in pose.rotation.T.tolist()]
-    shift = dot(normal, tuple(map(Fraction, pose.translation.tolist())))
-    return tuple(dot(normal, column) for column in columns), offset + shift
+    pulled = tuple(dot(normal, as_vector(column)) for column in pose.rotation.T.tolist())
+    return pulled, offset + dot(normal, as_vector(pose.translation.tolist()))

@@ -15,14 +15,15 @@ from fractions import Fraction
 
 import numpy as np
 
-from engine.arrays import FloatArray
-from engine.collision.exact_images import Vector, image_point, minus, squared_length
+from engine.arrays import FloatArray, IntArray
+from engine.collision.exact_images import Vector, image_map, image_point
 from engine.collision.meshes.live_faces import LivePiece, live_piece
-from engine.collision.meshes.mesh_arrays import Shell, shell_of
+from engine.collision.meshes.mesh_arrays import MeshBody, mesh_body_of
 from engine.collision.planar.outline import is_clean, live_edges, outline_of, rounded
 from engine.collision.result import Collision, Witness, Work
 from engine.collision.simple.feature_distance import box_distance_bounds, segment_distance, triangle_distance
 from engine.containment.rational_locate import rational_location
+from engine.predicates.exact_vectors import minus, squared_length
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
 from engine.solids.sphere import Sphere
@@ -34,16 +35,17 @@ from engine.types import Location, Relation
 class Features:
     """What a ball is measured against.
 
-    low, high: (n, d) float64 boxes that hold the faces or edges. vertices: (m, d) float64, each within `error` of an
-    exact position on every axis. distance: exact squared distance from the centre to a face. corners: of a face, exact.
-    vertex: an exact position.
-    reaches_inside: whether the live part of the boundary enters the open ball. faces: the caller's number of each.
+    low, high: (n, d) float64 boxes that hold the faces or edges. vertices: (m, d) float64. Each number is within
+    `error` of the exact one. center: of the ball. distance: exact squared distance from there to a face. corners: of a
+    face, exact. vertex: an exact position. reaches_inside: whether what is live of the boundary comes nearer than a
+    squared distance. faces: the caller's number of each.
     """
 
     low: FloatArray
     high: FloatArray
     vertices: FloatArray
     error: float
+    center: Vector
     distance: Callable[[int], Fraction]
     corners: Callable[[int], tuple[Vector, ...]]
     vertex: Callable[[int], Vector]
@@ -51,13 +53,24 @@ class Features:
     faces: Callable[[int], int]
     has_inside: bool
 
+    def bounds(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return bounds of the squared distances from the centre to what boxes of these bounds hold."""
+        around = np.array([rounded(value) for value in self.center])
+        slack = self.error + 2.0**-50 * float(np.abs(around).max()) + 2.0**-1070
+        return box_distance_bounds(around, low - slack, high + slack)
+
+    def candidates(self, nearest: FloatArray, limit: Fraction) -> IntArray:
+        """Return the faces that may come as near as a squared distance, by these bounds, nearest first."""
+        found = np.flatnonzero(nearest <= rounded(limit) * (1.0 + 2.0**-50) + 2.0**-1000)
+        return found[np.argsort(nearest[found], kind="stable")]
+
 
 def collide_mesh_sphere(
     body: Solid, sphere: Sphere, body_pose: Pose | None, sphere_pose: Pose | None, work: Work
 ) -> Collision:
     """Return the relation of a polyhedron, surface or 3D box (first) and a ball (second), exact."""
     center = image_point(sphere.center, sphere_pose)
-    return _relation(mesh_features(body, body_pose, center, work), body, body_pose, center, sphere.radius, work)
+    return _relation(mesh_features(body, body_pose, center, work), body, body_pose, sphere.radius, work)
 
 
 def collide_outline_sphere(
@@ -65,19 +78,14 @@ def collide_outline_sphere(
 ) -> Collision:
     """Return the relation of a polygon, triangle or 2D box (first) and a disc (second), exact."""
     center = image_point(sphere.center, sphere_pose)
-    return _relation(outline_features(body, body_pose, center, work), body, body_pose, center, sphere.radius, work)
+    return _relation(outline_features(body, body_pose, center, work), body, body_pose, sphere.radius, work)
 
 
 @np.errstate(over="ignore", invalid="ignore")  # an infinite bound only sends a face to the exact test
-def _relation(
-    features: Features, body: Solid, pose: Pose | None, center: Vector, radius: float, work: Work
-) -> Collision:
+def _relation(features: Features, body: Solid, pose: Pose | None, radius: float, work: Work) -> Collision:
+    center = features.center
     limit = Fraction(radius) ** 2
-    around = np.array([rounded(value) for value in center])
-    slack = features.error + 2.0**-50 * float(np.abs(around).max()) + 2.0**-1070
-    near, _ = box_distance_bounds(around, features.low - slack, features.high + slack)
-    candidates = np.flatnonzero(near <= rounded(limit) * (1.0 + 2.0**-50) + 2.0**-1000)
-    candidates = candidates[np.argsort(near[candidates], kind="stable")]
+    candidates = features.candidates(features.bounds(features.low, features.high)[0], limit)
     touched, entered = -1, []
     for count, face in enumerate(candidates.tolist()):
         work.budget.check()
@@ -96,7 +104,7 @@ def _relation(
         if location == Location.OUTSIDE:
             return Collision(Relation.DISJOINT)
         return Collision(Relation.SECOND_INSIDE_FIRST, Witness("containment", containing="first"))
-    if entered and _all_vertices_within(features, around, slack, center, limit, work):
+    if entered and _all_vertices_within(features, limit, work):
         return Collision(Relation.FIRST_INSIDE_SECOND, Witness("containment", containing="second"))
     face = features.faces(entered[0] if entered else touched)
     witness = Witness("surface", first_face=face)
@@ -122,29 +130,27 @@ def _is_within_walls(body: Solid, pose: Pose | None, center: Vector, radius: flo
     raise AssertionError("unreachable")
 
 
-def _all_vertices_within(
-    features: Features, around: FloatArray, slack: float, center: Vector, limit: Fraction, work: Work
-) -> bool:
+def _all_vertices_within(features: Features, limit: Fraction, work: Work) -> bool:
     """Tell whether every vertex lies strictly inside the ball; the farthest by float64 bounds are asked first."""
-    lower, upper = box_distance_bounds(around, features.vertices - slack, features.vertices + slack)
+    lower, upper = features.bounds(features.vertices, features.vertices)
     unsure = np.flatnonzero(~(upper < rounded(limit) * (1.0 - 2.0**-50)))
     for vertex in unsure[np.argsort(-lower[unsure], kind="stable")].tolist():
         work.budget.check()
-        if squared_length(minus(features.vertex(vertex), center)) >= limit:
+        if squared_length(minus(features.vertex(vertex), features.center)) >= limit:
             return False
     return True
 
 
 def mesh_features(body: Solid, pose: Pose | None, center: Vector, work: Work) -> Features:
     """Return what a ball is measured against, of a polyhedron, surface or 3D box."""
-    shell = shell_of(body)
-    arrays = shell.arrays
+    mesh = mesh_body_of(body)
+    arrays = mesh.arrays
     used = np.unique(arrays.triangles)
-    vertices, error = _placed(arrays.vertices, pose, shell.reach)
-    points = vertices[arrays.triangles]
+    vertices, error = _placed(arrays.vertices, pose, mesh.reach)
+    points, image = vertices[arrays.triangles], image_map(pose)
 
     def exact(index: int) -> Vector:
-        return image_point(arrays.vertices[index].tolist(), pose)
+        return image(arrays.vertices[index].tolist())
 
     def corners(face: int) -> tuple[Vector, ...]:
         return tuple(exact(vertex) for vertex in arrays.triangles[face].tolist())
@@ -154,28 +160,29 @@ def mesh_features(body: Solid, pose: Pose | None, center: Vector, work: Work) ->
         return triangle_distance(center, a, b, c)
 
     def reaches_inside(candidates: list[int], limit: Fraction) -> bool:
-        return any(piece_distance < limit for piece_distance in _live_distances(shell, pose, candidates, center, work))
+        return any(piece_distance < limit for piece_distance in _live_distances(mesh, pose, candidates, center, work))
 
     return Features(
         points.min(axis=1),
         points.max(axis=1),
         vertices[used],
         error,
+        center,
         distance,
         corners,
         lambda item: exact(int(used[item])),
         reaches_inside,
-        lambda face: int(shell.faces[face]),
-        shell.has_inside,
+        lambda face: int(mesh.faces[face]),
+        mesh.has_inside,
     )
 
 
 def _live_distances(
-    shell: Shell, pose: Pose | None, faces: Iterable[int], center: Vector, work: Work
+    mesh: MeshBody, pose: Pose | None, faces: Iterable[int], center: Vector, work: Work
 ) -> Iterable[Fraction]:
     for face in faces:
         work.budget.check()
-        piece = live_piece(shell, face, work.budget)
+        piece = live_piece(mesh, face, work.budget)
         if piece is not None:
             distance = moved_piece(piece, pose).squared_distance(center)
             if distance is not None:
@@ -186,12 +193,8 @@ def moved_piece(piece: LivePiece, pose: Pose | None) -> LivePiece:
     """Return the exact image of a live piece."""
     if pose is None:
         return piece
-    rows = [tuple(map(Fraction, row)) for row in pose.rotation.tolist()]
-    shifts = tuple(map(Fraction, pose.translation.tolist()))
-    points = {*piece.corners, *piece.vertices()}
-    return piece.moved(
-        {p: tuple(sum((r * x for r, x in zip(row, p)), s) for row, s in zip(rows, shifts)) for p in points}
-    )
+    image = image_map(pose)
+    return piece.moved({p: image(p) for p in (*piece.corners, *piece.vertices())})
 
 
 def _placed(vertices: FloatArray, pose: Pose | None, reach: float) -> tuple[FloatArray, float]:
@@ -220,6 +223,7 @@ def outline_features(body: Solid, pose: Pose | None, center: Vector, work: Work)
         outline.high,
         vertices,
         2.0**-52 * float(np.abs(vertices).max()) + 2.0**-1074,
+        center,
         lambda edge: segment_distance(center, *outline.edge(edge)),
         outline.edge,
         lambda vertex: outline.points[vertex],

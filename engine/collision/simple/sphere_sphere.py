@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from engine.collision.exact_images import image_point, minus, squared_length
+from engine.collision.exact_images import image_point
 from engine.collision.result import Collision, Witness, Work
+from engine.predicates.exact_vectors import minus, squared_length
 from engine.solids.pose import Pose
 from engine.solids.sphere import Sphere
 from engine.types import Relation

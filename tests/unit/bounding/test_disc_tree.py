@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from engine import Surface
-from engine.collision.meshes.mesh_arrays import Shell, shell_of
+from engine.collision.meshes.mesh_arrays import MeshBody, mesh_body_of
 from engine.lanes.boxes import EMPTY
 
 
-def faces_below(shell: Shell, node: int) -> list[int]:
+def faces_below(mesh: MeshBody, node: int) -> list[int]:
     """Return the triangles below a node."""
-    child = shell.arrays.child[node]
+    child = mesh.arrays.child[node]
     if child[0] < 0:
         return [-1 - int(item) for item in child if item != EMPTY]
-    return [face for below in child if below != EMPTY for face in faces_below(shell, int(below))]
+    return [face for below in child if below != EMPTY for face in faces_below(mesh, int(below))]
 
 
 def surfaces() -> dict[str, Surface]:
@@ -36,8 +36,8 @@ def surfaces() -> dict[str, Surface]:
 
 @pytest.mark.parametrize("name", surfaces())
 def test_a_disc_holds_the_faces_of_its_child(name: str) -> None:
-    shell = shell_of(surfaces()[name])
-    arrays = shell.arrays
+    mesh = mesh_body_of(surfaces()[name])
+    arrays = mesh.arrays
     local = (arrays.vertices - arrays.origin) / arrays.scale
     for node in range(len(arrays.child)):
         for lane in range(8):
@@ -46,7 +46,7 @@ def test_a_disc_holds_the_faces_of_its_child(name: str) -> None:
                 continue
             disc = arrays.discs[node, :, lane].astype(float)
             n = disc[3:6] / np.linalg.norm(disc[3:6])
-            away = local[arrays.triangles[faces_below(shell, below)]].reshape(-1, 3) - disc[:3]
+            away = local[arrays.triangles[faces_below(mesh, below)]].reshape(-1, 3) - disc[:3]
             along = away @ n
             assert (np.abs(along) <= disc[7]).all()
             assert (np.linalg.norm(away - along[:, None] * n, axis=1) <= disc[6]).all()

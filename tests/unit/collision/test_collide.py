@@ -318,7 +318,7 @@ def test_report_and_progress() -> None:
     assert accuracy.n_beyond_filter >= accuracy.n_rational >= 0
 
 
-def test_a_solid_is_pickled_without_its_shell() -> None:
+def test_a_solid_is_pickled_without_its_mesh_body() -> None:
     cube = made(UNIT)
     collide(cube, cube)
     again = pickle.loads(pickle.dumps(cube))

@@ -11,7 +11,7 @@ import pytest
 from engine import Relation, collide_poses
 from tests.reference.collision import relation
 from tests.reference.shapes import box
-from tests.unit.collision.test_pairs import QUARTERS, TURNS, aabb, points, polyhedron, solid, surface
+from tests.unit.collision.lattices import QUARTERS, TURNS, aabb, points, polyhedron, solid, surface
 
 STILL = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
 FLIP = [[0, 0, 1], [1, 0, 0], [0, 1, 0]]

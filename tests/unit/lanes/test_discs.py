@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from engine import Surface, collide_triangles
-from engine.collision.meshes.dual_traversal import new_descent, start_descent
-from engine.collision.meshes.mesh_arrays import STILL, shell_of
+from engine.collision.meshes.dual_traversal import new_descent, place_bodies
+from engine.collision.meshes.mesh_arrays import STILL, mesh_body_of
 from engine.collision.meshes.placement import PoseArrays
 from engine.jit import kernel
 from engine.lanes.boxes import meeting
@@ -34,7 +34,7 @@ def ask(first: Any, second: Any, frames: Any, scales: Any, work: Any, found: Any
 
 @kernel
 def place(first: Any, still: Any, second: Any, poses: Any, descent: Any) -> None:
-    start_descent(first, still, 0, second, poses, 0, descent)
+    place_bodies(first, still, 0, second, poses, 0, descent)
 
 
 @pytest.mark.parametrize("names", [("flat", "flat"), ("sphere", "waves"), ("waves", "soup"), ("line", "sphere")])
@@ -42,7 +42,7 @@ def place(first: Any, still: Any, second: Any, poses: Any, descent: Any) -> None
 def test_compiled_lanes_equal_python_and_keep_what_meets(names: tuple[str, str], size: float) -> None:
     first, second = surfaces()[names[0]], surfaces()[names[1]]
     second = Surface(size * second.vertices, second.triangles)
-    a, b = shell_of(first), shell_of(second)
+    a, b = mesh_body_of(first), mesh_body_of(second)
     rng, descent, n_boxes, n_kept = np.random.default_rng(3), new_descent(), 0, 0
     for item in range(12):
         gap = 1e-4 * (item - 4)

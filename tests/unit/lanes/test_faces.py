@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from engine import Surface, collide_triangles
-from engine.collision.meshes.dual_traversal import new_descent, start_descent
-from engine.collision.meshes.mesh_arrays import STILL, shell_of
+from engine.collision.meshes.dual_traversal import new_descent, place_bodies
+from engine.collision.meshes.mesh_arrays import STILL, mesh_body_of
 from engine.collision.meshes.placement import PoseArrays
 from engine.jit import kernel
 from engine.lanes.faces import (
@@ -35,7 +35,7 @@ def ask(first: Any, second: Any, frames: Any, work: Any, found: Any) -> None:
 
 @kernel
 def place(first: Any, still: Any, second: Any, poses: Any, descent: Any) -> None:
-    start_descent(first, still, 0, second, poses, 0, descent)
+    place_bodies(first, still, 0, second, poses, 0, descent)
 
 
 def touching_soups(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -61,7 +61,7 @@ def test_compiled_lanes_equal_python_and_keep_what_meets(seed: int, size: float)
         first, second, move = touching_soups(rng, 8 - seed)
         first = first[: 8 - seed // 2]
         soups = [Surface(size * s.reshape(-1, 3), np.arange(3 * len(s)).reshape(-1, 3)) for s in (first, second)]
-        a, b = (shell_of(soup) for soup in soups)
+        a, b = (mesh_body_of(soup) for soup in soups)
         place(a.arrays, STILL, b.arrays, PoseArrays(TURNED[None], size * move[None], True), descent)
         work, found = np.zeros((WORK_ROWS, 8), np.float32), np.zeros(12, np.int64)
         ask(a.arrays.blocks, b.arrays.blocks, descent.frames, work, found)
@@ -86,8 +86,8 @@ def test_compiled_lanes_equal_python_and_keep_what_meets(seed: int, size: float)
 
 
 def test_blocks_hold_corners_in_the_tree_and_nothing_in_unused_lanes() -> None:
-    shell = shell_of(Surface([[0, 0, 0], [4, 0, 0], [0, 4, 0]], [[0, 1, 2]]))
-    block, origin, scale = shell.arrays.blocks[0], shell.arrays.origin, shell.arrays.scale
+    mesh = mesh_body_of(Surface([[0, 0, 0], [4, 0, 0], [0, 4, 0]], [[0, 1, 2]]))
+    block, origin, scale = mesh.arrays.blocks[0], mesh.arrays.origin, mesh.arrays.scale
     assert block.shape == (CORNER_ROWS, 8)
     assert (block[:, 0].reshape(3, 3) * scale + origin).tolist() == [[0, 0, 0], [4, 0, 0], [0, 4, 0]]
     assert (block[:, 1:] == np.float32(1e30)).all()

@@ -9,11 +9,29 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from engine.predicates.posed import UNPOSED, orient3d_posed_batch, posed_error
+from engine.jit import inline, kernel
+from engine.predicates.posed import UNPOSED, PosedPoint3, orient3d_posed, orient3d_posed_exact, posed_error
 from engine.predicates.rational import orient3d_rational
 from engine.types import UNDECIDED
 
 Array = npt.NDArray[np.float64]
+
+
+@inline
+def posed_row(points: Any, bodies: Any, row: int) -> PosedPoint3:
+    return PosedPoint3(points[row, 0], points[row, 1], points[row, 2], int(bodies[row]))
+
+
+@kernel
+def orient3d_posed_batch(poses: Any, points: Any, bodies: Any, error: float, is_exact: bool, sides: Any) -> None:
+    """Fill sides (n,) int8 for points (4, n, 3) float64 with poses bodies (4, n) int64; is_exact: skip the filter."""
+    for item in range(sides.shape[0]):
+        a, b = posed_row(points[0], bodies[0], item), posed_row(points[1], bodies[1], item)
+        c, d = posed_row(points[2], bodies[2], item), posed_row(points[3], bodies[3], item)
+        if is_exact:
+            sides[item] = orient3d_posed_exact(poses, a, b, c, d)
+        else:
+            sides[item] = orient3d_posed(poses, a, b, c, d, error)
 
 
 def rotation(draw: np.random.Generator) -> Array:

@@ -12,13 +12,13 @@ import pytest
 from numba import config as numba_config
 
 from engine.predicates.orientation import orient3d_batch
-from engine.predicates.posed import orient3d_posed_batch
 from tests.unit.predicates.batches import (
     orient2d_batch,
     side_of_line_batch,
     side_of_plane_batch,
     sign_of_polynomial_batch,
 )
+from tests.unit.predicates.test_posed import orient3d_posed_batch
 
 
 def all_signs() -> str:

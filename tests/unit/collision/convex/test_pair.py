@@ -10,6 +10,7 @@ from engine.collision.codes import UNSETTLED
 from engine.collision.collide import collide_pair
 from engine.collision.convex.body import convex_body_of, pooled
 from engine.collision.convex.pair import relate_convex_pairs
+from engine.collision.meshes.placement import PoseArrays
 from engine.collision.result import Work
 
 CUBE = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]]
@@ -64,7 +65,7 @@ def short_answers(first: Solid, second: Solid, placed: list[Pose | None], boolea
     rows, found = np.append(0, np.ones(n, np.int64)), np.full(n, UNSETTLED, np.int8)
     with np.errstate(all="ignore"):
         pool = pooled([body for body in bodies if body is not None])
-        relate_convex_pairs(pool, rows, rotations, translations, pairs, boolean, found, FLAG)
+        relate_convex_pairs(pool, rows, PoseArrays(rotations, translations, True), pairs, boolean, found, FLAG)
     return found.tolist()
 
 

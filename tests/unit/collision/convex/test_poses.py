@@ -11,7 +11,8 @@ from engine.collision.codes import UNSETTLED
 from engine.collision.collide import collide_pair
 from engine.collision.convex.body import convex_body_of, pooled
 from engine.collision.convex.poses import lane_arrays, relate_in_lanes
-from engine.collision.meshes.placement import NO_ROTATION, NO_TRANSLATION, PoseArrays
+from engine.collision.meshes.mesh_arrays import STILL
+from engine.collision.meshes.placement import PoseArrays
 from engine.collision.result import Work
 from tests.unit.collision.convex.test_pair import BODIES, ball_of_belts, poses
 
@@ -27,7 +28,7 @@ def in_lanes(
     if lanes is None:
         return None
     found = np.full(len(placed), UNSETTLED, np.int8)
-    still = PoseArrays(NO_ROTATION, NO_TRANSLATION, False)
+    still = STILL
     turns = read_only(np.array([pose.rotation for pose in placed]))
     moves = read_only(np.array([pose.translation for pose in placed]))
     with np.errstate(all="ignore"):

@@ -1,4 +1,4 @@
-"""A plane between two bodies that touch; and sides of a face that a whole body keeps one status on."""
+"""A plane between two bodies that touch."""
 
 from __future__ import annotations
 
@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 from engine import Aabb, Polyhedron, Pose, Relation, collide
-from engine.collision.meshes.exact_body import plane_through
-from engine.collision.meshes.exact_cells import even_sides
-from engine.collision.meshes.mesh_arrays import shell_of
+from engine.collision.meshes.mesh_arrays import mesh_body_of
 from engine.collision.meshes.separating_plane import is_separated
 from engine.collision.result import Work
 from engine.parallel import Budget
@@ -20,7 +18,7 @@ TURN = Pose([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]], [0.1, 0.2, 0.3
 
 def contacts_of(first: object, second: object, pose: Pose | None) -> tuple[bool, Relation]:
     """Return whether every pair of faces, taken as contacts, proves separation, and the relation."""
-    a, b = shell_of(first), shell_of(second)
+    a, b = mesh_body_of(first), mesh_body_of(second)
     n, m = len(a.faces), len(b.faces)
     pairs = np.stack([np.repeat(np.arange(n), m), np.tile(np.arange(m), n)], axis=1)
     with Budget(None, None) as budget, np.errstate(all="ignore"):
@@ -51,21 +49,3 @@ def test_finds_a_plane_between_convex_bodies(other: object, pose: Pose | None) -
 def test_finds_none_where_interiors_meet(pose: Pose | None) -> None:
     assert contacts_of(BOX, Aabb([0.5, 0, 0], [2, 1, 1]), pose) == (False, Relation.OVERLAPPING)
     assert contacts_of(BOX, BOX, pose) == (False, Relation.OVERLAPPING)
-
-
-@pytest.mark.parametrize(
-    ("other", "expected"),
-    [
-        (((1, 1, 0), (2, 1, 5), (1, 2, 5)), (False, True)),  # stands on the open face
-        (((1, 1, 0), (2, 1, -5), (1, 2, -5)), (True, False)),
-        (((0, 0, 0), (0, -9, 5), (0, -9, -5)), (True, True)),  # passes a corner
-        (((0, 0, 0), (9, 0, 0), (0, 0, 9)), (True, True)),  # stands on an edge
-        (((1, -1, -5), (1, 9, 0), (1, -1, 5)), (False, False)),  # goes through
-        (((1, 1, 0), (2, 1, 0), (1, 2, 0)), (True, True)),  # lies in the plane
-    ],
-)
-def test_even_sides(other: tuple[tuple[int, int, int], ...], expected: tuple[bool, bool]) -> None:
-    face = ((0, 0, 0), (9, 0, 0), (0, 9, 0))
-    assert even_sides(face, plane_through(face), 2, [other]) == expected
-    turned = (face[0], face[2], face[1])
-    assert even_sides(turned, plane_through(turned), 2, [other]) == expected

@@ -1,30 +1,30 @@
-"""Boxes of float64 that hold bodies; infinite where a body is."""
+"""The box of a solid before its pose: what boxes of posed bodies (`bounding/posed_boxes.py`) are made from."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 
 from engine.arrays import FloatArray
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
-from engine.solids.half_space import HalfSpace
 from engine.solids.mesh import Mesh
 from engine.solids.polygon import Polygon
 from engine.solids.sphere import Sphere
 from engine.solids.triangle import Triangle
 
 
-def own_box(body: Solid) -> tuple[FloatArray, FloatArray, float]:
-    """Return low and high ``(d,)`` of a body without pose, and how far a point of the body is at most from the middle
-    as computed; of a sphere: those of its centre."""
-    if isinstance(body, HalfSpace):
-        return np.full(body.dimension, -np.inf), np.full(body.dimension, np.inf), np.inf
-    if isinstance(body, Sphere):
-        return body.center, body.center, 0.0
-    if isinstance(body, Aabb):
-        return body.min, body.max, np.inf
-    assert isinstance(body, Mesh | Polygon | Triangle)
-    return body.prepared("own_box", lambda: _box_of_vertices(body))
+def own_box(solid: Solid, check: Callable[[], object] | None = None) -> tuple[FloatArray, FloatArray, float]:
+    """Return low and high ``(d,)``, of a sphere those of its centre, infinite where a solid may have no bounds; and how
+    far a point is at most from the middle as computed. check: as for `Solid.prepared`."""
+    if isinstance(solid, Sphere):
+        return solid.center, solid.center, 0.0
+    if isinstance(solid, Aabb):
+        return solid.min, solid.max, np.inf
+    if isinstance(solid, Mesh | Polygon | Triangle):
+        return solid.prepared("own_box", lambda: _box_of_vertices(solid), check)
+    return np.full(solid.dimension, -np.inf), np.full(solid.dimension, np.inf), np.inf
 
 
 def _box_of_vertices(body: Mesh | Polygon | Triangle) -> tuple[FloatArray, FloatArray, float]:

@@ -22,7 +22,7 @@ def place_boxes(
     reaches: Any,
     radii: Any,
     kinds: Any,
-    is_posed: Any,
+    rows: Any,
     rotations: Any,
     translations: Any,
     low: Any,
@@ -31,26 +31,27 @@ def place_boxes(
     """Fill low and high (n, d), rounded outward.
 
     boxes (n_kinds, 2, d), of a ball its centre twice; reaches (n_kinds,): how far the body's points are at most from
-    the middle of the box (of a ball: its centre from there); radii (n_kinds,), 0.0 for others; kinds (n,): which of
-    these each body is; is_posed (n,); rotations (n, d, d) and translations (n, d), read where there is a pose.
+    the middle of the box (of a ball: its centre from there); radii (n_kinds,), 0.0 for others; kinds (n,) int64: which
+    of these each body is; rows (n,) int64: of each body's pose in rotations (n_poses, d, d) and translations (n_poses,
+    d), -1 for none.
     """
     dimension = low.shape[1]
     for body in range(low.shape[0]):
-        kind = kinds[body]
+        kind, pose = kinds[body], rows[body]
         radius = radii[kind]
         for axis in range(dimension):
             low[body, axis], high[body, axis] = boxes[kind, 0, axis], boxes[kind, 1, axis]
-        if is_posed[body]:
+        if pose >= 0:
             largest = shift = 0.0
             for axis in range(dimension):
                 largest = max(largest, abs(low[body, axis]), abs(high[body, axis]))
-                shift = max(shift, abs(translations[body, axis]))
+                shift = max(shift, abs(translations[pose, axis]))
             margin = 2.0**-49 * (3.0 * largest + shift) + 2.0**-1060
             radius *= 1.0 + 2.0**-38
             for axis in range(dimension):
-                middle, reach = translations[body, axis], margin
+                middle, reach = translations[pose, axis], margin
                 for k in range(dimension):
-                    turn = rotations[body, axis, k]
+                    turn = rotations[pose, axis, k]
                     middle += turn * (0.5 * boxes[kind, 0, k] + 0.5 * boxes[kind, 1, k])
                     reach += abs(turn) * (0.5 * boxes[kind, 1, k] - 0.5 * boxes[kind, 0, k])
                 reach = min(reach, margin + reaches[kind] * (1.0 + 2.0**-38))

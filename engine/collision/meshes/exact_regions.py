@@ -1,41 +1,37 @@
-"""What lies on either side of a face, cell by cell: the exact answer where contacts alone prove nothing.
+"""What lies on either side of a face, region by region: the exact answer where contacts alone prove nothing.
 
-The faces of both bodies cut a face T into cells. Within a cell, each body is inside or outside just above T, and just
-below. One point per cell, with rational coordinates, and the line through it along the axis on which T's normal is
-largest, tell all: crossings strictly above the point give the status above T; faces that hold the point lie in T's
+The faces of both bodies cut a face T into regions. Within a region, each body is inside or outside just above T, and
+just below. One point per region, with rational coordinates, and the line through it along the axis on which T's normal
+is largest, tell all: crossings strictly above the point give the status above T; faces that hold the point lie in T's
 plane there, and each changes the status on the way through.
 
-Cells are sampled by slabs: between two neighbouring abscissas of end points and crossings of the traces no two traces
-cross, so one point between each two neighbours on the middle of every slab meets every cell that has an interior there.
+Regions are sampled by slabs: between two neighbouring abscissas of end points and crossings of the traces no two
+traces cross, so one point between each two neighbours on the middle of every slab meets every region with an interior.
 The line is moved by (eps, eps^2) across itself, so that it meets no edge; a face that holds the point is known by its
 plane, whatever the move.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from itertools import pairwise
 from typing import NamedTuple
 
-from engine.collision.meshes.exact_body import (
-    Corners,
-    ExactBody,
-    Plane,
-    Vector,
-    cross,
-    dot,
-    largest_axis,
-    rounded_outward,
-    sign,
-)
-from engine.collision.meshes.exact_triangles import is_in_triangle, value_at
+from engine.arrays import IntArray
+from engine.collision.meshes.exact_body import Corners, ExactBody, Plane, Vector, rounded_outward
+from engine.collision.meshes.exact_triangles import is_in_triangle, value_at, without_axis
 from engine.parallel import Budget
+from engine.predicates.exact_vectors import cross, dot, largest_axis, minus
+from engine.predicates.rational import sign_of
 
 Rational = int | Fraction  # integers where they suffice: they are ten times faster
 Rational2 = tuple[Rational, Rational]
-Homogeneous = tuple[int, int, int, int]
+Homogeneous = tuple[int, ...]
 """x, y, z, w: the point (x / w, y / w, z / w), w > 0."""
+
+WITHIN = ((1, 1, 1), (1, 1, 2), (2, 1, 1), (3, 5, 4), (7, 11, 5))
+"""Weights of the corners for points within a face."""
 
 
 class Sides(NamedTuple):
@@ -57,7 +53,7 @@ def sides_at(body: ExactBody, q: Homogeneous, axis: int) -> Sides:
 def sides_over(body: ExactBody, q: Homogeneous, axis: int, plane: Plane | None) -> Sides | None:
     """Return the status of `body` along `axis` at q, a point of `plane`; None where a face that holds q and is not
     parallel to that plane leaves it open (it is not looked at where `plane` is None)."""
-    if not body.shell.has_inside:
+    if not body.mesh.has_inside:
         return Sides(False, False, False)
     above = changes = is_on_face = False
     j, k = (axis + 1) % 3, (axis + 2) % 3
@@ -82,17 +78,30 @@ def sides_over(body: ExactBody, q: Homogeneous, axis: int, plane: Plane | None) 
     return Sides(above, above != changes, above and not is_on_face)
 
 
-def even_sides(corners: Corners, plane: Plane, axis: int, touching: Iterable[Corners]) -> tuple[bool, bool]:
-    """Tell whether a body has one status just above (below) the whole of a face with area; `touching`: all faces of
-    the body that meet the face.
+def sides_within(body: ExactBody, face: int, other: ExactBody) -> tuple[Sides, Sides] | None:
+    """Return the status of either body at some point within a face of the first, None where no point tried tells."""
+    corners, plane, axis = body.corners(face), body.plane(face), body.axis(face)
+    for weights in WITHIN:
+        x, y, z = (sum(w * p[side] for w, p in zip(weights, corners)) for side in range(3))
+        q = (x, y, z, sum(weights))
+        ours, theirs = sides_over(body, q, axis, plane), sides_over(other, q, axis, plane)
+        if ours is not None and theirs is not None:
+            return ours, theirs
+    return None
+
+
+def even_sides(body: ExactBody, face: int, other: ExactBody, met: IntArray) -> tuple[bool, bool]:
+    """Tell whether another body has one status just above (below) the whole of a face with area; `met`: all faces of
+    the other body that meet this one.
 
     A face of the body comes between only where it meets the open face and leaves the plane on that side.
     """
-    flat = [(p[(axis + 1) % 3], p[(axis + 2) % 3], 1) for p in corners]
-    turn = sign(dot(cross(flat[0], flat[1]), flat[2]))
+    plane, axis = body.plane(face), body.axis(face)
+    flat = [(*without_axis(p, axis), 1) for p in body.corners(face)]
+    turn = sign_of(dot(cross(flat[0], flat[1]), flat[2]))
     lines = [cross(flat[i], flat[(i + 1) % 3]) for i in range(3)]
     above = below = True
-    for points in touching:
+    for points in map(other.corners, met.tolist()):
         values = [value_at(plane, p) for p in points]
         low, high = min(values), max(values)
         if (low, high) == (0, 0) or not _meets_open_face(_flat_trace(points, values, axis), flat, lines, turn):
@@ -102,7 +111,7 @@ def even_sides(corners: Corners, plane: Plane, axis: int, touching: Iterable[Cor
     return above, below
 
 
-def _flat_trace(points: Corners, values: list[int], axis: int) -> list[Vector]:
+def _flat_trace(points: Corners, values: list[int], axis: int) -> Sequence[Vector]:
     """Return the ends (x, y, w), w > 0, of the segment or point in which a face meets a plane that does not hold it."""
     j, k = (axis + 1) % 3, (axis + 2) % 3
     ends = [(points[i][j], points[i][k], 1) for i in range(3) if values[i] == 0]
@@ -115,7 +124,7 @@ def _flat_trace(points: Corners, values: list[int], axis: int) -> list[Vector]:
     return ends
 
 
-def _meets_open_face(ends: list[Vector], flat: list[Vector], lines: list[Vector], turn: int) -> bool:
+def _meets_open_face(ends: Sequence[Vector], flat: Sequence[Vector], lines: Sequence[Vector], turn: int) -> bool:
     """Tell whether a segment or point of its plane meets an open triangle: no line of an edge, nor its own line, has
     the two on different closed sides."""
     if any(max(turn * dot(line, end) for end in ends) <= 0 for line in lines):
@@ -142,7 +151,7 @@ def _moved_line_meets(corners: Corners, j: int, k: int, x: int, y: int, w: int) 
         value = dx * (y - a[k] * w) - dy * (x - a[j] * w)
         turn = (value > 0) - (value < 0)
         if turn == 0:
-            turn = -sign(dy) or sign(dx)
+            turn = -sign_of(dy) or sign_of(dx)
         if before * turn < 0:
             return False
         before = turn
@@ -162,23 +171,19 @@ def _is_on_face(body: ExactBody, q: Homogeneous) -> bool:
         plane = body.plane(face)
         if not any(plane[:3]) or plane[0] * q[0] + plane[1] * q[1] + plane[2] * q[2] + plane[3] * w != 0:
             continue
-        a, b, c = body.corners(face)
-        scaled = (_times(a, w), _times(b, w), _times(c, w))
+        a, b, c = (tuple(w * x for x in corner) for corner in body.corners(face))
+        scaled = (a, b, c)
         if is_in_triangle(q[:3], scaled, (*plane[:3], plane[3] * w)):
             return True
     return False
 
 
-def _times(p: Vector, w: int) -> Vector:
-    return p[0] * w, p[1] * w, p[2] * w
-
-
-def cells_of(body: ExactBody, face: int, cutters: list[ExactBody], budget: Budget) -> Iterator[Homogeneous]:
-    """Yield a point in each cell that the faces of `cutters` cut from a face with area; none lies on a trace."""
+def regions_of(body: ExactBody, face: int, cutters: list[ExactBody], budget: Budget) -> Iterator[Homogeneous]:
+    """Yield a point in each region that the faces of `cutters` cut from a face with area; none lies on a trace."""
     corners, plane = body.corners(face), body.plane(face)
     axis = largest_axis(plane[:3])
     segments = _traces(body, face, corners, plane, axis, cutters, budget)
-    own = [_segment(_flat(corners[i], axis), _flat(corners[i - 2], axis)) for i in range(3)]
+    own = [_segment(without_axis(corners[i], axis), without_axis(corners[i - 2], axis)) for i in range(3)]
     for x, y in _samples(own, segments, budget):
         yield _lifted(x, y, plane, axis)
 
@@ -195,10 +200,6 @@ def _lifted(x: Rational, y: Rational, plane: Plane, axis: int) -> Homogeneous:
     if w < 0:
         return -point[0], -point[1], -point[2], -w
     return point[0], point[1], point[2], w
-
-
-def _flat(p: Vector, axis: int) -> Rational2:
-    return p[(axis + 1) % 3], p[(axis + 2) % 3]
 
 
 def _segment(p: Rational2, q: Rational2) -> tuple[Rational2, Rational2]:
@@ -230,22 +231,17 @@ def _traces(
 
 def _trace(points: Corners, values: list[int], axis: int) -> list[tuple[Rational2, Rational2]]:
     """Return the segments in which a face meets the plane at which its corners have `values`."""
-    j, k = (axis + 1) % 3, (axis + 2) % 3
     if not any(values):
-        return [(_flat(points[i], axis), _flat(points[i - 2], axis)) for i in range(3)]
-    ends: list[Rational2] = [_flat(points[i], axis) for i in range(3) if values[i] == 0]
-    for i in range(3):
-        f, g = values[i], values[i - 2]
-        if f * g < 0:
-            p, q = points[i], points[i - 2]
-            ends.append((Fraction(f * q[j] - g * p[j], f - g), Fraction(f * q[k] - g * p[k], f - g)))
-    return [(ends[0], ends[1])] if len(ends) == 2 else []
+        return [(without_axis(points[i], axis), without_axis(points[i - 2], axis)) for i in range(3)]
+    ends = _flat_trace(points, values, axis)
+    flat: list[Rational2] = [(x, y) if w == 1 else (Fraction(x, w), Fraction(y, w)) for x, y, w in ends]
+    return [(flat[0], flat[1])] if len(flat) == 2 else []
 
 
 def _samples(
     own: list[tuple[Rational2, Rational2]], traces: list[tuple[Rational2, Rational2]], budget: Budget
 ) -> Iterator[Rational2]:
-    """Yield a point in every cell that `traces` cut from the triangle with the edges `own`."""
+    """Yield a point in every region that `traces` cut from the triangle with the edges `own`."""
     left, right = min(p[0] for p, _ in own), max(q[0] for _, q in own)
     segments = [_on_line(s) for s in sorted({*own, *traces}) if s[0][0] <= right and s[1][0] >= left]
     stops = {end[0] for s in segments for end in s.ends if left <= end[0] <= right}
@@ -339,9 +335,7 @@ def _planes_that_cut(cutter: ExactBody, face: int) -> Iterator[Plane]:
         return
     yield plane
     corners = cutter.corners(face)
-    n = plane[:3]
     for i in range(3):
         a, b = corners[i], corners[i - 2]
-        u = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
-        m = (n[1] * u[2] - n[2] * u[1], n[2] * u[0] - n[0] * u[2], n[0] * u[1] - n[1] * u[0])
-        yield (*m, -(m[0] * a[0] + m[1] * a[1] + m[2] * a[2]))
+        m = cross(plane[:3], minus(b, a))
+        yield (*m, -dot(m, a))

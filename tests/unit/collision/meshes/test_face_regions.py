@@ -1,0 +1,39 @@
+"""Regions of faces in contact: where both insides come up to one side, and where a face passes through the other."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from engine import Pose
+from engine.collision.meshes.face_contacts import find_all_contacts
+from engine.collision.meshes.face_regions import has_corner_outside, look_at_regions, vertices_outside
+from engine.collision.meshes.mesh_pair import MeshPair
+from engine.collision.result import Work
+from tests.unit.collision.meshes.bodies import TURN, mesh
+
+
+@pytest.mark.parametrize("pose", [None, TURN])
+@pytest.mark.parametrize(("at", "overlaps"), [((1, 0, 0), True), ((2, 0, 0), False), ((0, 0, 0), True)])
+def test_flush_boxes(at: tuple[float, float, float], overlaps: bool, pose: Pose | None) -> None:
+    pair = MeshPair(mesh(2), pose, mesh(2, at), pose, Work())
+    with np.errstate(all="ignore"):
+        contacts, _ = find_all_contacts(pair, looks_at_regions=False)
+        for met_known in (True, False):
+            found = False
+            for face in np.unique(contacts[:, 0]).tolist():
+                met = contacts[contacts[:, 0] == face, 1] if met_known else None
+                is_overlap, pierces = look_at_regions(pair, 0, face, met)
+                found |= is_overlap
+                assert not pierces or overlaps
+            assert found == overlaps
+
+
+def test_corners_outside() -> None:
+    pair = MeshPair(mesh(2), None, mesh(2, (2, 1, 0)), None, Work())
+    contacts, _ = find_all_contacts(pair)
+    faces = np.unique(contacts[:, 0])
+    outside = vertices_outside(pair, 0, faces)
+    assert outside
+    answers = [has_corner_outside(pair, 0, f, contacts[contacts[:, 0] == f, 1], outside) for f in faces.tolist()]
+    assert any(answers)

@@ -1,0 +1,30 @@
+"""What the batches answer of a scene is what single pairs say; contacts of meshes they leave."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from engine import Aabb, Pose, Solid, Sphere, Surface, collide
+from engine.collision.codes import UNSETTLED
+from engine.collision.scenes.batches import SceneBatches
+from engine.collision.scenes.bodies import scene_bodies
+from engine.parallel import Budget
+
+
+def test_agrees_with_single_pairs_where_it_answers() -> None:
+    rng = np.random.default_rng(5)
+    shapes: list[Solid] = [Aabb([0, 0, 0], [1, 1, 1]), Sphere([0, 0, 0], 1), Surface(np.eye(3), [[0, 1, 2]])]
+    solids = [shapes[k % 3] for k in range(24)]
+    turns, _ = np.linalg.qr(rng.normal(size=(24, 3, 3)))
+    turns *= np.sign(np.linalg.det(turns))[:, None, None]
+    poses = [None if k % 4 == 0 else Pose(turns[k], rng.normal(size=3)) for k in range(24)]
+    pairs = np.array([(i, j) for i in range(24) for j in range(i + 1, 24)])
+    with Budget(None, None) as budget:
+        batches = SceneBatches(scene_bodies(solids, poses), False, budget)
+        found = batches.relations(pairs, None)
+    has_surface = (pairs % 3 == 2).any(axis=1)
+    assert (found[has_surface] == UNSETTLED).all()
+    assert (found[~has_surface] != UNSETTLED).mean() > 0.9
+    for (i, j), how in zip(pairs.tolist(), found.tolist()):
+        if how != UNSETTLED:
+            assert how == collide(solids[i], solids[j], first_pose=poses[i], second_pose=poses[j]).relation

@@ -1,0 +1,23 @@
+"""What of a body lies beyond a half-space, known by hand."""
+
+from __future__ import annotations
+
+import pytest
+
+from engine import Aabb, HalfSpace, Polygon
+from engine.collision.result import Parts, Work
+from engine.collision.simple.half_space_detail import half_space_mesh_parts, half_space_outline_parts
+
+SQUARE = [[0, 0], [2, 0], [2, 2], [0, 2]]
+
+
+@pytest.mark.parametrize(("offset", "expected"), [(1, (False, False)), (0, (False, True)), (-1, (True, True))])
+def test_known_parts(offset: float, expected: tuple[bool, bool]) -> None:
+    space, plane = HalfSpace([1, 0, 0], offset), HalfSpace([1, 0], offset)
+    assert half_space_mesh_parts(space, Aabb([0, 0, 0], [2, 2, 2]), None, None, Work()) == Parts(True, *expected)
+    assert half_space_outline_parts(plane, Polygon([SQUARE]), None, None, Work()) == Parts(True, *expected)
+
+
+def test_walls_that_cancel_do_not_stick_out() -> None:
+    walled = Polygon([SQUARE, [[-3, 1], [-1, 1], [-2, 1]]])
+    assert half_space_outline_parts(HalfSpace([1, 0], 0), walled, None, None, Work()) == Parts(True, False, True)
