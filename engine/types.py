@@ -45,6 +45,8 @@ class HalfSpace3(NamedTuple):
 
 UNDECIDED: Final = 2
 """What a predicate returns beside -1, 0, 1 when an exponent leaves the range in which expansions are exact."""
+OPEN: Final = 2
+"""Status of an item that a kernel leaves to exact arithmetic."""
 
 
 class Location(IntEnum):

@@ -20,10 +20,11 @@ from itertools import pairwise
 import numpy as np
 
 from engine.arrangement.box_pairs import box_pairs
-from engine.arrangement.float_filter import CROSS, MISS, UNSURE, classify_pairs
+from engine.arrangement.float_filter import CROSS, MISS, classify_pairs
 from engine.arrangement.nodes import Homogeneous, NodeTable, Rational, float_nodes, rational_nodes, reduced
 from engine.arrays import FloatArray
 from engine.parallel import Budget
+from engine.types import UNDECIDED
 
 Line = tuple[int, int, int]
 """(a, b, c): a x + b y + c w is positive to the left of the directed line; its direction is (b, -a)."""
@@ -114,7 +115,7 @@ def _meet_all(
         kept = verdicts != MISS
         pairs, verdicts = pairs[kept], verdicts[kept]
     else:
-        verdicts = np.full(len(pairs), UNSURE, np.int8)
+        verdicts = np.full(len(pairs), UNDECIDED, np.int8)
     n_exact = 0
     for count, ((i, j), verdict) in enumerate(zip(pairs.tolist(), verdicts.tolist())):
         if count % _POLL == 0:

@@ -10,14 +10,14 @@ meant; those left alone with a bit, once, are.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
 from engine.arrangement.box_pairs import box_pairs
 from engine.arrays import FloatArray, IntArray
 from engine.parallel import Budget
-from engine.polygon_overlay.compiled.ring_labels import MOST_BITS
+from engine.polygon_overlay.compiled.ring_labels import MOST_BITS, RingBits
 
 _SPREAD: Final = 16
 """Bits that rings are dealt out to though fewer would do: those of one bit are then further from each other."""
@@ -26,13 +26,6 @@ _MOST_ORDERS: Final = 8
 """Orders in which bits are dealt out: a ring that is not meant passes for one in each with the part's share of bits."""
 
 Corners = tuple[FloatArray, FloatArray]
-
-
-class RingBits(NamedTuple):
-    """bits: by ring its bit; shells: by bit that of its shells; int64."""
-
-    bits: IntArray
-    shells: IntArray
 
 
 def assign_bits(boxes: Corners, piece_offsets: IntArray, budget: Budget, order: int = 0) -> RingBits | None:
@@ -91,7 +84,7 @@ def rings_meant(
     boxes: Corners,
     piece_offsets: IntArray,
     found: Corners,
-    again: Callable[[RingBits], IntArray | None],
+    again: Callable[[RingBits], IntArray],
     budget: Budget,
 ) -> list[list[int]] | None:
     """Return for each ring found which of the rings its evidence names; None where that is not sure.
@@ -123,10 +116,9 @@ def rings_meant(
                 meant[part].append(ring)
             return meant
         other = assign_bits(boxes, piece_offsets, budget, order)
-        found_evidence = None if other is None else again(other)
-        if other is None or found_evidence is None:
+        if other is None:
             return None
-        labels, evidence = other, found_evidence
+        labels, evidence = other, again(other)
     return None
 
 

@@ -12,10 +12,18 @@ from __future__ import annotations
 
 from typing import Any, Final, NamedTuple
 
+from engine.arrays import IntArray
 from engine.jit import inline
 
 MOST_BITS: Final = 62
 """Bits of a label."""
+
+
+class RingBits(NamedTuple):
+    """bits: by ring its bit; shells: by bit that of its shells; int64."""
+
+    bits: IntArray
+    shells: IntArray
 
 
 class RingLabels(NamedTuple):
