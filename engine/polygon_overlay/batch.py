@@ -14,7 +14,7 @@ from engine.parallel import Budget, Cancel, Progress, run_chunks
 from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
 from engine.polygon_overlay.implicit_rings import ImplicitRings, RingArrays
 from engine.polygon_overlay.overlay import accuracy_of, check_words, overlay_rings, rings_of, ulps_moved
-from engine.polygon_overlay.result import Overlay
+from engine.polygon_overlay.result import Output, Overlay
 from engine.polygon_overlay.rounds_of_many_pairs import (
     SettledPairs,
     found_of,
@@ -26,7 +26,6 @@ from engine.polygon_overlay.rounds_of_many_pairs import (
 from engine.polygon_overlay.run import (
     Found,
     Operation,
-    Output,
     Polygons,
     as_overlay,
     chained,

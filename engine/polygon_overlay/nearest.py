@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -14,7 +15,8 @@ import numpy as np
 from engine.arrangement.nodes import float_nodes
 from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.parallel import Budget
-from engine.polygon_overlay.rounds import Exact, RoundedRings, Settled, collapses
+from engine.polygon_overlay.result import Overlay
+from engine.polygon_overlay.rounds import Exact, RoundedRings, collapses, overlay_of
 
 _UNIT: Final = 2.0**-52
 _TINY: Final = 2.0**-1070
@@ -64,13 +66,17 @@ def nearest_rings(
     return NearestRings(in_order(pieces), lost_pieces, lost_holes)
 
 
-def leave_nearest(first: RoundedRings, exact: Exact, budget: Budget) -> Settled:
+def leave_nearest(first: RoundedRings, exact: Exact, budget: Budget) -> Overlay:
     """Return rounded rings that stay as they are, and what rounding left without area."""
     found = nearest_rings(first.vertices, first.ring_offsets, first.piece_offsets, budget)
-    return Settled(
-        rings=RoundedRings(*found.arrays(), first.displacement, is_valid=False, has_crossings=first.has_crossings),
+    vertices, ring_offsets, piece_offsets = found.arrays()
+    return overlay_of(
+        replace(first, vertices=vertices, ring_offsets=ring_offsets, piece_offsets=piece_offsets),
+        first,
+        exact,
+        "nearest",
         rounds=int(first.displacement > 0.0),
-        displacement=first.displacement,
+        largest_displacement=first.displacement,
         collapsed=collapses(first, exact, found.lost_pieces, found.lost_holes, budget),
     )
 

@@ -14,8 +14,8 @@ from typing import Final
 
 import numpy as np
 
-from engine.arrangement.box_pairs import box_pairs
 from engine.arrays import FloatArray, IntArray
+from engine.bounding.sweep import pairs_of_boxes
 from engine.parallel import Budget
 from engine.polygon_overlay.compiled.ring_labels import MOST_BITS, RingBits
 
@@ -42,7 +42,7 @@ def assign_bits(boxes: Corners, piece_offsets: IntArray, budget: Budget, order: 
     # meeting: the rings before each, by rank, that it may share no bit with
     meeting: list[list[int]] = [[] for _ in range(n_rings)]
     is_shell = shell_of == np.arange(n_rings)
-    pairs = box_pairs(*boxes, budget)
+    pairs = pairs_of_boxes(*boxes, budget)
     pairs = pairs[is_shell[pairs[:, 0]] == is_shell[pairs[:, 1]]]
     swapped = rank[pairs[:, 0]] > rank[pairs[:, 1]]
     pairs[swapped] = pairs[swapped, ::-1]
@@ -96,7 +96,7 @@ def rings_meant(
         return [places_of(bits) for bits in evidence.tolist()]
     n_rings = len(labels.bits)
     low, high = np.concatenate([boxes[0], found[0]]), np.concatenate([boxes[1], found[1]])
-    pairs = box_pairs(low, high, budget)
+    pairs = pairs_of_boxes(low, high, budget)
     across = (pairs[:, 0] < n_rings) & (pairs[:, 1] >= n_rings)
     rings, parts = pairs[across, 0], pairs[across, 1] - n_rings
     dealt: list[IntArray] = []

@@ -19,7 +19,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import frexp, hypot, inf, nextafter, ulp
-from typing import Final, Literal, NamedTuple
+from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 
@@ -30,7 +30,7 @@ from engine.arrangement.union_find import UnionFind
 from engine.arrays import FloatArray, IntArray, read_only
 from engine.parallel import Budget
 from engine.polygon_overlay.implicit_rings import ImplicitRings
-from engine.polygon_overlay.result import Collapse, Overlay
+from engine.polygon_overlay.result import Collapse, Output, Overlay
 
 MAX_ROUNDS: Final = 12
 """Rounds before snapping: on 4,296 results of public test pairs all but 14 had ended by then."""
@@ -61,22 +61,6 @@ class RoundedRings:
         return len(self.piece_offsets) - 1
 
 
-@dataclass(frozen=True, slots=True)
-class Settled:
-    """Valid rings, and what became of the parts of the exact result; the names are those of `Overlay`."""
-
-    rings: RoundedRings
-    rounds: int
-    displacement: float
-    collapsed: tuple[Collapse, ...]
-    snapped: bool = False
-    vertices_moved: int = 0
-    pieces_joined: int = 0
-    pieces_parted: int = 0
-    holes_joined: int = 0
-    holes_parted: int = 0
-
-
 class ArrangedAgain(NamedTuple):
     """What one round left; meant: for each ring those of the round before that it comes from."""
 
@@ -88,9 +72,7 @@ Exact = ExactRings | ImplicitRings
 Again = Callable[[RoundedRings], ArrangedAgain | None]
 
 
-def settle_rings(
-    first: RoundedRings, exact: Exact, again: Again, may_snap: bool, budget: Budget
-) -> Settled | None:
+def settle_rings(first: RoundedRings, exact: Exact, again: Again, may_snap: bool, budget: Budget) -> Overlay | None:
     """Arrange ``first`` until it is valid; None where ``again`` cannot, or snapping is needed and not possible.
 
     exact: the exact rings that ``first`` is rounded from. again: arranges rounded rings. may_snap: the rings are those
@@ -118,10 +100,13 @@ def settle_rings(
                 snapped = has_crossings = True
     lost_pieces, pieces_joined, pieces_parted = count_changes(first.n_pieces, piece_origins)
     lost_holes, holes_joined, holes_parted = count_changes(n_holes, hole_origins)
-    return Settled(
-        rings=rings,
+    return overlay_of(
+        rings,
+        first,
+        exact,
+        "valid",
         rounds=rounds,
-        displacement=displacement,
+        largest_displacement=displacement,
         snapped=snapped,
         vertices_moved=n_moved(first.vertices, rings.vertices) if has_crossings else 0,
         collapsed=collapses(first, exact, lost_pieces, lost_holes, budget),
@@ -129,6 +114,21 @@ def settle_rings(
         pieces_parted=pieces_parted,
         holes_joined=holes_joined,
         holes_parted=holes_parted,
+    )
+
+
+def overlay_of(rings: RoundedRings, first: RoundedRings, exact: Exact, output: Output, **told: Any) -> Overlay:
+    """Return the `Overlay` of rings that are settled, ``first`` before that; told: what became of its parts."""
+    return Overlay(
+        vertices=read_only(rings.vertices),
+        ring_offsets=read_only(rings.ring_offsets),
+        piece_offsets=read_only(rings.piece_offsets),
+        output=output,
+        may_be_invalid=output == "nearest" and first.displacement > 0.0,
+        n_pieces_exact=first.n_pieces,
+        n_holes_exact=first.n_rings - first.n_pieces,
+        exact=exact,
+        **told,
     )
 
 
@@ -227,26 +227,3 @@ def count_changes(n_exact: int, origins: Sequence[set[int]]) -> tuple[list[int],
     n_groups = len({linked.find(part) for part in survivors})
     lost = [part for part in range(n_exact) if part not in survivors]
     return lost, len(survivors) - n_groups, len(origins) - n_groups
-
-
-def overlay_of(settled: Settled, first: RoundedRings, exact: Exact, output: Literal["valid", "nearest"]) -> Overlay:
-    """Return the `Overlay` of rings that are settled, ``first`` before that."""
-    return Overlay(
-        vertices=read_only(settled.rings.vertices),
-        ring_offsets=read_only(settled.rings.ring_offsets),
-        piece_offsets=read_only(settled.rings.piece_offsets),
-        output=output,
-        may_be_invalid=output == "nearest" and settled.displacement > 0.0,
-        n_pieces_exact=first.n_pieces,
-        n_holes_exact=first.n_rings - first.n_pieces,
-        exact=exact,
-        largest_displacement=settled.displacement,
-        rounds=settled.rounds,
-        collapsed=settled.collapsed,
-        pieces_joined=settled.pieces_joined,
-        pieces_parted=settled.pieces_parted,
-        holes_joined=settled.holes_joined,
-        holes_parted=settled.holes_parted,
-        vertices_moved=settled.vertices_moved,
-        snapped=settled.snapped,
-    )

@@ -17,15 +17,14 @@ from engine.polygon_overlay.compiled.ring_labels import RingBits
 from engine.polygon_overlay.compiled.workspace import Outcomes, keep, more_contacts, scratch_for
 from engine.polygon_overlay.implicit_rings import ImplicitRings, RingArrays
 from engine.polygon_overlay.nearest import leave_nearest
-from engine.polygon_overlay.result import Overlay
+from engine.polygon_overlay.result import Output, Overlay
 from engine.polygon_overlay.ring_bits import assign_bits, boxes_of, rings_meant
-from engine.polygon_overlay.rounds import ArrangedAgain, RoundedRings, overlay_of, settle_rings
+from engine.polygon_overlay.rounds import ArrangedAgain, RoundedRings, settle_rings
 from engine.polygon_overlay.run_pair import NO_BITS, NOT_REDUCED, FoundPair, run_pair
 from engine.predicates.scaling import exponent_of, scaled_back, shifted
 from engine.types import OPEN
 
 Operation = Literal["intersection", "union", "difference", "symmetric_difference"]
-Output = Literal["valid", "nearest"]
 
 KEPT: Final = {  # by the label of a face: in neither, in the subject, in the clip, in both
     "intersection": (False, False, False, True),
@@ -186,7 +185,7 @@ def overlay_compiled(
             settled = leave_nearest(rounded, exact, budget)
         if settled is None:
             return None
-        result = overlay_of(settled, rounded, exact, output)
+        result = settled
     if exponent:
         vertices, doubtful = scaled_back(result.vertices, exponent)
         if doubtful.any() or not np.isfinite(vertices).all():

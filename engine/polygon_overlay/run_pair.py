@@ -43,6 +43,9 @@ _INT64: Final = np.dtype(np.int64)
 _entries: dict[Any, Any] = {}
 
 
+_Rings = tuple[FloatArray, Int32Array, IntArray]
+
+
 class FoundPair(NamedTuple):
     """What the kernel found for one pair; arrays are read-only, and no rings if it is OPEN.
 
@@ -121,25 +124,25 @@ def run_blocks(
     made = None
     if not size or status.item(0) == DONE:
         if size:
-            rings = _expanded(output, n + n_left_out, n_found, subject, clip, budget)
+            found = _expanded(output, n + n_left_out, n_found, subject, clip, budget)
         else:
-            rings = [_copied(output.vertices, n), _copied(output.sources, n), _copied(output.rings, n_found + 1)]
+            found = _copied(output.vertices, n), _copied(output.sources, n), _copied(output.rings, n_found + 1)
         pieces = _counted(n_pieces) if n_pieces == n_found <= _FEW_PIECES else _copied(output.pieces, n_pieces + 1)
-        made = FoundPair(status.item(0), counts.item(3), displacement.item(0), *rings, pieces)
+        made = FoundPair(status.item(0), counts.item(3), displacement.item(0), *found, pieces)
     keep(scratch, n_touched, used, n)
     return made
 
 
-def _expanded(output: Output, n: int, n_rings: int, subject: RingArrays, clip: RingArrays, budget: Budget) -> list[Any]:
+def _expanded(output: Output, n: int, n_rings: int, subject: RingArrays, clip: RingArrays, budget: Budget) -> _Rings:
     """Return vertices, sources and offsets of rings, n vertices in all, with what was left out of them."""
-    made: list[Any] = [np.empty((n, 2)), np.empty((n, 2), _INT32), np.empty(n_rings + 1, _INT64)]
+    made: Any = np.empty((n, 2)), np.empty((n, 2), _INT32), np.empty(n_rings + 1, _INT64)
     _entry(expand_rings)(
         output.vertices, output.sources, output.rings, subject.vertices, clip.vertices, budget.flag, *made
     )
     budget.check()
     for array in made:
         array.setflags(False)  # as in _copied
-    return made
+    return cast("_Rings", made)
 
 
 def _copied(array: npt.NDArray[Any], n: int) -> npt.NDArray[Any]:

@@ -344,9 +344,7 @@ def intersect_convex(
     n = first_end - first
     other = n + 1  # after the first vertex of the first ring once more
     end = other + second_end - second
-    top_second, step_second = load_convex(
-        clips, second, second_end, subjects.shape[0], edges, origins, other, stop
-    )
+    top_second, step_second = load_convex(clips, second, second_end, subjects.shape[0], edges, origins, other, stop)
     if top_second == GENERAL:
         return GENERAL, 0, 0.0
     passages.enters[:end] = _NONE

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from typing import Any, Final, NamedTuple
 
-from engine.jit import bare_kernel, inline, merged
+from engine.jit import bare_kernel, merged
 from engine.polygon_overlay.compiled.chain_faces import join_faces, number_cycles
 from engine.polygon_overlay.compiled.chain_rings import choose_boundary, walk_rings
 from engine.polygon_overlay.compiled.chains import build_chains, build_stars
@@ -205,10 +205,8 @@ def _round(w: Workspace, n: int, arranged: _Arranged, stop: Any) -> tuple[float,
     return farthest, is_valid
 
 
-@inline
-def _write(
-    w: Workspace, n: int, n_found: int, labels: RingLabels, output: Output, filled: _Filled, stop: Any
-) -> None:  # fmt: skip
+@merged
+def _write(w: Workspace, n: int, n_found: int, labels: RingLabels, output: Output, filled: _Filled, stop: Any) -> None:
     """Append the rings in their order to the output."""
     n_out, n_pieces = filled.n_vertices, filled.n_pieces
     for k in range(n_found):

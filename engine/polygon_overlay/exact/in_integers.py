@@ -22,9 +22,9 @@ from engine.parallel import Budget
 from engine.polygon_overlay.exact.rounding import arranged_again, rings_of, rounded
 from engine.polygon_overlay.implicit_rings import RingArrays
 from engine.polygon_overlay.nearest import leave_nearest
-from engine.polygon_overlay.result import Overlay
-from engine.polygon_overlay.rounds import overlay_of, settle_rings
-from engine.polygon_overlay.run import KEPT, Operation, Output
+from engine.polygon_overlay.result import Output, Overlay
+from engine.polygon_overlay.rounds import settle_rings
+from engine.polygon_overlay.run import KEPT, Operation
 
 _SUBJECT: Final = 1
 _CLIP: Final = 2
@@ -44,12 +44,9 @@ def overlay_exactly(
     exact = ExactRings(tuple(tuple(nodes.points[node] for node in ring) for ring in rings_of(pieces)), nodes.exponent)
     first = rounded(nodes, pieces)
     if output == "nearest":
-        settled = leave_nearest(first, exact, budget)
-    else:
-        bound = nextafter(first.displacement, inf) if first.displacement else 0.0
-        first = replace(first, displacement=bound)
-        found = settle_rings(first, exact, functools.partial(arranged_again, budget=budget), True, budget)
-        if found is None:
-            raise TooComplexError("snap rounding left a vertex off its lattice; please report this input")
-        settled = found
-    return overlay_of(settled, first, exact, output), arrangement.n_exact
+        return leave_nearest(first, exact, budget), arrangement.n_exact
+    first = replace(first, displacement=nextafter(first.displacement, inf) if first.displacement else 0.0)
+    result = settle_rings(first, exact, functools.partial(arranged_again, budget=budget), True, budget)
+    if result is None:
+        raise TooComplexError("snap rounding left a vertex off its lattice; please report this input")
+    return result, arrangement.n_exact

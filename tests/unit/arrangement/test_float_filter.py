@@ -9,6 +9,7 @@ import pytest
 
 from engine.arrangement.float_filter import CROSS, MISS, classify_pairs
 from engine.parallel import Budget
+from engine.types import UNDECIDED
 
 
 def exact_turn(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> int:
