@@ -124,16 +124,17 @@ def _surely_have_area(vertices: FloatArray, ring_offsets: IntArray) -> BoolArray
 
     Twice the area is the sum of x_i y_j - x_j y_i over its edges, coordinates counted from its first vertex. Each is
     off by half a unit u = 2^-52 of itself, so each product by less than 2 u, and adding 2 m products up by less than
-    m u of the sum of their sizes; and by the least double wherever a product underflows. Nothing overflows: coordinates
-    are below 2^121.
+    m u of the sum of their sizes; and by the least double wherever a product underflows. Where one overflows the bound
+    is infinite, or no number.
     """
     starts, sizes = ring_offsets[:-1], np.diff(ring_offsets)
     if len(starts) == 0:
         return np.zeros(0, np.bool_)
     after = np.arange(1, len(vertices) + 1)
     after[ring_offsets[1:] - 1] = starts
-    x, y = (vertices - np.repeat(vertices[starts], sizes, axis=0)).T
-    left, right = x * y[after], x[after] * y
-    doubled = np.add.reduceat(left - right, starts)
-    bound = np.add.reduceat(np.abs(left) + np.abs(right), starts) * ((sizes + 8) * _UNIT) + sizes * _TINY
-    return np.abs(doubled) > bound
+    with np.errstate(all="ignore"):
+        x, y = (vertices - np.repeat(vertices[starts], sizes, axis=0)).T
+        left, right = x * y[after], x[after] * y
+        doubled = np.add.reduceat(left - right, starts)
+        bound = np.add.reduceat(np.abs(left) + np.abs(right), starts) * ((sizes + 8) * _UNIT) + sizes * _TINY
+        return np.abs(doubled) > bound
