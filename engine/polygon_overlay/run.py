@@ -5,14 +5,13 @@ from __future__ import annotations
 import functools
 from collections.abc import Sequence
 from dataclasses import replace
-from types import FunctionType
 from typing import Any, Final, Literal, NamedTuple, cast
 
 import numpy as np
 
 from engine.arrays import FloatArray, Int8Array, Int32Array, IntArray, read_only
 from engine.parallel import Budget
-from engine.polygon_overlay.compiled.kernel import DONE, NEEDS_CONTACTS, NEEDS_OUTPUT, overlay_pairs
+from engine.polygon_overlay.compiled.kernel import DONE, NEEDS_CONTACTS, NEEDS_OUTPUT
 from engine.polygon_overlay.compiled.ring_labels import RingBits
 from engine.polygon_overlay.compiled.workspace import Outcomes, keep, more_contacts, scratch_for
 from engine.polygon_overlay.implicit_rings import ImplicitRings, RingArrays
@@ -20,7 +19,7 @@ from engine.polygon_overlay.nearest import leave_nearest
 from engine.polygon_overlay.result import Output, Overlay
 from engine.polygon_overlay.ring_bits import assign_bits, boxes_of, rings_meant
 from engine.polygon_overlay.rounds import ArrangedAgain, RoundedRings, settle_rings
-from engine.polygon_overlay.run_pair import NO_BITS, NOT_REDUCED, FoundPair, run_pair
+from engine.polygon_overlay.run_pair import NO_BITS, NOT_REDUCED, OVERLAY_PAIRS, FoundPair, entry_of, run_pair
 from engine.predicates.scaling import exponent_of, scaled_back, shifted
 from engine.types import OPEN
 
@@ -32,9 +31,6 @@ KEPT: Final = {  # by the label of a face: in neither, in the subject, in the cl
     "difference": (False, True, False, False),
     "symmetric_difference": (False, True, True, False),
 }
-_overlay_pairs: Any = overlay_pairs
-if isinstance(overlay_pairs, FunctionType):  # uncompiled: numpy warns of what overflows
-    _overlay_pairs = np.errstate(all="ignore")(overlay_pairs)
 KEPT_ARRAYS: Final = {name: np.array(kept, np.uint8) for name, kept in KEPT.items()}
 
 
@@ -111,7 +107,7 @@ def run_kernel(
     n_out, n_out_rings = 8 * n + len(subjects.vertices) + len(clips.vertices), 2 * n
     while reached < n:  # bound: each turn goes on, or makes room for one pair, geometrically
         scratch = scratch_for(n_vertices, n_rings, n_contacts, n_out, n_out_rings)
-        reached, needs, filled, n_filled, n_pieces, used, _ = _overlay_pairs(
+        reached, needs, filled, n_filled, n_pieces, used, _ = entry_of(OVERLAY_PAIRS)(
             first,
             subjects.polygon_offsets,
             second,

@@ -92,14 +92,14 @@ def run_blocks(
     while True:  # bound: each turn makes room, geometrically
         scratch = scratch_for(n_vertices, n_rings, n_contacts, n_out, n_out_rings)
         if size:
-            reduced = _entry(_reduce_pair)(subject, clip, size, n_most, kept, budget.flag, scratch.buffers)
+            reduced = entry_of(_reduce_pair)(subject, clip, size, n_most, kept, budget.flag, scratch.buffers)
             n_touched = reduced.n + n_vertices // 4
             if reduced.n == 0:
                 budget.check()
                 keep(scratch, n_touched, 0, 0)
                 return None
         (status, counts, displacement), output = scratch.outcome, scratch.output
-        _, needs, n, n_found, n_pieces, used, n_left_out = _entry(_overlay_pairs)(
+        _, needs, n, n_found, n_pieces, used, n_left_out = entry_of(OVERLAY_PAIRS)(
             subject,
             subject_item,
             clip,
@@ -136,7 +136,7 @@ def run_blocks(
 def _expanded(output: Output, n: int, n_rings: int, subject: RingArrays, clip: RingArrays, budget: Budget) -> _Rings:
     """Return vertices, sources and offsets of rings, n vertices in all, with what was left out of them."""
     made: Any = np.empty((n, 2)), np.empty((n, 2), _INT32), np.empty(n_rings + 1, _INT64)
-    _entry(expand_rings)(
+    entry_of(expand_rings)(
         output.vertices, output.sources, output.rings, subject.vertices, clip.vertices, budget.flag, *made
     )
     budget.check()
@@ -166,10 +166,11 @@ def _one_polygon(n_rings: int) -> IntArray:
     return offsets
 
 
-def _entry(kernel: Any) -> Any:
+def entry_of(kernel: Any) -> Any:
     """Return what calls a kernel without asking each argument for its type, which takes 3 us for as many as here.
 
-    Caller guarantees that arguments are of the types that the kernel is compiled for: those of polygons, and scratch.
+    Caller guarantees that arguments are of the types that the kernel is compiled for: read-only arrays of polygons, and
+    scratch.
     The kernel itself where it is not called yet, or compiled for others as well, or not compiled.
     """
     entry = _entries.get(kernel)
@@ -181,8 +182,8 @@ def _entry(kernel: Any) -> Any:
     return entry
 
 
-_overlay_pairs: Any = overlay_pairs
+OVERLAY_PAIRS: Any = overlay_pairs
 _reduce_pair: Any = reduce_pair
 if isinstance(overlay_pairs, FunctionType):  # uncompiled: numpy warns of what overflows
-    _overlay_pairs = np.errstate(all="ignore")(overlay_pairs)
+    OVERLAY_PAIRS = np.errstate(all="ignore")(overlay_pairs)
     _reduce_pair = np.errstate(all="ignore")(reduce_pair)
