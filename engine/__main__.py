@@ -25,7 +25,8 @@ from engine.files.tables import read_rows, write_geojson, write_table
 from engine.parallel import Progress
 from engine.polygon_clipping.clip_polygons import PolygonStatus, clip_polygons
 from engine.polygon_overlay.batch import overlay_batch
-from engine.polygon_overlay.run import Operation, Output
+from engine.polygon_overlay.result import Output
+from engine.polygon_overlay.run import Operation
 from engine.segment_clipping.clip_segments import clip_segments
 from engine.solids.bounds import bounds
 from engine.types import Location, Relation

@@ -27,7 +27,8 @@ from engine.errors import InvalidArrayError, InvalidInputError
 from engine.parallel import Progress, check_options
 from engine.polygon_overlay.batch import OverlayBatch, join_batches
 from engine.polygon_overlay.batch import overlay_batch as overlay_pairs
-from engine.polygon_overlay.run import Operation, Output
+from engine.polygon_overlay.result import Output
+from engine.polygon_overlay.run import Operation
 from engine.segment_clipping import clip_segments as clipping
 from engine.solids.base import Solid
 from engine.solids.checks import as_point_groups, as_points

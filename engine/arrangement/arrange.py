@@ -19,11 +19,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from engine.arrangement.box_pairs import box_pairs
-from engine.arrangement.float_filter import CROSS, MISS, UNSURE, classify_pairs
-from engine.arrangement.nodes import Homogeneous, NodeTable, Rational, float_nodes, rational_nodes, reduced
+from engine.arrangement.float_filter import CROSS, MISS, classify_pairs
+from engine.arrangement.nodes import Homogeneous, NodeTable, float_nodes, reduced
 from engine.arrays import FloatArray
+from engine.bounding.sweep import pairs_of_boxes
 from engine.parallel import Budget
+from engine.types import UNDECIDED
 
 Line = tuple[int, int, int]
 """(a, b, c): a x + b y + c w is positive to the left of the directed line; its direction is (b, -a)."""
@@ -107,14 +108,14 @@ def _meet_all(
     array = np.array(ends, np.int64)
     coordinates = np.column_stack([nodes.xs, nodes.ys])
     first, second = coordinates[array[:, 0]], coordinates[array[:, 1]]
-    pairs = box_pairs(np.minimum(first, second), np.maximum(first, second), budget)
+    pairs = pairs_of_boxes(np.minimum(first, second), np.maximum(first, second), budget)
     budget.check()
     if nodes.all_floats:
         verdicts = classify_pairs(coordinates, array, pairs, budget)
         kept = verdicts != MISS
         pairs, verdicts = pairs[kept], verdicts[kept]
     else:
-        verdicts = np.full(len(pairs), UNSURE, np.int8)
+        verdicts = np.full(len(pairs), UNDECIDED, np.int8)
     n_exact = 0
     for count, ((i, j), verdict) in enumerate(zip(pairs.tolist(), verdicts.tolist())):
         if count % _POLL == 0:
@@ -196,24 +197,6 @@ def _split(
         cover=[cover for _, cover in edges.values()],
         n_exact=n_exact,
     )
-
-
-def arrange_segments(
-    segments: Sequence[tuple[Sequence[Rational], Sequence[Rational]]],
-    masks: Sequence[int] | None = None,
-    budget: Budget | None = None,
-) -> Arrangement:
-    """Return the arrangement of segments given by their end points, ((x, y), (x, y)) of ints, floats or fractions.
-
-    masks: as in `arrange`; left out, every segment belongs to source 0 (mask 1).
-    """
-    ends = [end for segment in segments for end in segment]
-    if all(isinstance(value, float) for end in ends for value in end):
-        nodes, numbers = float_nodes(np.array(ends, np.float64).reshape(-1, 2))
-    else:
-        nodes, numbers = rational_nodes(ends)
-    pairs = list(zip(numbers[0::2], numbers[1::2]))
-    return arrange(nodes, pairs, [1] * len(pairs) if masks is None else masks, budget)
 
 
 def arrange_rings(

@@ -23,6 +23,10 @@ class ExactRings:
     rings: tuple[tuple[Homogeneous, ...], ...]
     exponent: int
 
+    def some(self, rings: Sequence[int]) -> ExactRings:
+        """Return some of the rings, by their numbers."""
+        return ExactRings(tuple(self.rings[ring] for ring in rings), self.exponent)
+
     def places(self) -> list[list[tuple[Fraction, Fraction]]]:
         """Return the coordinates of each ring's vertices."""
         up, down = max(self.exponent, 0), max(-self.exponent, 0)

@@ -16,6 +16,7 @@ import numpy as np
 
 from engine.arrays import FloatArray, IntArray
 from engine.jit import inline, kernel
+from engine.parallel import Budget
 
 BLOCK = 1 << 18
 """Pairs given out at once: a scene in which all meet all has n^2 / 2, which need not fit into memory. Sorting one block
@@ -43,6 +44,17 @@ def meeting_boxes(low: FloatArray, high: FloatArray, flag: Any, block: int = BLO
         keys.sort()
         yield np.stack([keys // n_boxes, keys % n_boxes], axis=1)
         start, done = stop, int(ends[stop - 1])
+
+
+def pairs_of_boxes(low: FloatArray, high: FloatArray, budget: Budget) -> IntArray:
+    """Return all of `meeting_boxes` at once. Raises as `Budget.check` when the call must end."""
+    blocks = [np.zeros((0, 2), np.int64)]
+    if len(low):
+        for block in meeting_boxes(low, high, budget.flag):
+            budget.check()
+            blocks.append(block)
+    budget.check()
+    return np.concatenate(blocks)
 
 
 def sweep_axis(low: FloatArray, high: FloatArray) -> int:

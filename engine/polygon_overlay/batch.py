@@ -11,11 +11,10 @@ import numpy as np
 from engine.arrays import BoolArray, FloatArray, Int8Array, Int32Array, IntArray
 from engine.errors import InvalidArrayError, NotRepresentableError
 from engine.parallel import Budget, Cancel, Progress, run_chunks
-from engine.polygon_overlay.compiled.kernel import DONE as SETTLED
-from engine.polygon_overlay.compiled.kernel import UNVOUCHED
+from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
 from engine.polygon_overlay.implicit_rings import ImplicitRings, RingArrays
 from engine.polygon_overlay.overlay import accuracy_of, check_words, overlay_rings, rings_of, ulps_moved
-from engine.polygon_overlay.result import Overlay
+from engine.polygon_overlay.result import Output, Overlay
 from engine.polygon_overlay.rounds_of_many_pairs import (
     SettledPairs,
     found_of,
@@ -27,7 +26,6 @@ from engine.polygon_overlay.rounds_of_many_pairs import (
 from engine.polygon_overlay.run import (
     Found,
     Operation,
-    Output,
     Polygons,
     as_overlay,
     chained,
@@ -39,9 +37,7 @@ from engine.solids.base import Solid
 from engine.solids.polygon import Polygon
 from engine.types import Accuracy
 
-DONE: Final = 0
 NOT_REPRESENTABLE: Final = 1
-
 _FIRST_CHUNK: Final = 8
 _DOUBTFUL: Final = 256
 """Pairs whose rings are arranged again together, whatever their time: a call costs as much as some hundred of them."""
@@ -240,7 +236,7 @@ def _settled(
     """Fill ``rest``; return all pairs settled, `Accuracy.coordinates_ulp`, and how many decisions took rationals."""
     settled: dict[int, SettledPairs] = {}
     alone: dict[int, tuple[Overlay, int, int]] = {}
-    doubtful = np.flatnonzero(found.status == UNVOUCHED)
+    doubtful = np.flatnonzero(found.status == MAY_CROSS)
 
     def settle(start: int, stop: int) -> None:
         some = doubtful[start * _DOUBTFUL : stop * _DOUBTFUL]
@@ -261,7 +257,7 @@ def _settled(
     together = [settled[start] for start in sorted(settled)]
     for each in together:
         rest.is_rounded_again[each.pairs] = True
-    left = np.flatnonzero((found.status != SETTLED) & ~rest.is_rounded_again)
+    left = np.flatnonzero((found.status != DONE) & ~rest.is_rounded_again)
     run_chunks(overlay_alone, len(left), budget=budget, first_chunk=1, workers=workers)
     rest.apart.update((pair, result) for pair, (result, _, _) in alone.items())
     more = [*(each.found for each in together), *(found_of(result, n_exact) for result, n_exact, _ in alone.values())]

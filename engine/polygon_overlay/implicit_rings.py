@@ -57,6 +57,12 @@ class ImplicitRings(NamedTuple):
         """Return the double nearest to the exact area. Raises `NotRepresentableError` beyond the largest double."""
         return self.exact_rings().nearest_area()
 
+    def some(self, rings: Sequence[int]) -> ExactRings:
+        """Return some of the rings, by their numbers, as integers."""
+        sources = [self.sources[self.offsets[ring] : self.offsets[ring + 1]] for ring in rings]
+        offsets = np.cumsum([0, *map(len, sources)])
+        return self._replace(sources=np.concatenate(sources), offsets=offsets).exact_rings()
+
     def exact_rings(self) -> ExactRings:
         """Return the rings as integers, with all that can be asked of them."""
         vertices = np.concatenate([self.subject.vertices, self.clip.vertices])

@@ -14,16 +14,16 @@ M. Sharir, Arrangements, Handbook of Discrete and Computational Geometry, 2018.
 
 from __future__ import annotations
 
-from typing import Final, Literal, overload
+from typing import Final, Literal, Unpack, overload
 
 import numpy as np
 
 from engine.errors import InvalidOperationError, UnsupportedSolidError
-from engine.parallel import Budget, Cancel, Progress, check_options
+from engine.parallel import Budget, Cancel, Options, Progress, check_options
 from engine.polygon_overlay.exact.in_integers import overlay_exactly
 from engine.polygon_overlay.implicit_rings import RingArrays
-from engine.polygon_overlay.result import Overlay
-from engine.polygon_overlay.run import KEPT, Operation, Output, overlay_compiled
+from engine.polygon_overlay.result import Output, Overlay
+from engine.polygon_overlay.run import KEPT, Operation, overlay_compiled
 from engine.solids.base import Solid
 from engine.solids.checks import shown
 from engine.solids.polygon import Polygon
@@ -38,32 +38,22 @@ _UNLIMITED: Final = Budget()
 def overlay(
     subject: Solid,
     clip: Solid,
-    operation: Operation = ...,
+    operation: Operation = "intersection",
     *,
-    output: Output = ...,
-    workers: int | None = ...,
-    deadline: float | None = ...,
-    cancel: Cancel | None = ...,
-    progress: Progress | None = ...,
-    report: Literal[False] = ...,
+    output: Output = "valid",
+    report: Literal[False] = False,
+    **options: Unpack[Options],
 ) -> Overlay: ...
-
-
 @overload
 def overlay(
     subject: Solid,
     clip: Solid,
-    operation: Operation = ...,
+    operation: Operation = "intersection",
     *,
-    output: Output = ...,
-    workers: int | None = ...,
-    deadline: float | None = ...,
-    cancel: Cancel | None = ...,
-    progress: Progress | None = ...,
+    output: Output = "valid",
     report: Literal[True],
+    **options: Unpack[Options],
 ) -> tuple[Overlay, Accuracy]: ...
-
-
 def overlay(
     subject: Solid,
     clip: Solid,

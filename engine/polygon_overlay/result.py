@@ -10,6 +10,8 @@ from engine.arrangement.exact_area import ExactRings
 from engine.arrays import FloatArray, IntArray
 from engine.polygon_overlay.implicit_rings import ImplicitRings
 
+Output = Literal["valid", "nearest"]
+
 
 class OverlayPiece(NamedTuple):
     """One connected part: its shell, counter-clockwise, and its holes, clockwise; each ``(n, 2)`` float64."""
@@ -55,7 +57,7 @@ class Overlay:
     vertices: FloatArray
     ring_offsets: IntArray
     piece_offsets: IntArray
-    output: Literal["valid", "nearest"]
+    output: Output
     may_be_invalid: bool
     n_pieces_exact: int
     n_holes_exact: int

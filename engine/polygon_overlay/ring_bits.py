@@ -10,14 +10,14 @@ meant; those left alone with a bit, once, are.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
-from engine.arrangement.box_pairs import box_pairs
 from engine.arrays import FloatArray, IntArray
+from engine.bounding.sweep import pairs_of_boxes
 from engine.parallel import Budget
-from engine.polygon_overlay.compiled.ring_labels import MOST_BITS
+from engine.polygon_overlay.compiled.ring_labels import MOST_BITS, RingBits
 
 _SPREAD: Final = 16
 """Bits that rings are dealt out to though fewer would do: those of one bit are then further from each other."""
@@ -26,13 +26,6 @@ _MOST_ORDERS: Final = 8
 """Orders in which bits are dealt out: a ring that is not meant passes for one in each with the part's share of bits."""
 
 Corners = tuple[FloatArray, FloatArray]
-
-
-class RingBits(NamedTuple):
-    """bits: by ring its bit; shells: by bit that of its shells; int64."""
-
-    bits: IntArray
-    shells: IntArray
 
 
 def assign_bits(boxes: Corners, piece_offsets: IntArray, budget: Budget, order: int = 0) -> RingBits | None:
@@ -49,7 +42,7 @@ def assign_bits(boxes: Corners, piece_offsets: IntArray, budget: Budget, order: 
     # meeting: the rings before each, by rank, that it may share no bit with
     meeting: list[list[int]] = [[] for _ in range(n_rings)]
     is_shell = shell_of == np.arange(n_rings)
-    pairs = box_pairs(*boxes, budget)
+    pairs = pairs_of_boxes(*boxes, budget)
     pairs = pairs[is_shell[pairs[:, 0]] == is_shell[pairs[:, 1]]]
     swapped = rank[pairs[:, 0]] > rank[pairs[:, 1]]
     pairs[swapped] = pairs[swapped, ::-1]
@@ -91,7 +84,7 @@ def rings_meant(
     boxes: Corners,
     piece_offsets: IntArray,
     found: Corners,
-    again: Callable[[RingBits], IntArray | None],
+    again: Callable[[RingBits], IntArray],
     budget: Budget,
 ) -> list[list[int]] | None:
     """Return for each ring found which of the rings its evidence names; None where that is not sure.
@@ -103,7 +96,7 @@ def rings_meant(
         return [places_of(bits) for bits in evidence.tolist()]
     n_rings = len(labels.bits)
     low, high = np.concatenate([boxes[0], found[0]]), np.concatenate([boxes[1], found[1]])
-    pairs = box_pairs(low, high, budget)
+    pairs = pairs_of_boxes(low, high, budget)
     across = (pairs[:, 0] < n_rings) & (pairs[:, 1] >= n_rings)
     rings, parts = pairs[across, 0], pairs[across, 1] - n_rings
     dealt: list[IntArray] = []
@@ -123,10 +116,9 @@ def rings_meant(
                 meant[part].append(ring)
             return meant
         other = assign_bits(boxes, piece_offsets, budget, order)
-        found_evidence = None if other is None else again(other)
-        if other is None or found_evidence is None:
+        if other is None:
             return None
-        labels, evidence = other, found_evidence
+        labels, evidence = other, again(other)
     return None
 
 

@@ -12,14 +12,13 @@ import numpy as np
 
 from engine.arrays import FloatArray, IntArray, read_only
 from engine.parallel import Budget
-from engine.polygon_overlay.compiled.kernel import DONE, OPEN, UNVOUCHED
-from engine.polygon_overlay.compiled.ring_labels import MOST_BITS
-from engine.polygon_overlay.exact.rounding import MAX_ROUNDS
+from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
+from engine.polygon_overlay.compiled.ring_labels import MOST_BITS, RingBits
 from engine.polygon_overlay.nearest import nearest_rings
 from engine.polygon_overlay.result import Overlay
-from engine.polygon_overlay.ring_bits import RingBits
-from engine.polygon_overlay.rounds import n_moved
-from engine.polygon_overlay.run import Found, Polygons, chained, run_kernel, summed
+from engine.polygon_overlay.rounds import MAX_ROUNDS, n_moved
+from engine.polygon_overlay.run import Found, Polygons, put_together, run_kernel, summed
+from engine.types import OPEN
 
 _NONE: Final = np.zeros(0, np.int64)
 
@@ -34,12 +33,12 @@ class SettledPairs(NamedTuple):
 
 
 def settle_pairs(first: Found, budget: Budget) -> SettledPairs:
-    """Arrange the pairs of ``first`` that are UNVOUCHED until they are valid.
+    """Arrange the pairs of ``first`` that are MAY_CROSS until they are valid.
 
     Left out are those that the kernel leaves open, that have more rings than a label has bits, or that are not valid
     after the last round. Raises as `Budget.check` when the call must end.
     """
-    pairs = np.flatnonzero(first.status == UNVOUCHED)
+    pairs = np.flatnonzero(first.status == MAY_CROSS)
     rings = taken(first, pairs)
     displacement = rings.displacement
     has_crossings = np.zeros(len(pairs), np.bool_)
@@ -63,7 +62,7 @@ def settle_pairs(first: Found, budget: Budget) -> SettledPairs:
         valid.counts[:, 3] = first.counts[pairs[done], 3]
         ulps = _ulps_moved(first, pairs[done], valid, np.flatnonzero(has_crossings[done]))
         settled.append(SettledPairs(pairs[done], valid, ulps))
-        left = np.flatnonzero(goes_on & (rings.status == UNVOUCHED))
+        left = np.flatnonzero(goes_on & (rings.status == MAY_CROSS))
         pairs, rings, displacement, has_crossings = (
             pairs[left],
             taken(rings, left),
@@ -104,8 +103,8 @@ def _arranged_again(rings: Found, budget: Budget) -> Found:
 
 
 def nearest_pairs(first: Found, budget: Budget) -> SettledPairs:
-    """Leave the rings of the pairs of ``first`` that are UNVOUCHED as they are, but those without area."""
-    pairs = np.flatnonzero(first.status == UNVOUCHED)
+    """Leave the rings of the pairs of ``first`` that are MAY_CROSS as they are, but those without area."""
+    pairs = np.flatnonzero(first.status == MAY_CROSS)
     found = [taken(first, _NONE)]
     for pair in range(len(pairs)):
         one = taken(first, pairs[pair : pair + 1])
@@ -157,13 +156,5 @@ def _places(offsets: IntArray, items: IntArray) -> IntArray:
 
 def joined(parts: list[Found]) -> Found:
     """Return the pairs of all parts, at least one, one part after another; no evidence."""
-    return Found(
-        np.concatenate([part.status for part in parts]),
-        np.concatenate([part.counts for part in parts]),
-        np.concatenate([part.displacement for part in parts]),
-        np.concatenate([part.vertices for part in parts]),
-        np.concatenate([part.sources for part in parts]),
-        chained([part.ring_offsets for part in parts]),
-        chained([part.piece_offsets for part in parts]),
-        _NONE,
-    )
+    outcomes = (np.concatenate(arrays) for arrays in list(zip(*parts, strict=True))[:3])
+    return Found(*outcomes, *put_together([(*part[3:7], _NONE) for part in parts]))

@@ -5,31 +5,25 @@ from __future__ import annotations
 import functools
 from collections.abc import Sequence
 from dataclasses import replace
-from types import FunctionType
 from typing import Any, Final, Literal, NamedTuple, cast
 
 import numpy as np
 
 from engine.arrays import FloatArray, Int8Array, Int32Array, IntArray, read_only
 from engine.parallel import Budget
-from engine.polygon_overlay.compiled.kernel import (
-    DONE,
-    NEEDS_CONTACTS,
-    NEEDS_OUTPUT,
-    OPEN,
-    overlay_pairs,
-)
-from engine.polygon_overlay.compiled.workspace import keep, more_contacts, scratch_for
+from engine.polygon_overlay.compiled.kernel import DONE, NEEDS_CONTACTS, NEEDS_OUTPUT
+from engine.polygon_overlay.compiled.ring_labels import RingBits
+from engine.polygon_overlay.compiled.workspace import Outcomes, keep, more_contacts, scratch_for
 from engine.polygon_overlay.implicit_rings import ImplicitRings, RingArrays
 from engine.polygon_overlay.nearest import leave_nearest
-from engine.polygon_overlay.result import Overlay
-from engine.polygon_overlay.ring_bits import RingBits
-from engine.polygon_overlay.rounds import RoundedRings, settle_rings
-from engine.polygon_overlay.run_pair import NOT_REDUCED, FoundPair, run_pair
+from engine.polygon_overlay.result import Output, Overlay
+from engine.polygon_overlay.ring_bits import assign_bits, boxes_of, rings_meant
+from engine.polygon_overlay.rounds import ArrangedAgain, RoundedRings, settle_rings
+from engine.polygon_overlay.run_pair import NO_BITS, NOT_REDUCED, OVERLAY_PAIRS, FoundPair, entry_of, run_pair
 from engine.predicates.scaling import exponent_of, scaled_back, shifted
+from engine.types import OPEN
 
 Operation = Literal["intersection", "union", "difference", "symmetric_difference"]
-Output = Literal["valid", "nearest"]
 
 KEPT: Final = {  # by the label of a face: in neither, in the subject, in the clip, in both
     "intersection": (False, False, False, True),
@@ -37,11 +31,6 @@ KEPT: Final = {  # by the label of a face: in neither, in the subject, in the cl
     "difference": (False, True, False, False),
     "symmetric_difference": (False, True, True, False),
 }
-_overlay_pairs: Any = overlay_pairs
-if isinstance(overlay_pairs, FunctionType):  # uncompiled: numpy warns of what overflows
-    _overlay_pairs = np.errstate(all="ignore")(overlay_pairs)
-_NONE: Final = np.zeros(0, np.int64)
-_NO_LABELS: Final = RingBits(_NONE, _NONE)
 KEPT_ARRAYS: Final = {name: np.array(kept, np.uint8) for name, kept in KEPT.items()}
 
 
@@ -61,7 +50,7 @@ class Polygons(NamedTuple):
 class Found(NamedTuple):
     """What the kernel found for some pairs, one after another.
 
-    status: (pairs,) int8, DONE, OPEN or UNVOUCHED; counts: (pairs, 4) int64, pieces, rings, vertices and pairs of edges
+    status: (pairs,) int8, DONE, OPEN or MAY_CROSS; counts: (pairs, 4) int64, pieces, rings, vertices and pairs of edges
     beyond the filter; displacement: (pairs,) float64. vertices, sources: of all pairs that are not OPEN; ring_offsets
     into them; piece_offsets: into the rings. evidence: by ring, of pairs whose rings are sources of their own.
     """
@@ -102,66 +91,52 @@ _EMPTY: Final = Polygons(
 
 
 def run_kernel(
-    subjects: Polygons, clips: Polygons, operation: Operation, budget: Budget, labels: RingBits = _NO_LABELS
+    subjects: Polygons, clips: Polygons, operation: Operation, budget: Budget, bits: RingBits = NO_BITS
 ) -> Found:
     """Overlay polygons pair by pair. Raises as `Budget.check` when the call must end.
 
-    labels: bits of the rings of subjects to be arranged each as a source of its own, as `overlay_pairs` takes them.
+    bits: of the rings of subjects to be arranged each as a source of its own, as `overlay_pairs` takes them.
     """
     n = len(subjects.polygon_offsets) - 1
     n_vertices, n_rings = subjects.most_vertices + clips.most_vertices, subjects.most_rings + clips.most_rings
-    status, counts, displacement = np.empty(n, np.int8), np.empty((n, 4), np.int64), np.empty(n)
+    first, second = RingArrays(*subjects[:2]), RingArrays(*clips[:2])
+    outcomes = Outcomes(np.empty(n, np.int8), np.empty((n, 4), np.int64), np.empty(n))
     reached = 0
-    parts: list[Found] = []
+    parts: list[list[Any]] = []
     n_contacts = max(256, 4 * n_vertices)
     n_out, n_out_rings = 8 * n + len(subjects.vertices) + len(clips.vertices), 2 * n
     while reached < n:  # bound: each turn goes on, or makes room for one pair, geometrically
         scratch = scratch_for(n_vertices, n_rings, n_contacts, n_out, n_out_rings)
-        reached, needs, filled, n_filled, n_pieces, used, _ = _overlay_pairs(
-            *subjects[:3],
-            *clips[:3],
-            0,
-            n,
+        reached, needs, filled, n_filled, n_pieces, used, _ = entry_of(OVERLAY_PAIRS)(
+            first,
+            subjects.polygon_offsets,
+            second,
+            clips.polygon_offsets,
             reached,
-            *NOT_REDUCED,
+            NOT_REDUCED,
             KEPT_ARRAYS[operation],
-            *labels,
+            bits,
             budget.flag,
             scratch.buffers,
-            status,
-            counts,
-            displacement,
-            *scratch.output,
+            outcomes,
+            scratch.output,
         )
         budget.check()
-        part = Found(
-            status,
-            counts,
-            displacement,
-            scratch.output[0][:filled].copy(),
-            scratch.output[1][:filled].copy(),
-            scratch.output[2][: n_filled + 1].copy(),
-            scratch.output[3][: n_pieces + 1].copy(),
-            scratch.output[4][:n_filled].copy() if len(labels.bits) else _NONE,
-        )
-        parts.append(part)
+        sizes = filled, filled, n_filled + 1, n_pieces + 1, n_filled if len(bits.bits) else 0
+        parts.append([array[:size].copy() for array, size in zip(scratch.output, sizes, strict=True)])
         keep(scratch, n_vertices, used, filled)
         if needs == NEEDS_CONTACTS:
             n_contacts = more_contacts(scratch.n_contacts)
         elif needs == NEEDS_OUTPUT:
-            n_out_rings, n_out = (max(m, int(counts[reached, k])) for k, m in ((1, n_out_rings), (2, n_out)))
-    if len(parts) == 1:
-        return parts[0]
-    return Found(
-        status,
-        counts,
-        displacement,
-        np.concatenate([each.vertices for each in parts]),
-        np.concatenate([each.sources for each in parts]),
-        chained([each.ring_offsets for each in parts]),
-        chained([each.piece_offsets for each in parts]),
-        np.concatenate([each.evidence for each in parts]),
-    )
+            n_out_rings, n_out = (max(m, int(outcomes.counts[reached, k])) for k, m in ((1, n_out_rings), (2, n_out)))
+    return Found(*outcomes, *(parts[0] if len(parts) == 1 else put_together(parts)))
+
+
+def put_together(parts: Sequence[Sequence[Any]]) -> list[Any]:
+    """Return vertices, sources, ring offsets, piece offsets and evidence of some parts as those of one."""
+    vertices, sources, ring_offsets, piece_offsets, evidence = zip(*parts, strict=True)
+    offsets = chained(ring_offsets), chained(piece_offsets)
+    return [np.concatenate(vertices), np.concatenate(sources), *offsets, np.concatenate(evidence)]
 
 
 def summed(sizes: IntArray) -> IntArray:
@@ -196,66 +171,65 @@ def overlay_compiled(
         if found.status == OPEN:
             return None
     exact = ImplicitRings(subject, clip, found.sources, found.ring_offsets)
-    settled = None
-    vertices, displacement = found.vertices, found.displacement
-    if found.status != DONE:
-        rounded = _rounded(found, _NONE)
+    if found.status == DONE:
+        result = as_overlay(found.vertices, found.piece_offsets, found.displacement, exact, output)
+    else:
+        rounded = _rounded(found)
         if output == "valid":
-            settled = settle_rings(rounded, exact, functools.partial(_again, budget), exponent == 0, budget)
+            settled = settle_rings(rounded, exact, functools.partial(_arranged_again, budget), exponent == 0, budget)
         else:
             settled = leave_nearest(rounded, exact, budget)
         if settled is None:
             return None
-        vertices, displacement = read_only(settled.rings.vertices), settled.displacement
+        result = settled
     if exponent:
-        vertices, doubtful = scaled_back(vertices, exponent)
-        vertices.setflags(write=False)
+        vertices, doubtful = scaled_back(result.vertices, exponent)
         if doubtful.any() or not np.isfinite(vertices).all():
             return None
-        displacement = float(np.nextafter(np.ldexp(displacement, exponent), np.inf)) if displacement else 0.0
-    result = as_overlay(vertices, found.piece_offsets, displacement, exact, output)
-    if settled is not None:
-        result = replace(
-            result,
-            ring_offsets=read_only(settled.rings.ring_offsets),
-            piece_offsets=read_only(settled.rings.piece_offsets),
-            collapsed=settled.collapsed,
-            pieces_joined=settled.pieces_joined,
-            pieces_parted=settled.pieces_parted,
-            holes_joined=settled.holes_joined,
-            holes_parted=settled.holes_parted,
-            rounds=settled.rounds,
-            vertices_moved=settled.vertices_moved,
-            snapped=settled.snapped,
-        )
+        moved = result.largest_displacement
+        displacement = float(np.nextafter(np.ldexp(moved, exponent), np.inf)) if moved else 0.0
+        result = replace(result, vertices=read_only(vertices), largest_displacement=displacement)
     return result, found.n_exact
 
 
-def _rounded(found: FoundPair, evidence: IntArray) -> RoundedRings:
+def _rounded(found: FoundPair) -> RoundedRings:
     """Return what was found for one pair as the outcome of a round."""
     return RoundedRings(
         vertices=found.vertices,
         ring_offsets=found.ring_offsets,
         piece_offsets=found.piece_offsets,
-        evidence=evidence,
         displacement=found.displacement,
         is_valid=found.status == DONE,
         has_crossings=bool((found.sources[:, 1] >= 0).any()),
     )
 
 
-def _again(budget: Budget, rings: RoundedRings, labels: RingBits) -> RoundedRings | None:
-    """Arrange rounded rings, each a source of its own; None where that is left open."""
-    offsets = read_only(rings.ring_offsets)
-    n_vertices, n_rings = len(rings.vertices), len(offsets) - 1
-    subject = Polygons(read_only(rings.vertices), offsets, read_only(np.array([0, n_rings])), n_vertices, n_rings)
-    status, counts, displacement, vertices, sources, *offsets_found, evidence = run_kernel(
-        subject, _EMPTY, "union", budget, labels
+def _arranged_again(budget: Budget, rings: RoundedRings) -> ArrangedAgain | None:
+    """Arrange rounded rings, each a source of its own; None where that is left open, or bits do not suffice."""
+    subject = Polygons(
+        read_only(rings.vertices),
+        read_only(rings.ring_offsets),
+        read_only(np.array([0, rings.n_rings])),
+        len(rings.vertices),
+        rings.n_rings,
     )
-    if status[0] == OPEN:
+    boxes = boxes_of(rings.vertices, rings.ring_offsets)
+    bits = assign_bits(boxes, rings.piece_offsets, budget)
+    if bits is None:
         return None
-    found = FoundPair(int(status[0]), int(counts[0, 3]), float(displacement[0]), vertices, sources, *offsets_found)
-    return _rounded(found, evidence)
+    found = run_kernel(subject, _EMPTY, "union", budget, bits)
+    if found.status[0] == OPEN:
+        return None
+
+    def evidence(other: RingBits) -> IntArray:
+        return run_kernel(subject, _EMPTY, "union", budget, other).evidence  # bits decide nothing: the same rings
+
+    boxes_found = boxes_of(found.vertices, found.ring_offsets)
+    meant = rings_meant(bits, found.evidence, boxes, rings.piece_offsets, boxes_found, evidence, budget)
+    if meant is None:
+        return None
+    one = FoundPair(int(found.status[0]), int(found.counts[0, 3]), float(found.displacement[0]), *found[3:7])
+    return ArrangedAgain(_rounded(one), meant)
 
 
 def as_overlay(

@@ -16,11 +16,13 @@ from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
 from engine.parallel import Budget
 from engine.polygon_overlay.compiled.expanding import expand_rings
 from engine.polygon_overlay.compiled.kernel import DONE, FINISHED, NEEDS_CONTACTS, overlay_pairs
+from engine.polygon_overlay.compiled.loading import Loaded
 from engine.polygon_overlay.compiled.reducing import reduce_pair
-from engine.polygon_overlay.compiled.workspace import Scratch, keep, more_contacts, scratch_for
+from engine.polygon_overlay.compiled.ring_labels import RingBits
+from engine.polygon_overlay.compiled.workspace import Output, keep, more_contacts, scratch_for
 from engine.polygon_overlay.implicit_rings import RingArrays
 
-NOT_REDUCED: Final = 0, 0, 0, 0.0
+NOT_REDUCED: Final = Loaded(0, 0, 0, 0.0)
 """What stands in the place of the result of reduce_pair."""
 _MANY: Final = 500
 """Vertices of a pair from which on blocks of edges are looked at first."""
@@ -34,17 +36,20 @@ _MOST: Final = 0.5
 _FEW_CONTACTS: Final = 1024
 _FEW_PIECES: Final = 64
 """Pieces without holes up to which offsets are kept, since many results have the same."""
-_NONE: Final = np.zeros(0, np.int64)
+NO_BITS: Final = RingBits(np.zeros(0, np.int64), np.zeros(0, np.int64))
 _INT32: Final = np.dtype(np.int32)
 _INT64: Final = np.dtype(np.int64)
 """Types that numpy need not look up."""
 _entries: dict[Any, Any] = {}
 
 
+_Rings = tuple[FloatArray, Int32Array, IntArray]
+
+
 class FoundPair(NamedTuple):
     """What the kernel found for one pair; arrays are read-only, and no rings if it is OPEN.
 
-    status: DONE, OPEN or UNVOUCHED. n_exact: pairs of edges beyond the filter. displacement: how far rounding moved a
+    status: DONE, OPEN or MAY_CROSS. n_exact: pairs of edges beyond the filter. displacement: how far rounding moved a
     vertex at most. vertices, sources, ring_offsets, piece_offsets: those of `Found`.
     """
 
@@ -62,105 +67,82 @@ def run_pair(subject: RingArrays, clip: RingArrays, kept: FlagArray, budget: Bud
     n_vertices = len(subject.vertices) + len(clip.vertices)
     if n_vertices >= _MANY and n_vertices >= _MANY_IN_RING * (len(subject.offsets) + len(clip.offsets) - 2):
         size = _BLOCK if n_vertices < _BLOCKS_GROW else 2 * _BLOCK
-        found = run_reduced(subject, clip, size, int(_MOST * n_vertices), kept, budget)
+        found = run_blocks(subject, clip, size, int(_MOST * n_vertices), kept, budget)
         if found is not None:
             return found
-    return run_whole(subject, clip, kept, budget)
+    return cast("FoundPair", run_blocks(subject, clip, 0, 0, kept, budget))
 
 
-def run_whole(subject: RingArrays, clip: RingArrays, kept: FlagArray, budget: Budget) -> FoundPair:
-    """Overlay two polygons edge by edge. Raises as `Budget.check` when the call must end."""
-    n_vertices, n_rings = len(subject.vertices) + len(clip.vertices), len(subject.offsets) + len(clip.offsets) - 2
-    n_contacts, n_out, n_out_rings = max(256, 4 * n_vertices), 8 + n_vertices, 2
-    while True:  # bound: each turn makes room, geometrically
-        scratch = scratch_for(n_vertices, n_rings, n_contacts, n_out, n_out_rings)
-        status, counts, displacement, vertices, sources, rings, pieces, _ = scratch.output_of_one
-        _, needs, n, n_found, n_pieces, used, _ = _run(subject, clip, NOT_REDUCED, kept, budget, scratch)
-        budget.check()
-        if needs == FINISHED:
-            break
-        keep(scratch, n_vertices, used, n)
-        if needs == NEEDS_CONTACTS:
-            n_contacts = more_contacts(scratch.n_contacts)
-        else:
-            n_out_rings, n_out = int(counts[0, 1]), int(counts[0, 2])
-    found = FoundPair(
-        status.item(0),
-        counts.item(3),
-        displacement.item(0),
-        _copied(vertices, n),
-        _copied(sources, n),
-        _copied(rings, n_found + 1),
-        _counted(n_pieces) if n_pieces == n_found <= _FEW_PIECES else _copied(pieces, n_pieces + 1),
-    )
-    keep(scratch, n_vertices, used, n)
-    return found
-
-
-def run_reduced(
+def run_blocks(
     subject: RingArrays, clip: RingArrays, size: int, n_most: int, kept: FlagArray, budget: Budget
 ) -> FoundPair | None:
     """Overlay two polygons in blocks of ``size`` edges, of which fewer than n_most may be looked at one by one.
 
     None where more edges are near others, or where the pair is not DONE: rounded rings that nothing vouches for are to
-    be arranged again, with all their vertices. Raises as `Budget.check` when the call must end.
+    be arranged again, with all their vertices. Size 0: all edges one by one, and never None. Raises as `Budget.check`
+    when the call must end.
     """
     n_vertices, n_rings = len(subject.vertices) + len(clip.vertices), len(subject.offsets) + len(clip.offsets) - 2
-    n_contacts, n_out, n_out_rings = _FEW_CONTACTS, 0, 0
+    subject_item, clip_item = _one_polygon(len(subject.offsets) - 1), _one_polygon(len(clip.offsets) - 1)
+    if size:
+        reduced, n_contacts, n_out, n_out_rings = NOT_REDUCED, _FEW_CONTACTS, 0, 0
+    else:
+        reduced, n_contacts, n_out, n_out_rings = NOT_REDUCED, max(256, 4 * n_vertices), 8 + n_vertices, 2
+    n_touched = n_vertices
     while True:  # bound: each turn makes room, geometrically
         scratch = scratch_for(n_vertices, n_rings, n_contacts, n_out, n_out_rings)
-        status, counts, displacement, vertices, sources, rings, pieces, _ = scratch.output_of_one
-        reduced = _entry(_reduce_pair)(*subject, *clip, size, n_most, kept, budget.flag, scratch.buffers)
-        if reduced[0] == 0:
-            budget.check()
-            keep(scratch, n_vertices // 4, 0, 0)
-            return None
-        _, needs, n, n_found, n_pieces, used, n_left_out = _run(subject, clip, reduced, kept, budget, scratch)
+        if size:
+            reduced = entry_of(_reduce_pair)(subject, clip, size, n_most, kept, budget.flag, scratch.buffers)
+            n_touched = reduced.n + n_vertices // 4
+            if reduced.n == 0:
+                budget.check()
+                keep(scratch, n_touched, 0, 0)
+                return None
+        (status, counts, displacement), output = scratch.outcome, scratch.output
+        _, needs, n, n_found, n_pieces, used, n_left_out = entry_of(OVERLAY_PAIRS)(
+            subject,
+            subject_item,
+            clip,
+            clip_item,
+            0,
+            reduced,
+            kept,
+            NO_BITS,
+            budget.flag,
+            scratch.buffers,
+            scratch.outcome,
+            output,
+        )
         budget.check()
         if needs == FINISHED:
             break
+        keep(scratch, n_touched, used, n)
         if needs == NEEDS_CONTACTS:
             n_contacts = more_contacts(scratch.n_contacts)
         else:
             n_out_rings, n_out = int(counts[0, 1]), int(counts[0, 2])
     made = None
-    if status.item(0) == DONE:
-        total = n + n_left_out
-        found = np.empty((total, 2)), np.empty((total, 2), _INT32), np.empty(n_found + 1, _INT64)
-        _entry(expand_rings)(vertices, sources, rings, subject.vertices, clip.vertices, budget.flag, *found)
-        budget.check()
-        array: Any
-        for array in found:
-            array.setflags(False)  # as in _copied
-        piece_offsets = _counted(n_pieces) if n_pieces == n_found <= _FEW_PIECES else _copied(pieces, n_pieces + 1)
-        made = FoundPair(DONE, counts.item(3), displacement.item(0), *found, piece_offsets)
-    keep(scratch, reduced[0] + n_vertices // 4, used, n)
+    if not size or status.item(0) == DONE:
+        if size:
+            found = _expanded(output, n + n_left_out, n_found, subject, clip, budget)
+        else:
+            found = _copied(output.vertices, n), _copied(output.sources, n), _copied(output.rings, n_found + 1)
+        pieces = _counted(n_pieces) if n_pieces == n_found <= _FEW_PIECES else _copied(output.pieces, n_pieces + 1)
+        made = FoundPair(status.item(0), counts.item(3), displacement.item(0), *found, pieces)
+    keep(scratch, n_touched, used, n)
     return made
 
 
-def _run(
-    subject: RingArrays, clip: RingArrays, reduced: Any, kept: FlagArray, budget: Budget, scratch: Scratch
-) -> tuple[int, ...]:
-    """Run overlay_pairs on one pair, and return what it does."""
-    found: tuple[int, ...] = _entry(_overlay_pairs)(
-        subject.vertices,
-        subject.offsets,
-        _one_polygon(len(subject.offsets) - 1),
-        clip.vertices,
-        clip.offsets,
-        _one_polygon(len(clip.offsets) - 1),
-        0,
-        1,
-        0,
-        *reduced,
-        kept,
-        _NONE,
-        _NONE,
-        budget.flag,
-        scratch.buffers,
-        *scratch.output_of_one,
+def _expanded(output: Output, n: int, n_rings: int, subject: RingArrays, clip: RingArrays, budget: Budget) -> _Rings:
+    """Return vertices, sources and offsets of rings, n vertices in all, with what was left out of them."""
+    made: Any = np.empty((n, 2)), np.empty((n, 2), _INT32), np.empty(n_rings + 1, _INT64)
+    entry_of(expand_rings)(
+        output.vertices, output.sources, output.rings, subject.vertices, clip.vertices, budget.flag, *made
     )
-    return found
+    budget.check()
+    for array in made:
+        array.setflags(False)  # as in _copied
+    return cast("_Rings", made)
 
 
 def _copied(array: npt.NDArray[Any], n: int) -> npt.NDArray[Any]:
@@ -184,10 +166,11 @@ def _one_polygon(n_rings: int) -> IntArray:
     return offsets
 
 
-def _entry(kernel: Any) -> Any:
+def entry_of(kernel: Any) -> Any:
     """Return what calls a kernel without asking each argument for its type, which takes 3 us for as many as here.
 
-    Caller guarantees that arguments are of the types that the kernel is compiled for: those of polygons, and scratch.
+    Caller guarantees that arguments are of the types that the kernel is compiled for: read-only arrays of polygons, and
+    scratch.
     The kernel itself where it is not called yet, or compiled for others as well, or not compiled.
     """
     entry = _entries.get(kernel)
@@ -199,8 +182,8 @@ def _entry(kernel: Any) -> Any:
     return entry
 
 
-_overlay_pairs: Any = overlay_pairs
+OVERLAY_PAIRS: Any = overlay_pairs
 _reduce_pair: Any = reduce_pair
 if isinstance(overlay_pairs, FunctionType):  # uncompiled: numpy warns of what overflows
-    _overlay_pairs = np.errstate(all="ignore")(overlay_pairs)
+    OVERLAY_PAIRS = np.errstate(all="ignore")(overlay_pairs)
     _reduce_pair = np.errstate(all="ignore")(reduce_pair)

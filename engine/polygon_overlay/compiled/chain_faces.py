@@ -9,13 +9,16 @@ changes them by its mask.
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
+from engine.arrangement.union_find import root_of, unite
 from engine.jit import inline, merged
-from engine.polygon_overlay.compiled.chains import Chains, is_live, place_before, standing
+from engine.polygon_overlay.compiled.chains import Chains, Stars, is_live, place_before, standing
 from engine.polygon_overlay.compiled.crossing_signs import Edges, crossing_against, exact_weight, orient, turn_of_edges
-from engine.polygon_overlay.compiled.edge_contacts import POLL, Events
-from engine.polygon_overlay.compiled.edge_tree import LEAF, RUN, leaves_of, push_children
+from engine.polygon_overlay.compiled.edge_contacts import POLL, Events, Unions
+from engine.polygon_overlay.compiled.edge_events import Along
+from engine.polygon_overlay.compiled.edge_tree import FEW, LEAF, RUN, BoxTree, leaves_of, push_children
+from engine.polygon_overlay.compiled.loading import Given
 from engine.predicates.error_free import two_diff, workspace
 from engine.predicates.expansion import add_scaled, sign
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
@@ -23,22 +26,33 @@ from engine.predicates.orientation import BOUND_2D, GUARD_2D
 NOTHING: Final = -1
 
 
-@inline
-def number_cycles(
-    chains: Chains, n_chains: int, n_simple: int, starts: Any, ends: Any, star: Any, place: Any, cycle: Any,
-    following: Any, stop: Any,
-) -> int:  # fmt: skip
-    """Fill ``following``, the half-chain that goes on around the face of each, and ``cycle``; return how many cycles.
+class Faces(NamedTuple):
+    """By half-chain: cycle, or -1 where another half-chain stands for it; following: the one that goes on around its
+    face. By cycle, of which entry n_cycles is the unbounded face: joined, a forest of those of one component of faces,
+    with the difference of labels to the next in label; regions, a forest of those of one region of the result; inside:
+    whether it is in the result. bounds: by chain, whether it bounds the result; fan: by node, how many that do."""
 
-    Both (2 n_chains,) int64; half-chains that another stands for get cycle -1.
-    """
+    cycle: Any
+    following: Any
+    joined: Any
+    label: Any
+    regions: Any
+    inside: Any
+    bounds: Any
+    fan: Any
+
+
+@inline
+def number_cycles(chains: Chains, stars: Stars, faces: Faces, n_chains: int, n_simple: int, stop: Any) -> int:
+    """Fill ``following`` and ``cycle``; return how many cycles."""
+    cycle, following = faces.cycle, faces.following
     cycle[: 2 * n_chains] = -1
     for chain in range(n_chains):
         if chain & POLL == 0 and stop[0]:
             return 0
         if is_live(chains, chain):
             for half in (2 * chain, 2 * chain + 1):
-                following[half] = star[place_before(chains, n_simple, starts, ends, place[half ^ 1], half ^ 1)]
+                following[half] = stars.half[place_before(chains, stars, n_simple, stars.place[half ^ 1], half ^ 1)]
     n_cycles = 0
     for first in range(2 * n_chains):
         if cycle[first] < 0 and is_live(chains, first >> 1):
@@ -136,59 +150,53 @@ def _test_edge(edges: Edges, v: int, e: int, nearest: int) -> int:
 
 
 @inline
-def edge_above(
-    edges: Edges, v: int, n: int, marks: Any, tree: Any, places: Any, has_tree: bool, stack: Any
-) -> int:  # fmt: skip
+def edge_above(edges: Edges, tree: BoxTree, v: int, n: int) -> int:
     """Return the edge next above vertex v, a step to its right, or NOTHING; no edge of its component is there.
 
     Edges whose mark has the bit RUN are not looked at: caller guarantees that it is none of what they stand for.
-
     Edges that begin or pass through v are not above it: caller guarantees that none does to the right.
     """
     nearest = NOTHING
-    if not has_tree:
+    if n <= FEW:
         for e in range(n):
-            if not marks[e] & RUN:
+            if not tree.marks[e] & RUN:
                 nearest = _test_edge(edges, v, e, nearest)
         return nearest
     n_leaves = leaves_of(n)
-    x, y = edges.x[v], edges.y[v]
-    stack[0, 0], depth = 1, 1
+    nodes, x, y = tree.nodes, edges.x[v], edges.y[v]
+    tree.stack[0, 0], depth = 1, 1
     while depth > 0:  # bound: each node enters the stack once
         depth -= 1
-        node = stack[depth, 0]
-        if tree[node, 0] > x or tree[node, 1] <= x or tree[node, 3] < y:
+        node = tree.stack[depth, 0]
+        if nodes[node, 0] > x or nodes[node, 1] <= x or nodes[node, 3] < y:
             continue
-        if nearest >= 0 and tree[node, 2] > max(edges.y[nearest], edges.y[edges.after[nearest]]):
+        if nearest >= 0 and nodes[node, 2] > max(edges.y[nearest], edges.y[edges.after[nearest]]):
             continue
         if node < n_leaves:
-            depth = push_children(tree, node, stack, depth)
+            depth = push_children(tree, node, depth)
             continue
         first = LEAF * (node - n_leaves)
         for place in range(first, min(first + LEAF, n)):
-            if not marks[places[place]] & RUN:
-                nearest = _test_edge(edges, v, places[place], nearest)
+            if not tree.marks[tree.places[place]] & RUN:
+                nearest = _test_edge(edges, v, tree.places[place], nearest)
     return nearest
 
 
 @inline
-def half_below(
-    edges: Edges, events: Events, chains: Chains, starts: Any, order: Any, parent: Any, chain_at: Any, e: int, v: int,
-    n: int,
-) -> int:  # fmt: skip
-    """Return the half-chain whose face is below edge e, right of vertex v."""
+def half_below(edges: Edges, events: Events, along: Along, points: Any, chains: Chains, e: int, v: int) -> int:
+    """Return the half-chain whose face is below edge e, right of vertex v. points: forest of those that are one."""
     x = edges.x
     runs_right = x[e] < x[edges.after[e]]
-    chain, before = chain_at[e], NOTHING
-    for k in range(starts[e], starts[e + 1]):  # linear: once a component, and ends at v
-        point = events.point[order[k]]
-        root = parent[point]
-        while root != parent[root]:  # bound: the path to the root
-            root = parent[root]
-        if events.other[order[k]] < 0:
+    chain, before = chains.at[e], NOTHING
+    for k in range(along.starts[e], along.starts[e + 1]):  # linear: once a component, and ends at v
+        point, other = events.point[along.order[k]], events.other[along.order[k]]
+        root = points[point]
+        while root != points[root]:  # bound: the path to the root
+            root = points[root]
+        if other < 0:
             side = 1 if x[point] > x[v] else -1 if x[point] < x[v] else 0
         else:
-            side = crossing_against(edges, e, events.other[order[k]], 0, x[v], 0.0)
+            side = crossing_against(edges, e, other, 0, x[v], 0.0)
         if side > 0 if runs_right else side <= 0:
             break
         if root != before:
@@ -196,3 +204,48 @@ def half_below(
             before = root
     half = 2 * chain + 1 if runs_right else 2 * chain
     return standing(chains, half)
+
+
+@inline
+def join_faces(
+    given: Given, events: Events, along: Along, unions: Unions, tree: BoxTree, chains: Chains, stars: Stars,
+    faces: Faces, highest: Any, sizes: tuple[int, int, int], stop: Any,
+) -> None:  # fmt: skip
+    """Join the outer cycle of each component of rings to the face it lies in.
+
+    highest: scratch by ring. sizes: the numbers of vertices, rings and cycles.
+    """
+    n, n_rings, n_cycles = sizes
+    for i in range(n_cycles + 1):
+        if i & POLL == 0 and stop[0]:
+            return
+        faces.joined[i] = faces.regions[i] = i
+        faces.label[i] = 0
+    _find_highest(given, unions.rings, n_rings, highest)
+    for ring in range(n_rings):
+        top = highest[ring]
+        if top < 0:
+            continue
+        if stop[0]:
+            return
+        node = stars.node_of[root_of(unions.points, top)]
+        outer = faces.cycle[stars.half[stars.ends[node] - 1]]
+        beyond = n_cycles
+        above = edge_above(given.edges, tree, top, n)
+        if above != NOTHING:
+            beyond = faces.cycle[half_below(given.edges, events, along, unions.points, chains, above, top)]
+        join(faces.joined, faces.label, outer, beyond, 0)
+        unite(faces.regions, outer, beyond)
+
+
+@inline
+def _find_highest(given: Given, rings: Any, n_rings: int, highest: Any) -> None:
+    """Fill ``highest``: for the ring that stands for a component its last vertex, for all others -1."""
+    x, y = given.edges.x, given.edges.y
+    for ring in range(n_rings):
+        highest[ring] = -1
+    for ring in range(n_rings):
+        root, top = root_of(rings, ring), given.tops[ring]
+        best = highest[root]
+        if best < 0 or x[top] > x[best] or (x[top] == x[best] and y[top] > y[best]):
+            highest[root] = top

@@ -12,9 +12,12 @@ from __future__ import annotations
 
 from typing import Any, Final, NamedTuple
 
+from engine.arrangement.union_find import root_of
 from engine.jit import called, inline, merged
 from engine.polygon_overlay.compiled.crossing_signs import Edges, turn_of_edges
-from engine.polygon_overlay.compiled.edge_contacts import LEFT, POLL, UNKNOWN, Events, root_of
+from engine.polygon_overlay.compiled.edge_contacts import LEFT, NOT_SIMPLE, POLL, Events, Unions
+from engine.polygon_overlay.compiled.edge_events import Along
+from engine.polygon_overlay.compiled.loading import Given
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
 
 NOT_YET: Final = -1
@@ -23,7 +26,8 @@ NOT_YET: Final = -1
 
 class Chains(NamedTuple):
     """By chain: node at its tail and head, its first and last edge, the mask of its sources, and the half-chain that
-    stands for its half-chain 2 c (itself, unless chains coincide)."""
+    stands for its half-chain 2 c (itself, unless chains coincide). at: for each edge the chain at its beginning; the
+    chains after the nodes inside it follow one by one."""
 
     tail: Any
     head: Any
@@ -31,6 +35,29 @@ class Chains(NamedTuple):
     last: Any
     mask: Any
     stands: Any
+    at: Any
+
+
+class Stars(NamedTuple):
+    """Half-chains around nodes. node_of: by point its node, or -1; by node its point, and where its half-chains begin
+    and end in ``half``; place: by half-chain its index there. Simple nodes have the first places, four each."""
+
+    node_of: Any
+    point: Any
+    starts: Any
+    ends: Any
+    half: Any
+    place: Any
+
+
+class Loose(NamedTuple):
+    """Half-chains that leave nodes that are not simple, ascending, to be sorted into stars. Scratch: masks, by chain
+    those from before chains are united; dx, dy: directions of a star's half-chains, float64."""
+
+    half: Any
+    masks: Any
+    dx: Any
+    dy: Any
 
 
 @merged
@@ -52,12 +79,12 @@ def origin(chains: Chains, half: int) -> int:
 
 
 @merged
-def place_before(chains: Chains, n_simple: int, starts: Any, ends: Any, at: int, half: int) -> int:
+def place_before(chains: Chains, stars: Stars, n_simple: int, at: int, half: int) -> int:
     """Return the place before ``at`` in the star of the node where half-chain ``half`` begins, around its end."""
     if at < 4 * n_simple:
         return at - 1 if at & 3 else at + 3
     node = origin(chains, half)
-    return (at if at > starts[node] else ends[node]) - 1
+    return (at if at > stars.starts[node] else stars.ends[node]) - 1
 
 
 @merged
@@ -67,20 +94,19 @@ def leaving_edge(chains: Chains, half: int) -> int:
 
 
 @merged
-def _node(node_of: Any, nodes: Any, starts: Any, ends: Any, n_nodes: int, point: int) -> tuple[int, int]:
+def _node(stars: Stars, n_nodes: int, point: int) -> tuple[int, int]:
     """Return the number of the node at a united point, and how many nodes there are then."""
-    if node_of[point] < 0:
-        node_of[point] = n_nodes
-        nodes[n_nodes], starts[n_nodes], ends[n_nodes] = point, NOT_YET, 0
+    if stars.node_of[point] < 0:
+        stars.node_of[point] = n_nodes
+        stars.point[n_nodes], stars.starts[n_nodes], stars.ends[n_nodes] = point, NOT_YET, 0
         n_nodes += 1
-    return node_of[point], n_nodes
+    return stars.node_of[point], n_nodes
 
 
 @inline
 def _pass_crossing(
-    events: Events, n: int, turn: Any, node_of: Any, nodes: Any, n_nodes: int, n_simple: int, point: int, e: int,
-    n_chains: int, star_starts: Any, star_ends: Any, star: Any, place: Any,
-) -> tuple[int, int, int]:  # fmt: skip
+    events: Events, stars: Stars, n: int, n_nodes: int, n_simple: int, n_chains: int, point: int, e: int
+) -> tuple[int, int, int]:
     """Enter the two half-chains that leave a simple node along edge e; return the node, how many there are, how many
     of them simple.
 
@@ -89,72 +115,74 @@ def _pass_crossing(
         1st 2 + 0 ->  1st
               3
     """
-    node = node_of[point]
+    star, place = stars.half, stars.place
+    node = stars.node_of[point]
     crossing = point - n
     if node < 0:  # here for the first time
         node, first = n_nodes, 4 * n_simple
-        node_of[point], nodes[node], star_starts[node], star_ends[node] = node, point, first, first + 4
+        stars.node_of[point], stars.point[node] = node, point
+        stars.starts[node], stars.ends[node] = first, first + 4
         n_nodes += 1
         n_simple += 1
         is_first = events.first[crossing] == e
         star[first] = NOT_YET
     else:
-        first = star_starts[node]
+        first = stars.starts[node]
         is_first = star[first] == NOT_YET
-    forward = first if is_first else first + (1 if turn[crossing] == LEFT else 3)
+    forward = first if is_first else first + (1 if events.turn[crossing] == LEFT else 3)
     back = first + ((forward - first + 2) & 3)
     star[forward], place[2 * n_chains + 2] = 2 * n_chains + 2, forward
     star[back], place[2 * n_chains + 1] = 2 * n_chains + 1, back
     return node, n_nodes, n_simple
 
 
+@merged
+def _begin_chain(chains: Chains, chain: int, node: int, edge: int, mask: int) -> None:
+    chains.tail[chain], chains.first[chain], chains.mask[chain] = node, edge, mask
+
+
 @inline
 def build_chains(
-    edges: Edges, events: Events, n: int, parent: Any, turn: Any, marked: Any, starts: Any, order: Any,
-    ring_tops: Any, ring_masks: Any, n_rings: int, node_of: Any, nodes: Any, chains: Chains, chain_at: Any,
-    star_starts: Any, star_ends: Any, star: Any, place: Any, loose: Any, stop: Any,
+    given: Given, events: Events, along: Along, unions: Unions, chains: Chains, stars: Stars, loose: Any, n: int,
+    n_rings: int, stop: Any,
 ) -> tuple[int, int, int, int]:  # fmt: skip
     """Walk every ring from its top vertex and cut it at its nodes, and fill the stars of simple nodes.
 
-    marked: vertices that are nodes, the tops among them. node_of: (n_points,), -1 on entry. chain_at: for each edge the
-    chain at its beginning; the chains after the nodes inside it follow one by one. turn: by crossing. Simple nodes have
-    the first places in ``star``; ``loose`` gets the half-chains that leave other nodes, whose stars begin NOT_YET.
-    Returns the numbers of nodes, simple nodes, chains and loose half-chains.
+    unions.is_node: the tops among them. stars.node_of: -1 on entry. ``loose`` gets the half-chains that leave other
+    nodes, whose stars begin NOT_YET. Returns the numbers of nodes, simple nodes, chains and loose half-chains.
     """
+    edges = given.edges
     n_nodes = n_simple = n_chains = n_loose = 0
     for ring in range(n_rings):
-        top = ring_tops[ring]
-        at, n_nodes = _node(node_of, nodes, star_starts, star_ends, n_nodes, root_of(parent, top))
+        top, mask = given.tops[ring], given.masks[ring]
+        node, n_nodes = _node(stars, n_nodes, root_of(unions.points, top))
         loose[n_loose] = 2 * n_chains
         n_loose += 1
-        chains.tail[n_chains], chains.first[n_chains], chains.mask[n_chains] = at, top, ring_masks[ring]
+        _begin_chain(chains, n_chains, node, top, mask)
         e = top
         while True:  # bound: once around the ring
             if stop[0]:
                 return n_nodes, n_simple, n_chains, n_loose
-            chain_at[e] = n_chains
+            chains.at[e] = n_chains
             before = -1
-            for k in range(starts[e], starts[e + 1]):
-                point = events.point[order[k]]
-                if point >= n and turn[point - n] != UNKNOWN:
-                    at, n_nodes, n_simple = _pass_crossing(
-                        events, n, turn, node_of, nodes, n_nodes, n_simple, point, e, n_chains,
-                        star_starts, star_ends, star, place,
-                    )  # fmt: skip
+            for k in range(along.starts[e], along.starts[e + 1]):
+                point = events.point[along.order[k]]
+                if point >= n and events.turn[point - n] != NOT_SIMPLE:
+                    node, n_nodes, n_simple = _pass_crossing(events, stars, n, n_nodes, n_simple, n_chains, point, e)
                 else:
-                    at, n_nodes = _node(node_of, nodes, star_starts, star_ends, n_nodes, root_of(parent, point))
-                    if at == before:
+                    node, n_nodes = _node(stars, n_nodes, root_of(unions.points, point))
+                    if node == before:
                         continue
                     loose[n_loose], loose[n_loose + 1] = 2 * n_chains + 1, 2 * n_chains + 2
                     n_loose += 2
-                before = at
-                chains.head[n_chains], chains.last[n_chains] = at, e
+                before = node
+                chains.head[n_chains], chains.last[n_chains] = node, e
                 n_chains += 1
-                chains.tail[n_chains], chains.first[n_chains], chains.mask[n_chains] = at, e, ring_masks[ring]
+                _begin_chain(chains, n_chains, node, e, mask)
             e = edges.after[e]
-            if marked[e]:
-                at, n_nodes = _node(node_of, nodes, star_starts, star_ends, n_nodes, root_of(parent, e))
-                chains.head[n_chains], chains.last[n_chains] = at, edges.before[e]
+            if unions.is_node[e]:
+                node, n_nodes = _node(stars, n_nodes, root_of(unions.points, e))
+                chains.head[n_chains], chains.last[n_chains] = node, edges.before[e]
                 loose[n_loose] = 2 * n_chains + 1
                 n_loose += 1
                 n_chains += 1
@@ -162,7 +190,7 @@ def build_chains(
                     break
                 loose[n_loose] = 2 * n_chains
                 n_loose += 1
-                chains.tail[n_chains], chains.first[n_chains], chains.mask[n_chains] = at, e, ring_masks[ring]
+                _begin_chain(chains, n_chains, node, e, mask)
     for chain in range(n_chains):
         chains.stands[chain] = 2 * chain
     return n_nodes, n_simple, n_chains, n_loose
@@ -191,75 +219,6 @@ def _compare_directions(edges: Edges, chains: Chains, g: int, h: int) -> int:
     return turn if (g ^ h) & 1 else -turn
 
 
-@inline
-def build_stars(
-    edges: Edges, chains: Chains, n_nodes: int, n_simple: int, loose: Any, n_loose: int, starts: Any,
-    ends: Any, star: Any, place: Any, masks: Any, dx: Any, dy: Any, stop: Any,
-) -> None:  # fmt: skip
-    """Fill the other stars: half-chains ``star[starts[i]:ends[i]]`` leave node i; each stands for itself.
-
-    starts, ends: (n_nodes,), star: (2 n_chains,), those of simple nodes filled already. place: for each half-chain its
-    index in ``star``. loose: (n_loose,) the half-chains that leave other nodes, ascending. masks: (n_chains,) the masks
-    as they were before. dx, dy: (2 n_chains,) float64, scratch.
-    """
-    x, y = edges.x, edges.y
-    for k in range(n_loose):
-        if k & POLL == 0 and stop[0]:
-            return
-        chain = loose[k] >> 1
-        masks[chain] = chains.mask[chain]
-        ends[origin(chains, loose[k])] += 1
-    end = 4 * n_simple
-    for node in range(n_nodes):
-        if node & POLL == 0 and stop[0]:
-            return
-        if starts[node] == NOT_YET:
-            starts[node], end = end, end + ends[node]
-            ends[node] = starts[node]
-    for k in range(n_loose):
-        if k & POLL == 0 and stop[0]:
-            return
-        node = origin(chains, loose[k])
-        star[ends[node]] = loose[k]
-        ends[node] += 1
-    for node in range(n_nodes):
-        first, last = starts[node], ends[node]
-        if first < 4 * n_simple:
-            continue
-        if stop[0]:
-            return
-        has_twins = False
-        for k in range(first, last):
-            edge = leaving_edge(chains, star[k])
-            ahead = edges.after[edge]
-            sign = -1.0 if star[k] & 1 else 1.0
-            dx[k - first], dy[k - first] = sign * (x[ahead] - x[edge]), sign * (y[ahead] - y[edge])
-        for k in range(first + 1, last):  # insertion: four half-chains nearly always
-            moving, ux, uy = star[k], dx[k - first], dy[k - first]
-            at = k
-            while at > first:
-                vx, vy = dx[at - 1 - first], dy[at - 1 - first]
-                u_is_left, v_is_left = ux < 0.0 or (ux == 0.0 and uy > 0.0), vx < 0.0 or (vx == 0.0 and vy > 0.0)
-                left, right = vx * uy, vy * ux
-                turn = left - right
-                if u_is_left != v_is_left:
-                    side = -1 if v_is_left else 1
-                elif abs(turn) > BOUND_2D * (abs(left) + abs(right)) + GUARD_2D:  # see turn_of_edges
-                    side = -1 if turn > 0.0 else 1
-                else:
-                    side = _compare_directions(edges, chains, star[at - 1], moving)
-                    has_twins = has_twins or side == 0
-                if side <= 0:
-                    break
-                star[at], dx[at - first], dy[at - first] = star[at - 1], vx, vy
-                at -= 1
-            star[at], dx[at - first], dy[at - first] = moving, ux, uy
-        if has_twins:
-            ends[node] = _unite_twins(edges, chains, star, first, last, masks)
-        for k in range(first, ends[node]):
-            place[star[k]] = k
-
-
 @called
 def _unite_twins(edges: Edges, chains: Chains, star: Any, first: int, last: int, masks: Any) -> int:
     """Let the lowest chain of each direction stand for all, and close the gaps; return where the star then ends.
@@ -283,3 +242,82 @@ def _unite_twins(edges: Edges, chains: Chains, star: Any, first: int, last: int,
         kept += 1
         at = stop
     return kept
+
+
+@inline
+def _group_loose(
+    chains: Chains, stars: Stars, loose: Loose, n_nodes: int, n_simple: int, n_loose: int, stop: Any
+) -> None:
+    """Put the loose half-chains of each node together, behind those of simple nodes, in any order."""
+    starts, ends = stars.starts, stars.ends
+    for k in range(n_loose):
+        if k & POLL == 0 and stop[0]:
+            return
+        chain = loose.half[k] >> 1
+        loose.masks[chain] = chains.mask[chain]
+        ends[origin(chains, loose.half[k])] += 1
+    end = 4 * n_simple
+    for node in range(n_nodes):
+        if node & POLL == 0 and stop[0]:
+            return
+        if starts[node] == NOT_YET:
+            starts[node], end = end, end + ends[node]
+            ends[node] = starts[node]
+    for k in range(n_loose):
+        if k & POLL == 0 and stop[0]:
+            return
+        node = origin(chains, loose.half[k])
+        stars.half[ends[node]] = loose.half[k]
+        ends[node] += 1
+
+
+@inline
+def _sort_star(edges: Edges, chains: Chains, star: Any, loose: Loose, first: int, last: int) -> bool:
+    """Sort the half-chains ``star[first:last]`` by direction; tell whether some leave in the same."""
+    x, y, dx, dy = edges.x, edges.y, loose.dx, loose.dy
+    has_twins = False
+    for k in range(first, last):
+        edge = leaving_edge(chains, star[k])
+        ahead = edges.after[edge]
+        sign = -1.0 if star[k] & 1 else 1.0
+        dx[k - first], dy[k - first] = sign * (x[ahead] - x[edge]), sign * (y[ahead] - y[edge])
+    for k in range(first + 1, last):  # insertion: four half-chains nearly always
+        moving, ux, uy = star[k], dx[k - first], dy[k - first]
+        at = k
+        while at > first:
+            vx, vy = dx[at - 1 - first], dy[at - 1 - first]
+            u_is_left, v_is_left = ux < 0.0 or (ux == 0.0 and uy > 0.0), vx < 0.0 or (vx == 0.0 and vy > 0.0)
+            left, right = vx * uy, vy * ux
+            turn = left - right
+            if u_is_left != v_is_left:
+                side = -1 if v_is_left else 1
+            elif abs(turn) > BOUND_2D * (abs(left) + abs(right)) + GUARD_2D:  # see turn_of_edges
+                side = -1 if turn > 0.0 else 1
+            else:
+                side = _compare_directions(edges, chains, star[at - 1], moving)
+                has_twins = has_twins or side == 0
+            if side <= 0:
+                break
+            star[at], dx[at - first], dy[at - first] = star[at - 1], vx, vy
+            at -= 1
+        star[at], dx[at - first], dy[at - first] = moving, ux, uy
+    return has_twins
+
+
+@inline
+def build_stars(
+    edges: Edges, chains: Chains, stars: Stars, loose: Loose, n_nodes: int, n_simple: int, n_loose: int, stop: Any
+) -> None:
+    """Fill the stars of nodes that are not simple; of chains that coincide one is left, which stands for all."""
+    _group_loose(chains, stars, loose, n_nodes, n_simple, n_loose, stop)
+    star = stars.half
+    for node in range(n_nodes):
+        first, last = stars.starts[node], stars.ends[node]
+        if first < 4 * n_simple:
+            continue
+        if stop[0]:
+            return
+        if _sort_star(edges, chains, star, loose, first, last):
+            last = stars.ends[node] = _unite_twins(edges, chains, star, first, last, loose.masks)
+        for k in range(first, last):
+            stars.place[star[k]] = k

@@ -35,6 +35,7 @@ from typing import Any, Final
 from engine.jit import inline
 from engine.polygon_overlay.compiled.crossing_signs import Edges
 from engine.polygon_overlay.compiled.edge_contacts import POLL
+from engine.polygon_overlay.compiled.edge_events import Along
 from engine.polygon_overlay.compiled.edge_tree import DOUBTFUL
 from engine.polygon_overlay.compiled.ring_certificate import segments_are_far
 
@@ -64,11 +65,12 @@ def _corner_is_clear(edges: Edges, v: int, share_before: float, share_after: flo
 
 
 @inline
-def corners_are_clear(edges: Edges, n: int, starts: Any, keys: Any, margin: float, marks: Any, stop: Any) -> bool:
+def corners_are_clear(edges: Edges, n: int, along: Along, margin: float, marks: Any, stop: Any) -> bool:
     """Tell whether the first and the last event of every edge are far enough from the edge that begins or ends there.
 
-    starts, keys: by sort_events. Edges of corners where that is not so get the mark DOUBTFUL.
+    along: by sort_events. Edges of corners where that is not so get the mark DOUBTFUL.
     """
+    starts, keys = along.starts, along.keys
     are_clear = True
     for e in range(n):
         if e & POLL == 0 and stop[0]:

@@ -23,13 +23,14 @@ import numpy as np
 from engine.jit import inline, merged
 from engine.polygon_overlay.compiled.crossing_signs import Edges
 from engine.polygon_overlay.compiled.edge_contacts import POLL
-from engine.polygon_overlay.compiled.edge_crossings import turns
-from engine.polygon_overlay.compiled.rounded_crossings import round_crossing
+from engine.polygon_overlay.compiled.edge_crossings import agree, smaller_of, turns
+from engine.polygon_overlay.compiled.loading import Given
+from engine.polygon_overlay.compiled.rounded_crossings import distance_of, round_crossing
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
 from engine.predicates.ranges import LARGEST, SMALLEST
 
-UNSETTLED: Final = -1
-"""Goes the general way."""
+GENERAL: Final = -1
+"""In the place of a result: the pair goes the general way."""
 _NONE: Final = -1
 
 
@@ -40,7 +41,7 @@ class Passages(NamedTuple):
     leaves: Any
 
 
-class _Points(NamedTuple):
+class Points(NamedTuple):
     """Points of the result: doubles, and where they come from: a vertex of the input and -1, or two edges of it."""
 
     x: Any
@@ -64,7 +65,7 @@ def _is_after(ax: float, ay: float, bx: float, by: float) -> bool:
 
 @inline
 def _rise_of(x: Any, y: Any, size: int) -> int:
-    """Return how many edges of a ring go up in the order of x, then y; UNSETTLED unless it is surely strictly convex.
+    """Return how many edges of a ring go up in the order of x, then y; GENERAL unless it is surely strictly convex.
 
     It is if all its turns are to the left, and it turns once: its edges go up once, and down once. x, y: its vertices,
     counter-clockwise, and the first one again. No branches: the compiler makes vectors of this loop.
@@ -81,7 +82,7 @@ def _rise_of(x: Any, y: Any, size: int) -> int:
     n_left += _is_left(ax, ay, bx, by, cx, cy)
     n_rising += rises
     n_changes += rises != _is_after(bx, by, cx, cy)
-    return n_rising if n_left == size and n_changes == 2 else UNSETTLED
+    return n_rising if n_left == size and n_changes == 2 else GENERAL
 
 
 @inline
@@ -124,7 +125,7 @@ def load_convex(
 ) -> tuple[int, int]:
     """Load a ring to where ``start`` is, counter-clockwise from its first vertex, with that again at its end.
 
-    Returns its last vertex in the order of x, then y, or UNSETTLED if it is not strictly convex, and 1 or -1, along or
+    Returns its last vertex in the order of x, then y, or GENERAL if it is not strictly convex, and 1 or -1, along or
     against the ring as given.
     """
     size = last - first
@@ -134,7 +135,7 @@ def load_convex(
     wx, wy = vertices[before, 0] - vertices[low, 0], vertices[before, 1] - vertices[low, 1]
     step = 1 if ux * wy - uy * wx > 0.0 else -1  # a guess: the turns below must all be to the left
     if size < 3 or stop[0]:
-        return UNSETTLED, step
+        return GENERAL, step
     end = start + size + 1
     if step > 0:
         middle = start + last - low
@@ -145,9 +146,9 @@ def load_convex(
         n_unsafe = _load_run(vertices, low, -1, base, edges, origins, start, middle)
         n_unsafe += _load_run(vertices, last - 1, -1, base, edges, origins, middle, end)
     if n_unsafe or stop[0]:
-        return UNSETTLED, step
+        return GENERAL, step
     n_rising = _rise_of(edges.x[start:end], edges.y[start:end], size)
-    return start + n_rising if n_rising > 0 else UNSETTLED, step
+    return start + n_rising if n_rising > 0 else GENERAL, step
 
 
 @inline
@@ -177,10 +178,32 @@ def _are_apart(edges: Edges, i: int, i_end: int, i_step: int, j: int, j_end: int
 
 
 @inline
+def _enter_passage(edges: Edges, e: int, f: int, passages: Passages) -> int:
+    """Enter the crossing of two edges, if they cross; return how many, or GENERAL."""
+    x, y = edges.x, edges.y
+    to_f = turns(x, y, e, e + 1, f, f + 1)
+    nearest_f = smaller_of(to_f)
+    if nearest_f > to_f.bound and agree(to_f):
+        return 0
+    to_e = turns(x, y, f, f + 1, e, e + 1)
+    nearest_e = smaller_of(to_e)
+    if nearest_e > to_e.bound and agree(to_e):
+        return 0
+    if nearest_f <= to_f.bound or nearest_e <= to_e.bound:
+        return GENERAL
+    # into the other polygon, to its edge's left, and there the other edge leaves this one
+    first, second = (passages.enters, passages.leaves) if to_e.second > 0.0 else (passages.leaves, passages.enters)
+    if first[e] != _NONE or second[f] != _NONE:
+        return GENERAL
+    first[e], second[f] = f, e
+    return 1
+
+
+@inline
 def _find_passages(
     edges: Edges, i: int, i_end: int, i_step: int, j: int, j_end: int, j_step: int, passages: Passages, stop: Any
 ) -> int:  # fmt: skip
-    """Enter the crossings of two chains, walked from left to right; return how many, or UNSETTLED.
+    """Enter the crossings of two chains, walked from left to right; return how many, or GENERAL.
 
     i, j: the leftmost vertex of each; a lower chain goes up by steps of 1, an upper one down by -1.
     """
@@ -196,29 +219,16 @@ def _find_passages(
     n_found = 0
     for k in range((i_end - i) * i_step + (j_end - j) * j_step):  # each turn ends an edge of one chain
         if k & POLL == POLL and stop[0]:
-            return UNSETTLED
+            return GENERAL
         p, q = np.uint64(i), np.uint64(j)  # no look at whether they count from the end
         b, d = np.uint64(i + i_step), np.uint64(j + j_step)
         if (min(y[p], y[b]) <= max(y[q], y[d])) & (min(y[q], y[d]) <= max(y[p], y[b])):
-            e, f = min(i, i + i_step), min(j, j + j_step)
-            turn_c, turn_d, bound, _ = turns(x, y, e, e + 1, f, f + 1)
-            nearest = min(abs(turn_c), abs(turn_d))
-            if nearest <= bound or (turn_c > 0.0) != (turn_d > 0.0):
-                turn_a, turn_b, bound_ab, _ = turns(x, y, f, f + 1, e, e + 1)
-                nearest_ab = min(abs(turn_a), abs(turn_b))
-                if nearest_ab <= bound_ab or (turn_a > 0.0) != (turn_b > 0.0):
-                    if nearest <= bound or nearest_ab <= bound_ab:
-                        return UNSETTLED
-                    # into the other polygon, to its edge's left, and there the other edge leaves this one
-                    first, second = (
-                        (passages.enters, passages.leaves) if turn_b > 0.0 else (passages.leaves, passages.enters)
-                    )
-                    if first[e] != _NONE or second[f] != _NONE:
-                        return UNSETTLED
-                    first[e], second[f] = f, e
-                    n_found += 1
+            n_entered = _enter_passage(edges, min(i, i + i_step), min(j, j + j_step), passages)
+            if n_entered == GENERAL:
+                return GENERAL
+            n_found += n_entered
         if x[b] == x[d]:
-            return UNSETTLED  # case: what touches there might be passed over
+            return GENERAL  # case: what touches there might be passed over
         is_first = x[b] < x[d]  # no branch: which of both ends first nobody can foresee
         i += i_step * is_first
         j += j_step * (not is_first)
@@ -241,7 +251,7 @@ def _holds(edges: Edges, first: int, last: int, v: int) -> int:
 
 
 @inline
-def _add_vertices(edges: Edges, origins: Any, first: int, last: int, points: _Points, n: int) -> int:
+def _add_vertices(edges: Edges, origins: Any, first: int, last: int, points: Points, n: int) -> int:
     """Append the vertices first .. last - 1 to a result of n points; return how many these are then."""
     size = max(last - first, 0)
     x, y, names = edges.x[first : first + size], edges.y[first : first + size], origins[first : first + size]
@@ -253,7 +263,7 @@ def _add_vertices(edges: Edges, origins: Any, first: int, last: int, points: _Po
 
 @inline
 def _add_stretch(
-    edges: Edges, origins: Any, e: int, f: int, first: int, last: int, points: _Points, n: int
+    edges: Edges, origins: Any, e: int, f: int, first: int, last: int, points: Points, n: int
 ) -> int:  # fmt: skip
     """Append the vertices between two points on edges e and f of the ring first .. last - 1."""
     if f >= e:
@@ -263,21 +273,21 @@ def _add_stretch(
 
 
 @inline
-def _add_crossing(edges: Edges, e: int, f: int, e_name: int, f_name: int, points: _Points, n: int) -> float:
+def _add_crossing(edges: Edges, e: int, f: int, e_name: int, f_name: int, points: Points, n: int) -> float:
     """Write the crossing of two edges to place n; return how far rounding moved it, infinity if it is not found."""
     x, y, ex, ey = round_crossing(edges, e, f)
     points.x[n], points.y[n], points.firsts[n], points.seconds[n] = x, y, e_name, f_name
     if ex < 0.0 or ey < 0.0:
         return np.inf
-    return np.sqrt(ex * ex + ey * ey) * (1.0 + 2.0**-50)  # two squares, their sum, a root
+    return distance_of(ex, ey)
 
 
 @inline
 def _walk(
     edges: Edges, origins: Any, n: int, second: int, end: int, turned: int, turned_second: int, passages: Passages,
-    points: _Points, stop: Any,
+    points: Points, stop: Any,
 ) -> tuple[int, float]:  # fmt: skip
-    """Write the points of the result; return how many, or UNSETTLED, and how far one moved.
+    """Write the points of the result; return how many, or GENERAL, and how far one moved.
 
     The first polygon is followed where it is inside the other, and the other from where the first leaves to where it
     enters again. Edges 0 .. n - 1 and second .. end - 1; at least one crossing. turned, turned_second: 1 if the ring
@@ -288,7 +298,7 @@ def _walk(
     while start < n and enters[start] == _NONE:  # bound: n
         start += 1
     if start == n:
-        return UNSETTLED, 0.0
+        return GENERAL, 0.0
     n_found, farthest = 0, 0.0
     e, entered, left_at = start, _NONE, _NONE
     for k in range(n + 1):  # the last turn closes the ring
@@ -296,7 +306,7 @@ def _walk(
         if f != _NONE:
             if k > 0:
                 if left_at == _NONE:
-                    return UNSETTLED, 0.0
+                    return GENERAL, 0.0
                 n_found = _add_stretch(edges, origins, left_at, f, second, end, points, n_found)
             if k == n:
                 return n_found, farthest
@@ -306,38 +316,37 @@ def _walk(
         f = leaves[e]
         if f != _NONE:
             if left_at != _NONE:
-                return UNSETTLED, 0.0
+                return GENERAL, 0.0
             n_found = _add_stretch(edges, origins, entered, e, 0, n, points, n_found)
             moved = _add_crossing(edges, e, f, origins[e + turned], origins[f + turned_second], points, n_found)
             n_found, farthest = n_found + 1, max(farthest, moved)
             left_at = f
         if n_found > 2 * end or (k & POLL == POLL and stop[0]):
-            return UNSETTLED, 0.0
+            return GENERAL, 0.0
         e = e + 1 if e + 1 < n else 0
-    return UNSETTLED, 0.0
+    return GENERAL, 0.0
 
 
 @inline
 def intersect_convex(
-    subjects: Any, first: int, first_end: int, clips: Any, second: int, second_end: int, base: int, edges: Edges,
-    origins: Any, passages: Passages, firsts: Any, seconds: Any, x: Any, y: Any,
-    stop: Any,
+    subjects: Any, first: int, first_end: int, clips: Any, second: int, second_end: int, given: Given,
+    passages: Passages, points: Points, stop: Any,
 ) -> tuple[int, int, float]:  # fmt: skip
-    """Intersect two rings: return the number of points, which of them is first, and how far one moved; or UNSETTLED.
+    """Intersect two rings: return the number of points, which of them is first, and how far one moved; or GENERAL.
 
-    firsts, seconds: filled with the points: a vertex and -1, or the first vertices of two edges, by their numbers in
-    the input, those of clips counted from ``base``; x, y: with their doubles, counter-clockwise. The arrays of edges,
-    origins and passages need room for two more than all vertices, x .. seconds for four times as many.
+    points: filled, counter-clockwise; vertices by their numbers in the input, those of clips after all subjects. The
+    arrays of given and passages need room for two more than all vertices, those of points for four times as many.
     """
+    edges, origins, x, y = given.edges, given.origins, points.x, points.y
     top, step = load_convex(subjects, first, first_end, 0, edges, origins, 0, stop)
-    if top == UNSETTLED:
-        return UNSETTLED, 0, 0.0
+    if top == GENERAL:
+        return GENERAL, 0, 0.0
     n = first_end - first
     other = n + 1  # after the first vertex of the first ring once more
     end = other + second_end - second
-    top_second, step_second = load_convex(clips, second, second_end, base, edges, origins, other, stop)
-    if top_second == UNSETTLED:
-        return UNSETTLED, 0, 0.0
+    top_second, step_second = load_convex(clips, second, second_end, subjects.shape[0], edges, origins, other, stop)
+    if top_second == GENERAL:
+        return GENERAL, 0, 0.0
     passages.enters[:end] = _NONE
     passages.leaves[:end] = _NONE
     n_crossings = 0
@@ -346,23 +355,22 @@ def intersect_convex(
             i, i_step = (n, -1) if is_upper else (0, 1)
             j, j_step = (end, -1) if is_other_upper else (other, 1)
             found = _find_passages(edges, i, top, i_step, j, top_second, j_step, passages, stop)
-            if found == UNSETTLED:
-                return UNSETTLED, 0, 0.0
+            if found == GENERAL:
+                return GENERAL, 0, 0.0
             n_crossings += found
-    points = _Points(x, y, firsts, seconds)
     if n_crossings == 0:
         in_second, in_first = _holds(edges, other, end, 0), _holds(edges, 0, n, other)
         if in_second > 0:
             return _add_vertices(edges, origins, 0, n, points, 0), 0, 0.0
         if in_first > 0 and in_second < 0:
             return _add_vertices(edges, origins, other, end, points, 0), 0, 0.0
-        return (0 if in_first < 0 and in_second < 0 else UNSETTLED), 0, 0.0
+        return (0 if in_first < 0 and in_second < 0 else GENERAL), 0, 0.0
     m, farthest = _walk(edges, origins, n, other, end, int(step < 0), int(step_second < 0), passages, points, stop)
     if m < 3 or farthest == np.inf:
-        return UNSETTLED, 0, 0.0
+        return GENERAL, 0, 0.0
     x[m], y[m] = x[0], y[0]
-    if _rise_of(x[: m + 1], y[: m + 1], m) == UNSETTLED:
-        return UNSETTLED, 0, 0.0
+    if _rise_of(x[: m + 1], y[: m + 1], m) == GENERAL:
+        return GENERAL, 0, 0.0
     low = 0
     for k in range(1, m):
         if x[k] <= x[low] and (x[k] < x[low] or y[k] < y[low]):

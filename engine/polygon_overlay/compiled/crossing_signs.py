@@ -85,14 +85,19 @@ def turn_of_edges(edges: Edges, e: int, f: int) -> int:
 
 @called
 def _exact_turn(edges: Edges, a: int, b: int, c: int, d: int) -> int:
+    e = workspace(16)
+    return sign(e, _cross(edges, a, b, c, d, e))
+
+
+@inline
+def _cross(edges: Edges, a: int, b: int, c: int, d: int, e: Components) -> int:
+    """Set e to the cross product of b - a and d - c; return its length, at most WEIGHT_ROOM."""
     x, y = edges.x, edges.y
     ux, ux_tail = two_diff(x[b], x[a])
     uy, uy_tail = two_diff(y[b], y[a])
     vx, vx_tail = two_diff(x[d], x[c])
     vy, vy_tail = two_diff(y[d], y[c])
-    e = workspace(16)
-    n = minor(e, ux, ux_tail, uy, uy_tail, vx, vx_tail, vy, vy_tail)
-    return sign(e, n)
+    return minor(e, ux, ux_tail, uy, uy_tail, vx, vx_tail, vy, vy_tail)
 
 
 @merged
@@ -117,12 +122,7 @@ def _weight_of(cx: float, cy: float, dx: float, dy: float, px: float, py: float)
 @called
 def exact_weight(edges: Edges, c: int, d: int, p: int, e: Components) -> int:
     """Set e to orient(c, d, p); return its length, at most WEIGHT_ROOM."""
-    x, y = edges.x, edges.y
-    ux, ux_tail = two_diff(x[d], x[c])
-    uy, uy_tail = two_diff(y[d], y[c])
-    wx, wx_tail = two_diff(x[p], x[c])
-    wy, wy_tail = two_diff(y[p], y[c])
-    return minor(e, ux, ux_tail, uy, uy_tail, wx, wx_tail, wy, wy_tail)
+    return _cross(edges, c, d, c, p, e)
 
 
 @inline

@@ -5,15 +5,27 @@ Events that turn out to be one point are united, so that lines through one point
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
+from engine.arrangement.union_find import unite
 from engine.jit import called, inline
 from engine.polygon_overlay.compiled.crossing_signs import Edges, order_of_crossings, orient
-from engine.polygon_overlay.compiled.edge_contacts import POLL, UNKNOWN, Events, unite
+from engine.polygon_overlay.compiled.edge_contacts import NOT_SIMPLE, POLL, Events, Unions
 from engine.polygon_overlay.compiled.edge_tree import DOUBTFUL
 
 _RUN: Final = 16
 """Events that are sorted by insertion; more are merged."""
+
+
+class Along(NamedTuple):
+    """The events along each edge in their order: ``order[starts[e]:starts[e + 1]]``; keys: their parameters, float64
+    in that order. spare_keys, spare: scratch of the same sizes."""
+
+    starts: Any
+    order: Any
+    keys: Any
+    spare_keys: Any
+    spare: Any
 
 
 @called
@@ -56,8 +68,9 @@ def _order_of_vertices(edges: Edges, e: int, v: int, w: int) -> int:
 
 
 @inline
-def _sort_by_key(keys: Any, order: Any, first: int, last: int, spare_keys: Any, spare: Any) -> None:
-    """Sort ``keys[first:last]`` and ``order`` with them: runs by insertion, then merged. spare_keys, spare: scratch."""
+def _sort_by_key(along: Along, first: int, last: int) -> None:
+    """Sort ``keys[first:last]`` and ``order`` with them: runs by insertion, then merged."""
+    order, keys, spare_keys, spare = along.order, along.keys, along.spare_keys, along.spare
     for low in range(first, last, _RUN):
         for k in range(low + 1, min(low + _RUN, last)):
             key, moving, at = keys[k], order[k], k
@@ -83,13 +96,12 @@ def _sort_by_key(keys: Any, order: Any, first: int, last: int, spare_keys: Any, 
 
 
 @called
-def _mark_near(
-    edges: Edges, events: Events, e: int, order: Any, keys: Any, first: int, last: int, marks: Any
-) -> None:  # fmt: skip
+def _mark_near(edges: Edges, events: Events, along: Along, marks: Any, e: int) -> None:
     """Put in doubt edge e, and those whose crossings with it are within reach of another event, or of an end of e.
 
     Then also the edge that begins or ends there.
     """
+    order, keys, first, last = along.order, along.keys, along.starts[e], along.starts[e + 1]
     marks[e] |= DOUBTFUL
     reached = 0.0
     for k in range(first, last):
@@ -110,17 +122,9 @@ def _mark_near(
 
 
 @inline
-def sort_events(
-    edges: Edges, events: Events, n: int, n_events: int, parent: Any, starts: Any, order: Any, keys: Any,
-    spare_keys: Any, spare: Any, turn: Any, marks: Any, stop: Any,
-) -> bool:  # fmt: skip
-    """Fill ``starts``, (n + 1,), and ``order``: events ``order[starts[e]:starts[e + 1]]`` lie along edge e.
-
-    Unites events at one point in ``parent``, and makes ``turn`` of crossings there UNKNOWN. Returns whether the events
-    of every edge are further apart than their reaches, and each is further from the ends than its own; other edges, and
-    those that cross there, get the mark DOUBTFUL. keys: float64 by event, filled with the parameters in that order;
-    spare_keys, spare: scratch.
-    """
+def _group_events(events: Events, along: Along, n: int, n_events: int, stop: Any) -> bool:
+    """Put the events of each edge together, in any order; return False where the call is to end."""
+    starts = along.starts
     starts[: n + 1] = 0
     for i in range(n_events):
         if i & POLL == 0 and stop[0]:
@@ -133,11 +137,48 @@ def sort_events(
             return False
         e = events.edge[i]
         starts[e + 1] -= 1
-        order[starts[e + 1]] = i
-        keys[starts[e + 1]] = events.t[i]
+        along.order[starts[e + 1]] = i
+        along.keys[starts[e + 1]] = events.t[i]
     for e in range(n):  # starts[e + 1] has come down to where the part of e begins
         starts[e] = starts[e + 1]
     starts[n] = n_events
+    return True
+
+
+@called
+def _sort_exactly(edges: Edges, events: Events, along: Along, unions: Unions, n: int, e: int) -> None:
+    """Sort the events of an edge by insertion, and unite those at one point."""
+    order, keys, points, first = along.order, along.keys, events.point, along.starts[e]
+    for k in range(first + 1, along.starts[e + 1]):
+        moving, key = order[k], keys[k]
+        at = k
+        while at > first:  # bound: the part sorted so far
+            before = order[at - 1]
+            side = compare_events(edges, events, e, before, moving)
+            if side == 0:
+                for point in (points[before], points[moving]):
+                    if point >= n:
+                        events.turn[point - n] = NOT_SIMPLE
+                unite(unions.points, points[before], points[moving])
+            if side <= 0:
+                break
+            order[at], keys[at] = before, keys[at - 1]
+            at -= 1
+        order[at], keys[at] = moving, key
+
+
+@inline
+def sort_events(
+    edges: Edges, events: Events, along: Along, unions: Unions, marks: Any, n: int, n_events: int, stop: Any
+) -> bool:
+    """Fill ``along``, unite events at one point, and make crossings there NOT_SIMPLE.
+
+    Returns whether the events of every edge are further apart than their reaches, and each is further from the ends
+    than its own; other edges, and those that cross there, get the mark DOUBTFUL.
+    """
+    if not _group_events(events, along, n, n_events, stop):
+        return False
+    starts, order, keys = along.starts, along.order, along.keys
     are_clear = True
     for e in range(n):
         first, last = starts[e], starts[e + 1]
@@ -146,7 +187,7 @@ def sort_events(
         if stop[0]:
             return False
         if last - first > 1:
-            _sort_by_key(keys, order, first, last, spare_keys, spare)
+            _sort_by_key(along, first, last)
         is_sorted = True
         slack, reach = events.slack[order[first]], events.reach[order[first]]
         is_clear = keys[first] > reach
@@ -157,23 +198,8 @@ def sort_events(
             is_sorted &= gap > slack + slack_before
             is_clear &= gap > reach + reach_before
         if not (is_clear and 1.0 - keys[last - 1] > reach):
-            _mark_near(edges, events, e, order, keys, first, last, marks)
+            _mark_near(edges, events, along, marks, e)
             are_clear = False
-        if is_sorted:
-            continue
-        for k in range(first + 1, last):
-            moving, key = order[k], keys[k]
-            at = k
-            while at > first:  # bound: the part sorted so far
-                side = compare_events(edges, events, e, order[at - 1], moving)
-                if side == 0:
-                    for point in (events.point[order[at - 1]], events.point[moving]):
-                        if point >= n:
-                            turn[point - n] = UNKNOWN
-                    unite(parent, events.point[order[at - 1]], events.point[moving])
-                if side <= 0:
-                    break
-                order[at], keys[at] = order[at - 1], keys[at - 1]
-                at -= 1
-            order[at], keys[at] = moving, key
+        if not is_sorted:
+            _sort_exactly(edges, events, along, unions, n, e)
     return are_clear

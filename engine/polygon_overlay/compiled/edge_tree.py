@@ -21,7 +21,7 @@ G. M. Morton, A computer oriented geodetic data base, 1966.
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -29,6 +29,8 @@ from engine.jit import allocating, inline, merged
 from engine.polygon_overlay.compiled.edge_contacts import POLL
 
 LEAF: Final = 4
+FEW: Final = 40
+"""Boxes up to which all pairs are looked at: fewer steps than a tree, and no more pairs than a portion."""
 PORTION: Final = 2048
 """Pairs at once: some 50 us of exact tests."""
 _MANY: Final = 1024
@@ -51,6 +53,24 @@ _LAST: Final = (1 << (_BITS - 1)) - 1
 _BORROWS: Final = sum(1 << (_BITS * side + _BITS - 1) for side in range(4))
 DEEPEST: Final = 256
 """Places on the stack: a walk through 60 levels holds at most three pairs a level."""
+
+
+class BoxTree(NamedTuple):
+    """Boxes by number (n, 4) float64, with the mark of each; the tree over them: by node its box and its mark.
+
+    places: the boxes in the order of the leaves; lows, highs: their codes in that order, int64: what must not be above
+    the other box's, and what must not be below. stack: (DEEPEST, 2) int64; pairs: (PORTION, 2), those found last.
+    """
+
+    boxes: Any
+    marks: Any
+    nodes: Any
+    node_marks: Any
+    places: Any
+    lows: Any
+    highs: Any
+    stack: Any
+    pairs: Any
 
 
 @inline
@@ -141,11 +161,9 @@ def _order_boxes(boxes: Any, n: int, places: Any, stop: Any) -> bool:
 
 
 @inline
-def build_tree(boxes: Any, marks: Any, n: int, tree: Any, tree_marks: Any, places: Any, stop: Any) -> None:
-    """Fill ``tree``, (2 n_leaves, 4) float64, and ``tree_marks`` for the first n boxes; empty nodes are inverted.
-
-    places: (n,) int64, filled with the boxes in the order of the leaves.
-    """
+def build_tree(tree: BoxTree, n: int, stop: Any) -> None:
+    """Fill the nodes, their marks and the places of the first n boxes; empty nodes are inverted."""
+    boxes, nodes, node_marks, places = tree.boxes, tree.nodes, tree.node_marks, tree.places
     n_leaves = leaves_of(n)
     added = ANYWHERE if _order_boxes(boxes, n, places, stop) else 0
     for leaf in range(n_leaves):
@@ -158,44 +176,41 @@ def build_tree(boxes: Any, marks: Any, n: int, tree: Any, tree_marks: Any, place
             k = places[place]
             x_min, x_max = min(x_min, boxes[k, 0]), max(x_max, boxes[k, 1])
             y_min, y_max = min(y_min, boxes[k, 2]), max(y_max, boxes[k, 3])
-            mark |= marks[k]
+            mark |= tree.marks[k]
         node = n_leaves + leaf
-        tree[node, 0], tree[node, 1], tree[node, 2], tree[node, 3] = x_min, x_max, y_min, y_max
-        tree_marks[node] = mark
+        nodes[node, 0], nodes[node, 1], nodes[node, 2], nodes[node, 3] = x_min, x_max, y_min, y_max
+        node_marks[node] = mark
     for node in range(n_leaves - 1, 0, -1):
         left, right = 2 * node, 2 * node + 1
-        tree[node, 0], tree[node, 1] = min(tree[left, 0], tree[right, 0]), max(tree[left, 1], tree[right, 1])
-        tree[node, 2], tree[node, 3] = min(tree[left, 2], tree[right, 2]), max(tree[left, 3], tree[right, 3])
-        tree_marks[node] = tree_marks[left] | tree_marks[right]
+        nodes[node, 0], nodes[node, 1] = min(nodes[left, 0], nodes[right, 0]), max(nodes[left, 1], nodes[right, 1])
+        nodes[node, 2], nodes[node, 3] = min(nodes[left, 2], nodes[right, 2]), max(nodes[left, 3], nodes[right, 3])
+        node_marks[node] = node_marks[left] | node_marks[right]
 
 
 @merged
-def push_children(tree: Any, node: int, stack: Any, depth: int) -> int:
+def push_children(tree: BoxTree, node: int, depth: int) -> int:
     """Put the children of a node on the stack of a search upwards; return the depth.
 
     The lower one is last, so first off: what is found there spares the other.
     """
     low, high = 2 * node, 2 * node + 1
-    if tree[low, 2] > tree[high, 2]:
+    if tree.nodes[low, 2] > tree.nodes[high, 2]:
         low, high = high, low
-    stack[depth, 0], stack[depth + 1, 0] = high, low
+    tree.stack[depth, 0], tree.stack[depth + 1, 0] = high, low
     return depth + 2
 
 
 @inline
-def encode_boxes(boxes: Any, n: int, tree: Any, places: Any, lows: Any, highs: Any, stop: Any) -> None:
-    """Fill the codes of the first n boxes, in the order of the leaves; those with y_max < y_min meet none.
-
-    lows, highs: (n,) int64, what must not be above the other box's, and what must not be below. Caller guarantees that
-    ``tree`` holds the boxes.
-    """
-    x_min, y_min = tree[1, 0], tree[1, 2]
-    wide, high = tree[1, 1] - x_min, tree[1, 3] - y_min
+def encode_boxes(tree: BoxTree, n: int, stop: Any) -> None:
+    """Fill the codes of the first n boxes; those with y_max < y_min meet none. Caller guarantees a built tree."""
+    boxes, nodes, lows, highs = tree.boxes, tree.nodes, tree.lows, tree.highs
+    x_min, y_min = nodes[1, 0], nodes[1, 2]
+    wide, high = nodes[1, 1] - x_min, nodes[1, 3] - y_min
     by_x, by_y = (_LAST - 1) / wide if wide > 0.0 else 0.0, (_LAST - 1) / high if high > 0.0 else 0.0
     for place in range(n):
         if place & POLL == 0 and stop[0]:
             return
-        k = places[place]
+        k = tree.places[place]
         if boxes[k, 3] < boxes[k, 2]:
             lows[place], highs[place] = _BORROWS - (_BORROWS >> (_BITS - 1)), _BORROWS
             continue
@@ -211,26 +226,22 @@ def _code(a: int, b: int, c: int, d: int) -> int:
 
 
 @inline
-def next_pairs(
-    lows: Any, highs: Any, n: int, tree: Any, tree_marks: Any, places: Any, stack: Any, depth: int, pairs: Any
-) -> tuple[int, int]:
-    """Go on with the walk: write pairs whose codes meet, each once; return how many, and the depth of the stack.
-
-    stack: (DEEPEST, 2) int64; the walk begins with the pair (1, 1) on it and depth 1, and is over at depth 0.
-    pairs: (PORTION, 2) int64.
-    """
+def _next_pairs(tree: BoxTree, n: int, depth: int) -> tuple[int, int]:
+    """Go on with the walk: write pairs whose codes meet, each once; return how many, and the depth of the stack."""
+    nodes, node_marks, places, lows, highs = tree.nodes, tree.node_marks, tree.places, tree.lows, tree.highs
+    stack, pairs = tree.stack, tree.pairs
     n_leaves, found, steps = leaves_of(n), 0, 0
     while depth > 0 and found <= PORTION - LEAF * LEAF and steps < _STEPS:
         depth -= 1
         steps += 1
         i, j = stack[depth, 0], stack[depth, 1]
-        if j - i <= 1 and _is_one_run(tree_marks[i] | tree_marks[j]):  # invariant: i <= j, both on one level
+        if j - i <= 1 and _is_one_run(node_marks[i] | node_marks[j]):  # invariant: i <= j, both on one level
             continue
         if i < n_leaves:
             for a in range(2 * i, 2 * i + 2):
                 for b in range(2 * j if i != j else a, 2 * j + 2):
                     stack[depth, 0], stack[depth, 1] = a, b
-                    depth += boxes_meet(tree, np.uint64(a), tree, np.uint64(b))
+                    depth += boxes_meet(nodes, np.uint64(a), nodes, np.uint64(b))
             continue
         first, second = LEAF * (i - n_leaves), LEAF * (j - n_leaves)
         for p in range(first, min(first + LEAF, n)):
@@ -239,3 +250,35 @@ def next_pairs(
                 pairs[found, 0], pairs[found, 1] = e, places[np.uint64(q)]
                 found += (highs[np.uint64(q)] - low) & _BORROWS == _BORROWS
     return found, depth
+
+
+@inline
+def _all_pairs(tree: BoxTree, n: int) -> int:
+    """Write the pairs of boxes that meet, of so few that all fit; return how many."""
+    boxes, pairs = tree.boxes, tree.pairs
+    found = 0
+    for i in range(n):
+        for j in range(i + 1, n):
+            pairs[found, 0], pairs[found, 1] = i, j
+            found += boxes_meet(boxes, i, boxes, j)
+    return found
+
+
+@inline
+def begin_pairs(tree: BoxTree, n: int, stop: Any) -> int:
+    """Make ready to look for the pairs among the first n boxes; return the depth for `next_pairs`."""
+    if n > FEW:
+        encode_boxes(tree, n, stop)
+    tree.stack[0, 0], tree.stack[0, 1] = 1, 1
+    return 1
+
+
+@inline
+def next_pairs(tree: BoxTree, n: int, depth: int) -> tuple[int, int]:
+    """Write the next portion of pairs, each once, of boxes that may meet; return how many, and the depth, 0 at the end.
+
+    Caller guarantees a built tree, unless boxes are few.
+    """
+    if n <= FEW:
+        return _all_pairs(tree, n), 0
+    return _next_pairs(tree, n, depth)

@@ -6,31 +6,73 @@ other beyond one side of the common box give way to the first and the last of th
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from engine.jit import inline
 from engine.polygon_overlay.compiled.crossing_signs import Edges
 from engine.polygon_overlay.compiled.edge_contacts import POLL
-from engine.polygon_overlay.compiled.edge_tree import ANYWHERE, BENT, DOUBTFUL, RUN, heading
+from engine.polygon_overlay.compiled.edge_tree import ANYWHERE, BENT, DOUBTFUL, RUN, BoxTree, heading
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
 from engine.predicates.ranges import SMALLEST
+
+Box = tuple[float, float, float, float]
+"""x_min, x_max, y_min, y_max."""
+EVERYTHING: Final = (-np.inf, np.inf, -np.inf, np.inf)
+
+
+class Given(NamedTuple):
+    """The rings of both polygons: their edges, by vertex its number in the input, by ring its top vertex (rightmost,
+    then highest) and the mask of its source."""
+
+    edges: Edges
+    origins: Any
+    tops: Any
+    masks: Any
+
+
+class Loaded(NamedTuple):
+    """How many vertices, rings, and edges that stand for many (runs); the largest coordinate, without its sign."""
+
+    n: int
+    n_rings: int
+    n_runs: int
+    largest: float
+
+
+@inline
+def end_ring(given: Given, start: int, n: int, n_rings: int, mask: int) -> tuple[int, int]:
+    """Close the ring of the vertices from ``start`` on, or drop it; return the numbers of vertices and rings then."""
+    edges = given.edges
+    x, y = edges.x, edges.y
+    while n > start + 1 and x[n - 1] == x[start] and y[n - 1] == y[start]:
+        n -= 1
+    if n - start < 3:  # a point, or an edge there and back
+        return start, n_rings
+    for k in range(start, n):
+        edges.after[k], edges.before[k], edges.ring[k] = k + 1, k - 1, n_rings
+    edges.after[n - 1], edges.before[start] = start, n - 1
+    top, px, py = start, x[start], y[start]
+    for k in range(start + 1, n):
+        if x[k] > px or (x[k] == px and y[k] > py):
+            top, px, py = k, x[k], y[k]
+    given.tops[n_rings], given.masks[n_rings] = top, mask
+    return n, n_rings + 1
 
 
 @inline
 def load_rings(
-    vertices: Any, offsets: Any, first_ring: int, last_ring: int, mask: int, bits: Any, base: int, edges: Edges,
-    origins: Any, tops: Any, masks: Any, box: tuple[float, float, float, float], n: int, n_rings: int, stop: Any,
+    vertices: Any, offsets: Any, first_ring: int, last_ring: int, mask: int, bits: Any, base: int,
+    box: Box, given: Given, n: int, n_rings: int, stop: Any,
 ) -> tuple[int, int, bool]:  # fmt: skip
     """Append rings without repeated points; return the numbers of vertices and rings, and whether none is too small.
 
     bits: empty, or by ring the bit that stands for the mask. base: what is added to the number of a vertex in
-    ``origins``. box: x_min, x_max, y_min, y_max; of vertices beyond one of its sides, one after another, only the first
-    and the last count.
+    ``origins``. box: of vertices beyond one of its sides, one after another, only the first and the last count.
     """
     x_min, x_max, y_min, y_max = box
-    x, y = edges.x, edges.y
+    x, y, origins = given.edges.x, given.edges.y, given.origins
     safe = True
     for ring in range(first_ring, last_ring):
         start = n
@@ -55,25 +97,12 @@ def load_rings(
             sides, qx, qy = beyond, px, py
             x[n], y[n], origins[n] = px, py, base + k
             n += 1
-        while n > start + 1 and x[n - 1] == x[start] and y[n - 1] == y[start]:
-            n -= 1
-        if n - start < 3:  # a point, or an edge there and back
-            n = start
-            continue
-        for k in range(start, n):
-            edges.after[k], edges.before[k], edges.ring[k] = k + 1, k - 1, n_rings
-        edges.after[n - 1], edges.before[start] = start, n - 1
-        top, px, py = start, x[start], y[start]
-        for k in range(start + 1, n):
-            if x[k] > px or (x[k] == px and y[k] > py):
-                top, px, py = k, x[k], y[k]
-        tops[n_rings], masks[n_rings] = top, (1 << bits[ring] if bits.shape[0] > 0 else mask)
-        n_rings += 1
+        n, n_rings = end_ring(given, start, n, n_rings, 1 << bits[ring] if bits.shape[0] > 0 else mask)
     return n, n_rings, safe
 
 
 @inline
-def box_of(vertices: Any, first: int, last: int) -> tuple[float, float, float, float]:
+def box_of(vertices: Any, first: int, last: int) -> Box:
     """Return x_min, x_max, y_min, y_max of some vertices; inverted where there is none."""
     x_min = y_min = np.inf
     x_max = y_max = -np.inf
@@ -85,18 +114,30 @@ def box_of(vertices: Any, first: int, last: int) -> tuple[float, float, float, f
 
 
 @inline
-def magnitude(x_min: float, x_max: float, y_min: float, y_max: float) -> float:
+def magnitude(box: Box) -> float:
     """Return the largest coordinate of a box, without its sign; 0 of an inverted one."""
-    return max(-x_min, x_max, -y_min, y_max) if x_min <= x_max else 0.0
+    return max(-box[0], box[1], -box[2], box[3]) if box[0] <= box[1] else 0.0
 
 
 @inline
-def fill_boxes(edges: Edges, n: int, margin: float, boxes: Any, marks: Any, stop: Any) -> float:
+def common_box(box: Box, other: Box) -> Box:
+    """Return what two boxes have in common."""
+    return max(box[0], other[0]), min(box[1], other[1]), max(box[2], other[2]), min(box[3], other[3])
+
+
+@inline
+def is_empty(box: Box) -> bool:
+    """Tell whether a box has no point."""
+    return box[0] > box[1] or box[2] > box[3]
+
+
+@inline
+def fill_boxes(edges: Edges, n: int, margin: float, tree: BoxTree, stop: Any) -> float:
     """Fill the box of every edge, with a margin around it, and its mark; return the least length of an edge.
 
     Its length is the larger of both coordinates'.
     """
-    x, y = edges.x, edges.y
+    x, y, boxes, marks = edges.x, edges.y, tree.boxes, tree.marks
     shortest = np.inf
     first = 0
     while first < n:  # bound: each turn passes one ring
@@ -122,13 +163,13 @@ def fill_boxes(edges: Edges, n: int, margin: float, boxes: Any, marks: Any, stop
 
 
 @inline
-def mark_runs(edges: Edges, runs: Any, n_runs: int, boxes: Any, marks: Any) -> None:
+def mark_runs(edges: Edges, runs: Any, n_runs: int, tree: BoxTree) -> None:
     """Give the edges that stand for many a mark, and boxes that meet none; the ring turns at the ends of each."""
     for k in range(n_runs):
         e = runs[k]
-        marks[e] = ANYWHERE | BENT | RUN
-        marks[edges.after[e]] |= BENT
-        boxes[e, 3] = -np.inf
+        tree.marks[e] = ANYWHERE | BENT | RUN
+        tree.marks[edges.after[e]] |= BENT
+        tree.boxes[e, 3] = -np.inf
 
 
 @inline

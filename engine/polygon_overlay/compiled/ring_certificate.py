@@ -20,18 +20,19 @@ from engine.polygon_overlay.compiled.edge_contacts import POLL
 from engine.polygon_overlay.compiled.edge_tree import (
     ANYWHERE,
     DOUBTFUL,
+    FEW,
     RUN,
+    BoxTree,
+    begin_pairs,
     boxes_meet,
     build_tree,
-    encode_boxes,
     next_pairs,
 )
+from engine.polygon_overlay.compiled.rounded_crossings import Rounded
 from engine.predicates.orientation import orient2d
 from engine.types import Point2
 
 MARGIN: Final = 16.0 * 2.0**-52
-_FEW: Final = 40
-"""Edges up to which all pairs of boxes are looked at."""
 
 
 @merged
@@ -98,8 +99,9 @@ def _is_apart(points: Any, x: Any, y: Any, a: int, b: int, c: int, d: int, squar
 
 
 @inline
-def has_straight_point(rings: Rings, n_rings: int, x: Any, y: Any, moved: Any, stop: Any) -> bool:
+def has_straight_point(rings: Rings, n_rings: int, rounded: Rounded, stop: Any) -> bool:
     """Tell whether rounding put a point, one where rings do not meet, on a straight line with its neighbours."""
+    x, y, moved = rounded.x, rounded.y, rounded.moved
     for ring in range(n_rings):
         first, last = rings.offset[ring], rings.offset[ring + 1]
         i, j = last - 2, last - 1
@@ -115,15 +117,14 @@ def has_straight_point(rings: Rings, n_rings: int, x: Any, y: Any, moved: Any, s
 
 @inline
 def certify(
-    rings: Rings, n_rings: int, n: int, x: Any, y: Any, moved: Any, boxes: Any, marks: Any, tails: Any, heads: Any,
-    tree: Any, tree_marks: Any, places: Any, lows: Any, highs: Any, stack: Any, pairs: Any, stop: Any,
-) -> bool:  # fmt: skip
+    rings: Rings, n_rings: int, n: int, rounded: Rounded, tree: BoxTree, tails: Any, heads: Any, stop: Any
+) -> bool:
     """Tell whether the rings are certainly valid after rounding, no edges near each other that do not meet.
 
-    x, y: (n,) rounded points of ``rings``; moved: (n,) uint8. The rest is scratch for n boxes. Only edges with the mark
-    DOUBTFUL are looked at: clearance.py vouches for pairs of which one has not. What is left out (RUN) is away from all
-    that moves.
+    n: points of ``rings``. tree, tails, heads: scratch for as many. Only edges with the mark DOUBTFUL are looked at:
+    clearance.py vouches for pairs of which one has not. What is left out (RUN) is away from all that moves.
     """
+    x, y, moved, boxes, pairs = rounded.x, rounded.y, rounded.moved, tree.boxes, tree.pairs
     largest = 0.0
     for k in range(n):
         largest = max(largest, abs(x[k]), abs(y[k]))
@@ -138,37 +139,24 @@ def certify(
             if rings.meets[k] & (DOUBTFUL | RUN) != DOUBTFUL:
                 continue
             j = k + 1 if k + 1 < last else first
-            tails[n_edges], heads[n_edges], marks[n_edges] = k, j, ANYWHERE
+            tails[n_edges], heads[n_edges], tree.marks[n_edges] = k, j, ANYWHERE
             boxes[n_edges, 0], boxes[n_edges, 1] = min(x[k], x[j]) - margin, max(x[k], x[j]) + margin
             boxes[n_edges, 2], boxes[n_edges, 3] = min(y[k], y[j]) - margin, max(y[k], y[j]) + margin
             n_edges += 1
-    points = rings.point
-    if n_edges <= _FEW:
-        for i in range(n_edges):
-            a, b = tails[i], heads[i]
-            for j in range(i + 1, n_edges):
-                c, d = tails[j], heads[j]
-                if (
-                    (moved[a] | moved[b] | moved[c] | moved[d])
-                    and boxes_meet(boxes, i, boxes, j)
-                    and not _is_apart(points, x, y, a, b, c, d, square)
-                ):
-                    return False
-        return True
-    build_tree(boxes, marks, n_edges, tree, tree_marks, places, stop)
-    encode_boxes(boxes, n_edges, tree, places, lows, highs, stop)
-    stack[0, 0], stack[0, 1], depth = 1, 1, 1
+    if n_edges > FEW:
+        build_tree(tree, n_edges, stop)
+    depth = begin_pairs(tree, n_edges, stop)
     while depth > 0:  # bound: the walk through the tree
         if stop[0]:
             return False
-        found, depth = next_pairs(lows, highs, n_edges, tree, tree_marks, places, stack, depth, pairs)
+        found, depth = next_pairs(tree, n_edges, depth)
         for k in range(found):
             i, j = pairs[k, 0], pairs[k, 1]
             a, b, c, d = tails[i], heads[i], tails[j], heads[j]
             if (
                 (moved[a] | moved[b] | moved[c] | moved[d])
                 and boxes_meet(boxes, i, boxes, j)
-                and not _is_apart(points, x, y, a, b, c, d, square)
+                and not _is_apart(rings.point, x, y, a, b, c, d, square)
             ):
                 return False
     return True

@@ -12,6 +12,7 @@ import numpy as np
 from engine.jit import inline
 from engine.polygon_overlay.compiled.chain_rings import Rings
 from engine.polygon_overlay.compiled.edge_contacts import OFTEN, POLL
+from engine.polygon_overlay.compiled.rounded_crossings import Rounded
 from engine.predicates.orientation import orient2d
 from engine.types import Point2
 
@@ -28,8 +29,9 @@ class Ranking(NamedTuple):
 
 
 @inline
-def _is_before(rings: Rings, ranking: Ranking, x: Any, y: Any, i: int, j: int) -> bool:
+def _is_before(rings: Rings, ranking: Ranking, rounded: Rounded, i: int, j: int) -> bool:
     """Tell whether ring i stands before ring j."""
+    x, y = rounded.x, rounded.y
     if ranking.piece[i] != ranking.piece[j]:
         return ranking.piece[i] < ranking.piece[j]
     if ranking.is_hole[i] != ranking.is_hole[j]:
@@ -47,7 +49,7 @@ def _is_before(rings: Rings, ranking: Ranking, x: Any, y: Any, i: int, j: int) -
 
 
 @inline
-def _sort(rings: Rings, ranking: Ranking, x: Any, y: Any, n: int, is_by_piece: bool, stop: Any) -> None:
+def _sort(rings: Rings, ranking: Ranking, rounded: Rounded, n: int, is_by_piece: bool, stop: Any) -> None:
     """Sort the first n entries of ``ranking.order``: merging runs of doubling length. is_by_piece: pieces differ."""
     order, spare, first_x = ranking.order, ranking.spare, ranking.x
     width = 1
@@ -58,32 +60,29 @@ def _sort(rings: Rings, ranking: Ranking, x: Any, y: Any, n: int, is_by_piece: b
             for k in range(low, high):
                 if k & POLL == 0 and stop[0]:
                     return
-                if i < middle and j < high:
-                    p, q = order[i], order[j]
-                    if is_by_piece or first_x[p] == first_x[q]:
-                        takes_second = _is_before(rings, ranking, x, y, q, p)
-                    else:
-                        takes_second = first_x[q] < first_x[p]
-                else:
+                p, q = order[i if i < middle else low], order[j if j < high else low]
+                if i >= middle or j >= high:
                     takes_second = i >= middle
-                if not takes_second:
-                    spare[k] = order[i]
-                    i += 1
+                elif is_by_piece or first_x[p] == first_x[q]:
+                    takes_second = _is_before(rings, ranking, rounded, q, p)
                 else:
-                    spare[k] = order[j]
-                    j += 1
+                    takes_second = first_x[q] < first_x[p]
+                spare[k] = q if takes_second else p
+                i += not takes_second
+                j += takes_second
         for k in range(n):
             order[k] = spare[k]
         width *= 2
 
 
 @inline
-def find_shells(rings: Rings, n_rings: int, x: Any, y: Any, ranking: Ranking, widest: Any, boxes: Any) -> bool:
+def find_shells(rings: Rings, n_rings: int, rounded: Rounded, ranking: Ranking, widest: Any, boxes: Any) -> bool:
     """Fill ``ranking.is_hole`` of rings whose rounded points may turn either way; tell whether it is sure.
 
     Rounding keeps order, so the rounded box of a shell holds those of its holes: the one ring of a region whose box
     holds all others, and is no other's, is its shell. widest: scratch by region; boxes: by ring.
     """
+    x, y = rounded.x, rounded.y
     for ring in range(n_rings):
         x_min = y_min = np.inf
         x_max = y_max = -np.inf
@@ -116,28 +115,19 @@ def _holds(boxes: Any, i: int, j: int) -> bool:
 
 @inline
 def rank_rings(
-    rings: Rings, n_rings: int, x: Any, y: Any, ranking: Ranking, is_valid: bool, piece_of: Any, boxes: Any, stop: Any
+    rings: Rings, n_rings: int, rounded: Rounded, ranking: Ranking, is_valid: bool, piece_of: Any, boxes: Any, stop: Any
 ) -> int:
     """Fill ``ranking``; return the number of pieces, -1 if a region has not exactly one shell, or none that is sure.
 
     is_valid: whether rounding left the rings what they were. piece_of: scratch by region; boxes: by ring.
     """
-    if not is_valid and not find_shells(rings, n_rings, x, y, ranking, piece_of, boxes):
+    if not is_valid and not find_shells(rings, n_rings, rounded, ranking, piece_of, boxes):
         return -1
     n_pieces = 0
     for ring in range(n_rings):
         if ring & OFTEN == 0 and stop[0]:
             return -1
-        first, last = rings.offset[ring], rings.offset[ring + 1]
-        low = first
-        for k in range(first + 1, last):
-            if k & POLL == 0 and stop[0]:
-                return -1
-            if x[k] < x[low] or (x[k] == x[low] and y[k] < y[low]):
-                low = k
-        ranking.start[ring], ranking.x[ring] = low, x[low]
-        before, after = (low if low > first else last) - 1, low + 1 if low + 1 < last else first
-        turn = orient2d(Point2(x[before], y[before]), Point2(x[low], y[low]), Point2(x[after], y[after]))
+        turn = _turn_at_first(rings, ring, rounded, ranking, stop)
         if is_valid:
             ranking.is_hole[ring] = turn < 0
         ranking.piece[ring] = 0
@@ -147,7 +137,7 @@ def rank_rings(
             n_pieces += 1
     if n_rings == 1:
         return n_pieces if n_pieces == 1 else -1
-    _sort(rings, ranking, x, y, n_pieces, False, stop)
+    _sort(rings, ranking, rounded, n_pieces, False, stop)
     if stop[0]:
         return -1
     for k in range(n_pieces):
@@ -162,5 +152,21 @@ def rank_rings(
     if n_pieces < n_rings:
         for ring in range(n_rings):
             ranking.order[ring] = ring
-        _sort(rings, ranking, x, y, n_rings, True, stop)
+        _sort(rings, ranking, rounded, n_rings, True, stop)
     return n_pieces
+
+
+@inline
+def _turn_at_first(rings: Rings, ring: int, rounded: Rounded, ranking: Ranking, stop: Any) -> int:
+    """Find the first vertex of a ring, and return the sign of the turn there, 0 where the call is to end."""
+    x, y = rounded.x, rounded.y
+    first, last = rings.offset[ring], rings.offset[ring + 1]
+    low = first
+    for k in range(first + 1, last):
+        if k & POLL == 0 and stop[0]:
+            return 0
+        if x[k] < x[low] or (x[k] == x[low] and y[k] < y[low]):
+            low = k
+    ranking.start[ring], ranking.x[ring] = low, x[low]
+    before, after = (low if low > first else last) - 1, low + 1 if low + 1 < last else first
+    return orient2d(Point2(x[before], y[before]), Point2(x[low], y[low]), Point2(x[after], y[after]))

@@ -11,12 +11,13 @@ nothing: quotients of their two leading components are within 2^-100 of it.
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from engine.jit import called, inline, merged
 from engine.polygon_overlay.compiled.crossing_signs import Edges, crossing_against, exact_weight, weight
+from engine.polygon_overlay.compiled.edge_contacts import OFTEN, Events
 from engine.predicates.double_double import U2, dd_add, dd_div, dd_scale, surely_rounded
 from engine.predicates.error_free import fast_two_sum, workspace
 from engine.predicates.expansion import add_scaled, compress, sign
@@ -24,6 +25,34 @@ from engine.predicates.expansion import add_scaled, compress, sign
 CUT_BOUND: Final = 40.0 * U2
 LOST: Final = -1.0
 """An error that tells that the double was not found."""
+_NOT_YET: Final = -2.0
+"""Error of a crossing that is not rounded yet."""
+
+
+class Rounded(NamedTuple):
+    """Doubles of the points of rings, and whether rounding moved each, uint8; by crossing its doubles and its error."""
+
+    x: Any
+    y: Any
+    moved: Any
+    crossing_x: Any
+    crossing_y: Any
+    error: Any
+
+
+class _Cut(NamedTuple):
+    """Two edges that cross, the weights of the ends of the first as positive double-doubles, their sum, and a bound of
+    the relative error of a coordinate."""
+
+    e: int
+    f: int
+    ah: float
+    al: float
+    bh: float
+    bl: float
+    sum_h: float
+    sum_l: float
+    relative: float
 
 
 @merged
@@ -48,8 +77,9 @@ def round_crossing(edges: Edges, e: int, f: int) -> tuple[float, float, float, f
         ae, be = 4.0 * U2 * ah, 4.0 * U2 * bh
     relative = 2.5 * max(ae / ah, be / bh)
     sum_h, sum_l = dd_add(ah, al, bh, bl)
-    x, x_error = _coordinate(edges, e, f, 0, edges.x[a], edges.x[b], ah, al, bh, bl, sum_h, sum_l, relative)
-    y, y_error = _coordinate(edges, e, f, 1, edges.y[a], edges.y[b], ah, al, bh, bl, sum_h, sum_l, relative)
+    cut = _Cut(e, f, ah, al, bh, bl, sum_h, sum_l, relative)
+    x, x_error = _coordinate(edges, cut, 0, edges.x[a], edges.x[b])
+    y, y_error = _coordinate(edges, cut, 1, edges.y[a], edges.y[b])
     return x, y, x_error, y_error
 
 
@@ -74,21 +104,18 @@ def _leading(e: Any, n: int) -> tuple[float, float]:
 
 
 @merged
-def _coordinate(
-    edges: Edges, e: int, f: int, axis: int, p: float, q: float, ah: float, al: float, bh: float, bl: float,
-    sum_h: float, sum_l: float, relative: float,
-) -> tuple[float, float]:  # fmt: skip
+def _coordinate(edges: Edges, cut: _Cut, axis: int, p: float, q: float) -> tuple[float, float]:
     """Return the double nearest to one coordinate, and a bound of its error; p and q are those of the ends of e."""
     if p == q:
         return p, 0.0
-    rh, rl = dd_scale(bh, bl, p)
-    sh, sl = dd_scale(ah, al, q)
+    rh, rl = dd_scale(cut.bh, cut.bl, p)
+    sh, sl = dd_scale(cut.ah, cut.al, q)
     nh, nl = dd_add(rh, rl, sh, sl)
-    h, low = dd_div(nh, nl, sum_h, sum_l)
-    bound = (CUT_BOUND + relative) * max(abs(p), abs(q))
+    h, low = dd_div(nh, nl, cut.sum_h, cut.sum_l)
+    bound = (CUT_BOUND + cut.relative) * max(abs(p), abs(q))
     if abs(low) > bound and surely_rounded(h, low, bound):
         return h + 0.0, abs(low) + bound
-    return _settle(edges, e, f, axis, h, bound)
+    return _settle(edges, cut.e, cut.f, axis, h, bound)
 
 
 @called
@@ -138,3 +165,36 @@ def _from_expansions(edges: Edges, e: int, f: int, axis: int) -> float:
 def _even(a: float, b: float) -> float:
     """Return the one of two neighbouring doubles whose last bit is 0."""
     return (a + b) / 2.0 if abs(a) < 2.0**1022 and abs(b) < 2.0**1022 else a
+
+
+@merged
+def distance_of(error_x: float, error_y: float) -> float:
+    """Return how far a point may have moved whose coordinates did by so much, rounded up."""
+    return np.sqrt(error_x * error_x + error_y * error_y) * (1.0 + 2.0**-50)  # two squares, their sum, a root
+
+
+@inline
+def round_points(
+    edges: Edges, events: Events, points: Any, n: int, n_crossings: int, n_points: int, rounded: Rounded, stop: Any
+) -> float:
+    """Round the points of all rings, vertices and crossings; return how far a point moved, or LOST."""
+    x, y, error = edges.x, edges.y, rounded.error
+    error[:n_crossings] = _NOT_YET
+    farthest = 0.0
+    lost = False
+    for k in range(n_points):
+        if k & OFTEN == 0 and stop[0]:
+            return LOST
+        point = points[k]
+        if point < n:
+            rounded.x[k], rounded.y[k], rounded.moved[k] = x[point] + 0.0, y[point] + 0.0, 0
+        else:
+            c = point - n
+            if error[c] == _NOT_YET:
+                cx, cy, ex, ey = round_crossing(edges, events.first[c], events.second[c])
+                lost = lost or ex < 0.0 or ey < 0.0
+                rounded.crossing_x[c], rounded.crossing_y[c], error[c] = cx, cy, distance_of(ex, ey)
+                farthest = max(farthest, error[c])
+            rounded.x[k], rounded.y[k] = rounded.crossing_x[c], rounded.crossing_y[c]
+            rounded.moved[k] = error[c] > 0.0
+    return LOST if lost else farthest

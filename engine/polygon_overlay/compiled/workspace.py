@@ -12,12 +12,16 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.jit import merged
-from engine.polygon_overlay.compiled.chain_rings import Rings
-from engine.polygon_overlay.compiled.chains import Chains
+from engine.polygon_overlay.compiled.chain_faces import Faces
+from engine.polygon_overlay.compiled.chain_rings import Rings, Walk
+from engine.polygon_overlay.compiled.chains import Chains, Loose, Stars
 from engine.polygon_overlay.compiled.crossing_signs import Edges
-from engine.polygon_overlay.compiled.edge_contacts import Events
-from engine.polygon_overlay.compiled.edge_tree import DEEPEST, LEAF, PORTION
+from engine.polygon_overlay.compiled.edge_contacts import Events, Unions
+from engine.polygon_overlay.compiled.edge_events import Along
+from engine.polygon_overlay.compiled.edge_tree import DEEPEST, LEAF, PORTION, BoxTree
+from engine.polygon_overlay.compiled.loading import Given
 from engine.polygon_overlay.compiled.ring_order import Ranking
+from engine.polygon_overlay.compiled.rounded_crossings import Rounded
 
 _kept = threading.local()
 _MOST_KEPT: Final = 80_000_000
@@ -52,76 +56,56 @@ class Buffers(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """Scratch by name: rows of the arrays of `Buffers`."""
+    """Scratch by name, a tuple for each step, in the order in which data passes: rows of the arrays of `Buffers`."""
 
-    edges: Edges
-    origins: Any
-    chain_at: Any
-    starts: Any
-    marked: Any
-    tops: Any
-    masks: Any
-    rings: Any
-    highest: Any
-    boxes: Any
-    marks: Any
-    tree: Any
-    tree_marks: Any
-    places: Any
-    lows: Any
-    highs: Any
-    stack: Any
-    pairs: Any
-    points: Any
-    node_of: Any
+    given: Given
+    tree: BoxTree
     events: Events
-    turn: Any
-    order: Any
-    nodes: Any
+    unions: Unions
+    along: Along
     chains: Chains
-    masks_before: Any
-    star_starts: Any
-    star_ends: Any
-    star: Any
-    place: Any
-    cycle: Any
-    following: Any
-    joined: Any
-    label: Any
-    regions: Any
+    stars: Stars
+    loose: Loose
+    faces: Faces
+    highest: Any
     gathered: Any
     beyond: Any
-    inside: Any
-    bounds: Any
-    seen: Any
-    fan: Any
-    path: Any
-    path_place: Any
+    walk: Walk
     found: Rings
-    crossing_x: Any
-    crossing_y: Any
-    crossing_error: Any
-    x: Any
-    y: Any
-    moved: Any
+    rounded: Rounded
     ranking: Ranking
+
+
+class Output(NamedTuple):
+    """Pair after pair: vertices (m, 2) float64, their sources (m, 2) int32, ends of rings and of pieces (n + 1,) int64,
+    that begin with 0, evidence by ring (n,) int64."""
+
+    vertices: Any
+    sources: Any
+    rings: Any
+    pieces: Any
+    evidence: Any
+
+
+class Outcomes(NamedTuple):
+    """By pair: status (n,) int8; counts (n, 4) int64: pieces, rings, vertices, pairs of edges beyond the filter;
+    displacement (n,) float64: how far rounding moved a vertex at most."""
+
+    status: Any
+    counts: Any
+    displacement: Any
 
 
 @dataclass(frozen=True, slots=True)
 class Scratch:
-    """What the kernel writes to, for pairs of up to so many vertices, rings and contacts, and for so much output.
-
-    output: vertices (m, 2) float64, their sources (m, 2) int32, ends of rings and of pieces (n + 1,) int64, that begin
-        with 0, evidence by ring (n,) int64.
-    output_of_one: status, counts and displacement of one pair, and the same.
-    """
+    """What the kernel writes to, for pairs of up to so many vertices, rings and contacts; outcome: of one pair."""
 
     n_vertices: int
     n_rings: int
     n_contacts: int
     buffers: Buffers
-    output: tuple[Any, ...]
-    output_of_one: tuple[Any, ...]
+    output: Output
+    outcome: Outcomes
 
 
 def scratch_for(n_vertices: int, n_rings: int, n_contacts: int, n_out: int, n_out_rings: int) -> Scratch:
@@ -134,16 +118,17 @@ def scratch_for(n_vertices: int, n_rings: int, n_contacts: int, n_out: int, n_ou
     kept: Scratch | None = vars(_kept).pop("scratch", None)
     if kept is not None and (kept.n_vertices < n_vertices or kept.n_rings < n_rings or kept.n_contacts < n_contacts):
         kept = None
-    if kept is not None and len(kept.output[0]) >= n_out and len(kept.output[4]) >= n_out_rings:
+    if kept is not None and len(kept.output.vertices) >= n_out and len(kept.output.evidence) >= n_out_rings:
         return kept
     n_out, n_out_rings = max(n_out, n_vertices + n_contacts), max(n_out_rings, n_contacts)
     rings, pieces = np.empty(n_out_rings + 1, np.int64), np.empty(n_out_rings + 1, np.int64)
     rings[0] = pieces[0] = 0
-    output = np.empty((n_out, 2)), np.empty((n_out, 2), np.int32), rings, pieces, np.empty(n_out_rings, np.int64)
-    of_one = np.empty(1, np.int8), np.empty((1, 4), np.int64), np.empty(1), *output
+    evidence = np.empty(n_out_rings, np.int64)
+    output = Output(np.empty((n_out, 2)), np.empty((n_out, 2), np.int32), rings, pieces, evidence)
+    outcome = Outcomes(np.empty(1, np.int8), np.empty((1, 4), np.int64), np.empty(1))
     if kept is not None:
-        return Scratch(kept.n_vertices, kept.n_rings, kept.n_contacts, kept.buffers, output, of_one)
-    return Scratch(n_vertices, n_rings, n_contacts, buffers_for(n_vertices, n_rings, n_contacts), output, of_one)
+        return Scratch(kept.n_vertices, kept.n_rings, kept.n_contacts, kept.buffers, output, outcome)
+    return Scratch(n_vertices, n_rings, n_contacts, buffers_for(n_vertices, n_rings, n_contacts), output, outcome)
 
 
 def more_contacts(n: int) -> int:
@@ -205,16 +190,25 @@ def rows_of(buffers: Buffers) -> Workspace:
     cx, c = buffers.contact_floats, buffers.contact_integers
     h, hl, hb = buffers.half_integers, buffers.half_labels, buffers.half_octets
     px, p, pb, codes = buffers.point_floats, buffers.point_integers, buffers.point_octets, buffers.point_codes
-    edges = Edges(vx[0], vx[1], v[0], v[1], v[2])
-    events = Events(c[0], c[1], c[2], cx[0], cx[1], cx[2], c[3], c[4])
-    chains = Chains(c[5], c[6], c[7], c[8], hl[3], c[9])
-    found = Rings(p[0], pb[0], c[10], c[11])
-    ranking = Ranking(c[5], cx[0], hb[0], c[6], c[7], c[8])  # in place of chains, and of parameters of events
+    crossing_x, crossing_y, error = cx[3], cx[4], cx[1]
     return Workspace(
-        edges, v[3], p[1], v[4], pb[1],
-        r[0], r[1], r[2], r[3],
-        buffers.boxes, pb[2], buffers.tree, buffers.tree_marks, p[2], codes[0], codes[1], buffers.stack, buffers.pairs,
-        p[3], p[4], events, hb[0], c[12], c[13], chains, hl[0], c[14], c[15],
-        h[0], h[1], h[2], h[3], h[4], hl[0], h[5], hl[1], hl[2], hb[1], hb[2], hb[3],
-        c[16], h[6], c[17], found, cx[3], cx[4], cx[1], px[0], px[1], pb[3], ranking,
+        given=Given(Edges(vx[0], vx[1], v[0], v[1], v[2]), v[3], r[0], r[1]),
+        tree=BoxTree(
+            buffers.boxes, pb[2], buffers.tree, buffers.tree_marks, p[2], codes[0], codes[1], buffers.stack,
+            buffers.pairs,
+        ),
+        events=Events(c[0], c[1], c[2], cx[0], cx[1], cx[2], c[3], c[4], hb[0]),
+        unions=Unions(p[3], pb[1], r[2]),
+        along=Along(v[4], c[12], crossing_x, crossing_y, c[13]),
+        chains=Chains(c[5], c[6], c[7], c[8], hl[3], c[9], p[1]),
+        stars=Stars(p[4], c[13], c[14], c[15], h[0], h[1]),
+        loose=Loose(h[3], hl[0], px[0], px[1]),
+        faces=Faces(h[2], h[3], h[4], hl[0], h[5], hb[1], hb[2], c[16]),
+        highest=r[3],
+        gathered=hl[1],
+        beyond=hl[2],
+        walk=Walk(hb[3], h[6], c[17]),
+        found=Rings(p[0], pb[0], c[10], c[11]),
+        rounded=Rounded(px[0], px[1], pb[3], crossing_x, crossing_y, error),
+        ranking=Ranking(c[5], cx[0], hb[0], c[6], c[7], c[8]),  # in place of chains, and of parameters of events
     )  # fmt: skip

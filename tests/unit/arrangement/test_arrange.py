@@ -7,9 +7,10 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from engine.arrangement.arrange import Arrangement, arrange_rings, arrange_segments
+from engine.arrangement.arrange import Arrangement, arrange_rings
 from engine.errors import DeadlineExceededError
 from engine.parallel import Budget
+from tests.unit.arrangement.segments import arrange_segments
 
 Point = tuple[float, float]
 

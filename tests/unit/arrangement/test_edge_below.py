@@ -7,8 +7,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from engine.arrangement.arrange import Arrangement, arrange_segments
+from engine.arrangement.arrange import Arrangement
 from engine.arrangement.edge_below import EdgesBelow
+from tests.unit.arrangement.segments import arrange_segments
 
 
 def slow_edge_below(arrangement: Arrangement, node: int) -> int:

@@ -7,8 +7,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from engine.arrangement.float_filter import CROSS, MISS, UNSURE, classify_pairs
+from engine.arrangement.float_filter import CROSS, MISS, classify_pairs
 from engine.parallel import Budget
+from engine.types import UNDECIDED
 
 
 def exact_turn(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> int:
@@ -35,15 +36,15 @@ def test_sure_verdicts_are_right(scale: float) -> None:
         elif verdict == MISS:
             assert first == 1 or second == 1
     if 2.0**-500 < scale < 2.0**400:
-        assert (verdicts != UNSURE).mean() > 0.5
+        assert (verdicts != UNDECIDED).mean() > 0.5
 
 
 def test_segments_that_share_an_end_miss_unless_collinear() -> None:
     points = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (2.0, 0.0)])
     segments = np.array([(0, 1), (0, 2), (0, 3)])
-    assert classify_pairs(points, segments, np.array([(0, 1), (0, 2)]), Budget()).tolist() == [MISS, UNSURE]
+    assert classify_pairs(points, segments, np.array([(0, 1), (0, 2)]), Budget()).tolist() == [MISS, UNDECIDED]
 
 
 def test_overflow_is_unsure() -> None:
     points = np.array([(-1e300, 0.0), (1e300, 1.0), (0.0, -1e300), (0.0, 1e300)])
-    assert classify_pairs(points, np.array([(0, 1), (2, 3)]), np.array([(0, 1)]), Budget()).tolist() == [UNSURE]
+    assert classify_pairs(points, np.array([(0, 1), (2, 3)]), np.array([(0, 1)]), Budget()).tolist() == [UNDECIDED]

@@ -7,10 +7,10 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from engine.arrangement.arrange import Arrangement, arrange_rings, arrange_segments
-from engine.arrangement.face_points import face_points
+from engine.arrangement.arrange import Arrangement, arrange_rings
 from engine.arrangement.subdivision import label_faces, subdivide
 from engine.arrangement.union_find import UnionFind
+from tests.unit.arrangement.segments import arrange_segments, face_points
 
 
 def n_components(arrangement: Arrangement) -> int:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from engine.bounding.sweep import meeting_boxes
+from engine.bounding.sweep import meeting_boxes, pairs_of_boxes
+from engine.errors import CancelledError
+from engine.parallel import Budget, Cancel
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
@@ -25,3 +27,20 @@ def test_every_pair_once_in_order(dimension: int, block: int) -> None:
 def test_a_raised_flag_ends_it() -> None:
     low = np.zeros((3000, 3))
     assert list(meeting_boxes(low, low + 1, np.ones(1, np.uint8))) == []
+
+
+@pytest.mark.parametrize("stretch", [(1.0, 1.0), (100.0, 1.0), (1.0, 100.0)])
+def test_all_pairs_at_once(stretch: tuple[float, float]) -> None:
+    random = np.random.default_rng(7)
+    low = random.integers(0, 40, (150, 2)) * stretch
+    high = low + random.integers(0, 6, (150, 2)) * stretch
+    meet = ((low[:, None] <= high[None]) & (low[None] <= high[:, None])).all(axis=2)
+    np.testing.assert_array_equal(pairs_of_boxes(low, high, Budget()), np.argwhere(np.triu(meet, 1)))
+    assert pairs_of_boxes(low[:0], high[:0], Budget()).shape == (0, 2)
+
+
+def test_all_pairs_end_when_cancelled() -> None:
+    cancel = Cancel()
+    cancel.set()
+    with Budget(cancel=cancel) as budget, pytest.raises(CancelledError):
+        pairs_of_boxes(np.zeros((200, 2)), np.ones((200, 2)), budget)

@@ -12,7 +12,6 @@ from engine.parallel import Budget
 from engine.polygon_overlay import rounds as overlay_rounds
 from engine.polygon_overlay.batch import overlay_batch
 from engine.polygon_overlay.compiled.ring_labels import MOST_BITS
-from engine.polygon_overlay.exact import rounding as overlay_rounding
 from engine.polygon_overlay.overlay import overlay
 from engine.polygon_overlay.run import overlay_compiled
 from engine.solids.polygon import Polygon
@@ -96,8 +95,7 @@ def test_many_rings_that_join_and_are_snapped(n: int) -> None:
 
 def test_rounds_that_do_not_end_are_snapped(monkeypatch: pytest.MonkeyPatch) -> None:
     """One round instead of twelve is all there is, so that many results are snapped."""
-    for module in (overlay_rounding, overlay_rounds):
-        monkeypatch.setattr(module, "MAX_ROUNDS", 1)
+    monkeypatch.setattr(overlay_rounds, "MAX_ROUNDS", 1)
     n_snapped = 0
     for seed in range(20):
         pair = families.drawn(families.slivers, seed)

@@ -10,21 +10,19 @@ from engine.polygon_overlay.compiled import edge_tree
 
 
 @kernel
-def pairs_of(boxes, marks, tree, tree_marks, places, codes, stack, portion, found):  # type: ignore[no-untyped-def]
+def pairs_of(tree, found):  # type: ignore[no-untyped-def]
     """Return how many pairs there are, written to `found`."""
-    n = len(boxes)
-    edge_tree.build_tree(boxes, marks, n, tree, tree_marks, places, np.zeros(1, np.uint8))
-    edge_tree.encode_boxes(boxes, n, tree, places, codes[0], codes[1], np.zeros(1, np.uint8))
-    stack[0, 0], stack[0, 1] = 1, 1
-    depth, total = 1, 0
+    n = len(tree.boxes)
+    edge_tree.build_tree(tree, n, np.zeros(1, np.uint8))
+    depth, total = edge_tree.begin_pairs(tree, n, np.zeros(1, np.uint8)), 0
     while depth > 0:
-        count, depth = edge_tree.next_pairs(codes[0], codes[1], n, tree, tree_marks, places, stack, depth, portion)
-        found[total : total + count] = portion[:count]
+        count, depth = edge_tree.next_pairs(tree, n, depth)
+        found[total : total + count] = tree.pairs[:count]
         total += count
     return total
 
 
-@pytest.mark.parametrize("n", [1, 3, 4, 5, 33, 300, 1500])
+@pytest.mark.parametrize("n", [1, 3, 4, 5, 33, 41, 300, 1500])
 @pytest.mark.parametrize("share", [1.0, 0.2])
 @pytest.mark.parametrize("wanders", [True, False])
 def test_every_pair_once(n: int, share: float, wanders: bool) -> None:
@@ -37,17 +35,18 @@ def test_every_pair_once(n: int, share: float, wanders: bool) -> None:
     marks = np.full(n, edge_tree.ANYWHERE, np.uint8)
     n_leaves = int(edge_tree.leaves_of(n))
     found = np.empty((n * n, 2), np.int64)
-    total = pairs_of(
+    tree = edge_tree.BoxTree(
         boxes,
         marks,
         np.empty((2 * n_leaves, 4)),
         np.empty(2 * n_leaves, np.uint8),
         np.empty(n, np.int64),
-        np.empty((2, n), np.int64),
+        np.empty(n, np.int64),
+        np.empty(n, np.int64),
         np.empty((edge_tree.DEEPEST, 2), np.int64),
         np.empty((edge_tree.PORTION, 2), np.int64),
-        found,
     )
+    total = pairs_of(tree, found)
     got = sorted(tuple(sorted(pair)) for pair in found[:total].tolist())
     left, right, lower, upper = boxes.T
     meet = (left[:, None] <= right) & (left <= right[:, None]) & (lower[:, None] <= upper) & (lower <= upper[:, None])

@@ -12,7 +12,7 @@ from engine.parallel import Budget
 from engine.polygon_overlay.compiled.kernel import DONE
 from engine.polygon_overlay.implicit_rings import ImplicitRings, RingArrays
 from engine.polygon_overlay.run import KEPT_ARRAYS, Operation
-from engine.polygon_overlay.run_pair import run_reduced, run_whole
+from engine.polygon_overlay.run_pair import run_blocks
 from tests.unit.polygon_overlay.checks import OPERATIONS
 from tests.unit.polygon_overlay.families import FAMILIES
 
@@ -104,9 +104,10 @@ MAKERS = (smooth, with_holes, damaged, shared, lattice_walk, parallels, apart)
 def compare(subject: Rings, clip: Rings, operation: Operation, size: int, has_area: bool = False) -> bool:
     """Compare with the ordinary way; tell whether edges were left out."""
     sides = arrays(subject), arrays(clip)
-    expected = run_whole(*sides, KEPT_ARRAYS[operation], Budget())
+    expected = run_blocks(*sides, 0, 0, KEPT_ARRAYS[operation], Budget())
+    assert expected is not None
     n_vertices = sum(len(each.vertices) for each in sides)
-    found = run_reduced(*sides, size, n_vertices + 1, KEPT_ARRAYS[operation], Budget())
+    found = run_blocks(*sides, size, n_vertices + 1, KEPT_ARRAYS[operation], Budget())
     if found is None:
         return False
     if expected.status == DONE:

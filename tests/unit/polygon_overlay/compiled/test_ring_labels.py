@@ -8,6 +8,7 @@ import pytest
 from engine.polygon_overlay.compiled.chain_rings import Rings
 from engine.polygon_overlay.compiled.ring_labels import MOST_BITS, verdict
 from engine.polygon_overlay.compiled.ring_order import Ranking, find_shells
+from engine.polygon_overlay.compiled.rounded_crossings import Rounded
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -30,7 +31,9 @@ def holes_among(rings: list[list[tuple[float, float]]]) -> list[bool] | None:
     found = Rings(np.arange(len(points)), np.ones(len(points), np.uint8), offsets, np.zeros(n, np.int64))
     ranking = Ranking(*(np.zeros(n, kind) for kind in (np.int64, float, np.uint8, np.int64, np.int64, np.int64)))
     x, y = (np.ascontiguousarray(axis) for axis in points.T)
-    is_sure = find_shells(found, n, x, y, ranking, np.zeros(n, np.int64), np.zeros((n, 4)))
+    none = np.zeros(0)
+    rounded = Rounded(x, y, np.zeros(len(x), np.uint8), none, none, none)
+    is_sure = find_shells(found, n, rounded, ranking, np.zeros(n, np.int64), np.zeros((n, 4)))
     return [bool(is_hole) for is_hole in ranking.is_hole] if is_sure else None
 
 

@@ -1,0 +1,52 @@
+"""Rings as edges: repeated points and rings without area dropped, what lies beyond the common box cut short."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from engine.polygon_overlay.compiled.crossing_signs import Edges
+from engine.polygon_overlay.compiled.loading import EVERYTHING, Box, Given, box_of, common_box, is_empty, load_rings
+
+NO_BITS = np.zeros(0, np.int64)
+
+
+def loaded(rings: list[list[tuple[float, float]]], box: Box) -> tuple[list[list[int]], list[int], Given]:
+    """Return the numbers of the vertices that stay, ring by ring, the tops, and all that was filled."""
+    vertices, offsets = np.array([v for ring in rings for v in ring], float), np.cumsum([0, *map(len, rings)])
+    n, whole = len(vertices), np.zeros(len(vertices), np.int64)
+    given = Given(Edges(np.zeros(n), np.zeros(n), *(whole.copy() for _ in range(3))), *(whole.copy() for _ in range(3)))
+    stop = np.zeros(1, np.uint8)
+    n, n_rings, safe = load_rings(vertices, offsets, 0, len(rings), 1, NO_BITS, 0, box, given, 0, 0, stop)
+    assert safe
+    found: list[list[int]] = []
+    for ring in range(n_rings):
+        e = first = int(np.flatnonzero(given.edges.ring[:n] == ring)[0])
+        found.append([])
+        while not found[-1] or e != first:
+            found[-1].append(int(given.origins[e]))
+            assert given.edges.before[given.edges.after[e]] == e
+            e = int(given.edges.after[e])
+    return found, given.origins[given.tops[:n_rings]].tolist(), given
+
+
+def test_repeats_and_flat_rings_go() -> None:
+    triangle: list[tuple[float, float]] = [(0, 0), (0, 0), (4, 0), (4, 3), (4, 3), (0, 0)]
+    flat: list[tuple[float, float]] = [(1, 1), (2, 2), (1, 1)]
+    assert loaded([triangle, flat, [(9, 9)] * 4, triangle[::-1]], EVERYTHING)[:2] == (
+        [[0, 2, 3], [13, 14, 16]],
+        [3, 14],
+    )
+
+
+def test_stretches_beyond_a_side_keep_their_ends() -> None:
+    ring: list[tuple[float, float]] = [(0, 0), (5, 1), (6, 9), (7, -3), (5, 2), (0, 4)]
+    assert loaded([ring], (0.0, 4.0, 0.0, 4.0))[0] == [[0, 1, 4, 5]]
+    assert loaded([ring], EVERYTHING)[0] == [[0, 1, 2, 3, 4, 5]]
+
+
+def test_boxes() -> None:
+    vertices = np.array([(1.0, 5.0), (-2.0, 7.0), (0.0, 6.0)])
+    assert box_of(vertices, 0, 3) == (-2.0, 1.0, 5.0, 7.0)
+    assert common_box((0.0, 4.0, 0.0, 4.0), (1.0, 9.0, -1.0, 2.0)) == (1.0, 4.0, 0.0, 2.0)
+    assert is_empty(box_of(vertices, 0, 0))
+    assert is_empty(common_box((0.0, 1.0, 0.0, 1.0), (2.0, 3.0, 0.0, 1.0)))

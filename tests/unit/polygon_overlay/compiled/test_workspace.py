@@ -1,0 +1,42 @@
+"""Scratch: what is in use at one time lies apart, and a thread keeps what suffices."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+
+from engine.polygon_overlay.compiled import workspace
+
+
+def arrays_of(part: Any) -> list[np.ndarray]:
+    return [part] if isinstance(part, np.ndarray) else [array for each in part for array in arrays_of(each)]
+
+
+def test_rows_in_use_together_lie_apart() -> None:
+    w = workspace.rows_of(workspace.buffers_for(100, 5, 300))
+    steps = (
+        [w.given, w.tree, w.events, w.unions, w.along],
+        [w.given, w.tree, w.events, w.unions, w.along.starts, w.along.order, w.chains, w.stars, w.loose],
+        [w.given, w.tree, w.events, w.unions, w.along.starts, w.along.order, w.chains, w.stars, w.faces, w.highest],
+        [w.given, w.tree.marks, w.chains, w.stars, w.faces, w.gathered, w.beyond, w.walk, w.found],
+        [w.given, w.events.first, w.events.second, w.found, w.rounded, w.ranking, w.gathered, w.beyond],
+    )
+    for step in steps:
+        arrays = arrays_of(step)
+        spans = sorted(np.lib.array_utils.byte_bounds(each) for each in arrays)
+        assert all(end <= start for (_, end), (start, _) in itertools.pairwise(spans))
+
+
+def test_a_thread_keeps_what_suffices() -> None:
+    first = workspace.scratch_for(100, 2, 300, 50, 5)
+    workspace.keep(first, 100, 300, 50)
+    assert workspace.scratch_for(50, 1, 200, 40, 4) is first
+    assert workspace.scratch_for(50, 1, 200, 40, 4) is not first  # it is the caller's until it is kept
+    workspace.keep(first, 100, 300, 50)
+    wider = workspace.scratch_for(100, 2, 300, 10**6, 5)
+    assert wider.buffers is first.buffers
+    assert len(wider.output.vertices) >= 10**6
+    workspace.keep(wider, 10**9, 0, 0)  # too much was written to
+    assert workspace.scratch_for(1, 1, 1, 1, 1) is not wider
