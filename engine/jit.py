@@ -20,6 +20,7 @@ read-only folder (an image's) that is copied there first.
 
 from __future__ import annotations
 
+import copy
 import functools
 import hashlib
 import os
@@ -36,12 +37,15 @@ from typing import Any
 import numba
 from numba import config as numba_config
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile, UserProvidedCacheLocator
+from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
 from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder, compile_result
 from numba.core.compiler_machinery import register_pass
+from numba.core.environment import lookup_environment
 from numba.core.lowering import Lower
 from numba.core.registry import CPUDispatcher
 from numba.core.runtime import rtsys
 from numba.core.typed_passes import NativeLowering
+from numba.core.types.misc import unliteral
 
 KERNELS: list[Any] = []
 """Every kernel of the modules imported so far, for the tests of `engine.warm`."""
@@ -263,6 +267,117 @@ class _KernelCache(FunctionCache):  # type: ignore[misc]
         return self._load_overload(signature, target_context)
 
 
+class _InnerLibrary(JITCodeLibrary):  # type: ignore[misc] # numba carries no types
+    """Code of a function that only compiled code calls: linked into its callers, which are optimised as a whole.
+
+    Neither what numba does to a whole library, half of the compiler's time, nor machine code: both would be thrown
+    away. Each function by itself is simplified as ever, before it is linked.
+    """
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+
+class _InnerCodegen(JITCPUCodegen):  # type: ignore[misc]
+    """numba's own generator of code, all of its state shared, but for the kind of library that it makes."""
+
+    _library_class = _InnerLibrary
+
+    def __init__(self, shared: JITCPUCodegen) -> None:
+        self.__dict__.update(vars(shared))
+
+    def set_env(self, env_name: str, env: Any) -> None:
+        """Leave that to the kernels: inner code stands nowhere that could be told of its constants."""
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _KernelLowering(NativeLowering):  # type: ignore[misc]
+    """Writes a kernel; what numba itself compiles to be called from there becomes inner libraries."""
+
+    _name = "engine_kernel_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        context, codegen = state.targetctx, state.targetctx.codegen()
+        state.library = self._library(state.func_id.func_qualname, codegen)
+        state.targetctx = copy.copy(context)
+        state.targetctx._internal_codegen = _InnerCodegen(codegen)
+        done: bool = super().run_pass(state)
+        state.targetctx = context
+        self._set_constants(state.library)
+        return done
+
+    def _library(self, name: str, codegen: JITCPUCodegen) -> JITCodeLibrary:
+        library = codegen.create_library(name)
+        library.enable_object_caching()
+        return library
+
+    def _set_constants(self, library: JITCodeLibrary) -> None:
+        """Tell the machine code where the constants of all functions in it are."""
+        for name in [variable.name for variable in library._final_module.global_variables]:
+            if (environment := lookup_environment(name)) is not None:
+                library.codegen.set_env(name, environment)
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _InnerLowering(_KernelLowering):
+    _name = "engine_inner_lowering"
+
+    def _library(self, name: str, codegen: JITCPUCodegen) -> JITCodeLibrary:
+        return _InnerLibrary(_InnerCodegen(codegen), name)
+
+    def _set_constants(self, library: JITCodeLibrary) -> None:
+        pass
+
+
+class _CalledLower(Lower):  # type: ignore[misc]
+    """Writes a function that the compiler may not copy into its callers."""
+
+    def setup_function(self, fndesc: Any) -> None:
+        super().setup_function(fndesc)
+        self.function.attributes.add("noinline")
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _CalledLowering(_InnerLowering):
+    _name = "engine_called_lowering"
+
+    @property
+    def lowering_class(self) -> type[Lower]:
+        return _CalledLower
+
+
+class _KernelCompiler(CompilerBase):  # type: ignore[misc]
+    """numba's own steps, but for how a function is written."""
+
+    lowering: type[NativeLowering] = _KernelLowering
+
+    def define_pipelines(self) -> list[Any]:
+        steps = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        steps.passes = [(self.lowering if step is NativeLowering else step, text) for step, text in steps.passes]
+        steps.finalize()
+        return [steps]
+
+
+class _InnerCompiler(_KernelCompiler):
+    lowering = _InnerLowering
+
+
+class _CalledCompiler(_KernelCompiler):
+    lowering = _CalledLowering
+
+
+class _InnerDispatcher(CPUDispatcher):  # type: ignore[misc]
+    """Compiles a function once for ``int``, not again for each number that a caller spells out."""
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        plain = {name: unliteral(kind) for name, kind in kws.items()}
+        return super().get_call_template(tuple(map(unliteral, args)), plain)
+
+
 class _Kernel:
     """A kernel whose dispatcher is made when it is first called: to make all of them is a third of the import."""
 
@@ -274,7 +389,7 @@ class _Kernel:
     @functools.cached_property
     def dispatcher(self) -> Any:
         """What numba makes of it."""
-        compiled = numba.njit(**self._options)(self.py_func)
+        compiled = numba.njit(pipeline_class=_KernelCompiler, **self._options)(self.py_func)
         folder = cache_folder()
         if folder is not None:
             compiled._cache = _KernelCache(self.py_func, folder)
@@ -318,16 +433,16 @@ class _Inline:
     """
 
     def __init__(
-        self, function: Callable[..., Any], compiler: type[CompilerBase] | None = None, **options: Any
+        self, function: Callable[..., Any], compiler: type[CompilerBase] = _InnerCompiler, **options: Any
     ) -> None:
         functools.update_wrapper(self, function)
         self.py_func = function
-        self._compiler = {} if compiler is None else {"pipeline_class": compiler}
+        self._compiler = compiler
         self._options = _OPTIONS | {"nopython": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True} | options
 
     @functools.cached_property
     def _dispatcher(self) -> CPUDispatcher:
-        return CPUDispatcher(py_func=self.py_func, targetoptions=self._options, **self._compiler)
+        return _InnerDispatcher(self.py_func, targetoptions=self._options, pipeline_class=self._compiler)
 
     @property
     def _numba_type_(self) -> Any:
@@ -336,37 +451,10 @@ class _Inline:
 
     @functools.cached_property
     def _from_python(self) -> Any:
-        return numba.njit(**_OPTIONS)(self.py_func)
+        return numba.njit(pipeline_class=_KernelCompiler, **_OPTIONS)(self.py_func)
 
     def __call__(self, *arguments: Any) -> Any:
         return self._from_python(*arguments)
-
-
-class _CalledLower(Lower):  # type: ignore[misc] # numba carries no types
-    """Writes a function that the compiler may not copy into its callers."""
-
-    def setup_function(self, fndesc: Any) -> None:
-        super().setup_function(fndesc)
-        self.function.attributes.add("noinline")
-
-
-@register_pass(mutates_CFG=True, analysis_only=False)
-class _CalledLowering(NativeLowering):  # type: ignore[misc]
-    _name = "engine_called_lowering"
-
-    @property
-    def lowering_class(self) -> type[Lower]:
-        return _CalledLower
-
-
-class _CalledCompiler(CompilerBase):  # type: ignore[misc]
-    """numba's own steps, but for how a function is written."""
-
-    def define_pipelines(self) -> list[Any]:
-        steps = DefaultPassBuilder.define_nopython_pipeline(self.state)
-        steps.passes = [(_CalledLowering if step is NativeLowering else step, text) for step, text in steps.passes]
-        steps.finalize()
-        return [steps]
 
 
 def inline(function: Callable[..., Any]) -> Any:
