@@ -6,10 +6,9 @@
 
 FROM python:3.12-slim AS build
 
-# Code compiled for one family of CPUs runs on all of them; the run-time stage names the same, else it would compile
-# anew. x86-64-v3: Haswell (2013) and later, AMD Excavator and later. For ARM: --build-arg CPU=generic
+# Code compiled for one family of CPUs runs on all of them; an older CPU compiles for itself.
+# x86-64-v3: Haswell (2013) and later, AMD Excavator and later. For ARM: --build-arg CPU=generic
 ARG CPU=x86-64-v3
-ENV NUMBA_CPU_NAME=$CPU NUMBA_CPU_FEATURES=
 
 WORKDIR /src
 COPY pyproject.toml README.md LICENSE ./
@@ -18,14 +17,12 @@ COPY service service
 
 RUN python -m venv /opt/exact-geometry
 RUN /opt/exact-geometry/bin/pip install --no-cache-dir . httptools uvloop
-# -P: the engine that was installed, not the one in this folder, since the cache knows a kernel by the path of its file
-RUN ENGINE_CACHE_DIR=/opt/exact-geometry/kernels /opt/exact-geometry/bin/python -P -c "import engine, os; engine.warm(processes=os.cpu_count())"
+# -P: the engine that was installed, not the one in this folder
+RUN /opt/exact-geometry/bin/python -P -m engine warm --into /opt/exact-geometry/kernels --cpu $CPU
 
 FROM python:3.12-slim
 
-ARG CPU=x86-64-v3
-ENV NUMBA_CPU_NAME=$CPU NUMBA_CPU_FEATURES=
-# numba writes next to what it reads, so the kernels are copied to a place that can be written: a tmpfs will do
+# the kernels are read where they are; what the image lacks is compiled into a place that can be written: a tmpfs will do
 ENV ENGINE_CACHE_SEED=/opt/exact-geometry/kernels ENGINE_CACHE_DIR=/tmp/kernels HOME=/tmp
 ENV PYTHONDONTWRITEBYTECODE=1 PYTHONUNBUFFERED=1
 ENV GEOMETRY_HOST=0.0.0.0 GEOMETRY_PORT=8000

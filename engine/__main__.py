@@ -1,5 +1,7 @@
 """The command line: ``python -m engine contains | collide | clip | overlay | bounds``, for people who have files.
 
+``python -m engine warm`` compiles all kernels before they are needed, here or for other machines (``--into``).
+
 A solid is a mesh file, an .npz of `vertices` and `faces`, a .json or .geojson file, or the JSON of a solid itself, as
 in ``'{"type": "sphere", "center": [0, 0, 0], "radius": 1}'``. Points, segments and poses come from .npy, .csv or
 .geojson. Answers go to the standard output as .csv or GeoJSON, or to the file named by --output, in the format that its
@@ -9,10 +11,14 @@ name tells. Exit code: 0, or 2 where the input is at fault (the message says how
 from __future__ import annotations
 
 import argparse
+import os
+import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, get_args
 
 import numpy as np
@@ -22,6 +28,7 @@ from engine.containment.locate import locate
 from engine.errors import EngineError, InvalidInputError
 from engine.files.solids import read_solid, read_solids
 from engine.files.tables import read_rows, write_geojson, write_table
+from engine.kernel_cache import cache_folder, seal
 from engine.parallel import Progress
 from engine.polygon_clipping.clip_polygons import PolygonStatus, clip_polygons
 from engine.polygon_overlay.batch import overlay_batch
@@ -31,6 +38,7 @@ from engine.segment_clipping.clip_segments import clip_segments
 from engine.solids.bounds import bounds
 from engine.types import Location, Relation
 from engine.version import __version__
+from engine.warmup import warm
 
 Options = argparse.Namespace
 
@@ -127,6 +135,46 @@ def _bounds(options: Options) -> None:
     write_table(options.output, {name: value[np.newaxis] for name, value in row.items()})
 
 
+def _warm(options: Options) -> None:
+    if options.cpu or options.into:
+        _warm_elsewhere(options)
+        return
+    with _bar(100, "%", options) as progress:
+        warm(progress or (None if options.quiet else _Lines()), processes=options.processes)
+    if not options.quiet:
+        print(f"every kernel is in {cache_folder()}", file=sys.stderr)
+
+
+def _warm_elsewhere(options: Options) -> None:
+    """Run the command again, where the compiler finds another CPU and another folder: it looks for them but once."""
+    command = [sys.executable, "-P", "-m", "engine", "warm", "--processes", str(options.processes)]
+    surroundings = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    if options.cpu:
+        surroundings |= {"NUMBA_CPU_NAME": options.cpu, "NUMBA_CPU_FEATURES": ""}
+    with TemporaryDirectory() as temporary:
+        archive = Path(options.into) if options.into and options.into.endswith(".tar.xz") else None
+        folder = Path(options.into) if options.into and archive is None else Path(temporary)
+        if options.into:
+            (archive.parent if archive else folder).mkdir(parents=True, exist_ok=True)
+            surroundings["ENGINE_CACHE_DIR"] = str(folder.resolve())
+            surroundings.pop("ENGINE_CACHE_SEED", None)
+        if subprocess.run([*command, *["--quiet"] * options.quiet], env=surroundings, check=False).returncode:
+            raise ValueError("not every kernel was compiled")
+        if options.into:
+            seal(folder, archive)
+
+
+class _Lines:
+    """Says in lines how much is done, where there is no bar."""
+
+    def __init__(self) -> None:
+        self._done = 0
+
+    def __call__(self, share: int) -> None:
+        self._done += share
+        print(f"kernels: {self._done} %", file=sys.stderr)
+
+
 @contextmanager
 def _bar(n_items: int, unit: str, options: Options) -> Iterator[Progress | None]:
     """Show a progress bar where someone looks at the standard error and tqdm is installed."""
@@ -183,6 +231,13 @@ def _parser() -> argparse.ArgumentParser:
     box = command("bounds", help="smallest box and smallest sphere of a solid")
     box.add_argument("solid")
     box.set_defaults(run=_bounds)
+
+    ready = commands.add_parser("warm", help="compile all kernels now, for this machine or to ship them")
+    ready.add_argument("--into", metavar="FOLDER", help="a folder or .tar.xz for ENGINE_CACHE_SEED of other machines")
+    ready.add_argument("--cpu", metavar="NAME", help="the oldest CPUs to run on: x86-64-v3; this one by default")
+    ready.add_argument("--processes", type=int, default=os.cpu_count() or 1, metavar="N", help="one a core by default")
+    ready.add_argument("-q", "--quiet", action="store_true", help="no progress bar")
+    ready.set_defaults(run=_warm)
     return parser
 
 

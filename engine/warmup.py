@@ -49,18 +49,19 @@ _lock = threading.Lock()
 def warm(progress: Callable[[int], object] | None = None, *, processes: int = 1) -> None:
     """Compile or load every kernel; the second call returns at once.
 
-    Takes some five minutes where nothing is cached, else a second or two. Safe to call from several threads (the others
-    wait) and processes (each compiles what it does not find). progress: called with 1 after each of `STEPS` steps.
-    processes: where nothing is cached, up to so many more are started that compile (some 400 MB each), and end.
+    Takes some minutes where nothing is cached, else a second or two; what is compiled is logged. Safe to call from
+    several threads (the others wait) and processes (each compiles what it does not find).
+    progress: called with hundredths of all the work as they are done, 100 in the end: ``tqdm(total=100).update`` fits.
+    processes: where nothing is cached, up to so many more are started that compile (up to 1 GB each), and end.
     """
     with _lock:
         if _is_warm.is_set():
             return
-        fill_cache(__name__, len(STEPS), processes)
-        for step in STEPS:
+        filled = fill_cache(__name__, SHARES, processes, progress)
+        for index, step in enumerate(STEPS):
             step()
-            if progress is not None:
-                progress(1)
+            if progress is not None and index not in filled:
+                progress(SHARES[index])
         note_full(__name__)
         _is_warm.set()
 
@@ -83,21 +84,27 @@ def _regions(dimension: int) -> list[Solid]:
     return [*simple, Polygon([[[0, 0], [4, 0], [1, 1], [0, 4]]]) if dimension == 2 else _cube()]
 
 
-def _warm_containment() -> None:
-    for dimension in (2, 3):
-        points = np.linspace(-0.5, 1.5, 12 * dimension).reshape(-1, dimension)
-        corners = np.vstack([np.zeros(dimension), np.eye(dimension)])[:3]
-        terms = Implicit([{"powers": [2] * dimension, "coefficient": 1.0}])
-        solids = [*_regions(dimension), Triangle(corners), terms]
-        poses: list[Pose | None] = [Pose(np.eye(dimension), np.full(dimension, 0.25))] * len(solids)
-        for solid in solids:
-            locate(points, solid)
-        locate_scene(points, solids, poses)
-        locate_scene(points, solids)
-        with Budget() as budget:  # what a scene asks of a single body, where its first pass is not sure
-            for solid, pose in zip(solids, poses):
-                posed_locator(solid, pose).fill(as_points(points, dimension), np.empty(len(points), np.int8), budget)
-    _warm_cells()
+def _warm_containment_2d() -> None:
+    _locate(2)
+
+
+def _warm_containment_3d() -> None:
+    _locate(3)
+
+
+def _locate(dimension: int) -> None:
+    points = np.linspace(-0.5, 1.5, 12 * dimension).reshape(-1, dimension)
+    corners = np.vstack([np.zeros(dimension), np.eye(dimension)])[:3]
+    terms = Implicit([{"powers": [2] * dimension, "coefficient": 1.0}])
+    solids = [*_regions(dimension), Triangle(corners), terms]
+    poses: list[Pose | None] = [Pose(np.eye(dimension), np.full(dimension, 0.25))] * len(solids)
+    for solid in solids:
+        locate(points, solid)
+    locate_scene(points, solids, poses)
+    locate_scene(points, solids)
+    with Budget() as budget:  # what a scene asks of a single body, where its first pass is not sure
+        for solid, pose in zip(solids, poses):
+            posed_locator(solid, pose).fill(as_points(points, dimension), np.empty(len(points), np.int8), budget)
 
 
 def _warm_cells() -> None:
@@ -126,20 +133,27 @@ def _warm_cells() -> None:
 
 def _warm_collision() -> None:
     turns, moves = np.broadcast_to(np.eye(3), (3, 3, 3)), np.array([[0.5, 0, 0], [1, 0, 0], [5, 0, 0]])
-    sheet = Surface([[0, 0, 0.5], [2, 0, 0.5], [0, 2, 0.5]], [[0, 1, 2]])
-    bodies: list[Solid] = [_cube(), sheet, Aabb([0, 0, 0], [1, 1, 1])]
+    bodies = _bodies()
     for first in bodies:
         collide_poses(first, bodies[0], turns, moves, witnesses=True)
         for other in (_cube(1.0), _cube(0.5), HalfSpace([1, 0, 0], -0.5), Sphere([0, 0, 0], 1)):
             collide(first, other)
     collide_poses(bodies[0], _cube(0.5), np.repeat(turns, 12, axis=0), np.repeat(moves, 12, axis=0))  # eight at a time
-    collide_scene(bodies)
+
+
+def _warm_scenes() -> None:
+    collide_scene(_bodies())
     collide_scene([Aabb([k, 0, 0], [k + 2, 1, 1]) for k in range(300)])  # many: their boxes go into a grid
     flat: list[Solid] = [Polygon([[[0, 0], [4, 0], [1, 1], [0, 4]]]), Triangle([[0, 0], [1, 0], [0, 1]])]
     collide_scene(flat)
     for dimension in (2, 3):
         corners = np.vstack([np.zeros(dimension), np.eye(dimension)])[None, :3]
         collide_triangles(corners, corners + 0.25)
+
+
+def _bodies() -> list[Solid]:
+    sheet = Surface([[0, 0, 0.5], [2, 0, 0.5], [0, 2, 0.5]], [[0, 1, 2]])
+    return [_cube(), sheet, Aabb([0, 0, 0], [1, 1, 1])]
 
 
 def _warm_clipping_2d() -> None:
@@ -164,6 +178,9 @@ def _clip(dimension: int) -> None:
 def _warm_overlay() -> None:
     first = Polygon([[[0, 0], [4, 0], [1, 1], [0, 4]]])
     overlay(first, Polygon([[[0.5, 0.3], [5, 1], [1, 5]]]))
+
+
+def _warm_overlay_rest() -> None:
     angles = np.linspace(0.0, 2.0 * np.pi, 2048, endpoint=False)
     circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     overlay(Polygon([circle]), Polygon([circle + 0.5]))  # large ones, of which few edges are looked at
@@ -179,5 +196,18 @@ def _warm_bounds() -> None:
                 bounds(solid)
 
 
-STEPS = (_warm_collision, _warm_clipping_2d, _warm_overlay, _warm_clipping_3d, _warm_containment, _warm_bounds)
-"""Parts of the work, long ones first; what several need is compiled by the first."""
+STEPS = (
+    _warm_collision,
+    _warm_overlay,
+    _warm_clipping_2d,
+    _warm_clipping_3d,
+    _warm_containment_3d,
+    _warm_overlay_rest,
+    _warm_scenes,
+    _warm_containment_2d,
+    _warm_cells,
+    _warm_bounds,
+)
+"""Parts of the work, long ones first; what several need is compiled by the first, or by a process each."""
+SHARES = (23, 23, 16, 9, 9, 5, 5, 5, 4, 1)
+"""How long each of `STEPS` takes, in hundredths of all."""

@@ -61,6 +61,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.state.memory = Memory(settings.request_bytes)
     app.state.metrics = Metrics()
     app.state.warm, app.state.warm_error = threading.Event(), None
+    app.state.warm_begin, app.state.warm_hundredths = time.perf_counter(), 0
     app.openapi = openapi_of(app, settings)  # type: ignore[method-assign]
     modules = (containment, collision, segments, polygons, overlay, bounds, solids, binary, health)
     for module in modules:
@@ -97,8 +98,12 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
 
 def _warm(app: FastAPI) -> None:
     before = time.perf_counter()
+
+    def note(share: int) -> None:
+        app.state.warm_hundredths += share
+
     try:
-        engine.warm(processes=os.cpu_count() or 1)
+        engine.warm(note, processes=os.cpu_count() or 1)
     except Exception as error:
         app.state.warm_error = f"warm-up failed: {error}; restart the service"
         log.exception("warm-up failed")

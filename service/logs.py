@@ -43,5 +43,5 @@ def config_of(level: str) -> dict[str, Any]:
         "disable_existing_loggers": False,
         "formatters": {"json": {"()": "service.logs.JsonFormatter"}},
         "handlers": {"stderr": {"class": "logging.StreamHandler", "formatter": "json"}},
-        "loggers": {"service": own, "uvicorn": own},
+        "loggers": {"engine": own, "service": own, "uvicorn": own},
     }

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from engine.cold_start import fill_cache
-from engine.warmup import STEPS
+from engine.warmup import SHARES
 
 ROOT = Path(__file__).resolve().parents[1]
 DATA = ROOT.parent / "shared" / "data"
@@ -32,7 +32,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 def pytest_collection_finish(session: pytest.Session) -> None:
     """Compile by every core before a run of the whole suite, where no kernel is cached yet."""
     if len(session.items) >= WHOLE_SUITE and not session.config.getoption("--collect-only"):
-        fill_cache("engine.warmup", len(STEPS), os.cpu_count() or 1)
+        fill_cache("engine.warmup", SHARES, os.cpu_count() or 1)
 
 
 @pytest.fixture(scope="session")

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import time
 from typing import Literal
 
 from fastapi import APIRouter
+from starlette.datastructures import State
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 
@@ -33,14 +35,19 @@ async def readyz(request: Request) -> Response:
     """Ready: every kernel is compiled and no shutdown has begun."""
     if request.app.state.warm.is_set():
         return _ok()
-    reason = request.app.state.warm_error or "kernels are being compiled or loaded; ask again in a second"
-    return problem([Fault((), "not_ready", reason)])
+    return problem([Fault((), "not_ready", request.app.state.warm_error or _how_far(request.app.state))])
 
 
 @router.get("/metrics", operation_id="metrics", response_class=PlainTextResponse)
 async def metrics(request: Request) -> Response:
     """Requests and phases counted by this process, in the text format of Prometheus."""
     return PlainTextResponse(request.app.state.metrics.text(), media_type="text/plain; version=0.0.4")
+
+
+def _how_far(state: State) -> str:
+    seconds, done = time.perf_counter() - state.warm_begin, state.warm_hundredths
+    left = f", some {seconds * (100 - done) / done:.0f} s are left" if done else ""
+    return f"kernels are being compiled or loaded, {done} % after {seconds:.0f} s{left}; ask again in a second"
 
 
 def _ok() -> Response:

@@ -1,7 +1,7 @@
 """The Dockerfile keeps its promises, and its steps work: run by hand in a temporary folder, since no image is built.
 
 The slow part (marker `full`) needs a package index: it installs the service as the image does, fills the kernel cache,
-starts the command of the image with the cache's seed, and sees that nothing is compiled again.
+starts the command of the image with that as its seed, and sees that nothing is compiled again.
 """
 
 from __future__ import annotations
@@ -47,11 +47,12 @@ def commands(stage: list[Step]) -> tuple[str, str]:
     return steps["CMD"], steps["HEALTHCHECK"].partition("CMD ")[2]
 
 
-def test_build_and_run_name_the_same_cpu() -> None:
-    build, run = map(environment, stages())
-    for name in ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES"):
-        assert build[name] == run[name]
-    assert run["NUMBA_CPU_NAME"] == "x86-64-v3"
+def test_the_kernels_that_are_built_are_the_seed_of_the_service() -> None:
+    build, run = stages()
+    (command,) = [rest for word, rest in build if word == "RUN" and "engine warm" in rest]
+    assert f"--into {environment(run)['ENGINE_CACHE_SEED']} --cpu $CPU" in command
+    assert ("ARG", "CPU=x86-64-v3") in build
+    assert not any(name.startswith("NUMBA_") for name in environment(run))
 
 
 def test_image_is_small_and_not_root() -> None:
@@ -90,13 +91,13 @@ def test_steps_build_a_service_that_starts_without_compiling(tmp_path: Path) -> 
                 else:
                     shutil.copy(ROOT / name, tmp_path / "src")
         elif word == "RUN":
-            surroundings = {**plain, **environment(build), "HOME": str(tmp_path / "tmp")}
+            arguments = dict(rest.split("=", 1) for word, rest in build if word == "ARG")
+            surroundings = {**plain, **environment(build), **arguments, "HOME": str(tmp_path / "tmp")}
             subprocess.run(["sh", "-c", moved(rest)], cwd=tmp_path / "src", env=surroundings, check=True, timeout=900)
 
     shutil.rmtree(tmp_path / "src")
     seed = tmp_path / "opt/exact-geometry/kernels"
-    kernels = sorted(path.relative_to(seed) for path in seed.rglob("*.nbc"))
-    assert kernels
+    assert list(seed.rglob("*.nbc"))
     for path in (tmp_path / "opt").rglob("*"):  # the image's root is read-only
         if not path.is_symlink():
             path.chmod(0o555 if path.is_dir() or os.access(path, os.X_OK) else 0o444)
@@ -110,8 +111,7 @@ def test_steps_build_a_service_that_starts_without_compiling(tmp_path: Path) -> 
             assert service.poll() is None
         with urllib.request.urlopen("http://127.0.0.1:18765/docs", timeout=5) as answer:
             assert answer.status == 200
-        copied = tmp_path / "tmp/kernels"
-        assert sorted(path.relative_to(copied) for path in copied.rglob("*.nbc")) == kernels
+        assert not list((tmp_path / "tmp/kernels").rglob("*.nbc"))  # nothing was compiled
     finally:
         service.terminate()
         assert service.wait(30) == 0

@@ -5,20 +5,23 @@ from __future__ import annotations
 import importlib
 import os
 import pkgutil
+import shutil
 import stat
 import subprocess
 import sys
+import tarfile
 from pathlib import Path
 
 import pytest
 from numba import config as numba_config
 
 import engine
-from engine import jit
+from engine import jit, kernel_cache
 
 ROOT = Path(__file__).resolve().parents[2]
 pytestmark = pytest.mark.skipif(bool(numba_config.DISABLE_JIT), reason="the compiler is disabled")
 
+COMPILER = ("jit.py", "compiling.py", "kernel_cache.py")
 HELPER = """
 from engine.jit import inline
 
@@ -45,7 +48,8 @@ def project(tmp_path: Path) -> Path:
     """Return a small package named `engine` whose kernel calls a helper two imports away."""
     package = tmp_path / "project" / "engine"
     (package / "deep").mkdir(parents=True)
-    (package / "jit.py").write_text((ROOT / "engine" / "jit.py").read_text("utf-8"))
+    for name in COMPILER:
+        (package / name).write_text((ROOT / "engine" / name).read_text("utf-8"))
     for folder in (package, package / "deep"):
         (folder / "__init__.py").write_text("")
     (package / "deep" / "helper.py").write_text(HELPER.format(step=1.0))
@@ -86,11 +90,13 @@ def test_a_changed_helper_elsewhere_is_noticed(project: Path) -> None:
 
 def test_the_digest_covers_what_is_imported_and_nothing_else(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def digests() -> tuple[str, str]:
-        jit._source.cache_clear()
-        jit._source_hash.cache_clear()
-        return jit.source_digest.__wrapped__("engine.work"), jit.source_digest.__wrapped__("engine.deep.helper")
+        kernel_cache._source.cache_clear()
+        kernel_cache._source_hash.cache_clear()
+        return kernel_cache.source_digest.__wrapped__("engine.work"), kernel_cache.source_digest.__wrapped__(
+            "engine.deep.helper"
+        )
 
-    monkeypatch.setattr(jit, "_ROOT", project / "engine")
+    monkeypatch.setattr(kernel_cache, "_ROOT", project / "engine")
     before = digests()
     (project / "engine" / "other.py").write_text("x = 1\n")
     assert digests() == before
@@ -102,12 +108,12 @@ def test_the_digest_covers_what_is_imported_and_nothing_else(project: Path, monk
     last = digests()
     assert last[0] != after[0]
     assert last[1] != after[1]
-    jit._source.cache_clear()
-    jit._source_hash.cache_clear()
+    kernel_cache._source.cache_clear()
+    kernel_cache._source_hash.cache_clear()
 
 
 def test_every_import_form_is_read() -> None:
-    found = jit.imported_modules("engine.predicates.orientation")
+    found = kernel_cache.imported_modules("engine.predicates.orientation")
     assert {"engine.jit", "engine.types", "engine.predicates.expansion", "engine.predicates.error_free"} <= found
     assert "engine" not in found
 
@@ -128,28 +134,114 @@ def test_without_any_writable_place_it_runs_uncached(project: Path) -> None:
     blocked.write_text("")
     code = (
         f"import tempfile; tempfile.tempdir = {str(blocked)!r}\n"
-        "from engine.work import run; from engine.jit import cache_folder; print(run(1.0), cache_folder())"
+        "from engine.work import run; from engine.kernel_cache import cache_folder; print(run(1.0), cache_folder())"
     )
     assert run(project, code, HOME=str(blocked), ENGINE_CACHE_DIR=str(blocked)) == ["2.0", "None"]
 
 
 def test_a_folder_of_another_user_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert jit._is_writable(tmp_path / "own")
+    assert kernel_cache._is_writable(tmp_path / "own")
     assert stat.S_IMODE((tmp_path / "own").stat().st_mode) == 0o700
     monkeypatch.setattr(os, "getuid", lambda: (tmp_path / "own").stat().st_uid + 1)
-    assert not jit._is_writable(tmp_path / "own")
+    assert not kernel_cache._is_writable(tmp_path / "own")
 
 
-def test_a_seed_is_copied_and_used(project: Path) -> None:
-    seed, cache = project / "seed", project / "cache"
-    assert run(project, ENGINE_CACHE_DIR=str(seed))[1] == "0"
+@pytest.fixture
+def seed(project: Path) -> Path:
+    """Return a seed of the project, made for a family of CPUs."""
+    folder = project / "seed"
+    family = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
+    assert run(project, ENGINE_CACHE_DIR=str(folder), **family)[1] == "0"
+    more = "from pathlib import Path; from engine.kernel_cache import seal; seal(Path({0!r}), Path({0!r} + '.tar.xz'))"
+    run(project, more.format(str(folder)))
+    return folder
+
+
+def started(project: Path, seed: Path, **more: str) -> tuple[list[str], str]:
+    """Return the words of a process that has an empty cache and this seed, and its log."""
+    cache = {"ENGINE_CACHE_DIR": str(project / "cache"), "ENGINE_CACHE_SEED": str(seed), **more}
+    process = start(project, f"import logging; logging.basicConfig(); {USE}", **cache)
+    output, errors = process.communicate(timeout=120)
+    assert process.returncode == 0, errors
+    return output.split(), errors
+
+
+@pytest.mark.parametrize("kind", ["folder", "archive"])
+def test_a_seed_of_the_family_is_used_by_each_of_its_cpus(project: Path, seed: Path, kind: str) -> None:
     for path in [seed, *seed.rglob("*")]:
         path.chmod(0o555 if path.is_dir() else 0o444)
-    words = run(project, ENGINE_CACHE_DIR=str(cache), ENGINE_CACHE_SEED=str(seed))
-    assert words[:2] == ["2.0", "1"]
-    assert words[2].startswith(str(cache))
-    (project / "engine" / "deep" / "helper.py").write_text(HELPER.format(step=3.0))  # a read-only seed stays writable
-    assert run(project, ENGINE_CACHE_DIR=str(cache), ENGINE_CACHE_SEED=str(seed))[:2] == ["4.0", "0"]
+    named = seed if kind == "folder" else Path(f"{seed}.tar.xz")
+    assert started(project, named)[0][:2] == ["2.0", "1"]
+    elsewhere = project / "elsewhere"  # the same sources in another folder: another machine
+    shutil.copytree(project / "engine", elsewhere / "engine")
+    assert started(project, named, PYTHONPATH=str(elsewhere))[0][:2] == ["2.0", "1"]
+    pinned = {"NUMBA_CPU_NAME": "x86-64-v2", "NUMBA_CPU_FEATURES": "", "ENGINE_CACHE_DIR": str(project / "pinned")}
+    assert started(project, named, **pinned)[0][:2] == ["2.0", "0"]  # asked for by name: not what others are given
+    (project / "engine" / "deep" / "helper.py").write_text(HELPER.format(step=3.0))
+    assert started(project, named)[0][:2] == ["4.0", "0"]
+
+
+@pytest.mark.parametrize("kind", ["code", "index", "list", "others", "tools", "names", "archive", "intruder", "absent"])
+def test_a_seed_that_is_not_as_it_was_made_is_not_run(project: Path, seed: Path, kind: str) -> None:
+    written = seed / "MANIFEST.json"
+    named = seed
+    match kind:
+        case "code" | "index":
+            (file,) = seed.rglob("*.nbc" if kind == "code" else "*.nbi")
+            content = bytearray(file.read_bytes())
+            content[-20] ^= 1
+            file.write_bytes(content)
+        case "list":
+            written.write_text(written.read_text()[:-30])
+        case "others":
+            seed.chmod(0o777)
+        case "tools":
+            written.write_text(written.read_text().replace("numba 0", "numba 1"))
+        case "names":
+            written.write_text(written.read_text().replace(".nbc", ".py"))
+        case "archive":
+            named = Path(f"{seed}.tar.xz")
+            named.write_bytes(named.read_bytes()[:-200])
+        case "intruder":
+            named = Path(f"{seed}.tar.xz")
+            with tarfile.open(named, "w:xz") as tar:
+                tar.add(written, "../MANIFEST.json")
+        case "absent":
+            named = project / "nowhere"
+    words, logged = started(project, named)
+    assert words[:2] == ["2.0", "0"]
+    assert "not used" in logged
+
+
+@pytest.mark.parametrize("option", ["NUMBA_OPT=1", "NUMBA_SLP_VECTORIZE=1", "NUMBA_LOOP_VECTORIZE=0"])
+def test_code_of_another_option_is_not_taken(project: Path, option: str) -> None:
+    cache = {"ENGINE_CACHE_DIR": str(project / "cache")}
+    assert run(project, **cache)[1] == "0"
+    name, _, value = option.partition("=")
+    assert run(project, **cache, **{name: value})[1] == "0"
+    assert run(project, **cache)[1] == "1"
+
+
+def test_where_numba_lacks_a_name_kernels_are_compiled_without_a_cache(project: Path) -> None:
+    lacking = "import numba.core.caching as c; del c.UserProvidedCacheLocator\n"
+    process = start(project, f"{lacking}{USE}", ENGINE_CACHE_DIR=str(project / "cache"))
+    output, errors = process.communicate(timeout=120)
+    assert output.split()[:2] == ["2.0", "0"]
+    assert "UserProvidedCacheLocator" in errors
+    assert not list((project / "cache").rglob("*.nbc"))
+
+
+def test_a_kernel_whose_code_cannot_be_kept_answers(project: Path) -> None:
+    full = "import tempfile, engine.compiling as c\ndef full(*a, **k): raise OSError(28, 'no space left on device')\n"
+    full += "c._CacheFile._save_data = full; c._Locator.ensure_cache_path = full\n"
+    assert run(project, f"{full}{USE}", ENGINE_CACHE_DIR=str(project / "cache"))[:2] == ["2.0", "0"]
+
+
+def test_inner_functions_are_compiled_once_for_all_literals(project: Path) -> None:
+    (project / "engine" / "work.py").write_text(KERNEL.format(middle="middle").replace("step(x)", "step(1) + step(x)"))
+    count = "from engine.deep.helper import step; print(len(step._dispatcher.overloads))"
+    code = f"from engine.work import run; run(2); {count}"
+    assert run(project, code, ENGINE_CACHE_DIR=str(project / "cache")) == ["1"]
 
 
 def test_processes_that_fill_one_cache_together(project: Path) -> None:

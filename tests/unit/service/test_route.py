@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import re
 import time
 from collections.abc import AsyncIterator
 from typing import Any
@@ -214,7 +215,10 @@ async def test_what_nobody_expected_is_a_problem_too(
 async def test_requests_before_the_kernels_are_warm_are_answered(app: FastAPI, anyio_backend: str) -> None:
     async with client_of(app) as client:
         app.state.warm.clear()
-        check_problem(await client.get("/readyz"), 503, "not_ready")
+        app.state.warm_hundredths = 50
+        answer = await client.get("/readyz")
+        check_problem(answer, 503, "not_ready")
+        assert re.search(r"50 % after \d+ s, some \d+ s are left", answer.text)
         assert (await client.get("/healthz")).json() == {"status": "ok"}
         assert (await client.post("/v1/solids", json=SPHERE)).status_code == 201
         app.state.warm.set()

@@ -1,0 +1,341 @@
+"""All that the engine takes from numba's inside; where a name is missing, importing this file fails and says which.
+
+How kernels and inner functions are written (`KernelCompiler`, `InnerCompiler`, `CalledCompiler`, `InnerDispatcher`),
+how kernels are kept on disk (`KernelCache`), and for which CPUs.
+"""
+
+from __future__ import annotations
+
+import copy
+import functools
+import hashlib
+import sys
+import uuid
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Final
+
+import llvmlite.binding
+import numba
+from numba import config as numba_config
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile, UserProvidedCacheLocator
+from numba.core.codegen import JITCodeLibrary, JITCPUCodegen, get_host_cpu_features
+from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder, compile_result
+from numba.core.compiler_machinery import register_pass
+from numba.core.environment import lookup_environment
+from numba.core.lowering import Lower
+from numba.core.registry import CPUDispatcher
+from numba.core.runtime import rtsys
+from numba.core.typed_passes import NativeLowering
+from numba.core.types.misc import unliteral
+
+from engine.kernel_cache import COMPLETE, Seed, source_digest
+
+_ASKED_FOR = {
+    JITCodeLibrary: ("_optimize_final_module", "_finalize_final_module", "_finalize_dynamic_globals"),
+    JITCodeLibrary.__mro__[1]: ("_set_compiled_object", "enable_object_caching"),
+    JITCPUCodegen: ("set_env", "create_library", "magic_tuple", "_library_class"),
+    FunctionCache: ("_index_key", "_save_overload", "enable"),
+    IndexDataCacheFile: ("_load_index", "_save_index", "_load_data", "_save_data"),
+    CompileResultCacheImpl: ("reduce", "rebuild", "get_filename_base"),
+    CPUDispatcher: ("get_call_template",),
+    Lower: ("setup_function",),
+    NativeLowering: ("run_pass", "lowering_class"),
+}
+for _owner, _names in _ASKED_FOR.items():
+    for _name in _names:
+        if not hasattr(_owner, _name):
+            raise ImportError(f"numba {numba.__version__} has no {_owner.__name__}.{_name}")
+
+_V2 = ("cx16", "popcnt", "sse3", "sse4.1", "sse4.2", "ssse3")
+_V3 = (*_V2, "avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
+_V4 = (*_V3, "avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl")
+BASELINES: Final = {"x86-64-v4": _V4, "x86-64-v3": _V3, "x86-64-v2": _V2, "generic": ()}
+"""Families of CPUs whose kernels a host may take, and what it must be able to do for that."""
+
+
+@functools.cache
+def cpus() -> list[tuple[str, str]]:
+    """Return the CPUs whose kernels are taken, as numba names them (name, features): the one compiled for first.
+
+    That alone where ``NUMBA_CPU_NAME`` names it, else the families that the host is of too.
+    """
+    name, features = numba_config.CPU_NAME, numba_config.CPU_FEATURES
+    own = (
+        llvmlite.binding.get_host_cpu_name() if name is None else name,
+        get_host_cpu_features() if features is None else features,
+    )
+    if name is not None:
+        return [own]
+    able = llvmlite.binding.get_host_cpu_features()
+    return [own, *((family, "") for family, needed in BASELINES.items() if all(map(able.get, needed)))]
+
+
+def signs() -> list[str]:
+    """Return the names of the empty files that say that all is compiled for each of `cpus`."""
+    return [f"{COMPLETE}-{name}-{hashlib.sha256(features.encode()).hexdigest()[:8]}" for name, features in cpus()]
+
+
+class _InnerLibrary(JITCodeLibrary):  # type: ignore[misc] # numba carries no types
+    """Code of a function that only compiled code calls: linked into its callers, which are optimised as a whole.
+
+    Neither what numba does to a whole library, half of the compiler's time, nor machine code: both would be thrown
+    away. Each function by itself is simplified as ever, before it is linked.
+    """
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+
+class _InnerCodegen(JITCPUCodegen):  # type: ignore[misc]
+    """numba's own generator of code, all of its state shared, but for the kind of library that it makes."""
+
+    _library_class = _InnerLibrary
+
+    def __init__(self, shared: JITCPUCodegen) -> None:
+        self.__dict__.update(vars(shared))
+
+    def set_env(self, env_name: str, env: Any) -> None:
+        """Leave that to the kernels: inner code stands nowhere that could be told of its constants."""
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _KernelLowering(NativeLowering):  # type: ignore[misc]
+    """Writes a kernel; what numba itself compiles to be called from there becomes inner libraries."""
+
+    _name = "engine_kernel_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        context, codegen = state.targetctx, state.targetctx.codegen()
+        state.library = self._library(state.func_id.func_qualname, codegen)
+        state.targetctx = copy.copy(context)
+        state.targetctx._internal_codegen = _InnerCodegen(codegen)
+        done: bool = super().run_pass(state)
+        state.targetctx = context
+        self._set_constants(state.library)
+        return done
+
+    def _library(self, name: str, codegen: JITCPUCodegen) -> JITCodeLibrary:
+        library = codegen.create_library(name)
+        library.enable_object_caching()
+        return library
+
+    def _set_constants(self, library: JITCodeLibrary) -> None:
+        """Tell the machine code where the constants of all functions in it are."""
+        for name in [variable.name for variable in library._final_module.global_variables]:
+            if (environment := lookup_environment(name)) is not None:
+                library.codegen.set_env(name, environment)
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _InnerLowering(_KernelLowering):
+    _name = "engine_inner_lowering"
+
+    def _library(self, name: str, codegen: JITCPUCodegen) -> JITCodeLibrary:
+        return _InnerLibrary(_InnerCodegen(codegen), name)
+
+    def _set_constants(self, library: JITCodeLibrary) -> None:
+        pass
+
+
+class _CalledLower(Lower):  # type: ignore[misc]
+    """Writes a function that the compiler may not copy into its callers."""
+
+    def setup_function(self, fndesc: Any) -> None:
+        super().setup_function(fndesc)
+        self.function.attributes.add("noinline")
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _CalledLowering(_InnerLowering):
+    _name = "engine_called_lowering"
+
+    @property
+    def lowering_class(self) -> type[Lower]:
+        return _CalledLower
+
+
+class KernelCompiler(CompilerBase):  # type: ignore[misc]
+    """numba's own steps, but for how a function is written."""
+
+    lowering: type[NativeLowering] = _KernelLowering
+
+    def define_pipelines(self) -> list[Any]:
+        steps = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        steps.passes = [(self.lowering if step is NativeLowering else step, text) for step, text in steps.passes]
+        steps.finalize()
+        return [steps]
+
+
+class InnerCompiler(KernelCompiler):
+    lowering = _InnerLowering
+
+
+class CalledCompiler(KernelCompiler):
+    lowering = _CalledLowering
+
+
+class InnerDispatcher(CPUDispatcher):  # type: ignore[misc]
+    """Compiles a function once for ``int``, not again for each number that a caller spells out."""
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        plain = {name: unliteral(kind) for name, kind in kws.items()}
+        return super().get_call_template(tuple(map(unliteral, args)), plain)
+
+
+class _CacheFile(IndexDataCacheFile):  # type: ignore[misc] # numba carries no types
+    """numba's cache file, made safe between processes and for trouble with the disk.
+
+    numba numbers the data files of a function and writes the index first: two processes that compile two signatures at
+    once may end with an index that names the other's code, and a process killed in between leaves an index that names
+    old code. Here every data file has a name of its own and is complete before an index names it; what two processes
+    can lose is an entry of the index, which costs one more compilation. The folder is named by the sources, so the
+    time stamp of the file, which a copied checkout changes, is left out.
+    """
+
+    def save(self, key: object, data: object) -> None:
+        with suppress(OSError):  # disk full or read-only by now: the kernel is compiled, the call must not fail
+            name = self._data_name_pattern.format(number=uuid.uuid4().int)
+            self._save_data(name, data)
+            self._save_index({**self._load_index(), key: name})
+
+    def load(self, key: object) -> Any:
+        try:
+            return super().load(key)
+        except Exception:  # damaged in any way: compile anew
+            return None
+
+    def _load_index(self) -> dict[object, str]:
+        try:
+            index: dict[object, str] = super()._load_index()
+        except Exception:
+            return {}
+        return index
+
+
+class _SeedFile(_CacheFile):
+    """The same in a seed, which is read only as far as it is as it was written."""
+
+    def __init__(self, seed: Seed, folder: str, base: str) -> None:
+        super().__init__(str(seed.folder / folder), base, source_stamp=None)
+        self._seed, self._folder = seed, folder
+
+    @functools.cached_property
+    def _index(self) -> dict[object, str]:
+        return super()._load_index() if self._seed.holds(f"{self._folder}/{self._index_name}") else {}
+
+    def _load_index(self) -> dict[object, str]:
+        return self._index
+
+    def _load_data(self, name: str) -> Any:
+        return super()._load_data(name) if self._seed.holds(f"{self._folder}/{name}") else None
+
+
+class _Locator(UserProvidedCacheLocator):  # type: ignore[misc] # numba carries no types
+    """Names the folder and the file of one kernel; numba's own would look for a folder that can be written first."""
+
+    def __init__(self, function: Callable[..., Any], folder: Path) -> None:
+        self._py_file = function.__code__.co_filename
+        self._lineno = function.__code__.co_firstlineno
+        self._cache_path = str(folder / source_digest(function.__module__))
+
+
+class _Implementation(CompileResultCacheImpl):  # type: ignore[misc]
+    """How compiled code is written and read, at the place that `_Locator` names.
+
+    Machine code alone. numba puts the code from before the last steps of compiling beside it, for callers that are
+    compiled later, and parses that at each load: more than half of all loading. No compiled function calls a kernel (a
+    test looks), and should one, numba says that the kernel is unfit for linking. The constants of a function that has
+    none, and the annotated source, are left out too.
+    """
+
+    def __init__(self, function: Callable[..., Any], folder: Path) -> None:
+        self._lineno = function.__code__.co_firstlineno
+        self._locator = _Locator(function, folder)
+        name = f"{Path(function.__code__.co_filename).stem}.{function.__qualname__}"
+        self._filename_base = self.get_filename_base(name, getattr(sys, "abiflags", ""))
+
+    def reduce(self, result: CompileResult) -> Any:
+        """Return what is kept of a compiled kernel."""
+        (name, _, (code, _)), fndesc, environment, signature, *_, reload, constants = super().reduce(result)
+        constants = [item for item in constants if item.consts]
+        return name, code, fndesc, environment, signature, reload, constants
+
+    def rebuild(self, target_context: Any, payload: Any) -> CompileResult:
+        """Return the kernel of which `payload` is kept, ready to be called."""
+        name, code, fndesc, environment, signature, reload, constants = payload
+        for prepare in reload:
+            prepare()
+        codegen = target_context.codegen()
+        library = codegen.create_library(name)
+        library.enable_object_caching()
+        library._set_compiled_object(code)
+        library._finalize_final_module()
+        codegen._engine._defined_symbols |= {fndesc.llvm_func_name, fndesc.llvm_cpython_wrapper_name}
+        for item in constants:
+            codegen.set_env(item.env_name, item)
+        return compile_result(
+            target_context=target_context,
+            typing_context=target_context.typing_context,
+            library=library,
+            environment=environment,
+            entry_point=target_context.get_executable(library, fndesc, environment),
+            fndesc=fndesc,
+            signature=signature,
+            objectmode=False,
+            lifted=(),
+            reload_init=reload,
+            referenced_envs=constants,
+        )
+
+
+class KernelCache(FunctionCache):  # type: ignore[misc]
+    """The cache of one kernel, looked for at its first call: importing the engine reads no source but Python's."""
+
+    def __init__(self, function: Callable[..., Any], folder: Path, seed: Seed | None) -> None:
+        self._name, self._py_func, self._folder, self._seed = repr(function), function, folder, seed
+        self.enable()
+
+    @functools.cached_property
+    def _impl(self) -> _Implementation:
+        return _Implementation(self._py_func, self._folder)
+
+    @functools.cached_property
+    def _cache_path(self) -> str:
+        path: str = self._impl.locator.get_cache_path()
+        return path
+
+    @functools.cached_property
+    def _cache_file(self) -> _CacheFile:
+        return _CacheFile(self._cache_path, self._impl.filename_base, source_stamp=None)
+
+    @functools.cached_property
+    def _files(self) -> list[_CacheFile]:
+        seed = (
+            [] if self._seed is None else [_SeedFile(self._seed, Path(self._cache_path).name, self._impl.filename_base)]
+        )
+        return [self._cache_file, *seed]
+
+    def load_overload(self, signature: Any, target_context: Any) -> CompileResult | None:
+        """Return the kernel for `signature` and this CPU, else for a family that it is of; None if it is not there.
+
+        numba first brings in everything that it can compile, a third of a second; compiling does that by itself.
+        """
+        rtsys.initialize(target_context)
+        types, (triple, *_), code = self._index_key(signature, target_context.codegen())
+        for cpu in cpus():
+            for file in self._files:
+                data = file.load((types, (triple, *cpu), code))
+                if data is not None:
+                    return self._impl.rebuild(target_context, data)
+        return None
+
+    def save_overload(self, signature: Any, data: Any) -> None:
+        """Keep a kernel; on a disk that is full or read-only by now it is compiled, and the call must not fail."""
+        with suppress(OSError):
+            super().save_overload(signature, data)
