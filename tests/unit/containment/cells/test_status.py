@@ -21,6 +21,7 @@ def test_each_empty_cell_is_joined_with_its_copy_by_empty_cells() -> None:
             first, second = np.moveaxis(cube, axis, 0)[:-1], np.moveaxis(cube, axis, 0)[1:]
             both = np.moveaxis(empty, axis, 0)[:-1] & np.moveaxis(empty, axis, 0)[1:]
             least = np.minimum(first, second)
-            first[both], second[both] = least[both], least[both]
+            first[both] = least[both]
+            second[both] = np.minimum(second, least)[both]
     assert (group[labels] == group).all()
     assert (counts[labels[counts == 0]] == 0).all()
