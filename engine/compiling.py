@@ -33,7 +33,7 @@ from numba.core.types.misc import unliteral
 from engine.kernel_cache import COMPLETE, Seed, source_digest
 
 _ASKED_FOR = {
-    JITCodeLibrary: ("_optimize_final_module", "_finalize_final_module", "_finalize_dynamic_globals"),
+    JITCodeLibrary: ("_finalize_final_module", "_finalize_dynamic_globals"),
     JITCodeLibrary.__mro__[1]: ("_set_compiled_object", "enable_object_caching"),
     JITCPUCodegen: ("set_env", "create_library", "magic_tuple", "_library_class"),
     FunctionCache: ("_index_key", "_save_overload", "enable"),
@@ -78,14 +78,11 @@ def signs() -> list[str]:
 
 
 class _InnerLibrary(JITCodeLibrary):  # type: ignore[misc] # numba carries no types
-    """Code of a function that only compiled code calls: linked into its callers, which are optimised as a whole.
+    """Code of a function that only compiled code calls: linked into its callers, without machine code of its own.
 
-    Neither what numba does to a whole library, half of the compiler's time, nor machine code: both would be thrown
-    away. Each function by itself is simplified as ever, before it is linked.
+    It is optimised before it is linked, and again within each caller. To leave out the first of these spares a tenth of
+    all compiling, and `decide_on_rows` took 35 ns a segment instead of 26.
     """
-
-    def _optimize_final_module(self) -> None:
-        pass
 
     def _finalize_final_module(self) -> None:
         self._finalize_dynamic_globals()

@@ -103,7 +103,7 @@ def _warm(app: FastAPI) -> None:
         app.state.warm_hundredths += share
 
     try:
-        engine.warm(note, processes=os.cpu_count() or 1)
+        engine.warm(progress=note, processes=os.cpu_count() or 1)
     except Exception as error:
         app.state.warm_error = f"warm-up failed: {error}; restart the service"
         log.exception("warm-up failed")

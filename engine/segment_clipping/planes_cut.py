@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from engine.jit import bare_kernel, inline
+from engine.jit import bare_kernel, inline, merged
 from engine.predicates.cut_point import parameter_and_point, point_at
 from engine.predicates.double_double import U2, dd_add, dd_div
 from engine.predicates.error_free import two_prod, two_sum, workspace
@@ -62,7 +62,7 @@ def cut_by_signs(row: Any, segment: Any, point: Any) -> tuple[float, bool]:
     return parameter_and_point(segment, wp, n_wp, wq, n_wq, -1, 0.0, point, e)
 
 
-@inline
+@merged
 def cut_by_values(p: Triple, q: Triple, sp: Triple, sq: Triple) -> tuple[float, float, float, float, bool]:
     """Return where p q crosses a plane that has these values there, t, and whether all is surely nearest."""
     th, tl, slack, sure = parameter_of(sp, sq)

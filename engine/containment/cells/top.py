@@ -23,7 +23,7 @@ MOST_FACES: Final = 1 << 14
 """Of a solid whose level 0 serves scenes: for a larger one all levels are better."""
 _PAYS_FROM: Final = 1 << 10
 _PAYS_PER_FACE: Final = 2
-_WANTED: Final = 3.0
+_WANTED: Final = 4.0
 """Cells along an axis for each triangle along an edge of a cube, and at most."""
 _MOST_CELLS: Final = 64.0
 _RANGE: Final = 2.0**400
