@@ -29,8 +29,6 @@ from engine.types import OPEN
 
 ROUGH_BOUND: Final = 32.0 * 2.0**-53
 """Doubles: differences, products and three sums, each term at most (1 + u)^8, squared terms (1 + u)^14."""
-SUM_BOUND: Final = 32.0 * U2
-"""A sum of at most four products of double-doubles: 5 u^2 for a product, 4 u^2 for each of four sums."""
 DISCRIMINANT_BOUND: Final = 96.0 * U2
 """D: A r^2 carries 42 u^2; a squared component of the cross product 2 * 9 + 5 u^2 of (|d_i f_j| + |d_j f_i|)^2."""
 TINY: Final = 2.0**-960
