@@ -9,17 +9,14 @@ from __future__ import annotations
 import copy
 import functools
 import hashlib
-import sys
-import uuid
+import pickle
 from collections.abc import Callable
-from contextlib import suppress
-from pathlib import Path
 from typing import Any, Final
 
 import llvmlite.binding
 import numba
 from numba import config as numba_config
-from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile, UserProvidedCacheLocator
+from numba.core.caching import NullCache
 from numba.core.codegen import JITCodeLibrary, JITCPUCodegen, get_host_cpu_features
 from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder, compile_result
 from numba.core.compiler_machinery import register_pass
@@ -27,18 +24,18 @@ from numba.core.environment import lookup_environment
 from numba.core.lowering import Lower
 from numba.core.registry import CPUDispatcher
 from numba.core.runtime import rtsys
+from numba.core.serialize import dumps
 from numba.core.typed_passes import NativeLowering
 from numba.core.types.misc import unliteral
 
-from engine.kernel_cache import COMPLETE, Seed, source_digest
+from engine.kernel_cache import COMPLETE, cache_folder, keep, kept, source_digest
 
 _ASKED_FOR = {
     JITCodeLibrary: ("_finalize_final_module", "_finalize_dynamic_globals"),
     JITCodeLibrary.__mro__[1]: ("_set_compiled_object", "enable_object_caching"),
-    JITCPUCodegen: ("set_env", "create_library", "magic_tuple", "_library_class"),
-    FunctionCache: ("_index_key", "_save_overload", "enable"),
-    IndexDataCacheFile: ("_load_index", "_save_index", "_load_data", "_save_data"),
-    CompileResultCacheImpl: ("reduce", "rebuild", "get_filename_base"),
+    JITCPUCodegen: ("set_env", "create_library", "_library_class"),
+    NullCache: ("load_overload", "save_overload"),
+    CompileResult: ("_reduce",),
     CPUDispatcher: ("get_call_template",),
     Lower: ("setup_function",),
     NativeLowering: ("run_pass", "lowering_class"),
@@ -185,154 +182,69 @@ class InnerDispatcher(CPUDispatcher):  # type: ignore[misc]
         return super().get_call_template(tuple(map(unliteral, args)), plain)
 
 
-class _CacheFile(IndexDataCacheFile):  # type: ignore[misc] # numba carries no types
-    """numba's cache file, made safe between processes and for trouble with the disk.
-
-    numba numbers the data files of a function and writes the index first: two processes that compile two signatures at
-    once may end with an index that names the other's code, and a process killed in between leaves an index that names
-    old code. Here every data file has a name of its own and is complete before an index names it; what two processes
-    can lose is an entry of the index, which costs one more compilation. The folder is named by the sources, so the
-    time stamp of the file, which a copied checkout changes, is left out.
-    """
-
-    def save(self, key: object, data: object) -> None:
-        with suppress(OSError):  # disk full or read-only by now: the kernel is compiled, the call must not fail
-            name = self._data_name_pattern.format(number=uuid.uuid4().int)
-            self._save_data(name, data)
-            self._save_index({**self._load_index(), key: name})
-
-    def load(self, key: object) -> Any:
-        try:
-            return super().load(key)
-        except Exception:  # damaged in any way: compile anew
-            return None
-
-    def _load_index(self) -> dict[object, str]:
-        try:
-            index: dict[object, str] = super()._load_index()
-        except Exception:
-            return {}
-        return index
-
-
-class _SeedFile(_CacheFile):
-    """The same in a seed, which is read only as far as it is as it was written."""
-
-    def __init__(self, seed: Seed, folder: str, base: str) -> None:
-        super().__init__(str(seed.folder / folder), base, source_stamp=None)
-        self._seed, self._folder = seed, folder
-
-    @functools.cached_property
-    def _index(self) -> dict[object, str]:
-        return super()._load_index() if self._seed.holds(f"{self._folder}/{self._index_name}") else {}
-
-    def _load_index(self) -> dict[object, str]:
-        return self._index
-
-    def _load_data(self, name: str) -> Any:
-        return super()._load_data(name) if self._seed.holds(f"{self._folder}/{name}") else None
-
-
-class _Locator(UserProvidedCacheLocator):  # type: ignore[misc] # numba carries no types
-    """Names the folder and the file of one kernel; numba's own would look for a folder that can be written first."""
-
-    def __init__(self, function: Callable[..., Any], folder: Path) -> None:
-        self._py_file = function.__code__.co_filename
-        self._lineno = function.__code__.co_firstlineno
-        self._cache_path = str(folder / source_digest(function.__module__))
-
-
-class _Implementation(CompileResultCacheImpl):  # type: ignore[misc]
-    """How compiled code is written and read, at the place that `_Locator` names.
+class KernelCache(NullCache):  # type: ignore[misc]
+    """What one kernel was compiled to: a file for each kind of arguments and CPU.
 
     Machine code alone. numba puts the code from before the last steps of compiling beside it, for callers that are
     compiled later, and parses that at each load: more than half of all loading. No compiled function calls a kernel (a
     test looks), and should one, numba says that the kernel is unfit for linking. The constants of a function that has
-    none, and the annotated source, are left out too.
+    none, and the annotated source, are left out too. numba's own files (an index, numbered data, both named by times of
+    sources) may end with another's code where two processes write, or one is killed.
     """
 
-    def __init__(self, function: Callable[..., Any], folder: Path) -> None:
-        self._lineno = function.__code__.co_firstlineno
-        self._locator = _Locator(function, folder)
-        name = f"{Path(function.__code__.co_filename).stem}.{function.__qualname__}"
-        self._filename_base = self.get_filename_base(name, getattr(sys, "abiflags", ""))
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._function = function
 
-    def reduce(self, result: CompileResult) -> Any:
-        """Return what is kept of a compiled kernel."""
-        (name, _, (code, _)), fndesc, environment, signature, *_, reload, constants = super().reduce(result)
-        constants = [item for item in constants if item.consts]
-        return name, code, fndesc, environment, signature, reload, constants
+    @property
+    def cache_path(self) -> str:
+        return f"{cache_folder()}/{source_digest(self._function.__module__)}"
 
-    def rebuild(self, target_context: Any, payload: Any) -> CompileResult:
-        """Return the kernel of which `payload` is kept, ready to be called."""
-        name, code, fndesc, environment, signature, reload, constants = payload
-        for prepare in reload:
-            prepare()
-        codegen = target_context.codegen()
-        library = codegen.create_library(name)
-        library.enable_object_caching()
-        library._set_compiled_object(code)
-        library._finalize_final_module()
-        codegen._engine._defined_symbols |= {fndesc.llvm_func_name, fndesc.llvm_cpython_wrapper_name}
-        for item in constants:
-            codegen.set_env(item.env_name, item)
-        return compile_result(
-            target_context=target_context,
-            typing_context=target_context.typing_context,
-            library=library,
-            environment=environment,
-            entry_point=target_context.get_executable(library, fndesc, environment),
-            fndesc=fndesc,
-            signature=signature,
-            objectmode=False,
-            lifted=(),
-            reload_init=reload,
-            referenced_envs=constants,
-        )
+    def _name(self, types: Any, cpu: tuple[str, str]) -> str:
+        key = hashlib.sha256(repr((types, cpu)).encode()).hexdigest()[:20]
+        return f"{source_digest(self._function.__module__)}/{self._function.__qualname__}-{key}.nbc"
 
-
-class KernelCache(FunctionCache):  # type: ignore[misc]
-    """The cache of one kernel, looked for at its first call: importing the engine reads no source but Python's."""
-
-    def __init__(self, function: Callable[..., Any], folder: Path, seed: Seed | None) -> None:
-        self._name, self._py_func, self._folder, self._seed = repr(function), function, folder, seed
-        self.enable()
-
-    @functools.cached_property
-    def _impl(self) -> _Implementation:
-        return _Implementation(self._py_func, self._folder)
-
-    @functools.cached_property
-    def _cache_path(self) -> str:
-        path: str = self._impl.locator.get_cache_path()
-        return path
-
-    @functools.cached_property
-    def _cache_file(self) -> _CacheFile:
-        return _CacheFile(self._cache_path, self._impl.filename_base, source_stamp=None)
-
-    @functools.cached_property
-    def _files(self) -> list[_CacheFile]:
-        seed = (
-            [] if self._seed is None else [_SeedFile(self._seed, Path(self._cache_path).name, self._impl.filename_base)]
-        )
-        return [self._cache_file, *seed]
-
-    def load_overload(self, signature: Any, target_context: Any) -> CompileResult | None:
-        """Return the kernel for `signature` and this CPU, else for a family that it is of; None if it is not there.
+    def load_overload(self, types: Any, target_context: Any) -> CompileResult | None:
+        """Return the kernel for `types` and this CPU, else for a family that it is of; None if it is not there.
 
         numba first brings in everything that it can compile, a third of a second; compiling does that by itself.
         """
         rtsys.initialize(target_context)
-        types, (triple, *_), code = self._index_key(signature, target_context.codegen())
-        for cpu in cpus():
-            for file in self._files:
-                data = file.load((types, (triple, *cpu), code))
-                if data is not None:
-                    return self._impl.rebuild(target_context, data)
-        return None
+        contents = (kept(self._name(types, cpu)) for cpu in cpus())
+        return next((_rebuilt(target_context, *pickle.loads(content)) for content in contents if content), None)
 
-    def save_overload(self, signature: Any, data: Any) -> None:
-        """Keep a kernel; on a disk that is full or read-only by now it is compiled, and the call must not fail."""
-        with suppress(OSError):
-            super().save_overload(signature, data)
+    def save_overload(self, types: Any, result: CompileResult) -> None:
+        """Keep a kernel."""
+        if not result.library.has_dynamic_globals:
+            (name, _, (code, _)), fndesc, environment, signature, *_, reload, constants = result._reduce()
+            constants = [item for item in constants if item.consts]
+            content = dumps((name, code, fndesc, environment, signature, reload, constants))
+            keep(self._name(types, cpus()[0]), content)
+
+
+def _rebuilt(
+    context: Any, name: str, code: bytes, fndesc: Any, environment: Any, signature: Any, reload: Any, constants: Any
+) -> CompileResult:
+    """Return the kernel that was kept, ready to be called."""
+    for prepare in reload:
+        prepare()
+    codegen = context.codegen()
+    library = codegen.create_library(name)
+    library.enable_object_caching()
+    library._set_compiled_object(code)
+    library._finalize_final_module()
+    codegen._engine._defined_symbols |= {fndesc.llvm_func_name, fndesc.llvm_cpython_wrapper_name}
+    for item in constants:
+        codegen.set_env(item.env_name, item)
+    return compile_result(
+        target_context=context,
+        typing_context=context.typing_context,
+        library=library,
+        environment=environment,
+        entry_point=context.get_executable(library, fndesc, environment),
+        fndesc=fndesc,
+        signature=signature,
+        objectmode=False,
+        lifted=(),
+        reload_init=reload,
+        referenced_envs=constants,
+    )

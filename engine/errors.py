@@ -32,6 +32,7 @@ named first, for example ``("solid", "faces", 3)``. The message alone is enough 
 
 from __future__ import annotations
 
+import re
 from typing import ClassVar
 
 
@@ -39,6 +40,10 @@ class EngineError(Exception):
     """Base of every error the engine raises on purpose."""
 
     code: ClassVar[str] = "engine_error"
+
+    def __init_subclass__(cls) -> None:
+        """Name the code after the class: `NotClosedError` has ``not_closed``, `InvalidInputError` ``invalid_input``."""
+        cls.code = re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__.removesuffix("Error")).lower()
 
     def __init__(self, message: str, where: tuple[str | int, ...] = ()) -> None:
         super().__init__(message)
@@ -57,142 +62,94 @@ class EngineError(Exception):
 class InvalidInputError(EngineError, ValueError):
     """An argument breaks an invariant; `where` names the element."""
 
-    code: ClassVar[str] = "invalid_input"
-
 
 class InvalidArrayError(InvalidInputError):
     """Wrong type or shape."""
-
-    code: ClassVar[str] = "invalid_array"
 
 
 class WrongDimensionError(InvalidInputError):
     """2D and 3D mixed, or a dimension the operation does not have."""
 
-    code: ClassVar[str] = "wrong_dimension"
-
 
 class NotFiniteError(InvalidInputError):
     """NaN or infinity."""
-
-    code: ClassVar[str] = "not_finite"
 
 
 class EmptyGeometryError(InvalidInputError):
     """A solid without vertices, faces, planes, rings, terms or operands."""
 
-    code: ClassVar[str] = "empty_geometry"
-
 
 class IndexOutOfRangeError(InvalidInputError):
     """A face names a vertex that is not there."""
-
-    code: ClassVar[str] = "index_out_of_range"
 
 
 class RepeatedIndexError(InvalidInputError):
     """A face names one vertex twice."""
 
-    code: ClassVar[str] = "repeated_index"
-
 
 class NotClosedError(InvalidInputError):
     """An edge has a face on one side only."""
-
-    code: ClassVar[str] = "not_closed"
 
 
 class InconsistentOrientationError(InvalidInputError):
     """An edge is not used equally often in both directions."""
 
-    code: ClassVar[str] = "inconsistent_orientation"
-
 
 class FaceNotSimpleError(InvalidInputError):
     """A polygonal face has no triangulation by the stated rule."""
-
-    code: ClassVar[str] = "face_not_simple"
 
 
 class RingTooShortError(InvalidInputError):
     """A ring of fewer than three vertices."""
 
-    code: ClassVar[str] = "ring_too_short"
-
 
 class MinAboveMaxError(InvalidInputError):
     """A box with min > max on an axis."""
-
-    code: ClassVar[str] = "min_above_max"
 
 
 class NegativeRadiusError(InvalidInputError):
     """A sphere with a negative radius."""
 
-    code: ClassVar[str] = "negative_radius"
-
 
 class ZeroNormalError(InvalidInputError):
     """A plane whose normal is zero."""
-
-    code: ClassVar[str] = "zero_normal"
 
 
 class InvalidPolynomialError(InvalidInputError):
     """Powers, degree or number of terms out of bounds."""
 
-    code: ClassVar[str] = "invalid_polynomial"
-
 
 class InvalidOperationError(InvalidInputError):
     """An unknown Boolean operation or output mode."""
-
-    code: ClassVar[str] = "invalid_operation"
 
 
 class NotRigidError(InvalidInputError):
     """A pose whose matrix is no rotation."""
 
-    code: ClassVar[str] = "not_rigid"
-
 
 class TooDeepError(InvalidInputError):
     """A CSG tree deeper than the limit."""
-
-    code: ClassVar[str] = "too_deep"
 
 
 class UnsupportedSolidError(EngineError):
     """This operation does not take this solid; the message names those it takes."""
 
-    code: ClassVar[str] = "unsupported_solid"
-
 
 class UnsupportedPairError(EngineError):
     """Collision of these two is not defined; the message names what is."""
-
-    code: ClassVar[str] = "unsupported_pair"
 
 
 class NotRepresentableError(EngineError):
     """The exact result is no float64."""
 
-    code: ClassVar[str] = "not_representable"
-
 
 class TooComplexError(EngineError):
     """A stated cap on exact work was reached."""
-
-    code: ClassVar[str] = "too_complex"
 
 
 class DeadlineExceededError(EngineError, TimeoutError):
     """The call ran past its deadline; there is no partial answer."""
 
-    code: ClassVar[str] = "deadline_exceeded"
-
 
 class CancelledError(EngineError):
     """The caller gave up on the call."""
-
-    code: ClassVar[str] = "cancelled"

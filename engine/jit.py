@@ -20,8 +20,6 @@ from typing import Any
 import numba
 from numba import config as numba_config
 
-from engine.kernel_cache import cache_folder, seed
-
 _compiling: Any = None
 try:
     import engine.compiling as _compiling
@@ -57,9 +55,8 @@ class _Kernel:
     def dispatcher(self) -> Any:
         """What numba makes of it."""
         compiled = _compiled(self.py_func, **self._options)
-        folder = cache_folder()
-        if folder is not None and _compiling is not None:
-            compiled._cache = _compiling.KernelCache(self.py_func, folder, seed())
+        if _compiling is not None:
+            compiled._cache = _compiling.KernelCache(self.py_func)
         return compiled
 
     def __call__(self, *arguments: Any) -> Any:

@@ -12,9 +12,9 @@ written:
 Where none can be written, kernels are compiled anew in each process.
 
 **Seeds.** ``ENGINE_CACHE_SEED`` names a folder or a .tar.xz that ``python -m engine warm --into`` has written, maybe on
-another machine. What the cache lacks is looked up there, read in place and never written. A list in it holds the sha256
-of each file: one that differs is not read, nor is a seed that belongs to neither this user nor root, that any user
-can write, or that other tools made; a line in the log says so, and its kernels are compiled.
+another machine. What the cache lacks is looked up there, read in place and never written. Each file begins with the
+sha256 of the rest: one that differs is not run, nor one that belongs to neither this user nor root or that any user can
+write, nor a seed that other tools made; a line in the log says so, and its kernels are compiled.
 """
 
 from __future__ import annotations
@@ -22,7 +22,6 @@ from __future__ import annotations
 import functools
 import hashlib
 import importlib.metadata
-import json
 import logging
 import os
 import platform
@@ -32,7 +31,6 @@ import tempfile
 import uuid
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 
 import numba
@@ -44,8 +42,8 @@ COMPLETE = "complete"
 """How the name of the empty file begins that says that nothing is left to compile for a CPU (cold_start.py)."""
 
 _ROOT = Path(__file__).resolve().parent
-_LIST = "MANIFEST.json"
-_FILE = re.compile(rf"[0-9a-f]{{20}}/(?:[\w.<>-]+\.nb[ci]|{COMPLETE}[\w.-]*)")
+_MADE_BY = "MADE_BY"
+"""The file of a seed that says what `tools` made it."""
 _LARGEST_SEED = 1 << 28  # bytes, unpacked; all kernels for one CPU are 5 MB
 _OPTIONS = (
     *("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "LLVM_REFPRUNE_PASS", "LLVM_REFPRUNE_FLAGS", "DEBUGINFO_DEFAULT"),
@@ -58,28 +56,25 @@ _IMPORT = re.compile(
 )
 
 
-@functools.cache
-def _source(module: str) -> str | None:
-    """Return the source text of the dotted engine `module`, None if there is no such file."""
+def _file(module: str) -> Path | None:
+    """Return the source of the dotted engine `module`, None if there is no such file."""
     base = _folder(module)
-    for path in (base.with_suffix(".py"), base / "__init__.py"):
-        if module != "engine" and path.is_file():
-            return path.read_text("utf-8")
-    return None
+    found = (path for path in (base.with_suffix(".py"), base / "__init__.py") if path.is_file())
+    return None if module == "engine" else next(found, None)
 
 
 @functools.cache
-def imported_modules(module: str) -> set[str]:
-    """Return the engine modules that `module` names in its import lines (``engine/__init__`` is left out)."""
-    found: set[str] = set()
-    for match in _IMPORT.finditer(_source(module) or ""):
+def read_source(module: str) -> tuple[bytes, set[str]]:
+    """Return a hash of an engine module, and the engine modules that its import lines name, `engine` left out."""
+    path, named = _file(module), set()
+    text = "" if path is None else path.read_text("utf-8")
+    for match in _IMPORT.finditer(text):
         package = "engine" + (match[1] or match[3] or "")
-        candidates = [package]
+        named.add(package)
         if _folder(package).is_dir():
             names = re.findall(r"\w+", re.sub(r"#.*|\bas\s+\w+", "", match[2] or ""))
-            candidates += [f"{package}.{name}" for name in names]
-        found.update(name for name in candidates if _source(name) is not None)
-    return found
+            named.update(f"{package}.{name}" for name in names)
+    return hashlib.sha256(text.encode()).digest(), {name for name in named if _file(name) is not None}
 
 
 def _folder(module: str) -> Path:
@@ -104,16 +99,11 @@ def source_digest(module: str) -> str:
     while waiting:
         name = waiting.pop()
         reached.add(name)
-        waiting |= imported_modules(name) - reached
+        waiting |= read_source(name)[1] - reached
     digest = hashlib.sha256(tools().encode())
     for name in sorted(reached):
-        digest.update(f"\0{name}\0".encode() + _source_hash(name))
+        digest.update(f"\0{name}\0".encode() + read_source(name)[0])
     return digest.hexdigest()[:20]
-
-
-@functools.cache
-def _source_hash(module: str) -> bytes:
-    return hashlib.sha256(str(_source(module)).encode()).digest()
 
 
 def _is_writable(folder: Path) -> bool:
@@ -143,49 +133,52 @@ def cache_folder() -> Path | None:
     return next((folder for folder in _candidates() if _is_writable(folder)), None)
 
 
-@dataclass(frozen=True)
-class Seed:
-    """Kernels that were compiled elsewhere: a folder, and the sha256 of each of its files."""
+def keep(name: str, content: bytes) -> None:
+    """Write the file `name` of the cache, whole or not at all, its sha256 in front; not where the disk is full."""
+    folder = cache_folder()
+    if folder is None:
+        return
+    part = folder / f"{name}.{uuid.uuid4().hex}"
+    with suppress(OSError):
+        try:
+            part.parent.mkdir(mode=0o700, exist_ok=True)
+            part.write_bytes(hashlib.sha256(content).digest() + content)
+            part.replace(folder / name)
+        finally:
+            part.unlink(missing_ok=True)
 
-    folder: Path
-    files: dict[str, str]
 
-    def holds(self, name: str) -> bool:
-        """Tell whether there is a file of this name, as it was written."""
-        expected = self.files.get(name)
-        if expected is None:
-            return False
-        with suppress(OSError):
-            if hashlib.sha256((self.folder / name).read_bytes()).hexdigest() == expected:
-                return True
-        log.warning("%s in the kernel seed %s is damaged: not used", name, self.folder)
-        return False
+def kept(name: str) -> bytes | None:
+    """Return the file `name` of the cache, else that of the seed; None where neither has it as it was written."""
+    for folder in (cache_folder(), seed()):
+        if folder is not None and (folder / name).exists():
+            try:
+                _check_owner(folder / name)
+                written = (folder / name).read_bytes()
+                if hashlib.sha256(written[32:]).digest() == written[:32]:
+                    return written[32:]
+                raise ValueError("it is damaged")
+            except (OSError, ValueError) as error:
+                log.warning("%s in %s is not used: %s", name, folder, error)
+    return None
 
 
 @functools.cache
-def seed() -> Seed | None:
-    """Return what ``ENGINE_CACHE_SEED`` names, None where that is nothing or may not be used."""
+def seed() -> Path | None:
+    """Return the folder of what ``ENGINE_CACHE_SEED`` names, None where that is nothing or may not be used."""
     named = os.environ.get("ENGINE_CACHE_SEED")
     if not named:
         return None
     try:
-        return _opened(Path(named))
+        _check_owner(Path(named))
+        folder = Path(named) if Path(named).is_dir() else _unpacked(Path(named))
+        _check_owner(folder / _MADE_BY)
+        if (made_by := (folder / _MADE_BY).read_text("utf-8")) != tools():
+            raise ValueError(f"made by {made_by[:1000]}; here is {tools()}")
+        return folder
     except Exception as error:  # torn in any way
         log.warning("the kernel seed %s is not used: %s", named, error)
         return None
-
-
-def _opened(path: Path) -> Seed:
-    _check_owner(path)
-    folder = path if path.is_dir() else _unpacked(path)
-    _check_owner(folder / _LIST)
-    written = json.loads((folder / _LIST).read_text("utf-8"))
-    files = {str(name): str(value) for name, value in written["files"].items()}
-    if not all(map(_FILE.fullmatch, files)):
-        raise ValueError("its list names files that no seed has")
-    if written["tools"] != tools():
-        raise ValueError(f"made by {written['tools']}; here is {tools()}")
-    return Seed(folder, files)
 
 
 def _check_owner(path: Path) -> None:
@@ -207,34 +200,19 @@ def _unpacked(archive: Path) -> Path:
     if not target.exists():
         part = target.with_name(f"{target.name}.{uuid.uuid4().hex}")
         with tarfile.open(fileobj=io.BytesIO(content), mode="r:xz") as tar:
-            room = _LARGEST_SEED
-            for member in tar:
-                room -= member.size
-                stream = tar.extractfile(member) if member.name == _LIST or _FILE.fullmatch(member.name) else None
-                if stream is None or room < 0:
-                    raise ValueError(f"it holds {member.name}, {member.size} bytes")
-                (part / member.name).parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-                (part / member.name).write_bytes(stream.read())
+            if sum(member.size for member in tar.getmembers()) > _LARGEST_SEED:
+                raise ValueError("it is too large")
+            tar.extractall(part, filter="data")
         with suppress(OSError):  # another process was faster
             part.rename(target)
     return target
 
 
 def seal(folder: Path, archive: Path | None = None) -> None:
-    """Make a seed of `folder`, by a list of what is in it; write it to `archive` (.tar.xz) as well if that is named."""
-    found = {path.relative_to(folder).as_posix(): path for path in sorted(folder.glob("*/*"))}
-    files = {
-        name: hashlib.sha256(path.read_bytes()).hexdigest() for name, path in found.items() if _FILE.fullmatch(name)
-    }
-    part = folder / f"{_LIST}.{uuid.uuid4().hex}"
-    part.write_text(json.dumps({"tools": tools(), "files": files}, indent=1), "utf-8")
-    part.replace(folder / _LIST)
+    """Make a seed of `folder`, by a file that says what made it; write it to `archive` (.tar.xz) if that is named."""
+    (folder / _MADE_BY).write_text(tools(), "utf-8")
     if archive is not None:
         import tarfile
 
         with tarfile.open(archive, "w:xz") as tar:
-            for name in (_LIST, *files):
-                item = tarfile.TarInfo(name)
-                item.size = (folder / name).stat().st_size
-                with (folder / name).open("rb") as file:
-                    tar.addfile(item, file)
+            tar.add(folder, ".")
