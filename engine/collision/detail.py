@@ -19,12 +19,12 @@ from engine.collision.exact_images import image_half_space, image_point, value_a
 from engine.collision.meshes.live_faces import live_piece
 from engine.collision.meshes.mesh_arrays import mesh_body_of
 from engine.collision.meshes.mesh_detail import mesh_parts
-from engine.collision.pairs import MESHES, OUTLINES
+from engine.collision.pairs import BODIES, MESHES, OUTLINES
 from engine.collision.planar.outline import arrange_outlines, live_edges, outline_of, single_points
 from engine.collision.planar.outline_outline import FIRST, SECOND, boundaries_meet
 from engine.collision.result import Parts, Work
-from engine.collision.simple.ball_detail import body_ball_parts
-from engine.collision.simple.half_space_detail import half_space_mesh_parts, half_space_outline_parts
+from engine.collision.simple.body_sphere import body_sphere_parts
+from engine.collision.simple.half_space_vertices import half_space_body_parts
 from engine.containment.rational_locate import rational_location
 from engine.errors import InvalidInputError, UnsupportedSolidError
 from engine.parallel import Budget
@@ -174,10 +174,8 @@ def _outlines(first: Solid, second: Solid, first_pose: Pose | None, second_pose:
 PARTS: dict[tuple[int, str, str], PartsFunction] = {
     **{(3, first, second): mesh_parts for first in MESHES for second in MESHES},
     **{(2, first, second): _outlines for first in OUTLINES for second in OUTLINES},
-    **{(3, "half_space", body): half_space_mesh_parts for body in MESHES},
-    **{(2, "half_space", body): half_space_outline_parts for body in OUTLINES},
-    **{(3, body, "sphere"): body_ball_parts for body in MESHES},
-    **{(2, body, "sphere"): body_ball_parts for body in OUTLINES},
+    **{(d, "half_space", body): half_space_body_parts for d, body in BODIES},
+    **{(d, body, "sphere"): body_sphere_parts for d, body in BODIES},
 }
 for _dimension in (2, 3):
     PARTS[_dimension, "half_space", "half_space"] = _half_spaces

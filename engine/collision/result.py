@@ -7,7 +7,7 @@ Every pair of types has one function ``(first, second, first_pose, second_pose, 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
 from engine.parallel import Budget
@@ -20,6 +20,15 @@ Kind = Literal[
 """The features of the two faces that meet; `containment` where a body, or a part of it, lies inside the other without
 contact. Edges are those of the triangles that a face was cut into; `surface` where a body without faces (sphere,
 half-space) takes part in the contact."""
+
+
+Containing = Literal["", "first", "second"]
+
+_SWAPPED: dict[Containing, Containing] = {"": "", "first": "second", "second": "first"}
+_SWAPPED_RELATION = {
+    Relation.FIRST_INSIDE_SECOND: Relation.SECOND_INSIDE_FIRST,
+    Relation.SECOND_INSIDE_FIRST: Relation.FIRST_INSIDE_SECOND,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +46,7 @@ class Witness:
     kind: Kind
     first_face: int = -1
     second_face: int = -1
-    containing: Literal["", "first", "second"] = ""
+    containing: Containing = ""
     piercing: bool = False
 
 
@@ -54,20 +63,10 @@ class Collision:
 
     def swapped(self) -> Collision:
         """Return the answer for the two bodies in the other order."""
-        swap: dict[Relation, Relation] = {
-            Relation.FIRST_INSIDE_SECOND: Relation.SECOND_INSIDE_FIRST,
-            Relation.SECOND_INSIDE_FIRST: Relation.FIRST_INSIDE_SECOND,
-        }
-        witness = self.witness
-        if witness is not None:
-            containing: Literal["", "first", "second"] = ""
-            if witness.containing:
-                containing = "second" if witness.containing == "first" else "first"
-            witness = replace(
-                witness, first_face=witness.second_face, second_face=witness.first_face, containing=containing
-            )
-        detail = None if self.detail is None else self.detail.swapped
-        return Collision(swap.get(self.relation, self.relation), witness, detail)
+        w, detail = self.witness, None if self.detail is None else self.detail.swapped
+        if w is not None:
+            w = Witness(w.kind, w.second_face, w.first_face, _SWAPPED[w.containing], w.piercing)
+        return Collision(_SWAPPED_RELATION.get(self.relation, self.relation), w, detail)
 
 
 class Parts(NamedTuple):

@@ -121,39 +121,28 @@ def classify_exact(t1: Corners, t2: Corners, plane1: Plane | None = None, plane2
     if not any(edges1) and not any(edges2):
         return APART
     both_straddle = {1, -1} <= set(sides1) and {1, -1} <= set(sides2)
-    if both_straddle and _share_a_length(t1, sides1, t2, sides2, plane1, plane2):
+    if both_straddle and _share_a_length(t1, sides1, t2, sides2):
         return CROSSING
     return CONTACT
 
 
-def _share_a_length(
-    t1: Corners, sides1: list[int], t2: Corners, sides2: list[int], plane1: Plane, plane2: Plane
-) -> bool:
-    """Tell whether the intervals of two straddling triangles on their common line share more than a point."""
-    direction = cross(plane1[:3], plane2[:3])
-    axis = largest_axis(direction)
-    low1, high1 = _interval(t1, sides1, plane2, axis)
-    low2, high2 = _interval(t2, sides2, plane1, axis)
-    return _is_below(low1, high2) and _is_below(low2, high1)
+def _share_a_length(t1: Corners, sides1: list[int], t2: Corners, sides2: list[int]) -> bool:
+    """Tell whether the intervals of two straddling triangles on their common line share more than a point, as
+    `triangle_triangle.classify_exactly` does."""
+    (a, b, c), side1 = _lone_first(t1, sides1)
+    (p, q, r), side2 = _lone_first(t2, sides2)
+    if side1 < 0:
+        q, r = r, q
+    if side2 < 0:
+        b, c = c, b
+    return side(b, p, a, q) < 0 and side(a, p, c, r) < 0
 
 
-def _interval(t: Corners, sides: list[int], plane: Plane, axis: int) -> tuple[Flat, Flat]:
-    """Return the ends of a straddling triangle's interval on a plane: one coordinate as numerator, denominator > 0."""
-    ends = []
-    for i in range(3):
-        j = (i + 1) % 3
-        if sides[i] == 0:
-            ends.append((t[i][axis], 1))
-        elif sides[i] * sides[j] < 0:
-            f, g = value_at(plane, t[i]), value_at(plane, t[j])
-            numerator, denominator = f * t[j][axis] - g * t[i][axis], f - g
-            ends.append((numerator, denominator) if denominator > 0 else (-numerator, -denominator))
-    low, high = ends
-    return (low, high) if _is_below(low, high) else (high, low)
-
-
-def _is_below(a: Flat, b: Flat) -> bool:
-    return a[0] * b[1] < b[0] * a[1]
+def _lone_first(t: Corners, sides: list[int]) -> tuple[Corners, int]:
+    """Return a straddling triangle with a vertex first that is alone on its side of a plane, and that side."""
+    lone = 1 if sides.count(1) == 1 else -1
+    k = sides.index(lone)
+    return (t[k], t[k - 2], t[k - 1]), lone
 
 
 def separation_exact(t1: Corners, t2: Corners, plane: Plane) -> int:

@@ -6,6 +6,7 @@ the plane it shares with those that cover it, into regions; a region covered an 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -17,7 +18,7 @@ from engine.arrangement.subdivision import label_faces, subdivide
 from engine.collision.exact_images import Vector
 from engine.collision.meshes.face_state import find_states
 from engine.collision.meshes.mesh_arrays import NO_AREA, STATE_STACKED, MeshBody
-from engine.collision.simple.feature_distance import segment_distance, triangle_distance
+from engine.collision.simple.feature_distance import segment_distance, simplex_distance
 from engine.parallel import Budget
 from engine.predicates.exact_vectors import cross, dot, largest_axis, minus, squared_length
 from engine.predicates.rational import orient2d_rational, orient3d_rational
@@ -28,9 +29,12 @@ IN_FACE, IN_ODD, LIVE = 1, 2, 3
 
 @dataclass(frozen=True, slots=True)
 class LivePiece:
-    """What is live of one face: its plane's corners, and the edges around the live regions (None: the whole face)."""
+    """What is live of one face: its corners, and the edges around the live regions (None: the whole face).
 
-    corners: tuple[Vector, Vector, Vector]
+    A whole edge of the plane has two corners.
+    """
+
+    corners: tuple[Vector, ...]
     edges: list[tuple[Vector, Vector]] | None
 
     def vertices(self) -> list[Vector]:
@@ -39,18 +43,19 @@ class LivePiece:
             return list(self.corners)
         return [end for edge in self.edges for end in edge]
 
-    def moved(self, images: dict[Vector, Vector]) -> LivePiece:
+    def moved(self, image: Callable[[Vector], Vector]) -> LivePiece:
         """Return the piece with every point replaced by its image."""
-        a, b, c = (images[corner] for corner in self.corners)
-        edges = None if self.edges is None else [(images[start], images[end]) for start, end in self.edges]
-        return LivePiece((a, b, c), edges)
+        edges = None if self.edges is None else [(image(start), image(end)) for start, end in self.edges]
+        return LivePiece(tuple(map(image, self.corners)), edges)
 
-    def squared_distance(self, point: Vector) -> Fraction | None:
-        """Return the squared distance from `point` to the live part; None where nothing is live."""
+    def farthest(self, point: Vector) -> Fraction:
+        """Return the largest squared distance from `point` to the live part."""
+        return max(squared_length(minus(p, point)) for p in self.vertices())
+
+    def squared_distance(self, point: Vector) -> Fraction:
+        """Return the squared distance from `point` to the live part."""
         if self.edges is None:
-            return triangle_distance(point, *self.corners)
-        if not self.edges:
-            return None
+            return simplex_distance(point, self.corners)
         a, b, c = self.corners
         normal = cross(minus(b, a), minus(c, a))
         height = dot(normal, minus(point, a)) / squared_length(normal)

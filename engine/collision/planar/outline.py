@@ -33,14 +33,15 @@ class Outline:
 
     points: exact positions of the vertices. ends: (n, 2) the vertices of each edge. low, high: (n, 2) float64 boxes of
     the edges, by correctly rounded coordinates (rounding is monotone: boxes apart have edges apart).
-    floats: (n_vertices, 2) where every position is a pair of float64 as given, else None.
+    floats: (n_vertices, 2) the rounded positions; is_posed: False where these are the positions as given.
     """
 
     points: list[Point]
     ends: IntArray
     low: FloatArray
     high: FloatArray
-    floats: FloatArray | None
+    floats: FloatArray
+    is_posed: bool
 
     @property
     def n_edges(self) -> int:
@@ -63,7 +64,7 @@ def outline_of(body: Solid, pose: Pose | None, budget: Budget) -> Outline:
     points: list[Point] = [(p[0], p[1]) for p in image_points(vertices, pose, budget.check)]
     floats = vertices if pose is None else np.array([[rounded(x), rounded(y)] for x, y in points])
     low, high = np.minimum(floats[ends[:, 0]], floats[ends[:, 1]]), np.maximum(floats[ends[:, 0]], floats[ends[:, 1]])
-    return Outline(points, ends, low, high, vertices if pose is None else None)
+    return Outline(points, ends, low, high, floats, pose is not None)
 
 
 def rounded(value: Fraction) -> float:
@@ -96,11 +97,10 @@ def arrange_outlines(outlines: list[Outline], budget: Budget) -> tuple[Arrangeme
 
 
 def _nodes_of(outlines: list[Outline], budget: Budget) -> tuple[NodeTable, list[list[int]]]:
-    floats = [outline.floats for outline in outlines if outline.floats is not None]
-    if len(floats) == len(outlines):
-        nodes, flat = float_nodes(np.concatenate(floats), budget)
-    else:
+    if any(outline.is_posed for outline in outlines):
         nodes, flat = rational_nodes([point for outline in outlines for point in outline.points], budget)
+    else:
+        nodes, flat = float_nodes(np.concatenate([outline.floats for outline in outlines]), budget)
     numbers, start = [], 0
     for outline in outlines:
         numbers.append(flat[start : start + len(outline.points)])

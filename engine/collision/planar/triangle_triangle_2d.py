@@ -3,8 +3,9 @@
 Two convex polygons without a common point have an edge of one of them with all of the other strictly outside (the
 normals of their Minkowski difference are those of their edges). So nine signs for each triangle decide: an edge with
 the other strictly outside: disjoint; all nine positive: the other is inside; an edge with the other outside or on it:
-the interiors are apart, the triangles touch; else they overlap. A triangle without area is a segment or a point: it
-has no interior, and the line along it may separate as well.
+the interiors are apart, the triangles touch; else they overlap. A triangle without area is a segment or a point
+without interior. Its edges go along its line both ways, so either side of the line may be the outside; two on one line
+have a common point if their boxes have.
 
 Source: the textbook's exercise 22.4-5; separating axes after S. Gottschalk et al., OBBTree, 1996, in exact signs.
 """
@@ -84,48 +85,6 @@ def against_edges(t: Triangle2, u: Triangle2) -> int:
 
 
 @inline
-def segment_of(t: Triangle2) -> tuple[Point2, Point2]:
-    """Return the ends of a triangle without area: its first and last corner by x, then y."""
-    low, high = t.p, t.p
-    if t.q.x < low.x or (t.q.x == low.x and t.q.y < low.y):
-        low = t.q
-    if t.r.x < low.x or (t.r.x == low.x and t.r.y < low.y):
-        low = t.r
-    if t.q.x > high.x or (t.q.x == high.x and t.q.y > high.y):
-        high = t.q
-    if t.r.x > high.x or (t.r.x == high.x and t.r.y > high.y):
-        high = t.r
-    return low, high
-
-
-@inline
-def segment_in_triangle(a: Point2, b: Point2, u: Triangle2) -> int:
-    """Return DISJOINT, FIRST_INSIDE_SECOND or TOUCHING for the segment a b (maybe a point) and u, counter-clockwise."""
-    how = against_edges(u, Triangle2(a, b, b))
-    if how in (UNSETTLED, DISJOINT):
-        return how
-    if how == SECOND_INSIDE_FIRST:
-        return FIRST_INSIDE_SECOND
-    low, high = side_range(a, b, u)  # of a point: 0, 0
-    if low == UNDECIDED:
-        return UNSETTLED
-    return DISJOINT if low > 0 or high < 0 else TOUCHING
-
-
-@inline
-def segments_meet(a: Point2, b: Point2, c: Point2, d: Point2) -> int:
-    """Return TOUCHING or DISJOINT for two closed segments, maybe points, whose boxes meet.
-
-    On one line boxes that meet are segments that meet; elsewhere each must have its ends on both sides of the other.
-    """
-    c_side, d_side = orient2d(a, b, c), orient2d(a, b, d)
-    a_side, b_side = orient2d(c, d, a), orient2d(c, d, b)
-    if c_side == UNDECIDED or d_side == UNDECIDED or a_side == UNDECIDED or b_side == UNDECIDED:
-        return UNSETTLED
-    return TOUCHING if c_side * d_side <= 0 and a_side * b_side <= 0 else DISJOINT
-
-
-@inline
 def relation_of_triangles(t: Triangle2, u: Triangle2) -> int:
     """Return the relation of two closed triangles of the plane, degenerate ones included, or UNSETTLED."""
     if are_boxes_apart(t, u):
@@ -137,16 +96,6 @@ def relation_of_triangles(t: Triangle2, u: Triangle2) -> int:
         t = Triangle2(t.p, t.r, t.q)
     if u_turn < 0:
         u = Triangle2(u.p, u.r, u.q)
-    if t_turn == 0 or u_turn == 0:
-        a, b = segment_of(t)
-        c, d = segment_of(u)
-        if t_turn == 0 and u_turn == 0:
-            low, high = Triangle2(a, b, b), Triangle2(c, d, d)
-            return DISJOINT if are_boxes_apart(low, high) else segments_meet(a, b, c, d)
-        if t_turn == 0:
-            return segment_in_triangle(a, b, u)
-        how = segment_in_triangle(c, d, t)
-        return SECOND_INSIDE_FIRST if how == FIRST_INSIDE_SECOND else how
     first = against_edges(t, u)
     if first in (UNSETTLED, DISJOINT, SECOND_INSIDE_FIRST):
         return first
@@ -155,7 +104,8 @@ def relation_of_triangles(t: Triangle2, u: Triangle2) -> int:
         return second
     if second == SECOND_INSIDE_FIRST:
         return FIRST_INSIDE_SECOND
-    return OVERLAPPING if first == OVERLAPPING and second == OVERLAPPING else TOUCHING
+    have_interiors = t_turn != 0 and u_turn != 0
+    return OVERLAPPING if have_interiors and first == OVERLAPPING and second == OVERLAPPING else TOUCHING
 
 
 @kernel

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from engine.collision.result import Collision, Witness, Work
+from engine.collision.result import Collision, Witness
 from engine.solids.aabb import Aabb
-from engine.solids.pose import Pose
 from engine.types import Relation
 
 
-def collide_aabb_aabb(
-    first: Aabb, second: Aabb, first_pose: Pose | None, second_pose: Pose | None, work: Work
-) -> Collision:
-    """Return the relation of two boxes without poses, in 2D or 3D; caller guarantees that both poses are None.
+def collide_aabb_aabb(first: Aabb, second: Aabb) -> Collision:
+    """Return the relation of two boxes without poses, in 2D or 3D; a witness only of one inside the other.
 
-    A flat box (min = max on an axis) has no interior: it never overlaps, and `piercing` says that a point of it lies in
-    the open interior of the other.
+    A flat box (min = max on an axis) has no interior: it never overlaps.
     """
     a0, a1, b0, b1 = first.min, first.max, second.min, second.max
     if (a0 > b1).any() or (b0 > a1).any():
@@ -23,8 +19,6 @@ def collide_aabb_aabb(
         return Collision(Relation.FIRST_INSIDE_SECOND, Witness("containment", containing="second"))
     if (a0 < b0).all() and (b1 < a1).all():
         return Collision(Relation.SECOND_INSIDE_FIRST, Witness("containment", containing="first"))
-    first_is_solid, second_is_solid = bool((a0 < a1).all()), bool((b0 < b1).all())
-    crossing = bool((a0 < b1).all() and (b0 < a1).all())
-    if first_is_solid and second_is_solid and crossing:
-        return Collision(Relation.OVERLAPPING, Witness("surface"))
-    return Collision(Relation.TOUCHING, Witness("surface", piercing=crossing and (first_is_solid or second_is_solid)))
+    are_solid = (a0 < a1).all() and (b0 < b1).all()
+    crossing = (a0 < b1).all() and (b0 < a1).all()
+    return Collision(Relation.OVERLAPPING if are_solid and crossing else Relation.TOUCHING)

@@ -5,6 +5,7 @@ The bounds come first, from boxes alone; the faces whose boxes leave a contact o
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 
 import numpy as np
@@ -26,6 +27,11 @@ def segment_distance(point: Vector, a: Vector, b: Vector) -> Fraction:
     if t >= length:
         return squared_length(minus(point, b))
     return squared_length(to_point) - t * t / length
+
+
+def simplex_distance(point: Vector, corners: Sequence[Vector]) -> Fraction:
+    """Return the squared distance from `point` to the closed segment or triangle of these corners."""
+    return segment_distance(point, *corners) if len(corners) == 2 else triangle_distance(point, *corners)
 
 
 def triangle_distance(point: Vector, a: Vector, b: Vector, c: Vector) -> Fraction:
