@@ -32,7 +32,7 @@ from engine.collision.codes import UNSETTLED
 from engine.collision.convex.body import REACH, ROUND, ConvexArrays
 from engine.collision.meshes.placement import Placement, PoseArrays, as_placement, placed, turned_back
 from engine.jit import inline, merged
-from engine.predicates.vectors import cross, dot, length, minus, negative
+from engine.predicates.vectors import cross, dot, largest_of, length, minus, negative
 from engine.types import Point3
 
 APART, MEETING = 0, 1
@@ -129,12 +129,7 @@ def is_apart_along(points: Any, a: PlacedBody, b: PlacedBody, d: Point3) -> bool
 @inline
 def is_around_origin(a: Point3, b: Point3, c: Point3, d: Point3, error: float) -> bool:
     """Tell whether the origin is strictly inside of the tetrahedron of exact points within `error` of these."""
-    m = max(
-        max(abs(a.x), abs(a.y), abs(a.z)),
-        max(abs(b.x), abs(b.y), abs(b.z)),
-        max(abs(c.x), abs(c.y), abs(c.z)),
-        max(abs(d.x), abs(d.y), abs(d.z)),
-    )
+    m = max(largest_of(a), largest_of(b), largest_of(c), largest_of(d))
     bc, ad = cross(b, c), cross(a, d)
     size_ab, size_ac, size_ad = _size(cross(a, b)), _size(cross(a, c)), _size(ad)
     size_bc, size_bd, size_cd = _size(bc), _size(cross(b, d)), _size(cross(c, d))

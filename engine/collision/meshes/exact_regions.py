@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 from engine.arrays import IntArray
 from engine.collision.meshes.exact_body import Corners, ExactBody, Plane, Vector, rounded_outward
-from engine.collision.meshes.exact_triangles import is_in_triangle, value_at, without_axis
+from engine.collision.meshes.exact_triangles import meets_open_face, open_face, value_at, without_axis
 from engine.parallel import Budget
 from engine.predicates.exact_vectors import cross, dot, largest_axis, minus
 from engine.predicates.rational import sign_of
@@ -58,7 +58,7 @@ def sides_over(body: ExactBody, q: Homogeneous, axis: int, plane: Plane | None) 
     above = changes = is_on_face = False
     j, k = (axis + 1) % 3, (axis + 2) % 3
     x, y, w = q[j], q[k], q[3]
-    low, high = _around(body, q)
+    low, high = _around(body, [q])
     high[axis] = float("inf")
     for face in body.faces_in(low, high):
         other = body.plane(face)
@@ -97,14 +97,12 @@ def even_sides(body: ExactBody, face: int, other: ExactBody, met: IntArray) -> t
     A face of the body comes between only where it meets the open face and leaves the plane on that side.
     """
     plane, axis = body.plane(face), body.axis(face)
-    flat = [(*without_axis(p, axis), 1) for p in body.corners(face)]
-    turn = sign_of(dot(cross(flat[0], flat[1]), flat[2]))
-    lines = [cross(flat[i], flat[(i + 1) % 3]) for i in range(3)]
+    ours = open_face(body.corners(face), axis)
     above = below = True
     for points in map(other.corners, met.tolist()):
         values = [value_at(plane, p) for p in points]
         low, high = min(values), max(values)
-        if (low, high) == (0, 0) or not _meets_open_face(_flat_trace(points, values, axis), flat, lines, turn):
+        if (low, high) == (0, 0) or not meets_open_face(_flat_trace(points, values, axis), ours):
             continue
         above = above and (high if plane[axis] > 0 else -low) <= 0
         below = below and (-low if plane[axis] > 0 else high) <= 0
@@ -124,22 +122,11 @@ def _flat_trace(points: Corners, values: list[int], axis: int) -> Sequence[Vecto
     return ends
 
 
-def _meets_open_face(ends: Sequence[Vector], flat: Sequence[Vector], lines: Sequence[Vector], turn: int) -> bool:
-    """Tell whether a segment or point of its plane meets an open triangle: no line of an edge, nor its own line, has
-    the two on different closed sides."""
-    if any(max(turn * dot(line, end) for end in ends) <= 0 for line in lines):
-        return False
-    if len(ends) < 2:
-        return True
-    own = cross(ends[0], ends[1])
-    values = [dot(own, p) for p in flat]
-    return not any(own) or min(values) < 0 < max(values)
-
-
-def _around(body: ExactBody, q: Homogeneous) -> tuple[list[float], list[float]]:
-    scale = q[3] << body.shift
-    bounds = [rounded_outward(q[side], scale) for side in range(3)]
-    return [low for low, _ in bounds], [high for _, high in bounds]
+def _around(body: ExactBody, points: Sequence[Homogeneous]) -> tuple[list[float], list[float]]:
+    """Return the ends of a box of doubles around points on one denominator."""
+    scale = points[0][3] << body.shift
+    sides = list(zip(*points))[:3]
+    return [rounded_outward(min(x), scale)[0] for x in sides], [rounded_outward(max(x), scale)[1] for x in sides]
 
 
 def _moved_line_meets(corners: Corners, j: int, k: int, x: int, y: int, w: int) -> bool:
@@ -160,22 +147,7 @@ def _moved_line_meets(corners: Corners, j: int, k: int, x: int, y: int, w: int) 
 
 def is_inside_exact(body: ExactBody, q: Homogeneous) -> bool:
     """Tell whether q, any point, lies in the open interior of a body and on no face with area."""
-    return sides_at(body, q, 2).at and not _is_on_face(body, q)
-
-
-def _is_on_face(body: ExactBody, q: Homogeneous) -> bool:
-    """Tell whether some face with area holds q."""
-    low, high = _around(body, q)
-    w = q[3]
-    for face in body.faces_in(low, high):
-        plane = body.plane(face)
-        if not any(plane[:3]) or plane[0] * q[0] + plane[1] * q[1] + plane[2] * q[2] + plane[3] * w != 0:
-            continue
-        a, b, c = (tuple(w * x for x in corner) for corner in body.corners(face))
-        scaled = (a, b, c)
-        if is_in_triangle(q[:3], scaled, (*plane[:3], plane[3] * w)):
-            return True
-    return False
+    return all(sides_at(body, q, axis).at for axis in range(3))  # every face with area lies across some axis
 
 
 def regions_of(body: ExactBody, face: int, cutters: list[ExactBody], budget: Budget) -> Iterator[Homogeneous]:
@@ -210,9 +182,7 @@ def _traces(
     body: ExactBody, face: int, corners: Corners, plane: Plane, axis: int, cutters: list[ExactBody], budget: Budget
 ) -> list[tuple[Rational2, Rational2]]:
     """Return the segments in which other faces meet the plane of a face, near the face, projected along `axis`."""
-    scale = 1 << body.shift
-    low = [rounded_outward(min(p[side] for p in corners), scale)[0] for side in range(3)]
-    high = [rounded_outward(max(p[side] for p in corners), scale)[1] for side in range(3)]
+    low, high = _around(body, [(*p, 1) for p in corners])
     found = set()
     for cutter in cutters:
         for other in cutter.faces_in(low, high):
@@ -303,9 +273,7 @@ def pieces_of_segment(
 ) -> Iterator[Homogeneous]:
     """Yield a point in each piece that the faces of `cutter` cut from a segment; points of a face may be among them."""
     p, q = ends
-    scale = 1 << body.shift
-    low = [rounded_outward(min(p[side], q[side]), scale)[0] for side in range(3)]
-    high = [rounded_outward(max(p[side], q[side]), scale)[1] for side in range(3)]
+    low, high = _around(body, [(*p, 1), (*q, 1)])
     stops = {Fraction(0), Fraction(1)}
     for face in cutter.faces_in(low, high):
         budget.check()

@@ -6,6 +6,8 @@ out of range) and names the kind of a witness. A face without area is its longes
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from engine.collision.meshes.exact_body import Corners, Plane, Vector, plane_through
 from engine.collision.meshes.triangle_triangle import APART, CONTACT, COPLANAR, CROSSING
 from engine.collision.result import Kind
@@ -66,12 +68,18 @@ def segments_meet(a: Vector, b: Vector, c: Vector, d: Vector) -> bool:
     """Tell whether two closed segments of positive length have a common point."""
     if side(a, b, c, d) != 0:
         return False
-    if any((is_on_segment(a, c, d), is_on_segment(b, c, d), is_on_segment(c, a, b), is_on_segment(d, a, b))):
-        return True
-    normal = cross(minus(b, a), minus(d, c))
-    if not any(normal):
+    return _has_end_on_other(a, b, c, d) or _cross_in_plane(a, b, c, d)
+
+
+def _has_end_on_other(a: Vector, b: Vector, c: Vector, d: Vector) -> bool:
+    return any((is_on_segment(a, c, d), is_on_segment(b, c, d), is_on_segment(c, a, b), is_on_segment(d, a, b)))
+
+
+def _cross_in_plane(a: Vector, b: Vector, c: Vector, d: Vector) -> bool:
+    """Tell whether two segments of one plane cross in a point that is no end of either."""
+    axis = largest_axis(cross(minus(b, a), minus(d, c)))
+    if axis < 0:
         return False
-    axis = largest_axis(normal)
     k, m, s, t = (without_axis(p, axis) for p in (a, b, c, d))
     return turn(k, m, s) * turn(k, m, t) < 0 and turn(s, t, k) * turn(s, t, m) < 0
 
@@ -116,33 +124,25 @@ def classify_exact(t1: Corners, t2: Corners, plane1: Plane | None = None, plane2
         return APART
     if not any(sides2):
         return APART if separation_exact(t1, t2, plane1) > 0 else COPLANAR
-    edges1 = [segment_meets_triangle(t1[i], t1[i - 2], t2, plane2) for i in range(3)]
-    edges2 = [segment_meets_triangle(t2[i], t2[i - 2], t1, plane1) for i in range(3)]
-    if not any(edges1) and not any(edges2):
-        return APART
-    both_straddle = {1, -1} <= set(sides1) and {1, -1} <= set(sides2)
-    if both_straddle and _share_a_length(t1, sides1, t2, sides2):
-        return CROSSING
-    return CONTACT
-
-
-def _share_a_length(t1: Corners, sides1: list[int], t2: Corners, sides2: list[int]) -> bool:
-    """Tell whether the intervals of two straddling triangles on their common line share more than a point, as
-    `triangle_triangle.classify_exactly` does."""
     (a, b, c), side1 = _lone_first(t1, sides1)
     (p, q, r), side2 = _lone_first(t2, sides2)
     if side1 < 0:
         q, r = r, q
     if side2 < 0:
         b, c = c, b
-    return side(b, p, a, q) < 0 and side(a, p, c, r) < 0
+    ends = side(b, p, a, q), side(a, p, c, r)
+    if max(ends) > 0:
+        return APART
+    both_straddle = {1, -1} <= set(sides1) and {1, -1} <= set(sides2)
+    return CROSSING if both_straddle and max(ends) < 0 else CONTACT
 
 
 def _lone_first(t: Corners, sides: list[int]) -> tuple[Corners, int]:
-    """Return a straddling triangle with a vertex first that is alone on its side of a plane, and that side."""
-    lone = 1 if sides.count(1) == 1 else -1
+    """Return a triangle with the vertex first that has one closed side of a plane for itself, and that side: see
+    `triangle_triangle.lone_vertex`."""
+    lone = next((one for one in (1, -1) if sides.count(one) == 1), 0)
     k = sides.index(lone)
-    return (t[k], t[k - 2], t[k - 1]), lone
+    return (t[k], t[k - 2], t[k - 1]), lone or -sides[k - 1]
 
 
 def separation_exact(t1: Corners, t2: Corners, plane: Plane) -> int:
@@ -217,24 +217,40 @@ def _edge_meets_open_face(s: tuple[Vector, ...], values: list[int], t: tuple[Vec
                 return True
         elif a_side == 0 and b_side == 0:
             axis = largest_axis(plane[:3])
-            flat = [without_axis(p, axis) for p in t]
-            around = turn(flat[0], flat[1], flat[2])
-            k, m = without_axis(a, axis), without_axis(b, axis)
-            outside = any(
-                around * turn(flat[n], flat[(n + 1) % 3], k) <= 0 and around * turn(flat[n], flat[(n + 1) % 3], m) <= 0
-                for n in range(3)
-            )
-            if not outside and {1, -1} <= {turn(k, m, p) for p in flat}:
+            if meets_open_face([(*without_axis(p, axis), 1) for p in (a, b)], open_face((t[0], t[1], t[2]), axis)):
                 return True
     return False
+
+
+def open_face(t: Corners, axis: int) -> tuple[list[Vector], list[Vector]]:
+    """Return the corners (x, y, 1) of a face with area along an axis, and the lines of its edges, positive inside."""
+    flat: list[Vector] = [(*without_axis(p, axis), 1) for p in t]
+    if dot(cross(flat[0], flat[1]), flat[2]) < 0:
+        flat.reverse()
+    return flat, [cross(flat[i], flat[(i + 1) % 3]) for i in range(3)]
+
+
+def meets_open_face(ends: Sequence[Vector], face: tuple[list[Vector], list[Vector]]) -> bool:
+    """Tell whether a segment or point (x, y, w), w > 0, meets an `open_face`: no line of an edge, nor its own line, has
+    the two on different closed sides."""
+    flat, lines = face
+    if any(max(dot(line, end) for end in ends) <= 0 for line in lines):
+        return False
+    if len(ends) < 2:
+        return True
+    own = cross(ends[0], ends[1])
+    values = [dot(own, p) for p in flat]
+    return not any(own) or min(values) < 0 < max(values)
 
 
 def _open_edges_meet(e: tuple[Vector, Vector], f: tuple[Vector, Vector]) -> bool:
     """Tell whether two segments have a point in common that is no end of either."""
     (a, b), (c, d) = e, f
-    if not segments_meet(a, b, c, d):
+    if side(a, b, c, d) != 0:
         return False
-    if any(cross(minus(b, a), minus(d, c))):
-        return not any((is_on_segment(a, c, d), is_on_segment(b, c, d), is_on_segment(c, a, b), is_on_segment(d, a, b)))
+    if _cross_in_plane(a, b, c, d):
+        return True
+    if any(cross(minus(b, a), minus(d, c))) or not _has_end_on_other(a, b, c, d):
+        return False
     low, high = max(min(a, b), min(c, d)), min(max(a, b), max(c, d))
     return low < high

@@ -124,16 +124,13 @@ class MeshPair:
         if not other.has_inside:
             return []
         triangles = mesh.arrays.triangles
-        if len(in_contact):
-            left_out = np.zeros(len(triangles), np.bool_)
-            left_out[in_contact] = True
-            parent = np.empty(len(mesh.arrays.vertices), np.int64)
-            join_vertices(triangles, left_out, parent)
-            kept = np.flatnonzero(~left_out)
-            roots = parent[triangles[kept, 0]]
-            vertices = np.unique(roots)
-        else:
-            vertices = triangles[mesh.arrays.components, 0]
+        left_out = np.zeros(len(triangles), np.bool_)
+        left_out[in_contact] = True
+        parent = np.empty(len(mesh.arrays.vertices), np.int64)
+        join_vertices(triangles, left_out, parent)
+        kept = np.flatnonzero(~left_out)
+        roots = parent[triangles[kept, 0]]
+        vertices = np.unique(roots)
         found = self.located(own, vertices)
         for index in np.flatnonzero(found == UNDECIDED):
             self.work.budget.check()
@@ -141,14 +138,7 @@ class MeshPair:
             self.work.n_rational += 1
             point = self.exact[own].vertex(int(vertices[index]))
             found[index] = INSIDE if sides_at(self.exact[1 - own], (*point, 1), 2).at else OUTSIDE
-        there = vertices[found == place]
-        if not len(there):
-            return []
-        if not len(in_contact):
-            parent = np.empty(len(mesh.arrays.vertices), np.int64)
-            join_vertices(triangles, np.zeros(len(triangles), np.bool_), parent)
-            kept, roots = np.arange(len(triangles)), parent[triangles[:, 0]]
-        return [kept[roots == parent[vertex]] for vertex in there]
+        return [kept[roots == vertex] for vertex in vertices[found == place]]
 
     def sides_beside(self, own: int, patch: IntArray) -> Iterator[Sides]:
         """Yield the status of a body beside each region of a patch of it; one that changes across a face says all."""
