@@ -7,18 +7,18 @@ half-space n . p + d >= 0 is that of the affine map: with A the adjugate of R, R
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from fractions import Fraction
 
 from engine.arrays import FloatArray
-from engine.predicates.exact_vectors import cross, dot
+from engine.containment.rational_locate import adjugate
+from engine.predicates.exact_vectors import dot
 from engine.solids.pose import Pose
 
 Vector = tuple[Fraction, ...]
 Point = Iterable[float | Fraction]
 HalfSpaceImage = tuple[Vector, Fraction]
 """Normal and offset."""
-_CHECK_EVERY = 64
 
 
 def as_vector(numbers: Point) -> Vector:
@@ -44,33 +44,13 @@ def image_point(point: Point, pose: Pose | None) -> Vector:
     return image_map(pose)(point)
 
 
-def image_points(points: FloatArray, pose: Pose | None, check: Callable[[], object]) -> list[Vector]:
-    """Return the exact images of the rows of ``(n, d)`` points; `check` is called now and then."""
-    check()
-    return list(map(image_map(pose), _watched(points, check)))
-
-
-def _watched(points: FloatArray, check: Callable[[], object]) -> Iterator[list[float]]:
-    for index, point in enumerate(points.tolist()):
-        if index % _CHECK_EVERY == 0:
-            check()
-        yield point
-
-
 def image_half_space(normal: FloatArray, offset: float, pose: Pose | None) -> HalfSpaceImage:
     """Return normal and offset of the exact image of a half-space, up to a positive factor."""
     n, d = as_vector(normal), Fraction(offset)
     if pose is None:
         return n, d
-    columns = [as_vector(column) for column in pose.rotation.T.tolist()]
-    if len(columns) == 2:
-        (a, c), (b, e) = columns
-        adjugate: list[Vector] = [(e, -b), (-c, a)]
-    else:
-        u, v, w = columns
-        adjugate = [cross(v, w), cross(w, u), cross(u, v)]
-    determinant = dot(adjugate[0], columns[0])
-    image = tuple(dot(n, column) for column in zip(*adjugate))
+    adjugated, determinant = adjugate([as_vector(row) for row in pose.rotation.tolist()])
+    image = tuple(dot(n, column) for column in zip(*adjugated))
     return image, d * determinant - dot(image, as_vector(pose.translation))
 
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from engine.arrays import Int8Array, IntArray
 from engine.bounding.bvh import MAX_DEPTH, WIDTH
 from engine.collision.meshes.mesh_arrays import (
     STATE_CLEAN,
@@ -50,14 +51,10 @@ def edge_meets_inside(t: Triangle3, axis: int, a: Point3, b: Point3) -> bool:
     p, q, r = projected(t.p, axis), projected(t.q, axis), projected(t.r, axis)
     s, e = projected(a, axis), projected(b, axis)
     turn = orient2d(p, q, r)
-    for edge in range(3):
-        if edge == 0:
-            tail, head = p, q
-        elif edge == 1:
-            tail, head = q, r
-        else:
-            tail, head = r, p
+    tail, head, third = p, q, r
+    for _ in range(3):
         s_side, e_side = orient2d(tail, head, s), orient2d(tail, head, e)
+        tail, head, third = head, third, tail
         if s_side == UNDECIDED or e_side == UNDECIDED:
             return True
         if s_side != turn and e_side != turn:  # the edge has the segment outside or on it
@@ -101,18 +98,14 @@ def state_by(mesh: MeshArrays, face: int, other: int, poses: Any) -> int:
         if how == UNDECIDED:
             return STATE_STACKED
         return STATE_CROSSED if how == CROSSING else STATE_CLEAN
-    a, b = o.p, o.q
-    if p == 0 and q == 0:
-        is_own_edge = is_corner(mesh, face, other, 0) and is_corner(mesh, face, other, 1)
-    elif q == 0 and r == 0:
-        a, b = o.q, o.r
-        is_own_edge = is_corner(mesh, face, other, 1) and is_corner(mesh, face, other, 2)
-    elif r == 0 and p == 0:
-        a, b = o.r, o.p
-        is_own_edge = is_corner(mesh, face, other, 2) and is_corner(mesh, face, other, 0)
-    else:
-        return STATE_CLEAN
-    return STATE_CROSSED if not is_own_edge and edge_meets_inside(t, axis, a, b) else STATE_CLEAN
+    sides, corners = (p, q, r), (o.p, o.q, o.r)
+    for k in range(3):
+        end = (k + 1) % 3
+        if sides[k] == 0 and sides[end] == 0:
+            is_own_edge = is_corner(mesh, face, other, k) and is_corner(mesh, face, other, end)
+            is_crossed = not is_own_edge and edge_meets_inside(t, axis, corners[k], corners[end])
+            return STATE_CROSSED if is_crossed else STATE_CLEAN
+    return STATE_CLEAN
 
 
 @inline
@@ -176,8 +169,16 @@ def proves_overlap(first: MeshArrays, i: int, second: MeshArrays, j: int, poses:
     return b != STATE_STACKED and (a == STATE_CLEAN or b == STATE_CLEAN)
 
 
+def states_of(mesh: MeshArrays, faces: IntArray) -> Int8Array:
+    """Return the state of each of `faces` (n,)."""
+    states = np.empty(len(faces), np.int8)
+    with np.errstate(all="ignore"):  # uncompiled runs only
+        _find_states(mesh, faces, states)
+    return states
+
+
 @kernel
-def find_states(mesh: MeshArrays, faces: Any, states: Any) -> None:
+def _find_states(mesh: MeshArrays, faces: Any, states: Any) -> None:
     """Fill states (n,) with the state of each of `faces` (n,)."""
     poses = np.zeros((1, 12))
     for item in range(faces.shape[0]):

@@ -16,7 +16,7 @@ from engine.arrangement.arrange import arrange
 from engine.arrangement.nodes import float_nodes
 from engine.arrangement.subdivision import label_faces, subdivide
 from engine.collision.exact_images import Vector
-from engine.collision.meshes.face_state import find_states
+from engine.collision.meshes.face_state import states_of
 from engine.collision.meshes.mesh_arrays import NO_AREA, STATE_STACKED, MeshBody
 from engine.collision.simple.feature_distance import segment_distance, simplex_distance
 from engine.parallel import Budget
@@ -72,10 +72,7 @@ def live_piece(mesh: MeshBody, face: int, budget: Budget) -> LivePiece | None:
     if arrays.axis[face] == NO_AREA:
         return None
     corners = _corners(mesh, face)
-    states = np.empty(1, np.int8)
-    with np.errstate(all="ignore"):  # uncompiled runs only
-        find_states(arrays, np.array([face]), states)
-    if states[0] != STATE_STACKED:
+    if states_of(arrays, np.array([face]))[0] != STATE_STACKED:
         return LivePiece(corners, None)
     edges = _live_edges(mesh, face, corners, budget)
     return LivePiece(corners, edges) if edges else None

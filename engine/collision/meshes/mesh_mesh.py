@@ -22,13 +22,8 @@ from engine.arrays import IntArray
 from engine.collision.meshes.dual_traversal import SEEK_CONTACT, SEEK_OVERLAP
 from engine.collision.meshes.exact_triangles import is_flush, kind_of_contact
 from engine.collision.meshes.face_contacts import find_all_contacts
-from engine.collision.meshes.face_regions import (
-    has_corner_outside,
-    look_at_regions,
-    pierces_without_area,
-    vertices_outside,
-)
-from engine.collision.meshes.mesh_arrays import STATE_CLEAN, mesh_body_of
+from engine.collision.meshes.face_regions import look_at_regions, pierces_without_area
+from engine.collision.meshes.mesh_arrays import mesh_body_of
 from engine.collision.meshes.mesh_pair import MeshPair, simplest
 from engine.collision.meshes.parity import INSIDE
 from engine.collision.meshes.separating_plane import is_separated
@@ -94,13 +89,8 @@ def _overlap_or_touch(pair: MeshPair, contacts: IntArray, patches: list[list[Int
         if not both and (piercing or not pair.work.witness or not pair.meshes[1 - own].has_inside):
             continue
         faces = np.unique(contacts[:, own])
-        outside = vertices_outside(pair, own, faces)
-        for face, state in zip(faces.tolist(), pair.states(own, faces).tolist()):
-            met = contacts[contacts[:, own] == face, 1 - own]
-            is_outlying = has_corner_outside(pair, own, face, met, outside)
-            if own == 1 and both and is_outlying and state == STATE_CLEAN:
-                continue  # case: a common region without any face of the first is one of the second, in the first
-            overlaps, pierces = look_at_regions(pair, own, face, met, is_outlying)
+        for face in faces.tolist():
+            overlaps, pierces = look_at_regions(pair, own, face, contacts[contacts[:, own] == face, 1 - own])
             if overlaps:
                 return _touch(pair, Relation.OVERLAPPING, contacts)
             piercing = piercing or pierces

@@ -19,7 +19,7 @@ from engine.collision.meshes.dual_traversal import (
 )
 from engine.collision.meshes.exact_body import ExactBody, exact_pair
 from engine.collision.meshes.exact_regions import Sides, regions_of, sides_at
-from engine.collision.meshes.face_state import find_states
+from engine.collision.meshes.face_state import states_of
 from engine.collision.meshes.mesh_arrays import NO_AREA, STATE_STACKED, MeshBody, join_vertices, mesh_body_of_triangles
 from engine.collision.meshes.parity import INSIDE, OUTSIDE, locate_vertices
 from engine.collision.result import Work
@@ -33,26 +33,12 @@ _BLOCK = 64
 def simplest(
     first: MeshBody, first_pose: Pose | None, second: MeshBody, second_pose: Pose | None
 ) -> tuple[MeshBody, Pose | None, MeshBody, Pose | None]:
-    """Return a placed pair that has the same relation, scaled into the range of the kernels where that is exact.
-
-    Two equal poses are left out: an invertible affine map, applied to both, changes no relation.
-    """
-    if first_pose is not None and first_pose.is_identity:
-        first_pose = None
-    if second_pose is not None and second_pose.is_identity:
-        second_pose = None
-    if first_pose is not None and first_pose == second_pose:
-        first_pose = second_pose = None
-    return in_range(first, first_pose, second, second_pose)
-
-
-def in_range(
-    first: MeshBody, first_pose: Pose | None, second: MeshBody, second_pose: Pose | None
-) -> tuple[MeshBody, Pose | None, MeshBody, Pose | None]:
-    """Return posed bodies near the ends of the exponent range scaled by a power of two, where that is exact.
+    """Return a placed pair that has the same relation: no pose for the identity, and posed bodies near the ends of the
+    exponent range scaled by a power of two, where that is exact.
 
     Without poses the predicates scale by themselves; the filter for rounded posed coordinates does not.
     """
+    first_pose, second_pose = (None if pose is None or pose.is_identity else pose for pose in (first_pose, second_pose))
     poses = [pose for pose in (first_pose, second_pose) if pose is not None]
     if not poses:
         return first, first_pose, second, second_pose
@@ -108,9 +94,7 @@ class MeshPair:
         return self._exact
 
     def states(self, own: int, faces: IntArray) -> Int8Array:
-        states = np.empty(len(faces), np.int8)
-        find_states(self.meshes[own].arrays, faces, states)
-        return states
+        return states_of(self.meshes[own].arrays, faces)
 
     def state(self, own: int, face: int) -> int:
         return int(self.states(own, np.array([face]))[0])

@@ -220,12 +220,7 @@ def projected(p: Any, axis: int) -> Point2:
 @inline
 def beside(t: PosedTriangle, axis: int) -> PosedPoint3:
     """Return a point off the plane of t: its first corner moved along `axis`, before its pose; maybe not finite."""
-    p, size = t.p, 0.0
-    for k in range(3):
-        a = t.p.x if k == 0 else (t.p.y if k == 1 else t.p.z)
-        b = t.q.x if k == 0 else (t.q.y if k == 1 else t.q.z)
-        c = t.r.x if k == 0 else (t.r.y if k == 1 else t.r.z)
-        size = max(size, abs(b - a), abs(c - a))
+    p, size = t.p, max(largest_of(minus(t.q, t.p)), largest_of(minus(t.r, t.p)))
     value = p.x if axis == 0 else (p.y if axis == 1 else p.z)
     value = 0.5 * value if abs(value) > size else value + size  # either differs from `value`
     return PosedPoint3(value if axis == 0 else p.x, value if axis == 1 else p.y, value if axis == 2 else p.z, p.pose)
@@ -250,15 +245,11 @@ def outside_an_edge(poses: Any, t: PosedTriangle, u: PosedTriangle, off: PosedPo
     turn = turn_in_plane(poses, t.p, t.q, t.r, off, axis, error)
     if turn == UNDECIDED:
         return UNDECIDED
-    best = -1
-    unsure = False
+    best, unsure = -1, False
+    s, e, third = t
     for edge in range(3):
-        if edge == 0:
-            s, e = t.p, t.q
-        elif edge == 1:
-            s, e = t.q, t.r
-        else:
-            s, e = t.r, t.p
+        if edge > 0:
+            s, e, third = e, third, s
         p_side = turn_in_plane(poses, s, e, u.p, off, axis, error)
         if p_side == turn:
             continue

@@ -15,7 +15,7 @@ import numpy as np
 from engine.arrangement.arrange import Arrangement, arrange
 from engine.arrangement.nodes import NodeTable, float_nodes, rational_nodes
 from engine.arrays import FloatArray, IntArray
-from engine.collision.exact_images import image_points
+from engine.collision.exact_images import image_map
 from engine.parallel import Budget
 from engine.predicates.rational import orient2d_rational
 from engine.solids.aabb import Aabb
@@ -24,7 +24,8 @@ from engine.solids.polygon import Polygon
 from engine.solids.pose import Pose
 from engine.solids.triangle import Triangle
 
-Point = tuple[Fraction, Fraction]
+Point = tuple[Fraction, ...]
+_CHECK_EVERY = 64
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,7 +62,12 @@ def outline_of(body: Solid, pose: Pose | None, budget: Budget) -> Outline:
     ends[:, 0] = np.arange(len(vertices))
     ends[:, 1] = ends[:, 0] + 1
     ends[offsets[1:] - 1, 1] = offsets[:-1]
-    points: list[Point] = [(p[0], p[1]) for p in image_points(vertices, pose, budget.check)]
+    points: list[Point] = []
+    image = image_map(pose)
+    for vertex, p in enumerate(vertices.tolist()):
+        if vertex % _CHECK_EVERY == 0:
+            budget.check()
+        points.append(image(p))
     floats = vertices if pose is None else np.array([[rounded(x), rounded(y)] for x, y in points])
     low, high = np.minimum(floats[ends[:, 0]], floats[ends[:, 1]]), np.maximum(floats[ends[:, 0]], floats[ends[:, 1]])
     return Outline(points, ends, low, high, floats, pose is not None)

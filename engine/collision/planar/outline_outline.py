@@ -6,13 +6,11 @@ do not meet, the face at any edge of one body says whether that part of it lies 
 
 from __future__ import annotations
 
-from fractions import Fraction
-
 import numpy as np
 
 from engine.arrangement.arrange import Arrangement
 from engine.arrangement.subdivision import label_faces, subdivide
-from engine.collision.planar.outline import Outline, arrange_outlines, outline_of, single_points
+from engine.collision.planar.outline import Outline, Point, arrange_outlines, outline_of, single_points
 from engine.collision.result import Collision, Kind, Witness, Work
 from engine.containment.rational_locate import rational_location
 from engine.parallel import Budget
@@ -85,12 +83,7 @@ def _witness(a: Outline, b: Outline, pierces: bool, containing: str, budget: Bud
     return Witness("containment", containing="second" if containing == "second" else "first", piercing=pierces)
 
 
-def _meeting(
-    p: tuple[Fraction, Fraction],
-    q: tuple[Fraction, Fraction],
-    r: tuple[Fraction, Fraction],
-    s: tuple[Fraction, Fraction],
-) -> Kind | None:
+def _meeting(p: Point, q: Point, r: Point, s: Point) -> Kind | None:
     """Return how the closed segments p q and r s meet, None if they do not."""
     if p in (r, s) or q in (r, s):
         return "vertex_vertex"
@@ -102,7 +95,7 @@ def _meeting(
     return "edge_edge"
 
 
-def _is_on(point: tuple[Fraction, Fraction], a: tuple[Fraction, Fraction], b: tuple[Fraction, Fraction]) -> bool:
+def _is_on(point: Point, a: Point, b: Point) -> bool:
     """Tell whether `point` lies on the closed segment a b."""
     within = all(min(a[k], b[k]) <= point[k] <= max(a[k], b[k]) for k in range(2))
     return within and orient2d_rational(a, b, point) == 0

@@ -62,26 +62,19 @@ def against_edges(t: Triangle2, u: Triangle2) -> int:
 
     Only DISJOINT and SECOND_INSIDE_FIRST are final; TOUCHING says that the interiors are apart if they exist.
     """
-    low, high = side_range(t.p, t.q, u)
-    if low == UNDECIDED:
-        return UNSETTLED
-    if high < 0:
-        return DISJOINT
-    inside, apart = low > 0, high == 0
-    low, high = side_range(t.q, t.r, u)
-    if low == UNDECIDED:
-        return UNSETTLED
-    if high < 0:
-        return DISJOINT
-    inside, apart = inside and low > 0, apart or high == 0
-    low, high = side_range(t.r, t.p, u)
-    if low == UNDECIDED:
-        return UNSETTLED
-    if high < 0:
-        return DISJOINT
-    if inside and low > 0:
+    p, q, r = t
+    inside, apart = True, False
+    for _ in range(3):
+        low, high = side_range(p, q, u)
+        if low == UNDECIDED:
+            return UNSETTLED
+        if high < 0:
+            return DISJOINT
+        inside, apart = inside and low > 0, apart or high == 0
+        p, q, r = q, r, p
+    if inside:
         return SECOND_INSIDE_FIRST
-    return TOUCHING if apart or high == 0 else OVERLAPPING
+    return TOUCHING if apart else OVERLAPPING
 
 
 @inline

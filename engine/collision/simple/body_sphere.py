@@ -58,9 +58,10 @@ def collide_body_sphere(
         return Collision(Relation.FIRST_INSIDE_SECOND, Witness("containment", containing="second"))
     face = boundary.number(int(entered[0]) if enters else touched)
     if sphere.radius > 0.0 and boundary.has_inside:
-        if location == Location.INSIDE or (enters and boundary.reaches_nearer(entered, center, limit)):
-            return Collision(Relation.OVERLAPPING, Witness("surface", first_face=face))
-        if location == Location.BOUNDARY and _is_within_walls(body, body_pose, center, sphere.radius, work):
+        overlaps = location == Location.INSIDE or _enters(boundary, entered, center, limit)
+        if not overlaps and location == Location.BOUNDARY:
+            overlaps = _is_within_walls(body, body_pose, center, sphere.radius, work)
+        if overlaps:
             return Collision(Relation.OVERLAPPING, Witness("surface", first_face=face))
     return Collision(Relation.TOUCHING, Witness("surface", first_face=face, piercing=enters))
 
@@ -69,6 +70,11 @@ def _candidates(nearest: FloatArray, limit: Fraction) -> IntArray:
     """Return the faces that may come as near as a squared distance, by lower bounds of theirs, nearest first."""
     found = np.flatnonzero(nearest <= rounded(limit) * (1.0 + 2.0**-50) + 2.0**-1000)
     return found[np.argsort(nearest[found], kind="stable")]
+
+
+def _enters(boundary: Boundary, faces: IntArray, center: Vector, limit: Fraction) -> bool:
+    """Tell whether something live of these faces comes nearer to the centre than a squared distance."""
+    return len(faces) > 0 and boundary.has_live(faces, lambda piece: piece.squared_distance(center) < limit)
 
 
 def _is_within_walls(body: Solid, pose: Pose | None, center: Vector, radius: float, work: Work) -> bool:
@@ -109,10 +115,10 @@ def body_sphere_parts(
     boundary = boundary_of(body, body_pose, work)
     nearest, farthest = boundary.face_bounds(center)
     candidates = _candidates(nearest, limit)
-    ball_sticks_out = boundary.reaches_nearer(candidates, center, limit)
+    ball_sticks_out = _enters(boundary, candidates, center, limit)
     beyond = np.flatnonzero(farthest >= rounded(limit) * (1.0 - 2.0**-50) - 2.0**-1000)
     beyond = beyond[np.argsort(-nearest[beyond], kind="stable")]
-    body_sticks_out = boundary.reaches_farther(beyond, center, limit)
+    body_sticks_out = boundary.has_live(beyond, lambda piece: piece.farthest(center) > limit)
     meet = ball_sticks_out and body_sticks_out
     if not meet:
         both = np.intersect1d(candidates, beyond).tolist()

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
@@ -20,37 +21,25 @@ from engine.solids.base import Solid
 from engine.solids.pose import Pose
 
 
+@dataclass(frozen=True, slots=True, eq=False)
 class Boundary:
     """What both kinds have in common.
 
     ends: (n, d) the vertices of each face or edge. floats: (m, d) the rounded posed vertices, each number within
-    `error` of the exact one. has_inside: False for surfaces and flat boxes.
+    `error` of the exact one. exact: the position of a vertex. number, number_at: the caller's number of a face, and of
+    one at a vertex. signs: of a plane at each vertex. live: what even-odd leaves of faces; of an outline maybe of other
+    edges too. has_inside: False for surfaces and flat boxes.
     """
 
     ends: IntArray
     floats: FloatArray
     error: float
-    has_inside: bool = True
-
-    def exact(self, vertex: int) -> Vector:
-        """Return the exact position of a vertex."""
-        raise NotImplementedError
-
-    def number(self, face: int) -> int:
-        """Return the caller's number of a face."""
-        return face
-
-    def number_at(self, vertex: int) -> int:
-        """Return the caller's number of a face at a vertex."""
-        return vertex
-
-    def signs(self, plane: HalfSpaceImage) -> Int8Array:
-        """Return the exact sign of a plane at each vertex."""
-        raise NotImplementedError
-
-    def live(self, faces: Iterable[int]) -> Iterator[LivePiece]:
-        """Yield what even-odd leaves of these faces; of an outline maybe of the other edges too."""
-        raise NotImplementedError
+    exact: Callable[[int], Vector]
+    number: Callable[[int], int]
+    number_at: Callable[[int], int]
+    signs: Callable[[HalfSpaceImage], Int8Array]
+    live: Callable[[list[int]], Iterator[LivePiece]]
+    has_inside: bool
 
     def corners(self, face: int) -> tuple[Vector, ...]:
         """Return the exact corners of a face."""
@@ -74,83 +63,66 @@ class Boundary:
         slack = self.error + 2.0**-50 * float(np.abs(around).max()) + 2.0**-1070
         return box_distance_bounds(around, low - slack, high + slack)
 
-    def reaches_beyond(self, faces: IntArray, plane: HalfSpaceImage, side: int) -> bool:
-        """Tell whether something live of these faces lies on one side, 1 or -1, of a plane."""
-        return self._has_live(faces, lambda piece: any(side * value_at(plane, p) > 0 for p in piece.vertices()))
-
-    def reaches_nearer(self, faces: IntArray, center: Vector, limit: Fraction) -> bool:
-        """Tell whether something live of these faces comes nearer to a point than a squared distance."""
-        return self._has_live(faces, lambda piece: piece.squared_distance(center) < limit)
-
-    def reaches_farther(self, faces: IntArray, center: Vector, limit: Fraction) -> bool:
-        """Tell whether something live of these faces is farther from a point than a squared distance."""
-        return self._has_live(faces, lambda piece: piece.farthest(center) > limit)
-
-    def _has_live(self, faces: IntArray, condition: Callable[[LivePiece], bool]) -> bool:
+    def has_live(self, faces: IntArray, condition: Callable[[LivePiece], bool]) -> bool:
+        """Tell whether a condition holds for something live of these faces."""
         return any(map(condition, self.live(faces.tolist())))
-
-
-class MeshBoundary(Boundary):
-    """The triangles of a polyhedron, surface or 3D box."""
-
-    def __init__(self, body: Solid, pose: Pose | None, work: Work) -> None:
-        self._mesh, self._pose, self._work = mesh_body_of(body), pose, work
-        self._image = image_map(pose)
-        arrays = self._mesh.arrays
-        self.ends, self.has_inside = arrays.triangles, self._mesh.has_inside
-        self.floats, self.error = arrays.vertices, 0.0
-        if pose is not None:  # the error is derived in `placement.py`
-            shift = float(np.abs(pose.translation).max())
-            with np.errstate(all="ignore"):
-                self.floats = arrays.vertices @ pose.rotation.T + pose.translation
-            self.error = 2.0**-49 * (3.0 * self._mesh.reach + shift) + 2.0**-1060
-
-    def exact(self, vertex: int) -> Vector:
-        return self._image(self._mesh.arrays.vertices[vertex].tolist())
-
-    def number(self, face: int) -> int:
-        return int(self._mesh.faces[face])
-
-    def number_at(self, vertex: int) -> int:
-        return self.number(int(np.argmax((self.ends == vertex).any(axis=1))))
-
-    def signs(self, plane: HalfSpaceImage) -> Int8Array:
-        return signs_of(plane, self._mesh.arrays.vertices, self._pose, self._work)
-
-    def live(self, faces: Iterable[int]) -> Iterator[LivePiece]:
-        for face in faces:
-            self._work.budget.check()
-            piece = live_piece(self._mesh, face, self._work.budget)
-            if piece is not None:
-                yield piece if self._pose is None else piece.moved(self._image)
-
-
-class OutlineBoundary(Boundary):
-    """The edges of a polygon, triangle or 2D box."""
-
-    def __init__(self, body: Solid, pose: Pose | None, work: Work) -> None:
-        self._outline, self._work = outline_of(body, pose, work.budget), work
-        self.ends, self.floats = self._outline.ends, self._outline.floats
-        self.error = 2.0**-52 * float(np.abs(self.floats).max()) + 2.0**-1074
-
-    def exact(self, vertex: int) -> Vector:
-        return self._outline.points[vertex]
-
-    def signs(self, plane: HalfSpaceImage) -> Int8Array:
-        return np.array([sign_of(value_at(plane, point)) for point in self._outline.points], np.int8)
-
-    def live(self, faces: Iterable[int]) -> Iterator[LivePiece]:
-        for edge in faces:
-            self._work.budget.check()
-            if is_clean(self._outline, edge):
-                yield LivePiece(self._outline.edge(edge), None)
-        for ends in live_edges(self._outline, self._work.budget):
-            yield LivePiece(ends, None)
 
 
 def boundary_of(body: Solid, pose: Pose | None, work: Work) -> Boundary:
     """Return the boundary of a body that is no ball and no half-space."""
-    return (MeshBoundary if body.dimension == 3 else OutlineBoundary)(body, pose, work)
+    return (_mesh_boundary if body.dimension == 3 else _outline_boundary)(body, pose, work)
+
+
+def _mesh_boundary(body: Solid, pose: Pose | None, work: Work) -> Boundary:
+    mesh, image = mesh_body_of(body), image_map(pose)
+    vertices, triangles = mesh.arrays.vertices, mesh.arrays.triangles
+    floats, error = vertices, 0.0
+    if pose is not None:  # the error is derived in `placement.py`
+        with np.errstate(all="ignore"):
+            floats = vertices @ pose.rotation.T + pose.translation
+        error = 2.0**-49 * (3.0 * mesh.reach + float(np.abs(pose.translation).max())) + 2.0**-1060
+
+    def live(faces: list[int]) -> Iterator[LivePiece]:
+        for face in faces:
+            work.budget.check()
+            piece = live_piece(mesh, face, work.budget)
+            if piece is not None:
+                yield piece if pose is None else piece.moved(image)
+
+    return Boundary(
+        triangles,
+        floats,
+        error,
+        lambda vertex: image(vertices[vertex].tolist()),
+        lambda face: int(mesh.faces[face]),
+        lambda vertex: int(mesh.faces[np.argmax((triangles == vertex).any(axis=1))]),
+        lambda plane: signs_of(plane, vertices, pose, work),
+        live,
+        mesh.has_inside,
+    )
+
+
+def _outline_boundary(body: Solid, pose: Pose | None, work: Work) -> Boundary:
+    outline = outline_of(body, pose, work.budget)
+
+    def live(edges: list[int]) -> Iterator[LivePiece]:
+        for edge in edges:
+            work.budget.check()
+            if is_clean(outline, edge):
+                yield LivePiece(outline.edge(edge), None)
+        yield from (LivePiece(ends, None) for ends in live_edges(outline, work.budget))
+
+    return Boundary(
+        outline.ends,
+        outline.floats,
+        2.0**-52 * float(np.abs(outline.floats).max()) + 2.0**-1074,
+        lambda vertex: outline.points[vertex],
+        lambda edge: edge,
+        lambda vertex: vertex,
+        lambda plane: np.array([sign_of(value_at(plane, point)) for point in outline.points], np.int8),
+        live,
+        True,
+    )
 
 
 def signs_of(plane: HalfSpaceImage, points: FloatArray, pose: Pose | None, work: Work) -> Int8Array:

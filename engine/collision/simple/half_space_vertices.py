@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from engine.collision.exact_images import image_half_space
+from engine.arrays import IntArray
+from engine.collision.exact_images import HalfSpaceImage, image_half_space, value_at
 from engine.collision.result import Collision, Parts, Witness, Work
-from engine.collision.simple.boundary import boundary_of
+from engine.collision.simple.boundary import Boundary, boundary_of
 from engine.solids.base import Solid
 from engine.solids.half_space import HalfSpace
 from engine.solids.pose import Pose
@@ -31,9 +32,14 @@ def collide_half_space_body(
     enters = bool((signs > 0).any())
     face = boundary.number_at(int(np.argmax(signs > 0 if enters else signs == 0)))
     faces = np.flatnonzero((signs[boundary.ends] > 0).any(axis=1))
-    if enters and boundary.has_inside and boundary.reaches_beyond(faces, plane, 1):
+    if enters and boundary.has_inside and _reaches(boundary, faces, plane, 1):
         return Collision(Relation.OVERLAPPING, Witness("surface", second_face=face))
     return Collision(Relation.TOUCHING, Witness("surface", second_face=face, piercing=enters))
+
+
+def _reaches(boundary: Boundary, faces: IntArray, plane: HalfSpaceImage, side: int) -> bool:
+    """Tell whether something live of these faces lies on one side, 1 or -1, of a plane."""
+    return boundary.has_live(faces, lambda piece: any(side * value_at(plane, p) > 0 for p in piece.vertices()))
 
 
 def half_space_body_parts(
@@ -44,5 +50,5 @@ def half_space_body_parts(
     plane = image_half_space(half_space.normal, half_space.offset, half_space_pose)
     signs = boundary.signs(plane)[boundary.ends]
     lowest = signs.min(axis=1)
-    sticks_out = boundary.reaches_beyond(np.flatnonzero(lowest < 0), plane, -1)
+    sticks_out = _reaches(boundary, np.flatnonzero(lowest < 0), plane, -1)
     return Parts(True, sticks_out, bool(((lowest <= 0) & (signs.max(axis=1) >= 0)).any()))

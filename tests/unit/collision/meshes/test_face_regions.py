@@ -7,7 +7,7 @@ import pytest
 
 from engine import Pose
 from engine.collision.meshes.face_contacts import find_all_contacts
-from engine.collision.meshes.face_regions import has_corner_outside, look_at_regions, vertices_outside
+from engine.collision.meshes.face_regions import look_at_regions
 from engine.collision.meshes.mesh_pair import MeshPair
 from engine.collision.result import Work
 from tests.unit.collision.meshes.bodies import TURN, mesh
@@ -27,13 +27,3 @@ def test_flush_boxes(at: tuple[float, float, float], overlaps: bool, pose: Pose 
                 found |= is_overlap
                 assert not pierces or overlaps
             assert found == overlaps
-
-
-def test_corners_outside() -> None:
-    pair = MeshPair(mesh(2), None, mesh(2, (2, 1, 0)), None, Work())
-    contacts, _ = find_all_contacts(pair)
-    faces = np.unique(contacts[:, 0])
-    outside = vertices_outside(pair, 0, faces)
-    assert outside
-    answers = [has_corner_outside(pair, 0, f, contacts[contacts[:, 0] == f, 1], outside) for f in faces.tolist()]
-    assert any(answers)

@@ -6,22 +6,20 @@ import numpy as np
 import pytest
 
 from engine import Surface
-from engine.collision.meshes.face_state import find_states
+from engine.collision.meshes.face_state import states_of
 from engine.collision.meshes.mesh_arrays import STATE_CLEAN, STATE_CROSSED, STATE_STACKED, MeshBody, mesh_body_of
 from tests.unit.collision.meshes.bodies import mesh
 
 FACE = [[0, 0, 0], [6, 0, 0], [0, 6, 0]]
 
 
-def states_of(body: MeshBody) -> list[int]:
-    found = np.empty(len(body.faces), np.int8)
-    with np.errstate(all="ignore"):
-        find_states(body.arrays, np.arange(len(body.faces)), found)
+def states(body: MeshBody) -> list[int]:
+    found = states_of(body.arrays, np.arange(len(body.faces)))
     return found[np.argsort(body.faces)].tolist()
 
 
 def test_faces_of_a_box_are_clean() -> None:
-    assert states_of(mesh(3)) == [STATE_CLEAN] * 108
+    assert states(mesh(3)) == [STATE_CLEAN] * 108
 
 
 @pytest.mark.parametrize(
@@ -36,4 +34,4 @@ def test_faces_of_a_box_are_clean() -> None:
     ],
 )
 def test_what_another_face_makes_of_it(other: list[list[float]], expected: int) -> None:
-    assert states_of(mesh_body_of(Surface(FACE + other, [[0, 1, 2], [3, 4, 5]])))[0] == expected
+    assert states(mesh_body_of(Surface(FACE + other, [[0, 1, 2], [3, 4, 5]])))[0] == expected

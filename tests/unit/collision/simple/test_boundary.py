@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from engine import Aabb, HalfSpace, Polygon, Pose, Solid
+from engine import Aabb, Polygon, Pose, Solid
 from engine.collision.exact_images import image_half_space, value_at
 from engine.collision.result import Work
 from engine.collision.simple.boundary import boundary_of
@@ -44,11 +44,8 @@ def test_rounded_vertices_bounds_and_signs_hold_the_exact_ones(body: Solid, pose
         )
 
 
-def test_what_is_live_of_a_square_and_where_it_reaches() -> None:
-    boundary, plane = boundary_of(SQUARE, None, Work()), image_half_space(HalfSpace([1, 0], -2).normal, -2.0, None)
-    edges, corner = np.arange(4), (Fraction(2), Fraction(1))
-    assert not boundary.reaches_beyond(edges, plane, 1)
-    assert boundary.reaches_beyond(edges, plane, -1)
-    assert boundary.reaches_nearer(edges, corner, Fraction(1, 8))
-    assert boundary.reaches_farther(edges, corner, Fraction(4))
-    assert not boundary.reaches_farther(edges, corner, Fraction(5))
+def test_what_is_live_of_a_square() -> None:
+    boundary, corner = boundary_of(SQUARE, None, Work()), (Fraction(2), Fraction(1))
+    edges = np.arange(4)
+    assert boundary.has_live(edges, lambda piece: piece.farthest(corner) == 5)
+    assert not boundary.has_live(edges, lambda piece: piece.squared_distance(corner) > 4)
