@@ -7,12 +7,7 @@ from typing import Literal, Unpack, overload
 from engine.collision.detail import check_has_detail, detail_of
 from engine.collision.pairs import PAIRS
 from engine.collision.result import Collision, PairFunction, Work
-from engine.errors import (
-    InvalidArrayError,
-    UnsupportedPairError,
-    UnsupportedSolidError,
-    WrongDimensionError,
-)
+from engine.errors import InvalidArrayError, UnsupportedPairError, UnsupportedSolidError, WrongDimensionError
 from engine.parallel import Budget, Cancel, Options, Progress, check_options
 from engine.solids.base import Solid
 from engine.solids.pose import Pose

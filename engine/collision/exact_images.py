@@ -57,3 +57,16 @@ def image_half_space(normal: FloatArray, offset: float, pose: Pose | None) -> Ha
 def value_at(half_space: HalfSpaceImage, point: Vector) -> Fraction:
     """Return n . p + d."""
     return dot(half_space[0], point) + half_space[1]
+
+
+def rounded(value: Fraction) -> float:
+    """Return the nearest double, an infinity beyond the largest: rounding that keeps the order, for boxes."""
+    return rounded_quotient(value.numerator, value.denominator)
+
+
+def rounded_quotient(numerator: int, denominator: int) -> float:
+    """Return the double nearest to a quotient, an infinity beyond the largest."""
+    try:
+        return numerator / denominator
+    except OverflowError:
+        return float("inf") if numerator > 0 else float("-inf")

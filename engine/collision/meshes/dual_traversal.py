@@ -19,13 +19,7 @@ from engine.bounding.bvh import MAX_DEPTH
 from engine.collision.meshes.face_state import proves_overlap, state_of
 from engine.collision.meshes.frames import defect_of, set_frame
 from engine.collision.meshes.mesh_arrays import STATE_CLEAN, MeshArrays, triangle_of
-from engine.collision.meshes.placement import (
-    Placement,
-    PoseArrays,
-    place_pair,
-    placed,
-    placed_axis,
-)
+from engine.collision.meshes.placement import Placement, PoseArrays, place_pair, placed, placed_axis
 from engine.collision.meshes.triangle_triangle import (
     APART,
     CROSSING,

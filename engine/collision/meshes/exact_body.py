@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from engine.bounding.bvh import WIDTH
+from engine.collision.exact_images import rounded_quotient
 from engine.collision.meshes.face_state import STACK_ROWS
 from engine.collision.meshes.mesh_arrays import MeshArrays, MeshBody, lattice_shift
 from engine.collision.meshes.placement import PoseArrays
@@ -112,10 +113,7 @@ def exact_pair(
 
 def rounded_outward(numerator: int, denominator: int) -> tuple[float, float]:
     """Return doubles around a rational, infinite where it is beyond them."""
-    try:
-        value = numerator / denominator  # correctly rounded
-    except OverflowError:
-        return (1.7976931348623157e308, float("inf")) if numerator > 0 else (float("-inf"), -1.7976931348623157e308)
+    value = rounded_quotient(numerator, denominator)
     return float(np.nextafter(value, -np.inf)), float(np.nextafter(value, np.inf))
 
 

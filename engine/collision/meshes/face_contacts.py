@@ -52,7 +52,10 @@ def find_all_contacts(pair: MeshPair, *, looks_at_regions: bool = True) -> tuple
         is_first = how == FULL and len(found_pairs) == 1
         if is_first and looks_at_regions and pair.seek == SEEK_OVERLAP and _is_overlap_near(pair, *found):
             return found.pairs[:1], True
-    return _settled(pair, *_in_order(pair, np.concatenate(found_pairs), np.concatenate(found_kinds)))
+    pairs, kinds = np.concatenate(found_pairs), np.concatenate(found_kinds)
+    faces = [pair.meshes[own].faces[pairs[:, own]] for own in (0, 1)]
+    order = np.lexsort((pairs[:, 1], pairs[:, 0], faces[1], faces[0]))  # the caller's faces, then triangles
+    return _settled(pair, pairs[order], kinds[order])
 
 
 def _settled(pair: MeshPair, pairs: IntArray, kinds: Int8Array) -> tuple[IntArray, bool]:
@@ -79,13 +82,6 @@ def _is_overlap_near(pair: MeshPair, pairs: IntArray, kinds: Int8Array) -> bool:
             pairs[0] = pairs[index]
             return True
     return False
-
-
-def _in_order(pair: MeshPair, pairs: IntArray, kinds: Int8Array) -> tuple[IntArray, Int8Array]:
-    """Sort pairs by the caller's faces, then by triangle."""
-    faces = [pair.meshes[own].faces[pairs[:, own]] for own in (0, 1)]
-    order = np.lexsort((pairs[:, 1], pairs[:, 0], faces[1], faces[0]))
-    return pairs[order], kinds[order]
 
 
 def _is_settled_by(pair: MeshPair, kind: int, i: int, j: int) -> bool:

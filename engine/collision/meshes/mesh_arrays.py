@@ -89,11 +89,6 @@ class MeshBody:
         """False for surfaces and flat boxes."""
         return self.arrays.has_inside
 
-    @property
-    def reach(self) -> float:
-        """Largest magnitude of a coordinate."""
-        return self.arrays.extent.reach
-
     def posed(self, pose: Pose | None) -> PoseArrays:
         """Return the pose as kernels take it."""
         if pose is None:

@@ -41,7 +41,7 @@ def _have_equal_faces(first: MeshBody, second: MeshBody) -> bool:
     """Tell whether two meshes have the same triangles, in any order and orientation."""
     if first is second:
         return True
-    if len(first.faces) != len(second.faces) or first.reach != second.reach:
+    if len(first.faces) != len(second.faces) or first.arrays.extent.reach != second.arrays.extent.reach:
         return False
     a, b = _sorted_faces(first), _sorted_faces(second)
     return bool((a == b).all())

@@ -42,7 +42,8 @@ def simplest(
     poses = [pose for pose in (first_pose, second_pose) if pose is not None]
     if not poses:
         return first, first_pose, second, second_pose
-    largest = max(first.reach, second.reach, *(float(np.abs(pose.translation).max()) for pose in poses), 0.0)
+    shifts = [float(np.abs(pose.translation).max()) for pose in poses]
+    largest = max(first.arrays.extent.reach, second.arrays.extent.reach, *shifts, 0.0)
     power = int(np.frexp(largest)[1])
     if abs(power) <= _SAFE_POWER or largest == 0.0:
         return first, first_pose, second, second_pose

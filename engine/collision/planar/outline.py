@@ -15,7 +15,7 @@ import numpy as np
 from engine.arrangement.arrange import Arrangement, arrange
 from engine.arrangement.nodes import NodeTable, float_nodes, rational_nodes
 from engine.arrays import FloatArray, IntArray
-from engine.collision.exact_images import image_map
+from engine.collision.exact_images import image_map, rounded
 from engine.parallel import Budget
 from engine.predicates.rational import orient2d_rational
 from engine.solids.aabb import Aabb
@@ -71,14 +71,6 @@ def outline_of(body: Solid, pose: Pose | None, budget: Budget) -> Outline:
     floats = vertices if pose is None else np.array([[rounded(x), rounded(y)] for x, y in points])
     low, high = np.minimum(floats[ends[:, 0]], floats[ends[:, 1]]), np.maximum(floats[ends[:, 0]], floats[ends[:, 1]])
     return Outline(points, ends, low, high, floats, pose is not None)
-
-
-def rounded(value: Fraction) -> float:
-    """Return the nearest double, an infinity beyond the largest: rounding that keeps the order, for boxes."""
-    try:
-        return value.numerator / value.denominator
-    except OverflowError:
-        return float("inf") if value > 0 else float("-inf")
 
 
 def _rings_of(body: Solid) -> tuple[FloatArray, IntArray]:

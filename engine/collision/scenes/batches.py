@@ -15,7 +15,7 @@ from engine.collision.detail import details_of_boxes, details_where_proven
 from engine.collision.meshes.mesh_arrays import STILL
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.scenes.bodies import SceneBodies
-from engine.collision.scenes.boxes import relate_box_pairs
+from engine.collision.simple.aabb_aabb import relate_box_pairs
 from engine.parallel import Budget, run_chunks
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid

@@ -1,24 +1,39 @@
-"""Two axis-aligned boxes: comparisons of their bounds, exact as they stand."""
+"""Axis-aligned boxes without poses: comparisons of their bounds, exact as they stand."""
 
 from __future__ import annotations
 
-from engine.collision.result import Collision, Witness
-from engine.solids.aabb import Aabb
-from engine.types import Relation
+from typing import Any
+
+from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING
+from engine.jit import inline, kernel
 
 
-def collide_aabb_aabb(first: Aabb, second: Aabb) -> Collision:
-    """Return the relation of two boxes without poses, in 2D or 3D; a witness only of one inside the other.
+def relate_boxes(low: Any, high: Any, i: int, j: int) -> int:
+    """Return the relation of box i to box j, closed boxes (n, d) of any dimension, flat ones too."""
+    meet = solid = i_within = j_within = interiors = True
+    for axis in range(low.shape[1]):
+        a0, a1, b0, b1 = low[i, axis], high[i, axis], low[j, axis], high[j, axis]
+        meet &= a0 <= b1 and b0 <= a1
+        i_within &= b0 < a0 and a1 < b1
+        j_within &= a0 < b0 and b1 < a1
+        solid &= a0 < a1 and b0 < b1
+        interiors &= a0 < b1 and b0 < a1
+    if not meet:
+        return DISJOINT
+    if i_within:
+        return FIRST_INSIDE_SECOND
+    if j_within:
+        return SECOND_INSIDE_FIRST
+    return OVERLAPPING if solid and interiors else TOUCHING
 
-    A flat box (min = max on an axis) has no interior: it never overlaps.
-    """
-    a0, a1, b0, b1 = first.min, first.max, second.min, second.max
-    if (a0 > b1).any() or (b0 > a1).any():
-        return Collision(Relation.DISJOINT)
-    if (b0 < a0).all() and (a1 < b1).all():
-        return Collision(Relation.FIRST_INSIDE_SECOND, Witness("containment", containing="second"))
-    if (a0 < b0).all() and (b1 < a1).all():
-        return Collision(Relation.SECOND_INSIDE_FIRST, Witness("containment", containing="first"))
-    are_solid = (a0 < a1).all() and (b0 < b1).all()
-    crossing = (a0 < b1).all() and (b0 < a1).all()
-    return Collision(Relation.OVERLAPPING if are_solid and crossing else Relation.TOUCHING)
+
+_relate = inline(relate_boxes)
+
+
+@kernel
+def relate_box_pairs(low: Any, high: Any, is_box: Any, pairs: Any, relations: Any) -> None:
+    """Fill relations (n,) int8 for the pairs (n, 2) of which both are boxes without pose."""
+    for item in range(pairs.shape[0]):
+        i, j = pairs[item, 0], pairs[item, 1]
+        if is_box[i] and is_box[j]:
+            relations[item] = _relate(low, high, i, j)

@@ -14,8 +14,7 @@ from fractions import Fraction
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
-from engine.collision.exact_images import Vector, image_point
-from engine.collision.planar.outline import rounded
+from engine.collision.exact_images import Vector, image_point, rounded
 from engine.collision.result import Collision, Parts, Witness, Work
 from engine.collision.simple.boundary import Boundary, boundary_of
 from engine.containment.rational_locate import rational_location

@@ -9,10 +9,10 @@ from fractions import Fraction
 import numpy as np
 
 from engine.arrays import FloatArray, Int8Array, IntArray
-from engine.collision.exact_images import HalfSpaceImage, Vector, as_vector, image_map, value_at
+from engine.collision.exact_images import HalfSpaceImage, Vector, as_vector, image_map, rounded, value_at
 from engine.collision.meshes.live_faces import LivePiece, live_piece
 from engine.collision.meshes.mesh_arrays import mesh_body_of
-from engine.collision.planar.outline import is_clean, live_edges, outline_of, rounded
+from engine.collision.planar.outline import is_clean, live_edges, outline_of
 from engine.collision.result import Work
 from engine.collision.simple.feature_distance import box_distance_bounds, simplex_distance
 from engine.predicates.exact_vectors import dot
@@ -80,7 +80,7 @@ def _mesh_boundary(body: Solid, pose: Pose | None, work: Work) -> Boundary:
     if pose is not None:  # the error is derived in `placement.py`
         with np.errstate(all="ignore"):
             floats = vertices @ pose.rotation.T + pose.translation
-        error = 2.0**-49 * (3.0 * mesh.reach + float(np.abs(pose.translation).max())) + 2.0**-1060
+        error = 2.0**-49 * (3.0 * mesh.arrays.extent.reach + float(np.abs(pose.translation).max())) + 2.0**-1060
 
     def live(faces: list[int]) -> Iterator[LivePiece]:
         for face in faces:

@@ -16,7 +16,7 @@ def test_triangles_keep_their_places_and_numbers() -> None:
     corners = mesh.arrays.vertices[mesh.arrays.triangles]
     assert (corners == body.vertices[body.triangles[mesh.faces]]).all()
     assert mesh.has_inside
-    assert mesh.reach == 3.5
+    assert mesh.arrays.extent.reach == 3.5
     assert mesh.arrays.extent.grain == 0.5
     assert mesh_body_of(body) is mesh
 

@@ -21,7 +21,7 @@ def test_posed_bodies_far_out_of_range_are_scaled_exactly() -> None:
     far = Pose(TURN.rotation, [2.0**400, 0, 0])
     a, _, _, pose = simplest(mesh(1, (2.0**399, 0, 0)), None, mesh(1, (2.0**399, 0, 0)), far)
     assert pose is not None
-    assert max(a.reach, np.abs(pose.translation).max()) <= 1.0
+    assert max(a.arrays.extent.reach, np.abs(pose.translation).max()) <= 1.0
     tiny = Pose(TURN.rotation, [2.0**400, 2.0**-1074, 0])
     assert simplest(mesh(1), None, mesh(1), tiny)[3] is tiny
 
