@@ -1,8 +1,8 @@
 """A tree of boxes over the elements of a boundary (edges or triangles), for the elements near a segment.
 
 The elements are put in the order of a space-filling curve through their centres; the tree over them is implicit: node
-i has the children 2 i and 2 i + 1, the leaves of `LEAF_SIZE` elements start at `first_leaf`, and a box that holds
-nothing has low = +inf. Boxes are the exact ones of the doubles given, so a test without rounding errs on neither side;
+i has the children 2 i and 2 i + 1, the second half are leaves of `LEAF_SIZE` elements, and a box that holds nothing
+has low = +inf. Boxes are the exact ones of the doubles given, so a test without rounding errs on neither side;
 where the test rounds, it keeps.
 
 Source: the order is that of G. M. Morton, A computer oriented geodetic data base, 1966; the separating axes of segment
@@ -11,7 +11,6 @@ and box stand in C. Ericson, Real-time collision detection, 2005, section 5.3.3.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -30,21 +29,11 @@ TOO_LARGE: Final = 2.0**500
 """Beyond this products may overflow, and only the boxes are compared."""
 
 
-@dataclass(frozen=True, slots=True)
-class BoxTree:
-    """order: (n,) int64, elements by leaf. boxes: (2 n_leaves, 2, dim) float64, low and high of node i at row i."""
+def build_box_tree(low: FloatArray, high: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Return the tree over elements with the boxes `low`, `high`, (n, dim) float64 each.
 
-    order: IntArray
-    boxes: FloatArray
-    first_leaf: int
-
-    @property
-    def memory(self) -> int:
-        return self.order.nbytes + self.boxes.nbytes
-
-
-def build_box_tree(low: FloatArray, high: FloatArray) -> BoxTree:
-    """Return the tree over elements with the boxes `low`, `high`, (n, dim) float64 each."""
+    (n,) int64, elements by leaf; (2 n_leaves, 2, dim) float64, low and high of node i at row i.
+    """
     n, dimension = low.shape
     order = np.argsort(_curve(low, high), kind="stable")
     n_leaves = 1
@@ -61,7 +50,7 @@ def build_box_tree(low: FloatArray, high: FloatArray) -> BoxTree:
         children = boxes[2 * level : 4 * level].reshape(level, 2, 2, dimension)
         boxes[level : 2 * level, 0] = children[:, :, 0].min(axis=1)
         boxes[level : 2 * level, 1] = children[:, :, 1].max(axis=1)
-    return BoxTree(order, boxes, n_leaves)
+    return order, boxes
 
 
 def _curve(low: FloatArray, high: FloatArray) -> npt.NDArray[np.uint64]:

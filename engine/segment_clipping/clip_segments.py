@@ -10,12 +10,13 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.arrays import FloatArray, IntArray
+from engine.containment.locators import locator_of
 from engine.errors import UnsupportedSolidError
 from engine.parallel import Budget, Cancel, Options, Progress, run_chunks
 from engine.predicates.scaling import balanced_rows
 from engine.segment_clipping.ball_cut import fill_on_sphere
 from engine.segment_clipping.ball_interval import decide_on_sphere
-from engine.segment_clipping.boundary import clip_chunk, locator_for
+from engine.segment_clipping.boundary import clip_chunk
 from engine.segment_clipping.box_cut import fill_on_boxes
 from engine.segment_clipping.cohen_sutherland import decide_on_boxes
 from engine.segment_clipping.cyrus_beck import as_columns, decide_on_rows
@@ -207,7 +208,7 @@ def _on_boundary(region: Polygon | Polyhedron) -> Task:
     def task(segments: FloatArray, budget: Budget, workers: int | None, progress: Progress | None) -> Clipped:
         check_finite(segments, ("segments",))
         chunks: dict[int, Clipped] = {}
-        locator = locator_for(region, len(segments), budget)
+        locator = locator_of(region).chosen(len(segments), budget)
 
         def chunk(first: int, last: int) -> None:
             chunks[first] = clip_chunk(segments, first, last, region, locator, budget)

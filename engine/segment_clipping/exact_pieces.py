@@ -1,34 +1,39 @@
 """The pieces of one segment within a polygon or polyhedron, in exact integer arithmetic.
 
 The segment's contacts with the boundary cut [0, 1] into open spans. A span along which the segment lies in an element
-is kept (the boundary counts as in); any other meets no element, so one location decides for all of it: that of its
-middle, or, where every contact so far is a proper crossing, that of the segment's first end turned over as often as the
-boundary was crossed. Contacts are kept as points. Pieces are what hangs together.
+is kept (the boundary counts as in). Any other meets no element, so one location holds for all of it, and for the line
+beside it, moved by infinitesimals (eps, eps^2): from span to span it turns over as often as that line crosses elements,
+which signs tell, through vertices and along edges too. The location of one span is that of an end that is not on the
+boundary, else it is asked for. Contacts are kept as points. Pieces are what hangs together.
 
 All coordinates of a segment and of the elements it meets are integers over one denominator, parameters are Fractions.
+Cost: n log n for n elements.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
-from typing import NamedTuple
+from itertools import groupby
+from typing import Final, NamedTuple
 
 from engine.predicates.integers import common_integers, nearest
 from engine.segment_clipping.exact_segments import Piece
 
 Integers = Sequence[int]
 ZERO, ONE = Fraction(0), Fraction(1)
+_CHECK_EVERY: Final = 64
 
 
 class Contact(NamedTuple):
     """Where a segment and an element meet: from `first` to `last`, equal for a point; is_along: it lies in a stretch
-    of the element's plane or line, so that the element is not crossed."""
+    of the element's plane or line; turns: the line beside the segment crosses the element."""
 
     first: Fraction
     last: Fraction
     face: int
     is_along: bool
+    turns: bool
 
 
 def _minus(a: Integers, b: Integers) -> list[int]:
@@ -99,78 +104,108 @@ def triangle_stretch(
     return (first, last, s_p == s_q) if first <= last else None
 
 
+def is_crossed(p: Integers, q: Integers, corners: Sequence[Integers]) -> bool:
+    """Tell whether the line through p and q, moved by infinitesimals, crosses an edge or a triangle.
+
+    Seen along the line, an element parallel to it has no length or no area: it holds no point that is moved so.
+    """
+    u = _minus(q, p)
+    if len(u) == 2:
+        return len({_cross(u, _minus(corner, p))[0] > 0 for corner in corners}) == 2
+    k = max(range(3), key=lambda axis: abs(u[axis]))
+    i, j = (k + 1) % 3, (k + 2) % 3
+    seen = [(w[i] * u[k] - w[k] * u[i], w[j] * u[k] - w[k] * u[j]) for w in (_minus(corner, p) for corner in corners)]
+    sides = [a[0] * b[1] - a[1] * b[0] or a[1] - b[1] or b[0] - a[0] for a, b in zip(seen, [*seen[1:], seen[0]])]
+    return min(sides) > 0 or max(sides) < 0
+
+
 def contacts_of(
-    start: Integers, end: Integers, elements: Sequence[tuple[int, Sequence[Integers]]]
+    start: Integers, end: Integers, elements: Sequence[tuple[int, Sequence[Integers]]], check: Callable[[], object]
 ) -> Iterator[Contact]:
     """Yield the contacts of a segment with elements, the face and the corners (two or three) of each."""
-    for face, corners in elements:
+    for i, (face, corners) in enumerate(elements):
+        if i % _CHECK_EVERY == 0:
+            check()
         stretch = (edge_stretch if len(corners) == 2 else triangle_stretch)(start, end, *corners)
         if stretch is not None:
-            yield Contact(stretch[0], stretch[1], face, stretch[2])
+            yield Contact(*stretch[:2], face, stretch[2], is_crossed(start, end, corners))
 
 
-def spans_of(contacts: Sequence[Contact], is_kept: Callable[[Fraction, Fraction], bool]) -> list[list[Fraction]]:
-    """Return the first and the last parameter of each piece; is_kept: whether a span between elements is inside."""
-    touched = {t for contact in contacts for t in contact[:2]}
-    along = [contact for contact in contacts if contact.first < contact.last]
-    cuts = sorted({ZERO, ONE} | touched)
-    spans: list[list[Fraction]] = []
-    is_open = False  # was the span before this cut kept
-    for t, following in zip(cuts, [*cuts[1:], None]):
-        goes_on = following is not None and (
-            any(contact.first <= t and following <= contact.last for contact in along) or is_kept(t, following)
-        )
-        if is_open:
-            spans[-1][1] = t
-        elif goes_on or t in touched:
-            spans.append([t, t])
+def nodes_of(contacts: Sequence[Contact]) -> list[tuple[Fraction, list[Contact]]]:
+    """Return the parameters at which contacts begin or end, 0 and 1 too, in order, and these contacts."""
+    events: list[tuple[Fraction, Contact | None]] = [(ZERO, None), (ONE, None)]
+    events += [(contact.first, contact) for contact in contacts]
+    events += [(contact.last, contact) for contact in contacts if contact.first < contact.last]
+    # rounding keeps order: Fractions are compared where doubles tie only
+    events.sort(key=lambda event: (nearest(*event[0].as_integer_ratio()), event[0]))
+    grouped = groupby(events, key=lambda event: event[0])
+    return [(t, [contact for _, contact in same if contact is not None]) for t, same in grouped]
+
+
+def spans_of(
+    contacts: Sequence[Contact], locations: tuple[int, int], locate: Callable[[Fraction], int]
+) -> Iterator[tuple[Fraction, Fraction, tuple[int, int]]]:
+    """Yield the first and the last parameter of each piece, and the faces there, -1 for an end of the segment.
+
+    locations: of the ends of the segment. locate: tells the location at a parameter; asked once at most, where both
+    ends are on the boundary. Of several faces at one parameter the smallest is named, those along the segment last.
+    """
+    nodes = nodes_of(contacts)
+    n_along, has_turned = 0, False
+    are_along, have_turned = [], []  # of the span after each node; turned: against the first span
+    for t, met in nodes:
+        for contact in met:
+            has_turned ^= contact.turns
+            if contact.first < contact.last:
+                n_along += 1 if t == contact.first else -1
+        are_along.append(n_along > 0)
+        have_turned.append(has_turned)
+    is_first_in = locations[0] > 0
+    if locations[0] == 0 and locations[1] != 0:
+        is_first_in = (locations[1] > 0) ^ have_turned[-2]
+    elif locations[0] == 0 and False in are_along[:-1]:
+        i = are_along.index(False)
+        is_first_in = (locate((nodes[i][0] + nodes[i + 1][0]) / 2) > 0) ^ have_turned[i]
+    is_open, first, entered = False, ZERO, -1
+    for (t, met), is_along, turned in zip(nodes, are_along, have_turned):
+        goes_on = t < 1 and (is_along or is_first_in ^ turned)
+        face = min((contact.is_along, contact.face) for contact in met)[1] if met else -1
+        if not is_open:
+            first, entered = t, -1 if t == 0 else face
+        if not goes_on and (is_open or met):
+            yield first, t, (entered, -1 if t == 1 else face)
         is_open = goes_on
-    return spans
-
-
-def face_at(contacts: Sequence[Contact], t: Fraction) -> int:
-    """Return the face of the contacts at t: the smallest, those that the segment runs along last."""
-    met = [contact for contact in contacts if t in contact[:2] or contact.first < t < contact.last]
-    return min(met, key=lambda contact: (contact.is_along, contact.face)).face
 
 
 def pieces_of(
     p: Sequence[float],
     q: Sequence[float],
     elements: Sequence[tuple[int, Sequence[Sequence[float]]]],
-    is_proper: bool,
-    location: int,
+    locations: tuple[int, int],
     locate: Callable[[list[Fraction]], int],
-) -> list[Piece]:
-    """Return the pieces of the segment p q, p and q different.
+    check: Callable[[], object],
+) -> Iterator[Piece]:
+    """Yield the pieces of the segment p q, p and q different.
 
     elements: the face and the corners (two or three) of each element that the segment may meet; others it misses.
-    is_proper: each of them is crossed in an interior point, neither end lies on the boundary. location: that of p, then
-    used for all spans; otherwise `locate` is asked for the middle of each.
+    locations: of p and q. locate: see `spans_of`. check: called now and then.
     """
     n = len(p)
     flat, scale = common_integers([*p, *q, *(x for _, corners in elements for corner in corners for x in corner)])
     points = iter([flat[i : i + n] for i in range(0, len(flat), n)])
     start, end = next(points), next(points)
-    contacts = list(contacts_of(start, end, [(face, [next(points) for _ in corners]) for face, corners in elements]))
+    whole = [(face, [next(points) for _ in corners]) for face, corners in elements]
 
     def at(t: Fraction) -> list[Fraction]:
         return [Fraction(x, scale) + t * Fraction(y - x, scale) for x, y in zip(start, end)]
 
-    def is_kept(t: Fraction, following: Fraction) -> bool:
-        if is_proper:
-            return location * (-1) ** sum(contact.first <= t for contact in contacts) > 0
-        return locate(at((t + following) / 2)) >= 0
-
     def rounded(t: Fraction) -> list[float]:
-        return [nearest(x.numerator, x.denominator) for x in at(t)]
+        top, bottom = t.as_integer_ratio()
+        return [nearest(x * (bottom - top) + y * top, bottom * scale) for x, y in zip(start, end)]
 
-    return [
-        Piece(
-            (nearest(*first.as_integer_ratio()), nearest(*last.as_integer_ratio())),
-            rounded(first),
-            rounded(last),
-            (-1 if first == 0 else face_at(contacts, first), -1 if last == 1 else face_at(contacts, last)),
-        )
-        for first, last in spans_of(contacts, is_kept)
-    ]
+    contacts = list(contacts_of(start, end, whole, check))
+    for i, (first, last, faces) in enumerate(spans_of(contacts, locations, lambda t: locate(at(t)))):
+        if i % _CHECK_EVERY == 0:
+            check()
+        t0, t1 = (nearest(*t.as_integer_ratio()) for t in (first, last))
+        yield Piece((t0, t1), rounded(first), rounded(last), faces)

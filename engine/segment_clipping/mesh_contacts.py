@@ -1,4 +1,4 @@
-"""A segment in the coordinates of a mesh's tree, with the slack that rounding takes; boxes that meet no triangle.
+"""A segment in the coordinates of a mesh's tree, with the slack that rounding takes.
 
 The tree (bvh.py) holds float32 boxes in coordinates of its own. A segment is brought there in doubles, cut to what lies
 near the tree, and stored as its middle and half in float32; the slack covers what all this rounds:
@@ -16,17 +16,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.bounding.bvh import MAX_DEPTH
-from engine.jit import inline, kernel, merged
-from engine.lanes.boxes import EMPTY
-from engine.lanes.lanes import lowest_bit
-from engine.lanes.segments import near_segment
-from engine.lanes.tracing import LANES
-from engine.predicates.loading import as_point3
-from engine.predicates.orientation import orient3d
+from engine.jit import merged
 from engine.types import Point3
 
-STACK: Final = LANES * MAX_DEPTH
 SLACK: Final = 2.0**-20
 CUT_SLACK: Final = 2.0**-45
 LIMIT: Final = 4.0
@@ -63,47 +55,3 @@ def local_segment(p: Point3, q: Point3, origin: Any, inverse: float) -> tuple[An
         tiny,
         True,
     )
-
-
-@inline
-def is_beside(corners: Any, triangle: Any) -> bool:
-    """Tell whether all corners of a box surely lie on one side of the plane of a triangle."""
-    a, b, c = as_point3(triangle, 0), as_point3(triangle, 1), as_point3(triangle, 2)
-    side = orient3d(a, b, c, as_point3(corners, 0))
-    for k in range(1, 8):
-        if orient3d(a, b, c, as_point3(corners, k)) != side:
-            return False
-    return abs(side) == 1
-
-
-@kernel
-def is_clear(corners: Any, mesh: Any, stop: Any) -> bool:
-    """Tell whether a box surely meets no triangle: exact signs of all its corners; False where that is not known.
-
-    corners: (8, 3) float64, those of the box, the last opposite to the first.
-    """
-    stack = np.empty(STACK, np.int64)
-    middle, half, slack, tiny, is_near = local_segment(
-        as_point3(corners, 0), as_point3(corners, 7), mesh.origin, mesh.inverse
-    )
-    if not is_near:
-        return True
-    # the box reaches as far from its diagonal as that is long
-    slack += 2.0 * (abs(half[0]) + abs(half[1]) + abs(half[2]))
-    stack[0], depth = 0, 1
-    while depth > 0:
-        depth -= 1
-        node = stack[depth]
-        bits = near_segment(mesh.boxes, node, middle, half, np.float32(slack), np.float32(tiny))
-        while bits != 0:
-            lane = lowest_bit(bits)
-            bits &= bits - 1
-            below = mesh.child[node, lane]
-            if below >= 0:
-                stack[depth] = below
-                depth += 1
-            elif below != EMPTY and not is_beside(corners, mesh.elements[-1 - below]):
-                return False
-        if stop[0]:
-            return False
-    return True

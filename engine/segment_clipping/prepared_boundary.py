@@ -26,11 +26,9 @@ class Outline(NamedTuple):
     """Whether every coordinate is zero or of a size for which kernels keep their bounds."""
     faces: IntArray
     """(k,) what each edge is reported as."""
-    beyond: FloatArray
-    """(2, 2) the coordinates next below and next above those of all edges."""
     order: IntArray
     boxes: FloatArray
-    """order, boxes: see `BoxTree`."""
+    """order, boxes: see `build_box_tree`."""
 
 
 class Mesh(NamedTuple):
@@ -42,8 +40,6 @@ class Mesh(NamedTuple):
     """See `Outline`."""
     faces: IntArray
     """(k,) the face of the caller that each triangle is reported as."""
-    beyond: FloatArray
-    """(2, 3) the coordinates next below and next above those of all triangles."""
     boxes: Float32Array
     child: Int32Array
     origin: FloatArray
@@ -74,11 +70,8 @@ def boundary_of(region: Polygon | Polyhedron) -> Outline | Mesh:
 def outline_of(elements: FloatArray, faces: IntArray) -> Outline:
     """Return what the kernels read of some edges (k, 2, 2)."""
     low, high = elements.min(axis=1), elements.max(axis=1)
-    tree = build_box_tree(low, high)
-    order, boxes = read_only(tree.order), read_only(tree.boxes)
-    return Outline(
-        read_only(elements), _are_safe(elements), read_only(faces), read_only(_beyond(low, high)), order, boxes
-    )
+    order, boxes = build_box_tree(low, high)
+    return Outline(read_only(elements), _are_safe(elements), read_only(faces), read_only(order), read_only(boxes))
 
 
 def _are_safe(elements: FloatArray) -> bool:
@@ -95,7 +88,6 @@ def mesh_of(elements: FloatArray, faces: IntArray) -> Mesh:
         on_lines(elements),
         _are_safe(elements),
         read_only(faces),
-        read_only(_beyond(low, high)),
         tree.boxes,
         tree.child,
         tree.origin,
@@ -115,12 +107,6 @@ def _inner_first(tree: Bvh) -> tuple[Bvh, int]:
     child = tree.child[order]
     child = np.where(child >= 0, place[np.maximum(child, 0)], child)
     return Bvh(on_lines(tree.boxes[order]), on_lines(child), tree.origin, tree.scale), int((~is_block).sum())
-
-
-def _beyond(low: FloatArray, high: FloatArray) -> FloatArray:
-    """Return the coordinates next below and next above all boxes, infinite where there are none."""
-    with np.errstate(over="ignore"):
-        return np.stack([np.nextafter(low.min(axis=0), -np.inf), np.nextafter(high.max(axis=0), np.inf)])
 
 
 def _levels_of(child: Int32Array) -> int:

@@ -10,7 +10,7 @@ from engine.bounding.bvh import build_bvh
 from engine.jit import kernel
 from engine.lanes.segments import near_segment
 from engine.segment_clipping.contacts import APART
-from engine.segment_clipping.mesh_contacts import is_clear, local_segment
+from engine.segment_clipping.mesh_contacts import local_segment
 from engine.segment_clipping.mesh_streams import find_mesh_contacts
 from engine.segment_clipping.prepared_boundary import Mesh, mesh_of
 from engine.segment_clipping.triangle_contact import exact_contact
@@ -94,17 +94,3 @@ def test_contacts_are_those_of_all_triangles() -> None:
     for k, pairs in enumerate(expected):
         mine = slice(offsets[k], offsets[k + 1])
         assert set(zip(met[mine].tolist(), kinds[mine].tolist())) == pairs
-
-
-def test_clear_boxes_hold_no_triangle() -> None:
-    mesh = mesh_of(np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]]), np.zeros(1, np.int64))
-
-    def clear(low: list[float], high: list[float]) -> bool:
-        corners = np.array(np.meshgrid(*zip(low, high), indexing="ij")).reshape(3, 8).T.copy()
-        return bool(is_clear(corners, mesh, np.zeros(1, np.uint8)))
-
-    above = float(np.nextafter(0.0, 1.0))
-    assert clear([0.25, 0.25, above], [0.5, 0.5, 1.0])
-    assert not clear([0.25, 0.25, 0.0], [0.5, 0.5, 1.0])
-    assert not clear([0.25, 0.25, -above], [0.5, 0.5, above])
-    assert clear([9.0, 9.0, 9.0], [9.5, 9.5, 9.5])

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from engine.containment.locators import locator_of
 from engine.parallel import Budget
 from engine.segment_clipping.boundary import clip_chunk
 from engine.segment_clipping.clip_segments import clip_segments
@@ -20,10 +21,8 @@ from tests.unit.segment_clipping.scenes import assert_exact, random_segments, th
 from tests.unit.segment_clipping.test_boundary import REGIONS, solid_of, vertices_of
 
 
-def nothing_settled(
-    segments: Any, chosen: Any, locations: Any, boundary: Any, budget: Any
-) -> tuple[list[Pieces], np.ndarray]:
-    return [], np.full(len(chosen), OPEN, np.uint8)
+def nothing_settled(segments: Any, locations: Any, boundary: Any, budget: Any) -> tuple[list[Pieces], np.ndarray]:
+    return [], np.full(len(segments), OPEN, np.uint8)
 
 
 def test_kernel_and_exact_integers_agree(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -64,9 +63,9 @@ def test_groups_answer_as_a_few_segments_do() -> None:
     n = GROUP + 300
     segments = rng.uniform((-2, -0.1, -0.1), (164, 1.1, 1.1), (n, 2, 3))
     segments[::50, 1] = segments[::50, 0]
-    budget = Budget()
-    whole = clip_chunk(segments, 0, n, boxes, None, budget)[0]
-    parts = [clip_chunk(segments, i, min(i + 60, n), boxes, None, budget)[0] for i in range(0, n, 60)]
+    budget, locator = Budget(), locator_of(boxes)
+    whole = clip_chunk(segments, 0, n, boxes, locator, budget)[0]
+    parts = [clip_chunk(segments, i, min(i + 60, n), boxes, locator, budget)[0] for i in range(0, n, 60)]
     assert len(whole.source) > 3 * n
     for one, many in zip(whole, joined(parts)):
         np.testing.assert_array_equal(one, many)

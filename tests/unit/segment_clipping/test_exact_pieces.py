@@ -5,7 +5,16 @@ from __future__ import annotations
 import itertools
 from fractions import Fraction
 
-from engine.segment_clipping.exact_pieces import Contact, edge_stretch, face_at, spans_of, triangle_stretch
+from engine.segment_clipping.exact_pieces import (
+    ONE,
+    ZERO,
+    Contact,
+    edge_stretch,
+    is_crossed,
+    pieces_of,
+    spans_of,
+    triangle_stretch,
+)
 
 
 def test_edges_are_met_in_points_and_stretches() -> None:
@@ -40,7 +49,50 @@ def test_triangles_are_met_whichever_way_they_are_turned() -> None:
 
 def test_spans_that_hang_together_are_one_piece() -> None:
     t = [Fraction(k, 8) for k in range(9)]
-    contacts = [Contact(t[2], t[4], 7, True), Contact(t[4], t[4], 3, False), Contact(t[6], t[6], 1, False)]
-    assert spans_of(contacts, lambda first, last: False) == [[t[2], t[4]], [t[6], t[6]]]
-    assert spans_of(contacts, lambda first, last: first == t[4]) == [[t[2], t[6]]]
-    assert (face_at(contacts, t[3]), face_at(contacts, t[4])) == (7, 3)
+    contacts = [Contact(t[2], t[4], 7, True, False), Contact(t[4], t[4], 3, False, True)]
+    contacts.append(Contact(t[6], t[6], 1, False, False))
+
+    def spans(p: int, q: int, asked: int = 0) -> list[tuple[Fraction, Fraction, tuple[int, int]]]:
+        return list(spans_of(contacts, (p, q), lambda at: {t[1]: asked}[at]))
+
+    outside_first = [(t[2], ONE, (7, -1))]
+    inside_first = [(ZERO, t[4], (-1, 3)), (t[6], t[6], (1, 1))]
+    assert spans(-1, 0) == spans(0, 1) == spans(0, 0, -1) == outside_first
+    assert spans(1, 0) == spans(0, -1) == spans(0, 0, 1) == inside_first
+    assert list(spans_of([], (1, 1), lambda at: 0)) == [(ZERO, ONE, (-1, -1))]
+    assert list(spans_of([Contact(ZERO, ONE, 4, True, False)], (0, 0), lambda at: 0)) == [(ZERO, ONE, (-1, -1))]
+
+
+def test_the_line_beside_crosses_what_meets_in_a_vertex_or_an_edge_an_even_number_of_times_around() -> None:
+    """A closed surface is crossed as often inwards as outwards, along whatever line of a lattice."""
+    corners = list(itertools.product([0, 2], repeat=3))
+    faces = [
+        (0, 1, 3),
+        (0, 3, 2),
+        (4, 6, 7),
+        (4, 7, 5),
+        (0, 4, 5),
+        (0, 5, 1),
+        (2, 3, 7),
+        (2, 7, 6),
+        (0, 2, 6),
+        (0, 6, 4),
+    ]
+    faces += [(1, 5, 7), (1, 7, 3)]
+    ring = [(0, 0), (2, 0), (2, 2), (1, 1), (0, 2)]
+    places = list(itertools.product([-1, 0, 1, 2, 3], repeat=3))
+    for p, q in zip(places, places[::-1]):
+        if p != q:
+            assert sum(is_crossed(p, q, [corners[k] for k in face]) for face in faces) in (0, 2)
+        if p[:2] != q[:2]:
+            assert sum(is_crossed(p[:2], q[:2], edge) for edge in zip(ring, ring[1:] + ring[:1])) in (0, 2, 4)
+
+
+def test_thousands_of_crossings_are_sorted_and_polled() -> None:
+    """Teeth of a comb, crossed in an order of their own: the count of looks at the clock grows with them."""
+    n, asked = 3000, []
+    edges = [(k, [[float(x), -1.0], [float(x), 1.0]]) for k, x in enumerate([*range(1, n, 2), *range(2, n + 1, 2)])]
+    found = list(pieces_of([0.5, 0.0], [n + 0.5, 0.0], edges, (-1, 1), lambda point: 0, lambda: asked.append(1)))
+    assert len(found) == n // 2
+    assert [piece.start[0] for piece in found] == [float(x) for x in range(1, n, 2)]
+    assert len(asked) > n // 64
