@@ -28,6 +28,7 @@ import numpy as np
 from engine.arrays import Float32Array, FloatArray, Int32Array, read_only
 from engine.jit import inline, kernel
 from engine.lanes.boxes import EMPTY
+from engine.lanes.lanes import aligned
 
 WIDTH = 8
 N_BINS = 16
@@ -37,7 +38,6 @@ MAX_DEPTH = HEURISTIC_DEPTH + 40  # 2^40 items and more do not fit into memory
 UNUSED = np.float32(-1e30)
 ENLARGED = 2.0**-22
 """Added to half widths: a centre rounded to float32 is off by 2^-24 of at most 2, the half width by as much."""
-
 
 _FEW_ROWS = 64
 
@@ -66,13 +66,8 @@ def build_bvh(boxes: FloatArray) -> Bvh:
 
 def on_lines(array: Any) -> Any:
     """Return a read-only copy that begins with a line of the cache, unless it is small."""
-    kept = array.copy()
-    if len(array) > _FEW_ROWS:
-        room = np.empty(kept.nbytes + 64, np.uint8)
-        start = -room.ctypes.data % 64
-        aligned = room[start : start + kept.nbytes].view(array.dtype).reshape(kept.shape)
-        aligned[:] = kept
-        kept = aligned
+    kept = aligned(array.shape, array.dtype) if len(array) > _FEW_ROWS else np.empty_like(array)
+    kept[:] = array
     kept.setflags(write=False)
     return kept
 
@@ -190,10 +185,7 @@ def _unite(items: Any, order: Any, start: int, end: int, box: Any) -> None:
     """Set `box` to the union of the items of one run."""
     box[:] = items[order[start]]
     for place in range(start + 1, end):
-        item = order[place]
-        for axis in range(3):
-            box[axis] = min(box[axis], items[item, axis])
-            box[3 + axis] = max(box[3 + axis], items[item, 3 + axis])
+        _grow(box, items, order[place])
 
 
 @inline
@@ -265,13 +257,13 @@ def _best_cut(bins: Any) -> int:
     number = 0.0
     for index in range(N_BINS - 1, 0, -1):
         number += bins[index, 6]
-        _grow(box, bins[index])
+        _grow(box, bins, index)
         from_right[index] = number * _half_area(box) if number > 0.0 else np.inf
     box[:3], box[3:] = np.inf, -np.inf
     number, best, cut = 0.0, np.inf, 0
     for index in range(1, N_BINS):
         number += bins[index - 1, 6]
-        _grow(box, bins[index - 1])
+        _grow(box, bins, index - 1)
         if number > 0.0:
             cost = number * _half_area(box) + from_right[index]
             if cost < best:
@@ -280,7 +272,7 @@ def _best_cut(bins: Any) -> int:
 
 
 @inline
-def _grow(box: Any, other: Any) -> None:
+def _grow(box: Any, boxes: Any, row: int) -> None:
     for axis in range(3):
-        box[axis] = min(box[axis], other[axis])
-        box[3 + axis] = max(box[3 + axis], other[3 + axis])
+        box[axis] = min(box[axis], boxes[row, axis])
+        box[3 + axis] = max(box[3 + axis], boxes[row, 3 + axis])

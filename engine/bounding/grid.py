@@ -121,22 +121,13 @@ def _estimate(lows: list[FloatArray], highs: list[FloatArray], axes: list[Axis])
 
 
 def build_box_grid(
-    u_low: FloatArray,
-    u_high: FloatArray,
-    v_low: FloatArray,
-    v_high: FloatArray,
-    u_cells: int,
-    v_cells: int,
-    check: Callable[[], object] = lambda: None,
+    lows: list[FloatArray], highs: list[FloatArray], cells: list[int], check: Callable[[], object] = lambda: None
 ) -> BoxGrid:
-    """List boxes, given by their four sides (n,), in a grid of about u_cells x v_cells cells over all of them.
+    """List boxes, given by their sides (n,) on two axes, in a grid of about ``cells[0] x cells[1]`` over all of them.
 
     Cost: linear in the boxes and the entries, at most four for each box and cell together.
-
     check: called between the steps; what it raises ends the building.
     """
-    flat, limit = np.zeros(1), 4 * (len(u_low) + u_cells * v_cells) + 64
-    axes, offsets, items = list_in_cells(
-        [u_low, v_low, flat], [u_high, v_high, flat], [u_cells, v_cells, 1], limit, check
-    )
+    flat, limit = np.zeros(1), 4 * (len(lows[0]) + cells[0] * cells[1]) + 64
+    axes, offsets, items = list_in_cells([*lows, flat], [*highs, flat], [*cells, 1], limit, check)
     return BoxGrid(axes[0], axes[1], offsets, items)

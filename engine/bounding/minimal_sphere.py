@@ -22,18 +22,19 @@ from fractions import Fraction
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
 from engine.arrays import FloatArray
 from engine.bounding.support_ball import smallest_ball
 from engine.errors import NotRepresentableError
 from engine.parallel import Budget
+from engine.predicates.error_free import two_sum
 from engine.predicates.rational import nearest_float
 
 Rational = tuple[Fraction, ...]
 
 _UNIT: Final = 2.0**-53
 _TINY: Final = 2.0**-900  # above all that scaling to the unit ball can lose to underflow
+_two_sum: Final = getattr(two_sum, "py_func", two_sum)  # of arrays
 _FEW: Final = 64  # candidates that are not worth a double-double pass
 
 
@@ -61,13 +62,7 @@ def minimal_sphere(points: FloatArray, budget: Budget | None = None) -> MinimalS
     >>> ball.center.tolist(), ball.radius, ball.support
     ([2.0, 0.0], 2.0, (0, 1))
     """
-    rows = points.tolist() if len(points) <= 8 else None
-
-    def exact(index: int) -> Rational:
-        row = points[index].tolist() if rows is None else rows[index]
-        return tuple(map(Fraction, row))
-
-    return _Walk(points, exact, 0.0, budget or Budget()).sphere()
+    return _Walk(points, lambda index: tuple(map(Fraction, points[index].tolist())), 0.0, budget or Budget()).sphere()
 
 
 def minimal_sphere_of_rationals(points: list[Rational], budget: Budget | None = None) -> MinimalSphere:
@@ -226,14 +221,6 @@ def excess_double_double(
     target_low = float(square - Fraction(target))
     excess = (high - target) + (low - target_low)
     return excess, 2.0**-90 + 8.0 * _up(lost)
-
-
-def _two_sum(a: npt.ArrayLike, b: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Return the rounded sums and their exact errors (Knuth)."""
-    first, second = np.asarray(a, np.float64), np.asarray(b, np.float64)
-    total = first + second
-    virtual = total - first
-    return total, (first - (total - virtual)) + (second - virtual)
 
 
 def _two_square(a: FloatArray) -> tuple[FloatArray, FloatArray]:

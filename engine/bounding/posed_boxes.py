@@ -18,15 +18,7 @@ from engine.jit import kernel
 
 @kernel
 def place_boxes(
-    boxes: Any,
-    reaches: Any,
-    radii: Any,
-    kinds: Any,
-    rows: Any,
-    rotations: Any,
-    translations: Any,
-    low: Any,
-    high: Any,
+    boxes: Any, reaches: Any, radii: Any, kinds: Any, rows: Any, rotations: Any, translations: Any, low: Any, high: Any
 ) -> None:
     """Fill low and high (n, d), rounded outward.
 

@@ -14,6 +14,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
+from engine.predicates.exact_vectors import determinant
+
 IntPoint = tuple[int, ...]
 
 
@@ -52,27 +54,15 @@ def _ball_through(points: Sequence[IntPoint], support: tuple[int, ...]) -> IntBa
     steps = [tuple(x - x0 for x, x0 in zip(point, first)) for point in others]
     gram = [[sum(a * b for a, b in zip(u, v)) for v in steps] for u in steps]
     squares = [gram[i][i] for i in range(len(steps))]
-    determinant = _determinant(gram)
-    if determinant == 0:
+    volume = determinant(gram)
+    if volume == 0:
         return None  # affinely dependent: a smaller set has the same ball
-    scale = 2 * determinant  # > 0: a Gram determinant
-    weights = [_determinant([_replaced(row, i, squares[j]) for j, row in enumerate(gram)]) for i in range(len(steps))]
+    scale = 2 * volume  # > 0: a Gram determinant
+    weights = [
+        determinant([[*row[:i], squares[j], *row[i + 1 :]] for j, row in enumerate(gram)]) for i in range(len(steps))
+    ]
     if any(weight < 0 for weight in weights) or sum(weights) > scale:
         return None
     offset = [sum(weight * step[axis] for weight, step in zip(weights, steps)) for axis in range(len(first))]
     center = tuple(scale * x0 + x for x0, x in zip(first, offset))
     return IntBall(center, sum(x * x for x in offset), scale, support)
-
-
-def _replaced(row: list[int], column: int, value: int) -> list[int]:
-    return [*row[:column], value, *row[column + 1 :]]
-
-
-def _determinant(matrix: list[list[int]]) -> int:
-    """Return the determinant of a matrix of at most 3 rows; 1 for none."""
-    if len(matrix) == 3:
-        (a, b, c), (d, e, f), (g, h, i) = matrix
-        return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
-    if len(matrix) == 2:
-        return matrix[0][0] * matrix[1][1] - matrix[0][1] * matrix[1][0]
-    return matrix[0][0] if matrix else 1

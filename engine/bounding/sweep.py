@@ -34,13 +34,13 @@ def meeting_boxes(low: FloatArray, high: FloatArray, flag: Any, block: int = BLO
     order = np.argsort(low[:, axis], kind="stable")
     low, high = np.ascontiguousarray(low[order]), np.ascontiguousarray(high[order])
     counts = np.zeros(n_boxes, np.int64)
-    _count(low, high, order, axis, counts, flag)
+    _sweep(low, high, order, axis, counts, 0, 0, np.empty(0, np.int64), flag)
     ends = np.cumsum(counts)
     start = done = 0
     while done < ends[-1]:  # bound: start grows
         stop = max(start + 1, int(np.searchsorted(ends, done + block, side="right")))
         keys = np.empty(int(ends[stop - 1]) - done, np.int64)
-        _collect(low, high, order, axis, start, stop, keys, flag)
+        _sweep(low, high, order, axis, counts, start, stop, keys, flag)
         keys.sort()
         yield np.stack([keys // n_boxes, keys % n_boxes], axis=1)
         start, done = stop, int(ends[stop - 1])
@@ -76,23 +76,12 @@ def _meet(low: Any, high: Any, box: int, other: int) -> bool:
 
 
 @kernel
-def _count(low: Any, high: Any, order: Any, axis: int, counts: Any, flag: Any) -> None:
-    """Count into counts (n,) the pairs of which each box is the first by number; boxes sorted by low on `axis`."""
-    n_boxes = low.shape[0]
-    for box in range(n_boxes):
-        if flag[0] != 0:
-            return
-        for other in range(box + 1, n_boxes):
-            if low[other, axis] > high[box, axis]:
-                break
-            if _meet(low, high, box, other):
-                counts[min(order[box], order[other])] += 1
-
-
-@kernel
-def _collect(low: Any, high: Any, order: Any, axis: int, start: int, stop: int, keys: Any, flag: Any) -> None:
-    """Write first * n + second of the pairs with start <= first < stop into `keys`, which has room for just those."""
-    n_boxes, n_found = low.shape[0], 0
+def _sweep(
+    low: Any, high: Any, order: Any, axis: int, counts: Any, start: int, stop: int, keys: Any, flag: Any
+) -> None:
+    """Count into counts (n,) the pairs of which each box is the first by number; boxes sorted by low on `axis`. Where
+    `keys` has room: write first * n + second of the pairs with start <= first < stop instead, which just fit."""
+    n_boxes, n_keys, n_found = low.shape[0], keys.shape[0], 0
     keys[:] = 0
     for box in range(n_boxes):
         if flag[0] != 0:
@@ -100,7 +89,11 @@ def _collect(low: Any, high: Any, order: Any, axis: int, start: int, stop: int, 
         for other in range(box + 1, n_boxes):
             if low[other, axis] > high[box, axis]:
                 break
+            if not _meet(low, high, box, other):
+                continue
             first, second = min(order[box], order[other]), max(order[box], order[other])
-            if start <= first < stop and n_found < keys.shape[0] and _meet(low, high, box, other):
+            if n_keys == 0:
+                counts[first] += 1
+            elif start <= first < stop and n_found < n_keys:
                 keys[n_found] = first * n_boxes + second
                 n_found += 1

@@ -91,7 +91,7 @@ def _build_columns(solid: Polyhedron, check: Check) -> Columns:
         check()
         areas[index] = orient2d_rational(*vertices[triangles[index], :2].tolist())
     side = max(1, min(2048, int(len(order) ** 0.5)))
-    grid = build_box_grid(boxes[:, 0], boxes[:, 1], boxes[:, 2], boxes[:, 3], side, side, check)
+    grid = build_box_grid([boxes[:, 0], boxes[:, 2]], [boxes[:, 1], boxes[:, 3]], [side, side], check)
     return Columns(vertices, triangles, boxes, areas, grid, float(boxes[:, 4].min()))
 
 
@@ -114,7 +114,7 @@ def _build_rings(starts: FloatArray, ends: FloatArray, check: Check) -> Rings:
     check()
     low, high = np.minimum(starts, ends), np.maximum(starts, ends)
     flat = np.zeros(1)
-    slabs = build_box_grid(low[:, 1], high[:, 1], flat, flat, max(1, min(1 << 20, len(order))), 1, check)
+    slabs = build_box_grid([low[:, 1], flat], [high[:, 1], flat], [max(1, min(1 << 20, len(order))), 1], check)
     box = (float(low[:, 0].min()), float(high[:, 0].max()), float(low[:, 1].min()), float(high[:, 1].max()))
     return Rings(starts, ends, np.ascontiguousarray(high[:, 0]), slabs, box)
 

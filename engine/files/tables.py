@@ -80,11 +80,7 @@ def write_table(target: str | None, columns: dict[str, npt.NDArray[Any]]) -> Non
     elif suffix == ".npz":
         np.savez(str(target), **columns)  # type: ignore[arg-type]
     elif suffix in ("", ".csv"):
-        text = _csv(columns)
-        if target is None:
-            sys.stdout.write(text)
-        else:
-            Path(target).write_text(text, "utf-8")
+        _write(target, _csv(columns))
     else:
         several = "" if len(columns) == 1 else " (one .npy array cannot hold several columns)"
         raise InvalidInputError(f"{target}: this answer is written to .csv, .npy or .npz{several}", ("output",))
@@ -107,7 +103,10 @@ def write_geojson(target: str | None, multipolygons: Sequence[Sequence[Sequence[
         coordinates = [[_closed(ring) for ring in rings] for rings in polygons]
         geometry = {"type": "MultiPolygon", "coordinates": coordinates}
         features.append({"type": "Feature", "properties": {"item": item}, "geometry": geometry})
-    text = json.dumps({"type": "FeatureCollection", "features": features}) + "\n"
+    _write(target, json.dumps({"type": "FeatureCollection", "features": features}) + "\n")
+
+
+def _write(target: str | None, text: str) -> None:
     if target is None:
         sys.stdout.write(text)
     else:

@@ -13,8 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.lanes.lanes import any_of, bits_of, count_bits, dot, greater, lesser, load
-from engine.lanes.memory import prefetch
+from engine.lanes.lanes import aligned, any_of, bits_of, count_bits, dot, greater, lesser, load, prefetch
 from engine.lanes.tracing import LANES, Lanes, Number, Rows, traced
 from engine.types import UNDECIDED
 
@@ -53,7 +52,4 @@ def prefetch_group(groups: Rows, group: int) -> None:
 
 def groups_of(n_groups: int) -> Any:
     """Return (n_groups, 14, 8) float32, uninitialised, that begins with a line of the cache: a group is seven."""
-    numbers = n_groups * ROWS * LANES
-    room = np.empty(numbers + _LINE, np.float32)
-    skipped = (-room.ctypes.data // 4) % _LINE
-    return room[skipped : skipped + numbers].reshape(n_groups, ROWS, LANES)
+    return aligned((n_groups, ROWS, LANES), np.float32)

@@ -19,19 +19,7 @@ from typing import Any, Final
 
 from engine.jit import inline
 from engine.lanes.boxes import FRAME_ROWS, MARGIN_ROW, SHIFT_ROW
-from engine.lanes.lanes import (
-    any_above,
-    bits_of,
-    bytes_of,
-    dot,
-    greater,
-    lane_of,
-    lesser,
-    load,
-    load_lane,
-    sift,
-    store,
-)
+from engine.lanes.lanes import any_above, bits_of, bytes_of, dot, greater, lane_of, lesser, load, load_lane, sift, store
 from engine.lanes.tracing import LANES, Lanes, Rows, traced
 from engine.lanes.triangles import CORNER_ROWS
 

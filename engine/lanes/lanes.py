@@ -9,6 +9,7 @@ m i + k.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -21,6 +22,7 @@ from engine.lanes.tracing import (
     LANES,
     VECTOR,
     WORD,
+    Array,
     EmittedArray,
     EmittedLanes,
     EmittedMask,
@@ -156,6 +158,44 @@ def sift(bits: int, first_lane: int, remaining: Any, arguments: Any) -> int:
         bits ^= lane_bits
         kept |= lane_bits & remaining(first_lane + shift // LANES, *arguments) << shift
     return kept
+
+
+# ---- of memory ------------------------------------------------------------------------------------------------------
+
+
+def _emit_move(target: EmittedArray, at: Any, source: EmittedArray, first: Any, n: EmittedWord) -> None:
+    cgutils.raw_memcpy(target.builder, target.address(at), source.address(first), n.value, 8)
+
+
+@instruction(_emit_move)
+def move(target: Array, at: int, source: Array, first: int, n: int) -> None:
+    """Set n numbers of `target` from `at` on to those of `source` from `first` on.
+
+    Flat float64 arrays, not the same one; the caller guarantees that both places are within them.
+    """
+    target[at : at + n] = source[first : first + n]
+
+
+def _emit_prefetch(array: EmittedArray, place: Any) -> None:
+    builder, word = array.builder, ir.IntType(32)
+    kind = ir.FunctionType(ir.VoidType(), [cgutils.voidptr_t, word, word, word])
+    function = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0")
+    there = builder.bitcast(array.address(place), cgutils.voidptr_t)
+    builder.call(function, [there, *(ir.Constant(word, number) for number in (0, 3, 1))])  # to read, to be kept
+
+
+@instruction(_emit_prefetch)
+def prefetch(array: Array, place: int) -> None:
+    """Ask for the line of the cache that holds number `place` of an array, so that a kernel works on one item while
+    those of the next are on their way; beyond the end is harmless."""
+
+
+def aligned(shape: tuple[int, ...], dtype: Any) -> Any:
+    """Return an uninitialised array that begins with a line of the cache."""
+    n_bytes = math.prod(shape) * np.dtype(dtype).itemsize
+    room = np.empty(n_bytes + 64, np.uint8)
+    start = -room.ctypes.data % 64
+    return room[start : start + n_bytes].view(dtype).reshape(shape)
 
 
 # ---- for traced functions -------------------------------------------------------------------------------------------

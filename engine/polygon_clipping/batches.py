@@ -14,8 +14,8 @@ from engine.polygon_clipping.in_integers import Row
 from engine.polygon_clipping.rings import PlaneTables
 from engine.polygon_clipping.sutherland_hodgman import clip_rings
 from engine.predicates.digits import packed_numbers
-from engine.predicates.integers import nearest
-from engine.predicates.ranges import LARGEST, SMALLEST
+from engine.predicates.expansion import LARGEST, SMALLEST
+from engine.predicates.rational import nearest
 from engine.predicates.scaling import exponent_above, scaled_back, shifted
 from engine.solids.base import Solid
 from engine.types import OPEN

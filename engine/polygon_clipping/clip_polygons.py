@@ -19,7 +19,6 @@ from engine.polygon_clipping.in_integers import Row, clip_polygon, integer_row, 
 from engine.predicates.scaling import largest_of
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
-from engine.solids.box_planes import box_rows
 from engine.solids.checks import as_point_groups, as_points, check_dimension, check_finite
 from engine.solids.convex import Convex
 from engine.solids.half_space import HalfSpace
@@ -144,7 +143,7 @@ def _planes(region: Solid, budget: Budget) -> list[Row]:
         case HalfSpace():
             rows = region.row[None, :]
         case Aabb():
-            rows = box_rows(region)
+            rows = region.rows
         case Convex():
             rows = region.planes
         case Polyhedron():

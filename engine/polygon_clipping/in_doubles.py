@@ -22,7 +22,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.jit import bare, inline, merged
-from engine.lanes.memory import move
+from engine.lanes.lanes import move
 from engine.polygon_clipping.cut_vertices import TINY, VALUE_BOUND, Vertices, are_same, cut_edge
 from engine.polygon_clipping.rings import CLIPPED, NO_ROOM, Clipped, Cutting, Plane, Polygons, has_bridges, plane_of
 

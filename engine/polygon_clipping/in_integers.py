@@ -17,7 +17,7 @@ from itertools import pairwise
 from math import gcd
 
 from engine.errors import TooComplexError
-from engine.predicates.integers import common_integers, nearest
+from engine.predicates.rational import common_integers, nearest
 
 Vertex = tuple[int, ...]
 Row = tuple[int, ...]

@@ -30,8 +30,7 @@ import numpy as np
 from engine.jit import inline
 from engine.predicates.double_double import U2, dd_add, dd_div, dd_scale, even_of, surely_rounded
 from engine.predicates.error_free import two_diff, two_prod, two_sum
-from engine.predicates.expansion import Components, grow_product, sign
-from engine.predicates.ranges import LARGEST
+from engine.predicates.expansion import LARGEST, Components, grow_product, sign
 
 CUT_BOUND: Final = 64.0 * U2
 POINT_BOUND: Final = 48.0 * U2

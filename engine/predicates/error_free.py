@@ -72,12 +72,7 @@ def _workspace_intrinsic(typing_context: Any, size: Any) -> Any:
         data = cgutils.alloca_once(builder, ir.DoubleType(), size=word(size.literal_value))
         array = make_array(array_type)(context, builder)
         populate_array(
-            array,
-            data=data,
-            shape=(word(size.literal_value),),
-            strides=(word(8),),
-            itemsize=word(8),
-            meminfo=None,
+            array, data=data, shape=(word(size.literal_value),), strides=(word(8),), itemsize=word(8), meminfo=None
         )
         return array._getvalue()
 
@@ -109,10 +104,7 @@ def fast_two_sum(a: float, b: float) -> tuple[float, float]:
 @inline
 def two_diff(a: float, b: float) -> tuple[float, float]:
     """Return (s, e) with s = fl(a - b) and s + e = a - b exactly."""
-    s = a - b
-    b_part = a - s
-    a_part = s + b_part
-    return s, (a - a_part) + (b_part - b)
+    return two_sum(a, -b)
 
 
 @inline

@@ -38,3 +38,12 @@ def largest_axis(u: Sequence[Exact]) -> int:
     sizes = [abs(value) for value in u]
     largest = max(sizes)
     return sizes.index(largest) if largest else -1
+
+
+def determinant(matrix: Sequence[Sequence[Exact]]) -> Exact | int:
+    """Return the determinant of a matrix of at most 3 rows; 1 for none."""
+    if len(matrix) == 3:
+        return dot(matrix[0], cross(matrix[1], matrix[2]))
+    if len(matrix) == 2:
+        return matrix[0][0] * matrix[1][1] - matrix[0][1] * matrix[1][0]
+    return matrix[0][0] if matrix else 1

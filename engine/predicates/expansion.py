@@ -15,12 +15,22 @@ asks for strongly non-overlapping operands and gains nothing at the lengths that
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final
 
 from engine.jit import inline
 from engine.predicates.error_free import fast_two_sum, two_prod, two_sum
 
 Components = Any  # a float64 array, or a list of floats when the compiler is disabled
+LARGEST: Final = 2.0**120
+SMALLEST: Final = 2.0**-120
+"""Coordinates of kernels that use double-double or expansions are zero or within these: products of degree four
+keep all their bits (multiples of 2^-172 after a difference, of 2^-688 after a product of four)."""
+
+
+@inline
+def is_safe(x: float) -> bool:
+    """Tell whether x is zero or of a size for which products of degree four are exact as expansions."""
+    return x == 0.0 or SMALLEST <= abs(x) <= LARGEST
 
 
 @inline

@@ -23,10 +23,12 @@ from __future__ import annotations
 from math import frexp, ldexp
 from typing import Any
 
-from engine.jit import inline, kernel
+from engine.jit import inline, kernel, merged
 from engine.predicates.error_free import two_diff, workspace
-from engine.predicates.expansion import Components, add_scaled, grow_product, sign
+from engine.predicates.expansion import Components, add_scaled, sign
 from engine.predicates.loading import as_point3
+from engine.predicates.parameters import compare_differences, minor
+from engine.predicates.vectors import minus
 from engine.types import UNDECIDED, Point2, Point3
 
 BOUND_2D = 2.0**-51  # 4u
@@ -66,20 +68,27 @@ def orient2d(a: Point2, b: Point2, c: Point2) -> int:
     return orient2d_exact(a, b, c)
 
 
+@merged
+def rounded_determinant(u: Point3, v: Point3, w: Point3) -> tuple[float, float]:
+    """Return the determinant of three rounded differences, positive as for `orient3d`, and its permanent."""
+    vx_wy, wx_vy = v.x * w.y, w.x * v.y
+    wx_uy, ux_wy = w.x * u.y, u.x * w.y
+    ux_vy, vx_uy = u.x * v.y, v.x * u.y
+    det = u.z * (wx_vy - vx_wy) + v.z * (ux_wy - wx_uy) + w.z * (vx_uy - ux_vy)
+    permanent = (
+        (abs(vx_wy) + abs(wx_vy)) * abs(u.z)
+        + (abs(wx_uy) + abs(ux_wy)) * abs(v.z)
+        + (abs(ux_vy) + abs(vx_uy)) * abs(w.z)
+    )
+    return det, permanent
+
+
 @inline
 def orient3d_filter(a: Point3, b: Point3, c: Point3, d: Point3) -> int:
     """Return the sign of orient3d where rounding cannot have changed it, else UNDECIDED."""
-    ax, ay, az = a.x - d.x, a.y - d.y, a.z - d.z
-    bx, by, bz = b.x - d.x, b.y - d.y, b.z - d.z
-    cx, cy, cz = c.x - d.x, c.y - d.y, c.z - d.z
-    bx_cy, cx_by = bx * cy, cx * by
-    cx_ay, ax_cy = cx * ay, ax * cy
-    ax_by, bx_ay = ax * by, bx * ay
-    det = az * (cx_by - bx_cy) + bz * (ax_cy - cx_ay) + cz * (bx_ay - ax_by)
-    permanent = (
-        (abs(bx_cy) + abs(cx_by)) * abs(az) + (abs(cx_ay) + abs(ax_cy)) * abs(bz) + (abs(ax_by) + abs(bx_ay)) * abs(cz)
-    )
-    threshold = BOUND_3D * permanent + GUARD_3D * (1.0 + (abs(az) + abs(bz) + abs(cz)))
+    u, v, w = minus(a, d), minus(b, d), minus(c, d)
+    det, permanent = rounded_determinant(u, v, w)
+    threshold = BOUND_3D * permanent + GUARD_3D * (1.0 + (abs(u.z) + abs(v.z) + abs(w.z)))
     if det > threshold:
         return 1
     if -det > threshold:
@@ -114,23 +123,16 @@ def axis_shift(smallest: float, largest: float, bottom: int, top: int) -> int:
 
 
 @inline
-def _lower(smallest: float, value: float) -> float:
+def lower(smallest: float, value: float) -> float:
     """Return the smaller of `smallest` and |value|, zero left out."""
     return min(smallest, abs(value)) if value != 0.0 else smallest
 
 
 @inline
-def axis_shift_2d(a: float, b: float, c: float) -> int:
-    """Return the shift that makes products of two such axes exact, or OUT_OF_RANGE."""
-    smallest = _lower(_lower(_lower(float("inf"), a), b), c)
-    return axis_shift(smallest, max(abs(a), abs(b), abs(c)), BOTTOM_2D, TOP_2D)
-
-
-@inline
-def axis_shift_3d(a: float, b: float, c: float, d: float) -> int:
-    """Return the shift that makes products of three such axes exact, or OUT_OF_RANGE."""
-    smallest = _lower(_lower(_lower(_lower(float("inf"), a), b), c), d)
-    return axis_shift(smallest, max(abs(a), abs(b), abs(c), abs(d)), BOTTOM_3D, TOP_3D)
+def _shift_of(a: float, b: float, c: float, d: float, bottom: int, top: int) -> int:
+    """Return the `axis_shift` of four coordinates."""
+    smallest = lower(lower(lower(lower(float("inf"), a), b), c), d)
+    return axis_shift(smallest, max(abs(a), abs(b), abs(c), abs(d)), bottom, top)
 
 
 @inline
@@ -141,47 +143,15 @@ def orient2d_exact(a: Point2, b: Point2, c: Point2) -> int:
         return 0
     if (a.x == c.x and a.y == c.y) or (b.x == c.x and b.y == c.y) or (a.x == b.x and a.y == b.y):
         return 0
-    shift_x, shift_y = axis_shift_2d(a.x, b.x, c.x), axis_shift_2d(a.y, b.y, c.y)
+    shift_x = _shift_of(a.x, b.x, c.x, c.x, BOTTOM_2D, TOP_2D)
+    shift_y = _shift_of(a.y, b.y, c.y, c.y, BOTTOM_2D, TOP_2D)
     if shift_x == OUT_OF_RANGE or shift_y == OUT_OF_RANGE:
         return UNDECIDED
     if shift_x != 0 or shift_y != 0:
         a = Point2(ldexp(a.x, shift_x), ldexp(a.y, shift_y))
         b = Point2(ldexp(b.x, shift_x), ldexp(b.y, shift_y))
         c = Point2(ldexp(c.x, shift_x), ldexp(c.y, shift_y))
-    ax, ax_tail = two_diff(a.x, c.x)
-    ay, ay_tail = two_diff(a.y, c.y)
-    bx, bx_tail = two_diff(b.x, c.x)
-    by, by_tail = two_diff(b.y, c.y)
-    e = workspace(16)
-    return sign(e, minor(e, ax, ax_tail, ay, ay_tail, bx, bx_tail, by, by_tail))
-
-
-@inline
-def minor(
-    e: Components,
-    ax: float,
-    ax_tail: float,
-    ay: float,
-    ay_tail: float,
-    bx: float,
-    bx_tail: float,
-    by: float,
-    by_tail: float,
-) -> int:
-    """Set e to (ax + ax_tail)(by + by_tail) - (ay + ay_tail)(bx + bx_tail); return its length, at most 16."""
-    n = grow_product(e, 0, ax, by)
-    n = grow_product(e, n, -ay, bx)
-    if ax_tail != 0.0:
-        n = grow_product(e, n, ax_tail, by)
-        n = grow_product(e, n, ax_tail, by_tail)
-    if ay_tail != 0.0:
-        n = grow_product(e, n, -ay_tail, bx)
-        n = grow_product(e, n, -ay_tail, bx_tail)
-    if bx_tail != 0.0:
-        n = grow_product(e, n, -ay, bx_tail)
-    if by_tail != 0.0:
-        n = grow_product(e, n, ax, by_tail)
-    return n
+    return compare_differences(a.x, c.x, b.y, c.y, a.y, c.y, b.x, c.x, workspace(16))
 
 
 @inline
@@ -194,9 +164,9 @@ def orient3d_exact(a: Point3, b: Point3, c: Point3, d: Point3) -> int:
         or (a.z == d.z and b.z == d.z and c.z == d.z)
     ):
         return 0
-    shift_x = axis_shift_3d(a.x, b.x, c.x, d.x)
-    shift_y = axis_shift_3d(a.y, b.y, c.y, d.y)
-    shift_z = axis_shift_3d(a.z, b.z, c.z, d.z)
+    shift_x = _shift_of(a.x, b.x, c.x, d.x, BOTTOM_3D, TOP_3D)
+    shift_y = _shift_of(a.y, b.y, c.y, d.y, BOTTOM_3D, TOP_3D)
+    shift_z = _shift_of(a.z, b.z, c.z, d.z, BOTTOM_3D, TOP_3D)
     if shift_x == OUT_OF_RANGE or shift_y == OUT_OF_RANGE or shift_z == OUT_OF_RANGE:
         return UNDECIDED
     if shift_x != 0 or shift_y != 0 or shift_z != 0:

@@ -92,15 +92,35 @@ def compare_differences(
     gap += gap_tail + ((left_tail - right_tail) + ((ah * bl + al * bh) - (ch * dl + cl * dh)))
     if abs(gap) > EXACT_DIFFERENCES * (abs(left) + abs(right)) + TINY:
         return 1 if gap > 0.0 else -1
-    n = grow_product(e, 0, al, bl)
-    n = grow_product(e, n, -cl, dl)
-    n = grow_product(e, n, ah, bl)
-    n = grow_product(e, n, al, bh)
-    n = grow_product(e, n, -ch, dl)
-    n = grow_product(e, n, -cl, dh)
-    n = grow_product(e, n, ah, bh)
-    n = grow_product(e, n, -ch, dh)
-    return sign(e, n)
+    return sign(e, minor(e, ah, al, ch, cl, dh, dl, bh, bl))
+
+
+@inline
+def minor(
+    e: Components,
+    ax: float,
+    ax_tail: float,
+    ay: float,
+    ay_tail: float,
+    bx: float,
+    bx_tail: float,
+    by: float,
+    by_tail: float,
+) -> int:
+    """Set e to (ax + ax_tail)(by + by_tail) - (ay + ay_tail)(bx + bx_tail); return its length, at most 16."""
+    n = grow_product(e, 0, ax, by)
+    n = grow_product(e, n, -ay, bx)
+    if ax_tail != 0.0:
+        n = grow_product(e, n, ax_tail, by)
+        n = grow_product(e, n, ax_tail, by_tail)
+    if ay_tail != 0.0:
+        n = grow_product(e, n, -ay_tail, bx)
+        n = grow_product(e, n, -ay_tail, bx_tail)
+    if bx_tail != 0.0:
+        n = grow_product(e, n, -ay, bx_tail)
+    if by_tail != 0.0:
+        n = grow_product(e, n, ax, by_tail)
+    return n
 
 
 @inline

@@ -19,6 +19,7 @@ from typing import Any
 from engine.jit import inline
 from engine.predicates.error_free import workspace
 from engine.predicates.expansion import Components, compress, grow, scale, sign
+from engine.predicates.side import NO_TERM
 from engine.types import UNDECIDED
 
 MAX_DEGREE = 16  # total degree; the caller guarantees it
@@ -87,37 +88,30 @@ def sign_of_polynomial(powers: Any, coefficients: Any, degree: int, points: Any,
 
 @inline
 def _term_exponent(powers: Any, coefficients: Any, points: Any, row: int, i_term: int) -> int:
-    """Return k with |term| < 2^k; caller guarantees that the term is not zero."""
+    """Return k with |term| < 2^k, NO_TERM for a term that is zero."""
+    if coefficients[i_term] == 0.0:
+        return NO_TERM
     exponent = frexp(float(coefficients[i_term]))[1]
     for axis in range(powers.shape[1]):
+        if powers[i_term, axis] > 0 and points[row, axis] == 0.0:
+            return NO_TERM
         exponent += int(powers[i_term, axis]) * frexp(float(points[row, axis]))[1]
     return exponent
 
 
 @inline
-def _is_zero_term(powers: Any, coefficients: Any, points: Any, row: int, i_term: int) -> bool:
-    """Tell whether the coefficient or a coordinate with a positive power is zero."""
-    is_zero = coefficients[i_term] == 0.0
-    for axis in range(powers.shape[1]):
-        is_zero = is_zero or (powers[i_term, axis] > 0 and points[row, axis] == 0.0)
-    return is_zero
-
-
-@inline
 def sign_of_polynomial_exact(powers: Any, coefficients: Any, points: Any, row: int) -> int:
     """Return the sign from an expansion, or UNDECIDED; arguments as for `sign_of_polynomial`."""
-    top, n_terms = 0, 0
+    top = NO_TERM
     for i_term in range(coefficients.shape[0]):
-        if not _is_zero_term(powers, coefficients, points, row, i_term):
-            exponent = _term_exponent(powers, coefficients, points, row, i_term)
-            top = exponent if n_terms == 0 else max(top, exponent)
-            n_terms += 1
+        top = max(top, _term_exponent(powers, coefficients, points, row, i_term))
     total, f, g = workspace(N_TOTAL), workspace(N_TERM), workspace(N_TERM)
     n, is_incomplete = 0, False
     for i_term in range(coefficients.shape[0]):
-        if _is_zero_term(powers, coefficients, points, row, i_term):
+        exponent = _term_exponent(powers, coefficients, points, row, i_term)
+        if exponent == NO_TERM:
             continue
-        shift = _term_exponent(powers, coefficients, points, row, i_term) - top + COMMON_TOP
+        shift = exponent - top + COMMON_TOP
         n_factors = 1
         for axis in range(powers.shape[1]):
             n_factors += int(powers[i_term, axis])

@@ -30,8 +30,11 @@ from engine.predicates.orientation import (
     GUARD_3D,
     OUT_OF_RANGE,
     axis_shift,
+    lower,
     orient3d_exact,
+    rounded_determinant,
 )
+from engine.predicates.vectors import minus
 from engine.types import UNDECIDED, Point3
 
 UNPOSED = -1
@@ -91,20 +94,12 @@ def _rounded(poses: Any, p: PosedPoint3, axis: int) -> float:
 @inline
 def orient3d_rounded(a: Point3, b: Point3, c: Point3, d: Point3, error: float) -> int:
     """Return orient3d of the exact points behind a, b, c, d, each coordinate off by at most `error`, or UNDECIDED."""
-    ax, ay, az = a.x - d.x, a.y - d.y, a.z - d.z
-    bx, by, bz = b.x - d.x, b.y - d.y, b.z - d.z
-    cx, cy, cz = c.x - d.x, c.y - d.y, c.z - d.z
-    bx_cy, cx_by = bx * cy, cx * by
-    cx_ay, ax_cy = cx * ay, ax * cy
-    ax_by, bx_ay = ax * by, bx * ay
-    det = az * (cx_by - bx_cy) + bz * (ax_cy - cx_ay) + cz * (bx_ay - ax_by)
-    permanent = (
-        (abs(bx_cy) + abs(cx_by)) * abs(az) + (abs(cx_ay) + abs(ax_cy)) * abs(bz) + (abs(ax_by) + abs(bx_ay)) * abs(cz)
-    )
+    u, v, w = minus(a, d), minus(b, d), minus(c, d)
+    det, permanent = rounded_determinant(u, v, w)
     moved = ENLARGED_TWO * error
-    x = abs(ax) + abs(bx) + abs(cx) + 3.0 * moved
-    y = abs(ay) + abs(by) + abs(cy) + 3.0 * moved
-    z = abs(az) + abs(bz) + abs(cz) + 3.0 * moved
+    x = abs(u.x) + abs(v.x) + abs(w.x) + 3.0 * moved
+    y = abs(u.y) + abs(v.y) + abs(w.y) + 3.0 * moved
+    z = abs(u.z) + abs(v.z) + abs(w.z) + 3.0 * moved
     threshold = BOUND_3D * permanent + GUARD_3D * (1.0 + z) + moved * (y * z + x * z + x * y)
     if det > threshold:
         return 1
@@ -194,42 +189,20 @@ def _factors(poses: Any, p: PosedPoint3, axis: int, k: int, shift: int, factor: 
     return entry, ldexp(value, shift)
 
 
-class _Extent(NamedTuple):
-    """Largest magnitude, smallest nonzero magnitude, smallest nonzero magnitude of a matrix entry (at most 1)."""
-
-    largest: float
-    smallest: float
-    entry: float
-
-
-@inline
-def _widened_by_point(extent: _Extent, poses: Any, p: PosedPoint3) -> _Extent:
-    """Return the extent with one more point and its pose."""
-    largest, smallest, entry = extent
-    for k in range(3):
-        size = abs(p.x if k == 0 else (p.y if k == 1 else p.z))
-        largest = max(largest, size)
-        smallest = smallest if size == 0.0 else min(smallest, size)
-    if p.pose == UNPOSED:
-        return _Extent(largest, smallest, entry)
-    for i in range(9):
-        size = abs(float(poses[p.pose, i]))
-        entry = entry if size == 0.0 else min(entry, size)
-    for i in range(9, 12):
-        size = abs(float(poses[p.pose, i]))
-        largest = max(largest, size)
-        smallest = smallest if size == 0.0 else min(smallest, size)
-    return _Extent(largest, smallest, entry)
-
-
 @inline
 def _common_shift(poses: Any, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d: PosedPoint3) -> int:
     """Return the power of two that brings all coordinates into the range of the exact stage, or OUT_OF_RANGE."""
-    extent = _Extent(0.0, float("inf"), 1.0)
+    largest, smallest, smallest_entry = 0.0, float("inf"), 1.0
     for k in range(4):
-        extent = _widened_by_point(extent, poses, a if k == 0 else (b if k == 1 else (c if k == 2 else d)))
+        p = a if k == 0 else (b if k == 1 else (c if k == 2 else d))
+        if p.pose != UNPOSED:
+            for i in range(9):
+                smallest_entry = lower(smallest_entry, float(poses[p.pose, i]))
+        for i in range(3 if p.pose == UNPOSED else 6):
+            value = float(poses[p.pose, 6 + i]) if i > 2 else (p.x if i == 0 else (p.y if i == 1 else p.z))
+            largest, smallest = max(largest, abs(value)), lower(smallest, value)
     # a multiple of the lowest bit of the smallest entry: as if the smallest coordinate were smaller by that factor
-    return axis_shift(extent.smallest, extent.largest, BOTTOM - exponent_of(extent.entry), TOP)
+    return axis_shift(smallest, largest, BOTTOM - exponent_of(smallest_entry), TOP)
 
 
 @inline

@@ -28,11 +28,16 @@ def fractions(point: Iterable[Number]) -> tuple[Fraction, ...]:
     return tuple(Fraction(value) for value in point)
 
 
-def scaled_integers(values: Sequence[Number]) -> list[int]:
-    """Return the values times their common positive factor that makes all of them integers (not the least one)."""
+def common_integers(values: Sequence[Number]) -> tuple[list[int], int]:
+    """Return integers and their common positive denominator (not the least one)."""
     ratios = [value.as_integer_ratio() for value in values]
     common = math.lcm(*(bottom for _, bottom in ratios))
-    return [top * (common // bottom) for top, bottom in ratios]
+    return [top * (common // bottom) for top, bottom in ratios], common
+
+
+def scaled_integers(values: Sequence[Number]) -> list[int]:
+    """Return the values times a common positive factor that makes all of them integers."""
+    return common_integers(values)[0]
 
 
 def orient2d_rational(a: Sequence[Number], b: Sequence[Number], c: Sequence[Number]) -> int:
@@ -91,3 +96,26 @@ def nearest_float(value: Number) -> float:
             f"an exact coordinate, {Decimal(top) / Decimal(bottom):.17g}, is beyond the largest float64, "
             "1.7976931348623157e+308; scale the input down"
         ) from None
+
+
+def nearest(numerator: int, denominator: int) -> float:
+    """Return the double nearest to a quotient of integers, zero as +0.0."""
+    return numerator / denominator + 0.0
+
+
+def nearest_with_root(u: int, v: int, w: int, z: int) -> float:
+    """Return the double nearest to (u + v sqrt(w)) / z for integers w >= 0 and z > 0.
+
+    Bound: if w is no square and v is not zero the number is irrational, so it is no double and no midpoint of two, and
+    the enclosing quotients round alike once they are close enough; each turn doubles the digits.
+    """
+    root = math.isqrt(w)
+    if v == 0 or root * root == w:
+        return nearest(u + v * root, z)
+    bits = 64
+    while True:
+        root = math.isqrt(w << 2 * bits)
+        ends = [nearest((u << bits) + v * (root + step), z << bits) for step in (0, 1)]
+        if ends[0] == ends[1]:
+            return ends[0]
+        bits *= 2

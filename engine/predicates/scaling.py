@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray, IntArray
+from engine.arrays import BoolArray, FloatArray, IntArray, read_only
 
 COMFORTABLE: Final = 64
 """Scenes whose largest coordinate lies within 2^-64 .. 2^64 stay as they are; kernels are exact to 2^-120 .. 2^120."""
@@ -38,9 +38,7 @@ def exponent_above(largest: float) -> int:
 def shifted(array: FloatArray, exponent: int | IntArray) -> FloatArray | None:
     """Return array 2^exponent, read-only as the arrays of callers are, if that is exact for every number, else None."""
     if isinstance(exponent, int) and exponent == 0:
-        same = array.view()
-        same.setflags(write=False)
-        return same
+        return read_only(array)
     with np.errstate(all="ignore"):
         result: FloatArray = np.ldexp(array, exponent)
         result.setflags(write=False)

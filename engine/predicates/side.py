@@ -51,16 +51,7 @@ def side_of_line(h: HalfSpace2, p: Point2) -> int:
     side = side_of_line_filter(h, p)
     if side != UNDECIDED:
         return side
-    e = workspace(6)
-    if is_exact_product(h.a, p.x) and is_exact_product(h.b, p.y) and is_exact_product(h.c, 1.0):
-        n = grow_product(e, grow_product(e, 0, h.a, p.x), h.b, p.y)
-        return sign(e, grow(e, n, h.c))
-    ax, by, c = product_exponent(h.a, p.x), product_exponent(h.b, p.y), product_exponent(h.c, 1.0)
-    shift = COMMON_TOP - max(ax, by, c)
-    n = grow_shifted_product(e, 0, h.a, p.x, ax + shift)
-    n = grow_shifted_product(e, n, h.b, p.y, by + shift)
-    n = grow_shifted_product(e, n, h.c, 1.0, c + shift)
-    return clear_sign(e, n, is_left_out(ax, shift) or is_left_out(by, shift) or is_left_out(c, shift))
+    return _side_exact(HalfSpace3(h.a, h.b, 0.0, h.c), Point3(p.x, p.y, 0.0))
 
 
 @inline
@@ -82,6 +73,12 @@ def side_of_plane(h: HalfSpace3, p: Point3) -> int:
     side = side_of_plane_filter(h, p)
     if side != UNDECIDED:
         return side
+    return _side_exact(h, p)
+
+
+@inline
+def _side_exact(h: HalfSpace3, p: Point3) -> int:
+    """Return what `side_of_plane` does, by an expansion; a zero product leaves no component."""
     e = workspace(8)
     if (
         is_exact_product(h.a, p.x)

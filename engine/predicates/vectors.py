@@ -42,3 +42,9 @@ def length(a: Point3) -> float:
 def largest_of(a: Point3) -> float:
     """Return the largest magnitude of a component."""
     return max(abs(a.x), abs(a.y), abs(a.z))
+
+
+@merged
+def along(a: Point3, b: Point3, t: float) -> Point3:
+    """Return a + t (b - a)."""
+    return Point3(a.x + t * (b.x - a.x), a.y + t * (b.y - a.y), a.z + t * (b.z - a.z))

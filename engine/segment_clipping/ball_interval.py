@@ -20,8 +20,7 @@ from typing import Any, Final
 from engine.jit import inline, kernel, merged
 from engine.predicates.double_double import U2, dd_add, dd_mul, dd_sub
 from engine.predicates.error_free import two_diff, two_prod, workspace
-from engine.predicates.expansion import grow_product, sign
-from engine.predicates.ranges import is_safe
+from engine.predicates.expansion import grow_product, is_safe, sign
 from engine.segment_clipping.cohen_sutherland import DROPPED, KEPT
 from engine.segment_clipping.cyrus_beck import is_segment_safe
 from engine.segment_clipping.pieces import Triple, point_of

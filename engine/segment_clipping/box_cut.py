@@ -12,7 +12,7 @@ from typing import Any
 from engine.jit import bare_kernel, inline, merged
 from engine.predicates.cut_point import parameter_and_point, point_at
 from engine.predicates.error_free import two_diff, workspace
-from engine.predicates.ranges import is_safe
+from engine.predicates.expansion import is_safe
 from engine.segment_clipping.cohen_sutherland import BLOCK, corners_of, plane_value
 from engine.segment_clipping.pieces import Pieces, Triple, point_of, put_end
 from engine.segment_clipping.plane_meeting import LONGEST, SHORTEST, T_BOUND, meeting

@@ -26,7 +26,6 @@ from engine.segment_clipping.pieces import joined
 from engine.segment_clipping.planes_cut import fill_on_rows
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
-from engine.solids.box_planes import box_rows
 from engine.solids.checks import as_point_groups, check_finite
 from engine.solids.convex import Convex
 from engine.solids.half_space import HalfSpace
@@ -150,7 +149,7 @@ def _method(region: Solid) -> tuple[Task, str]:
 
 
 def _on_box(region: Aabb) -> Task:
-    planes = box_rows(region).tolist()
+    planes = region.rows.tolist()
     return _one_piece(
         Method(
             decide_on_boxes,

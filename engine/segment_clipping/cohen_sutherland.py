@@ -33,8 +33,8 @@ import numpy as np
 
 from engine.jit import called, inline, kernel, merged
 from engine.predicates.error_free import workspace
+from engine.predicates.expansion import is_safe
 from engine.predicates.parameters import compare_differences, compare_differences_filter
-from engine.predicates.ranges import is_safe
 from engine.segment_clipping.pieces import Triple, point_of
 from engine.segment_clipping.plane_meeting import gap_between, meetings
 from engine.types import OPEN, UNDECIDED

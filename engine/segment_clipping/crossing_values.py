@@ -24,7 +24,7 @@ from engine.jit import merged
 from engine.predicates.cut_point import point_at
 from engine.predicates.double_double import U2, dd_div
 from engine.predicates.error_free import two_diff, two_prod, two_sum
-from engine.predicates.ranges import is_safe
+from engine.predicates.expansion import is_safe
 from engine.segment_clipping.plane_meeting import T_BOUND
 from engine.segment_clipping.triangle_contact import corner
 

@@ -23,9 +23,8 @@ import numpy as np
 from engine.arrays import FloatArray
 from engine.jit import inline, kernel
 from engine.predicates.error_free import workspace
-from engine.predicates.expansion import Components, compress, grow, grow_product, sign
+from engine.predicates.expansion import Components, compress, grow, grow_product, is_safe, sign
 from engine.predicates.parameters import compare_products, compare_ratios_filter
-from engine.predicates.ranges import is_safe
 from engine.segment_clipping.cohen_sutherland import DROPPED, KEPT, is_plain
 from engine.segment_clipping.pieces import point_of
 from engine.types import OPEN, UNDECIDED

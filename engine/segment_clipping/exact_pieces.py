@@ -17,7 +17,7 @@ from fractions import Fraction
 from itertools import groupby
 from typing import Final, NamedTuple
 
-from engine.predicates.integers import common_integers, nearest
+from engine.predicates.rational import common_integers, nearest
 from engine.segment_clipping.exact_segments import Piece
 
 Integers = Sequence[int]

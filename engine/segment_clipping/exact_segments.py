@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from engine.predicates.integers import common_integers, nearest, nearest_with_root
+from engine.predicates.rational import common_integers, nearest, nearest_with_root
 
 
 class Piece(NamedTuple):

@@ -22,10 +22,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.jit import bare, inline, kernel
-from engine.lanes.boxes import EMPTY
-from engine.lanes.lanes import lowest_bit
-from engine.lanes.memory import prefetch
-from engine.lanes.segments import near_segment
+from engine.lanes.boxes import EMPTY, near_segment
+from engine.lanes.lanes import lowest_bit, prefetch
 from engine.lanes.tracing import LANES
 from engine.lanes.triangles import AXES_BEFORE, CORNER_ROWS, longest_axis, near_triangles
 from engine.segment_clipping.contacts import APART, NO_ROOM, STOPPED, is_point

@@ -11,7 +11,7 @@ from engine.bounding.bvh import UNUSED, Bvh, build_bvh, on_lines
 from engine.lanes.boxes import EMPTY
 from engine.lanes.tracing import LANES
 from engine.lanes.triangles import CORNER_ROWS
-from engine.predicates.ranges import LARGEST, SMALLEST
+from engine.predicates.expansion import LARGEST, SMALLEST
 from engine.segment_clipping.box_tree import build_box_tree
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from engine.arrays import FloatArray
+from engine.arrays import FloatArray, read_only
 from engine.errors import MinAboveMaxError
 from engine.solids.base import Solid
 from engine.solids.checks import as_vector, digits
@@ -39,6 +39,14 @@ class Aabb(Solid):
                 ("min", axis),
             )
         self._set(dimension=len(low), min=low, max=high)
+
+    @property
+    def rows(self) -> FloatArray:
+        """``(2 dimension, dimension + 1)``: its planes, in the order xmin, xmax, ymin, ymax, zmin, zmax."""
+        unit = np.eye(self.dimension)
+        rows = np.empty((2 * self.dimension, self.dimension + 1))
+        rows[0::2, :-1], rows[1::2, :-1], rows[0::2, -1], rows[1::2, -1] = unit, -unit, -self.min, self.max
+        return read_only(rows + 0.0)
 
     def __repr__(self) -> str:
         return f"Aabb(min={digits(self.min)}, max={digits(self.max)})"

@@ -20,12 +20,25 @@ _WAIT: Final = 0.005
 _RUNTIME = ("__weakref__", "_lock", "_prepared")  # slots that are no part of a solid's value
 
 
-class Solid:
+class Immutable:
+    """Fields are set once, by the constructor; `type` is what a message calls it."""
+
+    __slots__ = ()
+
+    type: ClassVar[str]
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise AttributeError(f"a {self.type} is immutable: make a new one instead of setting {name!r}")
+
+    def __delattr__(self, name: str) -> None:
+        raise AttributeError(f"a {self.type} is immutable: {name!r} cannot be deleted")
+
+
+class Solid(Immutable):
     """Base of the ten solids. `type` is the name used in JSON, `dimension` is 2 or 3."""
 
     __slots__ = (*_RUNTIME, "dimension")
 
-    type: ClassVar[str]
     dimension: int
     _lock: Any
     _prepared: dict[str, Any]
@@ -38,12 +51,6 @@ class Solid:
             object.__setattr__(self, name, value)
         object.__setattr__(self, "_lock", threading.RLock())
         object.__setattr__(self, "_prepared", {})
-
-    def __setattr__(self, name: str, value: object) -> None:
-        raise AttributeError(f"a {self.type} is immutable: make a new one instead of setting {name!r}")
-
-    def __delattr__(self, name: str) -> None:
-        raise AttributeError(f"a {self.type} is immutable: {name!r} cannot be deleted")
 
     def prepared(self, key: str, build: Callable[[], T], check: Callable[[], object] | None = None) -> T:
         """Return the structure kept under `key`; the first caller builds it, others wait for that one build.

@@ -15,13 +15,8 @@ from typing import Any, Final, cast
 import numpy as np
 import numpy.typing as npt
 
-from engine.arrays import BoolArray, FloatArray, IntArray
-from engine.errors import (
-    EmptyGeometryError,
-    InvalidArrayError,
-    NotFiniteError,
-    WrongDimensionError,
-)
+from engine.arrays import BoolArray, FloatArray
+from engine.errors import EmptyGeometryError, InvalidArrayError, NotFiniteError, WrongDimensionError
 
 Where = tuple[str | int, ...]
 
@@ -240,12 +235,5 @@ def frozen(array: FloatArray) -> FloatArray:
     """Return a read-only C-contiguous copy in which -0.0 is 0.0."""
     copy = cast(FloatArray, np.array(array, np.float64, order="C"))
     copy += 0.0  # -0.0 + 0.0 = +0.0; every other value stays
-    copy.setflags(write=False)
-    return copy
-
-
-def frozen_integers(array: npt.NDArray[Any]) -> IntArray:
-    """Return a read-only C-contiguous int64 copy."""
-    copy = np.array(array, np.int64, order="C")
     copy.setflags(write=False)
     return copy

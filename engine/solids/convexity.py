@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray, read_only
+from engine.arrays import FloatArray, read_only
 from engine.jit import inline, kernel
 from engine.predicates.loading import as_point3
 from engine.predicates.orientation import orient3d
@@ -56,15 +56,8 @@ def _certified(solid: Polyhedron) -> Convexity | None:
         center = solid.vertices[solid.triangles.ravel()].mean(axis=0)
         if not np.isfinite(center).all():
             return None
-        side = _certify(read_only(solid.vertices), _shared(solid.triangles), center)
+        side = _certify(read_only(solid.vertices), read_only(solid.triangles), center)
     return None if side == 0 else Convexity(center, bool(side < 0))
-
-
-def _shared(triangles: IntArray) -> IntArray:
-    """Return a read-only view."""
-    view = triangles.view()
-    view.setflags(write=False)
-    return view
 
 
 @inline

@@ -31,6 +31,7 @@ import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.errors import FaceNotSimpleError, TooComplexError
+from engine.predicates.rational import scaled_integers
 from engine.solids.checks import digits
 
 IntPoint = tuple[int, int]
@@ -143,9 +144,8 @@ def cut_ring(points: FloatArray, face: int, names: IntArray) -> list[tuple[int, 
 
 def _integers(points: FloatArray) -> list[tuple[int, ...]]:
     """Return the points times one power of two that makes all coordinates whole."""
-    ratios = [[value.as_integer_ratio() for value in row] for row in points.tolist()]
-    scale = max(denominator for row in ratios for _, denominator in row)
-    return [tuple(numerator * (scale // denominator) for numerator, denominator in row) for row in ratios]
+    flat = iter(scaled_integers(points.ravel().tolist()))
+    return list(zip(*[flat] * points.shape[1]))
 
 
 def _axes_of_largest_area(points: list[tuple[int, ...]]) -> list[int] | None:

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Final
 import numpy as np
 import numpy.typing as npt
 
-from engine.arrays import FloatArray, IntArray
+from engine.arrays import FloatArray, IntArray, read_only
 from engine.errors import InvalidArrayError, InvalidPolynomialError, WrongDimensionError
 from engine.solids.base import Solid
 from engine.solids.checks import (
@@ -18,7 +18,6 @@ from engine.solids.checks import (
     check_given_dimension,
     check_not_empty,
     frozen,
-    frozen_integers,
     shown,
     spell,
 )
@@ -72,7 +71,7 @@ class Implicit(Solid):
         _check_powers(exponents)
         self._set(
             dimension=exponents.shape[1],
-            powers=frozen_integers(exponents),
+            powers=read_only(exponents.astype(np.int64)),
             coefficients=frozen(factors),
             function=None,
         )
@@ -91,7 +90,7 @@ class Implicit(Solid):
             raise InvalidArrayError(f"function must be callable, got {type(function).__name__}", ("function",))
         check_given_dimension(dimension)
         solid = object.__new__(cls)
-        powers, coefficients = frozen_integers(np.zeros((0, dimension))), frozen(np.zeros(0))
+        powers, coefficients = read_only(np.zeros((0, dimension), np.int64)), frozen(np.zeros(0))
         solid._set(dimension=int(dimension), powers=powers, coefficients=coefficients, function=function)
         return solid
 

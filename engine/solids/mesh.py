@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from engine.arrays import FloatArray, IntArray
+from engine.arrays import FloatArray, IntArray, read_only
 from engine.errors import IndexOutOfRangeError, InvalidArrayError, RepeatedIndexError, RingTooShortError
 from engine.solids.base import Solid
 from engine.solids.checks import as_points, check_not_empty, frozen, shown
@@ -79,7 +79,7 @@ class Mesh(Solid):
         """``(n_faces + 1,)``: face i has the vertices ``face_indices[face_offsets[i] : face_offsets[i + 1]]``."""
         if self._face_offsets is not None:
             return self._face_offsets
-        return self.prepared("face_offsets", lambda: _read_only(np.arange(0, len(self.face_indices) + 1, 3)))
+        return self.prepared("face_offsets", lambda: read_only(np.arange(0, len(self.face_indices) + 1, 3)))
 
     @property
     def triangles(self) -> IntArray:
@@ -92,16 +92,10 @@ class Mesh(Solid):
         """``(k,)``: the face that each triangle was cut from."""
         if self._triangle_faces is not None:
             return self._triangle_faces
-        return self.prepared("triangle_faces", lambda: _read_only(np.arange(len(self.triangles))))
+        return self.prepared("triangle_faces", lambda: read_only(np.arange(len(self.triangles))))
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({len(self.vertices)} vertices, {self.n_faces} faces)"
-
-
-def _read_only(array: npt.NDArray[Any]) -> IntArray:
-    array = array.astype(np.int64, copy=False)
-    array.setflags(write=False)
-    return array
 
 
 def as_faces(faces: object, n_vertices: int) -> tuple[IntArray | None, IntArray]:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 
-from engine.arrays import FloatArray
+from engine.arrays import FloatArray, read_only
 from engine.errors import InvalidArrayError, NotRigidError, WrongDimensionError
+from engine.jit import kernel
+from engine.predicates.exact_vectors import determinant
+from engine.solids.base import Immutable
 from engine.solids.checks import as_floats, as_vector, check_dimension, check_given_dimension, digits, frozen, spell
-from engine.solids.rotations import find_suspects
 
 TOLERANCE: Final = Fraction(1, 10**12)
 """Largest entry of ``R^T R - I`` that is still taken for a rotation; part of the contract, compared exactly."""
@@ -18,7 +20,7 @@ TOLERANCE: Final = Fraction(1, 10**12)
 _UNSURE: Final = 2.0**-45  # more than 8 roundings of sums of three products of numbers below 1.01
 
 
-class Pose:
+class Pose(Immutable):
     """A rigid motion ``p -> rotation @ p + translation`` of one body; the map is exact in these float64 numbers.
 
     Parameters: rotation, ``(d, d)`` row-major, d 2 or 3, with det > 0 and ``max|R^T R - I| <= 1e-12`` (both decided
@@ -32,6 +34,7 @@ class Pose:
 
     __slots__ = ("numbers", "rotation", "translation")
 
+    type: ClassVar[str] = "pose"
     rotation: FloatArray
     translation: FloatArray
     numbers: bytes
@@ -65,12 +68,6 @@ class Pose:
     def is_identity(self) -> bool:
         """Whether the motion leaves everything where it is."""
         return self.numbers in _IDENTITIES
-
-    def __setattr__(self, name: str, value: object) -> None:
-        raise AttributeError(f"a pose is immutable: make a new one instead of setting {name!r}")
-
-    def __delattr__(self, name: str) -> None:
-        raise AttributeError(f"a pose is immutable: {name!r} cannot be deleted")
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Pose) and self.numbers == other.numbers  # no -0.0: equal values, equal bytes
@@ -106,10 +103,8 @@ def check_rotations(rotations: FloatArray, where: tuple[str | int, ...] = ("rota
     if rotations.ndim != 3 or rotations.shape[1] != rotations.shape[2]:
         raise InvalidArrayError(f"{spell(where)} must have shape (n, d, d), got {rotations.shape}", where)
     is_suspect = np.zeros(len(rotations), np.bool_)
-    matrices = np.ascontiguousarray(rotations).view()
-    matrices.setflags(write=False)
     with np.errstate(all="ignore"):  # huge entries overflow, and are far from orthogonal
-        find_suspects(matrices, float(TOLERANCE) - _UNSURE, is_suspect)
+        find_suspects(read_only(rotations), float(TOLERANCE) - _UNSURE, is_suspect)
     for index in np.flatnonzero(is_suspect):
         matrix = rotations[index]
         path = where if one else (*where, int(index))
@@ -120,12 +115,38 @@ def check_rotations(rotations: FloatArray, where: tuple[str | int, ...] = ("rota
                 "the limit 1e-12; make it orthogonal (from a unit quaternion, say)",
                 path,
             )
-        if _exact_determinant(matrix) <= 0:
+        if determinant([[*map(Fraction, row)] for row in matrix.tolist()]) <= 0:
             raise NotRigidError(
                 f"{spell(path)} = {digits(matrix)} is a reflection: its determinant is negative; "
                 "change the sign of one row, or mirror the solid itself",
                 path,
             )
+
+
+@kernel
+def find_suspects(matrices: Any, limit: float, is_suspect: Any) -> None:
+    """Fill is_suspect (n,) for matrices (n, d, d): whether max|R^T R - I| > limit as computed, or det is not positive.
+
+    An entry of the product is a sum of d products, det a sum of d! of d; numbers that overflow are suspect.
+    """
+    dimension = matrices.shape[1]
+    for item in range(matrices.shape[0]):
+        suspect = False
+        for j in range(dimension):
+            for k in range(j + 1):
+                defect = -1.0 if j == k else 0.0
+                for i in range(dimension):
+                    defect += matrices[item, i, j] * matrices[item, i, k]
+                suspect |= not abs(defect) <= limit
+        if dimension == 2:
+            det = matrices[item, 0, 0] * matrices[item, 1, 1] - matrices[item, 0, 1] * matrices[item, 1, 0]
+        else:
+            det = 0.0
+            for i in range(3):
+                j, k = (i + 1) % 3, (i + 2) % 3
+                minor = matrices[item, 1, j] * matrices[item, 2, k] - matrices[item, 1, k] * matrices[item, 2, j]
+                det += matrices[item, 0, i] * minor
+        is_suspect[item] = suspect or not det > 0.0
 
 
 def _exact_defect(matrix: FloatArray) -> Fraction:
@@ -135,14 +156,6 @@ def _exact_defect(matrix: FloatArray) -> Fraction:
         for i, first in enumerate(columns)
         for j, second in enumerate(columns)
     )
-
-
-def _exact_determinant(matrix: FloatArray) -> Fraction:
-    rows = [[Fraction(value) for value in row] for row in matrix.tolist()]
-    if len(rows) == 2:
-        return rows[0][0] * rows[1][1] - rows[0][1] * rows[1][0]
-    (a, b, c), (d, e, f), (g, h, i) = rows
-    return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
 
 
 def _decimal(value: Fraction) -> str:

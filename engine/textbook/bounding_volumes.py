@@ -12,15 +12,11 @@ from math import sqrt
 
 import numpy as np
 
+from engine.arrays import FloatArray
 from engine.jit import inline, kernel
 from engine.predicates.loading import as_point3
-from engine.textbook.vectors import Floats, along, dot, minus
+from engine.predicates.vectors import along, dot, minus
 from engine.types import Point3
-
-
-def bounding_box(vertices: Floats) -> tuple[Floats, Floats]:
-    """Return the least and the largest coordinates of vertices (n, dim)."""
-    return vertices.min(axis=0), vertices.max(axis=0)
 
 
 @inline
@@ -30,7 +26,7 @@ def distance(a: Point3, b: Point3) -> float:
 
 
 @inline
-def farthest(vertices: Floats, start: Point3) -> Point3:
+def farthest(vertices: FloatArray, start: Point3) -> Point3:
     """Return the vertex farthest from `start`."""
     best, at = -1.0, start
     for i in range(len(vertices)):
@@ -41,7 +37,7 @@ def farthest(vertices: Floats, start: Point3) -> Point3:
 
 
 @kernel
-def bounding_sphere(vertices: Floats) -> tuple[Floats, float]:
+def bounding_sphere(vertices: FloatArray) -> tuple[FloatArray, float]:
     """Return centre (3,) and radius of Ritter's sphere around vertices (n, 3)."""
     p = farthest(vertices, as_point3(vertices, 0))
     q = farthest(vertices, p)
@@ -55,11 +51,11 @@ def bounding_sphere(vertices: Floats) -> tuple[Floats, float]:
     return np.array([center.x, center.y, center.z]), radius
 
 
-def boxes_meet(low: Floats, high: Floats, other_low: Floats, other_high: Floats) -> bool:
+def boxes_meet(low: FloatArray, high: FloatArray, other_low: FloatArray, other_high: FloatArray) -> bool:
     """Tell whether two closed boxes have a common point."""
     return bool((low <= other_high).all() and (other_low <= high).all())
 
 
-def spheres_meet(center: Floats, radius: float, other_center: Floats, other_radius: float) -> bool:
+def spheres_meet(center: FloatArray, radius: float, other_center: FloatArray, other_radius: float) -> bool:
     """Tell whether two closed spheres have a common point."""
     return float(np.linalg.norm(center - other_center)) <= radius + other_radius

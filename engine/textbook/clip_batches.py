@@ -9,12 +9,15 @@ What goes wrong: the same as there.
 from __future__ import annotations
 
 from math import sqrt
+from typing import Any
 
 import numpy as np
 
+from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.jit import inline, kernel
+from engine.predicates.loading import as_point2, as_point3
+from engine.predicates.vectors import along
 from engine.textbook.cohen_sutherland import ACCEPTED, MAX_TURNS, REJECTED, UNFINISHED
-from engine.textbook.vectors import Bools, Floats, Ints
 from engine.types import Point2, Point3
 
 
@@ -36,15 +39,7 @@ def code_word_2d(p: Point2, low: Point2, high: Point2) -> int:
 @inline
 def code_word_3d(p: Point3, low: Point3, high: Point3) -> int:
     """Return one bit per side that p is outside of."""
-    code = 0
-    if p.x < low.x:
-        code |= 1
-    elif p.x > high.x:
-        code |= 2
-    if p.y < low.y:
-        code |= 4
-    elif p.y > high.y:
-        code |= 8
+    code = code_word_2d(Point2(p.x, p.y), Point2(low.x, low.y), Point2(high.x, high.y))
     if p.z < low.z:
         code |= 16
     elif p.z > high.z:
@@ -78,70 +73,65 @@ def cut_3d(p: Point3, q: Point3, code: int, low: Point3, high: Point3) -> Point3
     return Point3(p.x + t * (q.x - p.x), p.y + t * (q.y - p.y), z)
 
 
+@inline
+def store(clipped: Any, i: int, end: int, p: Point3) -> None:
+    """Set one end of a segment."""
+    clipped[i, end, 0], clipped[i, end, 1], clipped[i, end, 2] = p.x, p.y, p.z
+
+
+@inline
+def clip_one(p: Any, q: Any, low: Any, high: Any, code_word: Any, cut: Any) -> tuple[Any, Any, int]:
+    """Return what is left of p q, and its status."""
+    code_p, code_q = code_word(p, low, high), code_word(q, low, high)
+    for _ in range(MAX_TURNS):
+        if code_p | code_q == 0:
+            return p, q, ACCEPTED
+        if code_p & code_q:
+            return p, q, REJECTED
+        if code_p:
+            p = cut(p, q, code_p, low, high)
+            code_p = code_word(p, low, high)
+        else:
+            q = cut(p, q, code_q, low, high)
+            code_q = code_word(q, low, high)
+    return p, q, UNFINISHED
+
+
 @kernel
-def clip_on_box_2d(segments: Floats, low: Floats, high: Floats) -> tuple[Floats, Ints]:
+def clip_on_box_2d(segments: FloatArray, low: FloatArray, high: FloatArray) -> tuple[FloatArray, IntArray]:
     """Return (clipped segments (n, 2, 2), status (n,)) of Cohen-Sutherland."""
     a, b = Point2(low[0], low[1]), Point2(high[0], high[1])
-    clipped, status = np.empty_like(segments), np.full(len(segments), UNFINISHED, np.int64)
+    clipped, status = np.empty_like(segments), np.empty(len(segments), np.int64)
     for i in range(len(segments)):
-        p = Point2(segments[i, 0, 0], segments[i, 0, 1])
-        q = Point2(segments[i, 1, 0], segments[i, 1, 1])
-        code_p, code_q = code_word_2d(p, a, b), code_word_2d(q, a, b)
-        for _ in range(MAX_TURNS):
-            if code_p | code_q == 0:
-                status[i] = ACCEPTED
-                break
-            if code_p & code_q:
-                status[i] = REJECTED
-                break
-            if code_p:
-                p = cut_2d(p, q, code_p, a, b)
-                code_p = code_word_2d(p, a, b)
-            else:
-                q = cut_2d(p, q, code_q, a, b)
-                code_q = code_word_2d(q, a, b)
+        p, q = as_point2(segments[i], 0), as_point2(segments[i], 1)
+        p, q, status[i] = clip_one(p, q, a, b, code_word_2d, cut_2d)
         clipped[i, 0, 0], clipped[i, 0, 1], clipped[i, 1, 0], clipped[i, 1, 1] = p.x, p.y, q.x, q.y
     return clipped, status
 
 
 @kernel
-def clip_on_box_3d(segments: Floats, low: Floats, high: Floats) -> tuple[Floats, Ints]:
+def clip_on_box_3d(segments: FloatArray, low: FloatArray, high: FloatArray) -> tuple[FloatArray, IntArray]:
     """Return (clipped segments (n, 2, 3), status (n,)) of Cohen-Sutherland."""
     a, b = Point3(low[0], low[1], low[2]), Point3(high[0], high[1], high[2])
-    clipped, status = np.empty_like(segments), np.full(len(segments), UNFINISHED, np.int64)
+    clipped, status = np.empty_like(segments), np.empty(len(segments), np.int64)
     for i in range(len(segments)):
-        p = Point3(segments[i, 0, 0], segments[i, 0, 1], segments[i, 0, 2])
-        q = Point3(segments[i, 1, 0], segments[i, 1, 1], segments[i, 1, 2])
-        code_p, code_q = code_word_3d(p, a, b), code_word_3d(q, a, b)
-        for _ in range(MAX_TURNS):
-            if code_p | code_q == 0:
-                status[i] = ACCEPTED
-                break
-            if code_p & code_q:
-                status[i] = REJECTED
-                break
-            if code_p:
-                p = cut_3d(p, q, code_p, a, b)
-                code_p = code_word_3d(p, a, b)
-            else:
-                q = cut_3d(p, q, code_q, a, b)
-                code_q = code_word_3d(q, a, b)
-        clipped[i, 0, 0], clipped[i, 0, 1], clipped[i, 0, 2] = p.x, p.y, p.z
-        clipped[i, 1, 0], clipped[i, 1, 1], clipped[i, 1, 2] = q.x, q.y, q.z
+        p, q = as_point3(segments[i], 0), as_point3(segments[i], 1)
+        p, q, status[i] = clip_one(p, q, a, b, code_word_3d, cut_3d)
+        store(clipped, i, 0, p)
+        store(clipped, i, 1, q)
     return clipped, status
 
 
 @kernel
-def clip_on_planes_3d(segments: Floats, rows: Floats) -> tuple[Floats, Bools]:
+def clip_on_planes_3d(segments: FloatArray, rows: FloatArray) -> tuple[FloatArray, BoolArray]:
     """Return (clipped segments (n, 2, 3), kept (n,)) of one pass over rows (m, 4)."""
     clipped, kept = np.empty_like(segments), np.zeros(len(segments), np.bool_)
     for i in range(len(segments)):
-        px, py, pz = segments[i, 0, 0], segments[i, 0, 1], segments[i, 0, 2]
-        qx, qy, qz = segments[i, 1, 0], segments[i, 1, 1], segments[i, 1, 2]
+        p, q = as_point3(segments[i], 0), as_point3(segments[i], 1)
         t0, t1 = 0.0, 1.0
         for j in range(len(rows)):
-            at_p = rows[j, 0] * px + rows[j, 1] * py + rows[j, 2] * pz + rows[j, 3]
-            at_q = rows[j, 0] * qx + rows[j, 1] * qy + rows[j, 2] * qz + rows[j, 3]
+            at_p = rows[j, 0] * p.x + rows[j, 1] * p.y + rows[j, 2] * p.z + rows[j, 3]
+            at_q = rows[j, 0] * q.x + rows[j, 1] * q.y + rows[j, 2] * q.z + rows[j, 3]
             if at_p < 0.0:
                 if at_q < 0.0:
                     t0 = 2.0
@@ -151,24 +141,15 @@ def clip_on_planes_3d(segments: Floats, rows: Floats) -> tuple[Floats, Bools]:
                 t1 = min(t1, at_p / (at_p - at_q))
             if t0 > t1:
                 break
-        if t0 > t1:
-            continue
-        kept[i] = True
-        clipped[i, 0, 0], clipped[i, 0, 1], clipped[i, 0, 2] = (
-            px + t0 * (qx - px),
-            py + t0 * (qy - py),
-            pz + t0 * (qz - pz),
-        )
-        clipped[i, 1, 0], clipped[i, 1, 1], clipped[i, 1, 2] = (
-            px + t1 * (qx - px),
-            py + t1 * (qy - py),
-            pz + t1 * (qz - pz),
-        )
+        if t0 <= t1:
+            kept[i] = True
+            store(clipped, i, 0, along(p, q, t0))
+            store(clipped, i, 1, along(p, q, t1))
     return clipped, kept
 
 
 @kernel
-def clip_on_sphere_3d(segments: Floats, center: Floats, radius: float) -> tuple[Floats, Bools]:
+def clip_on_sphere_3d(segments: FloatArray, center: FloatArray, radius: float) -> tuple[FloatArray, BoolArray]:
     """Return (clipped segments (n, 2, 3), kept (n,)) by the two roots of the quadratic."""
     clipped, kept = np.empty_like(segments), np.zeros(len(segments), np.bool_)
     for i in range(len(segments)):
@@ -192,7 +173,7 @@ def clip_on_sphere_3d(segments: Floats, center: Floats, radius: float) -> tuple[
 
 
 @kernel
-def clip_rings_on_planes(vertices: Floats, offsets: Ints, rows: Floats) -> tuple[Floats, Ints]:
+def clip_rings_on_planes(vertices: FloatArray, offsets: IntArray, rows: FloatArray) -> tuple[FloatArray, IntArray]:
     """Return (vertices, offsets) that Sutherland-Hodgman leaves of rings ``offsets[i]`` .. ``offsets[i + 1]``."""
     n, dimension = len(offsets) - 1, vertices.shape[1]
     room = 0

@@ -21,14 +21,14 @@ from typing import Any
 
 import numpy as np
 
-from engine.jit import inline, kernel
-from engine.textbook.vectors import Floats, Ints
+from engine.arrays import FloatArray, IntArray
+from engine.jit import kernel, merged
 
 REJECTED, ACCEPTED, UNFINISHED = 0, 1, 2
 MAX_TURNS = 64  # six would do in exact arithmetic: each turn settles one plane
 
 
-@inline
+@merged
 def code_word(p: Any, low: Any, high: Any) -> int:
     """Return one bit per side that p is outside of."""
     code = 0
@@ -40,7 +40,7 @@ def code_word(p: Any, low: Any, high: Any) -> int:
     return code
 
 
-@inline
+@merged
 def cut(p: Any, q: Any, bit: int, low: Any, high: Any) -> Any:
     """Return the intersection of the segment with the plane of the side `bit`."""
     axis = bit // 2
@@ -48,27 +48,31 @@ def cut(p: Any, q: Any, bit: int, low: Any, high: Any) -> Any:
     return p + (plane - p[axis]) / (q[axis] - p[axis]) * (q - p)
 
 
+@merged
+def clip_one(p: Any, q: Any, n_turns: int, region: Any, code_word: Any, cut: Any) -> int:
+    """Cut p q in place by ``code_word(p, *region)`` and ``cut(p, q, bit, *region)``; return its status."""
+    code_p, code_q = code_word(p, *region), code_word(q, *region)
+    for _ in range(n_turns):
+        if code_p == 0 and code_q == 0:
+            return ACCEPTED
+        if code_p & code_q:
+            return REJECTED
+        bit = 0
+        while not (code_p ^ code_q) >> bit & 1:
+            bit += 1
+        if code_p >> bit & 1:
+            p[:] = cut(p, q, bit, *region)
+            code_p = code_word(p, *region)
+        else:
+            q[:] = cut(p, q, bit, *region)
+            code_q = code_word(q, *region)
+    return UNFINISHED
+
+
 @kernel
-def clip(segments: Floats, low: Floats, high: Floats) -> tuple[Floats, Ints]:
+def clip(segments: FloatArray, low: FloatArray, high: FloatArray) -> tuple[FloatArray, IntArray]:
     """Return (clipped segments (n, 2, dim), status (n,): REJECTED, ACCEPTED or UNFINISHED)."""
-    clipped, status = segments.copy(), np.full(len(segments), UNFINISHED, np.int64)
+    clipped, status = segments.copy(), np.empty(len(segments), np.int64)
     for i in range(len(segments)):
-        p, q = clipped[i, 0], clipped[i, 1]
-        code_p, code_q = code_word(p, low, high), code_word(q, low, high)
-        for _ in range(MAX_TURNS):
-            if code_p == 0 and code_q == 0:
-                status[i] = ACCEPTED
-                break
-            if code_p & code_q:
-                status[i] = REJECTED
-                break
-            bit = 0
-            while not (code_p ^ code_q) >> bit & 1:
-                bit += 1
-            if code_p >> bit & 1:
-                p[:] = cut(p, q, bit, low, high)
-                code_p = code_word(p, low, high)
-            else:
-                q[:] = cut(p, q, bit, low, high)
-                code_q = code_word(q, low, high)
+        status[i] = clip_one(clipped[i, 0], clipped[i, 1], MAX_TURNS, (low, high), code_word, cut)
     return clipped, status

@@ -13,10 +13,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from engine.arrays import FloatArray, IntArray
 from engine.jit import inline, kernel
 from engine.predicates.loading import as_point3
+from engine.predicates.vectors import along, cross, dot, minus
 from engine.textbook.triangle_cross_dot import is_in_prism
-from engine.textbook.vectors import Floats, Ints, along, cross, dot, minus
 from engine.types import Point3
 
 
@@ -44,7 +45,7 @@ def has_edge_through_face(vertices: Any, triangles: Any, others: Any, faces: Any
 
 
 @kernel
-def collide(vertices: Floats, triangles: Ints, other_vertices: Floats, other_triangles: Ints) -> bool:
+def collide(vertices: FloatArray, triangles: IntArray, other_vertices: FloatArray, other_triangles: IntArray) -> bool:
     """Tell whether an edge of one polyhedron meets a face of the other, both ways; quadratic."""
     return has_edge_through_face(vertices, triangles, other_vertices, other_triangles) or has_edge_through_face(
         other_vertices, other_triangles, vertices, triangles

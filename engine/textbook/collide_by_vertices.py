@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from engine.arrays import FloatArray, IntArray
 from engine.jit import inline, kernel
 from engine.predicates.loading import as_point3
 from engine.textbook.polyhedron_ray_parity import is_inside
-from engine.textbook.vectors import Floats, Ints
 from engine.types import Point3
 
 
@@ -27,7 +27,7 @@ def has_vertex_inside(vertices: Any, others: Any, triangles: Any) -> bool:
 
 
 @kernel
-def collide(vertices: Floats, triangles: Ints, other_vertices: Floats, other_triangles: Ints) -> bool:
+def collide(vertices: FloatArray, triangles: IntArray, other_vertices: FloatArray, other_triangles: IntArray) -> bool:
     """Tell whether a vertex of one polyhedron is in the other."""
     return has_vertex_inside(vertices, other_vertices, other_triangles) or has_vertex_inside(
         other_vertices, vertices, triangles

@@ -12,11 +12,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from engine.arrays import FloatArray, IntArray
+from engine.bounding.aabb import box_of_points, corners_of_box
 from engine.textbook import collide_by_edges, collide_by_vertices
-from engine.textbook.bounding_volumes import bounding_box, boxes_meet
-from engine.textbook.vectors import Floats, Ints
+from engine.textbook.bounding_volumes import boxes_meet
 
-BOX_TRIANGLES: Ints = np.array(
+BOX_TRIANGLES: IntArray = np.array(
     [
         triangle
         for a, b, c, d in ((0, 4, 6, 2), (1, 3, 7, 5), (0, 1, 5, 4), (2, 6, 7, 3), (0, 2, 3, 1), (4, 5, 7, 6))
@@ -26,23 +27,17 @@ BOX_TRIANGLES: Ints = np.array(
 )
 
 
-def box_vertices(low: Floats, high: Floats) -> Floats:
-    """Return the corners of a box; bit k of the index says whether axis k is at its maximum."""
-    corners: Floats = np.array([[(high if i >> k & 1 else low)[k] for k in range(3)] for i in range(8)])
-    return corners
-
-
-def meet(vertices: Floats, triangles: Ints, other_vertices: Floats, other_triangles: Ints) -> bool:
+def meet(vertices: FloatArray, triangles: IntArray, other_vertices: FloatArray, other_triangles: IntArray) -> bool:
     """Tell whether two polyhedra collide: a vertex in the other, or an edge through a face."""
     arguments = (vertices, triangles, other_vertices, other_triangles)
     return bool(collide_by_vertices.collide(*arguments) or collide_by_edges.collide(*arguments))
 
 
-def collide(vertices: Floats, triangles: Ints, other_vertices: Floats, other_triangles: Ints) -> bool:
+def collide(vertices: FloatArray, triangles: IntArray, other_vertices: FloatArray, other_triangles: IntArray) -> bool:
     """Tell whether two polyhedra collide, the cheapest test first."""
-    low, high = bounding_box(other_vertices)
-    if not boxes_meet(*bounding_box(vertices), low, high):
+    low, high = box_of_points(other_vertices)
+    if not boxes_meet(*box_of_points(vertices), low, high):
         return False
-    if not meet(vertices, triangles, box_vertices(low, high), BOX_TRIANGLES):
+    if not meet(vertices, triangles, corners_of_box(low, high), BOX_TRIANGLES):
         return False
     return meet(vertices, triangles, other_vertices, other_triangles)

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from engine.arrays import BoolArray, FloatArray
 from engine.jit import kernel
 from engine.textbook.half_space import signed_distance
-from engine.textbook.vectors import Bools, Floats
 
 
 @kernel
-def contains(points: Floats, planes: Floats) -> Bools:
+def contains(points: FloatArray, planes: FloatArray) -> BoolArray:
     """Tell of each point (n, dim) whether every row (normal, offset) of planes (m, dim + 1) is >= 0 there."""
     contained = np.ones(len(points), np.bool_)
     dim = points.shape[1]

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from engine.arrays import FloatArray, IntArray
 from engine.jit import inline, kernel
-from engine.textbook.cohen_sutherland import ACCEPTED, REJECTED, UNFINISHED
+from engine.textbook.cohen_sutherland import clip_one
 from engine.textbook.half_space import signed_distance
-from engine.textbook.vectors import Floats, Ints
 
 MAX_PLANES = 62
 
@@ -31,33 +31,17 @@ def code_word(p: Any, planes: Any) -> int:
 
 
 @inline
-def cut(p: Any, q: Any, row: Any) -> Any:
-    """Return the intersection of the segment with a plane."""
-    at_p, at_q = signed_distance(p, row[:-1], row[-1]), signed_distance(q, row[:-1], row[-1])
+def cut(p: Any, q: Any, bit: int, planes: Any) -> Any:
+    """Return the intersection of the segment with the plane of row `bit`."""
+    normal, offset = planes[bit, :-1], planes[bit, -1]
+    at_p, at_q = signed_distance(p, normal, offset), signed_distance(q, normal, offset)
     return p + at_p / (at_p - at_q) * (q - p)
 
 
 @kernel
-def clip(segments: Floats, planes: Floats) -> tuple[Floats, Ints]:
+def clip(segments: FloatArray, planes: FloatArray) -> tuple[FloatArray, IntArray]:
     """Return (clipped segments (n, 2, dim), status (n,)); planes (m, dim + 1), m <= MAX_PLANES."""
-    clipped, status = segments.copy(), np.full(len(segments), UNFINISHED, np.int64)
+    clipped, status = segments.copy(), np.empty(len(segments), np.int64)
     for i in range(len(segments)):
-        p, q = clipped[i, 0], clipped[i, 1]
-        code_p, code_q = code_word(p, planes), code_word(q, planes)
-        for _ in range(2 * len(planes) + 2):
-            if code_p == 0 and code_q == 0:
-                status[i] = ACCEPTED
-                break
-            if code_p & code_q:
-                status[i] = REJECTED
-                break
-            bit = 0
-            while not (code_p ^ code_q) >> bit & 1:
-                bit += 1
-            if code_p >> bit & 1:
-                p[:] = cut(p, q, planes[bit])
-                code_p = code_word(p, planes)
-            else:
-                q[:] = cut(p, q, planes[bit])
-                code_q = code_word(q, planes)
+        status[i] = clip_one(clipped[i, 0], clipped[i, 1], 2 * len(planes) + 2, (planes,), code_word, cut)
     return clipped, status

@@ -10,12 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from engine.textbook.vectors import Bools, Floats
+from engine.arrays import BoolArray, FloatArray
 
-Leaf = Callable[[Floats], Bools]
+Leaf = Callable[[FloatArray], BoolArray]
 
 
-def contains(points: Floats, tree: Leaf | tuple[str, Any, Any]) -> Bools:
+def contains(points: FloatArray, tree: Leaf | tuple[str, Any, Any]) -> BoolArray:
     """Tell of each point whether the tree holds it; recursive, as deep as the tree."""
     if not isinstance(tree, tuple):
         return tree(points)

@@ -16,8 +16,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from engine.arrays import FloatArray
 from engine.textbook.polygon_ray_parity import contains
-from engine.textbook.vectors import Floats
 
 
 @dataclass(slots=True, eq=False)
@@ -34,7 +34,7 @@ class Node:
     before: Node | None = field(default=None, repr=False)
 
 
-def crossing(a: Floats, b: Floats, c: Floats, d: Floats) -> tuple[float, float] | None:
+def crossing(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> tuple[float, float] | None:
     """Return the parameters on ab and on cd where they cross, both strictly between 0 and 1."""
     u, v, w = b - a, d - c, c - a
     area = u[0] * v[1] - u[1] * v[0]
@@ -44,7 +44,7 @@ def crossing(a: Floats, b: Floats, c: Floats, d: Floats) -> tuple[float, float] 
     return (float(t), float(s)) if 0.0 < t < 1.0 and 0.0 < s < 1.0 else None
 
 
-def link(ring: Floats, crossings: list[Node], other: Floats) -> list[Node]:
+def link(ring: FloatArray, crossings: list[Node], other: FloatArray) -> list[Node]:
     """Return the nodes of a ring in order, linked, crossings marked as entry into `other` or exit from it."""
     nodes = [Node(float(x), float(y), (i, 0.0)) for i, (x, y) in enumerate(ring)]
     nodes = sorted(nodes + crossings, key=lambda node: node.at)
@@ -57,7 +57,7 @@ def link(ring: Floats, crossings: list[Node], other: Floats) -> list[Node]:
     return nodes
 
 
-def intersection(subject: Floats, clip: Floats) -> list[Floats]:
+def intersection(subject: FloatArray, clip: FloatArray) -> list[FloatArray]:
     """Return the rings of the intersection of two simple rings (n, 2) and (m, 2)."""
     of_subject, of_clip = [], []
     for i in range(len(subject)):
@@ -81,14 +81,14 @@ def intersection(subject: Floats, clip: Floats) -> list[Floats]:
     return rings
 
 
-def _without_crossings(subject: Floats, clip: Floats) -> list[Floats]:
+def _without_crossings(subject: FloatArray, clip: FloatArray) -> list[FloatArray]:
     for inner, outer in ((subject, clip), (clip, subject)):
         if contains(inner[:1], outer, np.array([0, len(outer)]))[0]:
             return [inner]
     return []
 
 
-def _walk(start: Node, n_steps: int) -> Floats:
+def _walk(start: Node, n_steps: int) -> FloatArray:
     """Follow the boundary from a crossing; capped, since marks that do not take turns may never lead back."""
     ring, node, forward = [], start, True
     for _ in range(n_steps):
@@ -104,5 +104,5 @@ def _walk(start: Node, n_steps: int) -> Floats:
             node = node.twin
         if node is start or node.twin is start:
             break
-    found: Floats = np.array(ring)
+    found: FloatArray = np.array(ring)
     return found

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from engine.arrays import BoolArray, FloatArray
 from engine.jit import inline, kernel
-from engine.textbook.vectors import Bools, Floats
 
 
 @inline
@@ -24,7 +24,7 @@ def signed_distance(point: Any, normal: Any, offset: float) -> float:
 
 
 @kernel
-def contains(points: Floats, normal: Floats, offset: float) -> Bools:
+def contains(points: FloatArray, normal: FloatArray, offset: float) -> BoolArray:
     """Tell of each point (n, dim) whether it is in the half-space."""
     contained = np.zeros(len(points), np.bool_)
     for i in range(len(points)):
@@ -32,7 +32,7 @@ def contains(points: Floats, normal: Floats, offset: float) -> Bools:
     return contained
 
 
-def clip_points(points: Floats, normal: Floats, offset: float) -> Floats:
+def clip_points(points: FloatArray, normal: FloatArray, offset: float) -> FloatArray:
     """Return the points that the half-space holds: each is either removed or preserved."""
-    kept: Floats = points[contains(points, normal, offset)]
+    kept: FloatArray = points[contains(points, normal, offset)]
     return kept

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.jit import kernel
-from engine.textbook.vectors import Bools, Floats, Ints
 
 
 @kernel
-def contains(points: Floats, powers: Ints, coefficients: Floats) -> Bools:
+def contains(points: FloatArray, powers: IntArray, coefficients: FloatArray) -> BoolArray:
     """Tell of each point whether f >= 0; points (n, dim), powers (t, dim), coefficients (t,)."""
     contained = np.zeros(len(points), np.bool_)
     for i in range(len(points)):

@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
+from engine.arrays import BoolArray, FloatArray
 from engine.jit import inline, kernel
-from engine.textbook.vectors import Bools, Floats
 
 
 @inline
@@ -36,7 +36,7 @@ def unsigned_angle(ux: float, uy: float, vx: float, vy: float) -> float:
 
 
 @kernel
-def contains_signed(points: Floats, vertices: Floats) -> Bools:
+def contains_signed(points: FloatArray, vertices: FloatArray) -> BoolArray:
     """Tell of each point (n, 2) whether the signed sum exceeds half a turn in size."""
     contained = np.zeros(len(points), np.bool_)
     for i in range(len(points)):
@@ -49,7 +49,7 @@ def contains_signed(points: Floats, vertices: Floats) -> Bools:
 
 
 @kernel
-def contains_unsigned(points: Floats, vertices: Floats, tolerance: Any) -> Bools:
+def contains_unsigned(points: FloatArray, vertices: FloatArray, tolerance: Any) -> BoolArray:
     """Tell of each point (n, 2) whether the unsigned sum is at least a full turn less `tolerance` (radians)."""
     contained = np.zeros(len(points), np.bool_)
     for i in range(len(points)):

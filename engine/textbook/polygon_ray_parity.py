@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.jit import kernel
-from engine.textbook.vectors import Bools, Floats, Ints
 
 
 @kernel
-def contains(points: Floats, vertices: Floats, ring_offsets: Ints) -> Bools:
+def contains(points: FloatArray, vertices: FloatArray, ring_offsets: IntArray) -> BoolArray:
     """Tell of each point (n, 2) whether it is in the rings vertices[ring_offsets[r] : ring_offsets[r + 1]]."""
     contained = np.zeros(len(points), np.bool_)
     for i in range(len(points)):

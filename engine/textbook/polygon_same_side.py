@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from engine.arrays import BoolArray, FloatArray
 from engine.jit import kernel
-from engine.textbook.vectors import Bools, Floats
 
 
 @kernel
-def contains(points: Floats, vertices: Floats) -> Bools:
+def contains(points: FloatArray, vertices: FloatArray) -> BoolArray:
     """Tell of each point (n, 2) whether it is in the convex ring vertices (m, 2)."""
     contained = np.zeros(len(points), np.bool_)
     for i in range(len(points)):

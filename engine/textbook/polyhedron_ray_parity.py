@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.jit import inline, kernel
 from engine.predicates.loading import as_point3
 from engine.textbook.ray_triangle import intersect, is_hit
-from engine.textbook.vectors import Bools, Floats, Ints
 from engine.types import Point3
 
 
@@ -31,7 +31,7 @@ def is_inside(point: Point3, direction: Point3, vertices: Any, triangles: Any) -
 
 
 @kernel
-def contains(points: Floats, vertices: Floats, triangles: Ints, direction: Floats) -> Bools:
+def contains(points: FloatArray, vertices: FloatArray, triangles: IntArray, direction: FloatArray) -> BoolArray:
     """Tell of each point (n, 3) whether an odd number of triangles (m, 3) lies ahead in `direction` (3,)."""
     contained = np.zeros(len(points), np.bool_)
     ahead = Point3(direction[0], direction[1], direction[2])

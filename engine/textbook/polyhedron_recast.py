@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.jit import inline, kernel
 from engine.predicates.loading import as_point3
 from engine.textbook.ray_triangle import intersect, is_hit
-from engine.textbook.vectors import Bools, Floats, Ints
 from engine.types import Point3
 
 OUT, IN, CLOSE_TO_AN_EDGE = 0, 1, 2
@@ -39,8 +39,8 @@ def count(point: Point3, direction: Point3, vertices: Any, triangles: Any, margi
 
 @kernel
 def contains(
-    points: Floats, vertices: Floats, triangles: Ints, directions: Floats, margin: float
-) -> tuple[Bools, Bools]:
+    points: FloatArray, vertices: FloatArray, triangles: IntArray, directions: FloatArray, margin: float
+) -> tuple[BoolArray, BoolArray]:
     """Return (contained, unfinished); unfinished where each of the directions (k, 3) passed close to an edge."""
     contained, unfinished = np.zeros(len(points), np.bool_), np.ones(len(points), np.bool_)
     for i in range(len(points)):

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from engine.jit import inline
-from engine.textbook.vectors import cross, dot, minus
+from engine.predicates.vectors import cross, dot, minus
 from engine.types import Point3
 
 

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from engine.arrays import BoolArray, FloatArray
 from engine.jit import kernel
 from engine.textbook.half_space import signed_distance
-from engine.textbook.vectors import Bools, Floats
 
 
 @kernel
-def clip(segments: Floats, normal: Floats, offset: float) -> tuple[Floats, Bools]:
+def clip(segments: FloatArray, normal: FloatArray, offset: float) -> tuple[FloatArray, BoolArray]:
     """Return (clipped segments (n, 2, dim), kept (n,)); a removed segment is left as it came."""
     clipped, kept = segments.copy(), np.ones(len(segments), np.bool_)
     for i in range(len(segments)):

@@ -11,12 +11,12 @@ from math import sqrt
 
 import numpy as np
 
+from engine.arrays import BoolArray, FloatArray
 from engine.jit import kernel
-from engine.textbook.vectors import Bools, Floats
 
 
 @kernel
-def clip(segments: Floats, center: Floats, radius: float) -> tuple[Floats, Bools]:
+def clip(segments: FloatArray, center: FloatArray, radius: float) -> tuple[FloatArray, BoolArray]:
     """Return (clipped segments (n, 2, dim), kept (n,)); a removed segment is left as it came."""
     clipped, kept = segments.copy(), np.zeros(len(segments), np.bool_)
     for i in range(len(segments)):

@@ -13,13 +13,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from engine.arrays import FloatArray
 from engine.jit import kernel
 from engine.textbook.half_space import signed_distance
-from engine.textbook.vectors import Floats
 
 
 @kernel
-def clip_contour(contour: Floats, normal: Floats, offset: float) -> Floats:
+def clip_contour(contour: FloatArray, normal: FloatArray, offset: float) -> FloatArray:
     """Return what the half-space leaves of a closed contour (n, dim); at most 2 n vertices."""
     n = len(contour)
     kept = np.empty((2 * n, contour.shape[1]))
@@ -36,13 +36,13 @@ def clip_contour(contour: Floats, normal: Floats, offset: float) -> Floats:
     return kept[:m].copy()
 
 
-def clip_polygon(contours: list[Floats], normal: Floats, offset: float) -> list[Floats]:
+def clip_polygon(contours: list[FloatArray], normal: FloatArray, offset: float) -> list[FloatArray]:
     """Return the contours that are left of a multiply connected polygon."""
     clipped = [clip_contour(contour, normal, offset) for contour in contours]
     return [contour for contour in clipped if len(contour) > 0]
 
 
-def clip_on_convex(contours: list[Floats], planes: Floats) -> list[Floats]:
+def clip_on_convex(contours: list[FloatArray], planes: FloatArray) -> list[FloatArray]:
     """Return what a convex polyhedron, given by rows (normal, offset), leaves of a polygon: one plane after another."""
     for row in planes:
         contours = clip_polygon(contours, row[:-1].copy(), float(row[-1]))

@@ -11,9 +11,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from engine.arrays import BoolArray, FloatArray
 from engine.jit import inline, kernel
 from engine.predicates.loading import as_point3
-from engine.textbook.vectors import Bools, Floats, cross, dot, minus
+from engine.predicates.vectors import cross, dot, minus
 from engine.types import Point3
 
 
@@ -29,7 +30,7 @@ def is_in_prism(p: Point3, a: Point3, b: Point3, c: Point3) -> bool:
 
 
 @kernel
-def contains(points: Floats, triangle: Floats) -> Bools:
+def contains(points: FloatArray, triangle: FloatArray) -> BoolArray:
     """Tell of each point (n, 3) whether it is in the prism over the triangle (3, 3)."""
     contained = np.zeros(len(points), np.bool_)
     a, b, c = as_point3(triangle, 0), as_point3(triangle, 1), as_point3(triangle, 2)

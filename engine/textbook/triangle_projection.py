@@ -13,9 +13,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from engine.arrays import BoolArray, FloatArray
 from engine.jit import inline, kernel
 from engine.predicates.loading import as_point3
-from engine.textbook.vectors import Bools, Floats, cross, minus
+from engine.predicates.vectors import cross, minus
 from engine.types import Point2, Point3
 
 
@@ -45,7 +46,7 @@ def axis_of_largest_area(a: Point3, b: Point3, c: Point3) -> int:
 
 
 @kernel
-def contains(points: Floats, triangle: Floats) -> Bools:
+def contains(points: FloatArray, triangle: FloatArray) -> BoolArray:
     """Tell of each point (n, 3) whether its projection is in that of the triangle (3, 3)."""
     contained = np.zeros(len(points), np.bool_)
     axis = axis_of_largest_area(as_point3(triangle, 0), as_point3(triangle, 1), as_point3(triangle, 2))

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from engine.arrays import BoolArray, FloatArray
 from engine.jit import inline, kernel
-from engine.textbook.vectors import Bools, Floats
 
 
 @inline
@@ -51,7 +51,7 @@ def pair_collides(first: Any, second: Any) -> bool:
 
 
 @kernel
-def collide(first: Floats, second: Floats) -> Bools:
+def collide(first: FloatArray, second: FloatArray) -> BoolArray:
     """Tell of each pair first[i], second[i], both (n, 3, 2), whether the closed triangles have a common point."""
     found = np.zeros(len(first), np.bool_)
     for i in range(len(first)):

@@ -13,7 +13,7 @@ from engine.collision.collide import check_pose, pair_function
 from engine.collision.scenes.numbering import numbered
 from engine.errors import InvalidArrayError, UnsupportedSolidError, WrongDimensionError
 from engine.solids.base import Solid
-from engine.solids.own_box import own_box
+from engine.solids.bounds import own_box
 from engine.solids.pose import Pose
 
 

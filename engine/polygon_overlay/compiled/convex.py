@@ -26,8 +26,8 @@ from engine.polygon_overlay.compiled.edge_contacts import POLL
 from engine.polygon_overlay.compiled.edge_crossings import agree, smaller_of, turns
 from engine.polygon_overlay.compiled.loading import Given
 from engine.polygon_overlay.compiled.rounded_crossings import distance_of, round_crossing
+from engine.predicates.expansion import LARGEST, SMALLEST
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
-from engine.predicates.ranges import LARGEST, SMALLEST
 
 GENERAL: Final = -1
 """In the place of a result: the pair goes the general way."""

@@ -23,7 +23,8 @@ from engine.jit import called, inline, merged
 from engine.predicates.double_double import U2, dd_mul, dd_sub
 from engine.predicates.error_free import two_diff, workspace
 from engine.predicates.expansion import Components, add_product, grow, sign
-from engine.predicates.orientation import BOUND_2D, GUARD_2D, minor, orient2d_exact
+from engine.predicates.orientation import BOUND_2D, GUARD_2D, orient2d_exact
+from engine.predicates.parameters import minor
 from engine.types import UNDECIDED, Point2
 
 WEIGHT_BOUND: Final = 32.0 * U2

@@ -53,7 +53,7 @@ from engine.polygon_overlay.compiled.ring_order import rank_rings
 from engine.polygon_overlay.compiled.rounded_crossings import LOST, round_points
 from engine.polygon_overlay.compiled.workspace import Buffers, Outcomes, Output, Workspace, rows_of
 from engine.polygon_overlay.implicit_rings import RingArrays
-from engine.predicates.ranges import LARGEST
+from engine.predicates.expansion import LARGEST
 from engine.types import OPEN
 
 DONE: Final = 0

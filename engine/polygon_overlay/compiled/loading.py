@@ -14,8 +14,8 @@ from engine.jit import inline
 from engine.polygon_overlay.compiled.crossing_signs import Edges
 from engine.polygon_overlay.compiled.edge_contacts import POLL
 from engine.polygon_overlay.compiled.edge_tree import ANYWHERE, BENT, DOUBTFUL, RUN, BoxTree, heading
+from engine.predicates.expansion import SMALLEST
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
-from engine.predicates.ranges import SMALLEST
 
 Box = tuple[float, float, float, float]
 """x_min, x_max, y_min, y_max."""

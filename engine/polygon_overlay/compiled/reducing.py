@@ -43,7 +43,7 @@ from engine.polygon_overlay.compiled.ring_blocks import (
 )
 from engine.polygon_overlay.compiled.workspace import Buffers, rows_of
 from engine.polygon_overlay.implicit_rings import RingArrays
-from engine.predicates.ranges import LARGEST, is_safe
+from engine.predicates.expansion import LARGEST, is_safe
 
 
 @merged

@@ -6,7 +6,7 @@ from decimal import Decimal, localcontext
 
 import numpy as np
 
-from engine.predicates.integers import common_integers, nearest, nearest_with_root
+from engine.predicates.rational import common_integers, nearest, nearest_with_root
 
 
 def test_numbers_keep_their_values_over_one_denominator() -> None:

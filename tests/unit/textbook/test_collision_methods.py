@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from engine.bounding.aabb import box_of_points
 from engine.textbook import bounding_volumes, collide_by_edges, collide_by_vertices, collide_by_volumes
 from engine.textbook.triangles_in_plane import collide as triangles_collide
 from tests.reference.bounds import exact_minimal_sphere
@@ -54,7 +55,7 @@ def test_a_vertex_half_an_ulp_off_a_face_is_seen_to_touch_it() -> None:
 
 
 def test_boxes_and_spheres() -> None:
-    low, high = bounding_volumes.bounding_box(np.array(UNIT["vertices"], float))
+    low, high = box_of_points(np.array(UNIT["vertices"], float))
     assert (low.tolist(), high.tolist()) == ([0, 0, 0], [1, 1, 1])
     assert bounding_volumes.boxes_meet(low, high, high, high + 1)
     assert not bounding_volumes.boxes_meet(low, high, high + 1e-9, high + 1)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from engine.jit import kernel
-from engine.lanes.memory import move, prefetch
+from engine.lanes.lanes import move, prefetch
 
 
 @kernel

@@ -8,7 +8,7 @@ import numpy as np
 
 from engine.bounding.bvh import build_bvh
 from engine.jit import kernel
-from engine.lanes.segments import near_segment
+from engine.lanes.boxes import near_segment
 from engine.segment_clipping.contacts import APART
 from engine.segment_clipping.mesh_contacts import local_segment
 from engine.segment_clipping.mesh_streams import find_mesh_contacts
