@@ -18,6 +18,7 @@ TABLES = {
 NAMES = TABLES | {
     "answers": "a fixed set of questions: one hash an operation, compared with those stored",
     "checkouts": "two checkouts of the engine, every row of ours in turns",
+    "cold_start": "what an empty kernel cache costs: a table of docs/speed_and_error.md",
     "collision_cost": "what each way out of the quadratic cost of collision saves: docs/collision_cost.md",
     "compare": "two stored reports, side by side",
     "filed": "inputs that users of the peers filed, replayed",

@@ -40,7 +40,7 @@ checkouts.serve()
 """
 MEAN, WORST = 0.98, 0.93
 """What must hold: the geometric mean over all rows, and every row."""
-LEAST_ROUNDS = 3
+LEAST_ROUNDS, QUICK = 3, 0.05
 DOUBTFUL = 0.96
 """A row below this is measured once more."""
 
@@ -51,8 +51,8 @@ DOUBTFUL = 0.96
 def serve() -> None:
     """Answer the lines of the standard input, one JSON each: what to make, or how often to run it."""
     import engine
-    from benchmarks.contest import Contest, run_of_ours
-    from benchmarks.fields import Size, tasks
+    from benchmarks.contest import Contest, Size, run_of_ours
+    from benchmarks.fields import tasks
 
     answers, sys.stdout = sys.stdout, sys.stderr
     known: dict[str, Callable[[], Any]] = {}
@@ -61,7 +61,7 @@ def serve() -> None:
         asked = json.loads(line)
         try:
             if "seed" in asked:
-                known = dict(tasks(Size(asked["seed"], asked["quick"]), has_figures=False))
+                known = {task.name: task.make for task in tasks(Size(asked["seed"], asked["scale"]), has_figures=False)}
                 found: Any = str(Path(engine.__file__).resolve().parents[1])
             elif "make" in asked:
                 run = None  # what the row before holds goes first
@@ -78,26 +78,20 @@ def serve() -> None:
         print(json.dumps(found), file=answers, flush=True)
 
 
-def _seconds(run: Any, times: int) -> tuple[float, float]:
-    """Return wall and CPU seconds of one run."""
-
-    def several() -> None:
-        for _ in range(times):
-            run()
-
-    wall, cpu, _ = clocked(several)
+def _seconds(run: Callable[[], Any], times: int) -> tuple[float, float]:
+    wall, cpu, _ = clocked(lambda: [run() for _ in range(times)])
     return wall / times, cpu / times
 
 
 class Side:
     """A process with the engine of one checkout."""
 
-    def __init__(self, checkout: Path, seed: int, is_quick: bool) -> None:
+    def __init__(self, checkout: Path, seed: int, scale: float) -> None:
         words = [sys.executable, "-c", START, str(ROOT)]
         self._process = subprocess.Popen(
             words, cwd=checkout, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1
         )
-        self.send(seed=seed, quick=is_quick)
+        self.send(seed=seed, scale=scale)
         if (found := self.answer()) != str(checkout):
             raise SystemExit(f"the engine was imported from {found}, not from {checkout}")
 
@@ -171,9 +165,10 @@ def compare(row: Compared, sides: tuple[Side, Side], rounds: int, seconds: float
 
 def run(other: Path, given: argparse.Namespace) -> list[Compared]:
     """Return all rows, measured in several passes of new processes, doubtful rows once more."""
-    from benchmarks.fields import Size, tasks
+    from benchmarks.contest import Size
+    from benchmarks.fields import tasks
 
-    names = [name for name, _ in tasks(Size(given.seed, given.quick), has_figures=False)]
+    names = [task.name for task in tasks(Size(given.seed, given.scale), has_figures=False)]
     rows = [Compared(name) for name in names if given.only in name]
     n_left, end = len(rows) * given.passes, time.perf_counter() + 60 * given.minutes
     for pass_ in range(given.passes):
@@ -188,7 +183,7 @@ def _pass(
 ) -> int:
     """Measure the rows once, with an even share of the time until `end` for each; return how many are left."""
     places = [ROOT, other] if is_swapped else [other, ROOT]
-    sides = {place: Side(place, given.seed, given.quick) for place in places} if rows else {}
+    sides = {place: Side(place, given.seed, given.scale) for place in places} if rows else {}
     for row in rows:
         started, share = time.perf_counter(), max(0.0, end - time.perf_counter()) / n_left
         if not row.failed:
@@ -218,14 +213,10 @@ def verdict(rows: list[Compared]) -> tuple[str, bool]:
     if failed or not rows:
         return f"{len(failed)} of {len(rows)} rows failed", False
     lines, means = [f"{len(rows)} rows"], []
-    clocks: dict[str, Callable[[Compared], float]] = {
-        "wall": lambda row: row.ratio.median,
-        "CPU": lambda row: row.cpu_ratio,
-    }
-    for clock, of in clocks.items():
-        means.append(math.exp(statistics.fmean(math.log(of(row)) for row in rows)))
-        worst = min(rows, key=of)
-        lines.append(f"{clock}: geometric mean {means[-1]:.4f} (must: {MEAN}), worst {of(worst):.3f}: {worst.name}")
+    for clock, ratios in (("wall", [row.ratio.median for row in rows]), ("CPU", [row.cpu_ratio for row in rows])):
+        means.append(math.exp(statistics.fmean(map(math.log, ratios))))
+        worst, name = min(zip(ratios, (row.name for row in rows)))
+        lines.append(f"{clock}: geometric mean {means[-1]:.4f} (must: {MEAN}), worst {worst:.3f}: {name}")
     below = [row for row in rows if max(row.ratio.median, row.cpu_ratio) < WORST]
     lines += [f"below {WORST} by both clocks: {row.name}" for row in below]
     return "\n".join(lines), max(means) >= MEAN and not below
@@ -243,9 +234,9 @@ def main(words: list[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--json", type=Path, help="write every round's seconds here")
     given = parser.parse_args(words)
-    given.rounds = given.rounds or (7 if given.quick else 21)
-    given.passes = given.passes or (1 if given.quick else 2)
-    given.minutes = given.minutes or (2.0 if given.quick else 12.0)
+    usual = (7, 1, 2.0, QUICK) if given.quick else (21, 2, 12.0, 1.0)
+    given.rounds, given.passes = given.rounds or usual[0], given.passes or usual[1]
+    given.minutes, given.scale = given.minutes or usual[2], usual[3]
     rows = run(given.other.resolve(), given)
     print(f"{'row':<52} {'ratio':>6}  {'quartiles':<13}  {'by CPU':>6} {'n':>3}  {'other, us':>12} {'this, us':>12}")
     for row in rows:

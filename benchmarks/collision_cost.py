@@ -13,10 +13,9 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 import engine
-from benchmarks.crowds import belted_ball, crowd
+from benchmarks.bodies import Pair, belted_ball, bumpy_pair, crowd, near_contact
 from benchmarks.measure import clocked
-from benchmarks.poses import Pair, near_contact
-from benchmarks.workloads import Mesh, bumpy_sphere
+from benchmarks.workloads import Mesh
 from engine.textbook import collide_by_edges
 
 Line = tuple[str, str, str]
@@ -41,14 +40,9 @@ def ask(pair: Pair, **options: bool) -> Callable[[], np.ndarray]:
     return lambda: engine.collide_poses(first, second, pair.rotations, pair.translations, workers=1, **options)
 
 
-def bodies(times: int, n_poses: int) -> Pair:
-    first, second = (bumpy_sphere(f"cost {seed}", seed, times) for seed in (1, 2))
-    return near_contact(f"cost {times}", first, second, True, n_poses, 1)
-
-
 def naive(times: int) -> Line:
     """Every edge against every face, for a pose without contact: nothing ends the loops early."""
-    pair = bodies(times, 50)
+    pair = bumpy_pair("cost", times, 50)
     free = int(np.flatnonzero(ask(pair)() == engine.Relation.DISJOINT)[0])
     moved = np.ascontiguousarray(pair.second.vertices @ pair.rotations[free].T + pair.translations[free])
     faces = pair.first.faces.astype(np.int64), pair.second.faces.astype(np.int64)
@@ -84,7 +78,7 @@ def lines(is_quick: bool) -> Iterator[Line]:
     for times in (2, 3) if is_quick else (2, 3, 4):
         yield naive(times)
     for times in (3, 4) if is_quick else (3, 4, 5):
-        pair = bodies(times, n_poses)
+        pair = bumpy_pair("cost", times, n_poses)
         if times == 3:
             yield from volumes(pair)
         name = f"box trees, {len(pair.first.faces):,} x {len(pair.second.faces):,} faces"
@@ -102,9 +96,7 @@ def lines(is_quick: bool) -> Iterator[Line]:
         yield name, shown(seconds), "five relations, exact"
     for n_bodies in (300,) if is_quick else (1_000, 3_000):
         scene = crowd(n_bodies, 1)
-        solids = [engine.Polyhedron(scene.meshes[kind].vertices, scene.meshes[kind].faces) for kind in range(8)]
-        stand = [engine.Pose(r, t) for r, t in zip(scene.rotations, scene.translations, strict=True)]
-        every = [solids[kind] for kind in scene.kinds]
+        every, stand = scene.solids(), scene.poses()
         pairs = np.stack(np.triu_indices(n_bodies, 1), axis=1)
         for how, only in (("every pair's boxes", pairs), ("grid of boxes", None)):
             run = best(lambda only=only: engine.collide_scene(every, stand, only=only, workers=1))  # noqa: B023

@@ -2,30 +2,34 @@
 
 A contender is a maker: called once (that is its build, timed), it returns a `Prepared` that answers for the items. One
 that cannot be imported is absent, one that raises refuses. Contenders are asked in turn, in an order that changes from
-round to round; a slow one gets the first so many items only, which its row says.
+round to round; a slow one is timed on the first so many items only, which its row says, but judged, outside the clock,
+on as many as all others.
 """
 
 from __future__ import annotations
 
 import gc
-import os
 import statistics
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from benchmarks import contenders, errors
 from benchmarks.contenders import Prepared
-from benchmarks.errors import REFUSED
-from benchmarks.load import memory_of
-from benchmarks.measure import LEAST_SECONDS, clocked
+from benchmarks.measure import LEAST_SECONDS, clocked, memory_of, percentile
 
 PROBE = 40
 """Items of the first, untimed question; the least that a slow contender gets."""
+JUDGING = 30.0
+"""Seconds that a slow contender may take for the items it is judged on, outside the clock."""
+SIZES = (1, 10, 100)
+"""Items of a question whose latency is measured by itself."""
+QUESTIONS = 200
+"""At most, for each of these sizes."""
 Goals = tuple[float | None, float | None]
 """What the ratio against a peer must be, and what it aims at."""
 
@@ -41,21 +45,44 @@ class Contender:
     overhead: Callable[[], float] | None = None
     """Seconds that one call costs by itself, where each item is a call from Python."""
     goals: Goals = (None, None)
+    setting: float | None = None
+    """Of the contender's own knob; rows of one contender that differ in nothing else are a curve."""
 
 
 def contender(
-    name: str, module: str, kind: str, subject: Any, threads: int = 2, goals: Goals = (None, None), is_new: bool = False
+    spec: str, kind: str, subject: Any, threads: int = 2, goals: Goals | None = None, is_new: bool = False
 ) -> Contender:
-    """Return the contender of a module for a kind of question; is_new: from the subject's arrays at every question."""
+    """Return a contender; spec: module[:kind][@setting]; is_new: from the subject's arrays at every question."""
+    spec, _, setting = spec.partition("@")
+    module, _, own = spec.partition(":")
     build = contenders.anew if is_new else contenders.make
-    package = contenders.PACKAGES.get(module, "")
-    return Contender(name, partial(build, module, kind, subject, threads), package, goals=goals)
+    knob = (float(setting),) if setting else ()
+    return Contender(
+        contenders.shown(module, own or kind), partial(build, module, own or kind, subject, threads, *knob),
+        contenders.PACKAGES.get(module, ""), goals=goals or (None, None), setting=knob[0] if knob else None,
+    )  # fmt: skip
 
 
-def refusing(ask: Callable[[Any], Any], item: Any, refusal: Any = REFUSED) -> Any:
-    """Return the answer for one item; whatever a peer raises is a refusal."""
+def field_of(
+    kind: str, subject: Any, peers: Sequence[str] | Mapping[str, Goals | None] = (), threads: int = 2, **more: Any
+) -> list[Contender]:
+    """Return ours and peers, with their goals where they have any."""
+    goals = peers if isinstance(peers, Mapping) else dict.fromkeys(peers)
+    return [contender(spec, kind, subject, threads, goal, **more) for spec, goal in ({"ours": None} | goals).items()]
+
+
+def two_threads(kind: str, subject: Any, goals: Goals = (1.7, 1.9)) -> list[Contender]:
+    """Return ours with two threads, and with one as its contender."""
+    (two,), (one,) = field_of(kind, subject, (), 2), field_of(kind, subject, (), 1)
+    return [two, replace(one, name="ours, one thread", goals=goals)]
+
+
+def refusing(ask: Callable[[Any], Any], item: Any, refusal: Any = errors.REFUSED) -> Any:
+    """Return the answer for one item; whatever a peer raises is a refusal, NotApplicable is out of its domain."""
     try:
         return ask(item)
+    except contenders.NotApplicable:
+        return errors.OUTSIDE if refusal == errors.REFUSED else refusal
     except Exception:
         return refusal
 
@@ -72,7 +99,7 @@ class Contest:
     """Answers to the first items, as many as there are (see `judge`); or what settles the items with given numbers, to
     be asked about those on which contenders differ and some others; or None: nothing is judged."""
     judge: Callable[[Any, Any], dict[str, Any]]
-    """``judge(answers, exact)`` counts what is wrong."""
+    """``judge(answers, exact)`` counts what is wrong; `worst` is the number of the worst."""
     contenders: Sequence[Contender]
     about: str = ""
     n_sample: int = 20
@@ -81,6 +108,38 @@ class Contest:
     """Of items on which contenders differ."""
     count: int = 0
     """How many questions the items stand for, where they are not one each; such items are never cut short."""
+    request: Callable[[int], tuple[str, dict[str, Any]]] | None = None
+    """Path and body that ask the service about the item with a number."""
+
+
+class Task(NamedTuple):
+    """A row of a table before it is made, so that none is made in vain: a contest, or a figure that is none."""
+
+    name: str
+    make: Callable[[], Any]
+    is_on_page: bool = False
+    is_figure: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Size:
+    """How large the workloads are: 1.0 for the record, less for a quick run."""
+
+    seed: int
+    scale: float = 1.0
+
+    @property
+    def is_quick(self) -> bool:
+        """Whether only small subjects are asked about."""
+        return self.scale < 0.3
+
+    def of(self, full: Any, quick: Any) -> Any:
+        """Return one of two sizes."""
+        return quick if self.is_quick else full
+
+    def n(self, full: int, least: int = 20) -> int:
+        """Return so many items, fewer if quick."""
+        return max(min(least, full), int(full * self.scale))
 
 
 @dataclass(slots=True)
@@ -92,6 +151,8 @@ class Row:
     is_hard: bool
     contender: str
     package: str = ""
+    setting: float | None = None
+    about: str = ""
     absent: str = ""
     n_items: int = 0
     build: float = 0.0
@@ -102,12 +163,18 @@ class Row:
     cpu: list[float] = field(default_factory=list)
     """The same by CPU time of all threads."""
     cold: float = 0.0
-    """Seconds of the first question."""
+    """Seconds of the first question, of `PROBE` items."""
+    first: float | None = None
+    """Seconds of a build anew and a question of one item, kernels loaded."""
+    latency: dict[str, list[float]] = field(default_factory=dict)
+    """By the number of items: median, 99th percentile, largest seconds of a question, and how many were asked."""
     method: str = ""
     goals: Goals = (None, None)
     call_overhead: float = 0.0
     exact_share: float | None = None
     errors: dict[str, Any] = field(default_factory=dict)
+    worst: dict[str, Any] = field(default_factory=dict)
+    """The worst answer that is wrong: number of the item, answer, exact answer, path and body of the request."""
 
     @property
     def rate(self) -> float:
@@ -127,21 +194,23 @@ class _Entry:
     """A contender that answers."""
 
     row: Row
+    contender: Contender
     prepared: Prepared
     items: Any
     answers: Any
     times: int
+    taken: float
 
 
-def hold(contest: Contest, rounds: int, seconds: float) -> list[Row]:
+def hold(contest: Contest, rounds: int, seconds: float, has_latency: bool = False) -> list[Row]:
     """Return one row for each contender; each is timed for about `seconds`."""
     rows, entries = [], []
     for each in contest.contenders:
-        row = Row(contest.operation, contest.name, contest.is_hard, each.name, each.package, goals=each.goals)
+        row = Row(contest.operation, contest.name, contest.is_hard, each.name, each.package, each.setting,
+                  contest.about, goals=each.goals)  # fmt: skip
         rows.append(row)
-        if (prepared := _built(each, row)) is not None:
-            if (entry := _asked(contest, each, row, prepared, seconds / rounds)) is not None:
-                entries.append(entry)
+        if (entry := _entered(contest, each, row, seconds / rounds)) is not None:
+            entries.append(entry)
     _judge(contest, entries)
     for round_ in range(rounds):
         for entry in entries if round_ % 2 == 0 else reversed(entries):
@@ -149,6 +218,9 @@ def hold(contest: Contest, rounds: int, seconds: float) -> list[Row]:
             wall, cpu, _ = clocked(partial(_repeat, entry))
             entry.row.seconds.append(wall / entry.times)
             entry.row.cpu.append(cpu / entry.times)
+    if has_latency and not contest.count:
+        for entry in entries:
+            _ask_few(contest, entry, seconds / 8)
     return rows
 
 
@@ -157,44 +229,31 @@ def _repeat(entry: _Entry) -> None:
         entry.prepared.ask(entry.items)
 
 
-def _built(each: Contender, row: Row) -> Prepared | None:
-    """Build a contender; None if it is absent."""
+def _entered(contest: Contest, each: Contender, row: Row, seconds: float) -> _Entry | None:
+    """Build a contender and ask it until it is warm; None if it is absent or refuses, for which ours has no excuse."""
     gc.collect()
-    resident, before = memory_of(os.getpid()), time.perf_counter()
+    resident, before = memory_of(), time.perf_counter()
     try:
         prepared = each.make()
-    except (ImportError, OSError) as error:
-        row.absent = f"{type(error).__name__}: {error}".splitlines()[0]
-        return None
-    row.build = time.perf_counter() - before
-    row.memory = int(max(0.0, memory_of(os.getpid()) - resident) * 2**20)
-    return prepared
-
-
-def _asked(contest: Contest, each: Contender, row: Row, prepared: Prepared, seconds: float) -> _Entry | None:
-    """Ask a contender until it is warm; None if it refuses the whole batch, for which ours has no excuse."""
-    try:
-        if contest.count:
-            row.n_items, items = contest.count, prepared.native(contest.items)
-            row.cold = clocked(partial(prepared.ask, items))[0]
-        else:
-            row.cold = clocked(partial(prepared.ask, prepared.native(contest.items[:PROBE])))[0]
-            row.n_items = _how_many(prepared, contest.items, seconds)
-            items = prepared.native(contest.items[: row.n_items])
+        row.build = time.perf_counter() - before
+        row.memory = int(max(0.0, memory_of() - resident) * 2**20)
+        probe = contest.items if contest.count else contest.items[:PROBE]
+        row.cold = clocked(partial(prepared.ask, prepared.native(probe)))[0]
+        row.n_items = contest.count or _how_many(prepared, contest.items, seconds)
+        items = prepared.native(contest.items if contest.count else contest.items[: row.n_items])
         settle(prepared, items)
         taken, _, found = clocked(partial(prepared.ask, items))
         answers = prepared.answer(found)
         row.method = prepared.method() if prepared.method else ""
-        if prepared.share is not None:
-            row.exact_share = prepared.share()
-        if each.overhead is not None:
-            row.call_overhead = each.overhead()
+        row.exact_share = prepared.share() if prepared.share else None
+        row.call_overhead = each.overhead() if each.overhead else 0.0
     except Exception as error:
         if each.name == "ours":
             raise
-        row.absent = f"raised {type(error).__name__}: {error}".splitlines()[0]
+        how = "" if isinstance(error, ImportError | OSError) else "raised "
+        row.absent = f"{how}{type(error).__name__}: {error}".splitlines()[0]
         return None
-    return _Entry(row, prepared, items, answers, max(1, int(LEAST_SECONDS / max(taken, 1e-7))))
+    return _Entry(row, each, prepared, items, answers, max(1, int(LEAST_SECONDS / max(taken, 1e-7))), taken)
 
 
 def settle(prepared: Prepared, items: Any) -> None:
@@ -224,13 +283,52 @@ def _how_many(prepared: Prepared, items: Any, seconds: float) -> int:
     return len(items)
 
 
+def _ask_few(contest: Contest, entry: _Entry, seconds: float) -> None:
+    """Measure questions of few items, each of other items, and the first question of all."""
+    for size in SIZES:
+        if size > len(contest.items):
+            break
+        starts = np.linspace(0, len(contest.items) - size, QUESTIONS).astype(int)
+        took: list[float] = []
+        for start in starts:
+            asked = entry.prepared.native(contest.items[start : start + size])
+            took.append(clocked(partial(entry.prepared.ask, asked))[0])
+            if sum(took) > seconds and len(took) >= 10:
+                break
+        row = [statistics.median(took), percentile(took, 0.99), max(took), len(took)]
+        entry.row.latency[str(size)] = row
+    if entry.row.build < seconds:
+        made: list[Prepared] = []
+        start = clocked(lambda: made.append(entry.contender.make()))[0]
+        entry.row.first = start + clocked(partial(made[0].ask, made[0].native(contest.items[:1])))[0]
+
+
 def _judge(contest: Contest, entries: list[_Entry]) -> None:
-    """Judge the first items against their exact answers, or what contenders differ on and a sample of the rest."""
-    if contest.exact is not None and not callable(contest.exact):
-        for entry in entries:
-            n_judged = min(entry.row.n_items, len(contest.exact))
-            entry.row.errors = contest.judge(entry.answers[:n_judged], contest.exact[:n_judged])
+    """Judge against the exact answers, or what contenders differ on and a sample of the rest; all on the same items."""
+    if contest.exact is None or callable(contest.exact):
+        _judge_differing(contest, entries)
         return
+    for entry in entries:
+        answers, n_items = entry.answers, len(contest.exact)
+        if n_items > entry.row.n_items and not contest.count:
+            n_items = min(n_items, max(entry.row.n_items, int(JUDGING * entry.row.n_items / max(entry.taken, 1e-9))))
+            answers = entry.prepared.answer(entry.prepared.ask(entry.prepared.native(contest.items[:n_items])))
+        _note(contest, entry, answers[:n_items], contest.exact[:n_items], np.arange(n_items))
+
+
+def _note(contest: Contest, entry: _Entry, answers: Any, exact: Any, rows: np.ndarray) -> None:
+    """Judge a contender; keep the worst of its answers."""
+    found = contest.judge(answers, exact)
+    worst = found.pop("worst", None)
+    entry.row.errors = found
+    if worst is not None:
+        item = int(rows[worst])
+        entry.row.worst = {"item": item, "answer": errors.plain(answers[worst]), "exact": errors.plain(exact[worst])}
+        if contest.request is not None:
+            entry.row.worst["request"] = contest.request(item)
+
+
+def _judge_differing(contest: Contest, entries: list[_Entry]) -> None:
     told = [entry for entry in entries if entry.answers is not None]
     if len(told) < 1 + (contest.exact is None):
         return
@@ -246,7 +344,7 @@ def _judge(contest: Contest, entries: list[_Entry]) -> None:
     exact = None if contest.exact is None or errors.REASON else contest.exact(chosen)
     for entry in told:
         if exact is not None:
-            entry.row.errors = contest.judge(np.asarray(entry.answers)[chosen], exact)
+            _note(contest, entry, np.asarray(entry.answers)[chosen], exact, chosen)
         entry.row.errors["differ"] = int(differs.sum())
 
 

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.contest import Contender
+from benchmarks.contest import Contender, field_of
 from benchmarks.errors import locations
 from benchmarks.fields import containment
 from benchmarks.measure import clocked
-from benchmarks.workloads import Mesh, Rings, bumpy_sphere, generator, uniform_points
+from benchmarks.workloads import Mesh, Rings, bumpy_sphere, generator, points_in_box, ring_around
 
 ULPS = (0, 1, 2, 4, 16, 64, 2**10, 2**14, 2**18, 2**24, 2**30)
 SIZES = (1, 2, 3, 4, 5, 6)
@@ -23,16 +23,16 @@ def by_distance(seed: int, n_points: int) -> dict[str, Any]:
     """Return for polygon and mesh the share of wrong answers of each contender, for points so many ulps off."""
     source = generator("report distance", seed)
     angles = np.linspace(0, 2 * np.pi, 97, endpoint=False) + 0.1
-    ring = np.stack([(2 + np.sin(5 * angles)) * np.cos(angles), (2 + np.sin(5 * angles)) * np.sin(angles)], axis=1)
+    ring = ring_around(angles, 2 + np.sin(5 * angles))
     mesh = bumpy_sphere("report distance", seed, 3)
     found: dict[str, Any] = {"ulps": list(ULPS), "containment 2D": {}, "containment 3D": {}}
     for ulps in ULPS:
         signs = source.choice([-1, 1], n_points)
         rings = Rings("flower", [ring])
         plane = containment.beside_edges(ring, n_points, ulps * signs, source)
-        _count(found["containment 2D"], containment.on_polygon(rings), plane, rings)
+        _count(found["containment 2D"], field_of("points", rings, containment.POLYGON_PEERS), plane, rings)
         space = _beside_faces(mesh, n_points, ulps * signs, source)
-        _count(found["containment 3D"], containment.on_mesh(mesh), space, mesh)
+        _count(found["containment 3D"], field_of("points", mesh, containment.MESH_PEERS), space, mesh)
     return found
 
 
@@ -59,14 +59,14 @@ def by_size(seed: int, quick: bool) -> dict[str, Any]:
     found: dict[str, Any] = {"faces": {}, "batch": {}}
     for times in (*SIZES[:2], *(() if quick else (*SIZES[2:], LARGEST))):
         mesh = bumpy_sphere("report size", seed, times)
-        points = uniform_points(mesh, 2_000 if quick else 50_000, seed)
-        for contender in containment.on_mesh(mesh):
+        points = points_in_box(mesh, 2_000 if quick else 50_000, seed)
+        for contender in field_of("points", mesh, containment.MESH_PEERS):
             if contender.name.startswith("textbook") and times > 4:
                 continue
             _time(found["faces"], contender, points, len(mesh.faces))
     mesh = bumpy_sphere("report size", seed, 2 if quick else 5)
-    points = uniform_points(mesh, 100_000, seed)
-    contenders = containment.on_mesh(mesh)
+    points = points_in_box(mesh, 100_000, seed)
+    contenders = field_of("points", mesh, containment.MESH_PEERS)
     for n_points in (1, 10, 100, 1_000, *(() if quick else (10_000, 100_000))):
         for contender in contenders:
             if not contender.name.startswith(("textbook", "CGAL")):

@@ -1,68 +1,42 @@
-"""Wrong answers, counted against exact ones.
+"""Wrong answers, counted against exact ones by tests/reference: rationals that share nothing with the engine.
 
 Hard sets carry their exact answers. On workloads made for speed, what contenders disagree on, and a random sample of
-the others, is settled by tests/reference: rational arithmetic that shares nothing with the engine.
-The exact location of a point in a large mesh is found with a nearly axial half-line, whose box throws out, by plain
-comparisons, all but the few faces that it could meet.
+the others, is settled here. Float64 boxes, padded far beyond rounding, only throw out pairs of faces that cannot meet.
 """
 
 from __future__ import annotations
 
-import random
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
-from benchmarks.workloads import Mesh, Planes, Rings
+from benchmarks.workloads import Mesh, Rings, document
 
 try:
     from tests.reference import containment as reference
+    from tests.reference.contact import triangles_meet
     from tests.reference.exact import Q, vector
+    from tests.reference.many_points import locate_points
+    from tests.reference.overlay import overlay, signed_area
+    from tests.reference.segments import clip_segment
+    from tests.reference.solids import image
+    from tests.reference.sutherland_hodgman import clip_contour, planes_of
 
     REASON = ""
 except ImportError as error:  # the reference needs gmpy2
     REASON = f"exact answers need {error.name}, of the extra test"
 
-_TILT = 2.0**-10
+_PADDING = 1e-9
 
 
-def contained(point: np.ndarray, subject: Mesh | Rings | Planes) -> tuple[bool, bool]:
-    """Return the exact answer: whether the point is in the closed solid, and whether it is on its boundary."""
-    match subject:
-        case Mesh():
-            location = _in_mesh(point, subject)
-        case Rings(rings=rings):
-            location = _in_rings(point, rings)
-        case Planes(rows=rows):
-            p = vector(point.tolist())
-            values = [sum((Q(c) * x for c, x in zip(row, (*p, 1), strict=True)), Q(0)) for row in rows.tolist()]
-            location = min((v > 0) - (v < 0) for v in values)
-    return location >= 0, location == 0
-
-
-def _in_mesh(point: np.ndarray, mesh: Mesh) -> int:
-    if not hasattr(_in_mesh, "boxes") or _in_mesh.boxes[0] is not mesh:
-        corners = mesh.vertices[mesh.faces]
-        _in_mesh.boxes = (mesh, corners.min(axis=1), corners.max(axis=1), float(np.ptp(mesh.vertices, axis=0).max()))
-    _, lows, highs, extent = _in_mesh.boxes
-    p = vector(point.tolist())
-
-    def faces(chosen: np.ndarray) -> list:
-        return [tuple(vector(corner) for corner in mesh.vertices[face].tolist()) for face in mesh.faces[chosen]]
-
-    touching = ((lows <= point) & (highs >= point)).all(axis=1)
-    if any(reference.on_triangle(p, *face) for face in faces(touching)):
-        return 0
-    source = random.Random(1)
-    while True:  # bound: a random half-line meets an edge with probability nearly 0
-        u = (Q(1), *(Q(source.randint(1, 1000)) * Q(_TILT) / 1000 for _ in range(2)))
-        # from the point to beyond the mesh the half-line drifts by less than 2 * _TILT * (its length along x)
-        drift = 4.0 * _TILT * (extent + abs(highs[:, 0].max() - point[0]))
-        met = (highs[:, 0] >= point[0]) & (highs[:, 1:] >= point[1:]).all(axis=1)
-        met &= (lows[:, 1:] <= point[1:] + drift).all(axis=1)
-        parity = reference._parity_in_space(p, u, faces(met))
-        if parity is not None:
-            return 1 if parity else -1
+def locations(points: np.ndarray, subject: Any) -> np.ndarray:
+    """Return whether each point is in the closed subject."""
+    if isinstance(subject, Mesh):
+        return locate_points(points, subject.vertices, subject.faces) >= 0
+    if isinstance(subject, Rings):
+        return np.array([_in_rings(point, subject.rings) >= 0 for point in points], bool)
+    return np.array(reference.locate_many(points.tolist(), document(subject))) >= 0
 
 
 def _in_rings(point: np.ndarray, rings: list[np.ndarray]) -> int:
@@ -82,39 +56,121 @@ def _in_rings(point: np.ndarray, rings: list[np.ndarray]) -> int:
     return 1 if parity else -1
 
 
-def locations(points: np.ndarray, subject: Any) -> np.ndarray:
-    """Return whether each point is in the closed subject, by rational arithmetic."""
-    return np.array([contained(point, subject)[0] for point in points], bool)
+class _Body:
+    """A mesh under a pose: float64 boxes of its faces, and their exact corners when asked for."""
+
+    def __init__(self, mesh: Mesh, pose: dict[str, Any] | None) -> None:
+        self.mesh, self.pose, self.placed = mesh, pose, mesh.vertices
+        if pose is not None:
+            self.placed = self.placed @ np.array(pose["rotation"]).T + np.array(pose["translation"])
+        corners, padding = self.placed[mesh.faces], _PADDING * np.abs(self.placed).max()
+        self.low, self.high = corners.min(axis=1) - padding, corners.max(axis=1) + padding
+        self._images: dict[int, Any] = {}
+
+    def vertex(self, number: int) -> Any:
+        if number not in self._images:
+            self._images[number] = image(self.mesh.vertices[number].tolist(), self.pose)
+        return self._images[number]
+
+    def face(self, number: int) -> Any:
+        return tuple(self.vertex(vertex) for vertex in self.mesh.faces[number].tolist())
+
+    def holds_part_of(self, other: _Body) -> bool:
+        """Tell whether a part of another body, which meets no face of this one, lies inside."""
+        labels, faces = np.arange(len(other.placed)), other.mesh.faces
+        while True:  # bound: labels only fall; a vertex of every connected part remains
+            least = labels.copy()
+            np.minimum.at(least, faces.ravel(), np.repeat(labels[faces].min(axis=1), 3))
+            if (least == labels).all():
+                break
+            labels = least
+        low, high, parts = self.low.min(axis=0), self.high.max(axis=0), np.unique(labels[faces]).tolist()
+        near = [v for v in parts if ((low <= other.placed[v]) & (other.placed[v] <= high)).all()]
+        own = [self.face(number) for number in range(len(self.mesh.faces))] if near else []
+        return any(reference.locate_by_triangles(other.vertex(v), own) > 0 for v in near)
+
+
+def collides(pair: Any, row: int) -> bool:
+    """Return whether the two bodies of a pair, closed sets, have a common point at one pose."""
+    pose = {"rotation": pair.rotations[row].tolist(), "translation": pair.translations[row].tolist()}
+    a, b = _Body(pair.first, None), _Body(pair.second, pose)
+    near = np.flatnonzero(((a.low <= b.high.max(axis=0)) & (a.high >= b.low.min(axis=0))).all(axis=1))
+    for face in near.tolist():
+        for other in np.flatnonzero(((b.low <= a.high[face]) & (b.high >= a.low[face])).all(axis=1)).tolist():
+            if triangles_meet(a.face(face), b.face(other)):
+                return True
+    return pair.is_closed and (a.holds_part_of(b) or b.holds_part_of(a))
+
+
+def first_pieces(segments: np.ndarray, region: Any) -> np.ndarray:
+    """Return (n, 2 * dim) nearest doubles of the first piece's ends, NaN where nothing remains."""
+    rows, told = np.full((len(segments), segments[0].size), np.nan), document(region)
+    for row, segment in zip(rows, segments.tolist(), strict=True):
+        if pieces := clip_segment(segment, told):
+            start, end, _ = pieces[0].rounded()
+            row[:] = (*start, *end)
+    return rows
+
+
+def are_kept(rings: np.ndarray, region: Any) -> np.ndarray:
+    """Return whether something remains of each ring."""
+    planes = planes_of(document(region))
+    return np.array([len(clip_contour(ring, planes)) > 0 for ring in rings.tolist()])
+
+
+def areas_in_region(rings: np.ndarray, region: Any) -> np.ndarray:
+    """Return area of what remains of each ring and its own area."""
+    planes, found = planes_of(document(region)), []
+    for ring in rings.tolist():
+        sizes = signed_area(clip_contour(ring, planes)), signed_area([vector(p) for p in ring])
+        left, whole = (abs(float(Fraction(size))) for size in sizes)
+        found.append([left, max(whole, 1e-300)])
+    return np.array(found)
+
+
+def scale_of(pair: Any) -> float:
+    """Return the largest area of the boxes of a pair of polygons."""
+    return max(*(float(np.prod(np.ptp(np.concatenate(rings), axis=0))) for rings in pair), 1e-300)
+
+
+def overlay_area(pair: Any) -> tuple[float, float]:
+    """Return the exact area of the intersection, rounded, and the scale of a pair."""
+    solids = [{"type": "polygon", "rings": [ring.tolist() for ring in rings]} for rings in pair]
+    return float(Fraction(overlay(*solids, "intersection").area)), scale_of(pair)
 
 
 # --- judging ----------------------------------------------------------------------------------------------------------
 
-REFUSED = -9
-"""In place of an answer: the contender raised an error for this item."""
+REFUSED, OUTSIDE = -9, -8
+"""In place of an answer: the contender raised an error for this item; the item is outside of what it says it takes."""
 AREA_TOLERANCE = 2.0**-20
 """Of the largest area of the pair: more than rounding coordinates does, less than any piece anyone would miss."""
+
+
+def plain(value: Any) -> Any:
+    """Return a number or array as JSON takes it, None for NaN."""
+    found = np.asarray(value).tolist()
+    return [None if x != x else x for x in found] if isinstance(found, list) else None if found != found else found
 
 
 def same(answers: np.ndarray, exact: np.ndarray) -> dict[str, Any]:
     """Judge answers that are labels: equal or wrong."""
     answers, exact = np.asarray(answers).astype(np.int64), np.asarray(exact).astype(np.int64)
-    refused = answers == REFUSED
-    return {
-        "judged": len(exact),
-        "wrong": int(((answers != exact) & ~refused).sum()),
-        "refused": int(refused.sum()),
-    }
+    refused, outside = answers == REFUSED, answers == OUTSIDE
+    wrong = (answers != exact) & ~refused & ~outside
+    found = {"judged": len(exact), "wrong": int(wrong.sum()), "refused": int(refused.sum())}
+    return found | {"outside": int(outside.sum())} | ({"worst": int(np.argmax(wrong))} if wrong.any() else {})
 
 
 def coordinates(answers: np.ndarray, exact: np.ndarray) -> dict[str, Any]:
     """Judge rows of coordinates, NaN where nothing remains: wrong where that differs; else their errors in ulps."""
     kept, should = ~np.isnan(answers).any(axis=1), ~np.isnan(exact).any(axis=1)
-    both = kept & should
+    both, wrong = kept & should, kept != should
     ulps = np.abs(answers[both] - exact[both]) / np.spacing(np.maximum(np.abs(exact[both]), np.finfo(float).tiny))
     values = ulps.ravel()
-    return {
+    found = {
         "judged": len(exact),
-        "wrong": int((kept != should).sum()),
+        "wrong": int(wrong.sum()),
         "refused": 0,
         "ulp_largest": float(values.max(initial=0.0)),
         "ulp_median": float(np.median(values)) if len(values) else 0.0,
@@ -122,18 +178,24 @@ def coordinates(answers: np.ndarray, exact: np.ndarray) -> dict[str, Any]:
         "off": int((values > 0).sum()),
         "coordinates": len(values),
     }
+    if wrong.any():
+        found["worst"] = int(np.argmax(wrong))
+    elif (values > 0).any():
+        found["worst"] = int(np.flatnonzero(both)[np.argmax(ulps.max(axis=1))])
+    return found
 
 
 def areas(answers: np.ndarray, exact: np.ndarray) -> dict[str, Any]:
-    """Judge (area, scale) pairs: NaN is a refusal; wrong is an area off by more than `AREA_TOLERANCE` of the scale."""
+    """Judge areas by (area, scale): NaN is a refusal; wrong is off by more than `AREA_TOLERANCE` of the scale."""
     answers = np.asarray(answers, float)
     refused = np.isnan(answers)
     error = np.abs(answers - exact[:, 0]) / exact[:, 1]
     good = error[~refused & (error <= AREA_TOLERANCE)] * 2.0**53
-    return {
+    found = {
         "judged": len(exact),
         "wrong": int((error > AREA_TOLERANCE).sum()),
         "refused": int(refused.sum()),
         "ulp_largest": float(good.max(initial=0.0)),
         "ulp_median": float(np.median(good)) if len(good) else 0.0,
     }
+    return found | ({"worst": int(np.nanargmax(error))} if found["wrong"] else {})

@@ -1,6 +1,6 @@
-"""Who gets the hard cases wrong: the figures and the drawings of docs/hard_cases.md.
+"""Who gets the hard cases wrong: the figures of docs/hard_cases.md.
 
-    python -m benchmarks hard_cases            # measures, and writes figures and drawings into docs
+    python -m benchmarks hard_cases            # measures, and writes the figures into docs
     python -m benchmarks hard_cases --dry      # prints the figures only; --only WORD: of marks with this word
 
 In the page, a line ``<!-- measured: points vertex; pairs d_ulp -->`` names sets; the paragraph after it is replaced by
@@ -18,18 +18,17 @@ from __future__ import annotations
 import argparse
 import json
 import re
-from collections import defaultdict
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import suppress
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks import filed, hard_pictures
-from benchmarks.contest import Contest, hold
+from benchmarks import filed
+from benchmarks.contest import Contest, Size, field_of, hold
 from benchmarks.errors import same
-from benchmarks.fields import collision, containment, overlay, polygons, segments
+from benchmarks.fields import collision, containment, tasks
 from benchmarks.workloads import Mesh, MissingDataError, bumpy_sphere, hard_pairs
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -45,31 +44,26 @@ def _held(contest: Contest) -> Shares:
     found = {}
     for row in hold(contest, 1, 2.0):
         if not row.absent and not row.contender.startswith("ours,"):
-            found[row.contender] = row.errors["wrong"] + row.errors["refused"], row.errors["judged"]
+            bad = (row.errors.get(kind, 0) for kind in ("wrong", "refused", "outside"))
+            found[row.contender] = sum(bad), row.errors["judged"]
     return found
-
-
-@cache
-def _solid(name: str) -> Mesh:
-    from tests.hard.points import generated_solids
-
-    if name:
-        return Mesh(name, *generated_solids()[name])
-    ball = bumpy_sphere("hard cases", 0, 3)
-    return Mesh("ball", np.round(ball.vertices * 64) / 64, ball.faces)
 
 
 def points(words: str) -> Shares:
     """Return the shares on points of a family."""
-    from tests.hard.points import hard_points
+    from tests.hard.points import generated_solids, hard_points
     from tests.reference.many_points import locate_points
 
     family, _, name = words.partition(": ")
-    mesh = _solid(name)
+    ball = bumpy_sphere("hard cases", 0, 3)
+    rounded = Mesh("ball", np.round(ball.vertices * 64) / 64, ball.faces)
+    mesh = Mesh(name, *generated_solids()[name]) if name else rounded
     drawn = dict(hard_points(f"hard cases {mesh.name}", mesh.vertices, mesh.faces, N_POINTS))
     asked = np.concatenate(list(drawn.values())) if family == "all" else drawn[family]
     exact = locate_points(asked, mesh.vertices, mesh.faces) >= 0
-    return _held(Contest("containment", family, True, asked, exact, same, containment.on_mesh(mesh)))
+    return _held(
+        Contest("containment", family, True, asked, exact, same, field_of("points", mesh, containment.MESH_PEERS))
+    )
 
 
 def pairs(family: str) -> Shares:
@@ -85,23 +79,17 @@ def cases(words: str) -> Shares:
     operation, family = words.split("/")
     stored = json.loads((ROOT / "tests" / "hard" / "cases" / operation / f"{family}.json").read_text("utf-8"))
     asked = [{"id": case["name"], "operation": operation, **case} for case in stored]
-    counts: dict[str, list[int]] = defaultdict(lambda: [0, 0])
-    for row in filed.replay(cases=asked):
-        if row["outcome"] not in ("not applicable", "absent"):
-            counts[row["contender"]][0] += row["outcome"] != "right"
-            counts[row["contender"]][1] += 1
-    return {name: (wrong, asked) for name, (wrong, asked) in counts.items()}
-
-
-@cache
-def _contests() -> dict[str, Contest]:
-    found = [each for field in (segments, polygons, overlay) for each in field.contests(0, 0.5)]
-    return {f"{each.operation}, {each.name}": each for each in found}
+    rows = [row for row in filed.replay(cases=asked) if row["outcome"] not in ("not applicable", "absent")]
+    all_, bad = (Counter(row["contender"] for row in rows if row["outcome"] not in ok) for ok in ((), ("right",)))
+    return {name: (bad[name], count) for name, count in all_.items()}
 
 
 def contest(name: str) -> Shares:
     """Return the shares in a contest of the report."""
-    return _held(_contests()[name])
+    for task in tasks(Size(0, 0.5), ("segments", "polygons", "overlay"), is_page=True):
+        if name.endswith(task.name.partition(": ")[2]) and f"{(made := task.make()).operation}, {made.name}" == name:
+            return _held(made)
+    raise KeyError(name)
 
 
 SETS = {"points": points, "pairs": pairs, "cases": cases, "contest": contest}
@@ -144,15 +132,8 @@ def main(words: list[str] | None = None) -> int:
     """Measure and write; 1 if an answer of ours is wrong."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--dry", action="store_true", help="print the figures, write nothing")
-    parser.add_argument("--pictures", action="store_true", help="only write the drawings")
     parser.add_argument("--only", default="", metavar="WORD", help="only marks with this word")
     options = parser.parse_args(words)
-    if not options.dry:
-        for name, drawing in hard_pictures.draw().items():
-            (PAGE.parent / "pictures").mkdir(exist_ok=True)
-            (PAGE.parent / "pictures" / f"hard_{name}.svg").write_text(drawing)
-    if options.pictures:
-        return 0
     text = PAGE.read_text("utf-8")
     lines = dict(measured(text, options.only))
     if not options.dry:

@@ -6,7 +6,6 @@ It runs on the same machine and shares the cores with what it measures. A reques
 from __future__ import annotations
 
 import multiprocessing
-import os
 import re
 import socket
 import threading
@@ -15,9 +14,13 @@ from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
+from benchmarks.measure import memory_of, percentile
+
+__all__ = [
+    "Connection", "Seen", "free_port", "in_process", "loop", "many", "memory_of", "percentile", "request", "wait_until",
+]  # fmt: skip
 NAME = "blocking sockets, Python"
 _LENGTH = re.compile(rb"\r\ncontent-length: (\d+)", re.IGNORECASE)
 
@@ -32,14 +35,6 @@ def free_port() -> int:
     """Return a port that nobody listens on now."""
     with socket.create_server(("127.0.0.1", 0)) as probe:
         return int(probe.getsockname()[1])
-
-
-def memory_of(pid: int) -> float:
-    """Return the resident megabytes of a process (Linux), else NaN."""
-    try:
-        return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 2**20
-    except OSError:
-        return float("nan")
 
 
 class Connection:
@@ -167,9 +162,3 @@ def in_process(function: Callable[..., Any], *arguments: Any) -> Callable[[], An
 def _send_result(connection: Any, function: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
     connection.send(function(*arguments))
     connection.close()
-
-
-def percentile(values: list[float], share: float) -> float:
-    """Return the value that this share of `values` does not exceed."""
-    ordered = sorted(values)
-    return ordered[min(len(ordered) - 1, int(share * len(ordered)))]

@@ -10,11 +10,10 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
+from benchmarks.contenders import PACKAGES
+
 ROOT = Path(__file__).resolve().parents[1]
-PACKAGES = (
-    "numpy", "numba", "llvmlite", "open3d", "shapely", "trimesh", "embreex", "libigl", "vtk", "matplotlib", "coal",
-    "python-fcl", "cgal", "manifold3d", "pyclipper", "numba-celltree",
-)  # fmt: skip
+RESULTS = ROOT / "benchmarks" / "results"
 
 
 def cores() -> int:
@@ -32,9 +31,9 @@ def processor() -> str:
     return found[1].strip() if found else platform.machine()
 
 
-def name() -> str:
-    """Return the folder of results for machines like this one."""
-    return f"{re.sub(r'[^a-z0-9]+', '-', processor().lower()).strip('-')}-{cores()}-cores"
+def results(name: str) -> Path:
+    """Return the file of results with a name of machines like this one."""
+    return RESULTS / f"{re.sub(r'[^a-z0-9]+', '-', processor().lower()).strip('-')}-{cores()}-cores" / f"{name}.json"
 
 
 def commit() -> str:
@@ -50,15 +49,12 @@ def commit() -> str:
         return "unknown"
 
 
-def versions() -> dict[str, str]:
-    """Return the versions of what is installed of `PACKAGES`, and "not installed"."""
-    found = {"python": platform.python_version()}
-    for package in PACKAGES:
-        try:
-            found[package] = importlib.metadata.version(package)
-        except importlib.metadata.PackageNotFoundError:
-            found[package] = "not installed"
-    return found
+def version_of(package: str) -> str:
+    """Return the version of a distribution, or "not installed"."""
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return "not installed"
 
 
 def load() -> float | None:
@@ -68,6 +64,7 @@ def load() -> float | None:
 
 def facts(seed: int, threads: int) -> dict[str, Any]:
     """Return everything a table of figures names."""
+    packages = ("numba", "llvmlite", "embreex", *PACKAGES.values())
     return {
         "processor": processor(),
         "cores": cores(),
@@ -75,5 +72,5 @@ def facts(seed: int, threads: int) -> dict[str, Any]:
         "seed": seed,
         "commit": commit(),
         "load_before": load(),
-        "versions": versions(),
+        "versions": {"python": platform.python_version()} | {name: version_of(name) for name in packages},
     }

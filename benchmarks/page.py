@@ -29,7 +29,23 @@ def text_of(found: dict[str, Any]) -> str:
         parts += [_table(rows, operation, contest) for contest in _contests(rows, operation)]
     if "filed" in found:
         parts.append("\n" + filed.section(found["filed"]))
+    if "cold_start" in found:
+        parts.append(_cold_start(found["cold_start"]))
     return "".join(parts) + _legend()
+
+
+def _cold_start(found: dict[str, Any]) -> str:
+    """Seconds from an empty cache, and from a seed, of a machine of the same name."""
+    lines = [
+        "\n## Cold start\n\nEach row a fresh process with an empty kernel cache, import included; "
+        f"commit {found['commit']}, load {found['load_before']} before.\n",
+        "| until | seconds | CPU seconds | compilations | machine code |",
+        "|---|---|---|---|---|",
+    ]
+    for row in found["figures"]:
+        cpu, count, size = (row["raw"][key] for key in ("cpu", "compilations", "bytes"))
+        lines.append(f"| {row['name']} | {row['values'][0]:.1f} | {cpu:.1f} | {count} | {size / 2**20:.1f} MB |")
+    return "\n".join(lines) + "\n"
 
 
 def _contests(rows: list[dict[str, Any]], operation: str) -> list[str]:

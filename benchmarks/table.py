@@ -13,34 +13,37 @@ import sys
 import time
 from collections.abc import Iterable
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from benchmarks import machine
-from benchmarks.contest import Contest, Row, hold
-from benchmarks.fields import Figure, Size, Task, tasks
+from benchmarks.contest import Contest, Row, Size, Task, hold
+from benchmarks.fields import FIELDS, Figure, tasks
 from benchmarks.measure import Spread, spread
 from benchmarks.workloads import MissingDataError
 
-RESULTS = Path(__file__).resolve().parent / "results"
-SHOWN = ("wrong", "refused", "off", "ulp_largest", "differ")
+SHOWN = ("wrong", "refused", "outside", "off", "ulp_largest", "differ")
+QUICK = 0.05
+"""Size of a quick run."""
 
 
-def options(words: list[str] | None, description: str) -> argparse.Namespace:
-    """Read the command line."""
+def options(words: list[str] | None, description: str, **more: str) -> argparse.Namespace:
+    """Read the command line; more: switches of a command and what they do."""
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="small sizes and few rounds: about a minute")
-    parser.add_argument("--rounds", type=int, help="interleaved rounds a row (15; quick: 3)")
+    parser.add_argument("--rounds", type=int, help="interleaved rounds a row (15, report 7; quick: 3)")
     parser.add_argument("--seconds", type=float, help="of each contender in each row (3; quick: 0.3)")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", default="", metavar="WORD", help="only rows whose name contains WORD")
     parser.add_argument("--dry", action="store_true", help="write no results file")
+    for name, about in more.items():
+        parser.add_argument(f"--{name}", action="store_true", help=about)
     given = parser.parse_args(words)
-    given.rounds = given.rounds or (3 if given.quick else 15)
+    given.rounds = given.rounds or (3 if given.quick else 7 if "pages" in more else 15)
     given.seconds = given.seconds or (0.3 if given.quick else 3.0)
     given.writes = not (given.dry or given.quick or given.only)
+    given.size = Size(given.seed, QUICK if given.quick else 1.0)
     return given
 
 
@@ -75,7 +78,8 @@ def lines_of(made: list[Row] | Figure) -> Iterable[str]:
         return
     ours = next(row for row in made if row.contender == "ours")
     for row in made:
-        name = f"{row.contest:<40} {row.contender:<26}"
+        operation = "" if row.operation in FIELDS else f"{row.operation}, "
+        name = f"{operation + row.contest:<40} {named(row.contender, row.setting):<26}"
         if row.absent:
             yield f"{name} absent: {row.absent}"
             continue
@@ -89,6 +93,11 @@ def lines_of(made: list[Row] | Figure) -> Iterable[str]:
         yield "  ".join(part for part in (name + figures, judged, row.method) if part)
 
 
+def named(contender: str, setting: float | None) -> str:
+    """Return a contender's name with the setting of its knob."""
+    return contender if setting is None else f"{contender} @{setting:g}"
+
+
 def _goals(must: float | None, aim: float | None) -> str:
     return f"{'' if must is None else f'{must:g}':>6} {'' if aim is None else f'{aim:g}':>6}"
 
@@ -99,21 +108,21 @@ def _rate(row: Row) -> str:
     return f"{1e3 / row.rate:.4g} ms"
 
 
-def run(name: str, chosen: Iterable[Task], given: argparse.Namespace) -> int:
-    """Hold the contests and take the figures; print; write; return how many are below their must."""
-    facts = machine.facts(given.seed, 2)
-    print(head(name, facts))
+def measured(name: str, chosen: Iterable[Task], given: argparse.Namespace, has_latency: bool = False) -> dict[str, Any]:
+    """Hold the contests and take the figures; print them; return what is stored, and how many are below their must."""
+    found: dict[str, Any] = machine.facts(given.seed, machine.cores()) | {"quick": given.quick}
+    print(head(name, found))
     started, rows, figures, missed = time.perf_counter(), [], [], 0
-    for shown, make in chosen:
-        if given.only not in shown:
+    for task in chosen:
+        if given.only not in task.name:
             continue
         if sys.stderr.isatty():
-            print(f"  ... {shown}", end="\r", file=sys.stderr, flush=True)
+            print(f"  ... {task.name}", end="\r", file=sys.stderr, flush=True)
         try:
-            made = make()
-            held = hold(made, given.rounds, given.seconds) if isinstance(made, Contest) else made
+            made = task.make()
+            held = hold(made, given.rounds, given.seconds, has_latency) if isinstance(made, Contest) else made
         except MissingDataError as error:
-            print(f"{shown}: skipped: {error}", flush=True)
+            print(f"{task.name}: skipped: {error}", flush=True)
             continue
         if isinstance(held, Figure):
             figures.append(held)
@@ -124,25 +133,18 @@ def run(name: str, chosen: Iterable[Task], given: argparse.Namespace) -> int:
             print(line, flush=True)
         del made
         gc.collect()
-    facts |= {"load_after": machine.load(), "seconds": round(time.perf_counter() - started, 1)}
-    print(f"{len(rows)} rows, {len(figures)} figures, {missed} below their must, {facts['seconds']} s, "
-          f"load {facts['load_before']} before and {facts['load_after']} after")  # fmt: skip
-    if given.writes:
-        store(name, facts, rows, figures)
-    return missed
+    found |= {"load_after": machine.load(), "seconds": round(time.perf_counter() - started, 1)}
+    found |= {"rows": [asdict(row) | {"rate": row.rate, "net_rate": row.net_rate} for row in rows]}
+    print(f"{len(rows)} rows, {len(figures)} figures, {missed} below their must, {found['seconds']} s, "
+          f"load {found['load_before']} before and {found['load_after']} after")  # fmt: skip
+    return found | {"figures": [asdict(figure) for figure in figures]}
 
 
-def store(name: str, facts: dict[str, Any], rows: list[Row], figures: list[Figure]) -> None:
+def store(name: str, found: dict[str, Any]) -> None:
     """Write results/<machine>/<name>.json."""
-    folder = RESULTS / machine.name()
-    folder.mkdir(parents=True, exist_ok=True)
-    found = facts | {"rows": [as_json(row) for row in rows], "figures": [asdict(figure) for figure in figures]}
-    (folder / f"{name}.json").write_text(json.dumps(found, indent=1, default=_plain) + "\n")
-
-
-def as_json(row: Row) -> dict[str, Any]:
-    """Return a row as it is stored."""
-    return asdict(row) | {"rate": row.rate, "net_rate": row.net_rate}
+    path = machine.results(name)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(found, indent=1, default=_plain) + "\n")
 
 
 def _plain(value: Any) -> Any:
@@ -161,8 +163,15 @@ def head(name: str, facts: dict[str, Any]) -> str:
     )
 
 
-def main(words: list[str] | None = None, name: str = "containment") -> int:
-    """Run a table; the exit code is 0 also where a row misses its goal: the table says so."""
-    given = options(words, __doc__ or "")
-    run(name, tasks(Size(given.seed, given.quick), (name,)), given)
+def run(name: str, chosen: Iterable[Task], given: argparse.Namespace) -> int:
+    """Measure, print and store; the exit code is 0 also where a row misses its goal: the table says so."""
+    found = measured(name, chosen, given)
+    if given.writes:
+        store(name, found)
     return 0
+
+
+def main(words: list[str] | None = None, name: str = "containment") -> int:
+    """Run a table."""
+    given = options(words, __doc__ or "")
+    return run(name, tasks(given.size, (name,)), given)

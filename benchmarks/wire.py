@@ -21,7 +21,6 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -29,12 +28,13 @@ import orjson
 
 import engine
 from benchmarks import load, table
+from benchmarks.contest import Task
 from benchmarks.fields import Figure
-from benchmarks.load import Connection, free_port, in_process, memory_of, percentile, request, wait_until
-from benchmarks.measure import clocked
+from benchmarks.load import Connection, free_port, in_process, request, wait_until
+from benchmarks.machine import ROOT
+from benchmarks.measure import clocked, memory_of, percentile
 from service.settings import Settings
 
-ROOT = Path(__file__).resolve().parents[1]
 OCTETS = "application/octet-stream"
 SPHERE = {"type": "sphere", "center": [0.5, 0.5, 0.5], "radius": 0.5}
 
@@ -223,7 +223,7 @@ def imports(is_quick: bool, name: str) -> Figure:
 
 
 def main(words: list[str] | None = None) -> int:
-    """Print the table; return the number of rows below their must."""
+    """Print the table."""
     given = table.options(words, __doc__ or "")
     print(f"load generator: {load.NAME}, on the same cores; loopback")
     planes = np.random.default_rng(given.seed).normal(size=(32, 4))
@@ -245,4 +245,4 @@ def main(words: list[str] | None = None) -> int:
             "start to ready, warm cache": partial(start, given.quick),
             "import engine over numba": partial(imports, given.quick),
         }
-        return int(table.run("wire", [(name, partial(make, name)) for name, make in rows.items()], given) > 0)
+        return table.run("wire", [Task(name, partial(make, name)) for name, make in rows.items()], given)

@@ -10,13 +10,13 @@ from typing import Any
 from unittest import mock
 
 import httpx
-import numpy as np
 
 import engine
 from benchmarks.answers import overlays, shapes, solids
 from benchmarks.answers.asking import Question, family
 from benchmarks.answers.draws import NEAR_PLACES, Array, Draw
 from benchmarks.answers.solids import points_about
+from benchmarks.workloads import document
 from service.app import create_app
 from service.settings import Settings
 
@@ -62,33 +62,6 @@ def _without_costs(body: Any) -> Any:
     return kept
 
 
-def as_json(solid: Any) -> dict[str, Any]:
-    """Return a solid as requests have it."""
-    found: dict[str, Any] = {"type": solid.type}
-    match solid:
-        case engine.HalfSpace():
-            found |= {"normal": solid.normal.tolist(), "offset": solid.offset}
-        case engine.Sphere():
-            found |= {"center": solid.center.tolist(), "radius": solid.radius}
-        case engine.Aabb():
-            found |= {"min": solid.min.tolist(), "max": solid.max.tolist()}
-        case engine.Convex():
-            found |= {"planes": solid.planes.tolist()}
-        case engine.Polygon():
-            found |= {"rings": [ring.tolist() for ring in np.split(solid.vertices, solid.ring_offsets[1:-1])]}
-        case engine.Triangle():
-            found |= {"vertices": solid.vertices.tolist()}
-        case engine.Implicit():
-            terms = zip(solid.powers.tolist(), solid.coefficients.tolist())
-            found |= {"terms": [{"powers": powers, "coefficient": factor} for powers, factor in terms]}
-        case engine.Csg():
-            found |= {"operation": solid.operation, "operands": [as_json(operand) for operand in solid.operands]}
-        case _:
-            faces = np.split(solid.face_indices, solid.face_offsets[1:-1])
-            found |= {"vertices": solid.vertices.tolist(), "faces": [face.tolist() for face in faces]}
-    return found
-
-
 def _pose(draw: Draw, dimension: int) -> dict[str, Any]:
     pose = solids.pose(draw, dimension)
     return {"rotation": pose.rotation.tolist(), "translation": pose.translation.tolist()}
@@ -99,7 +72,7 @@ def _shape(draw: Draw, makers: Any, dimension: int) -> tuple[dict[str, Any], Arr
     while True:  # bound: a callable is rare
         shape = draw.pick(makers)(draw, dimension, draw.pick(NEAR_PLACES))
         if not _holds_callable(shape.solid):
-            return as_json(shape.solid), shape.targets
+            return document(shape.solid), shape.targets
 
 
 def _holds_callable(solid: Any) -> bool:
@@ -108,19 +81,22 @@ def _holds_callable(solid: Any) -> bool:
     return isinstance(solid, engine.Implicit) and solid.function is not None
 
 
+def _bodies(draw: Draw, makers: Any, dimension: int, n: int, share_posed: float) -> list[dict[str, Any]]:
+    found = [{"solid": _shape(draw, makers, dimension)[0]} for _ in range(n)]
+    return [body | ({"pose": _pose(draw, dimension)} if draw.chance(share_posed) else {}) for body in found]
+
+
 def _good(draw: Draw, dimension: int) -> Iterator[Request]:
-    n = draw.pick([3, 40, 400])
-    solid, targets = _shape(draw, solids.LOCATED[dimension], dimension)
+    n, located, collided = draw.pick([3, 40, 400]), solids.LOCATED[dimension], solids.COLLIDED[dimension]
+    solid, targets = _shape(draw, located, dimension)
     yield "/v1/contains", {"solid": solid, "points": points_about(draw, targets, n).tolist()}
-    scene = [_shape(draw, solids.LOCATED[dimension], dimension)[0] for _ in range(4)]
-    bodies = [{"solid": body} | ({"pose": _pose(draw, dimension)} if draw.chance(0.5) else {}) for body in scene]
+    bodies = _bodies(draw, located, dimension, 4, 0.5)
     yield "/v1/contains/scene", {"bodies": bodies, "points": points_about(draw, targets, n).tolist()}
-    first, second = (_shape(draw, solids.COLLIDED[dimension], dimension)[0] for _ in range(2))
+    first, second = (_shape(draw, collided, dimension)[0] for _ in range(2))
     yield "/v1/collide", {"first": first, "second": second}
     poses = [_pose(draw, dimension) for _ in range(5)]
     yield "/v1/collide", {"first": first, "second": second, "poses": poses, "detail": True}
-    scene = [_shape(draw, solids.COLLIDED[dimension], dimension)[0] for _ in range(6)]
-    bodies = [{"solid": body} | ({"pose": _pose(draw, dimension)} if draw.chance(0.3) else {}) for body in scene]
+    bodies = _bodies(draw, collided, dimension, 6, 0.3)
     yield "/v1/collide/scene", {"bodies": bodies, "skip": [[0, 1]], "detail": draw.chance(0.5)}
     region, targets = _shape(draw, solids.REGIONS[dimension], dimension)
     segments = points_about(draw, targets, 2 * n).reshape(n, 2, dimension)
@@ -129,13 +105,11 @@ def _good(draw: Draw, dimension: int) -> Iterator[Request]:
     polygons = [[points_about(draw, targets, draw.one(3, 6)).tolist()] for _ in range(5)]
     yield "/v1/clip/polygons", {"region": region, "polygons": polygons}
     subject, clip = (
-        {"type": "polygon", "rings": [ring.tolist() for ring in rings]} for rings in overlays.any_rings(draw)
+        {"type": "polygon", "rings": [ring.tolist() for ring in side]} for side in overlays.any_rings(draw)
     )
     for name in overlays.OPERATIONS:
-        yield (
-            "/v1/overlay",
-            {"subject": subject, "clip": clip, "operation": name, "output": draw.pick(overlays.OUTPUTS)},
-        )
+        how = {"operation": name, "output": draw.pick(overlays.OUTPUTS)}
+        yield "/v1/overlay", {"subject": subject, "clip": clip, **how}
     yield "/v1/bounds", {"solid": region if draw.chance(0.3) else first}
     yield "/v1/solids", solid
 
@@ -169,19 +143,13 @@ def stored_solids(draw: Draw) -> Iterator[Question]:
         for makers in (solids.LOCATED[dimension], solids.REGIONS[dimension][:-1]):
             solid, targets = _shape(draw, makers, dimension)
             name = _id_of(solid)
-            points = points_about(draw, targets, 200).astype("<f8")
+            points, stored = points_about(draw, targets, 200).astype("<f8"), {"type": "stored", "id": name}
+            asked, clipped = f"/v1/solids/{name}/contains", f"/v1/solids/{name}/clip/segments"
             requests += [
-                (f"/v1/solids/{name}/contains", points.tobytes()),
-                ("/v1/solids", solid),
-                ("/v1/solids", solid),
-            ]
-            requests += [(f"/v1/solids/{name}/contains", points.tobytes()), (f"/v1/solids/{name}/contains", b"1234567")]
-            requests += [(f"/v1/solids/{name}/clip/segments", points.tobytes())]
-            stored = {"type": "stored", "id": name}
-            requests += [
-                ("/v1/contains", {"solid": stored, "points": points.tolist()}),
-                ("/v1/bounds", {"solid": stored}),
-            ]
+                (asked, points.tobytes()), ("/v1/solids", solid), ("/v1/solids", solid), (asked, points.tobytes()),
+                (asked, b"1234567"), (clipped, points.tobytes()),
+                ("/v1/contains", {"solid": stored, "points": points.tolist()}), ("/v1/bounds", {"solid": stored}),
+            ]  # fmt: skip
     yield partial(answers_to, requests)
 
 
@@ -196,7 +164,7 @@ def long_lists(draw: Draw) -> Iterator[Question]:
     """So many items that they are encoded in parts."""
     shape = solids.aabb(draw, 2)
     points = draw.uniform(-4.0, 4.0, 42_000, 2)
-    box = as_json(shape.solid)
+    box = document(shape.solid)
     requests: list[Request] = [("/v1/contains", {"solid": box, "points": points.tolist()})]
     requests.append(("/v1/contains/scene", {"bodies": [{"solid": box}], "points": points.tolist()}))
     requests.append(("/v1/clip/segments", {"region": box, "segments": points.reshape(-1, 2, 2).tolist()}))

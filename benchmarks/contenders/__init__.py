@@ -4,7 +4,7 @@ A contender is a module with `MAKERS`: for each kind of question a function ``(s
 once; that is its build. It imports its package when it is imported itself, so one that is not installed is found by
 `make`. The kinds, what they are about, the items they are asked about and the answers:
 
-    points            Mesh, Rings, Planes     points                      bool: contained, the boundary too
+    points            Mesh, Rings, Convex     points                      bool: contained, the boundary too
     scene             Bodies                  points                      point * n_bodies + body, sorted
     segments          a solid of ours         (n, 2, dim)                 (n, 2 * dim) first piece, NaN where nothing
     hits              Mesh                    (n, 2, 3)                   bool: meets a face
@@ -24,7 +24,6 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -38,6 +37,31 @@ PACKAGES = {
     "pyclipper": "pyclipper", "celltree": "numba-celltree",
 }  # fmt: skip
 """The distribution of each module; those of our own code have none."""
+SHOWN = {
+    "open3d": "Open3D", "open3d points": "Open3D occupancy", "open3d scene": "Open3D occupancy", "igl": "libigl",
+    "igl points": "libigl winding number", "trimesh": "trimesh + embreex", "vtk": "VTK", "cgal": "CGAL",
+    "vtk points": "VTK enclosed points", "cgal points": "CGAL side of mesh", "celltree": "numba_celltree",
+    "matplotlib": "matplotlib Path", "shapely": "shapely (GEOS)", "shapely points": "shapely, prepared",
+    "shapely scene": "shapely STRtree", "shapely segments": "shapely clip_by_rect",
+    "shapely polygon areas": "shapely clip_by_rect", "shapely kept polygons": "shapely clip_by_rect",
+    "numpy determinant": "numpy determinant", "numpy linalg": "numpy.linalg.det", "fcl crowd": "fcl's manager",
+    "manifold3d overlay": "Clipper2 by manifold3d", "manifold3d overlay of made": "Clipper2 by manifold3d",
+    "pyclipper emptied": "pyclipper, only made and filled", "plain_signs": "ours, plain signs",
+    "textbook points": "textbook: half-line", "textbook recast": "textbook: another half-line",
+    "textbook planes": "textbook: half-spaces", "textbook signed angles": "textbook: signed angles",
+    "textbook unsigned angles": "textbook: unsigned angles, 1e-6", "textbook same side": "textbook: same side",
+    "textbook cross and dot": "textbook: cross and dot", "textbook projection": "textbook: projection",
+    "textbook segments": "textbook: Cohen-Sutherland", "textbook by planes": "textbook: Cohen-Sutherland by planes",
+    "textbook quadratic": "textbook: quadratic", "textbook naive segments": "naive", "textbook kept polygons": "naive",
+    "textbook polygon areas": "textbook: Sutherland-Hodgman", "textbook overlay": "textbook: Greiner-Hormann",
+    "textbook pair by vertices": "textbook: vertices in the other", "ours relation": "ours",
+    "textbook pair by edges": "textbook: edges through faces", "textbook pair by volumes": "textbook: volumes first",
+}  # fmt: skip
+
+
+def shown(module: str, kind: str) -> str:
+    """Return the name of a contender in tables."""
+    return SHOWN.get(f"{module} {kind}") or SHOWN.get(module, module)
 
 
 class NotApplicable(Exception):
@@ -100,12 +124,12 @@ class Prepared:
     """Share of the items that needed more than floating point."""
 
 
-def make(module: str, kind: str, subject: Any, threads: int = 2) -> Prepared:
+def make(module: str, kind: str, subject: Any, threads: int = 2, *setting: float) -> Prepared:
     """Return a contender ready for questions of a kind; ImportError or OSError where its package does not run here."""
     makers = importlib.import_module(f"benchmarks.contenders.with_{module}").MAKERS
     if kind not in makers:
         raise NotApplicable(kind)
-    return makers[kind](subject, threads)
+    return makers[kind](subject, threads, *setting)
 
 
 def answers(module: str, kind: str, subject: Any, items: Any, threads: int = 1) -> Any:
@@ -126,17 +150,12 @@ def pool(threads: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(threads)
 
 
-def split(n_items: int, threads: int) -> list[slice]:
-    """Return as many equal parts of 0 .. n_items as there are threads."""
-    borders = [n_items * part // threads for part in range(threads + 1)]
-    return [slice(start, stop) for start, stop in pairwise(borders)]
-
-
 def in_threads(task: Callable[[slice], Any], n_items: int, threads: int) -> list[Any]:
-    """Return what `task` returns for each part, all parts at once."""
+    """Return what `task` returns for each of as many equal parts as there are threads, all parts at once."""
     if threads == 1 or n_items < 1000:
         return [task(slice(0, n_items))]
-    return list(pool(threads).map(task, split(n_items, threads)))
+    borders = [n_items * part // threads for part in range(threads + 1)]
+    return list(pool(threads).map(task, map(slice, borders, borders[1:])))
 
 
 def rows_of(found: np.ndarray, kept: np.ndarray) -> np.ndarray:
@@ -144,29 +163,29 @@ def rows_of(found: np.ndarray, kept: np.ndarray) -> np.ndarray:
     return np.where(np.asarray(kept)[:, None], found.reshape(len(found), -1), np.nan)
 
 
-def each_pair(run: Callable[[Any], Any], area: Callable[[Any, Any], float]) -> Callable[[Any], np.ndarray]:
-    """Return what asks for the area of pair after pair; whatever a peer raises is a refusal, NaN."""
+def each_or_nan(area: Callable[[Any], float]) -> Callable[[Any], np.ndarray]:
+    """Return what asks for the area of item after item; whatever a peer raises is a refusal, NaN."""
 
-    def one(pair: Any) -> float:
+    def one(item: Any) -> float:
         try:
-            return area(pair, run(pair))
+            return area(item)
         except Exception:
             return np.nan
 
-    return lambda pairs: np.array([one(pair) for pair in pairs])
+    return lambda items: np.array([one(item) for item in items])
 
 
 def overlays(
-    read: Callable[[Any], Any], run: Callable[[Any, str], Any], area: Callable[[Any, Any], float]
-) -> dict[str, Callable[[str, int], Prepared]]:
+    read: Callable[..., Any], run: Callable[[Any, str], Any], area: Callable[[Any, Any], float]
+) -> dict[str, Callable[..., Prepared]]:
     """Return the makers of overlay: from rings, all timed; and of pairs that were read before, the areas untimed."""
 
-    def whole(operation: str, threads: int) -> Prepared:
+    def whole(operation: str, threads: int, *setting: float) -> Prepared:
         def one(pair: Any) -> float:
-            made = read(pair)
+            made = read(pair, *setting)
             return area(made, run(made, operation))
 
-        return Prepared(each_pair(one, lambda _, found: found))
+        return Prepared(each_or_nan(one))
 
     def apart(operation: str, threads: int) -> Prepared:
         def ask(pairs: list[Any]) -> list[Any]:
@@ -177,3 +196,15 @@ def overlays(
         )
 
     return {"overlay": whole, "overlay of made": apart}
+
+
+def box_of(body: Placed) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return low and high of a box that stands where it is; None of a ball; another body is out of domain."""
+    match body.shape:
+        case engine.Aabb() | engine.Sphere() if body.pose is not None or body.shape.dimension == 2:
+            raise NotApplicable("poses of meshes only, and space only")
+        case engine.Aabb(min=low, max=high):
+            return low, high
+        case engine.Sphere():
+            return None
+    raise NotApplicable(type(body.shape).__name__)

@@ -24,35 +24,22 @@ def _clip(segments: Any, low: Any, high: Any) -> tuple[Any, Any]:
     return clipped, kept
 
 
-def _segments(region: engine.Aabb, threads: int) -> Prepared:
-    return Prepared(lambda segments: _clip(segments, region.min, region.max), answer=lambda found: rows_of(*found))
-
-
-def _one_by_one(region: engine.Solid, threads: int) -> Prepared:
-    """Called from Python for each segment."""
+def _segments(region: engine.Solid, threads: int) -> Prepared:
     if not isinstance(region, engine.Aabb):
         raise NotApplicable("boxes only")
-    (x0, y0), (x1, y1) = region.min.tolist(), region.max.tolist()
-    box = Box(x0, x1, y0, y1)
-
-    def ask(segments: np.ndarray) -> np.ndarray:
-        rows = np.full((len(segments), 4), np.nan)
-        for row, (a, b) in zip(rows, np.array(segments, float).tolist(), strict=True):
-            kept, start, end = cohen_sutherland_line_box_clip(Point(*a), Point(*b), box)
-            if kept:
-                row[:] = (*start, *end)
-        return rows
-
-    return Prepared(ask)
+    return Prepared(
+        lambda segments: _clip(np.ascontiguousarray(segments, float), region.min, region.max),
+        answer=lambda found: rows_of(*found),
+    )
 
 
 def _pieces(region: engine.Solid, threads: int) -> Prepared:
-    asked = _one_by_one(region, threads).ask
+    made = _segments(region, threads)
 
-    def ask(segments: np.ndarray) -> list[Any]:
-        return [(i, row[:2], row[2:]) for i, row in enumerate(asked(segments)) if not np.isnan(row[0])]
+    def answer(found: Any) -> list[Any]:
+        return [(i, row[:2], row[2:]) for i, row in enumerate(made.answer(found)) if not np.isnan(row[0])]
 
-    return Prepared(ask)
+    return Prepared(made.ask, answer=answer)
 
 
-MAKERS = {"segments": _segments, "segments one by one": _one_by_one, "pieces": _pieces}
+MAKERS = {"segments": _segments, "pieces": _pieces}

@@ -9,7 +9,7 @@ from CGAL.CGAL_Kernel import Point_3
 from CGAL.CGAL_Polygon_mesh_processing import Side_of_triangle_mesh
 from CGAL.CGAL_Polyhedron_3 import Polyhedron_3, Polyhedron_modifier
 
-from benchmarks.contenders import Prepared
+from benchmarks.contenders import NotApplicable, Prepared
 from benchmarks.workloads import Mesh
 
 
@@ -26,7 +26,7 @@ def _points(mesh: Mesh, threads: int) -> Prepared:
     body = Polyhedron_3()
     body.delegate(modifier)
     if body.size_of_facets() != len(mesh.faces) or not body.is_closed():
-        raise ValueError("CGAL's Polyhedron_3 takes closed manifolds only")
+        raise NotApplicable("closed manifolds only")
     side = Side_of_triangle_mesh(body)
 
     def ask(points: np.ndarray, kept: Any = body) -> np.ndarray:  # `side` borrows the body

@@ -11,9 +11,8 @@ from typing import Any
 import coal
 import numpy as np
 
-import engine
-from benchmarks.contenders import Couple, NotApplicable, Placed, Prepared
-from benchmarks.poses import Pair
+from benchmarks.bodies import Pair
+from benchmarks.contenders import Couple, Placed, Prepared, box_of
 from benchmarks.workloads import Mesh
 
 
@@ -58,24 +57,19 @@ def _calls(first: coal.CollisionGeometry, second: coal.CollisionGeometry, pair: 
 
 def _shape(body: Placed) -> tuple[Any, Any]:
     place = coal.Transform3s() if body.pose is None else coal.Transform3s(*body.pose)
-    match body.shape:
-        case Mesh():
-            return model(body.shape), place
-        case engine.Aabb() | engine.Sphere() if body.pose is not None or body.shape.dimension == 2:
-            raise NotApplicable("poses of meshes only, and space only")
-        case engine.Aabb(min=low, max=high):
-            place.setTranslation((low + high) / 2)
-            return coal.Box(*(high - low)), place
-        case engine.Sphere(center=center, radius=radius):
-            place.setTranslation(center)
-            return coal.Sphere(radius), place
-    raise NotApplicable(type(body.shape).__name__)
+    if isinstance(body.shape, Mesh):
+        return model(body.shape), place
+    if box := box_of(body):
+        place.setTranslation((box[0] + box[1]) / 2)
+        return coal.Box(*(box[1] - box[0])), place
+    place.setTranslation(body.shape.center)
+    return coal.Sphere(body.shape.radius), place
 
 
-def _pair(pair: Couple, threads: int) -> Prepared:
+def _pair(pair: Couple, threads: int, margin: float = 0.0) -> Prepared:
     first, second = (_shape(body) for body in pair)
     request, result = coal.CollisionRequest(), coal.CollisionResult()
-    request.num_max_contacts = 1
+    request.num_max_contacts, request.security_margin = 1, margin
 
     def ask(_: object) -> bool:
         result.clear()
@@ -88,5 +82,5 @@ MAKERS = {
     "poses": lambda pair, threads: _calls(model(pair.first), model(pair.second), pair),
     "convex poses": lambda pair, threads: _calls(convex(pair.first), convex(pair.second), pair),
     "pair": _pair,
-    "tree": lambda mesh, threads: Prepared(lambda _: model(mesh)),
+    "tree": lambda mesh, threads: Prepared(lambda _: model(mesh), answer=lambda _: None),
 }

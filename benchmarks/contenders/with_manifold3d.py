@@ -8,7 +8,7 @@ import numpy as np
 from manifold3d import CrossSection, Error, FillRule, Manifold, Mesh64
 
 import engine
-from benchmarks.contenders import Couple, NotApplicable, Prepared, meshes_of, overlays, rings_of
+from benchmarks.contenders import Couple, NotApplicable, Prepared, each_or_nan, meshes_of, overlays, rings_of
 
 
 def _combined(pair: Any, operation: str) -> Any:
@@ -27,9 +27,10 @@ def _read(pair: Any) -> Any:
     return [CrossSection(list(rings), FillRule.EvenOdd) for rings in pair]
 
 
-def _area_by_rectangle(region: engine.Aabb, threads: int) -> Prepared:
-    """Of a polygon of several rings."""
-    return Prepared(lambda polygons: _combined(_read((polygons[0], rings_of(region))), "intersection").area())
+def _polygon_areas(region: engine.Aabb, threads: int) -> Prepared:
+    """Of polygons of several rings."""
+    box = rings_of(region)
+    return Prepared(each_or_nan(lambda rings: _combined(_read((rings, box)), "intersection").area()))
 
 
 def _pair(pair: Couple, threads: int) -> Prepared:
@@ -48,6 +49,6 @@ def _pair(pair: Couple, threads: int) -> Prepared:
 
 MAKERS = {
     "pair": _pair,
-    "area by rectangle": _area_by_rectangle,
+    "polygon areas": _polygon_areas,
     **overlays(_read, _combined, lambda made, found: found.area()),
 }

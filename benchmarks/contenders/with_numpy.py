@@ -7,15 +7,15 @@ from __future__ import annotations
 
 import numpy as np
 
+import engine
 from benchmarks.contenders import Prepared, in_threads
-from benchmarks.workloads import Planes
 
 BLOCK = 1 << 15
 """Signed distances held at once: 256 KB, and products too small for the BLAS to start threads of its own."""
 
 
-def _points(planes: Planes, threads: int) -> Prepared:
-    normals, offsets = np.ascontiguousarray(planes.rows[:, :-1].T), planes.rows[:, -1]
+def _points(solid: engine.Convex, threads: int) -> Prepared:
+    normals, offsets = np.ascontiguousarray(solid.planes[:, :-1].T), solid.planes[:, -1]
 
     def ask(points: np.ndarray) -> np.ndarray:
         held = np.empty(len(points), np.bool_)

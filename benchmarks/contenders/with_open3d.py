@@ -27,10 +27,11 @@ def _scene_of(mesh: Mesh, threads: int) -> RaycastingScene:
     return scene
 
 
-def _points(mesh: Mesh, threads: int) -> Prepared:
+def _points(mesh: Mesh, threads: int, samples: float = 1) -> Prepared:
+    """Samples: rays a point, whose majority decides."""
     scene = _scene_of(mesh, threads)
     return Prepared(
-        lambda points: scene.compute_occupancy(points, nthreads=threads),
+        lambda points: scene.compute_occupancy(points, nthreads=threads, nsamples=int(samples)),
         lambda points: Tensor(points.astype(np.float32)),
         lambda found: found.numpy() > 0.5,
     )

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import inspect
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from textwrap import dedent
@@ -15,10 +16,8 @@ from types import FunctionType
 from typing import Any
 
 import numba
-import numpy as np
 
 from benchmarks.contenders import Prepared, make
-from benchmarks.poses import Pair
 from engine.collision.meshes import dual_traversal, pose_batch, triangle_triangle
 from engine.containment import locators
 from engine.containment.cells import locate as segment_parity
@@ -44,18 +43,23 @@ def _same_but_for_signs() -> object:
     return _compiled(segment_parity.locate_by_cells.py_func, ask_leaves=leaves)
 
 
-def _points(subject: Any, threads: int) -> Prepared:
-    """As ours, but for the signs in cells; where a mesh is small, it has none."""
-    ours, plain = make("ours", "points", subject, threads), _same_but_for_signs()
+def _swapped(kind: str, module: Any, name: str, other: Callable[[], Any]) -> Callable[..., Prepared]:
+    """Return the maker of ours with one compiled function of a module replaced while it is asked."""
 
-    def ask(points: np.ndarray) -> np.ndarray:
-        exact, locators.locate_by_cells = locators.locate_by_cells, plain
-        try:
-            return ours.ask(points)
-        finally:
-            locators.locate_by_cells = exact
+    def maker(subject: Any, threads: int) -> Prepared:
+        ours, plain = make("ours", kind, subject, threads), other()
 
-    return replace(ours, ask=ask, share=None)
+        def ask(items: Any) -> Any:
+            exact = getattr(module, name)
+            setattr(module, name, plain)
+            try:
+                return ours.ask(items)
+            finally:
+                setattr(module, name, exact)
+
+        return replace(ours, ask=ask, share=None)
+
+    return maker
 
 
 @cache
@@ -73,19 +77,9 @@ def _compiled(function: FunctionType, **replaced: object) -> Any:
     return numba.njit(**_AS_ENGINE)(FunctionType(function.__code__, {**function.__globals__, **replaced}))
 
 
-def _poses(pair: Pair, threads: int) -> Prepared:
-    """Pairs of faces are decided by the bare sign of a float64 determinant: no bound on its error."""
-    ours, module = make("ours", "poses", pair, threads), sys.modules["engine.collision.collide_poses"]
-    changed: Any = module  # the package's name stands for the function
-
-    def ask(poses: Any) -> Any:
-        exact, changed.relate_poses = changed.relate_poses, _poses_by_plain_signs()
-        try:
-            return ours.ask(poses)
-        finally:
-            changed.relate_poses = exact
-
-    return replace(ours, ask=ask)
-
-
-MAKERS = {"points": _points, "poses": _poses}
+MAKERS = {  # where a mesh is small, it has no cells; the package's name of collide_poses stands for the function
+    "points": _swapped("points", locators, "locate_by_cells", _same_but_for_signs),
+    "relations": _swapped(
+        "relations", sys.modules["engine.collision.collide_poses"], "relate_poses", _poses_by_plain_signs
+    ),
+}

@@ -2,27 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pyclipper
 
 import engine
-from benchmarks.contenders import Prepared, overlays, rings_of
+from benchmarks.contenders import Prepared, each_or_nan, overlays, rings_of
 from benchmarks.workloads import Rings
 
 OPERATIONS = {
     "intersection": pyclipper.CT_INTERSECTION, "union": pyclipper.CT_UNION, "difference": pyclipper.CT_DIFFERENCE,
     "symmetric_difference": pyclipper.CT_XOR,
 }  # fmt: skip
+BITS = 50
+"""Of a coordinate, unless a contest says otherwise."""
 Groups = list[list[np.ndarray]]
 
 
-def _integers(groups: Groups) -> tuple[list[list[Any]], float, np.ndarray]:
+def _integers(groups: Groups, bits: float = BITS) -> tuple[list[list[Any]], float, np.ndarray]:
     """Return the groups in integers, the scale, and the point that became the origin."""
     every = np.concatenate([ring for rings in groups for ring in rings])
     middle = np.round((every.min(axis=0) + every.max(axis=0)) / 2)
-    scale = 2.0 ** np.floor(50 - np.log2(max(np.abs(every - middle).max(), 1e-300)))
+    scale = 2.0 ** np.floor(bits - np.log2(max(np.abs(every - middle).max(), 1e-300)))
     integers = [[np.rint((ring - middle) * scale).astype(np.int64).tolist() for ring in rings] for rings in groups]
     return integers, scale, middle
 
@@ -63,31 +66,24 @@ def _pieces(region: engine.Solid, threads: int) -> Prepared:
     return Prepared(ask)
 
 
+def _area(pair: Any) -> float:
+    made = _integers(list(pair))
+    return abs(sum(map(pyclipper.Area, _clipped(*made[0])))) / made[1] ** 2
+
+
 def _polygon_areas(region: engine.Aabb, threads: int) -> Prepared:
+    """Of an array of single rings, made integers at once; of a list of polygons of several."""
     scale = 2.0**40
-    box = np.rint(rings_of(region)[0] * scale).astype(np.int64).tolist()
-
-    def one(ring: list[Any]) -> float:
-        try:
-            found = _clipped([ring], [box])
-        except pyclipper.ClipperException:
-            return np.nan
-        return sum(map(pyclipper.Area, found)) / scale**2
-
-    return Prepared(lambda rings: np.array([one(ring) for ring in np.rint(rings * scale).astype(np.int64).tolist()]))
+    box = [np.rint(ring * scale).astype(np.int64).tolist() for ring in rings_of(region)]
+    single = each_or_nan(lambda ring: sum(map(pyclipper.Area, _clipped([ring], box))) / scale**2)
+    several = each_or_nan(lambda rings: _area((rings, rings_of(region))))
+    return Prepared(
+        lambda rings: several(rings) if isinstance(rings, list)
+        else single(np.rint(rings * scale).astype(np.int64).tolist())
+    )  # fmt: skip
 
 
-def _area_by_rectangle(region: engine.Aabb, threads: int) -> Prepared:
-    """Of a polygon of several rings."""
-
-    def ask(polygons: list[list[np.ndarray]]) -> float:
-        (subject, clip), scale, _ = _integers([polygons[0], rings_of(region)])
-        return abs(sum(map(pyclipper.Area, _clipped(subject, clip)))) / scale**2
-
-    return Prepared(ask)
-
-
-def _small_pairs(executes: bool, threads: int) -> Prepared:
+def _filled_pairs(executes: bool) -> Callable[[str, int], Prepared]:
     """Pairs of single rings, called one by one: with the operation, or only making and filling a Clipper."""
 
     def ask(paths: tuple[list[Any], list[Any]]) -> list[Any]:
@@ -101,24 +97,24 @@ def _small_pairs(executes: bool, threads: int) -> Prepared:
         return found
 
     def native(pairs: list[Any]) -> list[Any]:
-        return [np.rint(np.array([pair[side][0] for pair in pairs]) * 2.0**50).astype(np.int64).tolist()
+        return [np.rint(np.array([pair[side][0] for pair in pairs]) * 2.0**BITS).astype(np.int64).tolist()
                 for side in range(2)]  # fmt: skip
 
     def answer(found: list[Any]) -> np.ndarray | None:
-        areas = [sum(map(pyclipper.Area, paths)) / 2.0**100 for paths in found]
+        areas = [sum(map(pyclipper.Area, paths)) / 4.0**BITS for paths in found]
         return np.array(areas) if executes else None
 
-    return Prepared(ask, native, answer)
+    return lambda operation, threads: Prepared(ask, native, answer)
 
 
 MAKERS = {
     "points": _points,
     "pieces": _pieces,
     "polygon areas": _polygon_areas,
-    "area by rectangle": _area_by_rectangle,
-    "small pairs": _small_pairs,
+    "small pairs": _filled_pairs(True),
+    "emptied": _filled_pairs(False),
     **overlays(
-        lambda pair: _integers(list(pair)),
+        lambda pair, bits=BITS: _integers(list(pair), bits),
         lambda made, operation: _clipped(*made[0], operation),
         lambda made, found: abs(sum(map(pyclipper.Area, found))) / made[1] ** 2,
     ),

@@ -104,21 +104,17 @@ def _kept_polygons(region: engine.Aabb, threads: int) -> Prepared:
 
 
 def _polygon_areas(region: engine.Aabb, threads: int) -> Prepared:
+    """Of single rings; of polygons of several."""
     bounds = _bounds(region)
 
-    def ask(rings: np.ndarray) -> np.ndarray:
+    def ask(rings: Any) -> np.ndarray:
         try:
-            return shapely.area(shapely.clip_by_rect(shapely.polygons(rings), *bounds))
+            shapes = [even_odd(each) for each in rings] if isinstance(rings, list) else shapely.polygons(rings)
+            return shapely.area(shapely.clip_by_rect(shapes, *bounds))
         except shapely.GEOSException:  # one polygon it cannot clip ends the whole call
-            return np.nan if len(rings) == 1 else np.hstack([ask(ring[None]) for ring in rings])
+            return np.full(1, np.nan) if len(rings) == 1 else np.hstack([ask(ring[None]) for ring in rings])
 
     return Prepared(ask)
-
-
-def _area_by_rectangle(region: engine.Aabb, threads: int) -> Prepared:
-    """Of polygons of several rings."""
-    bounds = _bounds(region)
-    return Prepared(lambda polygons: sum(shapely.clip_by_rect(even_odd(rings), *bounds).area for rings in polygons))
 
 
 def _pair(pair: Couple, threads: int) -> Prepared:
@@ -132,17 +128,20 @@ def _pair(pair: Couple, threads: int) -> Prepared:
     return Prepared(lambda _: shapely.intersects(*shapes))
 
 
-def _small_pairs(subject: object, threads: int) -> Prepared:
+def _small_pairs(operation: str, threads: int) -> Prepared:
     """Simple polygons, vectorised."""
 
     def native(pairs: list[Any]) -> list[np.ndarray]:
         return [shapely.polygons(np.array([pair[side][0] for pair in pairs])) for side in range(2)]
 
-    return Prepared(lambda shapes: shapely.intersection(*shapes), native, shapely.area)
+    return Prepared(lambda shapes: getattr(shapely, operation)(*shapes), native, shapely.area)
+
+
+def _gridded(pair: Any, grid: float = 0.0) -> Any:
+    return [shapely.set_precision(even_odd(rings), grid) if grid else even_odd(rings) for rings in pair], grid or None
 
 
 MAKERS = {
-    "small pairs": _small_pairs,
     "points": _points,
     "scene": _scene,
     "segments": _segments,
@@ -150,11 +149,11 @@ MAKERS = {
     "pieces by rectangle": _pieces_by_rectangle,
     "kept polygons": _kept_polygons,
     "polygon areas": _polygon_areas,
-    "area by rectangle": _area_by_rectangle,
     "pair": _pair,
+    "small pairs": _small_pairs,
     **overlays(
-        lambda pair: [even_odd(rings) for rings in pair],
-        lambda made, operation: getattr(shapely, operation)(*made),
+        _gridded,
+        lambda made, operation: getattr(shapely, operation)(*made[0], grid_size=made[1]),
         lambda made, found: found.area,
     ),
 }

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 import engine
-from benchmarks.contenders import Couple, Prepared, each_pair, in_threads, meshes_of, rows_of
+from benchmarks.contenders import Couple, NotApplicable, Prepared, each_or_nan, in_threads, meshes_of, rows_of
 from benchmarks.contenders.with_ours import ring_areas
-from benchmarks.workloads import Mesh, Planes, Rings
+from benchmarks.errors import REFUSED
+from benchmarks.workloads import Mesh, Rings
 from engine.textbook import (
     clip_batches,
     cohen_sutherland,
@@ -33,8 +34,6 @@ from engine.textbook import (
 
 OBLIQUE = np.array([0.5773, 0.2113, 0.7886])
 """A direction without zero components for the textbook's half-line."""
-REFUSED = -9
-"""In place of an answer."""
 Ask = Callable[[np.ndarray], Any]
 
 
@@ -52,9 +51,7 @@ def _points(subject: Any) -> Ask:
             return lambda points: polyhedron_ray_parity.contains(points, vertices, faces, OBLIQUE)
         case Rings(rings=[ring]):
             return lambda points: polygon_ray_parity.contains(points, ring, np.array([0, len(ring)]))
-        case Planes(rows=rows):
-            return lambda points: convex.contains(points, rows)
-    raise TypeError(type(subject))
+    raise NotApplicable("a polyhedron, or a polygon of one ring")
 
 
 def _recast(mesh: Mesh) -> Ask:
@@ -67,15 +64,14 @@ def _recast(mesh: Mesh) -> Ask:
     return ask
 
 
-def _segments(region: Any) -> Ask:
-    match region:
-        case engine.Aabb():
-            return lambda segments: _kept(cohen_sutherland.clip(segments, region.min, region.max))
-        case engine.Convex():
-            return lambda segments: _kept(convex_cohen_sutherland.clip(segments, region.planes))
-        case engine.Sphere():
-            return lambda segments: _kept(segment_sphere.clip(segments, region.center, region.radius))
-    raise TypeError(region.type)
+def _clipped(kernel: Any, *names: str) -> Callable[[Any], Ask]:
+    """Return a maker of questions to a kernel that clips segments on a region with these attributes."""
+
+    def make(region: Any) -> Ask:
+        rest = [getattr(region, name) for name in names]
+        return lambda segments: _kept(kernel(segments, *rest))
+
+    return make
 
 
 def _kept(found: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
@@ -132,7 +128,7 @@ def _overlay(operation: str) -> Ask:
         found = [ring for ring in greiner_hormann.intersection(pair[0][0], pair[1][0]) if len(ring) > 2]
         return sum(abs(float(ring_areas(np.array(ring), np.array([0, len(ring)]))[0])) for ring in found)
 
-    return each_pair(area, lambda _, found: found)
+    return each_or_nan(area)
 
 
 def _pair(collide: Callable[..., bool]) -> Callable[[Couple, int], Prepared]:
@@ -153,7 +149,10 @@ ASKS: dict[str, Callable[[Any], Ask]] = {
     "same side": lambda subject: lambda points: polygon_same_side.contains(points, subject.rings[0]),
     "cross and dot": lambda solid: lambda points: triangle_cross_dot.contains(points, solid.vertices),
     "projection": lambda solid: lambda points: triangle_projection.contains(points, solid.vertices),
-    "segments": _segments,
+    "planes": lambda solid: lambda points: convex.contains(points, solid.planes),
+    "segments": _clipped(cohen_sutherland.clip, "min", "max"),
+    "by planes": _clipped(convex_cohen_sutherland.clip, "planes"),
+    "quadratic": _clipped(segment_sphere.clip, "center", "radius"),
     "polygon areas": _polygon_areas,
     "overlay": _overlay,
 }

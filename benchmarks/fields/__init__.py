@@ -1,32 +1,19 @@
 """The contests, one file an operation.
 
-``contests(seed, scale)`` yields those of the report; scale: 1.0 for the record, less for a quick run with fewer items.
-``table(size)`` yields those of the tables as (name, what makes it), so that none is made in vain; ``figures(size)``
-likewise what is no contest.
+``tasks(size)`` yields the rows as (name, what makes it), so that none is made in vain; those that stand on the page of
+the report say so. What is no contest is a `Figure`.
 """
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from benchmarks.contest import Contest
+from benchmarks.contest import Size, Task
 
-TABLES = ("containment", "collision", "segments", "polygons", "overlay", "calls")
-
-
-@dataclass(frozen=True, slots=True)
-class Size:
-    """How large the workloads are."""
-
-    seed: int
-    is_quick: bool
-
-    def of(self, full: int, quick: int) -> int:
-        """Return one of two sizes."""
-        return quick if self.is_quick else full
+FIELDS = ("containment", "collision", "segments", "polygons", "overlay", "primitives", "calls")
 
 
 @dataclass(slots=True)
@@ -45,15 +32,11 @@ class Figure:
     raw: dict[str, Any] = field(default_factory=dict)
 
 
-Task = tuple[str, Callable[[], Contest | Figure]]
-
-
-def tasks(size: Size, names: tuple[str, ...] = TABLES, has_figures: bool = True) -> Iterator[Task]:
-    """Yield the rows of tables."""
+def tasks(
+    size: Size, names: tuple[str, ...] = FIELDS, is_page: bool = False, has_figures: bool = True
+) -> Iterator[Task]:
+    """Yield the rows of tables, or those of the page only."""
     for name in names:
-        module = importlib.import_module(f"benchmarks.fields.{name}")
-        for row, make in (
-            *module.table(size),
-            *(module.figures(size) if has_figures and hasattr(module, "figures") else ()),
-        ):
-            yield f"{name}: {row}", make
+        for row in importlib.import_module(f"benchmarks.fields.{name}").tasks(size):
+            if (row.is_on_page or not is_page) and (has_figures or not row.is_figure):
+                yield row._replace(name=f"{name}: {row.name}")

@@ -11,23 +11,24 @@ import numpy as np
 
 import engine
 from benchmarks import polygon_pairs, workloads
+from benchmarks.bodies import random_rotations
 from benchmarks.contenders import Prepared
-from benchmarks.contest import Contender, Contest
+from benchmarks.contenders.with_ours import solid_of
+from benchmarks.contest import Contender, Contest, Size, Task
 from benchmarks.errors import same
-from benchmarks.fields import Size, Task
-from benchmarks.poses import random_rotations
 
 COUNTS = (1, 10, 100)
 TURNS = 64
 """Different inputs, asked in turn: a single one would be learned by heart."""
 UNBOUNDED = ("half-space 3D", "implicit 3D", "csg 3D")
-Make = Callable[[], engine.Solid]
+SEGMENTS = ("aabb 2D", "aabb 3D", "sphere 3D", "convex of 20", "polygon of 16", "polyhedron of 80")
+Call = tuple[str, Callable[[Any], object], Callable[[], list[Any]], int]
 
 
-def table(size: Size) -> Iterator[Task]:
-    """Yield the rows of the table."""
+def tasks(size: Size) -> Iterator[Task]:
+    """Yield the rows."""
     for name, ask, items, count in _calls(size):
-        yield name, partial(_contest, name, ask, items, count)
+        yield Task(name, partial(_contest, name, ask, items, count))
 
 
 def _contest(name: str, ask: Callable[[Any], object], items: Callable[[], list[Any]], count: int) -> Contest:
@@ -36,89 +37,72 @@ def _contest(name: str, ask: Callable[[Any], object], items: Callable[[], list[A
     return Contest("calls", name, False, None, None, same, [ours], count=count)
 
 
-Call = tuple[str, Callable[[Any], object], Callable[[], list[Any]], int]
-
-
 def _calls(size: Size) -> Iterator[Call]:
-    solids = _solids(size)
+    solids = _solids(size.seed)
     for name, make in solids.items():
         yield f"make {name}", lambda _, make=make: make(), lambda: [None], 1
         if name not in UNBOUNDED:  # bounds are kept, so of a new solid each time
             yield f"bounds of {name}", lambda _, make=make: engine.bounds(make()), lambda: [None], 1
-        for n in COUNTS:
-            points = partial(_draw, size, "points", n, make().dimension)
-            yield f"locate {n} in {name}", partial(_second, engine.locate, make()), points, n
-    for name in ("aabb 2D", "aabb 3D", "sphere 3D", "convex of 20", "polygon of 16", "polyhedron of 80"):
-        for n in COUNTS:
-            region = solids[name]()
-            segments = partial(_draw, size, "segments", n, 2, region.dimension)
-            yield f"clip {n} segments, {name}", partial(_second, engine.clip_segments, region), segments, n
-    for name in ("aabb 2D", "aabb 3D", "convex 2D"):
-        for n in COUNTS:
-            region = solids[name]()
-            rings = partial(_rings, size, region.dimension, n)
-            yield f"clip {n} polygons, {name}", partial(_second, engine.clip_polygons, region), rings, n
+    asked = [("locate {} in", engine.locate, solids, ()), ("clip {} segments,", engine.clip_segments, SEGMENTS, (2,))]
+    asked.append(("clip {} polygons,", engine.clip_polygons, ("aabb 2D", "aabb 3D", "convex 2D"), None))
+    for shown, ask, names, shape in asked:
+        for name in names:
+            for n in COUNTS:
+                solid = solids[name]()
+                items = partial(_rings, size.seed, solid.dimension, n) if shape is None else partial(
+                    _draw, size.seed, shown, n, *shape, solid.dimension)  # fmt: skip
+                yield f"{shown.format(n)} {name}", partial(_second, ask, solid), items, n
     first, second = (solids["polyhedron of 80"]() for _ in range(2))
+    poses, sides = partial(_poses, size.seed), partial(_sides, size.seed)
     for n in COUNTS:
-        poses = partial(_poses, size, n)
-        yield f"collide {n} poses of 80", lambda poses: engine.collide_poses(first, second, *poses), poses, n
-        yield f"collide {n} triangles", lambda both: engine.collide_triangles(*both), partial(_triangles, size, n), n
-        yield f"overlay {n} pairs of 8", lambda sides: engine.overlay_batch(*sides), partial(_sides, size, n), n
-    posed = partial(_poses, size, 0)
-    yield "collide polyhedra of 80", lambda pose: engine.collide(first, second, second_pose=pose), posed, 1
-    yield (
-        "overlay of a pair of 8",
-        lambda sides: engine.overlay(*(side[0] for side in sides)),
-        partial(_sides, size, 1),
-        1,
-    )
-    yield "overlay of a pair of 8, from arrays to pieces", _from_arrays, partial(_ring_pairs, size), 1
+        yield f"collide {n} poses of 80", lambda one: engine.collide_poses(first, second, *one), partial(poses, n), n
+        triangles = partial(_triangles, size.seed, n)
+        yield f"collide {n} triangles", lambda both: engine.collide_triangles(*both), triangles, n
+        yield f"overlay {n} pairs of 8", lambda both: engine.overlay_batch(*both), partial(sides, n), n
+    yield "collide polyhedra of 80", lambda one: engine.collide(first, second, second_pose=one), partial(poses, 0), 1
+    yield "overlay of a pair of 8", lambda both: engine.overlay(both[0][0], both[1][0]), partial(sides, 1), 1
+    pairs = partial(polygon_pairs.small, "star", 8, TURNS, size.seed)
+    yield "overlay of a pair of 8, from arrays to pieces", _from_arrays, pairs, 1
 
 
 def _second(ask: Callable[..., object], solid: engine.Solid, items: Any) -> object:
     return ask(items, solid)
 
 
-def _solids(size: Size) -> dict[str, Make]:
-    mesh = workloads.bumpy_sphere("rows/calls", size.seed, 1)
-    rings, planes = workloads.star_polygon(16, size.seed).rings, workloads.convex_planes(20, size.seed).rows
-    names = ("aabb 2D", "aabb 3D", "sphere 3D", "half-space 3D", "convex 2D", "triangle 2D", "implicit 3D", "csg 3D")
-    return {name: workloads.SIMPLE[name] for name in names} | {
+def _solids(seed: int) -> dict[str, Callable[[], Any]]:
+    mesh, planes = workloads.bumpy_sphere("rows/calls", seed, 1), workloads.convex_of(20, seed).planes
+    rings = workloads.star_polygon(16, seed)
+    return {name: make for name, make in workloads.SIMPLE.items() if name not in ("sphere 2D", "half-space 2D")} | {
         "convex of 20": lambda: engine.Convex(planes),
-        "polygon of 16": lambda: engine.Polygon(rings),
-        "polyhedron of 80": lambda: engine.Polyhedron(mesh.vertices, mesh.faces),
+        "polygon of 16": lambda: solid_of(rings),
+        "polyhedron of 80": lambda: solid_of(mesh),
     }
 
 
-def _draw(size: Size, name: str, n_items: int, *shape: int) -> list[np.ndarray]:
-    return list(workloads.generator(f"rows/calls {name}", size.seed).uniform(-1.3, 1.3, (TURNS, n_items, *shape)))
+def _draw(seed: int, name: str, n_items: int, *shape: int) -> list[np.ndarray]:
+    return list(workloads.generator(f"rows/calls {name}", seed).uniform(-1.3, 1.3, (TURNS, n_items, *shape)))
 
 
-def _rings(size: Size, dimension: int, n_items: int) -> list[np.ndarray]:
-    return list(workloads.star_rings(8, dimension, TURNS * n_items, size.seed).reshape(TURNS, n_items, 8, dimension))
+def _rings(seed: int, dimension: int, n_items: int) -> list[np.ndarray]:
+    return list(workloads.star_rings(8, dimension, TURNS * n_items, seed).reshape(TURNS, n_items, 8, dimension))
 
 
-def _poses(size: Size, n_items: int) -> list[Any]:
+def _poses(seed: int, n_items: int) -> list[Any]:
     """Return poses as arrays; where n_items is 0, single ones as objects."""
-    draw = workloads.generator("rows/calls poses", size.seed)
+    draw = workloads.generator("rows/calls poses", seed)
     moves = [(random_rotations(draw, n_items or 1), draw.uniform(-1.5, 1.5, (n_items or 1, 3))) for _ in range(TURNS)]
     return moves if n_items else [engine.Pose(turns[0], places[0]) for turns, places in moves]
 
 
-def _triangles(size: Size, n_items: int) -> list[Any]:
-    return list(zip(_draw(size, "first", n_items, 3, 3), _draw(size, "second", n_items, 3, 3), strict=True))
+def _triangles(seed: int, n_items: int) -> list[Any]:
+    return list(zip(_draw(seed, "first", n_items, 3, 3), _draw(seed, "second", n_items, 3, 3), strict=True))
 
 
-def _sides(size: Size, n_items: int) -> list[Any]:
-    both = polygon_pairs.small("star", 8, TURNS * n_items, size.seed)
-    sides = [[engine.Polygon([ring]) for ring in rings] for rings in both]
-    return [tuple(side[start : start + n_items] for side in sides) for start in range(0, TURNS * n_items, n_items)]
-
-
-def _ring_pairs(size: Size) -> list[Any]:
-    return list(zip(*polygon_pairs.small("star", 8, TURNS, size.seed), strict=True))
+def _sides(seed: int, n_items: int) -> list[Any]:
+    made = [tuple(map(engine.Polygon, pair)) for pair in polygon_pairs.small("star", 8, TURNS * n_items, seed)]
+    return [tuple(map(list, zip(*made[start : start + n_items]))) for start in range(0, len(made), n_items)]
 
 
 def _from_arrays(pair: Any) -> object:
-    found = engine.overlay(*(engine.Polygon([ring]) for ring in pair))
+    found = engine.overlay(*map(engine.Polygon, pair))
     return [piece.shell for piece in found.pieces]  # type: ignore[union-attr]

@@ -4,195 +4,119 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Iterator
-from fractions import Fraction
+from collections.abc import Iterator, Mapping
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 import engine
 from benchmarks import polygon_pairs
-from benchmarks.contenders import Prepared
-from benchmarks.contest import Contender, Contest, Goals, contender
-from benchmarks.errors import areas
-from benchmarks.fields import Figure, Size, Task
+from benchmarks.contest import Contest, Goals, Size, Task, field_of, two_threads
+from benchmarks.errors import areas, overlay_area, scale_of
+from benchmarks.fields import Figure
 from benchmarks.measure import clocked
-from benchmarks.workloads import MissingDataError, generator
 
 Pair = tuple[list[np.ndarray], list[np.ndarray]]
 MOST_VERTICES = 40
 """Of a pair whose exact answer is found by the slow reference."""
+GRIDS = ("shapely@1e-12", "shapely@1e-6", "pyclipper@20", "pyclipper@35")
+PEERS = ("textbook", "shapely", *GRIDS[:2], "pyclipper", *GRIDS[2:], "manifold3d")
+"""On the page: shapely also on grids of such a size, pyclipper also with so many bits a coordinate."""
+PAGE = {
+    "random stars": (False, "star", 10, "10 vertices each"),
+    "lattice": (True, "lattice", 5, "6 to 9 vertices on a lattice of 5 x 5: shared edges and vertices, self-crossings"),
+}
+LARGE: dict[str, Goals] = {"shapely": (6.0, 15.0), "pyclipper": (0.4, 1.0), "manifold3d": (0.4, 1.0)}
+SMALL: dict[str, Goals] = {"shapely:small pairs": (5.0, 15.0), "pyclipper:small pairs": (2.0, 5.0)}
+OPERATIONS = ("union", "difference", "symmetric_difference")
 
 
-def contests(seed: int, scale: float) -> Iterator[Contest]:
-    """Yield the contests of overlay."""
-    source = generator("report overlay", seed)
-    easy = [tuple([_star(source, 10)] for _ in range(2)) for _ in range(int(400 * scale))]
-    yield _contest("random stars", False, easy, "10 vertices each")
-    lattice = [tuple([_lattice_ring(source)] for _ in range(2)) for _ in range(int(400 * scale))]
-    yield _contest(
-        "lattice", True, lattice, "6 to 9 vertices on a lattice of 5 x 5: shared edges and vertices, self-crossings"
-    )
-    public = list(_public_pairs())[: int(200 * min(1, 2 * scale))]
-    if public:
-        yield _contest(
-            "public suites",
-            True,
-            public,
-            f"pairs of at most {MOST_VERTICES} vertices that users and suites of GEOS and polygon-clipping filed",
-        )
+def tasks(size: Size) -> Iterator[Task]:
+    """Yield the rows; of the table: one thread, intersections unless a row says otherwise, polygons made before."""
+    for name in (*PAGE, "public suites"):
+        yield Task(name, partial(_on_page, size, name), True)
+    for n in (1_000, 10_000, 100_000)[: size.of(3, 1)]:
+        for family in ("smooth", "spiky", "comb", "soup"):
+            if (family, n) != ("soup", 100_000):
+                yield Task(f"{family} of {n:,}", partial(_large, size, family, n))
+    yield Task("soup of 30,000", partial(_large, size, "soup", size.of(30_000, 2_000)))
+    yield Task("dense comb of 300", partial(_large, size, "dense comb", 300))
+    for family in ("star", "convex"):
+        for n in (4, 10, 30, 100):
+            yield Task(f"batch of {family}s of {n}", partial(_batch, size, family, n))
+    for n in (10, 100):
+        yield Task(f"batch of stars of {n}, two threads", partial(_batch, size, "star", n, "two threads"))
+    for operation in OPERATIONS:
+        yield Task(f"batch of stars of 10, {operation}", partial(_batch, size, "star", 10, operation))
+    yield Task("public pairs", partial(_public, size))
+    yield Task("exact area", partial(_area, size))
+    yield Task("public pairs, four operations", partial(_identities, size), is_figure=True)
+    yield Task("late after a deadline", partial(_deadline, size), is_figure=True)
 
 
-def _star(source: np.random.Generator, size: int) -> np.ndarray:
-    angles, radii = np.sort(source.uniform(0, 2 * np.pi, size)), source.uniform(0.3, 1, size)
-    return source.uniform(-0.5, 0.5, 2) + np.stack([radii * np.cos(angles), radii * np.sin(angles)], axis=1)
+def _on_page(size: Size, name: str) -> Contest:
+    if name in PAGE:
+        is_hard, family, n, about = PAGE[name]
+        pairs = polygon_pairs.small(family, n, size.n(400, 100), size.seed)
+    else:
+        pairs, is_hard = list(polygon_pairs.public(MOST_VERTICES))[: size.n(200, 60)], True
+        about = f"at most {MOST_VERTICES} vertices, filed by users and suites of GEOS, polygon-clipping and Clipper"
+    exact = np.array([overlay_area(pair) for pair in pairs])
 
+    def request(item: int) -> tuple[str, dict[str, Any]]:
+        subject, clip = ({"type": "polygon", "rings": [ring.tolist() for ring in rings]} for rings in pairs[item])
+        return "/v1/overlay", {"subject": subject, "clip": clip, "operation": "intersection"}
 
-def _lattice_ring(source: np.random.Generator) -> np.ndarray:
-    return source.integers(0, 5, (source.integers(6, 10), 2)).astype(float)
-
-
-def _public_pairs() -> Iterator[Pair]:
-    with contextlib.suppress(MissingDataError):
-        for pair in polygon_pairs.public(("geos_pairs", "mfogel_cases"), n_most=2):
-            if sum(len(ring) for rings in pair for ring in rings) <= MOST_VERTICES:
-                yield pair
-
-
-def _scale(pair: Pair) -> float:
-    return max(*(float(np.prod(np.ptp(np.concatenate(rings), axis=0))) for rings in pair), 1e-300)
-
-
-def _exact_area(pair: Pair) -> tuple[float, float]:
-    from tests.reference import overlay as reference
-
-    solids = [{"type": "polygon", "rings": [ring.tolist() for ring in rings]} for rings in pair]
-    return float(Fraction(reference.overlay(*solids, "intersection").area)), _scale(pair)
-
-
-def _contest(name: str, is_hard: bool, pairs: list[Pair], about: str) -> Contest:
-    exact = np.array([_exact_area(pair) for pair in pairs])
-    return Contest("overlay", name, is_hard, pairs, exact, areas, contenders(), about)
-
-
-def contenders(kind: str = "overlay", goals: dict[str, Goals] | None = None, threads: int = 2) -> list[Contender]:
-    """Return the contenders; items are pairs of lists of rings under even-odd."""
-    shown = {
-        "ours": "ours", "textbook: Greiner-Hormann": "textbook", "shapely (GEOS)": "shapely", "pyclipper": "pyclipper",
-        "Clipper2 by manifold3d": "manifold3d",
-    }  # fmt: skip
-    return [
-        contender(name, module, kind, "intersection", threads, (goals or {}).get(module, (None, None)))
-        for name, module in shown.items()
-        if module != "textbook" or kind == "overlay"
-    ]
+    found = field_of("overlay", "intersection", PEERS)
+    return Contest("overlay", name, is_hard, pairs, exact, areas, found, about, request=request)
 
 
 # --- the table --------------------------------------------------------------------------------------------------------
 
-LARGE = {"shapely": (6.0, 15.0), "pyclipper": (0.4, 1.0), "manifold3d": (0.4, 1.0)}
-SMALL = {"shapely": (5.0, 15.0), "pyclipper": (2.0, 5.0)}
-OPERATIONS = ("union", "difference", "symmetric_difference")
-
-
-def table(size: Size) -> Iterator[Task]:
-    """Yield the rows of the table: one thread, intersections unless a row says otherwise, polygons made before."""
-    for n in (1_000, 10_000, 100_000)[: size.of(3, 1)]:
-        for family in ("smooth", "spiky", "comb", "soup"):
-            if (family, n) != ("soup", 100_000):
-                yield f"{family} of {n:,}", partial(_large, size, family, n)
-    yield "soup of 30,000", partial(_large, size, "soup", size.of(30_000, 2_000))
-    yield "dense comb of 300", partial(_large, size, "dense comb", 300)
-    for family in ("star", "convex"):
-        for n in (4, 10, 30, 100):
-            yield f"batch of {family}s of {n}", partial(_batch, size, family, n)
-    for n in (10, 100):
-        yield f"batch of stars of {n}, two threads", partial(_two_threads, size, n)
-    for operation in OPERATIONS:
-        name = f"batch of stars of 10, {operation}"
-        yield name, partial(_batch, size, "star", 10, operation)
-    yield "batch on a lattice", partial(_on_lattice, size)
-    yield "public pairs", partial(_public, size)
-    yield "exact area", partial(_area, size)
-
-
-def figures(size: Size) -> Iterator[Task]:
-    """Yield what is no contest."""
-    yield "public pairs, four operations", partial(_identities, size)
-    yield "late after a deadline", partial(_deadline, size)
-
 
 def _exact_areas(pairs: list[Pair], rows: np.ndarray) -> np.ndarray:
     """Return exact areas and scales: by the reference where it is quick, else by our exact rings, which tests prove."""
-    found = []
-    for row in rows:
-        rings = [polygon for side in pairs[row] for polygon in side]
-        is_small = sum(map(len, rings)) <= MOST_VERTICES
-        found.append(_exact_area(pairs[row]) if is_small else _ours_exactly(pairs[row]))
-    return np.array(found)
+    small = [sum(len(ring) for side in pairs[row] for ring in side) <= MOST_VERTICES for row in rows]
+    return np.array([overlay_area(pairs[row]) if is_small else _by_ours(pairs[row])
+                     for row, is_small in zip(rows, small)])  # fmt: skip
 
 
-def _ours_exactly(pair: Pair) -> tuple[float, float]:
-    return float(engine.overlay(*map(engine.Polygon, pair)).area_exact), _scale(pair)
+def _by_ours(pair: Pair) -> tuple[float, float]:
+    return engine.overlay(*map(engine.Polygon, pair)).area, scale_of(pair)
+
+
+def _contest(name: str, pairs: list[Pair], found: list[Any], is_judged: bool = True, **more: Any) -> Contest:
+    exact = partial(_exact_areas, pairs) if is_judged else None
+    return Contest("overlay", name, False, pairs, exact, areas, found, count=len(pairs), **more)
 
 
 def _large(size: Size, family: str, n: int) -> Contest:
     pairs = [polygon_pairs.large(family, n, size.seed)]
-    return Contest(
-        "overlay", f"{family} of {n:,}", False, pairs, partial(_exact_areas, pairs), areas,
-        contenders("overlay of made", LARGE, 1), count=1,
-    )  # fmt: skip
+    return _contest(f"{family} of {n:,}", pairs, field_of("overlay of made", "intersection", LARGE, 1))
 
 
-def _small(size: Size, family: str, n: int) -> list[Pair]:
-    sides = polygon_pairs.small(family, n, max(1000, size.of(120_000, 12_000) // n), size.seed)
-    return [([first], [second]) for first, second in zip(*sides, strict=True)]
-
-
-def _batch(size: Size, family: str, n: int, operation: str = "intersection") -> Contest:
+def _batch(size: Size, family: str, n: int, how: str = "intersection") -> Contest:
     """All polygons are simple: shapely is given them at once, pyclipper one by one, their areas are read untimed."""
-    pairs, name = _small(size, family, n), f"batch of {family}s of {n}"
-    if operation != "intersection":
-        ours = [contender("ours", "ours", "overlay of made", operation, 1)]
-        return Contest("overlay", f"{name}, {operation}", False, pairs, None, areas, ours, count=len(pairs))
-    ours, *_ = contenders("overlay of made", None, 1)
-    others = [
-        contender("shapely (GEOS)", "shapely", "small pairs", None, 1, SMALL["shapely"]),
-        contender("pyclipper, gross", "pyclipper", "small pairs", True, 1, SMALL["pyclipper"]),
-        contender("pyclipper, only made and filled", "pyclipper", "small pairs", False, 1),
-    ]
-    n_sample = max(3, min(60, 1500 // n**2))
-    exact = partial(_exact_areas, pairs)
-    return Contest(
-        "overlay", name, False, pairs, exact, areas, [ours, *others], n_sample=n_sample, most=0, count=len(pairs)
-    )
-
-
-def _two_threads(size: Size, n: int) -> Contest:
-    pairs = _small(size, "star", n)
-    two, one = (contender(name, "ours", "overlay of made", "intersection", threads, goals) for name, threads, goals in
-                (("ours", 2, (None, None)), ("ours, one thread", 1, (1.7, 1.9))))  # fmt: skip
-    name = f"batch of stars of {n}, two threads"
-    return Contest("overlay", name, False, pairs, None, areas, [two, one], count=len(pairs))
-
-
-def _on_lattice(size: Size) -> Contest:
-    source = generator("rows/lattice", size.seed)
-    pairs = [([_lattice_ring(source)], [_lattice_ring(source)]) for _ in range(size.of(1_000, 200))]
-    ours = contenders("overlay of made", None, 1)[:1]
-    return Contest("overlay", "batch on a lattice", True, pairs, None, areas, ours, count=len(pairs))
+    name = f"batch of {family}s of {n}"
+    pairs = polygon_pairs.small(family, n, max(1000, size.n(120_000) // n), size.seed)
+    if how == "two threads":
+        return _contest(f"{name}, {how}", pairs, two_threads("overlay of made", "intersection"), False)
+    peers: Mapping[str, Any] = SMALL | {"pyclipper:emptied": None} if how == "intersection" else {}
+    found = field_of("overlay of made", how, peers, 1)
+    return _contest(name if peers else f"{name}, {how}", pairs, found, bool(peers),
+                    n_sample=max(3, min(60, 1500 // n**2)), most=0)  # fmt: skip
 
 
 def _filed(size: Size) -> list[Pair]:
-    most = size.of(5_000, 300)
-    return [pair for pair in polygon_pairs.public() if sum(map(len, pair[0] + pair[1])) <= most]
+    return list(polygon_pairs.public(size.of(5_000, 300)))
 
 
 def _public(size: Size) -> Contest:
     """Pairs of public suites, polygons made while the clock runs."""
     pairs = _filed(size)
-    found = [each for each in contenders("overlay", None, 1) if not each.name.startswith("textbook")]
-    exact = np.array([_ours_exactly(pair) for pair in pairs])
+    exact = np.array([_by_ours(pair) for pair in pairs])
+    found = field_of("overlay", "intersection", ["shapely", "pyclipper", "manifold3d"], 1)
     return Contest("overlay", "public pairs", True, pairs, exact, areas, found, count=len(pairs))
 
 
@@ -212,9 +136,7 @@ def _identities(size: Size) -> Figure:
 
 def _area(size: Size) -> Contest:
     pairs = [polygon_pairs.large("spiky", 300, size.seed)]
-    first, second = map(engine.Polygon, pairs[0])
-    ours = Contender("ours", lambda: Prepared(lambda _: engine.overlay(first, second, workers=1).area_exact))
-    return Contest("overlay", "exact area", False, pairs, None, areas, [ours], count=1)
+    return _contest("exact area", pairs, field_of("exact area", "intersection", (), 1), False)
 
 
 def _deadline(size: Size) -> Figure:

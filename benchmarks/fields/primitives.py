@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from fractions import Fraction
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from benchmarks.contenders import Prepared
-from benchmarks.contest import Contender, Contest, contender
+from benchmarks.contest import Contender, Contest, Size, Task, field_of
 from benchmarks.errors import same
 from benchmarks.workloads import generator
 from engine.jit import kernel
@@ -17,33 +18,28 @@ from engine.predicates.orientation import orient2d, orient3d
 from engine.types import Point2, Point3
 
 
-def contests(seed: int, scale: float) -> Iterator[Contest]:
-    """Yield the contests of orientation signs."""
-    source = generator("report primitives", seed)
-    n_items = int(100_000 * scale)
+def tasks(size: Size) -> Iterator[Task]:
+    """Yield the rows."""
     for dimension in (2, 3):
-        size = dimension + 1
-        easy = source.uniform(-1, 1, (n_items, size, dimension))
-        weights = source.uniform(-1, 1, (n_items // 5, size - 1, 1))
+        for is_hard in (False, True):
+            name = "nearly degenerate" if is_hard else "random"
+            yield Task(f"orientation {dimension}D, {name}", partial(_signs, size, dimension, is_hard, name), True)
+
+
+def _signs(size: Size, dimension: int, is_hard: bool, name: str) -> Contest:
+    source = generator(f"report primitives {dimension}", size.seed)
+    items = source.uniform(-1, 1, (size.n(20_000 if is_hard else 100_000), dimension + 1, dimension))
+    if is_hard:
+        weights = source.uniform(-1, 1, (len(items), dimension, 1))
         weights /= weights.sum(axis=1, keepdims=True)
-        hard = easy[: n_items // 5].copy()
-        hard[:, -1] = (weights * hard[:, :-1]).sum(axis=1)  # in the flat of the others, up to rounding
-        hard[:, -1] += source.integers(-1, 2, (len(hard), dimension)) * np.spacing(np.abs(hard[:, -1]))
-        for name, items in (("random", easy), ("nearly degenerate", hard)):
-            exact = np.array([_sign(rows) for rows in items[: int(2000 * min(1, 4 * scale))].tolist()])
-            yield Contest(
-                f"orientation {dimension}D", name, items is hard, items, exact, same, _contenders(dimension),
-                "the last point in the flat of the others, within an ulp" if items is hard else "",
-            )  # fmt: skip
-
-
-def _contenders(dimension: int) -> list[Contender]:
-    return [
-        Contender("ours", lambda: _ours(dimension)),
-        contender("numpy determinant", "numpy", "determinant", dimension),
-        contender("numpy.linalg.det", "numpy", "linalg", dimension),
-        Contender("fractions", lambda: Prepared(lambda items: np.array([_sign(rows) for rows in items.tolist()]))),
-    ]
+        items[:, -1] = (weights * items[:, :-1]).sum(axis=1)  # in the flat of the others, up to rounding
+        items[:, -1] += source.integers(-1, 2, (len(items), dimension)) * np.spacing(np.abs(items[:, -1]))
+    exact = np.array([_sign(rows) for rows in items[: size.n(2000, 500)].tolist()])
+    fractions = Contender("fractions", lambda: Prepared(lambda rows: np.array([_sign(row) for row in rows.tolist()])))
+    _, *numpy = field_of("determinant", dimension, ["numpy", "numpy:linalg"])
+    asked = [Contender("ours", lambda: _ours(dimension)), *numpy, fractions]
+    about = "the last point in the flat of the others, within an ulp" if is_hard else "anywhere in the unit cube"
+    return Contest(f"orientation {dimension}D", name, is_hard, items, exact, same, asked, about)
 
 
 def _sign(rows: list[list[float]]) -> int:

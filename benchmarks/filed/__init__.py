@@ -15,17 +15,16 @@ import json
 import multiprocessing
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 from fractions import Fraction
-from importlib.metadata import PackageNotFoundError, version
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 import engine
 from benchmarks.contenders import PACKAGES, NotApplicable, Placed, answers
+from benchmarks.machine import version_of
 from benchmarks.workloads import Mesh, Rings
 
 PATH = Path(__file__).resolve().parent / "cases.json"
@@ -39,8 +38,7 @@ TOLERANCE = 2.0**-20
 Case = dict[str, Any]
 
 
-@dataclass(frozen=True, slots=True)
-class Peer:
+class Peer(NamedTuple):
     """One contender: its module, and for each kind of question what its maker is called."""
 
     name: str
@@ -49,7 +47,7 @@ class Peer:
 
 
 POINTS, PIECES, PAIR = {"locate 3D": "points"}, {"clip_segments 3D": "pieces"}, {"collide 3D": "pair"}
-OVERLAY, CLIPPING = {"overlay 2D": "overlay of made"}, {"clip_polygons 2D": "area by rectangle"}
+OVERLAY, CLIPPING = {"overlay 2D": "overlay of made"}, {"clip_polygons 2D": "polygon areas"}
 PLANE = {"locate 2D": "points", "clip_segments 2D": "pieces", **OVERLAY}
 PEERS = (
     Peer("ours", "", {}),
@@ -89,30 +87,27 @@ def kind_of(case: Case) -> str:
 
 def is_right(case: Case, answer: Any) -> bool:
     """Say whether a peer's answer is the exact one, up to rounding."""
-    exact = case["answer"]
+    exact, data = case["answer"], case["input"]
     match case["operation"]:
         case "locate":
             return [bool(held) for held in answer] == [location >= 0 for location in exact]
         case "collide":
             return bool(answer) == (exact != "disjoint")
         case "overlay":
-            size = np.prod(np.maximum(*(_extent(case["input"][key]["rings"]) for key in ("subject", "clip"))))
+            size = np.prod(np.maximum(*(_extent(data[key]["rings"]) for key in ("subject", "clip"))))
             area = Fraction(*(int(part, 16) for part in exact["area"].split("/")))
             return abs(answer - float(area)) <= TOLERANCE * size
         case "clip_polygons":
-            size = np.prod(_extent([ring for rings in case["input"]["polygons"] for ring in rings]))
-            return abs(answer - sum(abs(area_of(ring)) for rings in exact for ring in rings)) <= TOLERANCE * size
-    slack = TOLERANCE * _extent([case["input"]["segments"]]).max()
+            size = np.prod(_extent([ring for rings in data["polygons"] for ring in rings]))
+            return abs(np.sum(answer) - sum(abs(_area(ring)) for rings in exact for ring in rings)) <= TOLERANCE * size
+    slack = TOLERANCE * _extent([data["segments"]]).max()
     pieces = _long_pieces([(piece["segment"], piece["start"], piece["end"]) for piece in exact], slack)
     found = _long_pieces(answer, slack)
-    return len(pieces) == len(found) and all(
-        i == j and np.abs(ends - others).max() <= slack
-        for (i, ends), (j, others) in zip(pieces, found, strict=True)
-    )  # fmt: skip
+    pairs = zip(pieces, found)
+    return len(pieces) == len(found) and all(i == j and np.abs(a - b).max() <= slack for (i, a), (j, b) in pairs)
 
 
-def area_of(ring: Any) -> float:
-    """Return the signed area of a ring in plain float64."""
+def _area(ring: Any) -> float:
     x, y = np.asarray(ring, float).T
     return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
 
@@ -140,28 +135,19 @@ def _rings(solid: dict[str, Any]) -> list[np.ndarray]:
     return [np.array(ring, float) for ring in solid["rings"]]
 
 
-def _subject(solid: dict[str, Any]) -> Any:
+def _subject(solid: dict[str, Any], is_region: bool = False) -> Any:
     """Return a solid as the contenders take it."""
     match solid["type"]:
-        case "polyhedron" | "surface":
+        case "polyhedron" if is_region:
+            return engine.Polyhedron(solid["vertices"], solid["faces"])
+        case "polyhedron" | "surface" if not is_region:
             return Mesh("case", np.array(solid["vertices"], float), np.array(solid["faces"], np.int64))
-        case "sphere":
+        case "sphere" if not is_region:
             return engine.Sphere(solid["center"], solid["radius"])
-        case "aabb" if len(solid["min"]) == 3:
+        case "aabb" if is_region or len(solid["min"]) == 3:
             return engine.Aabb(solid["min"], solid["max"])
         case "polygon" | "aabb":
             return Rings("case", _rings(solid))
-    raise NotApplicable(solid["type"])
-
-
-def _region(solid: dict[str, Any]) -> Any:
-    match solid["type"]:
-        case "polyhedron":
-            return engine.Polyhedron(solid["vertices"], solid["faces"])
-        case "polygon":
-            return Rings("region", _rings(solid))
-        case "aabb":
-            return engine.Aabb(solid["min"], solid["max"])
     raise NotApplicable(solid["type"])
 
 
@@ -177,38 +163,37 @@ def _asked(module: str, kind: str, operation: str, data: dict[str, Any]) -> Any:
         case "locate":
             return answers(module, kind, _subject(data["solid"]), np.array(data["points"], float))
         case "clip_segments":
-            return answers(module, kind, _region(data["region"]), np.array(data["segments"], float))
+            return answers(module, kind, _subject(data["region"], True), np.array(data["segments"], float))
         case "clip_polygons":
             polygons = [[np.array(ring, float) for ring in rings] for rings in data["polygons"]]
-            return answers(module, kind, _region(data["region"]), polygons)
+            return answers(module, kind, _subject(data["region"], True), polygons)
         case "overlay":
             return answers(module, kind, data["operation"], [(_rings(data["subject"]), _rings(data["clip"]))])[0]
     return answers(module, kind, (_placed(data, "first"), _placed(data, "second")), None)
 
 
-def _answer(peer: Peer, case: Case) -> str:
-    """Return the outcome of one case; in the contender's own process."""
-    if peer.name == "ours":
-        from tests.hard.operations import OPERATIONS
-
-        return "right" if OPERATIONS[case["operation"]].by_engine(case["input"]) == case["answer"] else "wrong"
+def _answer(peer: Peer, case: Case) -> tuple[str, str]:
+    """Return the outcome of one case and a note; in the contender's own process."""
     try:
-        answer = _asked(peer.module, peer.calls[kind_of(case)], case["operation"], case["input"])
-        return "right" if is_right(case, answer) else "wrong"
+        if peer.name == "ours":
+            from tests.hard.operations import OPERATIONS
+
+            is_ok = OPERATIONS[case["operation"]].by_engine(case["input"]) == case["answer"]
+        else:
+            is_ok = is_right(case, _asked(peer.module, peer.calls[kind_of(case)], case["operation"], case["input"]))
+        return "right" if is_ok else "wrong", ""
     except NotApplicable:
-        return "not applicable"
+        return "not applicable", ""
+    except Exception as error:  # whatever a peer raises
+        outcome = "absent" if isinstance(error, ImportError | OSError) else "refused"
+        return outcome, f"{type(error).__name__}: {error}".splitlines()[0]
 
 
 def _serve(pipe: Connection, name: str) -> None:
     """Answer cases until there are no more."""
     peer = next(peer for peer in PEERS if peer.name == name)
     while (case := pipe.recv()) is not None:
-        try:
-            pipe.send((_answer(peer, case), ""))
-        except (ImportError, OSError) as error:
-            pipe.send(("absent", f"{type(error).__name__}: {error}".splitlines()[0]))
-        except Exception as error:  # whatever a peer raises
-            pipe.send(("refused", f"{type(error).__name__}: {error}".splitlines()[0]))
+        pipe.send(_answer(peer, case))
 
 
 def replay(names: Sequence[str] = (), limit: float = LIMIT, cases: list[Case] | None = None) -> list[dict[str, str]]:
@@ -221,40 +206,40 @@ def replay(names: Sequence[str] = (), limit: float = LIMIT, cases: list[Case] | 
 
 
 def _replay_one(peer: Peer, cases: list[Case], limit: float) -> list[dict[str, str]]:
-    context, rows = multiprocessing.get_context("spawn"), []
+    rows: list[dict[str, str]] = []
     process, pipe = None, None
+    package = PACKAGES.get(peer.module)
+    about = {"contender": peer.name, "version": version_of(package) if package else ""}
     for case in cases:
-        kind = kind_of(case)
-        row = {
-            "case": case["id"],
-            "kind": kind,
-            "contender": peer.name,
-            "version": _version(PACKAGES.get(peer.module, "")),
-        }
-        if peer.name != "ours" and kind not in peer.calls:
-            rows.append(row | {"outcome": "not applicable", "note": ""})
-            continue
-        if process is None:
-            pipe, other = context.Pipe()
-            process = context.Process(target=_serve, args=(other, peer.name), daemon=True)
-            process.start()
-            other.close()
-        outcome, note = _ask(pipe, case, limit if peer.module else COMPILING)
-        if outcome == "absent":
-            rows = [{**row, "case": "", "kind": "", "outcome": outcome, "note": note}]
-            break
-        if outcome in ("crashed", "no answer in time"):
-            process.kill()
-            process.join()
-            note, process = note or f"exit code {process.exitcode}", None
-        rows.append(row | {"outcome": outcome, "note": note})
+        kind, outcome, note = kind_of(case), "not applicable", ""
+        if peer.name == "ours" or kind in peer.calls:
+            if process is None:
+                pipe, process = _started(peer.name)
+            outcome, note = _ask(pipe, case, limit if peer.module else COMPILING)
+            if outcome == "absent":
+                rows = [about | {"case": "", "kind": "", "outcome": outcome, "note": note}]
+                break
+            if outcome in ("crashed", "no answer in time"):
+                process.kill()
+                process.join()
+                note, process = note or f"exit code {process.exitcode}", None
+        rows.append(about | {"case": case["id"], "kind": kind, "outcome": outcome, "note": note})
     if process is not None:
         process.kill()
         process.join()
     return rows
 
 
-def _ask(pipe: Connection, case: Case, limit: float) -> tuple[str, str]:
+def _started(name: str) -> tuple[Any, Any]:
+    context = multiprocessing.get_context("spawn")
+    pipe, other = context.Pipe()
+    process = context.Process(target=_serve, args=(other, name), daemon=True)
+    process.start()
+    other.close()
+    return pipe, process
+
+
+def _ask(pipe: Any, case: Case, limit: float) -> tuple[str, str]:
     try:
         pipe.send(case)
         return pipe.recv() if pipe.poll(limit) else ("no answer in time", f"{limit:g} s")
@@ -283,39 +268,27 @@ def section(rows: list[dict[str, str]]) -> str:
             lines.append(f"| {name} | not installed: {mine[0]['note']} |" + " |" * len(OUTCOMES))
             continue
         count = Counter(row["outcome"] for row in mine)
-        asked = len(mine) - count["not applicable"]
         cells = " | ".join(str(count[outcome]) for outcome in OUTCOMES[:-1])
-        lines.append(f"| {name} | {mine[0]['version']} | {asked} | {cells} |")
+        lines.append(f"| {name} | {mine[0]['version']} | {len(mine) - count['not applicable']} | {cells} |")
     failed: dict[str, list[str]] = {}
     for row in rows:
         if row["outcome"] not in ("right", "not applicable", "absent"):
             how = "" if row["outcome"] == "wrong" else f" ({row['outcome']})"
             failed.setdefault(row["case"], []).append(row["contender"] + how)
-    passed = len(cases) - len(failed)
-    lines += [f"\nAll contenders pass {passed} of the cases today; not these:\n", "| case | reported | wrong today |"]
-    lines.append("|---|---|---|")
+    lines += [f"\nAll contenders pass {len(cases) - len(failed)} of the cases today; not these:\n"]
+    lines += ["| case | reported | wrong today |", "|---|---|---|"]
     for name, contenders in failed.items():
-        case = cases[name]
-        repository, number = case["thread"].split("#")
+        repository, number = cases[name]["thread"].split("#")
         link = f"[{name}](https://github.com/{repository}/issues/{number})"
-        lines.append(f"| {link} | {case['about']} | {', '.join(contenders)} |")
+        lines.append(f"| {link} | {cases[name]['about']} | {', '.join(contenders)} |")
     return "\n".join(lines) + "\n"
-
-
-def _version(package: str) -> str:
-    try:
-        return version(package) if package else ""
-    except PackageNotFoundError:
-        return "?"
 
 
 def write_answers() -> None:
     """Compute every exact answer by the rational reference."""
     from tests.hard.operations import OPERATIONS
 
-    cases = load()
-    for case in cases:
-        case["answer"] = OPERATIONS[case["operation"]].exact(case["input"])
+    cases = [case | {"answer": OPERATIONS[case["operation"]].exact(case["input"])} for case in load()]
     PATH.write_text("[\n" + ",\n".join(json.dumps(case) for case in cases) + "\n]\n", "utf-8")
 
 
@@ -325,14 +298,14 @@ def main(words: list[str] | None = None) -> int:
     parser.add_argument("--answers", action="store_true", help="write the exact answers into cases.json")
     parser.add_argument("--only", nargs="*", default=(), metavar="NAME", help="only these contenders")
     parser.add_argument("--cases", action="store_true", help="print every answer that is not right, with its note")
+    parser.add_argument("--quick", action="store_true", help="the first twenty cases")
     options = parser.parse_args(words)
     if options.answers:
         write_answers()
         return 0
-    rows = replay(options.only)
-    if options.cases:
-        for row in rows:
-            if row["outcome"] not in ("right", "not applicable"):
-                print(f"{row['contender']:<24} {row['outcome']:<18} {row['case']:<50} {row['note']}")
+    rows = replay(options.only, cases=load()[: 20 if options.quick else None])
+    for row in rows:
+        if options.cases and row["outcome"] not in ("right", "not applicable"):
+            print(f"{row['contender']:<24} {row['outcome']:<18} {row['case']:<50} {row['note']}")
     print(section(rows))
     return int(any(row["contender"] == "ours" and row["outcome"] != "right" for row in rows))

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import re
 
-from benchmarks import hard_cases, hard_pictures
+from benchmarks import hard_cases
 
 TEXT = hard_cases.PAGE.read_text("utf-8")
 
 
-def test_every_picture_is_drawn_and_stored() -> None:
+def test_every_picture_is_stored_and_shown() -> None:
     shown = re.findall(r"\(pictures/hard_(\w+)\.svg\)", TEXT)
-    drawn = hard_pictures.draw()
-    assert sorted(shown) == sorted(drawn)
-    for name, drawing in drawn.items():
-        assert (hard_cases.PAGE.parent / "pictures" / f"hard_{name}.svg").read_text() == drawing
+    stored = (hard_cases.PAGE.parent / "pictures").glob("hard_*.svg")
+    assert sorted(shown) == sorted(path.stem.removeprefix("hard_") for path in stored)
 
 
 def test_every_set_has_its_figures_and_none_of_ours_is_wrong() -> None:

@@ -19,8 +19,8 @@ def test_large_pairs_are_seeded(family: str) -> None:
     assert engine.overlay(*map(engine.Polygon, first)).n_pieces > 0
 
 
-@pytest.mark.parametrize("family", ["star", "convex"])
+@pytest.mark.parametrize("family", ["star", "convex", "lattice"])
 def test_small_pairs_mostly_meet(family: str) -> None:
-    subjects, clips = polygon_pairs.small(family, 10, 50, 0)
-    batch = engine.overlay_batch(*([engine.Polygon([ring]) for ring in rings] for rings in (subjects, clips)))
+    sides = zip(*polygon_pairs.small(family, 10, 50, 0))
+    batch = engine.overlay_batch(*([engine.Polygon(rings) for rings in side] for side in sides))
     assert np.count_nonzero(np.diff(batch.pair_offsets)) > 30

@@ -9,24 +9,21 @@ import numpy as np
 import pytest
 
 from benchmarks import errors, machine, measure, table, workloads
-from benchmarks.contenders import Prepared, split
-from benchmarks.contest import Contender, Contest, Row, contender, hold
-from benchmarks.fields import Figure, Size, tasks
+from benchmarks.contenders import Prepared, in_threads
+from benchmarks.contest import Contender, Contest, Row, Size, contender, hold
+from benchmarks.fields import Figure, tasks
 
 
 def test_exact_answers_of_each_subject() -> None:
     mesh = workloads.bumpy_sphere("bumpy", 0, 1)
-    assert errors.contained(np.zeros(3), mesh) == (True, False)
-    assert errors.contained(mesh.vertices[3], mesh) == (True, True)
-    assert errors.contained(mesh.vertices[3] * 1.01, mesh) == (False, False)
+    points = np.array([np.zeros(3), mesh.vertices[3], mesh.vertices[3] * 1.01])
+    assert errors.locations(points, mesh).tolist() == [True, True, False]
     square = workloads.Rings("square", [np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]])])
-    assert [errors.contained(np.array(p), square) for p in ([1.0, 1.0], [2.0, 1.0], [3.0, 1.0])] == [
-        (True, False),
-        (True, True),
-        (False, False),
+    assert errors.locations(np.array([[1.0, 1.0], [2.0, 1.0], [3.0, 1.0]]), square).tolist() == [True, True, False]
+    assert errors.locations(np.array([[1.0, 0.5, 0.0], [1.1, 0, 0]]), workloads.convex_of(6, 0)).tolist() == [
+        True,
+        False,
     ]
-    cube = workloads.convex_planes(6, 0)
-    assert errors.contained(np.array([1.0, 0.5, 0.0]), cube) == (True, True)
 
 
 def test_answers_that_differ_are_settled() -> None:
@@ -58,7 +55,7 @@ def test_a_ratio_is_net_of_calls_and_for_the_same_items() -> None:
 
 
 def test_parts_cover_all_items() -> None:
-    assert split(7, 3) == [slice(0, 2), slice(2, 4), slice(4, 7)]
+    assert in_threads(lambda part: part, 7000, 3) == [slice(0, 2333), slice(2333, 4666), slice(4666, 7000)]
 
 
 def test_a_missing_peer_says_why() -> None:
@@ -75,8 +72,8 @@ def test_facts_name_what_figures_depend_on() -> None:
 
 
 def test_every_row_has_its_own_name() -> None:
-    for is_quick in (False, True):
-        names = [name for name, _ in tasks(Size(0, is_quick))]
+    for scale in (0.05, 1.0):
+        names = [task.name for task in tasks(Size(0, scale))]
         assert len(names) == len(set(names))
 
 
@@ -94,3 +91,25 @@ def test_a_row_runs(capsys: pytest.CaptureFixture[str]) -> None:
 def test_quick_run(capsys: pytest.CaptureFixture[str]) -> None:
     assert table.main(["--quick", "--only", "polygon of 10", "--rounds", "3", "--seconds", "1"], "containment") == 0
     assert "shapely, prepared" in capsys.readouterr().out
+
+
+def test_0_of_n_says_what_it_says() -> None:
+    assert measure.interval(0, 134)[0] == 0.0
+    assert measure.interval(0, 134)[1] == pytest.approx(0.0279, abs=1e-4)
+    assert measure.interval(134, 134)[1] == 1.0
+    low, high = measure.interval(5, 10)
+    assert low == pytest.approx(0.2366, abs=1e-4)
+    assert high == pytest.approx(1 - low)
+
+
+def test_all_are_judged_on_all_items_and_the_worst_is_kept() -> None:
+    items = np.arange(100)
+    asked = {"ours": lambda rows: rows % 2 == 0, "peer": lambda rows: np.where(rows < 60, rows % 2 == 0, rows == 99)}
+    contenders = [Contender(name, lambda ask=ask: Prepared(ask)) for name, ask in asked.items()]
+    request = "/v1/x", {"item": 60}
+    contest_ = Contest("o", "c", True, items, items % 2 == 0, errors.same, contenders, request=lambda _: request)
+    ours, peer = hold(contest_, 1, 0.01, has_latency=True)
+    assert (ours.errors["judged"], peer.errors["judged"], peer.errors["wrong"]) == (100, 100, 21)
+    assert (peer.worst["item"], peer.worst["exact"], peer.worst["request"]) == (60, True, request)
+    assert ours.worst == {}
+    assert set(ours.latency) == {"1", "10", "100"}

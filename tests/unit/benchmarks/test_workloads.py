@@ -24,7 +24,7 @@ def test_rings_are_seeded() -> None:
 def test_meshes_are_seeded() -> None:
     first, second = (workloads.bumpy_sphere("bumpy", 5, 2) for _ in range(2))
     assert np.array_equal(first.vertices, second.vertices)
-    points = [workloads.near_points(first, 50, seed) for seed in (0, 0, 1)]
+    points = [workloads.points_near(first, 50, seed) for seed in (0, 0, 1)]
     assert np.array_equal(points[0], points[1])
     assert not np.array_equal(points[0], points[2])
 
