@@ -43,10 +43,9 @@ USE = (
 )
 
 
-@pytest.fixture
-def project(tmp_path: Path) -> Path:
+def make_project(folder: Path) -> Path:
     """Return a small package named `engine` whose kernel calls a helper two imports away."""
-    package = tmp_path / "project" / "engine"
+    package = folder / "project" / "engine"
     (package / "deep").mkdir(parents=True)
     for name in COMPILER:
         (package / name).write_text((ROOT / "engine" / name).read_text("utf-8"))
@@ -56,6 +55,11 @@ def project(tmp_path: Path) -> Path:
     (package / "deep" / "middle.py").write_text("from engine.deep.helper import step as step\n")
     (package / "work.py").write_text(KERNEL.format(middle="middle"))
     return package.parent
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Path:
+    return make_project(tmp_path)
 
 
 def start(project: Path, code: str = USE, **variables: str) -> subprocess.Popen[str]:
@@ -144,15 +148,21 @@ def test_a_folder_of_another_user_is_refused(tmp_path: Path, monkeypatch: pytest
     assert not kernel_cache._is_writable(tmp_path / "own")
 
 
-@pytest.fixture
-def seed(project: Path) -> Path:
+@pytest.fixture(scope="module")
+def made_seed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a seed of the project, made for a family of CPUs."""
+    project = make_project(tmp_path_factory.mktemp("seed"))
     folder = project / "seed"
     family = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
     assert run(project, ENGINE_CACHE_DIR=str(folder), **family)[1] == "0"
-    more = "from pathlib import Path; from engine.kernel_cache import seal; seal(Path({0!r}), Path({0!r} + '.tar.xz'))"
-    run(project, more.format(str(folder)))
+    kernel_cache.seal(folder, Path(f"{folder}.tar.xz"))
     return folder
+
+
+@pytest.fixture
+def seed(project: Path, made_seed: Path) -> Path:
+    shutil.copy(f"{made_seed}.tar.xz", project)
+    return shutil.copytree(made_seed, project / "seed")
 
 
 def started(project: Path, seed: Path, **more: str) -> tuple[list[str], str]:

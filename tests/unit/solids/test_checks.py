@@ -40,7 +40,7 @@ def test_spelling() -> None:
         [np.array([1.0, 2.0]), np.array([3, 4])],
         [[np.float32(1), np.int8(2)], [3, 4]],
         np.array([[1, 2], [3, 4]], np.longdouble),
-        memoryview(np.array([[1.0, 2.0], [3.0, 4.0]])),
+        pytest.param(memoryview(np.array([[1.0, 2.0], [3.0, 4.0]])), id="memoryview"),
     ],
     ids=str,
 )
