@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from engine.arrays import read_only
 from engine.containment.locators import locator_of
 from engine.parallel import Budget
 from engine.segment_clipping.boundary import clip_chunk
@@ -63,6 +64,7 @@ def test_groups_answer_as_a_few_segments_do() -> None:
     n = GROUP + 300
     segments = rng.uniform((-2, -0.1, -0.1), (164, 1.1, 1.1), (n, 2, 3))
     segments[::50, 1] = segments[::50, 0]
+    segments = read_only(segments)  # the kind that the kernel is compiled for
     budget, locator = Budget(), locator_of(boxes)
     whole = clip_chunk(segments, 0, n, boxes, locator, budget)[0]
     parts = [clip_chunk(segments, i, min(i + 60, n), boxes, locator, budget)[0] for i in range(0, n, 60)]

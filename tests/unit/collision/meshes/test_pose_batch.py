@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from engine import Pose, Surface, collide
+from engine.arrays import read_only
 from engine.collision.codes import UNSETTLED
 from engine.collision.meshes.dual_traversal import SEEK_CONTACT, SEEK_OVERLAP, new_descent, new_found
 from engine.collision.meshes.mesh_arrays import STILL, mesh_body_of
@@ -27,7 +28,7 @@ def test_agrees_with_single_questions(size: int) -> None:
         first = brick(2)
         a, b = mesh_body_of(first), mesh_body_of(second)
         found = np.empty(40, np.int8)
-        poses = PoseArrays(turns, moves, True)
+        poses = PoseArrays(read_only(turns), read_only(moves), True)  # the kind that the kernel is compiled for
         with np.errstate(all="ignore"):
             relate_poses(
                 a.arrays, b.arrays, STILL, poses, seek, new_descent(), new_found(4), found, np.zeros(1, np.uint8)
