@@ -61,6 +61,9 @@ class Cancel:
         with self._lock:
             self._flags = [kept for kept in self._flags if kept is not flag]
 
+    def take(self, n_bytes: int) -> None:
+        """Hear that an answer is about to take so many more bytes; who must bound them overrides this, and raises."""
+
 
 @dataclass(order=True, slots=True)
 class _Waiting:
@@ -174,6 +177,11 @@ class Budget:
             )
         if self.flag[0]:
             raise CancelledError("another part of the call failed")
+
+    def take(self, n_bytes: int) -> None:
+        """Say, before it is gathered, by how many bytes an answer grows whose size the question does not tell."""
+        if self._cancel is not None:
+            self._cancel.take(n_bytes)
 
 
 def check_options(workers: object, progress: object) -> None:

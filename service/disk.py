@@ -2,21 +2,24 @@
 
 A file is named by its solid and written under another name first, so that a name never leads to half a file. Since a
 name is a hash of the content, a file that was damaged all the same is found out when it is read: it is not served, and
-taken away. Files used longest ago leave when the folder grows beyond its budget.
+taken away. Files used longest ago leave when the folder grows beyond its budget. What the system refuses is told as
+what it is: `store_full`, or `store_unavailable`; what is no file, a pipe for example, is never waited for.
 """
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import io
 import json
 import logging
 import os
 import re
+import stat
 import tempfile
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Final
 
@@ -24,6 +27,7 @@ import numpy as np
 
 import engine
 from engine import Solid
+from service.errors import ServiceError
 
 log = logging.getLogger("service")
 
@@ -46,6 +50,25 @@ _STALE_SECONDS: Final = 3600.0
 """Age at which a partial file has no writer any more."""
 
 
+_FULL: Final = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
+_READ: Final = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
+
+
+@contextlib.contextmanager
+def _told(path: Path) -> Iterator[None]:
+    """Turn what the system refuses into what is said of it."""
+    try:
+        yield
+    except OSError as error:
+        log.error("the store folder %s: %s", path, error)
+        reason = error.strerror or type(error).__name__
+        if error.errno in _FULL:
+            detail = f"the store folder has no room ({reason}); send the solid with each request, or try again later"
+            raise ServiceError("store_full", detail) from None
+        detail = f"the store folder cannot be used ({reason}); send the solid with the request, or try again later"
+        raise ServiceError("store_unavailable", detail) from None
+
+
 class Folder:
     """Writes, reads and forgets files of solids; safe to share between threads and processes."""
 
@@ -59,7 +82,14 @@ class Folder:
         self._shrink()
 
     def put(self, name: str, solid: Solid) -> bool:
-        """Write `solid` unless it is there; return whether it is new. It is on the disk when this returns."""
+        """Write `solid` unless it is there; return whether it is new. It is on the disk when this returns.
+
+        Raises: `store_full`, `store_unavailable`.
+        """
+        with _told(self._path):
+            return self._put(name, solid)
+
+    def _put(self, name: str, solid: Solid) -> bool:
         final = self._path / name
         if self._touch(final):
             return False
@@ -84,13 +114,13 @@ class Folder:
         return True
 
     def get(self, name: str) -> Solid | None:
-        """Return the solid called `name`, or None if there is no file that holds it."""
+        """Return the solid called `name`, or None if there is no file that holds it; `store_unavailable`."""
         if _NAME.fullmatch(name) is None:
             return None
         path = self._path / name
-        try:
-            octets = path.read_bytes()
-        except FileNotFoundError:
+        with _told(path):
+            octets = _content(path)
+        if octets is None:
             return None
         try:
             solid = from_octets(octets)
@@ -100,7 +130,8 @@ class Folder:
             log.warning(
                 "the file %s is damaged (%s) and taken away", path, reason if solid is None else "another solid"
             )
-            path.unlink(missing_ok=True)
+            with contextlib.suppress(OSError):  # another user's
+                path.unlink(missing_ok=True)
             return None
         self._touch(path)
         return solid
@@ -108,11 +139,12 @@ class Folder:
     def _touch(self, path: Path) -> bool:
         """Mark the file as used now; return whether it is there."""
         try:
-            os.utime(path)
+            if not stat.S_ISREG(path.lstat().st_mode):
+                return False
+            with contextlib.suppress(PermissionError):  # another user's file on a shared volume
+                os.utime(path)
         except FileNotFoundError:
             return False
-        except PermissionError:  # another user's file on a shared volume
-            return path.exists()
         return True
 
     def _sync(self) -> None:
@@ -145,36 +177,61 @@ class Folder:
             total -= size
 
 
+def _content(path: Path) -> bytes | None:
+    """Return what is in a file, None if there is none, or something else in its place."""
+    try:
+        handle = os.open(path, _READ)
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        if error.errno in (errno.ELOOP, errno.ENXIO):  # a link, a socket
+            return None
+        raise
+    if not stat.S_ISREG(os.fstat(handle).st_mode):
+        os.close(handle)
+        return None
+    with os.fdopen(handle, "rb") as file:
+        return file.read()
+
+
 def to_octets(solid: Solid) -> bytes:
-    """Return the file of `solid`: an npz archive of its arrays and of the tree they stand in."""
+    """Return the file of `solid`: an npz archive of its arrays, and of the solids that it is made of, operands first,
+    each once."""
     arrays: dict[str, Any] = {}
-    tree = json.dumps(_to_tree(solid, arrays)).encode()
+    nodes: list[dict[str, Any]] = []
+    _add_node(solid, nodes, arrays, {})
     file = io.BytesIO()
-    np.savez(file, tree=np.frombuffer(tree, np.uint8), **arrays)
+    np.savez(file, nodes=np.frombuffer(json.dumps(nodes).encode(), np.uint8), **arrays)
     return file.getvalue()
 
 
-def _to_tree(solid: Any, arrays: dict[str, Any]) -> dict[str, Any]:
-    if solid.type == "csg":  # depth: capped by the engine
-        operands = [_to_tree(operand, arrays) for operand in solid.operands]
-        return {"type": "csg", "operation": solid.operation, "operands": operands}
-    tree = {"type": solid.type}
-    for field in FIELDS[solid.type]:
-        tree[field] = f"array_{len(arrays)}"
-        arrays[tree[field]] = np.asarray(getattr(solid, field))
-    return tree
+def _add_node(solid: Any, nodes: list[dict[str, Any]], arrays: dict[str, Any], places: dict[int, int]) -> int:
+    """Add `solid` to the nodes, unless it is there; return its place. places: by `id`. Depth: capped by the engine."""
+    if id(solid) in places:
+        return places[id(solid)]
+    node: dict[str, Any] = {"type": solid.type}
+    if solid.type == "csg":
+        operands = [_add_node(operand, nodes, arrays, places) for operand in solid.operands]
+        node |= {"operation": solid.operation, "operands": operands}
+    else:
+        for field in FIELDS[solid.type]:
+            node[field] = f"array_{len(arrays)}"
+            arrays[node[field]] = np.asarray(getattr(solid, field))
+    nodes.append(node)
+    places[id(solid)] = len(nodes) - 1
+    return len(nodes) - 1
 
 
 def from_octets(octets: bytes) -> Solid:
     """Return the solid in a file; raises whatever comes up if it is damaged."""
+    made: list[Solid] = []
     with np.load(io.BytesIO(octets), allow_pickle=False) as arrays:
-        return _from_tree(json.loads(arrays["tree"].tobytes()), arrays)
-
-
-def _from_tree(tree: dict[str, Any], arrays: Any) -> Solid:
-    if tree["type"] == "csg":
-        return engine.Csg(tree["operation"], [_from_tree(operand, arrays) for operand in tree["operands"]])
-    return _MAKERS[tree["type"]](*(arrays[tree[field]] for field in FIELDS[tree["type"]]))
+        for node in json.loads(arrays["nodes"].tobytes()):
+            if node["type"] == "csg":
+                made.append(engine.Csg(node["operation"], [made[place] for place in node["operands"]]))
+            else:
+                made.append(_MAKERS[node["type"]](*(arrays[node[field]] for field in FIELDS[node["type"]])))
+    return made[-1]
 
 
 def _split(items: Any, offsets: Any) -> Any:

@@ -65,8 +65,11 @@ SERVICE_STATUS: Final[dict[str, int]] = {
     "unknown_field": 422,
     "unknown_type": 422,
     "limit_exceeded": 422,
+    "answer_too_large": 422,
     "invalid_mesh": 422,
     "queue_full": 503,
+    "store_unavailable": 503,
+    "store_full": 507,
     "not_ready": 503,
     "out_of_memory": 503,
     "internal": 500,
@@ -77,6 +80,7 @@ _RETRY_AFTER: Final = {"Retry-After": "1"}
 _HEADERS: Final[dict[str, dict[str, str]]] = {
     "queue_full": _RETRY_AFTER,
     "not_ready": _RETRY_AFTER,
+    "store_unavailable": _RETRY_AFTER,
     "cancelled": _RETRY_AFTER,
     "out_of_memory": _RETRY_AFTER,
     "missing_key": {"WWW-Authenticate": "Bearer"},
@@ -90,6 +94,9 @@ _PYDANTIC_CODES: Final = {
     "union_tag_not_found": "unknown_type",
     "recursion_loop": "too_deep",
 }
+_MOST_PROBLEM: Final = 1000
+_MOST_PART: Final = 100
+"""Characters of a sentence, and of a field's name in a pointer."""
 _HTTP_CODES: Final = {404: "not_found", 405: "method_not_allowed", 413: "body_too_large", 415: "unsupported_media_type"}
 
 
@@ -133,10 +140,13 @@ def problem(faults: list[Fault], headers: Mapping[str, str] = {}) -> Response:
         "type": PROBLEM_TYPE + first.code,
         "title": HTTPStatus(status).phrase,
         "status": status,
-        "detail": _encodable(first.detail),
+        "detail": _shown(first.detail, _MOST_PROBLEM),
         "code": first.code,
         "errors": [
-            {"pointer": _encodable(pointer(fault.path)), "detail": _encodable(fault.detail)}
+            {
+                "pointer": _shown(pointer(_shown(part, _MOST_PART) for part in fault.path), _MOST_PROBLEM),
+                "detail": _shown(fault.detail, _MOST_PROBLEM),
+            }
             for fault in faults[:MAX_ERRORS]
             if status == 422 or fault.path
         ],
@@ -171,7 +181,7 @@ def faults_of_validation(error: ValidationError, document: Any) -> list[Fault]:
 
 def _sentence(item: Any) -> str:
     """Return what pydantic found as a sentence that says what to do."""
-    name = item["loc"][-1] if item["loc"] else "the body"
+    name = _shown(item["loc"][-1], _MOST_PART) if item["loc"] else "the body"
     if item["type"] == "missing":
         return f"the field {name!r} is missing; add it"
     if item["type"] == "extra_forbidden":
@@ -205,6 +215,8 @@ def _child(value: Any, part: int | str) -> Any:
         return None
 
 
-def _encodable(text: str) -> str:
-    """Return `text` as valid UTF-8: a message may quote half a surrogate pair from the request."""
+def _shown(part: str | int, most: int) -> str:
+    """Return text cut short, as valid UTF-8: a message may quote half a surrogate pair from the request."""
+    text = str(part)
+    text = text if len(text) <= most else text[: most - 3] + "..."
     return text.encode("utf-8", "replace").decode("utf-8")

@@ -4,12 +4,14 @@ A client may offer HTTP/2 with any request (`Upgrade: h2c`; Java's HttpClient do
 ignore it (RFC 9110, 7.8). httptools stops after the headers of such a request, and uvicorn then hands the application
 a request without its body. Here the headers are parsed again without the offer, and what follows them is the body.
 
-Headers that do not arrive in time, or do not end, are answered with 408 or 431, and the connection is closed.
+Headers that do not arrive in time, or do not end, are answered with 408 or 431, what is no HTTP/1.1 with 400, and the
+connection is closed. A client that does not read its answer in time is dropped.
 """
 
 from __future__ import annotations
 
 import asyncio
+import secrets
 from contextlib import suppress
 from functools import cache
 from http import HTTPStatus
@@ -42,6 +44,8 @@ class Protocol(HttpToolsProtocol):
         self._timer: asyncio.TimerHandle | None = None  # runs while headers are waited for
         self._header_bytes = 0
         self._seconds = _settings().header_seconds
+        self._writing: asyncio.TimerHandle | None = None  # runs while the client has to read
+        self._is_refused = False
 
     def connection_made(self, transport: Any) -> None:
         """Start the clock for the first request."""
@@ -49,9 +53,23 @@ class Protocol(HttpToolsProtocol):
         self._start_clock()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Stop the clock."""
+        """Stop the clocks."""
         self._stop_clock()
+        self.resume_writing()
         super().connection_lost(exc)
+
+    def pause_writing(self) -> None:
+        """Give the client some time to read what was written."""
+        super().pause_writing()
+        if self._writing is None:
+            self._writing = self.loop.call_later(_settings().write_seconds, self.transport.abort)
+
+    def resume_writing(self) -> None:
+        """Go on: the client has read nearly all."""
+        if self._writing is not None:
+            self._writing.cancel()
+            self._writing = None
+        super().resume_writing()
 
     def data_received(self, data: bytes) -> None:
         """Parse `data`; headers without end are refused."""
@@ -81,9 +99,10 @@ class Protocol(HttpToolsProtocol):
     def _refuse(self, code: str, detail: str) -> None:
         """Answer before there is a request, and close."""
         self._stop_clock()
+        self._is_refused = True
         if self.transport.is_closing():
             return
-        answer = problem([Fault((), code, detail)], {"connection": "close"})
+        answer = problem([Fault((), code, detail)], {"connection": "close", "x-request-id": secrets.token_hex(8)})
         lines = [f"HTTP/1.1 {answer.status_code} {HTTPStatus(answer.status_code).phrase}".encode()]
         lines += [name + b": " + value for name, value in answer.raw_headers]
         self.transport.write(b"\r\n".join([*lines, b"", bytes(answer.body)]))
@@ -91,13 +110,37 @@ class Protocol(HttpToolsProtocol):
 
     def on_headers_complete(self) -> None:
         """Start the request, unless its headers are to be parsed again."""
-        if not self.parser.is_offer():
+        if self.parser.is_offer() or self._is_refused:
+            return
+        wrong = self._fault_of_headers()
+        if wrong:
+            self._refuse("bad_request", wrong)
+        else:
             self._stop_clock()
             super().on_headers_complete()
+
+    def _fault_of_headers(self) -> str:
+        """Return what HTTP/1.1 forbids about the headers, and the parser lets pass."""
+        n_hosts = sum(name == b"host" for name, _ in self.headers)
+        if n_hosts > 1 or (not n_hosts and self.parser.get_http_version() == "1.1"):
+            return f"a request has one header Host, this one has {n_hosts}; send one"
+        codings = [value.strip().lower() for name, value in self.headers if name == b"transfer-encoding"]
+        if codings and codings != [b"chunked"]:
+            return "the only Transfer-Encoding taken is chunked; compress with Content-Encoding: gzip"
+        return ""
+
+    def send_400_response(self, msg: str) -> None:
+        """Answer what the parser refuses; where an answer is under way already, just close."""
+        if self.cycle is not None and self.cycle.response_started and not self.cycle.response_complete:
+            self.transport.close()
+        else:
+            self._refuse("bad_request", "this is no valid HTTP/1.1 request; correct its first line, headers or chunks")
 
     def on_body(self, body: bytes) -> None:
         """Hand a part of the body on as it is where no other waits: uvicorn copies it into a buffer and out of it."""
         cycle = self.cycle
+        if self._is_refused:
+            return
         if cycle.body or cycle.response_complete or self.parser.is_offer():
             if isinstance(cycle.body, bytes):
                 cycle.body = bytearray(cycle.body)
@@ -110,7 +153,7 @@ class Protocol(HttpToolsProtocol):
 
     def on_message_complete(self) -> None:
         """End the request, unless its headers are to be parsed again."""
-        if not self.parser.is_offer():
+        if not (self.parser.is_offer() or self._is_refused):
             super().on_message_complete()
 
 

@@ -1,7 +1,6 @@
 """The route class: reads a body within its limits, decodes and checks it, calls the endpoint, encodes its answer.
 
-A body is JSON for the endpoint's model, or octets that the endpoint takes as they are (the binary lane). A large one is
-received into one buffer of the declared length.
+A body is JSON for the endpoint's model, or octets that the endpoint takes as they are (the binary lane).
 
 FastAPI describes the routes (parameters, models, the OpenAPI document); this class answers them. FastAPI's own handler
 would decode and check on the event loop, where one large body holds up everybody else's small ones. An endpoint is a
@@ -12,9 +11,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import mmap
+import re
 from collections.abc import Callable, Coroutine, Iterable
-from contextlib import suppress
 from typing import Any, Final
 
 import numpy as np
@@ -22,10 +20,11 @@ from fastapi.routing import APIRoute, APIRouter
 from pydantic import TypeAdapter, ValidationError
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response
-from starlette.types import Receive
+from starlette.types import Receive, Scope, Send
 
 from engine import EngineError
-from service import wire
+from service import body, wire
+from service.body import JSON
 from service.convert.questions import existing, is_light
 from service.errors import STATUS, ServiceError, faults_of, faults_of_validation, problem
 from service.json_arrays import Body
@@ -33,10 +32,10 @@ from service.work import Call, Pool
 
 log = logging.getLogger("service")
 
-JSON: Final = "application/json"
-OCTETS: Final = "application/octet-stream"
-LARGE: Final = 2**22
-"""Bytes from which a body gets memory in large pages: to give 64 MB of small ones back holds all threads for 5 ms."""
+LEAST_COMPRESSED: Final = 2**14
+"""Bytes from which an answer is compressed for those who take it so."""
+_CODING: Final = re.compile(rb"([a-z0-9*-]+)\s*(?:;\s*q=([01](?:\.\d{0,3})?))?\s*(?:,|$)")
+Part = bytes | memoryview
 Query = dict[str, tuple[TypeAdapter[Any], bool]]
 Answer = Callable[[Request], Coroutine[Any, Any, Response]]
 
@@ -64,31 +63,35 @@ class GeometryRoute(APIRoute):
         async def answer(request: Request, call: Call) -> Response:
             state = request.app.state
             try:
+                headers = dict(request.scope["headers"])  # a look-up in the framework's reads them all
+                call.coding = _coding_wanted(headers.get(b"accept-encoding", b""))
+                is_small = True
                 arguments = {**request.path_params, **_queried(request, query)}
-                job = _Job(endpoint, adapter, arguments, call)
+                job = _Job(endpoint, adapter, arguments, call, media_type is not None)
                 if media_type is not None:
-                    headers = dict(request.scope["headers"])  # a look-up in the framework's reads them all
-                    _check_media_type(headers.get(b"content-type", b""), media_type)
-                    state.pool.check_room()
-                    job.body = await _read(request.receive, headers.get(b"content-length", b"0"), call)
-                    job.question = job.body if adapter is None else None
-                if len(job.body) <= call.settings.inline_bytes and state.warm.is_set():
+                    body.check_media_type(headers, media_type)
+                    job.coding = body.coding_of(headers)
+                    declared = body.declared_length(headers, call.settings.max_body_bytes)
+                    is_small = 0 < declared <= call.settings.inline_bytes
+                    if not is_small:
+                        state.pool.check_room()
+                    job.body = await body.read(request.receive, declared, call)
+                if is_small and state.warm.is_set() and adapter is not None and job.coding is None:
                     job.decode()
-                    if is_light(job.question):
-                        call.is_light = True
-                        payload = job.answer()
-                    else:
-                        payload = await _run(state.pool, call, job.answer, request.receive)
+                    call.is_light = is_light(job.question)
+                if call.is_light:
+                    parts = job.answer()
                 else:
-                    payload = await _run(state.pool, call, job.answer, request.receive)
+                    parts = await _run(state.pool, call, job.answer, request.receive, is_small)
+                return _Answer(parts, call, call.status or status)
             except ClientDisconnect:
-                return Response(status_code=STATUS["bad_request"])  # nobody reads it
-            except Exception as error:
-                return _failed(error, request)
-            finally:
                 call.free()
-            headers = {"Server-Timing": call.timing(), **call.headers}
-            return Response(payload, call.status or status, headers, None if payload is None else call.media_type)
+                return Response(status_code=STATUS["bad_request"])  # nobody reads it
+            except BaseException as error:
+                call.free()
+                if not isinstance(error, Exception):
+                    raise
+                return _failed(error, request)
 
         return handle
 
@@ -112,49 +115,109 @@ class _Job:
         adapter: TypeAdapter[Any] | None,
         arguments: dict[str, Any],
         call: Call,
+        takes_body: bool,
     ) -> None:
         self.endpoint = endpoint
+        self.takes_body = takes_body
         self.adapter = adapter
         self.body: Body = b""
+        self.coding: str | None = None
         self.arguments = arguments
         self.call = call
         self.question: Any = None
 
     def decode(self) -> None:
         """Turn the body into the endpoint's model, and let go of it."""
-        if self.adapter is None or self.question is not None:
+        if self.question is not None:
             return
-        body, self.body = self.body, b""
+        text, self.body = self.body, b""
         with self.call.phase("decode"):
-            document = wire.decode_fast(body)
+            if self.coding is not None:
+                text = body.inflated(text, self.coding, self.call)
+            if self.adapter is None:
+                self.question = text
+                return
+            document = wire.decode_fast(text)
             if document is not None:
                 try:
                     self.question = self.adapter.validate_python(document, context=self.call.settings)
                     return
                 except ValidationError:  # the other decoder keeps what pointers need
                     del document
-            document = wire.decode(body)
+            self.call.remaining()
+            self.call.take(wire.cost_of(text))
+            document = wire.decode(text)
             try:
                 self.question = self.adapter.validate_python(document, context=self.call.settings)
             except ValidationError as error:
                 raise _InvalidBody(error, document) from None
 
-    def answer(self) -> bytes | memoryview | None:
-        """Return the encoded answer, None if there is no body."""
-        self.call.remaining()  # it may have waited past its deadline
-        self.decode()
-        if self.question is not None:
+    def answer(self) -> list[Part]:
+        """Return the encoded answer, nothing if it has no body."""
+        call = self.call
+        call.remaining()  # it may have waited past its deadline
+        if self.takes_body:
+            self.decode()
             self.arguments["question"] = self.question
         try:
-            answer = self.endpoint(**self.arguments, call=self.call)
+            answer = self.endpoint(**self.arguments, call=call)
         except (EngineError, ServiceError) as error:
             error.where = existing(self.question, error.where)
             raise
-        with self.call.phase("encode"):
+        if answer is None:
+            return []
+        with call.phase("encode"):
+            parts: Iterable[Part]
             if isinstance(answer, np.ndarray):
-                self.call.media_type = OCTETS
-                return wire.octets(answer)
-            return None if answer is None else wire.encode(answer)
+                call.media_type = body.OCTETS
+                parts = wire.cut(wire.octets(answer))
+            else:
+                parts = wire.encoded(answer)
+            return self._gathered(parts)
+
+    def _gathered(self, parts: Iterable[Part]) -> list[Part]:
+        """Return the parts of an answer, within its limits, compressed if that was asked for and is worth it."""
+        found, size = [], 0
+        for part in parts:
+            self.call.take_part(part)
+            found.append(part)
+            size += len(part)
+        if self.call.coding is None or size < LEAST_COMPRESSED:
+            self.call.coding = None
+            return found
+        return [*wire.compressed(_checked(found, self.call), self.call.coding)]
+
+
+def _checked(parts: list[Part], call: Call) -> Iterable[Part]:
+    for part in parts:
+        call.remaining()
+        yield part
+
+
+class _Answer(Response):
+    """An answer that leaves in parts, as fast as the client reads; what it holds is given back as it leaves."""
+
+    def __init__(self, parts: list[Part], call: Call, status: int) -> None:
+        self._parts, self._call = parts, call
+        headers = {"Server-Timing": call.timing(), **call.headers}
+        if call.coding is not None:
+            headers["Content-Encoding"] = call.coding
+        if parts:
+            headers |= {"Content-Length": str(sum(map(len, parts))), "Vary": "Accept-Encoding"}
+        super().__init__(None, status, headers, call.media_type if parts else None)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Send the parts; the server waits before each until the last has left (protocol.py says for how long)."""
+        parts, n_parts = self._parts, len(self._parts)
+        try:
+            await send({"type": "http.response.start", "status": self.status_code, "headers": self.raw_headers})
+            for i_part in range(n_parts - 1):
+                await send({"type": "http.response.body", "body": parts[i_part], "more_body": True})
+                self._call.take(-len(parts[i_part]))
+                parts[i_part] = b""
+            await send({"type": "http.response.body", "body": parts[-1] if parts else b"", "more_body": False})
+        finally:
+            self._call.free()
 
 
 class _InvalidBody(Exception):
@@ -170,18 +233,17 @@ def _failed(error: Exception, request: Request) -> Response:
     faults = error.faults if isinstance(error, _InvalidBody) else faults_of(error)
     if faults[0].code == "internal":
         log.error("%s %s failed", request.method, request.url.path, exc_info=error)
+    error.with_traceback(None)  # its frames hold the body, and lead back to it
     return problem(faults, getattr(error, "headers", None) or {})
 
 
-def _check_media_type(header: bytes, expected: str) -> None:
-    given = header.decode("latin-1")
-    kind = given.partition(";")[0].strip().lower()
-    is_json = expected == JSON and kind.startswith("application/") and kind.endswith("+json")
-    if kind != expected and not is_json:
-        got = f"got {given[:100]!r}" if given else "got none"
-        error = ServiceError("unsupported_media_type", f"expected the header Content-Type: {expected}, {got}")
-        error.headers = {"Accept-Post": expected}
-        raise error
+def _coding_wanted(header: bytes) -> str | None:
+    """Return how the client would have a large answer compressed; zstd before gzip, since it is faster and smaller."""
+    if not header:
+        return None
+    wanted = _CODING.findall(header.lower())
+    taken = {name for name, weight in wanted if not weight or float(weight)}
+    return next((coding for coding in ("zstd", "gzip") if coding.encode() in taken), None)
 
 
 def _queried(request: Request, query: Query) -> dict[str, Any]:
@@ -200,64 +262,11 @@ def _queried(request: Request, query: Query) -> dict[str, Any]:
     return found
 
 
-async def _read(receive: Receive, length: bytes, call: Call) -> Body:
-    """Return the body, refused as soon as it is known to be too long, declared or not, or too slow."""
-    limit, seconds = call.settings.max_body_bytes, call.settings.body_seconds
-    declared = int(length) if length.isdigit() else 0
-    if declared > limit:
-        raise _too_large(limit)
-    call.take(declared)
-    room = _room(declared) if declared >= LARGE else None
-    parts: list[bytes] = []
-    size, is_more = 0, True
-    try:
-        async with asyncio.timeout(seconds):
-            while is_more:
-                message = await receive()
-                if message["type"] == "http.disconnect":
-                    raise ClientDisconnect
-                part, is_more = message.get("body", b""), message.get("more_body", False)
-                end = size + len(part)
-                if end > limit:
-                    raise _too_large(limit)
-                if end > declared:
-                    call.take(end - max(size, declared))
-                    if room is not None:  # case: a server that does not hold bodies to their declared length
-                        parts, room = [bytes(room[:size])], None
-                if room is None:
-                    parts.append(part)
-                else:
-                    room[size:end] = part
-                size = end
-    except TimeoutError:
-        raise ServiceError("slow_body", f"the body did not arrive within {seconds} s; send it faster") from None
-    if room is not None:
-        return room if size == declared else room[:size]
-    return parts[0] if len(parts) == 1 else b"".join(parts)
-
-
-def _room(size: int) -> bytearray | mmap.mmap:
-    """Return so many bytes; untouched pages take no memory."""
-    if not hasattr(mmap, "MADV_HUGEPAGE"):
-        return bytearray(size)
-    room = mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
-    with suppress(OSError):  # a kernel without large pages
-        room.madvise(mmap.MADV_HUGEPAGE)
-    return room
-
-
-def _too_large(limit: int) -> ServiceError:
-    detail = f"the body is longer than {limit} bytes; send less at once, or raise GEOMETRY_MAX_BODY_BYTES"
-    return ServiceError("body_too_large", detail)
-
-
-async def _run(
-    pool: Pool, call: Call, job: Callable[[], bytes | memoryview | None], receive: Receive
-) -> bytes | memoryview | None:
+async def _run(pool: Pool, call: Call, job: Callable[[], list[Part]], receive: Receive, is_small: bool) -> list[Part]:
     """Run `job` in the pool and throw the call's cancel switch if the client goes away meanwhile."""
     watcher = asyncio.create_task(_watch(call, receive))
     try:
-        return await pool.run(call, job)
+        return await pool.run(call, job, is_small)
     finally:
         watcher.cancel()
 
@@ -265,4 +274,4 @@ async def _run(
 async def _watch(call: Call, receive: Receive) -> None:
     while (await receive())["type"] != "http.disconnect":
         pass
-    call.cancel.set()
+    call.set()

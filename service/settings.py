@@ -67,11 +67,15 @@ class Settings(BaseSettings):
     """Poses of one collision request."""
     max_polygons: Count = 100_000
     """Polygons of one clipping request."""
+    max_answer_bytes: Count = 256 * 2**20
+    """An answer before it is compressed; beyond it the request is refused, with what to ask for instead."""
 
     deadline_seconds: Seconds = 30.0
     """Time from the last byte of the request to the answer; common proxies give up after 60 s."""
     header_seconds: Seconds = 10.0
     """Time for the headers of a request to arrive, from the connection or their first byte."""
+    write_seconds: Seconds = 10.0
+    """Time for a client to read the next some 200 kB of an answer; one that does not is dropped."""
     body_seconds: Seconds = 60.0
     """Time for a body to arrive: a slow sender must not hold its memory for ever."""
     drain_seconds: Seconds = 30.0
@@ -83,7 +87,7 @@ class Settings(BaseSettings):
     inline_bytes: Annotated[int, Field(ge=0)] = 2048
     """Bodies up to this size on simple solids are answered without a thread: a hand-over costs as much as the work."""
     request_bytes: Count = 2**30
-    """Memory for requests under way, four bytes for each byte of a body; beyond it the answer is 503."""
+    """Memory for requests under way, from body to answer: 503 where others hold it, 422 where one wants more alone."""
     store_bytes: Count = 512 * 2**20
     """Memory for stored solids; the least recently used leave first."""
     store_folder: Path | None = None

@@ -27,21 +27,27 @@ VERSION: Final = b"exact-geometry/1"
 """Changes when the meaning of any stored field does."""
 
 
-def solid_id(solid: Solid) -> str:
-    """Return the name of `solid`: 64 hexadecimal digits."""
-    digest = hashlib.sha256()
-    for part in _parts(solid):
-        digest.update(len(part).to_bytes(8, "little"))
-        digest.update(part)
-    return digest.hexdigest()
+def solid_id(solid: Solid, known: dict[int, str] | None = None) -> str:
+    """Return the name of `solid`: 64 hexadecimal digits.
+
+    known: names by `id` of the solids in the tree: each is hashed once, however often it stands there.
+    """
+    known = {} if known is None else known
+    if id(solid) not in known:
+        digest = hashlib.sha256()
+        for part in _parts(solid, known):
+            digest.update(len(part).to_bytes(8, "little"))
+            digest.update(part)
+        known[id(solid)] = digest.hexdigest()
+    return known[id(solid)]
 
 
-def _parts(solid: Any) -> Iterator[Any]:
+def _parts(solid: Any, known: dict[int, str]) -> Iterator[Any]:
     yield VERSION
     yield solid.type.encode()
     if solid.type == "csg":
         yield solid.operation.encode()
-        yield from (solid_id(operand).encode() for operand in solid.operands)  # depth: capped by the engine
+        yield from (solid_id(operand, known).encode() for operand in solid.operands)  # depth: capped by the engine
         return
     for name in FIELDS[solid.type]:
         array = np.asarray(getattr(solid, name))

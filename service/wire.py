@@ -1,28 +1,66 @@
 """Bytes to Python values and back: the only file that knows which JSON library does it.
 
-Decoding: pydantic's own parser (jiter), as fast as orjson and stricter with numbers: integers of any size stay
-integers, 1e400 and NaN arrive as infinity and NaN and are refused later with a pointer. Floats come out as `float()`
-makes them of the same text (tests hold it against many). Nesting ends at 200 levels. Long arrays of numbers in bodies
-without a fault go through simdjson instead (json_arrays.py), with the same result.
+Decoding: jiter, pydantic's own parser, as fast as orjson and stricter: integers of any size stay integers, 1e400 and
+NaN arrive as infinity and NaN and are refused later with a pointer, a field that stands twice is refused. Floats come
+out as `float()` makes them of the same text (tests hold it against many). Nesting ends at 200 levels. Long arrays of
+numbers in bodies without a fault go through simdjson instead (json_arrays.py), with the same result.
 Encoding: orjson, straight from numpy arrays: 8 times faster than pydantic's encoder on booleans, 2.5 times on floats.
-Long lists are encoded in parts, since orjson lets no other thread run meanwhile.
+Long lists are made and encoded in parts, since orjson lets no other thread run meanwhile, and sent so: none is ever
+whole in memory.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any, Final
+import zlib
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, Final, NamedTuple
 
+import jiter
 import numpy as np
 import orjson
+import zstandard
 from pydantic import BaseModel
-from pydantic_core import from_json
 
 from service import json_arrays
 from service.errors import ServiceError
 
 PART: Final = 20_000
-"""Items encoded at once: half a millisecond."""
+"""Numbers encoded at once: half a millisecond."""
+SENT: Final = 2**17
+"""Bytes sent at once, about: parts are put together up to that."""
+_COSTS: Final = {b"{": 1000, b"[": 100, b",": 32}
+"""Bytes that Python holds for an object and the model of it, a list, a number."""
+_BOM: Final = b"\xef\xbb\xbf"
+
+
+class Series(NamedTuple):
+    """A list of an answer whose items are made when they are written.
+
+    make: returns the items from one index up to another. n: how many there are. weight: numbers in one, about; where
+    they differ, offsets (n + 1,) says how many stand before each.
+    """
+
+    n: int
+    make: Callable[[int, int], list[Any]]
+    weight: int = 1
+    offsets: Any = None
+
+    def cuts(self) -> Iterator[tuple[int, int]]:
+        """Yield where parts begin and end."""
+        start = 0
+        while start < self.n:  # bound: each turn takes an item at least
+            stop = start + max(1, PART // self.weight)
+            if self.offsets is not None:
+                most = np.searchsorted(self.offsets, self.offsets[start] + PART, "right") - 1
+                stop = min(stop, max(start + 1, int(most)))
+            yield start, min(stop, self.n)
+            start = stop
+
+    @property
+    def is_long(self) -> bool:
+        """Whether it is made in parts."""
+        n_numbers = self.n * self.weight if self.offsets is None else self.offsets[-1]
+        return bool(max(self.n, n_numbers) > PART)
 
 
 def decode_fast(body: json_arrays.Body) -> Any:
@@ -38,18 +76,48 @@ def decode_fast(body: json_arrays.Body) -> Any:
 
 def decode(body: json_arrays.Body) -> Any:
     """Return the value that the JSON text `body` stands for; `not_json` otherwise."""
-    text = body if isinstance(body, (bytes, bytearray)) else bytes(memoryview(body))
+    text = bytes(memoryview(body))
     try:
-        return from_json(text, cache_strings="keys")
+        return jiter.from_json(text, cache_mode="keys", catch_duplicate_keys=True)
     except ValueError as error:
-        raise ServiceError("not_json", f"the body is no JSON that is taken here: {error}") from None
+        raise ServiceError("not_json", _refusal(text, str(error))) from None
+
+
+def cost_of(body: json_arrays.Body) -> int:
+    """Return how many bytes decoding holds at most beyond what is counted for each byte: short lists and objects take
+    far more than their text."""
+    if len(body) < json_arrays.LEAST:
+        return 0
+    counts = dict.fromkeys(_COSTS, 0)
+    for start in range(0, len(body), json_arrays.STEP):
+        part = body[start : start + json_arrays.STEP]
+        for mark in counts:
+            counts[mark] += part.count(mark)
+    return max(0, sum(cost * counts[mark] for mark, cost in _COSTS.items()) - 2 * len(body))
+
+
+def _refusal(text: bytes, found: str) -> str:
+    if not text.strip():
+        return "the body is empty; send a JSON object, /docs has an example for each call"
+    if text.startswith(_BOM):
+        return "the body begins with a byte order mark; send it as UTF-8 without one"
+    if text[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return "the body is UTF-16; send it as UTF-8"
+    what = "leave one of the two out" if found.startswith("Detected duplicate key") else "correct it there"
+    return f"the body is no JSON that is taken here: {found:.200}; {what}"
 
 
 def encode(answer: Any) -> bytes:
     """Return an answer model as JSON; arrays may stand wherever the schema has lists."""
+    return b"".join(encoded(answer))
+
+
+def encoded(answer: Any) -> Iterator[bytes]:
+    """Yield the JSON of an answer in parts, one where it is short."""
     if isinstance(answer, BaseModel) and any(map(_is_long, vars(answer).values())):
-        return b"".join(_pieces(answer))
-    return _dumps(answer)
+        yield from _together(_pieces(answer))
+    else:
+        yield _dumps(answer)
 
 
 def _dumps(value: Any) -> bytes:
@@ -57,11 +125,26 @@ def _dumps(value: Any) -> bytes:
 
 
 def _is_long(value: Any) -> bool:
+    if isinstance(value, Series):
+        return value.is_long
     return isinstance(value, (np.ndarray, list)) and len(value) > PART
 
 
+def _together(pieces: Iterable[bytes | memoryview]) -> Iterator[bytes]:
+    """Yield short pieces put together."""
+    kept: list[bytes | memoryview] = []
+    size = 0
+    for piece in pieces:
+        kept.append(piece)
+        size += len(piece)
+        if size >= SENT:
+            yield b"".join(kept)
+            kept, size = [], 0
+    if kept:
+        yield b"".join(kept)
+
+
 def _pieces(answer: BaseModel) -> Iterator[bytes | memoryview]:
-    """Yield the text of an answer, its long lists in parts: as one text it would be copied once more."""
     lead = b"{"
     for name, item in vars(answer).items():
         if item is not None:
@@ -72,11 +155,17 @@ def _pieces(answer: BaseModel) -> Iterator[bytes | memoryview]:
 
 
 def _parts(items: Any) -> Iterator[bytes | memoryview]:
-    yield b"["
-    for start in range(0, len(items), PART):
-        if start:
-            yield b","
-        yield memoryview(_dumps(items[start : start + PART]))[1:-1]
+    cuts: Iterable[tuple[int, int]]
+    if isinstance(items, Series):
+        cuts, make = items.cuts(), items.make
+    else:
+        cuts = ((start, start + PART) for start in range(0, len(items), PART))
+        make = lambda start, stop: items[start:stop]  # noqa: E731
+    lead = b"["
+    for start, stop in cuts:
+        yield lead
+        yield memoryview(_dumps(make(start, stop)))[1:-1]
+        lead = b","
     yield b"]"
 
 
@@ -86,9 +175,27 @@ def octets(array: Any) -> memoryview:
     return np.ascontiguousarray(little).reshape(-1).view(np.uint8).data
 
 
+def cut(text: memoryview) -> Iterator[memoryview]:
+    """Yield a long text in parts, one where it is empty."""
+    for start in range(0, max(1, len(text)), SENT):
+        yield text[start : start + SENT]
+
+
+def compressed(parts: Iterable[Any], coding: str) -> Iterator[bytes]:
+    """Yield the parts of a text compressed, gzip or zstd, at their fastest."""
+    if coding == "gzip":
+        deflater: Any = zlib.compressobj(1, wbits=16 + zlib.MAX_WBITS)
+    else:
+        deflater = zstandard.ZstdCompressor(1).compressobj()
+    yield from _together(deflater.compress(part) for part in parts)
+    yield deflater.flush()
+
+
 def _plain(value: Any) -> Any:
     if isinstance(value, BaseModel):
         return {name: _in_parts(item) for name, item in vars(value).items() if item is not None}
+    if isinstance(value, Series):
+        return value.make(0, value.n)
     if isinstance(value, np.ndarray):
         return np.ascontiguousarray(value) if value.size else value.tolist()
     raise TypeError(f"{type(value).__name__} has no place in an answer")

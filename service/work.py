@@ -7,15 +7,17 @@ cut themselves into chunks of 1-3 ms over the engine's own pool, so short reques
 from __future__ import annotations
 
 import asyncio
+import ctypes
+import os
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sized
 from concurrent.futures import ThreadPoolExecutor
 from typing import Annotated, Any, Final, TypeVar
 
 from fastapi import Depends
 
-from engine import Accuracy, Cancel, DeadlineExceededError, EngineError
+from engine import Accuracy, Cancel, CancelledError, DeadlineExceededError, EngineError
 from service.errors import ServiceError
 from service.settings import Settings
 from service.store import Store
@@ -24,25 +26,39 @@ T = TypeVar("T")
 Where = tuple[str | int, ...]
 FOOTPRINT: Final = 4
 """Bytes held for each byte of a body, at most: itself, its numbers, a solid of them, the answer."""
+SMALL: Final = 2**16
+"""Bytes that a request is given whatever others hold: there are no more requests than fit into the queue."""
+_MUCH: Final = 2**25
+"""Bytes that a request held from which on the system gets back what was freed."""
+_trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if os.name == "posix" else None
+"""glibc keeps what was freed in arenas of each thread, some hundred MB after a large request."""
+_INSTEAD: Final = {
+    "locate_scene": "ask for fewer points or bodies at once",
+    "collide_scene": "split the scene, or name the pairs to look at in `only`",
+    "collide_poses": "ask for fewer poses at once",
+    "clip_segments": "send fewer segments at once",
+    "clip_polygons": "send fewer polygons at once",
+    "overlay": "cut both polygons by windows first and overlay window by window",
+}
+"""What to ask where an answer would be too large."""
 PHASES: Final = ("decode", "prepare", "compute", "encode")
 
 
 class Memory:
-    """Bytes of bodies under way, each counted with what is made of it; touched on the event loop only."""
+    """Bytes that requests under way hold, or may come to hold; safe to share between threads."""
 
     def __init__(self, limit: int) -> None:
-        self._limit = limit
+        self.limit = limit
         self.taken = 0
+        self.lock = threading.Lock()
 
-    def take(self, size: int) -> None:
-        """Count `size` more bytes (fewer if negative); `out_of_memory` beyond the limit, with nothing counted."""
-        if size > 0 and FOOTPRINT * (self.taken + size) > self._limit:
-            raise ServiceError(
-                "out_of_memory",
-                f"{self.taken} bytes of bodies are under way, and {size} more would need too much memory; try again, "
-                "send less at once, or raise GEOMETRY_REQUEST_BYTES",
-            )
-        self.taken += size
+    def refusal(self, size: int) -> ServiceError:
+        """Return what is said where there is no room for so many bytes more."""
+        detail = (
+            f"requests under way hold {self.taken} bytes, and {size} more would be too many; try again, send less at "
+            "once, or raise GEOMETRY_REQUEST_BYTES"
+        )
+        return ServiceError("out_of_memory", detail)
 
 
 class _Phase:
@@ -60,21 +76,28 @@ class _Phase:
         self._seconds[self._name] += time.perf_counter() - self._before
 
 
-class Call:
-    """One request under way: its limits, the store, its deadline and cancel switch, the time each phase took."""
+class Call(Cancel):
+    """One request under way: its limits, the store, its deadline, the time each phase took, and the memory it holds.
+
+    It is the switch that the engine is given, to end it, and to be told of the size of what it gathers.
+    """
 
     __slots__ = (
-        "_memory", "_taken", "cancel", "end", "headers", "is_light", "media_type", "seconds", "settings", "status",
-        "store",
+        "_answer", "_memory", "_most", "_taken", "coding", "end", "headers", "instead", "is_light", "media_type",
+        "seconds", "settings", "status", "store",
     )  # fmt: skip
 
     def __init__(self, settings: Settings, store: Store, memory: Memory) -> None:
+        super().__init__()
         self.settings = settings
         self.store = store
         self._memory = memory
-        self._taken = 0
+        self._taken = self._answer = self._most = 0
         self.media_type = "application/json"
-        self.cancel = Cancel()
+        self.coding: str | None = None
+        """How the answer is compressed."""
+        self.instead: str | None = None
+        """What to ask for where the answer would be too large, once it is asked for."""
         self.is_light = False  # then it ends before a deadline's timer could be started
         self.end = time.monotonic() + settings.deadline_seconds
         self.seconds = dict.fromkeys(PHASES, 0.0)
@@ -85,18 +108,49 @@ class Call:
         """Count the time spent inside under `name`."""
         return _Phase(self.seconds, name)
 
-    def take(self, size: int) -> None:
-        """Account for so many more bytes of a body; `out_of_memory` if there are too many under way."""
-        self._memory.take(size)
-        self._taken += size
+    def take(self, n_bytes: int) -> None:
+        """Account for so many bytes more (fewer if negative): of the body, of what is made of it, of the answer.
+
+        Raises, with nothing counted: `body_too_large` or `answer_too_large` where this request alone would hold more
+        than all may, `out_of_memory` where others hold what it needs; what takes next to nothing is always given.
+        """
+        memory = self._memory
+        with memory.lock:
+            if n_bytes > 0 and self._taken + n_bytes > SMALL:
+                if self._taken + n_bytes > memory.limit:
+                    raise self._too_large(memory.limit, "GEOMETRY_REQUEST_BYTES")
+                if memory.taken + n_bytes > memory.limit:
+                    raise memory.refusal(n_bytes)
+            memory.taken += n_bytes
+            self._taken += n_bytes
+            self._most = max(self._most, self._taken)
+
+    def take_part(self, part: Sized) -> None:
+        """Account for a part of the answer; `answer_too_large` beyond its limit."""
+        self.remaining()
+        self._answer += len(part)
+        if self._answer > self.settings.max_answer_bytes:
+            raise self._too_large(self.settings.max_answer_bytes, "GEOMETRY_MAX_ANSWER_BYTES")
+        self.take(len(part))
+
+    def _too_large(self, limit: int, setting: str) -> ServiceError:
+        what = "this body" if self.instead is None else "the answer"
+        detail = f"{what} would need more than {limit} bytes; {self.instead or 'send less at once'}, or raise {setting}"
+        return ServiceError("body_too_large" if self.instead is None else "answer_too_large", detail)
 
     def free(self) -> None:
         """Account for the end of the request."""
-        self._memory.take(-self._taken)
-        self._taken = 0
+        with self._memory.lock:
+            self._memory.taken -= self._taken
+            self._taken = 0
+        if self._most > _MUCH and _trim is not None:
+            self._most = 0
+            threading.Thread(target=_trim, args=(0,), daemon=True).start()
 
     def remaining(self) -> float:
-        """Return the seconds left; `deadline_exceeded` if there are none."""
+        """Return the seconds left; `deadline_exceeded` if there are none, `cancelled` if nobody waits any more."""
+        if self.is_set:
+            raise CancelledError("the request was cancelled; send it again")
         left = self.end - time.monotonic()
         if left <= 0:
             raise self._too_late()
@@ -121,7 +175,8 @@ class Call:
         where: turns the path of an engine error, which starts with the argument's name, into one in the request.
         """
         if not self.is_light:
-            options.update(deadline=self.remaining(), cancel=self.cancel)
+            self.instead = _INSTEAD.get(function.__name__, "ask for less at once")
+            options.update(deadline=self.remaining(), cancel=self)
         with self.phase("compute"):
             try:
                 result, accuracy = function(*arguments, report=True, **options)
@@ -145,45 +200,57 @@ def _no_call() -> None:
 CallOf = Annotated[Call, Depends(_no_call)]
 
 
-class Pool:
+class _Lane:
     """A few threads behind a queue of bounded length."""
 
+    def __init__(self, settings: Settings, name: str) -> None:
+        self.executor = ThreadPoolExecutor(settings.concurrency, thread_name_prefix=name)
+        self.room = settings.concurrency + settings.queue_length
+        self.under_way: set[Call] = set()
+
+    def check_room(self) -> None:
+        count = len(self.under_way)
+        if count >= self.room:
+            raise ServiceError("queue_full", f"{count} requests are under way, the most that are taken; try again")
+
+
+class Pool:
+    """Two lanes, so that small questions need not wait behind large ones."""
+
     def __init__(self, settings: Settings) -> None:
-        self._executor = ThreadPoolExecutor(settings.concurrency, thread_name_prefix="request")
-        self._room = settings.concurrency + settings.queue_length
-        self._under_way: set[Call] = set()
+        self._lanes = {False: _Lane(settings, "request"), True: _Lane(settings, "small")}
         self._lock = threading.Lock()
 
     def check_room(self) -> None:
-        """Raise `queue_full` if another job would not be taken now."""
-        count = len(self._under_way)
-        if count >= self._room:
-            raise ServiceError("queue_full", f"{count} requests are under way, the most that are taken; try again")
+        """Raise `queue_full` if another large question would not be taken now."""
+        self._lanes[False].check_room()
 
-    async def run(self, call: Call, job: Callable[[], T]) -> T:
+    async def run(self, call: Call, job: Callable[[], T], is_small: bool) -> T:
         """Run `job` in a thread; if this coroutine is cancelled, the call's switch is thrown."""
+        lane = self._lanes[is_small]
         with self._lock:
-            self.check_room()
-            self._under_way.add(call)
+            lane.check_room()
+            lane.under_way.add(call)
         try:
-            future = self._executor.submit(job)
+            future = lane.executor.submit(job)
         except RuntimeError:  # closed between two steps of this request
-            self._forget(call)
+            self._forget(lane, call)
             raise ServiceError("queue_full", "the service is shutting down; try again") from None
-        future.add_done_callback(lambda _: self._forget(call))
+        future.add_done_callback(lambda _: self._forget(lane, call))
         try:
             return await asyncio.wrap_future(future)
         except asyncio.CancelledError:
-            call.cancel.set()
+            call.set()
             raise
 
     def close(self) -> None:
         """Cancel what still runs and let the threads end."""
         with self._lock:
-            for call in self._under_way:
-                call.cancel.set()
-        self._executor.shutdown(wait=True, cancel_futures=True)
+            for call in [call for lane in self._lanes.values() for call in lane.under_way]:
+                call.set()
+        for lane in self._lanes.values():
+            lane.executor.shutdown(wait=True, cancel_futures=True)
 
-    def _forget(self, call: Call) -> None:
+    def _forget(self, lane: _Lane, call: Call) -> None:
         with self._lock:
-            self._under_way.discard(call)
+            lane.under_way.discard(call)

@@ -129,8 +129,11 @@ def clip_chunk(
                 tuple(range(d)),
             )
         budget.check()
+        budget.take(2 * out[: written * d].nbytes)
         parts.append(out[: written * d].reshape(-1, d))
-        room = room if reached > done else 2 * room
+        if reached == done:
+            room *= 2
+            budget.take(room * d * out.itemsize)
         done = reached
     vertices = parts[0] if len(parts) == 1 else np.concatenate([np.zeros((0, d)), *parts])
     if scene.exponent:

@@ -19,7 +19,15 @@ from engine.polygon_overlay.nearest import leave_nearest
 from engine.polygon_overlay.result import Output, Overlay
 from engine.polygon_overlay.ring_bits import assign_bits, boxes_of, rings_meant
 from engine.polygon_overlay.rounds import ArrangedAgain, RoundedRings, settle_rings
-from engine.polygon_overlay.run_pair import NO_BITS, NOT_REDUCED, OVERLAY_PAIRS, FoundPair, entry_of, run_pair
+from engine.polygon_overlay.run_pair import (
+    BY_CONTACT,
+    NO_BITS,
+    NOT_REDUCED,
+    OVERLAY_PAIRS,
+    FoundPair,
+    entry_of,
+    run_pair,
+)
 from engine.predicates.scaling import exponent_of, scaled_back, shifted
 from engine.types import OPEN
 
@@ -127,6 +135,7 @@ def run_kernel(
         keep(scratch, n_vertices, used, filled)
         if needs == NEEDS_CONTACTS:
             n_contacts = more_contacts(scratch.n_contacts)
+            budget.take(BY_CONTACT * n_contacts)
         elif needs == NEEDS_OUTPUT:
             n_out_rings, n_out = (max(m, int(outcomes.counts[reached, k])) for k, m in ((1, n_out_rings), (2, n_out)))
     return Found(*outcomes, *(parts[0] if len(parts) == 1 else put_together(parts)))

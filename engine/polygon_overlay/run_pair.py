@@ -33,6 +33,9 @@ _BLOCKS_GROW: Final = 10_000
 """Edges of a block, and vertices from which on it has twice as many: less to look at, and more around a crossing."""
 _MOST: Final = 0.5
 """Part of all edges that may be looked at one by one so that leaving out the others pays."""
+BY_CONTACT: Final = 300
+_BY_VERTEX: Final = 200
+"""Bytes of scratch and answer for each of them, at most."""
 _FEW_CONTACTS: Final = 1024
 _FEW_PIECES: Final = 64
 """Pieces without holes up to which offsets are kept, since many results have the same."""
@@ -89,6 +92,8 @@ def run_blocks(
     else:
         reduced, n_contacts, n_out, n_out_rings = NOT_REDUCED, max(256, 4 * n_vertices), 8 + n_vertices, 2
     n_touched = n_vertices
+    if n_vertices >= _MANY:
+        budget.take(_BY_VERTEX * n_vertices)
     while True:  # bound: each turn makes room, geometrically
         scratch = scratch_for(n_vertices, n_rings, n_contacts, n_out, n_out_rings)
         if size:
@@ -119,6 +124,7 @@ def run_blocks(
         keep(scratch, n_touched, used, n)
         if needs == NEEDS_CONTACTS:
             n_contacts = more_contacts(scratch.n_contacts)
+            budget.take(BY_CONTACT * n_contacts)
         else:
             n_out_rings, n_out = int(counts[0, 1]), int(counts[0, 2])
     made = None

@@ -32,6 +32,9 @@ _LEAST_ROOM: Final = 1 << 8
 """Contacts, or pieces, looked for at once; doubled where one segment has more."""
 _CONTACTS: Final = 4
 """Of each segment of a group; likewise."""
+_BYTES: Final = 180
+_BYTES_EXACT: Final = 600
+"""Of a piece, in its part and joined; as Python holds it."""
 
 
 def clip_chunk(
@@ -70,6 +73,7 @@ def _settle(
         if done[0] == reached:
             room *= 2  # of rows, if not of contacts
         m = int(done[1])
+        budget.take(_BYTES * m)
         parts.append(Pieces(pieces.source[:m], pieces.ends[:, :m], pieces.t[:m], pieces.faces[:m]))
     return parts or [room_for(0, segments.shape[2])], state
 
@@ -102,6 +106,7 @@ def _exact(
             found_here = list(pieces_of(p, q, near, (at_start, at_end), locate, budget.check))
         sources += [int(chosen[i])] * len(found_here)
         pieces += found_here
+        budget.take(_BYTES_EXACT * len(found_here))
     ends = np.array([(piece.start, piece.end) for piece in pieces], np.float64).reshape(-1, 2, segments.shape[2]) + 0.0
     return Pieces(
         np.array(sources, np.int64),

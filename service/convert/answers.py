@@ -1,4 +1,4 @@
-"""Answers: the engine's results to answer models. They hold arrays as they are; `wire.encode` writes them."""
+"""Answers: the engine's results to answer models, arrays as they are, long lists as `Series`; `wire` writes them."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import engine
 from engine import Solid
 from service.schemas import bounds, collision, containment, overlay, polygons, segments, solids
 from service.schemas.problem import Accuracy
+from service.wire import Series
 
 _BOUNDARY: Final = int(engine.Location.BOUNDARY)  # numpy compares with an enum's member more slowly
 
@@ -56,17 +57,26 @@ def from_locations(locations: Any, accuracy: engine.Accuracy) -> containment.Con
 
 def from_scene_locations(found: engine.SceneLocations, accuracy: engine.Accuracy) -> containment.ContainsSceneResponse:
     """Return the answer of `contains/scene`: ragged arrays as lists of lists."""
-    on_boundary = np.asarray(found.on_boundary, bool)
-    before = np.concatenate([[0], np.cumsum(on_boundary)])
+    offsets, n_points = found.offsets, len(found.offsets) - 1
+
+    def bodies(start: int, stop: int) -> list[Any]:
+        return _split(found.indices[offsets[start] : offsets[stop]], offsets[start : stop + 1])
+
+    def boundary(start: int, stop: int) -> list[Any]:
+        held = slice(offsets[start], offsets[stop])
+        before = np.concatenate([[0], np.cumsum(found.on_boundary[held])])
+        kept = found.indices[held][found.on_boundary[held]]
+        return _split(kept, before[offsets[start : stop + 1] - offsets[start]])
+
     return containment.ContainsSceneResponse.made(
-        bodies=_split(found.indices, found.offsets),
-        boundary=_split(found.indices[on_boundary], before[found.offsets]),
+        bodies=Series(n_points, bodies, offsets=offsets),
+        boundary=Series(n_points, boundary, offsets=offsets),
         accuracy=from_accuracy(accuracy),
     )
 
 
 def _split(items: Any, offsets: Any) -> list[list[int]]:
-    flat, ends = items.tolist(), offsets.tolist()
+    flat, ends = items.tolist(), (offsets - offsets[0]).tolist()
     return [flat[start:stop] for start, stop in pairwise(ends)]
 
 
@@ -82,22 +92,31 @@ def from_bounds(found: engine.Bounds, accuracy: engine.Accuracy) -> bounds.Bound
 def from_pieces(pieces: engine.SegmentPieces, accuracy: engine.Accuracy) -> segments.ClipSegmentsResponse:
     """Return the answer of `clip/segments`."""
     columns = (pieces.source, pieces.start, pieces.end, pieces.t, pieces.faces)
-    return segments.ClipSegmentsResponse.made(
-        pieces=[
+
+    def some(start: int, stop: int) -> list[Any]:
+        return [
             {"segment": source, "start": start, "end": end, "t": t, "faces": faces}
-            for source, start, end, t, faces in zip(*(column.tolist() for column in columns))
-        ],
-        accuracy=from_accuracy(accuracy),
+            for source, start, end, t, faces in zip(*(column[start:stop].tolist() for column in columns))
+        ]
+
+    return segments.ClipSegmentsResponse.made(
+        pieces=Series(len(pieces.source), some, weight=10), accuracy=from_accuracy(accuracy)
     )
 
 
 def from_overlay(result: engine.Overlay, accuracy: engine.Accuracy) -> overlay.OverlayResponse:
     """Return the answer of `overlay`."""
+    rings, vertices = result.ring_offsets, result.vertices
+
+    def pieces(start: int, stop: int) -> list[Any]:
+        found = []
+        for first, last in pairwise(result.piece_offsets[start : stop + 1].tolist()):
+            shell, *holes = [_closed(vertices[i:j]) for i, j in pairwise(rings[first : last + 1].tolist())]
+            found.append(overlay.OverlayPiece.made(shell=shell, holes=holes))
+        return found
+
     return overlay.OverlayResponse.made(
-        pieces=[
-            overlay.OverlayPiece.made(shell=_closed(piece.shell), holes=[_closed(hole) for hole in piece.holes])
-            for piece in result.pieces
-        ],
+        pieces=Series(result.n_pieces, pieces, weight=10, offsets=rings[result.piece_offsets]),
         area=_area(lambda: result.area),
         collapsed=[
             overlay.OverlayCollapse.made(kind=part.kind, area=_area(part.area.__float__), near=part.near)
@@ -135,17 +154,21 @@ def _area(nearest: Callable[[], float]) -> float | None:
 
 def from_clipped(clipped: engine.ClippedPolygons, accuracy: engine.Accuracy) -> polygons.ClipPolygonsResponse:
     """Return the answer of `clip/polygons`."""
-    offsets = clipped.polygon_offsets.tolist()
-    return polygons.ClipPolygonsResponse.made(
-        polygons=[
+    offsets = clipped.polygon_offsets
+
+    def some(first: int, last: int) -> list[Any]:
+        return [
             polygons.ClippedPolygon.made(
                 rings=clipped.rings(i_polygon),
                 contours=clipped.contours[start:stop],
                 status=engine.PolygonStatus(clipped.status[i_polygon]).name.lower(),
                 may_have_bridges=bool(clipped.may_have_bridges[i_polygon]),
             )
-            for i_polygon, (start, stop) in enumerate(pairwise(offsets))
-        ],
+            for i_polygon, (start, stop) in enumerate(pairwise(offsets[first : last + 1].tolist()), first)
+        ]
+
+    return polygons.ClipPolygonsResponse.made(
+        polygons=Series(len(clipped), some, weight=10, offsets=clipped.ring_offsets[offsets]),
         accuracy=from_accuracy(accuracy),
     )
 
@@ -160,23 +183,27 @@ def from_collision(collision_: engine.Collision, accuracy: engine.Accuracy) -> c
 
 def from_pose_collisions(found: Any, accuracy: engine.Accuracy) -> collision.CollideResponse:
     """Return the answer of `collide` for many poses."""
-    relations, witnesses, *details = found
-    return collision.CollideResponse.made(
-        collisions=[
+    relations, witnesses, *rest = found
+    details = rest[0] if rest else None
+
+    def some(start: int, stop: int) -> list[Any]:
+        return [
             _collision_answer(engine.Relation(relation), witness, detail)
             for relation, witness, detail in zip(
-                relations.tolist(), witnesses, _details(details[0] if details else None, len(relations))
+                relations[start:stop].tolist(), witnesses[start:stop], _details(details, start, stop)
             )
-        ],
-        accuracy=from_accuracy(accuracy),
+        ]
+
+    return collision.CollideResponse.made(
+        collisions=Series(len(relations), some, weight=10), accuracy=from_accuracy(accuracy)
     )
 
 
-def _details(codes: Any, n_items: int) -> list[engine.Rcc8 | None]:
-    """Return the relations of RCC-8 of `n_items` pairs: None where none was asked for (codes None), or none is."""
+def _details(codes: Any, start: int, stop: int) -> list[engine.Rcc8 | None]:
+    """Return the relations of RCC-8 of some pairs: None where none was asked for (codes None), or none is."""
     if codes is None:
-        return [None] * n_items
-    return [None if code < 0 else engine.Rcc8(code) for code in codes.tolist()]
+        return [None] * (stop - start)
+    return [None if code < 0 else engine.Rcc8(code) for code in codes[start:stop].tolist()]
 
 
 def _collision_answer(
@@ -202,11 +229,18 @@ def _witness(witness: engine.Witness) -> collision.CollisionWitness:
 def from_scene_pairs(pairs: engine.ScenePairs, accuracy: engine.Accuracy) -> collision.CollideSceneResponse:
     """Return the answer of `collide/scene`."""
     labels = [relation.label for relation in engine.Relation]
-    found = [
-        {"first": first, "second": second, "relation": labels[code]}
-        for first, second, code in zip(pairs.first.tolist(), pairs.second.tolist(), pairs.relation.tolist())
-    ]
-    for pair, detail in zip(found, _details(pairs.detail, len(found))):
-        if detail is not None:
-            pair["detail"] = detail.label
-    return collision.CollideSceneResponse.made(pairs=found, accuracy=from_accuracy(accuracy))
+    columns = (pairs.first, pairs.second, pairs.relation)
+
+    def some(start: int, stop: int) -> list[Any]:
+        found = [
+            {"first": first, "second": second, "relation": labels[code]}
+            for first, second, code in zip(*(column[start:stop].tolist() for column in columns))
+        ]
+        for pair, detail in zip(found, _details(pairs.detail, start, stop)):
+            if detail is not None:
+                pair["detail"] = detail.label
+        return found
+
+    return collision.CollideSceneResponse.made(
+        pairs=Series(len(pairs.first), some, weight=4), accuracy=from_accuracy(accuracy)
+    )

@@ -48,8 +48,9 @@ def check_is_convex(region: engine.Solid) -> engine.Solid:
     return region
 
 
-def from_pieces(pieces: engine.SegmentPieces, n_segments: int, dimension: int) -> Any:
+def from_pieces(pieces: engine.SegmentPieces, n_segments: int, dimension: int, call: Call) -> Any:
     """Return both ends of what remains of each segment, NaN where nothing does."""
+    call.take(16 * n_segments * dimension)
     ends = np.full((n_segments, 2, dimension), np.nan)
     ends[pieces.source, 0] = pieces.start
     ends[pieces.source, 1] = pieces.end

@@ -34,11 +34,34 @@ class _Builder:
         self._n_nodes = 0
 
     def build(self, model: solids.Solid, where: Where, depth: int) -> Solid:
-        settings, member = self._call.settings, model.root
-        self._n_nodes += 1
+        member = model.root
+        self._count(1, depth, where)
+        if isinstance(member, solids.StoredSolid):
+            try:
+                solid = self._call.store.get(member.id)
+            except ServiceError as error:
+                error.where = (*where, "id")
+                raise
+            if depth > 1 and isinstance(solid, engine.Csg):
+                self._count(solid.n_leaves - 1, depth + solid.depth, where)
+            return solid
+        if isinstance(member, solids.CsgSolid):
+            operands = [
+                self.build(operand, (*where, "operands", i_operand), depth + 1)
+                for i_operand, operand in enumerate(member.operands)
+            ]
+            return _checked(where, lambda: engine.Csg(member.operation, operands))
+        return _checked(where, lambda: _BUILDERS[member.type](member))
+
+    def _count(self, n_nodes: int, depth: int, where: Where) -> None:
+        """Count so many solids more of the whole tree, what stands in stored ones included."""
+        settings = self._call.settings
+        self._call.remaining()
+        self._n_nodes += n_nodes
         if self._n_nodes > settings.max_csg_nodes:
             detail = (
-                f"the tree has more than {settings.max_csg_nodes} solids; split it, or raise GEOMETRY_MAX_CSG_NODES"
+                f"the tree has more than {settings.max_csg_nodes} solids, with those that stored ones are made of; "
+                "split it, or raise GEOMETRY_MAX_CSG_NODES"
             )
             raise ServiceError("limit_exceeded", detail, where)
         if depth > settings.max_csg_depth + 1:
@@ -47,19 +70,6 @@ class _Builder:
                 "many operands), or raise GEOMETRY_MAX_CSG_DEPTH"
             )
             raise ServiceError("too_deep", detail, where)
-        if isinstance(member, solids.StoredSolid):
-            try:
-                return self._call.store.get(member.id)
-            except ServiceError as error:
-                error.where = (*where, "id")
-                raise
-        if isinstance(member, solids.CsgSolid):
-            operands = [
-                self.build(operand, (*where, "operands", i_operand), depth + 1)
-                for i_operand, operand in enumerate(member.operands)
-            ]
-            return _checked(where, lambda: engine.Csg(member.operation, operands))
-        return _checked(where, lambda: _BUILDERS[member.type](member))
 
 
 def _checked(where: Where, build: Callable[[], Solid]) -> Solid:

@@ -22,14 +22,14 @@ _OF_BODY: Final = {
     422: "The geometry breaks a rule; `code` says which, each pointer where.",
 }
 _OF_ALL: Final = {
-    503: "Too many requests are under way: try again after the time in Retry-After.",
+    503: "Too many requests are under way, or the store cannot be used: try again after the time in Retry-After.",
     504: "The deadline passed: ask for less at once.",
 }
 
 
 def responses(*statuses: int) -> dict[int | str, dict[str, Any]]:
     """Return the description of the error answers with these statuses."""
-    texts = {**_OF_BODY, **_OF_ALL}
+    texts = {**_OF_BODY, **_OF_ALL, 507: "The store's folder is full: send the solid with each request."}
     return {
         status: {"description": texts.get(status, HTTPStatus(status).phrase), "content": _PROBLEM}
         for status in statuses

@@ -8,8 +8,9 @@ from fastapi import APIRouter, Body, Query
 from pydantic import WithJsonSchema
 
 import engine
+from service.body import OCTETS
 from service.convert import meshes, octets
-from service.route import OCTETS, GeometryRoute
+from service.route import GeometryRoute
 from service.routes.base import responses
 from service.routes.solids import Id, keep
 from service.schemas.solids import StoredSolidSummary
@@ -61,14 +62,14 @@ def clip_segments_stored(solid_id: Id, question: Octets, call: CallOf) -> Any:
     region = octets.check_is_convex(call.store.get(solid_id))
     segments = octets.to_rows(question, (2, region.dimension))
     pieces, accuracy = call.compute(engine.clip_segments, segments, region)
-    return octets.answer(call, octets.from_pieces(pieces, len(segments), region.dimension), accuracy)
+    return octets.answer(call, octets.from_pieces(pieces, len(segments), region.dimension, call), accuracy)
 
 
 @router.post(
     "/v1/solids/import",
     operation_id="import_solid",
     status_code=201,
-    responses={200: {"description": "It was there already.", "model": StoredSolidSummary}},
+    responses={200: {"description": "It was there already.", "model": StoredSolidSummary}, **responses(507)},
 )
 def import_solid(question: Octets, format: Format, call: CallOf, type: MeshType = "polyhedron") -> StoredSolidSummary:
     """Keep a mesh from a file, vertices at equal coordinates merged, as `POST /v1/solids` keeps a solid. It must be

@@ -24,7 +24,7 @@ Id = Annotated[str, Path(description="Name of a stored solid, from `POST /v1/sol
     "/v1/solids",
     operation_id="put_solid",
     status_code=201,
-    responses={200: {"description": "It was there already.", "model": StoredSolidSummary}},
+    responses={200: {"description": "It was there already.", "model": StoredSolidSummary}, **responses(507)},
 )
 def put_solid(question: Solid, call: CallOf) -> StoredSolidSummary:
     """Keep a solid, so that later requests can name it: `{"type": "stored", "id": ...}`. The same solid has the same

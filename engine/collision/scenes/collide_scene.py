@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -22,6 +22,10 @@ from engine.parallel import Budget, Cancel, Progress, check_options, run_chunks
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
 from engine.types import Accuracy, Relation
+
+_BYTES: Final = 64
+_BYTES_OF_WITNESS: Final = 150
+"""Of a pair that collides, in its block, put together, and sorted."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,6 +106,7 @@ def collide_scene(
             _settle(bodies, pairs, answers, workers, progress)
             works += answers.works
             parts.append(_colliding(bodies, pairs, answers))
+            budget.take((_BYTES + _BYTES_OF_WITNESS * witnesses) * len(parts[-1].pairs))
         budget.check()
     result = _joined(parts, witnesses, detail)
     if not report:

@@ -27,7 +27,8 @@ from engine.types import Accuracy
 _MOST_PAIRS: Final = 1 << 23
 """Candidate pairs held at once, about 300 MB; the rest of the points waits (one piece of work is done at least)."""
 
-
+_BYTES: Final = 32
+"""Of a candidate pair, and later of a body and point that it holds, in the pieces and in the answer."""
 _MOST_IN_BLOCK: Final = 1 << 16
 """Points that are scanned in the order of their cells."""
 
@@ -134,7 +135,9 @@ def locate_scene(
             )
             n_beyond += counts.beyond + sum(piece.n_beyond for piece in pieces)
             n_rational += counts.rational
-            done += [_held(piece) for piece in pieces]
+            held = [_held(piece) for piece in pieces]
+            budget.take(_BYTES * sum(len(kept.bodies) - len(piece.bodies) for kept, piece in zip(held, pieces)))
+            done += held
             if progress is not None:
                 progress(sum(len(piece.counts) for piece in pieces))
         budget.check()
@@ -198,6 +201,7 @@ def _scan(
                 left.append((block, first + stop))
                 return
             piece = _scan_block(points[block * size : (block + 1) * size], block * size, scene, budget)
+            budget.take(_BYTES * len(piece.bodies))
             pieces.append(piece)
             n_pairs += len(piece.bodies)
 

@@ -157,8 +157,18 @@ def test_broken_http_is_answered_or_closed(service: Service) -> None:
         b"GET / HTTP/9.9\r\n\r\n",
         b"CONNECT x:1 HTTP/1.1\r\n\r\n",
         b"POST /v1/solids HTTP/1.1\r\nContent-Length: x\r\n\r\n",
+        b"GET /healthz HTTP/1.1\r\n\r\n",
+        b"GET /healthz HTTP/1.1\r\nHost: x\r\nHost: x\r\n\r\n",
+        b"POST /v1/solids HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: gzip, chunked\r\n\r\n0\r\n\r\n",
+        b"POST /v1/solids HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\n"
+        b"Transfer-Encoding: chunked\r\n\r\nzz\r\n",
     ):
-        assert service.send(data, half_close=True)[:12] in (b"HTTP/1.1 400", b"HTTP/1.1 404", b"")
+        answer = service.send(data, half_close=True)
+        assert answer[:12] in (b"HTTP/1.1 400", b"HTTP/1.1 404", b""), answer
+        if answer:
+            assert b"\ncontent-type: application/problem+json" in answer
+            assert b"\nx-request-id: " in answer
+    assert service.send(b"GET /healthz HTTP/1.0\r\n\r\n").startswith(b"HTTP/1.1 200 ")
     assert httpx.get(f"{service.url}/healthz").status_code == 200
 
 
@@ -181,6 +191,38 @@ def test_headers_without_end_are_given_up(service: Service) -> None:
     for lines in ([b"a: b\r\n" * 2000] * 6, [b"a: ", *[b"x" * 20_000] * 5]):
         answer = service.send(b"GET /healthz HTTP/1.1\r\n", *lines)
         assert answer.startswith((b"HTTP/1.1 431 ", b"HTTP/1.1 400 ")), answer
+
+
+def test_a_length_of_many_digits_is_a_number(service: Service) -> None:
+    head = b"POST /v1/solids HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: "
+    assert b" 422 " in service.send(head + b"0" * 4990 + b"2\r\n\r\n{}")[:20]
+    assert service.send(head + b"9" * 4990 + b"\r\n\r\n{}")[9:12] in (b"400", b"413")
+
+
+def test_a_client_that_does_not_read_is_dropped() -> None:
+    """And what its answer held is given back."""
+    service = Service(write_seconds=0.5)
+    try:
+        service.wait_until_ready()
+        solid = httpx.post(f"{service.url}/v1/solids", json=SPHERE).headers["location"].encode()
+        body = bytes(48 * 400_000)
+        head = b"POST %s/clip/segments HTTP/1.1\r\nHost: x\r\nContent-Length: %d\r\n\r\n" % (solid, len(body))
+        with socket.socket() as connection:
+            connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2**12)
+            connection.settimeout(30)
+            connection.connect(("127.0.0.1", service.port))
+            connection.sendall(head + body)
+            time.sleep(2)
+            received = 0
+            with suppress(ConnectionError):
+                while part := connection.recv(2**20):
+                    received += len(part)
+            assert received < len(body)
+        answer = httpx.post(service.url + solid.decode() + "/clip/segments", content=body, timeout=60)
+        assert len(answer.content) == len(body)  # who reads gets it all
+        assert service.stop() == 0, "".join(service.log)
+    finally:
+        service.close()
 
 
 def test_a_vanished_client_harms_nobody(service: Service) -> None:

@@ -247,7 +247,7 @@ async def test_pointers_lead_into_the_request(client: httpx.AsyncClient) -> None
 @pytest.fixture
 def large(monkeypatch: pytest.MonkeyPatch) -> int:
     """Bytes from which bodies lie in memory of their own, fewer than usual."""
-    monkeypatch.setattr("service.route.LARGE", 2**18)
+    monkeypatch.setattr("service.body.LARGE", 2**18)
     return 2**18
 
 

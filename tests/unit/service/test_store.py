@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -110,3 +111,14 @@ def test_many_threads_agree() -> None:
     for thread in threads:
         thread.join()
     assert sum(found) == 200
+
+
+def test_a_tree_of_shared_solids_takes_time_and_room_by_its_distinct_nodes(tmp_path: Path) -> None:
+    """A million leaves that are one: named, kept and read again as four solids."""
+    solid: engine.Solid = sphere(1)
+    for _ in range(3):
+        solid = engine.Csg("union", [solid] * 100)
+    store = Store(10**9, tmp_path)
+    name, _ = store.put(solid)
+    assert (tmp_path / name).stat().st_size < 20_000
+    assert solid_id(Store(10**9, tmp_path).get(name)) == name

@@ -1,0 +1,159 @@
+"""Bodies as they arrive: their media type, length and coding, read within their limits.
+
+A large one is received into one buffer of the declared length. A compressed one is inflated off the event loop, part by
+part, so that it ends as soon as it is known to be too long.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import mmap
+import zlib
+from collections.abc import Iterator
+from contextlib import suppress
+from typing import Final
+
+import zstandard
+from starlette.requests import ClientDisconnect
+from starlette.types import Receive
+
+from service.errors import ServiceError
+from service.json_arrays import Body
+from service.work import FOOTPRINT, Call
+
+JSON: Final = "application/json"
+OCTETS: Final = "application/octet-stream"
+LARGE: Final = 2**22
+"""Bytes from which a body gets memory in large pages: to give 64 MB of small ones back holds all threads for 5 ms."""
+CODINGS: Final = ("gzip", "zstd")
+_STEP: Final = 2**18
+"""Bytes inflated at once: half a millisecond."""
+_BLOCKS: Final = 2**8
+"""Bytes of zstd inflated at once: a block takes four at least, and gives 128 KB at most."""
+_WINDOW: Final = 2**23
+"""Bytes that a zstd body may look back: what decoders are asked to hold (RFC 8878, 3.1.1.1.2)."""
+
+
+def check_media_type(headers: dict[bytes, bytes], expected: str) -> None:
+    """Raise unless the body is what the route takes; octets need not be named, since they can be nothing else."""
+    given = headers.get(b"content-type", b"").decode("latin-1")
+    kind = given.partition(";")[0].strip().lower()
+    is_json = expected == JSON and kind.startswith("application/") and kind.endswith("+json")
+    if kind != expected and not is_json and (given or expected == JSON):
+        got = f"got {given[:100]!r}" if given else "got none"
+        error = ServiceError("unsupported_media_type", f"expected the header Content-Type: {expected}, {got}")
+        error.headers = {"Accept-Post": expected}
+        raise error
+
+
+def coding_of(headers: dict[bytes, bytes]) -> str | None:
+    """Return how the body is compressed, None if it is not."""
+    coding = headers.get(b"content-encoding", b"").decode("latin-1").strip().lower()
+    coding = {"x-gzip": "gzip", "identity": ""}.get(coding, coding)
+    if coding and coding not in CODINGS:
+        detail = f"Content-Encoding {coding[:100]!r} is not taken; send {' or '.join(CODINGS)}, or leave it out"
+        error = ServiceError("unsupported_media_type", detail)
+        error.headers = {"Accept-Encoding": ", ".join(CODINGS)}
+        raise error
+    return coding or None
+
+
+def declared_length(headers: dict[bytes, bytes], limit: int) -> int:
+    """Return the length that the headers declare, 0 if they do not; `body_too_large` beyond the limit."""
+    given = headers.get(b"content-length", b"0").lstrip(b"0") or b"0"
+    if not given.isdigit():
+        return 0
+    if len(given) > 18 or int(given) > limit:  # Python reads no number of thousands of digits
+        raise _too_large(limit)
+    return int(given)
+
+
+async def read(receive: Receive, declared: int, call: Call) -> Body:
+    """Return the body, refused as soon as it is known to be too long, declared or not, or too slow."""
+    limit, seconds = call.settings.max_body_bytes, call.settings.body_seconds
+    call.take(FOOTPRINT * declared)
+    room = _room(declared) if declared >= LARGE else None
+    parts: list[bytes] = []
+    size, is_more = 0, True
+    try:
+        async with asyncio.timeout(seconds):
+            while is_more:
+                message = await receive()
+                if message["type"] == "http.disconnect":
+                    raise ClientDisconnect
+                part, is_more = message.get("body", b""), message.get("more_body", False)
+                end = size + len(part)
+                if end > limit:
+                    raise _too_large(limit)
+                if end > declared:
+                    call.take(FOOTPRINT * (end - max(size, declared)))
+                    if room is not None:  # case: a server that does not hold bodies to their declared length
+                        parts, room = [bytes(room[:size])], None
+                if room is None:
+                    parts.append(part)
+                else:
+                    room[size:end] = part
+                size = end
+    except TimeoutError:
+        raise ServiceError("slow_body", f"the body did not arrive within {seconds} s; send it faster") from None
+    if room is not None:
+        return room if size == declared else room[:size]
+    return parts[0] if len(parts) == 1 else b"".join(parts)
+
+
+def inflated(body: Body, coding: str, call: Call) -> bytes:
+    """Return what `body` was before it was compressed."""
+    limit, size, parts = call.settings.max_body_bytes, 0, []
+    try:
+        for part in _unzipped(body) if coding == "gzip" else _unpacked(body):
+            call.remaining()
+            size += len(part)
+            if size > limit:
+                raise _too_large(limit, "inflated, ")
+            call.take(FOOTPRINT * len(part))
+            parts.append(part)
+    except (zlib.error, zstandard.ZstdError, EOFError) as error:
+        raise ServiceError("bad_request", f"the body is no {coding}: {error}; compress it anew") from None
+    return b"".join(parts)
+
+
+def _unzipped(body: Body) -> Iterator[bytes]:
+    inflater = zlib.decompressobj(wbits=16 + zlib.MAX_WBITS)
+    rest = bytes(memoryview(body))
+    while rest and not inflater.eof:  # bound: each turn takes bytes, or gives a whole part
+        yield inflater.decompress(rest, _STEP)
+        rest = inflater.unconsumed_tail
+    while not inflater.eof:
+        part = inflater.decompress(rest, _STEP)
+        if not part:
+            raise EOFError("it ends too early")
+        yield part
+    if inflater.unused_data:
+        raise EOFError("something follows its end")
+
+
+def _unpacked(body: Body) -> Iterator[bytes]:
+    inflater = zstandard.ZstdDecompressor(max_window_size=_WINDOW).decompressobj()
+    for start in range(0, len(body), _BLOCKS):
+        if inflater.eof:
+            break
+        yield inflater.decompress(body[start : start + _BLOCKS])
+    if not inflater.eof:
+        raise EOFError("it ends too early")
+    if inflater.unused_data or start + _BLOCKS < len(body):
+        raise EOFError("something follows its end")
+
+
+def _room(size: int) -> bytearray | mmap.mmap:
+    """Return so many bytes; untouched pages take no memory."""
+    if not hasattr(mmap, "MADV_HUGEPAGE"):
+        return bytearray(size)
+    room = mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+    with suppress(OSError):  # a kernel without large pages
+        room.madvise(mmap.MADV_HUGEPAGE)
+    return room
+
+
+def _too_large(limit: int, how: str = "") -> ServiceError:
+    detail = f"{how}the body is longer than {limit} bytes; send less at once, or raise GEOMETRY_MAX_BODY_BYTES"
+    return ServiceError("body_too_large", detail)
