@@ -73,6 +73,7 @@ SERVICE_STATUS: Final[dict[str, int]] = {
     "not_ready": 503,
     "out_of_memory": 503,
     "internal": 500,
+    "not_installed": 501,
 }
 STATUS: Final = {**ENGINE_STATUS, **SERVICE_STATUS}
 

@@ -83,7 +83,8 @@ class GeometryRoute(APIRoute):
                     parts = job.answer()
                 else:
                     parts = await _run(state.pool, call, job.answer, request.receive, is_small)
-                return _Answer(parts, call, call.status or status)
+                is_known = b"if-none-match" in headers and _is_known(headers[b"if-none-match"], call, request.method)
+                return _Answer([] if is_known else parts, call, 304 if is_known else call.status or status)
             except ClientDisconnect:
                 call.free()
                 return Response(status_code=STATUS["bad_request"])  # nobody reads it
@@ -244,6 +245,12 @@ def _coding_wanted(header: bytes) -> str | None:
     wanted = _CODING.findall(header.lower())
     taken = {name for name, weight in wanted if not weight or float(weight)}
     return next((coding for coding in ("zstd", "gzip") if coding.encode() in taken), None)
+
+
+def _is_known(tags: bytes, call: Call, method: str) -> bool:
+    """Tell whether the client has the answer already, by the tags that it names."""
+    named = {tag.strip().removeprefix("W/") for tag in tags.decode("latin-1").split(",")}
+    return method in ("GET", "HEAD") and call.headers.get("ETag", "") in named
 
 
 def _queried(request: Request, query: Query) -> dict[str, Any]:

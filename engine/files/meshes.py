@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import logging
+import re
 from typing import IO, Any, Final
 
 import numpy as np
@@ -13,6 +15,10 @@ from engine.solids.mesh import first_equal_points
 from engine.solids.polyhedron import Polyhedron
 
 FORMATS: Final = ("stl", "obj", "ply", "off", "glb")
+
+
+_NAMES: Final = re.compile(rb"^[ \t]*(?:g|o|s|usemtl|mtllib)(?:[ \t][^\r\n]*)?$", re.MULTILINE)
+"""Lines of an OBJ file that say nothing of its shape: trimesh's time grows with their number squared."""
 
 
 def read_polyhedron(file: IO[bytes], file_format: str) -> Polyhedron:
@@ -44,6 +50,8 @@ def read_mesh(file: IO[bytes], file_format: str) -> tuple[FloatArray, IntArray]:
         ) from None
     logging.getLogger("trimesh").setLevel(logging.CRITICAL)  # its warnings about repairs that we do not ask for
     try:
+        if file_format == "obj":
+            file = io.BytesIO(_NAMES.sub(b"", file.read()))
         with np.errstate(all="ignore"):
             scene = trimesh.load_scene(
                 file, file_type=file_format, process=False, maintain_order=True, skip_materials=True

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import io
 from typing import Literal
 
 import engine
-from service.errors import ServiceError
+from service import mesh_reader
 from service.work import Call
 
 Format = Literal["stl", "obj", "ply", "off", "glb"]
@@ -14,11 +13,8 @@ Format = Literal["stl", "obj", "ply", "off", "glb"]
 
 def to_solid(octets: bytes | bytearray, kind: Format, solid_type: str, call: Call) -> engine.Solid:
     """Return the polyhedron or surface in a file."""
-    with call.phase("decode"), io.BytesIO(octets) as file:
-        try:
-            vertices, faces = engine.read_mesh(file, kind)
-        except engine.InvalidInputError as error:
-            raise ServiceError("invalid_mesh", error.message) from None
+    with call.phase("decode"):
+        vertices, faces = mesh_reader.read(octets, kind, call)
     with call.phase("prepare"):
         make = engine.Polyhedron if solid_type == "polyhedron" else engine.Surface
         return make(vertices, faces)

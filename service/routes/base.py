@@ -29,7 +29,7 @@ _OF_ALL: Final = {
 
 def responses(*statuses: int) -> dict[int | str, dict[str, Any]]:
     """Return the description of the error answers with these statuses."""
-    texts = {**_OF_BODY, **_OF_ALL, 507: "The store's folder is full: send the solid with each request."}
+    texts = {**_OF_BODY, **_OF_ALL, 501: "Reading files is not installed.", 507: "The store is full."}
     return {
         status: {"description": texts.get(status, HTTPStatus(status).phrase), "content": _PROBLEM}
         for status in statuses

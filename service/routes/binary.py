@@ -69,7 +69,7 @@ def clip_segments_stored(solid_id: Id, question: Octets, call: CallOf) -> Any:
     "/v1/solids/import",
     operation_id="import_solid",
     status_code=201,
-    responses={200: {"description": "It was there already.", "model": StoredSolidSummary}, **responses(507)},
+    responses={200: {"description": "It was there already.", "model": StoredSolidSummary}, **responses(501, 507)},
 )
 def import_solid(question: Octets, format: Format, call: CallOf, type: MeshType = "polyhedron") -> StoredSolidSummary:
     """Keep a mesh from a file, vertices at equal coordinates merged, as `POST /v1/solids` keeps a solid. It must be

@@ -24,12 +24,14 @@ class Health(Schema):
     status: Literal["ok"]
 
 
+@router.head("/healthz", include_in_schema=False)
 @router.get("/healthz", operation_id="healthz", response_model=Health)
 async def healthz() -> Response:
     """Alive: the process answers."""
     return _ok()
 
 
+@router.head("/readyz", include_in_schema=False)
 @router.get("/readyz", operation_id="readyz", response_model=Health, responses=responses(503))
 async def readyz(request: Request) -> Response:
     """Ready: every kernel is compiled and no shutdown has begun."""

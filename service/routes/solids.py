@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any, Final
 
 from fastapi import APIRouter, Path
 from starlette.responses import Response
@@ -16,6 +16,9 @@ from service.work import Call, CallOf
 
 router = router_of("solids")
 lookup = APIRouter(route_class=GeometryRoute, tags=["solids"], responses=responses(401, 403, 404, 503))
+_KNOWN: Final[dict[int | str, dict[str, Any]]] = {
+    304: {"description": "The client has it: one of the tags in If-None-Match is the id."}
+}
 
 Id = Annotated[str, Path(description="Name of a stored solid, from `POST /v1/solids`.")]
 
@@ -40,14 +43,14 @@ def keep(solid: engine.Solid, call: Call) -> StoredSolidSummary:
     return answers.from_stored(name, solid)
 
 
-@lookup.get("/v1/solids/{solid_id}", operation_id="get_solid")
+@lookup.get("/v1/solids/{solid_id}", operation_id="get_solid", responses=_KNOWN)
 def get_solid(solid_id: Id, call: CallOf) -> StoredSolidSummary:
     """Return what the store holds under an id."""
     call.headers["ETag"] = f'"{solid_id}"'
     return answers.from_stored(solid_id, call.store.get(solid_id))
 
 
-@lookup.head("/v1/solids/{solid_id}", operation_id="has_solid", response_class=Response)
+@lookup.head("/v1/solids/{solid_id}", operation_id="has_solid", response_class=Response, responses=_KNOWN)
 def has_solid(solid_id: Id, call: CallOf) -> None:
     """Tell by the status whether the store holds an id."""
     call.headers["ETag"] = f'"{solid_id}"'

@@ -150,3 +150,23 @@ async def test_numbers_that_are_not_finite_are_named(client: httpx.AsyncClient, 
     body = f'{{"type":"sphere","center":[0,{number},0],"radius":1}}'
     answer = await client.post("/v1/solids", content=body, headers={"Content-Type": "application/json"})
     assert check_problem(answer, 422, "not_finite")["errors"][0]["pointer"] == "/center/1"
+
+
+async def test_a_client_that_knows_a_solid_is_told_so(client: httpx.AsyncClient) -> None:
+    stored = await client.post("/v1/solids", json=SPHERE)
+    path, tag = stored.headers["location"], stored.headers["etag"]
+    for tags in (tag, f'"other", W/{tag}'):
+        for method in ("GET", "HEAD"):
+            answer = await client.request(method, path, headers={"If-None-Match": tags})
+            assert (answer.status_code, answer.content, answer.headers["etag"]) == (304, b"", tag)
+    assert (await client.get(path, headers={"If-None-Match": '"other"'})).status_code == 200
+    gone = await client.get(f"/v1/solids/{'0' * 64}", headers={"If-None-Match": f'"{"0" * 64}"'})
+    check_problem(gone, 404, "unknown_solid")
+    again = await client.post("/v1/solids", json=SPHERE, headers={"If-None-Match": tag})
+    assert again.status_code == 200
+
+
+async def test_probes_may_ask_for_the_head_alone(client: httpx.AsyncClient) -> None:
+    for path in ("/healthz", "/readyz"):
+        answer = await client.head(path)
+        assert (answer.status_code, answer.content) == (200, b"")

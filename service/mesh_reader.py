@@ -1,0 +1,80 @@
+"""Reads mesh files in a child process, which has limits of its own and can be ended: the reader of files is not ours,
+polls no deadline, and holds what it likes.
+
+Children are forked from a server that has imported what they need; it starts with the first file and ends with this
+process. Without it (Windows) each child starts anew.
+"""
+
+from __future__ import annotations
+
+import io
+import multiprocessing
+import sys
+import time
+from importlib.util import find_spec
+from multiprocessing.connection import Connection, wait
+from typing import Any, Final
+
+import engine
+from service.errors import ServiceError
+from service.work import Call
+
+_ROOM: Final = 2**28
+_FOOTPRINT: Final = 16
+"""Bytes that a child may take besides what it starts with, and for each byte of a file."""
+_POLL_SECONDS: Final = 0.05
+_METHOD: Final = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
+
+
+def read(octets: bytes | bytearray | memoryview, kind: str, call: Call) -> tuple[Any, Any]:
+    """Return vertices and triangles of a mesh file; `invalid_mesh` where it cannot be read, in time or at all."""
+    if find_spec("trimesh") is None:
+        raise ServiceError("not_installed", "this service reads no mesh files; send vertices and faces as JSON")
+    context: Any = multiprocessing.get_context(_METHOD)
+    if _METHOD == "forkserver":
+        context.set_forkserver_preload(["service.mesh_reader", "service.__main__", "trimesh.exchange.load"])
+    mine, theirs = context.Pipe(duplex=False)
+    room = _ROOM + _FOOTPRINT * len(octets)
+    child = context.Process(target=_child, args=(theirs, bytes(octets), kind, room, call.remaining()), daemon=True)
+    try:
+        child.start()
+        theirs.close()
+        while not wait([mine], _POLL_SECONDS):
+            call.remaining()
+        try:
+            found = mine.recv()
+        except EOFError:
+            raise ServiceError("invalid_mesh", f"the reader of {kind} files ended without an answer") from None
+    finally:
+        child.kill()
+        child.join()
+        mine.close()
+    if isinstance(found, str):
+        raise ServiceError("invalid_mesh", found)
+    call.take(4 * sum(array.nbytes for array in found))
+    return found
+
+
+def _child(answer: Connection, octets: bytes, kind: str, room: int, seconds: float) -> None:
+    """Send what is in a file, or a sentence that says why it cannot be read."""
+    _limit(room, seconds)
+    try:
+        answer.send(engine.read_mesh(io.BytesIO(octets), kind))
+    except engine.EngineError as error:
+        answer.send(error.message)
+    except MemoryError:
+        answer.send(f"to read it takes more than {room} bytes; simplify the mesh, or send it as vertices and faces")
+
+
+def _limit(room: int, seconds: float) -> None:
+    """Let this process take no more than that, and no longer than that even where nobody ends it."""
+    if sys.platform == "win32":
+        return
+    import resource
+
+    limit = int(time.process_time() + seconds) + 2
+    resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
+    if sys.platform == "linux":
+        with open("/proc/self/statm") as file:
+            now = int(file.read().split()[0]) * resource.getpagesize()
+        resource.setrlimit(resource.RLIMIT_AS, (now + room, now + room))
