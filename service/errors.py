@@ -98,6 +98,17 @@ _PYDANTIC_CODES: Final = {
 _MOST_PROBLEM: Final = 1000
 _MOST_PART: Final = 100
 """Characters of a sentence, and of a field's name in a pointer."""
+_CALLED_HERE: Final = {
+    "Polygon": "GeoJSON's Polygon is polygon here, with its coordinates as `rings`",
+    "MultiPolygon": "GeoJSON's MultiPolygon is one polygon here, with all its rings as `rings`",
+    "xor": "here it is symmetric_difference",
+    "and": "here it is intersection",
+    "or": "here it is union",
+    "minus": "here it is difference",
+    "box": "here it is aabb",
+    "mesh": "here it is polyhedron",
+    "plane": "here it is half_space",
+}
 _HTTP_CODES: Final = {404: "not_found", 405: "method_not_allowed", 413: "body_too_large", 415: "unsupported_media_type"}
 
 
@@ -170,25 +181,40 @@ def faults_of_validation(error: ValidationError, document: Any) -> list[Fault]:
     faults: list[Fault] = []
     for item in error.errors(include_url=False, include_input=False):
         path = _path_in(document, item["loc"])
+        parent = document
+        for part in path[:-1]:
+            parent = _child(parent, part)
         if item["type"] == "numbers":
             faults += [Fault((*path, *fault.path), fault.code, fault.detail) for fault in item["ctx"]["faults"]]
         else:
             code = _PYDANTIC_CODES.get(item["type"], "invalid_request")
-            faults.append(Fault(path, code, _sentence(item)))
+            faults.append(Fault(path, code, _sentence(item, parent)))
         if len(faults) >= MAX_ERRORS:
             break
     return faults[:MAX_ERRORS]
 
 
-def _sentence(item: Any) -> str:
-    """Return what pydantic found as a sentence that says what to do."""
+def _meant(given: Any) -> str:
+    """Return what a word that is used elsewhere is called here."""
+    meant = _CALLED_HERE.get(given) if isinstance(given, str) else None
+    return "" if meant is None else f" ({meant})"
+
+
+def _sentence(item: Any, parent: Any) -> str:
+    """Return what pydantic found as a sentence that says what to do; parent: what holds the value."""
     name = _shown(item["loc"][-1], _MOST_PART) if item["loc"] else "the body"
     if item["type"] == "missing":
         return f"the field {name!r} is missing; add it"
     if item["type"] == "extra_forbidden":
         return f"the field {name!r} is not known here; leave it out"
     if item["type"] == "union_tag_invalid":
-        return f"there is no solid of type {item['ctx']['tag']!r:.60}; the types are {item['ctx']['expected_tags']}"
+        tag, tags = item["ctx"]["tag"], item["ctx"]["expected_tags"]
+        return f"there is no solid of type {tag!r:.60}{_meant(tag)}; the types are {tags}"
+    if item["type"] == "string_pattern_mismatch":
+        return "expected the id of a stored solid, 64 hexadecimal digits: POST /v1/solids answers with it"
+    if item["type"] == "literal_error":
+        got = _child(parent, name)
+        return f"expected {item['ctx']['expected']}, got {got!r:.60}{_meant(got)}"
     if item["type"] == "union_tag_not_found":
         return "a solid is an object with a field 'type' that names what it is, for example 'sphere'"
     if item["type"] in ("model_type", "model_attributes_type"):

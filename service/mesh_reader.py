@@ -11,6 +11,7 @@ import io
 import multiprocessing
 import sys
 import time
+from concurrent import futures
 from importlib.util import find_spec
 from multiprocessing.connection import Connection, wait
 from typing import Any, Final
@@ -23,6 +24,7 @@ _ROOM: Final = 2**28
 _FOOTPRINT: Final = 16
 """Bytes that a child may take besides what it starts with, and for each byte of a file."""
 _POLL_SECONDS: Final = 0.05
+_starter: Final = futures.ThreadPoolExecutor(1, thread_name_prefix="mesh reader")
 _METHOD: Final = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
 
 
@@ -36,23 +38,31 @@ def read(octets: bytes | bytearray | memoryview, kind: str, call: Call) -> tuple
     mine, theirs = context.Pipe(duplex=False)
     room = _ROOM + _FOOTPRINT * len(octets)
     child = context.Process(target=_child, args=(theirs, bytes(octets), kind, room, call.remaining()), daemon=True)
+    starting = _starter.submit(child.start)  # the first waits for the server, which takes seconds
     try:
-        child.start()
-        theirs.close()
-        while not wait([mine], _POLL_SECONDS):
+        while not futures.wait([starting], _POLL_SECONDS).done or not wait([mine], _POLL_SECONDS):
             call.remaining()
+        starting.result()
+        theirs.close()
         try:
             found = mine.recv()
         except EOFError:
             raise ServiceError("invalid_mesh", f"the reader of {kind} files ended without an answer") from None
     finally:
-        child.kill()
-        child.join()
-        mine.close()
+        starting.add_done_callback(lambda _: _end(child, mine, theirs))
     if isinstance(found, str):
         raise ServiceError("invalid_mesh", found)
     call.take(4 * sum(array.nbytes for array in found))
     return found
+
+
+def _end(child: Any, *pipe: Connection) -> None:
+    """End a child that was started, done or not, and close both ends of its pipe."""
+    for end in pipe:
+        end.close()
+    if child.pid is not None:
+        child.kill()
+        child.join()
 
 
 def _child(answer: Connection, octets: bytes, kind: str, room: int, seconds: float) -> None:

@@ -167,12 +167,12 @@ class Call(Cancel):
         self,
         function: Callable[..., Any],
         *arguments: Any,
-        where: Callable[[Where], Where] | None = None,
+        retold: Callable[[EngineError], None] | None = None,
         **options: Any,
     ) -> tuple[Any, Accuracy]:
         """Call an engine function within the time left; return its result and the report of its accuracy.
 
-        where: turns the path of an engine error, which starts with the argument's name, into one in the request.
+        retold: makes an engine error, which speaks of the function's arguments, one that speaks of the request.
         """
         if not self.is_light:
             self.instead = _INSTEAD.get(function.__name__, "ask for less at once")
@@ -183,8 +183,8 @@ class Call(Cancel):
             except DeadlineExceededError:
                 raise self._too_late() from None
             except EngineError as error:
-                if where is not None:
-                    error.where = where(error.where)
+                if retold is not None:
+                    retold(error)
                 raise
         return result, accuracy
 

@@ -14,6 +14,8 @@ from service.schemas import bounds, collision, containment, overlay, polygons, s
 from service.schemas.problem import Accuracy
 from service.wire import Series
 
+_FREE_AREA: Final = 100
+"""Vertices of an overlay up to which its area takes no longer than the rest of the answer."""
 _BOUNDARY: Final = int(engine.Location.BOUNDARY)  # numpy compares with an enum's member more slowly
 
 
@@ -104,8 +106,9 @@ def from_pieces(pieces: engine.SegmentPieces, accuracy: engine.Accuracy) -> segm
     )
 
 
-def from_overlay(result: engine.Overlay, accuracy: engine.Accuracy) -> overlay.OverlayResponse:
-    """Return the answer of `overlay`."""
+def from_overlay(result: engine.Overlay, accuracy: engine.Accuracy, area: bool | None) -> overlay.OverlayResponse:
+    """Return the answer of `overlay`; area: whether it was asked for, None for where it costs next to nothing."""
+    wants_area = len(result.vertices) <= _FREE_AREA if area is None else area
     rings, vertices = result.ring_offsets, result.vertices
 
     def pieces(start: int, stop: int) -> list[Any]:
@@ -117,7 +120,7 @@ def from_overlay(result: engine.Overlay, accuracy: engine.Accuracy) -> overlay.O
 
     return overlay.OverlayResponse.made(
         pieces=Series(result.n_pieces, pieces, weight=10, offsets=rings[result.piece_offsets]),
-        area=_area(lambda: result.area),
+        area=_area(lambda: result.area) if wants_area else None,
         collapsed=[
             overlay.OverlayCollapse.made(kind=part.kind, area=_area(part.area.__float__), near=part.near)
             for part in result.collapsed
@@ -173,17 +176,19 @@ def from_clipped(clipped: engine.ClippedPolygons, accuracy: engine.Accuracy) -> 
     )
 
 
-def from_collision(collision_: engine.Collision, accuracy: engine.Accuracy) -> collision.CollideResponse:
+def from_collision(collision_: engine.Collision, accuracy: engine.Accuracy, witness: bool) -> collision.CollideResponse:
     """Return the answer of `collide` for one pose."""
+    named = collision_.witness if witness else None
     return collision.CollideResponse.made(
-        collisions=[_collision_answer(collision_.relation, collision_.witness, collision_.detail)],
+        collisions=[_collision_answer(collision_.relation, named, collision_.detail)],
         accuracy=from_accuracy(accuracy),
     )
 
 
-def from_pose_collisions(found: Any, accuracy: engine.Accuracy) -> collision.CollideResponse:
-    """Return the answer of `collide` for many poses."""
-    relations, witnesses, *rest = found
+def from_pose_collisions(found: Any, accuracy: engine.Accuracy, witness: bool) -> collision.CollideResponse:
+    """Return the answer of `collide` for many poses: relations, witnesses if asked for, details if asked for."""
+    relations, *rest = found if isinstance(found, tuple) else (found,)
+    witnesses = rest.pop(0) if witness else [None] * len(relations)
     details = rest[0] if rest else None
 
     def some(start: int, stop: int) -> list[Any]:

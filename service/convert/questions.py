@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import Any, Final
 
@@ -135,20 +136,23 @@ def to_items(array: Any, dimension: int) -> Any:
     return array if array.size else np.empty((0, *array.shape[1:-1], dimension))
 
 
-def where_in_scene(where: Where) -> Where:
-    """Turn the engine's path into a scene's: solids and poses stand together in `bodies`."""
-    names = {"solids": "solid", "poses": "pose"}
-    if len(where) >= 2 and where[0] in names:
-        return ("bodies", where[1], names[str(where[0])], *where[2:])
-    return ("bodies",) if where[:1] in (("solids",), ("poses",)) else where
+def tell_of_scene(error: EngineError) -> None:
+    """Make an error speak of `bodies`, where solids and poses stand together."""
+    _tell(error, "bodies", {"solids": "solid", "poses": "pose"})
 
 
-def where_in_poses(where: Where) -> Where:
-    """Turn the engine's path into that of a list of poses, each of a rotation and a translation."""
-    names = {"rotations": "rotation", "translations": "translation"}
-    if len(where) >= 2 and where[0] in names:
-        return ("poses", where[1], names[str(where[0])], *where[2:])
-    return ("poses",) if where[:1] in (("rotations",), ("translations",)) else where
+def tell_of_poses(error: EngineError) -> None:
+    """Make an error speak of `poses`, each of a rotation and a translation."""
+    _tell(error, "poses", {"rotations": "rotation", "translations": "translation"})
+
+
+def _tell(error: EngineError, name: str, parts: dict[str, str]) -> None:
+    """Turn an argument's name, in the path and in the sentence, into that of a list whose items have such parts."""
+    where = error.where
+    if where and where[0] in parts:
+        error.where = (name, where[1], parts[str(where[0])], *where[2:]) if len(where) > 1 else (name,)
+    for argument, part in parts.items():
+        error.message = re.sub(rf"\b{argument}(\[\d+\])", rf"{name}\1.{part}", error.message)
 
 
 def existing(question: Any, where: Where) -> Where:

@@ -16,20 +16,29 @@ def collide(question: CollideRequest, call: CallOf) -> CollideResponse:
     """Tell how the first body lies to the second, for each pose of the second, with one reason."""
     first = questions.to_solid(question.first, call, ("first",))
     second = questions.to_solid(question.second, call, ("second",))
+    options = {"detail": bool(question.detail), "boolean": bool(question.boolean)}
+    witness = not question.boolean if question.witness is None else question.witness
     if question.poses is None:
-        return answers.from_collision(*call.compute(engine.collide, first, second, detail=bool(question.detail)))
+        return answers.from_collision(*call.compute(engine.collide, first, second, **options), witness)
     rotations, translations = questions.to_poses(question.poses, second.dimension)
-    options = {"witnesses": True, "detail": bool(question.detail)}
     found = call.compute(
-        engine.collide_poses, first, second, rotations, translations, **options, where=questions.where_in_poses
+        engine.collide_poses,
+        first,
+        second,
+        rotations,
+        translations,
+        witnesses=witness,
+        **options,
+        retold=questions.tell_of_poses,
     )
-    return answers.from_pose_collisions(*found)
+    return answers.from_pose_collisions(*found, witness)
 
 
 @router.post("/v1/collide/scene", operation_id="collide_scene")
 def collide_scene(question: CollideSceneRequest, call: CallOf) -> CollideSceneResponse:
     """List every pair of bodies with a common point, and how each lies to the other."""
     solids, poses = questions.to_bodies(question.bodies, call)
-    options = {"skip": question.skip, "only": question.only, "detail": bool(question.detail)}
-    found = call.compute(engine.collide_scene, solids, poses, **options, where=questions.where_in_scene)
+    options = {"detail": bool(question.detail), "boolean": bool(question.boolean)}
+    named = {"skip": question.skip, "only": question.only}
+    found = call.compute(engine.collide_scene, solids, poses, **named, **options, retold=questions.tell_of_scene)
     return answers.from_scene_pairs(*found)

@@ -29,5 +29,5 @@ def contains_scene(question: ContainsSceneRequest, call: CallOf) -> ContainsScen
     """List for each point the bodies that hold it, boundary included."""
     solids, poses = questions.to_bodies(question.bodies, call)
     points = questions.to_items(question.points, solids[0].dimension)
-    found = call.compute(engine.locate_scene, points, solids, poses, where=questions.where_in_scene)
+    found = call.compute(engine.locate_scene, points, solids, poses, retold=questions.tell_of_scene)
     return answers.from_scene_locations(*found)

@@ -17,4 +17,5 @@ def overlay(question: OverlayRequest, call: CallOf) -> OverlayResponse:
     subject = questions.to_solid(question.subject, call, ("subject",))
     clip = questions.to_solid(question.clip, call, ("clip",))
     output = question.output or "valid"
-    return answers.from_overlay(*call.compute(engine.overlay, subject, clip, question.operation, output=output))
+    found = call.compute(engine.overlay, subject, clip, question.operation, output=output)
+    return answers.from_overlay(*found, question.area)

@@ -50,6 +50,7 @@ _KINDS: Final[dict[str, tuple[npt.DTypeLike, frozenset[type], dict[str, Any]]]] 
     "integer": (np.int64, frozenset({int}), {"type": "integer", "format": "int64"}),
     "boolean": (np.bool_, frozenset({bool}), {"type": "boolean"}),
 }
+_NOT_FINITE: Final = "expected a finite number below 1.8e308 in magnitude, got {!r}; scale the scene, or leave it out"
 _WORDS: Final = {"number": "a number", "integer": "an integer", "boolean": "true or false"}
 
 
@@ -193,7 +194,7 @@ class Numbers:
                 )
         elif self.kind == "number" and type(value) is float:
             if value != value or value in (float("inf"), float("-inf")):
-                yield Fault(path, "not_finite", f"expected a finite number below 1.8e308 in magnitude, got {value!r}")
+                yield Fault(path, "not_finite", _NOT_FINITE.format(value))
         elif self.kind == "number" and not _is_exact(value):
             detail = f"float64 cannot hold {_show(value)}; write the float64 you mean, as 1.5e20"
             yield Fault(path, "invalid_array", detail)

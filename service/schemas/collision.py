@@ -18,6 +18,7 @@ Pairs = Annotated[Array, Numbers(Axis(0, "max_pairs"), Axis(2, 2), kind="integer
 _CUBE = {"type": "aabb", "min": [0, 0, 0], "max": [1, 1, 1]}
 _BALL = {"type": "sphere", "center": [2, 0.5, 0.5], "radius": 1}
 _DETAIL = "Say which of the eight relations of RCC-8 holds too: tangentially inside (TPP), equal (EQ), ..."
+_BOOLEAN = "Ask for disjoint or not alone: any other relation may then be answered as touching, sooner."
 _FOUND = "Which relation of RCC-8, where asked for; left out if a body has no interior."
 
 
@@ -33,6 +34,8 @@ class CollideRequest(Schema):
         "may be free while a motion between them collides."
     )
     detail: bool = left_out(_DETAIL)
+    boolean: bool = left_out(_BOOLEAN)
+    witness: bool = left_out("Name a reason for each contact: as if true where left out, unless `boolean` is.")
 
 
 class CollisionWitness(Schema):
@@ -54,7 +57,7 @@ class CollisionAnswer(Schema):
     interiors meet, overlapping; else touching."""
 
     relation: CollisionRelation
-    witness: CollisionWitness = left_out("Left out when disjoint.")
+    witness: CollisionWitness = left_out("Left out when disjoint, and where none was asked for.")
     detail: Detail = left_out(_FOUND)
 
 
@@ -85,6 +88,7 @@ class CollideSceneRequest(Schema):
     skip: Pairs = left_out("Pairs of bodies to leave out.")
     only: Pairs = left_out("The only pairs to look at.")
     detail: bool = left_out(_DETAIL)
+    boolean: bool = left_out(_BOOLEAN)
 
 
 class CollidingPair(Schema):

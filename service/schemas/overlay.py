@@ -33,6 +33,7 @@ class OverlayRequest(Schema):
         "valid (if left out): rings that are simple and cross nowhere; nearest: every vertex correctly rounded and no "
         "more, which may be invalid."
     )
+    area: bool = left_out("Compute the area; if left out, where it costs next to nothing: up to 100 vertices.")
 
 
 class OverlayPiece(Schema):
@@ -73,7 +74,9 @@ class OverlayResponse(Schema):
     """The pieces: their coordinates together are those of a GeoJSON MultiPolygon."""
 
     pieces: list[OverlayPiece]
-    area: Number = left_out("Area of the exact result, correctly rounded; left out where it is beyond float64.")
+    area: Number = left_out(
+        "Area of the exact result, correctly rounded; left out where it is beyond float64, or was not asked for."
+    )
     collapsed: list[OverlayCollapse]
     rounding: OverlayRounding
     accuracy: Accuracy

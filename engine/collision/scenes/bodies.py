@@ -9,9 +9,9 @@ import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.bounding.posed_boxes import place_boxes
-from engine.collision.collide import check_pose, pair_function
+from engine.collision.collide import TAKEN, check_pose, pair_function
 from engine.collision.scenes.numbering import numbered
-from engine.errors import InvalidArrayError, UnsupportedSolidError, WrongDimensionError
+from engine.errors import InvalidArrayError, UnsupportedPairError, UnsupportedSolidError, WrongDimensionError
 from engine.solids.base import Solid
 from engine.solids.bounds import own_box
 from engine.solids.pose import Pose
@@ -95,6 +95,11 @@ def _check_solids(distinct: list[Solid], firsts: IntArray) -> None:
     for index, body in zip(firsts.tolist(), distinct):
         try:
             pair_function(body, body)
+        except UnsupportedPairError:
+            raise UnsupportedPairError(
+                f"solids[{index}] is a {body.type}; a scene in {body.dimension}D takes {TAKEN[body.dimension]}",
+                ("solids", index),
+            ) from None
         except (UnsupportedSolidError, WrongDimensionError) as error:
             error.where = ("solids", index)
             raise

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import random
 from typing import Any
 
 import httpx
 import numpy as np
 import pytest
+from fastapi import FastAPI
 
 import engine
 from service.app import create_app
@@ -143,3 +145,16 @@ async def test_broken_files_are_refused(client: httpx.AsyncClient) -> None:
         seen.add(answer.status_code)
         assert answer.status_code in (200, 201, 422), (kind, bytes(body), answer.text)
     assert 422 in seen
+
+
+async def test_a_reader_of_files_ends_with_its_request(app: FastAPI, anyio_backend: str) -> None:
+    """At the deadline, and when the client goes away; a file of many groups is read in linear time."""
+    pytest.importorskip("trimesh", reason="the extra 'formats' is not installed")
+    groups = b"v 0 0 0\nv 1 0 0\nv 0 1 0\n" + b"".join(b"g a%d\nusemtl m%d\nf 1 2 3\n" % (i, i) for i in range(20_000))
+    async with client_of(app) as client:
+        answer = await send(client, "/v1/solids/import?format=obj&type=surface", groups)
+        assert (answer.status_code, answer.json()["faces"]) == (201, 20_000)
+        app.state.settings = app.state.settings.model_copy(update={"max_body_bytes": 2**26, "deadline_seconds": 0.3})
+        answer = await send(client, "/v1/solids/import?format=obj", b"v 0 0 0\n" * 2_000_000)
+        check_problem(answer, 504, "deadline_exceeded")
+    assert not multiprocessing.active_children()

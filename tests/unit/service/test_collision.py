@@ -138,3 +138,25 @@ async def test_what_is_wrong_in_a_scene_is_named(
 ) -> None:
     answer = await client.post("/v1/collide/scene", json={"bodies": [{"solid": CUBE}, {"solid": CUBE}], **change})
     assert check_problem(answer, 422, code)["errors"][0]["pointer"].startswith(pointer)
+
+
+async def test_those_who_need_no_witness_say_so(client: httpx.AsyncClient) -> None:
+    poses = [moved(2, 0, 0), moved(1, 0, 0), moved(0.5, 0, 0)]
+    for options, has_witness in (
+        ({"witness": False}, False),
+        ({"boolean": True}, False),
+        ({"boolean": True, "witness": True}, True),
+        ({"witness": True}, True),
+    ):
+        many = (await collide(client, first=CUBE, second=TETRAHEDRON, poses=poses, **options))["collisions"]
+        assert ["witness" in answer for answer in many] == [False, has_witness, has_witness]
+        assert [answer["relation"] == "disjoint" for answer in many] == [True, False, False]
+        (one,) = (await collide(client, first=CUBE, second=TETRAHEDRON, **options))["collisions"]
+        assert ("witness" in one, one["relation"] == "disjoint") == (has_witness, False)
+    found = (await collide(client, first=CUBE, second=CUBE, poses=poses, witness=False, detail=True))["collisions"]
+    assert [answer["detail"] for answer in found] == ["DC", "EC", "PO"]
+    body = {"bodies": [{"solid": CUBE}, {"solid": TETRAHEDRON}], "boolean": True}
+    answer = await client.post("/v1/collide/scene", json=body)
+    assert answer.json()["pairs"] == [{"first": 0, "second": 1, "relation": "touching"}]
+    answer = await client.post("/v1/collide", json={"first": CUBE, "second": CUBE, "boolean": True, "detail": True})
+    assert check_problem(answer, 422, "invalid_input")["errors"][0]["pointer"] == "/detail"

@@ -53,6 +53,16 @@ async def test_nothing_left_is_no_piece(client: httpx.AsyncClient) -> None:
     assert (answer.json()["pieces"], answer.json()["area"]) == ([], 0.0)
 
 
+async def test_the_area_of_a_large_result_is_asked_for(client: httpx.AsyncClient) -> None:
+    comb = [[x, y] for i in range(60) for x, y in ((2 * i, 0), (2 * i, 5), (2 * i + 1, 5), (2 * i + 1, 0))]
+    body = {"subject": {"type": "polygon", "rings": [[*comb, [120, -1], [0, -1]]]}, "operation": "union"}
+    body["clip"] = {"type": "polygon", "rings": [[[-9, -9], [-8, -9], [-8, -8]]]}
+    assert "area" not in (await client.post("/v1/overlay", json=body)).json()
+    assert (await client.post("/v1/overlay", json={**body, "area": True})).json()["area"] == 420.0
+    small = {**body, "subject": body["clip"], "area": False}
+    assert "area" not in (await client.post("/v1/overlay", json=small)).json()
+
+
 async def test_area_beyond_float64_is_left_out(client: httpx.AsyncClient) -> None:
     answer = await ask(client, subject=polygon(square(-1e300, 1e300)), operation="union", output="nearest")
     assert answer.status_code == 200, answer.text
