@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from engine.arrays import BoolArray, FlagArray, FloatArray, IntArray
+from engine.direct import entry_of
 from engine.parallel import Budget
 from engine.polygon_clipping.in_integers import Row
 from engine.polygon_clipping.rings import PlaneTables
@@ -40,7 +41,7 @@ def kernel_scene(
 
     largest: magnitude of any coordinate. planes: those of the region.
     """
-    exponent = exponent_above(largest)
+    exponent = 0 if 1.0 <= largest <= 2.0**60 else exponent_above(largest)  # the latter takes longer
     points = shifted(vertices, -exponent) if exponent else vertices
     if points is None or exponent < _DEEPEST or not planes:
         return None
@@ -113,21 +114,20 @@ def clip_chunk(
     d, room, done, parts = scene.vertices.shape[1], n_vertices + 4 * len(scene.tables.high) + 64, first, []
     while done < last:
         out = np.empty(room * d)
-        with np.errstate(all="ignore"):
-            reached, written = clip_rings(
-                scene.vertices.reshape(-1),
-                ring_offsets,
-                polygon_offsets,
-                scene.tables,
-                done,
-                last,
-                budget.flag,
-                out,
-                sizes,
-                state,
-                may_have_bridges,
-                tuple(range(d)),
-            )
+        reached, written = entry_of(clip_rings, d)(
+            scene.vertices.reshape(-1),
+            ring_offsets,
+            polygon_offsets,
+            scene.tables,
+            done,
+            last,
+            budget.flag,
+            out,
+            sizes,
+            state,
+            may_have_bridges,
+            tuple(range(d)),
+        )
         budget.check()
         budget.take(2 * out[: written * d].nbytes)
         parts.append(out[: written * d].reshape(-1, d))

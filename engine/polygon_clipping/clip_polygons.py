@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any, Literal, NamedTuple, Unpack, overload
+from itertools import pairwise
+from typing import Any, Final, Literal, NamedTuple, Unpack, cast, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray
 from engine.errors import EmptyGeometryError, InvalidArrayError, TooComplexError, UnsupportedSolidError
-from engine.parallel import Budget, Cancel, Options, Progress, run_chunks
+from engine.parallel import Budget, Cancel, Options, Progress, check_options, run_chunks
 from engine.polygon_clipping.batches import clip_chunk, kernel_scene
 from engine.polygon_clipping.convex_planes import convex_planes
 from engine.polygon_clipping.in_integers import Row, clip_polygon, integer_row, reduced
+from engine.polygon_clipping.rings import CLIPPED
 from engine.predicates.scaling import largest_of
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
@@ -64,6 +66,8 @@ class ClippedPolygons:
         return [self.vertices[i:j] for i, j in pairs]
 
 
+_FEW: Final = 1024
+"""Vertices that are clipped in the time that it takes to plan more."""
 Polygons = Sequence[Polygon] | Sequence[Sequence[npt.ArrayLike]] | npt.NDArray[Any]
 
 
@@ -139,6 +143,9 @@ def clip_polygons(
 
 def _planes(region: Solid, budget: Budget) -> list[Row]:
     """Return the planes of a region as integer rows in clipping order, repeated ones once: they cut nothing twice."""
+    kept = region.kept("clipping_planes") if isinstance(region, Solid) else None
+    if kept is not None:
+        return cast(list[Row], kept)
     match region:
         case HalfSpace():
             rows = region.row[None, :]
@@ -187,7 +194,7 @@ def as_contours(polygons: Any, dimension: int) -> Contours:
         n, size = array.shape[:2]
         if n and not size:
             raise EmptyGeometryError("polygons[0] has no vertices; leave it out", ("polygons", 0))
-        largest = largest_of(array)
+        largest = largest_of(array) if array.size > _FEW else float(np.abs(array).max(initial=0.0))
         if not np.isfinite(largest):
             check_finite(array, ("polygons",))
         return Contours(array.reshape(-1, dimension), size * np.arange(n + 1), np.arange(n + 1), largest)
@@ -226,6 +233,21 @@ def _offsets(counts: Sequence[int] | IntArray) -> IntArray:
     return offsets
 
 
+def _gathered(
+    vertices: FloatArray, sizes: list[int], offsets: list[int], status: Int8Array, may_have_bridges: BoolArray
+) -> ClippedPolygons:
+    """Return what is left of a few polygons: vertices, how many of each ring, and the polygons' first rings."""
+    ring_offsets, polygon_offsets, contours = [0], [0], list[int]()
+    for first, last in pairwise(offsets):
+        for ring in range(first, last):
+            if sizes[ring]:
+                ring_offsets.append(ring_offsets[-1] + sizes[ring])
+                contours.append(ring - first)
+        polygon_offsets.append(len(contours))
+    rings, polygons, names = (np.array(numbers, np.int64) for numbers in (ring_offsets, polygon_offsets, contours))
+    return ClippedPolygons(vertices, rings, polygons, names, status, may_have_bridges)
+
+
 def _clip(
     contours: Contours,
     region: Solid,
@@ -237,11 +259,19 @@ def _clip(
     """Clip every polygon; return the result, how many polygons needed more than the filter, and rational arithmetic."""
     vertices, ring_offsets, polygon_offsets, largest = contours
     n, dimension = len(polygon_offsets) - 1, vertices.shape[1]
+    check_options(workers, progress)
     status, may_have_bridges = np.zeros(n, np.int8), np.zeros(n, np.bool_)
     sizes = np.zeros(len(ring_offsets) - 1, np.int64)
     parts: dict[int, FloatArray] = {}
     scene = kernel_scene(region, vertices, largest, planes, budget)
     state = np.full(n, OPEN, np.uint8)
+    if scene is not None and len(vertices) <= _FEW:
+        kept = clip_chunk(scene, ring_offsets, polygon_offsets, 0, n, budget, sizes, state, may_have_bridges)
+        if OPEN not in (states := state.tolist()):
+            if progress is not None and n:
+                progress(n)
+            n_exact = n - states.count(CLIPPED)
+            return _gathered(kept, sizes.tolist(), polygon_offsets.tolist(), status, may_have_bridges), n_exact, 0
 
     def settle(i: int) -> FloatArray:
         rings = range(polygon_offsets[i], polygon_offsets[i + 1])

@@ -115,32 +115,32 @@ def fill_on_sphere(
     radius: float,
     items: Any,
     planes: Any,
-    first: int,
-    last: int,
+    begin: int,
+    size: int,
     stop: Any,
     pieces: Pieces,
     still: Any,
     n: Any,
 ) -> None:
-    """Fill rows first .. last - 1 of the pieces of ``segments`` ((n, 2, dim) float64): see `fill_on_boxes`."""
+    """Fill the pieces of ``segments`` ((n, 2, dim) float64): see `fill_on_boxes`."""
     is_flat = center.size == 2
     n_open, c = 0, center_of(center, is_flat)
-    for row in range(first, last):
+    for place in range(size):
         if stop[0]:
             return
-        i = items[row]
+        i, row = items[place], begin + place
         pieces.source[row] = i
         all_sure = True
         p, q = point_of(segments, i, 0, is_flat), point_of(segments, i, 1, is_flat)
         for end in range(2):
-            if planes[row, end] < 0:
+            if planes[place, end] < 0:
                 put_own_end(pieces, row, end, segments, i, is_flat)
                 continue
-            pieces.faces[row, end] = planes[row, end]
+            pieces.faces[row, end] = planes[place, end]
             x, y, z, pieces.t[row, end], sure = cut_by_ball(p, q, c, radius, end)
             put_end(pieces, row, end, (x, y, z), is_flat)
             all_sure &= sure
         if not all_sure:
-            still[first + n_open] = row
+            still[n_open] = row
             n_open += 1
     n[0], n[1] = n_open, n_open

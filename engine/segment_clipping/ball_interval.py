@@ -156,7 +156,7 @@ def decide_on_sphere(
 ) -> None:
     """Decide on ``segments[first:last]`` ((n, 2, dim) float64) and the closed ball: see `decide_on_boxes`."""
     is_flat = center.size == 2
-    kept, n_open, beyond = first, first, 0
+    kept, n_open, beyond = 0, 0, 0
     rr, c = radius * radius, center_of(center, is_flat)
     for i in range(first, last):
         if stop[0]:
@@ -189,4 +189,4 @@ def decide_on_sphere(
         if state == KEPT:
             items[kept], planes[kept, 0], planes[kept, 1] = i, entered, left
             kept += 1
-    n[0], n[1], n[2] = kept - first, n_open - first, beyond
+    n[0], n[1], n[2] = kept, n_open, beyond

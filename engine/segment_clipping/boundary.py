@@ -15,7 +15,8 @@ import numpy as np
 from engine.arrays import FlagArray, FloatArray, Int8Array, IntArray
 from engine.containment.locators import Locator, locator_of
 from engine.containment.rational_locate import rational_location
-from engine.parallel import Budget
+from engine.direct import entry_of
+from engine.parallel import Budget, Progress, run_chunks
 from engine.segment_clipping.boundary_cut import SETTLED, cut_on_mesh, cut_on_outline
 from engine.segment_clipping.contacts import GROUP, NO_ROOM, find_contacts_2d
 from engine.segment_clipping.decide_then_cut import Clipped
@@ -24,6 +25,7 @@ from engine.segment_clipping.exact_segments import Piece
 from engine.segment_clipping.mesh_streams import find_mesh_contacts
 from engine.segment_clipping.pieces import Pieces, joined, room_for
 from engine.segment_clipping.prepared_boundary import Mesh, Outline, boundary_of
+from engine.solids.checks import check_finite
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
 from engine.types import OPEN
@@ -35,6 +37,26 @@ _CONTACTS: Final = 4
 _BYTES: Final = 180
 _BYTES_EXACT: Final = 600
 """Of a piece, in its part and joined; as Python holds it."""
+
+
+def clip_on_boundary(
+    segments: FloatArray, region: Polygon | Polyhedron, budget: Budget, workers: int | None, progress: Progress | None
+) -> Clipped:
+    """Return the pieces of segments (n, 2, dim) float64, not yet looked at for NaN.
+
+    Raises: NotFiniteError.
+    """
+    check_finite(segments, ("segments",))
+    chunks: dict[int, Clipped] = {}
+    locator = locator_of(region).chosen(len(segments), budget)
+
+    def chunk(first: int, last: int) -> None:
+        chunks[first] = clip_chunk(segments, first, last, region, locator, budget)
+
+    run_chunks(chunk, len(segments), budget=budget, workers=workers, progress=progress, first_chunk=16)
+    parts = [chunks[first] for first in sorted(chunks)] or [clip_chunk(segments, 0, 0, region, locator, budget)]
+    pieces, n_beyond, n_rational = zip(*parts)
+    return joined(pieces), sum(n_beyond), sum(n_rational)
 
 
 def clip_chunk(
@@ -67,8 +89,7 @@ def _settle(
     done = np.array([0, 0, _LEAST_ROOM + _CONTACTS * min(GROUP, n)])
     while done[0] < n:
         reached, pieces = int(done[0]), room_for(room, segments.shape[2])
-        with np.errstate(all="ignore"):  # uncompiled kernels: overflow is looked at by their filters
-            kernel(segments, locations, boundary, budget.flag, pieces, state, done)
+        entry_of(kernel)(segments, locations, boundary, budget.flag, pieces, state, done)
         budget.check()
         if done[0] == reached:
             room *= 2  # of rows, if not of contacts
@@ -123,8 +144,7 @@ def _contacts(segments: FloatArray, boundary: Outline | Mesh, budget: Budget) ->
     for first in range(0, len(segments), GROUP):
         room, found = _LEAST_ROOM + 8 * min(GROUP, len(segments)), NO_ROOM
         while found == NO_ROOM:  # bound: room is doubled, and a segment meets an element once
-            with np.errstate(all="ignore"):
-                found, met, _, offsets = kernel(segments[first : first + GROUP], boundary, budget.flag, room)
+            found, met, _, offsets = entry_of(kernel)(segments[first : first + GROUP], boundary, budget.flag, room)
             budget.check()
             room *= 2
         ends.append(ends[-1][-1] + offsets[1:])

@@ -73,13 +73,13 @@ def difference(a: float, b: float, e: Any) -> int:
 
 
 @inline
-def cut_again(segments: Any, low: Any, high: Any, planes: Any, row: int, unsure: int, pieces: Pieces) -> bool:
+def cut_again(segments: Any, low: Any, high: Any, row: int, unsure: int, pieces: Pieces) -> bool:
     """Make those ends of a piece again whose bit of `unsure` is set, by exact signs; return whether all is sure."""
     all_sure = True
     for end in range(2):
         if unsure >> end & 1 == 1:
             segment, point = segments[pieces.source[row]], pieces.ends[end, row]
-            pieces.t[row, end], is_sure = cut_by_signs(segment, low, high, planes[row, end], point)
+            pieces.t[row, end], is_sure = cut_by_signs(segment, low, high, pieces.faces[row, end], point)
             all_sure = all_sure and is_sure
     return all_sure
 
@@ -91,16 +91,16 @@ def fill_on_boxes(
     high: Any,
     items: Any,
     planes: Any,
-    first: int,
-    last: int,
+    begin: int,
+    size: int,
     stop: Any,
     pieces: Pieces,
     still: Any,
     n: Any,
 ) -> None:
-    """Fill rows first .. last - 1 of the pieces of ``segments`` ((n, 2, dim) float64) on the box `low`, `high`.
+    """Fill the pieces, from row `begin` on, of the first `size` items, ``segments`` ((n, 2, dim) float64) on a box.
 
-    items: (m,) int32, planes: (m, 2) int32, as decided. still: from ``still[first]`` on the rows that are not surely
+    items: (m,) int32, planes: (m, 2) int32, as decided on the box `low`, `high`. still: the rows that are not surely
     rounded. n: how many of them, and how many needed more than the first try. stop: one uint8, polled.
     """
     is_flat = low.size == 2
@@ -110,29 +110,30 @@ def fill_on_boxes(
         workspace(64), workspace(64), workspace(64), workspace(64), workspace(64),
     )  # fmt: skip
     n_open = beyond = 0
-    for start in range(first, last, BLOCK):
+    for start in range(0, size, BLOCK):
         if stop[0]:
             return
-        size = min(BLOCK, last - start)
-        for j in range(size):
+        n_here = min(BLOCK, size - start)
+        for j in range(n_here):
             px[j], py[j], pz[j] = point_of(segments, items[start + j], 0, is_flat)
             qx[j], qy[j], qz[j] = point_of(segments, items[start + j], 1, is_flat)
             entered[j], left[j] = planes[start + j, 0], planes[start + j, 1]
-        for j in range(BLOCK):
+        for j in range((n_here + 7) >> 3 << 3):  # whole vectors
             p, q = (px[j], py[j], pz[j]), (qx[j], qy[j], qz[j])
             px[j], py[j], pz[j], t0[j], p_sure = cut_end(p, q, lowest, highest, entered[j], 0.0)
             qx[j], qy[j], qz[j], t1[j], q_sure = cut_end(p, q, lowest, highest, left[j], 1.0)
             unsure[j] = (0.0 if p_sure else 1.0) + (0.0 if q_sure else 2.0)
-        for j in range(size):
-            row = start + j
-            pieces.source[row], pieces.faces[row, 0], pieces.faces[row, 1] = items[row], planes[row, 0], planes[row, 1]
+        for j in range(n_here):
+            row, place = begin + start + j, start + j
+            pieces.source[row] = items[place]
+            pieces.faces[row, 0], pieces.faces[row, 1] = planes[place, 0], planes[place, 1]
             pieces.t[row, 0], pieces.t[row, 1] = t0[j], t1[j]
             put_end(pieces, row, 0, (px[j], py[j], pz[j]), is_flat)
             put_end(pieces, row, 1, (qx[j], qy[j], qz[j]), is_flat)
-        for j in range(size):
+        for j in range(n_here):
             if unsure[j] != 0.0:
                 beyond += 1
-                if not cut_again(segments, low, high, planes, start + j, int(unsure[j]), pieces):
-                    still[first + n_open] = start + j
+                if not cut_again(segments, low, high, begin + start + j, int(unsure[j]), pieces):
+                    still[n_open] = begin + start + j
                     n_open += 1
     n[0], n[1] = n_open, beyond

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal, Unpack, overload
 
@@ -10,23 +9,21 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.arrays import FloatArray, IntArray
-from engine.containment.locators import locator_of
 from engine.errors import UnsupportedSolidError
-from engine.parallel import Budget, Cancel, Options, Progress, run_chunks
+from engine.parallel import Budget, Cancel, Options, Progress
 from engine.predicates.scaling import balanced_rows
 from engine.segment_clipping.ball_cut import fill_on_sphere
 from engine.segment_clipping.ball_interval import decide_on_sphere
-from engine.segment_clipping.boundary import clip_chunk
+from engine.segment_clipping.boundary import clip_on_boundary
 from engine.segment_clipping.box_cut import fill_on_boxes
 from engine.segment_clipping.cohen_sutherland import decide_on_boxes
 from engine.segment_clipping.cyrus_beck import as_columns, decide_on_rows
-from engine.segment_clipping.decide_then_cut import Clipped, Method, Scaled, clip_on_convex, scaled
+from engine.segment_clipping.decide_then_cut import Method, Scaled, clip_on_convex, scaled
 from engine.segment_clipping.exact_segments import clip_by_planes, clip_by_sphere
-from engine.segment_clipping.pieces import joined
 from engine.segment_clipping.planes_cut import fill_on_rows
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
-from engine.solids.checks import as_point_groups, check_finite
+from engine.solids.checks import as_point_groups
 from engine.solids.convex import Convex
 from engine.solids.half_space import HalfSpace
 from engine.solids.polygon import Polygon
@@ -115,32 +112,33 @@ def clip_segments(
     >>> pieces.start.tolist(), pieces.end.tolist(), pieces.t.tolist(), pieces.faces.tolist()
     ([[0.0, 1.0]], [[2.0, 1.0]], [[0.25, 0.75]], [[0, 1]])
     """
-    task, method = _method(region)
+    method = _method_for(region)
     array = as_point_groups(segments, 2, region.dimension, ("segments",), must_be_finite=False)  # kernels look at it
     with Budget(deadline, cancel) as budget:
-        found, n_beyond, n_rational = task(array, budget, workers, progress)
+        if isinstance(method, Method):
+            found, n_beyond, n_rational = clip_on_convex(array, method, budget, workers, progress)
+        else:
+            found, n_beyond, n_rational = clip_on_boundary(array, method, budget, workers, progress)
     pieces = SegmentPieces(found.source, found.ends[0], found.ends[1], found.t, found.faces)
     if not report:
         return pieces
-    return pieces, Accuracy("exact", 0.5, len(array), n_beyond, n_rational, method)
+    name = method.name if isinstance(method, Method) else "box_tree"
+    return pieces, Accuracy("exact", 0.5, len(array), n_beyond, n_rational, name)
 
 
-Task = Callable[[FloatArray, Budget, int | None, Progress | None], Clipped]
-
-
-def _method(region: Solid) -> tuple[Task, str]:
-    """Return what clips on this solid, and its name: the one table from type to method."""
+def _method_for(region: Solid) -> Method | Polygon | Polyhedron:
+    """Return what clips on this solid, kept with it, or the boundary that it is: the one table from type to method."""
     match region:
         case HalfSpace():
-            return _on_rows(region.row[None, :]), "cyrus_beck"
+            return region.prepared("segment_method", lambda: _on_rows(region.row[None, :]))
         case Convex():
-            return _on_rows(region.planes), "cyrus_beck"
+            return region.prepared("segment_method", lambda: _on_rows(region.planes))
         case Aabb():
-            return _on_box(region), "cohen_sutherland"
+            return region.prepared("segment_method", lambda: _on_box(region.min, region.max, region.rows.tolist()))
         case Sphere():
-            return _on_ball(region), "sphere_interval"
+            return region.prepared("segment_method", lambda: _on_ball(region.center, float(region.radius)))
         case Polygon() | Polyhedron():
-            return _on_boundary(region), "box_tree"
+            return region
     kind = getattr(region, "type", type(region).__name__)
     raise UnsupportedSolidError(
         f"clip_segments does not take a {kind}; give a half_space, aabb, convex, sphere, polygon or polyhedron",
@@ -148,20 +146,18 @@ def _method(region: Solid) -> tuple[Task, str]:
     )
 
 
-def _on_box(region: Aabb) -> Task:
-    planes = region.rows.tolist()
-    return _one_piece(
-        Method(
-            decide_on_boxes,
-            fill_on_boxes,
-            (region.min, region.max),
-            lambda p, q: clip_by_planes(p, q, planes),
-            lambda segments: scaled(segments, region.min, region.max),
-        )
+def _on_box(low: FloatArray, high: FloatArray, planes: list[list[float]]) -> Method:
+    return Method(
+        "cohen_sutherland",
+        decide_on_boxes,
+        fill_on_boxes,
+        (low, high),
+        lambda p, q: clip_by_planes(p, q, planes),
+        lambda segments: scaled(segments, low, high),
     )
 
 
-def _on_rows(rows: FloatArray) -> Task:
+def _on_rows(rows: FloatArray) -> Method:
     planes = rows.tolist()
     plain = balanced_rows(rows, 0)
 
@@ -170,51 +166,28 @@ def _on_rows(rows: FloatArray) -> Task:
         balanced = None if found is None else balanced_rows(rows, found.exponent)
         return None if found is None or balanced is None else replace(found, region=(as_columns(balanced),))
 
-    return _one_piece(
-        Method(
-            decide_on_rows,
-            fill_on_rows,
-            (as_columns(rows if plain is None else plain),),
-            lambda p, q: clip_by_planes(p, q, planes),
-            scale,
-        )
+    return Method(
+        "cyrus_beck",
+        decide_on_rows,
+        fill_on_rows,
+        (as_columns(rows if plain is None else plain),),
+        lambda p, q: clip_by_planes(p, q, planes),
+        scale,
     )
 
 
-def _on_ball(region: Sphere) -> Task:
-    center, radius = region.center.tolist(), float(region.radius)
+def _on_ball(center: FloatArray, radius: float) -> Method:
+    place = center.tolist()
 
     def scale(segments: FloatArray) -> Scaled | None:
-        found = scaled(segments, region.center, np.array([radius]))
+        found = scaled(segments, center, np.array([radius]))
         return found and replace(found, region=(found.region[0], float(found.region[1][0])))
 
-    return _one_piece(
-        Method(
-            decide_on_sphere,
-            fill_on_sphere,
-            (region.center, radius),
-            lambda p, q: clip_by_sphere(p, q, center, radius),
-            scale,
-        )
+    return Method(
+        "sphere_interval",
+        decide_on_sphere,
+        fill_on_sphere,
+        (center, radius),
+        lambda p, q: clip_by_sphere(p, q, place, radius),
+        scale,
     )
-
-
-def _one_piece(method: Method) -> Task:
-    return lambda segments, budget, workers, progress: clip_on_convex(segments, method, budget, workers, progress)
-
-
-def _on_boundary(region: Polygon | Polyhedron) -> Task:
-    def task(segments: FloatArray, budget: Budget, workers: int | None, progress: Progress | None) -> Clipped:
-        check_finite(segments, ("segments",))
-        chunks: dict[int, Clipped] = {}
-        locator = locator_of(region).chosen(len(segments), budget)
-
-        def chunk(first: int, last: int) -> None:
-            chunks[first] = clip_chunk(segments, first, last, region, locator, budget)
-
-        run_chunks(chunk, len(segments), budget=budget, workers=workers, progress=progress, first_chunk=16)
-        parts = [chunks[first] for first in sorted(chunks)] or [clip_chunk(segments, 0, 0, region, locator, budget)]
-        pieces, n_beyond, n_rational = zip(*parts)
-        return joined(pieces), sum(n_beyond), sum(n_rational)
-
-    return task

@@ -188,8 +188,8 @@ def decide_on_boxes(
 ) -> None:
     """Decide on ``segments[first:last]`` ((n, 2, dim) float64) and the box `low`, `high`.
 
-    items: from ``items[first]`` on the segments that are kept, in order, in planes (n, 2) the planes entered and left,
-    -1 for an end of the segment. still: likewise the segments left open. n: how many are kept, open, and went beyond
+    items: (m,) the segments that are kept, in order, in planes (m, 2) the planes entered and left, -1 for an end of the
+    segment; there is room for all. still: likewise the segments left open. n: how many are kept, open, and went beyond
     the filter. stop: one uint8, polled.
     """
     is_flat = low.size == 2
@@ -198,7 +198,7 @@ def decide_on_boxes(
         workspace(64), workspace(64), workspace(64), workspace(64), workspace(64), workspace(64),
     )  # fmt: skip
     state, entered, left, unsure = workspace(64), workspace(64), workspace(64), np.empty(BLOCK, np.int64)
-    kept, n_open, beyond = first, first, 0
+    kept, n_open, beyond = 0, 0, 0
     for start in range(first, last, BLOCK):
         if stop[0]:
             return
@@ -206,7 +206,7 @@ def decide_on_boxes(
         for j in range(size):
             px[j], py[j], pz[j] = point_of(segments, start + j, 0, is_flat)
             qx[j], qy[j], qz[j] = point_of(segments, start + j, 1, is_flat)
-        for j in range(BLOCK):  # a number of turns that the compiler knows; those past `size` are not looked at
+        for j in range((size + 7) >> 3 << 3):  # whole vectors; what is past `size` is not looked at
             p, q = (px[j], py[j], pz[j]), (qx[j], qy[j], qz[j])
             state[j], entered[j], left[j] = decide_roughly(p, q, lowest, highest)
         n_unsure = 0
@@ -229,7 +229,7 @@ def decide_on_boxes(
                 still[n_open] = start + j
                 n_open += 1
         beyond += n_unsure
-        for j in range(size):  # kept <= start + j: what is not kept is written over
+        for j in range(size):  # kept <= start + j - first: what is not kept is written over
             items[kept], planes[kept, 0], planes[kept, 1] = start + j, int(entered[j]), int(left[j])
             kept += state[j] == KEPT
-    n[0], n[1], n[2] = kept - first, n_open - first, beyond
+    n[0], n[1], n[2] = kept, n_open, beyond

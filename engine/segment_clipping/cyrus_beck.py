@@ -214,7 +214,7 @@ def decide_on_rows(
     slopes, floors = columns[-2], columns[-1]
     m = d.size
     s_p, s_q, bounds, chosen = np.empty(m), np.empty(m), np.empty(m), np.empty(m, np.int64)
-    kept, n_open, beyond = first, first, 0
+    kept, n_open, beyond = 0, 0, 0
     for i in range(first, last):
         px, py, pz = point_of(segments, i, 0, is_flat)
         qx, qy, qz = point_of(segments, i, 1, is_flat)
@@ -252,4 +252,4 @@ def decide_on_rows(
         planes[kept, 0] = chosen[entered] if entered >= 0 else -1
         planes[kept, 1] = chosen[left] if left >= 0 else -1
         kept += 1
-    n[0], n[1], n[2] = kept - first, n_open - first, beyond
+    n[0], n[1], n[2] = kept, n_open, beyond

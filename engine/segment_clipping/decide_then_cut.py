@@ -1,9 +1,9 @@
-"""Runs the kernels of convex regions, on which a segment has one piece at most: decide, then fill.
+"""Runs the kernels of convex regions, on which a segment has one piece at most, chunk by chunk: decide, then fill.
 
-1. *decide* goes over the segments in chunks and lists those that are kept with the planes that bound them. What it
-   leaves open is settled by rational arithmetic and put in its place, so that the number of pieces is known.
-2. *fill* goes over the pieces in chunks and writes each where it belongs, nothing is copied. A coordinate that it
-   cannot round for sure is settled by rational arithmetic too.
+1. *decide* goes over the segments of a chunk and lists those that are kept with the planes that bound them. What it
+   leaves open is settled by rational arithmetic at last.
+2. *fill* goes over the pieces that the chunk has and writes each where it stays. A coordinate that it cannot round for
+   sure is settled by rational arithmetic too.
 
 Kernels take numbers of sizes for which expansions are exact. Where more than a few items are left open, all is done
 again on numbers times a power of two, if there is one that brings them into that range.
@@ -11,19 +11,19 @@ again on numbers times a power of two, if there is one that brings them into tha
 
 from __future__ import annotations
 
-from bisect import bisect_right
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from threading import Lock
 from typing import Any, Final
 
 import numpy as np
 
 from engine.arrays import FloatArray, Int32Array, IntArray
+from engine.direct import entry_of
 from engine.parallel import Budget, Progress, check_options, run_chunks
 from engine.predicates.scaling import exponent_of, scaled_back, shifted
 from engine.segment_clipping.exact_segments import Piece
-from engine.segment_clipping.pieces import Pieces
+from engine.segment_clipping.pieces import Pieces, joined, room_for
 from engine.solids.checks import check_finite
 
 Settle = Callable[[list[float], list[float]], Piece | None]
@@ -31,7 +31,12 @@ Clipped = tuple[Pieces, int, int]
 """Pieces, how many items needed more than the filter, and how many rational arithmetic."""
 
 _FEW: Final = 32
-"""Open items that rational arithmetic settles in the time in which a batch is looked through for its exponent."""
+"""Open items that rational arithmetic settles in the time in which a batch is looked through for its exponent; segments
+that are clipped in the time that it takes to plan more."""
+
+
+_AT_ONCE: Final = 1 << 12
+"""Segments that are decided on before their pieces are filled."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,33 +62,16 @@ def scaled(points: FloatArray, *region: FloatArray) -> Scaled | None:
 class Method:
     """How segments are clipped on one region.
 
-    decide, fill: kernels; see cohen_sutherland.py. region: their arguments. settle: rational arithmetic on one segment.
-    scale: returns the batch scaled, None where it is well as it is or cannot be scaled exactly.
+    decide, fill: kernels; see cohen_sutherland.py, box_cut.py. region: their arguments. settle: rational arithmetic on
+    one segment. scale: returns the batch scaled, None where it is well as it is or cannot be scaled exactly.
     """
 
+    name: str
     decide: Any
     fill: Any
     region: tuple[Any, ...]
     settle: Settle
     scale: Callable[[FloatArray], Scaled | None]
-
-
-class Tally:
-    """Counts each segment once, when it is dropped or its piece is filled, also where all is done a second time."""
-
-    def __init__(self, progress: Progress | None) -> None:
-        self._progress = progress
-        self._done = self._told = 0
-
-    def restart(self) -> None:
-        """Count from the first segment on; nothing is told again."""
-        self._done = 0
-
-    def add(self, n_items: int) -> None:
-        self._done += n_items
-        if self._progress is not None and self._done > self._told:
-            self._progress(self._done - self._told)
-            self._told = self._done
 
 
 def clip_on_convex(
@@ -94,14 +82,41 @@ def clip_on_convex(
     Raises: NotFiniteError.
     """
     check_options(workers, progress)
-    scene, tally = Scaled(segments, method.region, 0), Tally(progress)
-    found = _clip(segments, method, scene, _FEW + len(segments) // 256, budget, workers, tally)
+    found = _clip_few(segments, method, budget, progress) if len(segments) <= _FEW else None
+    if found is not None:
+        return found
+    scene = Scaled(segments, method.region, 0)
+    found = _clip(segments, method, scene, _FEW + len(segments) // 256, budget, workers, progress)
     if found is None:
         better = method.scale(segments)
-        tally.restart()
-        found = _clip(segments, method, better or scene, len(segments), budget, workers, tally)
+        found = _clip(segments, method, better or scene, len(segments), budget, workers, None)  # progress is told
     assert found is not None
     return found
+
+
+def _clip_few(segments: FloatArray, method: Method, budget: Budget, progress: Progress | None) -> Clipped | None:
+    """Return the pieces of a few segments; None where anything is left open."""
+    n, _, dimension = segments.shape
+    items, planes, still, counts = (
+        np.empty(n, np.int32),
+        np.empty((n, 2), np.int32),
+        np.empty(n, np.int32),
+        np.zeros(3, np.int64),
+    )
+    budget.check()
+    entry_of(method.decide)(segments, *method.region, 0, n, budget.flag, items, planes, still, counts)
+    m, n_open, n_beyond = counts.tolist()
+    if n_open:
+        return None
+    pieces = room_for(m, dimension)
+    entry_of(method.fill)(segments, *method.region, items, planes, 0, m, budget.flag, pieces, still, counts)
+    budget.check()
+    n_open, n_more, _ = counts.tolist()
+    if n_open:
+        return None
+    if progress is not None and n:
+        progress(n)
+    return pieces, min(n, n_beyond + n_more), 0
 
 
 def _clip(
@@ -111,129 +126,112 @@ def _clip(
     most_open: int,
     budget: Budget,
     workers: int | None,
-    tally: Tally,
+    progress: Progress | None,
 ) -> Clipped | None:
     """Return the pieces; None where more than `most_open` items are left to rational arithmetic."""
-    n = len(segments)
-    listed, still = np.empty((2, n), np.int32)  # together: a large block gets large pages
-    planes = np.empty((n, 2), np.int32)
-    decided: dict[int, IntArray] = {}
-    dropped: deque[int] = deque()
-
-    def decide(first: int, last: int) -> None:
-        counts = np.zeros(3, np.int64)
-        with np.errstate(all="ignore"):  # uncompiled kernels: overflow is looked at by their filters
-            method.decide(scene.points, *scene.region, first, last, budget.flag, listed, planes, still, counts)
-        decided[first] = counts
-        dropped.append(last - first - int(counts[0] + counts[1]))
-
-    def count(_: int) -> None:
-        while dropped:
-            tally.add(dropped.popleft())
-
-    run_chunks(decide, n, budget=budget, workers=workers, progress=count)
-    firsts = sorted(decided)
-    n_open = sum(int(decided[first][1]) for first in firsts)
+    batch = _Batch(method, scene, budget)
+    run_chunks(batch.clip, len(segments), budget=budget, workers=workers, progress=progress)
+    n_open = sum(map(len, batch.open_items))
     if n_open:
         check_finite(segments, ("segments",))  # kernels leave open what is not
-        if n_open > most_open:
-            return None
-    kept = [(first, int(decided[first][0])) for first in firsts]
-    left = _joined(still, [(first, int(decided[first][1])) for first in firsts])
+    n_rational = n_open + sum(map(len, batch.unsure_rows))
+    if n_rational > most_open:
+        return None
+    m = batch.n_rows
+    filled = batch.pieces
+    if m < len(segments):
+        filled = Pieces(filled.source[:m], filled.ends[:, :m], filled.t[:m], filled.faces[:m])
+    if n_rational:
+        filled = _settle(filled, batch, segments, method.settle, budget)
+    return filled, min(len(segments), batch.n_beyond + n_open), n_rational
+
+
+class _Batch:
+    """Clips chunks of a batch; each piece is written where it stays, behind those of all chunks before.
+
+    Rows are given in the order of the chunks: what is decided before its turn waits, and is filled by whoever decides
+    the chunk that it waits for. There are rows for a piece of every segment; memory that none is written to is no more
+    than addresses.
+    """
+
+    def __init__(self, method: Method, scene: Scaled, budget: Budget) -> None:
+        n, _, dimension = scene.points.shape
+        self.pieces = room_for(n, dimension)
+        self.open_items: list[IntArray] = []
+        self.unsure_rows: list[IntArray] = []
+        self.n_rows = self.n_beyond = 0
+        self._method, self._scene, self._flag = method, scene, budget.flag
+        self._waiting: dict[int, tuple[int, Int32Array, Int32Array, int]] = {}
+        self._lock, self._next = Lock(), 0
+
+    def clip(self, first: int, last: int) -> None:
+        """Clip segments first .. last - 1, a few at a time: they are still in the cache when pieces are filled."""
+        for begin in range(first, last, _AT_ONCE):
+            self._decide(begin, min(begin + _AT_ONCE, last))
+            while (found := self._placed()) is not None:
+                self._fill(*found)
+
+    def _decide(self, first: int, last: int) -> None:
+        size, scene = last - first, self._scene
+        items, planes, still = np.empty(size, np.int32), np.empty((size, 2), np.int32), np.empty(size, np.int32)
+        counts = np.zeros(3, np.int64)
+        entry_of(self._method.decide)(
+            scene.points, *scene.region, first, last, self._flag, items, planes, still, counts
+        )
+        n_kept, n_open, n_beyond = counts.tolist()
+        with self._lock:
+            self.n_beyond += n_beyond
+            if n_open:
+                self.open_items.append(still[:n_open].astype(np.int64))
+            self._waiting[first] = last, items, planes, n_kept
+
+    def _placed(self) -> tuple[int, Int32Array, Int32Array, int] | None:
+        """Return the first row and the items of the chunk whose turn it is, None where it is not decided."""
+        with self._lock:
+            if self._next not in self._waiting:
+                return None
+            row = self.n_rows
+            self._next, items, planes, n_kept = self._waiting.pop(self._next)
+            self.n_rows += n_kept
+            return row, items, planes, n_kept
+
+    def _fill(self, row: int, items: Int32Array, planes: Int32Array, n_kept: int) -> None:
+        """Fill `n_kept` rows from `row` on."""
+        scene, pieces, counts, still = self._scene, self.pieces, np.zeros(2, np.int64), np.empty(n_kept, np.int32)
+        entry_of(self._method.fill)(
+            scene.points, *scene.region, items, planes, row, n_kept, self._flag, pieces, still, counts
+        )
+        n_unsure, n_beyond = counts.tolist()
+        unsure = still[:n_unsure].astype(np.int64)
+        rows = slice(row, row + n_kept)
+        if scene.exponent:
+            is_cut = pieces.faces[rows] >= 0
+            for side in range(2):
+                pieces.ends[side, rows], doubtful = scaled_back(pieces.ends[side, rows], scene.exponent)
+                unsure = np.union1d(unsure, row + np.flatnonzero(doubtful & is_cut[:, side]))
+        with self._lock:
+            self.n_beyond += n_beyond
+            if len(unsure):
+                self.unsure_rows.append(unsure)
+
+
+def _settle(filled: Pieces, batch: _Batch, segments: FloatArray, settle: Settle, budget: Budget) -> Pieces:
+    """Return the pieces with those rows made anew that are not sure, and with what is left of open items."""
+    open_items = np.concatenate([np.zeros(0, np.int64), *batch.open_items])
+    unsure_rows = np.concatenate([np.zeros(0, np.int64), *batch.unsure_rows])
     pieces: dict[int, Piece] = {}
-    for item in left.tolist():
+    for item in [*open_items.tolist(), *filled.source[unsure_rows].tolist()]:
         budget.check()
-        piece = method.settle(segments[item, 0].tolist(), segments[item, 1].tolist())
+        piece = settle(*segments[item].tolist())
         if piece is not None:
             pieces[item] = piece
-    tally.add(len(left) - len(pieces))
-    if pieces:
-        items = np.append(_joined(listed, kept), np.array(list(pieces), np.int32))
-        bounding = np.append(_joined(planes, kept), np.full((len(pieces), 2), -1, np.int32), axis=0)
+    missing = [item for item in open_items.tolist() if item in pieces]
+    if missing:
+        items = np.append(filled.source, missing)
         order = np.argsort(items, kind="stable")
-        listed, planes, kept = items[order], bounding[order], [(0, len(items))]
-    filled, unsure, n_beyond = _fill(scene, method, listed, planes, kept, budget, workers, tally)
-    if len(unsure) + n_open > most_open:
-        return None
-    for row in unsure:
-        budget.check()
-        item = int(filled.source[row])
-        piece = method.settle(segments[item, 0].tolist(), segments[item, 1].tolist())
-        assert piece is not None
-        pieces[item] = piece
-    if pieces:
-        _put(filled, pieces)
-    beyond = sum(int(decided[first][2]) for first in firsts)
-    return filled, min(n, beyond + n_beyond + n_open), n_open + len(unsure)
-
-
-def _fill(
-    scene: Scaled,
-    method: Method,
-    items: Int32Array,
-    planes: Int32Array,
-    kept: list[tuple[int, int]],
-    budget: Budget,
-    workers: int | None,
-    tally: Tally,
-) -> tuple[Pieces, IntArray, int]:
-    """Return the pieces, which of them are not surely rounded, and how many needed more than one try.
-
-    items, planes: as decided, of the ranges `kept` (first, how many).
-    """
-    ends_of_ranges = np.cumsum([0, *(size for _, size in kept)]).tolist()
-    m, dimension = ends_of_ranges[-1], scene.points.shape[2]
-    floats, integers, still = np.empty(m * (2 * dimension + 2)), np.empty(3 * m, np.int64), np.empty(m, np.int32)
-    ends, t = floats[: 2 * m * dimension].reshape(2, m, dimension), floats[2 * m * dimension :].reshape(m, 2)
-    pieces = Pieces(integers[:m], ends, t, integers[m:].reshape(m, 2))
-    counts: dict[int, IntArray] = {}
-    unsure: list[IntArray] = []
-
-    def fill(first: int, last: int) -> None:
-        i_range = bisect_right(ends_of_ranges, first) - 1
-        while first < last:  # bound: every turn goes on to the next range
-            stop = min(last, ends_of_ranges[i_range + 1])
-            if first < stop:
-                fill_from(kept[i_range][0] - ends_of_ranges[i_range], first, stop)
-            first, i_range = stop, i_range + 1
-
-    def fill_from(shift: int, first: int, last: int) -> None:
-        """Fill rows from the items `shift` places further on."""
-        found = counts[first] = np.zeros(2, np.int64)
-        with np.errstate(all="ignore"):
-            method.fill(
-                scene.points,
-                *scene.region,
-                items[shift:],
-                planes[shift:],
-                first,
-                last,
-                budget.flag,
-                pieces,
-                still,
-                found,
-            )
-        if scene.exponent:
-            is_cut = pieces.faces[first:last] >= 0
-            for side in range(2):
-                points, doubtful = scaled_back(ends[side, first:last], scene.exponent)
-                ends[side, first:last] = points
-                unsure.append(first + np.flatnonzero(doubtful & is_cut[:, side]))
-
-    run_chunks(fill, m, budget=budget, workers=workers, progress=tally.add)
-    unsure += [still[first : first + found[0]].astype(np.int64) for first, found in counts.items()]
-    return pieces, np.unique(np.concatenate([np.zeros(0, np.int64), *unsure])), sum(int(c[1]) for c in counts.values())
-
-
-def _joined(array: Int32Array, parts: list[tuple[int, int]]) -> Int32Array:
-    """Return the parts (first, how many) of an array one after another."""
-    if len(parts) == 1:
-        return array[parts[0][0] : parts[0][0] + parts[0][1]]
-    return np.concatenate([array[:0], *(array[first : first + n] for first, n in parts)])
-
-
-def _put(filled: Pieces, pieces: dict[int, Piece]) -> None:
-    """Write settled pieces to their rows."""
+        filled = joined([filled, room_for(len(missing), segments.shape[2])])
+        filled = Pieces(items[order], filled.ends[:, order], filled.t[order], filled.faces[order])
     rows = np.searchsorted(filled.source, np.array(list(pieces), np.int64))
-    for row, piece in zip(rows, pieces.values()):
+    for row, piece in zip(rows.tolist(), pieces.values()):
         filled.t[row], filled.ends[:, row], filled.faces[row] = piece.t, (piece.start, piece.end), piece.faces
+    return filled

@@ -79,26 +79,26 @@ def fill_on_rows(
     columns: Any,
     items: Any,
     planes: Any,
-    first: int,
-    last: int,
+    begin: int,
+    size: int,
     stop: Any,
     pieces: Pieces,
     still: Any,
     n: Any,
 ) -> None:
-    """Fill rows first .. last - 1 of the pieces of ``segments`` ((n, 2, dim) float64): see `fill_on_boxes`."""
+    """Fill the pieces of ``segments`` ((n, 2, dim) float64): see `fill_on_boxes`."""
     is_flat = segments.shape[2] == 2
     a, b, c, d = columns_of(columns)
     n_open = beyond = 0
-    for row in range(first, last):
+    for place in range(size):
         if stop[0]:
             return
-        i = items[row]
+        i, row = items[place], begin + place
         pieces.source[row] = i
         all_sure = tried = True
         p, q = point_of(segments, i, 0, is_flat), point_of(segments, i, 1, is_flat)
         for end in range(2):
-            j = planes[row, end]
+            j = planes[place, end]
             if j < 0:
                 put_own_end(pieces, row, end, segments, i, is_flat)
                 continue
@@ -114,6 +114,6 @@ def fill_on_rows(
                 all_sure = all_sure and sure
         beyond += not tried
         if not all_sure:
-            still[first + n_open] = row
+            still[n_open] = row
             n_open += 1
     n[0], n[1] = n_open, beyond

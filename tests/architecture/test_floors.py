@@ -11,6 +11,7 @@ ROOT = Path(__file__).resolve().parents[2]
 FLOORS = {
     "engine.version": 0,
     "engine.arrays": 0,
+    "engine.direct": 0,
     "engine.errors": 0,
     "engine.types": 0,
     "engine.kernel_cache": 0,
