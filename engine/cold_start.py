@@ -52,14 +52,16 @@ def fill_cache(
     shares: how long each step takes, to any scale.
     progress: called with the share of each step that ended.
     """
-    folder = cache_folder()
-    if folder is None or numba_config.DISABLE_JIT or processes < 2 or not sys.executable or _is_full(folder, module):
+    folder, found = cache_folder(), seed()
+    if found is not None and not _has_all(found, module):
+        log.warning("the kernel seed %s lacks kernels of this version for this CPU: they are compiled", found)
+    if folder is None or numba_config.DISABLE_JIT or processes < 2 or not sys.executable or _is_full(module):
         return ()
     with contextlib.suppress(OSError):
         own = folder / source_digest(module)
         own.mkdir(parents=True, exist_ok=True)
         with _alone(own / "lock"):
-            if not _is_full(folder, module):
+            if not _is_full(module):
                 done = _run(module, shares, processes, progress)
                 if len(done) == len(shares):
                     note_full(module)
@@ -70,7 +72,7 @@ def fill_cache(
 def note_full(module: str) -> None:
     """Note that the cache holds all that the steps of `module` compile: every one of them was called."""
     folder = cache_folder()
-    if folder is not None and not numba_config.DISABLE_JIT and not _is_full(folder, module):
+    if folder is not None and not numba_config.DISABLE_JIT and not _is_full(module):
         with contextlib.suppress(OSError):
             own = folder / source_digest(module)
             own.mkdir(parents=True, exist_ok=True)
@@ -78,10 +80,13 @@ def note_full(module: str) -> None:
                 (own / sign).touch()
 
 
-def _is_full(folder: Path, module: str) -> bool:
+def _is_full(module: str) -> bool:
     """Tell whether nothing is left to compile for a CPU whose kernels can be run here."""
-    names = [f"{source_digest(module)}/{sign}" for sign in complete_signs()]
-    return any((place / name).exists() for place in (folder, seed()) if place is not None for name in names)
+    return any(folder is not None and _has_all(folder, module) for folder in (cache_folder(), seed()))
+
+
+def _has_all(folder: Path, module: str) -> bool:
+    return any((folder / source_digest(module) / sign).exists() for sign in complete_signs())
 
 
 @contextlib.contextmanager

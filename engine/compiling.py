@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import copy
 import functools
+import gc
 import hashlib
 import pickle
 from collections.abc import Callable
@@ -36,6 +37,7 @@ _ASKED_FOR = {
     JITCPUCodegen: ("set_env", "create_library", "_library_class"),
     NullCache: ("load_overload", "save_overload"),
     CompileResult: ("_reduce",),
+    CompilerBase: ("compile_extra",),
     CPUDispatcher: ("get_call_template",),
     Lower: ("setup_function",),
     NativeLowering: ("run_pass", "lowering_class"),
@@ -158,6 +160,15 @@ class KernelCompiler(CompilerBase):  # type: ignore[misc]
     """numba's own steps, but for how a function is written."""
 
     lowering: type[NativeLowering] = _KernelLowering
+
+    def compile_extra(self, function: Any) -> Any:
+        """Compile; to look for cycles as often as Python does, among so much that lives long, takes a tenth of it."""
+        usual = gc.get_threshold()
+        gc.set_threshold(50_000, 20, 50)
+        try:
+            return super().compile_extra(function)
+        finally:
+            gc.set_threshold(*usual)
 
     def define_pipelines(self) -> list[Any]:
         steps = DefaultPassBuilder.define_nopython_pipeline(self.state)

@@ -56,6 +56,7 @@ _IMPORT = re.compile(
 )
 
 
+@functools.cache
 def _file(module: str) -> Path | None:
     """Return the source of the dotted engine `module`, None if there is no such file."""
     base = _folder(module)

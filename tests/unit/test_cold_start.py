@@ -71,6 +71,17 @@ def test_a_seed_that_is_full_needs_no_step(place: Path) -> None:
     assert steps_done(place) == ["0", "1", "2"]
 
 
+def test_a_seed_for_another_cpu_is_left_and_said_to_be(place: Path) -> None:
+    assert end(fill(place)) == (0, b"")
+    kernel_cache.seal(place / "cache")
+    older = {"NUMBA_CPU_NAME": "x86-64-v2", "NUMBA_CPU_FEATURES": ""}
+    other = {"ENGINE_CACHE_DIR": str(place / "other"), "ENGINE_CACHE_SEED": str(place / "cache"), **older}
+    code, said = end(fill(place, **other))
+    assert code == 0
+    assert b"lacks kernels of this version for this CPU" in said
+    assert steps_done(place) == ["0", "0", "1", "1", "2", "2"]
+
+
 def test_a_killed_compiler_ends_in_answers(place: Path) -> None:
     assert end(fill(place, "os.kill(os.getpid(), 9)")) == (0, b"")
     assert steps_done(place) == ["0", "1"]

@@ -237,10 +237,13 @@ def test_where_numba_lacks_a_name_kernels_are_compiled_without_a_cache(project: 
     assert not list((project / "cache").rglob("*.nbc"))
 
 
-def test_a_kernel_whose_code_cannot_be_kept_answers(project: Path) -> None:
-    full = "import pathlib\ndef full(*a, **k): raise OSError(28, 'no space left on device')\n"
-    full += "pathlib.Path.write_bytes = full\n"
+def test_a_full_disk_ends_in_answers(project: Path) -> None:
+    """No file may grow: each write fails as on a disk without room, and leaves nothing behind."""
+    resource = pytest.importorskip("resource")
+    full = f"import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (0, {resource.RLIM_INFINITY}))\n"
     assert run(project, f"{full}{USE}", ENGINE_CACHE_DIR=str(project / "cache"))[:2] == ["2.0", "0"]
+    assert not [path for path in (project / "cache").rglob("*") if path.is_file()]
+    assert run(project, ENGINE_CACHE_DIR=str(project / "cache"))[:2] == ["2.0", "0"]
 
 
 def test_inner_functions_are_compiled_once_for_all_literals(project: Path) -> None:

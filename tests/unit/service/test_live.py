@@ -11,7 +11,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 
@@ -24,14 +24,19 @@ ROOT = Path(__file__).resolve().parents[3]
 
 
 class Service:
-    """A running service and what it wrote to its log."""
+    """A running service and what it wrote to its log; by another Python, from its folder, where that is named."""
 
-    def __init__(self, **settings: object) -> None:
-        environment = {**os.environ, **{f"GEOMETRY_{name.upper()}": str(value) for name, value in settings.items()}}
-        command = [sys.executable, "-m", "service"]
+    def __init__(
+        self,
+        python: str = sys.executable,
+        folder: Path = ROOT,
+        around: Mapping[str, str] = os.environ,
+        **settings: object,
+    ) -> None:
+        environment = {**around, **{f"GEOMETRY_{name.upper()}": str(value) for name, value in settings.items()}}
         self.process = subprocess.Popen(
-            command,
-            cwd=ROOT,
+            [python, "-m", "service"],
+            cwd=folder,
             env={**environment, "GEOMETRY_PORT": "0"},
             stderr=subprocess.PIPE,
             text=True,

@@ -1,0 +1,104 @@
+"""A seed of all kernels: a process with nothing of its own answers from it at once, and compiles nothing."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from numba import config as numba_config
+
+import engine
+from engine import jit, kernel_cache
+
+pytestmark = pytest.mark.skipif(bool(numba_config.DISABLE_JIT), reason="the compiler is disabled")
+
+PROBE = """
+import logging
+logging.basicConfig()
+import numpy as np
+from numba.core import event
+import engine
+
+class Counter(event.Listener):
+    n = 0
+    def on_start(self, happening):
+        self.n += 1
+    def on_end(self, happening):
+        pass
+
+counter = Counter()
+event.register("numba:compile", counter)
+corners = [[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)]
+faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]]
+cube, other = engine.Polyhedron(corners, faces), engine.Polyhedron(np.array(corners) + 0.5, faces)
+box, square = engine.Aabb([0, 0, 0], [1, 1, 1]), engine.Polygon([[[0, 0], [2, 0], [0, 2]]])
+points = np.linspace(-1, 2, 24)
+answers = [
+    engine.locate(points.reshape(8, 3), engine.Sphere([0, 0, 0], 1)).sum(),
+    engine.locate(points.reshape(8, 3), cube).sum(),
+    len(engine.clip_segments(points.reshape(4, 2, 3), box).source),
+    engine.collide(cube, other).relation.label,
+    engine.overlay(square, engine.Polygon([[[1, 0], [1, 1], [0, 1]]])).pieces[0].shell.size,
+]
+engine.warm(processes=2)
+print(*answers, counter.n)
+"""
+ANSWERS = "-4 -5 2 overlapping 6"
+
+
+@pytest.fixture(scope="module")
+def seed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a seed of all kernels, taken from the cache, which is filled first."""
+    engine.warm(processes=os.cpu_count() or 1)
+    cache, folder = kernel_cache.cache_folder(), tmp_path_factory.mktemp("made") / "seed"
+    assert cache is not None
+    modules = {name for name in (kernel.__module__ for kernel in jit.KERNELS) if name.startswith("engine.")}
+    for digest in map(kernel_cache.source_digest, modules | {"engine.warmup"}):
+        if (cache / digest).exists():
+            shutil.copytree(cache / digest, folder / digest)
+    kernel_cache.seal(folder, folder.with_name("seed.tar.xz"))
+    return folder
+
+
+def ask(home: Path, before: str = "", **more: str) -> subprocess.Popen[str]:
+    kept = {name: value for name, value in os.environ.items() if not name.startswith(("ENGINE_", "XDG_"))}
+    return subprocess.Popen(
+        [sys.executable, "-c", before + PROBE],
+        env={**kept, "HOME": str(home), "TMPDIR": str(home), **more},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def told(process: subprocess.Popen[str]) -> tuple[str, str]:
+    """Return what it answered, with the number of compilations last, and its log."""
+    output, errors = process.communicate(timeout=600)
+    assert process.returncode == 0, errors
+    return output.strip(), errors
+
+
+@pytest.mark.parametrize("kind", ["folder", "archive"])
+def test_an_empty_home_and_a_seed_compile_nothing(tmp_path: Path, seed: Path, kind: str) -> None:
+    named = seed if kind == "folder" else seed.with_name("seed.tar.xz")
+    assert told(ask(tmp_path, ENGINE_CACHE_SEED=str(named))) == (f"{ANSWERS} 0", "")
+    own = [path for path in tmp_path.rglob("*.nbc") if "seed-" not in str(path)]
+    assert not own
+
+
+def test_a_seed_is_enough_where_nothing_can_be_written(tmp_path: Path, seed: Path) -> None:
+    home = tmp_path / "home"
+    home.write_text("a file where a folder should be")  # unwritable even for root
+    nowhere = f"import tempfile; tempfile.tempdir = {str(home)!r}"
+    assert told(ask(home, nowhere, ENGINE_CACHE_SEED=str(seed))) == (f"{ANSWERS} 0", "")
+
+
+def test_two_processes_unpack_one_archive(tmp_path: Path, seed: Path) -> None:
+    archive = str(seed.with_name("seed.tar.xz"))
+    together = [ask(tmp_path, ENGINE_CACHE_SEED=archive) for _ in range(2)]
+    assert [told(process) for process in together] == [(f"{ANSWERS} 0", "")] * 2
+    assert len(list(tmp_path.rglob("seed-*"))) == 1
