@@ -47,7 +47,7 @@ answers = [
 engine.warm(processes=2)
 print(*answers, counter.n)
 """
-ANSWERS = "-4 -5 2 overlapping 6"
+ANSWERS = "-2 -4 2 overlapping 6"
 
 
 @pytest.fixture(scope="module")
