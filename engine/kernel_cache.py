@@ -95,14 +95,17 @@ def tools() -> str:
 
 @functools.cache
 def source_digest(module: str) -> str:
-    """Return a hash of `module`, of all engine modules below it, of those that compile, and of `tools`."""
+    """Return a hash of `module`, of all engine modules below it, of those that compile, and of `tools`.
+
+    Not of this one: how code is kept changes no code.
+    """
     reached, waiting = set(), {module, "engine.jit"}
     while waiting:
         name = waiting.pop()
         reached.add(name)
         waiting |= read_source(name)[1] - reached
     digest = hashlib.sha256(tools().encode())
-    for name in sorted(reached):
+    for name in sorted(reached - {__name__}):
         digest.update(f"\0{name}\0".encode() + read_source(name)[0])
     return digest.hexdigest()[:20]
 
@@ -199,13 +202,15 @@ def _unpacked(archive: Path) -> Path:
         raise OSError("there is no folder to unpack it in")
     target = folder / f"seed-{hashlib.sha256(content).hexdigest()[:20]}"
     if not target.exists():
-        part = target.with_name(f"{target.name}.{uuid.uuid4().hex}")
-        with tarfile.open(fileobj=io.BytesIO(content), mode="r:xz") as tar:
+        with (
+            tarfile.open(fileobj=io.BytesIO(content), mode="r:xz") as tar,
+            tempfile.TemporaryDirectory(dir=folder) as room,
+        ):
             if sum(member.size for member in tar.getmembers()) > _LARGEST_SEED:
                 raise ValueError("it is too large")
-            tar.extractall(part, filter="data")
-        with suppress(OSError):  # another process was faster
-            part.rename(target)
+            tar.extractall(f"{room}/seed", filter="data")
+            with suppress(OSError):  # another process was faster
+                Path(room, "seed").rename(target)
     return target
 
 

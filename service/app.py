@@ -46,6 +46,7 @@ object and the header `Server-Timing` (decode, prepare, compute, encode). Errors
 
 def create_app(settings: Settings | None = None) -> FastAPI:
     """Return the service as an ASGI application."""
+    gc.enable()  # all is imported (__main__.py)
     settings = settings or Settings()
     app = FastAPI(
         title="exact-geometry",
