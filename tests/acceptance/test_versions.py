@@ -66,9 +66,9 @@ def ask_everything(url: str) -> None:
         for path, example in examples(document):
             client.post(path, json=example).raise_for_status()
             asked.add(path)
-        stored = client.post("/v1/solids", json={"solid": SPHERE}).raise_for_status().headers["location"]
+        stored = client.post("/v1/solids", json=SPHERE).raise_for_status().headers["location"]
         box = {"type": "aabb", "min": [0, 0, 0], "max": [1, 1, 1]}
-        region = client.post("/v1/solids", json={"solid": box}).raise_for_status().headers["location"]
+        region = client.post("/v1/solids", json=box).raise_for_status().headers["location"]
         raw = {"content-type": "application/octet-stream"}
         rows = np.array([[0.5, 0.5, 0.5], [2.0, 2.0, 2.0]])
         inside = client.post(f"{stored}/contains", content=rows.tobytes(), headers=raw).raise_for_status()
