@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from engine.arrays import FloatArray, IntArray, read_only
 from engine.errors import IndexOutOfRangeError, InvalidArrayError, RepeatedIndexError, RingTooShortError
+from engine.parallel import Budget, Cancel
 from engine.solids.base import Solid
 from engine.solids.checks import as_points, check_not_empty, frozen, shown
 from engine.solids.ear_cutting import cut_faces
@@ -35,19 +36,31 @@ class Mesh(Solid):
     _triangles: IntArray | None  # None: `face_indices`, three by three
     _triangle_faces: IntArray | None  # None: triangle i is face i
 
-    def __init__(self, vertices: object, faces: object) -> None:
+    def __init__(
+        self, vertices: object, faces: object, *, deadline: float | None = None, cancel: Cancel | None = None
+    ) -> None:
+        with Budget(deadline, cancel) as budget:
+            self._fill(vertices, faces, budget)
+
+    def _fill(self, vertices: object, faces: object, budget: Budget) -> None:
+        budget.check()
         points = as_points(vertices, 3, ("vertices",))
         check_not_empty(len(points), "vertex", ("vertices",))
+        budget.check()
         points = frozen(points)
         offsets, indices = as_faces(faces, len(points))
         triangles, triangle_faces = indices, None
         if offsets is not None or not self._is_small_and_sound(points, indices):
+            budget.check()
             check_repeated_indices(offsets, indices)
+            budget.check()
             first_equal = first_equal_points(points)
             triangles = merged = indices if first_equal is None else first_equal[indices]
+            budget.check()
             self._check_faces(points, offsets, indices, merged)
+            budget.check()
             if offsets is not None:
-                triangles, triangle_faces = cut_faces(points, offsets, indices, merged)
+                triangles, triangle_faces = cut_faces(points, offsets, indices, merged, budget)
         for array in (offsets, indices, triangles, triangle_faces):
             if array is not None:
                 array.setflags(write=False)

@@ -12,7 +12,8 @@ class Surface(Mesh):
 
     Parameters: as for `Polyhedron`, whose checks it shares but for closedness.
     Raises: InvalidArrayError, WrongDimensionError, NotFiniteError, EmptyGeometryError, RingTooShortError,
-    IndexOutOfRangeError, RepeatedIndexError, FaceNotSimpleError.
+    IndexOutOfRangeError, RepeatedIndexError, FaceNotSimpleError, DeadlineExceededError,
+    CancelledError.
 
     >>> Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]]).triangles.tolist()
     [[3, 0, 1], [3, 1, 2]]

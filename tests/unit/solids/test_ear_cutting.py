@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 
 import engine
-from engine.solids import ear_cutting
+from engine.parallel import Budget
 from engine.solids.ear_cutting import cut_faces, cut_ring
 from tests.reference.exact import vector
 from tests.reference.solids import cut_face
@@ -102,10 +103,10 @@ def test_the_certificate_for_many_faces_changes_nothing() -> None:
     vertices = np.concatenate(rings)
     offsets = np.append(0, np.cumsum([len(ring) for ring in rings]))
     indices = np.arange(len(vertices))
-    together, faces = cut_faces(vertices, offsets, indices, indices)
+    together, faces = cut_faces(vertices, offsets, indices, indices, Budget())
     one_by_one = []
     for i_ring, ring in enumerate(rings):
-        ears = cut_ring(ring, i_ring, np.arange(len(ring)))
+        ears = cut_ring(ring, i_ring, np.arange(len(ring)), Budget()).tolist()
         one_by_one += [[offsets[i_ring] + corner for corner in ear] for ear in ears]
     assert together.reshape(-1, 3).tolist() == one_by_one
     assert faces.tolist() == [i_ring for i_ring, ring in enumerate(rings) for _ in range(len(ring) - 2)]
@@ -114,7 +115,7 @@ def test_the_certificate_for_many_faces_changes_nothing() -> None:
 def test_a_pentagram_is_not_taken_for_convex() -> None:
     order = [0, 2, 4, 1, 3]  # turns left at every corner, twice around
     ring = [[math.cos(2 * math.pi * i / 5), math.sin(2 * math.pi * i / 5), 0.0] for i in order]
-    with pytest.raises(engine.FaceNotSimpleError, match="side 0-1 meets side"):
+    with pytest.raises(engine.FaceNotSimpleError, match="side 1-2 meets side 3-4"):
         cut(ring)
 
 
@@ -137,10 +138,74 @@ def test_faces_that_are_not_simple_are_refused(ring: list[list[int]], words: str
     assert "cut it into triangles" in str(info.value)
 
 
-def test_a_ring_that_winds_without_end_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ear_cutting, "MAX_LOOKS", 0)
-    with pytest.raises(engine.TooComplexError, match=r"faces\[0\] has 20 vertices"):
-        cut(star(20, 1, 0.0))
+def comb(n: int) -> np.ndarray:
+    """Return a comb of n corners, its teeth pointing up."""
+    x = np.arange(n - 2)[::-1]
+    teeth = np.stack([x, np.where(x % 2 == 1, 1.0, 10.0), 0.0 * x], axis=1)
+    return np.concatenate([[[0.0, 0.0, 0.0], [n - 3.0, 0.0, 0.0]], teeth])
+
+
+def spiral(n: int) -> np.ndarray:
+    """Return a band of n corners that winds twenty times."""
+    t = np.linspace(1.0, 40.0 * np.pi, n // 2)
+    inner, outer = (np.stack([r * np.cos(t), r * np.sin(t), 0.0 * t], axis=1) for r in (t, t + 2.0))
+    return np.concatenate([inner, outer[::-1]])
+
+
+def zigzag(n: int) -> np.ndarray:
+    """Return a thin band of n corners that goes up and down."""
+    x = np.arange(n // 2)
+    low = np.stack([x, x % 2 * 100.0, 0.0 * x], axis=1)
+    return np.concatenate([low, (low + np.array([0.0, 1.5, 0.0]))[::-1]])
+
+
+@pytest.mark.parametrize("make", [comb, spiral, zigzag])
+@pytest.mark.parametrize("shift", [0, 7])
+def test_rings_that_wind_are_cut_by_the_plain_rule(make: Callable[[int], np.ndarray], shift: int) -> None:
+    ring = np.roll(make(40), shift, axis=0)
+    expected = cut_face([vector(point) for point in ring], list(range(40)))
+    assert rotated_to_first(cut(ring)) == rotated_to_first(expected)
+
+
+@pytest.mark.parametrize("make", [comb, spiral, zigzag, lambda n: 4096.0 * star(n, 4, 0.0)])
+def test_faces_of_many_corners_are_cut(make: Callable[[int], np.ndarray]) -> None:
+    n = 3000
+    ring = np.round(make(n) * 64.0)  # whole numbers: areas are exact
+    for points in (ring, ring[:, [2, 0, 1]], ring[::-1]):
+        triangles = np.array(cut(points))
+        edges = points[triangles[:, 1:]] - points[triangles[:, :1]]
+        areas = np.cross(edges[:, 0], edges[:, 1])[:, np.argmax(np.abs(np.cross(edges[0, 0], edges[0, 1])))]
+        whole = np.cross(points[1:-1] - points[0], points[2:] - points[0]).sum(axis=0)
+        assert (areas > 0).all() or (areas < 0).all()
+        assert abs(areas.sum()) == np.abs(whole).max()
+        sides = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        counts = np.unique(sides, axis=0, return_counts=True)[1]
+        assert np.bincount(counts).tolist() == [0, n, n - 3]  # sides once, diagonals twice
+
+
+def test_coordinates_of_all_sizes_are_settled() -> None:
+    far, near = 2.0**1000, 2.0**-1000
+    ring = [[0, 0, 0], [far, 0, 0], [far, far, 0], [near, 2 * near, 0], [near, far, 0], [0, far, 0]]
+    expected = cut_face([vector(point) for point in ring], list(range(6)))
+    assert rotated_to_first(cut(ring)) == rotated_to_first(expected)
+
+
+def test_a_side_that_many_others_part_is_found() -> None:
+    ring = comb(3000)
+    ring[1500] = [1498.0, -1e-9, 0.0]  # through the back of the comb
+    with pytest.raises(engine.FaceNotSimpleError, match=r"side 0-1 meets side (1499-1500|1500-1501)"):
+        cut(ring)
+
+
+def test_a_constructor_ends_at_its_deadline() -> None:
+    ring = star(2000, 1, 0.0)
+    for kind in (engine.Surface, engine.Polyhedron):
+        with pytest.raises(engine.DeadlineExceededError):
+            kind(ring, [list(range(2000)), list(range(2000))[::-1]], deadline=0.0)
+    cancel = engine.Cancel()
+    cancel.set()
+    with pytest.raises(engine.CancelledError):
+        engine.Surface(ring, [list(range(2000))], cancel=cancel)
 
 
 def test_a_box_of_quads_is_the_box_of_triangles() -> None:
