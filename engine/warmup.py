@@ -152,7 +152,7 @@ def _warm_scenes() -> None:
 
 
 def _bodies() -> list[Solid]:
-    sheet = Surface([[0, 0, 0.5], [2, 0, 0.5], [0, 2, 0.5]], [[0, 1, 2]])
+    sheet = Surface([[0, 0, 0.5], [2, 0, 0.5], [0.5, 0.5, 0.5], [0, 2, 0.5]], [[0, 1, 2, 3]])  # not convex: ears
     return [_cube(), sheet, Aabb([0, 0, 0], [1, 1, 1])]
 
 
