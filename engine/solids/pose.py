@@ -10,12 +10,24 @@ import numpy as np
 from engine.arrays import FloatArray, read_only
 from engine.errors import InvalidArrayError, NotRigidError, WrongDimensionError
 from engine.jit import kernel
-from engine.predicates.exact_vectors import determinant
+from engine.predicates.exact_vectors import cross, determinant
+from engine.predicates.rational import scaled_integers
 from engine.solids.base import Immutable
-from engine.solids.checks import as_floats, as_vector, check_dimension, check_given_dimension, digits, frozen, spell
+from engine.solids.checks import (
+    as_floats,
+    as_number,
+    as_vector,
+    check_dimension,
+    check_given_dimension,
+    digits,
+    frozen,
+    spell,
+)
 
 TOLERANCE: Final = Fraction(1, 10**12)
 """Largest entry of ``R^T R - I`` that is still taken for a rotation; part of the contract, compared exactly."""
+
+MOST_TOLERANCE: Final = 0.1
 
 _UNSURE: Final = 2.0**-45  # more than 8 roundings of sums of three products of numbers below 1.01
 
@@ -23,9 +35,12 @@ _UNSURE: Final = 2.0**-45  # more than 8 roundings of sums of three products of 
 class Pose(Immutable):
     """A rigid motion ``p -> rotation @ p + translation`` of one body; the map is exact in these float64 numbers.
 
-    Parameters: rotation, ``(d, d)`` row-major, d 2 or 3, with det > 0 and ``max|R^T R - I| <= 1e-12`` (both decided
-    exactly); translation, d numbers. A rotation of floats is not quite orthogonal: the image is that of the matrix as
-    given. Immutable, picklable, compared by value.
+    Parameters: rotation, ``(d, d)`` row-major, d 2 or 3, with det > 0 and ``max|R^T R - I| <= tolerance`` (both decided
+    exactly); translation, d numbers; tolerance, from 0 to 0.1: 1e-6 takes matrices of float32 or of few digits.
+    Which body is meant: up to 1e-12 the image under the matrix as given, though no rotation of floats is quite
+    orthogonal. Beyond, `rotation` is made the rotation nearest to it (the orthogonal factor of its polar form, of the
+    least sum of squared differences), each entry the double nearest to the exact one; so lengths are kept, a ball stays
+    a ball, and the same matrix gives the same body everywhere. Immutable, picklable, compared by value.
     Raises: InvalidArrayError, WrongDimensionError, NotFiniteError, NotRigidError.
 
     >>> Pose([[0, -1], [1, 0]], [5, 0])  # a quarter turn, then a step along x
@@ -40,12 +55,19 @@ class Pose(Immutable):
     numbers: bytes
     """The float64 of both, the rotation's first: many poses are joined, and two compared, by these."""
 
-    def __init__(self, rotation: object, translation: object) -> None:
+    def __init__(self, rotation: object, translation: object, *, tolerance: float = 1e-12) -> None:
         matrix = as_floats(rotation, 2, ("rotation",))
         check_dimension(matrix.shape[0], None, ("rotation",), "rows of")
         if matrix.shape[0] != matrix.shape[1]:
             raise WrongDimensionError(f"rotation must be square, got shape {matrix.shape}", ("rotation",))
-        check_rotations(matrix[None], ("rotation",), one=True)
+        if not 0.0 <= as_number(tolerance, ("tolerance",)) <= MOST_TOLERANCE:
+            raise InvalidArrayError(
+                f"tolerance is {tolerance!r}; it must be from 0.0 to {MOST_TOLERANCE}", ("tolerance",)
+            )
+        limit = TOLERANCE if tolerance == float(TOLERANCE) else Fraction(float(tolerance))
+        check_rotations(matrix[None], ("rotation",), one=True, limit=limit)
+        if limit > TOLERANCE and _exact_defect(matrix) > TOLERANCE:
+            matrix = _nearest_rotation(matrix)
         self._set(frozen(matrix), as_vector(translation, len(matrix), ("translation",)))
 
     def _set(self, rotation: FloatArray, translation: FloatArray) -> None:
@@ -58,6 +80,48 @@ class Pose(Immutable):
         """Return the motion that leaves everything where it is."""
         check_given_dimension(dimension)
         return cls(np.eye(dimension), np.zeros(dimension))
+
+    @classmethod
+    def from_quaternion(cls, quaternion: object, translation: object) -> Pose:
+        """Return the rotation of a quaternion ``(w, x, y, z)`` of any length but 0, each entry the nearest double, then
+        the translation; 3D.
+
+        >>> Pose.from_quaternion([1, 0, 0, 1], [0, 0, 5]).rotation.tolist()  # a quarter turn around z
+        [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+        """
+        numbers = as_floats(quaternion, 1, ("quaternion",))
+        if len(numbers) != 4:
+            raise InvalidArrayError(f"quaternion must hold w, x, y, z, got {len(numbers)} numbers", ("quaternion",))
+        w, x, y, z = scaled_integers(numbers.tolist())
+        square = w * w + x * x + y * y + z * z
+        if square == 0:
+            raise NotRigidError("quaternion has length 0; [1, 0, 0, 0] turns nothing", ("quaternion",))
+        rows = [
+            [w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z],
+        ]
+        return cls([[entry / square for entry in row] for row in rows], translation)
+
+    @classmethod
+    def from_matrix(cls, matrix: object, *, tolerance: float = 1e-12) -> Pose:
+        """Return the pose of a matrix ``(d + 1, d + 1)`` of homogeneous coordinates: rotation, translation in the last
+        column, last row 0 ... 0 1.
+
+        >>> Pose.from_matrix([[0, -1, 5], [1, 0, 0], [0, 0, 1]]) == Pose([[0, -1], [1, 0]], [5, 0])
+        True
+        """
+        rows = as_floats(matrix, 2, ("matrix",))
+        n = len(rows)
+        check_dimension(n - 1, None, ("matrix",), "a row more than")
+        if rows.shape != (n, n):
+            raise WrongDimensionError(f"matrix must be square, got shape {rows.shape}", ("matrix",))
+        if rows[-1].tolist() != [0.0] * (n - 1) + [1.0]:
+            raise NotRigidError(
+                f"matrix[{n - 1}] = {digits(rows[-1])} must be 0 ... 0 1; transpose a matrix whose last column is that",
+                ("matrix", n - 1),
+            )
+        return cls(rows[:-1, :-1], rows[:-1, -1], tolerance=tolerance)
 
     @property
     def dimension(self) -> int:
@@ -92,27 +156,35 @@ def _restored(rotation: FloatArray, translation: FloatArray) -> Pose:
     return pose
 
 
-def check_rotations(rotations: FloatArray, where: tuple[str | int, ...] = ("rotations",), *, one: bool = False) -> None:
+def check_rotations(
+    rotations: FloatArray,
+    where: tuple[str | int, ...] = ("rotations",),
+    *,
+    one: bool = False,
+    limit: Fraction = TOLERANCE,
+) -> None:
     """Raise on the first matrix of ``(n, d, d)`` finite float64 that is no rotation.
 
     Decided exactly: entries of ``R^T R - I`` are computed in float64 for all matrices, and in rationals for those
-    within rounding of the limit. Once they pass, det is within 1e-11 of 1 or -1, so that its float64 sign is right.
+    within rounding of the limit. Once they pass with the usual limit, det is within 1e-11 of 1 or
+    -1, so that its float64 sign is right; with the widest it is beyond 0.5 in size.
 
-    one: `rotations` holds a single matrix and `where` is its own path.
+    one: `rotations` holds a single matrix and `where` is its own path. limit: at most 0.1.
     """
     if rotations.ndim != 3 or rotations.shape[1] != rotations.shape[2]:
         raise InvalidArrayError(f"{spell(where)} must have shape (n, d, d), got {rotations.shape}", where)
     is_suspect = np.zeros(len(rotations), np.bool_)
     with np.errstate(all="ignore"):  # huge entries overflow, and are far from orthogonal
-        find_suspects(read_only(rotations), float(TOLERANCE) - _UNSURE, is_suspect)
+        find_suspects(read_only(rotations), float(limit) - _UNSURE, is_suspect)
     for index in np.flatnonzero(is_suspect):
         matrix = rotations[index]
         path = where if one else (*where, int(index))
         defect = _exact_defect(matrix)
-        if defect > TOLERANCE:
+        if defect > limit:
+            allowed = f", or allow it by tolerance={1.1 * float(defect):.1e}" if defect < Fraction(9, 100) else ""
             raise NotRigidError(
                 f"{spell(path)} = {digits(matrix)} is no rotation: max|R^T R - I| is {_decimal(defect)}, "
-                "the limit 1e-12; make it orthogonal (from a unit quaternion, say)",
+                f"the limit {float(limit)!r}; make it orthogonal (from a unit quaternion, say){allowed}",
                 path,
             )
         if determinant([[*map(Fraction, row)] for row in matrix.tolist()]) <= 0:
@@ -156,6 +228,41 @@ def _exact_defect(matrix: FloatArray) -> Fraction:
         for i, first in enumerate(columns)
         for j, second in enumerate(columns)
     )
+
+
+def _nearest_rotation(matrix: FloatArray) -> FloatArray:
+    """Return the orthogonal factor of the polar form of a matrix with det > 0, each entry the nearest double.
+
+    It is found to some units of 2^-300. Where that leaves a double open, a zero above all, it is found to some of
+    2^-1200; no entry of a rotation lies in the middle of two doubles, for a power of 4 is the sum of three squares only
+    where two of them are 0.
+    """
+    for bits in (300, 1200):
+        rows = _orthogonal_factor(matrix, bits)
+        ends = [[[(x + step) / (1 << bits) for x in row] for row in rows] for step in (-64, 64)]
+        if ends[0] == ends[1]:
+            break
+    return np.array([[x / (1 << bits) for x in row] for row in rows])
+
+
+def _orthogonal_factor(matrix: FloatArray, bits: int) -> list[list[int]]:
+    """Return the factor in units of 2^-bits by Newton's iteration X <- (X + X^-T) / 2: each turn squares the error.
+
+    Source: N. Higham, Computing the polar decomposition, with applications, 1986.
+    """
+    rows = [[int(Fraction(value) * (1 << bits)) for value in row] for row in matrix.tolist()]
+    while True:  # bound: the error is below 1 and squared
+        if len(rows) == 2:
+            (a, b), (c, d) = rows
+            cofactors = [[d, -c], [-b, a]]
+        else:
+            cofactors = [list(cross(rows[i - 2], rows[i - 1])) for i in range(3)]
+        volume = int(determinant(rows))
+        moved = [[(x + (c << 2 * bits) // volume) >> 1 for x, c in zip(*pair)] for pair in zip(rows, cofactors)]
+        step = max(abs(x - y) for pair in zip(rows, moved) for x, y in zip(*pair))
+        rows = moved
+        if step < 1 << bits // 2 - 8:
+            return rows
 
 
 def _decimal(value: Fraction) -> str:

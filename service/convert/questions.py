@@ -113,7 +113,9 @@ def to_bodies(models: list[solids.Body], call: Call) -> tuple[list[Solid], list[
 def to_pose(model: solids.RigidPose, where: Where) -> engine.Pose:
     """Return the engine's pose for `model`, which stands at `where` in the request."""
     try:
-        return engine.Pose(model.rotation, model.translation)
+        if model.tolerance is None:
+            return engine.Pose(model.rotation, model.translation)
+        return engine.Pose(model.rotation, model.translation, tolerance=model.tolerance)
     except EngineError as error:
         raise error.at(*where) from None
 
@@ -127,7 +129,12 @@ def to_poses(models: list[solids.RigidPose], dimension: int) -> tuple[Any, Any]:
                 f"{len(pose.translation)}; the bodies are {dimension}D",
                 ("poses", i_pose),
             )
-    rotations = np.array([pose.rotation for pose in models]).reshape(-1, dimension, dimension)
+    rotations = np.array(
+        [
+            pose.rotation if pose.tolerance is None else to_pose(pose, ("poses", i_pose)).rotation
+            for i_pose, pose in enumerate(models)
+        ]
+    ).reshape(-1, dimension, dimension)
     return rotations, np.array([pose.translation for pose in models]).reshape(-1, dimension)
 
 

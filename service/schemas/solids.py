@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, Union
 
-from pydantic import Field, RootModel
+from pydantic import Field, RootModel, WithJsonSchema
 
 from service.schemas.arrays import DIMENSION, Array, Axis, Numbers
 from service.schemas.limits import AtMost, left_out
@@ -149,6 +149,10 @@ class RigidPose(Schema):
 
     rotation: Annotated[Array, Numbers(DIMENSION, DIMENSION)]
     translation: Position
+    tolerance: Annotated[float, WithJsonSchema({"type": "number", "format": "double"})] = left_out(
+        "How far an entry of R^T R may be from that of the unit matrix: 0 to 0.1; 1e-12 where left out. What is farther "
+        "than 1e-12 stands for the rotation nearest to it, each entry the nearest double; 1e-6 takes float32 matrices."
+    )
 
 
 class Body(Schema):

@@ -122,3 +122,73 @@ def test_many_rotations_at_once() -> None:
     assert info.value.where == ("rotations", 700)
     with pytest.raises(engine.InvalidArrayError):
         check_rotations(np.zeros((4, 3, 2)))
+
+
+def test_matrices_of_float32_are_taken_for_the_nearest_rotation() -> None:
+    for dimension in (2, 3):
+        for matrix in random_rotations(20, dimension):
+            given = matrix.astype(np.float32).astype(np.float64)
+            with pytest.raises(engine.NotRigidError, match=r"tolerance=\d\.\de-0"):
+                engine.Pose(given, np.zeros(dimension))
+            pose = engine.Pose(given, np.zeros(dimension), tolerance=1e-6)
+            assert exact_defect(pose.rotation) < Fraction(1, 10**15)
+            # the orthogonal factor is the one rotation whose transposed product with the matrix is symmetric
+            product = [
+                [sum(Fraction(a) * Fraction(b) for a, b in zip(u, v)) for v in given.T.tolist()]
+                for u in pose.rotation.T.tolist()
+            ]
+            for i in range(dimension):
+                for j in range(i):
+                    assert abs(product[i][j] - product[j][i]) < Fraction(1, 10**15)
+            assert np.abs(pose.rotation - matrix).max() < 1e-6
+
+
+def test_what_is_rigid_enough_stays_as_given() -> None:
+    for matrix in random_rotations(20):
+        assert engine.Pose(matrix, [1, 2, 3], tolerance=1e-3) == engine.Pose(matrix, [1, 2, 3])
+    with pytest.raises(engine.NotRigidError):
+        engine.Pose(np.array([[0.6, -0.8], [0.8, 0.6]]), [0, 0], tolerance=0.0)
+    quarter = engine.Pose([[0, -1 - 1e-9], [1, 0]], [0, 0], tolerance=1e-8)
+    assert quarter.rotation.tolist() == [[0.0, -1.0], [1.0, 0.0]]
+    tiny = engine.Pose([[1, -1e-300, 0], [1e-300, 1, 0], [0, 0, 1.0001]], [0, 0, 0], tolerance=1e-3)
+    assert tiny.rotation.tolist() == [[1.0, -1e-300, 0.0], [1e-300, 1.0, 0.0], [0.0, 0.0, 1.0]]
+
+
+@pytest.mark.parametrize("tolerance", [-1e-9, math.nan, math.inf, 0.2, "wide"])
+def test_a_tolerance_that_is_none_is_refused(tolerance: Any) -> None:
+    with pytest.raises(engine.EngineError, match="tolerance"):
+        engine.Pose(np.eye(3), [0, 0, 0], tolerance=tolerance)
+
+
+def test_a_reflection_is_refused_whatever_the_tolerance() -> None:
+    with pytest.raises(engine.NotRigidError, match="reflection"):
+        engine.Pose(np.diag([1.0, 1.0, -1.0 - 1e-9]), [0, 0, 0], tolerance=1e-3)
+
+
+def test_quaternions() -> None:
+    rng = np.random.default_rng(3)
+    for scale in (1.0, 1e-300, 1e300):
+        for quaternion in rng.normal(size=(20, 4)) * scale:
+            w, x, y, z = map(Fraction, quaternion.tolist())
+            square = w * w + x * x + y * y + z * z
+            pose = engine.Pose.from_quaternion(quaternion, [1, 2, 3])
+            assert pose.rotation[0, 1] == float(2 * (x * y - w * z) / square)
+            assert pose.rotation[2, 2] == float((w * w - x * x - y * y + z * z) / square)
+            assert exact_defect(pose.rotation) < Fraction(1, 10**14)
+    assert engine.Pose.from_quaternion([2, 0, 0, 0], [0, 0, 0]).is_identity
+    with pytest.raises(engine.NotRigidError, match="length 0"):
+        engine.Pose.from_quaternion([0, 0, 0, -0.0], [0, 0, 0])
+    with pytest.raises(engine.InvalidArrayError, match="w, x, y, z"):
+        engine.Pose.from_quaternion([1, 0, 0], [0, 0, 0])
+
+
+def test_matrices_of_homogeneous_coordinates() -> None:
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = random_rotations(1)[0], [1, 2, 3]
+    assert engine.Pose.from_matrix(matrix) == engine.Pose(matrix[:3, :3], [1, 2, 3])
+    assert engine.Pose.from_matrix(matrix.astype(np.float32), tolerance=1e-6).dimension == 3
+    with pytest.raises(engine.NotRigidError, match="transpose"):
+        engine.Pose.from_matrix(matrix.T)
+    for wrong in (np.eye(2), np.eye(5), np.zeros((3, 4))):
+        with pytest.raises(engine.WrongDimensionError):
+            engine.Pose.from_matrix(wrong)
