@@ -150,7 +150,7 @@ class RigidPose(Schema):
     rotation: Annotated[Array, Numbers(DIMENSION, DIMENSION)]
     translation: Position
     tolerance: Annotated[float, WithJsonSchema({"type": "number", "format": "double"})] = left_out(
-        "How far an entry of R^T R may be from that of the unit matrix: 0 to 0.1; 1e-12 where left out. What is farther "
+        "How far an entry of R^T R may be from that of the unit matrix: 0 to 0.1, 1e-12 if left out. A matrix farther "
         "than 1e-12 stands for the rotation nearest to it, each entry the nearest double; 1e-6 takes float32 matrices."
     )
 
