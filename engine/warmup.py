@@ -152,7 +152,8 @@ def _warm_scenes() -> None:
 
 
 def _bodies() -> list[Solid]:
-    sheet = Surface([[0, 0, 0.5], [2, 0, 0.5], [0.5, 0.5, 0.5], [0, 2, 0.5]], [[0, 1, 2, 3]])  # not convex: ears
+    Surface([[0, 0, 0], [2, 0, 0], [0.5, 0.5, 0], [0, 2, 0]], [[0, 1, 2, 3]])  # not convex: ears are cut
+    sheet = Surface([[0, 0, 0.5], [2, 0, 0.5], [0, 2, 0.5]], [[0, 1, 2]])
     return [_cube(), sheet, Aabb([0, 0, 0], [1, 1, 1])]
 
 
