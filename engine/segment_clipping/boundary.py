@@ -35,7 +35,7 @@ _LEAST_ROOM: Final = 1 << 8
 _CONTACTS: Final = 4
 """Of each segment of a group; likewise."""
 _BYTES: Final = 180
-_BYTES_EXACT: Final = 600
+_BYTES_EXACT: Final = 1000
 """Of a piece, in its part and joined; as Python holds it."""
 
 

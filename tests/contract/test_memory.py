@@ -1,0 +1,126 @@
+"""Hostile bodies of at most 2 MB, many at once: memory stays within what requests are given, and /healthz answers."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+import zstandard
+
+from benchmarks.load import memory_of
+from tests.contract.test_deadlines import MANY_SIDES, ZIGZAG, comb, stripes
+from tests.unit.service.asking import SPHERE, examples
+from tests.unit.service.test_live import Service
+
+pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="memory of processes is read from /proc")
+MB = 2**20
+GIVEN = 512 * MB
+"""With half of it, what Python and the allocator keep beside what is counted is more than a tenth."""
+BOX = {"solid": {"type": "aabb", "min": [0, 0], "max": [1, 1]}}
+POSE = {"rotation": [[1, 0], [0, 1]], "translation": [0, 0]}
+
+
+def polygon(rings: Any) -> dict[str, Any]:
+    return {"type": "polygon", "rings": rings}
+
+
+def bodies() -> Iterator[tuple[str, bytes, dict[str, str]]]:
+    """Yield path, body and headers of what wants far more memory than it sends."""
+    bars = stripes(4_000)
+    across = [[[y, x] for x, y in bar] for bar in bars]
+    made: list[tuple[str, Any]] = [
+        ("contains/scene", {"bodies": [{"solid": SPHERE}] * 1_000, "points": [[0, 0, 0]] * 50_000}),
+        ("collide/scene", {"bodies": [BOX] * 10_000}),
+        ("collide", {"first": BOX["solid"], "second": BOX["solid"], "poses": [POSE] * 25_000}),
+        ("overlay", {"subject": polygon(bars), "clip": polygon(across), "operation": "intersection"}),
+        ("overlay", {"subject": polygon([ZIGZAG * 5]), "clip": polygon([ZIGZAG]), "operation": "union"}),
+        ("clip/segments", {"region": polygon([comb(20_000)]), "segments": [[[-1, 0.5], [30_000, 0.5]]] * 40_000}),
+        ("clip/segments", {"region": polygon([comb(20_000)]), "segments": [[[-1, 0], [30_000, 0]]] * 40_000}),
+        ("clip/polygons", {"region": MANY_SIDES, "polygons": [[ZIGZAG]] * 4}),
+        ("clip/polygons", {"region": BOX["solid"], "polygons": [[[[0, 0]]]] * 100_000}),
+        ("contains", {"solid": polygon([[[0, 0], [1, 0], [0, 1]]] * 60_000), "points": []}),
+        ("contains", {"x" * 2_000_000: 1}),
+    ]
+    for path, body in made:
+        yield path, json.dumps(body, separators=(",", ":")).encode(), {}
+    for text in (b"[],", b"{},", b'{"a":[{"b":0}]},', b"0,"):
+        yield "contains", b"[" + text * (2_000_000 // len(text)) + b"0]", {}
+    yield "contains", gzip.compress(b" " * 2**28), {"Content-Encoding": "gzip"}
+    yield "contains", zstandard.compress(b" " * 2**30), {"Content-Encoding": "zstd"}
+
+
+@pytest.fixture
+def service() -> Iterator[Service]:
+    service = Service(deadline_seconds=2, request_bytes=GIVEN, access_log=False)
+    try:
+        service.wait_until_ready()
+        yield service
+        assert service.stop() == 0, "".join(service.log)
+        assert "Traceback" not in "".join(service.log)
+    finally:
+        service.close()
+
+
+def ask(service: Service, path: str, body: bytes, headers: dict[str, str]) -> int:
+    assert len(body) <= 2 * MB, (path, len(body))
+    headers = {"Content-Type": "application/json", "Accept-Encoding": "identity", **headers}
+    return httpx.post(f"{service.url}/v1/{path}", content=body, headers=headers, timeout=60).status_code
+
+
+def never_read(service: Service) -> None:
+    """Ask for an answer of megabytes, and leave it."""
+    body = json.dumps({"bodies": [{"solid": SPHERE}] * 100, "points": [[0, 0, 0]] * 20_000}).encode()
+    lines = ["POST /v1/contains/scene HTTP/1.1", "Host: x", "Content-Type: application/json"]
+    head = "\r\n".join([*lines, f"Content-Length: {len(body)}", "", ""]).encode()
+    with socket.create_connection(("127.0.0.1", service.port)) as connection, suppress(OSError):
+        connection.sendall(head + body)
+        time.sleep(3)
+
+
+def hold_within(service: Service, n_clients: int, turns: int) -> list[float]:
+    """Send all bodies, some at once; return how long /healthz took each time."""
+    messages = [*bodies()] * turns
+    for path, example in examples(httpx.get(f"{service.url}/openapi.json").json()):
+        assert httpx.post(service.url + path, json=example, timeout=60).status_code in (200, 201)
+    base, most, waited, is_over = memory_of(service.process.pid), 0.0, [0.0], threading.Event()
+
+    def watch() -> None:
+        nonlocal most
+        with httpx.Client() as client:
+            while not is_over.is_set():
+                before = time.monotonic()
+                assert client.get(f"{service.url}/healthz").status_code == 200
+                waited.append(time.monotonic() - before)
+                most = max(most, memory_of(service.process.pid))
+                time.sleep(0.01)
+
+    with ThreadPoolExecutor(n_clients + 9) as clients:
+        watcher = clients.submit(watch)
+        idle = [clients.submit(never_read, service) for _ in range(8)]
+        statuses = set(clients.map(lambda message: ask(service, *message), messages))
+        for one in idle:
+            one.result()
+        is_over.set()
+        watcher.result()
+    assert statuses <= {200, 400, 413, 422, 503, 504}
+    assert most - base < 1.1 * GIVEN / MB, (base, most)
+    return waited
+
+
+def test_memory_stays_within_what_requests_are_given(service: Service) -> None:
+    hold_within(service, 4, 1)
+
+
+@pytest.mark.full
+def test_it_does_so_for_long_and_small_questions_are_answered(service: Service) -> None:
+    assert max(hold_within(service, 8, 10)) < 0.1
