@@ -13,10 +13,7 @@ from engine.solids.base import Solid
 from engine.solids.pose import Pose
 from engine.types import Accuracy
 
-TAKEN = {
-    2: "polygon, triangle, aabb, sphere, half_space",
-    3: "polyhedron, surface, aabb, sphere, half_space",
-}
+TAKEN = {2: "polygon, triangle, aabb, sphere, half_space", 3: "polyhedron, surface, aabb, sphere, half_space"}
 
 
 def pair_function(first: Solid, second: Solid) -> tuple[PairFunction, bool]:
@@ -114,8 +111,8 @@ def collide(
 
     Parameters: first, second: 3D polyhedron, surface, aabb, sphere, half_space; 2D polygon, triangle, aabb, sphere,
     half_space. first_pose, second_pose: exact affine images as given, None for none. boolean: disjoint or not is all
-    that is wanted; any other relation may then be answered as touching, sooner. detail: say which of the eight
-    relations of RCC-8 (`Rcc8`) too, in `Collision.detail`: disjoint is DC, touching EC, inside NTPP and NTPPi;
+    that is wanted; any other relation may then be answered as touching, sooner, without a witness. detail: say which of
+    the eight relations of RCC-8 (`Rcc8`) too, in `Collision.detail`: disjoint is DC, touching EC, inside NTPP, NTPPi;
     overlapping becomes PO, EQ, or TPP and TPPi where one body lies in the other and the boundaries meet. Containment
     and equality are of the closures of the open interiors, so walls that cancel do not count; they count as boundary.
     None where a body has no interior (flat, radius 0, all faces cancel); a surface is refused. workers, progress: taken
@@ -144,7 +141,7 @@ def collide(
         check_has_detail(((("first",), first), (("second",), second)), boolean)
     with Budget(deadline, cancel) as budget:
         budget.check()
-        work = Work(budget, boolean=boolean)
+        work = Work(budget, witness=not boolean, boolean=boolean)
         result = collide_pair(first, second, first_pose, second_pose, work)
         if detail:
             named = detail_of(first, second, first_pose, second_pose, result.relation, work)

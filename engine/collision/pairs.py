@@ -23,10 +23,7 @@ MESHES = ("polyhedron", "surface", "aabb")
 OUTLINES = ("polygon", "triangle", "aabb")
 BODIES = [(3, mesh) for mesh in MESHES] + [(2, outline) for outline in OUTLINES]
 
-_CONTAINING: dict[Any, Containing] = {
-    Relation.FIRST_INSIDE_SECOND: "second",
-    Relation.SECOND_INSIDE_FIRST: "first",
-}
+_CONTAINING: dict[Any, Containing] = {Relation.FIRST_INSIDE_SECOND: "second", Relation.SECOND_INSIDE_FIRST: "first"}
 
 
 def _aabb_aabb(first: Any, second: Any, first_pose: Pose | None, second_pose: Pose | None, work: Work) -> Collision:

@@ -119,13 +119,7 @@ def _hull(vertices: FloatArray, triangles: IntArray, center: FloatArray) -> Conv
 
 @kernel
 def _describe(
-    points: Any,
-    triangles: Any,
-    first_neighbor: Any,
-    neighbors: Any,
-    outermost: Any,
-    normals: Any,
-    numbers: Any,
+    points: Any, triangles: Any, first_neighbor: Any, neighbors: Any, outermost: Any, normals: Any, numbers: Any
 ) -> None:
     """Fill everything but points and the centre.
 

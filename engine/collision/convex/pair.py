@@ -39,8 +39,11 @@ LARGEST_ERROR = 2.0**250
 
 
 @inline
-def relate_convex(pool: ConvexArrays, first: int, second: int, a: PlacedBody, b: PlacedBody, is_boolean: bool) -> int:
-    """Return the relation of two convex bodies, or UNSETTLED; is_boolean: OVERLAPPING for all that is not disjoint."""
+def relate_convex(
+    pool: ConvexArrays, first: int, second: int, a: PlacedBody, b: PlacedBody, is_boolean: bool, may_be_equal: bool
+) -> int:
+    """Return the relation of two convex bodies, or UNSETTLED; is_boolean: OVERLAPPING for all that is not disjoint;
+    may_be_equal: OVERLAPPING for bodies that may be equal too."""
     error = a.place.error + b.place.error
     if not error < LARGEST_ERROR:
         return UNSETTLED
@@ -50,7 +53,7 @@ def relate_convex(pool: ConvexArrays, first: int, second: int, a: PlacedBody, b:
     if is_farther(square, first_radius + second_radius, error):
         return DISJOINT
     if a.round > 0.0 and b.round > 0.0:
-        return _relate_balls(np.sqrt(square), a.round, b.round, error)
+        return _relate_balls(np.sqrt(square), a.round, b.round, error, may_be_equal)
     found = meet_or_apart(pool.points, pool.graph, a, b, start)
     if found == APART:
         return DISJOINT
@@ -76,7 +79,7 @@ def relate_meeting(pool: ConvexArrays, first: int, second: int, a: PlacedBody, b
 
 
 @inline
-def _relate_balls(distance: float, first_radius: float, second_radius: float, error: float) -> int:
+def _relate_balls(distance: float, first_radius: float, second_radius: float, error: float, may_be_equal: bool) -> int:
     """Return the relation of two balls by the distance of their centres, or UNSETTLED."""
     both = first_radius + second_radius
     slack = 2.0**-40 * (distance + both) + 8.0 * error + 2.0**-400
@@ -86,6 +89,8 @@ def _relate_balls(distance: float, first_radius: float, second_radius: float, er
         return FIRST_INSIDE_SECOND
     if distance < first_radius - second_radius - slack:
         return SECOND_INSIDE_FIRST
+    if may_be_equal and first_radius == second_radius and distance < both - slack:
+        return OVERLAPPING  # neither lies within the other
     if abs(first_radius - second_radius) + slack < distance < both - slack:
         return OVERLAPPING
     return UNSETTLED
@@ -159,6 +164,7 @@ def relate_convex_pairs(
     poses: PoseArrays,
     pairs: Any,
     is_boolean: bool,
+    may_be_equal: bool,
     relations: Any,
     flag: Any,
 ) -> None:
@@ -176,6 +182,9 @@ def relate_convex_pairs(
             continue
         if _has_equal_pose(poses.rotations, poses.translations, i, j):
             i = j = 0
+            if first == second and may_be_equal:
+                relations[item] = OVERLAPPING
+                continue
         a = placed_body(pool, first, poses, i)
         b = placed_body(pool, second, poses, j)
-        relations[item] = relate_convex(pool, first, second, a, b, is_boolean)
+        relations[item] = relate_convex(pool, first, second, a, b, is_boolean, may_be_equal)

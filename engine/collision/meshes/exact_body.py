@@ -6,10 +6,14 @@ Signs of determinants of such integers are exact, need no fractions, and cost a 
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
+from engine.arrays import IntArray
 from engine.bounding.bvh import WIDTH
 from engine.collision.exact_images import rounded_quotient
 from engine.collision.meshes.face_state import STACK_ROWS
@@ -86,16 +90,26 @@ class ExactBody:
 
     def faces_in(self, low: list[float], high: list[float]) -> list[int]:
         """Return, ascending, at least the triangles that meet the closed box; bounds may be infinite."""
-        arrays = self.mesh.arrays
-        box = np.array([*low, *high])
-        found = np.empty(256, np.int64)
-        with np.errstate(all="ignore"):  # uncompiled runs only
-            n_found = _faces_in_box(arrays, self.pose, box, found)
-            if n_found > len(found):
-                found = np.empty(n_found, np.int64)
-                _faces_in_box(arrays, self.pose, box, found)
-        faces: list[int] = np.sort(found[:n_found]).tolist()
+        faces: list[int] = faces_in(self.mesh.arrays, self.pose, low, high).tolist()
         return faces
+
+    def at(self, point: Sequence[Fraction]) -> tuple[int, ...]:
+        """Return any point as x, y, z, w on the lattice."""
+        w = math.lcm(*(x.denominator for x in point))
+        x, y, z = (int(x * w) << self.shift for x in point)
+        return x, y, z, w
+
+
+def faces_in(arrays: MeshArrays, pose: PoseArrays, low: list[float], high: list[float]) -> IntArray:
+    """Return, ascending, at least the triangles of a placed mesh that meet a closed box; bounds may be infinite."""
+    box, found = np.array([*low, *high]), np.empty(256, np.int64)
+    with np.errstate(all="ignore"):  # uncompiled runs only
+        n_found = _faces_in_box(arrays, pose, box, found)
+        if n_found > len(found):
+            found = np.empty(n_found, np.int64)
+            _faces_in_box(arrays, pose, box, found)
+    faces: IntArray = np.sort(found[:n_found])
+    return faces
 
 
 def exact_pair(

@@ -145,11 +145,6 @@ def _moved_line_meets(corners: Corners, j: int, k: int, x: int, y: int, w: int) 
     return True
 
 
-def is_inside_exact(body: ExactBody, q: Homogeneous) -> bool:
-    """Tell whether q, any point, lies in the open interior of a body and on no face with area."""
-    return all(sides_at(body, q, axis).at for axis in range(3))  # every face with area lies across some axis
-
-
 def regions_of(body: ExactBody, face: int, cutters: list[ExactBody], budget: Budget) -> Iterator[Homogeneous]:
     """Yield a point in each region that the faces of `cutters` cut from a face with area; none lies on a trace."""
     corners, plane = body.corners(face), body.plane(face)
@@ -287,12 +282,7 @@ def pieces_of_segment(
     for t0, t1 in pairwise(ordered):
         t = (t0 + t1) / 2
         n, w = t.numerator, t.denominator
-        yield (
-            p[0] * (w - n) + q[0] * n,
-            p[1] * (w - n) + q[1] * n,
-            p[2] * (w - n) + q[2] * n,
-            w,
-        )
+        yield (p[0] * (w - n) + q[0] * n, p[1] * (w - n) + q[1] * n, p[2] * (w - n) + q[2] * n, w)
 
 
 def _planes_that_cut(cutter: ExactBody, face: int) -> Iterator[Plane]:

@@ -162,19 +162,12 @@ def separation_exact(t1: Corners, t2: Corners, plane: Plane) -> int:
     return best
 
 
-def is_flush(t1: Corners, t2: Corners, plane1: Plane, plane2: Plane) -> bool:
-    """Tell whether two faces with area share a part with area of one plane."""
-    if not any(plane1) or not any(plane2) or any(value_at(plane1, p) for p in t2):
-        return False
-    return separation_exact(t1, t2, plane1) < 0
-
-
 def kind_of_contact(t1: Corners, t2: Corners, plane1: Plane, plane2: Plane) -> Kind:
     """Return the kind of the contact of two faces that meet, in these planes: the one of highest dimension that
     occurs."""
     s1, s2 = as_simplex(t1), as_simplex(t2)
     values1, values2 = [value_at(plane2, p) for p in s1], [value_at(plane1, p) for p in s2]
-    if is_flush(t1, t2, plane1, plane2):
+    if len(s1) == len(s2) == 3 and not any(values2) and separation_exact(t1, t2, plane1) < 0:
         return "face_face"
     if _edge_meets_open_face(s1, values1, s2, plane2) or _edge_meets_open_face(s2, values2, s1, plane1):
         return "edge_face"

@@ -7,14 +7,7 @@ overlapping shows as a region of a face with both insides on one side of it.
 from __future__ import annotations
 
 from engine.arrays import IntArray
-from engine.collision.meshes.exact_regions import (
-    even_sides,
-    is_inside_exact,
-    pieces_of_segment,
-    regions_of,
-    sides_at,
-    sides_within,
-)
+from engine.collision.meshes.exact_regions import even_sides, pieces_of_segment, regions_of, sides_at, sides_within
 from engine.collision.meshes.exact_triangles import as_simplex
 from engine.collision.meshes.mesh_arrays import STATE_CLEAN
 from engine.collision.meshes.mesh_pair import MeshPair
@@ -75,4 +68,5 @@ def pierces_without_area(pair: MeshPair, own: int, face: int) -> bool:
     if len(ends) < 2:
         return False
     pieces = pieces_of_segment(body, (ends[0], ends[1]), other, pair.work.budget)
-    return any(is_inside_exact(other, q) for q in pieces)
+    # every face with area that holds a point lies across some axis
+    return any(all(sides_at(other, q, axis).at for axis in range(3)) for q in pieces)

@@ -190,9 +190,7 @@ def _lay_out(
                     n_used += 1
                 ordered[item, corner] = number[vertex]
             axis[item] = axis_of(
-                as_point3(used, ordered[item, 0]),
-                as_point3(used, ordered[item, 1]),
-                as_point3(used, ordered[item, 2]),
+                as_point3(used, ordered[item, 0]), as_point3(used, ordered[item, 1]), as_point3(used, ordered[item, 2])
             )
     parent = np.empty(n_used, np.int64)
     _join(ordered, np.zeros(n_triangles, np.bool_), parent)
@@ -296,9 +294,7 @@ def triangle_of(mesh: MeshArrays, item: int) -> Triangle3:
 def in_tree(mesh: MeshArrays, p: Point3) -> Point3:
     """Return a point in the coordinates of the body's tree, rounded."""
     return Point3(
-        (p.x - mesh.origin[0]) / mesh.scale,
-        (p.y - mesh.origin[1]) / mesh.scale,
-        (p.z - mesh.origin[2]) / mesh.scale,
+        (p.x - mesh.origin[0]) / mesh.scale, (p.y - mesh.origin[1]) / mesh.scale, (p.z - mesh.origin[2]) / mesh.scale
     )
 
 

@@ -19,7 +19,7 @@ from engine.arrays import FloatArray, IntArray
 from engine.collision.meshes.exact_regions import Sides, even_sides, regions_of, sides_at, sides_within
 from engine.collision.meshes.face_contacts import find_all_contacts
 from engine.collision.meshes.mesh_arrays import STATE_CLEAN, MeshBody, mesh_body_of
-from engine.collision.meshes.mesh_pair import MeshPair, simplest
+from engine.collision.meshes.mesh_pair import MeshPair, met_by_face, simplest
 from engine.collision.meshes.parity import INSIDE, OUTSIDE
 from engine.collision.result import Parts, Work
 from engine.solids.base import Solid
@@ -77,9 +77,9 @@ class _OverlappingPair(MeshPair):
                     if all(self._sticks_out):
                         return
         for own in (0, 1):
-            for face in np.unique(contacts[:, own]).tolist():
+            for face, met in met_by_face(contacts, own):
                 self.work.budget.check()
-                self._see_face(own, face, contacts[contacts[:, own] == face, 1 - own])
+                self._see_face(own, face, met)
                 if all(self._sticks_out):
                     return
 

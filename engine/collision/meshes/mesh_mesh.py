@@ -19,22 +19,16 @@ from typing import Literal
 import numpy as np
 
 from engine.arrays import IntArray
-from engine.collision.meshes.dual_traversal import SEEK_CONTACT, SEEK_OVERLAP
-from engine.collision.meshes.exact_triangles import is_flush, kind_of_contact
+from engine.collision.meshes.dual_traversal import SEEK_OVERLAP, SEEK_PIERCING_BY_FIRST, SEEK_PIERCING_BY_SECOND
 from engine.collision.meshes.face_contacts import find_all_contacts
 from engine.collision.meshes.face_regions import look_at_regions, pierces_without_area
 from engine.collision.meshes.mesh_arrays import mesh_body_of
-from engine.collision.meshes.mesh_pair import MeshPair, simplest
+from engine.collision.meshes.mesh_pair import MeshPair, met_by_face, simplest
 from engine.collision.meshes.parity import INSIDE
-from engine.collision.meshes.separating_plane import is_separated
-from engine.collision.result import Collision, Kind, Witness, Work
+from engine.collision.result import Collision, Witness, Work
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
 from engine.types import Relation
-
-_NAMED = 32
-STRENGTH: tuple[Kind, ...] = ("face_face", "edge_face", "vertex_face", "edge_edge", "vertex_edge", "vertex_vertex")
-"""Of several contacts the witness is the one of the kind that stands first here; at most `_NAMED` are looked at."""
 
 
 def mesh_mesh(first: Solid, second: Solid, first_pose: Pose | None, second_pose: Pose | None, work: Work) -> Collision:
@@ -50,11 +44,11 @@ def _relation(pair: MeshPair) -> Collision:
     if pair.is_disjoint:
         return Collision(Relation.DISJOINT)
     if is_settled:
-        if pair.seek == SEEK_OVERLAP:
-            return _touch(pair, Relation.OVERLAPPING, contacts)
-        return _touch(pair, Relation.TOUCHING, contacts, piercing=pair.seek != SEEK_CONTACT)
-    if len(contacts) and _is_separated(pair, contacts):
-        return _touch(pair, Relation.TOUCHING, contacts)
+        relation = Relation.OVERLAPPING if pair.seek == SEEK_OVERLAP else Relation.TOUCHING
+        pierces = pair.seek in (SEEK_PIERCING_BY_FIRST, SEEK_PIERCING_BY_SECOND)
+        return Collision(relation, pair.named(contacts, piercing=pierces))
+    if len(contacts) and pair.is_separated(contacts):
+        return Collision(Relation.TOUCHING, pair.named(contacts))
     patches = [pair.patches(own, contacts[:, own], INSIDE) for own in (0, 1)]
     if not len(contacts):
         n_inside = [sum(map(len, found)) for found in patches]
@@ -67,14 +61,6 @@ def _relation(pair: MeshPair) -> Collision:
     return _overlap_or_touch(pair, contacts, patches)
 
 
-def _is_separated(pair: MeshPair, contacts: IntArray) -> bool:
-    """Tell whether a plane is known that separates the two bodies."""
-    (first, second), (first_pose, second_pose) = pair.meshes, pair.posed
-    found = is_separated(first.arrays, first_pose, second.arrays, second_pose, contacts, pair.work.budget.flag)
-    pair.work.budget.check()
-    return bool(found)
-
-
 def _overlap_or_touch(pair: MeshPair, contacts: IntArray, patches: list[list[IntArray]]) -> Collision:
     """Return overlapping or touching, where no crossing has proven the first."""
     piercing = bool(patches[0] or patches[1])
@@ -83,45 +69,25 @@ def _overlap_or_touch(pair: MeshPair, contacts: IntArray, patches: list[list[Int
         for patch in patches[own]:
             if both and any(sides.above or sides.below for sides in pair.sides_beside(own, patch)):
                 if len(contacts):
-                    return _touch(pair, Relation.OVERLAPPING, contacts)
+                    return Collision(Relation.OVERLAPPING, pair.named(contacts))
                 return _contain(pair, Relation.OVERLAPPING, own, patch)
     for own in (0, 1):
         if not both and (piercing or not pair.work.witness or not pair.meshes[1 - own].has_inside):
             continue
-        faces = np.unique(contacts[:, own])
-        for face in faces.tolist():
-            overlaps, pierces = look_at_regions(pair, own, face, contacts[contacts[:, own] == face, 1 - own])
+        for face, met in met_by_face(contacts, own):
+            pair.work.budget.check()
+            overlaps, pierces = look_at_regions(pair, own, face, met)
             if overlaps:
-                return _touch(pair, Relation.OVERLAPPING, contacts)
+                return Collision(Relation.OVERLAPPING, pair.named(contacts))
             piercing = piercing or pierces
     if pair.work.witness and not piercing:
         piercing = any(
             pierces_without_area(pair, own, face) for own in (0, 1) for face in np.unique(contacts[:, own]).tolist()
         )
     if len(contacts):
-        return _touch(pair, Relation.TOUCHING, contacts, piercing=piercing)
+        return Collision(Relation.TOUCHING, pair.named(contacts, piercing=piercing))
     own = 0 if patches[0] else 1
     return _contain(pair, Relation.TOUCHING, own, patches[own][0], piercing=piercing)
-
-
-def _touch(pair: MeshPair, relation: Relation, contacts: IntArray, *, piercing: bool = False) -> Collision:
-    """Return a relation with two faces as its witness: the strongest kind among the first contacts."""
-    if not pair.work.witness:
-        return Collision(relation)
-    named: list[tuple[int, int, int]] = []
-    a, b = pair.exact
-    for is_short in (True, False):  # order: flush faces are found soonest, and nothing is stronger
-        for i, j in contacts[: 0 if named else _NAMED].tolist():
-            pair.work.budget.check()
-            faces = a.corners(i), b.corners(j), a.plane(i), b.plane(j)
-            if is_short and not is_flush(*faces):
-                continue
-            kind = STRENGTH[0] if is_short else kind_of_contact(*faces)
-            named.append((STRENGTH.index(kind), int(pair.meshes[0].faces[i]), int(pair.meshes[1].faces[j])))
-            if is_short:  # coplanar pairs stand first, in the order of the caller's faces
-                break
-    strength, first_face, second_face = min(named)
-    return Collision(relation, Witness(STRENGTH[strength], first_face, second_face, "", piercing))
 
 
 def _contain(pair: MeshPair, relation: Relation, own: int, patch: IntArray, *, piercing: bool = False) -> Collision:

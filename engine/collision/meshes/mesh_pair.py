@@ -11,6 +11,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from engine.arrays import Int8Array, IntArray
+from engine.collision.codes import UNSETTLED
+from engine.collision.meshes.contact_kinds import FACE_FACE, N_NAMED, STRENGTH, judge_contacts
 from engine.collision.meshes.dual_traversal import (
     SEEK_CONTACT,
     SEEK_OVERLAP,
@@ -19,10 +21,11 @@ from engine.collision.meshes.dual_traversal import (
 )
 from engine.collision.meshes.exact_body import ExactBody, exact_pair
 from engine.collision.meshes.exact_regions import Sides, regions_of, sides_at
+from engine.collision.meshes.exact_triangles import kind_of_contact
 from engine.collision.meshes.face_state import states_of
 from engine.collision.meshes.mesh_arrays import NO_AREA, STATE_STACKED, MeshBody, join_vertices, mesh_body_of_triangles
 from engine.collision.meshes.parity import INSIDE, OUTSIDE, locate_vertices
-from engine.collision.result import Work
+from engine.collision.result import Witness, Work
 from engine.solids.pose import Pose
 from engine.types import UNDECIDED
 
@@ -73,6 +76,13 @@ def what_to_seek(first: MeshBody, second: MeshBody, work: Work) -> int:
     return SEEK_PIERCING_BY_SECOND if first.has_inside else SEEK_PIERCING_BY_FIRST
 
 
+def met_by_face(contacts: IntArray, own: int) -> Iterator[tuple[int, IntArray]]:
+    """Yield each face of a body in contacts (n, 2), ascending, with the faces of the other body that it meets."""
+    order = np.argsort(contacts[:, own], kind="stable")
+    faces, firsts = np.unique(contacts[order, own], return_index=True)
+    yield from zip(faces.tolist(), np.split(contacts[order, 1 - own], firsts[1:]))
+
+
 class MeshPair:
     """One question, and the exact coordinates computed for it so far."""
 
@@ -85,6 +95,8 @@ class MeshPair:
         self.work = work
         self.seek = what_to_seek(first, second, work)
         self.is_disjoint = False
+        self._is_parted = False
+        self._judged: tuple[IntArray, Int8Array] | None = None
         self._exact: tuple[ExactBody, ExactBody] | None = None
 
     @property
@@ -93,6 +105,37 @@ class MeshPair:
         if self._exact is None:
             self._exact = exact_pair(self.meshes[0], self.poses[0], self.meshes[1], self.poses[1])
         return self._exact
+
+    def is_separated(self, contacts: IntArray) -> bool:
+        """Tell whether a plane through faces or edges in contact is known to separate the bodies, once it is."""
+        self._judge(contacts, wants_plane=not self._is_parted)
+        return self._is_parted
+
+    def _judge(self, contacts: IntArray, *, wants_plane: bool) -> Int8Array:
+        """Look for a plane and at the kinds of the first contacts; return these kinds."""
+        kinds = np.full(min(N_NAMED, len(contacts)) if self.work.witness else 0, UNSETTLED, np.int8)
+        self._judged = contacts, kinds
+        (first, second), (a, b), flag = self.meshes, self.posed, self.work.budget.flag
+        parted = judge_contacts(first.arrays, a, second.arrays, b, contacts, wants_plane, kinds, flag)
+        self._is_parted |= bool(parted)
+        self.work.budget.check()
+        return kinds
+
+    def named(self, contacts: IntArray, *, piercing: bool = False) -> Witness | None:
+        """Return the strongest of the first contacts, of equal ones that of the first faces; None if none is asked."""
+        if not self.work.witness:
+            return None
+        judged, found = self._judged, []
+        is_judged = judged is not None and judged[0] is contacts
+        kinds = (judged[1] if judged and is_judged else self._judge(contacts, wants_plane=False)).tolist()
+        for kind, (i, j) in zip(kinds[: kinds.index(FACE_FACE) + 1 if FACE_FACE in kinds else None], contacts.tolist()):
+            if kind == UNSETTLED:
+                self.work.budget.check()
+                a, b = self.exact
+                kind = STRENGTH.index(kind_of_contact(a.corners(i), b.corners(j), a.plane(i), b.plane(j)))
+            found.append((kind, int(self.meshes[0].faces[i]), int(self.meshes[1].faces[j])))
+        kind, first_face, second_face = min(found)
+        return Witness(STRENGTH[kind], first_face, second_face, "", piercing)
 
     def states(self, own: int, faces: IntArray) -> Int8Array:
         return states_of(self.meshes[own].arrays, faces)

@@ -161,6 +161,26 @@ def turned(t: PosedTriangle, lone: int) -> PosedTriangle:
     return PosedTriangle(t.r, t.p, t.q)
 
 
+@inline
+def corner(t: PosedTriangle, index: int) -> PosedPoint3:
+    """Return a corner by its number modulo 3."""
+    index = index % 3
+    return t.p if index == 0 else (t.q if index == 1 else t.r)
+
+
+@inline
+def sign_of_four(poses: Any, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d: PosedPoint3, error: float) -> int:
+    """Return `orient3d_posed`; 0 at once for a repeated point, or a common coordinate, of one pose."""
+    if a.pose == d.pose and b.pose == d.pose and c.pose == d.pose:
+        ax, ay, az, bx, by, bz = a.x == d.x, a.y == d.y, a.z == d.z, b.x == d.x, b.y == d.y, b.z == d.z
+        cx, cy, cz = c.x == d.x, c.y == d.y, c.z == d.z
+        if (ax and bx and cx) or (ay and by and cy) or (az and bz and cz):
+            return 0
+        if (ax and ay and az) or (bx and by and bz) or (cx and cy and cz):
+            return 0
+    return orient3d_posed(poses, a, b, c, d, error)
+
+
 @called
 def classify_exactly(poses: Any, t1: PosedTriangle, t2: PosedTriangle, axis: int, error: float) -> int:
     """Return the class of two triangles that both have an area; UNDECIDED only where exponents leave the range.
@@ -168,14 +188,14 @@ def classify_exactly(poses: Any, t1: PosedTriangle, t2: PosedTriangle, axis: int
     poses (n, 12), error: as for `orient3d_posed`. axis: a coordinate axis, before its pose, along which the projection
     of t1 has an area.
     """
-    p2 = orient3d_posed(poses, t1.p, t1.q, t1.r, t2.p, error)
-    q2 = orient3d_posed(poses, t1.p, t1.q, t1.r, t2.q, error)
-    r2 = orient3d_posed(poses, t1.p, t1.q, t1.r, t2.r, error)
+    p2 = sign_of_four(poses, t1.p, t1.q, t1.r, t2.p, error)
+    q2 = sign_of_four(poses, t1.p, t1.q, t1.r, t2.q, error)
+    r2 = sign_of_four(poses, t1.p, t1.q, t1.r, t2.r, error)
     if is_one_side(p2, q2, r2):
         return APART
-    p1 = orient3d_posed(poses, t2.p, t2.q, t2.r, t1.p, error)
-    q1 = orient3d_posed(poses, t2.p, t2.q, t2.r, t1.q, error)
-    r1 = orient3d_posed(poses, t2.p, t2.q, t2.r, t1.r, error)
+    p1 = sign_of_four(poses, t2.p, t2.q, t2.r, t1.p, error)
+    q1 = sign_of_four(poses, t2.p, t2.q, t2.r, t1.q, error)
+    r1 = sign_of_four(poses, t2.p, t2.q, t2.r, t1.r, error)
     if is_one_side(p1, q1, r1):
         return APART
     if p1 == UNDECIDED or q1 == UNDECIDED or r1 == UNDECIDED:
@@ -194,10 +214,10 @@ def classify_exactly(poses: Any, t1: PosedTriangle, t2: PosedTriangle, axis: int
         b = PosedTriangle(b.p, b.r, b.q)
     if side2 < 0:
         a = PosedTriangle(a.p, a.r, a.q)
-    first = orient3d_posed(poses, a.q, b.p, a.p, b.q, error)
+    first = sign_of_four(poses, a.q, b.p, a.p, b.q, error)
     if first == 1:
         return APART
-    second = orient3d_posed(poses, a.p, b.p, a.r, b.r, error)
+    second = sign_of_four(poses, a.p, b.p, a.r, b.r, error)
     if second == 1:
         return APART
     if first == UNDECIDED or second == UNDECIDED:
@@ -233,7 +253,7 @@ def turn_in_plane(
     """Return how a, b, c of one plane turn; off: a point off that plane. The sense is the same within a question."""
     if axis >= 0:
         return orient2d(projected(a, axis), projected(b, axis), projected(c, axis))
-    return orient3d_posed(poses, a, b, off, c, error)
+    return sign_of_four(poses, a, b, off, c, error)
 
 
 @inline

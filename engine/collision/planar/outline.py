@@ -57,7 +57,7 @@ class Outline:
 
 def outline_of(body: Solid, pose: Pose | None, budget: Budget) -> Outline:
     """Return the edges of a polygon, a triangle or a box of the plane under `pose`."""
-    vertices, offsets = _rings_of(body)
+    vertices, offsets = rings_of(body)
     ends = np.empty((len(vertices), 2), np.int64)
     ends[:, 0] = np.arange(len(vertices))
     ends[:, 1] = ends[:, 0] + 1
@@ -73,7 +73,7 @@ def outline_of(body: Solid, pose: Pose | None, budget: Budget) -> Outline:
     return Outline(points, ends, low, high, floats, pose is not None)
 
 
-def _rings_of(body: Solid) -> tuple[FloatArray, IntArray]:
+def rings_of(body: Solid) -> tuple[FloatArray, IntArray]:
     if isinstance(body, Polygon):
         return body.vertices, body.ring_offsets
     if isinstance(body, Triangle):

@@ -92,7 +92,7 @@ def collide_scene(
         budget.check()
         skipped = None if skip is None else _keys(skip, len(bodies.solids), "skip")
         wanted = None if only is None else _keys(only, len(bodies.solids), "only")
-        batches = SceneBatches(bodies, boolean, budget)
+        batches = SceneBatches(bodies, boolean, detail, budget)
         parts: list[_Part] = []
         works: list[Work] = []
         n_candidates = n_open = 0

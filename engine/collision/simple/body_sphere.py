@@ -22,7 +22,6 @@ from engine.predicates.exact_vectors import minus, squared_length
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
 from engine.solids.sphere import Sphere
-from engine.solids.surface import Surface
 from engine.types import Location, Relation
 
 
@@ -33,7 +32,8 @@ def collide_body_sphere(
     """Return the relation of a body with a boundary of faces or edges (first) and a ball or disc (second), exact."""
     center, limit = image_point(sphere.center, sphere_pose), Fraction(sphere.radius) ** 2
     boundary = boundary_of(body, body_pose, work)
-    candidates = _candidates(boundary.face_bounds(center)[0], limit)
+    near = boundary.near(center, sphere.radius)
+    candidates = near[_candidates(boundary.face_bounds(center, near)[0], limit)]
     touched, entered = -1, candidates[:0]
     for count, face in enumerate(candidates.tolist()):
         work.budget.check()
@@ -45,21 +45,20 @@ def collide_body_sphere(
             break
     work.n_beyond_filter += len(candidates) > 0
     work.n_rational += len(candidates) > 0
-    location = Location.OUTSIDE
-    if not isinstance(body, Surface):
-        location = Location(rational_location(center, body, body_pose, work.budget.check))
-    if touched < 0 and not len(entered):
-        if location == Location.OUTSIDE:
+    enters = len(entered) > 0
+    if touched < 0 and not enters:
+        if not boundary.is_inside(center):
             return Collision(Relation.DISJOINT)
         return Collision(Relation.SECOND_INSIDE_FIRST, Witness("containment", containing="first"))
-    enters = len(entered) > 0
     if enters and _all_vertices_within(boundary, center, limit, work):
         return Collision(Relation.FIRST_INSIDE_SECOND, Witness("containment", containing="second"))
     face = boundary.number(int(entered[0]) if enters else touched)
     if sphere.radius > 0.0 and boundary.has_inside:
-        overlaps = location == Location.INSIDE or _enters(boundary, entered, center, limit)
-        if not overlaps and location == Location.BOUNDARY:
-            overlaps = _is_within_walls(body, body_pose, center, sphere.radius, work)
+        if enters:
+            overlaps = _enters(boundary, entered, center, limit)
+            overlaps = overlaps or _is_within_walls(body, body_pose, center, sphere.radius, work)
+        else:
+            overlaps = boundary.is_inside(center)
         if overlaps:
             return Collision(Relation.OVERLAPPING, Witness("surface", first_face=face))
     return Collision(Relation.TOUCHING, Witness("surface", first_face=face, piercing=enters))
@@ -77,11 +76,14 @@ def _enters(boundary: Boundary, faces: IntArray, center: Vector, limit: Fraction
 
 
 def _is_within_walls(body: Solid, pose: Pose | None, center: Vector, radius: float, work: Work) -> bool:
-    """Tell whether a ball whose centre lies on walls that cancel, and into which nothing live reaches, is inside else.
+    """Tell whether a ball into which nothing live reaches, walls that cancel at most, is inside else.
 
     Off those walls the ball is all inside or all outside, so any point of it will do. The points tried lie on the curve
     (t, t^2, t^3) from the centre, which meets no plane more than three times: one of them is on no wall.
     """
+    location = rational_location(center, body, pose, work.budget.check)
+    if location != Location.BOUNDARY:
+        return location == Location.INSIDE
     for k in itertools.count(2):  # bound: three turns a face
         q = tuple(c + Fraction(radius) / 2 / k**power for power, c in enumerate(center, 1))
         location = rational_location(q, body, pose, work.budget.check)
@@ -92,7 +94,11 @@ def _is_within_walls(body: Solid, pose: Pose | None, center: Vector, radius: flo
 
 def _all_vertices_within(boundary: Boundary, center: Vector, limit: Fraction, work: Work) -> bool:
     """Tell whether every vertex lies strictly inside the ball; the farthest by float64 bounds are asked first."""
-    lower, upper = boundary.vertex_bounds(center)
+    n = int(boundary.ends.max()) + 1 if len(boundary.ends) else 0
+    if any(squared_length(minus(boundary.exact(n * k // 4), center)) >= limit for k in range(4)):
+        return False
+    floats = boundary.floats(slice(None))
+    lower, upper = boundary.bounds(center, floats, floats)
     unsure = np.flatnonzero(~(upper < rounded(limit) * (1.0 - 2.0**-50)))
     for vertex in unsure[np.argsort(-lower[unsure], kind="stable")].tolist():
         work.budget.check()

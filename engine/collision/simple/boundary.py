@@ -10,35 +10,44 @@ import numpy as np
 
 from engine.arrays import FloatArray, Int8Array, IntArray
 from engine.collision.exact_images import HalfSpaceImage, Vector, as_vector, image_map, rounded, value_at
+from engine.collision.meshes.exact_body import exact_pair, faces_in
+from engine.collision.meshes.exact_regions import sides_at
 from engine.collision.meshes.live_faces import LivePiece, live_piece
 from engine.collision.meshes.mesh_arrays import mesh_body_of
 from engine.collision.planar.outline import is_clean, live_edges, outline_of
 from engine.collision.result import Work
 from engine.collision.simple.feature_distance import box_distance_bounds, simplex_distance
+from engine.containment.rational_locate import rational_location
 from engine.predicates.exact_vectors import dot
 from engine.predicates.rational import sign_of
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
+from engine.types import Location
+
+_ALL = slice(None)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Boundary:
     """What both kinds have in common.
 
-    ends: (n, d) the vertices of each face or edge. floats: (m, d) the rounded posed vertices, each number within
-    `error` of the exact one. exact: the position of a vertex. number, number_at: the caller's number of a face, and of
-    one at a vertex. signs: of a plane at each vertex. live: what even-odd leaves of faces; of an outline maybe of other
-    edges too. has_inside: False for surfaces and flat boxes.
+    ends: (n, d) the vertices of each face or edge. floats: of a place in it the rounded posed vertices, each number
+    within `error` of the exact one. near: all faces that come as near to a point as a radius, ascending, and maybe
+    others. exact: the position of a vertex. number, number_at: the caller's number of a face, and of one at a vertex.
+    signs: of a plane at each vertex. live: what even-odd leaves of faces; of an outline maybe of other edges too.
+    is_inside: whether a point on no face lies in the body. has_inside: False for surfaces and flat boxes.
     """
 
     ends: IntArray
-    floats: FloatArray
+    floats: Callable[[IntArray | slice], FloatArray]
     error: float
+    near: Callable[[Vector, float], IntArray]
     exact: Callable[[int], Vector]
     number: Callable[[int], int]
     number_at: Callable[[int], int]
     signs: Callable[[HalfSpaceImage], Int8Array]
     live: Callable[[list[int]], Iterator[LivePiece]]
+    is_inside: Callable[[Vector], bool]
     has_inside: bool
 
     def corners(self, face: int) -> tuple[Vector, ...]:
@@ -49,16 +58,15 @@ class Boundary:
         """Return the exact squared distance from a point to a face."""
         return simplex_distance(center, self.corners(face))
 
-    def face_bounds(self, center: Vector) -> tuple[FloatArray, FloatArray]:
-        """Return bounds of the squared distances from a point to what the boxes of the faces hold."""
-        points = self.floats[self.ends]
-        return self._bounds(center, points.min(axis=1), points.max(axis=1))
+    def face_bounds(self, center: Vector, faces: IntArray | slice = _ALL) -> tuple[FloatArray, FloatArray]:
+        """Return bounds of the squared distances from a point to what the boxes of faces hold."""
+        ends = self.ends[faces]
+        points = self.floats(ends.reshape(-1))
+        points = points.reshape(*ends.shape, points.shape[1])
+        return self.bounds(center, points.min(axis=1), points.max(axis=1))
 
-    def vertex_bounds(self, center: Vector) -> tuple[FloatArray, FloatArray]:
-        """Return bounds of the squared distances from a point to the vertices."""
-        return self._bounds(center, self.floats, self.floats)
-
-    def _bounds(self, center: Vector, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def bounds(self, center: Vector, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return bounds of the squared distances from a point to what boxes of rounded posed coordinates hold."""
         around = np.array([rounded(value) for value in center])
         slack = self.error + 2.0**-50 * float(np.abs(around).max()) + 2.0**-1070
         return box_distance_bounds(around, low - slack, high + slack)
@@ -76,11 +84,22 @@ def boundary_of(body: Solid, pose: Pose | None, work: Work) -> Boundary:
 def _mesh_boundary(body: Solid, pose: Pose | None, work: Work) -> Boundary:
     mesh, image = mesh_body_of(body), image_map(pose)
     vertices, triangles = mesh.arrays.vertices, mesh.arrays.triangles
-    floats, error = vertices, 0.0
+    error = 0.0
     if pose is not None:  # the error is derived in `placement.py`
-        with np.errstate(all="ignore"):
-            floats = vertices @ pose.rotation.T + pose.translation
         error = 2.0**-49 * (3.0 * mesh.arrays.extent.reach + float(np.abs(pose.translation).max())) + 2.0**-1060
+
+    def floats(where: IntArray | slice) -> FloatArray:
+        with np.errstate(all="ignore"):
+            return vertices[where] if pose is None else vertices[where] @ pose.rotation.T + pose.translation
+
+    def near(center: Vector, radius: float) -> IntArray:
+        low = [np.nextafter(rounded(x - Fraction(radius)), -np.inf) for x in center]
+        high = [np.nextafter(rounded(x + Fraction(radius)), np.inf) for x in center]
+        return faces_in(mesh.arrays, mesh.posed(pose), low, high)
+
+    def is_inside(center: Vector) -> bool:
+        exact, _ = exact_pair(mesh, pose, mesh, pose)
+        return mesh.has_inside and sides_at(exact, exact.at(center), 2).at
 
     def live(faces: list[int]) -> Iterator[LivePiece]:
         for face in faces:
@@ -93,11 +112,13 @@ def _mesh_boundary(body: Solid, pose: Pose | None, work: Work) -> Boundary:
         triangles,
         floats,
         error,
+        near,
         lambda vertex: image(vertices[vertex].tolist()),
         lambda face: int(mesh.faces[face]),
         lambda vertex: int(mesh.faces[np.argmax((triangles == vertex).any(axis=1))]),
         lambda plane: signs_of(plane, vertices, pose, work),
         live,
+        is_inside,
         mesh.has_inside,
     )
 
@@ -114,13 +135,15 @@ def _outline_boundary(body: Solid, pose: Pose | None, work: Work) -> Boundary:
 
     return Boundary(
         outline.ends,
-        outline.floats,
+        lambda where: outline.floats[where],
         2.0**-52 * float(np.abs(outline.floats).max()) + 2.0**-1074,
+        lambda center, radius: np.arange(outline.n_edges),
         lambda vertex: outline.points[vertex],
         lambda edge: edge,
         lambda vertex: vertex,
         lambda plane: np.array([sign_of(value_at(plane, point)) for point in outline.points], np.int8),
         live,
+        lambda center: rational_location(center, body, pose, work.budget.check) == Location.INSIDE,
         True,
     )
 

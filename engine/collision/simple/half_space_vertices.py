@@ -6,13 +6,16 @@ by its faces with vertices there; the half-space always sticks out of the body.
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from engine.arrays import IntArray
 from engine.collision.exact_images import HalfSpaceImage, image_half_space, value_at
 from engine.collision.result import Collision, Parts, Witness, Work
-from engine.collision.simple.boundary import Boundary, boundary_of
+from engine.collision.simple.boundary import Boundary, boundary_of, signs_of
 from engine.solids.base import Solid
+from engine.solids.bounds import own_box
 from engine.solids.half_space import HalfSpace
 from engine.solids.pose import Pose
 from engine.types import Relation
@@ -22,9 +25,13 @@ def collide_half_space_body(
     half_space: HalfSpace, body: Solid, half_space_pose: Pose | None, body_pose: Pose | None, work: Work
 ) -> Collision:
     """Return the relation of a half-space (first) and a body with vertices (second), exact."""
-    boundary = boundary_of(body, body_pose, work)
     plane = image_half_space(half_space.normal, half_space.offset, half_space_pose)
-    signs = boundary.signs(plane)
+    low, high, _ = own_box(body)
+    corners = np.array(list(itertools.product(*zip(low.tolist(), high.tolist()))))
+    signs = signs_of(plane, corners, body_pose, work)  # of a linear function: one side with these is one with the body
+    if not ((signs < 0).all() or (signs > 0).all()):
+        boundary = boundary_of(body, body_pose, work)
+        signs = boundary.signs(plane)
     if (signs < 0).all():
         return Collision(Relation.DISJOINT)
     if (signs > 0).all():

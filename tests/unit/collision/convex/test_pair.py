@@ -65,7 +65,7 @@ def short_answers(first: Solid, second: Solid, placed: list[Pose | None], boolea
     rows, found = np.append(0, np.ones(n, np.int64)), np.full(n, UNSETTLED, np.int8)
     with np.errstate(all="ignore"):
         pool = pooled([body for body in bodies if body is not None])
-        relate_convex_pairs(pool, rows, PoseArrays(rotations, translations, True), pairs, boolean, found, FLAG)
+        relate_convex_pairs(pool, rows, PoseArrays(rotations, translations, True), pairs, boolean, False, found, FLAG)
     return found.tolist()
 
 

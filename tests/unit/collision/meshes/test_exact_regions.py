@@ -7,7 +7,7 @@ import pytest
 
 from engine import Pose, Surface
 from engine.collision.meshes.exact_body import ExactBody, exact_pair
-from engine.collision.meshes.exact_regions import Sides, even_sides, is_inside_exact, regions_of, sides_at, sides_within
+from engine.collision.meshes.exact_regions import Sides, even_sides, regions_of, sides_at, sides_within
 from engine.collision.meshes.mesh_arrays import mesh_body_of
 from engine.parallel import Budget
 from tests.unit.collision.meshes.bodies import TURN, mesh
@@ -56,6 +56,6 @@ def test_sides_of_the_faces_of_a_box(pose: Pose | None) -> None:
         assert not sides[0].at
     n = len(body.mesh.arrays.vertices)
     centre = (*map(sum, zip(*(body.vertex(vertex) for vertex in range(n)))), n)
-    assert is_inside_exact(body, centre)
-    assert not is_inside_exact(other, centre)
+    assert sides_at(body, centre, 2).at
+    assert not sides_at(other, centre, 2).at
     assert sides_at(body, centre, 2) == Sides(True, True, True)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from engine.collision.meshes.exact_body import Corners, plane_through
-from engine.collision.meshes.exact_triangles import as_simplex, classify_exact, is_flush, kind_of_contact
+from engine.collision.meshes.exact_triangles import as_simplex, classify_exact, kind_of_contact
 from engine.collision.meshes.triangle_triangle import APART
 from tests.reference.contact import triangles_meet
 from tests.reference.exact import vector
@@ -40,4 +40,3 @@ def test_kinds(other: Corners, kind: str) -> None:
     planes = plane_through(FACE), plane_through(other)
     assert kind_of_contact(FACE, other, *planes) == kind
     assert kind_of_contact(other, FACE, *planes[::-1]) == kind
-    assert is_flush(FACE, other, *planes) == (kind == "face_face")

@@ -7,7 +7,7 @@ import pytest
 
 from engine import Aabb, Polyhedron, Pose, Relation, collide
 from engine.collision.meshes.mesh_arrays import mesh_body_of
-from engine.collision.meshes.separating_plane import is_separated
+from engine.collision.meshes.mesh_pair import MeshPair
 from engine.collision.result import Work
 from engine.parallel import Budget
 
@@ -22,10 +22,7 @@ def contacts_of(first: object, second: object, pose: Pose | None) -> tuple[bool,
     n, m = len(a.faces), len(b.faces)
     pairs = np.stack([np.repeat(np.arange(n), m), np.tile(np.arange(m), n)], axis=1)
     with Budget(None, None) as budget, np.errstate(all="ignore"):
-        found = any(
-            is_separated(a.arrays, a.posed(pose), b.arrays, b.posed(pose), pairs[i : i + 1], Work(budget).budget.flag)
-            for i in range(len(pairs))
-        )
+        found = any(MeshPair(a, pose, b, pose, Work(budget)).is_separated(pairs[i : i + 1]) for i in range(len(pairs)))
     return found, collide(first, second, first_pose=pose, second_pose=pose).relation
 
 

@@ -24,9 +24,10 @@ def test_rounded_vertices_bounds_and_signs_hold_the_exact_ones(body: Solid, pose
     boundary = boundary_of(body, pose, Work())
     center = tuple(map(Fraction, [5, 6, 7][: body.dimension]))
     plane = image_half_space(np.array([3.0, 1.0, -2.0][: body.dimension]), -2.5, None)
-    lower, upper = boundary.vertex_bounds(center)
+    floats = boundary.floats(slice(None))
+    lower, upper = boundary.bounds(center, floats, floats)
     signs = boundary.signs(plane)
-    for vertex, rounded in enumerate(boundary.floats.tolist()):
+    for vertex, rounded in enumerate(floats.tolist()):
         exact = boundary.exact(vertex)
         assert all(abs(Fraction(r) - x) <= boundary.error for r, x in zip(rounded, exact))
         assert lower[vertex] <= squared_length(minus(exact, center)) <= upper[vertex]

@@ -1,0 +1,231 @@
+"""Compiled: how faces in contact meet (the kind of a witness), and whether a plane separates the bodies behind them.
+
+The rules are those of `exact_triangles.kind_of_contact`, by exact signs of points under their poses. With t, u the two
+faces: an edge of t passes the open face u where its ends lie on two sides of u's plane and all three edges of u turn
+one way about it, or where it lies in that plane and its own line has corners of u on both sides. A corner of t in u's
+plane is in the open face, on an edge or on a corner of u by its three turns there. Two open edges cross where they are
+coplanar and each has the other's ends on two sides, in a plane told by a third corner off their own.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from engine.collision.codes import UNSETTLED
+from engine.collision.meshes.dual_traversal import store_pose
+from engine.collision.meshes.mesh_arrays import MeshArrays, triangle_of
+from engine.collision.meshes.placement import PoseArrays
+from engine.collision.meshes.separating_plane import are_separated
+from engine.collision.meshes.triangle_triangle import (
+    PosedTriangle,
+    beside,
+    corner,
+    separation,
+    sign_of_four,
+    turn_in_plane,
+    with_pose,
+)
+from engine.collision.result import Kind
+from engine.jit import called, kernel
+from engine.predicates.posed import UNPOSED, PosedPoint3, posed_error
+from engine.types import UNDECIDED
+
+STRENGTH: tuple[Kind, ...] = ("face_face", "edge_face", "vertex_face", "edge_edge", "vertex_edge", "vertex_vertex")
+"""Of several contacts the witness is the one of the kind that stands first here; at most `N_NAMED` are looked at."""
+FACE_FACE, EDGE_FACE, VERTEX_FACE, EDGE_EDGE, VERTEX_EDGE, VERTEX_VERTEX = range(6)
+N_NAMED = 32
+
+_BAD = 9
+"""Place in the work space, after nine turns, that says that a sign was open."""
+
+
+@called
+def _side(poses: Any, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d: PosedPoint3, error: float, work: Any) -> int:
+    """Return orient3d; 0, and note it, where it is open."""
+    side = sign_of_four(poses, a, b, c, d, error)
+    if side != UNDECIDED:
+        return side
+    work[_BAD] = 1
+    return 0
+
+
+@called
+def _turn(
+    poses: Any, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, off: PosedPoint3, axis: int, error: float, work: Any
+) -> int:
+    """Return how three points of one plane turn; 0, and note it, where that is open."""
+    turn = turn_in_plane(poses, a, b, c, off, axis, error)
+    if turn != UNDECIDED:
+        return turn
+    work[_BAD] = 1
+    return 0
+
+
+@called
+def _against_face(
+    poses: Any, t: PosedTriangle, sides: tuple[int, int, int], u: PosedTriangle, axis: int, error: float, work: Any
+) -> int:
+    """Return EDGE_FACE or VERTEX_FACE for what of t meets the open face u, else VERTEX_VERTEX for a common corner, else
+    VERTEX_EDGE. sides: of t's corners, by the plane of u."""
+    off, flat = beside(u, axis), axis if (t.p.pose == UNPOSED and u.p.pose == UNPOSED) else -1
+    if not np.isfinite(off.x + off.y + off.z):
+        work[_BAD] = 1
+        return VERTEX_EDGE
+    turn = _turn(poses, u.p, u.q, u.r, off, flat, error, work)
+    found = VERTEX_EDGE
+    for k in range(3):
+        if sides[k] != 0:
+            continue
+        n_on, n_out = 0, 0
+        for edge in range(3):
+            value = turn * _turn(poses, corner(u, edge), corner(u, edge + 1), corner(t, k), off, flat, error, work)
+            work[3 * k + edge] = value
+            n_on += value == 0
+            n_out += value < 0
+        if n_out == 0 and n_on == 0:
+            found = VERTEX_FACE
+        elif n_out == 0 and n_on == 2 and found != VERTEX_FACE:
+            found = VERTEX_VERTEX
+    for k in range(3):
+        end = (k + 1) % 3
+        a, b = corner(t, k), corner(t, end)
+        n_left, n_right, is_outside = 0, 0, False
+        for edge in range(3):
+            value = 0
+            if sides[k] * sides[end] < 0:
+                value = _side(poses, a, b, corner(u, edge), corner(u, edge + 1), error, work)
+            elif sides[k] == 0 and sides[end] == 0:
+                is_outside |= work[3 * k + edge] <= 0 and work[3 * end + edge] <= 0
+                value = _turn(poses, a, b, corner(u, edge), off, flat, error, work)
+            n_left += value > 0
+            n_right += value < 0
+        if sides[k] * sides[end] < 0:
+            if n_left == 3 or n_right == 3:
+                return EDGE_FACE
+        elif n_left > 0 and n_right > 0 and not is_outside:
+            return EDGE_FACE
+    return found
+
+
+@called
+def _overlap_on_line(
+    poses: Any, t: PosedTriangle, k: int, c: PosedPoint3, d: PosedPoint3, axis: int, error: float, work: Any
+) -> bool:
+    """Tell whether edge k of t and c d, both on one line, share a length: some of c and d lies on the inner side of
+    either end, by planes through it and off the line."""
+    a, b, apex, off = corner(t, k), corner(t, k + 1), corner(t, k + 2), beside(t, axis)
+    for end in range(2):
+        p, q = (a, b) if end == 0 else (b, a)
+        inner = _side(poses, p, apex, off, q, error, work)
+        by_c, by_d = _side(poses, p, apex, off, c, error, work), _side(poses, p, apex, off, d, error, work)
+        if inner * by_c <= 0 and inner * by_d <= 0:
+            return False
+    return True
+
+
+@called
+def _open_edges_meet(
+    poses: Any,
+    t: PosedTriangle,
+    sides: tuple[int, int, int],
+    u: PosedTriangle,
+    their_sides: tuple[int, int, int],
+    axis: int,
+    error: float,
+    work: Any,
+) -> bool:
+    """Tell whether two open edges of the faces have a common point."""
+    is_flat = sides[0] == 0 and sides[1] == 0 and sides[2] == 0
+    off, flat = beside(t, axis), axis if (t.p.pose == UNPOSED and u.p.pose == UNPOSED) else -1
+    for k in range(3):
+        across = sides[k] * sides[(k + 1) % 3]
+        if across > 0 or (across == 0 and (sides[k] != 0 or sides[(k + 1) % 3] != 0)):
+            continue
+        a, b = corner(t, k), corner(t, k + 1)
+        for m in range(3):
+            their_across = their_sides[m] * their_sides[(m + 1) % 3]
+            if their_across > 0 or (their_across == 0 and (their_sides[m] != 0 or their_sides[(m + 1) % 3] != 0)):
+                continue
+            c, d = corner(u, m), corner(u, m + 1)
+            if their_across == 0 and across == 0:
+                if is_flat:
+                    by_c = _turn(poses, a, b, c, off, flat, error, work)
+                    by_d = _turn(poses, a, b, d, off, flat, error, work)
+                    by_a = _turn(poses, c, d, a, off, flat, error, work)
+                    if by_c * by_d < 0 and by_a * _turn(poses, c, d, b, off, flat, error, work) < 0:
+                        return True
+                    if by_c != 0 or by_d != 0:
+                        continue
+                if _overlap_on_line(poses, t, k, c, d, axis, error, work):
+                    return True
+            elif _side(poses, a, b, c, d, error, work) == 0:
+                if their_across != 0:
+                    apex = corner(t, k + 2)
+                    one, other = _side(poses, c, d, apex, a, error, work), _side(poses, c, d, apex, b, error, work)
+                else:
+                    apex = corner(u, m + 2)
+                    one, other = _side(poses, a, b, apex, c, error, work), _side(poses, a, b, apex, d, error, work)
+                if one * other < 0:
+                    return True
+    return False
+
+
+@called
+def kind_of(poses: Any, t: PosedTriangle, axis: int, u: PosedTriangle, their_axis: int, error: float, work: Any) -> int:
+    """Return the kind of the contact of two faces with area, UNSETTLED where a sign is open."""
+    work[_BAD] = 0
+    sides = (
+        _side(poses, u.p, u.q, u.r, t.p, error, work),
+        _side(poses, u.p, u.q, u.r, t.q, error, work),
+        _side(poses, u.p, u.q, u.r, t.r, error, work),
+    )
+    their_sides = (
+        _side(poses, t.p, t.q, t.r, u.p, error, work),
+        _side(poses, t.p, t.q, t.r, u.q, error, work),
+        _side(poses, t.p, t.q, t.r, u.r, error, work),
+    )
+    if work[_BAD] == 0 and sides[0] == 0 and sides[1] == 0 and sides[2] == 0:
+        how = separation(poses, t, u, axis, error)
+        if how == UNDECIDED or how < 0:
+            return UNSETTLED if how == UNDECIDED else FACE_FACE
+    one = _against_face(poses, t, sides, u, their_axis, error, work)
+    other = _against_face(poses, u, their_sides, t, axis, error, work)
+    found = min(one, other)
+    if found > VERTEX_FACE and _open_edges_meet(poses, t, sides, u, their_sides, axis, error, work):
+        found = EDGE_EDGE
+    elif found > VERTEX_FACE:
+        found = max(one, other)  # a common corner, if there is one
+    return UNSETTLED if work[_BAD] != 0 else found
+
+
+@kernel
+def judge_contacts(
+    first: MeshArrays,
+    first_pose: PoseArrays,
+    second: MeshArrays,
+    second_pose: PoseArrays,
+    contacts: Any,
+    wants_plane: bool,
+    kinds: Any,
+    flag: Any,
+) -> bool:
+    """Tell whether a plane is known to separate the bodies, if asked; fill kinds (n,) int8 of the first n contacts.
+
+    UNSETTLED stands for what is open. Beyond a contact of FACE_FACE, than which nothing is stronger, nothing is filled.
+    """
+    poses, work = np.zeros((2, 12)), np.zeros(10, np.int8)
+    store_pose(poses, 0, first_pose, 0)
+    store_pose(poses, 1, second_pose, 0)
+    own, their = 0 if first_pose.is_posed else UNPOSED, 1 if second_pose.is_posed else UNPOSED
+    error = max(posed_error(poses, own, first.extent.reach), posed_error(poses, their, second.extent.reach))
+    for item in range(kinds.shape[0]):
+        i, j = contacts[item, 0], contacts[item, 1]
+        kinds[item] = UNSETTLED
+        if first.axis[i] >= 0 and second.axis[j] >= 0:
+            t, u = with_pose(triangle_of(first, i), own), with_pose(triangle_of(second, j), their)
+            kinds[item] = kind_of(poses, t, int(first.axis[i]), u, int(second.axis[j]), error, work)
+        if kinds[item] == FACE_FACE or flag[0] != 0:
+            break
+    return wants_plane and are_separated(poses, first, own, second, their, contacts, error, flag)

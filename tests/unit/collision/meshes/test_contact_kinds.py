@@ -1,0 +1,43 @@
+"""The kind of a contact by compiled signs: what exact integers say, for triangles on a small lattice, posed or not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from engine import Pose, Surface
+from engine.collision.codes import UNSETTLED
+from engine.collision.meshes.contact_kinds import STRENGTH, judge_contacts
+from engine.collision.meshes.exact_body import exact_pair
+from engine.collision.meshes.exact_triangles import classify_exact, kind_of_contact
+from engine.collision.meshes.mesh_arrays import mesh_body_of
+from engine.collision.meshes.triangle_triangle import APART
+from tests.unit.collision.meshes.bodies import TURN
+
+
+@pytest.mark.parametrize("pose", [None, TURN])
+@pytest.mark.parametrize("size", [3, 4])
+def test_agrees_with_exact_integers(size: int, pose: Pose | None) -> None:
+    rng = np.random.default_rng(size)
+    flag, seen = np.zeros(1, np.uint8), set()
+    for _ in range(600 if pose is None else 300):
+        t, u = rng.integers(0, size, (2, 3, 3)).astype(float)
+        if rng.random() < 0.5:
+            t[:, 2] = u[:, 2] = 0.0
+        first, second = (mesh_body_of(Surface(corners, [[0, 1, 2]])) for corners in (t, u))
+        a, b = exact_pair(first, pose, second, pose)
+        faces = a.corners(0), b.corners(0), a.plane(0), b.plane(0)
+        if classify_exact(*faces) == APART:
+            continue
+        kinds = np.full(1, UNSETTLED, np.int8)
+        with np.errstate(all="ignore"):
+            judge_contacts(
+                first.arrays, first.posed(pose), second.arrays, second.posed(pose),
+                np.zeros((1, 2), np.int64), False, kinds, flag,
+            )  # fmt: skip
+        if min(first.arrays.axis[0], second.arrays.axis[0]) < 0:
+            assert kinds[0] == UNSETTLED
+        else:
+            assert STRENGTH[kinds[0]] == kind_of_contact(*faces)
+            seen.add(int(kinds[0]))
+    assert seen == set(range(6))
