@@ -28,7 +28,8 @@ def main() -> None:
         settings = Settings()
     except ValidationError as error:
         lines = [f"GEOMETRY_{'_'.join(map(str, item['loc'])).upper()}: {item['msg']}" for item in error.errors()]
-        sys.exit("a setting is wrong\n" + "\n".join(lines))
+        print("a setting is wrong: " + "; ".join(lines), file=sys.stderr)
+        sys.exit(2)
     config = logs.config_of(settings.log_level)
     logging.config.dictConfig(config)
     # uvicorn drains, restores these handlers and raises the signal again: that must end in 0, not in a kill
@@ -42,6 +43,9 @@ def main() -> None:
         settings.max_body_bytes,
         settings.deadline_seconds,
     )
+    known = {f"GEOMETRY_{name.upper()}" for name in Settings.model_fields}
+    if unknown := [name for name in os.environ if name.startswith("GEOMETRY_") and name.upper() not in known]:
+        log.warning("no setting is called %s; the README has a table of them", ", ".join(sorted(unknown)))
     if not settings.api_keys and not _is_loopback(settings.host):
         log.warning("anyone who reaches %s may use this service: GEOMETRY_API_KEYS is not set", settings.host)
     with ExitStack() as stack:

@@ -277,8 +277,9 @@ def test_several_workers_share_solids_and_counters() -> None:
 
 @pytest.mark.parametrize(("settings", "warns"), [({"api_keys": "abc"}, False), ({}, True)])
 def test_a_start_for_others_without_keys_says_so(settings: dict[str, str], warns: bool) -> None:
-    service = Service(host="0.0.0.0", **settings)
+    service = Service(host="0.0.0.0", max_point=7, **settings)
     try:
+        assert any("no setting is called GEOMETRY_MAX_POINT;" in line for line in service.log)
         assert any("GEOMETRY_API_KEYS is not set" in line for line in service.log) is warns
         assert "abc" not in "".join(service.log)
         assert service.stop() == 0
@@ -296,6 +297,6 @@ def test_a_wrong_setting_is_named() -> None:
         timeout=60,
         check=False,
     )
-    assert done.returncode == 1
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
     assert "GEOMETRY_MAX_POINTS" in done.stderr
     assert "Traceback" not in done.stderr

@@ -274,3 +274,19 @@ async def test_a_length_that_is_not_the_bodys_is_not_believed(
     body = b'{"solid": %s, "points": [[0, 0, 0]]%s}' % (json.dumps(SPHERE).encode(), b" " * 3 * 2**17)
     answer = await client.post("/v1/contains", content=body, headers={**JSON, "Content-Length": str(declared)})
     assert answer.json()["contained"] == [True]
+
+
+async def test_small_questions_do_not_wait_behind_large_ones(app: FastAPI, anyio_backend: str) -> None:
+    add_slow_routes(app)
+    app.state.settings = app.state.settings.model_copy(update={"concurrency": 1, "queue_length": 1})
+    large = b'{"seconds": 0.5' + b" " * app.state.settings.inline_bytes + b"}"
+    async with client_of(app) as client, anyio.create_task_group() as group:
+        for _ in range(2):
+            group.start_soon(lambda: client.post("/nap", content=large, headers=JSON))
+        await anyio.sleep(0.1)
+        check_problem(await client.post("/nap", content=large, headers=JSON), 503, "queue_full")
+        light = await client.post("/v1/contains", json={"solid": SPHERE, "points": [[0, 0, 0]]})
+        assert light.json()["contained"] == [True]
+        before = time.monotonic()
+        await nap(client, 0.0)  # small, and computed in a thread
+        assert time.monotonic() - before < 0.3
