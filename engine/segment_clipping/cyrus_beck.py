@@ -6,8 +6,9 @@ t = s_p / (s_p - s_q); the last plane entered and the first one left bound the p
 looked at once, so the loop ends; all signs and all comparisons are exact and about the original end points: a filter,
 then expansions, then "open" (where exponents leave the range in which expansions are exact).
 
-Plane values come from columns; only planes that an end is not surely inside of are looked at again. In the plane z is
-0. As for boxes, one kernel says which planes bound each piece, `fill_on_rows` (planes_cut.py) makes their points.
+Plane values come from columns, parameters from doubles for a block of segments at once; what these leave open is looked
+at again, by the planes that an end is not surely inside of. In the plane z is 0. As for boxes, one kernel says which
+planes bound each piece, `fill_on_rows` (planes_cut.py) makes their points.
 
 Source: M. Cyrus, J. Beck, Generalized two- and three-dimensional clipping, 1978; the textbook's exercise:
 Cohen-Sutherland generalised to a convex polyhedron. Changed: exact signs of s, exact order of t, cut points from the
@@ -16,16 +17,16 @@ original ends.
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from engine.arrays import FloatArray
-from engine.jit import inline, kernel
+from engine.jit import inline, kernel, merged
 from engine.predicates.error_free import workspace
 from engine.predicates.expansion import Components, compress, grow, grow_product, is_safe, sign
 from engine.predicates.parameters import compare_products, compare_ratios_filter
-from engine.segment_clipping.cohen_sutherland import DROPPED, KEPT, is_plain
+from engine.segment_clipping.cohen_sutherland import BLOCK, DROPPED, KEPT, is_plain
 from engine.segment_clipping.pieces import point_of
 from engine.types import OPEN, UNDECIDED
 
@@ -37,7 +38,20 @@ Each term carries at most (1 + u)^4, the sum of absolute terms the same; 8 u cov
 VALUE_TINY: Final = 2.0**-1070
 """Products that underflow lose at most 2^-1074 each."""
 T_ROUNDINGS: Final = 8.0 * 2.0**-53
-"""Of a parameter in doubles, beside the bounds of its plane values."""
+"""Of a parameter in doubles, beside the bounds of its plane values: two or three roundings of a number up to 1."""
+WIDEST: Final = 2.0**900
+"""Where bounds stay below it, no term of a plane value overflows."""
+NARROWEST: Final = 2.0**-960
+"""Where values of two signs are beyond it, the inverse of their difference does not overflow."""
+
+
+class Latest(NamedTuple):
+    """The last plane of some that a segment crosses: at t, within `slack`; rival: the latest that another may be."""
+
+    t: float
+    slack: float
+    plane: float
+    rival: float
 
 
 def as_columns(rows: FloatArray) -> FloatArray:
@@ -158,40 +172,31 @@ def compare_rows(
     return exact_order(row_i, row_j, segment), False
 
 
-@inline
-def decide_by_parameters(s_p: Any, s_q: Any, bounds: Any, chosen: Any, n: int) -> tuple[int, int, int]:
-    """Decide on one segment by the n `chosen` planes from doubles: state, plane entered, plane left; OPEN: unsure.
+@merged
+def later(t: float, slack: float, plane: float, is_crossed: bool, best: Latest) -> Latest:
+    """Return the later of a crossing, if there is one, known within `slack`, and the latest so far."""
+    is_later = is_crossed & (t > best.t)
+    other = best.t + best.slack if is_later else (t + slack if is_crossed else best.rival)
+    return Latest(
+        t if is_later else best.t,
+        slack if is_later else best.slack,
+        plane if is_later else best.plane,
+        other if other > best.rival else best.rival,
+    )
+
+
+@merged
+def state_of(entered: Latest, left: Latest, is_out: bool, is_open: bool) -> float:
+    """Return the state of a segment from the latest plane entered and, by -t, the first one left; OPEN: unsure.
 
     t = s_p / (s_p - s_q) moves by at most bound / (|s_p| + |s_q|) when both values move by a bound.
     """
-    entered = left = -1
-    start, start_slack, start_rival = -1.0, 0.0, -1.0  # the last plane entered, the next to last at its latest
-    end, end_slack, end_rival = 2.0, 0.0, 2.0  # the first plane left, the second at its earliest
-    for i in range(n):
-        p, q, bound = s_p[i], s_q[i], bounds[i]
-        if not (abs(p) > bound and abs(q) > bound):
-            return OPEN, -1, -1
-        if p > 0.0 and q > 0.0:
-            continue
-        t = p / (p - q)
-        slack = 1.01 * bound / abs(p - q) + T_ROUNDINGS
-        if p < 0.0:
-            if t > start:
-                start_rival = max(start_rival, start + start_slack)
-                start, start_slack, entered = t, slack, i
-            else:
-                start_rival = max(start_rival, t + slack)
-        elif t < end:
-            end_rival = min(end_rival, end - end_slack)
-            end, end_slack, left = t, slack, i
-        else:
-            end_rival = min(end_rival, t - slack)
-    if start - start_slack > end + end_slack:
-        return DROPPED, -1, -1
-    is_sure = max(start + start_slack, start_rival) < min(end - end_slack, end_rival)
-    is_sure = is_sure and (entered < 0 or start_rival < start - start_slack)
-    is_sure = is_sure and (left < 0 or end_rival > end + end_slack)
-    return (KEPT, entered, left) if is_sure else (OPEN, -1, -1)
+    start, end = entered.t, -left.t
+    is_sure = max(start + entered.slack, entered.rival) < min(end - left.slack, -left.rival)
+    is_sure = is_sure & ((entered.plane < 0.0) | (entered.rival < start - entered.slack))
+    is_sure = is_sure & ((left.plane < 0.0) | (-left.rival > end + left.slack))
+    is_out = is_out | ((start - entered.slack > end + left.slack) & (not is_open))
+    return 0.0 if is_out else (1.0 if is_sure & (not is_open) else 2.0)
 
 
 @inline
@@ -201,55 +206,100 @@ def columns_of(columns: Any) -> tuple[Any, Any, Any, Any]:
     return columns[0], columns[1], columns[d - 1], columns[d]
 
 
+@inline
+def coordinate_limit(columns: Any) -> float:
+    """Return what coordinates have to stay below, so that bounds of plane values stay below `WIDEST`."""
+    limit = np.inf
+    for j in range(columns.shape[1]):
+        limit = min(limit, (WIDEST - columns[-1, j]) / columns[-2, j])
+    return limit
+
+
+@inline
+def decide_alone(
+    segments: Any, item: int, columns: Any, limit: float, numbers: Any, chosen: Any
+) -> tuple[int, int, int, int]:
+    """Decide on one segment as `decide_by_rows` does; limit: of coordinates. numbers, chosen: (3, m), (m,), scratch."""
+    is_flat = segments.shape[2] == 2
+    a, b, c, d = columns_of(columns)
+    p, q = point_of(segments, item, 0, is_flat), point_of(segments, item, 1, is_flat)
+    most = max(abs(p[0]), abs(p[1]), abs(p[2]), abs(q[0]), abs(q[1]), abs(q[2]))
+    if not (is_plain(p, q) and most < limit):
+        return OPEN, -1, -1, 0
+    s_p, s_q, bounds, n = numbers[0], numbers[1], numbers[2], 0
+    for j in range(d.size):
+        s_p[n] = a[j] * p[0] + b[j] * p[1] + c[j] * p[2] + d[j]
+        s_q[n] = a[j] * q[0] + b[j] * q[1] + c[j] * q[2] + d[j]
+        bounds[n], chosen[n] = columns[-2, j] * most + columns[-1, j], j
+        n += not min(s_p[n], s_q[n]) > bounds[n]
+    state, entered, left, beyond = decide_by_rows(segments[item], columns, s_p, s_q, bounds, chosen, n)
+    return state, (chosen[entered] if entered >= 0 else -1), (chosen[left] if left >= 0 else -1), beyond
+
+
 @kernel
 def decide_on_rows(
     segments: Any, columns: Any, first: int, last: int, stop: Any, items: Any, planes: Any, still: Any, n: Any
 ) -> None:
     """Decide on ``segments[first:last]`` ((n, 2, dim) float64) where all planes (`as_columns`) are >= 0.
 
-    Outputs: see `decide_on_boxes`.
+    Plane by plane over a block of segments, without branches. Outputs: see `decide_on_boxes`.
     """
     is_flat = segments.shape[2] == 2
     a, b, c, d = columns_of(columns)
-    slopes, floors = columns[-2], columns[-1]
-    m = d.size
-    s_p, s_q, bounds, chosen = np.empty(m), np.empty(m), np.empty(m), np.empty(m, np.int64)
+    m, limit = d.size, coordinate_limit(columns)
+    numbers, chosen = np.empty((3, m + 1)), np.empty(m + 1, np.int64)
+    px, py, pz, qx, qy, qz, most = (
+        workspace(64), workspace(64), workspace(64), workspace(64), workspace(64), workspace(64), workspace(64),
+    )  # fmt: skip
+    t0, slack0, plane0, rival0, t1, slack1, plane1, rival1, is_open, is_out = (
+        workspace(64), workspace(64), workspace(64), workspace(64), workspace(64), workspace(64), workspace(64),
+        workspace(64), workspace(64), workspace(64),
+    )  # fmt: skip
     kept, n_open, beyond = 0, 0, 0
-    for i in range(first, last):
-        px, py, pz = point_of(segments, i, 0, is_flat)
-        qx, qy, qz = point_of(segments, i, 1, is_flat)
-        if not is_plain((px, py, pz), (qx, qy, qz)):
-            still[n_open] = i
-            n_open += 1
-            continue
-        most = max(abs(px), abs(py), abs(pz), abs(qx), abs(qy), abs(qz))
-        n_chosen, is_out = 0, False
+    for begin in range(first, last, BLOCK):
+        size = min(BLOCK, last - begin)
+        n_lanes = (size + 7) >> 3 << 3  # whole vectors
+        for i in range(size):
+            px[i], py[i], pz[i] = point_of(segments, begin + i, 0, is_flat)
+            qx[i], qy[i], qz[i] = point_of(segments, begin + i, 1, is_flat)
+        for i in range(n_lanes):
+            largest = max(abs(px[i]), abs(py[i]), abs(pz[i]), abs(qx[i]), abs(qy[i]), abs(qz[i]))
+            is_good = is_plain((px[i], py[i], pz[i]), (qx[i], qy[i], qz[i])) & (largest < limit)
+            most[i], is_open[i], is_out[i] = (largest if is_good else np.inf), (0.0 if is_good else 1.0), 0.0
+            t0[i], slack0[i], plane0[i], rival0[i] = -1.0, 0.0, -1.0, -1.0
+            t1[i], slack1[i], plane1[i], rival1[i] = -2.0, 0.0, -1.0, -2.0
         for j in range(m):
-            p = a[j] * px + b[j] * py + c[j] * pz + d[j]
-            q = a[j] * qx + b[j] * qy + c[j] * qz + d[j]
-            bound = slopes[j] * most + floors[j]
-            if min(p, q) > bound:
-                continue
-            if max(p, q) < -bound:
-                is_out = True
-                break
-            s_p[n_chosen], s_q[n_chosen], bounds[n_chosen], chosen[n_chosen] = p, q, bound, j
-            n_chosen += 1
             if stop[0]:
                 return
-        if is_out:
-            continue
-        state, entered, left = decide_by_parameters(s_p, s_q, bounds, chosen, n_chosen)
-        if state == OPEN:
-            state, entered, left, more = decide_by_rows(segments[i], columns, s_p, s_q, bounds, chosen, n_chosen)
-            beyond += more
-        if state == OPEN:
-            still[n_open] = i
-            n_open += 1
-        if state != KEPT:
-            continue
-        items[kept] = i
-        planes[kept, 0] = chosen[entered] if entered >= 0 else -1
-        planes[kept, 1] = chosen[left] if left >= 0 else -1
-        kept += 1
+            aj, bj, cj, dj, slope, floor = a[j], b[j], c[j], d[j], columns[-2, j], columns[-1, j] + NARROWEST
+            for i in range(n_lanes):
+                p = aj * px[i] + bj * py[i] + cj * pz[i] + dj
+                q = aj * qx[i] + bj * qy[i] + cj * qz[i] + dj
+                bound = slope * most[i] + floor
+                p_in, p_out, q_in, q_out = p > bound, p < -bound, q > bound, q < -bound
+                is_open[i] = is_open[i] if (p_in | p_out) & (q_in | q_out) else 1.0
+                is_out[i] = 1.0 if p_out & q_out else is_out[i]
+                inverse = 1.0 / (p - q)
+                t, slack = p * inverse, 1.01 * bound * abs(inverse) + T_ROUNDINGS
+                t0[i], slack0[i], plane0[i], rival0[i] = later(
+                    t, slack, float(j), p_out & q_in, Latest(t0[i], slack0[i], plane0[i], rival0[i])
+                )
+                t1[i], slack1[i], plane1[i], rival1[i] = later(
+                    -t, slack, float(j), p_in & q_out, Latest(t1[i], slack1[i], plane1[i], rival1[i])
+                )
+        for i in range(size):
+            entered, left = (
+                Latest(t0[i], slack0[i], plane0[i], rival0[i]),
+                Latest(t1[i], slack1[i], plane1[i], rival1[i]),
+            )
+            state = int(state_of(entered, left, is_out[i] != 0.0, is_open[i] != 0.0))
+            plane_in, plane_out = int(entered.plane), int(left.plane)
+            if state == OPEN:
+                state, plane_in, plane_out, more = decide_alone(segments, begin + i, columns, limit, numbers, chosen)
+                beyond += more
+                if state == OPEN:
+                    still[n_open] = begin + i
+                    n_open += 1
+            items[kept], planes[kept, 0], planes[kept, 1] = begin + i, plane_in, plane_out
+            kept += state == KEPT
     n[0], n[1], n[2] = kept, n_open, beyond

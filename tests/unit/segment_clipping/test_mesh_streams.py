@@ -1,0 +1,41 @@
+"""Which triangles the segments of a group meet: those of all triangles asked one by one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from engine.segment_clipping.contacts import APART
+from engine.segment_clipping.mesh_streams import find_mesh_contacts
+from engine.segment_clipping.prepared_boundary import Mesh, mesh_of
+from engine.segment_clipping.triangle_contact import exact_contact
+from engine.types import Point3
+
+Floats = np.ndarray
+
+
+def test_contacts_are_those_of_all_triangles() -> None:
+    rng = np.random.default_rng(2)
+    vertices = rng.integers(-8, 9, (400, 3)) / 4
+    triangles = rng.integers(0, 400, (300, 3))
+    triangles = triangles[[len({tuple(vertices[k]) for k in triangle}) == 3 for triangle in triangles]]
+    corners = vertices[triangles]
+    segments = np.concatenate([rng.integers(-12, 13, (40, 2, 3)) / 4, rng.uniform(-3, 3, (40, 2, 3))])
+    segments = np.concatenate([segments, segments[:5] * 1e6])
+    stop, room = np.zeros(1, np.uint8), 100_000
+
+    def found(mesh: Mesh) -> tuple[Floats, Floats, Floats]:
+        n_contacts, met, kinds, offsets = find_mesh_contacts(segments, mesh, stop, room)
+        assert n_contacts == offsets[-1]
+        return met, kinds, offsets
+
+    met, kinds, offsets = found(mesh_of(corners, np.arange(len(corners))))
+    expected: list[set[tuple[int, int]]] = [set() for _ in segments]
+    for i, triangle in enumerate(corners):
+        for k, segment in enumerate(segments):
+            kind = exact_contact(*(Point3(*row) for row in (*triangle.tolist(), *segment.tolist())))
+            if kind != APART:
+                expected[k].add((i, kind))
+    assert any(expected)
+    for k, pairs in enumerate(expected):
+        mine = slice(offsets[k], offsets[k + 1])
+        assert set(zip(met[mine].tolist(), kinds[mine].tolist())) == pairs
