@@ -178,7 +178,7 @@ def _clip(dimension: int) -> None:
 
 def _warm_overlay() -> None:
     first = Polygon([[[0, 0], [4, 0], [1, 1], [0, 4]]])
-    overlay(first, Polygon([[[0.5, 0.3], [5, 1], [1, 5]]]))
+    float(overlay(first, Polygon([[[0.5, 0.3], [5, 1], [1, 5]]])).area)
 
 
 def _warm_overlay_rest() -> None:

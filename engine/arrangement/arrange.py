@@ -200,10 +200,7 @@ def _split(
 
 
 def arrange_rings(
-    coordinates: FloatArray,
-    ring_offsets: Sequence[int],
-    ring_masks: Sequence[int],
-    budget: Budget | None = None,
+    coordinates: FloatArray, ring_offsets: Sequence[int], ring_masks: Sequence[int], budget: Budget | None = None
 ) -> Arrangement:
     """Return the arrangement of closed rings.
 

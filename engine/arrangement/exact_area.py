@@ -10,8 +10,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import pairwise
+
+import numpy as np
 
 from engine.arrangement.nodes import Homogeneous, nearest_quotient
+from engine.arrays import FloatArray, IntArray
 
 _PRECISIONS = (160, 640)  # bits of the largest term that are kept; the second for sums that nearly cancel
 
@@ -22,6 +26,14 @@ class ExactRings:
 
     rings: tuple[tuple[Homogeneous, ...], ...]
     exponent: int
+
+    @property
+    def n_rings(self) -> int:
+        return len(self.rings)
+
+    def exact_rings(self) -> ExactRings:
+        """Return the rings themselves; those of an overlay may first have to be made."""
+        return self
 
     def some(self, rings: Sequence[int]) -> ExactRings:
         """Return some of the rings, by their numbers."""
@@ -51,6 +63,10 @@ class ExactRings:
         """Return the exact area; its length grows with the number of crossings."""
         numerator, denominator = _sum(self._terms())
         return Fraction(numerator, 2 * denominator) * Fraction(4) ** self.exponent
+
+    def nearest_areas(self, groups: IntArray) -> FloatArray:
+        """Return (n,) float64, the doubles nearest to the areas of the rings groups[k] .. groups[k + 1] - 1."""
+        return np.array([self.some(range(a, b)).nearest_area() for a, b in pairwise(groups.tolist())], np.float64)
 
     def nearest_area(self) -> float:
         """Return the double nearest to the exact area. Raises `NotRepresentableError` beyond the largest double."""

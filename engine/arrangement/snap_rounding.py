@@ -14,7 +14,7 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Sequence
 from fractions import Fraction
-from math import floor, lcm, ldexp
+from math import floor, ldexp
 
 import numpy as np
 
@@ -23,49 +23,25 @@ from engine.parallel import Budget
 Point = tuple[Fraction, Fraction]
 Pixel = tuple[int, int]
 
-Axis = tuple[int, int, int]
-"""Ends of a segment along an axis, and half of the lattice's spacing, as integers in a unit of their own."""
-
 _HALF = Fraction(1, 2)
-_FEW = 16
-"""Pixels up to which each is looked at instead of an array of them."""
 
 
-def _axis(start: Fraction, end: Fraction) -> Axis:
-    half = lcm(start.denominator, end.denominator)
-    return (
-        2 * start.numerator * (half // start.denominator),
-        2 * end.numerator * (half // end.denominator),
-        half,
-    )
-
-
-def _passage(axes: Sequence[Axis], pixel: Pixel) -> tuple[int, int, int, int] | None:
-    """Return the parameters between which the segment is in the half-open pixel, None where it is not.
-
-    Both are numerator and denominator, the latter positive.
-    """
-    low = low_open = high_open = 0
-    low_of = high = high_of = 1
-    for (a, b, half), centre in zip(axes, pixel):
-        near, far = (2 * centre - 1) * half, (2 * centre + 1) * half  # near <= value < far
+def _passage(start: Point, end: Point, pixel: Pixel) -> tuple[Fraction, Fraction] | None:
+    """Return the parameters between which the segment is in the half-open pixel, None where it is not."""
+    low, low_open, high, high_open = Fraction(0), False, Fraction(1), False
+    for a, b, centre in zip(start, end, pixel):
         if a == b:
-            if not near <= a < far:
+            if not centre - _HALF <= a < centre + _HALF:
                 return None
             continue
-        if a < b:
-            enters, leaves, length, is_back = near - a, far - a, b - a, 0
-        else:
-            enters, leaves, length, is_back = a - far, a - near, a - b, 1
-        later, earlier = enters * low_of - low * length, high * length - leaves * high_of
-        if later > 0 or (later == 0 and is_back):
-            low, low_of, low_open = enters, length, is_back
-        if earlier > 0 or (earlier == 0 and not is_back):
-            high, high_of, high_open = leaves, length, 1 - is_back
-    order = high * low_of - low * high_of
-    if order > 0 or (order == 0 and not low_open and not high_open):
-        return low, low_of, high, high_of
-    return None
+        near, far = ((centre + side - a) / (b - a) for side in (-_HALF, _HALF))
+        is_back = a > b
+        enters, leaves = (far, near) if is_back else (near, far)  # near belongs to the pixel, far does not
+        if enters > low or (enters == low and is_back):
+            low, low_open = enters, is_back
+        if leaves < high or (leaves == high and not is_back):
+            high, high_open = leaves, not is_back
+    return (low, high) if low < high or (low == high and not low_open and not high_open) else None
 
 
 def snap_rings(
@@ -87,13 +63,12 @@ def snap_rings(
         chain: list[Pixel] = []
         for start, end, first, last in zip(ring, [*ring[1:], *ring[:1]], own, [*own[1:], *own[:1]]):
             budget.check()
-            axes = _axis(start[0], end[0]), _axis(start[1], end[1])
             passed = []
             for number in _candidates(hot, centres, start, end):
                 pixel = hot[number]
-                through = None if pixel in (first, last) else _passage(axes, pixel)
+                through = None if pixel in (first, last) else _passage(start, end, pixel)
                 if through is not None:
-                    passed.append((Fraction(*through[:2]), Fraction(*through[2:]), pixel))
+                    passed.append((*through, pixel))
             for pixel in (first, *(pixel for *_, pixel in sorted(passed)), last):
                 if not chain or chain[-1] != pixel:
                     chain.append(pixel)
@@ -110,8 +85,6 @@ def _candidates(hot: Sequence[Pixel], centres: np.ndarray, start: Point, end: Po
     """
     (x0, x1), (y0, y1) = (sorted((floor(a), floor(b))) for a, b in zip(start, end))
     first, last = bisect_left(hot, (x0 - 1, y0 - 1)), bisect_left(hot, (x1 + 2, y1 + 3))
-    if last - first <= _FEW:
-        return [number for number in range(first, last) if y0 - 1 <= hot[number][1] <= y1 + 2]
     a, b = np.array(start, np.float64), np.array(end, np.float64)
     # bound: below 2**53 the rounded ends are off by at most 1/2, so differences by at most 1 1/2.
     among = centres[first:last]

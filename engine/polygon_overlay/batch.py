@@ -4,53 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Final, NamedTuple, cast
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray, Int8Array, Int32Array, IntArray
+from engine.arrays import BoolArray, FloatArray, Int8Array, Int32Array, IntArray, read_only
 from engine.errors import InvalidArrayError, NotRepresentableError
 from engine.parallel import Budget, Cancel, Progress, run_chunks
 from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
+from engine.polygon_overlay.found import NO_PAIRS, Found, chained, joined, one_pair, summed, taken
 from engine.polygon_overlay.implicit_rings import ImplicitRings, RingArrays
 from engine.polygon_overlay.overlay import accuracy_of, check_words, overlay_rings, rings_of, ulps_moved
 from engine.polygon_overlay.result import Output, Overlay
-from engine.polygon_overlay.rounds_of_many_pairs import (
-    SettledPairs,
-    found_of,
-    joined,
-    nearest_pairs,
-    settle_pairs,
-    taken,
-)
-from engine.polygon_overlay.run import (
-    Found,
-    Operation,
-    Polygons,
-    as_overlay,
-    chained,
-    gathered,
-    run_kernel,
-    summed,
-)
+from engine.polygon_overlay.rounds_of_many_pairs import SettledPairs, nearest_pairs, settle_pairs
+from engine.polygon_overlay.run import Operation, Polygons, as_overlay, gathered, run_kernel
 from engine.solids.base import Solid
 from engine.solids.polygon import Polygon
-from engine.types import Accuracy
+from engine.types import OPEN, Accuracy
 
 NOT_REPRESENTABLE: Final = 1
 _FIRST_CHUNK: Final = 8
 _DOUBTFUL: Final = 256
 """Pairs whose rings are arranged again together, whatever their time: a call costs as much as some hundred of them."""
-_NO_PAIRS: Final = Found(
-    np.zeros(0, np.int8),
-    np.zeros((0, 4), np.int64),
-    np.zeros(0),
-    np.zeros((0, 2)),
-    np.zeros((0, 2), np.int32),
-    np.zeros(1, np.int64),
-    np.zeros(1, np.int64),
-    np.zeros(0, np.int64),
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,10 +39,11 @@ class OverlayBatch:
     piece_offsets: (n_pieces + 1,) int64 into the rings, a shell before its holes. pair_offsets: (n_pairs + 1,) int64
         into the pieces.
     displacement: (n_pairs,) float64, how far an edge may lie from the exact one, as `Overlay.largest_displacement`.
-    _sources: (n_vertices, 2), as those of `ImplicitRings`, but counted as _bases says. _bases: (n_pairs, 3), what is
-        added to the numbers of the subject's vertices, to those of the clip's, and from where on they are the clip's.
-    _is_rounded_again: (n_pairs,) bool, whose rings were not valid once rounded, or without area: such a pair is
-        overlaid again for its object, which tells what became of all parts. _apart: objects made already, by pair.
+    _exact: what the first call of the kernel found; sources as those of `ImplicitRings`, but counted as _bases says.
+    _bases: (n_pairs, 3), what is added to the numbers of the subject's vertices, to those of the clip's, and from where
+        on they are the clip's. _is_rounded_again: (n_pairs,) bool, whose rings were not valid once rounded, or without
+        area: such a pair is overlaid again for its object, which tells what became of all parts. _apart: objects made
+        already, by pair.
     """
 
     status: Int8Array
@@ -79,7 +56,7 @@ class OverlayBatch:
     _clips: Sequence[Solid] = field(repr=False)
     _operation: Operation = field(repr=False)
     _output: Output = field(repr=False)
-    _sources: Int32Array = field(repr=False)
+    _exact: Found = field(repr=False)
     _bases: Int32Array = field(repr=False)
     _is_rounded_again: BoolArray = field(repr=False)
     _apart: dict[int, Overlay] = field(repr=False)
@@ -105,18 +82,43 @@ class OverlayBatch:
         first, last = self.pair_offsets[pair], self.pair_offsets[pair + 1]
         rings = self.piece_offsets[first : last + 1]
         stops = self.ring_offsets[rings[0] : rings[-1] + 1]
-        sources = self._sources[stops[0] : stops[-1]].copy()
+        sources = taken(self._exact, np.array([pair])).sources
         subject, clip = _arrays(self._subjects[pair]), _arrays(self._clips[pair])
         in_subjects, in_clips, n_subjects = self._bases[pair].tolist()
         is_clip = sources >= n_subjects
         sources[is_clip] += len(subject.vertices) - n_subjects - in_clips
         sources[~is_clip & (sources >= 0)] -= in_subjects
         vertices = self.vertices[stops[0] : stops[-1]].copy()
-        ring_offsets, piece_offsets = stops - stops[0], rings - rings[0]
-        for array in (vertices, ring_offsets, piece_offsets):
+        arrays = vertices, rings - rings[0], sources, stops - stops[0]
+        for array in arrays:
             array.setflags(write=False)
-        exact = ImplicitRings(subject, clip, sources, ring_offsets)
-        return as_overlay(vertices, piece_offsets, float(self.displacement[pair]), exact, self._output)
+        exact = ImplicitRings(subject, clip, *arrays[2:])
+        return as_overlay(vertices, arrays[1], float(self.displacement[pair]), exact, self._output)
+
+    @property
+    def areas(self) -> FloatArray:
+        """The doubles nearest to the exact areas of all pairs, (n_pairs,), computed now.
+
+        NaN where status is not 0, infinity for what is beyond the largest double.
+        """
+        exact = self._exact
+        areas = np.full(len(self), np.nan)
+        groups = exact.piece_offsets[summed(exact.counts[:, 0])]
+        starts = np.flatnonzero((self._bases[:, :2] == 0).all(axis=1)).tolist()
+        for start, stop in pairwise([*starts, len(self)]):  # as they were gathered
+            both = [RingArrays(*_gathered(side[start:stop])[:2]) for side in (self._subjects, self._clips)]
+            rings = groups[start : stop + 1]
+            stops = exact.ring_offsets[rings[0] : rings[-1] + 1]
+            part = ImplicitRings(both[0], both[1], exact.sources[stops[0] : stops[-1]], read_only(stops - stops[0]))
+            areas[start:stop], _ = part.sure_areas(rings - rings[0])
+        unsure = np.isnan(areas) | (exact.status == OPEN)
+        areas[self.status != DONE] = np.nan
+        for pair in np.flatnonzero(unsure & (self.status == DONE)).tolist():
+            try:
+                areas[pair] = cast("Overlay", self[pair]).area
+            except NotRepresentableError:
+                areas[pair] = np.inf
+        return areas
 
     @property
     def overlays(self) -> tuple[Overlay | None, ...]:
@@ -185,12 +187,12 @@ def overlay_batch(
 
         run_chunks(task, len(subjects), budget=budget, first_chunk=_FIRST_CHUNK, workers=workers, progress=progress)
         chunks = [parts[start] for start in sorted(parts)]
-        found = joined([_NO_PAIRS, *(found for found, _ in chunks)])
+        found = first_found = joined([NO_PAIRS, *(found for found, _ in chunks)])
         rest = _Rest(np.zeros(len(subjects), np.int8), np.zeros(len(subjects), np.bool_), {})
         ulps, n_rational = 0.5, 0
         if found.status.any():
             found, ulps, n_rational = _settled(found, rest, subjects, clips, operation, output, workers, budget)
-    for array in (rest.status, *found):
+    for array in (rest.status, *found, *first_found):
         array.setflags(write=False)
     batch = OverlayBatch(
         status=rest.status,
@@ -203,7 +205,7 @@ def overlay_batch(
         _clips=tuple(clips),
         _operation=operation,
         _output=output,
-        _sources=found.sources,
+        _exact=first_found,
         _bases=np.concatenate([np.zeros((0, 3), np.int32), *(bases for _, bases in chunks)]),
         _is_rounded_again=rest.is_rounded_again,
         _apart=rest.apart,
@@ -260,12 +262,18 @@ def _settled(
     left = np.flatnonzero((found.status != DONE) & ~rest.is_rounded_again)
     run_chunks(overlay_alone, len(left), budget=budget, first_chunk=1, workers=workers)
     rest.apart.update((pair, result) for pair, (result, _, _) in alone.items())
-    more = [*(each.found for each in together), *(found_of(result, n_exact) for result, n_exact, _ in alone.values())]
+    more = [*(each.found for each in together), *(_found_of(*each) for each in alone.values())]
     pairs = np.concatenate([*(each.pairs for each in together), np.array([*alone], np.int64)])
     rows = np.arange(len(found.status))
     rows[pairs] = len(rows) + np.arange(len(pairs))
     ulps = [0.5, *(each.ulps for each in together), *(ulps_moved(result) for result, _, _ in alone.values())]
     return taken(joined([found, *more]), rows), max(ulps), sum(n for _, _, n in alone.values())
+
+
+def _found_of(result: Overlay, n_exact: int, _: int) -> Found:
+    """Return what was found for one pair from its object; n_exact: pairs of edges beyond the filter."""
+    rings = result.vertices, result.ring_offsets, result.piece_offsets
+    return one_pair(*rings, result.largest_displacement, n_exact)
 
 
 def join_batches(batches: Sequence[OverlayBatch]) -> OverlayBatch:
@@ -286,7 +294,7 @@ def join_batches(batches: Sequence[OverlayBatch]) -> OverlayBatch:
         _clips=tuple(solid for part in batches for solid in part._clips),
         _operation=batches[0]._operation,
         _output=batches[0]._output,
-        _sources=np.concatenate([part._sources for part in batches]),
+        _exact=joined([part._exact for part in batches]),
         _bases=np.concatenate([part._bases for part in batches]),
         _is_rounded_again=np.concatenate([part._is_rounded_again for part in batches]),
         _apart=apart,

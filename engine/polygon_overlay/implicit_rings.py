@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from fractions import Fraction
-from typing import NamedTuple
+from types import FunctionType
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +18,13 @@ from engine.arrangement.arrange import crossing, line_through
 from engine.arrangement.exact_area import ExactRings
 from engine.arrangement.nodes import Homogeneous, float_nodes
 from engine.arrays import FloatArray, IntArray
+from engine.polygon_overlay.compiled.ring_area import sum_areas
+from engine.polygon_overlay.entries import entry_of
+
+_NEVER: Final = np.zeros(1, np.uint8)
+_sum_areas: Any = sum_areas
+if isinstance(sum_areas, FunctionType):  # uncompiled: numpy warns of what overflows
+    _sum_areas = np.errstate(all="ignore")(sum_areas)
 
 
 class RingArrays(NamedTuple):
@@ -28,7 +35,7 @@ class RingArrays(NamedTuple):
 
 
 class ImplicitRings(NamedTuple):
-    """Exact rings over two polygons; the same questions as `ExactRings`, answered when asked.
+    """Exact rings over two polygons, made when asked for.
 
     sources: (n, 2) integers: an input vertex and -1, or the first vertices of two edges that cross; those of `clip` are
     counted after those of `subject`. offsets: (n_rings + 1,) int64, where each ring begins.
@@ -40,22 +47,27 @@ class ImplicitRings(NamedTuple):
     offsets: IntArray
 
     @property
-    def rings(self) -> tuple[tuple[Homogeneous, ...], ...]:
-        """The rings as integers."""
-        return self.exact_rings().rings
+    def n_rings(self) -> int:
+        return len(self.offsets) - 1
 
-    @property
-    def exponent(self) -> int:
-        """A coordinate is ``x / w * 2**exponent``."""
-        return self.exact_rings().exponent
+    def sure_areas(self, groups: IntArray) -> tuple[FloatArray, int]:
+        """Return (n,) float64, the doubles nearest to the areas of the rings groups[k] .. groups[k + 1] - 1, or NaN.
 
-    def area(self) -> Fraction:
-        """Return the exact area; its length grows with the number of crossings."""
-        return self.exact_rings().area()
+        And how many are NaN.
+        """
+        areas = np.empty(len(groups) - 1)
+        sum_them = entry_of(_sum_areas)
+        return areas, sum_them(self.subject, self.clip, self.sources, self.offsets, groups, _NEVER, areas)
 
-    def nearest_area(self) -> float:
-        """Return the double nearest to the exact area. Raises `NotRepresentableError` beyond the largest double."""
-        return self.exact_rings().nearest_area()
+    def nearest_areas(self, groups: IntArray) -> FloatArray:
+        """Return those areas, the exact sums where a bound is not enough.
+
+        Raises `NotRepresentableError` where one is beyond the largest double.
+        """
+        areas, n_unsure = self.sure_areas(groups)
+        for k in np.flatnonzero(np.isnan(areas)).tolist() if n_unsure else ():
+            areas[k] = self.some(range(groups[k], groups[k + 1])).nearest_area()
+        return areas
 
     def some(self, rings: Sequence[int]) -> ExactRings:
         """Return some of the rings, by their numbers, as integers."""

@@ -7,25 +7,24 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable
-from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from engine.arrangement.nodes import float_nodes
-from engine.arrays import BoolArray, FloatArray, IntArray
+from engine.arrays import FloatArray, IntArray, read_only
 from engine.parallel import Budget
+from engine.polygon_overlay.found import Found, one_pair
+from engine.polygon_overlay.implicit_rings import ImplicitRings, RingArrays
 from engine.polygon_overlay.result import Overlay
-from engine.polygon_overlay.rounds import Exact, RoundedRings, collapses, overlay_of
+from engine.polygon_overlay.rounds import Exact, collapses, overlay_of
 
-_UNIT: Final = 2.0**-52
-_TINY: Final = 2.0**-1070
+_NOTHING: Final = RingArrays(read_only(np.zeros((0, 2))), read_only(np.zeros(1, np.int64)))
 Vertex = tuple[float, float]
 Ring = list[Vertex]
 
 
 class NearestRings(NamedTuple):
-    """pieces: shell and holes of each, in their order; lost_pieces, lost_holes: numbers of those without area."""
+    """pieces: shell and holes of each, in their order; lost_pieces, lost_holes: numbers of their rings."""
 
     pieces: list[list[Ring]]
     lost_pieces: list[int]
@@ -39,14 +38,11 @@ class NearestRings(NamedTuple):
 
 
 def nearest_rings(
-    vertices: FloatArray,
-    ring_offsets: IntArray,
-    piece_offsets: IntArray,
-    budget: Budget,
+    vertices: FloatArray, ring_offsets: IntArray, piece_offsets: IntArray, budget: Budget
 ) -> NearestRings:
-    """Return rounded rings, as `RoundedRings` has them, without those that have no area; with a shell its holes go."""
+    """Return rounded rings without those that have no area; with a shell its holes go."""
     places = list(map(tuple, vertices.tolist()))
-    is_sure = _surely_have_area(vertices, ring_offsets).tolist()
+    have_area = _have_area(vertices, ring_offsets)
     rings: list[Ring] = []
     for start, stop in itertools.pairwise(ring_offsets.tolist()):
         budget.check()
@@ -54,29 +50,29 @@ def nearest_rings(
     pieces: list[list[Ring]] = []
     lost_pieces: list[int] = []
     lost_holes: list[int] = []
-    for piece, (shell, end) in enumerate(itertools.pairwise(piece_offsets.tolist())):
+    for shell, end in itertools.pairwise(piece_offsets.tolist()):
         budget.check()
-        stays = is_sure[shell] or has_area(rings[shell])
-        kept = [ring for ring in range(shell + 1, end) if stays and (is_sure[ring] or has_area(rings[ring]))]
-        lost_holes += [ring - piece - 1 for ring in sorted({*range(shell + 1, end)} - {*kept})]
+        stays = have_area[shell]
+        kept = [ring for ring in range(shell + 1, end) if stays and have_area[ring]]
+        lost_holes += sorted({*range(shell + 1, end)} - {*kept})
         if stays:
             pieces.append([rings[ring] for ring in (shell, *kept)])
         else:
-            lost_pieces.append(piece)
+            lost_pieces.append(shell)
     return NearestRings(in_order(pieces), lost_pieces, lost_holes)
 
 
-def leave_nearest(first: RoundedRings, exact: Exact, budget: Budget) -> Overlay:
+def leave_nearest(first: Found, exact: Exact, budget: Budget) -> Overlay:
     """Return rounded rings that stay as they are, and what rounding left without area."""
     found = nearest_rings(first.vertices, first.ring_offsets, first.piece_offsets, budget)
-    vertices, ring_offsets, piece_offsets = found.arrays()
+    displacement = float(first.displacement[0])
     return overlay_of(
-        replace(first, vertices=vertices, ring_offsets=ring_offsets, piece_offsets=piece_offsets),
+        one_pair(*found.arrays(), displacement, 0),
         first,
         exact,
         "nearest",
-        rounds=int(first.displacement > 0.0),
-        largest_displacement=first.displacement,
+        rounds=int(displacement > 0.0),
+        largest_displacement=displacement,
         collapsed=collapses(first, exact, found.lost_pieces, found.lost_holes, budget),
     )
 
@@ -110,31 +106,11 @@ def _from_first(ring: Ring) -> Ring:
     return ring[start:] + ring[:start]
 
 
-def has_area(ring: Ring) -> bool:
-    """Tell whether the signed area of `ring` is not zero, exactly."""
-    if len(ring) < 3:
-        return False
-    nodes, numbers = float_nodes(np.array(ring))
-    points = [nodes.points[number] for number in numbers]
-    return sum(a[0] * b[1] - b[0] * a[1] for a, b in zip(points, points[1:] + points[:1])) != 0
-
-
-def _surely_have_area(vertices: FloatArray, ring_offsets: IntArray) -> BoolArray:
-    """Tell of each ring whether its signed area is not zero; False where floating point does not tell.
-
-    Twice the area is the sum of x_i y_j - x_j y_i over its edges, coordinates counted from its first vertex. Each is
-    off by half a unit u = 2^-52 of itself, so each product by less than 2 u, and adding 2 m products up by less than
-    m u of the sum of their sizes; and by the least double wherever a product underflows. Where one overflows the bound
-    is infinite, or no number.
-    """
-    starts, sizes = ring_offsets[:-1], np.diff(ring_offsets)
-    if len(starts) == 0:
-        return np.zeros(0, np.bool_)
-    after = np.arange(1, len(vertices) + 1)
-    after[ring_offsets[1:] - 1] = starts
-    with np.errstate(all="ignore"):
-        x, y = (vertices - np.repeat(vertices[starts], sizes, axis=0)).T
-        left, right = x * y[after], x[after] * y
-        doubled = np.add.reduceat(left - right, starts)
-        bound = np.add.reduceat(np.abs(left) + np.abs(right), starts) * ((sizes + 8) * _UNIT) + sizes * _TINY
-        return np.abs(doubled) > bound
+def _have_area(vertices: FloatArray, ring_offsets: IntArray) -> list[bool]:
+    """Tell of each ring whether its signed area is not zero, exactly."""
+    sources = np.full((len(vertices), 2), -1, np.int32)
+    sources[:, 0] = np.arange(len(vertices))
+    own = RingArrays(read_only(vertices), read_only(ring_offsets))
+    rings = ImplicitRings(own, _NOTHING, read_only(sources), own.offsets)
+    areas, _ = rings.sure_areas(np.arange(len(ring_offsets)))
+    return [rings.some([k]).area() != 0 if area != area else area != 0.0 for k, area in enumerate(areas.tolist())]

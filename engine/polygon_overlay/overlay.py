@@ -6,7 +6,7 @@
 All rings of both polygons are split where they meet. Each face of that arrangement is known to lie in the subject or
 not, in the clip or not (even-odd over the polygon's rings); the operation is a table over these two. Edges between a
 kept face and one that is not bound the result. Decisions end there: rounding only moves vertices, and where it would
-make rings invalid the rounded rings are arranged once more (exact/rounding.py).
+make rings invalid the rounded rings are arranged once more (in_integers.py).
 
 Sources: the textbook's exercise on clipping a polygon by a concave one; exact arrangements as in D. Halperin and
 M. Sharir, Arrangements, Handbook of Discrete and Computational Geometry, 2018.
@@ -20,8 +20,8 @@ import numpy as np
 
 from engine.errors import InvalidOperationError, UnsupportedSolidError
 from engine.parallel import Budget, Cancel, Options, Progress, check_options
-from engine.polygon_overlay.exact.in_integers import overlay_exactly
 from engine.polygon_overlay.implicit_rings import RingArrays
+from engine.polygon_overlay.in_integers import overlay_exactly
 from engine.polygon_overlay.result import Output, Overlay
 from engine.polygon_overlay.run import KEPT, Operation, overlay_compiled
 from engine.solids.base import Solid

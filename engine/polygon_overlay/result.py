@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Literal, NamedTuple
+
+import numpy as np
 
 from engine.arrangement.exact_area import ExactRings
 from engine.arrays import FloatArray, IntArray
 from engine.polygon_overlay.implicit_rings import ImplicitRings
 
 Output = Literal["valid", "nearest"]
+
+
+@functools.lru_cache(64)
+def _all_of(n_rings: int) -> IntArray:
+    """Return all rings as one group."""
+    return np.array([0, n_rings])
 
 
 class OverlayPiece(NamedTuple):
@@ -99,9 +108,21 @@ class Overlay:
     @property
     def area_exact(self) -> Fraction:
         """The exact area of the exact result; as long as all its crossings together, so costly for thousands."""
-        return self.exact.area()
+        return self.exact.exact_rings().area()
 
     @property
     def area(self) -> float:
-        """The double nearest to `area_exact`, without making the fraction."""
-        return self.exact.nearest_area()
+        """The double nearest to `area_exact`: a bound proves it, or the exact sum; no fraction is made.
+
+        Raises `NotRepresentableError` beyond the largest double.
+        """
+        return self.exact.nearest_areas(_all_of(self.exact.n_rings)).item(0)
+
+    @property
+    def piece_areas(self) -> FloatArray:
+        """Areas of the pieces of the exact result, holes taken off: (n_pieces_exact,), the nearest doubles.
+
+        Where rounding lost, joined or parted none these are those of `pieces`, in their order.
+        """
+        signs = self.exact.nearest_areas(np.arange(self.exact.n_rings + 1))
+        return self.exact.nearest_areas(np.append(np.flatnonzero(signs > 0.0), len(signs)))

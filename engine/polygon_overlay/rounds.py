@@ -10,16 +10,16 @@ the lattice whose spacing is the unit in the last place of the largest coordinat
 ends by construction. Each round moves an edge by no more than its ends, so the displacements add up to a bound.
 
 Which exact parts a part comes from is carried along, so that lost, joined and parted ones are counted. The work of a
-round is the kernel's (run.py), or that of integers (exact/rounding.py).
+round is the kernel's (run.py), or that of integers (in_integers.py).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
+from itertools import pairwise
 from math import frexp, hypot, inf, nextafter, ulp
-from typing import Any, Final, Literal, NamedTuple
+from typing import Any, Final, Literal
 
 import numpy as np
 
@@ -27,79 +27,52 @@ from engine.arrangement.exact_area import ExactRings
 from engine.arrangement.nodes import nearest_quotient
 from engine.arrangement.snap_rounding import snap_rings
 from engine.arrangement.union_find import UnionFind
-from engine.arrays import FloatArray, IntArray, read_only
+from engine.arrays import BoolArray, FloatArray, IntArray, read_only
 from engine.parallel import Budget
+from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
+from engine.polygon_overlay.found import Found, one_pair, places_of
 from engine.polygon_overlay.implicit_rings import ImplicitRings
 from engine.polygon_overlay.result import Collapse, Output, Overlay
+from engine.types import OPEN
 
 MAX_ROUNDS: Final = 12
 """Rounds before snapping: on 4,296 results of public test pairs all but 14 had ended by then."""
 
 
-@dataclass(frozen=True, slots=True)
-class RoundedRings:
-    """What one arrangement left, rounded.
-
-    vertices: (n, 2) float64 of all rings, ring_offsets into them, piece_offsets into the rings, shells first; both
-    int64. displacement: how far rounding moved a vertex at most. is_valid: whether the rings are surely those of the
-    arrangement still. has_crossings: some vertex may be none of the round before.
-    """
-
-    vertices: FloatArray
-    ring_offsets: IntArray
-    piece_offsets: IntArray
-    displacement: float
-    is_valid: bool
-    has_crossings: bool
-
-    @property
-    def n_rings(self) -> int:
-        return len(self.ring_offsets) - 1
-
-    @property
-    def n_pieces(self) -> int:
-        return len(self.piece_offsets) - 1
-
-
-class ArrangedAgain(NamedTuple):
-    """What one round left; meant: for each ring those of the round before that it comes from."""
-
-    rings: RoundedRings
-    meant: Sequence[Sequence[int]]
-
-
 Exact = ExactRings | ImplicitRings
-Again = Callable[[RoundedRings], ArrangedAgain | None]
+Again = Callable[[Found, Budget], Found]
 
 
-def settle_rings(first: RoundedRings, exact: Exact, again: Again, may_snap: bool, budget: Budget) -> Overlay | None:
-    """Arrange ``first`` until it is valid; None where ``again`` cannot, or snapping is needed and not possible.
+def settle_rings(first: Found, exact: Exact, again: Again, may_snap: bool, budget: Budget) -> Overlay | None:
+    """Arrange a pair until it is valid; None where ``again`` cannot, or snapping is needed and not possible.
 
-    exact: the exact rings that ``first`` is rounded from. again: arranges rounded rings. may_snap: the rings are those
-    of ``exact``, not scaled.
+    exact: the exact rings that ``first`` is rounded from. again: arranges rounded rings, and gives evidence. may_snap:
+    the rings are those of ``exact``, not scaled.
     """
-    n_holes = first.n_rings - first.n_pieces
-    own = [{piece} for piece in range(first.n_pieces)], [{hole} for hole in range(n_holes)]
-    piece_origins, hole_origins = own
-    rings, rounds, displacement = first, int(first.displacement > 0.0), first.displacement
+    rings, displacement = first, float(first.displacement[0])
+    rounds = int(displacement > 0.0)
+    own = np.repeat(np.arange(first.counts[0, 1]), 2).reshape(-1, 2)
+    origins = own  # rows of a ring and one of ``first`` that it comes from, sorted
     has_crossings = snapped = False
-    while not rings.is_valid:  # bound: MAX_ROUNDS + 1
-        found = again(rings)
-        if found is None:
+    while rings.status[0] != DONE:  # bound: MAX_ROUNDS + 1
+        rings = again(rings, budget)
+        if rings.status[0] == OPEN:
             return None
-        piece_origins, hole_origins = _origins(rings, found, piece_origins, hole_origins)
-        rings, has_crossings = found.rings, has_crossings or found.rings.has_crossings
-        if rings.displacement:
+        origins = _composed(rings.evidence, origins)
+        has_crossings = has_crossings or bool((rings.sources[:, 1] >= 0).any())
+        moved = float(rings.displacement[0])
+        if moved:
             if snapped or (rounds == MAX_ROUNDS and not may_snap):
                 return None
             if rounds < MAX_ROUNDS:
-                rounds, displacement = rounds + 1, nextafter(displacement + rings.displacement, inf)
+                rounds, displacement = rounds + 1, nextafter(displacement + moved, inf)
             else:
                 rings, displacement = _snapped(first, exact, budget)
-                piece_origins, hole_origins = own
-                snapped = has_crossings = True
-    lost_pieces, pieces_joined, pieces_parted = count_changes(first.n_pieces, piece_origins)
-    lost_holes, holes_joined, holes_parted = count_changes(n_holes, hole_origins)
+                origins, snapped, has_crossings = own, True, True
+    is_shell, was_shell = _shells(rings), _shells(first)
+    of_shells = is_shell[origins[:, 0]]
+    lost_pieces, pieces_joined, pieces_parted = count_changes(was_shell, origins[of_shells], int(is_shell.sum()))
+    lost_holes, holes_joined, holes_parted = count_changes(~was_shell, origins[~of_shells], int((~is_shell).sum()))
     return overlay_of(
         rings,
         first,
@@ -117,73 +90,66 @@ def settle_rings(first: RoundedRings, exact: Exact, again: Again, may_snap: bool
     )
 
 
-def overlay_of(rings: RoundedRings, first: RoundedRings, exact: Exact, output: Output, **told: Any) -> Overlay:
+def _shells(found: Found) -> BoolArray:
+    """Tell of each ring whether it is a shell."""
+    is_shell = np.zeros(found.counts[0, 1], np.bool_)
+    is_shell[found.piece_offsets[:-1]] = True
+    return is_shell
+
+
+def _composed(evidence: IntArray, origins: IntArray) -> IntArray:
+    """Return where rings come from by way of those of the round before."""
+    offsets = np.searchsorted(origins[:, 0], np.arange(evidence[:, 1].max(initial=-1) + 2))
+    sizes = np.diff(offsets)[evidence[:, 1]]
+    through = origins[places_of(offsets, evidence[:, 1]), 1]
+    return np.unique(np.column_stack([np.repeat(evidence[:, 0], sizes), through]), axis=0)
+
+
+def overlay_of(rings: Found, first: Found, exact: Exact, output: Output, **told: Any) -> Overlay:
     """Return the `Overlay` of rings that are settled, ``first`` before that; told: what became of its parts."""
+    n_pieces, n_rings = first.counts[0, :2].tolist()
     return Overlay(
         vertices=read_only(rings.vertices),
         ring_offsets=read_only(rings.ring_offsets),
         piece_offsets=read_only(rings.piece_offsets),
         output=output,
-        may_be_invalid=output == "nearest" and first.displacement > 0.0,
-        n_pieces_exact=first.n_pieces,
-        n_holes_exact=first.n_rings - first.n_pieces,
+        may_be_invalid=output == "nearest" and bool(first.displacement[0]),
+        n_pieces_exact=n_pieces,
+        n_holes_exact=n_rings - n_pieces,
         exact=exact,
         **told,
     )
 
 
-def _snapped(first: RoundedRings, exact: Exact, budget: Budget) -> tuple[RoundedRings, float]:
+def _snapped(first: Found, exact: Exact, budget: Budget) -> tuple[Found, float]:
     """Return the exact rings snapped to the lattice of their largest coordinate, and half a pixel's diagonal."""
     spacing = ulp(float(np.abs(first.vertices).max()))
-    snapped = snap_rings(exact.some(range(first.n_rings)).places(), frexp(spacing)[1] - 1, budget)
-    rings = RoundedRings(
-        vertices=np.array([vertex for ring in snapped for vertex in ring]),
-        ring_offsets=np.cumsum([0, *map(len, snapped)]),
-        piece_offsets=first.piece_offsets,
-        displacement=0.0,
-        is_valid=False,
-        has_crossings=True,
-    )
+    snapped = snap_rings(exact.some(range(first.counts[0, 1])).places(), frexp(spacing)[1] - 1, budget)
+    vertices = np.array([vertex for ring in snapped for vertex in ring])
+    ring_offsets = np.cumsum([0, *map(len, snapped)])
+    rings = one_pair(vertices, ring_offsets, first.piece_offsets, 0.0, 0, status=MAY_CROSS)
     return rings, nextafter(hypot(spacing, spacing) / 2, inf)
-
-
-def _origins(
-    before: RoundedRings, found: ArrangedAgain, piece_origins: list[set[int]], hole_origins: list[set[int]]
-) -> tuple[list[set[int]], list[set[int]]]:
-    """Return the exact parts that the pieces and holes of a round come from, given those of the round before."""
-    of_ring: list[set[int]] = []
-    holes = iter(hole_origins)
-    for origin, size in zip(piece_origins, np.diff(before.piece_offsets).tolist(), strict=True):
-        of_ring.append(origin)
-        of_ring += [next(holes) for _ in range(size - 1)]
-    collected: list[set[int]] = [set().union(*(of_ring[ring] for ring in rings)) for rings in found.meant]
-    shells = found.rings.piece_offsets[:-1].tolist()
-    is_shell = set(shells)
-    pieces = [collected[ring] for ring in shells]
-    return pieces, [origin for ring, origin in enumerate(collected) if ring not in is_shell]
 
 
 def n_moved(images: FloatArray, vertices: FloatArray) -> int:
     """Return how many vertices are none of ``images``."""
-    known = {(x, y) for x, y in images.tolist()}
-    return sum((x, y) not in known for x, y in vertices.tolist())
+    known, places = (np.ascontiguousarray(each).view(np.complex128).ravel() for each in (images, vertices))
+    return int((~np.isin(places, known)).sum())
 
 
 def collapses(
-    first: RoundedRings, exact: Exact, lost_pieces: Sequence[int], lost_holes: Sequence[int], budget: Budget
+    first: Found, exact: Exact, lost_pieces: Sequence[int], lost_holes: Sequence[int], budget: Budget
 ) -> tuple[Collapse, ...]:
-    """Return lost pieces, then lost holes, each by the vertices of its exact ring from the first one on."""
+    """Return lost pieces, given by their shells, then lost holes, each by its exact ring from the first vertex on."""
     if not lost_pieces and not lost_holes:
         return ()
-    shells = first.piece_offsets.tolist()
+    ends = dict(pairwise(first.piece_offsets.tolist()))
     shell_of = np.repeat(first.piece_offsets[:-1], np.diff(first.piece_offsets)).tolist()
-    holes = [ring for ring, shell in enumerate(shell_of) if ring != shell]
-    holes = [holes[hole] for hole in lost_holes]
-    around = {shell_of[ring] for ring in holes}
+    around = {shell_of[ring] for ring in lost_holes}
     if len(around) == 1:  # order: of one shell, which may be large, holes need no more than their own vertices
         around.clear()
-    rings = {ring for piece in lost_pieces for ring in range(shells[piece], shells[piece + 1])}
-    numbers = sorted(rings.union(holes, around))
+    rings = {ring for shell in lost_pieces for ring in range(shell, ends[shell])}
+    numbers = sorted(rings.union(lost_holes, around))
     some = exact.some(numbers)
     made = {ring: ExactRings((points,), some.exponent) for ring, points in zip(numbers, some.rings, strict=True)}
 
@@ -195,8 +161,8 @@ def collapses(
         return place, Collapse(kind, area, near)
 
     of_shell = {ring: _first_vertex(made[ring])[0] for ring in around}
-    pieces = [entry("piece", range(shells[piece], shells[piece + 1])) for piece in lost_pieces]
-    lost = [(of_shell.get(shell_of[ring], []), *entry("hole", [ring])) for ring in holes]
+    pieces = [entry("piece", range(shell, ends[shell])) for shell in lost_pieces]
+    lost = [(of_shell.get(shell_of[ring], []), *entry("hole", [ring])) for ring in lost_holes]
     pieces.sort(key=lambda each: each[0])
     lost.sort(key=lambda each: each[:2])
     return (*(each[-1] for each in pieces), *(each[-1] for each in lost))
@@ -213,17 +179,23 @@ def _first_vertex(ring: ExactRings) -> tuple[list[_Place], tuple[float, float]]:
     return places[k:] + places[:k], (x, y)
 
 
-def count_changes(n_exact: int, origins: Sequence[set[int]]) -> tuple[list[int], int, int]:
+def count_changes(is_exact: BoolArray, origins: IntArray, n_found: int) -> tuple[list[int], int, int]:
     """Return which exact parts are lost, by how many the rest fell by joining, and by how many it rose by parting.
 
-    Parts are linked where an output part comes from an exact one. Of each linked group of e exact and o output parts,
-    e - 1 were joined and o - 1 parted; an output part without origin counts as parted.
+    is_exact: of the rings of the exact result those that are such parts. origins: rows of an output part and an exact
+    one that it comes from. n_found: output parts. Parts are linked where one comes from the other. Of each linked group
+    of e exact and o output parts, e - 1 were joined and o - 1 parted; an output part without origin counts as parted.
     """
-    survivors = set().union(*origins)
-    linked = UnionFind(n_exact + len(origins))
-    for number, origin in enumerate(origins):
-        for part in origin:
-            linked.unite(part, n_exact + number)
-    n_groups = len({linked.find(part) for part in survivors})
-    lost = [part for part in range(n_exact) if part not in survivors]
-    return lost, len(survivors) - n_groups, len(origins) - n_groups
+    survivors = np.unique(origins[:, 1])
+    is_lost = is_exact.copy()
+    is_lost[survivors] = False
+    alone = (np.bincount(origins[:, 0])[origins[:, 0]] == 1) & (np.bincount(origins[:, 1])[origins[:, 1]] == 1)
+    n_groups = len(survivors)
+    if not alone.all():
+        firsts: dict[int, int] = {}
+        linked = UnionFind(len(is_exact))
+        for found, part in origins[~alone].tolist():
+            other = firsts.setdefault(found, part)
+            n_groups -= linked.find(part) != linked.find(other)
+            linked.unite(part, other)
+    return np.flatnonzero(is_lost).tolist(), len(survivors) - n_groups, n_found - n_groups

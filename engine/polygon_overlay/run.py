@@ -2,32 +2,24 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, Final, Literal, NamedTuple, cast
 
 import numpy as np
 
-from engine.arrays import FloatArray, Int8Array, Int32Array, IntArray, read_only
+from engine.arrays import FloatArray, IntArray, read_only
 from engine.parallel import Budget
 from engine.polygon_overlay.compiled.kernel import DONE, NEEDS_CONTACTS, NEEDS_OUTPUT
-from engine.polygon_overlay.compiled.ring_labels import RingBits
+from engine.polygon_overlay.compiled.ring_nesting import Nesting
 from engine.polygon_overlay.compiled.workspace import Outcomes, keep, more_contacts, scratch_for
+from engine.polygon_overlay.entries import entry_of
+from engine.polygon_overlay.found import Found, one_pair, put_together, ring_sizes, summed
 from engine.polygon_overlay.implicit_rings import ImplicitRings, RingArrays
 from engine.polygon_overlay.nearest import leave_nearest
 from engine.polygon_overlay.result import Output, Overlay
-from engine.polygon_overlay.ring_bits import assign_bits, boxes_of, rings_meant
-from engine.polygon_overlay.rounds import ArrangedAgain, RoundedRings, settle_rings
-from engine.polygon_overlay.run_pair import (
-    BY_CONTACT,
-    NO_BITS,
-    NOT_REDUCED,
-    OVERLAY_PAIRS,
-    FoundPair,
-    entry_of,
-    run_pair,
-)
+from engine.polygon_overlay.rounds import settle_rings
+from engine.polygon_overlay.run_pair import BY_CONTACT, NOT_REDUCED, OVERLAY_PAIRS, UNNAMED, run_pair
 from engine.predicates.scaling import exponent_of, scaled_back, shifted
 from engine.types import OPEN
 
@@ -55,24 +47,6 @@ class Polygons(NamedTuple):
     most_rings: int
 
 
-class Found(NamedTuple):
-    """What the kernel found for some pairs, one after another.
-
-    status: (pairs,) int8, DONE, OPEN or MAY_CROSS; counts: (pairs, 4) int64, pieces, rings, vertices and pairs of edges
-    beyond the filter; displacement: (pairs,) float64. vertices, sources: of all pairs that are not OPEN; ring_offsets
-    into them; piece_offsets: into the rings. evidence: by ring, of pairs whose rings are sources of their own.
-    """
-
-    status: Int8Array
-    counts: IntArray
-    displacement: FloatArray
-    vertices: FloatArray
-    sources: Int32Array
-    ring_offsets: IntArray
-    piece_offsets: IntArray
-    evidence: IntArray
-
-
 def gathered(vertices: Sequence[FloatArray], ring_offsets: Sequence[IntArray]) -> Polygons:
     """Return polygons, given by the arrays of each, as flat arrays; at least one polygon, and none without a ring.
 
@@ -93,17 +67,12 @@ def gathered(vertices: Sequence[FloatArray], ring_offsets: Sequence[IntArray]) -
     return Polygons(joined, rings, summed(n_rings), int(sizes.max()), int(n_rings.max()))
 
 
-_EMPTY: Final = Polygons(
-    read_only(np.zeros((0, 2))), read_only(np.zeros(1, np.int64)), read_only(np.zeros(2, np.int64)), 0, 0
-)
-
-
 def run_kernel(
-    subjects: Polygons, clips: Polygons, operation: Operation, budget: Budget, bits: RingBits = NO_BITS
+    subjects: Polygons, clips: Polygons, operation: Operation, budget: Budget, nesting: Nesting = UNNAMED
 ) -> Found:
     """Overlay polygons pair by pair. Raises as `Budget.check` when the call must end.
 
-    bits: of the rings of subjects to be arranged each as a source of its own, as `overlay_pairs` takes them.
+    nesting: of the rings of subjects, to be arranged each as a source of its own, as `overlay_pairs` takes it.
     """
     n = len(subjects.polygon_offsets) - 1
     n_vertices, n_rings = subjects.most_vertices + clips.most_vertices, subjects.most_rings + clips.most_rings
@@ -115,7 +84,8 @@ def run_kernel(
     n_out, n_out_rings = 8 * n + len(subjects.vertices) + len(clips.vertices), 2 * n
     while reached < n:  # bound: each turn goes on, or makes room for one pair, geometrically
         scratch = scratch_for(n_vertices, n_rings, n_contacts, n_out, n_out_rings)
-        reached, needs, filled, n_filled, n_pieces, used, _ = entry_of(OVERLAY_PAIRS)(
+        n_known = sum(len(part[2]) - 1 for part in parts)
+        reached, needs, filled, n_filled, n_pieces, n_evidence, used, _ = entry_of(OVERLAY_PAIRS)(
             first,
             subjects.polygon_offsets,
             second,
@@ -123,15 +93,16 @@ def run_kernel(
             reached,
             NOT_REDUCED,
             KEPT_ARRAYS[operation],
-            bits,
+            nesting,
             budget.flag,
             scratch.buffers,
             outcomes,
             scratch.output,
         )
         budget.check()
-        sizes = filled, filled, n_filled + 1, n_pieces + 1, n_filled if len(bits.bits) else 0
+        sizes = filled, filled, n_filled + 1, n_pieces + 1, n_evidence
         parts.append([array[:size].copy() for array, size in zip(scratch.output, sizes, strict=True)])
+        parts[-1][4][:, 0] += n_known
         keep(scratch, n_vertices, used, filled)
         if needs == NEEDS_CONTACTS:
             n_contacts = more_contacts(scratch.n_contacts)
@@ -139,25 +110,6 @@ def run_kernel(
         elif needs == NEEDS_OUTPUT:
             n_out_rings, n_out = (max(m, int(outcomes.counts[reached, k])) for k, m in ((1, n_out_rings), (2, n_out)))
     return Found(*outcomes, *(parts[0] if len(parts) == 1 else put_together(parts)))
-
-
-def put_together(parts: Sequence[Sequence[Any]]) -> list[Any]:
-    """Return vertices, sources, ring offsets, piece offsets and evidence of some parts as those of one."""
-    vertices, sources, ring_offsets, piece_offsets, evidence = zip(*parts, strict=True)
-    offsets = chained(ring_offsets), chained(piece_offsets)
-    return [np.concatenate(vertices), np.concatenate(sources), *offsets, np.concatenate(evidence)]
-
-
-def summed(sizes: IntArray) -> IntArray:
-    """Return where each of some parts put one after another begins, and the end of the last; read-only."""
-    offsets = np.zeros(len(sizes) + 1, np.int64)
-    np.cumsum(sizes, out=offsets[1:])
-    return read_only(offsets)
-
-
-def chained(offsets: Sequence[IntArray]) -> IntArray:
-    """Return the offsets of several arrays put one after another."""
-    return summed(np.concatenate([np.zeros(0, np.int64), *(each[1:] - each[:-1] for each in offsets)]))
 
 
 def overlay_compiled(
@@ -183,9 +135,10 @@ def overlay_compiled(
     if found.status == DONE:
         result = as_overlay(found.vertices, found.piece_offsets, found.displacement, exact, output)
     else:
-        rounded = _rounded(found)
+        rings = found.ring_offsets, found.piece_offsets
+        rounded = one_pair(found.vertices, *rings, found.displacement, found.n_exact, found.sources, found.status)
         if output == "valid":
-            settled = settle_rings(rounded, exact, functools.partial(_arranged_again, budget), exponent == 0, budget)
+            settled = settle_rings(rounded, exact, arranged_again, exponent == 0, budget)
         else:
             settled = leave_nearest(rounded, exact, budget)
         if settled is None:
@@ -201,67 +154,36 @@ def overlay_compiled(
     return result, found.n_exact
 
 
-def _rounded(found: FoundPair) -> RoundedRings:
-    """Return what was found for one pair as the outcome of a round."""
-    return RoundedRings(
-        vertices=found.vertices,
-        ring_offsets=found.ring_offsets,
-        piece_offsets=found.piece_offsets,
-        displacement=found.displacement,
-        is_valid=found.status == DONE,
-        has_crossings=bool((found.sources[:, 1] >= 0).any()),
-    )
-
-
-def _arranged_again(budget: Budget, rings: RoundedRings) -> ArrangedAgain | None:
-    """Arrange rounded rings, each a source of its own; None where that is left open, or bits do not suffice."""
-    subject = Polygons(
-        read_only(rings.vertices),
-        read_only(rings.ring_offsets),
-        read_only(np.array([0, rings.n_rings])),
-        len(rings.vertices),
-        rings.n_rings,
-    )
-    boxes = boxes_of(rings.vertices, rings.ring_offsets)
-    bits = assign_bits(boxes, rings.piece_offsets, budget)
-    if bits is None:
-        return None
-    found = run_kernel(subject, _EMPTY, "union", budget, bits)
-    if found.status[0] == OPEN:
-        return None
-
-    def evidence(other: RingBits) -> IntArray:
-        return run_kernel(subject, _EMPTY, "union", budget, other).evidence  # bits decide nothing: the same rings
-
-    boxes_found = boxes_of(found.vertices, found.ring_offsets)
-    meant = rings_meant(bits, found.evidence, boxes, rings.piece_offsets, boxes_found, evidence, budget)
-    if meant is None:
-        return None
-    one = FoundPair(int(found.status[0]), int(found.counts[0, 3]), float(found.displacement[0]), *found[3:7])
-    return ArrangedAgain(_rounded(one), meant)
+def arranged_again(rings: Found, budget: Budget) -> Found:
+    """Arrange the rings of each pair, each a source of its own."""
+    n_rings = rings.counts[:, 1]
+    items = summed(n_rings)
+    shells = np.repeat(rings.piece_offsets[:-1], np.diff(rings.piece_offsets))
+    largest = (int(rings.counts[:, k].max(initial=0)) for k in (2, 1))
+    subjects = Polygons(read_only(rings.vertices), read_only(rings.ring_offsets), items, *largest)
+    none = read_only(np.zeros((0, 2))), read_only(np.zeros(1, np.int64)), read_only(np.zeros_like(items))
+    nesting = Nesting(shells - np.repeat(items[:-1], n_rings), ring_sizes(rings)[shells])
+    return run_kernel(subjects, Polygons(*none, 0, 0), "union", budget, nesting)
 
 
 def as_overlay(
-    vertices: FloatArray,
-    piece_offsets: IntArray,
-    displacement: float,
-    exact: ImplicitRings,
-    output: Output,
+    vertices: FloatArray, piece_offsets: IntArray, displacement: float, exact: ImplicitRings, output: Output
 ) -> Overlay:
     """Return an `Overlay` whose rounded rings have the structure of the exact ones; all arrays are read-only."""
     offsets = exact.offsets
     n_pieces = len(piece_offsets) - 1
     result = object.__new__(Overlay)
-    vars(result).update(  # as Overlay(...) does one by one, which takes 2 us
-        vertices=vertices,
-        ring_offsets=offsets,
-        piece_offsets=piece_offsets,
-        output=output,
-        may_be_invalid=output == "nearest" and displacement > 0.0,
-        n_pieces_exact=n_pieces,
-        n_holes_exact=len(offsets) - 1 - n_pieces,
-        exact=exact,
-        largest_displacement=displacement,
-        rounds=int(displacement > 0.0),
-    )
+    told = {  # all at once: Overlay(...) sets one by one, which takes 2 us
+        "vertices": vertices,
+        "ring_offsets": offsets,
+        "piece_offsets": piece_offsets,
+        "output": output,
+        "may_be_invalid": output == "nearest" and displacement > 0.0,
+        "n_pieces_exact": n_pieces,
+        "n_holes_exact": len(offsets) - 1 - n_pieces,
+        "exact": exact,
+        "largest_displacement": displacement,
+        "rounds": int(displacement > 0.0),
+    }
+    object.__setattr__(result, "__dict__", told)
     return result

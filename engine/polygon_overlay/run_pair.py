@@ -18,8 +18,9 @@ from engine.polygon_overlay.compiled.expanding import expand_rings
 from engine.polygon_overlay.compiled.kernel import DONE, FINISHED, NEEDS_CONTACTS, overlay_pairs
 from engine.polygon_overlay.compiled.loading import Loaded
 from engine.polygon_overlay.compiled.reducing import reduce_pair
-from engine.polygon_overlay.compiled.ring_labels import RingBits
+from engine.polygon_overlay.compiled.ring_nesting import Nesting
 from engine.polygon_overlay.compiled.workspace import Output, keep, more_contacts, scratch_for
+from engine.polygon_overlay.entries import entry_of
 from engine.polygon_overlay.implicit_rings import RingArrays
 
 NOT_REDUCED: Final = Loaded(0, 0, 0, 0.0)
@@ -39,11 +40,10 @@ _BY_VERTEX: Final = 200
 _FEW_CONTACTS: Final = 1024
 _FEW_PIECES: Final = 64
 """Pieces without holes up to which offsets are kept, since many results have the same."""
-NO_BITS: Final = RingBits(np.zeros(0, np.int64), np.zeros(0, np.int64))
+UNNAMED: Final = Nesting(np.zeros(0, np.int64), np.zeros(0))
 _INT32: Final = np.dtype(np.int32)
 _INT64: Final = np.dtype(np.int64)
 """Types that numpy need not look up."""
-_entries: dict[Any, Any] = {}
 
 
 _Rings = tuple[FloatArray, Int32Array, IntArray]
@@ -104,7 +104,7 @@ def run_blocks(
                 keep(scratch, n_touched, 0, 0)
                 return None
         (status, counts, displacement), output = scratch.outcome, scratch.output
-        _, needs, n, n_found, n_pieces, used, n_left_out = entry_of(OVERLAY_PAIRS)(
+        _, needs, n, n_found, n_pieces, _, used, n_left_out = entry_of(OVERLAY_PAIRS)(
             subject,
             subject_item,
             clip,
@@ -112,7 +112,7 @@ def run_blocks(
             0,
             reduced,
             kept,
-            NO_BITS,
+            UNNAMED,
             budget.flag,
             scratch.buffers,
             scratch.outcome,
@@ -170,22 +170,6 @@ def _one_polygon(n_rings: int) -> IntArray:
     offsets = np.array([0, n_rings])
     offsets.setflags(write=False)
     return offsets
-
-
-def entry_of(kernel: Any) -> Any:
-    """Return what calls a kernel without asking each argument for its type, which takes 3 us for as many as here.
-
-    Caller guarantees that arguments are of the types that the kernel is compiled for: read-only arrays of polygons, and
-    scratch.
-    The kernel itself where it is not called yet, or compiled for others as well, or not compiled.
-    """
-    entry = _entries.get(kernel)
-    if entry is None:
-        if isinstance(kernel, FunctionType) or len(kernel.signatures) != 1:
-            return kernel
-        (compiled,) = kernel.dispatcher.overloads.values()
-        entry = _entries[kernel] = compiled.entry_point
-    return entry
 
 
 OVERLAY_PAIRS: Any = overlay_pairs

@@ -11,14 +11,12 @@ from __future__ import annotations
 
 from typing import Any, Final, NamedTuple
 
-from engine.arrangement.union_find import root_of, unite
 from engine.jit import inline, merged
 from engine.polygon_overlay.compiled.chains import Chains, Stars, is_live, place_before, standing
 from engine.polygon_overlay.compiled.crossing_signs import Edges, crossing_against, exact_weight, orient, turn_of_edges
-from engine.polygon_overlay.compiled.edge_contacts import POLL, Events, Unions
+from engine.polygon_overlay.compiled.edge_contacts import POLL, Events
 from engine.polygon_overlay.compiled.edge_events import Along
-from engine.polygon_overlay.compiled.edge_tree import FEW, LEAF, RUN, BoxTree, leaves_of, push_children
-from engine.polygon_overlay.compiled.loading import Given
+from engine.polygon_overlay.compiled.edge_tree import LEAF, BoxTree, leaves_of, push_children
 from engine.predicates.error_free import two_diff, workspace
 from engine.predicates.expansion import add_scaled, sign
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
@@ -137,7 +135,7 @@ def _compare_heights(edges: Edges, v: int, a: int, b: int, c: int, d: int) -> in
 
 
 @merged
-def _test_edge(edges: Edges, v: int, e: int, nearest: int) -> int:
+def test_edge(edges: Edges, v: int, e: int, nearest: int) -> int:
     """Return e if it is above v and nearer than ``nearest``, else ``nearest``."""
     x = edges.x
     b = edges.after[e]
@@ -150,24 +148,19 @@ def _test_edge(edges: Edges, v: int, e: int, nearest: int) -> int:
 
 
 @inline
-def edge_above(edges: Edges, tree: BoxTree, v: int, n: int) -> int:
+def edge_above(edges: Edges, tree: BoxTree, names: Any, v: int, n: int) -> int:
     """Return the edge next above vertex v, a step to its right, or NOTHING; no edge of its component is there.
 
-    Edges whose mark has the bit RUN are not looked at: caller guarantees that it is none of what they stand for.
-    Edges that begin or pass through v are not above it: caller guarantees that none does to the right.
+    tree: of n edges, ``names`` their numbers. Edges that begin or pass through v are not above it: caller guarantees
+    that none does to the right.
     """
     nearest = NOTHING
-    if n <= FEW:
-        for e in range(n):
-            if not tree.marks[e] & RUN:
-                nearest = _test_edge(edges, v, e, nearest)
-        return nearest
     n_leaves = leaves_of(n)
-    nodes, x, y = tree.nodes, edges.x[v], edges.y[v]
-    tree.stack[0, 0], depth = 1, 1
+    nodes, stack, x, y = tree.nodes, tree.stack, edges.x[v], edges.y[v]
+    stack[0, 0], depth = 1, 1
     while depth > 0:  # bound: each node enters the stack once
         depth -= 1
-        node = tree.stack[depth, 0]
+        node = stack[depth, 0]
         if nodes[node, 0] > x or nodes[node, 1] <= x or nodes[node, 3] < y:
             continue
         if nearest >= 0 and nodes[node, 2] > max(edges.y[nearest], edges.y[edges.after[nearest]]):
@@ -177,8 +170,7 @@ def edge_above(edges: Edges, tree: BoxTree, v: int, n: int) -> int:
             continue
         first = LEAF * (node - n_leaves)
         for place in range(first, min(first + LEAF, n)):
-            if not tree.marks[tree.places[place]] & RUN:
-                nearest = _test_edge(edges, v, tree.places[place], nearest)
+            nearest = test_edge(edges, v, names[tree.places[place]], nearest)
     return nearest
 
 
@@ -204,48 +196,3 @@ def half_below(edges: Edges, events: Events, along: Along, points: Any, chains: 
             before = root
     half = 2 * chain + 1 if runs_right else 2 * chain
     return standing(chains, half)
-
-
-@inline
-def join_faces(
-    given: Given, events: Events, along: Along, unions: Unions, tree: BoxTree, chains: Chains, stars: Stars,
-    faces: Faces, highest: Any, sizes: tuple[int, int, int], stop: Any,
-) -> None:  # fmt: skip
-    """Join the outer cycle of each component of rings to the face it lies in.
-
-    highest: scratch by ring. sizes: the numbers of vertices, rings and cycles.
-    """
-    n, n_rings, n_cycles = sizes
-    for i in range(n_cycles + 1):
-        if i & POLL == 0 and stop[0]:
-            return
-        faces.joined[i] = faces.regions[i] = i
-        faces.label[i] = 0
-    _find_highest(given, unions.rings, n_rings, highest)
-    for ring in range(n_rings):
-        top = highest[ring]
-        if top < 0:
-            continue
-        if stop[0]:
-            return
-        node = stars.node_of[root_of(unions.points, top)]
-        outer = faces.cycle[stars.half[stars.ends[node] - 1]]
-        beyond = n_cycles
-        above = edge_above(given.edges, tree, top, n)
-        if above != NOTHING:
-            beyond = faces.cycle[half_below(given.edges, events, along, unions.points, chains, above, top)]
-        join(faces.joined, faces.label, outer, beyond, 0)
-        unite(faces.regions, outer, beyond)
-
-
-@inline
-def _find_highest(given: Given, rings: Any, n_rings: int, highest: Any) -> None:
-    """Fill ``highest``: for the ring that stands for a component its last vertex, for all others -1."""
-    x, y = given.edges.x, given.edges.y
-    for ring in range(n_rings):
-        highest[ring] = -1
-    for ring in range(n_rings):
-        root, top = root_of(rings, ring), given.tops[ring]
-        best = highest[root]
-        if best < 0 or x[top] > x[best] or (x[top] == x[best] and y[top] > y[best]):
-            highest[root] = top

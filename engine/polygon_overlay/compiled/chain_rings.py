@@ -15,7 +15,7 @@ from engine.polygon_overlay.compiled.chains import Chains, Stars, is_live, leavi
 from engine.polygon_overlay.compiled.crossing_signs import Edges, orient, turn_of_edges
 from engine.polygon_overlay.compiled.edge_contacts import POLL
 from engine.polygon_overlay.compiled.edge_tree import BENT, DOUBTFUL, RUN
-from engine.polygon_overlay.compiled.ring_labels import RingLabels, verdict
+from engine.polygon_overlay.compiled.ring_nesting import Holders, enter_beyond
 
 MEETS: Final = 1
 
@@ -40,14 +40,8 @@ class Walk(NamedTuple):
 
 
 @inline
-def choose_boundary(
-    chains: Chains, faces: Faces, kept: Any, labels: RingLabels, n_chains: int, n_cycles: int, n_nodes: int, stop: Any
-) -> None:
-    """Spread labels, fill ``inside``, ``bounds`` and ``fan``, and join regions.
-
-    kept: (4,) uint8, whether a face of that label is in the result, unless ``labels`` has shells; then
-    ``labels.gathered`` is filled by region.
-    """
+def spread_labels(chains: Chains, faces: Faces, kept: Any, n_chains: int, n_cycles: int, stop: Any) -> None:
+    """Spread labels and fill ``inside``. kept: (4,) uint8, whether a face of that label is in the result."""
     cycle = faces.cycle
     for chain in range(n_chains):
         if chain & POLL == 0 and stop[0]:
@@ -58,8 +52,13 @@ def choose_boundary(
     for i in range(n_cycles):
         if i & POLL == 0 and stop[0]:
             return
-        mask = find_label(faces.joined, faces.label, i)[1] ^ unbounded
-        faces.inside[i] = verdict(labels.shells, mask)[0] if labels.shells.shape[0] > 0 else kept[mask]
+        faces.inside[i] = kept[find_label(faces.joined, faces.label, i)[1] ^ unbounded]
+
+
+@inline
+def choose_boundary(chains: Chains, faces: Faces, n_chains: int, n_nodes: int, stop: Any) -> None:
+    """Fill ``bounds`` and ``fan``, and join regions; ``inside`` is filled."""
+    cycle = faces.cycle
     faces.fan[:n_nodes] = 0
     for chain in range(n_chains):
         if chain & POLL == 0 and stop[0]:
@@ -73,14 +72,6 @@ def choose_boundary(
                 faces.bounds[chain] = 1
                 faces.fan[chains.tail[chain]] += 1
                 faces.fan[chains.head[chain]] += 1
-    if labels.shells.shape[0] > 0:
-        for i in range(n_cycles):
-            labels.gathered[i] = 0
-        for i in range(n_cycles):
-            if i & POLL == 0 and stop[0]:
-                return
-            mask = find_label(faces.joined, faces.label, i)[1] ^ unbounded
-            labels.gathered[root_of(faces.regions, i)] |= verdict(labels.shells, mask)[1]
 
 
 @merged
@@ -137,25 +128,11 @@ def _emit(
 
 
 @inline
-def _end_ring(
-    faces: Faces, path: Any, first: int, last: int, rings: Rings, n_rings: int, n_points: int, labels: RingLabels
-) -> None:
-    """Enter the ring of the half-chains ``path[first:last]``: where it ends, its region, and the evidence beyond it."""
-    rings.region[n_rings] = root_of(faces.regions, faces.cycle[path[first]])
-    rings.offset[n_rings + 1] = n_points
-    if labels.shells.shape[0] > 0:
-        beyond = 0
-        for k in range(first, last):
-            beyond |= labels.gathered[root_of(faces.regions, faces.cycle[path[k] ^ 1])]
-        labels.beyond[n_rings] = beyond
-
-
-@inline
 def walk_rings(
-    edges: Edges, chains: Chains, stars: Stars, faces: Faces, marks: Any, walk: Walk, rings: Rings, labels: RingLabels,
-    sizes: tuple[int, int, int], stop: Any,
+    edges: Edges, chains: Chains, stars: Stars, faces: Faces, marks: Any, walk: Walk, rings: Rings, holders: Holders,
+    is_named: bool, sizes: tuple[int, int, int], stop: Any,
 ) -> tuple[int, int]:  # fmt: skip
-    """Write all boundary rings; return how many rings and points.
+    """Write all boundary rings, and what is beyond them if rings are named; return how many rings and points.
 
     marks: of the edges, BENT where the boundary surely turns at the first vertex, RUN where one stands for many,
     DOUBTFUL as clearance.py says. sizes: the numbers of chains, nodes and simple nodes.
@@ -184,8 +161,11 @@ def walk_rings(
             first = 0 if is_closed else place[node] if fan[node] > 2 else -1
             if first >= 0:  # a ring, cut off where the walk passes a node twice
                 n_points = _emit(edges, chains, stars.point, fan, marks, path, first, depth, rings, n_points, stop)
-                _end_ring(faces, path, first, depth, rings, n_rings, n_points, labels)
+                if is_named:
+                    enter_beyond(faces, holders, path, first, depth, n_rings)
+                rings.region[n_rings] = root_of(faces.regions, faces.cycle[path[first]])
                 n_rings += 1
+                rings.offset[n_rings] = n_points
                 for k in range(first, depth):
                     place[origin(chains, path[k])] = -1
                 depth = first

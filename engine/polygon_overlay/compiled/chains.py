@@ -26,8 +26,8 @@ NOT_YET: Final = -1
 
 class Chains(NamedTuple):
     """By chain: node at its tail and head, its first and last edge, the mask of its sources, and the half-chain that
-    stands for its half-chain 2 c (itself, unless chains coincide). at: for each edge the chain at its beginning; the
-    chains after the nodes inside it follow one by one."""
+    stands for its half-chain 2 c (itself, unless chains coincide). twin: the next of the chains that one stands for, or
+    -1. at: for each edge the chain at its beginning; the chains after the nodes inside it follow one by one."""
 
     tail: Any
     head: Any
@@ -35,6 +35,7 @@ class Chains(NamedTuple):
     last: Any
     mask: Any
     stands: Any
+    twin: Any
     at: Any
 
 
@@ -192,7 +193,7 @@ def build_chains(
                 n_loose += 1
                 _begin_chain(chains, n_chains, node, e, mask)
     for chain in range(n_chains):
-        chains.stands[chain] = 2 * chain
+        chains.stands[chain], chains.twin[chain] = 2 * chain, -1
     return n_nodes, n_simple, n_chains, n_loose
 
 
@@ -236,8 +237,13 @@ def _unite_twins(edges: Edges, chains: Chains, star: Any, first: int, last: int,
             if star[k] >> 1 < chosen >> 1:
                 chosen = star[k]
         chains.mask[chosen >> 1] = mask
+        before = chosen >> 1
         for k in range(at, stop):
-            chains.stands[star[k] >> 1] = chosen ^ (star[k] & 1)
+            chain = star[k] >> 1
+            chains.stands[chain] = chosen ^ (star[k] & 1)
+            if chain != chosen >> 1:
+                chains.twin[before] = before = chain
+        chains.twin[before] = -1
         star[kept] = chosen
         kept += 1
         at = stop

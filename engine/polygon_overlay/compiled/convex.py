@@ -26,7 +26,7 @@ from engine.polygon_overlay.compiled.edge_contacts import POLL
 from engine.polygon_overlay.compiled.edge_crossings import agree, smaller_of, turns
 from engine.polygon_overlay.compiled.loading import Given
 from engine.polygon_overlay.compiled.rounded_crossings import distance_of, round_crossing
-from engine.predicates.expansion import LARGEST, SMALLEST
+from engine.predicates.expansion import is_safe
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
 
 GENERAL: Final = -1
@@ -97,28 +97,6 @@ def _first_of(vertices: Any, first: int, last: int) -> int:
     return low
 
 
-@merged
-def _load_run(
-    vertices: Any, k: int, step: int, base: int, edges: Edges, origins: Any, first: int, last: int
-) -> int:  # fmt: skip
-    """Load the places first .. last - 1 from vertex k on; return how many coordinates are too large or too small."""
-    size = last - first
-    rows = vertices[k : k + size] if step > 0 else vertices[k + 1 - size : k + 1]
-    x, y, names, ends = edges.x[first:last], edges.y[first:last], origins[first:last], edges.after[first:last]
-    n_unsafe = 0
-    for i in range(size):  # three loops: the compiler makes vectors of each
-        at = np.uint64(i if step > 0 else size - 1 - i)
-        px, py = rows[at, 0], rows[at, 1]
-        x[i], y[i] = px, py
-        n_unsafe += (abs(px) > LARGEST) | ((abs(px) < SMALLEST) & (px != 0.0))
-        n_unsafe += (abs(py) > LARGEST) | ((abs(py) < SMALLEST) & (py != 0.0))
-    for i in range(size):
-        names[i] = base + k + step * i
-    for i in range(size):
-        ends[i] = first + 1 + i
-    return n_unsafe
-
-
 @inline
 def load_convex(
     vertices: Any, first: int, last: int, base: int, edges: Edges, origins: Any, start: int, stop: Any
@@ -136,16 +114,14 @@ def load_convex(
     step = 1 if ux * wy - uy * wx > 0.0 else -1  # a guess: the turns below must all be to the left
     if size < 3 or stop[0]:
         return GENERAL, step
-    end = start + size + 1
-    if step > 0:
-        middle = start + last - low
-        n_unsafe = _load_run(vertices, low, 1, base, edges, origins, start, middle)
-        n_unsafe += _load_run(vertices, first, 1, base, edges, origins, middle, end)
-    else:
-        middle = start + low + 1 - first
-        n_unsafe = _load_run(vertices, low, -1, base, edges, origins, start, middle)
-        n_unsafe += _load_run(vertices, last - 1, -1, base, edges, origins, middle, end)
-    if n_unsafe or stop[0]:
+    end, k, is_range_safe = start + size + 1, low, True
+    for i in range(start, end):
+        px, py = vertices[k, 0], vertices[k, 1]
+        edges.x[i], edges.y[i], edges.after[i], origins[i] = px, py, i + 1, base + k
+        is_range_safe &= is_safe(px) & is_safe(py)
+        k += step
+        k = first if k == last else last - 1 if k < first else k
+    if not is_range_safe or stop[0]:
         return GENERAL, step
     n_rising = _rise_of(edges.x[start:end], edges.y[start:end], size)
     return start + n_rising if n_rising > 0 else GENERAL, step

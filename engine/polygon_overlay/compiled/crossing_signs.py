@@ -105,11 +105,11 @@ def _cross(edges: Edges, a: int, b: int, c: int, d: int, e: Components) -> int:
 def weight(edges: Edges, c: int, d: int, p: int) -> tuple[float, float, float]:
     """Return orient(c, d, p) as a double-double, and its bound."""
     x, y = edges.x, edges.y
-    return _weight_of(x[c], y[c], x[d], y[d], x[p], y[p])
+    return weight_of(x[c], y[c], x[d], y[d], x[p], y[p])
 
 
 @inline
-def _weight_of(cx: float, cy: float, dx: float, dy: float, px: float, py: float) -> tuple[float, float, float]:
+def weight_of(cx: float, cy: float, dx: float, dy: float, px: float, py: float) -> tuple[float, float, float]:
     ux, ux_tail = two_diff(dx, cx)
     uy, uy_tail = two_diff(dy, cy)
     wx, wx_tail = two_diff(px, cx)

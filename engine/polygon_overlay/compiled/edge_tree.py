@@ -33,8 +33,6 @@ FEW: Final = 40
 """Boxes up to which all pairs are looked at: fewer steps than a tree, and no more pairs than a portion."""
 PORTION: Final = 2048
 """Pairs at once: some 50 us of exact tests."""
-_MANY: Final = 1024
-"""Boxes from which on sorting by digits is faster than by comparison, and looks at the flag."""
 _DIGITS: Final = 2048
 _STEPS: Final = 1 << 16
 """Steps of the walk at once, about a millisecond."""
@@ -136,9 +134,6 @@ def _order_boxes(boxes: Any, n: int, places: Any, stop: Any) -> bool:
     for k in range(n):
         x, y = boxes[k, 0] - x_min, boxes[k, 2] - y_min
         keys[k] = _spread(min(int(x * by_x), 65535)) | (_spread(min(int(y * by_y), 65535)) << 1)
-    if n < _MANY:
-        places[:n] = np.argsort(keys)
-        return True
     spare_keys, spare, counts = np.empty(n, np.int64), np.empty(n, np.int64), np.empty(_DIGITS + 1, np.int64)
     for shift in (0, 11, 22):  # the last digit first: each pass keeps the order of those before it
         counts[:] = 0

@@ -11,7 +11,7 @@ number of crossings. Decisions are exact throughout. A pair is left OPEN, for th
 
 A pair is left MAY_CROSS where rounding came so near another edge that neither clearance.py nor ring_certificate.py
 vouches for the rounded rings, or put a vertex on the line of its neighbours: its rounded rings may cross. They come
-back as another pair then, each ring a source of its own (ring_labels.py).
+back as another pair then, each ring a source of its own (ring_nesting.py).
 
 The intersection of two convex rings is convex.py's where floating point is sure of all that it asks.
 
@@ -24,10 +24,11 @@ from __future__ import annotations
 from typing import Any, Final, NamedTuple
 
 from engine.jit import bare_kernel, merged
-from engine.polygon_overlay.compiled.chain_faces import join_faces, number_cycles
-from engine.polygon_overlay.compiled.chain_rings import choose_boundary, walk_rings
+from engine.polygon_overlay.compiled.chain_faces import number_cycles
+from engine.polygon_overlay.compiled.chain_rings import choose_boundary, spread_labels, walk_rings
 from engine.polygon_overlay.compiled.chains import build_chains, build_stars
 from engine.polygon_overlay.compiled.clearance import CLEARANCE, corners_are_clear
+from engine.polygon_overlay.compiled.components import join_faces
 from engine.polygon_overlay.compiled.convex import GENERAL, Passages, Points, intersect_convex
 from engine.polygon_overlay.compiled.edge_contacts import POLL
 from engine.polygon_overlay.compiled.edge_crossings import find_contacts
@@ -48,7 +49,7 @@ from engine.polygon_overlay.compiled.loading import (
     mark_short,
 )
 from engine.polygon_overlay.compiled.ring_certificate import certify, has_straight_point
-from engine.polygon_overlay.compiled.ring_labels import RingBits, RingLabels
+from engine.polygon_overlay.compiled.ring_nesting import NO_ROOM, Nesting, gather_evidence, spread_rings, write_evidence
 from engine.polygon_overlay.compiled.ring_order import rank_rings
 from engine.polygon_overlay.compiled.rounded_crossings import LOST, round_points
 from engine.polygon_overlay.compiled.workspace import Buffers, Outcomes, Output, Workspace, rows_of
@@ -80,6 +81,7 @@ class _Filled(NamedTuple):
     n_vertices: int
     n_rings: int
     n_pieces: int
+    n_evidence: int
 
 
 class _Arranged(NamedTuple):
@@ -125,22 +127,23 @@ def _write_convex(w: Workspace, m: int, low: int, output: Output, filled: _Fille
 
 @merged
 def _load_pair(
-    w: Workspace, subjects: RingArrays, clips: RingArrays, span: _Span, common: Box, kept: Any, bits: Any, stop: Any
-) -> tuple[int, int, bool]:
+    w: Workspace, subjects: RingArrays, clips: RingArrays, span: _Span, common: Box, kept: Any, is_named: bool,
+    stop: Any,
+) -> tuple[int, int, bool]:  # fmt: skip
     """Load the rings of both polygons; return the numbers of vertices and rings, and whether none is too small."""
     n, n_rings, safe = load_rings(
-        subjects.vertices, subjects.offsets, span.first, span.first_end, 1, bits, 0,
+        subjects.vertices, subjects.offsets, span.first, span.first_end, 1, is_named, 0,
         EVERYTHING if kept[1] else common, w.given, 0, 0, stop,
     )  # fmt: skip
     n, n_rings, also_safe = load_rings(
-        clips.vertices, clips.offsets, span.second, span.second_end, 2, bits, subjects.vertices.shape[0],
+        clips.vertices, clips.offsets, span.second, span.second_end, 2, False, subjects.vertices.shape[0],
         EVERYTHING if kept[2] else common, w.given, n, n_rings, stop,
     )  # fmt: skip
     return n, n_rings, safe and also_safe
 
 
 @merged
-def _arrange(w: Workspace, loaded: Loaded, kept: Any, labels: RingLabels, stop: Any) -> _Arranged:
+def _arrange(w: Workspace, loaded: Loaded, kept: Any, nesting: Nesting, stop: Any) -> _Arranged:
     """Find the boundary rings of a pair that is loaded. Where the call is to end, nothing found is right."""
     n, n_rings, edges = loaded.n, loaded.n_rings, w.given.edges
     margin = CLEARANCE * loaded.largest
@@ -178,15 +181,25 @@ def _arrange(w: Workspace, loaded: Loaded, kept: Any, labels: RingLabels, stop: 
     if stop[0]:
         return _NONE
     join_faces(
-        w.given, w.events, w.along, w.unions, w.tree, w.chains, w.stars, w.faces, w.highest, (n, n_rings, n_cycles),
-        stop,
+        w.given, w.events, w.along, w.unions, w.tree, w.chains, w.stars, w.faces, w.components, w.found.point,
+        (n, n_rings, n_cycles, loaded.n_runs), stop,
     )  # fmt: skip
-    choose_boundary(w.chains, w.faces, kept, labels, n_chains, n_cycles, n_nodes, stop)
+    is_named, n_entries = nesting.shells.shape[0] > 0, 0
+    if is_named:
+        n_entries = spread_rings(w.given, w.chains, w.faces, nesting, w.holders, (n_chains, n_cycles), stop)
+        if n_entries == NO_ROOM:
+            return _Arranged(0, 0, 0, 0, False, room + 1)
+    else:
+        spread_labels(w.chains, w.faces, kept, n_chains, n_cycles, stop)
+    choose_boundary(w.chains, w.faces, n_chains, n_nodes, stop)
+    if is_named:
+        gather_evidence(w.faces, w.holders, n_entries, n_cycles, nesting.shells.shape[0], stop)
     if stop[0]:
         return _NONE
     n_found, n_points = walk_rings(
-        edges, w.chains, w.stars, w.faces, w.tree.marks, w.walk, w.found, labels, (n_chains, n_nodes, n_simple), stop
-    )
+        edges, w.chains, w.stars, w.faces, w.tree.marks, w.walk, w.found, w.holders, is_named,
+        (n_chains, n_nodes, n_simple), stop,
+    )  # fmt: skip
     is_clear = is_clear and contacts.are_far and are_clear and corners_clear
     return _Arranged(n_found, n_points, contacts.n_crossings, contacts.n_exact, is_clear, n_contacts)
 
@@ -206,7 +219,7 @@ def _round(w: Workspace, n: int, arranged: _Arranged, stop: Any) -> tuple[float,
 
 
 @merged
-def _write(w: Workspace, n: int, n_found: int, labels: RingLabels, output: Output, filled: _Filled, stop: Any) -> None:
+def _write(w: Workspace, n: int, n_found: int, output: Output, filled: _Filled, stop: Any) -> None:
     """Append the rings in their order to the output."""
     n_out, n_pieces = filled.n_vertices, filled.n_pieces
     for k in range(n_found):
@@ -228,33 +241,51 @@ def _write(w: Workspace, n: int, n_found: int, labels: RingLabels, output: Outpu
             i = i + 1 if i + 1 < last else first
         output.rings[filled.n_rings + k + 1] = n_out
         is_hole = w.ranking.is_hole[ring]
-        if labels.shells.shape[0] > 0:
-            told = labels.beyond[ring] if is_hole else labels.gathered[w.found.region[ring]]
-            output.evidence[filled.n_rings + k] = told
         n_pieces += int(not is_hole)
         output.pieces[n_pieces] = filled.n_rings + k + 1
+
+
+@merged
+def _tell(w: Workspace, n_found: int, first: int, output: Output, filled: _Filled) -> int:
+    """Append the evidence of the rings to the output; return how much there is then, or NO_ROOM."""
+    n = filled.n_evidence
+    for k in range(n_found):
+        ring = w.ranking.order[k] if n_found > 1 else 0
+        is_hole, region = w.ranking.is_hole[ring] != 0, w.found.region[ring]
+        n = write_evidence(w.holders, ring, region, is_hole, filled.n_rings + k, first, output.evidence, n)
+        if n == NO_ROOM:
+            return n
+    return n
+
+
+@merged
+def _ended(
+    pair: int, needs: int, filled: _Filled, used: int, n_left_out: int
+) -> tuple[int, int, int, int, int, int, int, int]:
+    n_vertices, n_rings, n_pieces, n_evidence = filled
+    return pair, needs, n_vertices, n_rings, n_pieces, n_evidence, used, n_left_out
 
 
 @bare_kernel
 def overlay_pairs(
     subjects: RingArrays, subject_items: Any, clips: RingArrays, clip_items: Any, begin: int, reduced: Loaded,
-    kept: Any, bits: RingBits, stop: Any, buffers: Buffers, outcomes: Outcomes, output: Output,
-) -> tuple[int, int, int, int, int, int, int]:  # fmt: skip
+    kept: Any, nesting: Nesting, stop: Any, buffers: Buffers, outcomes: Outcomes, output: Output,
+) -> tuple[int, int, int, int, int, int, int, int]:  # fmt: skip
     """Overlay the pairs from ``begin`` on; fill outcomes, by pair, and output from its beginning.
 
     subject_items, clip_items: the first ring of each polygon, and the end of the last one's. kept: (4,) uint8 by label.
-    bits: empty; or, for rounded rings as subjects, no clips, and kept all but the first, those of the rings
-    (ring_labels.py): of a single pair, or of many of which each ring has a bit of its own, counted from the pair's
-    first ring, one pair after another; then evidence is filled too.
+    nesting: empty; or, for rounded rings as subjects, no clips, and kept all but the first, that of the rings
+    (ring_nesting.py), shells counted from the pair's first ring; then evidence is filled too, with numbers of rings.
     A source is the input vertex and -1, or the first vertices of the two edges that cross; clip vertices are counted
     after those of all subjects. The input vertex and LEFT_OUT where the vertices up to the next source are left out.
     reduced: what reduce_pair returned for the only pair; no vertices, no such pair.
-    Returns the pair reached, FINISHED or what is needed to go on with it, numbers of vertices, rings, pieces, how many
-    contacts there was scratch used for at most, and how many vertices are left out.
+    Returns the pair reached, FINISHED or what is needed to go on with it, numbers of vertices, rings, pieces, rows of
+    evidence, how many contacts there was scratch used for at most, and how many vertices are left out.
     """
     w = rows_of(buffers)
     is_intersection = not (kept[0] or kept[1] or kept[2])
-    filled = _Filled(0, 0, 0)
+    filled = _Filled(0, 0, 0, 0)
+    is_named = nesting.shells.shape[0] > 0
     used = n_left_out = 0
     status, counts, displacement = outcomes.status, outcomes.counts, outcomes.displacement
     for pair in range(begin, status.shape[0]):
@@ -276,24 +307,24 @@ def overlay_pairs(
                 if m != GENERAL:
                     if not _has_room(output, filled, m, 1):
                         counts[pair, 1], counts[pair, 2] = 1, m
-                        return pair, NEEDS_OUTPUT, filled.n_vertices, filled.n_rings, filled.n_pieces, used, 0
+                        return _ended(pair, NEEDS_OUTPUT, filled, used, 0)
                     if m > 0:
                         _write_convex(w, m, low, output, filled)
-                        filled = _Filled(filled.n_vertices + m, filled.n_rings + 1, filled.n_pieces + 1)
+                        filled = _Filled(filled.n_vertices + m, filled.n_rings + 1, filled.n_pieces + 1, 0)
                         counts[pair, 0], counts[pair, 1], counts[pair, 2] = 1, 1, m
                     status[pair], displacement[pair] = DONE, moved_by
                     continue
-            n, n_rings, safe = _load_pair(w, subjects, clips, span, common, kept, bits.bits, stop)
+            n, n_rings, safe = _load_pair(w, subjects, clips, span, common, kept, is_named, stop)
             loaded = Loaded(n, n_rings, 0, max(magnitude(subject_box), magnitude(clip_box)))
             if not (safe and loaded.largest <= LARGEST):
                 continue
-        labels = RingLabels(bits.shells[span.first : span.first_end], w.gathered, w.beyond)
-        arranged = _arrange(w, loaded, kept, labels, stop)
+        own = Nesting(nesting.shells[span.first : span.first_end], nesting.sizes[span.first : span.first_end])
+        arranged = _arrange(w, loaded, kept, own, stop)
         if stop[0]:
             break
         room = w.along.order.shape[0] - 9
         if arranged.n_contacts > room:
-            return pair, NEEDS_CONTACTS, filled.n_vertices, filled.n_rings, filled.n_pieces, room, 0
+            return _ended(pair, NEEDS_CONTACTS, filled, room, 0)
         used = max(used, arranged.n_contacts)
         moved_by, is_valid = _round(w, loaded.n, arranged, stop)
         if moved_by == LOST:
@@ -306,22 +337,26 @@ def overlay_pairs(
             continue
         if not _has_room(output, filled, m, n_found):
             counts[pair, 1], counts[pair, 2] = n_found, m
-            return pair, NEEDS_OUTPUT, filled.n_vertices, filled.n_rings, filled.n_pieces, used, 0
-        _write(w, loaded.n, n_found, labels, output, filled, stop)
+            return _ended(pair, NEEDS_OUTPUT, filled, used, 0)
+        n_evidence = _tell(w, n_found, span.first, output, filled) if is_named else 0
+        if n_evidence == NO_ROOM:
+            counts[pair, 2] = 2 * output.vertices.shape[0]
+            return _ended(pair, NEEDS_OUTPUT, filled, used, 0)
+        _write(w, loaded.n, n_found, output, filled, stop)
         if stop[0]:
             break
         if loaded.n_runs > 0:
             for ring in range(n_found):
                 n_left_out += count_left_out(output.sources, output.rings[ring], output.rings[ring + 1])
-        filled = _Filled(filled.n_vertices + m, filled.n_rings + n_found, filled.n_pieces + n_pieces)
+        filled = _Filled(filled.n_vertices + m, filled.n_rings + n_found, filled.n_pieces + n_pieces, n_evidence)
         counts[pair, 0], counts[pair, 1], counts[pair, 2], counts[pair, 3] = n_pieces, n_found, m, arranged.n_exact
         status[pair], displacement[pair] = (DONE if is_valid else MAY_CROSS), moved_by
-    return status.shape[0], FINISHED, filled.n_vertices, filled.n_rings, filled.n_pieces, used, n_left_out
+    return _ended(status.shape[0], FINISHED, filled, used, n_left_out)
 
 
 @merged
 def _has_room(output: Output, filled: _Filled, n_vertices: int, n_rings: int) -> bool:
     """Tell whether so much more fits into the output."""
     return (filled.n_vertices + n_vertices <= output.vertices.shape[0]) & (
-        filled.n_rings + n_rings <= output.evidence.shape[0]
+        filled.n_rings + n_rings < output.rings.shape[0]
     )

@@ -63,13 +63,13 @@ def end_ring(given: Given, start: int, n: int, n_rings: int, mask: int) -> tuple
 
 @inline
 def load_rings(
-    vertices: Any, offsets: Any, first_ring: int, last_ring: int, mask: int, bits: Any, base: int,
+    vertices: Any, offsets: Any, first_ring: int, last_ring: int, mask: int, is_named: bool, base: int,
     box: Box, given: Given, n: int, n_rings: int, stop: Any,
 ) -> tuple[int, int, bool]:  # fmt: skip
     """Append rings without repeated points; return the numbers of vertices and rings, and whether none is too small.
 
-    bits: empty, or by ring the bit that stands for the mask. base: what is added to the number of a vertex in
-    ``origins``. box: of vertices beyond one of its sides, one after another, only the first and the last count.
+    is_named: the mask of each ring is its number instead, from ``first_ring`` on. base: what is added to the number of
+    a vertex in ``origins``. box: of vertices beyond one of its sides, one after another, the first and the last count.
     """
     x_min, x_max, y_min, y_max = box
     x, y, origins = given.edges.x, given.edges.y, given.origins
@@ -97,7 +97,7 @@ def load_rings(
             sides, qx, qy = beyond, px, py
             x[n], y[n], origins[n] = px, py, base + k
             n += 1
-        n, n_rings = end_ring(given, start, n, n_rings, 1 << bits[ring] if bits.shape[0] > 0 else mask)
+        n, n_rings = end_ring(given, start, n, n_rings, ring - first_ring if is_named else mask)
     return n, n_rings, safe
 
 

@@ -23,15 +23,7 @@ from engine.jit import bare_kernel, inline, merged
 from engine.polygon_overlay.compiled.block_tree import count_active, wake_above, wake_near
 from engine.polygon_overlay.compiled.clearance import CLEARANCE
 from engine.polygon_overlay.compiled.edge_tree import BoxTree, build_tree
-from engine.polygon_overlay.compiled.loading import (
-    EVERYTHING,
-    Given,
-    Loaded,
-    common_box,
-    end_ring,
-    is_empty,
-    magnitude,
-)
+from engine.polygon_overlay.compiled.loading import EVERYTHING, Given, Loaded, common_box, end_ring, is_empty, magnitude
 from engine.polygon_overlay.compiled.ring_blocks import (
     CHORD,
     EVERYWHERE,
@@ -239,15 +231,15 @@ def reduce_pair(
     mark_blocks(clips.vertices, clips.offsets, n_clip, margin, blocks, n_subject, x, y, stop)
     if stop[0] or count_active(blocks, end) >= n_most:
         return Loaded(0, 0, 0, largest)
-    if not _wake(subjects, clips, blocks, end, margin, n_most, w.tree, w.highest, stop):
+    if not _wake(subjects, clips, blocks, end, margin, n_most, w.tree, w.components.highest, stop):
         return Loaded(0, 0, 0, largest)
     runs = w.tree.places  # order: the tree is not asked any more
     reduced, safe = _load_polygon(
-        subjects.vertices, n_subject, blocks, 0, 1, 0, w.given, w.highest, runs, _Reduced(0, 0, 0), stop
+        subjects.vertices, n_subject, blocks, 0, 1, 0, w.given, w.components.highest, runs, _Reduced(0, 0, 0), stop
     )
     reduced, also_safe = _load_polygon(
-        clips.vertices, n_clip, blocks, n_subject, 2, subjects.vertices.shape[0], w.given, w.highest, runs, reduced,
-        stop,
+        clips.vertices, n_clip, blocks, n_subject, 2, subjects.vertices.shape[0], w.given, w.components.highest, runs,
+        reduced, stop,
     )  # fmt: skip
     if stop[0] or not (safe and also_safe):
         return Loaded(0, 0, 0, largest)

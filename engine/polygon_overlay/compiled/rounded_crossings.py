@@ -88,15 +88,15 @@ def _weights_from_expansions(edges: Edges, a: int, b: int, f: int, fb: int) -> t
     """Return the weights of a and b to twice 53 bits, both as positive double-doubles."""
     first, second = workspace(16), workspace(16)
     n, m = exact_weight(edges, f, fb, a, first), exact_weight(edges, f, fb, b, second)
-    ah, al = _leading(first, n)
-    bh, bl = _leading(second, m)
+    ah, al = leading(first, n)
+    bh, bl = leading(second, m)
     ah, al = _abs2(ah, al)
     bh, bl = _abs2(bh, bl)
     return ah, al, bh, bl
 
 
 @inline
-def _leading(e: Any, n: int) -> tuple[float, float]:
+def leading(e: Any, n: int) -> tuple[float, float]:
     n = compress(e, n)
     if n == 0:
         return 0.0, 0.0
@@ -155,8 +155,8 @@ def _from_expansions(edges: Edges, e: int, f: int, axis: int) -> float:
     above, below = workspace(64), workspace(64)  # 2 * 16 components for each of two products
     n = add_scaled(above, add_scaled(above, 0, wa, na, factor * z[b]), wb, nb, -factor * z[a])
     m = add_scaled(below, add_scaled(below, 0, wa, na, factor), wb, nb, -factor)
-    nh, nl = _leading(above, n)
-    dh, dl = _leading(below, m)
+    nh, nl = leading(above, n)
+    dh, dl = leading(below, m)
     h, _ = dd_div(nh, nl, dh, dl)
     return h + 0.0
 

@@ -15,11 +15,13 @@ from engine.jit import merged
 from engine.polygon_overlay.compiled.chain_faces import Faces
 from engine.polygon_overlay.compiled.chain_rings import Rings, Walk
 from engine.polygon_overlay.compiled.chains import Chains, Loose, Stars
+from engine.polygon_overlay.compiled.components import Components
 from engine.polygon_overlay.compiled.crossing_signs import Edges
 from engine.polygon_overlay.compiled.edge_contacts import Events, Unions
 from engine.polygon_overlay.compiled.edge_events import Along
 from engine.polygon_overlay.compiled.edge_tree import DEEPEST, LEAF, PORTION, BoxTree
 from engine.polygon_overlay.compiled.loading import Given
+from engine.polygon_overlay.compiled.ring_nesting import Holders
 from engine.polygon_overlay.compiled.ring_order import Ranking
 from engine.polygon_overlay.compiled.rounded_crossings import Rounded
 
@@ -67,9 +69,8 @@ class Workspace(NamedTuple):
     stars: Stars
     loose: Loose
     faces: Faces
-    highest: Any
-    gathered: Any
-    beyond: Any
+    components: Components
+    holders: Holders
     walk: Walk
     found: Rings
     rounded: Rounded
@@ -78,7 +79,7 @@ class Workspace(NamedTuple):
 
 class Output(NamedTuple):
     """Pair after pair: vertices (m, 2) float64, their sources (m, 2) int32, ends of rings and of pieces (n + 1,) int64,
-    that begin with 0, evidence by ring (n,) int64."""
+    that begin with 0, evidence (m, 2) int64: a ring, and one that it comes from."""
 
     vertices: Any
     sources: Any
@@ -118,12 +119,12 @@ def scratch_for(n_vertices: int, n_rings: int, n_contacts: int, n_out: int, n_ou
     kept: Scratch | None = vars(_kept).pop("scratch", None)
     if kept is not None and (kept.n_vertices < n_vertices or kept.n_rings < n_rings or kept.n_contacts < n_contacts):
         kept = None
-    if kept is not None and len(kept.output.vertices) >= n_out and len(kept.output.evidence) >= n_out_rings:
+    if kept is not None and len(kept.output.vertices) >= n_out and len(kept.output.rings) > n_out_rings:
         return kept
     n_out, n_out_rings = max(n_out, n_vertices + n_contacts), max(n_out_rings, n_contacts)
     rings, pieces = np.empty(n_out_rings + 1, np.int64), np.empty(n_out_rings + 1, np.int64)
     rings[0] = pieces[0] = 0
-    evidence = np.empty(n_out_rings, np.int64)
+    evidence = np.empty((n_out, 2), np.int64)
     output = Output(np.empty((n_out, 2)), np.empty((n_out, 2), np.int32), rings, pieces, evidence)
     outcome = Outcomes(np.empty(1, np.int8), np.empty((1, 4), np.int64), np.empty(1))
     if kept is not None:
@@ -165,11 +166,11 @@ def buffers_for(n_vertices: int, n_rings: int, n_contacts: int) -> Buffers:
     return Buffers(
         vertex_floats=np.empty((2, n + 1)),
         vertex_integers=np.empty((5, n + 1), np.int32),
-        ring_integers=np.empty((4, n_rings + 1), np.int64),
+        ring_integers=np.empty((8, n_rings + 1), np.int64),
         contact_floats=np.empty((5, k)),
-        contact_integers=np.empty((18, k + 1), np.int32),
-        half_integers=np.empty((7, 2 * k + 1), np.int32),
-        half_labels=np.empty((4, 2 * k + 1), np.int64),
+        contact_integers=np.empty((20, k + 1), np.int32),
+        half_integers=np.empty((11, 2 * k + 1), np.int32),
+        half_labels=np.empty((2, 2 * k + 1), np.int64),
         half_octets=np.empty((4, 2 * k + 1), np.uint8),
         point_floats=np.empty((2, m)),
         point_integers=np.empty((5, m), np.int32),
@@ -200,13 +201,12 @@ def rows_of(buffers: Buffers) -> Workspace:
         events=Events(c[0], c[1], c[2], cx[0], cx[1], cx[2], c[3], c[4], hb[0]),
         unions=Unions(p[3], pb[1], r[2]),
         along=Along(v[4], c[12], crossing_x, crossing_y, c[13]),
-        chains=Chains(c[5], c[6], c[7], c[8], hl[3], c[9], p[1]),
+        chains=Chains(c[5], c[6], c[7], c[8], hl[1], c[9], c[18], p[1]),
         stars=Stars(p[4], c[13], c[14], c[15], h[0], h[1]),
         loose=Loose(h[3], hl[0], px[0], px[1]),
         faces=Faces(h[2], h[3], h[4], hl[0], h[5], hb[1], hb[2], c[16]),
-        highest=r[3],
-        gathered=hl[1],
-        beyond=hl[2],
+        components=Components(r[3], r[4], r[5], r[6], r[7]),
+        holders=Holders(r[4], r[5], r[6], h[3], h[6], hl[0], h[7], h[8], h[9], h[10], c[19]),
         walk=Walk(hb[3], h[6], c[17]),
         found=Rings(p[0], pb[0], c[10], c[11]),
         rounded=Rounded(px[0], px[1], pb[3], crossing_x, crossing_y, error),

@@ -11,7 +11,7 @@ import pytest
 from engine.parallel import Budget
 from engine.polygon_overlay import rounds as overlay_rounds
 from engine.polygon_overlay.batch import overlay_batch
-from engine.polygon_overlay.compiled.ring_labels import MOST_BITS
+from engine.polygon_overlay.in_integers import overlay_exactly
 from engine.polygon_overlay.overlay import overlay
 from engine.polygon_overlay.run import overlay_compiled
 from engine.solids.polygon import Polygon
@@ -19,6 +19,8 @@ from tests.unit.polygon_overlay import families as families
 from tests.unit.polygon_overlay.checks import OPERATIONS
 from tests.unit.polygon_overlay.compiled.test_kernel import agree, arrays
 
+WORD = 62
+"""Rings that would each have a bit of a label of one word."""
 HARD = (
     families.rotated_lattice,
     families.nearly_coincident,
@@ -55,8 +57,8 @@ def border_in_two_versions() -> tuple[np.ndarray, np.ndarray]:
     return border, border + random.choice([-1, 0, 1], border.shape) * np.spacing(border)
 
 
-def test_more_rings_than_a_label_has_bits() -> None:
-    """Slivers by the hundred, as pieces or as holes, share bits."""
+def test_more_rings_than_a_word_has_bits() -> None:
+    """Slivers by the hundred, as pieces or as holes."""
     border, version = border_in_two_versions()
     frame = np.array([[90.0, 40], [110, 40], [110, 60], [90, 60]])
     for subject, clip in (([border], [version]), ([frame, border], [version]), ([frame, border], [frame, version])):
@@ -64,11 +66,10 @@ def test_more_rings_than_a_label_has_bits() -> None:
             assert agree(subject, clip, operation)
     found = overlay_compiled(arrays([border]), arrays([version]), "symmetric_difference", "valid", Budget())
     assert found is not None
-    assert found[0].n_pieces_exact > MOST_BITS
+    assert found[0].n_pieces_exact > WORD
 
 
-def test_more_rings_than_a_label_has_bits_in_a_batch() -> None:
-    """None of the pairs can be arranged again together with others."""
+def test_more_rings_than_a_word_has_bits_in_a_batch() -> None:
     border, version = map(Polygon, ([each] for each in border_in_two_versions()))
     (found,) = overlay_batch([border], [version], "symmetric_difference")
     assert found is not None
@@ -77,7 +78,7 @@ def test_more_rings_than_a_label_has_bits_in_a_batch() -> None:
 
 @pytest.mark.parametrize("n", [100, pytest.param(500, marks=pytest.mark.full)])
 def test_many_rings_that_join_and_are_snapped(n: int) -> None:
-    """Crowds of rings and a wandering line, each on itself an ulp off: parts near several rings of one bit."""
+    """Crowds of rings and a wandering line, each on itself an ulp off: parts near several rings."""
     random = np.random.default_rng(1)
     soup = 1000 + random.random((n // 5, 1, 2)) + random.uniform(-0.05, 0.05, (n // 5, 5, 2))
     line = 1e6 + np.cumsum(random.uniform(-1, 1, (n, 2)), axis=0)
@@ -89,7 +90,7 @@ def test_many_rings_that_join_and_are_snapped(n: int) -> None:
             found = overlay_compiled(arrays(rings), arrays(moved), operation, "valid", Budget())
             assert found is not None
             n_pieces, n_snapped = max(n_pieces, found[0].n_pieces_exact), n_snapped + found[0].snapped
-    assert n_pieces > MOST_BITS
+    assert n_pieces > WORD
     assert n < 500 or n_snapped > 0
 
 
@@ -139,3 +140,16 @@ def test_a_batch_equals_single_calls(output: Any, n: int) -> None:
             assert (found.collapsed, found.rounds, found.output) == (single.collapsed, single.rounds, output)
             assert found.area_exact == single.area_exact
         assert accuracy.coordinates_ulp == ulps
+
+
+def test_pieces_in_holes_stay_what_they_are_where_a_round_is_taken() -> None:
+    """A face in a hole within a hole comes from the inner one: no holes join, and none part."""
+    clip = [[(-9, -9.5), (9.3, -9), (9, 9.7), (-9.1, 9)]]
+    frames = [[(x * r, y * r) for x, y in ((-1, -1.1), (1.2, -1), (1, 1.3), (-1.1, 1))] for r in (8, 6, 4, 2)]
+    sliver = [(0.0, 0.0), (1.0, 1 / 3), (1.0, float(np.nextafter(1 / 3, 1)))]
+    for rings in (frames, [*frames, sliver]):
+        crossed = [*rings, [(-20, 0.1), (-8.5, 0.2), (-20, 0.3)]]
+        for operation in OPERATIONS:
+            assert agree(crossed, [*clip, [(0.1, -0.1), (0.4, 0.2), (0.5, 0.1)]], operation)
+    result, _ = overlay_exactly(arrays(frames), arrays(clip), "difference", "valid", Budget())
+    assert (result.n_holes, result.holes_joined, result.holes_parted) == (result.n_holes_exact, 0, 0)

@@ -7,8 +7,6 @@ import numpy as np
 from engine.polygon_overlay.compiled.crossing_signs import Edges
 from engine.polygon_overlay.compiled.loading import EVERYTHING, Box, Given, box_of, common_box, is_empty, load_rings
 
-NO_BITS = np.zeros(0, np.int64)
-
 
 def loaded(rings: list[list[tuple[float, float]]], box: Box) -> tuple[list[list[int]], list[int], Given]:
     """Return the numbers of the vertices that stay, ring by ring, the tops, and all that was filled."""
@@ -16,7 +14,7 @@ def loaded(rings: list[list[tuple[float, float]]], box: Box) -> tuple[list[list[
     n, whole = len(vertices), np.zeros(len(vertices), np.int64)
     given = Given(Edges(np.zeros(n), np.zeros(n), *(whole.copy() for _ in range(3))), *(whole.copy() for _ in range(3)))
     stop = np.zeros(1, np.uint8)
-    n, n_rings, safe = load_rings(vertices, offsets, 0, len(rings), 1, NO_BITS, 0, box, given, 0, 0, stop)
+    n, n_rings, safe = load_rings(vertices, offsets, 0, len(rings), 1, False, 0, box, given, 0, 0, stop)
     assert safe
     found: list[list[int]] = []
     for ring in range(n_rings):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from engine.polygon_overlay.compiled.chain_rings import Rings
-from engine.polygon_overlay.compiled.ring_order import Ranking, rank_rings
+from engine.polygon_overlay.compiled.ring_order import Ranking, find_shells, rank_rings
 from engine.polygon_overlay.compiled.rounded_crossings import Rounded
 
 Ring = list[tuple[float, float]]
@@ -42,3 +42,27 @@ def test_pieces_by_shells_and_holes_after_their_shell(seed: int) -> None:
     assert rank_rings(found, n, rounded, ranking, True, *scratch) == len(pieces)
     expected = sorted([turned(piece[0]), *sorted(map(turned, piece[1:]))] for piece in pieces)
     assert [turned(rings[k][1]) for k in ranking.order.tolist()] == [ring for piece in expected for ring in piece]
+
+
+def holes_among(rings: list[list[tuple[float, float]]]) -> list[bool] | None:
+    """Return which rings of one region are holes, None where that is not sure."""
+    n, points = len(rings), np.array([point for ring in rings for point in ring])
+    offsets = np.cumsum([0, *map(len, rings)])
+    found = Rings(np.arange(len(points)), np.ones(len(points), np.uint8), offsets, np.zeros(n, np.int64))
+    ranking = Ranking(*(np.zeros(n, kind) for kind in (np.int64, float, np.uint8, np.int64, np.int64, np.int64)))
+    x, y = (np.ascontiguousarray(axis) for axis in points.T)
+    none = np.zeros(0)
+    rounded = Rounded(x, y, np.zeros(len(x), np.uint8), none, none, none)
+    is_sure = find_shells(found, n, rounded, ranking, np.zeros(n, np.int64), np.zeros((n, 4)))
+    return [bool(is_hole) for is_hole in ranking.is_hole] if is_sure else None
+
+
+def test_the_widest_ring_is_the_shell_whatever_its_turn() -> None:
+    hole: list[tuple[float, float]] = [(1, 1), (2, 1), (1, 2)]
+    shell: list[tuple[float, float]] = [(0, 0), (0, 4), (4, 4), (4, 0)]
+    flat: list[tuple[float, float]] = [(0, 0), (4, 4), (2, 2)]
+    for order in ([hole, shell, hole], [shell, hole], [hole, shell]):
+        assert holes_among(order) == [ring is hole for ring in order]
+    assert holes_among([hole, flat]) == [True, False]
+    assert holes_among([shell, flat]) is None  # boxes are equal: either may be the shell
+    assert holes_among([hole, [(0, 1.5), (3, 1.5), (3, 1.6)]]) is None  # no box holds both

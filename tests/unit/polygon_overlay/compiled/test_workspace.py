@@ -19,9 +19,10 @@ def test_rows_in_use_together_lie_apart() -> None:
     steps = (
         [w.given, w.tree, w.events, w.unions, w.along],
         [w.given, w.tree, w.events, w.unions, w.along.starts, w.along.order, w.chains, w.stars, w.loose],
-        [w.given, w.tree, w.events, w.unions, w.along.starts, w.along.order, w.chains, w.stars, w.faces, w.highest],
-        [w.given, w.tree.marks, w.chains, w.stars, w.faces, w.gathered, w.beyond, w.walk, w.found],
-        [w.given, w.events.first, w.events.second, w.found, w.rounded, w.ranking, w.gathered, w.beyond],
+        [w.given, w.tree, w.events, w.unions, w.along.starts, w.along.order, w.chains, w.stars, w.faces, w.components],
+        [w.given, w.tree.marks, w.chains, w.stars, *w.faces[:1], *w.faces[2:3], *w.faces[4:], w.holders],
+        [w.given, w.tree.marks, w.chains, w.stars, w.faces, w.walk, w.found, *w.holders[:3], *w.holders[6:]],
+        [w.given, w.events.first, w.events.second, w.found, w.rounded, w.ranking, *w.holders[:3], *w.holders[6:]],
     )
     for step in steps:
         arrays = arrays_of(step)

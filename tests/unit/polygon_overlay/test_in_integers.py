@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from engine.parallel import Budget
-from engine.polygon_overlay.exact.in_integers import overlay_exactly
-from engine.polygon_overlay.exact.rounding import arranged_again
-from engine.polygon_overlay.rounds import RoundedRings
+from engine.polygon_overlay.compiled.kernel import DONE
+from engine.polygon_overlay.found import one_pair
+from engine.polygon_overlay.in_integers import arranged_again, overlay_exactly
 from tests.unit.polygon_overlay.checks import OPERATIONS
 from tests.unit.polygon_overlay.compiled.test_kernel import arrays
 
@@ -33,8 +33,8 @@ def test_valid_rings_arranged_again_are_themselves() -> None:
         [(20, 0), (21, 0), (20, 1)],
     ]
     vertices = np.array([vertex for ring in rings for vertex in ring], float)
-    given = RoundedRings(vertices, np.array([0, 4, 7, 10, 13]), np.array([0, 3, 4]), 0.0, False, False)
-    found, meant = arranged_again(given, Budget())
+    given = one_pair(vertices, np.array([0, 4, 7, 10, 13]), np.array([0, 3, 4]), 0.0, 0)
+    found = arranged_again(given, Budget())
     assert found.vertices.tolist() == vertices.tolist()
     assert (found.ring_offsets.tolist(), found.piece_offsets.tolist()) == ([0, 4, 7, 10, 13], [0, 3, 4])
-    assert (found.is_valid, [list(each) for each in meant]) == (True, [[0], [1], [2], [3]])
+    assert (found.status[0], found.evidence.tolist()) == (DONE, [[ring, ring] for ring in range(4)])

@@ -1,0 +1,219 @@
+"""Components of rings, each joined to the face it lies in: by boxes first, by the edge above it where that is open.
+
+A component lies in a face of another only if its box lies in the other's. Where no box holds its own it is in the
+unbounded face. Else the edge above its last vertex is looked for, among those of the components whose boxes do: what is
+left out encloses nothing here. It is apart from these, and disjoint connected sets of which none keeps two points apart
+do not keep them apart together (S. Janiszewski, Sur les coupures du plan, 1913). Were the edge found enclosed by one
+of them, its box would hold that edge's component's, and so this one's.
+
+    .-----------------------.
+    |  []   []   []   []    |     windows in a wall: each looks at the wall's edges, none at other windows
+    |  []   []   []   []    |
+    '-----------------------'
+
+Few edges are looked at one by one, those of large components by a tree over the edges of all that hold another.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final, NamedTuple
+
+from engine.arrangement.union_find import root_of, unite
+from engine.jit import inline, merged
+from engine.polygon_overlay.compiled.chain_faces import NOTHING, Faces, edge_above, half_below, join, test_edge
+from engine.polygon_overlay.compiled.chains import Chains, Stars
+from engine.polygon_overlay.compiled.crossing_signs import Edges
+from engine.polygon_overlay.compiled.edge_contacts import OFTEN, POLL, Events, Unions
+from engine.polygon_overlay.compiled.edge_events import Along
+from engine.polygon_overlay.compiled.edge_tree import LEAF, RUN, BoxTree, build_tree, leaves_of, push_children
+from engine.polygon_overlay.compiled.loading import Given
+
+_SMALL: Final = 32
+"""Edges of a component up to which each is looked at."""
+TOO_MANY: Final = -2
+_HOLDS: Final = 1
+_IS_OPEN: Final = 2
+"""States of a component: its box holds another's; the edge above it is not known yet."""
+
+
+class Components(NamedTuple):
+    """By ring: highest: of the one that stands for a component its last vertex (rightmost, then highest), of others -1;
+    following: the next ring of the component, or -1; first: its first vertex. By number of component: ring, state."""
+
+    highest: Any
+    following: Any
+    first: Any
+    ring: Any
+    state: Any
+
+
+@inline
+def _find_components(given: Given, rings: Any, n: int, n_rings: int, components: Components) -> int:
+    """Fill ``components``; return how many."""
+    edges = given.edges
+    x, y, highest, following = edges.x, edges.y, components.highest, components.following
+    k = n_components = 0
+    while k < n:  # bound: each turn passes one ring
+        components.first[edges.ring[k]] = k
+        k = edges.before[k] + 1
+    for ring in range(n_rings):
+        root, top = root_of(rings, ring), given.tops[ring]
+        if root == ring:  # invariant: the first of its component
+            components.ring[n_components], components.state[n_components] = ring, 0
+            highest[ring], following[ring] = top, -1
+            n_components += 1
+            continue
+        highest[ring], following[ring] = -1, following[root]
+        following[root], best = ring, highest[root]
+        if x[top] > x[best] or (x[top] == x[best] and y[top] > y[best]):
+            highest[root] = top
+    return n_components
+
+
+@inline
+def _box_of(edges: Edges, components: Components, k: int) -> tuple[float, float, float, float]:
+    """Return the box of component k, of the vertices that are there."""
+    x, y, ring = edges.x, edges.y, components.ring[k]
+    x_min = y_min = float("inf")
+    x_max = y_max = float("-inf")
+    while ring >= 0:  # bound: the rings of the component
+        first = components.first[ring]
+        for v in range(first, edges.before[first] + 1):
+            x_min, x_max, y_min, y_max = min(x_min, x[v]), max(x_max, x[v]), min(y_min, y[v]), max(y_max, y[v])
+        ring = components.following[ring]
+    return x_min, x_max, y_min, y_max
+
+
+@merged
+def _holds(boxes: Any, i: int, box: tuple[float, float, float, float]) -> bool:
+    """Tell whether box i holds another."""
+    return (boxes[i, 0] <= box[0]) & (boxes[i, 1] >= box[1]) & (boxes[i, 2] <= box[2]) & (boxes[i, 3] >= box[3])
+
+
+@inline
+def _test_component(edges: Edges, marks: Any, components: Components, v: int, k: int, nearest: int) -> int:
+    """Return what is nearest above vertex v, of the edges of component k and ``nearest``, or TOO_MANY."""
+    ring, n = components.ring[k], 0
+    while ring >= 0:  # bound: the rings of the component
+        first = components.first[ring]
+        last = edges.before[first]
+        n += last + 1 - first
+        if n > _SMALL:
+            return TOO_MANY
+        for e in range(first, last + 1):
+            if not marks[e] & RUN:
+                nearest = test_edge(edges, v, e, nearest)
+        ring = components.following[ring]
+    return nearest
+
+
+@inline
+def _look_in_boxes(edges: Edges, components: Components, k: int, n: int, tree: BoxTree) -> int:
+    """Return the edge next above component k, or NOTHING, if those whose boxes hold its own are small; else its state
+    is open."""
+    stack, n_leaves, box = tree.stack, leaves_of(n), _box_of(edges, components, k)
+    nearest, v = NOTHING, components.highest[components.ring[k]]
+    stack[0, 0], depth = 1, 1
+    while depth > 0:  # bound: each node enters the stack once
+        depth -= 1
+        node = stack[depth, 0]
+        if not _holds(tree.nodes, node, box):
+            continue
+        if node < n_leaves:
+            depth = push_children(tree, node, depth)
+            continue
+        first = LEAF * (node - n_leaves)
+        for place in range(first, min(first + LEAF, n)):
+            other = tree.places[place]
+            if other != k and _holds(tree.boxes, other, box):
+                components.state[other] |= _HOLDS
+                found = _test_component(edges, tree.marks, components, v, other, nearest)
+                if found == TOO_MANY:
+                    components.state[k] |= _IS_OPEN
+                else:
+                    nearest = found
+    return nearest
+
+
+@inline
+def _gather_edges(edges: Edges, components: Components, n: int, tree: BoxTree, names: Any) -> int:
+    """Fill ``names`` and ``boxes`` with the edges of all components that hold another; return how many."""
+    x, y, boxes = edges.x, edges.y, tree.boxes
+    m = 0
+    for k in range(n):
+        ring = components.ring[k] if components.state[k] & _HOLDS else -1
+        while ring >= 0:  # bound: the rings of the component
+            first = components.first[ring]
+            for e in range(first, edges.before[first] + 1):
+                if tree.marks[e] & RUN:
+                    continue
+                b = edges.after[e]
+                names[m] = e
+                boxes[m, 0], boxes[m, 1] = min(x[e], x[b]), max(x[e], x[b])
+                boxes[m, 2], boxes[m, 3] = min(y[e], y[b]), max(y[e], y[b])
+                m += 1
+            ring = components.following[ring]
+    return m
+
+
+@inline
+def join_faces(
+    given: Given, events: Events, along: Along, unions: Unions, tree: BoxTree, chains: Chains, stars: Stars,
+    faces: Faces, components: Components, names: Any, sizes: tuple[int, int, int, int], stop: Any,
+) -> None:  # fmt: skip
+    """Join the outer cycle of each component of rings to the face it lies in.
+
+    names: scratch by point. sizes: the numbers of vertices, rings, cycles and runs. tree: scratch, but for its marks:
+    RUN of the edges that stand for many; caller guarantees that none of these is next above another component.
+    """
+    n, n_rings, n_cycles, n_runs = sizes
+    for i in range(n_cycles + 1):
+        if i & POLL == 0 and stop[0]:
+            return
+        faces.joined[i] = faces.regions[i] = i
+        faces.label[i] = 0
+    edges, boxes, endless = given.edges, tree.boxes, float("inf")
+    n_components = _find_components(given, unions.rings, n, n_rings, components)
+    for k in range(n_components if n_components > 1 else 0):
+        boxes[k, 0], boxes[k, 1], boxes[k, 2], boxes[k, 3] = _box_of(edges, components, k)
+        if n_runs > 0:  # what is left out may be anywhere
+            boxes[k, 0], boxes[k, 1], boxes[k, 2], boxes[k, 3] = -endless, endless, -endless, endless
+    if n_components > 1:
+        build_tree(tree, n_components, stop)
+    n_open = 0
+    for k in range(n_components):
+        if stop[0]:
+            return
+        above = NOTHING
+        if n_components > 1:
+            above = _look_in_boxes(edges, components, k, n_components, tree)
+            if components.state[k] & _IS_OPEN:
+                n_open += 1
+                continue
+        top = components.highest[components.ring[k]]
+        _join_one(given, events, along, unions, chains, stars, faces, top, above, n_cycles)
+    if n_open == 0:
+        return
+    m = _gather_edges(edges, components, n_components, tree, names)
+    build_tree(tree, m, stop)
+    for k in range(n_components):
+        if k & OFTEN == 0 and stop[0]:
+            return
+        if components.state[k] & _IS_OPEN:
+            top = components.highest[components.ring[k]]
+            above = edge_above(edges, tree, names, top, m)
+            _join_one(given, events, along, unions, chains, stars, faces, top, above, n_cycles)
+
+
+@inline
+def _join_one(
+    given: Given, events: Events, along: Along, unions: Unions, chains: Chains, stars: Stars, faces: Faces, top: int,
+    above: int, n_cycles: int,
+) -> None:  # fmt: skip
+    """Join the outer cycle at the last vertex of a component to the face below the edge above it."""
+    node = stars.node_of[root_of(unions.points, top)]
+    outer, beyond = faces.cycle[stars.half[stars.ends[node] - 1]], n_cycles
+    if above != NOTHING:
+        beyond = faces.cycle[half_below(given.edges, events, along, unions.points, chains, above, top)]
+    join(faces.joined, faces.label, outer, beyond, 0)
+    unite(faces.regions, outer, beyond)

@@ -1,0 +1,184 @@
+"""Areas of rings of implicit points, as certified doubles: double-doubles with a running bound.
+
+Twice the area is the sum of x_k (y_k+1 - y_k-1), places counted from a vertex near the ring. A vertex is known exactly;
+the crossing of the edges ab and cd lies at a + t (b - a) with t = w_a / (w_a - w_b), the weights of crossing_signs.py,
+of opposite signs: t carries their relative errors and 20 u^2, the place that of t (b - a) and 4 u^2 for each sum. In a
+sum of n terms, each is off by the errors of its factors and 12 u^2 of its size; what sums lose adds up to a second
+double, which is off by less than (2 n + n^2) u^2 of all sizes, twice over. Where a weight is less than a thousand times
+its bound both come from expansions, if exponents allow.
+
+What the bound leaves open (a tie, a sum that nearly cancels, exponents near the ends) the caller settles in integers.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from engine.jit import bare_kernel, called, inline, merged
+from engine.polygon_overlay.compiled.crossing_signs import weight_of
+from engine.polygon_overlay.compiled.rounded_crossings import leading
+from engine.predicates.double_double import U2, dd_add, dd_div, dd_mul, dd_sub, surely_rounded
+from engine.predicates.error_free import fast_two_sum, two_diff, two_sum, workspace
+from engine.predicates.expansion import is_safe
+from engine.predicates.parameters import minor
+
+_TINY = 2.0**-1040
+"""More than what an underflow may lose in a term."""
+
+
+class _Place(NamedTuple):
+    """A point, as double-doubles counted from another, and a bound of the error of each coordinate."""
+
+    xh: float
+    xl: float
+    yh: float
+    yl: float
+    error: float
+
+
+@merged
+def _end_of(ring: Any, v: int, known: Any, side: int) -> int:
+    """Return the next vertex of the ring of vertex v that is not at its place (v if there is none).
+
+    known: the ring that was found last, of both polygons.
+    """
+    low = int(known[side])
+    if not ring.offsets[low] <= v < ring.offsets[low + 1]:
+        low, high = 0, ring.offsets.shape[0] - 1
+        while high - low > 1:  # bound: halves
+            middle = (low + high) // 2
+            if ring.offsets[middle] <= v:
+                low = middle
+            else:
+                high = middle
+        known[side] = low
+    start, stop = ring.offsets[low], ring.offsets[low + 1]
+    after = v
+    for _ in range(stop - start):
+        after = after + 1 if after + 1 < stop else start
+        if ring.vertices[after, 0] != ring.vertices[v, 0] or ring.vertices[after, 1] != ring.vertices[v, 1]:
+            break
+    return after
+
+
+@merged
+def _edge(subjects: Any, clips: Any, known: Any, v: int) -> tuple[float, float, float, float]:
+    """Return the ends of the edge that begins with vertex v."""
+    n = subjects.vertices.shape[0]
+    side = int(v >= n)
+    rings, v = (subjects, v) if v < n else (clips, v - n)
+    after = _end_of(rings, v, known, side)
+    return rings.vertices[v, 0], rings.vertices[v, 1], rings.vertices[after, 0], rings.vertices[after, 1]
+
+
+@called
+def _exact_weight(
+    cx: float, cy: float, dx: float, dy: float, px: float, py: float
+) -> tuple[float, float, float]:  # fmt: skip
+    e = workspace(16)
+    ux, ux_tail = two_diff(dx, cx)
+    uy, uy_tail = two_diff(dy, cy)
+    vx, vx_tail = two_diff(px, cx)
+    vy, vy_tail = two_diff(py, cy)
+    h, low = leading(e, minor(e, ux, ux_tail, uy, uy_tail, vx, vx_tail, vy, vy_tail))
+    return h, low, 4.0 * U2 * abs(h)
+
+
+@inline
+def _crossing(subjects: Any, clips: Any, known: Any, e: int, f: int, ox: float, oy: float) -> _Place:
+    """Return where two edges cross, counted from o."""
+    ax, ay, bx, by = _edge(subjects, clips, known, e)
+    cx, cy, dx, dy = _edge(subjects, clips, known, f)
+    ah, al, ae = weight_of(cx, cy, dx, dy, ax, ay)
+    bh, bl, be = weight_of(cx, cy, dx, dy, bx, by)
+    if ae > 0.001 * abs(ah) or be > 0.001 * abs(bh):
+        safe = is_safe(ax) & is_safe(ay) & is_safe(bx) & is_safe(by)
+        if safe & is_safe(cx) & is_safe(cy) & is_safe(dx) & is_safe(dy):
+            ah, al, ae = _exact_weight(cx, cy, dx, dy, ax, ay)
+            bh, bl, be = _exact_weight(cx, cy, dx, dy, bx, by)
+    sum_h, sum_l = dd_sub(ah, al, bh, bl)
+    th, tl = dd_div(ah, al, sum_h, sum_l)
+    relative = 2.5 * max(ae / abs(ah), be / abs(bh)) + 20.0 * U2
+    uh, ul = two_diff(bx, ax)
+    vh, vl = two_diff(by, ay)
+    error = relative * abs(th) * max(abs(uh), abs(vh))
+    uh, ul = dd_mul(th, tl, uh, ul)
+    vh, vl = dd_mul(th, tl, vh, vl)
+    xh, xl = two_diff(ax, ox)
+    yh, yl = two_diff(ay, oy)
+    error += 4.0 * U2 * max(abs(xh) + abs(uh), abs(yh) + abs(vh))
+    xh, xl = dd_add(xh, xl, uh, ul)
+    yh, yl = dd_add(yh, yl, vh, vl)
+    return _Place(xh, xl, yh, yl, error)
+
+
+@inline
+def _place(subjects: Any, clips: Any, known: Any, sources: Any, k: int, ox: float, oy: float) -> _Place:
+    """Return point k, counted from o."""
+    v, n = sources[k, 0], subjects.vertices.shape[0]
+    if sources[k, 1] >= 0:
+        return _crossing(subjects, clips, known, v, sources[k, 1], ox, oy)
+    vertices, v = (subjects.vertices, v) if v < n else (clips.vertices, v - n)
+    xh, xl = two_diff(vertices[v, 0], ox)
+    yh, yl = two_diff(vertices[v, 1], oy)
+    return _Place(xh, xl, yh, yl, 0.0)
+
+
+@inline
+def _twice_area(
+    subjects: Any, clips: Any, known: Any, sources: Any, first: int, last: int
+) -> tuple[float, float, float, float]:
+    """Return twice the area of a ring as a double-double, the bound of its terms, and the sum of their sizes."""
+    v, n = sources[first, 0], subjects.vertices.shape[0]
+    vertices, v = (subjects.vertices, v) if v < n else (clips.vertices, v - n)
+    ox, oy = vertices[v, 0], vertices[v, 1]
+    before = _place(subjects, clips, known, sources, last - 1, ox, oy)
+    now = _place(subjects, clips, known, sources, first, ox, oy)
+    total = rest = error = size = 0.0
+    start, end = now, before
+    for k in range(first, last):
+        after = start if k + 1 == last else end
+        if k + 2 < last:
+            after = _place(subjects, clips, known, sources, k + 1, ox, oy)
+        dh, dl = dd_sub(after.yh, after.yl, before.yh, before.yl)
+        ph, pl = dd_mul(now.xh, now.xl, dh, dl)
+        total, lost = two_sum(total, ph)
+        rest += lost + pl
+        off = before.error + after.error
+        error += now.error * (abs(dh) + off) + abs(now.xh) * off
+        size += abs(now.xh) * (abs(after.yh) + abs(before.yh))
+        before, now = now, after
+    total, rest = fast_two_sum(total, rest)
+    return total, rest, error, size
+
+
+@bare_kernel
+def sum_areas(
+    subjects: Any, clips: Any, sources: Any, offsets: Any, groups: Any, stop: Any, areas: Any
+) -> int:  # fmt: skip
+    """Fill ``areas``, (n,) float64, with the doubles nearest to the areas of some rings each, NaN where that is unsure.
+
+    sources, offsets: of rings, as those of `ImplicitRings`. groups: (n + 1,) int64 into the rings. Returns how many are
+    unsure.
+    """
+    n_unsure = 0
+    known = workspace(2)
+    known[0] = known[1] = 0.0
+    for k in range(areas.shape[0]):
+        total_h = total_l = error = size = 0.0
+        n_points = 0
+        for ring in range(groups[k], groups[k + 1]):
+            if stop[0]:
+                return 0
+            h, low, ring_error, ring_size = _twice_area(
+                subjects, clips, known, sources, offsets[ring], offsets[ring + 1]
+            )
+            total_h, total_l = dd_add(total_h, total_l, h, low)
+            error, size = error + ring_error, size + ring_size
+            n_points += offsets[ring + 1] - offsets[ring]
+        n = float(n_points)
+        bound = 1.001 * (error + (16.0 + 4.0 * n + 2.0 * n * n) * U2 * size) + n_points * _TINY
+        is_sure = n_points == 0 or surely_rounded(total_h, total_l, bound + 4.0 * U2 * abs(total_h))
+        areas[k] = (total_h + total_l) / 2.0 + 0.0 if is_sure else float("nan")
+        n_unsure += not is_sure
+    return n_unsure
