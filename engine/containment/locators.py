@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -19,12 +20,12 @@ from engine.containment.cells.order import order_if_it_pays
 from engine.containment.methods.ball import locate_in_ball
 from engine.containment.methods.box import locate_in_box
 from engine.containment.methods.half_spaces import locate_in_half_planes, locate_in_half_spaces
+from engine.containment.methods.polygon_one_pass import locate_by_ring_pass
 from engine.containment.methods.polygon_ray_parity import locate_in_rings
 from engine.containment.methods.polyhedron_one_pass import locate_few
-from engine.containment.methods.polyhedron_ray_parity import locate_by_columns
+from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
 from engine.containment.methods.polynomial import locate_by_polynomial
-from engine.containment.methods.triangle import locate_in_triangle
-from engine.containment.prepared import columns_of, columns_pay, rings_of, rounded_rows
+from engine.containment.prepared import closed_rings_of, rings_of, rounded_rows, tree_of, tree_pays
 from engine.containment.rational_locate import Check, combine, prism_walls, rational_location, unsupported
 from engine.containment.ring_cells.build import ring_cells_if_they_pay
 from engine.containment.ring_cells.locate import locate_by_ring_cells
@@ -77,22 +78,17 @@ class Locator:
 
 
 def settled(
-    kernel: Callable[[FloatArray, Int8Array, FlagArray], int],
-    settle: Callable[[Sequence[float], Check], int],
-    prepare: Callable[[Check], object] | None = None,
+    kernel: Callable[[FloatArray, Int8Array, Budget], int], settle: Callable[[Sequence[float], Check], int]
 ) -> Fill:
     """Return the fill that runs `kernel` over a chunk and settles what it leaves UNDECIDED one by one.
 
     kernel: returns how many points needed more than its filter, those left UNDECIDED among them.
-    prepare: builds what `kernel` reads, where that takes time and is not there yet.
     Raises what `Budget.check` raises, also when the kernel stopped early.
     """
 
     def fill(points: FloatArray, locations: Int8Array, budget: Budget) -> Counts:
-        if prepare is not None:
-            prepare(budget.check)
         with np.errstate(all="ignore"):  # uncompiled, numpy scalars warn where the filter means to overflow
-            n_beyond = int(kernel(read_only(points), locations, budget.flag))
+            n_beyond = int(kernel(read_only(points), locations, budget))
         budget.check()
         if not n_beyond:
             return Counts(0, 0)
@@ -122,10 +118,11 @@ def rational_half(solid: Solid, pose: Pose | None = None) -> Callable[[Sequence[
 
 def _by_kernel(method: str, kernel: Callable[..., int], solid: Solid, *prepared: object) -> Locator:
     """Return the locator by a kernel that takes points, what is prepared of the solid, locations and flag."""
-    return Locator(
-        method,
-        settled(lambda points, out, flag: int(kernel(points, *prepared, out, flag)), rational_half(solid)),
-    )
+    return _located(method, solid, lambda points, out, budget: kernel(points, *prepared, out, budget.flag))
+
+
+def _located(method: str, solid: Solid, kernel: Callable[[FloatArray, Int8Array, Budget], int]) -> Locator:
+    return Locator(method, settled(kernel, rational_half(solid)))
 
 
 def _in_rows(solid: HalfSpace | Convex) -> Locator:
@@ -135,10 +132,10 @@ def _in_rows(solid: HalfSpace | Convex) -> Locator:
 
 
 def _in_sphere(solid: Sphere) -> Locator:
-    def run(points: FloatArray, locations: Int8Array, flag: FlagArray) -> int:
-        return int(locate_in_ball(points, solid.center, 0.0, solid.radius, np.empty(8), locations, flag))
+    def run(points: FloatArray, locations: Int8Array, budget: Budget) -> int:
+        return int(locate_in_ball(points, solid.center, 0.0, solid.radius, np.empty(8), locations, budget.flag))
 
-    return Locator("squared_distance", settled(run, rational_half(solid)))
+    return _located("squared_distance", solid, run)
 
 
 def _in_aabb(solid: Aabb) -> Locator:
@@ -147,28 +144,28 @@ def _in_aabb(solid: Aabb) -> Locator:
 
 def _in_triangle(solid: Triangle) -> Locator:
     if solid.dimension == 3:
-        return _in_prism(solid)
-    low, high = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
-    return _by_kernel("same_side", locate_in_triangle, solid, solid.vertices, low, high)
+        return _located("prism", solid, partial(_run_in_prism, solid))
+    return _located("same_side", solid, partial(_run_ring_pass, solid))
 
 
-def _in_prism(solid: Triangle) -> Locator:
-    def run(points: FloatArray, locations: Int8Array, flag: FlagArray) -> int:
-        walls = prism_walls(solid)
-        if not any(any(wall) for wall in walls):  # no area: every product of the formula is zero
-            locations[:] = 0
-            return 0
-        rows, is_exact = solid.prepared("rounded_walls", lambda: rounded_rows(walls))
-        return int(locate_in_half_spaces(points, rows, is_exact, locations, flag))
+def _run_in_prism(solid: Triangle, points: FloatArray, locations: Int8Array, budget: Budget) -> int:
+    walls = prism_walls(solid)
+    if not any(any(wall) for wall in walls):  # no area: every product of the formula is zero
+        locations[:] = 0
+        return 0
+    rows, is_exact = solid.prepared("rounded_walls", lambda: rounded_rows(walls))
+    return int(locate_in_half_spaces(points, rows, is_exact, locations, budget.flag))
 
-    return Locator("prism", settled(run, rational_half(solid)))
+
+def _run_ring_pass(solid: Polygon | Triangle, points: FloatArray, locations: Int8Array, budget: Budget) -> int:
+    rings = closed_rings_of(solid, budget.check)
+    return int(locate_by_ring_pass(points, np.zeros(len(points)), *rings, locations, budget.flag))
 
 
 def _in_polygon(solid: Polygon) -> Locator:
-    def run(points: FloatArray, locations: Int8Array, flag: FlagArray) -> int:
-        return int(locate_in_rings(points, *rings_of(solid), locations, flag))
-
-    by_rays = settled(run, rational_half(solid), lambda check: rings_of(solid, check))
+    def run(points: FloatArray, locations: Int8Array, budget: Budget) -> int:
+        slabs = rings_of(solid, budget.check)
+        return int(locate_in_rings(points, np.zeros(len(points)), *slabs, locations, budget.flag))
 
     def choose(n_points: int, budget: Budget) -> Locator:
         cells = ring_cells_if_they_pay(solid, n_points, budget)
@@ -178,23 +175,23 @@ def _in_polygon(solid: Polygon) -> Locator:
             "ring_cells", _in_cells(lambda *rest: int(locate_by_ring_cells(rest[0], cells, *rest[1:])), by_rays)
         )
 
+    by_rays = settled(run, rational_half(solid))
     plain = Locator("ring_crossing", by_rays, for_batch=choose)
     return plain
 
 
 def _in_polyhedron(solid: Polyhedron) -> Locator:
-    def run(points: FloatArray, locations: Int8Array, flag: FlagArray) -> int:
-        return int(locate_by_columns(points, *columns_of(solid), locations, flag))
+    def run(points: FloatArray, locations: Int8Array, budget: Budget) -> int:
+        tree = tree_of(solid, budget.check)
+        return int(locate_by_tree(points, np.zeros(len(points)), tree, locations, budget.flag))
 
-    def run_once(points: FloatArray, locations: Int8Array, flag: FlagArray) -> int:
-        return locate_few(points, solid.vertices, solid.triangles, locations, flag)
-
-    by_rays = settled(run, rational_half(solid), lambda check: columns_of(solid, check))
+    def run_once(points: FloatArray, locations: Int8Array, budget: Budget) -> int:
+        return locate_few(points, solid.vertices, solid.triangles, locations, budget.flag)
 
     def choose(n_points: int, budget: Budget) -> Locator:
         cells = cells_if_they_pay(solid, n_points, budget)
         if cells is None:
-            return plain if columns_pay(solid, n_points) else at_once
+            return plain if tree_pays(solid, n_points) else at_once
         return Locator(
             "segment_parity",
             _in_cells(lambda *rest: int(locate_by_cells(rest[0], cells, *rest[1:])), by_rays),
@@ -202,7 +199,8 @@ def _in_polyhedron(solid: Polyhedron) -> Locator:
             sees_not_finite=True,
         )
 
-    at_once = Locator("ray_parity", settled(run_once, rational_half(solid)))
+    by_rays = settled(run, rational_half(solid))
+    at_once = _located("ray_parity", solid, run_once)
     plain = Locator("ray_parity", by_rays, for_batch=choose)
     return plain
 

@@ -1,4 +1,4 @@
-"""Structures that queries share, each built once a solid: columns of triangles, slabs of edges, rounded rows."""
+"""Structures that queries share, each built once a solid: the tree of triangles, slabs of edges, rounded rows."""
 
 from __future__ import annotations
 
@@ -8,35 +8,39 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray, Int8Array, Int32Array, read_only
+from engine.arrays import BoolArray, Float32Array, FloatArray, Int32Array, IntArray, read_only
+from engine.bounding.bvh import WIDTH, build_bvh, on_lines
 from engine.bounding.grid import BoxGrid, build_box_grid
-from engine.containment.methods.polyhedron_ray_parity import fill_rows
+from engine.containment.methods.polygon_one_pass import close_rings
+from engine.containment.methods.polyhedron_ray_parity import fill_triangle_boxes, lay_out
 from engine.containment.rational_locate import Check, next_in_ring, no_check
-from engine.predicates.rational import orient2d_rational
+from engine.lanes.overhead import OVERHEAD_ROWS
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
 from engine.solids.triangle import Triangle
-from engine.types import UNDECIDED
 
-_AT_ONCE: Final = 1 << 16
 _PASSES: Final = 16
 _POINTS_A_PASS: Final = 1024
 """As `run_chunks` begins with."""
 
 
-class Columns(NamedTuple):
-    """Triangles by columns of a grid over x and y, for vertical rays."""
+class TriangleTree(NamedTuple):
+    """Triangles in a tree of boxes, for vertical rays."""
 
     vertices: FloatArray
     """``(n, 3)``: the solid's."""
     triangles: Int32Array
-    """``(m, 3)``, by falling zmax."""
-    boxes: FloatArray
-    """``(m, 6)``: xmin, xmax, ymin, ymax, zmin, zmax."""
-    areas: Int8Array
-    """``(m,)``: exact sign of the area seen from above."""
-    grid: BoxGrid
-    z_min: float
+    """``(m, 3)``, in the order of the tree."""
+    boxes: Float32Array
+    child: Int32Array
+    """As `Bvh` has them."""
+    blocks: Float32Array
+    """``(n_nodes, 8, 8)``: what `overhead` reads of the triangles of a node."""
+    origin: tuple[float, float, float]
+    scale: float
+    low: tuple[float, float, float]
+    """The box of all triangles."""
+    high: tuple[float, float, float]
 
 
 class Rings(NamedTuple):
@@ -53,70 +57,75 @@ class Rings(NamedTuple):
     """xmin, xmax, ymin, ymax."""
 
 
-def columns_of(solid: Polyhedron, check: Check = no_check) -> Columns:
-    """Return the columns of `solid`, prepared once: about two triangles to a column if they are evenly spread.
+def tree_of(solid: Polyhedron, check: Check = no_check) -> TriangleTree:
+    """Return the tree over the triangles of `solid`, prepared once.
 
     check: called between the steps, a second's work for a million triangles; what it raises ends the building.
     """
-    return solid.prepared("columns", lambda: _build_columns(solid, check), check)
+    return solid.prepared("tree", lambda: _build_tree(solid, check), check)
 
 
-def columns_pay(solid: Polyhedron, n_points: int) -> bool:
-    """Tell whether the points asked so far would have taken as long, in passes over all triangles, as columns take."""
+def tree_pays(solid: Polyhedron, n_points: int) -> bool:
+    """Tell whether the points asked so far would have taken as long, in passes over all triangles, as a tree takes."""
     passes = solid.prepared("passes", lambda: [0])
     passes[0] += 1 + (n_points - 1) // _POINTS_A_PASS
     return passes[0] > _PASSES
 
 
-def _build_columns(solid: Polyhedron, check: Check) -> Columns:
+def _build_tree(solid: Polyhedron, check: Check) -> TriangleTree:
     check()
-    vertices, given = solid.vertices, solid.triangles
-    heights = vertices[:, 2].copy()
-    tops = heights[given[:, 0]]
-    for corner in (1, 2):
-        check()
-        np.maximum(tops, heights[given[:, corner]], out=tops)
+    boxes, triangles = np.empty((len(solid.triangles), 6)), np.empty((len(solid.triangles), 3), np.int32)
+    fill_triangle_boxes(solid.vertices, solid.triangles, boxes)
     check()
-    order = np.argsort(-tops, kind="stable")
-    del tops
-    triangles, boxes = np.empty((len(order), 3), np.int32), np.empty((len(order), 6))
-    areas = np.empty(len(order), np.int8)
-    for start in range(0, len(order), _AT_ONCE):
-        check()
-        some = slice(start, start + _AT_ONCE)
-        with np.errstate(all="ignore"):
-            fill_rows(vertices, given, order[some], triangles[some], boxes[some], areas[some])
+    tree = build_bvh(boxes)
     check()
-    for index in np.flatnonzero(areas == UNDECIDED):
-        check()
-        areas[index] = orient2d_rational(*vertices[triangles[index], :2].tolist())
-    side = max(1, min(2048, int(len(order) ** 0.5)))
-    grid = build_box_grid([boxes[:, 0], boxes[:, 2]], [boxes[:, 1], boxes[:, 3]], [side, side], check)
-    return Columns(vertices, triangles, boxes, areas, grid, float(boxes[:, 4].min()))
+    child, blocks = np.empty_like(tree.child), np.zeros((len(tree.child), OVERHEAD_ROWS, WIDTH), np.float32)
+    lay_out(solid.vertices, solid.triangles, tree, child, triangles, blocks)
+    check()
+    low, high = boxes[:, :3].min(axis=0).tolist(), boxes[:, 3:].max(axis=0).tolist()
+    origin = tuple(tree.origin.tolist())
+    return TriangleTree(
+        solid.vertices, triangles, tree.boxes, child, on_lines(blocks), origin, tree.scale, tuple(low), tuple(high)
+    )
 
 
-def rings_of(solid: Polygon | Triangle, check: Check = no_check) -> Rings:
-    """Return the slabs of a polygon, or of a plane triangle as one ring, prepared once; check as in `columns_of`."""
-
-    def build() -> Rings:
-        check()
-        if isinstance(solid, Triangle):
-            return _build_rings(solid.vertices, solid.vertices[[1, 2, 0]], check)
-        return _build_rings(solid.vertices, solid.vertices[next_in_ring(solid)], check)
-
-    return solid.prepared("slabs", build, check)
+def rings_of(solid: Polygon, check: Check = no_check) -> Rings:
+    """Return the slabs of a polygon, prepared once; check as in `tree_of`."""
+    return solid.prepared("slabs", lambda: _build_rings(solid.vertices, next_in_ring(solid), check), check)
 
 
-def _build_rings(starts: FloatArray, ends: FloatArray, check: Check) -> Rings:
+def _build_rings(vertices: FloatArray, following: IntArray, check: Check) -> Rings:
+    check()
+    starts, ends = vertices, vertices[following]
     order = np.argsort(-np.maximum(starts[:, 0], ends[:, 0]), kind="stable")
     check()
     starts, ends = np.ascontiguousarray(starts[order]), np.ascontiguousarray(ends[order])
     check()
     low, high = np.minimum(starts, ends), np.maximum(starts, ends)
     flat = np.zeros(1)
-    slabs = build_box_grid([low[:, 1], flat], [high[:, 1], flat], [max(1, min(1 << 20, len(order))), 1], check)
-    box = (float(low[:, 0].min()), float(high[:, 0].max()), float(low[:, 1].min()), float(high[:, 1].max()))
-    return Rings(starts, ends, np.ascontiguousarray(high[:, 0]), slabs, box)
+    slabs = build_box_grid(low[:, 1], high[:, 1], flat, flat, max(1, min(1 << 20, len(order))), 1, check)
+    return Rings(starts, ends, np.ascontiguousarray(high[:, 0]), slabs, _box_of(vertices))
+
+
+def _box_of(vertices: FloatArray) -> tuple[float, float, float, float]:
+    (x_min, y_min), (x_max, y_max) = vertices.min(axis=0).tolist(), vertices.max(axis=0).tolist()
+    return x_min, x_max, y_min, y_max
+
+
+class ClosedRings(NamedTuple):
+    """What `locate_by_ring_pass` reads of a polygon, or of a plane triangle as one ring."""
+
+    rings: tuple[FloatArray, FloatArray, IntArray]
+    box: tuple[float, float, float, float]
+
+
+def closed_rings_of(solid: Polygon | Triangle, check: Check = no_check) -> ClosedRings:
+    """Return the rings of a polygon, each ended by its first vertex, prepared once."""
+
+    offsets = solid.ring_offsets if isinstance(solid, Polygon) else np.array([0, 3])
+    return solid.prepared(
+        "closed_rings", lambda: ClosedRings(close_rings(solid.vertices, offsets), _box_of(solid.vertices)), check
+    )
 
 
 def rounded_rows(rows: Sequence[Sequence[int | Fraction]]) -> tuple[FloatArray, BoolArray]:

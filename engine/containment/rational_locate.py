@@ -20,6 +20,7 @@ import numpy as np
 
 from engine.arrays import FloatArray, IntArray
 from engine.errors import UnsupportedSolidError
+from engine.predicates.exact_vectors import cross, dot, minus
 from engine.predicates.rational import Number, polynomial_sign_rational, scaled_integers, side_rational, sign_of
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
@@ -50,19 +51,9 @@ def _orient2d(a: Sequence[int], b: Sequence[int], c: Sequence[int]) -> int:
     return sign_of((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
 
 
-def _cross(u: Sequence[int], v: Sequence[int]) -> Integers:
-    """Return u x v."""
-    return (u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0])
-
-
 def _orient3d(a: Sequence[int], b: Sequence[int], c: Sequence[int], d: Sequence[int]) -> int:
     """Return 1 when d lies on the side that the normal of (a, b, c) points to, -1 on the other, 0 in the plane."""
-    normal = _cross(_minus(b, a), _minus(c, a))
-    return sign_of(sum(n * (d[k] - a[k]) for k, n in enumerate(normal)))
-
-
-def _minus(a: Sequence[int], b: Sequence[int]) -> Integers:
-    return tuple(left - right for left, right in zip(a, b))
+    return sign_of(dot(cross(minus(b, a), minus(c, a)), minus(d, a)))
 
 
 def _is_on_closed_triangle(a: Integers, b: Integers, c: Integers, q: Integers) -> bool:
@@ -181,12 +172,12 @@ def prism_walls(solid: Triangle) -> list[list[int]]:
     def build() -> list[list[int]]:
         flat = scaled_integers((*solid.vertices.ravel().tolist(), 1))
         a, b, c = (tuple(flat[k : k + 3]) for k in (0, 3, 6))
-        normal = _cross(_minus(b, a), _minus(c, a))
+        normal = cross(minus(b, a), minus(c, a))
         walls = []
         for p, r in ((a, b), (b, c), (c, a)):
-            inward = _cross(normal, _minus(r, p))
+            inward = cross(normal, minus(r, p))
             # in coordinates scaled by flat[9]: dot(inward, flat[9] x - p)
-            walls.append([*(n * flat[9] for n in inward), -sum(n * x for n, x in zip(inward, p))])
+            walls.append([*(n * flat[9] for n in inward), -dot(inward, p)])
         return walls
 
     return solid.prepared("prism_walls", build)

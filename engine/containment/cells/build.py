@@ -15,7 +15,7 @@ from engine.containment.cells.lattice import LEVELS, PARTS, SPLIT, UNKNOWN, Latt
 from engine.containment.cells.locate import CODE_SHIFT, INSIDE_CELL, MIXED_CELL, OUTSIDE_CELL
 from engine.containment.cells.status import fill_leaves, locate_parts
 from engine.containment.cells.top import ask_cells, can_have_cells, make_lattice, top_places, top_statuses
-from engine.containment.prepared import Columns, columns_of
+from engine.containment.prepared import TriangleTree, tree_of
 from engine.lanes.cells import groups_of
 from engine.lanes.tracing import LANES
 from engine.parallel import Budget
@@ -67,16 +67,16 @@ def cells_if_they_pay(solid: Polyhedron, n_points: int, budget: Budget) -> Cells
 
 def build_cells(solid: Polyhedron, budget: Budget) -> Cells:
     """Return the cells of `solid`. Raises what `Budget.check` raises."""
-    columns = columns_of(solid, budget.check)
-    lattice = make_lattice(columns, _WANTED, _MOST_CELLS)
-    mesh = Mesh(columns.vertices, columns.triangles, lattice)
-    level, index, found = _top_level(columns, mesh, budget)
+    tree = tree_of(solid, budget.check)
+    lattice = make_lattice(tree, _WANTED, _MOST_CELLS)
+    mesh = Mesh(tree.vertices, tree.triangles, lattice)
+    level, index, found = _top_level(tree, mesh, budget)
     codes, leaves = [], []
     n_groups = n_bricks = 0
     for depth in range(LEVELS):
         lengths = np.diff(level.firsts)
         is_cut = np.zeros(len(lengths), np.bool_)
-        if depth < LEVELS - 1 and len(level.lists) <= _MOST_ENTRIES * len(columns.triangles) + (1 << 14):
+        if depth < LEVELS - 1 and len(level.lists) <= _MOST_ENTRIES * len(tree.triangles) + (1 << 14):
             is_cut = lengths > _LONG[depth]
         parents = np.flatnonzero(is_cut)
         kept = np.flatnonzero(~is_cut & (level.statuses != UNKNOWN))
@@ -92,16 +92,15 @@ def build_cells(solid: Polyhedron, budget: Budget) -> Cells:
         leaves.append((level, kept, starts))
         if not len(parents):
             break
-        level, index, found = _next_level(columns, mesh, level, parents, budget)
+        level, index, found = _next_level(tree, mesh, level, parents, budget)
     groups = groups_of(n_groups)
     for of_level in leaves:
         fill_leaves(mesh, *of_level, groups, budget.flag)
         budget.check()
-    low, high = columns.boxes[:, 0::2].min(axis=0), columns.boxes[:, 1::2].max(axis=0)
     return Cells(
         lattice,
-        (float(low[0]), float(low[1]), float(low[2])),
-        (float(high[0]), float(high[1]), float(high[2])),
+        tree.low,
+        tree.high,
         np.append(np.minimum(codes[0], MIXED_CELL) + CODE_SHIFT, -1).astype(np.int8),
         np.concatenate(codes),
         groups,
@@ -126,17 +125,17 @@ def _listed(
     return counts, index, np.append(ends[index] - counts[index], ends[-1]), lists
 
 
-def _top_level(columns: Columns, mesh: Mesh, budget: Budget) -> tuple[Level, IntArray, Int8Array]:
+def _top_level(tree: TriangleTree, mesh: Mesh, budget: Budget) -> tuple[Level, IntArray, Int8Array]:
     """Return level 0, the place of its cells among all, and the statuses of all, those without lists included."""
     nx, ny, nz = mesh.lattice.n
     counts, index, firsts, lists = _listed(lambda *rest: list_top(mesh, *rest, budget.flag), nx * ny * nz, budget)
-    found = top_statuses(columns, mesh.lattice, counts, False, budget)
+    found = top_statuses(tree, mesh.lattice, counts, False, budget)
     places = top_places(mesh.lattice, index)
     return Level(0, places, found[index], firsts, lists), index, found
 
 
 def _next_level(
-    columns: Columns, mesh: Mesh, above: Level, parents: IntArray, budget: Budget
+    tree: TriangleTree, mesh: Mesh, above: Level, parents: IntArray, budget: Budget
 ) -> tuple[Level, IntArray, Int8Array]:
     """Return the level below `above`, as `_top_level` does, of which all cells are the parts of `parents`."""
     n = len(parents) * PARTS
@@ -148,7 +147,7 @@ def _next_level(
     locate_parts(mesh, above, parents, counts, groups, found, budget.flag)
     budget.check()
     unknown, depth = np.flatnonzero(found == UNKNOWN), above.depth + 1
-    found[unknown] = ask_cells(columns, mesh.lattice, _part_places(above.places[parents], unknown), depth, budget)
+    found[unknown] = ask_cells(tree, mesh.lattice, _part_places(above.places[parents], unknown), depth, budget)
     return Level(depth, _part_places(above.places[parents], index), found[index], firsts, lists), index, found
 
 

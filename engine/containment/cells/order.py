@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray
+from engine.arrays import FloatArray, IntArray, read_only
 from engine.containment.cells.build import Cells
 from engine.containment.cells.lattice import LEVELS, finest
 from engine.jit import kernel
@@ -63,14 +63,6 @@ def counting_sort(keys: Any, ends: Any, order: Any, flag: Any) -> None:
         ends[keys[item]] += 1
 
 
-@kernel
-def _gather(points: Any, order: Any, gathered: Any) -> None:
-    """Fill gathered (n, 3) with the rows of points that `order` names."""
-    for item in range(len(order)):
-        row = order[item]
-        gathered[item, 0], gathered[item, 1], gathered[item, 2] = points[row, 0], points[row, 1], points[row, 2]
-
-
 def order_if_it_pays(points: FloatArray, cells: Cells, budget: Budget) -> IntArray | None:
     """Return an order of the points that keeps memory near, None where it would cost more than it saves."""
     if len(points) < _FEWEST_POINTS or len(cells.groups) < _FEWEST_GROUPS:
@@ -96,7 +88,4 @@ def order_by_cell(points: FloatArray, cells: Cells, budget: Budget) -> IntArray:
 
 def gathered(points: FloatArray, places: IntArray) -> FloatArray:
     """Return the rows of points (n, 3) at `places`, read-only."""
-    rows = np.empty((len(places), 3))
-    _gather(points, places, rows)
-    rows.setflags(write=False)
-    return rows
+    return read_only(points.take(places, axis=0, mode="clip"))

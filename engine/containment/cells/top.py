@@ -13,8 +13,8 @@ import numpy as np
 from engine.arrays import FloatArray, Int8Array, Int32Array, IntArray, read_only
 from engine.containment.cells.lattice import UNKNOWN, Lattice, Mesh, list_top
 from engine.containment.cells.status import label_empty, reference_points
-from engine.containment.methods.polyhedron_ray_parity import locate_by_columns
-from engine.containment.prepared import Columns, columns_of
+from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
+from engine.containment.prepared import TriangleTree, tree_of
 from engine.parallel import Budget
 from engine.solids.polyhedron import Polyhedron
 from engine.types import UNDECIDED
@@ -68,30 +68,30 @@ def top_cells_if_they_pay(solid: Polyhedron, n_points: int, budget: Budget) -> T
 
 def build_top_cells(solid: Polyhedron, budget: Budget) -> TopCells:
     """Return level 0 of `solid`. Raises what `Budget.check` raises."""
-    columns = columns_of(solid, budget.check)
-    lattice = make_lattice(columns, _WANTED, _MOST_CELLS)
+    tree = tree_of(solid, budget.check)
+    lattice = make_lattice(tree, _WANTED, _MOST_CELLS)
     nx, ny, nz = lattice.n
     counts = np.zeros(nx * ny * nz, np.int64)
-    mesh = Mesh(columns.vertices, columns.triangles, lattice)
+    mesh = Mesh(tree.vertices, tree.triangles, lattice)
     list_top(mesh, counts, np.empty(0, np.int32), False, budget.flag)
     budget.check()
-    sides = top_statuses(columns, lattice, counts, True, budget)
+    sides = top_statuses(tree, lattice, counts, True, budget)
     sides[sides == UNKNOWN] = UNDECIDED
     return TopCells(np.array([*lattice.low, *lattice.scale]), (sides.ctypes.data, nx, ny, nz), sides)
 
 
-def make_lattice(columns: Columns, wanted: float, most: float) -> Lattice:
+def make_lattice(tree: TriangleTree, wanted: float, most: float) -> Lattice:
     """Return level 0: some cells to each triangle of a cube, by powers of two, flat axes in one cell.
 
     wanted: cells along the longest axis for each triangle along an edge of a cube; most: cells along it.
     """
-    low, high = columns.boxes[:, 0::2].min(axis=0), columns.boxes[:, 1::2].max(axis=0)
-    extent = high - low
+    low, high = tree.low, tree.high
+    extent = np.subtract(high, low)
     largest = float(extent.max())
-    size = _power_of_two(largest / min(most, max(8.0, wanted * len(columns.triangles) ** (1.0 / 3.0))))
+    size = _power_of_two(largest / min(most, max(8.0, wanted * len(tree.triangles) ** (1.0 / 3.0))))
     sizes = [size if float(e) >= size else _power_of_two(max(float(e), largest * 2.0**-40)) for e in extent]
-    lows = tuple(float(low[k]) - sizes[k] * (95.0 / 256.0) for k in range(3))
-    n = tuple(int((float(high[k]) - lows[k]) / sizes[k]) + 1 for k in range(3))
+    lows = tuple(low[k] - sizes[k] * (95.0 / 256.0) for k in range(3))
+    n = tuple(int((high[k] - lows[k]) / sizes[k]) + 1 for k in range(3))
     return Lattice(
         (lows[0], lows[1], lows[2]),
         (1.0 / sizes[0], 1.0 / sizes[1], 1.0 / sizes[2]),
@@ -112,7 +112,7 @@ def top_places(lattice: Lattice, cells: IntArray) -> Int32Array:
     return np.stack([cells % nx, cells // nx % ny, cells // (nx * ny)], axis=1).astype(np.int32)
 
 
-def top_statuses(columns: Columns, lattice: Lattice, counts: IntArray, only_empty: bool, budget: Budget) -> Int8Array:
+def top_statuses(tree: TriangleTree, lattice: Lattice, counts: IntArray, only_empty: bool, budget: Budget) -> Int8Array:
     """Return the sides of the cells of level 0: of all of an empty one, of the reference point of another one.
 
     counts: lengths of the cells' lists. only_empty: the other ones are left UNKNOWN.
@@ -124,22 +124,22 @@ def top_statuses(columns: Columns, lattice: Lattice, counts: IntArray, only_empt
         is_asked &= counts == 0
     asked = np.flatnonzero(is_asked)
     found = np.zeros(len(counts), np.int8)
-    found[asked] = ask_cells(columns, lattice, top_places(lattice, asked), 0, budget)
+    found[asked] = ask_cells(tree, lattice, top_places(lattice, asked), 0, budget)
     return found[labels]
 
 
-def ask_cells(columns: Columns, lattice: Lattice, places: Int32Array, depth: int, budget: Budget) -> Int8Array:
+def ask_cells(tree: TriangleTree, lattice: Lattice, places: Int32Array, depth: int, budget: Budget) -> Int8Array:
     """Return the sides of the reference points of cells of a level, by vertical rays.
 
     UNKNOWN where such a point is not in its cell, on the boundary, or not decided by the compiled ray.
     """
     points, is_valid = np.empty((len(places), 3)), np.empty(len(places), np.bool_)
     reference_points(lattice, places, depth, points, is_valid)
-    found = np.empty(len(points), np.int8)
+    found, blurs = np.empty(len(points), np.int8), np.zeros(len(points))
     for start in range(0, len(points), _AT_ONCE):
         some = slice(start, start + _AT_ONCE)
         with np.errstate(all="ignore"):
-            locate_by_columns(read_only(points[some]), *columns, found[some], budget.flag)
+            locate_by_tree(read_only(points[some]), blurs[some], tree, found[some], budget.flag)
         budget.check()
     found[(np.abs(found) != 1) | ~is_valid] = UNKNOWN
     return found

@@ -50,7 +50,7 @@ def _add_square(expansion: Any, length: int, value: float, sign: float) -> int:
 
 
 @merged
-def _located(dx: float, dy: float, dz: float, square: float, reach: float, blur: float) -> float:
+def located(dx: float, dy: float, dz: float, square: float, reach: float, blur: float) -> float:
     """Return the location of a point at that difference from the centre, UNDECIDED where the filter is unsure."""
     ax, ay, az = abs(dx), abs(dy), abs(dz)
     total = dx * dx + dy * dy + dz * dz
@@ -97,7 +97,7 @@ def locate_in_ball(
             dx[j], dy[j] = points[first + j, 0] - x, points[first + j, 1] - y
             dz[j] = 0.0 if is_flat else points[first + j, 2] - z
         for j in range(_BLOCK):  # a number of turns that the compiler knows; those past `size` are not looked at
-            found[j] = _located(dx[j], dy[j], dz[j], square, reach, blur)
+            found[j] = located(dx[j], dy[j], dz[j], square, reach, blur)
         n_open = 0
         for j in range(size):
             locations[first + j] = int(found[j])

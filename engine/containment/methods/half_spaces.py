@@ -26,10 +26,11 @@ from typing import Any, Final
 
 import numpy as np
 
+from engine.containment.posed.filters import in_space
 from engine.jit import inline, kernel
 from engine.predicates.loading import as_half_space2, as_half_space3, as_point2, as_point3
-from engine.predicates.side import side_of_line, side_of_plane
-from engine.types import UNDECIDED
+from engine.predicates.side import side_of_plane
+from engine.types import UNDECIDED, HalfSpace3, Point3
 
 _SLACK: Final = 8.0 * 2.0**-53
 _TINY: Final = 1e-320
@@ -42,16 +43,14 @@ _LARGE: Final = 1e300
 
 
 @inline
-def _filter2(h: Any, p: Any) -> int:
-    """Return the sign of h at p where floating point proves it, else UNDECIDED."""
-    ax, by = h.a * p.x, h.b * p.y
-    distance = ax + by + h.c
-    bound = _SLACK * (abs(ax) + abs(by) + abs(h.c)) + _TINY
-    return 1 if distance > bound else -1 if -distance > bound else UNDECIDED
+def _row(planes: Any, row: int) -> HalfSpace3:
+    """Return row `row` of planes (m, 3 or 4); those of the plane have 0 in the third place, as points have."""
+    a, b, d = float(planes[row, 0]), float(planes[row, 1]), float(planes[row, planes.shape[1] - 1])
+    return HalfSpace3(a, b, 0.0 if planes.shape[1] == 3 else float(planes[row, 2]), d)
 
 
 @inline
-def _filter3(h: Any, p: Any) -> int:
+def _filter(h: Any, p: Any) -> int:
     """Return the sign of h at p where floating point proves it, else UNDECIDED."""
     ax, by, cz = h.a * p.x, h.b * p.y, h.c * p.z
     distance = ax + by + cz + h.d
@@ -60,36 +59,17 @@ def _filter3(h: Any, p: Any) -> int:
 
 
 @inline
-def _locate2(p: Any, planes: Any, is_exact: Any) -> tuple[int, bool]:
-    """Return the location of a point and whether it needed more than the filter."""
-    location, is_unsure = 1, False
+def _locate_one(points: Any, item: int, planes: Any, is_exact: Any) -> tuple[int, bool]:
+    """Return the location of a point (n, 2 or 3) and whether it needed more than the filter."""
+    x, y, z = in_space(points, item)
+    p, location, is_unsure = Point3(x, y, z), 1, False
     for row in range(len(planes)):
-        side = _filter2(as_half_space2(planes, row), p)
+        side = _filter(_row(planes, row), p)
         if side == 1:
             continue
         if side == UNDECIDED:
             is_unsure = True
-            side = side_of_line(as_half_space2(planes, row), p) if is_exact[row] else UNDECIDED
-        if side == -1:  # outside one is outside all, whatever is still undecided
-            return -1, is_unsure
-        if side == UNDECIDED:
-            location = UNDECIDED
-        elif side == 0 and location == 1:
-            location = 0
-    return location, is_unsure
-
-
-@inline
-def _locate3(p: Any, planes: Any, is_exact: Any) -> tuple[int, bool]:
-    """Return the location of a point and whether it needed more than the filter."""
-    location, is_unsure = 1, False
-    for row in range(len(planes)):
-        side = _filter3(as_half_space3(planes, row), p)
-        if side == 1:
-            continue
-        if side == UNDECIDED:
-            is_unsure = True
-            side = side_of_plane(as_half_space3(planes, row), p) if is_exact[row] else UNDECIDED
+            side = side_of_plane(_row(planes, row), p) if is_exact[row] else UNDECIDED
         if side == -1:
             return -1, is_unsure
         if side == UNDECIDED:
@@ -172,7 +152,7 @@ def locate_in_half_planes(points: Any, planes: Any, is_exact: Any, locations: An
             locations[start + (places[k] if is_thinned else k)] = found[k]
         for item in range(start, stop if n_open > 0 else start):
             if locations[item] == UNDECIDED:
-                locations[item], is_unsure = _locate2(as_point2(points, item), planes, is_exact)
+                locations[item], is_unsure = _locate_one(points, item, planes, is_exact)
                 n_beyond += is_unsure
     return n_beyond
 
@@ -229,6 +209,6 @@ def locate_in_half_spaces(points: Any, planes: Any, is_exact: Any, locations: An
             locations[start + (places[k] if is_thinned else k)] = found[k]
         for item in range(start, stop if n_open > 0 else start):
             if locations[item] == UNDECIDED:
-                locations[item], is_unsure = _locate3(as_point3(points, item), planes, is_exact)
+                locations[item], is_unsure = _locate_one(points, item, planes, is_exact)
                 n_beyond += is_unsure
     return n_beyond

@@ -17,7 +17,8 @@ from __future__ import annotations
 from typing import Any
 
 from engine.bounding.grid import cell_of
-from engine.jit import kernel
+from engine.containment.posed.filters import orient2d_blurred
+from engine.jit import inline, kernel
 from engine.predicates.loading import as_point2
 from engine.predicates.orientation import orient2d_exact, orient2d_filter
 from engine.types import UNDECIDED
@@ -25,54 +26,66 @@ from engine.types import UNDECIDED
 
 @kernel
 def locate_in_rings(
-    points: Any, starts: Any, ends: Any, x_highs: Any, slabs: Any, box: Any, locations: Any, flag: Any
+    points: Any, blurs: Any, starts: Any, ends: Any, x_highs: Any, slabs: Any, box: Any, locations: Any, flag: Any
 ) -> int:
-    """Fill `locations` (n,) int8 for points (n, 2); returns how many needed more than the filter.
+    """Fill `locations` (n,) int8 for points (n, 2) with blurs (n,); returns how many needed more than the filter.
 
     starts, ends: (m, 2) edges, by falling x_highs (m,), the larger x of each edge.
     slabs: a `BoxGrid` over y whose second axis has one cell; box: xmin, xmax, ymin, ymax of all edges.
     Caller guarantees rings: every vertex starts as many edges as it ends.
     """
     x_min, x_max, y_min, y_max = box
-    n_beyond = 0
+    edges, u, n_beyond = (starts, ends, x_highs), slabs.u, 0
     for item in range(len(points)):
         if flag[0]:
             break
-        q = as_point2(points, item)
-        if q.x < x_min or q.x > x_max or q.y < y_min or q.y > y_max:
+        q, blur = as_point2(points, item), float(blurs[item])
+        below, above = q.y - blur, q.y + blur
+        if q.x + blur < x_min or q.x - blur > x_max or above < y_min or below > y_max:
             locations[item] = -1
             continue
-        slab = cell_of(q.y, slabs.u.low, slabs.u.cells_per_unit, slabs.u.n_cells)
-        is_odd, is_unsure, is_open = False, False, False
-        location = -1
-        for entry in range(slabs.offsets[slab], slabs.offsets[slab + 1]):
-            edge = slabs.items[entry]
-            if x_highs[edge] < q.x:
-                break
-            if entry & 4095 == 4095 and flag[0]:
-                break
-            a, b = as_point2(starts, edge), as_point2(ends, edge)
-            if (a.y < q.y and b.y < q.y) or (a.y > q.y and b.y > q.y):
-                continue
-            is_passed = (a.y <= q.y) != (b.y <= q.y)
-            if a.x > q.x and b.x > q.x:  # wholly to the right: no sign needed
-                is_odd ^= is_passed
-                continue
-            turn = orient2d_filter(a, b, q)
-            if turn == UNDECIDED:
-                is_unsure = True
-                turn = orient2d_exact(a, b, q)
-            if turn == UNDECIDED:
-                is_open = True
-            elif turn == 0:
-                # on the line, and between the ends in y; in x too, unless the edge is horizontal and q beyond it
-                if min(a.x, b.x) <= q.x and q.x <= max(a.x, b.x):
-                    location = 0
-                    break
-            elif is_passed:
-                is_odd ^= (turn > 0) == (a.y < b.y)
-        if location != 0:
-            location = UNDECIDED if is_open else 1 if is_odd else -1
+        location, is_beyond = UNDECIDED, True
+        if below >= y_min and q.x - blur >= x_min:  # false for NaN; what sticks out of the box is left open
+            slab = cell_of(below, u.low, u.cells_per_unit, u.n_cells)
+            if blur == 0.0 or slab == cell_of(above, u.low, u.cells_per_unit, u.n_cells):
+                location, is_beyond = _locate_in_slab(q, blur, edges, slabs, slab, flag)
         locations[item] = location
-        n_beyond += is_unsure
+        n_beyond += is_beyond
     return n_beyond
+
+
+@inline
+def _locate_in_slab(q: Any, blur: float, edges: Any, slabs: Any, slab: int, flag: Any) -> tuple[int, bool]:
+    """Return the location of a blurred q by the edges of a slab, and whether it took more than the filter."""
+    starts, ends, x_highs = edges
+    left, right, below, above = q.x - blur, q.x + blur, q.y - blur, q.y + blur
+    is_odd, is_unsure, is_open = False, False, False
+    for entry in range(slabs.offsets[slab], slabs.offsets[slab + 1]):
+        edge = slabs.items[entry]
+        if x_highs[edge] < left:
+            break
+        if entry & 4095 == 4095 and flag[0]:
+            break
+        a, b = as_point2(starts, edge), as_point2(ends, edge)
+        if (a.y < below and b.y < below) or (a.y > above and b.y > above):
+            continue
+        if blur > 0.0 and ((below <= a.y and a.y <= above) or (below <= b.y and b.y <= above)):
+            return UNDECIDED, True
+        is_passed = (a.y <= q.y) != (b.y <= q.y)
+        if a.x > right and b.x > right:  # wholly to the right: no sign needed
+            is_odd ^= is_passed
+            continue
+        turn = orient2d_filter(a, b, q) if blur == 0.0 else orient2d_blurred(a, b, q, blur)
+        if turn == UNDECIDED:
+            is_unsure = True
+            if blur == 0.0:
+                turn = orient2d_exact(a, b, q)
+        if turn == UNDECIDED:
+            is_open = True
+        elif turn == 0:
+            # on the line, and between the ends in y; in x too, unless the edge is horizontal and q beyond it
+            if min(a.x, b.x) <= q.x and q.x <= max(a.x, b.x):
+                return 0, True
+        elif is_passed:
+            is_odd ^= (turn > 0) == (a.y < b.y)
+    return UNDECIDED if is_open else 1 if is_odd else -1, is_unsure

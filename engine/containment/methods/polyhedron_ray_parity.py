@@ -3,15 +3,20 @@
 The ray goes straight up from q = (x, y, z), moved by the symbolic (eps, eps^2, 0). So moved, no vertex, no edge and no
 vertical triangle lies over it, and every other triangle is passed in its interior or not at all:
 
-- q' is in the triangle's projection if orient2d(a, b, q), (b, c, q), (c, a, q) have the sign of its area. A zero is
-  decided by the move: the derivative of orient2d(a, b, q) by q.x is a.y - b.y, by q.y it is b.x - a.x.
+- q' is in the triangle's projection if orient2d(a, b, q), (b, c, q), (c, a, q) have one sign, that of its area. A zero
+  is decided by the move: the derivative of orient2d(a, b, q) by q.x is a.y - b.y, by q.y it is b.x - a.x.
 - orient3d(a, b, c, q) tells whether the triangle passes above q or below. Where it is zero and q is in the closed
   projection, q is on the triangle: BOUNDARY, whatever the parity.
-- A vertical triangle (projected area exactly zero) is only looked at for BOUNDARY. Such a q is in its plane and on no
-  projection on both sides of its edges; that also holds for triangles that are a segment or a point.
+- The three signs add up to the area: all are zero where the triangle is vertical (or less) and q on its line. It is
+  only looked at for BOUNDARY. Such a q is in its plane and on no projection on both sides of its edges; that also
+  holds for triangles that are a segment or a point.
 
 Both triangles at an edge decide the zero on their common edge alike, so the parity is that of a generic ray close to q
 for every surface that is even at each edge: also self-intersecting, non-manifold and degenerate ones.
+
+The triangles over q are found in a tree of boxes (bvh.py), whose float32 boxes hold theirs; q is widened by more than
+its own rounding. Eight at a time are counted or left out in single precision (overhead.py), the rest one by one. A q
+with a blur (posed/filters.py) is located where all rays of it agree, else left UNDECIDED.
 
 Source: the textbook's ray and parity test; symbolic perturbation after Edelsbrunner and Muecke 1990, "Simulation of
 simplicity".
@@ -21,10 +26,16 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from engine.bounding.grid import cell_of
+import numpy as np
+
+from engine.bounding.bvh import MAX_DEPTH, WIDTH
+from engine.containment.posed.filters import orient2d_blurred, orient3d_blurred
 from engine.jit import inline, kernel
+from engine.lanes.boxes import EMPTY, inside_box
+from engine.lanes.lanes import count_bits, lowest_bit
+from engine.lanes.overhead import BAND, GROWTH, OVERHEAD_ROWS, overhead
 from engine.predicates.loading import as_point3
-from engine.predicates.orientation import orient2d_exact, orient2d_filter, orient3d_exact, orient3d_filter
+from engine.predicates.orientation import orient2d, orient2d_exact, orient2d_filter, orient3d_exact, orient3d_filter
 from engine.types import UNDECIDED, Point2
 
 MISSED: Final = 0
@@ -33,6 +44,10 @@ ON_FACE: Final = 3
 """How a ray meets a triangle; UNDECIDED where a sign is out of the compiled range, for rational arithmetic."""
 BEYOND: Final = 4
 """Added to one of these where the filter was not enough."""
+STACK: Final = WIDTH * MAX_DEPTH + WIDTH
+_SLACK: Final = 2.0**-20
+"""By how much a point in the tree's coordinates, at most 4, is widened for its rounding to float32."""
+_ABOVE_ALL: Final = np.float32(8.0)
 
 
 @inline
@@ -55,7 +70,7 @@ def moved_sign(turn: int, a: Any, b: Any) -> int:
 
 
 @inline
-def _is_astride(first: int, second: int, third: int) -> bool:
+def is_astride(first: int, second: int, third: int) -> bool:
     """Tell whether both 1 and -1 are among the three signs; UNDECIDED counts as neither."""
     has_left = first == 1 or second == 1 or third == 1
     has_right = first == -1 or second == -1 or third == -1
@@ -66,17 +81,11 @@ def _is_astride(first: int, second: int, third: int) -> bool:
 def touch_in_plane(a: Any, b: Any, c: Any, q: Any) -> int:
     """Return ON_FACE, MISSED or UNDECIDED for 2D points: q among the signs of all three edges never on both sides."""
     first, second, third = orient2d(a, b, q), orient2d(b, c, q), orient2d(c, a, q)
-    if _is_astride(first, second, third):
+    if is_astride(first, second, third):
         return MISSED
     if first == UNDECIDED or second == UNDECIDED or third == UNDECIDED:
         return UNDECIDED
     return ON_FACE
-
-
-@inline
-def orient2d(a: Any, b: Any, c: Any) -> int:
-    """Return the exact sign or UNDECIDED; the filter is `decide2`'s."""
-    return decide2(a, b, c)[0]
 
 
 @inline
@@ -106,31 +115,32 @@ def touch_triangle(a: Any, b: Any, c: Any, q: Any) -> int:
 
 
 @inline
-def cross_upwards(a: Any, b: Any, c: Any, area: int, z_low: float, q: Any) -> int:
-    """Return CROSSED if the ray up from the moved q meets the face, ON_FACE if q is on it, else MISSED, or UNDECIDED.
+def meet_upwards(a: Any, b: Any, c: Any, q: Any) -> int:
+    """Return CROSSED if the ray up from the moved q meets the triangle, ON_FACE if q is on it, MISSED or UNDECIDED.
 
-    area: exact sign of the projected area, not 0. Caller guarantees that q is in the box in x and y, and not above it.
+    BEYOND is added where it took more than the filter.
     """
+    if q.z > max(a.z, b.z, c.z):
+        return MISSED
     a2, b2, c2, q2 = Point2(a.x, a.y), Point2(b.x, b.y), Point2(c.x, c.y), Point2(q.x, q.y)
-    beyond, is_open, is_inside = 0, False, True
-    for edge in range(3):
-        if edge == 0:
-            start, end = a2, b2
-        elif edge == 1:
-            start, end = b2, c2
-        else:
-            start, end = c2, a2
-        turn, more = decide2(start, end, q2)
-        beyond |= more
-        if turn == -area:
-            return MISSED | beyond
-        if turn == UNDECIDED:
-            is_open = True
-        elif turn == 0:
-            is_inside &= moved_sign(0, start, end) == area
-    if is_open:
+    first, beyond = decide2(a2, b2, q2)
+    second, more = decide2(b2, c2, q2)
+    if first * second == -1:
+        return MISSED | beyond | more
+    third, most = decide2(c2, a2, q2)
+    beyond |= more | most
+    if is_astride(first, second, third):
+        return MISSED | beyond
+    if first == UNDECIDED or second == UNDECIDED or third == UNDECIDED:
         return UNDECIDED | beyond
-    if q.z < z_low:
+    area = first if first != 0 else second if second != 0 else third
+    if area == 0:
+        is_beside = q.x < min(a.x, b.x, c.x) or q.x > max(a.x, b.x, c.x)
+        is_beside |= q.y < min(a.y, b.y, c.y) or q.y > max(a.y, b.y, c.y)
+        return (MISSED if is_beside or q.z < min(a.z, b.z, c.z) else touch_triangle(a, b, c, q)) | beyond
+    is_inside = moved_sign(first, a2, b2) == area and moved_sign(second, b2, c2) == area
+    is_inside = is_inside and moved_sign(third, c2, a2) == area
+    if q.z < min(a.z, b.z, c.z):
         return (CROSSED if is_inside else MISSED) | beyond
     side = orient3d_filter(a, b, c, q)
     if side == UNDECIDED:
@@ -143,87 +153,122 @@ def cross_upwards(a: Any, b: Any, c: Any, area: int, z_low: float, q: Any) -> in
     return (CROSSED if is_inside and side != area else MISSED) | beyond
 
 
-@kernel
-def fill_rows(vertices: Any, triangles: Any, order: Any, rows: Any, boxes: Any, areas: Any) -> None:
-    """Fill rows (m, 3) int32, boxes (m, 6) and areas (m,) int8 with the triangles that `order` names.
+@inline
+def _meet_blurred(a: Any, b: Any, c: Any, q: Any, blur: float) -> int:
+    """Return CROSSED if the rays up from all of the blurred q meet the triangle, MISSED if none does, or UNDECIDED."""
+    if q.z - blur > max(a.z, b.z, c.z):
+        return MISSED
+    a2, b2, c2, q2 = Point2(a.x, a.y), Point2(b.x, b.y), Point2(c.x, c.y), Point2(q.x, q.y)
+    first, second = orient2d_blurred(a2, b2, q2, blur), orient2d_blurred(b2, c2, q2, blur)
+    third = orient2d_blurred(c2, a2, q2, blur)
+    if is_astride(first, second, third):
+        return MISSED
+    if first == UNDECIDED or second == UNDECIDED or third == UNDECIDED:
+        return UNDECIDED | BEYOND
+    if q.z + blur < min(a.z, b.z, c.z):
+        return CROSSED
+    side = orient3d_blurred(a, b, c, q, blur)
+    return UNDECIDED | BEYOND if side == UNDECIDED else MISSED if side == first else CROSSED
 
-    boxes: xmin, xmax, ymin, ymax, zmin, zmax. areas: exact sign of the area seen from above, UNDECIDED out of range.
+
+@inline
+def locate_in_tree(tree: Any, q: Any, blur: float, stack: Any, flag: Any) -> tuple[int, bool]:
+    """Return the location of a blurred q in a `TriangleTree`, and whether it took more than a filter.
+
+    stack: (STACK,) int32. Coordinates of the tree are at most 2, and so is q in it, or it is outside.
     """
-    for place in range(len(order)):
-        triangle = order[place]
-        for corner in range(3):
-            rows[place, corner] = triangles[triangle, corner]
-        a = as_point3(vertices, triangles[triangle, 0])
-        b = as_point3(vertices, triangles[triangle, 1])
-        c = as_point3(vertices, triangles[triangle, 2])
-        boxes[place, 0], boxes[place, 1] = min(a.x, b.x, c.x), max(a.x, b.x, c.x)
-        boxes[place, 2], boxes[place, 3] = min(a.y, b.y, c.y), max(a.y, b.y, c.y)
-        boxes[place, 4], boxes[place, 5] = min(a.z, b.z, c.z), max(a.z, b.z, c.z)
-        areas[place] = orient2d(Point2(a.x, a.y), Point2(b.x, b.y), Point2(c.x, c.y))
+    low, high = tree.low, tree.high
+    is_out = (q.x + blur < low[0]) | (q.x - blur > high[0]) | (q.y + blur < low[1]) | (q.y - blur > high[1])
+    if is_out | (q.z + blur < low[2]) | (q.z - blur > high[2]):
+        return -1, False
+    origin, scale = tree.origin, tree.scale
+    x, y, z = (q.x - origin[0]) / scale, (q.y - origin[1]) / scale, (q.z - origin[2]) / scale
+    slack = _SLACK + blur / scale
+    if not (abs(x) < 4.0 and abs(y) < 4.0 and abs(z) < 4.0 and slack < 1.0):  # also NaN
+        return UNDECIDED, True
+    least = np.float32(x - slack), np.float32(y - slack), np.float32(z - slack)
+    most = np.float32(x + slack), np.float32(y + slack), _ABOVE_ALL
+    n_stack, is_odd, is_open, beyond = 1, False, False, 0
+    stack[0] = 0
+    while n_stack > 0 and not flag[0]:  # bound: each node enters once
+        n_stack -= 1
+        node = int(stack[n_stack])
+        lanes = inside_box(tree.boxes, node, least, most)
+        if lanes != 0 and tree.child[node, 0] < 0:
+            u, v = x - float(tree.boxes[node, 0, 0]), y - float(tree.boxes[node, 1, 0])
+            over, beside = overhead(tree.blocks, tree.boxes, node, u, v, z + slack, blur / scale)
+            is_odd ^= (count_bits(lanes & over) & 1) == 1
+            lanes &= ~(over | beside)
+        while lanes != 0:
+            child = int(tree.child[node, lowest_bit(lanes)])
+            lanes &= lanes - 1
+            if child >= 0:
+                stack[n_stack] = child
+                n_stack += 1
+                continue
+            a = as_point3(tree.vertices, tree.triangles[-1 - child, 0])
+            b = as_point3(tree.vertices, tree.triangles[-1 - child, 1])
+            c = as_point3(tree.vertices, tree.triangles[-1 - child, 2])
+            met = meet_upwards(a, b, c, q) if blur == 0.0 else _meet_blurred(a, b, c, q, blur)
+            beyond |= met & BEYOND
+            if met & 3 == ON_FACE:
+                return 0, True
+            is_open |= met & 3 == UNDECIDED
+            is_odd ^= met & 3 == CROSSED
+    return UNDECIDED if is_open else 1 if is_odd else -1, beyond != 0
 
 
 @kernel
-def locate_by_columns(
-    points: Any,
-    vertices: Any,
-    triangles: Any,
-    boxes: Any,
-    areas: Any,
-    columns: Any,
-    z_min: float,
-    locations: Any,
-    flag: Any,
-) -> int:
-    """Fill `locations` (n,) int8 for points (n, 3); returns how many needed more than the filter.
+def locate_by_tree(points: Any, blurs: Any, tree: Any, locations: Any, flag: Any) -> int:
+    """Fill `locations` (n,) int8 for points (n, 3) with blurs (n,); returns how many needed more than the filter.
 
-    triangles: (m, 3) by falling zmax. boxes: (m, 6) xmin, xmax, ymin, ymax, zmin, zmax. areas: (m,) int8 exact signs.
-    columns: a `BoxGrid` over x and y. Caller guarantees a surface that is even at each edge.
+    tree: a `TriangleTree`. Caller guarantees a surface that is even at each edge.
     """
-    u, v = columns.u, columns.v
-    n_beyond = 0
+    stack, n_beyond = np.empty(STACK, np.int32), 0
     for item in range(len(points)):
         if flag[0]:
             break
-        q = as_point3(points, item)
-        if q.x < u.low or q.x > u.high or q.y < v.low or q.y > v.high or q.z < z_min:
-            locations[item] = -1
-            continue
-        column = cell_of(q.x, u.low, u.cells_per_unit, u.n_cells)
-        column += cell_of(q.y, v.low, v.cells_per_unit, v.n_cells) * u.n_cells
-        is_odd, is_open, beyond = False, False, 0
-        location = -1
-        for entry in range(columns.offsets[column], columns.offsets[column + 1]):
-            triangle = columns.items[entry]
-            if boxes[triangle, 5] < q.z:
-                break
-            if entry & 1023 == 1023 and flag[0]:
-                break
-            if (
-                q.x < boxes[triangle, 0]
-                or q.x > boxes[triangle, 1]
-                or q.y < boxes[triangle, 2]
-                or q.y > boxes[triangle, 3]
-            ):
-                continue
-            z_low, area = boxes[triangle, 4], areas[triangle]
-            if area == 0 and q.z < z_low:
-                continue
-            a = as_point3(vertices, triangles[triangle, 0])
-            b = as_point3(vertices, triangles[triangle, 1])
-            c = as_point3(vertices, triangles[triangle, 2])
-            if area != 0:
-                met = cross_upwards(a, b, c, area, z_low, q)
-            else:
-                met = touch_triangle(a, b, c, q)
-            beyond |= met & BEYOND
-            met &= 3
-            if met == ON_FACE:
-                location = 0
-                break
-            is_open |= met == UNDECIDED
-            is_odd ^= met == CROSSED
-        if location != 0:
-            location = UNDECIDED if is_open else 1 if is_odd else -1
-        locations[item] = location
-        n_beyond += beyond != 0
+        locations[item], is_beyond = locate_in_tree(tree, as_point3(points, item), float(blurs[item]), stack, flag)
+        n_beyond += is_beyond
     return n_beyond
+
+
+@kernel
+def fill_triangle_boxes(vertices: Any, triangles: Any, boxes: Any) -> None:
+    """Fill boxes (m, 6) with the least and the largest coordinates of triangles (m, 3)."""
+    for triangle in range(len(triangles)):
+        a, b = as_point3(vertices, triangles[triangle, 0]), as_point3(vertices, triangles[triangle, 1])
+        c = as_point3(vertices, triangles[triangle, 2])
+        boxes[triangle, 0], boxes[triangle, 3] = min(a.x, b.x, c.x), max(a.x, b.x, c.x)
+        boxes[triangle, 1], boxes[triangle, 4] = min(a.y, b.y, c.y), max(a.y, b.y, c.y)
+        boxes[triangle, 2], boxes[triangle, 5] = min(a.z, b.z, c.z), max(a.z, b.z, c.z)
+
+
+@kernel
+def lay_out(vertices: Any, triangles: Any, tree: Any, child: Any, ordered: Any, blocks: Any) -> None:
+    """Fill ordered (m, 3) int32 with the triangles in the order of a `Bvh`, child with its children numbered so.
+
+    blocks: (n_nodes, 8, 8) float32, zero; filled as `overhead` reads them.
+    """
+    place, origin, scale = 0, tree.origin, tree.scale
+    for node in range(len(child)):
+        centre_x, centre_y = float(tree.boxes[node, 0, 0]), float(tree.boxes[node, 1, 0])
+        reach = 0.0
+        for lane in range(WIDTH):
+            triangle = -1 - tree.child[node, lane]
+            child[node, lane] = tree.child[node, lane]
+            if triangle < 0 or tree.child[node, lane] == EMPTY:
+                continue
+            for corner in range(3):
+                vertex = triangles[triangle, corner]
+                x = (vertices[vertex, 0] - origin[0]) / scale - centre_x
+                y = (vertices[vertex, 1] - origin[1]) / scale - centre_y
+                blocks[node, 2 * corner, lane], blocks[node, 2 * corner + 1, lane] = x, y
+                reach = max(reach, abs(x), abs(y))
+                ordered[place, corner] = vertex
+            child[node, lane] = -1 - place
+            place += 1
+        reach += 2.0 * _SLACK
+        for lane in range(WIDTH):
+            blocks[node, OVERHEAD_ROWS - 2, lane] = BAND * reach * reach
+            blocks[node, OVERHEAD_ROWS - 1, lane] = GROWTH * reach

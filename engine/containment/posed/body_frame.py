@@ -13,28 +13,40 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from engine.jit import kernel
+from engine.containment.posed.filters import in_space
+from engine.jit import inline, kernel
 from engine.predicates.error_free import two_diff
 
-BLUR: Final = 128.0 * 2.0**-53
+_BLUR: Final = 128.0 * 2.0**-53
 _TINY: Final = 1e-320
 
 
-@kernel
-def move_to_body_frame(points: Any, inverse: Any, translation: Any, is_turn: bool, moved: Any, blurs: Any) -> None:
-    """Fill moved (n, dim) and blurs (n,): twice a bound on the error of each coordinate, 0.0 where it is exact.
+@inline
+def to_frame(frames: Any, frame: int, p: Any) -> Any:
+    """Return a point (x, y, z) in the frame of a pose, and its blur: 0.0 where it is exact.
 
-    inverse: (dim, dim), R^-1 rounded; is_turn: its entries are exactly -1, 0 and 1.
+    frames: has inverses (n, 3, 3) of R^-1 rounded, translations (n, 3) and is_turn (n,): whether the entries are
+    exactly -1, 0 and 1. frame: which of them, -1 for none.
     """
-    n_axes = len(translation)
+    if frame < 0:
+        return p, 0.0
+    inverses, translations = frames.inverses, frames.translations
+    dx, x_tail = two_diff(p[0], float(translations[frame, 0]))
+    dy, y_tail = two_diff(p[1], float(translations[frame, 1]))
+    dz, z_tail = two_diff(p[2], float(translations[frame, 2]))
+    x = inverses[frame, 0, 0] * dx + inverses[frame, 0, 1] * dy + inverses[frame, 0, 2] * dz
+    y = inverses[frame, 1, 0] * dx + inverses[frame, 1, 1] * dy + inverses[frame, 1, 2] * dz
+    z = inverses[frame, 2, 0] * dx + inverses[frame, 2, 1] * dy + inverses[frame, 2, 2] * dz
+    if frames.is_turn[frame] and x_tail == 0.0 and y_tail == 0.0 and z_tail == 0.0:
+        return (x, y, z), 0.0
+    return (x, y, z), _BLUR * (abs(dx) + abs(dy) + abs(dz)) + _TINY
+
+
+@kernel
+def move_to_body_frame(points: Any, frames: Any, moved: Any, blurs: Any) -> None:
+    """Fill moved (n, dim) and blurs (n,) by the only one of `frames`."""
     for item in range(len(points)):
-        size, is_exact = 0.0, is_turn
-        for axis in range(n_axes):
-            moved[item, axis] = 0.0
-        for axis in range(n_axes):
-            difference, tail = two_diff(float(points[item, axis]), float(translation[axis]))
-            size += abs(difference)
-            is_exact &= tail == 0.0
-            for row in range(n_axes):
-                moved[item, row] += inverse[row, axis] * difference
-        blurs[item] = 0.0 if is_exact else BLUR * size + _TINY
+        p, blurs[item] = to_frame(frames, 0, in_space(points, item))
+        moved[item, 0], moved[item, 1] = p[0], p[1]
+        if points.shape[1] == 3:
+            moved[item, 2] = p[2]

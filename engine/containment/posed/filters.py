@@ -10,20 +10,16 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from engine.bounding.grid import cell_of
 from engine.jit import inline, kernel
-from engine.predicates.loading import as_point2, as_point3
 from engine.predicates.orientation import BOUND_2D, BOUND_3D, GUARD_2D, GUARD_3D
-from engine.types import UNDECIDED, Point2
+from engine.types import UNDECIDED
 
 _SLACK: Final = 8.0 * 2.0**-53
 _TINY: Final = 1e-320
-BESIDE, ACROSS = -1, -2
-"""No column: the ray from all of the point misses all columns; it lies over several, or over the edge of all."""
 
 
 @inline
-def _orient2d_blurred(a: Any, b: Any, q: Any, blur: float) -> int:
+def orient2d_blurred(a: Any, b: Any, q: Any, blur: float) -> int:
     """Return the sign of orient2d(a, b, .) on all of the blurred q, or UNDECIDED."""
     left = (a.x - q.x) * (b.y - q.y)
     right = (a.y - q.y) * (b.x - q.x)
@@ -33,7 +29,7 @@ def _orient2d_blurred(a: Any, b: Any, q: Any, blur: float) -> int:
 
 
 @inline
-def _orient3d_blurred(a: Any, b: Any, c: Any, q: Any, blur: float) -> int:
+def orient3d_blurred(a: Any, b: Any, c: Any, q: Any, blur: float) -> int:
     """Return the sign of orient3d(a, b, c, .) on all of the blurred q, or UNDECIDED.
 
     Taken from a: dot((b - a) x (c - a), q - a), whose change with q is at most the sum of the normal's parts.
@@ -153,159 +149,3 @@ def locate_by_polynomial_blurred(
         locations[item] = 1 if value > bound else -1 if -value > bound else UNDECIDED
         n_open += locations[item] == UNDECIDED
     return n_open
-
-
-@kernel
-def locate_in_rings_blurred(
-    points: Any, blurs: Any, starts: Any, ends: Any, x_highs: Any, slabs: Any, box: Any, locations: Any, flag: Any
-) -> int:
-    """Fill `locations` (n,) int8 by ray and parity as polygon_ray_parity.py does; returns how many stay open."""
-    x_min, x_max, y_min, y_max = box
-    n_open = 0
-    for item in range(len(points)):
-        if flag[0]:
-            break
-        q, blur = as_point2(points, item), blurs[item]
-        left, right, below, above = q.x - blur, q.x + blur, q.y - blur, q.y + blur
-        if right < x_min or left > x_max or above < y_min or below > y_max:
-            locations[item] = -1
-            continue
-        location = UNDECIDED
-        if left > x_min and below > y_min:  # false for NaN; the frame's border is left open
-            slab = cell_of(below, slabs.u.low, slabs.u.cells_per_unit, slabs.u.n_cells)
-            if slab == cell_of(above, slabs.u.low, slabs.u.cells_per_unit, slabs.u.n_cells):
-                location = _parity_in_slab(q, blur, slab, starts, ends, x_highs, slabs)
-        locations[item] = location
-        n_open += location == UNDECIDED
-    return n_open
-
-
-@inline
-def _parity_in_slab(q: Any, blur: float, slab: int, starts: Any, ends: Any, x_highs: Any, slabs: Any) -> int:
-    """Return the location of a blurred q within one slab, or UNDECIDED."""
-    left, right, below, above = q.x - blur, q.x + blur, q.y - blur, q.y + blur
-    is_odd = False
-    for entry in range(slabs.offsets[slab], slabs.offsets[slab + 1]):
-        edge = slabs.items[entry]
-        if x_highs[edge] < left:
-            break
-        a, b = as_point2(starts, edge), as_point2(ends, edge)
-        if (a.y < below and b.y < below) or (a.y > above and b.y > above):
-            continue
-        if (below <= a.y and a.y <= above) or (below <= b.y and b.y <= above):
-            return UNDECIDED
-        if a.x > right and b.x > right:
-            is_odd = not is_odd
-            continue
-        turn = _orient2d_blurred(a, b, q, blur)
-        if turn == UNDECIDED:
-            return UNDECIDED
-        if (turn > 0) == (a.y < b.y):
-            is_odd = not is_odd
-    return 1 if is_odd else -1
-
-
-@inline
-def column_of(q: Any, blur: float, u: Any, v: Any, z_min: float) -> int:
-    """Return the column over x and y that holds all of a blurred q; BESIDE or ACROSS where there is none."""
-    x_low, x_high, y_low, y_high = q.x - blur, q.x + blur, q.y - blur, q.y + blur
-    if (x_high < u.low) | (x_low > u.high) | (y_high < v.low) | (y_low > v.high) | (q.z + blur < z_min):
-        return BESIDE
-    if not ((x_low >= u.low) & (y_low >= v.low)):  # false for NaN
-        return ACROSS
-    column = cell_of(x_low, u.low, u.cells_per_unit, u.n_cells)
-    row = cell_of(y_low, v.low, v.cells_per_unit, v.n_cells)
-    if blur > 0.0:
-        is_one = column == cell_of(x_high, u.low, u.cells_per_unit, u.n_cells)
-        if not (is_one & (row == cell_of(y_high, v.low, v.cells_per_unit, v.n_cells))):
-            return ACROSS
-    return row * u.n_cells + column
-
-
-@kernel
-def locate_by_columns_blurred(
-    points: Any,
-    blurs: Any,
-    vertices: Any,
-    triangles: Any,
-    boxes: Any,
-    areas: Any,
-    columns: Any,
-    z_min: float,
-    locations: Any,
-    flag: Any,
-) -> int:
-    """Fill `locations` (n,) int8 by vertical rays as polyhedron_ray_parity.py does; returns how many stay open."""
-    lists = vertices, triangles, boxes, areas, columns.offsets, columns.items
-    n_open = 0
-    for item in range(len(points)):
-        if flag[0]:
-            break
-        q, blur = as_point3(points, item), blurs[item]
-        column = column_of(q, blur, columns.u, columns.v, z_min)
-        location = -1 if column == BESIDE else UNDECIDED
-        if column >= 0:
-            location = parity_in_column(q, blur, column, lists, flag)
-        locations[item] = location
-        n_open += location == UNDECIDED
-    return n_open
-
-
-@inline
-def parity_in_column(q: Any, blur: float, column: int, lists: Any, flag: Any) -> int:
-    """Return the location of a blurred q within one column, or UNDECIDED.
-
-    lists: vertices, triangles, boxes, areas as for `locate_by_columns`, offsets and items of the columns.
-    """
-    vertices, triangles, boxes, areas, offsets, items = lists
-    x_low, x_high, y_low, y_high = q.x - blur, q.x + blur, q.y - blur, q.y + blur
-    z_low, z_high = q.z - blur, q.z + blur
-    is_odd = False
-    for entry in range(offsets[column], offsets[column + 1]):
-        triangle = items[entry]
-        if boxes[triangle, 5] < z_low:
-            break
-        if entry & 1023 == 1023 and flag[0]:
-            break
-        if boxes[triangle, 1] < x_low or boxes[triangle, 0] > x_high:
-            continue
-        if boxes[triangle, 3] < y_low or boxes[triangle, 2] > y_high:
-            continue
-        area, is_below = areas[triangle], z_high < boxes[triangle, 4]
-        if area == 0 and is_below:
-            continue
-        a = as_point3(vertices, triangles[triangle, 0])
-        b = as_point3(vertices, triangles[triangle, 1])
-        c = as_point3(vertices, triangles[triangle, 2])
-        met = _met_by_ray(a, b, c, q, area, is_below, blur)
-        if met == UNDECIDED:
-            return UNDECIDED
-        is_odd ^= met == 1
-    return 1 if is_odd else -1
-
-
-@inline
-def _met_by_ray(a: Any, b: Any, c: Any, q: Any, area: int, is_below: bool, blur: float) -> int:
-    """Return 1 if the rays up from all of the blurred q meet the triangle, 0 if none does, else UNDECIDED."""
-    if area != 0:
-        turn = _in_projection(a, b, c, q, area, blur)
-        if turn != 1:
-            return UNDECIDED if turn == UNDECIDED else 0
-        if is_below:
-            return 1
-    side = _orient3d_blurred(a, b, c, q, blur)
-    if side == UNDECIDED:
-        return UNDECIDED
-    return 1 if area != 0 and side != area else 0
-
-
-@inline
-def _in_projection(a: Any, b: Any, c: Any, q: Any, area: int, blur: float) -> int:
-    """Return 1 if all of the blurred q is in the triangle seen from above, -1 if none of it is, else UNDECIDED."""
-    a2, b2, c2, q2 = Point2(a.x, a.y), Point2(b.x, b.y), Point2(c.x, c.y), Point2(q.x, q.y)
-    first = _orient2d_blurred(a2, b2, q2, blur)
-    second = _orient2d_blurred(b2, c2, q2, blur)
-    third = _orient2d_blurred(c2, a2, q2, blur)
-    if first == -area or second == -area or third == -area:
-        return -1
-    return 1 if first == area and second == area and third == area else UNDECIDED

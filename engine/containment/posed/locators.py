@@ -10,22 +10,25 @@ rationals.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray, Int8Array, read_only
+from engine.arrays import FloatArray, Int8Array, read_only
 from engine.containment.locators import Counts, Fill, Locator, csg_locator, locator_of, rational_half, settled
 from engine.containment.methods.ball import locate_in_ball
+from engine.containment.methods.polygon_one_pass import locate_by_ring_pass
+from engine.containment.methods.polygon_ray_parity import locate_in_rings
+from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
 from engine.containment.posed.body_frame import move_to_body_frame
 from engine.containment.posed.filters import (
-    locate_by_columns_blurred,
     locate_by_polynomial_blurred,
     locate_in_box_blurred,
-    locate_in_rings_blurred,
     locate_in_rows_blurred,
 )
-from engine.containment.prepared import columns_of, rings_of, rounded_rows
-from engine.containment.rational_locate import adjugate, prism_walls, to_world_frame
+from engine.containment.posed.frames import Frames, frames_of
+from engine.containment.prepared import closed_rings_of, rings_of, rounded_rows, tree_of
+from engine.containment.rational_locate import Check, prism_walls, to_world_frame
 from engine.parallel import Budget
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
@@ -40,7 +43,7 @@ from engine.solids.sphere import Sphere
 from engine.solids.triangle import Triangle
 from engine.types import UNDECIDED
 
-Blurred = Callable[[FloatArray, FloatArray, Int8Array, FlagArray], int]
+Blurred = Callable[[FloatArray, FloatArray, Int8Array, Budget], int]
 
 
 def posed_locator(solid: Solid, pose: Pose | None) -> Locator:
@@ -52,48 +55,36 @@ def posed_locator(solid: Solid, pose: Pose | None) -> Locator:
     if isinstance(solid, Sphere):
         return _in_posed_sphere(solid, pose)
     unposed = locator_of(solid)
-    inverse, is_turn = inverse_of(pose.rotation)
+    frames = frames_of([pose], solid.dimension)
     if isinstance(solid, Implicit) and solid.function is not None:
-        return Locator(unposed.method, _through_frame(unposed.fill, inverse, pose), unposed.decisions)
-    return Locator(unposed.method, _filtered(solid, pose, unposed, inverse, is_turn), unposed.decisions)
+        return Locator(unposed.method, _through_frame(unposed.fill, frames), unposed.decisions)
+    return Locator(unposed.method, _filtered(solid, pose, unposed, frames), unposed.decisions)
 
 
-def inverse_of(rotation: FloatArray) -> tuple[FloatArray, bool]:
-    """Return R^-1 with each entry off by less than 32 u, and whether R only turns the axes onto each other."""
-    if np.isin(rotation, (-1.0, 0.0, 1.0)).all() and (np.abs(rotation).sum(axis=0) == 1.0).all():
-        return np.ascontiguousarray(rotation.T), True
-    found, determinant = adjugate(rotation.tolist())
-    return np.array(found) / determinant, False
-
-
-def _moved(points: FloatArray, inverse: FloatArray, pose: Pose, is_turn: bool) -> tuple[FloatArray, FloatArray]:
+def _moved(points: FloatArray, frames: Frames) -> tuple[FloatArray, FloatArray]:
     moved, blurs = np.empty_like(points), np.empty(len(points))
     with np.errstate(all="ignore"):
-        move_to_body_frame(points, inverse, pose.translation, is_turn, moved, blurs)
-    return moved, blurs
+        move_to_body_frame(points, frames, moved, blurs)
+    return read_only(moved), blurs
 
 
-def _through_frame(fill: Fill, inverse: FloatArray, pose: Pose) -> Fill:
+def _through_frame(fill: Fill, frames: Frames) -> Fill:
     """Return the fill that rounds each point's preimage: for callables, whose decisions are float64 anyway."""
-    return lambda points, locations, budget: fill(_moved(points, inverse, pose, False)[0], locations, budget)
+    return lambda points, locations, budget: fill(_moved(points, frames)[0], locations, budget)
 
 
-def _filtered(solid: Solid, pose: Pose, unposed: Locator, inverse: FloatArray, is_turn: bool) -> Fill:
+def _filtered(solid: Solid, pose: Pose, unposed: Locator, frames: Frames) -> Fill:
     """Return the fill that tries exact preimages, then the blurred filter, then integers."""
     blurred = _blurred_kernel(solid)
     settle = rational_half(solid, pose)
 
     def fill(points: FloatArray, locations: Int8Array, budget: Budget) -> Counts:
-        moved, blurs = _moved(points, inverse, pose, is_turn)
-        if isinstance(solid, Polyhedron):
-            columns_of(solid, budget.check)
-        elif isinstance(solid, Polygon):
-            rings_of(solid, budget.check)
+        moved, blurs = _moved(points, frames)
         with np.errstate(all="ignore"):
-            n_beyond = int(blurred(moved, blurs, locations, budget.flag))
+            n_beyond = int(blurred(moved, blurs, locations, budget))
         budget.check()
         n_rational = 0
-        if is_turn:
+        if frames.is_turn[0]:
             exact = np.flatnonzero((blurs == 0.0) & (locations == UNDECIDED))
             if len(exact):
                 found = np.empty(len(exact), np.int8)
@@ -109,25 +100,25 @@ def _filtered(solid: Solid, pose: Pose, unposed: Locator, inverse: FloatArray, i
 
 def _blurred_kernel(solid: Solid) -> Blurred:
     """Return the blurred kernel over the prepared structures of `solid`."""
+    prepared: Callable[[Check], tuple[Any, ...]]
     if isinstance(solid, Aabb):
-        low, high = solid.min, solid.max
-        return lambda points, blurs, out, flag: int(locate_in_box_blurred(points, blurs, low, high, out, flag))
-    if isinstance(solid, (HalfSpace, Convex)) or (isinstance(solid, Triangle) and solid.dimension == 3):
+        kernel, prepared = locate_in_box_blurred, lambda _: (solid.min, solid.max)
+    elif isinstance(solid, (HalfSpace, Convex)) or (isinstance(solid, Triangle) and solid.dimension == 3):
         planes = _rows(solid)
         rows = np.zeros((len(planes), 4))
         rows[:, : planes.shape[1] - 1], rows[:, 3] = planes[:, :-1], planes[:, -1]
-        return lambda points, blurs, out, flag: int(locate_in_rows_blurred(points, blurs, rows, out, flag))
-    if isinstance(solid, (Polygon, Triangle)):
-        return lambda points, blurs, out, flag: int(locate_in_rings_blurred(points, blurs, *rings_of(solid), out, flag))
-    if isinstance(solid, Polyhedron):
-        return lambda points, blurs, out, flag: int(
-            locate_by_columns_blurred(points, blurs, *columns_of(solid), out, flag)
-        )
-    assert isinstance(solid, Implicit)
-    powers, coefficients, degree = solid.powers, solid.coefficients, int(solid.powers.sum(axis=1).max())
-    return lambda points, blurs, out, flag: int(
-        locate_by_polynomial_blurred(points, blurs, powers, coefficients, degree, out, flag)
-    )
+        kernel, prepared = locate_in_rows_blurred, lambda _: (rows,)
+    elif isinstance(solid, Triangle):
+        kernel, prepared = locate_by_ring_pass, lambda check: closed_rings_of(solid, check)
+    elif isinstance(solid, Polygon):
+        kernel, prepared = locate_in_rings, lambda check: rings_of(solid, check)
+    elif isinstance(solid, Polyhedron):
+        kernel, prepared = locate_by_tree, lambda check: (tree_of(solid, check),)
+    else:
+        assert isinstance(solid, Implicit)
+        degree = int(solid.powers.sum(axis=1).max())
+        kernel, prepared = locate_by_polynomial_blurred, lambda _: (solid.powers, solid.coefficients, degree)
+    return lambda points, blurs, out, budget: int(kernel(points, blurs, *prepared(budget.check), out, budget.flag))
 
 
 def _rows(solid: Solid) -> FloatArray:
@@ -153,7 +144,7 @@ def posed_center(solid: Sphere, pose: Pose) -> tuple[FloatArray, float]:
 def _in_posed_sphere(solid: Sphere, pose: Pose) -> Locator:
     center, blur = posed_center(solid, pose)
 
-    def run(points: FloatArray, locations: Int8Array, flag: FlagArray) -> int:
-        return int(locate_in_ball(points, center, blur, solid.radius, np.empty(8), locations, flag))
+    def run(points: FloatArray, locations: Int8Array, budget: Budget) -> int:
+        return int(locate_in_ball(points, center, blur, solid.radius, np.empty(8), locations, budget.flag))
 
     return Locator("squared_distance", settled(run, rational_half(solid, pose)))

@@ -13,12 +13,12 @@ from typing import Any, Final, NamedTuple
 
 from engine.arrays import BoolArray, FloatArray, Int8Array, Int32Array, IntArray
 from engine.containment.cells.side import side_in_cell
-from engine.containment.posed.body_frame import BLUR
+from engine.containment.methods.ball import located
+from engine.containment.methods.polygon_one_pass import locate_in_small_rings
+from engine.containment.posed.body_frame import to_frame
 from engine.containment.posed.filters import in_space, side_of_box, side_of_rows
 from engine.containment.scene.grid import cell_at
-from engine.containment.scene.rings import locate_in_small_rings
 from engine.jit import bare_kernel, inline, kernel, merged
-from engine.predicates.error_free import two_diff
 from engine.types import UNDECIDED
 
 SECOND_PASS: Final = 0
@@ -28,9 +28,6 @@ ROWS: Final = 3
 RINGS: Final = 4
 CELLS: Final = 5
 """Kinds of bodies: how a candidate is decided in the first pass."""
-
-_TINY: Final = 1e-320
-_SLACK: Final = 16.0 * 2.0**-53
 
 
 class SceneTables(NamedTuple):
@@ -70,30 +67,10 @@ class SceneTables(NamedTuple):
 
 
 @inline
-def to_frame(tables: Any, frame: int, p: Any) -> Any:
-    """Return a point (x, y, z) in the frame of a pose, and its blur: what `move_to_body_frame` does."""
-    if frame < 0:
-        return p, 0.0
-    inverses, translations = tables.inverses, tables.translations
-    dx, x_tail = two_diff(p[0], float(translations[frame, 0]))
-    dy, y_tail = two_diff(p[1], float(translations[frame, 1]))
-    dz, z_tail = two_diff(p[2], float(translations[frame, 2]))
-    x = inverses[frame, 0, 0] * dx + inverses[frame, 0, 1] * dy + inverses[frame, 0, 2] * dz
-    y = inverses[frame, 1, 0] * dx + inverses[frame, 1, 1] * dy + inverses[frame, 1, 2] * dz
-    z = inverses[frame, 2, 0] * dx + inverses[frame, 2, 1] * dy + inverses[frame, 2, 2] * dz
-    if tables.is_turn[frame] and x_tail == 0.0 and y_tail == 0.0 and z_tail == 0.0:
-        return (x, y, z), 0.0
-    return (x, y, z), BLUR * (abs(dx) + abs(dy) + abs(dz)) + _TINY
-
-
-@inline
 def _in_ball(centers: Any, balls: Any, slot: int, p: Any) -> int:
     dx, dy, dz = p[0] - centers[slot, 0], p[1] - centers[slot, 1], p[2] - centers[slot, 2]
     radius, blur = balls[slot, 0], balls[slot, 1]
-    square, total = radius * radius, dx * dx + dy * dy + dz * dz
-    bound = _SLACK * (square + total) + _TINY + 4.0 * blur * (abs(dx) + abs(dy) + abs(dz) + 2.0 * blur)
-    excess = square - total
-    return 1 if excess > bound else -1 if -excess > bound else UNDECIDED
+    return int(located(dx, dy, dz, radius * radius, radius + 2.0 * blur, blur))
 
 
 @merged

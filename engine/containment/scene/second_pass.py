@@ -1,32 +1,31 @@
 """Settles the candidates that the first pass over a scene left open, grouped by body.
 
-Polyhedra of moderate size are asked all together, by the columns of each (columns.py). What is then still open,
+Polyhedra of moderate size are asked all together, by the tree of each (trees.py). What is then still open,
 and what is of other kinds, each body locates by itself as `locate` does.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
 from engine.arrays import FloatArray, Int8Array, IntArray
 from engine.containment.cells.order import counting_sort
 from engine.containment.cells.top import MOST_FACES, top_cells_if_they_pay
 from engine.containment.locators import Counts
-from engine.containment.prepared import columns_of
-from engine.containment.scene.columns import ColumnTables, locate_groups
+from engine.containment.prepared import tree_of
 from engine.containment.scene.tables import Scene
+from engine.containment.scene.trees import TreeTables, locate_groups, tree_line
 from engine.parallel import Budget, run_chunks
 from engine.solids.polyhedron import Polyhedron
 from engine.types import UNDECIDED
 
 _MOST_IN_GROUP: Final = 1 << 14
 """Points that one body locates in one piece of work."""
-_FEWEST_FOR_COLUMNS: Final = 64
-"""Points that columns are built for; fewer are left to what `locate` does with few points."""
+_FEWEST_FOR_TREES: Final = 64
+"""Points that a tree is built for; fewer are left to what `locate` does with few points."""
 
 
 def settle_rest(
@@ -51,11 +50,11 @@ def settle_rest(
     sizes = np.bincount(bodies, minlength=n_bodies)
     counting_sort(bodies, np.cumsum(sizes) - sizes, order, budget.flag)
     budget.check()
-    tables = _column_tables(scene, sizes, budget, workers)
+    tables = _tree_tables(scene, sizes, budget, workers)
     if tables is not None:
         groups = _groups(sizes)
 
-        def by_columns(start: int, stop: int) -> None:
+        def by_trees(start: int, stop: int) -> None:
             with np.errstate(all="ignore"):
                 locate_groups(
                     points,
@@ -68,7 +67,7 @@ def settle_rest(
                     budget.flag,
                 )
 
-        run_chunks(by_columns, len(groups[0]), budget=budget, first_chunk=4, workers=workers)
+        run_chunks(by_trees, len(groups[0]), budget=budget, first_chunk=4, workers=workers)
         order = order[found[order] == UNDECIDED]
         sizes = np.bincount(bodies[order], minlength=n_bodies)
     counts = []
@@ -99,60 +98,34 @@ def _groups(sizes: IntArray) -> tuple[IntArray, IntArray, IntArray]:
     return begins, np.minimum(begins + _MOST_IN_GROUP, np.repeat(lasts, n_parts)), np.repeat(bodies, n_parts)
 
 
-def _column_tables(scene: Scene, sizes: IntArray, budget: Budget, workers: int | None) -> ColumnTables | None:
-    """Return the columns of the polyhedra that are asked often enough, built where they are not there yet."""
+def _tree_tables(scene: Scene, sizes: IntArray, budget: Budget, workers: int | None) -> TreeTables | None:
+    """Return the trees of the polyhedra that are asked often enough, built where they are not there yet."""
     asked = np.bincount(scene.owners, weights=sizes, minlength=len(scene.solids))
     chosen: list[tuple[int, Polyhedron]] = []
     for index in np.flatnonzero(asked).tolist():
         solid = scene.solids[index]
         if isinstance(solid, Polyhedron) and len(solid.triangles) <= MOST_FACES:
-            if asked[index] >= _FEWEST_FOR_COLUMNS or solid.kept("columns") is not None:
+            if asked[index] >= _FEWEST_FOR_TREES or solid.kept("tree") is not None:
                 chosen.append((index, solid))
     if not chosen:
         return None
 
     def build(start: int, stop: int) -> None:
         for index, solid in chosen[start:stop]:
-            columns_of(solid, budget.check)
+            tree_of(solid, budget.check)
             top_cells_if_they_pay(solid, int(asked[index]), budget)
 
     run_chunks(build, len(chosen), budget=budget, first_chunk=1, workers=workers)
     rows = np.full(len(scene.solids), -1, np.int32)
     rows[[index for index, _ in chosen]] = np.arange(len(chosen))
-    lines = [solid.prepared("column_line", _line(solid), budget.check) for _, solid in chosen]
+    lines = [tree_line(tree_of(solid, budget.check)) for _, solid in chosen]
     cells = [solid.kept("top_cells") for _, solid in chosen]
-    addresses, sizes_of, axes = (np.array(each) for each in zip(*lines))
-    return ColumnTables(
+    addresses, sizes_of, places = (np.array(each) for each in zip(*lines))
+    return TreeTables(
         rows[scene.owners],
         addresses,
         sizes_of,
-        axes,
+        places,
         np.array([(0, 0, 0, 0) if each is None else each.place for each in cells], np.int64),
-        np.array([_NO_FRAME if each is None else each.frame for each in cells]),
+        np.array([np.zeros(6) if each is None else each.frame for each in cells]),
     )
-
-
-_NO_FRAME: Final = np.zeros(6)
-
-
-def _line(solid: Polyhedron) -> Callable[[], tuple[tuple[int, ...], tuple[int, ...], tuple[float, ...]]]:
-    """Return what builds a solid's line of the tables: addresses, sizes and axes of its columns."""
-
-    def build() -> tuple[tuple[int, ...], tuple[int, ...], tuple[float, ...]]:
-        columns = columns_of(solid)
-        u, v, offsets, items = columns.grid
-        arrays: list[npt.NDArray[Any]] = [
-            columns.vertices,
-            columns.triangles,
-            columns.boxes,
-            columns.areas,
-            offsets,
-            items,
-        ]
-        return (
-            tuple(array.ctypes.data for array in arrays),
-            (len(columns.vertices), len(columns.triangles), len(items), u.n_cells, v.n_cells),
-            (u.low, u.high, u.cells_per_unit, v.low, v.high, v.cells_per_unit, columns.z_min),
-        )
-
-    return build

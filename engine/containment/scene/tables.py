@@ -14,11 +14,12 @@ import numpy as np
 from engine.arrays import FloatArray, IntArray
 from engine.containment.cells.top import TopCells
 from engine.containment.locators import Locator
+from engine.containment.methods.polygon_one_pass import close_rings
+from engine.containment.posed.frames import frames_of
 from engine.containment.posed.locators import posed_locator
-from engine.containment.scene.bodies import body_box, frames_of, grown_boxes, moved_boxes, own_box
+from engine.containment.scene.bodies import body_box, grown_boxes, moved_boxes, own_box
 from engine.containment.scene.first_pass import BALL, BOX, CELLS, RINGS, ROWS, SECOND_PASS, SceneTables
 from engine.containment.scene.grid import SceneGrid, build_scene_grid
-from engine.containment.scene.rings import boxes_of_rings, close_rings
 from engine.errors import EngineError
 from engine.parallel import Budget
 from engine.solids.aabb import Aabb
@@ -170,16 +171,14 @@ class _Kinds:
     def _set_rings(self, indices: list[int]) -> None:
         solids = self._chosen(indices, RINGS)
         offsets = [_TRIANGLE if isinstance(solid, Triangle) else solid.ring_offsets for solid in solids]
-        n_rings = np.array([len(each) - 1 for each in offsets], np.int64)
-        sizes = np.diff(np.concatenate([*offsets, np.zeros(1, np.int64)]))
-        sizes = np.delete(sizes, np.cumsum(n_rings + 1) - 1)  # the steps from one polygon to the next
-        polygon_offsets, ring_offsets = _offsets(n_rings), _offsets(sizes + 1)
+        polygon_offsets = _offsets(np.array([len(each) - 1 for each in offsets], np.int64))
+        sizes = np.concatenate([np.zeros(0, np.int64), *(np.diff(each) for each in offsets)])
         vertices = np.concatenate([np.empty((0, 2)), *(solid.vertices for solid in solids)])
-        xs, ys = np.empty(len(vertices) + len(sizes)), np.empty(len(vertices) + len(sizes))
-        close_rings(vertices, sizes, xs, ys)
-        lows, highs = np.zeros((len(solids), 3)), np.zeros((len(solids), 3))
-        boxes_of_rings(xs, ys, ring_offsets, polygon_offsets, lows, highs)
-        self.lows[indices], self.highs[indices] = lows, highs
+        xs, ys, ring_offsets = close_rings(vertices, _offsets(sizes))
+        firsts = ring_offsets[polygon_offsets[:-1]]
+        for axis, values in enumerate((xs, ys) if solids else ()):
+            self.lows[indices, axis] = np.minimum.reduceat(values, firsts)
+            self.highs[indices, axis] = np.maximum.reduceat(values, firsts)
         n_edges = ring_offsets[polygon_offsets[1:]] - ring_offsets[polygon_offsets[:-1]]
         self.kinds[np.array(indices, np.int64)[n_edges > _MOST_EDGES]] = SECOND_PASS
         self.polygon_offsets, self.ring_offsets, self.xs, self.ys = polygon_offsets, ring_offsets, xs, ys

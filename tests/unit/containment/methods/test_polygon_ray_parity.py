@@ -18,5 +18,5 @@ def test_rings_that_cross_themselves(seed: int) -> None:
     solid = Polygon([random.integers(0, 6, (n, 2)) for n in (9, 4)])
     points = read_only(random.integers(-1, 13, (300, 2)) / 2.0)
     found = np.empty(len(points), np.int8)
-    locate_in_rings(points, *rings_of(solid), found, np.zeros(1, np.uint8))
+    locate_in_rings(points, np.zeros(len(points)), *rings_of(solid), found, np.zeros(1, np.uint8))
     assert found.tolist() == [rational_location(point, solid) for point in points.tolist()]

@@ -1,4 +1,4 @@
-"""Few points in one pass over the triangles: the columns' answers, and when columns are built instead."""
+"""Few points in one pass over the triangles: the tree's answers, and when a tree is built instead."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from engine import Cancel, CancelledError, locate
 from engine.arrays import read_only
 from engine.containment import prepared
 from engine.containment.methods.polyhedron_one_pass import locate_few
-from engine.containment.methods.polyhedron_ray_parity import locate_by_columns
-from engine.containment.prepared import columns_of
+from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
+from engine.containment.prepared import tree_of
 from engine.parallel import Budget
 from tests.unit.containment.scenes import box_mesh, lattice_points, made, merged
 
@@ -25,23 +25,23 @@ def test_any_number_of_points_in_any_box(n_points: int, scale: tuple[float, floa
     points = read_only(points[random.permutation(len(points))[:n_points]] * scale)
     found, expected, flag = np.empty(n_points, np.int8), np.empty(n_points, np.int8), np.zeros(1, np.uint8)
     locate_few(points, solid.vertices, solid.triangles, found, flag)
-    locate_by_columns(points, *columns_of(solid), expected, flag)
+    locate_by_tree(points, np.zeros(n_points), tree_of(solid), expected, flag)
     assert (found == expected).all()
 
 
-def test_columns_come_after_some_passes() -> None:
+def test_a_tree_comes_after_some_passes() -> None:
     solid = made(box_mesh([0, 0, 0], [1, 1, 1]))
     points = np.random.default_rng(0).uniform(-0.1, 1.1, (100, 3))
     answers = set()
     for _ in range(prepared._PASSES):
         answers.add(locate(points, solid).tobytes())
-        assert "columns" not in solid._prepared
+        assert "tree" not in solid._prepared
     answers.add(locate(points, solid).tobytes())
-    assert "columns" in solid._prepared
+    assert "tree" in solid._prepared
     assert len(answers) == 1
     many = made(box_mesh([0, 0, 0], [1, 1, 1]))
     locate(np.zeros(((prepared._PASSES + 1) * 1024, 3)), many)
-    assert "columns" in many._prepared
+    assert "tree" in many._prepared
 
 
 def test_a_pass_ends_when_the_call_must() -> None:

@@ -1,4 +1,4 @@
-"""Polyhedron by ray and parity, in a pass and by columns: degeneracies by hand, the hard sets, invariance."""
+"""Polyhedron by ray and parity, in a pass and by a tree: degeneracies by hand, the hard sets, invariance."""
 
 from __future__ import annotations
 
@@ -8,7 +8,12 @@ import numpy as np
 import pytest
 
 from engine import Polyhedron, locate
+from engine.arrays import read_only
 from engine.containment import prepared
+from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
+from engine.containment.prepared import tree_of
+from engine.containment.rational_locate import rational_location
+from engine.types import UNDECIDED
 from tests.reference.containment import locate_many
 from tests.unit.containment.scenes import box_mesh, lattice_points, made, merged
 
@@ -24,9 +29,9 @@ HARD = (
 )
 
 
-@pytest.fixture(autouse=True, params=[0, 1 << 60], ids=["columns", "pass"])
+@pytest.fixture(autouse=True, params=[0, 1 << 60], ids=["tree", "pass"])
 def _method(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every test twice: columns from the first point on, and never."""
+    """Every test twice: a tree from the first point on, and never."""
     monkeypatch.setattr(prepared, "_PASSES", request.param)
 
 
@@ -104,3 +109,34 @@ def test_order_of_faces_and_translation_change_nothing() -> None:
     turned = [face[k:] + face[:k] for face, k in zip(faces, random.integers(0, 3, len(faces)))]
     assert (locate(points, Polyhedron(mesh["vertices"], turned)) == found).all()
     assert (locate(points + 2.0**40, Polyhedron(np.array(mesh["vertices"]) + 2.0**40, turned)) == found).all()
+
+
+def test_a_tree_of_slivers_far_away_tells_what_rationals_tell() -> None:
+    """Triangles that are thin, upright, or flat seen from above; points over edges, on them and a blur beside."""
+    random = np.random.default_rng(11)
+    flat = random.integers(0, 5, (40, 4, 3)).astype(np.float64)
+    flat[::3, :, 0] = flat[::3, :1, 0]  # upright
+    flat[1::3, 3] = flat[1::3, 0] + 2.0**-40  # thin
+    tetrahedra = [{"vertices": four.tolist(), "faces": [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]} for four in flat]
+    mesh = merged(*tetrahedra)
+    for shift, scale in ((0.0, 1.0), (2.0**30, 1.0), (0.0, 2.0**-600)):
+        solid = Polyhedron((np.array(mesh["vertices"]) + shift) * scale, mesh["faces"])
+        points = np.concatenate([lattice_points(3)[::5], random.uniform(-1, 5, (100, 3))]) + shift
+        points = read_only(points * scale)
+        found, flag = np.empty(len(points), np.int8), np.zeros(1, np.uint8)
+        locate_by_tree(points, np.zeros(len(points)), tree_of(solid), found, flag)
+        expected = np.array([rational_location(point, solid) for point in points.tolist()])
+        assert ((found == expected) | (found == UNDECIDED)).all()
+        assert (found != UNDECIDED).mean() > 0.95 or scale != 1.0
+        blurs = np.full(len(points), 2.0**-20 * scale)
+        locate_by_tree(points, blurs, tree_of(solid), found, flag)
+        assert ((found == expected) | (found == UNDECIDED)).all()
+        assert (found != UNDECIDED).any()
+
+
+def test_what_is_no_number_is_undecided() -> None:
+    tree, flag, found = tree_of(made(box_mesh([0, 0, 0], [2, 2, 2]))), np.zeros(1, np.uint8), np.zeros(4, np.int8)
+    points = read_only(np.array([[np.nan, 1, 1], [1, np.nan, 1], [1, 1, np.nan], [1, 1, 1]]))
+    with np.errstate(invalid="ignore"):
+        locate_by_tree(points, np.array([0.0, 1e-9, 0.0, np.nan]), tree, found, flag)
+    assert found.tolist() == [UNDECIDED] * 4

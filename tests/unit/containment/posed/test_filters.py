@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from engine import Aabb, Convex, HalfSpace, Implicit, Polygon, Solid
+from engine.arrays import read_only
 from engine.containment.posed.locators import _blurred_kernel
 from engine.containment.rational_locate import rational_location
+from engine.parallel import Budget
 from tests.unit.containment.scenes import box_mesh, made
 
 SOLIDS: list[Callable[[], Solid]] = [
@@ -30,8 +32,8 @@ def test_an_answer_holds_all_over_the_blur(make: Callable[[], Any]) -> None:
     points = np.random.default_rng(0).integers(-2, 12, (150, solid.dimension)) / 4.0
     blurs = np.where(np.arange(len(points)) % 2, 0.25, 2.0**-40)
     found = np.empty(len(points), np.int8)
-    with np.errstate(all="ignore"):
-        _blurred_kernel(solid)(points, blurs, found, np.zeros(1, np.uint8))
+    with np.errstate(all="ignore"), Budget() as budget:
+        _blurred_kernel(solid)(read_only(points), blurs, found, budget)
     assert (np.abs(found) == 1).mean() > 0.2
     corners = np.stack(np.meshgrid(*[[-0.5, 0.0, 0.5]] * solid.dimension), axis=-1).reshape(-1, solid.dimension)
     for point, blur, location in zip(points, blurs, found.tolist()):

@@ -34,7 +34,7 @@ def assert_certified(points: Any, solid: Polygon, most_open: float = 1.0, is_sma
         if is_small:
             expected[:] = [rational_location(point, solid, None, no_check) for point in points.tolist()]
         else:
-            locate_in_rings(points, *rings_of(solid), expected, flag)
+            locate_in_rings(points, np.zeros(len(points)), *rings_of(solid), expected, flag)
     sure = found != UNDECIDED
     assert n_open == (~sure).sum()
     assert (found[sure] == expected[sure]).all()

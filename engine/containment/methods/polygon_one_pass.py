@@ -1,4 +1,4 @@
-"""One point among the edges of one small polygon, all edges at once: the float filter without a branch.
+"""Polygon by ray and parity in one pass over the edges, with nothing prepared: the float filter without a branch.
 
 The ray and the parity are those of polygon_ray_parity.py. An edge is passed if one end has y <= q.y and the other y >
 q.y; every edge takes part in every sum, so that the compiler works on four at a time. Where the sign at a passed edge
@@ -14,35 +14,18 @@ from typing import Any
 
 import numpy as np
 
+from engine.arrays import FloatArray, IntArray
 from engine.jit import inline, kernel
+from engine.predicates.loading import as_point2
 from engine.predicates.orientation import BOUND_2D, GUARD_2D, orient2d
 from engine.types import UNDECIDED, Point2
 
 
-@kernel
-def close_rings(vertices: Any, sizes: Any, xs: Any, ys: Any) -> None:
-    """Fill xs and ys, (n_vertices + n_rings,), with the rings of vertices (n, 2), each ended by its first vertex."""
-    first = place = 0
-    for ring in range(len(sizes)):
-        for vertex in range(first, first + sizes[ring] + 1):
-            row = vertex if vertex < first + sizes[ring] else first
-            xs[place], ys[place] = vertices[row, 0], vertices[row, 1]
-            place += 1
-        first += sizes[ring]
-
-
-@kernel
-def boxes_of_rings(xs: Any, ys: Any, ring_offsets: Any, polygon_offsets: Any, lows: Any, highs: Any) -> None:
-    """Fill lows and highs (n_polygons, 2) with the boxes of polygons given by the offsets of their rings."""
-    for polygon in range(len(lows)):
-        first, last = ring_offsets[polygon_offsets[polygon]], ring_offsets[polygon_offsets[polygon + 1]]
-        x_low = x_high = xs[first]
-        y_low = y_high = ys[first]
-        for place in range(first + 1, last):
-            x_low, x_high = min(x_low, xs[place]), max(x_high, xs[place])
-            y_low, y_high = min(y_low, ys[place]), max(y_high, ys[place])
-        lows[polygon, 0], lows[polygon, 1] = x_low, y_low
-        highs[polygon, 0], highs[polygon, 1] = x_high, y_high
+def close_rings(vertices: FloatArray, ring_offsets: IntArray) -> tuple[FloatArray, FloatArray, IntArray]:
+    """Return the xs and ys of the rings of vertices (n, 2), each ended by its first vertex, and where they begin."""
+    firsts, ends = ring_offsets[:-1], ring_offsets[1:]
+    xs, ys = (np.insert(vertices[:, axis], ends, vertices[firsts, axis]) for axis in (0, 1))
+    return xs, ys, ring_offsets + np.arange(len(ring_offsets))
 
 
 @inline
@@ -112,3 +95,23 @@ def locate_in_small_rings(
         is_open |= location == UNDECIDED
         is_odd ^= location == 1
     return (UNDECIDED if is_open else 1 if is_odd else -1), True
+
+
+@kernel
+def locate_by_ring_pass(points: Any, blurs: Any, rings: Any, box: Any, locations: Any, flag: Any) -> int:
+    """Fill `locations` (n,) int8 for points (n, 2) with blurs (n,); returns how many needed more than the filter.
+
+    rings: xs, ys and the offsets of the rings, as `close_rings` leaves them; box: xmin, xmax, ymin, ymax.
+    """
+    (xs, ys, offsets), (x_min, x_max, y_min, y_max) = rings, box
+    n_beyond, all_rings = 0, (0, len(offsets) - 1)
+    for item in range(len(points)):
+        if flag[0]:
+            break
+        q, blur = as_point2(points, item), float(blurs[item])
+        location, is_beyond = -1, False
+        if not ((q.x + blur < x_min) | (q.x - blur > x_max) | (q.y + blur < y_min) | (q.y - blur > y_max)):
+            location, is_beyond = locate_in_small_rings(xs, ys, offsets, all_rings, q, blur)
+        locations[item] = location
+        n_beyond += is_beyond
+    return n_beyond
