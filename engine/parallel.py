@@ -243,9 +243,10 @@ def run_chunks(
 ) -> None:
     """Call ``task(start, stop)`` until the ranges cover ``0 .. n_items``, each item once.
 
-    The first chunk runs in the calling thread and is timed; later ones are sized to take `CHUNK_SECONDS`. With one
-    worker, or as long as what is left would take less than that, no other thread is involved: to wake one takes half a
-    millisecond. Tasks write to disjoint slices, so the result does not depend on `workers` or on the sizes chosen.
+    The first chunks run in the calling thread and are timed, the very first only where it is long enough to tell: it
+    may load what the others find. Later ones are sized to take `CHUNK_SECONDS`. With one worker, or as long as what is
+    left would take less than twice that, no other thread is involved: to wake one takes up to half a millisecond.
+    Tasks write to disjoint slices, so the result does not depend on `workers` or on the sizes chosen.
 
     task: must not call `run_chunks` with more than one worker (the pool is shared and could wait on itself).
     workers: threads at once; None for one per core, 1 for the calling thread only.
@@ -253,11 +254,11 @@ def run_chunks(
     """
     check_options(workers, progress)
     n_workers = default_workers() if workers is None else workers
-    done, chunk, pace = 0, max(1, first_chunk), 0.0  # pace: seconds an item
+    done, chunk, pace, is_timed = 0, max(1, first_chunk), 0.0, False  # pace: seconds an item
     while done < n_items:
         budget.check()
-        is_worth_it = n_items - done > chunk and (n_items - done) * pace > CHUNK_SECONDS
-        if done and n_workers > 1 and is_worth_it:
+        is_worth_it = n_items - done > chunk and (n_items - done) * pace > 2.0 * CHUNK_SECONDS
+        if is_timed and n_workers > 1 and is_worth_it:
             _run_threaded(task, done, n_items, chunk, n_workers, budget, progress)
             break
         stop = min(n_items, done + chunk)
@@ -266,6 +267,7 @@ def run_chunks(
         seconds = time.perf_counter() - before
         if progress is not None:
             progress(stop - done)
+        is_timed = done > 0 or seconds > CHUNK_SECONDS / _SMALLEST
         chunk, pace = _next_chunk(stop - done, seconds), seconds / (stop - done)
         done = stop
     budget.check()

@@ -17,7 +17,7 @@ from engine.collision.collide import collide
 from engine.collision.collide_poses import collide_poses
 from engine.collision.scenes.collide_scene import collide_scene
 from engine.collision.triangles import collide_triangles
-from engine.containment.cells.build import cells_if_they_pay
+from engine.containment.cells.build import cells_of
 from engine.containment.cells.order import gathered, order_by_cell
 from engine.containment.locate import locate
 from engine.containment.posed.locators import posed_locator
@@ -124,9 +124,7 @@ def _warm_cells() -> None:
     locate_scene(many, [ball])  # so many that level 0 of its cells pays
     points = as_points(many, 3)
     with Budget() as budget:  # large batches near large meshes are asked in the order of their cells
-        cells = cells_if_they_pay(ball, len(points), budget)
-        assert cells is not None
-        gathered(points, order_by_cell(points, cells, budget))
+        gathered(points, order_by_cell(points, cells_of(ball, budget), budget))
     around = np.linspace(0, 2 * np.pi, 300, endpoint=False)
     locate(np.ascontiguousarray(many[:, :2]), Polygon([np.column_stack([np.cos(around), np.sin(around)])]))
 

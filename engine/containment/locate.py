@@ -10,6 +10,7 @@ from typing import Literal, Unpack, overload
 import numpy as np
 
 from engine.arrays import BoolArray, Int8Array
+from engine.containment.at_once import located_at_once
 from engine.containment.cells.order import gathered
 from engine.containment.locators import locator_of
 from engine.errors import NotFiniteError
@@ -66,6 +67,12 @@ def locate(
     >>> locate([[0.5, 0.5], [1.0, 0.2], [2.0, 2.0]], Aabb([0, 0], [1, 1])).tolist()
     [1, 0, -1]
     """
+    if workers is None and deadline is None and cancel is None and progress is None:
+        found = located_at_once(points, solid)
+        if found is not None and report:
+            return found.locations, Accuracy("exact", None, len(found.locations), *found[1:])
+        if found is not None:
+            return found.locations
     choice = locator_of(solid)
     array = as_points(points, solid.dimension, must_be_finite=False)
     locations = np.empty(len(array), np.int8)
@@ -82,9 +89,9 @@ def locate(
                 counts = locator.fill(array[start:stop], locations[start:stop], budget)
             else:
                 places = order[start:stop]
-                found = np.empty(stop - start, np.int8)
-                counts = locator.fill(gathered(array, places), found, budget)
-                locations[places] = found
+                located = np.empty(stop - start, np.int8)
+                counts = locator.fill(gathered(array, places), located, budget)
+                locations[places] = located
             beyond.append(counts.beyond)
             rational.append(counts.rational)
 
@@ -127,8 +134,9 @@ def contains(
     >>> contains([[3.0, 4.0], [3.1, 4.0]], Sphere([0, 0], 5)).tolist()
     [True, False]
     """
+    if not report:
+        return locate(points, solid, workers=workers, deadline=deadline, cancel=cancel, progress=progress) >= 0
     locations, accuracy = locate(
         points, solid, workers=workers, deadline=deadline, cancel=cancel, progress=progress, report=True
     )
-    held = locations >= 0
-    return (held, accuracy) if report else held
+    return locations >= 0, accuracy

@@ -7,14 +7,14 @@ out of its range, and a rational half, which settles one such point. Structures 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray, Int8Array, IntArray, read_only
-from engine.containment.cells.build import cells_if_they_pay
+from engine.arrays import FloatArray, Int8Array, IntArray, read_only
+from engine.containment.cells.build import cells_of
 from engine.containment.cells.locate import NOT_FINITE, locate_by_cells
 from engine.containment.cells.order import order_if_it_pays
 from engine.containment.methods.ball import locate_in_ball
@@ -22,12 +22,13 @@ from engine.containment.methods.box import locate_in_box
 from engine.containment.methods.half_spaces import locate_in_half_planes, locate_in_half_spaces
 from engine.containment.methods.polygon_one_pass import locate_by_ring_pass
 from engine.containment.methods.polygon_ray_parity import locate_in_rings
-from engine.containment.methods.polyhedron_one_pass import locate_few
+from engine.containment.methods.polyhedron_one_pass import locate_by_pass
 from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
 from engine.containment.methods.polynomial import locate_by_polynomial
-from engine.containment.prepared import closed_rings_of, rings_of, rounded_rows, tree_of, tree_pays
-from engine.containment.rational_locate import Check, combine, prism_walls, rational_location, unsupported
-from engine.containment.ring_cells.build import ring_cells_if_they_pay
+from engine.containment.policy import CELLS, PASS, choose_for_mesh, choose_for_rings
+from engine.containment.prepared import closed_rings_of, rings_of, rounded_rows, tree_of
+from engine.containment.rational_locate import Check, combine, over_tree, prism_walls, rational_location, unsupported
+from engine.containment.ring_cells.build import ring_cells_of
 from engine.containment.ring_cells.locate import locate_by_ring_cells
 from engine.errors import InvalidArrayError, NotFiniteError
 from engine.parallel import Budget
@@ -69,6 +70,8 @@ class Locator:
 
     order: Callable[[FloatArray, Budget], IntArray | None] | None = None
     """Returns the order in which a large batch is best asked, None for as it is."""
+    direct: tuple[Any, ...] = ()
+    """The kernel, and what stands between points and locations among its arguments, where that is all there is."""
     sees_not_finite: bool = False
     """Whether `fill` raises NotFiniteError for points that are not finite; otherwise the caller guarantees them."""
 
@@ -118,7 +121,8 @@ def rational_half(solid: Solid, pose: Pose | None = None) -> Callable[[Sequence[
 
 def _by_kernel(method: str, kernel: Callable[..., int], solid: Solid, *prepared: object) -> Locator:
     """Return the locator by a kernel that takes points, what is prepared of the solid, locations and flag."""
-    return _located(method, solid, lambda points, out, budget: kernel(points, *prepared, out, budget.flag))
+    located = _located(method, solid, lambda points, out, budget: kernel(points, *prepared, out, budget.flag))
+    return replace(located, direct=(kernel, *prepared))
 
 
 def _located(method: str, solid: Solid, kernel: Callable[[FloatArray, Int8Array, Budget], int]) -> Locator:
@@ -132,10 +136,7 @@ def _in_rows(solid: HalfSpace | Convex) -> Locator:
 
 
 def _in_sphere(solid: Sphere) -> Locator:
-    def run(points: FloatArray, locations: Int8Array, budget: Budget) -> int:
-        return int(locate_in_ball(points, solid.center, 0.0, solid.radius, np.empty(8), locations, budget.flag))
-
-    return _located("squared_distance", solid, run)
+    return _by_kernel("squared_distance", locate_in_ball, solid, solid.center, 0.0, solid.radius)
 
 
 def _in_aabb(solid: Aabb) -> Locator:
@@ -158,59 +159,55 @@ def _run_in_prism(solid: Triangle, points: FloatArray, locations: Int8Array, bud
 
 
 def _run_ring_pass(solid: Polygon | Triangle, points: FloatArray, locations: Int8Array, budget: Budget) -> int:
-    rings = closed_rings_of(solid, budget.check)
-    return int(locate_by_ring_pass(points, np.zeros(len(points)), *rings, locations, budget.flag))
+    prepared = np.zeros(len(points)), *closed_rings_of(solid, budget.check)
+    return int(locate_by_ring_pass(points, *prepared, locations, budget.flag))
 
 
 def _in_polygon(solid: Polygon) -> Locator:
-    def run(points: FloatArray, locations: Int8Array, budget: Budget) -> int:
-        slabs = rings_of(solid, budget.check)
-        return int(locate_in_rings(points, np.zeros(len(points)), *slabs, locations, budget.flag))
+    def run(points: FloatArray, out: Int8Array, budget: Budget) -> int:
+        return int(locate_in_rings(points, np.zeros(len(points)), *rings_of(solid, budget.check), out, budget.flag))
 
     def choose(n_points: int, budget: Budget) -> Locator:
-        cells = ring_cells_if_they_pay(solid, n_points, budget)
+        choice = choose_for_rings(solid, n_points)
+        cells = ring_cells_of(solid, budget) if choice == CELLS else None
         if cells is None:
-            return plain
-        return Locator(
-            "ring_cells", _in_cells(lambda *rest: int(locate_by_ring_cells(rest[0], cells, *rest[1:])), by_rays)
-        )
+            return at_once if choice == PASS else plain
+        return Locator("ring_cells", _in_cells(locate_by_ring_cells, cells, by_rays))
 
     by_rays = settled(run, rational_half(solid))
+    at_once = _located("ring_crossing", solid, partial(_run_ring_pass, solid))
     plain = Locator("ring_crossing", by_rays, for_batch=choose)
     return plain
 
 
 def _in_polyhedron(solid: Polyhedron) -> Locator:
-    def run(points: FloatArray, locations: Int8Array, budget: Budget) -> int:
-        tree = tree_of(solid, budget.check)
-        return int(locate_by_tree(points, np.zeros(len(points)), tree, locations, budget.flag))
-
-    def run_once(points: FloatArray, locations: Int8Array, budget: Budget) -> int:
-        return locate_few(points, solid.vertices, solid.triangles, locations, budget.flag)
+    def run(points: FloatArray, out: Int8Array, budget: Budget) -> int:
+        return int(locate_by_tree(points, np.zeros(len(points)), tree_of(solid, budget.check), out, budget.flag))
 
     def choose(n_points: int, budget: Budget) -> Locator:
-        cells = cells_if_they_pay(solid, n_points, budget)
-        if cells is None:
-            return plain if tree_pays(solid, n_points) else at_once
+        choice = choose_for_mesh(solid, n_points, budget)
+        if choice != CELLS:
+            return at_once if choice == PASS else plain
+        cells = cells_of(solid, budget)
         return Locator(
             "segment_parity",
-            _in_cells(lambda *rest: int(locate_by_cells(rest[0], cells, *rest[1:])), by_rays),
+            _in_cells(locate_by_cells, cells, by_rays),
             order=lambda points, budget: order_if_it_pays(points, cells, budget),
             sees_not_finite=True,
         )
 
     by_rays = settled(run, rational_half(solid))
-    at_once = _located("ray_parity", solid, run_once)
+    at_once = _by_kernel("ray_parity", locate_by_pass, solid, solid.vertices, solid.triangles)
     plain = Locator("ray_parity", by_rays, for_batch=choose)
     return plain
 
 
-def _in_cells(by_cells: Callable[[FloatArray, Int8Array, FlagArray], int], by_rays: Fill) -> Fill:
+def _in_cells(kernel: Callable[..., int], cells: object, by_rays: Fill) -> Fill:
     """Return the fill that asks the cells, and casts rays for the points that are too close to a plane for them."""
 
     def fill(points: FloatArray, locations: Int8Array, budget: Budget) -> Counts:
         with np.errstate(all="ignore"):
-            n_open = by_cells(read_only(points), locations, budget.flag)
+            n_open = int(kernel(read_only(points), cells, locations, budget.flag))
         if n_open == NOT_FINITE:
             raise NotFiniteError("a point is not finite", ("points",))
         if n_open == 0:
@@ -256,37 +253,18 @@ def _call(solid: Implicit) -> Fill:
 def csg_locator(solid: Csg, leaf_locator: Callable[[Solid], Locator]) -> Locator:
     """Return the locator of a tree: every distinct node is located once a chunk, its operands first."""
     leaves: dict[int, Locator] = {}
-    seen: set[int] = set()
-
-    def gather(node: Solid) -> None:
-        if id(node) in seen:
-            return
-        seen.add(id(node))
-        if isinstance(node, Csg):
-            for operand in node.operands:
-                gather(operand)
-        else:
-            leaves[id(node)] = leaf_locator(node)
-
-    gather(solid)
+    over_tree(solid, lambda leaf: leaves.setdefault(id(leaf), leaf_locator(leaf)), lambda *_: None)
 
     def fill(points: FloatArray, locations: Int8Array, budget: Budget) -> Counts:
-        located: dict[int, Int8Array] = {}
-        n_beyond = n_rational = 0
+        counts: list[Counts] = []
 
-        def visit(node: Solid) -> Int8Array:
-            nonlocal n_beyond, n_rational
-            if id(node) not in located:
-                if isinstance(node, Csg):
-                    found = combine(node.operation, [visit(operand) for operand in node.operands])
-                else:
-                    found = np.empty(len(points), np.int8)
-                    counts = leaves[id(node)].chosen(len(points), budget).fill(points, found, budget)
-                    n_beyond, n_rational = n_beyond + counts.beyond, n_rational + counts.rational
-                located[id(node)] = found
-            return located[id(node)]
+        def locate_leaf(leaf: Solid) -> Int8Array:
+            found = np.empty(len(points), np.int8)
+            counts.append(leaves[id(leaf)].chosen(len(points), budget).fill(points, found, budget))
+            return found
 
-        locations[:] = visit(solid)
+        locations[:] = over_tree(solid, locate_leaf, combine)
+        n_beyond, n_rational = sum(each.beyond for each in counts), sum(each.rational for each in counts)
         return Counts(min(n_beyond, len(points)), min(n_rational, len(points)))
 
     is_exact = all(leaf.decisions == "exact" for leaf in leaves.values())

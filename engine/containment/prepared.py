@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,10 +18,6 @@ from engine.lanes.overhead import OVERHEAD_ROWS
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
 from engine.solids.triangle import Triangle
-
-_PASSES: Final = 16
-_POINTS_A_PASS: Final = 1024
-"""As `run_chunks` begins with."""
 
 
 class TriangleTree(NamedTuple):
@@ -65,13 +61,6 @@ def tree_of(solid: Polyhedron, check: Check = no_check) -> TriangleTree:
     return solid.prepared("tree", lambda: _build_tree(solid, check), check)
 
 
-def tree_pays(solid: Polyhedron, n_points: int) -> bool:
-    """Tell whether the points asked so far would have taken as long, in passes over all triangles, as a tree takes."""
-    passes = solid.prepared("passes", lambda: [0])
-    passes[0] += 1 + (n_points - 1) // _POINTS_A_PASS
-    return passes[0] > _PASSES
-
-
 def _build_tree(solid: Polyhedron, check: Check) -> TriangleTree:
     check()
     boxes, triangles = np.empty((len(solid.triangles), 6)), np.empty((len(solid.triangles), 3), np.int32)
@@ -103,13 +92,13 @@ def _build_rings(vertices: FloatArray, following: IntArray, check: Check) -> Rin
     check()
     low, high = np.minimum(starts, ends), np.maximum(starts, ends)
     flat = np.zeros(1)
-    slabs = build_box_grid(low[:, 1], high[:, 1], flat, flat, max(1, min(1 << 20, len(order))), 1, check)
+    slabs = build_box_grid([low[:, 1], flat], [high[:, 1], flat], [max(1, min(1 << 20, len(order))), 1], check)
     return Rings(starts, ends, np.ascontiguousarray(high[:, 0]), slabs, _box_of(vertices))
 
 
 def _box_of(vertices: FloatArray) -> tuple[float, float, float, float]:
-    (x_min, y_min), (x_max, y_max) = vertices.min(axis=0).tolist(), vertices.max(axis=0).tolist()
-    return x_min, x_max, y_min, y_max
+    xs, ys = vertices[:, 0], vertices[:, 1]  # one by one: some 40 times as fast as min(axis=0)
+    return float(xs.min()), float(xs.max()), float(ys.min()), float(ys.max())
 
 
 class ClosedRings(NamedTuple):

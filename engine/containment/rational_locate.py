@@ -132,18 +132,19 @@ def _in_polyhedron(point: Sequence[Number], solid: Polyhedron, check: Check) -> 
     return INSIDE if odd else OUTSIDE
 
 
-def next_in_ring(polygon: Polygon) -> IntArray:
-    """Return for each vertex of `polygon` the index of the one after it in its ring, prepared once."""
+def next_in_ring(solid: Polygon | Triangle) -> IntArray:
+    """Return for each vertex the index of the one after it in its ring, prepared once."""
 
     def build() -> IntArray:
-        following = np.arange(1, len(polygon.vertices) + 1, dtype=np.int64)
-        following[polygon.ring_offsets[1:] - 1] = polygon.ring_offsets[:-1]
+        ends = solid.ring_offsets[1:] if isinstance(solid, Polygon) else np.array([3])
+        following = np.arange(1, len(solid.vertices) + 1, dtype=np.int64)
+        following[ends - 1] = np.append(0, ends[:-1])
         return following
 
-    return polygon.prepared("next_in_ring", build)
+    return solid.prepared("next_in_ring", build)
 
 
-def _in_polygon(point: Sequence[Number], solid: Polygon, check: Check) -> int:
+def _in_polygon(point: Sequence[Number], solid: Polygon | Triangle, check: Check) -> int:
     starts, ends = solid.vertices, solid.vertices[next_in_ring(solid)]
     (x_low, _), (y_low, y_high) = _around(point[0]), _around(point[1])
     held = (np.minimum(starts[:, 1], ends[:, 1]) <= y_high) & (np.maximum(starts[:, 1], ends[:, 1]) >= y_low)
@@ -181,19 +182,6 @@ def prism_walls(solid: Triangle) -> list[list[int]]:
         return walls
 
     return solid.prepared("prism_walls", build)
-
-
-def _in_triangle(solid: Triangle, point: Sequence[Number]) -> int:
-    if solid.dimension == 3:
-        return min(side_rational(wall, point) for wall in prism_walls(solid))
-    flat = scaled_integers((*solid.vertices.ravel().tolist(), *point))
-    a, b, c, q = (tuple(flat[k : k + 2]) for k in (0, 2, 4, 6))
-    turns = [_orient2d(p, r, q) for p, r in ((a, b), (b, c), (c, a))]
-    if any(not min(a[k], b[k], c[k]) <= q[k] <= max(a[k], b[k], c[k]) for k in range(2)):
-        return OUTSIDE
-    if 1 in turns and -1 in turns:
-        return OUTSIDE
-    return BOUNDARY if 0 in turns else INSIDE
 
 
 def _in_sphere(center: Sequence[Number], radius: float, point: Sequence[Number]) -> int:
@@ -259,7 +247,7 @@ def rational_location(point: Sequence[Number], solid: Solid, pose: Pose | None =
     check()
     match solid:
         case Csg():
-            return _in_csg(point, solid, pose, check)
+            return int(over_tree(solid, lambda leaf: rational_location(point, leaf, pose, check), combine))
         case Sphere():
             center: Sequence[Number] = solid.center.tolist()
             return _in_sphere(center if pose is None else to_world_frame(center, pose), solid.radius, point)
@@ -268,10 +256,10 @@ def rational_location(point: Sequence[Number], solid: Solid, pose: Pose | None =
     match solid:
         case Polyhedron():
             return _in_polyhedron(point, solid, check)
-        case Polygon():
+        case Triangle() if solid.dimension == 3:
+            return min(side_rational(wall, point) for wall in prism_walls(solid))
+        case Polygon() | Triangle():
             return _in_polygon(point, solid, check)
-        case Triangle():
-            return _in_triangle(solid, point)
         case Aabb():
             return _in_aabb(solid, point)
         case HalfSpace():
@@ -294,16 +282,16 @@ def combine(operation: str, located: Sequence[Any]) -> Any:
     return functools.reduce(np.maximum if operation == "union" else np.minimum, located)
 
 
-def _in_csg(point: Sequence[Number], solid: Csg, pose: Pose | None, check: Check) -> int:
-    """Locate in every distinct node once, operands first; the depth is bounded by the constructor."""
-    known: dict[int, int] = {}
+def over_tree(solid: Csg, of_leaf: Callable[[Solid], Any], join: Callable[[str, list[Any]], Any]) -> Any:
+    """Return what a tree makes of its leaves: each distinct node once, operands first; its depth is bounded."""
+    known: dict[int, Any] = {}
 
-    def visit(node: Solid) -> int:
+    def visit(node: Solid) -> Any:
         if id(node) not in known:
             if isinstance(node, Csg):
-                known[id(node)] = int(combine(node.operation, [visit(operand) for operand in node.operands]))
+                known[id(node)] = join(node.operation, [visit(operand) for operand in node.operands])
             else:
-                known[id(node)] = rational_location(point, node, pose, check)
+                known[id(node)] = of_leaf(node)
         return known[id(node)]
 
     return visit(solid)

@@ -1,4 +1,4 @@
-"""Hard points of every family, by a pass over the triangles, by columns and by cells: all exact, or the test fails."""
+"""Hard points of every family, by a pass over the triangles, by a tree and by cells: all exact, or the test fails."""
 
 from __future__ import annotations
 
@@ -9,14 +9,13 @@ import numpy as np
 import pytest
 
 from engine import Polyhedron, locate
-from engine.containment import prepared
-from engine.containment.cells import build as build_cells
+from engine.containment import policy
 from tests.hard.points import STORED, generated_solids, hard_points
 from tests.reference.many_points import locate_points
 
 NEVER = 1 << 60
-METHODS = {"pass": (NEVER, NEVER), "columns": (0, NEVER), "cells": (0, 0)}
-"""Passes before columns are built, points before cells are."""
+METHODS = {"pass": (NEVER, NEVER), "tree": (0, NEVER), "cells": (0, 0)}
+"""What a tree is said to cost, and points before cells are built."""
 MESHES = {
     "c3d_spot": (0.0, 1e6),
     "syn_sliver_uv": (0.0, 1e9),
@@ -37,10 +36,12 @@ PLACES = [(name, offset) for name, offsets in MESHES.items() for offset in offse
 
 
 def assert_exact(points: Any, vertices: Any, faces: Any, exact: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    for name, (passes, points_of_cells) in METHODS.items():
-        monkeypatch.setattr(prepared, "_PASSES", passes)
-        monkeypatch.setattr(build_cells, "_PAYS_FROM", points_of_cells)
-        monkeypatch.setattr(build_cells, "_PAYS_PER_FACE", 0)
+    monkeypatch.setattr(policy, "_CELLS_PER_FACE", 0)
+    monkeypatch.setattr(policy, "_VISIT", 0.0)
+    for name, (tree, points_of_cells) in METHODS.items():
+        monkeypatch.setattr(policy, "_TREE", tree)
+        monkeypatch.setattr(policy, "_TREE_A_FACE", 0)
+        monkeypatch.setattr(policy, "_CELLS_FROM", points_of_cells)
         found = locate(points, Polyhedron(vertices, faces))
         wrong = np.flatnonzero(found != exact)
         assert not len(wrong), (name, len(wrong), points[wrong[0]].tolist(), int(found[wrong[0]]), int(exact[wrong[0]]))

@@ -14,7 +14,8 @@ from engine.arrays import Float32Array, Int8Array, Int32Array, IntArray
 from engine.containment.cells.lattice import LEVELS, PARTS, SPLIT, UNKNOWN, Lattice, Level, Mesh, list_parts, list_top
 from engine.containment.cells.locate import CODE_SHIFT, INSIDE_CELL, MIXED_CELL, OUTSIDE_CELL
 from engine.containment.cells.status import fill_leaves, locate_parts
-from engine.containment.cells.top import ask_cells, can_have_cells, make_lattice, top_places, top_statuses
+from engine.containment.cells.top import ask_cells, lattice_of, top_places, top_statuses
+from engine.containment.policy import cost_in_tree
 from engine.containment.prepared import TriangleTree, tree_of
 from engine.lanes.cells import groups_of
 from engine.lanes.tracing import LANES
@@ -26,21 +27,15 @@ _LONG: Final = (8, 32)
 parts take more memory than they save time."""
 _MOST_ENTRIES: Final = 24
 """Entries a face (and 2^14 more) above which a level is not cut further."""
-_WANTED: Final = 4.0
-"""Cells of level 0 along an axis for each triangle along an edge of a cube."""
-_MOST_CELLS: Final = 96.0
-"""Along the longest axis on level 0: more than fit the cache cost uniform points more than they save."""
-_PAYS_FROM: Final = 1 << 14
-_PAYS_PER_FACE: Final = 5
+_GROUP: Final = 8.0
+"""Nanoseconds that a group of a list costs a point: lists that cost more than the tree are left to it."""
+_FEWEST_GROUPS: Final = 32
 
 
 class Cells(NamedTuple):
     """What `locate_by_cells` reads."""
 
     lattice: Lattice
-    low: tuple[float, float, float]
-    high: tuple[float, float, float]
-    """The solid's box: beyond it all is outside."""
     statuses: Int8Array
     """(n + 1,) of level 0: the location of all points of a cell, UNDECIDED where its code says more, and last that of
     points beyond the lattice; small enough to stay in the cache."""
@@ -50,28 +45,19 @@ class Cells(NamedTuple):
     """(n, 14, 8): what leaves keep of their triangles (lanes/cells.py)."""
 
 
-def cells_if_they_pay(solid: Polyhedron, n_points: int, budget: Budget) -> Cells | None:
-    """Return the cells of `solid` if they are there, or if the points asked so far would have paid for building them.
-
-    The answers are the same either way. Building takes about 10 us a face, a vertical ray 0.2 us (1,000 faces) to 3 us
-    (100,000); a solid that is asked about few points never gets cells.
-    """
-    seen = solid.prepared("points_seen", lambda: [0], budget.check)
-    seen[0] += n_points
-    if seen[0] < _PAYS_FROM + _PAYS_PER_FACE * len(solid.triangles):
-        return None
-    if not solid.prepared("can_have_cells", lambda: can_have_cells(solid)):
-        return None
+def cells_of(solid: Polyhedron, budget: Budget) -> Cells:
+    """Return the cells of a solid that can have them, prepared once."""
     return solid.prepared("cells", lambda: build_cells(solid, budget), budget.check)
 
 
 def build_cells(solid: Polyhedron, budget: Budget) -> Cells:
     """Return the cells of `solid`. Raises what `Budget.check` raises."""
     tree = tree_of(solid, budget.check)
-    lattice = make_lattice(tree, _WANTED, _MOST_CELLS)
+    lattice = lattice_of(tree)
     mesh = Mesh(tree.vertices, tree.triangles, lattice)
     level, index, found = _top_level(tree, mesh, budget)
     codes, leaves = [], []
+    longest = LANES * max(_FEWEST_GROUPS, cost_in_tree(solid) / _GROUP)
     n_groups = n_bricks = 0
     for depth in range(LEVELS):
         lengths = np.diff(level.firsts)
@@ -79,7 +65,7 @@ def build_cells(solid: Polyhedron, budget: Budget) -> Cells:
         if depth < LEVELS - 1 and len(level.lists) <= _MOST_ENTRIES * len(tree.triangles) + (1 << 14):
             is_cut = lengths > _LONG[depth]
         parents = np.flatnonzero(is_cut)
-        kept = np.flatnonzero(~is_cut & (level.statuses != UNKNOWN))
+        kept = np.flatnonzero(~is_cut & (level.statuses != UNKNOWN) & (lengths <= longest))
         sizes = (lengths[kept] + LANES - 1) // LANES
         starts = n_groups + np.cumsum(sizes) - sizes
         code = np.full(len(found), MIXED_CELL, np.int32)
@@ -99,8 +85,6 @@ def build_cells(solid: Polyhedron, budget: Budget) -> Cells:
         budget.check()
     return Cells(
         lattice,
-        tree.low,
-        tree.high,
         np.append(np.minimum(codes[0], MIXED_CELL) + CODE_SHIFT, -1).astype(np.int8),
         np.concatenate(codes),
         groups,

@@ -12,7 +12,6 @@ import numpy as np
 
 from engine.arrays import FloatArray, IntArray, read_only
 from engine.containment.cells.build import Cells
-from engine.containment.cells.lattice import LEVELS, finest
 from engine.jit import kernel
 from engine.parallel import Budget
 
@@ -26,28 +25,19 @@ _SHARE: Final = 0.4
 
 @kernel
 def top_cells(points: Any, cells: Any, keys: Any, flag: Any) -> int:
-    """Fill keys (n,) int32 with each point's cell of level 0, the last one for points outside the box.
+    """Fill keys (n,) int32 with each point's cell of level 0, the last one for points beyond.
 
     Returns how many of the cells have lists.
     """
     low, scale, n = cells.lattice.low, cells.lattice.scale, cells.lattice.n
-    box_low, box_high = cells.low, cells.high
-    shift, n_listed = 2 * (LEVELS - 1), 0
+    x_end, y_end, z_end, n_listed = float(n[0]), float(n[1]), float(n[2]), 0
     for item in range(len(points)):
         if item & 4095 == 0 and flag[0]:
             break
-        px, py, pz = points[item, 0], points[item, 1], points[item, 2]
-        key = n[0] * n[1] * n[2]
-        if (
-            (px >= box_low[0])
-            & (px <= box_high[0])
-            & (py >= box_low[1])
-            & (py <= box_high[1])
-            & (pz >= box_low[2])
-            & (pz <= box_high[2])
-        ):
-            x, y, z = finest(px, low[0], scale[0]), finest(py, low[1], scale[1]), finest(pz, low[2], scale[2])
-            key = ((z >> shift) * n[1] + (y >> shift)) * n[0] + (x >> shift)
+        key, x = n[0] * n[1] * n[2], (points[item, 0] - low[0]) * scale[0]
+        y, z = (points[item, 1] - low[1]) * scale[1], (points[item, 2] - low[2]) * scale[2]
+        if (x >= 0.0) & (y >= 0.0) & (z >= 0.0) & (x < x_end) & (y < y_end) & (z < z_end):
+            key = (int(z) * n[1] + int(y)) * n[0] + int(x)
             n_listed += cells.codes[key] >= 0
         keys[item] = key
     return n_listed

@@ -26,6 +26,8 @@ _PAYS_PER_FACE: Final = 2
 _WANTED: Final = 4.0
 """Cells along an axis for each triangle along an edge of a cube, and at most."""
 _MOST_CELLS: Final = 64.0
+_MOST_OF_ALL: Final = 96.0
+"""Where finer levels follow: more than fit the cache cost uniform points more than they save."""
 _RANGE: Final = 2.0**400
 """Largest extent, and 1 / smallest, of a solid that gets cells: products of three stay far from its ends."""
 _AT_ONCE: Final = 4096
@@ -98,6 +100,11 @@ def make_lattice(tree: TriangleTree, wanted: float, most: float) -> Lattice:
         (sizes[0], sizes[1], sizes[2]),
         (n[0], n[1], n[2]),
     )
+
+
+def lattice_of(tree: TriangleTree) -> Lattice:
+    """Return level 0 of all levels: finer than that of scenes, as far as it fits the cache."""
+    return make_lattice(tree, _WANTED, _MOST_OF_ALL)
 
 
 def _power_of_two(value: float) -> float:

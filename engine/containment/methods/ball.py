@@ -77,17 +77,14 @@ def _settle(points: Any, item: int, center: Any, radius: float, expansion: Any) 
 
 
 @kernel
-def locate_in_ball(
-    points: Any, center: Any, blur: float, radius: float, expansion: Any, locations: Any, flag: Any
-) -> int:
+def locate_in_ball(points: Any, center: Any, blur: float, radius: float, locations: Any, flag: Any) -> int:
     """Fill `locations` (n,) int8 for points (n, dim); returns how many needed more than the filter.
 
     blur: bound on the error of each coordinate of `center`; 0.0 where it is exact, else what stays open is UNDECIDED.
-    expansion: (8,) float64.
     """
     is_flat, n_beyond = len(center) == 2, 0
     x, y, z = center[0], center[1], 0.0 if is_flat else center[2]
-    square, reach = radius * radius, radius + 2.0 * blur
+    square, reach, expansion = radius * radius, radius + 2.0 * blur, workspace(8)
     dx, dy, dz, found = workspace(64), workspace(64), workspace(64), workspace(64)
     for first in range(0, len(points), _BLOCK):
         if flag[0]:

@@ -36,6 +36,8 @@ _SLACK: Final = 8.0 * 2.0**-53
 _TINY: Final = 1e-320
 _BLOCK: Final = 256
 """Points taken together: their coordinates and least distances fit the first-level cache."""
+_FEW: Final = 16
+"""Points below which a block would cost more than it spares."""
 _ROWS: Final = 4
 """Rows taken together: coordinates and least distances are loaded once for all of them."""
 _LARGE: Final = 1e300
@@ -80,6 +82,18 @@ def _locate_one(points: Any, item: int, planes: Any, is_exact: Any) -> tuple[int
 
 
 @inline
+def _locate_few(points: Any, planes: Any, is_exact: Any, locations: Any, flag: Any) -> int:
+    """Do what the kernels do, point by point."""
+    n_beyond = 0
+    for item in range(len(points)):
+        if flag[0]:
+            break
+        locations[item], is_unsure = _locate_one(points, item, planes, is_exact)
+        n_beyond += is_unsure
+    return n_beyond
+
+
+@inline
 def _largest(values: Any, folded: Any) -> float:
     """Return the largest size of values (_BLOCK,), by halves: short loops that the compiler turns into vectors."""
     half = _BLOCK // 2
@@ -105,6 +119,8 @@ def locate_in_half_planes(points: Any, planes: Any, is_exact: Any, locations: An
     is_exact: (m,) bool, False for a row that is correctly rounded from a rational one, without underflow.
     Returns how many points needed more than the filter. Stops early, answers incomplete, once flag[0] is set.
     """
+    if len(points) < _FEW:
+        return _locate_few(points, planes, is_exact, locations, flag)
     xs, ys, least, folded = np.empty(_BLOCK), np.empty(_BLOCK), np.empty(_BLOCK), np.empty(_BLOCK)
     places, found = np.empty(_BLOCK, np.uint32), np.empty(_BLOCK, np.int8)
     n_beyond, last = 0, len(planes) - 1
@@ -160,6 +176,8 @@ def locate_in_half_planes(points: Any, planes: Any, is_exact: Any, locations: An
 @kernel
 def locate_in_half_spaces(points: Any, planes: Any, is_exact: Any, locations: Any, flag: Any) -> int:
     """Fill `locations` (n,) int8 for points (n, 3) and planes (m, 4); the rest as in the plane."""
+    if len(points) < _FEW:
+        return _locate_few(points, planes, is_exact, locations, flag)
     xs, ys, zs = np.empty(_BLOCK), np.empty(_BLOCK), np.empty(_BLOCK)
     least, folded = np.empty(_BLOCK), np.empty(_BLOCK)
     places, found = np.empty(_BLOCK, np.uint32), np.empty(_BLOCK, np.int8)

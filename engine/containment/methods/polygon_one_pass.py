@@ -15,17 +15,22 @@ from typing import Any
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
+from engine.containment.methods.polygon_ray_parity import CROSSED, ON_EDGE, meet_edge
 from engine.jit import inline, kernel
 from engine.predicates.loading import as_point2
-from engine.predicates.orientation import BOUND_2D, GUARD_2D, orient2d
+from engine.predicates.orientation import BOUND_2D, GUARD_2D
 from engine.types import UNDECIDED, Point2
 
 
 def close_rings(vertices: FloatArray, ring_offsets: IntArray) -> tuple[FloatArray, FloatArray, IntArray]:
     """Return the xs and ys of the rings of vertices (n, 2), each ended by its first vertex, and where they begin."""
-    firsts, ends = ring_offsets[:-1], ring_offsets[1:]
-    xs, ys = (np.insert(vertices[:, axis], ends, vertices[firsts, axis]) for axis in (0, 1))
-    return xs, ys, ring_offsets + np.arange(len(ring_offsets))
+    offsets = ring_offsets + np.arange(len(ring_offsets))
+    is_last, closed = np.zeros(offsets[-1], np.bool_), np.empty((2, offsets[-1]))
+    is_last[offsets[1:] - 1] = True
+    for axis in (0, 1):
+        closed[axis, ~is_last] = vertices[:, axis]
+        closed[axis, is_last] = vertices[ring_offsets[:-1], axis]
+    return closed[0], closed[1], offsets
 
 
 @inline
@@ -55,20 +60,11 @@ def _one_by_one(xs: Any, ys: Any, first: int, last: int, q: Any) -> int:
     is_odd, is_open = False, False
     for edge in range(first, last - 1):
         a, b = Point2(float(xs[edge]), float(ys[edge])), Point2(float(xs[edge + 1]), float(ys[edge + 1]))
-        if (a.y < q.y and b.y < q.y) or (a.y > q.y and b.y > q.y) or (a.x < q.x and b.x < q.x):
-            continue
-        is_passed = (a.y <= q.y) != (b.y <= q.y)
-        if a.x > q.x and b.x > q.x:
-            is_odd ^= is_passed
-            continue
-        turn = orient2d(a, b, q)
-        if turn == UNDECIDED:
-            is_open = True
-        elif turn == 0:
-            if min(a.x, b.x) <= q.x and q.x <= max(a.x, b.x):
-                return 0
-        elif is_passed:
-            is_odd ^= (turn > 0) == (a.y < b.y)
+        met = meet_edge(a, b, q, 0.0) & 3
+        if met == ON_EDGE:
+            return 0
+        is_open |= met == UNDECIDED
+        is_odd ^= met == CROSSED
     return UNDECIDED if is_open else 1 if is_odd else -1
 
 

@@ -23,6 +23,9 @@ from engine.predicates.loading import as_point2
 from engine.predicates.orientation import orient2d_exact, orient2d_filter
 from engine.types import UNDECIDED
 
+MISSED, CROSSED, ON_EDGE, BEYOND = 0, 1, 3, 4
+"""How a ray meets an edge, as `polyhedron_ray_parity.py` has it for faces."""
+
 
 @kernel
 def locate_in_rings(
@@ -58,34 +61,43 @@ def locate_in_rings(
 def _locate_in_slab(q: Any, blur: float, edges: Any, slabs: Any, slab: int, flag: Any) -> tuple[int, bool]:
     """Return the location of a blurred q by the edges of a slab, and whether it took more than the filter."""
     starts, ends, x_highs = edges
-    left, right, below, above = q.x - blur, q.x + blur, q.y - blur, q.y + blur
-    is_odd, is_unsure, is_open = False, False, False
+    is_odd, is_open, beyond = False, False, 0
     for entry in range(slabs.offsets[slab], slabs.offsets[slab + 1]):
         edge = slabs.items[entry]
-        if x_highs[edge] < left:
+        if x_highs[edge] < q.x - blur:
             break
         if entry & 4095 == 4095 and flag[0]:
             break
-        a, b = as_point2(starts, edge), as_point2(ends, edge)
-        if (a.y < below and b.y < below) or (a.y > above and b.y > above):
-            continue
-        if blur > 0.0 and ((below <= a.y and a.y <= above) or (below <= b.y and b.y <= above)):
-            return UNDECIDED, True
-        is_passed = (a.y <= q.y) != (b.y <= q.y)
-        if a.x > right and b.x > right:  # wholly to the right: no sign needed
-            is_odd ^= is_passed
-            continue
-        turn = orient2d_filter(a, b, q) if blur == 0.0 else orient2d_blurred(a, b, q, blur)
-        if turn == UNDECIDED:
-            is_unsure = True
-            if blur == 0.0:
-                turn = orient2d_exact(a, b, q)
-        if turn == UNDECIDED:
-            is_open = True
-        elif turn == 0:
-            # on the line, and between the ends in y; in x too, unless the edge is horizontal and q beyond it
-            if min(a.x, b.x) <= q.x and q.x <= max(a.x, b.x):
-                return 0, True
-        elif is_passed:
-            is_odd ^= (turn > 0) == (a.y < b.y)
-    return UNDECIDED if is_open else 1 if is_odd else -1, is_unsure
+        met = meet_edge(as_point2(starts, edge), as_point2(ends, edge), q, blur)
+        beyond |= met & BEYOND
+        if met & 3 == ON_EDGE:
+            return 0, True
+        is_open |= met & 3 == UNDECIDED
+        is_odd ^= met & 3 == CROSSED
+    return UNDECIDED if is_open else 1 if is_odd else -1, beyond != 0
+
+
+@inline
+def meet_edge(a: Any, b: Any, q: Any, blur: float) -> int:
+    """Return CROSSED if the rays to the right from all of the blurred q pass the edge, MISSED, ON_EDGE or UNDECIDED.
+
+    BEYOND is added where it took more than the filter.
+    """
+    left, right, below, above = q.x - blur, q.x + blur, q.y - blur, q.y + blur
+    if (a.y < below and b.y < below) or (a.y > above and b.y > above) or (a.x < left and b.x < left):
+        return MISSED
+    if blur > 0.0 and ((below <= a.y and a.y <= above) or (below <= b.y and b.y <= above)):
+        return UNDECIDED | BEYOND
+    is_passed = (a.y <= q.y) != (b.y <= q.y)
+    if a.x > right and b.x > right:  # wholly to the right: no sign needed
+        return CROSSED if is_passed else MISSED
+    turn, beyond = orient2d_filter(a, b, q) if blur == 0.0 else orient2d_blurred(a, b, q, blur), 0
+    if turn == UNDECIDED:
+        beyond = BEYOND
+        turn = orient2d_exact(a, b, q) if blur == 0.0 else UNDECIDED
+    if turn == UNDECIDED:
+        return UNDECIDED | beyond
+    if turn == 0:
+        # on the line, and between the ends in y; in x too, unless the edge is horizontal and q beyond it
+        return (ON_EDGE if min(a.x, b.x) <= q.x and q.x <= max(a.x, b.x) else MISSED) | beyond
+    return (CROSSED if is_passed and (turn > 0) == (a.y < b.y) else MISSED) | beyond

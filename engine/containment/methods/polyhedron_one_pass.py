@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray, Int8Array, IntArray
-from engine.bounding.grid import cell_of, make_axis
+from engine.bounding.grid import Axis, cell_of
 from engine.containment.methods.polyhedron_ray_parity import BEYOND, CROSSED, ON_FACE, meet_upwards
 from engine.jit import inline, kernel
 from engine.predicates.loading import as_point3
@@ -22,8 +21,8 @@ _ODD, _ON_FACE, _OPEN, _BEYOND = 1, 2, 4, 8
 """Bits of what is known of a point."""
 
 
-@kernel
-def sort_into_cells(points: Any, u: Any, v: Any, firsts: Any, order: Any) -> None:
+@inline
+def _sort_into_cells(points: Any, u: Any, v: Any, firsts: Any, order: Any) -> None:
     """Fill order (n,) int32 with the points (n, 3) by their cell, and firsts (u_cells * v_cells + 1,) with the places.
 
     u, v: each an `Axis` over x and y of all points. firsts: int64, zero.
@@ -77,14 +76,11 @@ def _conclude(states: Any, locations: Any) -> int:
     return n_beyond
 
 
-@kernel
-def locate_by_pass(
-    points: Any, cells: Any, vertices: Any, triangles: Any, z_min: float, states: Any, locations: Any, flag: Any
-) -> int:
-    """Fill `locations` (n,) int8 for points (n, 3); returns how many needed more than the filter.
+@inline
+def _pass_over(points: Any, cells: Any, vertices: Any, triangles: Any, z_min: float, states: Any, flag: Any) -> None:
+    """Enter in states (n,) uint8 how the rays of points (n, 3) meet the triangles (m, 3).
 
-    cells: u, v, firsts, order as `sort_into_cells` leaves them. triangles: (m, 3) int64. z_min: least of the points.
-    states: (n,) uint8, zero. Caller guarantees a surface that is even at each edge.
+    cells: u, v, firsts, order as `_sort_into_cells` leaves them. z_min: least of the points.
     """
     u, v, firsts, order = cells
     for triangle in range(len(triangles)):
@@ -110,18 +106,28 @@ def locate_by_pass(
                 if is_above or q.x < x_low or q.x > x_high or q.y < y_low or q.y > y_high or states[item] & _ON_FACE:
                     continue
                 _take_down(states, item, meet_upwards(a, b, c, q))
-    return int(_conclude(states, locations))
 
 
-def locate_few(
-    points: FloatArray, vertices: FloatArray, triangles: IntArray, locations: Int8Array, flag: FlagArray
-) -> int:
-    """Fill `locations` (n,) for points (n, 3), one at least; returns how many needed more than the filter."""
-    low, high = points.min(axis=0), points.max(axis=0)
+@inline
+def _axis_over(points: Any, axis: int, n_cells: int) -> Axis:
+    """Return cells over the points along an axis, one where there is no extent: `make_axis`, compiled."""
+    low = high = float(points[0, axis])
+    for item in range(1, len(points)):
+        low, high = min(low, float(points[item, axis])), max(high, float(points[item, axis]))
+    extent = high * 0.5 - low * 0.5
+    return Axis(low, high, min(n_cells / extent, 1e300) if extent > 0.0 else 0.0, n_cells if extent > 0.0 else 1)
+
+
+@kernel
+def locate_by_pass(points: Any, vertices: Any, triangles: Any, locations: Any, flag: Any) -> int:
+    """Fill `locations` (n,) int8 for points (n, 3), one at least; returns how many needed more than the filter.
+
+    triangles: (m, 3) int64. Caller guarantees a surface that is even at each edge.
+    """
     side = max(1, int(len(points) ** 0.5))
-    u, v = make_axis(float(low[0]), float(high[0]), side), make_axis(float(low[1]), float(high[1]), side)
+    u, v, z_min = _axis_over(points, 0, side), _axis_over(points, 1, side), _axis_over(points, 2, 1).low
     firsts, order = np.zeros(u.n_cells * v.n_cells + 1, np.int64), np.empty(len(points), np.int32)
-    sort_into_cells(points, u, v, firsts, order)
+    _sort_into_cells(points, u, v, firsts, order)
     states = np.zeros(len(points), np.uint8)
-    cells = (u, v, firsts, order)
-    return int(locate_by_pass(points, cells, vertices, triangles, float(low[2]), states, locations, flag))
+    _pass_over(points, (u, v, firsts, order), vertices, triangles, z_min, states, flag)
+    return int(_conclude(states, locations))

@@ -10,6 +10,7 @@ rationals.
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import ulp
 from typing import Any
 
 import numpy as np
@@ -137,14 +138,14 @@ def posed_center(solid: Sphere, pose: Pose) -> tuple[FloatArray, float]:
         center = np.array([float(value) for value in exact])
     except OverflowError:
         return np.zeros(solid.dimension), np.inf
-    blur = 0.0 if center.tolist() == exact else float(np.spacing(np.abs(center).max()))
+    blur = 0.0 if center.tolist() == exact else ulp(float(np.abs(center).max()))
     return read_only(center), blur
 
 
 def _in_posed_sphere(solid: Sphere, pose: Pose) -> Locator:
-    center, blur = posed_center(solid, pose)
+    ball = *posed_center(solid, pose), solid.radius
 
     def run(points: FloatArray, locations: Int8Array, budget: Budget) -> int:
-        return int(locate_in_ball(points, center, blur, solid.radius, np.empty(8), locations, budget.flag))
+        return int(locate_in_ball(points, *ball, locations, budget.flag))
 
     return Locator("squared_distance", settled(run, rational_half(solid, pose)))

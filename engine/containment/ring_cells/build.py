@@ -18,8 +18,6 @@ from engine.containment.ring_cells.locate import FINE_BITS, LAST, SPLIT_BITS, Ri
 from engine.parallel import Budget
 from engine.solids.polygon import Polygon
 
-_PAYS_FROM: Final = 1 << 12
-_PAYS_PER_EDGE: Final = 1
 _MOST: Final = 1 << 27
 """Edges whose numbers fit an item."""
 _RANGE: Final = 2.0**500
@@ -40,12 +38,8 @@ _ENTRIES: Final = 32
 _WORDS: Final = 1 << 24
 
 
-def ring_cells_if_they_pay(solid: Polygon, n_points: int, budget: Budget) -> RingCells | None:
-    """Return the cells of `solid` if they are there, or if the points asked so far would have paid for them."""
-    seen = solid.prepared("points_seen", lambda: [0], budget.check)
-    seen[0] += n_points
-    if seen[0] < _PAYS_FROM + _PAYS_PER_EDGE * len(solid.vertices):
-        return None
+def ring_cells_of(solid: Polygon, budget: Budget) -> RingCells | None:
+    """Return the cells of `solid`, prepared once; None where its coordinates are out of their range."""
     if len(solid.vertices) > _MOST or not solid.prepared("is_in_range", lambda: [_is_in_range(solid)])[0]:
         return None
     return solid.prepared("ring_cells", lambda: build_ring_cells(solid, budget), budget.check)

@@ -7,7 +7,7 @@ import numpy as np
 from engine.arrays import FloatArray, Int32Array
 from engine.bounding.posed_boxes import place_boxes
 from engine.containment.posed.frames import Frames, frames_of
-from engine.containment.rational_locate import Check
+from engine.containment.rational_locate import Check, over_tree
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.csg import Csg
@@ -42,7 +42,8 @@ def body_box(solid: Solid, pose: Pose | None, check: Check) -> Box:
     check: as for `Solid.prepared`.
     """
     if isinstance(solid, Csg):
-        return _csg_box(solid, pose, check, {})
+        found: Box = over_tree(solid, lambda leaf: body_box(leaf, pose, check), _csg_box)
+        return found
     low, high = own_box(solid, check)
     if np.isinf(low).any() or (pose is None and not isinstance(solid, Sphere)):
         return low, high
@@ -68,17 +69,9 @@ def own_box(solid: Solid, check: Check) -> Box:
     return np.full(solid.dimension, -np.inf), np.full(solid.dimension, np.inf)
 
 
-def _csg_box(solid: Csg, pose: Pose | None, check: Check, known: dict[int, Box]) -> Box:
+def _csg_box(operation: str, boxes: list[Box]) -> Box:
     """Return the box of a Boolean tree; an intersection that is empty keeps a box that holds nothing."""
-    if id(solid) in known:
-        return known[id(solid)]
-    boxes = [
-        _csg_box(operand, pose, check, known) if isinstance(operand, Csg) else body_box(operand, pose, check)
-        for operand in (solid.operands[:1] if solid.operation == "difference" else solid.operands)
-    ]
-    lows, highs = np.array([box[0] for box in boxes]), np.array([box[1] for box in boxes])
-    if solid.operation == "union":
-        known[id(solid)] = lows.min(axis=0), highs.max(axis=0)
-    else:
-        known[id(solid)] = lows.max(axis=0), highs.min(axis=0)
-    return known[id(solid)]
+    lows, highs = (np.array(sides) for sides in zip(*(boxes[:1] if operation == "difference" else boxes)))
+    if operation == "union":
+        return lows.min(axis=0), highs.max(axis=0)
+    return lows.max(axis=0), highs.min(axis=0)

@@ -15,7 +15,7 @@ from engine.containment.methods.box import locate_in_box
 from engine.containment.methods.half_spaces import locate_in_half_planes, locate_in_half_spaces
 from engine.containment.methods.polygon_one_pass import locate_by_ring_pass
 from engine.containment.methods.polygon_ray_parity import locate_in_rings
-from engine.containment.methods.polyhedron_one_pass import locate_by_pass, sort_into_cells
+from engine.containment.methods.polyhedron_one_pass import locate_by_pass
 from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
 from engine.containment.methods.polynomial import locate_by_polynomial
 
@@ -25,7 +25,7 @@ TURN = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
 SOLIDS = [
     (
         engine.Polyhedron(VERTICES, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]),
-        [locate_by_tree, sort_into_cells, locate_by_pass],
+        [locate_by_tree, locate_by_pass],
     ),
     (engine.Triangle(VERTICES[:3]), [locate_in_half_spaces]),
     (engine.Convex([[1, 0, 0, 0]]), [locate_in_half_spaces]),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from engine import Cancel, CancelledError, Csg, Polyhedron, locate
-from engine.containment.cells import build as building
+from engine.containment import policy
 from engine.containment.cells.build import build_cells
 from engine.parallel import Budget
 from tests.unit.containment.scenes import box_mesh, made
@@ -21,7 +21,7 @@ def test_cells_are_built_only_when_they_pay(monkeypatch: pytest.MonkeyPatch) -> 
         again, accuracy = locate(points, solid, report=True)
         assert (again == first).all()
     assert accuracy.method == "segment_parity"
-    monkeypatch.setattr(building, "_PAYS_FROM", 0)
+    monkeypatch.setattr(policy, "_CELLS_FROM", 0)
     huge = Polyhedron(np.array(box_mesh([0, 0, 0], [1, 1, 1])["vertices"]) * 1e300, box_mesh([0] * 3, [1] * 3)["faces"])
     assert locate(points * 1e300, huge, report=True)[1].method == "ray_parity"
     tree = Csg("union", [solid, made(box_mesh([1, 0, 0], [2, 1, 1]))])
@@ -29,7 +29,7 @@ def test_cells_are_built_only_when_they_pay(monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_a_cancelled_build_keeps_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(building, "_PAYS_FROM", 0)
+    monkeypatch.setattr(policy, "_CELLS_FROM", 0)
     solid = made(box_mesh([0, 0, 0], [1, 1, 1]))
     cancel = Cancel()
     cancel.set()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from engine import locate
-from engine.containment.cells import build as building
+from engine.containment import policy
 from engine.containment.cells import order as cell_order
 from engine.containment.cells.build import build_cells
 from engine.parallel import Budget
@@ -14,7 +14,7 @@ from tests.unit.containment.scenes import box_mesh, made, merged
 
 
 def test_ordered_points_get_the_same_answers(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(building, "_PAYS_FROM", 0)
+    monkeypatch.setattr(policy, "_CELLS_FROM", 0)
     solid = made(merged(box_mesh([0, 0, 0], [3, 3, 3]), box_mesh([1, 1, 1], [4, 4, 2])))
     points = np.random.default_rng(8).uniform(-0.5, 4.5, (20_000, 3))
     points[::5, 2] = 3.0  # on a face

@@ -1,4 +1,4 @@
-"""Few points in one pass over the triangles: the tree's answers, and when a tree is built instead."""
+"""Few points in one pass over the triangles: the tree's answers."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ import pytest
 
 from engine import Cancel, CancelledError, locate
 from engine.arrays import read_only
-from engine.containment import prepared
-from engine.containment.methods.polyhedron_one_pass import locate_few
+from engine.containment.methods.polyhedron_one_pass import locate_by_pass
 from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
 from engine.containment.prepared import tree_of
 from engine.parallel import Budget
@@ -24,24 +23,9 @@ def test_any_number_of_points_in_any_box(n_points: int, scale: tuple[float, floa
     points = np.concatenate([lattice_points(3), random.uniform(-1, 5, (200, 3))])
     points = read_only(points[random.permutation(len(points))[:n_points]] * scale)
     found, expected, flag = np.empty(n_points, np.int8), np.empty(n_points, np.int8), np.zeros(1, np.uint8)
-    locate_few(points, solid.vertices, solid.triangles, found, flag)
+    locate_by_pass(points, solid.vertices, solid.triangles, found, flag)
     locate_by_tree(points, np.zeros(n_points), tree_of(solid), expected, flag)
     assert (found == expected).all()
-
-
-def test_a_tree_comes_after_some_passes() -> None:
-    solid = made(box_mesh([0, 0, 0], [1, 1, 1]))
-    points = np.random.default_rng(0).uniform(-0.1, 1.1, (100, 3))
-    answers = set()
-    for _ in range(prepared._PASSES):
-        answers.add(locate(points, solid).tobytes())
-        assert "tree" not in solid._prepared
-    answers.add(locate(points, solid).tobytes())
-    assert "tree" in solid._prepared
-    assert len(answers) == 1
-    many = made(box_mesh([0, 0, 0], [1, 1, 1]))
-    locate(np.zeros(((prepared._PASSES + 1) * 1024, 3)), many)
-    assert "tree" in many._prepared
 
 
 def test_a_pass_ends_when_the_call_must() -> None:
@@ -52,5 +36,5 @@ def test_a_pass_ends_when_the_call_must() -> None:
         locate(np.zeros((10, 3)), solid, cancel=cancel)
     locations = np.zeros(10, np.int8)
     with Budget(None, cancel) as budget:
-        locate_few(read_only(np.zeros((10, 3))), solid.vertices, solid.triangles, locations, budget.flag)
+        locate_by_pass(read_only(np.zeros((10, 3))), solid.vertices, solid.triangles, locations, budget.flag)
     assert locate(np.zeros((10, 3)), solid).tolist() == [0] * 10

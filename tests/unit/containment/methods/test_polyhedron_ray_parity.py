@@ -9,7 +9,7 @@ import pytest
 
 from engine import Polyhedron, locate
 from engine.arrays import read_only
-from engine.containment import prepared
+from engine.containment import policy
 from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
 from engine.containment.prepared import tree_of
 from engine.containment.rational_locate import rational_location
@@ -32,7 +32,8 @@ HARD = (
 @pytest.fixture(autouse=True, params=[0, 1 << 60], ids=["tree", "pass"])
 def _method(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every test twice: a tree from the first point on, and never."""
-    monkeypatch.setattr(prepared, "_PASSES", request.param)
+    monkeypatch.setattr(policy, "_TREE", request.param)
+    monkeypatch.setattr(policy, "_TREE_A_FACE", 0)
 
 
 @pytest.mark.data

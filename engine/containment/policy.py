@@ -1,0 +1,130 @@
+"""Which way of locating points a batch is worth: one rule by cost, from what was asked so far, this batch included.
+
+The first question goes in one pass, with nothing prepared. A structure is built once the points asked so far would
+have paid for it: a tree or slabs soon, cells for many points. The answers are the same either way. Nanoseconds, one
+thread, measured on meshes of 10^3 to 10^6 faces and rings of 10 to 2 10^5 edges.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from engine.containment.cells.top import can_have_cells, lattice_of
+from engine.containment.prepared import tree_of
+from engine.containment.rational_locate import triangle_boxes
+from engine.parallel import Budget
+from engine.solids.polygon import Polygon
+from engine.solids.polyhedron import Polyhedron
+
+PASS, LISTS, CELLS = 0, 1, 2
+"""One pass over all faces or edges; a tree or slabs; cells."""
+
+_POINTS_A_PASS: Final = 1024
+_PASS_A_FACE: Final = 20.0
+_TREE: Final = 60_000.0
+_TREE_A_FACE: Final = 450.0
+_SOON: Final = 1.0 / 16.0
+"""Share of the tree's cost that earlier passes may have taken: in general the second question builds it."""
+_CELLS_FROM, _CELLS_PER_FACE = 1 << 14, 5
+_CELLS_A_FACE: Final = 5_000.0
+_SAMPLE: Final = 256
+_IN_TREE, _IN_TREE_A_FACE_OVER = 150.0, 2.0
+_VISIT: Final = 4.5
+"""A look at one cell of the box of a triangle, when cells are built."""
+
+_PASS_AN_EDGE: Final = 0.8
+_SLABS_AN_EDGE: Final = 410.0
+_RING_CELLS_FROM, _RING_CELLS_AN_EDGE = 1 << 12, 1_000.0
+_FEW_SIGNS: Final = 1 << 15
+"""Signs of orient2d that cost less than the general way."""
+_IN_SLABS: Final = 40.0
+_MET_EDGE: Final = 4.0
+
+
+def faces_over(solid: Polyhedron) -> float:
+    """Return in how many boxes of faces, seen from above, a point lies in the mean; thousands on bad shapes."""
+
+    def find() -> float:
+        some = solid.vertices[solid.triangles[:: len(solid.triangles) // _SAMPLE + 1], :2]
+        with np.errstate(all="ignore"):
+            extents = some.max(axis=1) - some.min(axis=1)
+            for axis in (0, 1):
+                extents[:, axis] /= np.ptp(solid.vertices[:, axis])
+            over = float(extents.prod(axis=1).mean()) * len(solid.triangles)
+        return over if over >= 0.0 else float(len(solid.triangles))
+
+    return solid.prepared("faces_over", find)
+
+
+def cost_in_tree(solid: Polyhedron) -> float:
+    """Return what a point costs in the tree."""
+    return _IN_TREE + _IN_TREE_A_FACE_OVER * faces_over(solid)
+
+
+def cost_of_cells(solid: Polyhedron, budget: Budget) -> float:
+    """Return what cells cost to build: those that the box of each face reaches into are looked at one by one."""
+
+    def find() -> float:
+        boxes, lattice = triangle_boxes(solid), lattice_of(tree_of(solid, budget.check))
+        budget.check()
+        n_cells = (boxes[1::2] - boxes[0::2]) * np.array(lattice.scale)[:, None] + 1.5
+        return _CELLS_A_FACE * len(solid.triangles) + _VISIT * float(n_cells.prod(axis=0).sum())
+
+    return solid.prepared("cost_of_cells", find, budget.check)
+
+
+def choose_for_mesh(solid: Polyhedron, n_points: int, budget: Budget) -> int:
+    """Return PASS, LISTS (the tree) or CELLS."""
+    seen, n_faces = _points_seen(solid, n_points), len(solid.triangles)
+    if solid.kept("cells") is not None:
+        return CELLS
+    if seen >= _CELLS_FROM + _CELLS_PER_FACE * n_faces:
+        if solid.prepared("can_have_cells", lambda: can_have_cells(solid)):
+            gain = seen * cost_in_tree(solid) + 2.0 * _CELLS_A_FACE * n_faces  # on ordinary meshes it pays at once
+            if gain > cost_of_cells(solid, budget):
+                return CELLS
+    if solid.kept("tree") is not None:
+        return LISTS
+    spent = solid.prepared("spent_on_passes", lambda: [0.0])
+    earlier, tree = spent[0], _TREE + _TREE_A_FACE * n_faces
+    spent[0] += _PASS_A_FACE * n_faces * (1 + (n_points - 1) // _POINTS_A_PASS)
+    if n_points > _SAMPLE:
+        spent[0] += n_points * (_PASS_A_FACE * faces_over(solid) - cost_in_tree(solid))
+    return PASS if spent[0] <= tree and earlier <= _SOON * tree else LISTS
+
+
+def choose_for_rings(solid: Polygon, n_points: int) -> int:
+    """Return PASS, LISTS (slabs) or CELLS; cells only where the coordinates are in their range."""
+    seen, n_edges = _points_seen(solid, n_points), len(solid.vertices)
+    if solid.kept("ring_cells") is not None:
+        return CELLS
+    by_pass, lists = _PASS_AN_EDGE * n_edges, PASS
+    if seen * by_pass > _SLABS_AN_EDGE * n_edges or n_points >= _RING_CELLS_FROM:
+        by_slabs = _IN_SLABS + _MET_EDGE * solid.prepared("edges_met", lambda: _edges_met(solid))
+        by_pass, lists = min((by_pass, PASS), (by_slabs, LISTS))
+    is_dear = seen * by_pass > _RING_CELLS_AN_EDGE * (n_edges + _RING_CELLS_FROM)
+    return CELLS if is_dear or seen >= _RING_CELLS_FROM + n_edges else lists
+
+
+def ring_pass_pays(solid: Polygon, n_points: int) -> bool:
+    """Tell whether few more points are best located in a pass; if so they count as asked."""
+    seen, n_edges = solid.prepared("points_seen", lambda: [0]), len(solid.vertices)
+    is_cheap = (seen[0] + n_points) * _PASS_AN_EDGE <= _SLABS_AN_EDGE or n_points * n_edges <= _FEW_SIGNS
+    seen[0] += n_points * is_cheap
+    return bool(is_cheap)
+
+
+def _edges_met(solid: Polygon) -> float:
+    """Return how many edges a horizontal line meets, in the mean; at most all."""
+    heights = solid.vertices[:, 1] * 0.25
+    with np.errstate(all="ignore"):
+        met = float((np.abs(np.diff(heights)) / (heights.max() - heights.min())).sum())
+    return met if met < len(heights) else float(len(heights))
+
+
+def _points_seen(solid: Polygon | Polyhedron, n_points: int) -> int:
+    seen = solid.prepared("points_seen", lambda: [0])
+    seen[0] += n_points
+    return seen[0]

@@ -1,0 +1,62 @@
+"""Few points at once: every kind gets the answers, errors and figures of the general way."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import engine
+from engine import contains, locate
+from engine.containment.at_once import MOST, located_at_once
+from engine.containment.rational_locate import rational_location
+from tests.unit.containment.scenes import box_mesh, lattice_points, lattice_solids, made, merged
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_every_kind_equals_the_general_way(dimension: int) -> None:
+    points = lattice_points(dimension)
+    for solid in (made(each) for seed in (3, 4) for each in lattice_solids(dimension, seed)):
+        general = locate(points, solid, workers=1)
+        for _ in range(3):  # the first compiles, the second may still build
+            for step in (1, 7, 40):
+                some = points[step::97] if step < 40 else points[:600]
+                expected = general[step::97] if step < 40 else general[:600]
+                assert (locate(some, solid) == expected).all(), solid
+                assert (contains(some.tolist(), solid) == (expected >= 0)).all()
+    assert general.tolist() == [rational_location(point, solid) for point in points.tolist()]
+
+
+def test_reports_and_kinds_of_arrays() -> None:
+    ball = engine.Sphere([0, 0, 0], 5)
+    points = np.array([[3.0, 4.0, 0.0], [9, 9, 9]])
+    locate(points, ball)
+    for given in (points, points[::-1][::-1], np.asfortranarray(points), points.astype(np.float32), points.tolist()):
+        found, accuracy = locate(given, ball, report=True)
+        assert (found.tolist(), accuracy.n_items, accuracy.method) == ([0, -1], 2, "squared_distance")
+        assert (accuracy.n_beyond_filter, accuracy.n_rational) == (1, 0)
+    assert contains(points, ball, report=True)[0].tolist() == [True, False]
+    far = np.full((2, 3), 1e200)  # squares out of range are no reason to refuse
+    assert locate(far, ball).tolist() == [-1, -1]
+
+
+@pytest.mark.parametrize("bad", [[[np.nan, 0, 0]], [[0, 0, 0], [0, np.inf, 0]], [[0, 0]], [0, 0, 0], [[True, 0, 0]]])
+def test_refusals_are_those_of_the_general_way(bad: Any) -> None:
+    for solid in (engine.Sphere([0, 0, 0], 5), made(box_mesh([0] * 3, [1] * 3))):
+        locate([[0, 0, 0]], solid)
+        messages = []
+        for given, options in ((bad, {}), (bad, {"workers": 1})):
+            with pytest.raises(engine.EngineError) as error:
+                locate(given, solid, **options)
+            messages.append((type(error.value), str(error.value)))
+        assert messages[0] == messages[1]
+
+
+def test_many_points_and_other_solids_go_the_general_way() -> None:
+    ball = engine.Sphere([0, 0, 0], 5)
+    assert located_at_once(np.zeros((MOST + 1, 3)), ball) is None
+    assert located_at_once(np.zeros((0, 3)), ball) is None
+    assert located_at_once(np.zeros((1, 3)), engine.Csg("union", [ball, ball])) is None
+    mesh = made(merged(*(box_mesh([k, 0, 0], [k + 1, 1, 1]) for k in range(50))))
+    assert located_at_once(np.zeros((500, 3)), mesh) is None

@@ -1,0 +1,74 @@
+"""Which structure a batch is worth: the cheapest pass first, then what the points asked so far would have paid for."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from engine import Polygon, Polyhedron, locate
+from engine.containment.policy import (
+    CELLS,
+    LISTS,
+    PASS,
+    choose_for_mesh,
+    choose_for_rings,
+    cost_in_tree,
+    cost_of_cells,
+    faces_over,
+    ring_pass_pays,
+)
+from engine.parallel import Budget
+from tests.unit.containment.scenes import box_mesh, made, merged
+
+
+def _boxes(n: int) -> Polyhedron:
+    solid: Polyhedron = made(merged(*(box_mesh([k, 0, 0], [k + 0.5, 1, 1]) for k in range(n))))
+    return solid
+
+
+def test_the_second_question_about_a_large_mesh_builds_the_tree() -> None:
+    solid = _boxes(300)
+    points = np.random.default_rng(0).uniform(0, 300, (100, 3))
+    answers = [locate(points, solid).tobytes()]
+    assert solid.kept("tree") is None
+    answers += [locate(points, solid).tobytes() for _ in range(3)]
+    assert solid.kept("tree") is not None
+    assert len(set(answers)) == 1
+
+
+def test_many_points_get_cells_and_bad_shapes_a_tree() -> None:
+    with Budget() as budget:
+        assert choose_for_mesh(_boxes(100), 10, budget) == PASS
+        assert choose_for_mesh(_boxes(10), 10**6, budget) == CELLS
+        random = np.random.default_rng(1)
+        ends = random.normal(size=(500, 2, 3))
+        thin = [np.concatenate([pair, pair + 1e-5 * random.normal(size=(2, 3))]) for pair in ends]
+        faces = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
+        needles = made(merged(*({"vertices": four.tolist(), "faces": faces} for four in thin)))
+        assert choose_for_mesh(needles, 20_000, budget) == LISTS
+        assert faces_over(needles) > 20 * faces_over(_boxes(100))
+        assert cost_in_tree(needles) > cost_in_tree(_boxes(100))
+        assert cost_of_cells(needles, budget) / 2000 > 1.1 * cost_of_cells(_boxes(100), budget) / 1200
+
+
+def test_rings_go_from_a_pass_to_slabs_and_cells() -> None:
+    turn = np.linspace(0.0, 2 * np.pi, 5000, endpoint=False)
+    circle = np.column_stack([np.cos(turn), np.sin(turn)])
+    solid = Polygon([circle])
+    assert choose_for_rings(solid, 100) == PASS
+    assert choose_for_rings(solid, 1000) == LISTS
+    assert choose_for_rings(solid, 10_000) == CELLS
+    teeth = np.arange(5000.0)
+    comb = Polygon([[*np.column_stack([teeth, teeth % 2]).tolist(), [4999, -1], [0, -1]]])
+    assert choose_for_rings(comb, 5000) == CELLS  # each slab holds all teeth
+    small = Polygon([circle[::500]])
+    assert all(ring_pass_pays(small, 100) for _ in range(100))
+    assert not ring_pass_pays(solid, 100)
+
+
+def test_shapes_without_extent_have_finite_costs() -> None:
+    flat = made(box_mesh([0, 0, 0], [0, 0, 0]))
+    with Budget() as budget:
+        assert np.isfinite(cost_in_tree(flat))
+        assert choose_for_mesh(flat, 10**6, budget) == LISTS
+    level = Polygon([[[0, 0], [1, 0], [2, 0]]])
+    assert choose_for_rings(level, 10_000) == CELLS
