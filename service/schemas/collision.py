@@ -35,7 +35,9 @@ class CollideRequest(Schema):
     )
     detail: bool = left_out(_DETAIL)
     boolean: bool = left_out(_BOOLEAN)
-    witness: bool = left_out("Name a reason for each contact: as if true where left out, unless `boolean` is.")
+    witness: bool = left_out(
+        "Name a reason for each contact: if left out, unless `boolean` is true; a single pair then has none."
+    )
 
 
 class CollisionWitness(Schema):
