@@ -1,5 +1,8 @@
 """Exact answers to four questions about a scene: containment, collision, segment clipping, polygon clipping."""
 
+from engine.collision.clearance.clearance import clearance
+from engine.collision.clearance.clearance_poses import clearance_poses
+from engine.collision.clearance.result import Clearance, Feature
 from engine.collision.collide import collide
 from engine.collision.collide_poses import collide_poses
 from engine.collision.result import Collision, Witness
@@ -64,6 +67,7 @@ __all__ = [
     "Bounds",
     "Cancel",
     "CancelledError",
+    "Clearance",
     "ClippedPolygons",
     "Collapse",
     "Collision",
@@ -73,6 +77,7 @@ __all__ = [
     "EmptyGeometryError",
     "EngineError",
     "FaceNotSimpleError",
+    "Feature",
     "HalfSpace",
     "Implicit",
     "InconsistentOrientationError",
@@ -115,6 +120,8 @@ __all__ = [
     "ZeroNormalError",
     "__version__",
     "bounds",
+    "clearance",
+    "clearance_poses",
     "clip_polygons",
     "clip_segments",
     "collide",

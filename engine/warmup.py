@@ -13,6 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from engine.cold_start import fill_cache, note_full
+from engine.collision.clearance.clearance import clearance
 from engine.collision.collide import collide
 from engine.collision.collide_poses import collide_poses
 from engine.collision.scenes.collide_scene import collide_scene
@@ -193,6 +194,7 @@ def _warm_bounds() -> None:
         for solid in _regions(dimension):
             with contextlib.suppress(Exception):  # unbounded ones are refused
                 bounds(solid)
+    clearance(Sphere([0, 0, 0], 1), Sphere([3, 0, 0], 1))
 
 
 STEPS = (

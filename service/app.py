@@ -26,7 +26,18 @@ from service.metrics import Metrics
 from service.openapi import openapi_of
 from service.playground import add_playground
 from service.route import posts_of
-from service.routes import binary, bounds, collision, containment, health, overlay, polygons, segments, solids
+from service.routes import (
+    binary,
+    bounds,
+    clearance,
+    collision,
+    containment,
+    health,
+    overlay,
+    polygons,
+    segments,
+    solids,
+)
 from service.settings import Settings
 from service.store import Store
 from service.work import Memory, Pool
@@ -64,7 +75,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.state.warm, app.state.warm_error = threading.Event(), None
     app.state.warm_begin, app.state.warm_hundredths = time.perf_counter(), 0
     app.openapi = openapi_of(app, settings)  # type: ignore[method-assign]
-    modules = (containment, collision, segments, polygons, overlay, bounds, solids, binary, health)
+    modules = (containment, collision, clearance, segments, polygons, overlay, bounds, solids, binary, health)
     for module in modules:
         app.include_router(module.router)
     app.include_router(solids.lookup)

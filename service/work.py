@@ -36,6 +36,7 @@ _INSTEAD: Final = {
     "locate_scene": "ask for fewer points or bodies at once",
     "collide_scene": "split the scene, or name the pairs to look at in `only`",
     "collide_poses": "ask for fewer poses at once",
+    "clearance_poses": "ask for fewer poses at once",
     "clip_segments": "send fewer segments at once",
     "clip_polygons": "send fewer polygons at once",
     "overlay": "cut both polygons by windows first and overlay window by window",

@@ -80,7 +80,7 @@ def collide_poses(
         relations = np.full(n_poses, UNSETTLED, np.int8)
         found: Witnesses | None = [None] * n_poses if witnesses else None
         answers = Answers(budget, boolean, relations, found, details if has_detail else None)
-        fill = _batch(first, second, poses, answers)
+        fill = batch_of(first, second, poses, answers)
 
         def task(start: int, stop: int) -> None:
             if fill is not None:
@@ -121,7 +121,7 @@ def as_poses(rotations: object, translations: object, dimension: int) -> tuple[F
     return turns, moves
 
 
-def _batch(first: Solid, second: Solid, poses: PoseArrays, answers: Answers) -> Callable[[int, int], None] | None:
+def batch_of(first: Solid, second: Solid, poses: PoseArrays, answers: Answers) -> Callable[[int, int], None] | None:
     """Return the function that lets kernels answer a range of poses, UNSETTLED where they cannot; None without one."""
     if pair_function(first, second)[0] is not mesh_mesh:
         return None

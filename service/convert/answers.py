@@ -10,7 +10,7 @@ import numpy as np
 
 import engine
 from engine import Solid
-from service.schemas import bounds, collision, containment, overlay, polygons, segments, solids
+from service.schemas import bounds, clearance, collision, containment, overlay, polygons, segments, solids
 from service.schemas.problem import Accuracy
 from service.wire import Series
 
@@ -229,6 +229,31 @@ def _witness(witness: engine.Witness) -> collision.CollisionWitness:
         containing=witness.containing or None,
         piercing=witness.piercing,
     )
+
+
+def from_clearances(found: Any, accuracy: engine.Accuracy, are_bools: bool) -> clearance.ClearanceResponse:
+    """Return the answer of `clearance`: of one pair, or distances or bools of many poses."""
+    if are_bools:
+        return clearance.ClearanceResponse.made(
+            clearances=None, clear=np.asarray(found, np.bool_), accuracy=from_accuracy(accuracy)
+        )
+
+    def some(start: int, stop: int) -> list[Any]:
+        return [
+            _clearance(item if isinstance(item, engine.Clearance) else engine.Clearance(float(item)))
+            for item in found[start:stop]
+        ]
+
+    return clearance.ClearanceResponse.made(
+        clearances=Series(len(found), some, weight=4), clear=None, accuracy=from_accuracy(accuracy)
+    )
+
+
+def _clearance(found: engine.Clearance) -> clearance.ClearanceAnswer:
+    features = found.features and [
+        clearance.ClearanceFeature.made(kind=feature.kind, indices=list(feature.indices)) for feature in found.features
+    ]
+    return clearance.ClearanceAnswer.made(distance=found.distance, points=found.points, features=features)
 
 
 def from_scene_pairs(pairs: engine.ScenePairs, accuracy: engine.Accuracy) -> collision.CollideSceneResponse:

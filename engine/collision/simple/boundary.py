@@ -156,7 +156,7 @@ def signs_of(plane: HalfSpaceImage, points: FloatArray, pose: Pose | None, work:
     and the sum of k products one of (k + 2) u of the sum of magnitudes: 2^-49 of it, 2^-1073 of the sum of coordinates
     (for the denormal weights) and 2^-1000 more are not exceeded.
     """
-    normal, offset = _pulled_back(plane, pose)
+    normal, offset = pulled_back(plane, pose)
     largest = max(abs(value) for value in (*normal, offset))
     weights = np.array([float(value / largest) for value in normal])
     shift = float(offset / largest)
@@ -175,7 +175,8 @@ def signs_of(plane: HalfSpaceImage, points: FloatArray, pose: Pose | None, work:
     return signs
 
 
-def _pulled_back(plane: HalfSpaceImage, pose: Pose | None) -> HalfSpaceImage:
+def pulled_back(plane: HalfSpaceImage, pose: Pose | None) -> HalfSpaceImage:
+    """Return the function of points before the pose whose value is that of a plane at their images."""
     if pose is None:
         return plane
     normal, offset = plane

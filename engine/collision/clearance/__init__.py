@@ -1,0 +1,1 @@
+"""How far apart two bodies are: a traversal in floats with proven bounds, and an exact stage for what it leaves."""

@@ -1,0 +1,106 @@
+"""What clearance sees of a body: triangles, and a radius about them. Built once per solid, lazily.
+
+A ball is its centre and its radius; a body of the plane is its edges, in space at z = 0, each a triangle of no area.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from engine.arrays import FloatArray, IntArray, read_only
+from engine.collision.clearance.near_triangles import FACE
+from engine.collision.clearance.result import Feature
+from engine.collision.meshes.mesh_arrays import (
+    BOX_TRIANGLES,
+    MeshBody,
+    box_corners,
+    mesh_body_of,
+    mesh_body_of_triangles,
+)
+from engine.collision.meshes.placement import PoseArrays
+from engine.collision.planar.outline import rings_of
+from engine.solids.aabb import Aabb
+from engine.solids.base import Solid
+from engine.solids.mesh import Mesh
+from engine.solids.sphere import Sphere
+
+
+def spread_of(solid: Solid) -> MeshBody:
+    """Return the triangles of a body that is no half-space; of a ball its centre."""
+    if solid.dimension == 3 and not isinstance(solid, Sphere):
+        return mesh_body_of(solid)
+    return solid.prepared("spread", lambda: _built(solid))
+
+
+def _built(solid: Solid) -> MeshBody:
+    points, ends = _points_and_ends(solid)
+    vertices = np.zeros((len(points), 3))
+    vertices[:, : solid.dimension] = points
+    triangles = np.column_stack([ends, ends[:, 1]])
+    return mesh_body_of_triangles(vertices, triangles, np.arange(len(ends)), False)
+
+
+def _points_and_ends(solid: Solid) -> tuple[FloatArray, IntArray]:
+    """Return the points (n, d) of a ball or a planar body and the two ends of each edge (m, 2)."""
+    if isinstance(solid, Sphere):
+        return solid.center[None], np.zeros((1, 2), np.int64)
+    vertices, offsets = rings_of(solid)
+    starts = np.arange(len(vertices))
+    following = starts + 1
+    following[offsets[1:] - 1] = offsets[:-1]
+    return vertices, np.column_stack([starts, following])
+
+
+def radius_of(solid: Solid) -> float:
+    """Return the radius about the triangles of a body."""
+    return float(solid.radius) if isinstance(solid, Sphere) else 0.0
+
+
+def in_space(rotations: FloatArray, translations: FloatArray) -> PoseArrays:
+    """Return poses (n, d, d), (n, d) as poses of space; those of the plane turn about z."""
+    n, d = translations.shape
+    if d == 3:
+        return PoseArrays(read_only(rotations), read_only(translations), True)
+    turns, moves = np.zeros((n, 3, 3)), np.zeros((n, 3))
+    turns[:, :2, :2], turns[:, 2, 2], moves[:, :2] = rotations, 1.0, translations
+    return PoseArrays(read_only(turns), read_only(moves), True)
+
+
+def feature_of(solid: Solid, mesh: MeshBody, triangle: int, code: int) -> Feature:
+    """Return the feature `code` of a triangle (near_triangles.py) as the caller knows it."""
+    if isinstance(solid, Sphere):
+        return Feature("ball")
+    face = int(mesh.faces[triangle])
+    corners = mesh.arrays.vertices[mesh.arrays.triangles[triangle]]
+    numbers, points = _ring(solid, face)
+    if code == FACE:
+        return Feature("face", (face,))
+    places = [_first(points, corner) for corner in (corners[code % 3], corners[(code + 1) % 3])]
+    if code < 3 or places[0] == places[1]:
+        return Feature("vertex", (_named(solid, int(numbers[places[0]])),))
+    if solid.dimension == 3 and abs(places[0] - places[1]) not in (1, len(numbers) - 1):
+        return Feature("face", (face,))  # an edge of the triangulation only
+    return Feature("edge", tuple(sorted(_named(solid, int(numbers[place])) for place in places)))
+
+
+def _ring(solid: Solid, face: int) -> tuple[IntArray, FloatArray]:
+    """Return the numbers and the points (n, 3) of the vertices of a face or edge, in order."""
+    if isinstance(solid, Mesh):
+        numbers = solid.face_indices[solid.face_offsets[face] : solid.face_offsets[face + 1]]
+        return numbers, solid.vertices[numbers]
+    if isinstance(solid, Aabb) and solid.dimension == 3:
+        (a, b, c), (_, _, d) = BOX_TRIANGLES[face]
+        numbers = np.array([a, b, c, d])
+        return numbers, box_corners(solid)[numbers]
+    points, ends = _points_and_ends(solid)
+    numbers = ends[face]
+    return numbers, np.column_stack([points[numbers], np.zeros(2)])
+
+
+def _first(points: FloatArray, corner: FloatArray) -> int:
+    return int(np.argmax((points == corner).all(axis=1)))
+
+
+def _named(solid: Solid, number: int) -> int:
+    """Return the vertex's number as the caller knows it: a box of the plane counts its corners as one of space."""
+    return (0, 1, 3, 2)[number] if isinstance(solid, Aabb) and solid.dimension == 2 else number

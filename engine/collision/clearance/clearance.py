@@ -1,0 +1,145 @@
+"""Public: how far apart two solids are."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any, Literal, Unpack, overload
+
+from engine.collision.clearance.half_spaces import gap_of_planes
+from engine.collision.clearance.result import Clearance
+from engine.collision.clearance.spreads import spread_pair
+from engine.collision.collide import check_pose, collide_pair, pair_function
+from engine.collision.result import Work
+from engine.errors import InvalidInputError
+from engine.parallel import Budget, Cancel, Options, Progress, check_options
+from engine.solids.base import Solid
+from engine.solids.half_space import HalfSpace
+from engine.solids.pose import Pose
+from engine.types import Accuracy, Relation
+
+
+class ClearanceOptions(Options, total=False):
+    """What `clearance` takes by name, but for `report`, which changes what it returns."""
+
+    at_least: float | None
+    first_pose: Pose | None
+    second_pose: Pose | None
+
+
+@overload
+def clearance(
+    first: Solid, second: Solid, *, report: Literal[False] = False, **options: Unpack[ClearanceOptions]
+) -> Clearance | bool: ...
+@overload
+def clearance(
+    first: Solid, second: Solid, *, report: Literal[True], **options: Unpack[ClearanceOptions]
+) -> tuple[Clearance | bool, Accuracy]: ...
+def clearance(
+    first: Solid,
+    second: Solid,
+    *,
+    first_pose: Pose | None = None,
+    second_pose: Pose | None = None,
+    at_least: float | None = None,
+    workers: int | None = None,
+    deadline: float | None = None,
+    cancel: Cancel | None = None,
+    progress: Progress | None = None,
+    report: bool = False,
+) -> Clearance | bool | tuple[Clearance | bool, Accuracy]:
+    """Say how far apart two solids are, or whether they are at least so far apart, exactly.
+
+    Solids are closed sets: one within another, or in contact, is 0 apart; one in a cavity of another is as far from it
+    as the walls are. For many poses of one pair use `clearance_poses`, for a scene `collide_scene(..., gap=)`.
+
+    Parameters: first, second, first_pose, second_pose: as for `collide`, all pairs that it takes. at_least: a distance;
+    the answer is then a bool. workers, progress: taken for uniformity, one pair is one item. deadline: seconds.
+    report: return an `Accuracy` too.
+    Returns: a `Clearance`; with at_least whether the exact distance is that or more, that itself counts (so 0 is always
+    true; `collide` tells whether they meet).
+    Boundary: 0.0 exactly where they have a common point; a positive distance that would round to 0 is the smallest
+    denormal. Degenerate input: as `collide`; radius 0, flat boxes and faces without area are bodies too.
+    Of several nearest pairs the one on the faces with the smallest numbers is given, the first body's first; where two
+    faces are as near along an edge or all over, one point of that.
+    Accuracy: the distance and each coordinate are the doubles nearest to the exact values, each on its own, so the
+    points given may be a little nearer or further. Poses are exact images, equal ones are left out, as by `collide`.
+    Cost: both trees, built once per solid; then about the number of faces that are nearly nearest, 30 us each.
+    Raises: as `collide`; InvalidInputError (at_least negative or not finite); NotRepresentableError (the distance is
+    beyond the largest double).
+
+    >>> from engine import Aabb, Sphere
+    >>> box = Aabb([0, 0, 0], [1, 1, 1])
+    >>> clearance(box, Sphere([4, 5, 1], 2)).distance
+    3.0
+    >>> clearance(box, Aabb([1.5, 0, 0], [2, 1, 1]), at_least=0.5)
+    True
+    """
+    pair_function(first, second)
+    check_pose(first_pose, first, "first_pose")
+    check_pose(second_pose, second, "second_pose")
+    check_options(workers, progress)
+    least = None if at_least is None else checked_distance(at_least)
+    if first_pose is not None and first_pose == second_pose:
+        first_pose = second_pose = None  # as `collide_pair` does, so that the two agree
+    with Budget(deadline, cancel) as budget:
+        budget.check()
+        answer: Clearance | bool
+        if least is None:
+            answer = _clearance(first, second, first_pose, second_pose, budget)
+        else:
+            answer = is_clear(first, second, first_pose, second_pose, least, budget)
+    if progress is not None:
+        progress(1)
+    if not report:
+        return answer
+    n_exact = int(isinstance(answer, Clearance) and answer.points is not None)
+    return answer, Accuracy("exact", 0.5, 1, n_exact, n_exact, "+".join(sorted({first.type, second.type})))
+
+
+def checked_distance(value: Any, name: str = "at_least") -> float:
+    """Return a distance; raise unless it is a finite number, 0 or more."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = -1.0
+    if isinstance(value, (bool, str)) or not 0.0 <= number < float("inf"):
+        raise InvalidInputError(f"{name} must be a distance, finite and 0 or more, got {value!r}", (name,))
+    return number
+
+
+def do_meet(first: Solid, second: Solid, first_pose: Pose | None, second_pose: Pose | None, budget: Budget) -> bool:
+    """Tell whether two bodies have a common point."""
+    work = Work(budget, witness=False, boolean=True)
+    return collide_pair(first, second, first_pose, second_pose, work).relation != Relation.DISJOINT
+
+
+def is_clear(
+    first: Solid, second: Solid, first_pose: Pose | None, second_pose: Pose | None, least: float, budget: Budget
+) -> bool:
+    """Tell whether two bodies are at least so far apart."""
+    if least == 0.0:
+        return True
+    if has_plane(first, second):
+        if do_meet(first, second, first_pose, second_pose, budget):
+            return False
+        return gap_of_planes(first, second, first_pose, second_pose, budget)[0].is_at_least(Fraction(least))
+    pair = spread_pair(first, second, first_pose, second_pose, budget)
+    if not pair.are_boundaries_clear(0, Fraction(least)):
+        return False
+    return not do_meet(first, second, first_pose, second_pose, budget)
+
+
+def _clearance(
+    first: Solid, second: Solid, first_pose: Pose | None, second_pose: Pose | None, budget: Budget
+) -> Clearance:
+    if do_meet(first, second, first_pose, second_pose, budget):
+        return Clearance(0.0)
+    if has_plane(first, second):
+        gap, features = gap_of_planes(first, second, first_pose, second_pose, budget)
+        return gap.clearance(features, first.dimension)
+    return spread_pair(first, second, first_pose, second_pose, budget).clearance(0)
+
+
+def has_plane(first: Solid, second: Solid) -> bool:
+    """Tell whether one of two solids is a half-space."""
+    return isinstance(first, HalfSpace) or isinstance(second, HalfSpace)

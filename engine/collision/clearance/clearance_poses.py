@@ -1,0 +1,107 @@
+"""Public: how far apart two solids are under many rigid poses of the second."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from engine.arrays import BoolArray, FloatArray
+from engine.collision.answers import Answers
+from engine.collision.clearance.bodies import in_space
+from engine.collision.clearance.clearance import checked_distance, do_meet, has_plane
+from engine.collision.clearance.half_spaces import gap_of_planes
+from engine.collision.clearance.spreads import SpreadPair
+from engine.collision.codes import DISJOINT, UNSETTLED
+from engine.collision.collide import pair_function
+from engine.collision.collide_poses import as_poses, batch_of
+from engine.collision.meshes.mesh_arrays import STILL
+from engine.collision.meshes.placement import PoseArrays
+from engine.parallel import Budget, Cancel, Progress, run_chunks
+from engine.solids.base import Solid
+from engine.solids.pose import Pose
+from engine.types import Accuracy
+
+
+def clearance_poses(
+    first: Solid,
+    second: Solid,
+    rotations: object,
+    translations: object,
+    *,
+    at_least: float | None = None,
+    workers: int | None = None,
+    deadline: float | None = None,
+    cancel: Cancel | None = None,
+    progress: Progress | None = None,
+    report: bool = False,
+) -> FloatArray | BoolArray | tuple[FloatArray | BoolArray, Accuracy]:
+    """Say how far `first` is from `second` moved by each of many poses, or whether at least so far, exactly.
+
+    Parameters: first, second, rotations ``(n_poses, d, d)``, translations ``(n_poses, d)``: as for `collide_poses`.
+    at_least: a distance that every pose is held against. workers, deadline, cancel, progress (items are poses), report:
+    as everywhere.
+    Returns: ``(n_poses,) float64`` distances, each as `clearance` gives it; with at_least ``(n_poses,) bool``.
+    Boundary, degenerate input, accuracy: as `clearance`. Empty arrays give an empty answer.
+    Raises: as `clearance`; NotRigidError, NotFiniteError, InvalidArrayError name the pose.
+
+    >>> from engine import Aabb
+    >>> box = Aabb([0, 0, 0], [1, 1, 1])
+    >>> turns = np.broadcast_to(np.eye(3), (3, 3, 3))
+    >>> clearance_poses(box, box, turns, [[0.5, 0, 0], [1.25, 0, 0], [4, 5, 0]]).tolist()
+    [0.0, 0.25, 5.0]
+    """
+    pair_function(first, second)
+    least = None if at_least is None else checked_distance(at_least)
+    poses = PoseArrays(*as_poses(rotations, translations, first.dimension), True)
+    n_poses = len(poses.rotations)
+    result: Any = np.zeros(n_poses) if least is None else np.ones(n_poses, np.bool_)
+    with Budget(deadline, cancel) as budget:
+        batch = _Batch(first, second, poses, budget)
+
+        def task(start: int, stop: int) -> None:
+            if least != 0.0:
+                batch.fill(result, start, stop, None if least is None else Fraction(least))
+
+        run_chunks(task, n_poses, budget=budget, first_chunk=4, workers=workers, progress=progress)
+    if not report:
+        return result
+    n_exact = batch.n_exact
+    return result, Accuracy("exact", 0.5, n_poses, n_exact, n_exact, "+".join(sorted({first.type, second.type})))
+
+
+class _Batch:
+    """One pair of bodies and all poses of the second."""
+
+    def __init__(self, first: Solid, second: Solid, poses: PoseArrays, budget: Budget) -> None:
+        self.first, self.second, self.poses, self.budget = first, second, poses, budget
+        n_poses = len(poses.rotations)
+        self.relations = np.full(n_poses, UNSETTLED, np.int8)
+        self.relate = batch_of(first, second, poses, Answers(budget, True, self.relations, None, None))
+        self.spread = None if has_plane(first, second) or not n_poses else in_space(poses.rotations, poses.translations)
+        self.n_exact = 0
+
+    def fill(self, result: Any, start: int, stop: int, least: Fraction | None) -> None:
+        """Answer the poses of a range; threads may answer different ranges."""
+        if self.relate is not None:
+            self.relate(start, stop)
+        pair = None if self.spread is None else SpreadPair(self.first, self.second, STILL, self.spread, self.budget)
+        for item in range(start, stop):
+            self.budget.check()
+            if self._do_meet(item):
+                result[item] = 0.0 if least is None else False
+            elif pair is not None:
+                result[item] = pair.distance(item) if least is None else pair.are_boundaries_clear(item, least)
+            else:
+                gap, _ = gap_of_planes(self.first, self.second, None, self._pose(item), self.budget)
+                result[item] = gap.distance() if least is None else gap.is_at_least(least)
+        self.n_exact += stop - start if pair is None else pair.n_exact
+
+    def _do_meet(self, item: int) -> bool:
+        if self.relations[item] != UNSETTLED:
+            return bool(self.relations[item] != DISJOINT)
+        return do_meet(self.first, self.second, None, self._pose(item), self.budget)
+
+    def _pose(self, item: int) -> Pose:
+        return Pose(self.poses.rotations[item], self.poses.translations[item])

@@ -1,0 +1,134 @@
+"""The squared distance of two triangles in integers, and the points of them that are nearest.
+
+Corners are integers on the lattice of the pair (exact_body.py). Of the two features that floats suggest the nearest
+points of their lines or planes are found, as integers over a denominator. They are the nearest of the triangles exactly
+if they lie on them and both triangles lie beyond the planes across their connection (the triangles are convex); where
+that fails, all pairs of features are tried.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from engine.collision.clearance.near_triangles import FACE
+from engine.predicates.exact_vectors import cross, dot, minus, squared_length
+
+Vector = tuple[int, ...]
+Corners = tuple[Vector, Vector, Vector]
+
+
+class Rational(NamedTuple):
+    """A point: integers over one positive denominator."""
+
+    numerators: Vector
+    denominator: int
+
+
+class Gap(NamedTuple):
+    """Two points, the features they lie on, and the square of their distance, top / bottom."""
+
+    p: Rational
+    q: Rational
+    first: int
+    second: int
+    top: int
+    bottom: int
+
+    def is_less(self, other: Gap) -> bool:
+        """Tell whether this is the shorter one."""
+        return self.top * other.bottom < other.top * self.bottom
+
+
+def nearest_of_triangles(s: Corners, t: Corners, first: int, second: int) -> Gap:
+    """Return the gap between two triangles that are apart; first, second: the features that are probably nearest."""
+    suggested = _gap(s, t, first, second)
+    if suggested is not None and _is_least(s, t, suggested):
+        return suggested
+    best: Gap | None = None
+    for found in _all_gaps(s, t):
+        if best is None or found.is_less(best):
+            best = found
+    assert best is not None
+    return best
+
+
+def _all_gaps(s: Corners, t: Corners) -> Iterator[Gap]:
+    """Yield the gaps of all pairs of features, those of vertices first."""
+    pairs = [(i, j) for i in range(7) for j in range(7) if (i < 6 and j < 6) or i < 3 or j < 3]
+    for i, j in sorted(pairs, key=lambda pair: max(pair[0] // 3, pair[1] // 3)):
+        found = _gap(s, t, i, j)
+        if found is not None:
+            yield found
+
+
+def _is_least(s: Corners, t: Corners, gap: Gap) -> bool:
+    """Tell whether the triangles lie beyond the planes across the gap through its ends."""
+    (p, p_size), (q, q_size) = gap.p, gap.q
+    n = tuple(y * p_size - x * q_size for x, y in zip(p, q))
+    at_p, at_q = dot(n, p), dot(n, q)
+    return all(dot(n, corner) * p_size <= at_p for corner in s) and all(dot(n, corner) * q_size >= at_q for corner in t)
+
+
+def _gap(s: Corners, t: Corners, first: int, second: int) -> Gap | None:
+    """Return the gap of two features, None where the nearest points of their lines or planes lie off them."""
+    if first < 3 and second < 3:
+        return _between(Rational(s[first], 1), Rational(t[second], 1), first, second)
+    if first < 3:
+        foot = _foot(s[first], t, second)
+        return None if foot is None else _between(Rational(s[first], 1), foot[0], first, foot[1])
+    if second < 3:
+        foot = _foot(t[second], s, first)
+        return None if foot is None else _between(foot[0], Rational(t[second], 1), foot[1], second)
+    if first == FACE or second == FACE:
+        return None
+    return _edges(s, first - 3, t, second - 3)
+
+
+def _between(p: Rational, q: Rational, first: int, second: int) -> Gap:
+    n = tuple(y * p.denominator - x * q.denominator for x, y in zip(p.numerators, q.numerators))
+    return Gap(p, q, first, second, squared_length(n), (p.denominator * q.denominator) ** 2)
+
+
+def _foot(point: Vector, t: Corners, feature: int) -> tuple[Rational, int] | None:
+    """Return the foot of a point on an edge or on all of a triangle, and the feature it lies on; None if it is off."""
+    if feature < FACE:
+        k = feature - 3
+        a, u = t[k], minus(t[(k + 1) % 3], t[k])
+        size = squared_length(u)
+        return _on_edge(t, k, dot(minus(point, a), u), size) if size else (Rational(a, 1), k)
+    n = cross(minus(t[1], t[0]), minus(t[2], t[0]))
+    size = squared_length(n)
+    if not size:
+        return None
+    for k in range(3):
+        side = dot(cross(minus(t[(k + 1) % 3], t[k]), minus(point, t[k])), n)
+        if side < 0:
+            return None
+        if side == 0:
+            return _foot(point, t, 3 + k)
+    height = dot(n, minus(point, t[0]))
+    return Rational(tuple(x * size - height * y for x, y in zip(point, n)), size), FACE
+
+
+def _on_edge(t: Corners, k: int, part: int, whole: int) -> tuple[Rational, int] | None:
+    """Return the point at part / whole of an edge, and the feature it lies on; None where it is beyond the ends."""
+    a, b = t[k], t[(k + 1) % 3]
+    if part == 0:
+        return Rational(a, 1), k
+    if part == whole:
+        return Rational(b, 1), (k + 1) % 3
+    if not 0 < part < whole:
+        return None
+    return Rational(tuple(x * (whole - part) + y * part for x, y in zip(a, b)), whole), 3 + k
+
+
+def _edges(s: Corners, i: int, t: Corners, j: int) -> Gap | None:
+    """Return the gap of two edges across both, None for parallel ones: that of an end is as small."""
+    u, v, w = minus(s[(i + 1) % 3], s[i]), minus(t[(j + 1) % 3], t[j]), minus(s[i], t[j])
+    uu, uv, vv, uw, vw = dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w)
+    size = uu * vv - uv * uv
+    if not size:
+        return None
+    p, q = _on_edge(s, i, uv * vw - vv * uw, size), _on_edge(t, j, uu * vw - uv * uw, size)
+    return None if p is None or q is None else _between(p[0], q[0], p[1], q[1])

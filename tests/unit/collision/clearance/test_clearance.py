@@ -1,0 +1,148 @@
+"""How far apart two bodies are, against rationals: every distance the nearest double, every bound decided exactly."""
+
+from __future__ import annotations
+
+import math
+import random
+from fractions import Fraction
+from itertools import combinations_with_replacement
+from typing import Any
+
+import numpy as np
+import pytest
+
+from engine import (
+    Aabb,
+    Convex,
+    HalfSpace,
+    InvalidInputError,
+    NotRepresentableError,
+    Polygon,
+    Polyhedron,
+    Pose,
+    Sphere,
+    Surface,
+    UnsupportedPairError,
+    clearance,
+)
+from engine.collision.clearance.result import Clearance, Feature
+from tests.unit.collision.clearance.makers import (
+    KINDS,
+    Scale,
+    body,
+    distance,
+    is_at_least,
+    is_nearest,
+    placed,
+    pose,
+)
+from tests.unit.collision.lattices import solid
+
+COUNTS = pytest.mark.parametrize("n", [4, pytest.param(400, marks=pytest.mark.full)])
+
+
+def lengths_agree(found: Clearance) -> bool:
+    """Tell whether the points are as far apart as is said, but for their rounding."""
+    assert found.points is not None
+    p, q = ([Fraction(x) for x in row] for row in found.points.tolist())
+    squared = sum((x - y) ** 2 for x, y in zip(p, q))
+    size = max(abs(x) for x in (*p, *q, Fraction(found.distance)))
+    slack = Fraction(1, 2**48) * size + Fraction(1, 2**1060)
+    return max(Fraction(found.distance) - slack, Fraction(0)) ** 2 <= squared <= (Fraction(found.distance) + slack) ** 2
+
+
+@pytest.mark.parametrize(
+    ("d", "first", "second"),
+    [(d, *pair) for d in (2, 3) for pair in combinations_with_replacement(KINDS[d], 2)],
+)
+@COUNTS
+def test_agrees_with_the_reference(d: int, first: str, second: str, n: int) -> None:
+    rng = random.Random(f"{d}{first}{second}")
+    for _ in range(n):
+        scale = Scale(rng)
+        offset = [
+            rng.choice([0.0, 0.0, 5.0, *([1e6, 1e9] if scale.size < 1e299 else [])]) * scale.size for _ in range(d)
+        ]
+        a, b = body(rng, scale, first, [0.0] * d), body(rng, scale, second, offset)
+        p, q = pose(rng, scale, d), pose(rng, scale, d)
+        try:
+            one, other = solid(a), solid(b)
+            exact = distance(a, b, p, q)
+            found: Any = clearance(one, other, first_pose=placed(p), second_pose=placed(q))
+        except (NotRepresentableError, NotImplementedError):
+            continue
+        if exact is None:
+            assert (found.distance, found.points, found.features) == (0.0, None, None), (a, b, p, q)
+        else:
+            assert is_nearest(found.distance, exact), (a, b, p, q)
+            assert lengths_agree(found), (a, b, p, q)
+        around = (0.0, math.nextafter(found.distance, 0.0), found.distance, math.nextafter(found.distance, math.inf))
+        for least in {*around, scale.size / 2}:
+            answer = clearance(one, other, first_pose=placed(p), second_pose=placed(q), at_least=least)
+            assert answer == is_at_least(least, exact), (a, b, p, q, least)
+        mirrored: Any = clearance(other, one, first_pose=placed(q), second_pose=placed(p))
+        assert mirrored.distance == found.distance
+
+
+def test_pythagorean_balls_are_at_least_their_distance_apart_and_no_ulp_more() -> None:
+    for x, y, z, length in [(1, 2, 2, 3), (2, 3, 6, 7), (4, 4, 7, 9), (12, 15, 16, 25)]:
+        for r, radius in [(1.0, 0.5), (0.25, 1.75), (0.0, 0.0)]:
+            one, other = Sphere([0, 0, 0], r), Sphere([x, y, z], radius)
+            exact = length - r - radius
+            assert clearance(one, other).distance == exact  # type: ignore[union-attr]
+            assert clearance(one, other, at_least=exact) is True
+            assert clearance(one, other, at_least=math.nextafter(exact, math.inf)) is False
+
+
+def test_names_the_features_and_the_smallest_faces() -> None:
+    box, other = Aabb([0, 0, 0], [1, 1, 1]), Aabb([3, 2, 0.25], [4, 3, 0.75])
+    found: Any = clearance(box, other)
+    assert found.features[1].kind == "edge" or found.features[1].kind == "vertex"
+    ball: Any = clearance(Polyhedron(*tetrahedron()), Sphere([0.25, 0.25, -2], 1))
+    assert (ball.distance, ball.features) == (1.0, (Feature("face", (0,)), Feature("ball")))
+    assert ball.points.tolist() == [[0.25, 0.25, 0.0], [0.25, 0.25, -1.0]]
+    quad = Surface([[0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0]], [[0, 1, 2, 3]])
+    diagonal: Any = clearance(quad, Sphere([2, 2, 3], 1))  # over the edge that cuts the face
+    assert diagonal.features == (Feature("face", (0,)), Feature("ball"))
+    edge: Any = clearance(Polygon([[(0, 0), (4, 0), (4, 4)]]), Sphere([2, -3], 1))
+    assert edge.features == (Feature("edge", (0, 1)), Feature("ball"))
+    plane: Any = clearance(HalfSpace([0, 0, 1], -2), box)
+    assert (plane.distance, plane.features[0]) == (1.0, Feature("plane"))
+    assert plane.features[1].kind == "vertex"
+
+
+def tetrahedron() -> tuple[list[list[float]], list[list[int]]]:
+    return [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
+
+
+def test_a_body_in_a_cavity_is_as_far_as_the_walls_and_one_within_is_no_distance_apart() -> None:
+    corners = [[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]
+    quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    outer, inner = np.array(corners) * 10.0, np.array(corners) * 6.0 + 2.0
+    hollow = Polyhedron([*outer.tolist(), *inner.tolist()], quads + [[i + 8 for i in quad[::-1]] for quad in quads])
+    assert clearance(hollow, Sphere([5, 5, 5], 1)).distance == 2.0  # type: ignore[union-attr]
+    assert clearance(hollow, Sphere([1, 1, 1], 0.25)).distance == 0.0  # type: ignore[union-attr]
+    assert clearance(hollow, Sphere([1, 1, 1], 0.25), at_least=0.1) is False
+
+
+def test_equal_poses_are_left_out_and_a_denormal_gap_is_kept() -> None:
+    box, beside = Aabb([0, 0, 0], [1, 1, 1]), Aabb([2, 0, 0], [3, 1, 1])
+    tilted = Pose([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]], [1, 2, 3])
+    assert clearance(box, beside, first_pose=tilted, second_pose=tilted).distance == 1.0  # type: ignore[union-attr]
+    tiny = Aabb([0, 0], [5e-324, 1]), Aabb([1e-323, 0], [1, 1])
+    assert clearance(*tiny).distance == 5e-324  # type: ignore[union-attr]
+    wide = Sphere([-1.7e308, 0], 0), Sphere([1.7e308, 0], 0)
+    assert clearance(*wide, at_least=1.7e308) is True
+    with pytest.raises(NotRepresentableError, match="beyond the largest double"):
+        clearance(*wide)
+
+
+@pytest.mark.parametrize("wrong", [-1.0, math.nan, math.inf, "1", True, None.__class__])
+def test_refuses_what_is_no_distance(wrong: Any) -> None:
+    with pytest.raises(InvalidInputError, match="at_least must be a distance"):
+        clearance(Sphere([0, 0], 1), Sphere([3, 0], 1), at_least=wrong)
+
+
+def test_refuses_pairs_that_collide_refuses() -> None:
+    with pytest.raises(UnsupportedPairError, match="convex"):
+        clearance(Convex([[1, 0, 0]]), Sphere([0, 0], 1))

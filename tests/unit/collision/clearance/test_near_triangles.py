@@ -1,0 +1,41 @@
+"""Float bounds on the distance of two triangles: both sides of the exact one, and close to it."""
+
+from __future__ import annotations
+
+import random
+
+import numpy as np
+
+from engine.collision.clearance.near_triangles import nearest_points, rounding_of, seen_from, slab
+from engine.collision.meshes.triangle_triangle import Triangle3
+from engine.jit import kernel
+from engine.predicates.vectors import length, minus
+from engine.types import Point3
+from tests.reference.distance import squared_distance
+from tests.reference.exact import q, vector
+
+
+@kernel
+def bounds(s: Triangle3, t: Triangle3) -> tuple[float, float]:
+    origin = s.p
+    s, t = seen_from(origin, s), seen_from(origin, t)
+    best = nearest_points(s, t)
+    gap = minus(best.q, best.p)
+    size, slack = length(gap), rounding_of(s, t)
+    return slab(s, t, gap, size) - slack, size + slack
+
+
+def test_bounds_enclose_the_exact_distance_closely() -> None:
+    rng = random.Random(7)
+    for _ in range(200):
+        offset = rng.choice([2.5, 2.0 + 2.0**-40, 9.0])
+        whole = rng.random() < 0.5
+        s, t = (
+            [[float(rng.randint(0, 2)) if whole else rng.uniform(0, 2) for _ in range(3)] for _ in range(3)]
+            for _ in range(2)
+        )
+        t = [[x + offset, y, z] for x, y, z in t]
+        low, high = bounds(*(Triangle3(*(Point3(*p) for p in hull)) for hull in (s, t)))
+        exact = squared_distance(*[tuple(dict.fromkeys(map(vector, hull))) for hull in (s, t)])
+        assert q(max(low, 0.0)) ** 2 <= exact <= q(high) ** 2, (s, t)
+        assert high - low <= 1e-12 * (1.0 + high) or np.sqrt(float(exact)) < 1e-6, (s, t)
