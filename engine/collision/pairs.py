@@ -39,12 +39,6 @@ def _aabb_aabb(first: Any, second: Any, first_pose: Pose | None, second_pose: Po
     return bodies(first, second, first_pose, second_pose, work)
 
 
-def _aabb_sphere(box: Any, sphere: Any, box_pose: Pose | None, sphere_pose: Pose | None, work: Work) -> Collision:
-    """Decide axis by axis where the box has no pose."""
-    function: PairFunction = collide_aabb_sphere if box_pose is None else collide_body_sphere
-    return function(box, sphere, box_pose, sphere_pose, work)
-
-
 PAIRS: dict[tuple[int, str, str], PairFunction] = {
     **{(3, first, second): mesh_mesh for first in MESHES for second in MESHES},
     **{(2, first, second): collide_outline_outline for first in OUTLINES for second in OUTLINES},
@@ -53,7 +47,7 @@ PAIRS: dict[tuple[int, str, str], PairFunction] = {
 }
 for _dimension in (2, 3):
     PAIRS[_dimension, "aabb", "aabb"] = _aabb_aabb
-    PAIRS[_dimension, "aabb", "sphere"] = _aabb_sphere
+    PAIRS[_dimension, "aabb", "sphere"] = collide_aabb_sphere
     PAIRS[_dimension, "half_space", "half_space"] = collide_half_space_half_space
     PAIRS[_dimension, "half_space", "sphere"] = collide_half_space_sphere
     PAIRS[_dimension, "sphere", "sphere"] = collide_sphere_sphere

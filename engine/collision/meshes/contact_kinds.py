@@ -1,10 +1,8 @@
 """Compiled: how faces in contact meet (the kind of a witness), and whether a plane separates the bodies behind them.
 
-The rules are those of `exact_triangles.kind_of_contact`, by exact signs of points under their poses. With t, u the two
-faces: an edge of t passes the open face u where its ends lie on two sides of u's plane and all three edges of u turn
-one way about it, or where it lies in that plane and its own line has corners of u on both sides. A corner of t in u's
-plane is in the open face, on an edge or on a corner of u by its three turns there. Two open edges cross where they are
-coplanar and each has the other's ends on two sides, in a plane told by a third corner off their own.
+As `exact_triangles.kind_of_contact`. An edge of t passes the open face u where its ends lie on two sides of u's plane
+and u's edges turn one way about it, or where it lies in that plane with corners of u on both sides. Open edges cross
+where they are coplanar and each has the other's ends on two sides, in a plane told by a third corner.
 """
 
 from __future__ import annotations

@@ -108,8 +108,7 @@ def faces_in(arrays: MeshArrays, pose: PoseArrays, low: list[float], high: list[
         if n_found > len(found):
             found = np.empty(n_found, np.int64)
             _faces_in_box(arrays, pose, box, found)
-    faces: IntArray = np.sort(found[:n_found])
-    return faces
+    return np.asarray(np.sort(found[:n_found]), np.int64)
 
 
 def exact_pair(

@@ -49,10 +49,9 @@ def find_all_contacts(pair: MeshPair, *, looks_at_regions: bool = True) -> tuple
             return found.pairs[:0], False
         found_pairs.append(found.pairs[:n_pairs].copy())
         found_kinds.append(found.kinds[:n_pairs].copy())
-        is_first = how == FULL and len(found_pairs) == 1
-        if is_first and looks_at_regions and pair.seek == SEEK_OVERLAP and not pair.is_separated(found_pairs[0]):
-            if _is_overlap_near(pair, *found):
-                return found.pairs[:1], True
+        may_probe = how == FULL and len(found_pairs) == 1 and looks_at_regions and pair.seek == SEEK_OVERLAP
+        if may_probe and not pair.is_separated(found_pairs[0]) and _is_overlap_near(pair, *found):
+            return found.pairs[:1], True
     pairs, kinds = np.concatenate(found_pairs), np.concatenate(found_kinds)
     faces = [pair.meshes[own].faces[pairs[:, own]] for own in (0, 1)]
     order = np.lexsort((pairs[:, 1], pairs[:, 0], faces[1], faces[0]))  # the caller's faces, then triangles

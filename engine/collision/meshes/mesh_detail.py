@@ -43,8 +43,7 @@ def _have_equal_faces(first: MeshBody, second: MeshBody) -> bool:
         return True
     if len(first.faces) != len(second.faces) or first.arrays.extent.reach != second.arrays.extent.reach:
         return False
-    a, b = _sorted_faces(first), _sorted_faces(second)
-    return bool((a == b).all())
+    return bool((_sorted_faces(first) == _sorted_faces(second)).all())
 
 
 def _sorted_faces(mesh: MeshBody) -> FloatArray:

@@ -78,7 +78,12 @@ def are_separated(
             return True
         if separates(poses, t.p, t.q, t.r, u, own, v, their, error):
             return True
-        for edge in range(6 if item < N_EDGES else 0):
+        if flag[0] != 0:
+            return False
+    for item in range(min(N_EDGES, contacts.shape[0])):  # order: a plane of a face is likelier, and tried with all
+        s = with_pose(triangle_of(first, contacts[item, 0]), own)
+        t = with_pose(triangle_of(second, contacts[item, 1]), their)
+        for edge in range(6):
             one, other = (s, t) if edge < 3 else (t, s)
             for end in range(3):
                 a, b, c = corner(one, edge), corner(one, edge + 1), corner(other, end)

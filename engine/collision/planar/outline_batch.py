@@ -1,9 +1,8 @@
 """Pairs of planar bodies in batches: polygons, triangles and boxes whose edges meet only where they follow each other.
 
-Each edge is compared with each edge of the other body by signs with a bound. One strict crossing proves overlapping:
-about it lie all four combinations of inside and outside, because no other edge of either body comes near it. Where all
-pairs of edges are surely apart, one vertex of each ring tells whether the ring lies in the other body. Contacts, and
-whatever a rounded pose leaves open, stay UNSETTLED and are decided by the exact path of the pair.
+One strict crossing of two edges, by signs with a bound, proves overlapping: about it lie all combinations of inside and
+outside, for no other edge comes near. Where all edges are surely apart, a vertex of each ring tells whether it lies in
+the other body. Contacts, and what rounded poses leave open, stay UNSETTLED for the exact path.
 """
 
 from __future__ import annotations
@@ -192,10 +191,7 @@ def relate_outline_pairs(
     bodies: of each its number in the pool, or -1; rows: of each the row of its pose, 0 for none. Returns early when the
     flag is raised.
     """
-    most = 0
-    for body in range(pool.reach.shape[0]):
-        most = max(most, pool.firsts[body + 1] - pool.firsts[body])
-    placed = np.empty((2, min(most, MOST_EDGES), 2))
+    placed = np.empty((2, MOST_EDGES, 2))
     for item in range(pairs.shape[0]):
         if item % _POLL_EVERY == 0 and flag[0] != 0:
             return

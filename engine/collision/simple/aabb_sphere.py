@@ -6,6 +6,7 @@ from fractions import Fraction
 
 from engine.collision.exact_images import as_vector, image_point
 from engine.collision.result import Collision, Witness, Work
+from engine.collision.simple.body_sphere import collide_body_sphere
 from engine.predicates.exact_vectors import squared_length
 from engine.solids.aabb import Aabb
 from engine.solids.pose import Pose
@@ -16,10 +17,12 @@ from engine.types import Relation
 def collide_aabb_sphere(
     box: Aabb, sphere: Sphere, box_pose: Pose | None, sphere_pose: Pose | None, work: Work
 ) -> Collision:
-    """Return the relation of a box without pose (first) and a ball (second), exact, in 2D or 3D.
+    """Return the relation of a box (first) and a ball (second), exact, in 2D or 3D; a posed box is any body.
 
-    Caller guarantees that the box has no pose. Flat boxes and balls of radius 0 have no interior and never overlap.
+    Flat boxes and balls of radius 0 have no interior and never overlap.
     """
+    if box_pose is not None:
+        return collide_body_sphere(box, sphere, box_pose, sphere_pose, work)
     center, low, high = image_point(sphere.center, sphere_pose), as_vector(box.min), as_vector(box.max)
     radius = Fraction(sphere.radius)
     nearest = tuple(max(a - c, c - b, Fraction(0)) for c, a, b in zip(center, low, high))
