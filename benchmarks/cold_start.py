@@ -58,7 +58,7 @@ def ask(name: str, code: str, cache: Path, **variables: str) -> Figure:
     done = subprocess.run(words, cwd=machine.ROOT, env=environment, capture_output=True, text=True, check=True)
     seconds, after = time.perf_counter() - begin, resource.getrusage(resource.RUSAGE_CHILDREN)
     cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    code_bytes = sum(file.stat().st_size for file in cache.rglob("*.nbc"))
+    code_bytes = sum(file.stat().st_size for file in cache.rglob("*") if file.is_file())
     raw = {"cpu": cpu, "compilations": int(done.stdout), "bytes": code_bytes}
     note = f"CPU {cpu:.1f} s, {raw['compilations']} compilations, {code_bytes / 2**20:.1f} MB of machine code"
     return Figure(name, "s", [seconds], note=note, raw=raw)

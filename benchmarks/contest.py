@@ -9,6 +9,7 @@ on as many as all others.
 from __future__ import annotations
 
 import gc
+import json
 import statistics
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -28,6 +29,8 @@ JUDGING = 30.0
 """Seconds that a slow contender may take for the items it is judged on, outside the clock."""
 SIZES = (1, 10, 100)
 """Items of a question whose latency is measured by itself."""
+LARGEST = 20_000
+"""Characters of a request that is kept."""
 QUESTIONS = 200
 """At most, for each of these sizes."""
 Goals = tuple[float | None, float | None]
@@ -325,7 +328,8 @@ def _note(contest: Contest, entry: _Entry, answers: Any, exact: Any, rows: np.nd
         item = int(rows[worst])
         entry.row.worst = {"item": item, "answer": errors.plain(answers[worst]), "exact": errors.plain(exact[worst])}
         if contest.request is not None:
-            entry.row.worst["request"] = contest.request(item)
+            path, body = contest.request(item)
+            entry.row.worst["request"] = (path, body if len(json.dumps(body)) <= LARGEST else None)
 
 
 def _judge_differing(contest: Contest, entries: list[_Entry]) -> None:

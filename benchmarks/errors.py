@@ -186,15 +186,16 @@ def coordinates(answers: np.ndarray, exact: np.ndarray) -> dict[str, Any]:
 
 
 def areas(answers: np.ndarray, exact: np.ndarray) -> dict[str, Any]:
-    """Judge areas by (area, scale): NaN is a refusal; wrong is off by more than `AREA_TOLERANCE` of the scale."""
+    """Judge areas by (area, scale): NaN is a refusal, infinity out of domain; wrong is off by `AREA_TOLERANCE`."""
     answers = np.asarray(answers, float)
-    refused = np.isnan(answers)
-    error = np.abs(answers - exact[:, 0]) / exact[:, 1]
-    good = error[~refused & (error <= AREA_TOLERANCE)] * 2.0**53
+    refused, outside = np.isnan(answers), np.isinf(answers)
+    error = np.abs(np.where(outside, np.nan, answers) - exact[:, 0]) / exact[:, 1]
+    good = error[error <= AREA_TOLERANCE] * 2.0**53
     found = {
         "judged": len(exact),
         "wrong": int((error > AREA_TOLERANCE).sum()),
         "refused": int(refused.sum()),
+        "outside": int(outside.sum()),
         "ulp_largest": float(good.max(initial=0.0)),
         "ulp_median": float(np.median(good)) if len(good) else 0.0,
     }

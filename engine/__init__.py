@@ -8,6 +8,7 @@ from engine.collision.collide_poses import collide_poses
 from engine.collision.result import Collision, Witness
 from engine.collision.scenes.collide_scene import ScenePairs, collide_scene
 from engine.collision.triangles import collide_triangles
+from engine.compare import Comparison, compare
 from engine.containment.locate import contains, locate
 from engine.containment.scene.locate_scene import SceneLocations, locate_scene
 from engine.errors import (
@@ -71,6 +72,7 @@ __all__ = [
     "ClippedPolygons",
     "Collapse",
     "Collision",
+    "Comparison",
     "Convex",
     "Csg",
     "DeadlineExceededError",
@@ -128,6 +130,7 @@ __all__ = [
     "collide_poses",
     "collide_scene",
     "collide_triangles",
+    "compare",
     "contains",
     "locate",
     "locate_scene",

@@ -31,6 +31,7 @@ from service.routes import (
     bounds,
     clearance,
     collision,
+    compare,
     containment,
     health,
     overlay,
@@ -75,7 +76,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.state.warm, app.state.warm_error = threading.Event(), None
     app.state.warm_begin, app.state.warm_hundredths = time.perf_counter(), 0
     app.openapi = openapi_of(app, settings)  # type: ignore[method-assign]
-    modules = (containment, collision, clearance, segments, polygons, overlay, bounds, solids, binary, health)
+    modules = (containment, collision, clearance, segments, polygons, overlay, bounds, compare, solids, binary, health)
     for module in modules:
         app.include_router(module.router)
     app.include_router(solids.lookup)

@@ -169,6 +169,8 @@ def each_or_nan(area: Callable[[Any], float]) -> Callable[[Any], np.ndarray]:
     def one(item: Any) -> float:
         try:
             return area(item)
+        except NotApplicable:
+            return np.inf  # out of its domain
         except Exception:
             return np.nan
 

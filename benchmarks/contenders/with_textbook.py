@@ -124,7 +124,7 @@ def _polygon_areas(region: engine.Aabb) -> Ask:
 def _overlay(operation: str) -> Ask:
     def area(pair: Any) -> float:
         if len(pair[0]) > 1 or len(pair[1]) > 1:
-            raise ValueError("single rings only")
+            raise NotApplicable("single rings only")
         found = [ring for ring in greiner_hormann.intersection(pair[0][0], pair[1][0]) if len(ring) > 2]
         return sum(abs(float(ring_areas(np.array(ring), np.array([0, len(ring)]))[0])) for ring in found)
 

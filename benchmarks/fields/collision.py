@@ -29,6 +29,11 @@ NEAR: dict[str, Goals] = {"coal": (5.0, 8.0), "fcl": (3.3, 5.0)}
 SOUP: dict[str, Goals] = {"coal": (6.0, 10.0), "fcl": (5.0, 8.0)}
 CONVEX = {10: (3.0, 4.0), 32: (2.0, 3.0), 100: (1.3, 3.0), 200: (1.0, 3.0)}
 """Against coal, net of what its calls cost."""
+RELATIONS = {relation.label: relation for relation in engine.Relation} | {
+    "A_in_B": engine.Relation.FIRST_INSIDE_SECOND,
+    "B_in_A": engine.Relation.SECOND_INSIDE_FIRST,
+}
+"""As the hard set names them."""
 ALONE = ("flush stack, a scene", "flush stack, call by call", "pairs of simple solids", "pairs of polygons",
          "triangles 2D", "triangles 3D")  # fmt: skip
 
@@ -68,7 +73,7 @@ def _contact(size: Size, peers: tuple[str, ...]) -> Contest:
 def stored(name: str, cases: list[dict], about: str = "", peers: tuple[str, ...] = PEERS) -> Contest:
     """Return the contest of some pairs of the hard set; without peers: which of five relations."""
     couples = [tuple(Placed(_mesh(case[key])) for key in ("first", "second")) for case in cases]
-    relations = np.array([engine.Relation[case["relation"].upper()] for case in cases])
+    relations = np.array([RELATIONS[case["relation"]] for case in cases])
     return _on_couples(name, True, couples, relations != engine.Relation.DISJOINT if peers else relations, about, peers)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 import engine
 from engine import Solid
-from service.schemas import bounds, clearance, collision, containment, overlay, polygons, segments, solids
+from service.schemas import bounds, clearance, collision, compare, containment, overlay, polygons, segments, solids
 from service.schemas.problem import Accuracy
 from service.wire import Series
 
@@ -89,6 +89,13 @@ def from_bounds(found: engine.Bounds, accuracy: engine.Accuracy) -> bounds.Bound
         sphere=bounds.SphereBounds.made(center=found.sphere.center, radius=found.sphere.radius),
         accuracy=from_accuracy(accuracy),
     )
+
+
+def from_comparison(found: engine.Comparison, accuracy: engine.Accuracy) -> compare.CompareResponse:
+    """Return the answer of `compare`."""
+    names = ("method", "differing", "inexact", "seconds_exact", "seconds_plain")
+    same = {name: getattr(found, name) for name in names}
+    return compare.CompareResponse.made(methods=list(found.methods), accuracy=from_accuracy(accuracy), **same)
 
 
 def from_pieces(pieces: engine.SegmentPieces, accuracy: engine.Accuracy) -> segments.ClipSegmentsResponse:

@@ -30,6 +30,7 @@ FLOORS = {
     "engine.polygon_overlay": 7,
     "engine.collision": 7,
     "engine.textbook": 7,
+    "engine.compare": 8,
     "engine.distributed": 8,
     "engine.files": 8,
     "engine.warmup": 8,

@@ -1,0 +1,173 @@
+"""Public: the exact answer beside the textbook's plain float64 one, on the caller's own data."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+
+import numpy as np
+
+from engine.arrays import BoolArray, FloatArray, IntArray
+from engine.collision.collide import collide
+from engine.containment.locate import locate
+from engine.errors import InvalidOperationError, TooComplexError, UnsupportedSolidError, WrongDimensionError
+from engine.parallel import Budget, Cancel
+from engine.polygon_clipping.clip_polygons import clip_polygons
+from engine.segment_clipping.clip_segments import clip_segments
+from engine.solids.base import Solid
+from engine.types import Accuracy, Relation
+
+Compared = Literal["contains", "collide", "clip_segments", "clip_polygons"]
+STEPS: Final = 1 << 19
+"""Of a brute-force method between two looks at the deadline: some milliseconds."""
+MOST_STEPS: Final = 1 << 24
+"""That an item may take, since nothing interrupts it: a second or so."""
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """What both said, how long it took them, and where they differ."""
+
+    method: str
+    """The textbook's method."""
+    methods: tuple[str, ...]
+    """All that the textbook has for this question."""
+    exact: BoolArray | FloatArray
+    """For each item whether it is contained, collides or is kept; of segments rows of both ends, NaN where removed."""
+    plain: BoolArray | FloatArray
+    """The same in plain float64."""
+    differing: IntArray
+    """Items that plain float64 decides wrongly, ascending."""
+    inexact: IntArray
+    """Items decided rightly, with a coordinate that is not the double nearest to the exact one, ascending."""
+    seconds_exact: float
+    seconds_plain: float
+    accuracy: Accuracy
+
+
+def compare(
+    operation: Compared,
+    *arguments: Any,
+    method: str | None = None,
+    deadline: float | None = None,
+    cancel: Cancel | None = None,
+) -> Comparison:
+    """Answer a question exactly and by the textbook's plain float64 method.
+
+    Both are asked about one item before, so that kernels are there, and then timed on all.
+
+    Parameters
+        operation: "contains" (points, solid), "collide" (first, second), "clip_segments" (segments, region) or
+            "clip_polygons" (an ``(n, size, dim)`` array of polygons of one ring, region).
+        arguments: those of the engine's function of that name.
+        method: one of the textbook's methods for this question; None for the first. A wrong name lists them.
+        deadline: seconds; cancel: a switch. One pair of bodies is not interrupted, but refused if it is too large.
+    Boundary: what is on the boundary is contained, bodies that touch collide, a segment that touches is kept.
+    Degenerate input: as the engine's function takes it; the textbook's methods give whatever they give.
+    Accuracy: the exact answer is exact, coordinates correctly rounded; the other has no bound at all.
+    Cost: that of both methods; those of the textbook pass over all faces for every point.
+    Raises: InvalidOperationError, UnsupportedSolidError, WrongDimensionError, TooComplexError and what the engine's
+        function raises.
+    Source: the textbook's section 22.4, file by file in `engine.textbook`.
+
+    >>> from engine import HalfSpace, compare
+    >>> found = compare("contains", [[0.1, 0.3], [0.1, 0.2]], HalfSpace([3.0, -1.0], 0.0))
+    >>> found.method, found.exact.tolist(), found.plain.tolist(), found.differing.tolist()
+    ('half-space', [True, True], [True, True], [])
+    """
+    if operation not in OPERATIONS:
+        raise InvalidOperationError(f"cannot compare {operation!r}; one of {', '.join(OPERATIONS)}", ("operation",))
+    from engine.textbook import methods as textbook  # whoever compares nothing does not load it
+
+    exactly, of = OPERATIONS[operation]
+    items, second = arguments
+    methods = textbook.of_pairs(items, second) if operation == "collide" else getattr(textbook, of)(second)
+    if not methods:
+        raise UnsupportedSolidError(f"the textbook has no method for {operation} with {second.type}", ("solid",))
+    name = next(iter(methods)) if method is None else method
+    if name not in methods:
+        raise InvalidOperationError(f"no method {name!r} here; one of {', '.join(methods)}", ("method",))
+    ask, n_steps = methods[name]
+    if n_steps > MOST_STEPS:
+        raise TooComplexError(f"{n_steps:,} steps for the textbook's method; at most {MOST_STEPS:,}", ("second",))
+    end = None if deadline is None else time.monotonic() + deadline
+
+    def limits() -> dict[str, Any]:
+        return {"report": True, "cancel": cancel, "deadline": None if end is None else end - time.monotonic()}
+
+    with Budget(deadline, cancel) as budget:
+        if operation == "collide":
+            ask()
+            plainly: Callable[[], Any] = lambda: np.array([ask()])  # noqa: E731
+        else:
+            items = _as_items(items, second.dimension, 2 if operation == "contains" else 3)
+            exactly(items[:1], second, limits())
+            ask(items[:1])
+            plainly = lambda: _in_parts(ask, n_steps, budget, items)  # noqa: E731
+        started = time.perf_counter()
+        exact, accuracy = exactly(items, second, limits())
+        middle = time.perf_counter()
+        plain = plainly()
+        ended = time.perf_counter()
+    differing, inexact = _differences(exact, plain)
+    return Comparison(
+        name, tuple(methods), exact, plain, differing, inexact, middle - started, ended - middle, accuracy
+    )
+
+
+def _as_items(items: Any, dimension: int, n_axes: int) -> FloatArray:
+    found = np.ascontiguousarray(items, np.float64)
+    if found.ndim != n_axes or found.shape[-1] != dimension:
+        wanted = "(n, dim)" if n_axes == 2 else "(n, size, dim)"
+        raise WrongDimensionError(f"expected {wanted} with dim = {dimension}, got shape {found.shape}")
+    return found
+
+
+def _in_parts(ask: Callable[..., Any], n_steps: int, budget: Budget, items: FloatArray) -> Any:
+    """Ask about so few items at once that the deadline is looked at in between."""
+    size, found = max(1, STEPS // max(n_steps, 1)), []
+    for start in range(0, max(len(items), 1), size):
+        budget.check()
+        found.append(ask(items[start : start + size]))
+    return np.concatenate(found)
+
+
+def _differences(exact: Any, plain: Any) -> tuple[IntArray, IntArray]:
+    """Return where decisions differ, and where only coordinates do."""
+    if exact.ndim == 1:
+        return np.flatnonzero(exact != plain), np.empty(0, np.int64)
+    kept, as_plain = ~np.isnan(exact).any(axis=1), ~np.isnan(plain).any(axis=1)
+    return np.flatnonzero(kept != as_plain), np.flatnonzero(kept & as_plain & (exact != plain).any(axis=1))
+
+
+def _contains(points: Any, solid: Solid, limits: dict[str, Any]) -> tuple[Any, Accuracy]:
+    found, accuracy = locate(points, solid, **limits)
+    return found >= 0, accuracy
+
+
+def _collide(first: Solid, second: Solid, limits: dict[str, Any]) -> tuple[Any, Accuracy]:
+    found, accuracy = collide(first, second, boolean=True, **limits)
+    return np.array([found.relation != Relation.DISJOINT]), accuracy
+
+
+def _clip_segments(segments: Any, region: Solid, limits: dict[str, Any]) -> tuple[Any, Accuracy]:
+    pieces, accuracy = clip_segments(segments, region, **limits)
+    rows = np.full((len(segments), 2 * region.dimension), np.nan)
+    rows[pieces.source] = np.hstack([pieces.start, pieces.end])
+    return rows, accuracy
+
+
+def _clip_polygons(polygons: Any, region: Solid, limits: dict[str, Any]) -> tuple[Any, Accuracy]:
+    found, accuracy = clip_polygons(polygons, region, **limits)
+    return np.diff(found.polygon_offsets) > 0, accuracy
+
+
+OPERATIONS: Final[dict[str, tuple[Callable[..., tuple[Any, Accuracy]], str]]] = {
+    "contains": (_contains, "of_points"),
+    "collide": (_collide, "of_pairs"),
+    "clip_segments": (_clip_segments, "of_segments"),
+    "clip_polygons": (_clip_polygons, "of_polygons"),
+}
+"""The exact answer, and the function of `engine.textbook.methods`."""

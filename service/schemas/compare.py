@@ -1,0 +1,64 @@
+"""Question and answer of the comparison with the textbook's methods."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from service.schemas.arrays import DIMENSION, POINTS, Array, Axis, Numbers
+from service.schemas.containment import Indices, Points
+from service.schemas.limits import left_out
+from service.schemas.problem import Accuracy, Schema, with_example
+from service.schemas.segments import PAIR
+from service.schemas.solids import Number, Solid
+
+NEEDED = {
+    "contains": ("points", "solid"),
+    "collide": ("first", "second"),
+    "clip_segments": ("segments", "region"),
+    "clip_polygons": ("polygons", "region"),
+}
+"""The fields of each operation, in the order of the engine's arguments."""
+
+
+class CompareRequest(Schema):
+    """Where does the textbook's plain float64 method go wrong on this question, and what does exactness cost?"""
+
+    model_config = with_example(
+        {
+            "operation": "clip_segments",
+            "region": {"type": "aabb", "min": [0, 0], "max": [1, 3]},
+            "segments": [[[-0.1, 0.3], [0.2, -0.6]], [[2, 2], [0.5, 0.5]]],
+        }
+    )
+
+    operation: Literal["contains", "collide", "clip_segments", "clip_polygons"]
+    method: str = left_out("One of the textbook's methods; left out, the first. A wrong one is answered with a list.")
+    solid: Solid = left_out("contains: half_space, convex, polyhedron, triangle or polygon.")
+    points: Points = left_out("contains.")
+    first: Solid = left_out("collide: a polyhedron.")
+    second: Solid = left_out("collide: a polyhedron.")
+    region: Solid = left_out("clip_segments: half_space, aabb, convex, sphere; clip_polygons: not the sphere.")
+    segments: Annotated[Array, Numbers(POINTS, PAIR, DIMENSION)] = left_out("clip_segments: two end points each.")
+    polygons: Annotated[Array, Numbers(POINTS, Axis(1, "max_points"), DIMENSION)] = left_out(
+        "clip_polygons: one ring each, all of as many vertices."
+    )
+
+    @model_validator(mode="after")
+    def _is_complete(self) -> CompareRequest:
+        if missing := [name for name in NEEDED[self.operation] if getattr(self, name) is None]:
+            raise ValueError(f"{self.operation} needs {' and '.join(missing)}")
+        return self
+
+
+class CompareResponse(Schema):
+    """Where both differ, and what both took."""
+
+    method: str = Field(description="The textbook's method that was asked.")
+    methods: list[str] = Field(description="All that the textbook has for this question.")
+    differing: Indices = Field(description="Items that plain float64 decides wrongly.")
+    inexact: Indices = Field(description="Items decided rightly, with a coordinate that is not the nearest double.")
+    seconds_exact: Number
+    seconds_plain: Number
+    accuracy: Accuracy
