@@ -76,6 +76,7 @@ def _scatter(rows: list[dict[str, Any]]) -> str:
         axis.set_visible(False)
     for axis, operation in zip(axes.flat, operations):
         chosen = [row for row in rows if row["operation"] == operation and row["is_hard"] and row["seconds"]]
+        chosen = [row for row in chosen if row.get("setting") is None and "judged" in row["errors"]]
         for name, look in _looks([row["contender"] for row in chosen]).items():
             mine = [row for row in chosen if row["contender"] == name]
             shares = [error_share(row) or ZERO_LANE for row in mine]
@@ -95,9 +96,9 @@ def _scatter(rows: list[dict[str, Any]]) -> str:
 
 
 def error_share(row: dict[str, Any]) -> float:
-    """Return the share of wrong and refused answers among those judged."""
+    """Return the share of wrong, refused and not taken among those judged."""
     errors = row["errors"]
-    return (errors["wrong"] + errors["refused"]) / max(1, errors["judged"])
+    return (errors["wrong"] + errors["refused"] + errors.get("outside", 0)) / max(1, errors["judged"])
 
 
 def _distance(found: dict[str, Any]) -> str:

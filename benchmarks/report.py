@@ -14,7 +14,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from benchmarks import curves, filed, machine, page, pictures, table
+from benchmarks import curves, filed, machine, page, pictures, table, web_page
 from benchmarks.fields import tasks
 
 DOCS, README = machine.ROOT / "docs", machine.ROOT / "README.md"
@@ -53,5 +53,7 @@ def _write_pages(found: dict[str, Any]) -> None:
         (DOCS / "pictures").mkdir(parents=True, exist_ok=True)
         (DOCS / "pictures" / name).write_text(text)
     (DOCS / "speed_and_error.md").write_text(page.text_of(found))
+    path = machine.results("report").relative_to(machine.ROOT).as_posix()
+    (DOCS / "speed_and_error.html").write_text(web_page.text_of(found, path))
     head, _, rest = README.read_text().partition(BEGIN)
     README.write_text(f"{head}{BEGIN}\n{page.smallest(found)}{END}{rest.partition(END)[2]}")

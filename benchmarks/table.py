@@ -33,7 +33,7 @@ def options(words: list[str] | None, description: str, **more: str) -> argparse.
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="small sizes and few rounds: about a minute")
     parser.add_argument("--rounds", type=int, help="interleaved rounds a row (15, report 7; quick: 3)")
-    parser.add_argument("--seconds", type=float, help="of each contender in each row (3; quick: 0.3)")
+    parser.add_argument("--seconds", type=float, help="of each contender in each row (3, report 2; quick: 0.3)")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", default="", metavar="WORD", help="only rows whose name contains WORD")
     parser.add_argument("--dry", action="store_true", help="write no results file")
@@ -41,7 +41,7 @@ def options(words: list[str] | None, description: str, **more: str) -> argparse.
         parser.add_argument(f"--{name}", action="store_true", help=about)
     given = parser.parse_args(words)
     given.rounds = given.rounds or (3 if given.quick else 7 if "pages" in more else 15)
-    given.seconds = given.seconds or (0.3 if given.quick else 3.0)
+    given.seconds = given.seconds or (0.3 if given.quick else 2.0 if "pages" in more else 3.0)
     given.writes = not (given.dry or given.quick or given.only)
     given.size = Size(given.seed, QUICK if given.quick else 1.0)
     return given

@@ -1,0 +1,98 @@
+"""The page of speed against error: its sentences, and in Chromium from a file: no other host, mouse and keyboard."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from benchmarks import web_page
+
+CHROMIUM = next(
+    (path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None
+)
+REQUEST = ("/v1/contains", {"solid": {"type": "polygon", "rings": [[[0, 0], [4, 0], [0, 4]]]}, "points": [[2, 2]]})
+WORST = {"item": 7, "answer": 0, "exact": 1, "request": REQUEST}
+SCRIPT = "</script><b>not markup</b>"
+
+
+def row(contest: str, contender: str, rate: float, wrong: int, **more: Any) -> dict[str, Any]:
+    errors = {"judged": 200, "wrong": wrong, "refused": 0, "outside": 3 * (contender == "picky")}
+    known = {"operation": "containment 2D", "contest": contest, "is_hard": contest == "boundary", "about": SCRIPT}
+    known |= {"contender": contender, "package": "" if contender == "ours" else contender, "absent": "", "rate": rate}
+    latency = {"1": [1e-6, 2e-6, 3e-5, 200]}
+    known |= {"build": 0.1, "first": 0.2, "latency": latency, "worst": WORST if wrong else {}, "seconds": [1.0]}
+    return known | {"errors": errors, "setting": None} | more
+
+
+ROWS = [
+    *(row("uniform", name, rate, 0) for name, rate in (("ours", 2e6), ("peer", 1e6), ("picky", 1e5))),
+    *(
+        row("boundary", name, rate, wrong)
+        for name, rate, wrong in (("ours", 1e6, 0), ("peer", 3e6, 50), ("picky", 1e5, 0))
+    ),
+    row("boundary", "peer", 2e6, 9, setting=7.0),
+]
+FOUND: dict[str, Any] = dict.fromkeys(web_page.FACTS, 0) | {"versions": {"numpy": "2"}, "quick": False, "rows": ROWS}
+
+
+def test_a_question_is_said_in_words() -> None:
+    (asked,) = web_page.questions(ROWS)
+    assert asked["tag"] == "exact costs 3x"
+    assert "Easy input: 2x faster than peer." in asked["say"]
+    assert "3x slower than peer, wrong in 25% (20% to 31%); none of them is always right." in asked["say"]
+    wrong = [row("boundary", "ours", 1.0, 3), row("boundary", "peer", 1.0, 0)]
+    assert web_page.questions(wrong)[0]["tone"] == "bad"
+    assert "OURS IS WRONG in 3 of 200" in web_page.questions(wrong)[0]["say"]
+
+
+def test_numbers_on_the_page_name_their_line_of_results() -> None:
+    text = web_page.text_of(FOUND, "results/report.json")
+    start = text.index('type="application/json">') + len('type="application/json">')
+    data = json.loads(text[start : text.index("</script>", start)])
+    for contest in data["contests"].values():
+        for shown in contest["rows"]:
+            assert (shown["rate"], shown["wrong"]) == (ROWS[shown["i"]]["rate"], ROWS[shown["i"]]["errors"]["wrong"])
+    assert (data["wrong"], data["judged"]) == (0, 400)
+
+
+@pytest.fixture
+def browser() -> Any:
+    if CHROMIUM is None:
+        pytest.skip("no Chromium on this machine (Debian: apt-get install chromium)")
+    api = pytest.importorskip("playwright.sync_api", reason="needs playwright")
+    with api.sync_playwright() as driver:
+        made = driver.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu"])
+        yield made
+        made.close()
+
+
+@pytest.mark.parametrize(("width", "scheme"), [(1200, "light"), (390, "dark")])
+def test_in_a_browser(browser: Any, tmp_path: Path, width: int, scheme: str) -> None:
+    file = tmp_path / "page.html"
+    file.write_text(web_page.text_of(FOUND, "results/report.json"))
+    page = browser.new_page(viewport={"width": width, "height": 800}, color_scheme=scheme)
+    troubles: list[str] = []
+    page.on("pageerror", lambda error: troubles.append(str(error)))
+    page.on("request", lambda asked: troubles.append(asked.url) if not asked.url.startswith("file:") else None)
+    page.goto(file.as_uri())
+    assert page.locator("#questions button").count() == 1
+    assert page.locator("g.mark").count() == 3  # a setting that easy rows have not cannot be mixed
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert page.locator("b", has_text="not markup").count() == 0
+    assert "one answer in 4.00 is wrong" in page.locator("#pays").inner_text()
+    page.locator("#share").focus()
+    page.keyboard.press("Home")
+    assert "with no wrong answer seen" in page.locator("#pays").inner_text()
+    page.keyboard.press("End")
+    page.locator("g.mark", has_text="peer").first.focus()
+    page.keyboard.press("Enter")
+    shown = page.locator("#detail").inner_text()
+    assert "Item 7" in shown
+    assert "curl -s http://127.0.0.1:8000/v1/contains" in shown
+    assert "results/report.json, rows[4]" in shown
+    assert page.locator("#detail svg circle").count() == 1
+    assert troubles == []
