@@ -23,6 +23,7 @@ OPERATIONS = {
     ("post", "/v1/overlay"): "overlay",
     ("post", "/v1/bounds"): "bounds",
     ("post", "/v1/clearance"): "clearance",
+    ("post", "/v1/compare"): "compare",
     ("post", "/v1/collide"): "collide",
     ("post", "/v1/collide/scene"): "collide_scene",
     ("post", "/v1/clip/segments"): "clip_segments",
