@@ -65,7 +65,7 @@ class Located(NamedTuple):
 def located_at_once(points: object, solid: Solid) -> Located | None:
     """Return where points lie in a solid, None where the general way must be gone. Raises as `locate` does."""
     maker = _PLANS.get(type(solid))
-    if maker is None or not isinstance(points, (np.ndarray, list, tuple)) or not 0 < len(points) <= MOST:
+    if maker is None or not isinstance(points, (np.ndarray, list, tuple)) or not 0 < _length(points) <= MOST:
         return None
     array = _as_points(points, solid.dimension)
     plan = solid.kept("plan") or maker(solid, len(array))
@@ -81,6 +81,10 @@ def located_at_once(points: object, solid: Solid) -> Located | None:
             locations[item] = rational_location(array[item].tolist(), solid)
             n_rational += 1
     return Located(locations, n_beyond, n_rational, plan.method)
+
+
+def _length(points: Any) -> int:
+    return 0 if isinstance(points, np.ndarray) and points.ndim == 0 else len(points)
 
 
 def _as_points(points: Any, dimension: int) -> FloatArray:

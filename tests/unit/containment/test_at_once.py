@@ -41,7 +41,9 @@ def test_reports_and_kinds_of_arrays() -> None:
     assert locate(far, ball).tolist() == [-1, -1]
 
 
-@pytest.mark.parametrize("bad", [[[np.nan, 0, 0]], [[0, 0, 0], [0, np.inf, 0]], [[0, 0]], [0, 0, 0], [[True, 0, 0]]])
+@pytest.mark.parametrize(
+    "bad", [[[np.nan, 0, 0]], [[0, 0, 0], [0, np.inf, 0]], [[0, 0]], [0, 0, 0], [[True, 0, 0]], np.array(3.0)]
+)
 def test_refusals_are_those_of_the_general_way(bad: Any) -> None:
     for solid in (engine.Sphere([0, 0, 0], 5), made(box_mesh([0] * 3, [1] * 3))):
         locate([[0, 0, 0]], solid)
