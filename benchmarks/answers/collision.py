@@ -60,6 +60,19 @@ def posed_witnessed(first: Any, second: Any, turns: Array, moves: Array, workers
     return len(turns), [said(witness) for witness in witnesses]
 
 
+def parted(first: Any, second: Any, turns: Array, moves: Array, workers: int | None) -> tuple[int, Any]:
+    """Ask how far apart, and whether as far as half of them are."""
+    distances = engine.clearance_poses(first, second, turns, moves, workers=workers)
+    least = 1.001 * float(np.median(distances))  # no distance: those are rounded, the bound is not
+    same(
+        engine.clearance_poses(first, second, turns, moves, at_least=least, workers=workers),
+        distances >= least,
+        "a bound",
+    )
+    single = engine.clearance(first, second, second_pose=engine.Pose(turns[0], moves[0]), workers=workers)
+    return 2 * len(turns) + 1, [distances, single.points, single.features]
+
+
 def scene_collided(bodies: list[Any], poses: Any, options: dict[str, Any], workers: int | None) -> tuple[int, Any]:
     found = engine.collide_scene(bodies, poses, workers=workers, **options)
     return len(bodies), [found.first, found.second, found.relation, found.detail]
@@ -163,6 +176,14 @@ def posed_pairs_of_any_types(draw: Draw) -> Iterator[Question]:
             yield partial(posed, *pair, *_poses(draw, dimension, 15))
             if _has_inside(*pair):
                 yield partial(posed_in_detail, *pair, *_poses(draw, dimension, 5))
+
+
+@family("clearance", 12)
+def parted_pairs_of_any_types(draw: Draw) -> Iterator[Question]:
+    for dimension in (2, 3):
+        for _ in range(6):
+            turns, moves = _poses(draw, dimension, 12)
+            yield partial(parted, *_pair(draw, dimension, (HOME,))[:2], turns, 2.0 * moves)
 
 
 @family("witnesses", 4)
