@@ -7,7 +7,7 @@ whose error is below one unit per term, and the fraction is made only where thos
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from engine.arrangement.nodes import Homogeneous, nearest_quotient
-from engine.arrays import FloatArray, IntArray
+from engine.arrays import BoolArray, FloatArray, IntArray
 
 _PRECISIONS = (160, 640)  # bits of the largest term that are kept; the second for sums that nearly cancel
 
@@ -71,14 +71,30 @@ class ExactRings:
     def nearest_area(self) -> float:
         """Return the double nearest to the exact area. Raises `NotRepresentableError` beyond the largest double."""
         terms = self._terms()
-        longest = max(abs(numerator).bit_length() - denominator.bit_length() for numerator, denominator in terms)
-        for precision in _PRECISIONS:
-            shift = precision - longest
-            low = sum(_floor(numerator, denominator, shift) for numerator, denominator in terms)
-            ends = {_nearest(end, 1, 2 * self.exponent - 1 - shift) for end in (low, low + len(terms))}
+        for low, high, shift in _bounds(terms):
+            ends = {_nearest(end, 1, 2 * self.exponent - 1 - shift) for end in (low, high)}
             if len(ends) == 1:
                 return ends.pop()
         return _nearest(*_sum(terms), 2 * self.exponent - 1)
+
+    def are_shells(self) -> BoolArray:
+        """Tell of each ring whether its exact area is positive, also where that is no double."""
+        return np.array([_is_positive(self.some([ring])._terms()) for ring in range(self.n_rings)], np.bool_)
+
+
+def _is_positive(terms: Sequence[tuple[int, int]]) -> bool:
+    for low, high, _ in _bounds(terms):
+        if low > 0 or high < 0:
+            return low > 0
+    return _sum(terms)[0] > 0
+
+
+def _bounds(terms: Sequence[tuple[int, int]]) -> Iterator[tuple[int, int, int]]:
+    """Yield a lower and an upper bound of the sum of terms, times 2**shift, and that shift."""
+    longest = max(abs(numerator).bit_length() - denominator.bit_length() for numerator, denominator in terms)
+    for precision in _PRECISIONS:
+        low = sum(_floor(numerator, denominator, precision - longest) for numerator, denominator in terms)
+        yield low, low + len(terms), precision - longest
 
 
 def _floor(numerator: int, denominator: int, shift: int) -> int:

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from engine.arrangement.arrange import crossing, line_through
 from engine.arrangement.exact_area import ExactRings
 from engine.arrangement.nodes import Homogeneous, float_nodes
-from engine.arrays import FloatArray, IntArray
+from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.polygon_overlay.compiled.ring_area import sum_areas
 from engine.polygon_overlay.entries import entry_of
 
@@ -68,6 +68,15 @@ class ImplicitRings(NamedTuple):
         for k in np.flatnonzero(np.isnan(areas)).tolist() if n_unsure else ():
             areas[k] = self.some(range(groups[k], groups[k + 1])).nearest_area()
         return areas
+
+    def are_shells(self) -> BoolArray:
+        """Tell of each ring whether its exact area is positive, also where that is no double."""
+        areas, n_unsure = self.sure_areas(np.arange(self.n_rings + 1))
+        is_shell = areas > 0.0
+        if n_unsure:
+            unsure = np.flatnonzero(np.isnan(areas)).tolist()
+            is_shell[unsure] = self.some(unsure).are_shells()
+        return is_shell
 
     def some(self, rings: Sequence[int]) -> ExactRings:
         """Return some of the rings, by their numbers, as integers."""

@@ -124,5 +124,4 @@ class Overlay:
 
         Where rounding lost, joined or parted none these are those of `pieces`, in their order.
         """
-        signs = self.exact.nearest_areas(np.arange(self.exact.n_rings + 1))
-        return self.exact.nearest_areas(np.append(np.flatnonzero(signs > 0.0), len(signs)))
+        return self.exact.nearest_areas(np.append(np.flatnonzero(self.exact.are_shells()), self.exact.n_rings))

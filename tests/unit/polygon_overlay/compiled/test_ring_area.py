@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
@@ -17,6 +18,10 @@ from engine.solids.polygon import Polygon
 from tests.unit.polygon_overlay import families as families
 from tests.unit.polygon_overlay.checks import OPERATIONS, structure
 from tests.unit.polygon_overlay.families import FAMILIES, star
+
+
+def in_integers(result: Overlay) -> Overlay:
+    return replace(result, exact=result.exact.exact_rings())
 
 
 def assert_nearest(result: Overlay) -> None:
@@ -55,6 +60,14 @@ def test_areas_at_the_ends(scale: float) -> None:
     random = np.random.default_rng(2)
     result = overlay(Polygon([star(random, 9) * scale]), Polygon([star(random, 9) * scale]), "difference")
     assert result.area == float(result.area_exact)
+
+
+@pytest.mark.parametrize("scale", [2.0**-538, 2.0**-600, 2.0**-1074, 2.0**509])
+def test_pieces_are_told_from_holes_where_areas_are_no_doubles(scale: float) -> None:
+    frame = Polygon([np.array([(0, 0), (k, 0), (k, k), (0, k)]) * scale for k in (8, 7)])
+    result = overlay(frame, Polygon([[(9e9, 9e9), (9.1e9, 9e9), (9e9, 9.1e9)]]), "difference")
+    assert result.piece_areas.tolist() == [float(result.area_exact)] == [15 * scale * scale]
+    assert in_integers(result).piece_areas.tolist() == result.piece_areas.tolist()
 
 
 def test_an_area_that_is_no_double_is_refused() -> None:
