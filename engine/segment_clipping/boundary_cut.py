@@ -12,7 +12,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.jit import inline, kernel
+from engine.jit import bare, inline, kernel
 from engine.segment_clipping.contacts import GROUP, PROPER, edge_contacts_for, gather_edges
 from engine.segment_clipping.crossing_values import cut_at, is_item_safe, line_values, plane_values
 from engine.segment_clipping.mesh_streams import gather_contacts, streams_for
@@ -117,7 +117,7 @@ def cut_segment(segments: Any, item: int, boundary: Any, contacts: Any, cuts: Cr
     return sort_crossings(cuts, first, last - first)
 
 
-@inline
+@bare
 def cut_group(
     segments: Any,
     locations: Any,
