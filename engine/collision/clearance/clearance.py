@@ -50,7 +50,7 @@ def clearance(
     """Say how far apart two solids are, or whether they are at least so far apart, exactly.
 
     Solids are closed sets: one within another, or in contact, is 0 apart; one in a cavity of another is as far from it
-    as the walls are. For many poses of one pair use `clearance_poses`, for a scene `collide_scene(..., gap=)`.
+    as the walls are. For many poses of one pair use `clearance_poses`.
 
     Parameters: first, second, first_pose, second_pose: as for `collide`, all pairs that it takes. at_least: a distance;
     the answer is then a bool. workers, progress: taken for uniformity, one pair is one item. deadline: seconds.

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
+from itertools import product
 from math import frexp, isfinite, ldexp, nextafter
 from typing import Final
 
@@ -64,12 +65,12 @@ class SpreadPair:
         exact = self._exact(item)
         return all(exact.gap(*row).is_at_least(least) for row in self._polled(pairs))
 
-    def _candidates(self, item: int, most: float, enough: float) -> tuple[int, list[list[int]]]:
+    def _candidates(self, item: int, most: float, enough: float) -> tuple[int, Iterable[Sequence[int]]]:
         """Return how the search ended, and its candidates: two triangles and two features each."""
         (a, b), (pose, poses) = self.meshes, self.poses
         size = self._reach + float(np.abs(poses.translations[item]).max()) + sum(self._radii)
         if not size < _LARGEST:
-            return DONE, [[i, j, 0, 0] for i in range(len(a.faces)) for j in range(len(b.faces))]
+            return DONE, product(range(len(a.faces)), range(len(b.faces)), (0,), (0,))  # never held all at once
         unit = ldexp(1.0, -min(max(frexp(size)[1], -1000), 1000))
         limits = np.array([most * unit, enough * unit if enough > 0.0 else -1.0])
         while True:  # bound: the room doubles
@@ -81,7 +82,7 @@ class SpreadPair:
             self._room *= 2
             self._work = new_room(self._room, len(self._work.kept))
 
-    def _polled(self, pairs: list[list[int]]) -> Iterator[list[int]]:
+    def _polled(self, pairs: Iterable[Sequence[int]]) -> Iterator[Sequence[int]]:
         for count, row in enumerate(pairs):
             if count % 16 == 0:
                 self.budget.check()

@@ -76,3 +76,11 @@ def test_bodies_that_enclose_each_other_and_little_room(monkeypatch: pytest.Monk
 def test_the_deadline_holds() -> None:
     with pytest.raises(DeadlineExceededError):
         clearance(ball(6, 3), ball(6, 4), second_pose=Pose(np.eye(3), [3, 0, 0]), deadline=0.0)
+
+
+def test_the_deadline_holds_where_every_pair_of_triangles_is_a_candidate() -> None:
+    """Sums of coordinates beyond 1e300 are not searched: the list of all pairs would be long before it is looked at."""
+    first = ball(20, 3)
+    huge = [Polyhedron(1e304 * (first.vertices + np.array([away, 0, 0])), first.triangles) for away in (0, 3)]
+    with pytest.raises(DeadlineExceededError):
+        clearance(huge[0], huge[1], at_least=1e304, deadline=0.05)
