@@ -10,12 +10,14 @@ from typing import Final
 
 import numpy as np
 
+from engine.collision.clearance.blocks import CLOSER, DONE
 from engine.collision.clearance.bodies import feature_of, in_space, radius_of, spread_of
+from engine.collision.clearance.boxes import new_room
 from engine.collision.clearance.exact import nearest_of_triangles
 from engine.collision.clearance.result import Clearance
 from engine.collision.clearance.rounded import ScaledGap
-from engine.collision.clearance.traversal import CLOSER, DONE, find_nearest, new_room
-from engine.collision.meshes.exact_body import ExactBody, on_lattice
+from engine.collision.clearance.traversal import find_nearest
+from engine.collision.meshes.exact_body import exact_pair, on_lattice
 from engine.collision.meshes.mesh_arrays import STILL, MeshBody, lattice_shift
 from engine.collision.meshes.placement import PoseArrays
 from engine.parallel import Budget
@@ -114,15 +116,10 @@ class _ExactPair:
     def __init__(
         self, a: MeshBody, a_pose: Pose | None, b: MeshBody, b_pose: Pose | None, radii: tuple[float, float]
     ) -> None:
-        shift = lattice_shift(np.array(radii))
-        for mesh, pose in ((a, a_pose), (b, b_pose)):
-            own = mesh.shift
-            if pose is not None:
-                own = max(own + lattice_shift(pose.rotation), lattice_shift(pose.translation))
-            shift = max(shift, own)
+        self._bodies = exact_pair(a, a_pose, b, b_pose, lattice_shift(np.array(radii)))
+        shift = self._bodies[0].shift
         self._scale = 1 << shift
         self._radii = on_lattice(radii[0], shift), on_lattice(radii[1], shift)
-        self._bodies = ExactBody(a, a_pose, shift), ExactBody(b, b_pose, shift)
 
     def gap(self, i: int, j: int, first: int, second: int) -> ScaledGap:
         """Return the gap between two triangles."""

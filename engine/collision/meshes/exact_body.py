@@ -112,10 +112,9 @@ def faces_in(arrays: MeshArrays, pose: PoseArrays, low: list[float], high: list[
 
 
 def exact_pair(
-    first: MeshBody, first_pose: Pose | None, second: MeshBody, second_pose: Pose | None
+    first: MeshBody, first_pose: Pose | None, second: MeshBody, second_pose: Pose | None, shift: int = 0
 ) -> tuple[ExactBody, ExactBody]:
-    """Return both bodies on one lattice."""
-    shift = 0
+    """Return both bodies on one lattice, of spacing 2^-shift at most."""
     for mesh, pose in ((first, first_pose), (second, second_pose)):
         own = mesh.shift
         if pose is not None:

@@ -1,0 +1,113 @@
+"""Each body alone along the line of the nearest pair so far: what of it reaches far enough to be nearer."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+
+from engine.collision.clearance.blocks import DONE, FULL, block_reach, keep_below, measure_blocks
+from engine.collision.clearance.boxes import MOST_LISTED, Search, View, lane_centre, lane_half, magnitudes
+from engine.jit import inline
+from engine.lanes.boxes import EMPTY
+from engine.lanes.tracing import LANES
+from engine.predicates.vectors import dot
+from engine.types import Point3
+
+MOST_STEPS: Final = 8
+"""Of the first approach."""
+
+
+@inline
+def _reach_of_lane(s: Search, view: View, row: int, at: int) -> float:
+    """Return a bound on how far a box reaches along the line toward the other body."""
+    d = Point3(s.room.line[3 * row], s.room.line[3 * row + 1], s.room.line[3 * row + 2])
+    o, unit, sign = view.mesh.origin, view.unit, (1.0 if row == 0 else -1.0)
+    c, h = lane_centre(view, at), lane_half(view, at)
+    middle = d.x * (o[0] * unit + c.x) + d.y * (o[1] * unit + c.y) + d.z * (o[2] * unit + c.z) + s.room.line[9 + row]
+    return sign * middle + dot(magnitudes(d), h) + s.frame.margin
+
+
+@inline
+def _furthest(s: Search, view: View, row: int) -> tuple[float, int]:
+    """Return how far a body reaches along the line toward the other, and the block that does."""
+    child, waiting, sign = view.mesh.child, s.room.waiting, (1.0 if row == 0 else -1.0)
+    waiting[0], n, best, found = 0, 1, -np.inf, 0
+    while n > 0:  # bound: each node enters once
+        n -= 1
+        node = int(waiting[n])
+        if child[node, 0] < 0:
+            reach = sign * block_reach(s, view, row, node)
+            if reach > best:
+                best, found = reach, node
+            continue
+        for lane in range(LANES):
+            if child[node, lane] != EMPTY and _reach_of_lane(s, view, row, node * LANES + lane) > best:
+                waiting[n] = child[node, lane]
+                n += 1
+    return best, found
+
+
+@inline
+def approach(s: Search, limits: Any) -> tuple[int, int]:
+    """Measure the blocks that reach furthest along the line as long as that brings an upper bound down and turns it.
+
+    Returns CLOSER or DONE, and 0.
+    """
+    for _ in range(MOST_STEPS):
+        before = limits[0]
+        (reach, i), (their_reach, j) = _furthest(s, s.a, 0), _furthest(s, s.b, 1)
+        if -their_reach - reach - s.frame.margin > limits[0]:
+            return DONE, 0
+        how, _ = measure_blocks(s, i, j, 0, limits)
+        if how != DONE or not limits[0] < before:
+            return how, 0
+    return DONE, 0
+
+
+@inline
+def _list_blocks(s: Search, view: View, row: int, least: float) -> int:
+    """List the blocks that reach so far toward the other body; return their number, above MOST_LISTED for too many."""
+    child, waiting, sign = view.mesh.child, s.room.waiting, (1.0 if row == 0 else -1.0)
+    waiting[0], n, n_listed = 0, 1, 0
+    while n > 0 and n_listed <= MOST_LISTED:  # bound: each node enters once
+        n -= 1
+        node = int(waiting[n])
+        if child[node, 0] < 0:
+            if sign * block_reach(s, view, row, node) >= least:
+                if n_listed < MOST_LISTED:
+                    s.room.listed[row, n_listed] = node
+                n_listed += 1
+            continue
+        for lane in range(LANES):
+            if child[node, lane] != EMPTY and _reach_of_lane(s, view, row, node * LANES + lane) >= least:
+                waiting[n] = child[node, lane]
+                n += 1
+    return n_listed
+
+
+@inline
+def finish_along_line(s: Search, limits: Any) -> tuple[int, int]:
+    """Measure all pairs of blocks that may be nearer than the least upper bound, where few reach so far along the line.
+
+    Bodies that bulge toward each other have few: this looks at each body alone, not at pairs of boxes. Returns FULL
+    where they are many, and there is nothing gained.
+    """
+    margin = s.frame.margin
+    (furthest, _), (theirs, _) = _furthest(s, s.a, 0), _furthest(s, s.b, 1)
+    n_first = _list_blocks(s, s.a, 0, -theirs - limits[0] - 2.0 * margin)
+    if n_first > MOST_LISTED:
+        return FULL, 0
+    n_second = _list_blocks(s, s.b, 1, -furthest - limits[0] - 2.0 * margin)
+    if n_second > MOST_LISTED:
+        return FULL, 0
+    n_found = 0
+    for k in range(n_first):
+        for m in range(n_second):
+            i, j = int(s.room.listed[0, k]), int(s.room.listed[1, m])
+            if block_reach(s, s.b, 1, j) - block_reach(s, s.a, 0, i) - margin > limits[0]:
+                continue
+            how, n_found = measure_blocks(s, i, j, n_found, limits)
+            if how != DONE:
+                return how, 0
+    return DONE, keep_below(s.room.found, n_found, limits[0])

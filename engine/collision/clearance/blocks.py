@@ -1,0 +1,150 @@
+"""The triangles of two blocks: how far they reach along the line, and which pairs of them may be the nearest."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+
+from engine.collision.clearance.boxes import Candidates, Search, View, set_line
+from engine.collision.clearance.near_triangles import nearest_points, rounding_of, seen_from, slab
+from engine.collision.meshes.mesh_arrays import triangle_of
+from engine.collision.meshes.placement import placed
+from engine.collision.meshes.triangle_triangle import Triangle3
+from engine.jit import inline
+from engine.lanes.boxes import EMPTY
+from engine.lanes.tracing import LANES
+from engine.predicates.vectors import dot, largest_of, minus
+from engine.types import Point3
+
+DONE: Final = 0
+FULL: Final = 1
+CLOSER: Final = 2
+INTERRUPTED: Final = 3
+"""How a search ended: with all pairs; without room for more pairs of boxes or triangles; with two points nearer than
+asked; by the flag."""
+
+
+@inline
+def _triangle(view: View, item: int) -> Triangle3:
+    """Return a placed triangle, rounded, times the unit."""
+    t, place, unit = triangle_of(view.mesh, item), view.place, view.unit
+    p, q, r = placed(t.p, place), placed(t.q, place), placed(t.r, place)
+    return Triangle3(
+        Point3(p.x * unit, p.y * unit, p.z * unit),
+        Point3(q.x * unit, q.y * unit, q.z * unit),
+        Point3(r.x * unit, r.y * unit, r.z * unit),
+    )
+
+
+@inline
+def _measure(s: Triangle3, t: Triangle3, error: float) -> tuple[float, float, Point3, tuple[int, int]]:
+    """Return bounds on the distance of two triangles, from below and above, and direction and features of nearly
+    nearest points.
+
+    error: bound on the distance of a point from its rounded one, both bodies together.
+    """
+    origin = s.p
+    s, t = seen_from(origin, s), seen_from(origin, t)
+    slack = rounding_of(s, t) + error
+    best = nearest_points(s, t)
+    gap = minus(best.q, best.p)
+    largest = largest_of(gap)
+    if not largest > 0.0:
+        return 0.0, slack, Point3(0.0, 0.0, 0.0), (best.first, best.second)
+    d = Point3(gap.x / largest, gap.y / largest, gap.z / largest)  # order: squares of small numbers are none
+    size = np.sqrt(dot(d, d))
+    low, high = max(slab(s, t, d, size) - slack, 0.0), largest * size + slack
+    return low, high, Point3(d.x / size, d.y / size, d.z / size), (best.first, best.second)
+
+
+@inline
+def keep_below(found: Candidates, n: int, most: float) -> int:
+    """Leave out the candidates above the bound; return how many there are."""
+    n_kept = 0
+    for item in range(n):
+        if found.bounds[item] <= most:
+            found.bounds[n_kept] = found.bounds[item]
+            for column in range(4):
+                found.pairs[n_kept, column] = found.pairs[item, column]
+            n_kept += 1
+    return n_kept
+
+
+@inline
+def block_reach(s: Search, view: View, row: int, node: int) -> float:
+    """Return how far the triangles of a block reach along the line, toward the other body; kept until that turns."""
+    turn = s.room.line[11]
+    if s.room.kept[node, 2 * row] == turn:
+        return float(s.room.kept[node, 2 * row + 1])
+    d = Point3(s.room.line[3 * row], s.room.line[3 * row + 1], s.room.line[3 * row + 2])
+    sign = 1.0 if row == 0 else -1.0
+    reach = -np.inf
+    for lane in range(LANES):
+        child = int(view.mesh.child[node, lane])
+        if child == EMPTY:
+            break
+        t = triangle_of(view.mesh, -1 - child)
+        reach = max(reach, sign * dot(d, t.p), sign * dot(d, t.q), sign * dot(d, t.r))
+    reach = sign * reach * view.unit + s.room.line[9 + row]
+    s.room.kept[node, 2 * row], s.room.kept[node, 2 * row + 1] = turn, reach
+    return reach
+
+
+@inline
+def _load_block(s: Search, view: View, row: int, node: int) -> int:
+    """Place the triangles of a block, and find how far each reaches along the line; return how many there are."""
+    n = 0
+    d = Point3(s.room.line[6], s.room.line[7], s.room.line[8])
+    while n < LANES and view.mesh.child[node, n] != EMPTY:
+        t = _triangle(view, -1 - int(view.mesh.child[node, n]))
+        c = s.room.corners
+        c[row, n, 0, 0], c[row, n, 0, 1], c[row, n, 0, 2] = t.p.x, t.p.y, t.p.z
+        c[row, n, 1, 0], c[row, n, 1, 1], c[row, n, 1, 2] = t.q.x, t.q.y, t.q.z
+        c[row, n, 2, 0], c[row, n, 2, 1], c[row, n, 2, 2] = t.r.x, t.r.y, t.r.z
+        along = (dot(d, t.p), dot(d, t.q), dot(d, t.r))
+        s.room.reaches[row, n] = max(along[0], along[1], along[2]) if row == 0 else min(along[0], along[1], along[2])
+        n += 1
+    return n
+
+
+@inline
+def _loaded(s: Search, row: int, n: int) -> Triangle3:
+    c = s.room.corners
+    return Triangle3(
+        Point3(c[row, n, 0, 0], c[row, n, 0, 1], c[row, n, 0, 2]),
+        Point3(c[row, n, 1, 0], c[row, n, 1, 1], c[row, n, 1, 2]),
+        Point3(c[row, n, 2, 0], c[row, n, 2, 1], c[row, n, 2, 2]),
+    )
+
+
+@inline
+def measure_blocks(s: Search, i: int, j: int, n_found: int, limits: Any) -> tuple[int, int]:
+    """Add the pairs of triangles of two blocks that may be the nearest; return how that ended, and their number.
+
+    limits: as in `find_nearest`; the first falls.
+    """
+    n_first, n_second = _load_block(s, s.a, 0, i), _load_block(s, s.b, 1, j)
+    for k in range(n_first):
+        t = _loaded(s, 0, k)
+        for m in range(n_second):
+            if s.room.reaches[1, m] - s.room.reaches[0, k] - s.frame.margin > limits[0]:
+                continue
+            low, high, d, features = _measure(t, _loaded(s, 1, m), s.error)
+            if high < limits[1]:
+                return CLOSER, 0
+            if high < limits[0]:
+                limits[0] = high
+                set_line(s.room.line, s.a, s.b, d)
+            if low > limits[0]:
+                continue
+            if n_found == len(s.room.found.bounds):
+                n_found = keep_below(s.room.found, n_found, limits[0])
+                if 2 * n_found > len(s.room.found.bounds):
+                    return FULL, 0
+            pairs = s.room.found.pairs
+            s.room.found.bounds[n_found] = low
+            pairs[n_found, 0], pairs[n_found, 1] = -1 - s.a.mesh.child[i, k], -1 - s.b.mesh.child[j, m]
+            pairs[n_found, 2], pairs[n_found, 3] = features
+            n_found += 1
+    return DONE, n_found
