@@ -1,5 +1,6 @@
 """Exact answers to four questions about a scene: containment, collision, segment clipping, polygon clipping."""
 
+from engine import layers
 from engine.collision.clearance.clearance import clearance
 from engine.collision.clearance.clearance_poses import clearance_poses
 from engine.collision.clearance.result import Clearance, Feature
@@ -44,7 +45,11 @@ from engine.polygon_clipping.clip_polygons import ClippedPolygons, PolygonStatus
 from engine.polygon_overlay.batch import OverlayBatch, overlay_batch
 from engine.polygon_overlay.overlay import overlay
 from engine.polygon_overlay.result import Collapse, Overlay, OverlayPiece
+from engine.polygon_overlay.union_all import filled, union_all
+from engine.scenes.ends import ScenePieces
+from engine.scenes.scene import Scene
 from engine.segment_clipping.clip_segments import SegmentPieces, clip_segments
+from engine.segment_clipping.lines import LinePieces, clip_lines
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.bounds import Bounds, bounds
@@ -55,6 +60,7 @@ from engine.solids.implicit import Implicit
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
 from engine.solids.pose import Pose
+from engine.solids.ragged import polygons
 from engine.solids.sphere import Sphere
 from engine.solids.surface import Surface
 from engine.solids.triangle import Triangle
@@ -88,6 +94,7 @@ __all__ = [
     "InvalidInputError",
     "InvalidOperationError",
     "InvalidPolynomialError",
+    "LinePieces",
     "Location",
     "MinAboveMaxError",
     "NegativeRadiusError",
@@ -106,8 +113,10 @@ __all__ = [
     "Relation",
     "RepeatedIndexError",
     "RingTooShortError",
+    "Scene",
     "SceneLocations",
     "ScenePairs",
+    "ScenePieces",
     "SegmentPieces",
     "Solid",
     "Sphere",
@@ -124,6 +133,7 @@ __all__ = [
     "bounds",
     "clearance",
     "clearance_poses",
+    "clip_lines",
     "clip_polygons",
     "clip_segments",
     "collide",
@@ -132,10 +142,14 @@ __all__ = [
     "collide_triangles",
     "compare",
     "contains",
+    "filled",
+    "layers",
     "locate",
     "locate_scene",
     "overlay",
     "overlay_batch",
+    "polygons",
     "read_mesh",
+    "union_all",
     "warm",
 ]

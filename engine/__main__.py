@@ -1,6 +1,7 @@
-"""The command line: ``python -m engine contains | collide | clip | overlay | bounds``, for people who have files.
+"""The command line ``python -m engine contains | collide | clearance | clip | overlay | bounds``: for files.
 
-``python -m engine warm`` compiles all kernels before they are needed, here or for other machines (``--into``).
+``python -m engine warm`` compiles all kernels before they are needed, here or for other machines (``--into``);
+``python -m engine audit`` says which other packages are wrong on your data.
 
 A solid is a mesh file, an .npz of `vertices` and `faces`, a .json or .geojson file, or the JSON of a solid itself, as
 in ``'{"type": "sphere", "center": [0, 0, 0], "radius": 1}'``. Points, segments and poses come from .npy, .csv or
@@ -17,23 +18,24 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
+from engine.collision.clearance.clearance_poses import clearance_poses
 from engine.collision.collide_poses import collide_poses
 from engine.containment.locate import locate
 from engine.errors import EngineError, InvalidInputError
-from engine.files.solids import read_solid, read_solids
+from engine.files.solids import read_features, read_solid, read_solids
 from engine.files.tables import read_rows, write_geojson, write_table
 from engine.kernel_cache import cache_folder, seal
+from engine.layers.features import overlay_features
+from engine.layers.rows import HOWS
 from engine.parallel import Progress
 from engine.polygon_clipping.clip_polygons import PolygonStatus, clip_polygons
-from engine.polygon_overlay.batch import overlay_batch
-from engine.polygon_overlay.result import Output
-from engine.polygon_overlay.run import Operation
 from engine.segment_clipping.clip_segments import clip_segments
 from engine.solids.bounds import bounds
 from engine.types import Location, Relation
@@ -45,9 +47,12 @@ Options = argparse.Namespace
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
-    options = _parser().parse_args(arguments)
-    run: Callable[[Options], None] = options.run
+    words = sys.argv[1:] if arguments is None else list(arguments)
     try:
+        if words[:1] == ["audit"]:
+            return _audit(words[1:])
+        options = _parser().parse_args(words)
+        run: Callable[[Options], None] = options.run
         run(options)
     except EngineError as error:
         place = ".".join(map(str, error.where))
@@ -77,21 +82,29 @@ def _contains(options: Options) -> None:
         write_table(options.output, {"location": answer})
 
 
-def _collide(options: Options) -> None:
+def _posed_pair(options: Options) -> tuple[Any, ...]:
+    """Return both solids, and rotations and translations of the second; no pose is the identity."""
     first, second = read_solid(options.first), read_solid(options.second)
     size = first.dimension
-    if options.poses is None:
-        rows = np.eye(size, size + 1)[np.newaxis]
-    else:
-        rows = read_rows(options.poses, (size, size + 1))
-    with _bar(len(rows), "poses", options) as progress:
-        answer: Any = collide_poses(
-            first, second, rows[:, :, :size], rows[:, :, size], progress=progress, deadline=options.deadline
-        )
+    rows = np.eye(size, size + 1)[np.newaxis] if options.poses is None else read_rows(options.poses, (size, size + 1))
+    return first, second, rows[:, :, :size], rows[:, :, size]
+
+
+def _collide(options: Options) -> None:
+    pair = _posed_pair(options)
+    with _bar(len(pair[2]), "poses", options) as progress:
+        answer: Any = collide_poses(*pair, progress=progress, deadline=options.deadline)
     if options.output is None or options.output.endswith(".csv"):
         write_table(options.output, {"relation": np.array([each.label for each in Relation])[answer]})
     else:
         write_table(options.output, {"relation": answer})
+
+
+def _clearance(options: Options) -> None:
+    pair = _posed_pair(options)
+    with _bar(len(pair[2]), "poses", options) as progress:
+        answer: Any = clearance_poses(*pair, at_least=options.at_least, progress=progress, deadline=options.deadline)
+    write_table(options.output, {"distance" if options.at_least is None else "clear": answer})
 
 
 def _clip(options: Options) -> None:
@@ -115,17 +128,22 @@ def _clip_polygons(region: Any, options: Options) -> None:
         raise InvalidInputError(
             f"polygon {item} has status {PolygonStatus(clipped.status[item]).name}", ("items", item)
         )
-    write_geojson(options.output, [[clipped.rings(item)] for item in range(len(polygons))])
+    write_geojson(options.output, (_clipped(clipped.rings(item), item) for item in range(len(polygons))))
+
+
+def _clipped(rings: Any, item: int) -> dict[str, Any]:
+    """Return what remains of a polygon as a feature: all its rings, which may have bridges."""
+    closed = [[*ring.tolist(), ring[0].tolist()] for ring in rings]
+    geometry = {"type": "MultiPolygon", "coordinates": [closed]}
+    return {"type": "Feature", "properties": {"item": item}, "geometry": geometry}
 
 
 def _overlay(options: Options) -> None:
-    subjects, clips = read_solids(options.subject), read_solids(options.clip)
-    with _bar(len(subjects), "pairs", options) as progress:
-        batch: Any = overlay_batch(
-            subjects, clips, options.operation, output=options.rounding, progress=progress, deadline=options.deadline
-        )
-    pieces = [[] if each is None else each.pieces for each in batch]
-    write_geojson(options.output, [[[piece.shell, *piece.holes] for piece in item] for item in pieces])
+    left, right = read_features(options.left), read_features(options.right)
+    rows: Any = overlay_features(left, right, options.operation, deadline=options.deadline)
+    write_geojson(options.output, rows, rows.crs)
+    if rows.collapsed and not options.quiet:
+        print(f"rounding left nothing of {rows.collapsed} rows", file=sys.stderr)
 
 
 def _bounds(options: Options) -> None:
@@ -133,6 +151,17 @@ def _bounds(options: Options) -> None:
     radius = np.array([found.sphere.radius])
     row = {"min": found.aabb.min, "max": found.aabb.max, "center": found.sphere.center, "radius": radius}
     write_table(options.output, {name: value[np.newaxis] for name, value in row.items()})
+
+
+def _audit(words: Sequence[str]) -> int:
+    """Run the audit, whose peers are those of the benchmarks."""
+    try:
+        run: Callable[[Sequence[str]], int] = import_module("benchmarks.audit").main
+    except ModuleNotFoundError as error:
+        raise ValueError(
+            f"the audit needs {error.name}: run it in a checkout of the repository after pip install -e '.[bench,test]'"
+        ) from None
+    return run(words)
 
 
 def _warm(options: Options) -> None:
@@ -208,12 +237,15 @@ def _parser() -> argparse.ArgumentParser:
     contains.set_defaults(run=_contains)
 
     collide = command("collide", help="tell how two solids lie to each other, under one or many poses of the second")
-    collide.add_argument("first")
-    collide.add_argument("second")
-    collide.add_argument(
-        "--poses", metavar="FILE", help="rows [R | t] of the second: 12 numbers in space, 6 in the plane"
-    )
-    collide.set_defaults(run=_collide)
+    apart = command("clearance", help="tell how far two solids are apart, under one or many poses of the second")
+    for pair, run in ((collide, _collide), (apart, _clearance)):
+        pair.add_argument("first")
+        pair.add_argument("second")
+        pair.add_argument(
+            "--poses", metavar="FILE", help="rows [R | t] of the second: 12 numbers in space, 6 in the plane"
+        )
+        pair.set_defaults(run=run)
+    apart.add_argument("--at-least", type=float, metavar="DISTANCE", help="tell whether they are so far apart or more")
 
     clip = command("clip", help="clip segments on a solid, or polygons on a convex one")
     clip.add_argument("region")
@@ -221,17 +253,17 @@ def _parser() -> argparse.ArgumentParser:
     clip.add_argument("--polygons", action="store_true", help="Sutherland-Hodgman on the polygons of a .geojson file")
     clip.set_defaults(run=_clip)
 
-    overlay = command("overlay", help="Boolean operation on polygons, pair by pair")
-    overlay.add_argument("subject", help=".geojson file")
-    overlay.add_argument("clip", help=".geojson file with as many polygons")
-    overlay.add_argument("--operation", choices=get_args(Operation), default="intersection")
-    overlay.add_argument("--rounding", choices=get_args(Output), default="valid")
+    overlay = command("overlay", help="Boolean operation on two layers, every feature with every one that it meets")
+    overlay.add_argument("left", help=".geojson file of polygons; properties and ids are kept")
+    overlay.add_argument("right", help=".geojson file of polygons")
+    overlay.add_argument("--operation", choices=HOWS, default="intersection")
     overlay.set_defaults(run=_overlay)
 
     box = command("bounds", help="smallest box and smallest sphere of a solid")
     box.add_argument("solid")
     box.set_defaults(run=_bounds)
 
+    commands.add_parser("audit", help="who is wrong on your data: the textbook, float32 and peers, on one page")
     ready = commands.add_parser("warm", help="compile all kernels now, for this machine or to ship them")
     ready.add_argument("--into", metavar="FOLDER", help="a folder or .tar.xz for ENGINE_CACHE_SEED of other machines")
     ready.add_argument("--cpu", metavar="NAME", help="the oldest CPUs to run on: x86-64-v3; this one by default")

@@ -19,7 +19,8 @@ def entry_of(kernel: Any, n_names: int = 0) -> Any:
     and its own. The kernel itself where it is not called yet, or compiled for others as well; uncompiled it is kept
     from warning of what overflows: filters look at that.
     """
-    entry = _entries.get((kernel, n_names))
+    key = (kernel, n_names) if n_names else kernel
+    entry = _entries.get(key)
     if entry is None:
         if isinstance(kernel, FunctionType):
             entry = np.errstate(all="ignore")(kernel)
@@ -29,5 +30,5 @@ def entry_of(kernel: Any, n_names: int = 0) -> Any:
             if len(fitting) != 1:
                 return kernel
             entry = fitting[0].entry_point
-        _entries[kernel, n_names] = entry
+        _entries[key] = entry
     return entry

@@ -1,4 +1,4 @@
-"""Batches over Dask: `locate`, `collide_poses`, `clip_segments` and `overlay_batch` on more than one machine.
+"""Batches over Dask: the functions below, on more than one machine.
 
 Each function splits its batch into parts, sends the solids once to every worker, keeps a few parts per thread in flight
 and puts the answers in order, so that the result is that of the function of the same name in `engine`, bit for bit. A
@@ -13,6 +13,7 @@ items just finished. All other parameters, results and errors are those of the f
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import fields
 from functools import partial
 from typing import Any
 
@@ -20,8 +21,10 @@ import dask.config
 import numpy as np
 from distributed import Client, Future, as_completed
 
-from engine.arrays import Int8Array
+from engine.arrays import BoolArray, FloatArray, Int8Array
 from engine.collision import collide_poses as poses
+from engine.collision.clearance import clearance_poses as clearances
+from engine.collision.clearance.clearance import checked_distance
 from engine.containment import locate as containment
 from engine.errors import InvalidArrayError, InvalidInputError
 from engine.parallel import Progress, check_options
@@ -29,6 +32,8 @@ from engine.polygon_overlay.batch import OverlayBatch, join_batches
 from engine.polygon_overlay.batch import overlay_batch as overlay_pairs
 from engine.polygon_overlay.result import Output
 from engine.polygon_overlay.run import Operation
+from engine.scenes.ends import ScenePieces
+from engine.scenes.scene import Keep, Scene
 from engine.segment_clipping import clip_segments as clipping
 from engine.solids.base import Solid
 from engine.solids.checks import as_point_groups, as_points
@@ -68,6 +73,27 @@ def collide_poses(
     return result
 
 
+def clearance_poses(
+    client: Client,
+    first: Solid,
+    second: Solid,
+    rotations: object,
+    translations: object,
+    *,
+    at_least: float | None = None,
+    part: int = 2_000,
+    progress: Progress | None = None,
+) -> FloatArray | BoolArray:
+    """Say how far `first` is from `second` under many poses, see `engine.clearance_poses`."""
+    turns, moves = poses.as_poses(rotations, translations, first.dimension)
+    least = None if at_least is None else checked_distance(at_least)
+    result: Any = np.empty(len(turns), np.float64 if least is None else np.bool_)
+    function = partial(_clearance_poses, at_least=least)
+    for start, answer in _answers(client, function, (first, second), (turns, moves), part, progress):
+        result[start : start + len(answer)] = answer
+    return result
+
+
 def clip_segments(
     client: Client, segments: object, region: Solid, *, part: int = 100_000, progress: Progress | None = None
 ) -> clipping.SegmentPieces:
@@ -81,6 +107,30 @@ def clip_segments(
         np.concatenate([getattr(pieces, name) for _, pieces in found]) for name in ("start", "end", "t", "faces")
     )
     return clipping.SegmentPieces(source, start, end, t, faces)
+
+
+def clip_segments_scene(
+    client: Client,
+    segments: object,
+    scene: Scene,
+    *,
+    keep: Keep = "all",
+    part: int = 20_000,
+    progress: Progress | None = None,
+) -> ScenePieces | BoolArray:
+    """Clip segments on the bodies of a scene, see `engine.Scene.clip_segments`; the scene is sent once to every worker
+    and stays prepared there."""
+    rows = as_point_groups(segments, 2, scene.solids[0].dimension if len(scene) else None, ("segments",))
+    function = partial(_clip_segments_scene, keep=keep)
+    answers = _answers(client, function, (scene,), (rows,), part, progress)
+    found = sorted(answers, key=lambda each: each[0])
+    if len(found) < 2:
+        return found[0][1] if found else function((scene,), rows)
+    if keep == "any":
+        return np.concatenate([met for _, met in found])
+    source = np.concatenate([start + pieces.source for start, pieces in found])
+    names = [field.name for field in fields(ScenePieces)][1:]
+    return ScenePieces(source, *(np.concatenate([getattr(pieces, name) for _, pieces in found]) for name in names))
 
 
 def overlay_batch(
@@ -113,8 +163,16 @@ def _collide_poses(solids: tuple[Solid, ...], turns: Any, moves: Any) -> Any:
     return poses.collide_poses(solids[0], solids[1], turns, moves, workers=1)
 
 
+def _clearance_poses(solids: tuple[Solid, ...], turns: Any, moves: Any, at_least: float | None) -> Any:
+    return clearances.clearance_poses(solids[0], solids[1], turns, moves, at_least=at_least, workers=1)
+
+
 def _clip_segments(solids: tuple[Solid, ...], segments: Any) -> clipping.SegmentPieces:
     return clipping.clip_segments(segments, solids[0], workers=1)
+
+
+def _clip_segments_scene(held: tuple[Any, ...], segments: Any, keep: Any) -> Any:
+    return held[0].clip_segments(segments, keep=keep, workers=1)
 
 
 def _overlay_batch(_: tuple[Solid, ...], subjects: Any, clips: Any, **options: Any) -> Any:
@@ -124,7 +182,7 @@ def _overlay_batch(_: tuple[Solid, ...], subjects: Any, clips: Any, **options: A
 def _answers(
     client: Client,
     function: Function,
-    solids: tuple[Solid, ...],
+    solids: tuple[Any, ...],
     arrays: tuple[Any, ...],
     part: int,
     progress: Progress | None,

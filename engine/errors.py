@@ -11,7 +11,7 @@
     │   ├── NotClosedError            not_closed               an edge has a face on one side only
     │   ├── InconsistentOrientationError inconsistent_orientation  an edge is used unequally in its two directions
     │   ├── FaceNotSimpleError        face_not_simple          a polygonal face cannot be cut into triangles
-    │   ├── RingTooShortError         ring_too_short           a ring of fewer than three vertices
+    │   ├── RingTooShortError         ring_too_short           a ring or face of too few vertices
     │   ├── MinAboveMaxError          min_above_max            a box with min > max on an axis
     │   ├── NegativeRadiusError       negative_radius
     │   ├── ZeroNormalError           zero_normal              a plane without direction

@@ -127,11 +127,25 @@ class Options(TypedDict, total=False):
     progress: Progress | None
 
 
-class Budget:
-    """Deadline and cancel switch of one call; use as a context manager.
+_here = threading.local()
 
-    deadline: seconds from now, None for no limit. cancel: a switch shared with other threads, or None.
-    `flag` is the one-element uint8 array that kernels poll.
+
+def poll() -> None:
+    """Check every `Budget` that the work of this thread is done under, if any: for what is built deep below a call.
+
+    Raises: what `Budget.check` raises.
+    """
+    budget: Budget | None = getattr(_here, "budget", None)
+    while budget is not None:
+        budget.check()
+        budget = budget.around
+
+
+class Budget:
+    """Deadline and cancel switch of one call; use as a context manager, which `poll` then knows of.
+
+    deadline: seconds from now, None for no limit. cancel: a switch shared with other threads, or None. around: the one
+    that this one was entered under. `flag` is the one-element uint8 array that kernels poll.
     """
 
     def __init__(self, deadline: float | None = None, cancel: Cancel | None = None) -> None:
@@ -149,8 +163,10 @@ class Budget:
         self._cancel = cancel
         self._end = None if self.deadline is None else time.monotonic() + self.deadline
         self._waiting: _Waiting | None = None
+        self.around: Budget | None = None
 
     def __enter__(self) -> Budget:
+        self.around, _here.budget = getattr(_here, "budget", None), self
         if self._cancel is not None:
             self._cancel.attach(self.flag)
         if self._end is not None:
@@ -158,6 +174,7 @@ class Budget:
         return self
 
     def __exit__(self, *_: object) -> None:
+        _here.budget = self.around
         if self._waiting is not None:
             _clock.drop(self._waiting)
         if self._cancel is not None:
@@ -324,7 +341,7 @@ def _run_threaded(
     failures: list[tuple[int, BaseException]] = []
 
     def work() -> int:
-        n_done = 0
+        _here.budget, n_done = budget, 0
         while not failures and (found := ranges.take()) is not None:
             first, stop = found
             before = time.perf_counter()

@@ -22,10 +22,12 @@ from engine.containment.cells.build import cells_of
 from engine.containment.cells.order import gathered, order_by_cell
 from engine.containment.locate import locate
 from engine.containment.posed.locators import posed_locator
+from engine.containment.rational_locate import rational_location
 from engine.containment.scene.locate_scene import locate_scene
 from engine.parallel import Budget
 from engine.polygon_clipping.clip_polygons import clip_polygons
 from engine.polygon_overlay.overlay import overlay
+from engine.scenes.scene import Scene
 from engine.segment_clipping.clip_segments import clip_segments
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
@@ -106,6 +108,7 @@ def _locate(dimension: int) -> None:
     with Budget() as budget:  # what a scene asks of a single body, where its first pass is not sure
         for solid, pose in zip(solids, poses):
             posed_locator(solid, pose).fill(as_points(points, dimension), np.empty(len(points), np.int8), budget)
+            rational_location(points[0].tolist(), solid)
 
 
 def _warm_cells() -> None:
@@ -142,7 +145,16 @@ def _warm_collision() -> None:
 
 def _warm_scenes() -> None:
     collide_scene(_bodies())
-    collide_scene([Aabb([k, 0, 0], [k + 2, 1, 1]) for k in range(300)])  # many: their boxes go into a grid
+    Scene(_bodies()).collide(moved=[0])
+    segments = [[[-1.0, 0.3, 0.2], [2.0, 0.4, 0.1]]]
+    turned = Pose.from_quaternion([3, 1, 0, 0], [0.25, 0, 0])
+    for dimension in (2, 3):
+        some = [*_regions(dimension), *_bodies()[1:2] * (dimension == 3)]
+        pose = turned if dimension == 3 else Pose([[0.6, -0.8], [0.8, 0.6]], [0.25, 0])
+        Scene(some * 2, [None] * len(some) + [pose] * len(some)).clip_segments(np.array(segments)[:, :, :dimension])
+    many = [Aabb([k, 0, 0], [k + 2, 1, 1]) for k in range(300)]
+    collide_scene(many)  # their boxes go into a grid
+    Scene(many).clip_segments(segments)  # and into a tree that looks at eight at a time
     flat: list[Solid] = [Polygon([[[0, 0], [4, 0], [1, 1], [0, 4]]]), Triangle([[0, 0], [1, 0], [0, 1]])]
     collide_scene(flat)
     for dimension in (2, 3):
@@ -184,6 +196,7 @@ def _warm_overlay_rest() -> None:
     angles = np.linspace(0.0, 2.0 * np.pi, 2048, endpoint=False)
     circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     overlay(Polygon([circle]), Polygon([circle + 0.5]))  # large ones, of which few edges are looked at
+    overlay(Polygon([circle]), Polygon([circle + 0.5]), grid=0.5)
     # Edges an ulp apart are left to the path in integers, whose kernels look for pairs of boxes.
     near = 1.0 + 2.0**-52
     overlay(Polygon([[[0, 0], [1, 1], [0, 1]]]), Polygon([[[0, 0], [1, near], [near, 0.5]]]), "union")

@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cmp_to_key
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -39,8 +40,8 @@ class Arrangement:
     nodes: all points; those of no edge (split away, or of zero length) may be among them.
     tails, heads: the ends of each edge; the tail comes first in the order by x, then y.
     lines: the line through each edge, directed from tail to head.
-    masks: for each edge the exclusive or of the masks of all input segments that cover it (even-odd by source).
-    cover: for each edge the inclusive or of them.
+    masks: for each edge the exclusive or of the masks of all input segments that cover it (even-odd by source): sets
+        of bits, or frozen sets. cover: for each edge the inclusive or of them.
     n_exact: pairs of segments that the float filter left to integers.
     """
 
@@ -48,9 +49,13 @@ class Arrangement:
     tails: list[int]
     heads: list[int]
     lines: list[Line]
-    masks: list[int]
-    cover: list[int]
+    masks: list[Any]
+    cover: list[Any]
     n_exact: int
+
+    def origin(self, half_edge: int) -> int:
+        """Return the node where a half-edge begins: 2 e runs along edge e, 2 e + 1 back."""
+        return (self.heads if half_edge & 1 else self.tails)[half_edge >> 1]
 
 
 def line_through(a: Homogeneous, b: Homogeneous) -> Line:
@@ -71,23 +76,22 @@ def crossing(first: Line, second: Line) -> Homogeneous:
 
 
 def arrange(
-    nodes: NodeTable, segments: Sequence[tuple[int, int]], masks: Sequence[int], budget: Budget | None = None
+    nodes: NodeTable, segments: Sequence[tuple[int, int]], masks: Sequence[Any], budget: Budget | None = None
 ) -> Arrangement:
     """Return the arrangement of `segments`, pairs of numbers in `nodes`, which gains the crossings.
 
-    masks: for each segment an integer whose bits name the sources it bounds. Segments of zero length bound nothing and
-    are left out. Cost: the box sweep, 5 us per crossing, 10 us per pair that the filter leaves.
+    masks: for each segment the sources it bounds: the bits of an integer, or a frozenset. Segments of zero length bound
+    nothing and are left out. Cost: the box sweep, 5 us per crossing, 10 us per pair that the filter leaves.
     """
     budget = budget or Budget()
-    merged: dict[tuple[int, int], list[int]] = {}
+    merged: dict[tuple[int, int], list[Any]] = {}
     for count, ((start, end), mask) in enumerate(zip(segments, masks)):
         if count % _POLL == 0:
             budget.check()
         if start != end:
             key = (start, end) if nodes.compare(start, end) < 0 else (end, start)
-            both = merged.setdefault(key, [0, 0])
-            both[0] ^= mask
-            both[1] |= mask
+            known = merged.get(key)
+            merged[key] = [mask, mask] if known is None else [known[0] ^ mask, known[1] | mask]
     ends = list(merged)
     lines: list[Line] = []
     for count, (tail, head) in enumerate(ends):
@@ -165,14 +169,14 @@ def _split(
     nodes: NodeTable,
     ends: list[tuple[int, int]],
     lines: list[Line],
-    merged: list[list[int]],
+    merged: list[list[Any]],
     on_segment: dict[int, set[int]],
     n_exact: int,
     budget: Budget,
 ) -> Arrangement:
     """Cut every segment at its nodes and unite the edges that several segments share."""
     by_place = cmp_to_key(nodes.compare)
-    edges: dict[tuple[int, int], list[int]] = {}
+    edges: dict[tuple[int, int], list[Any]] = {}
     carriers: list[Line] = []
     for segment, (tail, head) in enumerate(ends):
         if segment % _POLL == 0:
@@ -200,18 +204,20 @@ def _split(
 
 
 def arrange_rings(
-    coordinates: FloatArray, ring_offsets: Sequence[int], ring_masks: Sequence[int], budget: Budget | None = None
+    coordinates: FloatArray, ring_offsets: Sequence[int], ring_masks: Sequence[Any] | None, budget: Budget | None = None
 ) -> Arrangement:
     """Return the arrangement of closed rings.
 
     coordinates: (n_vertices, 2) float64, all rings one after another, none repeating its first vertex at its end.
-    ring_offsets: n_rings + 1 numbers, where each ring begins. ring_masks: the mask of each ring's edges.
+    ring_offsets: n_rings + 1 numbers, where each ring begins. ring_masks: the mask of each ring's edges; None for edges
+    that are sources of their own: the mask of each is the set of the number of its first vertex.
     """
     nodes, numbers = float_nodes(coordinates, budget)
     segments: list[tuple[int, int]] = []
-    masks: list[int] = []
-    for start, stop, mask in zip(ring_offsets, ring_offsets[1:], ring_masks):
-        ring = numbers[start:stop]
-        segments += zip(ring, ring[1:] + ring[:1])
-        masks += [mask] * len(ring)
+    masks: list[Any] = [] if ring_masks is not None else [frozenset((k,)) for k in range(len(numbers))]
+    for ring, (start, stop) in enumerate(pairwise(ring_offsets)):
+        own = numbers[start:stop]
+        segments += zip(own, own[1:] + own[:1])
+        if ring_masks is not None:
+            masks += [ring_masks[ring]] * len(own)
     return arrange(nodes, segments, masks, budget)

@@ -27,20 +27,22 @@ from engine.parallel import Budget
 
 @dataclass(slots=True)
 class Piece:
-    """One region: a shell and the holes in it, as nodes. The first node of a ring is its leftmost, then lowest.
+    """One region: a shell and the holes in it, by the half-edges that leave their corners.
 
-    evidence: the inclusive or of the evidence of the region's faces; hole_evidence: the same for each hole, of the
-    regions on the other side of its ring.
+    The first corner of a ring is its leftmost, then lowest.
+
+    evidence: the union of the evidence of the region's faces; hole_evidence: the same for each hole, of the regions on
+    the other side of its ring.
     """
 
     shell: list[int] = field(default_factory=list)
     holes: list[list[int]] = field(default_factory=list)
-    evidence: int = 0
-    hole_evidence: list[int] = field(default_factory=list)
+    evidence: frozenset[int] = frozenset()
+    hole_evidence: list[frozenset[int]] = field(default_factory=list)
 
 
 def trace_pieces(
-    subdivision: Subdivision, inside: Sequence[bool], evidence: Sequence[int], budget: Budget | None = None
+    subdivision: Subdivision, inside: Sequence[bool], evidence: Sequence[frozenset[int]], budget: Budget | None = None
 ) -> list[Piece]:
     """Return the regions that the faces marked `inside` make, in the order of their shells.
 
@@ -55,7 +57,7 @@ def trace_pieces(
         if not is_boundary:
             regions.unite(faces[2 * edge], faces[2 * edge + 1])
     region_of = [regions.find(face) for face in range(subdivision.n_faces)]
-    gathered = [0] * subdivision.n_faces
+    gathered: list[frozenset[int]] = [frozenset()] * subdivision.n_faces
     for face, region in enumerate(region_of):
         gathered[region] |= evidence[face]
     fans = [[half_edge for half_edge in fan if bounds[half_edge >> 1]] for fan in subdivision.around]
@@ -67,18 +69,18 @@ def trace_pieces(
         budget.check()
         region = region_of[faces[ring[0]]]
         piece = pieces.setdefault(region, Piece(evidence=gathered[region]))
-        nodes, is_shell = _corners(arrangement, fans, rank, ring)
+        corners, is_shell = _corners(arrangement, fans, rank, ring)
         if is_shell:
-            piece.shell = nodes
+            piece.shell = corners
         else:
-            piece.holes.append(nodes)
-            beyond = 0
+            piece.holes.append(corners)
+            beyond: frozenset[int] = frozenset()
             for other in {region_of[faces[half_edge ^ 1]] for half_edge in ring}:
                 beyond |= gathered[other]
             piece.hole_evidence.append(beyond)
 
     def place(ring: list[int]) -> list[int]:
-        return [rank[node] for node in ring]
+        return [rank[arrangement.origin(half_edge)] for half_edge in ring]
 
     for piece in pieces.values():
         if len(piece.holes) > 1:
@@ -104,7 +106,6 @@ def _ranks(arrangement: Arrangement, fans: Sequence[Sequence[int]]) -> dict[int,
 
 def _simple_rings(arrangement: Arrangement, following: Sequence[int], starts: Sequence[int]) -> list[list[int]]:
     """Return the cycles of `following` through `starts`, cut where they pass a node twice, as half-edges."""
-    ends = (arrangement.tails, arrangement.heads)
     seen = [False] * len(following)
     rings: list[list[int]] = []
     for start in starts:
@@ -115,13 +116,13 @@ def _simple_rings(arrangement: Arrangement, following: Sequence[int], starts: Se
         half_edge = start
         while not seen[half_edge]:  # bound: each turn marks one half-edge
             seen[half_edge] = True
-            node = ends[half_edge & 1][half_edge >> 1]
+            node = arrangement.origin(half_edge)
             first = place.get(node)
             if first is not None:
                 loop = path[first:]
                 del path[first:]
                 for other in loop:
-                    del place[ends[other & 1][other >> 1]]
+                    del place[arrangement.origin(other)]
                 rings.append(loop)
             place[node] = len(path)
             path.append(half_edge)
@@ -133,18 +134,18 @@ def _simple_rings(arrangement: Arrangement, following: Sequence[int], starts: Se
 def _corners(
     arrangement: Arrangement, fans: Sequence[Sequence[int]], rank: dict[int, int], ring: list[int]
 ) -> tuple[list[int], bool]:
-    """Return the nodes of a simple ring, straight ones left out, from its first one on; and whether it is a shell."""
-    lines, ends = arrangement.lines, (arrangement.tails, arrangement.heads)
-    nodes: list[int] = []
+    """Return the half-edges that leave the corners of a simple ring, from its first on; and whether it is a shell."""
+    lines = arrangement.lines
+    corners: list[int] = []
     first, is_shell = -1, False
     before = ring[-1]
     for half_edge in ring:
-        node = ends[half_edge & 1][half_edge >> 1]
+        node = arrangement.origin(half_edge)
         arriving, leaving = lines[before >> 1], lines[half_edge >> 1]
         if len(fans[node]) > 2 or turn_of(arriving, leaving) != 0:
-            if first < 0 or rank[node] < rank[nodes[first]]:
+            if first < 0 or rank[node] < rank[arrangement.origin(corners[first])]:
                 # At the leftmost node the ring arrives against its line and leaves along it: the sign is reversed.
-                first, is_shell = len(nodes), turn_of(arriving, leaving) < 0
-            nodes.append(node)
+                first, is_shell = len(corners), turn_of(arriving, leaving) < 0
+            corners.append(half_edge)
         before = half_edge
-    return nodes[first:] + nodes[:first], is_shell
+    return corners[first:] + corners[:first], is_shell

@@ -14,7 +14,7 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Sequence
 from fractions import Fraction
-from math import floor, ldexp
+from math import floor, lcm, ldexp
 
 import numpy as np
 
@@ -26,28 +26,36 @@ Pixel = tuple[int, int]
 _HALF = Fraction(1, 2)
 
 
-def _passage(start: Point, end: Point, pixel: Pixel) -> tuple[Fraction, Fraction] | None:
-    """Return the parameters between which the segment is in the half-open pixel, None where it is not."""
-    low, low_open, high, high_open = Fraction(0), False, Fraction(1), False
-    for a, b, centre in zip(start, end, pixel):
-        if a == b:
-            if not centre - _HALF <= a < centre + _HALF:
-                return None
-            continue
-        near, far = ((centre + side - a) / (b - a) for side in (-_HALF, _HALF))
-        is_back = a > b
-        enters, leaves = (far, near) if is_back else (near, far)  # near belongs to the pixel, far does not
-        if enters > low or (enters == low and is_back):
-            low, low_open = enters, is_back
-        if leaves < high or (leaves == high and not is_back):
-            high, high_open = leaves, not is_back
-    return (low, high) if low < high or (low == high and not low_open and not high_open) else None
+class _Segment:
+    """A segment in whole parts of a lattice spacing."""
+
+    def __init__(self, start: Point, end: Point) -> None:
+        (ax, ay), (bx, by) = (start, end) if start[0] <= end[0] else (end, start)
+        self.unit = 2 * lcm(ax.denominator, ay.denominator, bx.denominator, by.denominator)
+        self.ends = [value.numerator * (self.unit // value.denominator) for value in (ax, ay, bx, by)]
+
+    def passes(self, pixel: Pixel) -> bool:
+        """Tell whether it is in the half-open pixel: unless a corner tells that it enters and leaves on one side."""
+        ax, ay, bx, by = self.ends
+        left, low = ((2 * centre - 1) * (self.unit // 2) for centre in pixel)
+        right, high = left + self.unit, low + self.unit
+        if not (bx >= left and ax < right and max(ay, by) >= low and min(ay, by) < high):
+            return False
+        if ax == bx or ay == by:
+            return True
+
+        def turn(x: int, y: int) -> int:
+            return (bx - ax) * (y - ay) - (by - ay) * (x - ax)
+
+        return turn(left, high) > 0 > turn(right, low) if by > ay else turn(left, low) <= 0 < turn(right, high)
 
 
 def snap_rings(
     rings: Sequence[Sequence[Point]], spacing_exponent: int, budget: Budget | None = None
-) -> list[list[tuple[float, float]]]:
+) -> tuple[list[list[tuple[float, float]]], list[int]]:
     """Return the rings snapped to the lattice of spacing ``2**spacing_exponent``, no vertex repeated in succession.
+
+    And for each of their vertices the number of the one, of all of ``rings``, whose edge goes on from there.
 
     rings: exact vertices; the edges of all rings meet only in vertices. Every coordinate must be below ``2**53``
     spacings, so that lattice points are doubles. A ring may shrink to fewer than three vertices.
@@ -58,24 +66,27 @@ def snap_rings(
     pixels = [[(floor(x + _HALF), floor(y + _HALF)) for x, y in ring] for ring in scaled]
     hot = sorted({pixel for ring in pixels for pixel in ring})
     centres = np.array(hot, np.float64).reshape(-1, 2)
-    result = []
+    result, edges, edge = [], [], -1
     for ring, own in zip(scaled, pixels):
         chain: list[Pixel] = []
+        along: list[int] = []
         for start, end, first, last in zip(ring, [*ring[1:], *ring[:1]], own, [*own[1:], *own[:1]]):
             budget.check()
-            passed = []
-            for number in _candidates(hot, centres, start, end):
-                pixel = hot[number]
-                through = None if pixel in (first, last) else _passage(start, end, pixel)
-                if through is not None:
-                    passed.append((*through, pixel))
-            for pixel in (first, *(pixel for *_, pixel in sorted(passed)), last):
+            edge, segment = edge + 1, _Segment(start, end)
+            near = [hot[number] for number in _candidates(hot, centres, start, end)]
+            passed = [pixel for pixel in near if pixel not in (first, last) and segment.passes(pixel)]
+            ways = [(b > a) - (b < a) for a, b in zip(start, end)]  # order: it never goes back to the left, or down
+            passed.sort(key=lambda pixel: ways[0] * pixel[0] + ways[1] * pixel[1])
+            for pixel in (first, *passed, last):
                 if not chain or chain[-1] != pixel:
                     chain.append(pixel)
+                    along.append(edge)
+                along[-1] = edge
         while len(chain) > 1 and chain[0] == chain[-1]:
             chain.pop()
         result.append([(ldexp(x, spacing_exponent), ldexp(y, spacing_exponent)) for x, y in chain])
-    return result
+        edges += along[: len(chain)]
+    return result, edges
 
 
 def _candidates(hot: Sequence[Pixel], centres: np.ndarray, start: Point, end: Point) -> list[int]:

@@ -13,9 +13,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cmp_to_key
+from typing import Any
 
-from engine.arrangement.arrange import Arrangement, Line
-from engine.arrangement.edge_below import EdgesBelow
+import numpy as np
+
+from engine.arrangement.arrange import Arrangement, Line, side
+from engine.arrangement.nodes import Homogeneous
 from engine.arrangement.union_find import UnionFind
 from engine.parallel import Budget
 
@@ -128,21 +131,22 @@ def _first_nodes(arrangement: Arrangement) -> list[int]:
     return list(first.values())
 
 
-def label_faces(subdivision: Subdivision, masks: Sequence[int] | None = None) -> list[int]:
+def label_faces(subdivision: Subdivision, masks: Sequence[Any] | None = None, winds: bool = False) -> list[Any]:
     """Return for each face the exclusive or of the masks of the edges between it and infinity.
 
     masks: one for each edge; left out, those of the arrangement. Bit k of a label tells whether the face lies in source
-    k under the even-odd rule. The labels are well defined where each source is a set of closed rings.
+    k under the even-odd rule. The labels are well defined where each source is a set of closed rings. winds: masks are
+    how often rings run along each edge, less how often against it, and labels are winding numbers.
     """
     masks = subdivision.arrangement.masks if masks is None else masks
     faces = subdivision.faces
-    neighbours: list[list[tuple[int, int]]] = [[] for _ in range(subdivision.n_faces)]
+    neighbours: list[list[tuple[int, Any]]] = [[] for _ in range(subdivision.n_faces)]
     for edge, mask in enumerate(masks):
         left, right = faces[2 * edge], faces[2 * edge + 1]
         if left != right:
-            neighbours[left].append((right, mask))
+            neighbours[left].append((right, -mask if winds else mask))
             neighbours[right].append((left, mask))
-    labels = [0] * subdivision.n_faces
+    labels: list[Any] = [masks[0] ^ masks[0] if len(masks) else 0] * subdivision.n_faces
     reached = [False] * subdivision.n_faces
     reached[0], waiting = True, [0]
     while waiting:  # bound: each face is entered once; all are reached, since no face is enclosed by nothing
@@ -150,6 +154,52 @@ def label_faces(subdivision: Subdivision, masks: Sequence[int] | None = None) ->
         for other, mask in neighbours[face]:
             if not reached[other]:
                 reached[other] = True
-                labels[other] = labels[face] ^ mask
+                labels[other] = labels[face] + mask if winds else labels[face] ^ mask
                 waiting.append(other)
     return labels
+
+
+class EdgesBelow:
+    """The edges of an arrangement, ready for stabs straight down from a node, an infinitesimal step to its right.
+
+    Arrays of rounded coordinates prune (rounding is monotone), integers decide. A stab counts edges that begin at the
+    node's x and leaves out those that end there, and vertical ones.
+    """
+
+    __slots__ = ("_arrangement", "_high", "_low", "_x_max", "_x_min")
+
+    def __init__(self, arrangement: Arrangement) -> None:
+        xs, ys = np.array(arrangement.nodes.xs), np.array(arrangement.nodes.ys)
+        tails, heads = np.array(arrangement.tails, np.int64), np.array(arrangement.heads, np.int64)
+        self._arrangement = arrangement
+        self._x_min, self._x_max = xs[tails], xs[heads]
+        self._low, self._high = np.minimum(ys[tails], ys[heads]), np.maximum(ys[tails], ys[heads])
+
+    def find(self, node: int) -> int:
+        """Return the edge next below `node` (the node not on it), -1 where there is none."""
+        nodes, lines = self._arrangement.nodes, self._arrangement.lines
+        tails, heads = self._arrangement.tails, self._arrangement.heads
+        x, y, point = nodes.xs[node], nodes.ys[node], nodes.points[node]
+        near = np.flatnonzero((self._x_min <= x) & (self._x_max >= x) & (self._low <= y))
+        # An edge that surely spans x and surely lies below bounds the answer from below.
+        sure = near[(self._x_min[near] < x) & (self._x_max[near] > x) & (self._high[near] < y)]
+        if len(sure):
+            near = near[self._high[near] >= self._low[sure].max()]
+        best = -1
+        for edge in near.tolist():
+            tail, head = nodes.points[tails[edge]], nodes.points[heads[edge]]
+            # spans: tail.x <= x < head.x; then the node lies above where it lies to the left.
+            if tail[0] * point[2] <= point[0] * tail[2] and point[0] * head[2] < head[0] * point[2]:
+                if side(lines[edge], point) > 0 and (best < 0 or _is_above(lines[edge], lines[best], point)):
+                    best = edge
+        return best
+
+
+def _is_above(first: Line, second: Line, point: Homogeneous) -> bool:
+    """Tell whether `first` runs above `second` just right of `point`; both run to the right."""
+    # On a x + b y + c w = 0 with b > 0 and w = 1: y = -(a x + c) / b, and the slope is -a / b.
+    height = (first[0] * point[0] + first[2] * point[2]) * second[1]
+    other = (second[0] * point[0] + second[2] * point[2]) * first[1]
+    if height != other:
+        return height < other
+    return first[0] * second[1] < second[0] * first[1]

@@ -29,6 +29,7 @@ from engine.arrays import Float32Array, FloatArray, Int32Array, read_only
 from engine.jit import inline, kernel
 from engine.lanes.boxes import EMPTY
 from engine.lanes.lanes import aligned
+from engine.parallel import poll
 
 WIDTH = 8
 N_BINS = 16
@@ -40,6 +41,8 @@ ENLARGED = 2.0**-22
 """Added to half widths: a centre rounded to float32 is off by 2^-24 of at most 2, the half width by as much."""
 
 _FEW_ROWS = 64
+_WORK = 1 << 18
+"""Items looked at, or nodes filled, between two looks at the deadline: a hundredth of a second."""
 
 
 class Bvh(NamedTuple):
@@ -56,12 +59,25 @@ def build_bvh(boxes: FloatArray) -> Bvh:
     """Return the tree over `boxes` (n_items, 6) float64: xmin ymin zmin xmax ymax zmax; n_items >= 1.
 
     Cost: n log n; two arrays are kept, of some 45 bytes an item.
+    Raises: what `poll` does.
     """
-    origin = np.empty(3)
+    n_items, origin = len(boxes), np.empty(3)
+    local, order, stack = np.empty((n_items, 6)), np.arange(n_items), np.zeros((WIDTH * MAX_DEPTH + WIDTH, 2), np.int64)
+    halves, runs = np.empty((2 * n_items - 1, 6)), np.empty((2 * n_items - 1, 2), np.int64)
+    left, state = np.empty(2 * n_items - 1, np.int64), np.array([1, 1])
     with np.errstate(all="ignore"):  # what underflows here is far below the enlargement of the boxes
-        nodes, child, n_nodes, scale = _build(read_only(boxes), origin)
+        scale = _normalise(read_only(boxes), origin, local)
+        runs[0] = 0, n_items
+        while state[0] > 0:  # bound: each turn ends a node
+            poll()
+            _halve(local, order, halves, left, runs, stack, state)
+        nodes, child = np.empty((state[1], 6, WIDTH), np.float32), np.empty((state[1], WIDTH), np.int32)
+        stack[0], state[:] = 0, 1
+        while state[0] > 0:  # bound: each turn fills a node
+            poll()
+            _widen(local, order, halves, left, runs, nodes, child, stack, state)
     origin.setflags(write=False)
-    return Bvh(on_lines(nodes[:n_nodes]), on_lines(child[:n_nodes]), origin, scale)
+    return Bvh(on_lines(nodes[: state[1]]), on_lines(child[: state[1]]), origin, scale)
 
 
 def on_lines(array: Any) -> Any:
@@ -73,8 +89,8 @@ def on_lines(array: Any) -> Any:
 
 
 @kernel
-def _build(boxes: Any, origin: Any) -> tuple[Any, Any, int, float]:
-    """Fill origin (3,); return boxes and children of the nodes, some rows too many, the number of nodes, and scale."""
+def _normalise(boxes: Any, origin: Any, local: Any) -> float:
+    """Fill origin (3,) and local (n, 6) with the boxes in the coordinates of the tree; return scale."""
     n_items, half = boxes.shape[0], 0.0
     for axis in range(3):
         low, high = boxes[0, axis], boxes[0, 3 + axis]
@@ -85,35 +101,27 @@ def _build(boxes: Any, origin: Any) -> tuple[Any, Any, int, float]:
     power = frexp(half)[1] - 1 if half > 0.0 else 0
     once = ldexp(1.0, -power // 2)
     again = ldexp(1.0, -power - (-power // 2))  # order: two factors, since 2^-power may be no float
-    local = np.empty((n_items, 6))
     for item in range(n_items):
         for side in range(6):
             local[item, side] = boxes[item, side] * once * again - origin[side % 3] * once * again
-    order = np.arange(n_items)
-    halves, runs = np.empty((2 * n_items - 1, 6)), np.empty((2 * n_items - 1, 2), np.int64)
-    left = np.empty(2 * n_items - 1, np.int64)
-    n_halves = _halve(local, order, halves, left, runs)
-    nodes = np.empty((n_halves, 6, WIDTH), np.float32)
-    child = np.empty((n_halves, WIDTH), np.int32)
-    return nodes, child, _widen(local, order, halves, left, runs, nodes, child), ldexp(1.0, power)
+    return ldexp(1.0, power)
 
 
-@inline
-def _halve(items: Any, order: Any, boxes: Any, left: Any, runs: Any) -> int:
-    """Build a binary tree whose leaves are runs of `order` of at most eight items; return its number of nodes.
+@kernel
+def _halve(items: Any, order: Any, boxes: Any, left: Any, runs: Any, stack: Any, state: Any) -> None:
+    """Go on with a binary tree whose leaves are runs of `order` of at most eight items, for `_WORK` items.
 
     items (n, 6). Fills boxes (n_nodes, 6), left (n_nodes,): the left child, the right one follows, or -1, and runs
-    (n_nodes, 2): first and end in `order`. Caller guarantees 2 n - 1 rows.
+    (n_nodes, 2): first and end in `order`. Caller guarantees 2 n - 1 rows, of which runs has the first. stack: rows of
+    node and depth; state: how many rows wait there, and how many nodes there are.
     """
-    stack = np.empty((2 * MAX_DEPTH, 2), np.int64)  # node, depth
-    stack[0, 0], stack[0, 1] = 0, 0
-    runs[0, 0], runs[0, 1] = 0, items.shape[0]
-    n_stack, n_nodes = 1, 1
+    n_stack, n_nodes, n_seen = state[0], state[1], 0
     bins = np.empty((N_BINS, 7))  # box and number of items of each bin
-    while n_stack > 0:  # bound: each turn ends one of the 2 n - 1 nodes
+    while n_stack > 0 and n_seen < _WORK:  # bound: each turn ends one of the 2 n - 1 nodes
         n_stack -= 1
         node, depth = stack[n_stack, 0], stack[n_stack, 1]
         start, end = runs[node, 0], runs[node, 1]
+        n_seen += end - start
         _unite(items, order, start, end, boxes[node])
         if end - start <= WIDTH:
             left[node] = -1
@@ -128,17 +136,22 @@ def _halve(items: Any, order: Any, boxes: Any, left: Any, runs: Any) -> int:
             stack[n_stack, 0], stack[n_stack, 1] = n_nodes + side, depth + 1
             n_stack += 1
         n_nodes += 2
-    return n_nodes
+    state[0], state[1] = n_stack, n_nodes
 
 
-@inline
-def _widen(items: Any, order: Any, halves: Any, left: Any, runs: Any, boxes: Any, child: Any) -> int:
-    """Join binary nodes to nodes of eight, the largest boxes opened first; return the number of nodes filled."""
-    stack = np.empty((WIDTH * MAX_DEPTH + WIDTH, 2), np.int64)  # binary node, node
-    stack[0, 0], stack[0, 1] = 0, 0
-    n_stack, n_nodes = 1, 1
+@kernel
+def _widen(
+    items: Any, order: Any, halves: Any, left: Any, runs: Any, boxes: Any, child: Any, stack: Any, state: Any
+) -> None:
+    """Go on to join binary nodes to nodes of eight, the largest boxes opened first, for `_WORK` / 8 nodes.
+
+    stack: rows of binary node and node; state: how many rows wait there, and how many nodes are filled or wait.
+    """
+    n_stack, n_nodes = state[0], state[1]
     gathered = np.empty(WIDTH, np.int64)
-    while n_stack > 0:  # bound: each turn fills a node
+    for _ in range(_WORK // WIDTH):
+        if n_stack == 0:
+            break
         n_stack -= 1
         half, node = stack[n_stack, 0], stack[n_stack, 1]
         for lane in range(WIDTH):
@@ -169,7 +182,7 @@ def _widen(items: Any, order: Any, halves: Any, left: Any, runs: Any, boxes: Any
             stack[n_stack, 0], stack[n_stack, 1] = gathered[lane], n_nodes
             n_stack += 1
             n_nodes += 1
-    return n_nodes
+    state[0], state[1] = n_stack, n_nodes
 
 
 @inline

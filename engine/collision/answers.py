@@ -37,11 +37,11 @@ class Answers:
     works: list[Work] = field(default_factory=list)
 
     def left(self, start: int = 0, stop: int | None = None) -> IntArray:
-        """Return the pairs of a range to be settled one by one: open ones, and those whose witness is asked for."""
+        """Return the pairs of a range to be settled one by one: open ones, and those whose witness is asked for yet."""
         relations = self.relations[start:stop]
         is_left = relations == UNSETTLED
         if self.witnesses is not None:
-            is_left |= relations != DISJOINT
+            is_left |= (relations != DISJOINT) & np.array([w is None for w in self.witnesses[start:stop]], np.bool_)
         left: IntArray = start + np.flatnonzero(is_left)
         return left
 

@@ -4,20 +4,82 @@ from __future__ import annotations
 
 from typing import Literal, Unpack, overload
 
+from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, TOUCHING
 from engine.collision.detail import check_has_detail, detail_of
-from engine.collision.pairs import PAIRS
-from engine.collision.result import Collision, PairFunction, Work
+from engine.collision.meshes.mesh_mesh import mesh_mesh
+from engine.collision.planar.outline import collide_outline_outline
+from engine.collision.result import (
+    BODIES,
+    FIRST_WITHIN,
+    MESHES,
+    OUTLINES,
+    SECOND_WITHIN,
+    UNLIMITED,
+    UNNAMED,
+    Collision,
+    PairFunction,
+    Work,
+)
+from engine.collision.simple.against_boundary import collide_body_sphere, collide_half_space_body
+from engine.collision.simple.closed_forms import (
+    collide_aabb_sphere,
+    collide_half_space_half_space,
+    collide_half_space_sphere,
+    collide_sphere_sphere,
+    flush_boxes,
+    relate_boxes,
+)
 from engine.errors import InvalidArrayError, UnsupportedPairError, UnsupportedSolidError, WrongDimensionError
 from engine.parallel import Budget, Cancel, Options, Progress, check_options
+from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
-from engine.types import Accuracy
+from engine.types import Accuracy, Relation
 
 TAKEN = {2: "polygon, triangle, aabb, sphere, half_space", 3: "polyhedron, surface, aabb, sphere, half_space"}
 
 
+def _aabb_aabb(first: Aabb, second: Aabb, first_pose: Pose | None, second_pose: Pose | None, work: Work) -> Collision:
+    """Decide by comparisons where neither box has a pose; a witness of a contact is named as for other bodies."""
+    if first_pose is None and second_pose is None:
+        bounds = first.min.tolist(), first.max.tolist(), second.min.tolist(), second.max.tolist()
+        relation = relate_boxes(*bounds)
+        if relation == DISJOINT or not work.witness:
+            return UNNAMED[relation]
+        if relation < OVERLAPPING:
+            return FIRST_WITHIN if relation == FIRST_INSIDE_SECOND else SECOND_WITHIN
+        if relation == TOUCHING and first.dimension == 3 and (witness := flush_boxes(*bounds)) is not None:
+            return Collision(Relation.TOUCHING, witness)
+    bodies = mesh_mesh if first.dimension == 3 else collide_outline_outline
+    return bodies(first, second, first_pose, second_pose, work)
+
+
+PAIRS: dict[tuple[int, str, str], PairFunction] = {
+    **{(3, first, second): mesh_mesh for first in MESHES for second in MESHES},
+    **{(2, first, second): collide_outline_outline for first in OUTLINES for second in OUTLINES},
+    **{(d, "half_space", body): collide_half_space_body for d, body in BODIES},
+    **{(d, body, "sphere"): collide_body_sphere for d, body in BODIES},
+}
+for _dimension in (2, 3):
+    PAIRS[_dimension, "aabb", "aabb"] = _aabb_aabb
+    PAIRS[_dimension, "aabb", "sphere"] = collide_aabb_sphere
+    PAIRS[_dimension, "half_space", "half_space"] = collide_half_space_half_space
+    PAIRS[_dimension, "half_space", "sphere"] = collide_half_space_sphere
+    PAIRS[_dimension, "sphere", "sphere"] = collide_sphere_sphere
+"""Dimension and the two types to the function of that pair; a pair may stand in one order only."""
+
+_BOTH_ORDERS = {
+    **{(d, second, d, first): (function, True) for (d, first, second), function in PAIRS.items()},
+    **{(d, first, d, second): (function, False) for (d, first, second), function in PAIRS.items()},
+}
+
+
 def pair_function(first: Solid, second: Solid) -> tuple[PairFunction, bool]:
     """Return the function of a pair and whether it wants the two in the other order."""
+    if isinstance(first, Solid) and isinstance(second, Solid):
+        found = _BOTH_ORDERS.get((first.dimension, first.type, second.dimension, second.type))
+        if found is not None:
+            return found
     for name, solid in (("first", first), ("second", second)):
         if not isinstance(solid, Solid):
             raise UnsupportedSolidError(
@@ -30,12 +92,6 @@ def pair_function(first: Solid, second: Solid) -> tuple[PairFunction, bool]:
             "both must have one dimension",
             ("second",),
         )
-    function = PAIRS.get((first.dimension, first.type, second.type))
-    if function is not None:
-        return function, False
-    function = PAIRS.get((second.dimension, second.type, first.type))
-    if function is not None:
-        return function, True
     raise UnsupportedPairError(
         f"collision of a {first.type} with a {second.type} in {first.dimension}D is not defined; "
         f"collide takes {TAKEN[first.dimension]} in {first.dimension}D",
@@ -77,6 +133,7 @@ class CollideOptions(Options, total=False):
     first_pose: Pose | None
     second_pose: Pose | None
     boolean: bool
+    witness: bool
     detail: bool
 
 
@@ -95,6 +152,7 @@ def collide(
     first_pose: Pose | None = None,
     second_pose: Pose | None = None,
     boolean: bool = False,
+    witness: bool = True,
     detail: bool = False,
     workers: int | None = None,
     deadline: float | None = None,
@@ -111,8 +169,9 @@ def collide(
 
     Parameters: first, second: 3D polyhedron, surface, aabb, sphere, half_space; 2D polygon, triangle, aabb, sphere,
     half_space. first_pose, second_pose: exact affine images as given, None for none. boolean: disjoint or not is all
-    that is wanted; any other relation may then be answered as touching, sooner, without a witness. detail: say which of
-    the eight relations of RCC-8 (`Rcc8`) too, in `Collision.detail`: disjoint is DC, touching EC, inside NTPP, NTPPi;
+    that is wanted; any other relation may then be answered as touching, sooner, without a witness. witness: False where
+    no reason is wanted. detail: say which of the eight relations of RCC-8 (`Rcc8`) too, in `Collision.detail`: disjoint
+    is DC, touching EC, inside NTPP, NTPPi;
     overlapping becomes PO, EQ, or TPP and TPPi where one body lies in the other and the boundaries meet. Containment
     and equality are of the closures of the open interiors, so walls that cancel do not count; they count as boundary.
     None where a body has no interior (flat, radius 0, all faces cancel); a surface is refused. workers, progress: taken
@@ -134,14 +193,19 @@ def collide(
     'TPP'
     """
     pair_function(first, second)
-    check_pose(first_pose, first, "first_pose")
-    check_pose(second_pose, second, "second_pose")
-    check_options(workers, progress)
+    if first_pose is not None or second_pose is not None:
+        check_pose(first_pose, first, "first_pose")
+        check_pose(second_pose, second, "second_pose")
+    if workers is not None or progress is not None:
+        check_options(workers, progress)
+    is_named = witness and not boolean
+    if deadline is None and cancel is None and progress is None and not (detail or report):
+        return collide_pair(first, second, first_pose, second_pose, Work(UNLIMITED, is_named, boolean))
     if detail:
         check_has_detail(((("first",), first), (("second",), second)), boolean)
     with Budget(deadline, cancel) as budget:
         budget.check()
-        work = Work(budget, witness=not boolean, boolean=boolean)
+        work = Work(budget, witness=is_named, boolean=boolean)
         result = collide_pair(first, second, first_pose, second_pose, work)
         if detail:
             named = detail_of(first, second, first_pose, second_pose, result.relation, work)

@@ -7,19 +7,20 @@ from typing import Any
 
 import numpy as np
 
-from engine.arrays import FloatArray, Int8Array, read_only
+from engine.arrays import FloatArray, Int8Array, IntArray, read_only
 from engine.collision.answers import Answers, Witnesses, accuracy_of
-from engine.collision.codes import UNSETTLED
+from engine.collision.codes import DISJOINT, UNSETTLED
 from engine.collision.collide import pair_function
 from engine.collision.detail import NO_DETAIL, check_has_detail, details_where_proven, has_interior
-from engine.collision.meshes.dual_traversal import new_descent, new_found
+from engine.collision.meshes.contact_kinds import N_NAMED
 from engine.collision.meshes.mesh_arrays import STILL, mesh_body_of
-from engine.collision.meshes.mesh_mesh import mesh_mesh
+from engine.collision.meshes.mesh_mesh import SPACE, witness_of
 from engine.collision.meshes.mesh_pair import what_to_seek
 from engine.collision.meshes.placement import PoseArrays
-from engine.collision.meshes.pose_batch import relate_poses
-from engine.collision.result import Work
+from engine.collision.meshes.pose_batch import N_COLUMNS, RELATION, relate_poses
+from engine.collision.result import MESHES, Work
 from engine.collision.scenes.batches import convex_poses
+from engine.direct import entry_of
 from engine.errors import InvalidArrayError, WrongDimensionError
 from engine.parallel import Budget, Cancel, Progress, run_chunks
 from engine.solids.base import Solid
@@ -27,7 +28,6 @@ from engine.solids.checks import as_floats
 from engine.solids.pose import Pose, check_rotations
 from engine.types import Accuracy
 
-_ROOM = 64
 PoseCollisions = (
     Int8Array | tuple[Int8Array, Witnesses] | tuple[Int8Array, Int8Array] | tuple[Int8Array, Witnesses, Int8Array]
 )
@@ -79,7 +79,7 @@ def collide_poses(
         details = np.full(n_poses, NO_DETAIL, np.int8)
         relations = np.full(n_poses, UNSETTLED, np.int8)
         found: Witnesses | None = [None] * n_poses if witnesses else None
-        answers = Answers(budget, boolean, relations, found, details if has_detail else None)
+        answers = Answers(budget, bool(boolean), relations, found, details if has_detail else None)
         fill = batch_of(first, second, poses, answers)
 
         def task(start: int, stop: int) -> None:
@@ -123,21 +123,41 @@ def as_poses(rotations: object, translations: object, dimension: int) -> tuple[F
 
 def batch_of(first: Solid, second: Solid, poses: PoseArrays, answers: Answers) -> Callable[[int, int], None] | None:
     """Return the function that lets kernels answer a range of poses, UNSETTLED where they cannot; None without one."""
-    if pair_function(first, second)[0] is not mesh_mesh:
+    if first.dimension == 2 or first.type not in MESHES or second.type not in MESHES:
         return None
-    budget, relations = answers.budget, answers.relations
+    budget, relations, witnesses = answers.budget, answers.relations, answers.witnesses
     poses = PoseArrays(read_only(poses.rotations), read_only(poses.translations), True)
     convex = convex_poses(first, second, poses, relations, budget, answers.boolean)
-    if convex is not None:
-        return convex
     a, b = mesh_body_of(first), mesh_body_of(second)
-    seek = what_to_seek(a, b, Work(budget, witness=False, boolean=answers.boolean))
+    is_named = witnesses is not None
+    seek = what_to_seek(a, b, Work(budget, is_named, answers.boolean))
 
     def fill(start: int, stop: int) -> None:
-        some = PoseArrays(poses.rotations[start:stop], poses.translations[start:stop], True)
-        descent, room = new_descent(), new_found(_ROOM)
-        with np.errstate(all="ignore"):
-            relate_poses(a.arrays, b.arrays, STILL, some, seek, descent, room, relations[start:stop], budget.flag)
+        if convex is not None:
+            convex(start, stop)
+        items: IntArray | slice = slice(start, stop) if convex is None else answers.left(start, stop)
+        some = PoseArrays(read_only(poses.rotations[items]), read_only(poses.translations[items]), True)
+        rows = np.empty((len(some.rotations), N_COLUMNS), np.int64)
+        if not len(rows):
+            return
+        entry_of(relate_poses)(
+            a.arrays,
+            b.arrays,
+            STILL,
+            some,
+            seek,
+            N_NAMED if is_named else 0,
+            SPACE.descent,
+            SPACE.found,
+            rows,
+            budget.flag,
+        )
         budget.check()
+        relations[items] = rows[:, RELATION]
+        if witnesses is not None:
+            numbers = range(start, stop) if isinstance(items, slice) else items.tolist()
+            for item, row in zip(numbers, rows.tolist()):
+                if row[RELATION] > DISJOINT:
+                    witnesses[item] = witness_of(row, a, b, seek)
 
     return fill

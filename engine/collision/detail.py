@@ -19,12 +19,17 @@ from engine.collision.exact_images import image_half_space, image_point, value_a
 from engine.collision.meshes.live_faces import live_piece
 from engine.collision.meshes.mesh_arrays import mesh_body_of
 from engine.collision.meshes.mesh_detail import mesh_parts
-from engine.collision.pairs import BODIES, MESHES, OUTLINES
-from engine.collision.planar.outline import arrange_outlines, live_edges, outline_of, single_points
-from engine.collision.planar.outline_outline import FIRST, SECOND, boundaries_meet
-from engine.collision.result import Parts, Work
-from engine.collision.simple.body_sphere import body_sphere_parts
-from engine.collision.simple.half_space_vertices import half_space_body_parts
+from engine.collision.planar.outline import (
+    FIRST,
+    SECOND,
+    arrange_outlines,
+    boundaries_meet,
+    live_edges,
+    outline_of,
+    single_points,
+)
+from engine.collision.result import BODIES, MESHES, OUTLINES, Parts, Work
+from engine.collision.simple.against_boundary import body_sphere_parts, half_space_body_parts
 from engine.containment.rational_locate import rational_location
 from engine.errors import InvalidInputError, UnsupportedSolidError
 from engine.parallel import Budget
@@ -66,8 +71,7 @@ def check_has_detail(named: Iterable[tuple[tuple[str | int, ...], Solid]], boole
 
 
 def details_where_proven(relations: Int8Array) -> Int8Array:
-    """Return the codes for pairs that a batch of meshes or convex bodies decided: one that finds overlapping does so by
-    a crossing, or by a point of either body outside the other, so that is PO; NO_DETAIL where it left UNSETTLED."""
+    """Return the codes for pairs that a batch decided, by crossings or points outside the other: overlapping is PO."""
     return np.where(relations == UNSETTLED, np.int8(NO_DETAIL), _WHERE_PROVEN[relations])
 
 

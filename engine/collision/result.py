@@ -69,6 +69,23 @@ class Collision:
         return Collision(_SWAPPED_RELATION.get(self.relation, self.relation), w, detail)
 
 
+MESHES = ("polyhedron", "surface", "aabb")
+OUTLINES = ("polygon", "triangle", "aabb")
+BODIES = [(3, mesh) for mesh in MESHES] + [(2, outline) for outline in OUTLINES]
+"""Types with faces and with edges, and of both the dimension and the type."""
+
+RELATIONS = tuple(Relation)
+UNNAMED = tuple(map(Collision, RELATIONS))
+"""By code: the relation, and the answer without a witness."""
+NO_CONTACT = UNNAMED[Relation.DISJOINT]
+FIRST_WITHIN = Collision(Relation.FIRST_INSIDE_SECOND, Witness("containment", containing="second"))
+SECOND_WITHIN = Collision(Relation.SECOND_INSIDE_FIRST, Witness("containment", containing="first"))
+OVERLAP, TOUCH = Collision(Relation.OVERLAPPING, Witness("surface")), Collision(Relation.TOUCHING, Witness("surface"))
+"""What bodies without faces are answered with."""
+UNLIMITED = Budget()
+"""Of a call without deadline and switch: nobody raises its flag."""
+
+
 class Parts(NamedTuple):
     """What of two bodies lies outside the other, for bodies whose open interiors meet.
 

@@ -69,10 +69,8 @@ def locate(
     """
     if workers is None and deadline is None and cancel is None and progress is None:
         found = located_at_once(points, solid)
-        if found is not None and report:
-            return found.locations, Accuracy("exact", None, len(found.locations), *found[1:])
         if found is not None:
-            return found.locations
+            return (found[0], Accuracy("exact", None, len(found[0]), *found[1:])) if report else found[0]
     choice = locator_of(solid)
     array = as_points(points, solid.dimension, must_be_finite=False)
     locations = np.empty(len(array), np.int8)
@@ -83,7 +81,7 @@ def locate(
         order = None if locator.order is None else locator.order(array, budget)
 
         def task(start: int, stop: int) -> None:
-            if not locator.sees_not_finite:
+            if locator.decisions != "exact":
                 check_finite(array[start:stop], ("points",))
             if order is None:
                 counts = locator.fill(array[start:stop], locations[start:stop], budget)
@@ -98,7 +96,7 @@ def locate(
         try:
             run_chunks(task, len(array), budget=budget, workers=workers, progress=progress)
         except NotFiniteError:
-            check_finite(array, ("points",))  # names the first of all, not of a chunk
+            check_finite(array, ("points",))  # names the first of all
             raise
     if not report:
         return locations

@@ -7,15 +7,13 @@ out of its range, and a rational half, which settles one such point. Structures 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from engine.arrays import FloatArray, Int8Array, IntArray, read_only
 from engine.containment.cells.build import cells_of
-from engine.containment.cells.locate import NOT_FINITE, locate_by_cells
+from engine.containment.cells.locate import locate_by_cells
 from engine.containment.cells.order import order_if_it_pays
 from engine.containment.methods.ball import locate_in_ball
 from engine.containment.methods.box import locate_in_box
@@ -26,8 +24,9 @@ from engine.containment.methods.polyhedron_one_pass import locate_by_pass
 from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
 from engine.containment.methods.polynomial import locate_by_polynomial
 from engine.containment.policy import CELLS, PASS, choose_for_mesh, choose_for_rings
-from engine.containment.prepared import closed_rings_of, rings_of, rounded_rows, tree_of
-from engine.containment.rational_locate import Check, combine, over_tree, prism_walls, rational_location, unsupported
+from engine.containment.posed.filters import NOT_FINITE
+from engine.containment.prepared import EXACT, prism_rows, ring_offsets_of, rings_of, tree_of
+from engine.containment.rational_locate import Check, combine, over_tree, rational_location, unsupported
 from engine.containment.ring_cells.build import ring_cells_of
 from engine.containment.ring_cells.locate import locate_by_ring_cells
 from engine.errors import InvalidArrayError, NotFiniteError
@@ -48,32 +47,27 @@ from engine.types import UNDECIDED
 Fill = Callable[[FloatArray, Int8Array, Budget], "Counts"]
 
 
-@dataclass(frozen=True, slots=True)
-class Counts:
+class Counts(NamedTuple):
     """How many points of a chunk needed more than the filter, and how many rational arithmetic."""
 
     beyond: int
     rational: int
 
 
-@dataclass(frozen=True, slots=True)
-class Locator:
+class Locator(NamedTuple):
     """How to locate points in one solid."""
 
     method: str
     """Stable short name, for `Accuracy.method`."""
     fill: Fill
-    """Locates the points (n, dim) of a chunk into int8 (n,)."""
+    """Locates the points (n, dim) of a chunk into int8 (n,). Raises NotFiniteError unless a callable decides."""
     decisions: Literal["exact", "float64"] = "exact"
     for_batch: Callable[[int, Budget], Locator] | None = None
     """Returns the locator to use for so many points, where that depends: it may build a structure that pays."""
-
     order: Callable[[FloatArray, Budget], IntArray | None] | None = None
     """Returns the order in which a large batch is best asked, None for as it is."""
     direct: tuple[Any, ...] = ()
     """The kernel, and what stands between points and locations among its arguments, where that is all there is."""
-    sees_not_finite: bool = False
-    """Whether `fill` raises NotFiniteError for points that are not finite; otherwise the caller guarantees them."""
 
     def chosen(self, n_points: int, budget: Budget) -> Locator:
         """Return the locator for a batch of `n_points`."""
@@ -85,16 +79,20 @@ def settled(
 ) -> Fill:
     """Return the fill that runs `kernel` over a chunk and settles what it leaves UNDECIDED one by one.
 
-    kernel: returns how many points needed more than its filter, those left UNDECIDED among them.
-    Raises what `Budget.check` raises, also when the kernel stopped early.
+    kernel: returns how many points needed more than its filter, those left UNDECIDED among them, or NOT_FINITE.
+    Raises NotFiniteError, which names no point, and what `Budget.check` raises, also when the kernel stopped early.
     """
 
     def fill(points: FloatArray, locations: Int8Array, budget: Budget) -> Counts:
+        if len(points) == 0:
+            return Counts(0, 0)
         with np.errstate(all="ignore"):  # uncompiled, numpy scalars warn where the filter means to overflow
             n_beyond = int(kernel(read_only(points), locations, budget))
         budget.check()
         if not n_beyond:
             return Counts(0, 0)
+        if n_beyond == NOT_FINITE:
+            raise NotFiniteError("a point is not finite", ("points",))
         undecided = np.flatnonzero(locations == UNDECIDED)
         for item in undecided:
             locations[item] = settle(points[item].tolist(), budget.check)
@@ -121,12 +119,17 @@ def rational_half(solid: Solid, pose: Pose | None = None) -> Callable[[Sequence[
 
 def _by_kernel(method: str, kernel: Callable[..., int], solid: Solid, *prepared: object) -> Locator:
     """Return the locator by a kernel that takes points, what is prepared of the solid, locations and flag."""
-    located = _located(method, solid, lambda points, out, budget: kernel(points, *prepared, out, budget.flag))
-    return replace(located, direct=(kernel, *prepared))
+
+    def run(points: FloatArray, out: Int8Array, budget: Budget) -> int:
+        return kernel(points, *prepared, out, budget.flag)
+
+    return Locator(method, settled(run, rational_half(solid)), direct=(kernel, *prepared))
 
 
-def _located(method: str, solid: Solid, kernel: Callable[[FloatArray, Int8Array, Budget], int]) -> Locator:
-    return Locator(method, settled(kernel, rational_half(solid)))
+def _by_choice(method: str, choose: Callable[[int, Budget], Locator]) -> Locator:
+    return Locator(
+        method, lambda points, out, budget: choose(len(points), budget).fill(points, out, budget), for_batch=choose
+    )
 
 
 def _in_rows(solid: HalfSpace | Convex) -> Locator:
@@ -144,62 +147,56 @@ def _in_aabb(solid: Aabb) -> Locator:
 
 
 def _in_triangle(solid: Triangle) -> Locator:
-    if solid.dimension == 3:
-        return _located("prism", solid, partial(_run_in_prism, solid))
-    return _located("same_side", solid, partial(_run_ring_pass, solid))
+    if solid.dimension == 2:
+        return by_ring_pass("same_side", solid)
+    return _by_choice("prism", lambda _, budget: _by_kernel("prism", locate_in_half_spaces, solid, *prism_rows(solid)))
 
 
-def _run_in_prism(solid: Triangle, points: FloatArray, locations: Int8Array, budget: Budget) -> int:
-    walls = prism_walls(solid)
-    if not any(any(wall) for wall in walls):  # no area: every product of the formula is zero
-        locations[:] = 0
-        return 0
-    rows, is_exact = solid.prepared("rounded_walls", lambda: rounded_rows(walls))
-    return int(locate_in_half_spaces(points, rows, is_exact, locations, budget.flag))
-
-
-def _run_ring_pass(solid: Polygon | Triangle, points: FloatArray, locations: Int8Array, budget: Budget) -> int:
-    prepared = np.zeros(len(points)), *closed_rings_of(solid, budget.check)
-    return int(locate_by_ring_pass(points, *prepared, locations, budget.flag))
+def by_ring_pass(method: str, solid: Polygon | Triangle) -> Locator:
+    """Return the locator that passes over all edges."""
+    return _by_kernel(method, locate_by_ring_pass, solid, EXACT, solid.vertices, ring_offsets_of(solid))
 
 
 def _in_polygon(solid: Polygon) -> Locator:
-    def run(points: FloatArray, out: Int8Array, budget: Budget) -> int:
-        return int(locate_in_rings(points, np.zeros(len(points)), *rings_of(solid, budget.check), out, budget.flag))
+    return _by_choice(
+        "ring_crossing", lambda n_points, budget: polygon_by(solid, choose_for_rings(solid, n_points), budget)
+    )
 
-    def choose(n_points: int, budget: Budget) -> Locator:
-        choice = choose_for_rings(solid, n_points)
-        cells = ring_cells_of(solid, budget) if choice == CELLS else None
-        if cells is None:
-            return at_once if choice == PASS else plain
-        return Locator("ring_cells", _in_cells(locate_by_ring_cells, cells, by_rays))
 
-    by_rays = settled(run, rational_half(solid))
-    at_once = _located("ring_crossing", solid, partial(_run_ring_pass, solid))
-    plain = Locator("ring_crossing", by_rays, for_batch=choose)
-    return plain
+def polygon_by(solid: Polygon, choice: int, budget: Budget) -> Locator:
+    """Return the locator by what policy.py chose; it builds that."""
+
+    def by_rays(budget: Budget) -> Locator:
+        return _by_kernel("ring_crossing", locate_in_rings, solid, EXACT, *rings_of(solid, budget.check))
+
+    if choice == PASS:
+        return by_ring_pass("ring_crossing", solid)
+    cells = ring_cells_of(solid, budget) if choice == CELLS else None
+    if cells is None:
+        return by_rays(budget)
+    rays: Fill = lambda points, out, budget: by_rays(budget).fill(points, out, budget)  # noqa: E731
+    return Locator("ring_cells", _in_cells(locate_by_ring_cells, cells, rays))
 
 
 def _in_polyhedron(solid: Polyhedron) -> Locator:
-    def run(points: FloatArray, out: Int8Array, budget: Budget) -> int:
-        return int(locate_by_tree(points, np.zeros(len(points)), tree_of(solid, budget.check), out, budget.flag))
+    return _by_choice(
+        "ray_parity", lambda n_points, budget: polyhedron_by(solid, choose_for_mesh(solid, n_points, budget), budget)
+    )
 
-    def choose(n_points: int, budget: Budget) -> Locator:
-        choice = choose_for_mesh(solid, n_points, budget)
-        if choice != CELLS:
-            return at_once if choice == PASS else plain
-        cells = cells_of(solid, budget)
-        return Locator(
-            "segment_parity",
-            _in_cells(locate_by_cells, cells, by_rays),
-            order=lambda points, budget: order_if_it_pays(points, cells, budget),
-            sees_not_finite=True,
-        )
 
-    by_rays = settled(run, rational_half(solid))
-    at_once = _by_kernel("ray_parity", locate_by_pass, solid, solid.vertices, solid.triangles)
-    plain = Locator("ray_parity", by_rays, for_batch=choose)
-    return plain
+def polyhedron_by(solid: Polyhedron, choice: int, budget: Budget) -> Locator:
+    """Return the locator by what policy.py chose; it builds that."""
+    if choice == PASS:
+        return _by_kernel("ray_parity", locate_by_pass, solid, solid.vertices, solid.triangles)
+    by_rays = _by_kernel("ray_parity", locate_by_tree, solid, EXACT, tree_of(solid, budget.check))
+    if choice != CELLS:
+        return by_rays
+    cells = cells_of(solid, budget)
+    return Locator(
+        "segment_parity",
+        _in_cells(locate_by_cells, cells, by_rays.fill),
+        order=lambda points, budget: order_if_it_pays(points, cells, budget),
+    )
 
 
 def _in_cells(kernel: Callable[..., int], cells: object, by_rays: Fill) -> Fill:

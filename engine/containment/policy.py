@@ -21,6 +21,10 @@ from engine.solids.polyhedron import Polyhedron
 PASS, LISTS, CELLS = 0, 1, 2
 """One pass over all faces or edges; a tree or slabs; cells."""
 
+_FEW: Final = 64
+"""Points for which cells, if there are any, are not worth the general way."""
+_FEW_RAYS: Final = 256
+"""Of points through faces: a pass over so many costs less than to hand over a tree."""
 _POINTS_A_PASS: Final = 1024
 _PASS_A_FACE: Final = 20.0
 _TREE: Final = 60_000.0
@@ -37,8 +41,6 @@ _VISIT: Final = 4.5
 _PASS_AN_EDGE: Final = 0.8
 _SLABS_AN_EDGE: Final = 410.0
 _RING_CELLS_FROM, _RING_CELLS_AN_EDGE = 1 << 12, 1_000.0
-_FEW_SIGNS: Final = 1 << 15
-"""Signs of orient2d that cost less than the general way."""
 _IN_SLABS: Final = 40.0
 _MET_EDGE: Final = 4.0
 
@@ -78,9 +80,11 @@ def cost_of_cells(solid: Polyhedron, budget: Budget) -> float:
 def choose_for_mesh(solid: Polyhedron, n_points: int, budget: Budget) -> int:
     """Return PASS, LISTS (the tree) or CELLS."""
     seen, n_faces = _points_seen(solid, n_points), len(solid.triangles)
-    if solid.kept("cells") is not None:
+    if n_points * n_faces <= _FEW_RAYS:
+        return PASS
+    if n_points > _FEW and solid.kept("cells") is not None:
         return CELLS
-    if seen >= _CELLS_FROM + _CELLS_PER_FACE * n_faces:
+    if n_points > _FEW and seen >= _CELLS_FROM + _CELLS_PER_FACE * n_faces:
         if solid.prepared("can_have_cells", lambda: can_have_cells(solid)):
             gain = seen * cost_in_tree(solid) + 2.0 * _CELLS_A_FACE * n_faces  # on ordinary meshes it pays at once
             if gain > cost_of_cells(solid, budget):
@@ -98,22 +102,16 @@ def choose_for_mesh(solid: Polyhedron, n_points: int, budget: Budget) -> int:
 def choose_for_rings(solid: Polygon, n_points: int) -> int:
     """Return PASS, LISTS (slabs) or CELLS; cells only where the coordinates are in their range."""
     seen, n_edges = _points_seen(solid, n_points), len(solid.vertices)
-    if solid.kept("ring_cells") is not None:
+    if n_points > _FEW and solid.kept("ring_cells") is not None:
         return CELLS
     by_pass, lists = _PASS_AN_EDGE * n_edges, PASS
-    if seen * by_pass > _SLABS_AN_EDGE * n_edges or n_points >= _RING_CELLS_FROM:
+    if seen * _PASS_AN_EDGE > _SLABS_AN_EDGE or n_points >= _RING_CELLS_FROM:
         by_slabs = _IN_SLABS + _MET_EDGE * solid.prepared("edges_met", lambda: _edges_met(solid))
         by_pass, lists = min((by_pass, PASS), (by_slabs, LISTS))
+    if n_points <= _FEW:
+        return lists
     is_dear = seen * by_pass > _RING_CELLS_AN_EDGE * (n_edges + _RING_CELLS_FROM)
     return CELLS if is_dear or seen >= _RING_CELLS_FROM + n_edges else lists
-
-
-def ring_pass_pays(solid: Polygon, n_points: int) -> bool:
-    """Tell whether few more points are best located in a pass; if so they count as asked."""
-    seen, n_edges = solid.prepared("points_seen", lambda: [0]), len(solid.vertices)
-    is_cheap = (seen[0] + n_points) * _PASS_AN_EDGE <= _SLABS_AN_EDGE or n_points * n_edges <= _FEW_SIGNS
-    seen[0] += n_points * is_cheap
-    return bool(is_cheap)
 
 
 def _edges_met(solid: Polygon) -> float:

@@ -4,20 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from engine.arrays import BoolArray, Float32Array, FloatArray, Int32Array, IntArray, read_only
 from engine.bounding.bvh import WIDTH, build_bvh, on_lines
 from engine.bounding.grid import BoxGrid, build_box_grid
-from engine.containment.methods.polygon_one_pass import close_rings
 from engine.containment.methods.polyhedron_ray_parity import fill_triangle_boxes, lay_out
-from engine.containment.rational_locate import Check, next_in_ring, no_check
+from engine.containment.rational_locate import Check, next_in_ring, no_check, prism_walls
 from engine.lanes.overhead import OVERHEAD_ROWS
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
 from engine.solids.triangle import Triangle
+
+EXACT: Final = np.zeros(0)
+"""In place of blurs: the points are what they are."""
+_TRIANGLE: Final = read_only(np.array([0, 3], np.int64))
 
 
 class TriangleTree(NamedTuple):
@@ -101,20 +104,14 @@ def _box_of(vertices: FloatArray) -> tuple[float, float, float, float]:
     return float(xs.min()), float(xs.max()), float(ys.min()), float(ys.max())
 
 
-class ClosedRings(NamedTuple):
-    """What `locate_by_ring_pass` reads of a polygon, or of a plane triangle as one ring."""
-
-    rings: tuple[FloatArray, FloatArray, IntArray]
-    box: tuple[float, float, float, float]
+def ring_offsets_of(solid: Polygon | Triangle) -> IntArray:
+    """Return where the rings of a polygon begin, of a plane triangle its one."""
+    return solid.ring_offsets if isinstance(solid, Polygon) else _TRIANGLE
 
 
-def closed_rings_of(solid: Polygon | Triangle, check: Check = no_check) -> ClosedRings:
-    """Return the rings of a polygon, each ended by its first vertex, prepared once."""
-
-    offsets = solid.ring_offsets if isinstance(solid, Polygon) else np.array([0, 3])
-    return solid.prepared(
-        "closed_rings", lambda: ClosedRings(close_rings(solid.vertices, offsets), _box_of(solid.vertices)), check
-    )
+def prism_rows(solid: Triangle) -> tuple[FloatArray, BoolArray]:
+    """Return the walls of the prism over a triangle, as `rounded_rows` does, prepared once."""
+    return solid.prepared("rounded_walls", lambda: rounded_rows(prism_walls(solid)))
 
 
 def rounded_rows(rows: Sequence[Sequence[int | Fraction]]) -> tuple[FloatArray, BoolArray]:

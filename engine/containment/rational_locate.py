@@ -19,9 +19,17 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
+from engine.containment.methods.polyhedron_ray_parity import fill_triangle_boxes, list_unsure
 from engine.errors import UnsupportedSolidError
 from engine.predicates.exact_vectors import cross, dot, minus
-from engine.predicates.rational import Number, polynomial_sign_rational, scaled_integers, side_rational, sign_of
+from engine.predicates.rational import (
+    Number,
+    common_integers,
+    polynomial_sign_rational,
+    scaled_integers,
+    side_rational,
+    sign_of,
+)
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.convex import Convex
@@ -40,6 +48,7 @@ Integers: TypeAlias = tuple[int, ...]
 OUTSIDE, BOUNDARY, INSIDE = -1, 0, 1
 MISSED, CROSSED, ON_FACE = 0, 1, 2
 _CHECK_EVERY = 64
+_MOST_UNSURE = 1 << 10
 
 
 def no_check() -> None:
@@ -107,23 +116,37 @@ def triangle_boxes(solid: Polyhedron) -> FloatArray:
     """Return the six rows xmin, xmax, ymin, ymax, zmin, zmax over the triangles of `solid`, prepared once."""
 
     def build() -> FloatArray:
-        corners = solid.vertices[solid.triangles]
-        low, high = corners.min(axis=1), corners.max(axis=1)
-        return np.ascontiguousarray(np.stack([low, high], axis=2).reshape(len(low), 6).T)
+        boxes = np.empty((len(solid.triangles), 6))
+        fill_triangle_boxes(solid.vertices, solid.triangles, boxes)
+        return np.ascontiguousarray(boxes.reshape(-1, 2, 3).transpose(2, 1, 0).reshape(6, -1))
 
     return solid.prepared("triangle_boxes", build)
 
 
-def _in_polyhedron(point: Sequence[Number], solid: Polyhedron, check: Check) -> int:
-    boxes = triangle_boxes(solid)
+def _unsure_triangles(point: Sequence[Number], solid: Polyhedron) -> tuple[IntArray, bool]:
+    """Return the triangles (n, 3) that the ray up from a point may meet, and whether it meets an odd number of others.
+
+    By the tree where there is one, else by a look at all boxes.
+    """
     near = [_around(value) for value in point]
+    tree, found = solid.kept("tree"), np.empty(_MOST_UNSURE, np.int64)
+    if tree is not None:
+        middle = [low if math.isfinite(low) else high for low, high in near]
+        n_found, odd = list_unsure(tree, *middle, 2.0 * max(high - low for low, high in near), found)
+        if n_found >= 0:
+            return tree.triangles[found[:n_found]], odd
+    boxes = triangle_boxes(solid)
     held = (boxes[0] <= near[0][1]) & (boxes[1] >= near[0][0]) & (boxes[2] <= near[1][1])
     held &= (boxes[3] >= near[1][0]) & (boxes[5] >= near[2][0])
-    odd = False
-    for turn, index in enumerate(np.flatnonzero(held)):
+    return solid.triangles[held], False
+
+
+def _in_polyhedron(point: Sequence[Number], solid: Polyhedron, check: Check) -> int:
+    triangles, odd = _unsure_triangles(point, solid)
+    for turn, triangle in enumerate(triangles):
         if turn % _CHECK_EVERY == 0:
             check()
-        corners = solid.vertices[solid.triangles[index]].ravel().tolist()
+        corners = solid.vertices[triangle].ravel().tolist()
         v = scaled_integers((*corners, *point))
         met = _cross_upwards(tuple(v[0:3]), tuple(v[3:6]), tuple(v[6:9]), tuple(v[9:12]))
         if met == ON_FACE:
@@ -219,9 +242,19 @@ def adjugate(r: Sequence[Sequence[Any]]) -> tuple[list[list[Any]], Any]:
 
 def to_body_frame(point: Sequence[Number], pose: Pose) -> list[Fraction]:
     """Return R^-1 (point - t), the exact preimage of `point` under `pose`."""
-    moved = [Fraction(value) - Fraction(shift) for value, shift in zip(point, pose.translation.tolist())]
-    rows, determinant = adjugate([[Fraction(entry) for entry in row] for row in pose.rotation.tolist()])
-    return [sum((a * x for a, x in zip(row, moved)), Fraction(0)) / determinant for row in rows]
+    numbers, common = common_integers((*point, *pose.translation.tolist()))
+    moved = [value - shift for value, shift in zip(numbers, numbers[len(point) :])]
+    rows, below = _exact_inverse(pose)
+    return [Fraction(sum(a * x for a, x in zip(row, moved)), below * common) for row in rows]
+
+
+@functools.lru_cache(maxsize=64)
+def _exact_inverse(pose: Pose) -> tuple[list[list[int]], int]:
+    """Return R^-1 as integers over one denominator."""
+    entries, common = common_integers(pose.rotation.ravel().tolist())
+    dimension = len(pose.rotation)
+    rows, determinant = adjugate([entries[k : k + dimension] for k in range(0, len(entries), dimension)])
+    return [[common * entry for entry in row] for row in rows], determinant  # adj(D R) / D^(n - 1), det(D R) / D^n
 
 
 def to_world_frame(point: Sequence[Number], pose: Pose) -> list[Fraction]:

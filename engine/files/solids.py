@@ -11,6 +11,7 @@ import numpy as np
 
 from engine.errors import InvalidInputError
 from engine.files.meshes import FORMATS, read_polyhedron
+from engine.layers.features import polygon_of
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.convex import Convex
@@ -64,8 +65,17 @@ def read_solids(source: str) -> list[Solid]:
     )
 
 
+def read_features(source: str) -> Any:
+    """Return the FeatureCollection of a GeoJSON file; a feature or a geometry alone is one of one feature."""
+    value = _parsed(source if source.lstrip().startswith("{") else Path(source).read_text("utf-8"), source)
+    if not isinstance(value, dict) or value.get("type") == "FeatureCollection":
+        return value
+    feature = value if value.get("type") == "Feature" else {"type": "Feature", "properties": None, "geometry": value}
+    return {"type": "FeatureCollection", "features": [feature]}
+
+
 def from_json(value: Any) -> list[Solid]:
-    """Return the solids of a parsed JSON or GeoJSON value; a multipolygon is one polygon of all its rings."""
+    """Return the solids of a parsed JSON or GeoJSON value; the parts of a multipolygon are united."""
     kind = value.get("type") if isinstance(value, dict) else None
     try:
         if kind == "FeatureCollection":
@@ -77,7 +87,7 @@ def from_json(value: Any) -> list[Solid]:
         if kind == "Polygon":
             return [Polygon(value["coordinates"])]
         if kind == "MultiPolygon":
-            return [Polygon([ring for rings in value["coordinates"] for ring in rings])]
+            return [polygon_of(value)]
         if kind in CLASSES:
             fields = {name: field for name, field in value.items() if name != "type"}
             if kind == "csg":

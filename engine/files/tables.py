@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, Final
 
@@ -96,14 +97,15 @@ def _csv(columns: dict[str, npt.NDArray[Any]]) -> str:
     return "\n".join([",".join(names), *map(",".join, zip(*lists, strict=True))]) + "\n"
 
 
-def write_geojson(target: str | None, multipolygons: Sequence[Sequence[Sequence[Any]]]) -> None:
-    """Write one feature for each item: a MultiPolygon of polygons, each a list of rings (without a repeated end)."""
-    features = []
-    for item, polygons in enumerate(multipolygons):
-        coordinates = [[_closed(ring) for ring in rings] for rings in polygons]
-        geometry = {"type": "MultiPolygon", "coordinates": coordinates}
-        features.append({"type": "Feature", "properties": {"item": item}, "geometry": geometry})
-    _write(target, json.dumps({"type": "FeatureCollection", "features": features}) + "\n")
+def write_geojson(target: str | None, features: Iterable[dict[str, Any]], crs: Any = None) -> None:
+    """Write features, whose coordinates may be arrays, one a line; crs: a member of the collection, if there is one."""
+    with nullcontext(sys.stdout) if target is None else Path(target).open("w", encoding="utf-8") as file:
+        told = "" if crs is None else f'"crs": {json.dumps(crs)}, '
+        file.write(f'{{"type": "FeatureCollection", {told}"features": [')
+        for number, feature in enumerate(features):
+            file.write(",\n" if number else "\n")
+            file.write(json.dumps(feature, default=lambda array: array.tolist()))
+        file.write("\n]}\n")
 
 
 def _write(target: str | None, text: str) -> None:
@@ -111,8 +113,3 @@ def _write(target: str | None, text: str) -> None:
         sys.stdout.write(text)
     else:
         Path(target).write_text(text, "utf-8")
-
-
-def _closed(ring: Any) -> list[list[float]]:
-    positions: list[list[float]] = np.asarray(ring).tolist()
-    return [*positions, positions[0]]

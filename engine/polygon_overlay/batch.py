@@ -13,14 +13,17 @@ from engine.arrays import BoolArray, FloatArray, Int8Array, Int32Array, IntArray
 from engine.errors import InvalidArrayError, NotRepresentableError
 from engine.parallel import Budget, Cancel, Progress, run_chunks
 from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
+from engine.polygon_overlay.compiled.loading import LEFT_OUT, RingArrays
 from engine.polygon_overlay.found import NO_PAIRS, Found, chained, joined, one_pair, summed, taken
-from engine.polygon_overlay.implicit_rings import ImplicitRings, RingArrays
+from engine.polygon_overlay.implicit_rings import ImplicitRings
 from engine.polygon_overlay.overlay import accuracy_of, check_words, overlay_rings, rings_of, ulps_moved
+from engine.polygon_overlay.polygon_arrays import Chosen
 from engine.polygon_overlay.result import Output, Overlay
 from engine.polygon_overlay.rounds_of_many_pairs import SettledPairs, nearest_pairs, settle_pairs
 from engine.polygon_overlay.run import Operation, Polygons, as_overlay, gathered, run_kernel
 from engine.solids.base import Solid
 from engine.solids.polygon import Polygon
+from engine.solids.ragged import closed_rings
 from engine.types import OPEN, Accuracy
 
 NOT_REPRESENTABLE: Final = 1
@@ -85,9 +88,12 @@ class OverlayBatch:
         sources = taken(self._exact, np.array([pair])).sources
         subject, clip = _arrays(self._subjects[pair]), _arrays(self._clips[pair])
         in_subjects, in_clips, n_subjects = self._bases[pair].tolist()
+        is_edge = sources < LEFT_OUT  # as `overlay_pairs` tells it
+        sources[is_edge] = LEFT_OUT - 1 - sources[is_edge]
         is_clip = sources >= n_subjects
         sources[is_clip] += len(subject.vertices) - n_subjects - in_clips
         sources[~is_clip & (sources >= 0)] -= in_subjects
+        sources[is_edge] = LEFT_OUT - 1 - sources[is_edge]
         vertices = self.vertices[stops[0] : stops[-1]].copy()
         arrays = vertices, rings - rings[0], sources, stops - stops[0]
         for array in arrays:
@@ -121,6 +127,20 @@ class OverlayBatch:
         return areas
 
     @property
+    def n_pieces_exact(self) -> IntArray:
+        """How many pieces the exact result of each pair has, before rounding, (n_pairs,)."""
+        counts = self._exact.counts[:, 0].copy()
+        for pair, result in self._apart.items():
+            counts[pair] = result.n_pieces_exact
+        return counts
+
+    @property
+    def ragged(self) -> tuple[FloatArray, tuple[IntArray, IntArray, IntArray]]:
+        """Coordinates, and offsets of rings, polygons and pairs, rings closed: for `shapely.from_ragged_array`."""
+        positions, offsets = closed_rings(self.vertices, self.ring_offsets)
+        return positions, (offsets, self.piece_offsets, self.pair_offsets)
+
+    @property
     def overlays(self) -> tuple[Overlay | None, ...]:
         """One `Overlay` for each pair, made now; None where its status is not 0."""
         return tuple(self)
@@ -131,7 +151,15 @@ def _arrays(solid: Solid) -> RingArrays:
     return RingArrays(solid.vertices, solid.ring_offsets)
 
 
+def _n_vertices(solids: Sequence[Solid]) -> int:
+    return solids.n_vertices if isinstance(solids, Chosen) else sum(len(_arrays(each).vertices) for each in solids)
+
+
 def _gathered(solids: Sequence[Solid]) -> Polygons:
+    if isinstance(solids, Chosen):
+        arrays = solids.together()
+        most = (int(sizes.max()) for sizes in (arrays.sizes(), np.diff(arrays.polygon_offsets)))
+        return Polygons(*arrays, *most)
     polygons = cast("Sequence[Polygon]", solids)
     return gathered([each.vertices for each in polygons], [each.ring_offsets for each in polygons])
 
@@ -167,14 +195,14 @@ def overlay_batch(
     """
     check_words(operation, output)
     for solids, name in ((subjects, "subjects"), (clips, "clips")):
-        if not isinstance(solids, (list, tuple)):
+        if not isinstance(solids, (list, tuple, Chosen)):
             raise InvalidArrayError(f"{name} must be a list of polygons, got {type(solids).__name__}", (name,))
     if len(subjects) != len(clips):
         raise InvalidArrayError(
             f"subjects and clips must be of equal length, got {len(subjects)} and {len(clips)}", ("clips",)
         )
     for solids, name in ((subjects, "subjects"), (clips, "clips")):
-        if set(map(type, solids)) - {Polygon}:
+        if not isinstance(solids, Chosen) and set(map(type, solids)) - {Polygon}:
             for i_pair, solid in enumerate(solids):
                 rings_of(solid, name, i_pair)
     parts: dict[int, tuple[Found, Int32Array]] = {}
@@ -201,8 +229,8 @@ def overlay_batch(
         piece_offsets=found.piece_offsets,
         pair_offsets=summed(found.counts[:, 0]),
         displacement=found.displacement,
-        _subjects=tuple(subjects),
-        _clips=tuple(clips),
+        _subjects=subjects if isinstance(subjects, Chosen) else tuple(subjects),
+        _clips=clips if isinstance(clips, Chosen) else tuple(clips),
         _operation=operation,
         _output=output,
         _exact=first_found,
@@ -212,7 +240,7 @@ def overlay_batch(
     )
     if not report:
         return batch
-    n_edges = sum(len(_arrays(each).vertices) for solids in (subjects, clips) for each in solids)
+    n_edges = _n_vertices(subjects) + _n_vertices(clips)
     return batch, accuracy_of(ulps, n_edges, int(found.counts[:, 3].sum()), n_rational)
 
 

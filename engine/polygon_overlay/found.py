@@ -107,6 +107,11 @@ def chained(offsets: Sequence[IntArray]) -> IntArray:
     return summed(np.concatenate([np.zeros(0, np.int64), *(each[1:] - each[:-1] for each in offsets)]))
 
 
+def ring_numbers(offsets: IntArray) -> IntArray:
+    """Return by vertex the number of its ring."""
+    return np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
+
+
 def ring_sizes(rings: Found) -> FloatArray:
     """Return by ring the sum of both sides of its box."""
     starts = rings.ring_offsets[:-1]

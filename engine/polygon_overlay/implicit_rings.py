@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from types import FunctionType
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -17,28 +16,28 @@ import numpy.typing as npt
 from engine.arrangement.arrange import crossing, line_through
 from engine.arrangement.exact_area import ExactRings
 from engine.arrangement.nodes import Homogeneous, float_nodes
-from engine.arrays import BoolArray, FloatArray, IntArray
+from engine.arrays import BoolArray, FloatArray, IntArray, read_only
+from engine.direct import entry_of
+from engine.polygon_overlay.compiled.loading import LEFT_OUT, RingArrays
 from engine.polygon_overlay.compiled.ring_area import sum_areas
-from engine.polygon_overlay.entries import entry_of
 
 _NEVER: Final = np.zeros(1, np.uint8)
-_sum_areas: Any = sum_areas
-if isinstance(sum_areas, FunctionType):  # uncompiled: numpy warns of what overflows
-    _sum_areas = np.errstate(all="ignore")(sum_areas)
 
 
-class RingArrays(NamedTuple):
-    """Rings as read-only arrays: vertices (n, 2) float64, where each ring begins (n_rings + 1,) int64; may be empty."""
+NOTHING: Final = RingArrays(read_only(np.zeros((0, 2))), read_only(np.zeros(1, np.int64)))
 
-    vertices: FloatArray
-    offsets: IntArray
+
+def edges_along(sources: npt.NDArray[np.signedinteger]) -> IntArray:
+    """Return by vertex of a ring the input edge, by its first vertex, along which the ring goes on from there."""
+    return np.where(sources[:, 1] < LEFT_OUT, LEFT_OUT - 1 - sources[:, 1], sources[:, 0]).astype(np.int64)
 
 
 class ImplicitRings(NamedTuple):
     """Exact rings over two polygons, made when asked for.
 
-    sources: (n, 2) integers: an input vertex and -1, or the first vertices of two edges that cross; those of `clip` are
-    counted after those of `subject`. offsets: (n_rings + 1,) int64, where each ring begins.
+    sources: (n, 2) integers: an input vertex and a negative number, or the first vertices of two edges that cross, as
+    `overlay_pairs` tells them; those of `clip` are counted after those of `subject`. offsets: (n_rings + 1,) int64,
+    where each ring begins.
     """
 
     subject: RingArrays
@@ -56,7 +55,7 @@ class ImplicitRings(NamedTuple):
         And how many are NaN.
         """
         areas = np.empty(len(groups) - 1)
-        sum_them = entry_of(_sum_areas)
+        sum_them = entry_of(sum_areas)
         return areas, sum_them(self.subject, self.clip, self.sources, self.offsets, groups, _NEVER, areas)
 
     def nearest_areas(self, groups: IntArray) -> FloatArray:
@@ -87,9 +86,9 @@ class ImplicitRings(NamedTuple):
     def exact_rings(self) -> ExactRings:
         """Return the rings as integers, with all that can be asked of them."""
         vertices = np.concatenate([self.subject.vertices, self.clip.vertices])
-        offsets = [*self.subject.offsets.tolist(), *(self.clip.offsets[1:] + len(self.subject.vertices)).tolist()]
-        firsts = np.unique(self.sources[self.sources >= 0])
-        ends = np.array([_end_of_edge(vertices, offsets, first) for first in firsts.tolist()], np.int64)
+        offsets = np.concatenate([self.subject.offsets, self.clip.offsets[1:] + len(self.subject.vertices)])
+        firsts = np.unique(np.append(self.sources[:, 0], self.sources[self.sources[:, 1] >= 0, 1])).astype(np.int64)
+        ends = _ends_of_edges(vertices, offsets, firsts)
         nodes, numbers = float_nodes(vertices[np.concatenate([firsts, ends])])
         place = {first: k for k, first in enumerate(firsts.tolist())}
         points = [nodes.points[number] for number in numbers]
@@ -105,13 +104,15 @@ class ImplicitRings(NamedTuple):
         return ExactRings(tuple(tuple(made[a:b]) for a, b in itertools.pairwise(stops)), nodes.exponent)
 
 
-def _end_of_edge(vertices: FloatArray, offsets: Sequence[int], first: int) -> int:
-    """Return the next vertex of the ring that is not at the place of `first` (itself if there is none)."""
-    ring = int(np.searchsorted(offsets, first, side="right")) - 1
-    start, stop = offsets[ring], offsets[ring + 1]
-    after = first
-    for _ in range(stop - start):
-        after = after + 1 if after + 1 < stop else start
-        if (vertices[after] != vertices[first]).any():
-            break
-    return after
+def _ends_of_edges(vertices: FloatArray, offsets: IntArray, firsts: IntArray) -> IntArray:
+    """Return of each vertex the next one of its ring that is not at its place (itself if there is none)."""
+    rings = np.searchsorted(offsets, firsts, side="right") - 1
+    starts, stops = offsets[rings], offsets[rings + 1]
+    ends = firsts.copy()
+    left = np.arange(len(firsts))
+    while len(left):  # bound: the vertices of the largest ring
+        after = ends[left] + 1
+        ends[left] = np.where(after < stops[left], after, starts[left])
+        is_there = (vertices[ends[left]] == vertices[firsts[left]]).all(axis=1) & (ends[left] != firsts[left])
+        left = left[is_there]
+    return ends

@@ -1,7 +1,7 @@
 """The overlay in Python integers: right for every input, and slow; for what the compiled one leaves open.
 
-The steps are those of overlay.py; the rule of a round that of ring_nesting.py, over integers of any length: bit k of a
-label stands for ring k.
+The steps are those of overlay.py, the rules those of ring_nesting.py; a label is the set of sources, by their numbers,
+that a face lies in.
 """
 
 from __future__ import annotations
@@ -9,50 +9,90 @@ from __future__ import annotations
 import functools
 import itertools
 from collections.abc import Iterable, Sequence
-from typing import Final
+from dataclasses import replace
 
 import numpy as np
 
-from engine.arrangement.arrange import arrange_rings
+from engine.arrangement.arrange import Arrangement, arrange_rings
 from engine.arrangement.exact_area import ExactRings
-from engine.arrangement.nodes import NodeTable
 from engine.arrangement.rings import Piece, trace_pieces
 from engine.arrangement.subdivision import label_faces, subdivide
+from engine.arrays import FloatArray
 from engine.errors import TooComplexError
 from engine.parallel import Budget
 from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
+from engine.polygon_overlay.compiled.loading import RingArrays
+from engine.polygon_overlay.compiled.ring_nesting import NEGATIVE, NON_ZERO, POSITIVE, Nesting
 from engine.polygon_overlay.found import Found, one_pair, ring_sizes
-from engine.polygon_overlay.implicit_rings import RingArrays
 from engine.polygon_overlay.nearest import leave_nearest
 from engine.polygon_overlay.result import Output, Overlay
 from engine.polygon_overlay.rounds import settle_rings
 from engine.polygon_overlay.run import KEPT, Operation
+from engine.polygon_overlay.run_pair import UNNAMED
 
-_SUBJECT: Final = 1
-_CLIP: Final = 2
+_Sources = frozenset[int]
 
 
 def overlay_exactly(
-    subject: RingArrays, clip: RingArrays, operation: Operation, output: Output, budget: Budget
+    subject: RingArrays,
+    clip: RingArrays,
+    operation: Operation,
+    output: Output,
+    budget: Budget,
+    nesting: Nesting = UNNAMED,
+    is_on_grid: bool = False,
 ) -> tuple[Overlay, int]:
     """Return the overlay of checked rings (either may be empty), and how many pairs of edges the filter left open."""
+    vertices = np.concatenate([subject.vertices, clip.vertices])
     offsets = [*subject.offsets.tolist(), *(clip.offsets[1:] + len(subject.vertices)).tolist()]
-    masks = [_SUBJECT] * (len(subject.offsets) - 1) + [_CLIP] * (len(clip.offsets) - 1)
-    arrangement = arrange_rings(np.concatenate([subject.vertices, clip.vertices]), offsets, masks, budget)
+    arrangement = arrange_rings(vertices, offsets, None, budget)
     subdivision = subdivide(arrangement, budget)
-    inside = [KEPT[operation][label] for label in label_faces(subdivision)]
-    pieces = trace_pieces(subdivision, inside, [0] * subdivision.n_faces, budget)
+    sources = nesting.shells
+    if not len(sources):  # two polygons
+        sources = np.repeat([0, 1], [len(subject.offsets) - 1, len(clip.offsets) - 1])
+    if nesting.rule >= NON_ZERO:
+        labels = label_faces(subdivision, _windings(arrangement, vertices, offsets), winds=True)
+        inside = [{NON_ZERO: label != 0, POSITIVE: label > 0, NEGATIVE: label < 0}[nesting.rule] for label in labels]
+    else:
+        source_of = np.repeat(sources, np.diff(offsets)).tolist()
+        masks = [_odd(source_of[k] for k in edges) for edges in arrangement.cover]
+        labels = [label or frozenset() for label in label_faces(subdivision, masks)]  # 0 where there is no edge
+        kept = KEPT[operation] if nesting is UNNAMED else None
+        inside = [bool(label) if kept is None else kept[sum(1 << source for source in label)] for label in labels]
+    budget.check()
+    pieces = trace_pieces(subdivision, inside, [frozenset()] * subdivision.n_faces, budget)
     nodes = arrangement.nodes
-    exact = ExactRings(tuple(tuple(nodes.points[node] for node in ring) for ring in rings_of(pieces)), nodes.exponent)
-    first = rounded(nodes, pieces)
+    corners = [[arrangement.origin(half_edge) for half_edge in ring] for ring in rings_of(pieces)]
+    exact = ExactRings(tuple(tuple(nodes.points[node] for node in ring) for ring in corners), nodes.exponent)
+    first = rounded(arrangement, pieces)
     if output == "nearest":
-        return leave_nearest(first, exact, budget), arrangement.n_exact
-    moved = first.displacement
-    first = first._replace(displacement=np.where(moved, np.nextafter(moved, np.inf), 0.0))
-    result = settle_rings(first, exact, arranged_again, True, budget)
-    if result is None:
-        raise TooComplexError("snap rounding left a vertex off its lattice; please report this input")
-    return result, arrangement.n_exact
+        result = leave_nearest(first, exact, budget)
+    else:
+        moved = first.displacement
+        first = first._replace(displacement=np.where(moved, np.nextafter(moved, np.inf), 0.0))
+        settled = settle_rings(first, exact, arranged_again, True, budget, is_on_grid)
+        if settled is None:
+            raise TooComplexError("snap rounding left a vertex off its lattice; please report this input")
+        result = settled
+    return replace(result, _starts=np.array([len(subject.vertices)])), arrangement.n_exact
+
+
+def _odd(sources: Iterable[int]) -> _Sources:
+    """Return those that are there an odd number of times."""
+    found: set[int] = set()
+    for source in sources:
+        found ^= {source}
+    return frozenset(found)
+
+
+def _windings(arrangement: Arrangement, vertices: FloatArray, offsets: Sequence[int]) -> list[int]:
+    """Return for each edge how often rings run along it, less how often they run against it."""
+    places = list(map(tuple, vertices.tolist()))
+    along = [0] * len(places)
+    for start, stop in itertools.pairwise(offsets):
+        for k in range(start, stop):
+            along[k] = 1 if places[k] < places[k + 1 if k + 1 < stop else start] else -1
+    return [sum(along[k] for k in edges) for edges in arrangement.cover]
 
 
 def rings_of(pieces: Iterable[Piece]) -> list[list[int]]:
@@ -60,10 +100,15 @@ def rings_of(pieces: Iterable[Piece]) -> list[list[int]]:
     return [ring for piece in pieces for ring in (piece.shell, *piece.holes)]
 
 
-def rounded(nodes: NodeTable, pieces: Sequence[Piece]) -> Found:
-    """Return the nearest doubles of the nodes of all rings; done where nothing moves."""
-    rings = rings_of(pieces)
-    used = [node for ring in rings for node in ring]
+def rounded(arrangement: Arrangement, pieces: Sequence[Piece]) -> Found:
+    """Return the nearest doubles of the nodes of all rings; done where nothing moves.
+
+    sources: twice the first of the edges along which the ring goes on, since no vertex is told from a crossing.
+    """
+    rings, nodes = rings_of(pieces), arrangement.nodes
+    half_edges = [half_edge for ring in rings for half_edge in ring]
+    used = [arrangement.origin(half_edge) for half_edge in half_edges]
+    edges = [min(arrangement.cover[half_edge >> 1]) for half_edge in half_edges]
     displacement = max(map(nodes.displacement, set(used)), default=0.0)
     return one_pair(
         np.array([(nodes.xs[node], nodes.ys[node]) for node in used]).reshape(-1, 2),
@@ -71,42 +116,33 @@ def rounded(nodes: NodeTable, pieces: Sequence[Piece]) -> Found:
         np.cumsum([0, *(1 + len(piece.holes) for piece in pieces)]),
         displacement,
         0,
-        status=MAY_CROSS if displacement else DONE,
+        np.array([edges, edges], np.int32).T,
+        MAY_CROSS if displacement else DONE,
     )
 
 
 def arranged_again(rings: Found, budget: Budget) -> Found:
     """Trace the pieces of one pair anew from the exact arrangement of rounded rings."""
-    holes_of = {  # for each shell's bit the bits of its holes
-        shell: (1 << end) - (1 << (shell + 1)) for shell, end in itertools.pairwise(rings.piece_offsets.tolist())
-    }
-    all_shells = sum(1 << bit for bit in holes_of)
+    ends = rings.piece_offsets.tolist()
+    holes_of = {shell: frozenset(range(shell + 1, end)) for shell, end in itertools.pairwise(ends)}
     sizes = np.repeat(ring_sizes(rings)[rings.piece_offsets[:-1]], np.diff(rings.piece_offsets)).tolist()
-    masks = [1 << bit for bit in range(len(sizes))]
-    arrangement = arrange_rings(rings.vertices, rings.ring_offsets.tolist(), masks, budget)
+    ring_of = np.repeat(np.arange(len(sizes)), np.diff(rings.ring_offsets)).tolist()
+    arrangement = arrange_rings(rings.vertices, rings.ring_offsets.tolist(), None, budget)
     subdivision = subdivide(arrangement, budget)
     budget.check()
 
     @functools.cache
-    def verdict(label: int) -> tuple[bool, int]:
+    def verdict(label: _Sources) -> tuple[bool, _Sources]:
         """Tell whether a face is inside, and name the shells it lies in, or else the innermost holes."""
-        inside = sum(1 << shell for shell in _places(label & all_shells) if not label & holes_of[shell])
-        holes = [] if inside else _places(label & ~all_shells)
+        inside = frozenset(ring for ring in label if ring in holes_of and not label & holes_of[ring])
+        holes = [] if inside else [ring for ring in label if ring not in holes_of]
         least = min((sizes[hole] for hole in holes), default=0.0)
-        return inside != 0, inside or sum(1 << hole for hole in holes if sizes[hole] == least)
+        return bool(inside), inside or frozenset(hole for hole in holes if sizes[hole] == least)
 
-    inside, evidence = zip(*map(verdict, label_faces(subdivision)), strict=True)
+    masks = [_odd(ring_of[k] for k in edges) for edges in arrangement.cover]
+    labels = [label or frozenset() for label in label_faces(subdivision, masks)]
+    inside, evidence = zip(*map(verdict, labels), strict=True)
     pieces = trace_pieces(subdivision, inside, evidence, budget)
-    meant = [_places(bits) for piece in pieces for bits in (piece.evidence, *piece.hole_evidence)]
-    named = [(ring, source) for ring, sources in enumerate(meant) for source in sources]
-    return rounded(arrangement.nodes, pieces)._replace(evidence=np.array(named, np.int64).reshape(-1, 2))
-
-
-def _places(number: int) -> list[int]:
-    """Return the places of the bits that are set."""
-    places = []
-    while number:  # bound: each turn clears a bit
-        bit = number & -number
-        places.append(bit.bit_length() - 1)
-        number ^= bit
-    return places
+    meant = [sorted(named) for piece in pieces for named in (piece.evidence, *piece.hole_evidence)]
+    told = [(ring, source) for ring, sources in enumerate(meant) for source in sources]
+    return rounded(arrangement, pieces)._replace(evidence=np.array(told, np.int64).reshape(-1, 2))

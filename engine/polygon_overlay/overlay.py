@@ -18,12 +18,18 @@ from typing import Final, Literal, Unpack, overload
 
 import numpy as np
 
+from engine.arrays import FloatArray
 from engine.errors import InvalidOperationError, UnsupportedSolidError
 from engine.parallel import Budget, Cancel, Options, Progress, check_options
-from engine.polygon_overlay.implicit_rings import RingArrays
+from engine.polygon_overlay.compiled.kernel import MAY_CROSS
+from engine.polygon_overlay.compiled.loading import RingArrays
+from engine.polygon_overlay.compiled.ring_nesting import Nesting
+from engine.polygon_overlay.found import one_pair
+from engine.polygon_overlay.grid import from_units, grid_of
 from engine.polygon_overlay.in_integers import overlay_exactly
 from engine.polygon_overlay.result import Output, Overlay
-from engine.polygon_overlay.run import KEPT, Operation, overlay_compiled
+from engine.polygon_overlay.run import KEPT, Operation, arranged_again, overlay_compiled
+from engine.polygon_overlay.run_pair import UNNAMED
 from engine.solids.base import Solid
 from engine.solids.checks import shown
 from engine.solids.polygon import Polygon
@@ -41,6 +47,7 @@ def overlay(
     operation: Operation = "intersection",
     *,
     output: Output = "valid",
+    grid: float | None = None,
     report: Literal[False] = False,
     **options: Unpack[Options],
 ) -> Overlay: ...
@@ -51,6 +58,7 @@ def overlay(
     operation: Operation = "intersection",
     *,
     output: Output = "valid",
+    grid: float | None = None,
     report: Literal[True],
     **options: Unpack[Options],
 ) -> tuple[Overlay, Accuracy]: ...
@@ -60,6 +68,7 @@ def overlay(
     operation: Operation = "intersection",
     *,
     output: Output = "valid",
+    grid: float | None = None,
     workers: int | None = None,
     deadline: float | None = None,
     cancel: Cancel | None = None,
@@ -73,9 +82,11 @@ def overlay(
 
     Parameters: subject, clip: `Polygon`, even-odd over all rings. operation: "intersection", "union", "difference"
     (subject without clip) or "symmetric_difference". output: "valid" (default): simple rings that cross nowhere, holes
-    inside their shells; "nearest": every vertex the correctly rounded one and no more, which may be invalid. deadline
-    in seconds; cancel: a switch for other threads; workers is accepted and not used, one overlay runs in one thread;
-    progress is called with 1 at the end.
+    inside their shells; "nearest": every vertex the correctly rounded one and no more, which may be invalid. grid: snap
+    the valid result to multiples of a power of two or ten (the doubles nearest to these), so that borders that nearly
+    coincide do; no edge moves by more than 0.71 of it and a unit in the last place; with it `area` is the output's,
+    counts and `collapsed` go from the overlay before it to the output. deadline in seconds; cancel: a switch for other
+    threads; workers is accepted and not used, one overlay runs in one thread; progress is called with 1 at the end.
     Returns: `Overlay`; with report=True also an `Accuracy`, whose items are the edges of the input, and whose
     coordinates_ulp is 0.5 unless vertices were moved to keep rings valid: then it is the largest displacement in units
     in the last place of the largest coordinate.
@@ -101,7 +112,7 @@ def overlay(
     first, second = rings_of(subject, "subject"), rings_of(clip, "clip")
     check_options(workers, progress)
     with _UNLIMITED if deadline is None and cancel is None else Budget(deadline, cancel) as budget:
-        result, n_exact, n_rational = overlay_rings(first, second, operation, output, budget)
+        result, n_exact, n_rational = overlay_rings(first, second, operation, output, budget, UNNAMED, grid)
     if progress is not None:
         progress(1)
     if not report:
@@ -130,14 +141,38 @@ def rings_of(solid: object, *where: str | int) -> RingArrays:
 
 
 def overlay_rings(
-    subject: RingArrays, clip: RingArrays, operation: Operation, output: Output, budget: Budget
+    subject: RingArrays,
+    clip: RingArrays,
+    operation: Operation,
+    output: Output,
+    budget: Budget,
+    nesting: Nesting = UNNAMED,
+    grid: float | None = None,
 ) -> tuple[Overlay, int, int]:
-    """Return the overlay of checked rings (either may be empty), pairs of edges beyond the filter, and in rationals."""
-    compiled = overlay_compiled(subject, clip, operation, output, budget)
+    """Return the overlay of checked rings (either may be empty), pairs of edges beyond the filter, and in rationals.
+
+    nesting: of the rings of the subject, for another rule than even-odd in either; no clip then, and "union".
+    """
+    units = None if grid is None else grid_of(grid)
+    first, second = subject, clip
+    if units is not None:
+        if output != "valid":
+            raise InvalidOperationError(f'a grid goes with output="valid" only; got {shown(output)}', ("output",))
+        first, second = (rings._replace(vertices=units.units_of(rings.vertices)) for rings in (subject, clip))
+    compiled = overlay_compiled(first, second, operation, output, budget, nesting, units is not None)
     if compiled is not None:
-        return *compiled, 0
-    result, n_exact = overlay_exactly(subject, clip, operation, output, budget)
-    return result, n_exact, n_exact
+        result, n_exact, n_rational = *compiled, 0
+    else:
+        result, n_exact = overlay_exactly(first, second, operation, output, budget, nesting, units is not None)
+        n_rational = n_exact
+    if units is None:
+        return result, n_exact, n_rational
+
+    def is_valid(vertices: FloatArray) -> bool:
+        rings = one_pair(vertices, result.ring_offsets, result.piece_offsets, 0.0, 0, status=MAY_CROSS)
+        return np.array_equal(arranged_again(rings, budget).vertices, vertices)
+
+    return from_units(result, units, np.array([len(subject.vertices)]), is_valid), n_exact, n_rational
 
 
 def ulps_moved(result: Overlay) -> float:

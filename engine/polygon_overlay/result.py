@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from engine.arrangement.exact_area import ExactRings
 from engine.arrays import FloatArray, IntArray
-from engine.polygon_overlay.implicit_rings import ImplicitRings
+from engine.polygon_overlay.implicit_rings import ImplicitRings, edges_along
+from engine.solids.ragged import as_geojson
 
 Output = Literal["valid", "nearest"]
 
@@ -61,6 +62,8 @@ class Overlay:
     largest_displacement: proven bound on the distance between an edge of the exact result and its image.
     snapped: the coarser lattice of snap rounding was needed.
     exact: the rings of the exact result, from which `area_exact` and `area` are computed when asked for.
+    _edges: by vertex the input edge along which its ring goes on, by its first vertex; None: that of ``exact``.
+    _starts: the first vertex of each input but the first, all inputs one after another; None: that of the clip.
     """
 
     vertices: FloatArray
@@ -71,6 +74,8 @@ class Overlay:
     n_pieces_exact: int
     n_holes_exact: int
     exact: ExactRings | ImplicitRings
+    _edges: IntArray | None = field(default=None, repr=False)
+    _starts: IntArray | None = field(default=None, repr=False)
     largest_displacement: float = 0.0
     rounds: int = 0
     collapsed: tuple[Collapse, ...] = ()
@@ -104,6 +109,27 @@ class Overlay:
             OverlayPiece(rings[start], tuple(rings[start + 1 : stop]))
             for start, stop in zip(self.piece_offsets, self.piece_offsets[1:])
         ]
+
+    @property
+    def sources(self) -> IntArray:
+        """Which input each edge comes from, (n_vertices,): entry k of the edge from vertex k to the next of its ring.
+
+        0: the subject, 1: the clip; of `union_all` the place in its list. Where several inputs share an edge, the first
+        of them; where one output edge is several of the input in line, the one that it begins with.
+        """
+        exact = self.exact
+        edges, starts = self._edges, self._starts
+        if isinstance(exact, ImplicitRings):
+            edges = edges_along(exact.sources) if edges is None else edges
+            starts = np.array([len(exact.subject.vertices)]) if starts is None else starts
+        assert edges is not None
+        assert starts is not None
+        return np.searchsorted(starts, edges, side="right")
+
+    @property
+    def __geo_interface__(self) -> dict[str, Any]:
+        """The pieces as a GeoJSON Polygon or MultiPolygon."""
+        return as_geojson(self.vertices, self.ring_offsets, self.piece_offsets)
 
     @property
     def area_exact(self) -> Fraction:

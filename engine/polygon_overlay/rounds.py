@@ -31,7 +31,8 @@ from engine.arrays import BoolArray, FloatArray, IntArray, read_only
 from engine.parallel import Budget
 from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
 from engine.polygon_overlay.found import Found, one_pair, places_of
-from engine.polygon_overlay.implicit_rings import ImplicitRings
+from engine.polygon_overlay.grid import snapped_to_units
+from engine.polygon_overlay.implicit_rings import ImplicitRings, edges_along
 from engine.polygon_overlay.result import Collapse, Output, Overlay
 from engine.types import OPEN
 
@@ -43,14 +44,17 @@ Exact = ExactRings | ImplicitRings
 Again = Callable[[Found, Budget], Found]
 
 
-def settle_rings(first: Found, exact: Exact, again: Again, may_snap: bool, budget: Budget) -> Overlay | None:
+def settle_rings(
+    first: Found, exact: Exact, again: Again, may_snap: bool, budget: Budget, is_on_grid: bool = False
+) -> Overlay | None:
     """Arrange a pair until it is valid; None where ``again`` cannot, or snapping is needed and not possible.
 
     exact: the exact rings that ``first`` is rounded from. again: arranges rounded rings, and gives evidence. may_snap:
-    the rings are those of ``exact``, not scaled.
+    the rings are those of ``exact``, not scaled. is_on_grid: once valid, they are snapped to whole numbers (grid.py).
     """
     rings, displacement = first, float(first.displacement[0])
     rounds = int(displacement > 0.0)
+    edges = own_edges = edges_along(first.sources)
     own = np.repeat(np.arange(first.counts[0, 1]), 2).reshape(-1, 2)
     origins = own  # rows of a ring and one of ``first`` that it comes from, sorted
     has_crossings = snapped = False
@@ -58,7 +62,7 @@ def settle_rings(first: Found, exact: Exact, again: Again, may_snap: bool, budge
         rings = again(rings, budget)
         if rings.status[0] == OPEN:
             return None
-        origins = _composed(rings.evidence, origins)
+        origins, edges = _composed(rings.evidence, origins), edges[edges_along(rings.sources)]
         has_crossings = has_crossings or bool((rings.sources[:, 1] >= 0).any())
         moved = float(rings.displacement[0])
         if moved:
@@ -68,7 +72,18 @@ def settle_rings(first: Found, exact: Exact, again: Again, may_snap: bool, budge
                 rounds, displacement = rounds + 1, nextafter(displacement + moved, inf)
             else:
                 rings, displacement = _snapped(first, exact, budget)
+                edges = own_edges[edges_along(rings.sources)]
                 origins, snapped, has_crossings = own, True, True
+    if is_on_grid:
+        rings = snapped_to_units(rings, budget)
+        edges, moved = edges[edges_along(rings.sources)], float(rings.displacement[0])
+        if moved:
+            rounds, displacement, snapped, has_crossings = rounds + 1, nextafter(displacement + moved, inf), True, True
+        if rings.status[0] != DONE:
+            rings = again(rings, budget)
+            if rings.status[0] != DONE:
+                return None
+            origins, edges = _composed(rings.evidence, origins), edges[edges_along(rings.sources)]
     is_shell, was_shell = _shells(rings), _shells(first)
     of_shells = is_shell[origins[:, 0]]
     lost_pieces, pieces_joined, pieces_parted = count_changes(was_shell, origins[of_shells], int(is_shell.sum()))
@@ -78,6 +93,7 @@ def settle_rings(first: Found, exact: Exact, again: Again, may_snap: bool, budge
         first,
         exact,
         "valid",
+        _edges=read_only(edges),
         rounds=rounds,
         largest_displacement=displacement,
         snapped=snapped,
@@ -124,10 +140,11 @@ def overlay_of(rings: Found, first: Found, exact: Exact, output: Output, **told:
 def _snapped(first: Found, exact: Exact, budget: Budget) -> tuple[Found, float]:
     """Return the exact rings snapped to the lattice of their largest coordinate, and half a pixel's diagonal."""
     spacing = ulp(float(np.abs(first.vertices).max()))
-    snapped = snap_rings(exact.some(range(first.counts[0, 1])).places(), frexp(spacing)[1] - 1, budget)
+    snapped, along = snap_rings(exact.some(range(first.counts[0, 1])).places(), frexp(spacing)[1] - 1, budget)
     vertices = np.array([vertex for ring in snapped for vertex in ring])
     ring_offsets = np.cumsum([0, *map(len, snapped)])
-    rings = one_pair(vertices, ring_offsets, first.piece_offsets, 0.0, 0, status=MAY_CROSS)
+    sources = np.column_stack([along, along]).astype(np.int32)
+    rings = one_pair(vertices, ring_offsets, first.piece_offsets, 0.0, 0, sources, MAY_CROSS)
     return rings, nextafter(hypot(spacing, spacing) / 2, inf)
 
 

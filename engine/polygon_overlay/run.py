@@ -9,17 +9,18 @@ from typing import Any, Final, Literal, NamedTuple, cast
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray, read_only
+from engine.direct import entry_of
 from engine.parallel import Budget
-from engine.polygon_overlay.compiled.kernel import DONE, NEEDS_CONTACTS, NEEDS_OUTPUT
-from engine.polygon_overlay.compiled.ring_nesting import Nesting
+from engine.polygon_overlay.compiled.kernel import DONE, NEEDS_CONTACTS, NEEDS_OUTPUT, overlay_pairs
+from engine.polygon_overlay.compiled.loading import RingArrays
+from engine.polygon_overlay.compiled.ring_nesting import AGAIN, Nesting
 from engine.polygon_overlay.compiled.workspace import Outcomes, keep, more_contacts, scratch_for
-from engine.polygon_overlay.entries import entry_of
 from engine.polygon_overlay.found import Found, one_pair, put_together, ring_sizes, summed
-from engine.polygon_overlay.implicit_rings import ImplicitRings, RingArrays
+from engine.polygon_overlay.implicit_rings import ImplicitRings
 from engine.polygon_overlay.nearest import leave_nearest
 from engine.polygon_overlay.result import Output, Overlay
 from engine.polygon_overlay.rounds import settle_rings
-from engine.polygon_overlay.run_pair import BY_CONTACT, NOT_REDUCED, OVERLAY_PAIRS, UNNAMED, run_pair
+from engine.polygon_overlay.run_pair import BY_CONTACT, NOT_REDUCED, UNNAMED, run_pair
 from engine.predicates.scaling import exponent_of, scaled_back, shifted
 from engine.types import OPEN
 
@@ -32,6 +33,8 @@ KEPT: Final = {  # by the label of a face: in neither, in the subject, in the cl
     "symmetric_difference": (False, True, True, False),
 }
 KEPT_ARRAYS: Final = {name: np.array(kept, np.uint8) for name, kept in KEPT.items()}
+
+_NO_BYTES: Final = read_only(np.zeros(0))
 
 
 class Polygons(NamedTuple):
@@ -48,14 +51,14 @@ class Polygons(NamedTuple):
 
 
 def gathered(vertices: Sequence[FloatArray], ring_offsets: Sequence[IntArray]) -> Polygons:
-    """Return polygons, given by the arrays of each, as flat arrays; at least one polygon, and none without a ring.
+    """Return polygons, given by the arrays of each, as flat arrays; at least one polygon.
 
     Joined as bytes: numpy takes three times as long to put small arrays one after another.
     """
     n = len(vertices)
-    joined = np.frombuffer(b"".join(cast("Sequence[bytes]", vertices))).reshape(-1, 2)
+    joined = np.frombuffer(b"".join(cast("Sequence[bytes]", vertices)) or _NO_BYTES).reshape(-1, 2)
     offsets = np.frombuffer(b"".join(cast("Sequence[bytes]", ring_offsets)), np.int64)
-    if len(offsets) == 2 * n:  # one ring each
+    if len(offsets) == 2 * n and not offsets[::2].any():  # one ring each
         sizes = offsets[1::2]
         return Polygons(joined, summed(sizes), read_only(np.arange(n + 1)), int(sizes.max()), 1)
     starts = np.flatnonzero(offsets == 0)  # of each polygon's: no ring is empty
@@ -85,7 +88,7 @@ def run_kernel(
     while reached < n:  # bound: each turn goes on, or makes room for one pair, geometrically
         scratch = scratch_for(n_vertices, n_rings, n_contacts, n_out, n_out_rings)
         n_known = sum(len(part[2]) - 1 for part in parts)
-        reached, needs, filled, n_filled, n_pieces, n_evidence, used, _ = entry_of(OVERLAY_PAIRS)(
+        reached, needs, filled, n_filled, n_pieces, n_evidence, used, _ = entry_of(overlay_pairs)(
             first,
             subjects.polygon_offsets,
             second,
@@ -113,32 +116,38 @@ def run_kernel(
 
 
 def overlay_compiled(
-    subject: RingArrays, clip: RingArrays, operation: Operation, output: Output, budget: Budget
+    subject: RingArrays,
+    clip: RingArrays,
+    operation: Operation,
+    output: Output,
+    budget: Budget,
+    nesting: Nesting = UNNAMED,
+    is_on_grid: bool = False,
 ) -> tuple[Overlay, int] | None:
     """Return the overlay of one pair and the number of pairs of edges beyond the filter; None where it is left open.
 
     A scene outside of the kernel's range is brought into it by a power of two where that is exact.
     """
-    found, exponent = run_pair(subject, clip, KEPT_ARRAYS[operation], budget), 0
+    found, exponent = run_pair(subject, clip, KEPT_ARRAYS[operation], budget, nesting), 0
     if found.status == OPEN:
         exponent = exponent_of(subject.vertices, clip.vertices)
-        if exponent == 0:
+        if exponent == 0 or is_on_grid:
             return None
         first, second = shifted(subject.vertices, -exponent), shifted(clip.vertices, -exponent)
         if first is None or second is None:
             return None
         near = RingArrays(first, subject.offsets), RingArrays(second, clip.offsets)
-        found = run_pair(*near, KEPT_ARRAYS[operation], budget)
+        found = run_pair(*near, KEPT_ARRAYS[operation], budget, nesting)
         if found.status == OPEN:
             return None
     exact = ImplicitRings(subject, clip, found.sources, found.ring_offsets)
-    if found.status == DONE:
+    if found.status == DONE and not is_on_grid:
         result = as_overlay(found.vertices, found.piece_offsets, found.displacement, exact, output)
     else:
         rings = found.ring_offsets, found.piece_offsets
         rounded = one_pair(found.vertices, *rings, found.displacement, found.n_exact, found.sources, found.status)
         if output == "valid":
-            settled = settle_rings(rounded, exact, arranged_again, exponent == 0, budget)
+            settled = settle_rings(rounded, exact, arranged_again, exponent == 0, budget, is_on_grid)
         else:
             settled = leave_nearest(rounded, exact, budget)
         if settled is None:
@@ -162,7 +171,7 @@ def arranged_again(rings: Found, budget: Budget) -> Found:
     largest = (int(rings.counts[:, k].max(initial=0)) for k in (2, 1))
     subjects = Polygons(read_only(rings.vertices), read_only(rings.ring_offsets), items, *largest)
     none = read_only(np.zeros((0, 2))), read_only(np.zeros(1, np.int64)), read_only(np.zeros_like(items))
-    nesting = Nesting(shells - np.repeat(items[:-1], n_rings), ring_sizes(rings)[shells])
+    nesting = Nesting(shells - np.repeat(items[:-1], n_rings), ring_sizes(rings)[shells], AGAIN)
     return run_kernel(subjects, Polygons(*none, 0, 0), "union", budget, nesting)
 
 

@@ -6,22 +6,19 @@ Small overlays are called so often that what stands around the kernel counts: no
 from __future__ import annotations
 
 import functools
-from types import FunctionType
 from typing import Any, Final, NamedTuple, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
+from engine.direct import entry_of
 from engine.parallel import Budget
-from engine.polygon_overlay.compiled.expanding import expand_rings
 from engine.polygon_overlay.compiled.kernel import DONE, FINISHED, NEEDS_CONTACTS, overlay_pairs
-from engine.polygon_overlay.compiled.loading import Loaded
-from engine.polygon_overlay.compiled.reducing import reduce_pair
-from engine.polygon_overlay.compiled.ring_nesting import Nesting
+from engine.polygon_overlay.compiled.loading import Loaded, RingArrays
+from engine.polygon_overlay.compiled.reducing import expand_rings, reduce_pair
+from engine.polygon_overlay.compiled.ring_nesting import ANY, Nesting
 from engine.polygon_overlay.compiled.workspace import Output, keep, more_contacts, scratch_for
-from engine.polygon_overlay.entries import entry_of
-from engine.polygon_overlay.implicit_rings import RingArrays
 
 NOT_REDUCED: Final = Loaded(0, 0, 0, 0.0)
 """What stands in the place of the result of reduce_pair."""
@@ -40,7 +37,7 @@ _BY_VERTEX: Final = 200
 _FEW_CONTACTS: Final = 1024
 _FEW_PIECES: Final = 64
 """Pieces without holes up to which offsets are kept, since many results have the same."""
-UNNAMED: Final = Nesting(np.zeros(0, np.int64), np.zeros(0))
+UNNAMED: Final = Nesting(np.zeros(0, np.int64), np.zeros(0), ANY)
 _INT32: Final = np.dtype(np.int32)
 _INT64: Final = np.dtype(np.int64)
 """Types that numpy need not look up."""
@@ -65,19 +62,32 @@ class FoundPair(NamedTuple):
     piece_offsets: IntArray
 
 
-def run_pair(subject: RingArrays, clip: RingArrays, kept: FlagArray, budget: Budget) -> FoundPair:
-    """Overlay two polygons. Raises as `Budget.check` when the call must end."""
+def run_pair(
+    subject: RingArrays, clip: RingArrays, kept: FlagArray, budget: Budget, nesting: Nesting = UNNAMED
+) -> FoundPair:
+    """Overlay two polygons, or the rings of one by a rule. Raises as `Budget.check` when the call must end."""
     n_vertices = len(subject.vertices) + len(clip.vertices)
-    if n_vertices >= _MANY and n_vertices >= _MANY_IN_RING * (len(subject.offsets) + len(clip.offsets) - 2):
+    is_named = nesting is not UNNAMED
+    if (
+        not is_named
+        and n_vertices >= _MANY
+        and n_vertices >= _MANY_IN_RING * (len(subject.offsets) + len(clip.offsets) - 2)
+    ):
         size = _BLOCK if n_vertices < _BLOCKS_GROW else 2 * _BLOCK
         found = run_blocks(subject, clip, size, int(_MOST * n_vertices), kept, budget)
         if found is not None:
             return found
-    return cast("FoundPair", run_blocks(subject, clip, 0, 0, kept, budget))
+    return cast("FoundPair", run_blocks(subject, clip, 0, 0, kept, budget, nesting))
 
 
 def run_blocks(
-    subject: RingArrays, clip: RingArrays, size: int, n_most: int, kept: FlagArray, budget: Budget
+    subject: RingArrays,
+    clip: RingArrays,
+    size: int,
+    n_most: int,
+    kept: FlagArray,
+    budget: Budget,
+    nesting: Nesting = UNNAMED,
 ) -> FoundPair | None:
     """Overlay two polygons in blocks of ``size`` edges, of which fewer than n_most may be looked at one by one.
 
@@ -97,14 +107,14 @@ def run_blocks(
     while True:  # bound: each turn makes room, geometrically
         scratch = scratch_for(n_vertices, n_rings, n_contacts, n_out, n_out_rings)
         if size:
-            reduced = entry_of(_reduce_pair)(subject, clip, size, n_most, kept, budget.flag, scratch.buffers)
+            reduced = entry_of(reduce_pair)(subject, clip, size, n_most, kept, budget.flag, scratch.buffers)
             n_touched = reduced.n + n_vertices // 4
             if reduced.n == 0:
                 budget.check()
                 keep(scratch, n_touched, 0, 0)
                 return None
         (status, counts, displacement), output = scratch.outcome, scratch.output
-        _, needs, n, n_found, n_pieces, _, used, n_left_out = entry_of(OVERLAY_PAIRS)(
+        _, needs, n, n_found, n_pieces, _, used, n_left_out = entry_of(overlay_pairs)(
             subject,
             subject_item,
             clip,
@@ -112,7 +122,7 @@ def run_blocks(
             0,
             reduced,
             kept,
-            UNNAMED,
+            nesting,
             budget.flag,
             scratch.buffers,
             scratch.outcome,
@@ -170,10 +180,3 @@ def _one_polygon(n_rings: int) -> IntArray:
     offsets = np.array([0, n_rings])
     offsets.setflags(write=False)
     return offsets
-
-
-OVERLAY_PAIRS: Any = overlay_pairs
-_reduce_pair: Any = reduce_pair
-if isinstance(overlay_pairs, FunctionType):  # uncompiled: numpy warns of what overflows
-    OVERLAY_PAIRS = np.errstate(all="ignore")(overlay_pairs)
-    _reduce_pair = np.errstate(all="ignore")(reduce_pair)

@@ -1,10 +1,11 @@
 """orient2d and orient3d: on which side of a line or plane a point lies, exact for every float64 input.
 
-Three stages. A float filter, whose bound is proven below. Then the determinant as an expansion, exact, without
-allocation, with the coordinates of an axis scaled by a power of two where that widens the range (the sign does not
-change). Where even that leaves the range in which expansions are exact, UNDECIDED: the caller settles the item with
-`rational.py`. A whole scene at 1e300 or 1e-300 is decided here; undecided are only sets of points with coordinates of
-one axis more than 2^636 (2D: 2^985) apart, which the filter did not settle either.
+Four stages. A float filter, whose bound is proven below. Equal points, and all on one axis-parallel line or plane. The
+determinant in pairs of doubles, with a bound. Then as an expansion, exact, without allocation, with the coordinates of
+an axis scaled by a power of two where that widens the range (the sign does not change). Where even that leaves the
+range in which expansions are exact, UNDECIDED: the caller settles the item with `rational.py`. A whole scene at 1e300
+or 1e-300 is decided here; undecided are only sets of points with coordinates of one axis more than 2^636 (2D: 2^985)
+apart, which the filter did not settle either.
 
 **The filter.** Let u = 2^-53, h = 2^-1075 (half the smallest subnormal), and * a rounded product:
 |x * y - x y| <= u |x y| + h. Differences of doubles carry a relative error u only. So in 2D, with l and r the products,
@@ -13,6 +14,14 @@ products). The threshold used is 4u (|l| + |r|) + 8h: the spare u and 6h pay for
 likewise (7u + 56u^2) P for the permanent P of the rounded differences, plus 2h |z| for the two products under each of
 the three differences z and h for their product with it; the threshold is 8u P + 16h (1 + sum |z|). Infinite
 intermediates make the threshold infinite or NaN, and both comparisons false: UNDECIDED.
+
+**In pairs.** Differences of doubles are exact pairs. In 2D see `EXACT_DIFFERENCES`. In 3D, by the bounds of
+double_double.py, a minor carries 5 u^2 of each product and 3 u^2 of its value, below 8.1 u^2 of the products' sizes;
+the product with z adds 5 u^2, two sums 3 u^2 each: below 19.3 u^2 P in all, for which the threshold has 32 u^2 P, with
+room for the low part of the sum. A rounded product that underflows is off by 2h; three in each of the six products
+under a z, and three with each z, make less than 32 h (1 + sum |z|).
+Where no low part is left anywhere (lattices), and no difference is so small that one could underflow, the value is
+exact, zero too.
 
 Source: J. R. Shewchuk, Adaptive precision floating-point arithmetic and fast robust geometric predicates, 1997.
 Changed: the sign of orient3d is opposite, underflow and overflow are covered, the exact stage drops zeros and scales.
@@ -24,10 +33,11 @@ from math import frexp, ldexp
 from typing import Any
 
 from engine.jit import inline, kernel, merged
+from engine.predicates.double_double import U2, dd_add, dd_mul, dd_sub
 from engine.predicates.error_free import two_diff, workspace
 from engine.predicates.expansion import Components, add_scaled, sign
 from engine.predicates.loading import as_point3
-from engine.predicates.parameters import compare_differences, minor
+from engine.predicates.parameters import compare_differences, compare_in_pairs, minor
 from engine.predicates.vectors import minus
 from engine.types import UNDECIDED, Point2, Point3
 
@@ -42,6 +52,7 @@ TOP_2D = 500  # 12 products below 2^1000
 BOTTOM_2D = -485  # 2 (-485 - 52) = -1074
 TOP_3D = 330  # differences < 2^331, 6 products below 2^993
 BOTTOM_3D = -306  # 3 (-306 - 52) = -1074
+SMALLEST_EXACT = 2.0**-300  # 3 (-300 - 52) > -1074: of differences whose products keep all their bits
 OUT_OF_RANGE = 1 << 20  # no power of two brings this axis into the range
 
 
@@ -143,6 +154,13 @@ def orient2d_exact(a: Point2, b: Point2, c: Point2) -> int:
         return 0
     if (a.x == c.x and a.y == c.y) or (b.x == c.x and b.y == c.y) or (a.x == b.x and a.y == b.y):
         return 0
+    ax, ax_tail = two_diff(a.x, c.x)
+    ay, ay_tail = two_diff(a.y, c.y)
+    bx, bx_tail = two_diff(b.x, c.x)
+    by, by_tail = two_diff(b.y, c.y)
+    side = compare_in_pairs(ax, ax_tail, by, by_tail, ay, ay_tail, bx, bx_tail)
+    if side != UNDECIDED:
+        return side
     shift_x = _shift_of(a.x, b.x, c.x, c.x, BOTTOM_2D, TOP_2D)
     shift_y = _shift_of(a.y, b.y, c.y, c.y, BOTTOM_2D, TOP_2D)
     if shift_x == OUT_OF_RANGE or shift_y == OUT_OF_RANGE:
@@ -164,6 +182,13 @@ def orient3d_exact(a: Point3, b: Point3, c: Point3, d: Point3) -> int:
         or (a.z == d.z and b.z == d.z and c.z == d.z)
     ):
         return 0
+    if _are_equal(a, d) or _are_equal(b, d) or _are_equal(c, d) or _are_equal(a, b) or _are_equal(b, c):
+        return 0
+    if _are_equal(c, a):
+        return 0
+    side = _orient3d_in_pairs(a, b, c, d)
+    if side != UNDECIDED:
+        return side
     shift_x = _shift_of(a.x, b.x, c.x, d.x, BOTTOM_3D, TOP_3D)
     shift_y = _shift_of(a.y, b.y, c.y, d.y, BOTTOM_3D, TOP_3D)
     shift_z = _shift_of(a.z, b.z, c.z, d.z, BOTTOM_3D, TOP_3D)
@@ -192,6 +217,41 @@ def orient3d_exact(a: Point3, b: Point3, c: Point3, d: Point3) -> int:
     if cz != 0.0:
         n = _add_times(e, n, m, minor(m, bx, bx_tail, by, by_tail, ax, ax_tail, ay, ay_tail), cz, cz_tail)
     return sign(e, n)
+
+
+@inline
+def _are_equal(p: Point3, q: Point3) -> bool:
+    return p.x == q.x and p.y == q.y and p.z == q.z
+
+
+@inline
+def _orient3d_in_pairs(a: Point3, b: Point3, c: Point3, d: Point3) -> int:
+    """Return the sign of orient3d from pairs of doubles where it is sure, else UNDECIDED."""
+    total, total_tail, permanent, heights, lows, smallest = 0.0, 0.0, 0.0, 0.0, 0.0, 1.0
+    p, q, r = a, b, c
+    for _ in range(3):  # z of p, times the minor of r and q; a loop, because three copies compile three times as long
+        z, z_tail = two_diff(p.z, d.z)
+        qx, qx_tail = two_diff(q.x, d.x)
+        qy, qy_tail = two_diff(q.y, d.y)
+        rx, rx_tail = two_diff(r.x, d.x)
+        ry, ry_tail = two_diff(r.y, d.y)
+        left, left_tail = dd_mul(rx, rx_tail, qy, qy_tail)
+        right, right_tail = dd_mul(qx, qx_tail, ry, ry_tail)
+        minor_, minor_tail = dd_sub(left, left_tail, right, right_tail)
+        term, term_tail = dd_mul(minor_, minor_tail, z, z_tail)
+        total, total_tail = dd_add(total, total_tail, term, term_tail)
+        permanent += (abs(left) + abs(right)) * abs(z)
+        heights += abs(z)
+        lows += abs(z_tail) + abs(qx_tail) + abs(qy_tail) + abs(left_tail) + abs(right_tail)
+        lows += abs(minor_tail) + abs(term_tail) + abs(total_tail)
+        smallest = lower(lower(lower(smallest, z), qx), qy)
+        p, q, r = q, r, p
+    bound = 32.0 * U2 * permanent + 2.0 * GUARD_3D * (1.0 + heights)
+    if lows == 0.0 and smallest >= SMALLEST_EXACT:
+        bound = 0.0
+        if total == 0.0:
+            return 0
+    return 1 if total > bound else -1 if -total > bound else UNDECIDED
 
 
 @inline

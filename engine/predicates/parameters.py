@@ -86,13 +86,23 @@ def compare_differences(
         if left != right:
             return 1 if left > right else -1
         return 0 if left_tail == right_tail else (1 if left_tail > right_tail else -1)
+    side = compare_in_pairs(ah, al, bh, bl, ch, cl, dh, dl)
+    return side if side != UNDECIDED else sign(e, minor(e, ah, al, ch, cl, dh, dl, bh, bl))
+
+
+@inline
+def compare_in_pairs(ah: float, al: float, bh: float, bl: float, ch: float, cl: float, dh: float, dl: float) -> int:
+    """Return the sign of a b - c d for exact differences (h, l) where the products' leading parts decide it.
+
+    Else UNDECIDED, for infinities and NaN too; underflow is covered.
+    """
     left, left_tail = two_prod(ah, bh)
     right, right_tail = two_prod(ch, dh)
     gap, gap_tail = two_diff(left, right)
     gap += gap_tail + ((left_tail - right_tail) + ((ah * bl + al * bh) - (ch * dl + cl * dh)))
     if abs(gap) > EXACT_DIFFERENCES * (abs(left) + abs(right)) + TINY:
         return 1 if gap > 0.0 else -1
-    return sign(e, minor(e, ah, al, ch, cl, dh, dl, bh, bl))
+    return UNDECIDED
 
 
 @inline

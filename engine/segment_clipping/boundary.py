@@ -28,8 +28,11 @@ from engine.segment_clipping.prepared_boundary import Mesh, Outline, boundary_of
 from engine.solids.checks import check_finite
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
+from engine.solids.triangle import Triangle
 from engine.types import OPEN
 
+Bounded = Polygon | Polyhedron | Triangle
+"""What a boundary bounds; triangles of the plane."""
 _LEAST_ROOM: Final = 1 << 8
 """Contacts, or pieces, looked for at once; doubled where one segment has more."""
 _CONTACTS: Final = 4
@@ -60,13 +63,13 @@ def clip_on_boundary(
 
 
 def clip_chunk(
-    segments: FloatArray, first: int, last: int, region: Polygon | Polyhedron, locator: Locator, budget: Budget
+    segments: FloatArray, first: int, last: int, region: Bounded, locator: Locator, budget: Budget
 ) -> Clipped:
     """Return the pieces of ``segments[first:last]``, (n, 2, dim) float64, in order of source and t."""
     boundary, part = boundary_of(region), segments[first:last]
     locations = np.empty(len(part), np.int8)
     locator.fill(part[:, 0].copy(), locations, budget)
-    parts, state = _settle(part, locations, boundary, budget)
+    parts, state = cut_at_crossings(part, locations, boundary, budget)
     left = np.flatnonzero(state != SETTLED)
     if len(left):
         parts.append(_exact(part, left, locations[left], region, boundary, budget))
@@ -78,7 +81,7 @@ def clip_chunk(
     return Pieces(source + first, ends, t, faces), len(left), len(left)
 
 
-def _settle(
+def cut_at_crossings(
     segments: FloatArray, locations: Int8Array, boundary: Outline | Mesh, budget: Budget
 ) -> tuple[list[Pieces], FlagArray]:
     """Return the pieces of those segments that the kernel settles, and the state of each."""
@@ -103,13 +106,13 @@ def _exact(
     segments: FloatArray,
     chosen: IntArray,
     locations: Int8Array,
-    region: Polygon | Polyhedron,
+    region: Bounded,
     boundary: Outline | Mesh,
     budget: Budget,
 ) -> Pieces:
     """Return the pieces of the chosen segments by exact arithmetic; locations: of their first ends."""
     part = segments[chosen]
-    offsets, elements = _contacts(part, boundary, budget)
+    offsets, elements = elements_met(part, boundary, budget)
     last_locations, on_boundary = np.zeros_like(locations), np.flatnonzero(locations == 0)
     locator_of(region).fill(part[on_boundary, 1], found := np.empty(len(on_boundary), np.int8), budget)
     last_locations[on_boundary] = found
@@ -137,7 +140,7 @@ def _exact(
     )
 
 
-def _contacts(segments: FloatArray, boundary: Outline | Mesh, budget: Budget) -> tuple[IntArray, IntArray]:
+def elements_met(segments: FloatArray, boundary: Outline | Mesh, budget: Budget) -> tuple[IntArray, IntArray]:
     """Return the offsets (n + 1,) of each segment's contacts, and their elements."""
     kernel: Any = find_mesh_contacts if isinstance(boundary, Mesh) else find_contacts_2d
     ends, elements = [np.zeros(1, np.int64)], [np.zeros(0, np.int64)]

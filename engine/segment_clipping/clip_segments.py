@@ -112,7 +112,7 @@ def clip_segments(
     >>> pieces.start.tolist(), pieces.end.tolist(), pieces.t.tolist(), pieces.faces.tolist()
     ([[0.0, 1.0]], [[2.0, 1.0]], [[0.25, 0.75]], [[0, 1]])
     """
-    method = _method_for(region)
+    method = method_for(region)
     array = as_point_groups(segments, 2, region.dimension, ("segments",), must_be_finite=False)  # kernels look at it
     with Budget(deadline, cancel) as budget:
         if isinstance(method, Method):
@@ -126,7 +126,7 @@ def clip_segments(
     return pieces, Accuracy("exact", 0.5, len(array), n_beyond, n_rational, name)
 
 
-def _method_for(region: Solid) -> Method | Polygon | Polyhedron:
+def method_for(region: Solid) -> Method | Polygon | Polyhedron:
     """Return what clips on this solid, kept with it, or the boundary that it is: the one table from type to method."""
     match region:
         case HalfSpace():

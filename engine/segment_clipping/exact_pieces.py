@@ -142,13 +142,14 @@ def nodes_of(contacts: Sequence[Contact]) -> list[tuple[Fraction, list[Contact]]
     return [(t, [contact for _, contact in same if contact is not None]) for t, same in grouped]
 
 
-def spans_of(
+def nodes_with_locations(
     contacts: Sequence[Contact], locations: tuple[int, int], locate: Callable[[Fraction], int]
-) -> Iterator[tuple[Fraction, Fraction, tuple[int, int]]]:
-    """Yield the first and the last parameter of each piece, and the faces there, -1 for an end of the segment.
+) -> Iterator[tuple[Fraction, list[Contact], bool, bool]]:
+    """Yield the parameters of `nodes_of` with their contacts, and of the span after each whether the segment lies in an
+    element there, and else whether it is inside.
 
     locations: of the ends of the segment. locate: tells the location at a parameter; asked once at most, where both
-    ends are on the boundary. Of several faces at one parameter the smallest is named, those along the segment last.
+    ends are on the boundary.
     """
     nodes = nodes_of(contacts)
     n_along, has_turned = 0, False
@@ -166,9 +167,21 @@ def spans_of(
     elif locations[0] == 0 and False in are_along[:-1]:
         i = are_along.index(False)
         is_first_in = (locate((nodes[i][0] + nodes[i + 1][0]) / 2) > 0) ^ have_turned[i]
-    is_open, first, entered = False, ZERO, -1
     for (t, met), is_along, turned in zip(nodes, are_along, have_turned):
-        goes_on = t < 1 and (is_along or is_first_in ^ turned)
+        yield t, met, is_along, is_first_in ^ turned
+
+
+def spans_of(
+    contacts: Sequence[Contact], locations: tuple[int, int], locate: Callable[[Fraction], int]
+) -> Iterator[tuple[Fraction, Fraction, tuple[int, int]]]:
+    """Yield the first and the last parameter of each piece, and the faces there, -1 for an end of the segment.
+
+    locations, locate: see `nodes_with_locations`. Of several faces at one parameter the smallest is named, those along
+    the segment last.
+    """
+    is_open, first, entered = False, ZERO, -1
+    for t, met, is_along, is_in in nodes_with_locations(contacts, locations, locate):
+        goes_on = t < 1 and (is_along or is_in)
         face = min((contact.is_along, contact.face) for contact in met)[1] if met else -1
         if not is_open:
             first, entered = t, -1 if t == 0 else face

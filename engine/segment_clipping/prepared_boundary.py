@@ -15,6 +15,8 @@ from engine.predicates.expansion import LARGEST, SMALLEST
 from engine.segment_clipping.box_tree import build_box_tree
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
+from engine.solids.surface import Surface
+from engine.solids.triangle import Triangle
 
 
 class Outline(NamedTuple):
@@ -53,14 +55,15 @@ class Mesh(NamedTuple):
     """(n_blocks, 9, 8), see `corners_of`."""
 
 
-def boundary_of(region: Polygon | Polyhedron) -> Outline | Mesh:
-    """Return the prepared boundary of a region."""
+def boundary_of(region: Polygon | Triangle | Polyhedron | Surface) -> Outline | Mesh:
+    """Return the prepared boundary of a region; a triangle is one of the plane."""
 
     def build() -> Outline | Mesh:
-        if isinstance(region, Polyhedron):
+        if isinstance(region, Polyhedron | Surface):
             return mesh_of(region.vertices[region.triangles], region.triangle_faces)
+        offsets = region.ring_offsets if isinstance(region, Polygon) else np.array([0, 3])
         following = np.arange(1, len(region.vertices) + 1, dtype=np.int64)
-        following[region.ring_offsets[1:] - 1] = region.ring_offsets[:-1]
+        following[offsets[1:] - 1] = offsets[:-1]
         first = np.arange(len(following), dtype=np.int64)  # an edge is named by its first vertex
         return outline_of(region.vertices[np.stack([first, following], axis=1)], first)
 

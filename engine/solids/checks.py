@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 import reprlib
+from itertools import chain
 from typing import Any, Final, cast
 
 import numpy as np
@@ -133,8 +134,25 @@ def _check_converted(array: npt.NDArray[Any], result: FloatArray, where: Where) 
         as_number(array[path], (*where, *map(int, path)))
 
 
+def plain_floats(values: Any, depth: int) -> FloatArray | None:
+    """Return a list (depth 1) or lists (2) of finite floats and small integers as an array; None for all else."""
+    try:
+        items = values if depth == 1 else list(chain.from_iterable(values))
+        is_plain = depth == 1 or (depth == 2 and set(map(type, values)) <= {list, tuple})
+        kinds = set(map(type, items))
+        if int in kinds:
+            is_plain &= kinds <= {float, int} and min(items) >= -_FLOAT_INTEGERS and max(items) <= _FLOAT_INTEGERS
+        if is_plain and items and kinds <= {float, int} and math.isfinite(sum(items)):
+            return np.array(values, np.float64)
+    except (TypeError, ValueError):  # no lists, or of different lengths
+        pass
+    return None
+
+
 def _from_lists(values: list[Any] | tuple[Any, ...], depth: int, where: Where) -> FloatArray:
     """Flatten nested lists level by level, each level checked for equal lengths, then the leaves for their type."""
+    if (plain := plain_floats(values, depth)) is not None:
+        return plain
     shape, items = [len(values)], list(values)
     for level in range(1, depth):
         rows = [item.tolist() if isinstance(item, np.ndarray) else item for item in items]

@@ -2,24 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import accumulate
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
 from engine.errors import InvalidArrayError, RingTooShortError
-from engine.solids.base import Solid
+from engine.solids.base import Solid, T
 from engine.solids.checks import as_points, check_not_empty, frozen
+
+_NO_VERTICES = np.zeros((0, 2))
 
 
 class Polygon(Solid):
     """All points from which a ray crosses the rings an odd number of times, and the rings themselves; 2D.
 
-    Parameters: rings, a list of rings, each a list of at least 3 positions of 2 numbers; a repeated last vertex is
-    dropped. Rings may cross, touch, overlap and repeat themselves.
+    Parameters: rings, a list of rings, each a list of positions of 2 numbers; a repeated last vertex is dropped. Rings
+    may cross, touch, overlap and repeat themselves. Or an object with `__geo_interface__`, of shapely for example, a
+    Polygon or a MultiPolygon, whose parts are united.
     Boundary: the points on any edge, even on one that another edge cancels under even-odd.
-    Raises: InvalidArrayError, WrongDimensionError, NotFiniteError, EmptyGeometryError, RingTooShortError.
+    Degenerate input: a ring of two positions is the edge between them, there and back, without area; one that is left
+    with fewer is refused. Without rings a polygon is empty, as results of overlays may be: overlays take it, other
+    operations refuse it (EmptyGeometryError).
+    Raises: InvalidArrayError, WrongDimensionError, NotFiniteError, RingTooShortError.
 
     >>> Polygon([[[0, 0], [4, 0], [4, 4], [0, 4]], [[1, 1], [2, 1], [1, 2]]])
     Polygon(2 rings, 7 vertices)
@@ -29,11 +36,18 @@ class Polygon(Solid):
 
     type: ClassVar[str] = "polygon"
     vertices: FloatArray
-    """``(n, 2)``: the vertices of all rings, one ring after another."""
+    """``(n, 2)``: the vertices of all rings, one ring after another; of two positions the last is there twice."""
     ring_offsets: IntArray
     """``(n_rings + 1,)``: ring i holds the vertices ``ring_offsets[i]`` up to ``ring_offsets[i + 1]``."""
 
+    geojson: ClassVar[tuple[Callable[[Any], Polygon], Callable[[Polygon], dict[str, Any]]]]
+    """How a geometry is read and written: `engine.layers` says it, by overlays."""
+
     def __init__(self, rings: object) -> None:
+        if hasattr(rings, "__geo_interface__"):
+            read = Polygon.geojson[0](rings.__geo_interface__)
+            self._set(dimension=2, vertices=read.vertices, ring_offsets=read.ring_offsets)
+            return
         if isinstance(rings, np.ndarray) and rings.ndim == 3:
             rings = list(rings)
         if not isinstance(rings, (list, tuple)):
@@ -42,17 +56,37 @@ class Polygon(Solid):
                 "put a single ring into a list",
                 ("rings",),
             )
-        check_not_empty(len(rings), "ring", ("rings",))
         arrays = [_as_ring(ring, ("rings", i_ring)) for i_ring, ring in enumerate(rings)]
-        vertices = frozen(arrays[0]) if len(arrays) == 1 else frozen(np.concatenate(arrays))
+        vertices = frozen(arrays[0]) if len(arrays) == 1 else frozen(np.concatenate([_NO_VERTICES, *arrays]))
         offsets = np.array([0, *accumulate(map(len, arrays))], np.int64)
         offsets.setflags(write=False)
         self._set(dimension=2, vertices=vertices, ring_offsets=offsets)
+
+    @classmethod
+    def of_arrays(cls, vertices: FloatArray, ring_offsets: IntArray) -> Polygon:
+        """Return a polygon that holds these arrays as they are: read-only, checked, without -0.0 or repeated ends."""
+        polygon = object.__new__(cls)
+        polygon._set(dimension=2, vertices=vertices, ring_offsets=ring_offsets)
+        return polygon
 
     @property
     def n_rings(self) -> int:
         """Number of rings."""
         return len(self.ring_offsets) - 1
+
+    def prepared(self, key: str, build: Callable[[], T], check: Callable[[], object] | None = None) -> T:
+        """As of any solid; an empty polygon has no structures: only overlays take it."""
+        self.check_not_empty()
+        return super().prepared(key, build, check)
+
+    def check_not_empty(self) -> None:
+        """Raise if there are no rings."""
+        check_not_empty(len(self.vertices), "ring", ("rings",))
+
+    @property
+    def __geo_interface__(self) -> dict[str, Any]:
+        """The polygon as GeoJSON: its pieces with their holes, valid (rings that cross are arranged anew)."""
+        return Polygon.geojson[1](self)
 
     def __repr__(self) -> str:
         return f"Polygon({self.n_rings} rings, {len(self.vertices)} vertices)"
@@ -61,9 +95,8 @@ class Polygon(Solid):
 def _as_ring(ring: object, where: tuple[str | int, ...]) -> FloatArray:
     """Return the vertices of one ring without a repeated last one."""
     points = as_points(ring, 2, where)
-    repeats = len(points) > 1 and points[0].tolist() == points[-1].tolist()
-    points = points[:-1] if repeats else points
-    if len(points) < 3:
-        told = " after its repeated last vertex was dropped" if repeats else ""
-        raise RingTooShortError(f"rings[{where[-1]}] has {len(points)} vertices{told}; a ring needs at least 3", where)
-    return points
+    if len(points) < 2:
+        raise RingTooShortError(f"rings[{where[-1]}] has {len(points)} vertices; a ring needs at least 2", where)
+    if len(points) > 2 and points[0].tolist() == points[-1].tolist():
+        points = points[:-1]
+    return points if len(points) > 2 else points[[0, 1, 1]]  # no kernel is handed a ring of fewer

@@ -30,12 +30,14 @@ FLOORS = {
     "engine.polygon_overlay": 7,
     "engine.collision": 7,
     "engine.textbook": 7,
-    "engine.compare": 8,
-    "engine.distributed": 8,
-    "engine.files": 8,
-    "engine.warmup": 8,
-    "engine": 9,
-    "engine.__main__": 10,
+    "engine.scenes": 8,
+    "engine.layers": 8,
+    "engine.compare": 9,
+    "engine.distributed": 9,
+    "engine.files": 9,
+    "engine.warmup": 9,
+    "engine": 10,
+    "engine.__main__": 11,
 }
 SAME_FLOOR_ALLOWED = {("engine.parallel", "engine.errors"), ("engine.parallel", "engine.arrays")}
 SPEAKS_LLVM = {"engine.compiling", "engine.predicates.error_free"}

@@ -30,16 +30,20 @@ class Trapezoid(NamedTuple):
     right: Q
     low: tuple[Q, Q]
     high: tuple[Q, Q]
-    inside: tuple[bool, bool]
+    windings: tuple[int, ...]
+
+    @property
+    def inside(self) -> tuple[bool, ...]:
+        return tuple(winding % 2 == 1 for winding in self.windings)
 
     @property
     def area(self) -> Q:
         return (self.right - self.left) * (self.high[0] - self.low[0] + self.high[1] - self.low[1]) / 2
 
 
-def trapezoids(subject: list[Segment], clip: list[Segment]) -> list[Trapezoid]:
-    """Return the cells of the common subdivision with both parities, a frame around it included."""
-    every = [edge for edge in subject + clip if edge[0] != edge[1]]
+def trapezoids(*bodies: list[Segment]) -> list[Trapezoid]:
+    """Return the cells of the common subdivision with the winding number of each body, a frame around it included."""
+    every = [edge for body in bodies for edge in body if edge[0] != edge[1]]
     if not every:
         return []
     cuts = {p[0] for edge in every for p in edge}
@@ -52,19 +56,18 @@ def trapezoids(subject: list[Segment], clip: list[Segment]) -> list[Trapezoid]:
     found = []
     for slab, (left, right) in enumerate(pairwise([min(cuts) - 1, *sorted(cuts), max(cuts) + 1])):
         lines = []
-        for body, part in enumerate((subject, clip)):
+        for body, part in enumerate(bodies):
             for a, b in part:
                 if min(a[0], b[0]) <= left and right <= max(a[0], b[0]) and a[0] != b[0]:
                     ends = tuple(along(a, b, (x - a[0]) / (b[0] - a[0]))[1] for x in (left, right))
-                    lines.append((ends[0] + ends[1], ends, body))
+                    lines.append((ends[0] + ends[1], ends, body, 1 if a[0] < b[0] else -1))
         lines.sort()
-        inside, low = [False, False], (bottom, bottom)
-        for middle, ends, body in [*lines, (2 * top, (top, top), None)]:
+        windings, low = [0] * len(bodies), (bottom, bottom)
+        for middle, ends, body, step in [*lines, (2 * top, (top, top), 0, 0)]:
             if middle > low[0] + low[1]:
-                found.append(Trapezoid(slab, left, right, low, ends, (inside[0], inside[1])))
+                found.append(Trapezoid(slab, left, right, low, ends, tuple(windings)))
             low = ends
-            if body is not None:
-                inside[body] = not inside[body]
+            windings[body] += step
     return found
 
 
@@ -104,10 +107,14 @@ class Result(NamedTuple):
 
 def overlay(subject: Solid, clip: Solid, operation: str) -> Result:
     """Return the exact area and structure of the open interior of the result."""
-    keep = OPERATIONS[operation]
     cells = trapezoids(edges(subject), edges(clip))
+    return structure(cells, [cell for cell in cells if OPERATIONS[operation](*cell.inside)])
+
+
+def structure(cells: list[Trapezoid], kept: list[Trapezoid]) -> Result:
+    """Return the exact area and structure of some of the cells."""
     pieces = []
-    for piece in _components([cell for cell in cells if keep(*cell.inside)]):
+    for piece in _components(kept):
         members = set(piece)
         rest = _components([cell for cell in cells if cell not in members])
         pieces.append((sum((cell.area for cell in piece), Q(0)), len(rest) - 1))

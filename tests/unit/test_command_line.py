@@ -77,6 +77,18 @@ def test_collide_with_and_without_poses(cube: str, tmp_path: Path, capsys: pytes
     assert capsys.readouterr().out.split() == ["relation", "overlapping", "touching", "disjoint"]
 
 
+def test_clearance_and_whether_it_is_at_least_so_much(capsys: pytest.CaptureFixture[str]) -> None:
+    pair = [
+        '{"type": "aabb", "min": [0, 0, 0], "max": [1, 1, 1]}',
+        '{"type": "sphere", "center": [4, 5, 1], "radius": 2}',
+    ]
+    assert main(["clearance", *pair]) == 0
+    assert capsys.readouterr().out.split() == ["distance", "3.0"]
+    for least, said in (("3", "True"), ("3.0000000000000004", "False")):
+        assert main(["clearance", *pair, "--at-least", least]) == 0
+        assert capsys.readouterr().out.split() == ["clear", said]
+
+
 def test_clip_segments_reads_back_the_same_doubles(cube: str, tmp_path: Path) -> None:
     segments = np.random.default_rng(4).uniform(-1, 2, (200, 2, 3))
     source, target = written(tmp_path, "segments.npy", segments), tmp_path / "pieces.csv"
@@ -102,18 +114,34 @@ def test_clip_line_strings_and_polygons_of_geojson(tmp_path: Path, capsys: pytes
     assert engine.overlay(clipped, engine.Polygon(SQUARE["coordinates"])).area_exact == 3
 
 
-def test_overlay_writes_geojson_that_it_reads(tmp_path: Path) -> None:
-    left, right = written(tmp_path, "left.geojson", SQUARE), written(tmp_path, "right.geojson", HOLED)
+def test_overlay_of_layers_keeps_attributes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    far = {"type": "Polygon", "coordinates": [[[90, 0], [91, 0], [91, 1], [90, 0]]]}
+    features = [
+        {"type": "Feature", "id": 7 + k, "properties": {"a": k}, "geometry": each}
+        for k, each in enumerate([SQUARE, far])
+    ]
+    layer = {"type": "FeatureCollection", "crs": {"type": "name"}, "features": features}
+    left, right = written(tmp_path, "left.geojson", layer), written(tmp_path, "right.geojson", HOLED)
     target = tmp_path / "out.geojson"
-    assert main(["overlay", left, right, "--operation", "union", "-o", str(target)]) == 0
-    (feature,) = json.loads(target.read_text())["features"]
-    rings = [ring for polygon in feature["geometry"]["coordinates"] for ring in polygon]
-    assert all(ring[0] == ring[-1] for ring in rings)
-    union = engine.overlay(engine.Polygon(SQUARE["coordinates"]), engine.Polygon(HOLED["coordinates"]), "union")
-    assert len(rings) == len(union.rings)
-    again = tmp_path / "again.geojson"
-    assert main(["overlay", str(target), str(target), "-o", str(again)]) == 0
-    assert json.loads(again.read_text()) == json.loads(target.read_text())
+    assert main(["overlay", left, right, "--operation", "identity", "-o", str(target)]) == 0
+    found = json.loads(target.read_text())
+    assert found["crs"] == {"type": "name"}
+    assert [(f["properties"], f.get("id"), "right" in f) for f in found["features"]] == [
+        ({"a": 0}, None, True), ({"a": 0}, 7, False), ({"a": 1}, 8, False),
+    ]  # fmt: skip
+    square, holed = (engine.Polygon(each["coordinates"]) for each in (SQUARE, HOLED))
+    for feature, operation in zip(found["features"], ("intersection", "difference"), strict=False):
+        polygon = engine.layers.polygon_of(feature["geometry"])
+        assert engine.union_all([polygon]).area_exact == engine.overlay(square, holed, operation).area_exact  # type: ignore[arg-type]
+    assert main(["overlay", str(target), str(target)]) == 0
+    assert len(json.loads(capsys.readouterr().out)["features"]) == 3
+
+
+def test_parts_of_a_multipolygon_are_united(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rings = [[[0, 0], [2, 0], [2, 2], [0, 2], [0, 0]], [[1, 1], [3, 1], [3, 3], [1, 3], [1, 1]]]
+    path = written(tmp_path, "both.geojson", {"type": "MultiPolygon", "coordinates": [[ring] for ring in rings]})
+    assert main(["contains", path, written(tmp_path, "p.csv", "1.5,1.5\n0.5,2.5\n")]) == 0
+    assert capsys.readouterr().out.split() == ["location", "inside", "outside"]
 
 
 def test_bounds(cube: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -150,7 +178,7 @@ def test_every_mesh_format(suffix: str, tmp_path: Path, capsys: pytest.CaptureFi
         (["contains", "broken.glb", "p.csv"], "cannot be read as glb"),
         (["contains", "open.off", "p.csv"], "not_closed"),
         (["clip", SPHERE, "p.csv"], "rows of 2 x 3 numbers expected"),
-        (["overlay", "square.geojson", SPHERE], "unsupported_solid at clips.0"),
+        (["overlay", "square.geojson", SPHERE], "unsupported_solid at right.features.0"),
         (["contains", BOX, "ok.csv", "-o", "out.xml"], "this answer is written to"),
     ],
 )

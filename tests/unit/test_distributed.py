@@ -67,6 +67,9 @@ def test_poses_equal_one_process(client: Client, solid: engine.Polyhedron, point
     turns, moves = np.broadcast_to(np.eye(3), (60, 3, 3)), points[:60] * 2
     answer = distributed.collide_poses(client, solid, solid, turns, moves, part=7)
     np.testing.assert_array_equal(answer, engine.collide_poses(solid, solid, turns, moves))
+    for least in (None, 0.5):
+        found = distributed.clearance_poses(client, solid, solid, turns, moves, at_least=least, part=7)
+        np.testing.assert_array_equal(found, engine.clearance_poses(solid, solid, turns, moves, at_least=least))
 
 
 def test_segments_equal_one_process(client: Client, solid: engine.Polyhedron, points: np.ndarray) -> None:
@@ -74,6 +77,23 @@ def test_segments_equal_one_process(client: Client, solid: engine.Polyhedron, po
     answer, here = distributed.clip_segments(client, segments, solid, part=33), engine.clip_segments(segments, solid)
     for name in ("source", "start", "end", "t", "faces"):
         np.testing.assert_array_equal(getattr(answer, name), getattr(here, name))
+
+
+def test_segments_through_a_scene_equal_one_process(
+    client: Client, solid: engine.Polyhedron, points: np.ndarray
+) -> None:
+    segments = points[:400].reshape(-1, 2, 3)
+    scene = engine.Scene(
+        [solid, engine.Sphere([0, 0, 0], 1)], [engine.Pose.from_quaternion([2, 1, 0, 0], [0, 0, 0])] * 2
+    )
+    for keep in ("all", "first"):
+        answer = distributed.clip_segments_scene(client, segments, scene, keep=keep, part=33)  # type: ignore[arg-type]
+        here = scene.clip_segments(segments, keep=keep)  # type: ignore[call-overload]
+        for name in ("source", "body", "start", "end", "t", "faces", "ranks"):
+            np.testing.assert_array_equal(getattr(answer, name), getattr(here, name))
+    met = distributed.clip_segments_scene(client, segments, scene, keep="any", part=33)
+    np.testing.assert_array_equal(met, scene.clip_segments(segments, keep="any"))
+    assert len(distributed.clip_segments_scene(client, [], scene)) == 0
 
 
 def test_overlays_equal_one_process(client: Client, points: np.ndarray) -> None:

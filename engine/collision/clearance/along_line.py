@@ -31,20 +31,27 @@ def _reach_of_lane(s: Search, view: View, row: int, at: int) -> float:
 @inline
 def _furthest(s: Search, view: View, row: int) -> tuple[float, int]:
     """Return how far a body reaches along the line toward the other, and the block that does."""
-    child, waiting, sign = view.mesh.child, s.room.waiting, (1.0 if row == 0 else -1.0)
-    waiting[0], n, best, found = 0, 1, -np.inf, 0
+    child, waiting, bounds, sign = view.mesh.child, s.room.waiting, s.room.waiting_bounds, (1.0 if row == 0 else -1.0)
+    waiting[0], bounds[0], n, best, found = 0, np.inf, 1, -np.inf, 0
     while n > 0:  # bound: each node enters once
         n -= 1
         node = int(waiting[n])
+        if bounds[n] <= best:
+            continue
         if child[node, 0] < 0:
             reach = sign * block_reach(s, view, row, node)
             if reach > best:
                 best, found = reach, node
             continue
         for lane in range(LANES):
-            if child[node, lane] != EMPTY and _reach_of_lane(s, view, row, node * LANES + lane) > best:
-                waiting[n] = child[node, lane]
-                n += 1
+            if child[node, lane] == EMPTY:
+                continue
+            bound, place = _reach_of_lane(s, view, row, node * LANES + lane), n
+            while place > 0 and n - place < lane and bounds[place - 1] > bound:  # order: of a node, the furthest last
+                waiting[place], bounds[place] = waiting[place - 1], bounds[place - 1]
+                place -= 1
+            waiting[place], bounds[place] = child[node, lane], bound
+            n += 1
     return best, found
 
 

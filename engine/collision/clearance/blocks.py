@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.collision.clearance.boxes import Candidates, Search, View, set_line
+from engine.collision.clearance.boxes import Candidates, Search, View, box_bound, lane_centre, lane_half, set_line
 from engine.collision.clearance.near_triangles import nearest_points, rounding_of, seen_from, slab
 from engine.collision.meshes.mesh_arrays import triangle_of
 from engine.collision.meshes.placement import placed
@@ -119,16 +119,39 @@ def _loaded(s: Search, row: int, n: int) -> Triangle3:
 
 
 @inline
+def _box_of_block(view: View, node: int) -> tuple[Point3, Point3]:
+    """Return centre and half widths of a box around the boxes of a block."""
+    c, h = lane_centre(view, node * LANES), lane_half(view, node * LANES)
+    low, high = minus(c, h), minus(c, minus(Point3(0.0, 0.0, 0.0), h))
+    for lane in range(1, LANES):
+        if view.mesh.child[node, lane] == EMPTY:
+            break
+        c, h = lane_centre(view, node * LANES + lane), lane_half(view, node * LANES + lane)
+        low = Point3(min(low.x, c.x - h.x), min(low.y, c.y - h.y), min(low.z, c.z - h.z))
+        high = Point3(max(high.x, c.x + h.x), max(high.y, c.y + h.y), max(high.z, c.z + h.z))
+    middle = Point3(0.5 * (low.x + high.x), 0.5 * (low.y + high.y), 0.5 * (low.z + high.z))
+    return middle, minus(high, middle)
+
+
+@inline
 def measure_blocks(s: Search, i: int, j: int, n_found: int, limits: Any) -> tuple[int, int]:
     """Add the pairs of triangles of two blocks that may be the nearest; return how that ended, and their number.
 
     limits: as in `find_nearest`; the first falls.
     """
+    (c, h), (other, half) = _box_of_block(s.a, i), _box_of_block(s.b, j)
+    if box_bound(s, limits[0], c, h, other, half) > limits[0]:
+        return DONE, n_found
     n_first, n_second = _load_block(s, s.a, 0, i), _load_block(s, s.b, 1, j)
     for k in range(n_first):
-        t = _loaded(s, 0, k)
+        t, c, h = _loaded(s, 0, k), lane_centre(s.a, i * LANES + k), lane_half(s.a, i * LANES + k)
+        if box_bound(s, limits[0], c, h, other, half) > limits[0]:
+            continue
         for m in range(n_second):
             if s.room.reaches[1, m] - s.room.reaches[0, k] - s.frame.margin > limits[0]:
+                continue
+            at = j * LANES + m
+            if box_bound(s, limits[0], c, h, lane_centre(s.b, at), lane_half(s.b, at)) > limits[0]:
                 continue
             low, high, d, features = _measure(t, _loaded(s, 1, m), s.error)
             if high < limits[1]:

@@ -13,9 +13,8 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.collision.meshes.frames import defect_of
 from engine.collision.meshes.mesh_arrays import MeshArrays
-from engine.collision.meshes.placement import Placement, turned, turned_back
+from engine.collision.meshes.placement import Placement, defect_of, turned, turned_back
 from engine.jit import inline, merged
 from engine.lanes.tracing import LANES
 from engine.predicates.vectors import dot, largest_of
@@ -70,19 +69,22 @@ class Candidates(NamedTuple):
 class Room(NamedTuple):
     """Work space of searches, one at a time.
 
-    line (12,): the direction of the nearest pair so far, not longer than 1, in the axes of both bodies and in space;
-    where the two origins are along it; how often it turned. corners (2, 8, 3, 3), reaches (2, 8): of the triangles of
-    two blocks, and how far they reach along the line. kept (n_nodes, 4): of either body the turn at which
-    `block_reach` was found, and it. waiting (n_nodes,), listed (2, MOST_LISTED): nodes of one body.
+    limits (2,): of a search (traversal.py). line (12,): the direction of the nearest pair so far, not longer than 1, in
+    the axes of both bodies and in space; where the two origins are along it; how often it turned. corners (2, 8, 3, 3),
+    reaches (2, 8): of the triangles of two blocks, and how far they reach along the line. kept (n_nodes, 4): of either
+    body the turn at which `block_reach` was found, and it. waiting, waiting_bounds (n_nodes,), listed (2, MOST_LISTED):
+    nodes of one body.
     """
 
     heap: Heap
     found: Candidates
+    limits: Any
     line: Any
     corners: Any
     reaches: Any
     kept: Any
     waiting: Any
+    waiting_bounds: Any
     listed: Any
 
 
@@ -91,11 +93,13 @@ def new_room(room: int, n_nodes: int) -> Room:
     return Room(
         Heap(np.empty(room), np.empty((room, 2), np.int64)),
         Candidates(np.empty((room, 4), np.int64), np.empty(room)),
+        np.empty(2),
         np.zeros(12),
         np.empty((2, LANES, 3, 3)),
         np.empty((2, LANES)),
         np.zeros((n_nodes, 4)),
-        np.empty(n_nodes, np.int32),
+        np.empty(n_nodes + LANES, np.int32),
+        np.empty(n_nodes + LANES),
         np.empty((2, MOST_LISTED), np.int32),
     )
 

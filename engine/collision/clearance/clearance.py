@@ -5,6 +5,8 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import Any, Literal, Unpack, overload
 
+import numpy as np
+
 from engine.collision.clearance.half_spaces import gap_of_planes
 from engine.collision.clearance.result import Clearance
 from engine.collision.clearance.spreads import spread_pair
@@ -63,7 +65,8 @@ def clearance(
     faces are as near along an edge or all over, one point of that.
     Accuracy: the distance and each coordinate are the doubles nearest to the exact values, each on its own, so the
     points given may be a little nearer or further. Poses are exact images, equal ones are left out, as by `collide`.
-    Cost: both trees, built once per solid; then about the number of faces that are nearly nearest, 30 us each.
+    Cost: both trees, built once per solid; a search of 30 to 400 us for 1,000 to 10,000 faces, then integers for the
+    points and for ties. Where sums of coordinates may exceed 1e300 every pair of faces is measured: right, and slow.
     Raises: as `collide`; InvalidInputError (at_least negative or not finite); NotRepresentableError (the distance is
     beyond the largest double).
 
@@ -123,10 +126,9 @@ def is_clear(
         if do_meet(first, second, first_pose, second_pose, budget):
             return False
         return gap_of_planes(first, second, first_pose, second_pose, budget)[0].is_at_least(Fraction(least))
-    pair = spread_pair(first, second, first_pose, second_pose, budget)
-    if not pair.are_boundaries_clear(0, Fraction(least)):
-        return False
-    return not do_meet(first, second, first_pose, second_pose, budget)
+    answers = np.full(1, np.nan)
+    spread_pair(first, second, first_pose, second_pose, budget).fill(0, 1, answers, Fraction(least))
+    return bool(answers[0] > 0.0) and not do_meet(first, second, first_pose, second_pose, budget)
 
 
 def _clearance(

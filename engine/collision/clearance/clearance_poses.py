@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 
@@ -56,15 +55,16 @@ def clearance_poses(
     least = None if at_least is None else checked_distance(at_least)
     poses = PoseArrays(*as_poses(rotations, translations, first.dimension), True)
     n_poses = len(poses.rotations)
-    result: Any = np.zeros(n_poses) if least is None else np.ones(n_poses, np.bool_)
+    answers = np.full(n_poses, np.nan if least != 0.0 else np.inf)
     with Budget(deadline, cancel) as budget:
         batch = _Batch(first, second, poses, budget)
 
         def task(start: int, stop: int) -> None:
             if least != 0.0:
-                batch.fill(result, start, stop, None if least is None else Fraction(least))
+                batch.fill(answers, start, stop, None if least is None else Fraction(least))
 
         run_chunks(task, n_poses, budget=budget, first_chunk=4, workers=workers, progress=progress)
+    result = answers if least is None else answers > 0.0
     if not report:
         return result
     n_exact = batch.n_exact
@@ -82,21 +82,23 @@ class _Batch:
         self.spread = None if has_plane(first, second) or not n_poses else in_space(poses.rotations, poses.translations)
         self.n_exact = 0
 
-    def fill(self, result: Any, start: int, stop: int, least: Fraction | None) -> None:
-        """Answer the poses of a range; threads may answer different ranges."""
+    def fill(self, answers: FloatArray, start: int, stop: int, least: Fraction | None) -> None:
+        """Answer the poses of a range as `SpreadPair.fill`; threads may answer different ranges."""
         if self.relate is not None:
             self.relate(start, stop)
-        pair = None if self.spread is None else SpreadPair(self.first, self.second, STILL, self.spread, self.budget)
         for item in range(start, stop):
             self.budget.check()
             if self._do_meet(item):
-                result[item] = 0.0 if least is None else False
-            elif pair is not None:
-                result[item] = pair.distance(item) if least is None else pair.are_boundaries_clear(item, least)
-            else:
+                answers[item] = 0.0
+            elif self.spread is None:
                 gap, _ = gap_of_planes(self.first, self.second, None, self._pose(item), self.budget)
-                result[item] = gap.distance() if least is None else gap.is_at_least(least)
-        self.n_exact += stop - start if pair is None else pair.n_exact
+                answers[item] = gap.distance() if least is None else (np.inf if gap.is_at_least(least) else 0.0)
+        if self.spread is None:
+            self.n_exact += stop - start
+        else:
+            pair = SpreadPair(self.first, self.second, STILL, self.spread, self.budget)
+            pair.fill(start, stop, answers, least)
+            self.n_exact += pair.n_exact
 
     def _do_meet(self, item: int) -> bool:
         if self.relations[item] != UNSETTLED:

@@ -16,6 +16,7 @@ from engine.predicates.exact_vectors import cross, dot, minus, squared_length
 
 Vector = tuple[int, ...]
 Corners = tuple[Vector, Vector, Vector]
+Wall = tuple[Vector, int, int]
 
 
 class Rational(NamedTuple):
@@ -62,12 +63,23 @@ def _all_gaps(s: Corners, t: Corners) -> Iterator[Gap]:
             yield found
 
 
-def _is_least(s: Corners, t: Corners, gap: Gap) -> bool:
-    """Tell whether the triangles lie beyond the planes across the gap through its ends."""
+def walls(gap: Gap) -> tuple[Wall, Wall]:
+    """Return the planes across a gap at its ends: (n, at, size), beyond it is x with n . x size <= at, away from it."""
     (p, p_size), (q, q_size) = gap.p, gap.q
     n = tuple(y * p_size - x * q_size for x, y in zip(p, q))
-    at_p, at_q = dot(n, p), dot(n, q)
-    return all(dot(n, corner) * p_size <= at_p for corner in s) and all(dot(n, corner) * q_size >= at_q for corner in t)
+    return (n, dot(n, p), p_size), (tuple(-x for x in n), -dot(n, q), q_size)
+
+
+def is_beyond(wall: Wall, point: Vector) -> bool:
+    """Tell whether a point lies on or beyond a plane across a gap."""
+    n, at, size = wall
+    return dot(n, point) * size <= at
+
+
+def _is_least(s: Corners, t: Corners, gap: Gap) -> bool:
+    """Tell whether the triangles lie beyond the planes across the gap through its ends."""
+    first, second = walls(gap)
+    return all(is_beyond(first, corner) for corner in s) and all(is_beyond(second, corner) for corner in t)
 
 
 def _gap(s: Corners, t: Corners, first: int, second: int) -> Gap | None:

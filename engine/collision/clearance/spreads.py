@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 from itertools import product
-from math import frexp, isfinite, ldexp, nextafter
+from math import isfinite, nextafter
 from typing import Final
 
 import numpy as np
 
-from engine.collision.clearance.blocks import CLOSER, DONE
+from engine.arrays import FloatArray
+from engine.collision.clearance.blocks import DONE
 from engine.collision.clearance.bodies import feature_of, in_space, radius_of, spread_of
-from engine.collision.clearance.boxes import new_room
-from engine.collision.clearance.exact import nearest_of_triangles
+from engine.collision.clearance.boxes import Room, new_room
+from engine.collision.clearance.exact import Gap, Wall, is_beyond, nearest_of_triangles, walls
 from engine.collision.clearance.result import Clearance
 from engine.collision.clearance.rounded import ScaledGap
-from engine.collision.clearance.traversal import find_nearest
+from engine.collision.clearance.traversal import BEYOND, Asked, find_nearest
 from engine.collision.meshes.exact_body import exact_pair, on_lattice
 from engine.collision.meshes.mesh_arrays import STILL, MeshBody, lattice_shift
 from engine.collision.meshes.placement import PoseArrays
@@ -25,64 +27,76 @@ from engine.solids.base import Solid
 from engine.solids.pose import Pose
 
 _ROOM: Final = 4096
-_LARGEST: Final = 1e300
-"""Coordinates up to here never overflow in the search; beyond it every pair of triangles is a candidate."""
+
+_rooms = threading.local()
+
+
+def _room(n_nodes: int) -> Room:
+    """Return the work space that this thread keeps, for trees of so many nodes."""
+    found: Room | None = getattr(_rooms, "room", None)
+    if found is None or len(found.kept) < n_nodes or len(found.heap.bounds) != _ROOM:
+        found = _rooms.room = new_room(_ROOM, max(n_nodes, 256))
+    return found
 
 
 class SpreadPair:
-    """Two bodies, the second under one of many poses; one thread at a time."""
+    """Two bodies, the second under one of many poses, the first under one or as many; one thread at a time."""
 
     def __init__(
-        self, first: Solid, second: Solid, first_pose: PoseArrays, second_poses: PoseArrays, budget: Budget
+        self, first: Solid, second: Solid, first_poses: PoseArrays, second_poses: PoseArrays, budget: Budget
     ) -> None:
         self.solids = first, second
         self.meshes = spread_of(first), spread_of(second)
-        self.poses = first_pose, second_poses
+        self.poses = first_poses, second_poses
         self.budget = budget
         self.n_exact = 0  # poses that the exact stage was asked about
-        self._room = _ROOM
-        self._work = new_room(_ROOM, max(len(mesh.arrays.child) for mesh in self.meshes))
         self._radii = radius_of(first), radius_of(second)
         a, b = self.meshes
-        self._reach = 4.0 * (a.arrays.extent.reach + b.arrays.extent.reach) + float(
-            np.abs(first_pose.translations).max()
-        )
+        self._room = _room(max(len(a.arrays.child), len(b.arrays.child)))
+        self._reach = 4.0 * (a.arrays.extent.reach + b.arrays.extent.reach) + sum(self._radii)
 
     def clearance(self, item: int) -> Clearance:
         """Return distance, points and features under pose `item`; the bodies have no common point there."""
-        gap, triangles = self._least(item)
+        asked = Asked(np.inf, -1.0, *self._radii, self._reach, True)
+        _, pairs = next(self._left(item, item + 1, np.full(len(self.poses[1].translations), np.nan), asked))
+        gap, triangles = self._least(item, pairs)
         codes = gap.gap.first, gap.gap.second
         first, second = map(feature_of, self.solids, self.meshes, triangles, codes)
         return gap.clearance((first, second), self.solids[0].dimension)
 
-    def distance(self, item: int) -> float:
-        """Return the distance under pose `item`; the bodies have no common point there."""
-        return self._least(item)[0].distance()
+    def fill(self, start: int, stop: int, answers: FloatArray, least: Fraction | None = None) -> None:
+        """Answer for the poses of a range whose answers are NaN: how far apart the triangles are, those of bodies that
+        have no common point; where a distance is given 0.0 if they are nearer than that, else infinity."""
+        if least is None:
+            for item, pairs in self._left(start, stop, answers, Asked(np.inf, -1.0, *self._radii, self._reach, False)):
+                answers[item] = self._least(item, pairs)[0].distance()
+            return
+        limits = _around(least + Fraction(self._radii[0]) + Fraction(self._radii[1]))
+        for item, pairs in self._left(start, stop, answers, Asked(*limits, *self._radii, self._reach, False)):
+            answers[item] = np.inf if self._least(item, pairs)[0].is_at_least(least) else 0.0
 
-    def are_boundaries_clear(self, item: int, least: Fraction) -> bool:
-        """Tell whether all triangles are at least so far apart under pose `item`."""
-        how, pairs = self._candidates(item, *_around(least + Fraction(self._radii[0]) + Fraction(self._radii[1])))
-        if how == CLOSER or not pairs:
-            return how != CLOSER
-        exact = self._exact(item)
-        return all(exact.gap(*row).is_at_least(least) for row in self._polled(pairs))
+    def _left(
+        self, start: int, stop: int, answers: FloatArray, asked: Asked
+    ) -> Iterator[tuple[int, Iterable[Sequence[int]]]]:
+        """Yield the poses that the search leaves, and the candidates: two triangles and two features each.
 
-    def _candidates(self, item: int, most: float, enough: float) -> tuple[int, Iterable[Sequence[int]]]:
-        """Return how the search ended, and its candidates: two triangles and two features each."""
-        (a, b), (pose, poses) = self.meshes, self.poses
-        size = self._reach + float(np.abs(poses.translations[item]).max()) + sum(self._radii)
-        if not size < _LARGEST:
-            return DONE, product(range(len(a.faces)), range(len(b.faces)), (0,), (0,))  # never held all at once
-        unit = ldexp(1.0, -min(max(frexp(size)[1], -1000), 1000))
-        limits = np.array([most * unit, enough * unit if enough > 0.0 else -1.0])
-        while True:  # bound: the room doubles
+        Whoever takes them fills the answer.
+        """
+        (a, b), (own, poses) = self.meshes, self.poses
+        while True:  # bound: an answer is filled, or the room doubles
             with np.errstate(all="ignore"):
-                how, n = find_nearest(a.arrays, pose, b.arrays, poses, item, unit, limits, self._work, self.budget.flag)
+                start, how, n = find_nearest(
+                    a.arrays, own, b.arrays, poses, (start, stop), asked, answers, self._room, self.budget.flag
+                )
             self.budget.check()
-            if how in (DONE, CLOSER):
-                return how, self._work.found.pairs[:n].tolist()
-            self._room *= 2
-            self._work = new_room(self._room, len(self._work.kept))
+            if start == stop:
+                return
+            if how == DONE:
+                yield start, self._room.found.pairs[:n].tolist()
+            elif how == BEYOND:
+                yield start, product(range(len(a.faces)), range(len(b.faces)), (0,), (0,))  # never held all at once
+            else:
+                self._room = new_room(2 * len(self._room.found.bounds), len(self._room.kept))
 
     def _polled(self, pairs: Iterable[Sequence[int]]) -> Iterator[Sequence[int]]:
         for count, row in enumerate(pairs):
@@ -92,20 +106,25 @@ class SpreadPair:
 
     def _exact(self, item: int) -> _ExactPair:
         self.n_exact += 1
-        (a, b), (pose, poses) = self.meshes, self.poses
-        return _ExactPair(a, _pose_at(pose, 0), b, _pose_at(poses, item), self._radii)
+        (a, b), (own, poses) = self.meshes, self.poses
+        return _ExactPair(a, _pose_at(own, min(item, len(own.rotations) - 1)), b, _pose_at(poses, item), self._radii)
 
-    def _least(self, item: int) -> tuple[ScaledGap, tuple[int, int]]:
+    def _least(self, item: int, pairs: Iterable[Sequence[int]]) -> tuple[ScaledGap, tuple[int, int]]:
         """Return the least gap of the candidates, of equal ones that of the smallest faces, and its triangles."""
         exact, (a, b) = self._exact(item), self.meshes
         best: ScaledGap | None = None
         kept, faces = (-1, -1), (-1, -1)
-        for i, j, first, second in self._polled(self._candidates(item, np.inf, -1.0)[1]):
-            found = exact.gap(i, j, first, second)
+        if isinstance(pairs, list) and len(pairs) > 1:
+            pairs.sort(key=lambda row: (int(a.faces[row[0]]), int(b.faces[row[1]])))  # ties fall to the first
+        for i, j, first, second in self._polled(pairs):
             own = int(a.faces[i]), int(b.faces[j])
+            if best is not None and own >= faces and exact.are_beyond(i, j):
+                continue
+            found = exact.gap(i, j, first, second)
             is_less = best is None or found.gap.is_less(best.gap)
             if is_less or (own < faces and best is not None and not best.gap.is_less(found.gap)):
                 best, kept, faces = found, (i, j), own
+                exact.hold(found.gap)
         assert best is not None
         return best, kept
 
@@ -120,6 +139,22 @@ class _ExactPair:
         shift = self._bodies[0].shift
         self._scale = 1 << shift
         self._radii = on_lattice(radii[0], shift), on_lattice(radii[1], shift)
+        self._walls: tuple[Wall, ...] = ()
+        self._beyond: tuple[dict[int, bool], ...] = ()
+
+    def hold(self, gap: Gap) -> None:
+        """Hold triangles against this gap from now on."""
+        self._walls, self._beyond = walls(gap), ({}, {})
+
+    def are_beyond(self, i: int, j: int) -> bool:
+        """Tell whether two triangles are surely no nearer than the gap held; each vertex is looked at once."""
+        for body, wall, known, triangle in zip(self._bodies, self._walls, self._beyond, (i, j)):
+            for vertex in body.mesh.arrays.triangles[triangle].tolist():
+                if vertex not in known:
+                    known[vertex] = is_beyond(wall, body.vertex(vertex))
+                if not known[vertex]:
+                    return False
+        return True
 
     def gap(self, i: int, j: int, first: int, second: int) -> ScaledGap:
         """Return the gap between two triangles."""

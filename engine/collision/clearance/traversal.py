@@ -7,18 +7,22 @@ search once no pair that waits is below it. Now and then each body alone is aske
 that line to be nearer: where that is little, it is measured and nothing is left. What is returned are all pairs of
 triangles whose lower bound does not exceed the least upper bound: the distance of the bodies is that of one of them.
 
+limits (2,) of a search: pairs above the first are not looked for (it falls to the least upper bound found); a pair
+below the second ends it as CLOSER.
+
 Source: G. Hjaltason, H. Samet, Incremental distance join algorithms for spatial databases, 1998 (the order); E. Larsen,
 S. Gottschalk, M. Lin, D. Manocha, Fast distance queries with rectangular swept sphere volumes, 2000 (the descent).
 """
 
 from __future__ import annotations
 
-from typing import Any
+import math
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from engine.collision.clearance.along_line import approach, finish_along_line
-from engine.collision.clearance.blocks import DONE, FULL, INTERRUPTED, block_reach, keep_below, measure_blocks
+from engine.collision.clearance.blocks import CLOSER, DONE, FULL, INTERRUPTED, block_reach, keep_below, measure_blocks
 from engine.collision.clearance.boxes import (
     ROOT,
     Heap,
@@ -31,6 +35,7 @@ from engine.collision.clearance.boxes import (
     lane_half,
     set_line,
 )
+from engine.collision.clearance.refined import refine
 from engine.collision.meshes.mesh_arrays import MeshArrays
 from engine.collision.meshes.placement import PoseArrays, place_pair, turned
 from engine.jit import bare_kernel, inline
@@ -38,6 +43,23 @@ from engine.lanes.boxes import EMPTY
 from engine.lanes.tracing import LANES
 from engine.predicates.vectors import largest_of, length
 from engine.types import Point3
+
+BEYOND: Final = 4
+"""How a search ended that was none: beyond `_LARGEST` sums of coordinates may overflow."""
+_LARGEST: Final = 1e300
+
+
+class Asked(NamedTuple):
+    """What is wanted: the least distance of pairs of triangles up to `most`, or whether some is below `enough`; the
+    radii about the triangles; what bounds sums of coordinates of both bodies but for the translations; whether
+    candidates are wanted where the answer is sure."""
+
+    most: float
+    enough: float
+    radius: float
+    other_radius: float
+    reach: float
+    is_told: bool
 
 
 @inline
@@ -130,27 +152,54 @@ def _search(s: Search, limits: Any, flag: Any) -> tuple[int, int]:
     return DONE, keep_below(s.room.found, n_found, limits[0])
 
 
-@bare_kernel
-def find_nearest(
-    first: MeshArrays, first_pose: PoseArrays, second: MeshArrays, second_poses: PoseArrays, item: int,
-    unit: float, limits: Any, room: Room, flag: Any,
-) -> tuple[int, int]:  # fmt: skip
-    """Fill `room.found` with the pairs of triangles that may be the nearest; return how the search ended, and their
-    number.
-
-    second_poses, item: the pose of the second body is that one of many. unit: a power of two that brings the bodies
-    near 1. limits (2,): pairs above the first are not looked for (it falls to the least upper bound found); a pair
-    below the second ends the search as CLOSER; both times unit.
-    """
-    place, other = place_pair(first.extent, first_pose, 0, second.extent, second_poses, item)
-    a, b = View(first, place, unit), View(second, other, unit)
-    frame, error = frame_of(a, b), 2.0 * unit * (place.error + other.error)
-    s = Search(a, b, frame, error, room)
+@inline
+def _start_line(s: Search) -> None:
+    """Take the line of the middles of both trees to begin with; what was kept for another is of no use."""
     for k in range(11):
         s.room.line[k] = 0.0
-    s.room.line[11] += 1.0  # what was kept is of no use
-    middle = turned(place, frame.shift)  # the line of the middles of both trees, to begin with
+    s.room.line[11] += 1.0
+    middle = turned(s.a.place, s.frame.shift)
     size = length(middle)
     if 0.0 < size < np.inf:
-        set_line(s.room.line, a, b, Point3(middle.x / size, middle.y / size, middle.z / size))
-    return _search(s, limits, flag)
+        set_line(s.room.line, s.a, s.b, Point3(middle.x / size, middle.y / size, middle.z / size))
+
+
+@bare_kernel
+def find_nearest(
+    first: MeshArrays, first_poses: PoseArrays, second: MeshArrays, second_poses: PoseArrays, span: tuple[int, int],
+    asked: Asked, answers: Any, room: Room, flag: Any,
+) -> tuple[int, int, int]:  # fmt: skip
+    """Answer for the poses of both bodies from span[0] to span[1] whose answers (n,) are NaN; the first may have but
+    one.
+
+    Returns the first pose that is left, how its search ended, and the number of the pairs of triangles in `room.found`
+    that may be the nearest; span[1] where none is left. An answer is the double nearest to the distance; where a limit
+    is asked for, 0.0 for a pose that is surely nearer, infinity for one that is surely not.
+    """
+    limits, has_one = room.limits, len(first_poses.translations) == 1
+    for item in range(span[0], span[1]):
+        if answers[item] == answers[item]:
+            continue
+        own = 0 if has_one else item
+        start, move = first_poses.translations[own], second_poses.translations[item]
+        size = max(abs(start[0]), abs(start[1]), abs(start[2]), abs(move[0]), abs(move[1]), abs(move[2]))
+        size = asked.reach + 2.0 * size
+        if not size < _LARGEST:
+            return item, BEYOND, 0
+        unit = math.ldexp(1.0, -min(max(math.frexp(size)[1], -1000), 1000))
+        limits[0], limits[1] = asked.most * unit, (asked.enough * unit if asked.enough > 0.0 else -1.0)
+        place, other = place_pair(first.extent, first_poses, own, second.extent, second_poses, item)
+        radii = asked.radius * unit, asked.other_radius * unit
+        a, b = View(first, place, unit), View(second, other, unit)
+        s = Search(a, b, frame_of(a, b), 2.0 * unit * (place.error + other.error), room)
+        _start_line(s)
+        how, n = _search(s, limits, flag)
+        if how == CLOSER or (how == DONE and n == 0):
+            answers[item] = 0.0 if how == CLOSER else np.inf
+        elif how == DONE and asked.most == np.inf:
+            distance, n = refine(s, start, move, radii, n)
+            if distance > 0.0:
+                answers[item] = distance
+        if answers[item] != answers[item] or asked.is_told:
+            return item, how, n
+    return span[1], DONE, 0

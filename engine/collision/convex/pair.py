@@ -42,8 +42,7 @@ LARGEST_ERROR = 2.0**250
 def relate_convex(
     pool: ConvexArrays, first: int, second: int, a: PlacedBody, b: PlacedBody, is_boolean: bool, may_be_equal: bool
 ) -> int:
-    """Return the relation of two convex bodies, or UNSETTLED; is_boolean: OVERLAPPING for all that is not disjoint;
-    may_be_equal: OVERLAPPING for bodies that may be equal too."""
+    """Return the relation or UNSETTLED; OVERLAPPING for all that meet if is_boolean, for equal ones if may_be_equal."""
     error = a.place.error + b.place.error
     if not error < LARGEST_ERROR:
         return UNSETTLED

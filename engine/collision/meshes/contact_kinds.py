@@ -1,4 +1,4 @@
-"""Compiled: how faces in contact meet (the kind of a witness), and whether a plane separates the bodies behind them.
+"""Compiled: how faces in contact meet (the kind of a witness).
 
 As `exact_triangles.kind_of_contact`. An edge of t passes the open face u where its ends lie on two sides of u's plane
 and u's edges turn one way about it, or where it lies in that plane with corners of u on both sides. Open edges cross
@@ -12,22 +12,19 @@ from typing import Any
 import numpy as np
 
 from engine.collision.codes import UNSETTLED
-from engine.collision.meshes.dual_traversal import store_pose
-from engine.collision.meshes.mesh_arrays import MeshArrays, triangle_of
-from engine.collision.meshes.placement import PoseArrays
-from engine.collision.meshes.separating_plane import are_separated
 from engine.collision.meshes.triangle_triangle import (
     PosedTriangle,
     beside,
     corner,
+    is_same,
+    is_straddling,
     separation,
     sign_of_four,
     turn_in_plane,
-    with_pose,
 )
 from engine.collision.result import Kind
-from engine.jit import called, kernel
-from engine.predicates.posed import UNPOSED, PosedPoint3, posed_error
+from engine.jit import called, inline
+from engine.predicates.posed import UNPOSED, PosedPoint3
 from engine.types import UNDECIDED
 
 STRENGTH: tuple[Kind, ...] = ("face_face", "edge_face", "vertex_face", "edge_edge", "vertex_edge", "vertex_vertex")
@@ -35,8 +32,9 @@ STRENGTH: tuple[Kind, ...] = ("face_face", "edge_face", "vertex_face", "edge_edg
 FACE_FACE, EDGE_FACE, VERTEX_FACE, EDGE_EDGE, VERTEX_EDGE, VERTEX_VERTEX = range(6)
 N_NAMED = 32
 
-_BAD = 9
-"""Place in the work space, after nine turns, that says that a sign was open."""
+_BAD, FLUSH, N_SIGNS = 9, 10, 11
+"""Places in the work space, after nine turns: that a sign was open; the corners that lie in the plane of the other
+face, three bits for each face."""
 
 
 @called
@@ -65,8 +63,7 @@ def _turn(
 def _against_face(
     poses: Any, t: PosedTriangle, sides: tuple[int, int, int], u: PosedTriangle, axis: int, error: float, work: Any
 ) -> int:
-    """Return EDGE_FACE or VERTEX_FACE for what of t meets the open face u, else VERTEX_VERTEX for a common corner, else
-    VERTEX_EDGE. sides: of t's corners, by the plane of u."""
+    """Return how t, at these sides of u's plane, meets the open face u: EDGE_FACE, VERTEX_FACE; or by corners."""
     off, flat = beside(u, axis), axis if (t.p.pose == UNPOSED and u.p.pose == UNPOSED) else -1
     if not np.isfinite(off.x + off.y + off.z):
         work[_BAD] = 1
@@ -111,8 +108,7 @@ def _against_face(
 def _overlap_on_line(
     poses: Any, t: PosedTriangle, k: int, c: PosedPoint3, d: PosedPoint3, axis: int, error: float, work: Any
 ) -> bool:
-    """Tell whether edge k of t and c d, both on one line, share a length: some of c and d lies on the inner side of
-    either end, by planes through it and off the line."""
+    """Tell whether edge k of t and c d, on one line, share a length, by planes through either end and off the line."""
     a, b, apex, off = corner(t, k), corner(t, k + 1), corner(t, k + 2), beside(t, axis)
     for end in range(2):
         p, q = (a, b) if end == 0 else (b, a)
@@ -170,9 +166,21 @@ def _open_edges_meet(
     return False
 
 
+@inline
+def lone_zero(sides: tuple[int, int, int]) -> int:
+    """Return the corner of a face that alone lies on a plane, the others strictly on one side of it; -1 for none."""
+    for k in range(3):
+        if sides[k] == 0 and sides[(k + 1) % 3] * sides[(k + 2) % 3] == 1:
+            return k
+    return -1
+
+
 @called
-def kind_of(poses: Any, t: PosedTriangle, axis: int, u: PosedTriangle, their_axis: int, error: float, work: Any) -> int:
-    """Return the kind of the contact of two faces with area, UNSETTLED where a sign is open."""
+def kind_of(
+    poses: Any, t: PosedTriangle, axis: int, u: PosedTriangle, their_axis: int, error: float, work: Any
+) -> tuple[int, bool]:
+    """Return the kind of the contact of two faces with area, UNSETTLED where a sign is open, and whether it may cut an
+    open face: False where all that they share is one point, or on the borders of both. Sets FLUSH."""
     work[_BAD] = 0
     sides = (
         _side(poses, u.p, u.q, u.r, t.p, error, work),
@@ -184,10 +192,21 @@ def kind_of(poses: Any, t: PosedTriangle, axis: int, u: PosedTriangle, their_axi
         _side(poses, t.p, t.q, t.r, u.q, error, work),
         _side(poses, t.p, t.q, t.r, u.r, error, work),
     )
-    if work[_BAD] == 0 and sides[0] == 0 and sides[1] == 0 and sides[2] == 0:
+    work[FLUSH] = 0
+    for k in range(3):
+        work[FLUSH] |= int(sides[k] == 0) << k | int(their_sides[k] == 0) << 3 + k
+    if work[_BAD] != 0:
+        return UNSETTLED, True
+    own, their = lone_zero(sides), lone_zero(their_sides)
+    for k in range(3):
+        if (own >= 0 and is_same(corner(t, own), corner(u, k))) or (
+            their >= 0 and is_same(corner(u, their), corner(t, k))
+        ):
+            return VERTEX_VERTEX, False
+    if sides[0] == 0 and sides[1] == 0 and sides[2] == 0:
         how = separation(poses, t, u, axis, error)
         if how == UNDECIDED or how < 0:
-            return UNSETTLED if how == UNDECIDED else FACE_FACE
+            return UNSETTLED if how == UNDECIDED else FACE_FACE, True
     one = _against_face(poses, t, sides, u, their_axis, error, work)
     other = _against_face(poses, u, their_sides, t, axis, error, work)
     found = min(one, other)
@@ -195,35 +214,11 @@ def kind_of(poses: Any, t: PosedTriangle, axis: int, u: PosedTriangle, their_axi
         found = EDGE_EDGE
     elif found > VERTEX_FACE:
         found = max(one, other)  # a common corner, if there is one
-    return UNSETTLED if work[_BAD] != 0 else found
-
-
-@kernel
-def judge_contacts(
-    first: MeshArrays,
-    first_pose: PoseArrays,
-    second: MeshArrays,
-    second_pose: PoseArrays,
-    contacts: Any,
-    wants_plane: bool,
-    kinds: Any,
-    flag: Any,
-) -> bool:
-    """Tell whether a plane is known to separate the bodies, if asked; fill kinds (n,) int8 of the first n contacts.
-
-    UNSETTLED stands for what is open. Beyond a contact of FACE_FACE, than which nothing is stronger, nothing is filled.
-    """
-    poses, work = np.zeros((2, 12)), np.zeros(10, np.int8)
-    store_pose(poses, 0, first_pose, 0)
-    store_pose(poses, 1, second_pose, 0)
-    own, their = 0 if first_pose.is_posed else UNPOSED, 1 if second_pose.is_posed else UNPOSED
-    error = max(posed_error(poses, own, first.extent.reach), posed_error(poses, their, second.extent.reach))
-    for item in range(kinds.shape[0]):
-        i, j = contacts[item, 0], contacts[item, 1]
-        kinds[item] = UNSETTLED
-        if first.axis[i] >= 0 and second.axis[j] >= 0:
-            t, u = with_pose(triangle_of(first, i), own), with_pose(triangle_of(second, j), their)
-            kinds[item] = kind_of(poses, t, int(first.axis[i]), u, int(second.axis[j]), error, work)
-        if kinds[item] == FACE_FACE or flag[0] != 0:
-            break
-    return wants_plane and are_separated(poses, first, own, second, their, contacts, error, flag)
+    if work[_BAD] != 0:
+        return UNSETTLED, True
+    if own >= 0 or their >= 0 or found == VERTEX_VERTEX:
+        return found, False
+    # case: both straddle and are cut by the line of their planes in one and the same segment; no corner is common then
+    are_across = is_straddling(sides[0], sides[1], sides[2])
+    are_across = are_across and is_straddling(their_sides[0], their_sides[1], their_sides[2])
+    return found, found <= VERTEX_FACE or are_across

@@ -17,9 +17,16 @@ import numpy as np
 from engine.arrays import FlagArray, Float32Array, FloatArray, Int8Array, Int32Array, IntArray
 from engine.bounding.bvh import MAX_DEPTH
 from engine.collision.meshes.face_state import proves_overlap, state_of
-from engine.collision.meshes.frames import defect_of, set_frame
 from engine.collision.meshes.mesh_arrays import STATE_CLEAN, MeshArrays, triangle_of
-from engine.collision.meshes.placement import Placement, PoseArrays, place_pair, placed, placed_axis
+from engine.collision.meshes.placement import (
+    Placement,
+    PoseArrays,
+    defect_of,
+    place_pair,
+    placed,
+    placed_axis,
+    set_frame,
+)
 from engine.collision.meshes.triangle_triangle import (
     APART,
     CROSSING,
@@ -61,7 +68,7 @@ class Descent(NamedTuple):
     stack (STACK_ROWS, 2) int32: pairs of nodes. rest (5,) int64: pairs waiting; then, of the pair of blocks at hand,
     nodes i, j and the two halves of the bits of `faces_meeting` not looked at yet. frames (2, 22, 8) float32: see
     `lanes/boxes.py`. work (28, 8) float32: of `lanes/discs.py` and `lanes/faces.py`, for one pair of nodes. poses (2,
-    12) float64: rotation and translation of either body, for exact signs.
+    12) float64: rotation and translation of either body, for exact signs. signs (11,) int8: of `contact_kinds.py`.
     """
 
     stack: Int32Array
@@ -69,6 +76,7 @@ class Descent(NamedTuple):
     frames: Float32Array
     work: Float32Array
     poses: FloatArray
+    signs: Int8Array
 
 
 class Found(NamedTuple):
@@ -107,6 +115,7 @@ def new_descent() -> Descent:
         np.empty((2, FRAME_ROWS, LANES), np.float32),
         np.empty((WORK_ROWS, LANES), np.float32),
         np.zeros((2, 12)),
+        np.zeros(11, np.int8),
     )
 
 
@@ -140,16 +149,14 @@ def place_bodies(
     is_apart = set_frame(descent.frames[0], a, first.origin, first.scale, b, second.origin, second.scale, defect)
     if not is_apart:
         is_apart = set_frame(descent.frames[1], b, second.origin, second.scale, a, first.origin, first.scale, defect)
-    error = max(a.error, b.error)
     exact_error = 0.0
-    if error != 0.0:
+    if first_pose.is_posed:
         store_pose(descent.poses, 0, first_pose, first_item)
+        exact_error = posed_error(descent.poses, 0, first.extent.reach)
+    if second_pose.is_posed:
         store_pose(descent.poses, 1, second_pose, second_item)
-        if first_pose.is_posed:
-            exact_error = posed_error(descent.poses, 0, first.extent.reach)
-        if second_pose.is_posed:
-            exact_error = max(exact_error, posed_error(descent.poses, 1, second.extent.reach))
-    return Place(a, b, error, exact_error), is_apart
+        exact_error = max(exact_error, posed_error(descent.poses, 1, second.extent.reach))
+    return Place(a, b, max(a.error, b.error), exact_error), is_apart
 
 
 @inline
@@ -168,8 +175,7 @@ def placed_triangle(t: Triangle3, place: Placement) -> Triangle3:
 
 @called
 def settle_class(s: Search, i: int, j: int) -> int:
-    """Return the class of two faces that `classify_near` leaves open; UNDECIDED where one has no area or exponents
-    leave the range."""
+    """Return the class of two faces that `classify_near` leaves open; UNDECIDED without area, or out of range."""
     place, poses = s.place, s.descent.poses
     if s.first.axis[i] < 0 or s.second.axis[j] < 0:
         return UNDECIDED
@@ -275,10 +281,7 @@ def replace_pair(s: Search, i: int, j: int, n_stack: int) -> tuple[int, int, int
 
 @inline
 def search(s: Search) -> tuple[int, int]:
-    """Write the pairs of faces that are not apart and their classes; return how the search ended and their number.
-
-    A pair that settles what is sought is written to row 0.
-    """
+    """Write the pairs of faces not apart and their classes, one that settles to row 0; return how it ended, n."""
     stack, rest = s.descent.stack, s.descent.rest
     n_stack, n_pairs = rest[0], 0
     i, j, low, high = rest[1], rest[2], rest[3], rest[4]

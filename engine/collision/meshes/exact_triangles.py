@@ -138,8 +138,7 @@ def classify_exact(t1: Corners, t2: Corners, plane1: Plane | None = None, plane2
 
 
 def _lone_first(t: Corners, sides: list[int]) -> tuple[Corners, int]:
-    """Return a triangle with the vertex first that has one closed side of a plane for itself, and that side: see
-    `triangle_triangle.lone_vertex`."""
+    """Return a triangle with its lone vertex first, and the side of that: see `triangle_triangle.lone_vertex`."""
     lone = next((one for one in (1, -1) if sides.count(one) == 1), 0)
     k = sides.index(lone)
     return (t[k], t[k - 2], t[k - 1]), lone or -sides[k - 1]
@@ -163,8 +162,7 @@ def separation_exact(t1: Corners, t2: Corners, plane: Plane) -> int:
 
 
 def kind_of_contact(t1: Corners, t2: Corners, plane1: Plane, plane2: Plane) -> Kind:
-    """Return the kind of the contact of two faces that meet, in these planes: the one of highest dimension that
-    occurs."""
+    """Return the kind of the contact of two faces that meet, in these planes: the one of highest dimension."""
     s1, s2 = as_simplex(t1), as_simplex(t2)
     values1, values2 = [value_at(plane2, p) for p in s1], [value_at(plane1, p) for p in s2]
     if len(s1) == len(s2) == 3 and not any(values2) and separation_exact(t1, t2, plane1) < 0:
@@ -198,8 +196,7 @@ def _is_in_open_face(p: Vector, t: tuple[Vector, ...], plane: Plane) -> bool:
 
 
 def _edge_meets_open_face(s: tuple[Vector, ...], values: list[int], t: tuple[Vector, ...], plane: Plane) -> bool:
-    """Tell whether some open edge of s, corners at these values of the plane, meets the relative interior of a
-    triangle t with area."""
+    """Tell whether an open edge of s, corners at these values of the plane, meets the open face t."""
     if len(t) < 3:
         return False
     for i in range(len(s) if len(s) == 3 else len(s) - 1):

@@ -117,10 +117,7 @@ def is_corner(mesh: MeshArrays, face: int, other: int, corner: int) -> bool:
 
 @inline
 def state_of(mesh: MeshArrays, face: int, poses: Any) -> int:
-    """Return the state of a face, computed at the first question; a face without area counts as stacked.
-
-    poses: any (n, 12) float64; nothing here has a pose.
-    """
+    """Return the state of a face, kept once computed; stacked without area. poses: any (n, 12), nothing has a pose."""
     if mesh.state[face] == STATE_UNKNOWN:
         mesh.state[face] = state_among(mesh, face, poses) if mesh.axis[face] >= 0 else STATE_STACKED
     return int(mesh.state[face])

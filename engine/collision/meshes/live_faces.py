@@ -6,7 +6,7 @@ the plane it shares with those that cover it, into regions; a region covered an 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -18,13 +18,48 @@ from engine.arrangement.subdivision import label_faces, subdivide
 from engine.collision.exact_images import Vector
 from engine.collision.meshes.face_state import states_of
 from engine.collision.meshes.mesh_arrays import NO_AREA, STATE_STACKED, MeshBody
-from engine.collision.simple.feature_distance import segment_distance, simplex_distance
 from engine.parallel import Budget
 from engine.predicates.exact_vectors import cross, dot, largest_axis, minus, squared_length
 from engine.predicates.rational import orient2d_rational, orient3d_rational
 
 Point2 = tuple[Fraction, Fraction]
 IN_FACE, IN_ODD, LIVE = 1, 2, 3
+
+
+def segment_distance(point: Vector, a: Vector, b: Vector) -> Fraction:
+    """Return the squared distance from `point` to the closed segment a b, which may be a point."""
+    along, to_point = minus(b, a), minus(point, a)
+    length = squared_length(along)
+    if length == 0:
+        return squared_length(to_point)
+    t = dot(to_point, along)
+    if t <= 0:
+        return squared_length(to_point)
+    if t >= length:
+        return squared_length(minus(point, b))
+    return squared_length(to_point) - t * t / length
+
+
+def simplex_distance(point: Vector, corners: Sequence[Vector]) -> Fraction:
+    """Return the squared distance from `point` to the closed segment or triangle of these corners."""
+    return segment_distance(point, *corners) if len(corners) == 2 else triangle_distance(point, *corners)
+
+
+def triangle_distance(point: Vector, a: Vector, b: Vector, c: Vector) -> Fraction:
+    """Return the squared distance from `point` of space to the closed triangle a b c, which may be degenerate.
+
+    Over the open triangle it is the distance to the plane, elsewhere that to the nearest edge.
+    """
+    normal = cross(minus(b, a), minus(c, a))
+    size = squared_length(normal)
+    if size != 0:
+        corners = (a, b, c)
+        inner = (
+            dot(cross(minus(corners[(k + 1) % 3], corners[k]), minus(point, corners[k])), normal) >= 0 for k in range(3)
+        )
+        if all(inner):
+            return dot(normal, minus(point, a)) ** 2 / size
+    return min(segment_distance(point, a, b), segment_distance(point, b, c), segment_distance(point, c, a))
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ inside. All arrays are in the body's own coordinates: poses are applied where a 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import frexp, ldexp
 from typing import Any, NamedTuple
 
@@ -56,7 +56,8 @@ class MeshArrays(NamedTuple):
     """What kernels take; boxes to scale: the tree (`bvh.py`); blocks, discs: what its blocks (`lanes/faces.py`) and its
     inner nodes (`lanes/discs.py`) hold beside boxes, the rows of the other kind not set. `state` is filled by kernels
     as needed: any thread writes the same values. components: of the triangles connected through vertices, one triangle
-    each, ascending. has_inside: False for surfaces and flat boxes."""
+    each, ascending. faces: the caller's face of each triangle; first_face: the least in the first component.
+    has_inside: False for surfaces and flat boxes."""
 
     vertices: FloatArray
     triangles: IntArray
@@ -70,19 +71,24 @@ class MeshArrays(NamedTuple):
     scale: float
     extent: Extent
     components: IntArray
+    faces: IntArray
+    first_face: int
     has_inside: bool
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeshBody:
-    """Triangles of one body.
-
-    arrays: for kernels. faces: the caller's face of each triangle. shift: every coordinate times 2^shift is an integer.
-    """
+    """Triangles of one body. arrays: for kernels; shift: every coordinate times 2^shift is an integer; inner: of clean
+    faces asked for so far, whether the body lies on the side of the normal, and on the other."""
 
     arrays: MeshArrays
-    faces: IntArray
     shift: int
+    inner: dict[int, tuple[bool, bool]] = field(default_factory=dict)
+
+    @property
+    def faces(self) -> IntArray:
+        """The caller's face of each triangle."""
+        return self.arrays.faces
 
     @property
     def has_inside(self) -> bool:
@@ -119,7 +125,7 @@ def mesh_body_of_triangles(vertices: FloatArray, triangles: IntArray, faces: Int
     Triangles and vertices are copied in the order of the tree: the faces near a contact then lie side by side in
     memory, which a large mesh, asked at another place by every pose, needs more than anything else.
     """
-    vertices, triangles = read_only(vertices), read_only(triangles)
+    vertices, triangles, faces = read_only(vertices), read_only(triangles), read_only(faces)
     n_triangles = len(triangles)
     boxes = np.empty((n_triangles, 6))
     _fill_boxes(vertices, triangles, boxes)
@@ -128,7 +134,9 @@ def mesh_body_of_triangles(vertices: FloatArray, triangles: IntArray, faces: Int
     ordered, axis = np.empty((n_triangles, 3), np.int64), np.empty(n_triangles, np.int8)
     used, components = np.empty((len(vertices), 3)), np.empty(n_triangles, np.int64)
     with np.errstate(over="ignore", invalid="ignore", under="ignore"):  # uncompiled runs only
-        n_used, n_components = _lay_out(vertices, triangles, child, order, ordered, used, axis, components)
+        n_used, n_components, first_face = _lay_out(
+            vertices, triangles, faces, child, order, ordered, used, axis, components
+        )
         reach, lowest_bit, shift = _lattice_of(used[:n_used])
     blocks = np.empty((len(child), CORNER_ROWS, WIDTH), np.float32)
     _fill_blocks(used, ordered, child, tree.origin, tree.scale, blocks)
@@ -147,9 +155,11 @@ def mesh_body_of_triangles(vertices: FloatArray, triangles: IntArray, faces: Int
         tree.scale,
         Extent(reach, ldexp(1.0, lowest_bit)),
         components[:n_components].copy(),
+        faces[order],
+        first_face,
         has_inside,
     )
-    return MeshBody(arrays, faces[order], shift)
+    return MeshBody(arrays, shift)
 
 
 @kernel
@@ -165,9 +175,18 @@ def _fill_boxes(vertices: Any, triangles: Any, boxes: Any) -> None:
 
 @kernel
 def _lay_out(
-    vertices: Any, triangles: Any, child: Any, order: Any, ordered: Any, used: Any, axis: Any, components: Any
-) -> tuple[int, int]:
-    """Renumber triangles and vertices in the order of the tree; return the numbers of vertices and components.
+    vertices: Any,
+    triangles: Any,
+    faces: Any,
+    child: Any,
+    order: Any,
+    ordered: Any,
+    used: Any,
+    axis: Any,
+    components: Any,
+) -> tuple[int, int, int]:
+    """Renumber triangles and vertices in the order of the tree; return the numbers of vertices and components, and the
+    least face connected with the first triangle.
 
     child: of the tree, items renumbered. order (n,): the old number of each triangle; ordered (n, 3): its vertices;
     used (n_vertices, 3): their coordinates; axis (n,): `axis_of`; components: the first triangle of each.
@@ -195,13 +214,16 @@ def _lay_out(
     parent = np.empty(n_used, np.int64)
     _join(ordered, np.zeros(n_triangles, np.bool_), parent)
     number[:n_used] = 0
+    first_face = faces[order[0]]
     for item in range(n_triangles):
         root = parent[ordered[item, 0]]
+        if root == parent[ordered[0, 0]]:
+            first_face = min(first_face, faces[order[item]])
         if number[root] == 0:
             number[root] = 1
             components[n_components] = item
             n_components += 1
-    return n_used, n_components
+    return n_used, n_components, first_face
 
 
 @kernel

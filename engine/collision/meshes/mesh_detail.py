@@ -17,8 +17,8 @@ import numpy as np
 
 from engine.arrays import FloatArray, IntArray
 from engine.collision.meshes.exact_regions import Sides, even_sides, regions_of, sides_at, sides_within
-from engine.collision.meshes.face_contacts import find_all_contacts
 from engine.collision.meshes.mesh_arrays import STATE_CLEAN, MeshBody, mesh_body_of
+from engine.collision.meshes.mesh_mesh import find_all_contacts
 from engine.collision.meshes.mesh_pair import MeshPair, met_by_face, simplest
 from engine.collision.meshes.parity import INSIDE, OUTSIDE
 from engine.collision.result import Parts, Work
@@ -97,7 +97,7 @@ class _OverlappingPair(MeshPair):
             return
         is_clean = self.state(own, face) == STATE_CLEAN
         if is_clean and all(even_sides(body, face, other, met)):
-            sides = sides_within(body, face, other)
+            sides = sides_within(body, face, other, met)
             if sides is not None:
                 self._see(own, *sides)
                 return

@@ -12,7 +12,7 @@ import numpy as np
 
 from engine.arrays import Int8Array, IntArray
 from engine.collision.codes import UNSETTLED
-from engine.collision.meshes.contact_kinds import FACE_FACE, N_NAMED, STRENGTH, judge_contacts
+from engine.collision.meshes.contact_kinds import FACE_FACE, N_NAMED, STRENGTH
 from engine.collision.meshes.dual_traversal import (
     SEEK_CONTACT,
     SEEK_OVERLAP,
@@ -25,6 +25,7 @@ from engine.collision.meshes.exact_triangles import kind_of_contact
 from engine.collision.meshes.face_state import states_of
 from engine.collision.meshes.mesh_arrays import NO_AREA, STATE_STACKED, MeshBody, join_vertices, mesh_body_of_triangles
 from engine.collision.meshes.parity import INSIDE, OUTSIDE, locate_vertices
+from engine.collision.meshes.touching import ONLY_TOUCHING, judge_contacts
 from engine.collision.result import Witness, Work
 from engine.solids.pose import Pose
 from engine.types import UNDECIDED
@@ -94,8 +95,7 @@ class MeshPair:
         self.posed = (first.posed(first_pose), second.posed(second_pose))
         self.work = work
         self.seek = what_to_seek(first, second, work)
-        self.is_disjoint = False
-        self._is_parted = False
+        self._only_touch = False
         self._judged: tuple[IntArray, Int8Array] | None = None
         self._exact: tuple[ExactBody, ExactBody] | None = None
 
@@ -106,29 +106,28 @@ class MeshPair:
             self._exact = exact_pair(self.meshes[0], self.poses[0], self.meshes[1], self.poses[1])
         return self._exact
 
-    def is_separated(self, contacts: IntArray) -> bool:
-        """Tell whether a plane through faces or edges in contact is known to separate the bodies, once it is."""
-        self._judge(contacts, wants_plane=not self._is_parted)
-        return self._is_parted
-
-    def _judge(self, contacts: IntArray, *, wants_plane: bool) -> Int8Array:
-        """Look for a plane and at the kinds of the first contacts; return these kinds."""
+    def judge(self, contacts: IntArray, *, are_all: bool) -> int:
+        """Say what contacts prove (`judge_contacts`), ONLY_TOUCHING once it is known; keep the kinds of the first."""
         kinds = np.full(min(N_NAMED, len(contacts)) if self.work.witness else 0, UNSETTLED, np.int8)
         self._judged = contacts, kinds
         (first, second), (a, b), flag = self.meshes, self.posed, self.work.budget.flag
-        parted = judge_contacts(first.arrays, a, second.arrays, b, contacts, wants_plane, kinds, flag)
-        self._is_parted |= bool(parted)
+        found = judge_contacts(
+            first.arrays, a, second.arrays, b, contacts, are_all and not self._only_touch, kinds, flag
+        )
+        self._only_touch |= found == ONLY_TOUCHING
         self.work.budget.check()
-        return kinds
+        return ONLY_TOUCHING if self._only_touch else int(found)
 
     def named(self, contacts: IntArray, *, piercing: bool = False) -> Witness | None:
         """Return the strongest of the first contacts, of equal ones that of the first faces; None if none is asked."""
         if not self.work.witness:
             return None
-        judged, found = self._judged, []
-        is_judged = judged is not None and judged[0] is contacts
-        kinds = (judged[1] if judged and is_judged else self._judge(contacts, wants_plane=False)).tolist()
-        for kind, (i, j) in zip(kinds[: kinds.index(FACE_FACE) + 1 if FACE_FACE in kinds else None], contacts.tolist()):
+        if self._judged is None or self._judged[0] is not contacts:
+            self.judge(contacts, are_all=False)
+        assert self._judged is not None
+        kinds, found = self._judged[1].tolist(), []
+        n = kinds.index(FACE_FACE) + 1 if FACE_FACE in kinds else len(kinds)
+        for kind, (i, j) in zip(kinds[:n], contacts[:n].tolist()):
             if kind == UNSETTLED:
                 self.work.budget.check()
                 a, b = self.exact
@@ -144,10 +143,7 @@ class MeshPair:
         return int(self.states(own, np.array([face]))[0])
 
     def patches(self, own: int, in_contact: IntArray, place: int) -> list[IntArray]:
-        """Return the patches of one body, away from its faces in contact, that lie INSIDE or OUTSIDE the other body.
-
-        A patch: faces (n,) connected through vertices.
-        """
+        """Return the patches (connected faces without contact) of one body that lie INSIDE or OUTSIDE the other."""
         mesh, other = self.meshes[own], self.meshes[1 - own]
         if not other.has_inside:
             return []

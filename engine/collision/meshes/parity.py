@@ -14,11 +14,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from engine.collision.meshes.face_state import SLACK, STACK_ROWS
-from engine.collision.meshes.frames import defect_of
 from engine.collision.meshes.mesh_arrays import MeshArrays, in_tree, triangle_of
 from engine.collision.meshes.placement import (
     Placement,
     PoseArrays,
+    defect_of,
     orient2d_near,
     orient3d_near,
     place_pair,
@@ -60,8 +60,7 @@ def moved_side(a: Point3, b: Point3, q: Point3, error: float) -> int:
 
 @inline
 def half_line_crosses(t: Triangle3, q: Point3, error: float) -> int:
-    """Return where the moved vertical line through q meets t: above q 1, below -1, at q 0, else MISSED; or
-    UNDECIDED."""
+    """Return where the moved vertical line through q meets t: above q 1, below -1, at q 0; MISSED or UNDECIDED."""
     p_side = moved_side(t.p, t.q, q, error)
     q_side = moved_side(t.q, t.r, q, error)
     r_side = moved_side(t.r, t.p, q, error)

@@ -169,14 +169,20 @@ def corner(t: PosedTriangle, index: int) -> PosedPoint3:
 
 
 @inline
+def is_same(p: PosedPoint3, q: PosedPoint3) -> bool:
+    """Tell whether two points of one pose coincide."""
+    return p.x == q.x and p.y == q.y and p.z == q.z and p.pose == q.pose
+
+
+@inline
 def sign_of_four(poses: Any, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d: PosedPoint3, error: float) -> int:
     """Return `orient3d_posed`; 0 at once for a repeated point, or a common coordinate, of one pose."""
+    if is_same(a, d) or is_same(b, d) or is_same(c, d) or is_same(a, b) or is_same(a, c) or is_same(b, c):
+        return 0
     if a.pose == d.pose and b.pose == d.pose and c.pose == d.pose:
-        ax, ay, az, bx, by, bz = a.x == d.x, a.y == d.y, a.z == d.z, b.x == d.x, b.y == d.y, b.z == d.z
-        cx, cy, cz = c.x == d.x, c.y == d.y, c.z == d.z
-        if (ax and bx and cx) or (ay and by and cy) or (az and bz and cz):
+        if (a.x == d.x and b.x == d.x and c.x == d.x) or (a.y == d.y and b.y == d.y and c.y == d.y):
             return 0
-        if (ax and ay and az) or (bx and by and bz) or (cx and cy and cz):
+        if a.z == d.z and b.z == d.z and c.z == d.z:
             return 0
     return orient3d_posed(poses, a, b, c, d, error)
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from engine.arrays import Int8Array, IntArray
+from engine.arrays import BoolArray, Int8Array, IntArray
 from engine.collision.codes import UNSETTLED
 from engine.collision.convex.body import ConvexArrays, ConvexBody, convex_body_of, pooled
 from engine.collision.convex.pair import relate_convex_pairs
@@ -16,57 +17,55 @@ from engine.collision.meshes.mesh_arrays import STILL
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.planar.outline_batch import OutlineArrays, outline_pool, relate_outline_pairs
 from engine.collision.scenes.bodies import SceneBodies
-from engine.collision.simple.aabb_aabb import relate_box_pairs
+from engine.collision.simple.closed_forms import relate_box_pairs
 from engine.parallel import Budget, run_chunks
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 
 
+@dataclass(slots=True, eq=False)
 class SceneBatches:
-    """Which bodies of a scene the batches take, and the arrays that they want."""
+    """Which bodies of a scene the batches take, and the arrays that they want, made when they are."""
 
-    def __init__(self, bodies: SceneBodies, boolean: bool, detail: bool, budget: Budget) -> None:
-        self._bodies = bodies
-        self._boolean = boolean
-        self._detail = detail
-        self._budget = budget
-        is_box = np.array([isinstance(solid, Aabb) for solid in bodies.distinct], np.bool_)
-        self._is_box = is_box[bodies.kinds] & ~bodies.is_posed
-        self._pool: ConvexArrays | None = None
-        self._convex = np.full(len(bodies.solids), -1, np.int64)
-        self._outlines: OutlineArrays | None = None
-        self._simple = self._convex
+    bodies: SceneBodies
+    _is_box: BoolArray = field(init=False)
+    _pool: tuple[ConvexArrays, IntArray] | None = None
+    _outlines: tuple[OutlineArrays, IntArray] | None = None
 
-    def relations(self, pairs: IntArray, workers: int | None) -> Int8Array:
+    def __post_init__(self) -> None:
+        """Note which bodies are boxes that stand where their solid does."""
+        is_box = np.array([isinstance(solid, Aabb) for solid in self.bodies.distinct], np.bool_)
+        self._is_box = is_box[self.bodies.kinds] & ~self.bodies.is_posed
+
+    def relations(self, pairs: IntArray, boolean: bool, detail: bool, budget: Budget, workers: int | None) -> Int8Array:
         """Return the relations ``(n,)`` of pairs ``(n, 2)`` of bodies, UNSETTLED where no batch decides."""
         found = np.full(len(pairs), UNSETTLED, np.int8)
-        bodies, flag = self._bodies, self._budget.flag
+        bodies, flag = self.bodies, budget.flag
         relate_box_pairs(bodies.low, bodies.high, self._is_box, pairs, found)
         if bodies.dimension == 2:
-            self._relate_outlines(pairs, found, workers)
-        elif (found == UNSETTLED).any():
-            self._prepare()
-        pool = self._pool
-        if pool is None:
+            self._relate_outlines(pairs, found, budget, workers)
             return found
-        rows, poses = np.append(np.int64(-1), self._convex), PoseArrays(bodies.rotations, bodies.translations, True)
+        if not (found == UNSETTLED).any():
+            return found
+        pool, convex = self._pool or self._prepared(budget)
+        rows, poses = np.append(np.int64(-1), convex), PoseArrays(bodies.rotations, bodies.translations, True)
 
         def task(start: int, stop: int) -> None:
             with np.errstate(all="ignore"):  # uncompiled runs only
                 relate_convex_pairs(
-                    pool, rows, poses, pairs[start:stop] + 1, self._boolean, not self._detail, found[start:stop], flag
+                    pool, rows, poses, pairs[start:stop] + 1, boolean, not detail, found[start:stop], flag
                 )
 
-        run_chunks(task, len(pairs), budget=self._budget, workers=workers)
+        run_chunks(task, len(pairs), budget=budget, workers=workers)
         return found
 
-    def _relate_outlines(self, pairs: IntArray, found: Int8Array, workers: int | None) -> None:
+    def _relate_outlines(self, pairs: IntArray, found: Int8Array, budget: Budget, workers: int | None) -> None:
         """Fill the relations of pairs of polygons, triangles and boxes of the plane, UNSETTLED where they are open."""
-        bodies, flag = self._bodies, self._budget.flag
+        bodies, flag = self.bodies, budget.flag
         if self._outlines is None:
             pool, numbers = outline_pool(bodies.distinct)
-            self._outlines, self._simple = pool, numbers[bodies.kinds]
-        outlines, simple = self._outlines, self._simple
+            self._outlines = pool, numbers[bodies.kinds]
+        outlines, simple = self._outlines
         rows = np.where(bodies.is_posed, np.arange(1, len(bodies.solids) + 1), 0)
         poses = PoseArrays(bodies.rotations, bodies.translations, True)
 
@@ -74,41 +73,39 @@ class SceneBatches:
             with np.errstate(all="ignore"):  # uncompiled runs only
                 relate_outline_pairs(outlines, simple, rows, poses, pairs[start:stop], found[start:stop], flag)
 
-        run_chunks(task, len(pairs), budget=self._budget, workers=workers)
+        run_chunks(task, len(pairs), budget=budget, workers=workers)
 
     def details(self, pairs: IntArray, relations: Int8Array) -> Int8Array:
-        """Return the codes of `Rcc8` of pairs of bodies with interiors whose relations are those that `relations`
-        found; NO_DETAIL where these are UNSETTLED."""
+        """Return the codes of `Rcc8` of pairs of bodies with interiors; NO_DETAIL where relations are UNSETTLED."""
         found = details_where_proven(relations)
         boxes = np.flatnonzero(self._is_box[pairs].all(axis=1))
-        found[boxes] = details_of_boxes(self._bodies.low, self._bodies.high, pairs[boxes], relations[boxes])
+        found[boxes] = details_of_boxes(self.bodies.low, self.bodies.high, pairs[boxes], relations[boxes])
         return found
 
-    def _prepare(self) -> None:
+    def _prepared(self, budget: Budget) -> tuple[ConvexArrays, IntArray]:
         """Look at each solid once: is it convex?"""
-        if self._pool is not None:
-            return
-        kinds = np.full(len(self._bodies.distinct), -1, np.int64)
+        kinds = np.full(len(self.bodies.distinct), -1, np.int64)
         convex: list[ConvexBody] = []
-        for kind, solid in enumerate(self._bodies.distinct):
-            self._budget.check()
+        for kind, solid in enumerate(self.bodies.distinct):
+            budget.check()
             body = convex_body_of(solid)
             if body is not None:
                 kinds[kind] = len(convex)
                 convex.append(body)
-        self._pool = pooled(convex)
-        self._convex = kinds[self._bodies.kinds]
+        self._pool = pooled(convex), kinds[self.bodies.kinds]
+        return self._pool
 
 
 def convex_poses(
     first: Solid, second: Solid, poses: PoseArrays, relations: Int8Array, budget: Budget, boolean: bool
 ) -> Callable[[int, int], None] | None:
-    """Return the task that fills relations for a range of poses of `second`, UNSETTLED where float64 does not decide;
-    None unless both solids are convex."""
+    """Return the task that relates ranges of poses, UNSETTLED where open; None where this does not pay."""
+    if len(relations) < LEAST_POSES:
+        return None
     bodies = [body for body in (convex_body_of(first), convex_body_of(second)) if body is not None]
     if len(bodies) < 2:
         return None
-    pool, lanes = pooled(bodies), lane_arrays(*bodies) if len(relations) >= LEAST_POSES else None
+    pool, lanes = pooled(bodies), lane_arrays(*bodies)
     turns, moves, _ = poses
 
     def fill(start: int, stop: int) -> None:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.bounding.posed_boxes import place_boxes
 from engine.collision.collide import TAKEN, check_pose, pair_function
-from engine.collision.scenes.numbering import numbered
 from engine.errors import InvalidArrayError, UnsupportedPairError, UnsupportedSolidError, WrongDimensionError
+from engine.jit import kernel
 from engine.solids.base import Solid
 from engine.solids.bounds import own_box
 from engine.solids.pose import Pose
@@ -51,9 +52,7 @@ def scene_bodies(solids: Sequence[Solid], poses: Sequence[Pose | None] | None) -
     placed: list[Pose | None] = [None] * len(bodies) if poses is None else list(poses)
     if len(placed) != len(bodies):
         raise InvalidArrayError(f"poses must be as many as solids, {len(bodies)}, got {len(placed)}", ("poses",))
-    kinds, firsts = numbered(np.fromiter(map(id, bodies), np.int64, len(bodies)))
-    distinct = [bodies[first] for first in firsts.tolist()]
-    _check_solids(distinct, firsts)
+    distinct, kinds = check_collidable(bodies)
     dimension = distinct[0].dimension if distinct else 3
     is_posed, numbers = _pose_numbers(placed, dimension, bodies)
     rotations, translations = np.empty((len(bodies) + 1, dimension, dimension)), np.zeros((len(bodies) + 1, dimension))
@@ -74,10 +73,7 @@ def scene_bodies(solids: Sequence[Solid], poses: Sequence[Pose | None] | None) -
 
 
 def _pose_numbers(placed: list[Pose | None], dimension: int, bodies: list[Solid]) -> tuple[BoolArray, FloatArray]:
-    """Return which bodies have a pose, and these poses' numbers, one row each: the rotation, then the translation.
-
-    Raises on the first that is no pose, or of another dimension.
-    """
+    """Return which bodies have a pose, and rows of rotation and translation; raise on the first that is none."""
     types, moving, is_posed = set(map(type, placed)), placed, np.ones(len(placed), np.bool_)
     if type(None) in types:
         moving, is_posed = [pose for pose in placed if pose is not None], np.array([p is not None for p in placed])
@@ -90,8 +86,11 @@ def _pose_numbers(placed: list[Pose | None], dimension: int, bodies: list[Solid]
     raise AssertionError("unreachable")
 
 
-def _check_solids(distinct: list[Solid], firsts: IntArray) -> None:
-    """Raise unless every solid is one that `collide` takes, all of one dimension."""
+def check_collidable(bodies: Sequence[Solid]) -> tuple[list[Solid], IntArray]:
+    """Return each solid once and which of them each body is; raise unless every solid is one that `collide` takes, all
+    of one dimension."""
+    kinds, firsts = numbered(np.fromiter(map(id, bodies), np.int64, len(bodies)))
+    distinct = [bodies[first] for first in firsts.tolist()]
     for index, body in zip(firsts.tolist(), distinct):
         try:
             pair_function(body, body)
@@ -108,3 +107,29 @@ def _check_solids(distinct: list[Solid], firsts: IntArray) -> None:
                 f"solids[{index}] is {body.dimension}D, solids[0] {distinct[0].dimension}D; a scene has one dimension",
                 ("solids", index),
             )
+    return distinct, kinds
+
+
+def numbered(keys: IntArray) -> tuple[IntArray, IntArray]:
+    """Return for each of keys (n,) >= 0 the number of its kind, and for each kind where it first appears."""
+    kinds, firsts = np.empty(len(keys), np.int64), np.empty(len(keys), np.int64)
+    bits = max(4, (2 * len(keys)).bit_length())
+    with np.errstate(over="ignore"):  # uncompiled runs only
+        n_kinds = _number(keys, np.full(1 << bits, -1, np.int64), kinds, firsts)
+    return kinds, firsts[:n_kinds].copy()
+
+
+@kernel
+def _number(keys: Any, table: Any, kinds: Any, firsts: Any) -> int:
+    """Fill kinds and firsts; return the number of kinds. table: -1 everywhere, a power of two longer than keys."""
+    last, n_kinds = table.shape[0] - 1, 0
+    for item in range(keys.shape[0]):
+        key = keys[item]
+        place = (key >> 4 ^ key >> 16) & last
+        while table[place] >= 0 and keys[firsts[table[place]]] != key:  # bound: a place is free
+            place = (place + 1) & last
+        if table[place] < 0:
+            table[place], firsts[n_kinds] = n_kinds, item
+            n_kinds += 1
+        kinds[item] = table[place]
+    return n_kinds

@@ -1,4 +1,4 @@
-"""Public: every colliding pair of a scene of up to thousands of bodies."""
+"""Public: every colliding pair of a scene of up to thousands of bodies, and those that are nearer than a gap."""
 
 from __future__ import annotations
 
@@ -12,11 +12,13 @@ from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray
 from engine.bounding.box_grid import pairs_of_boxes
 from engine.bounding.sweep import BLOCK
 from engine.collision.answers import Answers, PlacedPair, Witnesses, accuracy_of
+from engine.collision.clearance.clearance import checked_distance
 from engine.collision.codes import UNSETTLED
 from engine.collision.detail import NO_DETAIL, check_has_detail, has_interior
 from engine.collision.result import Witness, Work
 from engine.collision.scenes.batches import SceneBatches
 from engine.collision.scenes.bodies import SceneBodies, scene_bodies
+from engine.collision.scenes.near_pairs import distances_below, enlarged
 from engine.errors import IndexOutOfRangeError, InvalidArrayError
 from engine.parallel import Budget, Cancel, Progress, check_options, run_chunks
 from engine.solids.base import Solid
@@ -30,12 +32,14 @@ _BYTES_OF_WITNESS: Final = 150
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScenePairs:
-    """The colliding pairs of a scene, sorted by first, then second.
+    """The colliding pairs of a scene, with a gap those nearer than that too, sorted by first, then second.
 
     first, second: ``(n_pairs,)`` int64, indices of bodies, first < second.
-    relation: ``(n_pairs,)`` int8, `Relation` of the first to the second, never DISJOINT.
+    relation: ``(n_pairs,)`` int8, `Relation` of the first to the second, DISJOINT only where a gap was given.
     witnesses: one a pair, where asked for; else None.
     detail: ``(n_pairs,)`` int8, codes of `Rcc8`, -1 where a body has no interior, where asked for; else None.
+    distance: ``(n_pairs,)`` float64, how far apart, as `clearance` gives it, 0.0 where they meet, where a gap was given
+        and boolean was not; else None.
     """
 
     first: IntArray
@@ -43,6 +47,7 @@ class ScenePairs:
     relation: Int8Array
     witnesses: tuple[Witness | None, ...] | None = None
     detail: Int8Array | None = None
+    distance: FloatArray | None = None
 
 
 def collide_scene(
@@ -51,6 +56,7 @@ def collide_scene(
     *,
     skip: object = None,
     only: object = None,
+    gap: float | None = None,
     witnesses: bool = False,
     boolean: bool = False,
     detail: bool = False,
@@ -68,14 +74,19 @@ def collide_scene(
     are built once.
 
     Parameters: solids: bodies of one dimension, of the types that `collide` takes. poses: one or None for each. skip:
-    ``(n, 2)`` pairs of indices to leave out, in either order. only: ``(n, 2)`` the only pairs to look at. witnesses:
-    give the witness of each pair too. boolean: disjoint or not is all that is wanted, every pair found is answered as
-    touching, sooner. detail: which of the eight relations of RCC-8 holds too, as by `collide`; no body may be a
-    surface. workers, deadline, cancel, progress (items are candidate pairs), report: as everywhere.
+    ``(n, 2)`` pairs of indices to leave out, in either order. only: ``(n, 2)`` the only pairs to look at. gap: a
+    distance; pairs that do not meet but are nearer than that, exactly, are found too, as disjoint. witnesses: give the
+    witness of each pair too. boolean: disjoint or not is all that is wanted, every pair that meets is answered as
+    touching, sooner, and no distance is measured. detail: which of the eight relations of RCC-8 holds too, as by
+    `collide`; no body may be a surface. workers, deadline, cancel, progress (items are candidate pairs), report: as
+    everywhere.
     Returns: `ScenePairs`; with report=True a pair of it and an `Accuracy` whose items are the candidate pairs.
-    Boundary and degenerate input: as `collide`. An empty scene has no pairs; two surfaces touch or are disjoint.
-    Accuracy: exact. Cost: n log n for the boxes, 1 us or less for each pair that a batch decides, then as `collide`.
-    Raises: as `collide`, with the index of the body; IndexOutOfRangeError and InvalidArrayError for skip and only.
+    Boundary and degenerate input: as `collide`; a pair exactly as far apart as the gap is clear. An empty scene has no
+    pairs; two surfaces touch or are disjoint.
+    Accuracy: exact. Cost: n log n for the boxes, 1 us or less for each pair that a batch decides, then as `collide`;
+    with a gap as `clearance` for those whose boxes are nearer than that, but for boxes and balls.
+    Raises: as `collide`, with the index of the body; IndexOutOfRangeError and InvalidArrayError for skip and only;
+    InvalidInputError (gap negative or not finite).
 
     >>> from engine import Aabb, Pose
     >>> cube = Aabb([0, 0, 0], [1, 1, 1])
@@ -85,42 +96,65 @@ def collide_scene(
     ([0], [1], ['touching'])
     """
     check_options(workers, progress)
-    bodies = scene_bodies(solids, poses)
+    batches = SceneBatches(scene_bodies(solids, poses))
+    asked = Asked(skip, only, gap, witnesses, boolean, detail)
+    with Budget(deadline, cancel) as budget:
+        found = collide_bodies(batches, asked, budget, workers, progress)
+    return found if report else found[0]
+
+
+class Asked(NamedTuple):
+    """What is asked about a scene, see `collide_scene`."""
+
+    skip: object = None
+    only: object = None
+    gap: float | None = None
+    witnesses: bool = False
+    boolean: bool = False
+    detail: bool = False
+
+
+def collide_bodies(
+    batches: SceneBatches, asked: Asked, budget: Budget, workers: int | None, progress: Progress | None
+) -> tuple[ScenePairs, Accuracy]:
+    """Return the colliding pairs of a prepared scene."""
+    bodies, (skip, only, gap, witnesses, boolean, detail) = batches.bodies, asked
+    boolean, detail = bool(boolean), bool(detail)  # what is not a bool would compile kernels of its own
     if detail:
         check_has_detail(((("solids", i), solid) for i, solid in enumerate(bodies.solids)), boolean)
-    with Budget(deadline, cancel) as budget:
+    gap = None if gap is None else checked_distance(gap, "gap")
+    budget.check()
+    skipped = None if skip is None else pair_keys(skip, len(bodies.solids), "skip")
+    wanted = None if only is None else pair_keys(only, len(bodies.solids), "only")
+    parts: list[_Part] = []
+    works: list[Work] = []
+    n_candidates = n_open = 0
+    for pairs in _candidates(bodies, enlarged(bodies, gap), wanted, skipped, budget):
         budget.check()
-        skipped = None if skip is None else _keys(skip, len(bodies.solids), "skip")
-        wanted = None if only is None else _keys(only, len(bodies.solids), "only")
-        batches = SceneBatches(bodies, boolean, detail, budget)
-        parts: list[_Part] = []
-        works: list[Work] = []
-        n_candidates = n_open = 0
-        for pairs in _candidates(bodies, wanted, skipped, budget):
-            budget.check()
-            relations = batches.relations(pairs, workers)
-            n_candidates += len(pairs)
-            n_open += int((relations == UNSETTLED).sum())
-            details = batches.details(pairs, relations) if detail else None
-            answers = Answers(budget, boolean, relations, [None] * len(pairs) if witnesses else None, details)
-            _settle(bodies, pairs, answers, workers, progress)
-            works += answers.works
-            parts.append(_colliding(bodies, pairs, answers))
-            budget.take((_BYTES + _BYTES_OF_WITNESS * witnesses) * len(parts[-1].pairs))
-        budget.check()
-    result = _joined(parts, witnesses, detail)
-    if not report:
-        return result
-    return result, accuracy_of(n_candidates, n_open, works, "boxes" if only is None else "named pairs")
+        relations = batches.relations(pairs, boolean, detail, budget, workers)
+        n_candidates += len(pairs)
+        n_open += int((relations == UNSETTLED).sum())
+        details = batches.details(pairs, relations) if detail else None
+        answers = Answers(budget, boolean, relations, [None] * len(pairs) if witnesses else None, details)
+        _settle(bodies, pairs, answers, workers, progress)
+        works += answers.works
+        near = None if gap is None else _near(bodies, pairs, answers, gap, workers)
+        parts.append(_found(bodies, pairs, answers, near))
+        budget.take((_BYTES + _BYTES_OF_WITNESS * witnesses) * len(parts[-1].pairs))
+    budget.check()
+    method = "boxes" if only is None else "named pairs"
+    result = _joined(parts, witnesses, detail, gap is not None and not boolean)
+    return result, accuracy_of(n_candidates, n_open, works, method)
 
 
 class _Part(NamedTuple):
-    """Of a block of candidates those that collide; witnesses and details where asked for."""
+    """Of a block of candidates those that are found; witnesses, details and distances where asked for."""
 
     pairs: IntArray
     relations: Int8Array
     witnesses: Witnesses
     details: Int8Array
+    distances: FloatArray
 
 
 def _settle(
@@ -141,31 +175,43 @@ def _settle(
     run_chunks(task, len(left), budget=answers.budget, first_chunk=4, workers=workers, progress=progress)
 
 
-def _colliding(bodies: SceneBodies, pairs: IntArray, answers: Answers) -> _Part:
-    """Return the pairs of a block that collide."""
-    kept = np.flatnonzero(answers.relations != Relation.DISJOINT)
-    relations = np.full(len(kept), Relation.TOUCHING, np.int8) if answers.boolean else answers.relations[kept]
+def _near(bodies: SceneBodies, pairs: IntArray, answers: Answers, gap: float, workers: int | None) -> FloatArray:
+    """Return how far apart the pairs of a block are, 0 where they meet, infinite where no nearer than the gap."""
+    distances, disjoint = np.zeros(len(pairs)), np.flatnonzero(answers.relations == Relation.DISJOINT)
+    is_measured = not answers.boolean
+    distances[disjoint] = distances_below(bodies, pairs[disjoint], gap, is_measured, answers.budget, workers)
+    return distances
+
+
+def _found(bodies: SceneBodies, pairs: IntArray, answers: Answers, near: FloatArray | None) -> _Part:
+    """Return the pairs of a block that collide or are near."""
+    meet = answers.relations != Relation.DISJOINT
+    if answers.boolean:
+        answers.relations[meet] = Relation.TOUCHING
+    kept = np.flatnonzero(meet if near is None else near != np.inf)
     named = [] if answers.witnesses is None else [answers.witnesses[item] for item in kept.tolist()]
     details = np.empty(0, np.int8)
     if answers.details is not None:
         details = answers.details[kept]
         details[~_have_interiors(bodies, pairs[kept], answers.budget)] = NO_DETAIL
-    return _Part(pairs[kept], relations, named, details)
+    return _Part(pairs[kept], answers.relations[kept], named, details, np.empty(0) if near is None else near[kept])
 
 
-def _joined(parts: list[_Part], witnesses: bool, detail: bool) -> ScenePairs:
-    """Return the colliding pairs of all blocks as one, sorted; each block is."""
+def _joined(parts: list[_Part], witnesses: bool, detail: bool, distance: bool) -> ScenePairs:
+    """Return the pairs found of all blocks as one, sorted; each block is."""
     none = np.empty(0, np.int8)
     pairs = np.concatenate([np.empty((0, 2), np.int64), *(part.pairs for part in parts)])
     relations = np.concatenate([none, *(part.relations for part in parts)])
     named = tuple(witness for part in parts for witness in part.witnesses) if witnesses else None
     details = np.concatenate([none, *(part.details for part in parts)]) if detail else None
+    distances = np.concatenate([np.empty(0), *(part.distances for part in parts)]) if distance else None
     if len(parts) > 1:
         order = np.lexsort((pairs[:, 1], pairs[:, 0]))
         pairs, relations = pairs[order], relations[order]
         named = None if named is None else tuple(named[item] for item in order.tolist())
         details = None if details is None else details[order]
-    return ScenePairs(pairs[:, 0].copy(), pairs[:, 1].copy(), relations, named, details)
+        distances = None if distances is None else distances[order]
+    return ScenePairs(pairs[:, 0].copy(), pairs[:, 1].copy(), relations, named, details, distances)
 
 
 def _have_interiors(bodies: SceneBodies, pairs: IntArray, budget: Budget) -> BoolArray:
@@ -177,14 +223,14 @@ def _have_interiors(bodies: SceneBodies, pairs: IntArray, budget: Budget) -> Boo
 
 
 def _candidates(
-    bodies: SceneBodies, wanted: IntArray | None, skipped: IntArray | None, budget: Budget
+    bodies: SceneBodies, low: FloatArray, wanted: IntArray | None, skipped: IntArray | None, budget: Budget
 ) -> Iterator[IntArray]:
     """Yield the pairs whose boxes meet, of those wanted and not skipped (keys first * n + second), in blocks, each of
-    them sorted."""
+    them sorted; low: of the boxes, moved outward."""
     n_bodies = len(bodies.solids)
     if n_bodies < 2 or (wanted is not None and not len(wanted)):
         return
-    low, high = bodies.low, bodies.high
+    high = bodies.high
     blocks = pairs_of_boxes(low, high, budget.flag) if wanted is None else _wanted_pairs(low, high, wanted)
     for pairs in blocks:
         yield pairs if skipped is None else pairs[~np.isin(pairs[:, 0] * n_bodies + pairs[:, 1], skipped)]
@@ -200,7 +246,7 @@ def _wanted_pairs(low: FloatArray, high: FloatArray, wanted: IntArray) -> Iterat
         yield pairs[start : start + BLOCK][meet]
 
 
-def _keys(named: Any, n_bodies: int, name: str) -> IntArray:
+def pair_keys(named: Any, n_bodies: int, name: str) -> IntArray:
     try:
         array = np.asarray(named)
     except ValueError:

@@ -5,24 +5,42 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import reduce
 
 import numpy as np
 
-from engine.arrays import FloatArray, Int8Array, IntArray
+from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray
 from engine.collision.exact_images import HalfSpaceImage, Vector, as_vector, image_map, rounded, value_at
 from engine.collision.meshes.exact_body import exact_pair, faces_in
 from engine.collision.meshes.exact_regions import sides_at
-from engine.collision.meshes.live_faces import LivePiece, live_piece
+from engine.collision.meshes.live_faces import LivePiece, live_piece, simplex_distance
 from engine.collision.meshes.mesh_arrays import mesh_body_of
 from engine.collision.planar.outline import is_clean, live_edges, outline_of
 from engine.collision.result import Work
-from engine.collision.simple.feature_distance import box_distance_bounds, simplex_distance
 from engine.containment.rational_locate import rational_location
 from engine.predicates.exact_vectors import dot
 from engine.predicates.rational import sign_of
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
 from engine.types import Location
+
+
+def box_distance_bounds(point: FloatArray, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return lower and upper bounds of the squared distance from `point` to anything that fills the boxes ``(n, d)``.
+
+    The lower bound is the distance to the box, the upper one that to its farthest corner, both widened by 2^-48 of
+    themselves and 2^-1000: at most d + 3 roundings of relative size u enter each, and d underflows of 2^-1074.
+    Overflow makes them infinite or NaN; NaN lower bounds become 0, NaN upper bounds infinity.
+    """
+    with np.errstate(all="ignore"):
+        gap = np.maximum(np.maximum(low - point, point - high), 0.0)
+        reach = np.maximum(np.abs(low - point), np.abs(high - point))
+        lower = (gap * gap).sum(axis=1) * (1.0 - 2.0**-48) - 2.0**-1000
+        upper = (reach * reach).sum(axis=1) * (1.0 + 2.0**-48) + 2.0**-1000
+    lower[np.isnan(lower) | np.isinf(lower)] = 0.0
+    upper[np.isnan(upper)] = np.inf
+    return lower, upper
+
 
 _ALL = slice(None)
 
@@ -62,14 +80,18 @@ class Boundary:
         """Return bounds of the squared distances from a point to what the boxes of faces hold."""
         ends = self.ends[faces]
         points = self.floats(ends.reshape(-1))
-        points = points.reshape(*ends.shape, points.shape[1])
-        return self.bounds(center, points.min(axis=1), points.max(axis=1))
+        corners = points.reshape(*ends.shape, points.shape[1]).transpose(1, 0, 2)  # numpy is slow along short axes
+        return self.bounds(center, reduce(np.minimum, corners), reduce(np.maximum, corners))
 
     def bounds(self, center: Vector, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return bounds of the squared distances from a point to what boxes of rounded posed coordinates hold."""
         around = np.array([rounded(value) for value in center])
         slack = self.error + 2.0**-50 * float(np.abs(around).max()) + 2.0**-1070
         return box_distance_bounds(around, low - slack, high + slack)
+
+    def faces_at(self, is_chosen: BoolArray) -> IntArray:
+        """Return the faces with a corner among the vertices chosen."""
+        return np.flatnonzero(reduce(np.logical_or, is_chosen[self.ends.T]))
 
     def has_live(self, faces: IntArray, condition: Callable[[LivePiece], bool]) -> bool:
         """Tell whether a condition holds for something live of these faces."""
@@ -162,8 +184,7 @@ def signs_of(plane: HalfSpaceImage, points: FloatArray, pose: Pose | None, work:
     shift = float(offset / largest)
     with np.errstate(all="ignore"):
         values = points @ weights + shift
-        bounds = 2.0**-49 * (np.abs(points) @ np.abs(weights) + abs(shift)) + 2.0**-1000
-        bounds += 2.0**-1073 * np.abs(points).sum(axis=1)
+        bounds = np.abs(points) @ (2.0**-49 * np.abs(weights) + 2.0**-1073) + (2.0**-49 * abs(shift) + 2.0**-1000)
         signs = np.where(values > bounds, 1, np.where(values < -bounds, -1, 0)).astype(np.int8)
         open_items = np.flatnonzero(~(np.abs(values) > bounds) | ~np.isfinite(bounds))
     work.n_beyond_filter += len(open_items)

@@ -14,6 +14,7 @@ from typing import Any, Final
 import numpy as np
 
 from engine.containment.cells.lattice import LEVELS, PARTS, PLACE, finest, parts_of, reference_coordinate, share_of
+from engine.containment.posed.filters import NOT_FINITE
 from engine.jit import inline, kernel, merged
 from engine.lanes.cells import ROWS, group_parity, prefetch_group
 from engine.types import UNDECIDED
@@ -25,7 +26,6 @@ MIXED_CELL: Final = -1
 on, a brick's number with the lowest bit set, or the place of a leaf's first entry; one bit above is the side of the
 leaf's reference point."""
 CODE_SHIFT: Final = 3
-NOT_FINITE: Final = -1
 _BLOCK: Final = 256
 """Points that pass through the first stage together."""
 _FEWEST: Final = 128

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
+from engine.containment.posed.filters import NOT_FINITE, has_not_finite
 from engine.jit import inline, kernel, merged
 from engine.predicates.error_free import two_diff, two_prod, two_sum, workspace
 from engine.types import UNDECIDED
@@ -78,10 +79,12 @@ def _settle(points: Any, item: int, center: Any, radius: float, expansion: Any) 
 
 @kernel
 def locate_in_ball(points: Any, center: Any, blur: float, radius: float, locations: Any, flag: Any) -> int:
-    """Fill `locations` (n,) int8 for points (n, dim); returns how many needed more than the filter.
+    """Fill `locations` (n,) int8 for points (n, dim); returns how many needed more than the filter, or NOT_FINITE.
 
     blur: bound on the error of each coordinate of `center`; 0.0 where it is exact, else what stays open is UNDECIDED.
     """
+    if has_not_finite(points):
+        return NOT_FINITE
     is_flat, n_beyond = len(center) == 2, 0
     x, y, z = center[0], center[1], 0.0 if is_flat else center[2]
     square, reach, expansion = radius * radius, radius + 2.0 * blur, workspace(8)

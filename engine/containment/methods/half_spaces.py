@@ -26,7 +26,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.containment.posed.filters import in_space
+from engine.containment.posed.filters import NOT_FINITE, has_not_finite, in_space
 from engine.jit import inline, kernel
 from engine.predicates.loading import as_half_space2, as_half_space3, as_point2, as_point3
 from engine.predicates.side import side_of_plane
@@ -117,8 +117,10 @@ def locate_in_half_planes(points: Any, planes: Any, is_exact: Any, locations: An
     """Fill `locations` (n,) int8 for points (n, 2) and planes (m, 3); UNDECIDED where the exponents are out of range.
 
     is_exact: (m,) bool, False for a row that is correctly rounded from a rational one, without underflow.
-    Returns how many points needed more than the filter. Stops early, answers incomplete, once flag[0] is set.
+    Returns how many points needed more than the filter, or NOT_FINITE. Stops early once flag[0] is set.
     """
+    if has_not_finite(points):
+        return NOT_FINITE
     if len(points) < _FEW:
         return _locate_few(points, planes, is_exact, locations, flag)
     xs, ys, least, folded = np.empty(_BLOCK), np.empty(_BLOCK), np.empty(_BLOCK), np.empty(_BLOCK)
@@ -176,6 +178,8 @@ def locate_in_half_planes(points: Any, planes: Any, is_exact: Any, locations: An
 @kernel
 def locate_in_half_spaces(points: Any, planes: Any, is_exact: Any, locations: Any, flag: Any) -> int:
     """Fill `locations` (n,) int8 for points (n, 3) and planes (m, 4); the rest as in the plane."""
+    if has_not_finite(points):
+        return NOT_FINITE
     if len(points) < _FEW:
         return _locate_few(points, planes, is_exact, locations, flag)
     xs, ys, zs = np.empty(_BLOCK), np.empty(_BLOCK), np.empty(_BLOCK)

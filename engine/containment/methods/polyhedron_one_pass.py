@@ -13,6 +13,7 @@ import numpy as np
 
 from engine.bounding.grid import Axis, cell_of
 from engine.containment.methods.polyhedron_ray_parity import BEYOND, CROSSED, ON_FACE, meet_upwards
+from engine.containment.posed.filters import NOT_FINITE, has_not_finite
 from engine.jit import inline, kernel
 from engine.predicates.loading import as_point3
 from engine.types import UNDECIDED
@@ -120,10 +121,12 @@ def _axis_over(points: Any, axis: int, n_cells: int) -> Axis:
 
 @kernel
 def locate_by_pass(points: Any, vertices: Any, triangles: Any, locations: Any, flag: Any) -> int:
-    """Fill `locations` (n,) int8 for points (n, 3), one at least; returns how many needed more than the filter.
+    """Fill `locations` (n,) int8 for points (n, 3), n > 0; returns how many needed more than the filter, or NOT_FINITE.
 
     triangles: (m, 3) int64. Caller guarantees a surface that is even at each edge.
     """
+    if has_not_finite(points):
+        return NOT_FINITE
     side = max(1, int(len(points) ** 0.5))
     u, v, z_min = _axis_over(points, 0, side), _axis_over(points, 1, side), _axis_over(points, 2, 1).low
     firsts, order = np.zeros(u.n_cells * v.n_cells + 1, np.int64), np.empty(len(points), np.int32)

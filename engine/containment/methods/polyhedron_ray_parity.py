@@ -29,14 +29,14 @@ from typing import Any, Final
 import numpy as np
 
 from engine.bounding.bvh import MAX_DEPTH, WIDTH
-from engine.containment.posed.filters import orient2d_blurred, orient3d_blurred
-from engine.jit import inline, kernel
+from engine.containment.posed.filters import NOT_FINITE, has_not_finite, orient2d_blurred, orient3d_blurred
+from engine.jit import bare, inline, kernel, merged
 from engine.lanes.boxes import EMPTY, inside_box
 from engine.lanes.lanes import count_bits, lowest_bit
 from engine.lanes.overhead import BAND, GROWTH, OVERHEAD_ROWS, overhead
 from engine.predicates.loading import as_point3
 from engine.predicates.orientation import orient2d, orient2d_exact, orient2d_filter, orient3d_exact, orient3d_filter
-from engine.types import UNDECIDED, Point2
+from engine.types import UNDECIDED, Point2, Point3
 
 MISSED: Final = 0
 CROSSED: Final = 1
@@ -171,6 +171,53 @@ def _meet_blurred(a: Any, b: Any, c: Any, q: Any, blur: float) -> int:
     return UNDECIDED | BEYOND if side == UNDECIDED else MISSED if side == first else CROSSED
 
 
+@merged
+def _in_tree(tree: Any, q: Any, blur: float) -> tuple[float, float, float, float, bool]:
+    """Return q in the coordinates of the tree, by how much it is widened, and whether it is near enough for that."""
+    origin, scale = tree.origin, tree.scale
+    x, y, z = (q.x - origin[0]) / scale, (q.y - origin[1]) / scale, (q.z - origin[2]) / scale
+    slack = _SLACK + blur / scale
+    return x, y, z, slack, abs(x) < 4.0 and abs(y) < 4.0 and abs(z) < 4.0 and slack < 1.0  # not NaN
+
+
+@kernel
+def list_unsure(tree: Any, x: float, y: float, z: float, blur: float, found: Any) -> tuple[int, bool]:
+    """Fill found (n,) int64 with the rows of `tree.triangles` of which it is not sure how the rays up from all of the
+    blurred (x, y, z) meet them; return how many, and whether they meet an odd number of the others.
+
+    The number is -1 where there is no room, or the point is too far from the tree.
+    """
+    q, stack, n_found, is_odd, n_stack = Point3(x, y, z), np.empty(STACK, np.int32), 0, False, 1
+    u, v, w, slack, is_near = _in_tree(tree, q, blur)
+    if not is_near:
+        return -1, False
+    least = np.float32(u - slack), np.float32(v - slack), np.float32(w - slack)
+    most = np.float32(u + slack), np.float32(v + slack), _ABOVE_ALL
+    stack[0] = 0
+    while n_stack > 0:  # bound: each node enters once
+        n_stack -= 1
+        node = int(stack[n_stack])
+        lanes = inside_box(tree.boxes, node, least, most)
+        while lanes != 0:
+            child = int(tree.child[node, lowest_bit(lanes)])
+            lanes &= lanes - 1
+            if child >= 0:
+                stack[n_stack] = child
+                n_stack += 1
+                continue
+            a = as_point3(tree.vertices, tree.triangles[-1 - child, 0])
+            b = as_point3(tree.vertices, tree.triangles[-1 - child, 1])
+            c = as_point3(tree.vertices, tree.triangles[-1 - child, 2])
+            met = _meet_blurred(a, b, c, q, blur)
+            is_odd ^= met == CROSSED
+            if met & 3 == UNDECIDED:
+                if n_found == len(found):
+                    return -1, False
+                found[n_found] = -1 - child
+                n_found += 1
+    return n_found, is_odd
+
+
 @inline
 def locate_in_tree(tree: Any, q: Any, blur: float, stack: Any, flag: Any) -> tuple[int, bool]:
     """Return the location of a blurred q in a `TriangleTree`, and whether it took more than a filter.
@@ -181,10 +228,8 @@ def locate_in_tree(tree: Any, q: Any, blur: float, stack: Any, flag: Any) -> tup
     is_out = (q.x + blur < low[0]) | (q.x - blur > high[0]) | (q.y + blur < low[1]) | (q.y - blur > high[1])
     if is_out | (q.z + blur < low[2]) | (q.z - blur > high[2]):
         return -1, False
-    origin, scale = tree.origin, tree.scale
-    x, y, z = (q.x - origin[0]) / scale, (q.y - origin[1]) / scale, (q.z - origin[2]) / scale
-    slack = _SLACK + blur / scale
-    if not (abs(x) < 4.0 and abs(y) < 4.0 and abs(z) < 4.0 and slack < 1.0):  # also NaN
+    x, y, z, slack, is_near = _in_tree(tree, q, blur)
+    if not is_near:
         return UNDECIDED, True
     least = np.float32(x - slack), np.float32(y - slack), np.float32(z - slack)
     most = np.float32(x + slack), np.float32(y + slack), _ABOVE_ALL
@@ -196,7 +241,7 @@ def locate_in_tree(tree: Any, q: Any, blur: float, stack: Any, flag: Any) -> tup
         lanes = inside_box(tree.boxes, node, least, most)
         if lanes != 0 and tree.child[node, 0] < 0:
             u, v = x - float(tree.boxes[node, 0, 0]), y - float(tree.boxes[node, 1, 0])
-            over, beside = overhead(tree.blocks, tree.boxes, node, u, v, z + slack, blur / scale)
+            over, beside = overhead(tree.blocks, tree.boxes, node, u, v, z + slack, blur / tree.scale)
             is_odd ^= (count_bits(lanes & over) & 1) == 1
             lanes &= ~(over | beside)
         while lanes != 0:
@@ -220,15 +265,25 @@ def locate_in_tree(tree: Any, q: Any, blur: float, stack: Any, flag: Any) -> tup
 
 @kernel
 def locate_by_tree(points: Any, blurs: Any, tree: Any, locations: Any, flag: Any) -> int:
-    """Fill `locations` (n,) int8 for points (n, 3) with blurs (n,); returns how many needed more than the filter.
+    """Fill `locations` (n,) int8 for points (n, 3); returns how many needed more than the filter.
 
-    tree: a `TriangleTree`. Caller guarantees a surface that is even at each edge.
+    blurs: (n,), or (0,) for points that are exact; then NOT_FINITE is returned where one is not finite. tree: a
+    `TriangleTree`. Caller guarantees a surface that is even at each edge.
     """
-    stack, n_beyond = np.empty(STACK, np.int32), 0
+    if len(blurs) == 0 and has_not_finite(points):
+        return NOT_FINITE
+    return int(_locate_each(points, blurs, tree, locations, np.empty(STACK, np.int32), flag))
+
+
+@bare
+def _locate_each(points: Any, blurs: Any, tree: Any, locations: Any, stack: Any, flag: Any) -> int:
+    """Do what `locate_by_tree` does, without counting references to the arrays of the tree for each point."""
+    n_beyond = 0
     for item in range(len(points)):
         if flag[0]:
             break
-        locations[item], is_beyond = locate_in_tree(tree, as_point3(points, item), float(blurs[item]), stack, flag)
+        blur = float(blurs[item]) if len(blurs) > 0 else 0.0
+        locations[item], is_beyond = locate_in_tree(tree, as_point3(points, item), blur, stack, flag)
         n_beyond += is_beyond
     return n_beyond
 

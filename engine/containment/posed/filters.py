@@ -16,6 +16,17 @@ from engine.types import UNDECIDED
 
 _SLACK: Final = 8.0 * 2.0**-53
 _TINY: Final = 1e-320
+NOT_FINITE: Final = -1
+"""Returned by kernels in place of a count."""
+
+
+@inline
+def has_not_finite(points: Any) -> bool:
+    """Tell whether NaN or an infinity is among points (n, dim): without a branch, at the speed of the memory."""
+    is_found, flat = False, points.reshape(points.size)
+    for place in range(len(flat)):
+        is_found |= flat[place] - flat[place] != 0.0
+    return is_found
 
 
 @inline

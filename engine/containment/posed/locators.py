@@ -28,8 +28,8 @@ from engine.containment.posed.filters import (
     locate_in_rows_blurred,
 )
 from engine.containment.posed.frames import Frames, frames_of
-from engine.containment.prepared import closed_rings_of, rings_of, rounded_rows, tree_of
-from engine.containment.rational_locate import Check, prism_walls, to_world_frame
+from engine.containment.prepared import prism_rows, ring_offsets_of, rings_of, tree_of
+from engine.containment.rational_locate import Check, to_world_frame
 from engine.parallel import Budget
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
@@ -110,7 +110,7 @@ def _blurred_kernel(solid: Solid) -> Blurred:
         rows[:, : planes.shape[1] - 1], rows[:, 3] = planes[:, :-1], planes[:, -1]
         kernel, prepared = locate_in_rows_blurred, lambda _: (rows,)
     elif isinstance(solid, Triangle):
-        kernel, prepared = locate_by_ring_pass, lambda check: closed_rings_of(solid, check)
+        kernel, prepared = locate_by_ring_pass, lambda _: (solid.vertices, ring_offsets_of(solid))
     elif isinstance(solid, Polygon):
         kernel, prepared = locate_in_rings, lambda check: rings_of(solid, check)
     elif isinstance(solid, Polyhedron):
@@ -128,7 +128,7 @@ def _rows(solid: Solid) -> FloatArray:
     if isinstance(solid, Convex):
         return solid.planes
     assert isinstance(solid, Triangle)
-    return rounded_rows(prism_walls(solid))[0]
+    return prism_rows(solid)[0]
 
 
 def posed_center(solid: Sphere, pose: Pose) -> tuple[FloatArray, float]:

@@ -43,6 +43,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, Int32Array
+from engine.containment.posed.filters import NOT_FINITE, has_not_finite
 from engine.jit import inline, kernel, merged
 from engine.predicates.loading import as_point2
 from engine.types import UNDECIDED
@@ -190,7 +191,9 @@ def _take_edges(cells: Any, block: Any, n_waiting: int) -> int:
 
 @kernel
 def locate_by_ring_cells(points: Any, cells: Any, locations: Any, flag: Any) -> int:
-    """Fill `locations` (n,) int8 for points (n, 2) from a `RingCells`; returns how many are left UNDECIDED."""
+    """Fill `locations` (n,) int8 for points (n, 2) from a `RingCells`; returns how many are open, or NOT_FINITE."""
+    if has_not_finite(points):
+        return NOT_FINITE
     xs, ys, states = np.empty(_BLOCK), np.empty(_BLOCK), np.empty(_BLOCK, np.uint8)
     us, vs, found = np.empty(_BLOCK, np.int32), np.empty(_BLOCK, np.int32), np.empty(_BLOCK, np.int32)
     waiting, places = np.empty(_BLOCK, np.uint32), np.empty(_BLOCK, np.uint32)

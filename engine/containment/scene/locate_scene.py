@@ -114,33 +114,40 @@ def locate_scene(
     >>> held.offsets.tolist(), held.indices.tolist(), held.on_boundary.tolist()
     ([0, 1, 3, 3], [0, 0, 1], [False, True, True])
     """
-    _check_solids(solids, poses)
+    check_bodies(solids, poses)
     check_options(workers, progress)
     array = as_points(points, solids[0].dimension if len(solids) else None)
+    with Budget(deadline, cancel) as budget:
+        found = locate_in(array, scene_of(solids, poses, array.shape[1], budget), budget, workers, progress)
+    return found if report else found[0]
+
+
+def locate_in(
+    array: FloatArray, scene: Scene, budget: Budget, workers: int | None, progress: Progress | None
+) -> tuple[SceneLocations, Accuracy]:
+    """Return the bodies of a prepared scene that hold each of some checked points."""
     done: list[_Piece] = []
     n_beyond = n_rational = 0
-    with Budget(deadline, cancel) as budget:
-        scene = scene_of(solids, poses, array.shape[1], budget)
-        todo = [(0, -(-len(array) // _block_size(scene)))]
-        while todo:  # bound: each turn does a piece of work
-            pieces, todo = _scan(array, todo, scene, budget, workers)
-            counts = settle_rest(
-                array,
-                scene,
-                [piece.owners for piece in pieces],
-                [piece.bodies[piece.places] for piece in pieces],
-                [partial(piece.located.__setitem__, piece.places) for piece in pieces],
-                budget,
-                workers,
-            )
-            n_beyond += counts.beyond + sum(piece.n_beyond for piece in pieces)
-            n_rational += counts.rational
-            held = [_held(piece) for piece in pieces]
-            budget.take(_BYTES * sum(len(kept.bodies) - len(piece.bodies) for kept, piece in zip(held, pieces)))
-            done += held
-            if progress is not None:
-                progress(sum(len(piece.counts) for piece in pieces))
-        budget.check()
+    todo = [(0, -(-len(array) // _block_size(scene)))]
+    while todo:  # bound: each turn does a piece of work
+        pieces, todo = _scan(array, todo, scene, budget, workers)
+        counts = settle_rest(
+            array,
+            scene,
+            [piece.owners for piece in pieces],
+            [piece.bodies[piece.places] for piece in pieces],
+            [partial(piece.located.__setitem__, piece.places) for piece in pieces],
+            budget,
+            workers,
+        )
+        n_beyond += counts.beyond + sum(piece.n_beyond for piece in pieces)
+        n_rational += counts.rational
+        held = [_held(piece) for piece in pieces]
+        budget.take(_BYTES * sum(len(kept.bodies) - len(piece.bodies) for kept, piece in zip(held, pieces)))
+        done += held
+        if progress is not None:
+            progress(sum(len(piece.counts) for piece in pieces))
+    budget.check()
     done.sort(key=lambda piece: piece.start)
     offsets = np.zeros(len(array) + 1, np.int64)
     if done:
@@ -150,15 +157,14 @@ def locate_scene(
         np.concatenate([np.zeros(0, np.int64), *(piece.bodies for piece in done)]),
         np.concatenate([np.zeros(0, np.int8), *(piece.located for piece in done)]) == 0,
     )
-    if not report:
-        return result
     is_exact = all(locator.decisions == "exact" for locator in scene.locators.values())
     decisions: Literal["exact", "float64"] = "exact" if is_exact else "float64"
     n = len(array)
     return result, Accuracy(decisions, None, n, min(n_beyond, n), min(n_rational, n), "box_grid")
 
 
-def _check_solids(solids: Sequence[Solid], poses: Sequence[Pose | None] | None) -> None:
+def check_bodies(solids: Sequence[Solid], poses: Sequence[Pose | None] | None) -> None:
+    """Raise unless these are solids of one dimension and a pose or None for each, naming the first that is wrong."""
     if not isinstance(solids, (list, tuple)):
         raise InvalidArrayError(f"solids must be a list of solids, got {type(solids).__name__}", ("solids",))
     for index, solid in enumerate(solids):

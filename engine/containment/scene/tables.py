@@ -172,7 +172,8 @@ class _Kinds:
         solids = self._chosen(indices, RINGS)
         offsets = [_TRIANGLE if isinstance(solid, Triangle) else solid.ring_offsets for solid in solids]
         polygon_offsets = _offsets(np.array([len(each) - 1 for each in offsets], np.int64))
-        sizes = np.concatenate([np.zeros(0, np.int64), *(np.diff(each) for each in offsets)])
+        ends = np.concatenate([np.zeros(0, np.int64), *offsets])  # each begins with 0
+        sizes = np.delete(np.diff(ends, prepend=0), polygon_offsets[:-1] + np.arange(len(offsets)))
         vertices = np.concatenate([np.empty((0, 2)), *(solid.vertices for solid in solids)])
         xs, ys, ring_offsets = close_rings(vertices, _offsets(sizes))
         firsts = ring_offsets[polygon_offsets[:-1]]

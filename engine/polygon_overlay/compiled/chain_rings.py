@@ -21,11 +21,12 @@ MEETS: Final = 1
 
 
 class Rings(NamedTuple):
-    """point: united points, ring after ring; meets: MEETS where rings meet, RUN where those up to the next point are
-    left out, DOUBTFUL where an edge up to there has that mark; offset: where each ring begins; region: a number of the
-    region it bounds."""
+    """point: united points, ring after ring; edge: along which the ring goes on from there; meets: MEETS where rings
+    meet, RUN where those up to the next point are left out, DOUBTFUL where an edge up to there has that mark; offset:
+    where each ring begins; region: a number of the region it bounds."""
 
     point: Any
+    edge: Any
     meets: Any
     offset: Any
     region: Any
@@ -86,11 +87,13 @@ def _following(chains: Chains, stars: Stars, n_simple: int, bounds: Any, half: i
 
 
 @merged
-def _pass_point(rings: Rings, start: int, at: int, point: int, turns: bool, meets: int, doubt: int) -> tuple[int, int]:
+def _pass_point(
+    rings: Rings, start: int, at: int, point: int, edge: int, turns: bool, meets: int, doubt: int
+) -> tuple[int, int]:
     """Write a point where the boundary turns, else only the doubt about what follows; return how many points, and the
     doubt about what the ring begins with, which goes on from its last point."""
     if turns:
-        rings.point[at], rings.meets[at] = point, meets
+        rings.point[at], rings.edge[at], rings.meets[at] = point, edge, meets
         return at + 1, doubt
     if at > start:
         rings.meets[at - 1] |= meets & DOUBTFUL
@@ -113,7 +116,9 @@ def _emit(
         edge = leaving_edge(chains, half)
         meets = MEETS * (fan[node] > 2)
         turns = meets != 0 or turn_of_edges(edges, leaving_edge(chains, before ^ 1), edge) != 0
-        n_points, doubt = _pass_point(rings, start, n_points, nodes[node], turns, meets | marks[edge] & DOUBTFUL, doubt)
+        n_points, doubt = _pass_point(
+            rings, start, n_points, nodes[node], edge, turns, meets | marks[edge] & DOUBTFUL, doubt
+        )
         is_back, end = half & 1, leaving_edge(chains, half ^ 1)
         while edge != end:  # bound: the vertices of the chain
             if edge & POLL == 0 and stop[0]:
@@ -121,7 +126,8 @@ def _emit(
             v = edge if is_back else edges.after[edge]
             edge = edges.before[v] if is_back else v
             turns = marks[v] & BENT != 0 or orient(edges, edges.before[v], v, edges.after[v]) != 0
-            n_points, doubt = _pass_point(rings, start, n_points, v, turns, marks[edge] & (RUN | DOUBTFUL), doubt)
+            meets = marks[edge] & (RUN | DOUBTFUL)
+            n_points, doubt = _pass_point(rings, start, n_points, v, edge, turns, meets, doubt)
         before = half
     rings.meets[n_points - 1] |= doubt
     return n_points

@@ -42,7 +42,8 @@ class Passages(NamedTuple):
 
 
 class Points(NamedTuple):
-    """Points of the result: doubles, and where they come from: a vertex of the input and -1, or two edges of it."""
+    """Points of the result: doubles, and where they come from: a vertex of the input and -1, or two edges of it, the
+    one along which the result goes on first."""
 
     x: Any
     y: Any
@@ -294,7 +295,7 @@ def _walk(
             if left_at != _NONE:
                 return GENERAL, 0.0
             n_found = _add_stretch(edges, origins, entered, e, 0, n, points, n_found)
-            moved = _add_crossing(edges, e, f, origins[e + turned], origins[f + turned_second], points, n_found)
+            moved = _add_crossing(edges, e, f, origins[f + turned_second], origins[e + turned], points, n_found)
             n_found, farthest = n_found + 1, max(farthest, moved)
             left_at = f
         if n_found > 2 * end or (k & POLL == POLL and stop[0]):

@@ -63,6 +63,8 @@ def orient(edges: Edges, a: int, b: int, c: int) -> int:
 
 @called
 def _exact_orient(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> int:
+    if ((ax == cx) & (ay == cy)) | ((bx == cx) & (by == cy)):  # case: borders that polygons share
+        return 0
     return orient2d_exact(Point2(ax, ay), Point2(bx, by), Point2(cx, cy))
 
 
@@ -86,6 +88,9 @@ def turn_of_edges(edges: Edges, e: int, f: int) -> int:
 
 @called
 def _exact_turn(edges: Edges, a: int, b: int, c: int, d: int) -> int:
+    x, y = edges.x, edges.y
+    if (x[a] == x[d]) & (y[a] == y[d]) & (x[b] == x[c]) & (y[b] == y[c]):  # case: as above
+        return 0
     e = workspace(16)
     return sign(e, _cross(edges, a, b, c, d, e))
 

@@ -147,24 +147,27 @@ def _group_events(events: Events, along: Along, n: int, n_events: int, stop: Any
 
 @called
 def _sort_exactly(edges: Edges, events: Events, along: Along, unions: Unions, n: int, e: int) -> None:
-    """Sort the events of an edge by insertion, and unite those at one point."""
+    """Sort the events of an edge, each put where a search by halves finds its place, and unite those at one point."""
     order, keys, points, first = along.order, along.keys, events.point, along.starts[e]
     for k in range(first + 1, along.starts[e + 1]):
-        moving, key = order[k], keys[k]
-        at = k
-        while at > first:  # bound: the part sorted so far
-            before = order[at - 1]
-            side = compare_events(edges, events, e, before, moving)
-            if side == 0:
-                for point in (points[before], points[moving]):
-                    if point >= n:
-                        events.turn[point - n] = NOT_SIMPLE
-                unite(unions.points, points[before], points[moving])
-            if side <= 0:
-                break
-            order[at], keys[at] = before, keys[at - 1]
-            at -= 1
-        order[at], keys[at] = moving, key
+        moving, key, low, high = order[k], keys[k], first, k
+        middle, is_same = k - 1, False  # nearly sorted: the last is looked at first
+        while low < high:  # invariant: those before low are not after the moving one, those from high on are
+            side = compare_events(edges, events, e, order[middle], moving)
+            if side > 0:
+                high = middle
+            else:
+                low, is_same = middle + 1, side == 0
+            middle = (low + high) // 2
+        if is_same:
+            before = order[low - 1]
+            for point in (points[before], points[moving]):
+                if point >= n:
+                    events.turn[point - n] = NOT_SIMPLE
+            unite(unions.points, points[before], points[moving])
+        for at in range(k, low, -1):
+            order[at], keys[at] = order[at - 1], keys[at - 1]
+        order[low], keys[low] = moving, key
 
 
 @inline

@@ -30,15 +30,17 @@ from engine.polygon_overlay.compiled.chains import build_chains, build_stars
 from engine.polygon_overlay.compiled.clearance import CLEARANCE, corners_are_clear
 from engine.polygon_overlay.compiled.components import join_faces
 from engine.polygon_overlay.compiled.convex import GENERAL, Passages, Points, intersect_convex
+from engine.polygon_overlay.compiled.crossing_signs import turn_of_edges
 from engine.polygon_overlay.compiled.edge_contacts import POLL
 from engine.polygon_overlay.compiled.edge_crossings import find_contacts
 from engine.polygon_overlay.compiled.edge_events import sort_events
 from engine.polygon_overlay.compiled.edge_tree import FEW, RUN, build_tree
-from engine.polygon_overlay.compiled.expanding import LEFT_OUT, count_left_out
 from engine.polygon_overlay.compiled.loading import (
     EVERYTHING,
+    LEFT_OUT,
     Box,
     Loaded,
+    RingArrays,
     box_of,
     common_box,
     fill_boxes,
@@ -48,12 +50,19 @@ from engine.polygon_overlay.compiled.loading import (
     mark_runs,
     mark_short,
 )
+from engine.polygon_overlay.compiled.reducing import count_left_out
 from engine.polygon_overlay.compiled.ring_certificate import certify, has_straight_point
-from engine.polygon_overlay.compiled.ring_nesting import NO_ROOM, Nesting, gather_evidence, spread_rings, write_evidence
+from engine.polygon_overlay.compiled.ring_nesting import (
+    AGAIN,
+    NO_ROOM,
+    Nesting,
+    gather_evidence,
+    spread_rings,
+    write_evidence,
+)
 from engine.polygon_overlay.compiled.ring_order import rank_rings
 from engine.polygon_overlay.compiled.rounded_crossings import LOST, round_points
 from engine.polygon_overlay.compiled.workspace import Buffers, Outcomes, Output, Workspace, rows_of
-from engine.polygon_overlay.implicit_rings import RingArrays
 from engine.predicates.expansion import LARGEST
 from engine.types import OPEN
 
@@ -184,20 +193,20 @@ def _arrange(w: Workspace, loaded: Loaded, kept: Any, nesting: Nesting, stop: An
         w.given, w.events, w.along, w.unions, w.tree, w.chains, w.stars, w.faces, w.components, w.found.point,
         (n, n_rings, n_cycles, loaded.n_runs), stop,
     )  # fmt: skip
-    is_named, n_entries = nesting.shells.shape[0] > 0, 0
-    if is_named:
+    tells, n_entries = nesting.rule == AGAIN, 0
+    if nesting.shells.shape[0] > 0:
         n_entries = spread_rings(w.given, w.chains, w.faces, nesting, w.holders, (n_chains, n_cycles), stop)
         if n_entries == NO_ROOM:
             return _Arranged(0, 0, 0, 0, False, room + 1)
     else:
         spread_labels(w.chains, w.faces, kept, n_chains, n_cycles, stop)
     choose_boundary(w.chains, w.faces, n_chains, n_nodes, stop)
-    if is_named:
+    if tells:
         gather_evidence(w.faces, w.holders, n_entries, n_cycles, nesting.shells.shape[0], stop)
     if stop[0]:
         return _NONE
     n_found, n_points = walk_rings(
-        edges, w.chains, w.stars, w.faces, w.tree.marks, w.walk, w.found, w.holders, is_named,
+        edges, w.chains, w.stars, w.faces, w.tree.marks, w.walk, w.found, w.holders, tells,
         (n_chains, n_nodes, n_simple), stop,
     )  # fmt: skip
     is_clear = is_clear and contacts.are_far and are_clear and corners_clear
@@ -219,6 +228,19 @@ def _round(w: Workspace, n: int, arranged: _Arranged, stop: Any) -> tuple[float,
 
 
 @merged
+def _source_of(w: Workspace, n: int, i: int) -> tuple[int, int]:
+    """Return the source of point i of the rings, as `overlay_pairs` tells it."""
+    point, edge, origins = w.found.point[i], w.found.edge[i], w.given.origins
+    if point >= n:
+        first, second = w.events.first[point - n], w.events.second[point - n]
+        is_beside = edge == first or (edge != second and turn_of_edges(w.given.edges, edge, first) == 0)
+        return origins[edge], origins[second if is_beside else first]
+    if w.found.meets[i] & RUN:
+        return origins[point], LEFT_OUT
+    return origins[point], -1 if edge == point else LEFT_OUT - 1 - origins[edge]
+
+
+@merged
 def _write(w: Workspace, n: int, n_found: int, output: Output, filled: _Filled, stop: Any) -> None:
     """Append the rings in their order to the output."""
     n_out, n_pieces = filled.n_vertices, filled.n_pieces
@@ -229,14 +251,8 @@ def _write(w: Workspace, n: int, n_found: int, output: Output, filled: _Filled, 
         for _ in range(last - first):
             if n_out & POLL == 0 and stop[0]:
                 return
-            point = w.found.point[i]
             output.vertices[n_out, 0], output.vertices[n_out, 1] = w.rounded.x[i], w.rounded.y[i]
-            if point < n:
-                output.sources[n_out, 0] = w.given.origins[point]
-                output.sources[n_out, 1] = LEFT_OUT if w.found.meets[i] & RUN else -1
-            else:
-                output.sources[n_out, 0] = w.given.origins[w.events.first[point - n]]
-                output.sources[n_out, 1] = w.given.origins[w.events.second[point - n]]
+            output.sources[n_out, 0], output.sources[n_out, 1] = _source_of(w, n, i)
             n_out += 1
             i = i + 1 if i + 1 < last else first
         output.rings[filled.n_rings + k + 1] = n_out
@@ -274,9 +290,10 @@ def overlay_pairs(
     """Overlay the pairs from ``begin`` on; fill outcomes, by pair, and output from its beginning.
 
     subject_items, clip_items: the first ring of each polygon, and the end of the last one's. kept: (4,) uint8 by label.
-    nesting: empty; or, for rounded rings as subjects, no clips, and kept all but the first, that of the rings
-    (ring_nesting.py), shells counted from the pair's first ring; then evidence is filled too, with numbers of rings.
-    A source is the input vertex and -1, or the first vertices of the two edges that cross; clip vertices are counted
+    nesting: empty; or, without clips, and kept all but the first, that of the rings of subjects (ring_nesting.py),
+    numbers counted from the pair's first ring; by the rule AGAIN evidence is filled too, with numbers of rings.
+    A source is an input vertex and -1, where the ring goes on along an edge of that vertex, or -3 - e, along edge e; or
+    two edges that cross, the one that it goes on along first. Edges by their first vertices; clip vertices are counted
     after those of all subjects. The input vertex and LEFT_OUT where the vertices up to the next source are left out.
     reduced: what reduce_pair returned for the only pair; no vertices, no such pair.
     Returns the pair reached, FINISHED or what is needed to go on with it, numbers of vertices, rings, pieces, rows of
@@ -318,7 +335,8 @@ def overlay_pairs(
             loaded = Loaded(n, n_rings, 0, max(magnitude(subject_box), magnitude(clip_box)))
             if not (safe and loaded.largest <= LARGEST):
                 continue
-        own = Nesting(nesting.shells[span.first : span.first_end], nesting.sizes[span.first : span.first_end])
+        first, end = span.first, span.first_end
+        own = Nesting(nesting.shells[first:end], nesting.sizes[first:end], nesting.rule)
         arranged = _arrange(w, loaded, kept, own, stop)
         if stop[0]:
             break
@@ -338,7 +356,7 @@ def overlay_pairs(
         if not _has_room(output, filled, m, n_found):
             counts[pair, 1], counts[pair, 2] = n_found, m
             return _ended(pair, NEEDS_OUTPUT, filled, used, 0)
-        n_evidence = _tell(w, n_found, span.first, output, filled) if is_named else 0
+        n_evidence = _tell(w, n_found, span.first, output, filled) if nesting.rule == AGAIN else 0
         if n_evidence == NO_ROOM:
             counts[pair, 2] = 2 * output.vertices.shape[0]
             return _ended(pair, NEEDS_OUTPUT, filled, used, 0)

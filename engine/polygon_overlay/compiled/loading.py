@@ -10,6 +10,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from engine.arrays import FloatArray, IntArray
 from engine.jit import inline
 from engine.polygon_overlay.compiled.crossing_signs import Edges
 from engine.polygon_overlay.compiled.edge_contacts import POLL
@@ -20,6 +21,17 @@ from engine.predicates.orientation import BOUND_2D, GUARD_2D
 Box = tuple[float, float, float, float]
 """x_min, x_max, y_min, y_max."""
 EVERYTHING: Final = (-np.inf, np.inf, -np.inf, np.inf)
+
+
+LEFT_OUT: Final = -2
+"""Second source of a vertex after which those up to the next one are left out."""
+
+
+class RingArrays(NamedTuple):
+    """Rings as read-only arrays: vertices (n, 2) float64, where each ring begins (n_rings + 1,) int64; may be empty."""
+
+    vertices: FloatArray
+    offsets: IntArray
 
 
 class Given(NamedTuple):
@@ -84,6 +96,7 @@ def load_rings(
             px, py = vertices[k, 0], vertices[k, 1]
             safe &= ((abs(px) >= SMALLEST) | (px == 0.0)) & ((abs(py) >= SMALLEST) | (py == 0.0))
             if px == qx and py == qy:
+                origins[n - 1] = base + k  # the next edge begins here
                 continue
             beyond = 1 * (px < x_min) + 2 * (px > x_max) + 4 * (py < y_min) + 8 * (py > y_max)
             if beyond & sides & sides_before:  # a triangle beyond that side changes no label in the box

@@ -1,4 +1,8 @@
-"""Rounded rings arranged again, each a source of its own: which faces are inside, and which rings tell so.
+"""Faces of many sources: which are inside, and for rounded rings that are arranged again which rings tell so.
+
+The faces are walked as a tree, from the unbounded one and back: each step takes up or lays down the sources that it
+crosses, however many there are. What is inside is a rule: where any source is (even-odd within each), where all rings
+together have a winding number that is not zero, positive, or negative; or that of a round of rounding:
 
 A face is inside where it lies (even-odd) in a shell and in no hole of that shell. Its evidence names those shells; that
 of a face outside names the holes that it lies in, the innermost of them: those whose shell is smallest. Evidence tells,
@@ -11,8 +15,7 @@ part by part, what the result came from (in_integers.py states the same rule ove
     '---------------+--'   |        {0, 2}   in two shells                  inside             {0, 2}
                     '------'        {}       in none                        outside            {}
 
-The faces are walked as a tree, from the unbounded one and back: each step takes up or lays down the rings that it
-crosses, however many there are, and looks at the few that the face lies in.
+Only the few rings that a face lies in are looked at.
 """
 
 from __future__ import annotations
@@ -28,16 +31,24 @@ from engine.polygon_overlay.compiled.loading import Given
 
 NO_ROOM: Final = -1
 _NOT_YET: Final = -2
+AGAIN: Final = 0
+ANY: Final = 1
+NON_ZERO: Final = 2
+POSITIVE: Final = 3
+NEGATIVE: Final = 4
+"""Rules: shells and holes of a round, within any source, winding numbers."""
 
 
 class Nesting(NamedTuple):
-    """By ring the number of its shell, its own where it is one, int64, and how large that shell is, float64.
+    """AGAIN: by ring the number of its shell, its own where it is one, int64, and how large that shell is, float64.
 
+    ANY: by ring the number of its source, no larger than that of the ring. Winding numbers: by ring any number.
     No rings: labels are those of two polygons.
     """
 
     shells: Any
     sizes: Any
+    rule: int
 
 
 class Holders(NamedTuple):
@@ -63,20 +74,34 @@ class Holders(NamedTuple):
 
 
 @merged
-def _cross(given: Given, chains: Chains, h: Holders, chain: int, n_held: int) -> int:
-    """Take up, or lay down, the rings of all chains that one stands for; return how many are held."""
+def _cross(given: Given, chains: Chains, nesting: Nesting, h: Holders, half: int, n_held: int) -> int:
+    """Go over a half-chain, from its left, and take up or lay down all that it stands for; return how many are held.
+
+    Of winding numbers: return the one beyond, ``n_held`` being the one here.
+    """
+    chain = half >> 1
     while chain >= 0:  # bound: the chains that coincide
         ring = given.masks[given.edges.ring[chains.first[chain]]]
-        if h.place[ring] < 0:
-            h.place[ring], h.held[n_held] = n_held, ring
-            n_held += 1
+        if nesting.rule >= NON_ZERO:
+            n_held += 1 if (chains.stands[chain] ^ half) & 1 else -1
         else:
-            n_held -= 1
-            last = h.held[n_held]
-            h.held[h.place[ring]], h.place[last] = last, h.place[ring]
-            h.place[ring] = -1
+            source = ring if nesting.rule == AGAIN else nesting.shells[ring]
+            if h.place[source] < 0:
+                h.place[source], h.held[n_held] = n_held, source
+                n_held += 1
+            else:
+                n_held -= 1
+                last = h.held[n_held]
+                h.held[h.place[source]], h.place[last] = last, h.place[source]
+                h.place[source] = -1
         chain = chains.twin[chain]
     return n_held
+
+
+@merged
+def _is_inside(rule: int, n_held: int) -> bool:
+    """Tell whether a face is inside by a rule other than AGAIN."""
+    return n_held < 0 if rule == NEGATIVE else n_held > 0 if rule != NON_ZERO else n_held != 0
 
 
 @merged
@@ -134,16 +159,19 @@ def spread_rings(
             h.first[face] = h.link[half]
             other = root_of(joined, cycle[half ^ 1])
             if h.entered[other] == _NOT_YET:
-                n_held = _cross(given, chains, h, half >> 1, n_held)
-                inside[other], n_entries = _judge(nesting, h, other, n_held, n_entries)
-                if n_entries == NO_ROOM:
-                    return NO_ROOM
+                n_held = _cross(given, chains, nesting, h, half, n_held)
+                if nesting.rule != AGAIN:
+                    inside[other] = _is_inside(nesting.rule, n_held)
+                else:
+                    inside[other], n_entries = _judge(nesting, h, other, n_held, n_entries)
+                    if n_entries == NO_ROOM:
+                        return NO_ROOM
                 h.entered[other], face = half, other
         else:
             half = h.entered[face]
             if half < 0:
                 break
-            n_held = _cross(given, chains, h, half >> 1, n_held)
+            n_held = _cross(given, chains, nesting, h, half ^ 1, n_held)
             face = root_of(joined, cycle[half])
     for i in range(n_cycles):
         inside[i] = inside[root_of(joined, i)]

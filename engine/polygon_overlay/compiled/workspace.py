@@ -29,8 +29,8 @@ _kept = threading.local()
 _MOST_KEPT: Final = 80_000_000
 """Bytes that were written to up to which a thread keeps its scratch."""
 _MANY_CONTACTS: Final = 2**18
-_BY_VERTEX: Final = 180
-_BY_CONTACT: Final = 270
+_BY_VERTEX: Final = 184
+_BY_CONTACT: Final = 278
 _BY_OUTPUT: Final = 40
 """Bytes of scratch for each vertex, contact, and vertex of the output."""
 
@@ -173,7 +173,7 @@ def buffers_for(n_vertices: int, n_rings: int, n_contacts: int) -> Buffers:
         half_labels=np.empty((2, 2 * k + 1), np.int64),
         half_octets=np.empty((4, 2 * k + 1), np.uint8),
         point_floats=np.empty((2, m)),
-        point_integers=np.empty((5, m), np.int32),
+        point_integers=np.empty((6, m), np.int32),
         point_codes=np.empty((2, m), np.int64),
         point_octets=np.empty((4, m), np.uint8),
         boxes=np.empty((m, 4)),
@@ -208,7 +208,7 @@ def rows_of(buffers: Buffers) -> Workspace:
         components=Components(r[3], r[4], r[5], r[6], r[7]),
         holders=Holders(r[4], r[5], r[6], h[3], h[6], hl[0], h[7], h[8], h[9], h[10], c[19]),
         walk=Walk(hb[3], h[6], c[17]),
-        found=Rings(p[0], pb[0], c[10], c[11]),
+        found=Rings(p[0], p[5], pb[0], c[10], c[11]),
         rounded=Rounded(px[0], px[1], pb[3], crossing_x, crossing_y, error),
         ranking=Ranking(c[5], cx[0], hb[0], c[6], c[7], c[8]),  # in place of chains, and of parameters of events
     )  # fmt: skip

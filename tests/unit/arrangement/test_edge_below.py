@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from engine.arrangement.arrange import Arrangement
-from engine.arrangement.edge_below import EdgesBelow
+from engine.arrangement.subdivision import EdgesBelow
 from tests.unit.arrangement.segments import arrange_segments
 
 

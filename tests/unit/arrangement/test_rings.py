@@ -15,14 +15,14 @@ Ring = list[tuple[int, int]]
 def traced(rings: list[Ring], evidence: bool = False) -> list[tuple[Ring, list[Ring]]]:
     """Return shells and holes of the even-odd region of `rings` as coordinates."""
     coordinates = np.array([vertex for ring in rings for vertex in ring], float)
-    masks = [1 << k for k in range(len(rings))]
+    masks = [frozenset({k}) for k in range(len(rings))]
     subdivision = subdivide(arrange_rings(coordinates, np.cumsum([0, *map(len, rings)]).tolist(), masks))
     labels = label_faces(subdivision)
-    pieces = trace_pieces(subdivision, [label.bit_count() % 2 == 1 for label in labels], labels)
-    nodes = subdivision.arrangement.nodes
+    pieces = trace_pieces(subdivision, [len(label) % 2 == 1 for label in labels], labels)
+    nodes, origin = subdivision.arrangement.nodes, subdivision.arrangement.origin
 
     def points(ring: list[int]) -> Ring:
-        exact = [nodes.exact(node) for node in ring]
+        exact = [nodes.exact(origin(half_edge)) for half_edge in ring]
         assert all(value.denominator == 1 for point in exact for value in point)
         return [(int(x), int(y)) for x, y in exact]
 
@@ -72,7 +72,7 @@ def test_straight_nodes_are_left_out() -> None:
 
 def test_evidence_is_gathered_over_regions() -> None:
     rings = [square(0, 0, 9), square(1, 1, 5), square(2, 2, 2)]
-    assert traced(rings, evidence=True) == [(1, [3]), (7, [])]
+    assert traced(rings, evidence=True) == [({0}, [{0, 1}]), ({0, 1, 2}, [])]
 
 
 @pytest.mark.parametrize("seed", range(10))

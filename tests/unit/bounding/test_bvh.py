@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from engine.bounding import bvh
 from engine.bounding.bvh import MAX_DEPTH, UNUSED, WIDTH, Bvh, build_bvh
+from engine.errors import CancelledError
 from engine.lanes.boxes import EMPTY
+from engine.parallel import Budget, Cancel
 
 
 def check_tree(boxes: np.ndarray, tree: Bvh) -> None:
@@ -56,3 +59,17 @@ def test_equal_centres_and_geometric_sizes_stay_shallow() -> None:
     check_tree(boxes, build_bvh(boxes))
     ladder = np.array([[2.0**k, 0, 0, 2.0 ** (k + 1), 1, 1] for k in range(-500, 500)])
     check_tree(ladder, build_bvh(ladder))
+
+
+def test_building_looks_at_every_budget_around_it() -> None:
+    boxes, cancel = random_boxes(50_000, 1.0, 0), Cancel()
+    cancel.set()
+    with Budget(cancel=cancel), Budget(), pytest.raises(CancelledError):
+        build_bvh(boxes)
+
+
+def test_a_tree_is_built_in_many_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    steps: list[None] = []
+    monkeypatch.setattr(bvh, "poll", lambda: steps.append(None))
+    build_bvh(random_boxes(100_000, 1.0, 0))
+    assert len(steps) > 5

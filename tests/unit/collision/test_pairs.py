@@ -6,8 +6,7 @@ import random
 
 import pytest
 
-from engine.collision.collide import TAKEN, pair_function
-from engine.collision.pairs import PAIRS
+from engine.collision.collide import PAIRS, TAKEN, pair_function
 from tests.unit.collision import lattices
 
 MAKERS = {

@@ -59,6 +59,12 @@ def test_many_points_and_other_solids_go_the_general_way() -> None:
     ball = engine.Sphere([0, 0, 0], 5)
     assert located_at_once(np.zeros((MOST + 1, 3)), ball) is None
     assert located_at_once(np.zeros((0, 3)), ball) is None
-    assert located_at_once(np.zeros((1, 3)), engine.Csg("union", [ball, ball])) is None
+    assert located_at_once(np.zeros((1, 3)), engine.Implicit.from_callable(lambda points: points[:, 0], 3)) is None
+    tree = engine.Csg("union", [ball, engine.Implicit.from_callable(lambda points: points[:, 0], 3)])
+    assert located_at_once(np.zeros((1, 3)), tree) is None
     mesh = made(merged(*(box_mesh([k, 0, 0], [k + 1, 1, 1]) for k in range(50))))
-    assert located_at_once(np.zeros((500, 3)), mesh) is None
+    found = located_at_once(np.zeros((500, 3)), mesh)
+    assert (found or ("",))[-1] == "ray_parity"
+    locate(np.random.default_rng(0).uniform(0, 50, (40_000, 3)), mesh)  # builds cells
+    found = located_at_once(np.zeros((500, 3)), mesh)
+    assert (found or ("",))[-1] == "segment_parity"

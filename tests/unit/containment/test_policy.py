@@ -14,7 +14,6 @@ from engine.containment.policy import (
     cost_in_tree,
     cost_of_cells,
     faces_over,
-    ring_pass_pays,
 )
 from engine.parallel import Budget
 from tests.unit.containment.scenes import box_mesh, made, merged
@@ -61,8 +60,8 @@ def test_rings_go_from_a_pass_to_slabs_and_cells() -> None:
     comb = Polygon([[*np.column_stack([teeth, teeth % 2]).tolist(), [4999, -1], [0, -1]]])
     assert choose_for_rings(comb, 5000) == CELLS  # each slab holds all teeth
     small = Polygon([circle[::500]])
-    assert all(ring_pass_pays(small, 100) for _ in range(100))
-    assert not ring_pass_pays(solid, 100)
+    assert all(choose_for_rings(small, 10) == PASS for _ in range(1000))
+    assert choose_for_rings(solid, 10) == LISTS  # few points do not go to the cells
 
 
 def test_shapes_without_extent_have_finite_costs() -> None:

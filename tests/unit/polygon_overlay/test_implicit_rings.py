@@ -6,7 +6,8 @@ from fractions import Fraction
 
 import numpy as np
 
-from engine.polygon_overlay.implicit_rings import ImplicitRings, RingArrays
+from engine.polygon_overlay.compiled.loading import RingArrays
+from engine.polygon_overlay.implicit_rings import ImplicitRings
 
 
 def test_crossings_and_vertices() -> None:

@@ -16,7 +16,7 @@ import pytest
 
 from engine.arrays import read_only
 from engine.parallel import Budget
-from engine.polygon_overlay.implicit_rings import RingArrays
+from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.overlay import overlay_rings
 from engine.polygon_overlay.result import Overlay
 from tests.conftest import DATA

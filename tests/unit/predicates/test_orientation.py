@@ -149,3 +149,12 @@ def test_products_that_underflow_or_overflow_never_decide_wrongly() -> None:
         assert side in (UNDECIDED, orient2d_rational(a, b, c))
     a, b, c, d = (tiny, 0.0, 0.0), (0.0, tiny, 0.0), (0.0, 0.0, huge), (0.0, 0.0, 0.0)
     assert run(orient3d_batch, *map(np.array, (d, a, b, c)))[0] == 1
+
+
+def test_equal_points_are_coplanar_at_any_exponent() -> None:
+    draw = np.random.default_rng(6)
+    points = list(draw.random((4, 300, 3)) * 2.0 ** draw.integers(-1060, 1020, (4, 300, 3)))
+    for first, second in itertools.combinations(range(4), 2):
+        equal = [point.copy() for point in points]
+        equal[second] = equal[first]
+        assert (run(orient3d_batch, *equal) == 0).all()

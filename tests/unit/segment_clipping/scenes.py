@@ -10,10 +10,13 @@ from engine.segment_clipping.clip_segments import SegmentPieces, clip_segments
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.convex import Convex
+from engine.solids.csg import Csg
 from engine.solids.half_space import HalfSpace
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
 from engine.solids.sphere import Sphere
+from engine.solids.surface import Surface
+from engine.solids.triangle import Triangle
 from tests.reference.segments import clip_segments as reference_pieces
 
 Floats = Any
@@ -33,7 +36,12 @@ def as_json(solid: Solid) -> dict[str, Any]:
         case Polygon():
             pairs = zip(solid.ring_offsets, solid.ring_offsets[1:])
             return {"type": solid.type, "rings": [solid.vertices[i:j].tolist() for i, j in pairs]}
-        case Polyhedron():
+        case Triangle():
+            return {"type": solid.type, "vertices": solid.vertices.tolist()}
+        case Csg():
+            operands = [as_json(operand) for operand in solid.operands]
+            return {"type": solid.type, "operation": solid.operation, "operands": operands}
+        case Polyhedron() | Surface():
             pairs = zip(solid.face_offsets, solid.face_offsets[1:])
             faces = [solid.face_indices[i:j].tolist() for i, j in pairs]
             return {"type": solid.type, "vertices": solid.vertices.tolist(), "faces": faces}

@@ -34,7 +34,7 @@ def test_kernel_and_exact_integers_agree(monkeypatch: pytest.MonkeyPatch) -> Non
             segments = np.concatenate([random_segments(rng, 40, dimension), through(rng, vertices_of(region), 40)])
             both = [clip_segments(segments, region)]
             with monkeypatch.context() as patch:
-                patch.setattr("engine.segment_clipping.boundary._settle", nothing_settled)
+                patch.setattr("engine.segment_clipping.boundary.cut_at_crossings", nothing_settled)
                 both.append(clip_segments(segments, region))
             for name in ("source", "start", "end", "t", "faces"):
                 np.testing.assert_array_equal(getattr(both[0], name), getattr(both[1], name))

@@ -135,13 +135,36 @@ def test_polygon() -> None:
     assert engine.Polygon([[[0, 0], [0, 0], [1, 1]]]).n_rings == 1
 
 
+@pytest.mark.parametrize("ring", [[[0, 0], [2, 2]], [[0, 0], [2, 2], [0, 0]]])
+def test_ring_of_two_positions_is_an_edge(ring: list[list[int]]) -> None:
+    edge, square = engine.Polygon([ring]), engine.Polygon([[[1, 1], [3, 1], [3, 3], [1, 3]]])
+    assert engine.locate([[1, 1], [0, 0], [1, 0]], edge).tolist() == [0, 0, -1]
+    assert engine.collide(edge, square).relation == engine.Relation.TOUCHING
+    assert engine.overlay(edge, square, "union").area == 4.0
+
+
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda empty, box: engine.locate([[0, 0]], empty),
+        lambda empty, box: engine.collide(box, empty),
+        lambda empty, box: engine.collide_scene([empty, box]),
+        lambda empty, box: engine.clearance(empty, box),
+        lambda empty, box: engine.clip_segments([[[0, 0], [1, 0]]], empty),
+        lambda empty, box: engine.bounds(empty),
+        lambda empty, box: engine.locate([[0, 0]], engine.Csg("union", [box, empty])),
+    ],
+)
+def test_empty_polygon_is_for_overlays(ask: Any) -> None:
+    with pytest.raises(engine.EmptyGeometryError, match="at least one ring"):
+        ask(engine.Polygon([]), engine.Aabb([0, 0], [1, 1]))
+
+
 @pytest.mark.parametrize(
     ("rings", "error", "where", "words"),
     [
-        ([], engine.EmptyGeometryError, ("rings",), "at least one ring"),
         ([[]], engine.RingTooShortError, ("rings", 0), "rings[0] has 0"),
-        ([[[0, 0], [1, 0], [0, 1]], [[0, 0], [1, 0]]], engine.RingTooShortError, ("rings", 1), "rings[1] has 2"),
-        ([[[0, 0], [1, 0], [0, 0]]], engine.RingTooShortError, ("rings", 0), "after its repeated last vertex"),
+        ([[[0, 0], [1, 0], [0, 1]], [[0, 0]]], engine.RingTooShortError, ("rings", 1), "rings[1] has 1"),
         ([[0, 0], [1, 0], [0, 1]], engine.InvalidArrayError, ("rings", 0, 0), "rings[0][0] must be a list"),
         (np.zeros((4, 2)), engine.InvalidArrayError, ("rings",), "put a single ring into a list"),
         ("text", engine.InvalidArrayError, ("rings",), "str"),

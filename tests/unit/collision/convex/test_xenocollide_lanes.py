@@ -7,7 +7,7 @@ import pytest
 
 from engine import Aabb
 from engine.collision.convex.body import ConvexBody, convex_body_of
-from engine.collision.convex.xenocollide_lanes import MOST_VERTICES, lane_points, lane_scale
+from engine.collision.convex.poses import MOST_VERTICES, lane_points, lane_scale
 from tests.unit.collision.convex.test_pair import ball_of_belts
 
 

@@ -7,10 +7,11 @@ import pytest
 
 from engine import Pose, Surface
 from engine.collision.codes import UNSETTLED
-from engine.collision.meshes.contact_kinds import STRENGTH, judge_contacts
+from engine.collision.meshes.contact_kinds import STRENGTH
 from engine.collision.meshes.exact_body import exact_pair
 from engine.collision.meshes.exact_triangles import classify_exact, kind_of_contact
 from engine.collision.meshes.mesh_arrays import mesh_body_of
+from engine.collision.meshes.touching import judge_contacts
 from engine.collision.meshes.triangle_triangle import APART
 from tests.unit.collision.meshes.bodies import TURN
 

@@ -37,7 +37,7 @@ def test_finds_what_looking_at_all_pairs_finds(room: int, pose: Pose | None, at:
     how, kinds = FULL, set()
     for turn in itertools.count():  # bound: each finds new pairs
         with np.errstate(all="ignore"):
-            how, n, _ = find_contacts(
+            how, n = find_contacts(
                 a.arrays, a.posed(pose), b.arrays, b.posed(pose), SEEK_OVERLAP, turn == 0, descent, found, FLAG
             )
         new = set(map(tuple, found.pairs[:n].tolist()))
@@ -61,7 +61,7 @@ def test_a_crossing_or_any_contact_may_settle_the_question(pose: Pose | None) ->
     for seek in (SEEK_OVERLAP, SEEK_CONTACT):
         found = new_found(512)
         with np.errstate(all="ignore"):
-            how, n, _ = find_contacts(
+            how, n = find_contacts(
                 a.arrays, a.posed(pose), b.arrays, b.posed(pose), seek, True, new_descent(), found, FLAG
             )
         assert (how, n) == (SETTLED, 1)

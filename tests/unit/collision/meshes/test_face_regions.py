@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from engine import Pose
-from engine.collision.meshes.face_contacts import find_all_contacts
-from engine.collision.meshes.face_regions import look_at_regions
+from engine.collision.meshes.mesh_mesh import find_all_contacts, look_at_regions
 from engine.collision.meshes.mesh_pair import MeshPair
 from engine.collision.result import Work
 from tests.unit.collision.meshes.bodies import TURN, mesh

@@ -11,12 +11,13 @@ from engine.collision.codes import UNSETTLED
 from engine.collision.meshes.dual_traversal import SEEK_CONTACT, SEEK_OVERLAP, new_descent, new_found
 from engine.collision.meshes.mesh_arrays import STILL, mesh_body_of
 from engine.collision.meshes.placement import PoseArrays
-from engine.collision.meshes.pose_batch import relate_poses
+from engine.collision.meshes.pose_batch import N_COLUMNS, RELATION, relate_poses
 from tests.unit.collision.meshes.bodies import brick
 
 
+@pytest.mark.parametrize("room", [4, 256])
 @pytest.mark.parametrize("size", [1, 3])
-def test_agrees_with_single_questions(size: int) -> None:
+def test_agrees_with_single_questions(size: int, room: int) -> None:
     rng = np.random.default_rng(size)
     turns, _ = np.linalg.qr(rng.normal(size=(40, 3, 3)))
     turns *= np.sign(np.linalg.det(turns))[:, None, None]
@@ -27,12 +28,13 @@ def test_agrees_with_single_questions(size: int) -> None:
     for second, seek in ((brick(size), SEEK_OVERLAP), (brick(5, (-2, -2, -2)), SEEK_OVERLAP), (sheet, SEEK_CONTACT)):
         first = brick(2)
         a, b = mesh_body_of(first), mesh_body_of(second)
-        found = np.empty(40, np.int8)
+        rows = np.empty((40, N_COLUMNS), np.int64)
         poses = PoseArrays(read_only(turns), read_only(moves), True)  # the kind that the kernel is compiled for
         with np.errstate(all="ignore"):
             relate_poses(
-                a.arrays, b.arrays, STILL, poses, seek, new_descent(), new_found(4), found, np.zeros(1, np.uint8)
+                a.arrays, b.arrays, STILL, poses, seek, 0, new_descent(), new_found(room), rows, np.zeros(1, np.uint8)
             )
+        found = rows[:, RELATION]
         assert (found != UNSETTLED).sum() > 20
         for turn, move, how in zip(turns, moves, found.tolist()):
             if how != UNSETTLED:

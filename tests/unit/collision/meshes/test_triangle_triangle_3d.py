@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from engine.collision.codes import UNSETTLED
-from engine.collision.meshes.triangle_triangle_3d import relate_triangles_3d
+from engine.collision.triangles import relate_triangles_3d
 from tests.reference.contact import triangles_meet
 from tests.reference.exact import vector
 

@@ -51,7 +51,7 @@ def test_agrees_with_single_pairs_where_it_answers(is_posed: bool, size: float) 
     ]
     pairs = np.array([(i, j) for i in range(30) for j in range(i + 1, 30)])
     with Budget(None, None) as budget:
-        found = SceneBatches(scene_bodies(scene, poses), False, False, budget).relations(pairs, None)
+        found = SceneBatches(scene_bodies(scene, poses)).relations(pairs, False, False, budget, None)
     for (i, j), how in zip(pairs.tolist(), found.tolist()):
         if how != UNSETTLED:
             assert how == collide(scene[i], scene[j], first_pose=poses[i], second_pose=poses[j]).relation

@@ -20,8 +20,8 @@ def test_agrees_with_single_pairs_where_it_answers() -> None:
     poses = [None if k % 4 == 0 else Pose(turns[k], rng.normal(size=3)) for k in range(24)]
     pairs = np.array([(i, j) for i in range(24) for j in range(i + 1, 24)])
     with Budget(None, None) as budget:
-        batches = SceneBatches(scene_bodies(solids, poses), False, False, budget)
-        found = batches.relations(pairs, None)
+        batches = SceneBatches(scene_bodies(solids, poses))
+        found = batches.relations(pairs, False, False, budget, None)
     has_surface = (pairs % 3 == 2).any(axis=1)
     assert (found[has_surface] == UNSETTLED).all()
     assert (found[~has_surface] != UNSETTLED).mean() > 0.9
@@ -38,5 +38,5 @@ def test_many_equal_balls_and_boxes_are_decided_unless_their_detail_is_asked() -
     pairs = np.array([(0, 1), (2, 3), (4, 5)])
     for detail in (False, True):
         with Budget(None, None) as budget:
-            found = SceneBatches(bodies, False, detail, budget).relations(pairs, None)
+            found = SceneBatches(bodies).relations(pairs, False, detail, budget, None)
         assert (found == (UNSETTLED if detail else Relation.OVERLAPPING)).all()

@@ -5,7 +5,9 @@ from __future__ import annotations
 import random
 import time
 from functools import partial
+from typing import Any
 
+import numba
 import numpy as np
 import pytest
 
@@ -26,7 +28,9 @@ from engine import (
 )
 from engine.bounding.box_grid import pairs_of_boxes
 from engine.collision.collide import collide
+from engine.collision.collide_poses import collide_poses
 from engine.collision.scenes.collide_scene import collide_scene
+from engine.jit import KERNELS
 
 EYE = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
 TURN = [[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]]
@@ -160,6 +164,19 @@ def test_witnesses_come_with_the_pairs_when_asked_for() -> None:
     assert pairs.witnesses is not None
     assert pairs.witnesses[0] is not None
     assert (pairs.witnesses[0].kind, pairs.witnesses[0].containing) == ("containment", "first")
+
+
+def test_a_flag_that_is_no_bool_compiles_no_kernels_of_its_own() -> None:
+    boxes = [Aabb([k, 0, 0], [k + 1, 1, 1]) for k in range(3)]
+    turns, moves = np.eye(3)[None].repeat(20, axis=0), np.zeros((20, 3))
+    kinds = []
+    flag: Any
+    for flag in (True, 1, np.bool_(True), "yes"):
+        pairs = collide_scene(boxes, [None, Pose(np.eye(3), [0.0, 0.0, 0.5]), None], boolean=flag)
+        assert pairs.relation.astype(bool).all()
+        assert collide_poses(boxes[0], boxes[1], turns, moves, boolean=flag).astype(bool).all()
+        kinds.append([len(each.signatures) for each in KERNELS if not numba.config.DISABLE_JIT])
+    assert kinds[1:] == kinds[:1] * 3
 
 
 def test_a_scene_in_which_all_meet_all_ends_at_its_deadline() -> None:

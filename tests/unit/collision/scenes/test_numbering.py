@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from engine.collision.scenes.numbering import numbered
+from engine.collision.scenes.bodies import numbered
 
 
 @pytest.mark.parametrize("n", [0, 1, 1000])

@@ -6,7 +6,8 @@ from fractions import Fraction
 
 import numpy as np
 
-from engine.collision.simple.feature_distance import box_distance_bounds, segment_distance, triangle_distance
+from engine.collision.meshes.live_faces import segment_distance, triangle_distance
+from engine.collision.simple.boundary import box_distance_bounds
 from tests.reference.contact import squared_distance_to_segment, squared_distance_to_triangle
 from tests.reference.exact import vector
 

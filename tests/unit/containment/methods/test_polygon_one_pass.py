@@ -10,7 +10,7 @@ import pytest
 from engine import Polygon, Triangle, locate
 from engine.arrays import read_only
 from engine.containment.methods.polygon_one_pass import close_rings, locate_by_ring_pass, locate_in_small_rings
-from engine.containment.prepared import closed_rings_of
+from engine.containment.posed.filters import NOT_FINITE
 from engine.containment.rational_locate import rational_location
 from engine.jit import kernel
 from engine.types import UNDECIDED
@@ -47,8 +47,19 @@ def test_a_pass_tells_what_rational_arithmetic_tells() -> None:
     solid = Polygon([random.integers(0, 6, (n, 2)) for n in (300, 4)])
     points = read_only(random.integers(-1, 13, (200, 2)) / 2.0)
     found, flag = np.empty(len(points), np.int8), np.zeros(1, np.uint8)
-    locate_by_ring_pass(points, np.zeros(len(points)), *closed_rings_of(solid), found, flag)
-    assert found.tolist() == [rational_location(point, solid) for point in points.tolist()]
+    expected = [rational_location(point, solid) for point in points.tolist()]
+    locate_by_ring_pass(points, np.zeros(0), solid.vertices, solid.ring_offsets, found, flag)
+    assert found.tolist() == expected
+    small = Polygon([solid.vertices[:40], solid.vertices[300:]])  # a block of points, and few points
+    expected = [rational_location(point, small) for point in points.tolist()]
+    for some in (slice(None), slice(0, 9)):
+        locate_by_ring_pass(points[some], np.zeros(0), small.vertices, small.ring_offsets, found[some], flag)
+        assert found[some].tolist() == expected[some]
+    blurs, blurred = np.full(len(points), 2.0**-30), np.empty(len(points), np.int8)
+    locate_by_ring_pass(points, blurs, small.vertices, small.ring_offsets, blurred, flag)
+    assert ((blurred == expected) | (blurred == UNDECIDED)).all()
+    bad = read_only(np.array([[0.0, np.inf]]))
+    assert locate_by_ring_pass(bad, np.zeros(0), small.vertices, small.ring_offsets, found, flag) == NOT_FINITE
 
 
 def test_plane_triangle_without_area_is_its_segment() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from engine.arrays import read_only
 from engine.parallel import Budget
-from engine.polygon_overlay.implicit_rings import RingArrays
+from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.in_integers import overlay_exactly
 from engine.polygon_overlay.run import Operation, overlay_compiled
 from tests.unit.polygon_overlay.checks import OPERATIONS, assert_valid

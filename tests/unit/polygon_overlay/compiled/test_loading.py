@@ -31,8 +31,8 @@ def test_repeats_and_flat_rings_go() -> None:
     triangle: list[tuple[float, float]] = [(0, 0), (0, 0), (4, 0), (4, 3), (4, 3), (0, 0)]
     flat: list[tuple[float, float]] = [(1, 1), (2, 2), (1, 1)]
     assert loaded([triangle, flat, [(9, 9)] * 4, triangle[::-1]], EVERYTHING)[:2] == (
-        [[0, 2, 3], [13, 14, 16]],
-        [3, 14],
+        [[1, 2, 4], [13, 15, 16]],
+        [4, 15],
     )
 
 

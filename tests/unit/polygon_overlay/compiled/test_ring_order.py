@@ -33,7 +33,7 @@ def test_pieces_by_shells_and_holes_after_their_shell(seed: int) -> None:
     rings = [(region, ring[k:] + ring[:k]) for (region, ring), k in zip(rings, random.integers(0, 3, 99), strict=False)]
     n, points = len(rings), np.array([vertex for _, ring in rings for vertex in ring])
     offsets, regions = np.cumsum([0, *(len(ring) for _, ring in rings)]), np.array([region for region, _ in rings])
-    found = Rings(np.arange(len(points)), np.zeros(len(points), np.uint8), offsets, regions)
+    found = Rings(np.arange(len(points)), np.arange(len(points)), np.zeros(len(points), np.uint8), offsets, regions)
     ranking = Ranking(*(np.zeros(n, kind) for kind in (np.int64, float, np.uint8, np.int64, np.int64, np.int64)))
     x, y = np.ascontiguousarray(points.T)
     none = np.zeros(0)
@@ -48,7 +48,9 @@ def holes_among(rings: list[list[tuple[float, float]]]) -> list[bool] | None:
     """Return which rings of one region are holes, None where that is not sure."""
     n, points = len(rings), np.array([point for ring in rings for point in ring])
     offsets = np.cumsum([0, *map(len, rings)])
-    found = Rings(np.arange(len(points)), np.ones(len(points), np.uint8), offsets, np.zeros(n, np.int64))
+    found = Rings(
+        np.arange(len(points)), np.arange(len(points)), np.ones(len(points), np.uint8), offsets, np.zeros(n, np.int64)
+    )
     ranking = Ranking(*(np.zeros(n, kind) for kind in (np.int64, float, np.uint8, np.int64, np.int64, np.int64)))
     x, y = (np.ascontiguousarray(axis) for axis in points.T)
     none = np.zeros(0)

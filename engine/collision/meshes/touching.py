@@ -1,0 +1,228 @@
+"""Compiled: two proofs that bodies in contact only touch, that their open interiors have no common point.
+
+**A plane.** Two convex bodies that touch are always separated by a plane through a face in contact, or through two
+edges that cross (a face of their Minkowski difference holds the origin); a plane through two crossing edges is the one
+through the first and an end of the second. Many bodies that are not convex lie that way too.
+
+**Free faces.** If the open interiors meet, the border of their intersection has a piece with area on some face of
+either body: on one with a point in the other's open interior, or on one flush with a face of the other. Where no
+contact is flush or cuts an open face (`kind_of`), each open face in contact keeps clear of the other body but for
+single points, so all of it lies on one side, and any of its corners off the other body tells which. A patch of faces
+without contact has such a corner too, or is a component by itself. So where all these are outside, no piece of a face
+lies inside.
+
+Where neither proves it, nothing is said.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from engine.collision.codes import UNSETTLED
+from engine.collision.meshes.contact_kinds import FACE_FACE, FLUSH, N_SIGNS, kind_of
+from engine.collision.meshes.dual_traversal import store_pose
+from engine.collision.meshes.mesh_arrays import MeshArrays, triangle_of
+from engine.collision.meshes.parity import OUTSIDE, brought_back, locate_point
+from engine.collision.meshes.placement import Placement, PoseArrays, defect_of, place_pair
+from engine.collision.meshes.triangle_triangle import corner, sign_of_four, with_pose
+from engine.jit import allocating, called, inline, kernel
+from engine.predicates.loading import as_point3
+from engine.predicates.posed import UNPOSED, PosedPoint3, posed_error
+from engine.types import UNDECIDED
+
+N_FACES = 32
+N_EDGES = 8
+"""So many contacts give the planes of their faces, so many those of their edges."""
+_SAMPLED = 16
+
+UNKNOWN, ONLY_TOUCHING, CUTTING = range(3)
+"""What `judge_contacts` says of the two bodies: nothing; that they only touch; nothing, and some contact may cut a
+face or is flush, so that interiors may well meet at it."""
+
+
+@called
+def side_of_all(
+    poses: Any, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, vertices: Any, pose: int, error: float, n_samples: int
+) -> int:
+    """Return the closed side (1, -1) of the plane of a, b, c on which about so many of vertices (n, 3) lie, 0 if they
+    lie on it; UNDECIDED if they lie on both sides, or where a sign is open."""
+    found = 0
+    for vertex in range(0, vertices.shape[0], max(1, vertices.shape[0] // n_samples)):
+        p = PosedPoint3(vertices[vertex, 0], vertices[vertex, 1], vertices[vertex, 2], pose)
+        side = sign_of_four(poses, a, b, c, p, error)
+        if side == UNDECIDED or side * found < 0:
+            return UNDECIDED
+        if found == 0:
+            found = side
+    return found
+
+
+@called
+def separates(
+    poses: Any,
+    a: PosedPoint3,
+    b: PosedPoint3,
+    c: PosedPoint3,
+    vertices: Any,
+    pose: int,
+    their_vertices: Any,
+    their_pose: int,
+    error: float,
+) -> bool:
+    """Tell whether the plane of a, b, c has the two bodies on different closed sides, not both of them in it."""
+    for n_samples in (_SAMPLED, max(len(vertices), len(their_vertices))):  # most planes cut the bodies in the middle
+        side = side_of_all(poses, a, b, c, vertices, pose, error, n_samples)
+        if side == UNDECIDED:
+            return False
+        their_side = side_of_all(poses, a, b, c, their_vertices, their_pose, error, n_samples)
+        if their_side == UNDECIDED or side * their_side > 0:
+            return False
+    return side != their_side
+
+
+@called
+def are_separated(
+    poses: Any, first: MeshArrays, own: int, second: MeshArrays, their: int, contacts: Any, error: float, flag: Any
+) -> bool:
+    """Tell whether a plane through faces or edges of contacts (n, 2) is known to separate the two bodies.
+
+    own, their: the numbers of their poses, error: the larger `posed_error`.
+    """
+    u, v = first.vertices, second.vertices
+    for item in range(min(N_FACES, contacts.shape[0])):
+        s = with_pose(triangle_of(first, contacts[item, 0]), own)
+        t = with_pose(triangle_of(second, contacts[item, 1]), their)
+        if separates(poses, s.p, s.q, s.r, u, own, v, their, error):
+            return True
+        if separates(poses, t.p, t.q, t.r, u, own, v, their, error):
+            return True
+        if flag[0] != 0:
+            return False
+    for item in range(min(N_EDGES, contacts.shape[0])):  # order: a plane of a face is likelier, and tried with all
+        s = with_pose(triangle_of(first, contacts[item, 0]), own)
+        t = with_pose(triangle_of(second, contacts[item, 1]), their)
+        for edge in range(6):
+            one, other = (s, t) if edge < 3 else (t, s)
+            for end in range(3):
+                a, b, c = corner(one, edge), corner(one, edge + 1), corner(other, end)
+                if separates(poses, a, b, c, u, own, v, their, error):
+                    return True
+        if flag[0] != 0:
+            return False
+    return False
+
+
+@inline
+def place_of(known: Any, vertex: int) -> int:
+    """Return where a vertex stands in a table of a power of two of places, or the free place where it may."""
+    last = known.shape[0] - 1
+    place = vertex & last
+    while known[place] >= 0 and known[place] != vertex:  # bound: half the places are free
+        place = (place + 1) & last
+    return place
+
+
+@allocating
+def are_outside(
+    source: MeshArrays, place: Placement, contacts: Any, flush: Any, own: int, mesh: MeshArrays, target: Placement
+) -> bool:
+    """Tell whether every face of a body in contact has a corner that surely lies outside the other body, and no corner
+    off it that does not, nor any component without contact.
+
+    own: the column of the body in contacts (n, 2); flush (n,): of each the corners in the plane of the other face
+    (`kind_of`): what lies on the other body is among those.
+    """
+    n, n_places = contacts.shape[0], 16
+    while n_places < 6 * n:
+        n_places *= 2
+    known, is_flush = np.full(n_places, -1, np.int64), np.empty(n_places, np.bool_)
+    for item in range(n):
+        for k in range(3):
+            if flush[item] >> (3 * own + k) & 1:
+                at = place_of(known, source.triangles[contacts[item, own], k])
+                known[at], is_flush[at] = source.triangles[contacts[item, own], k], True
+    defect, before = defect_of(target), -1
+    for item in range(n + source.components.shape[0]):
+        face = contacts[item, own] if item < n else source.components[item - n]
+        if face == before:
+            continue
+        before, n_outside = face, 0
+        for k in range(3):
+            vertex = source.triangles[face, k]
+            at = place_of(known, vertex)
+            if known[at] < 0:
+                point = brought_back(as_point3(source.vertices, vertex), place, target, defect)
+                if locate_point(point, mesh) != OUTSIDE:
+                    return False
+                if item < n:
+                    known[at], is_flush[at] = vertex, False
+            n_outside += known[at] < 0 or not is_flush[at]
+        if n_outside == 0:
+            return False
+    return True
+
+
+@called
+def only_touch(
+    first: MeshArrays,
+    a: Placement,
+    second: MeshArrays,
+    b: Placement,
+    poses: Any,
+    contacts: Any,
+    flush: Any,
+    is_free: bool,
+    flag: Any,
+) -> bool:
+    """Tell whether two placed bodies are known only to touch. contacts (n, 2): all of them where is_free, which says
+    that none is flush or cuts an open face; else any. flush (n,): as for `are_outside`."""
+    if is_free and first.has_inside and second.has_inside:
+        if are_outside(first, a, contacts, flush, 0, second, b) and are_outside(
+            second, b, contacts, flush, 1, first, a
+        ):
+            return True
+    own, their = 0 if a.is_posed else UNPOSED, 1 if b.is_posed else UNPOSED
+    error = max(posed_error(poses, own, first.extent.reach), posed_error(poses, their, second.extent.reach))
+    return are_separated(poses, first, own, second, their, contacts, error, flag)
+
+
+@kernel
+def judge_contacts(
+    first: MeshArrays,
+    first_pose: PoseArrays,
+    second: MeshArrays,
+    second_pose: PoseArrays,
+    contacts: Any,
+    are_all: bool,
+    kinds: Any,
+    flag: Any,
+) -> int:
+    """Say what contacts (n, 2) prove (UNKNOWN, ONLY_TOUCHING, CUTTING); are_all: whether there are no others.
+
+    Fills kinds (m <= n,) int8 of the first contacts; UNSETTLED stands for what is open. Beyond a contact of FACE_FACE,
+    than which nothing is stronger, nothing is filled.
+    """
+    poses, work, is_free = np.zeros((2, 12)), np.zeros(N_SIGNS, np.int8), True
+    flush = np.zeros(contacts.shape[0], np.int8)
+    store_pose(poses, 0, first_pose, 0)
+    store_pose(poses, 1, second_pose, 0)
+    own, their = 0 if first_pose.is_posed else UNPOSED, 1 if second_pose.is_posed else UNPOSED
+    error = max(posed_error(poses, own, first.extent.reach), posed_error(poses, their, second.extent.reach))
+    for item in range(contacts.shape[0]):
+        i, j = contacts[item, 0], contacts[item, 1]
+        kind, may_cut = UNSETTLED, True
+        if first.axis[i] >= 0 and second.axis[j] >= 0:
+            t, u = with_pose(triangle_of(first, i), own), with_pose(triangle_of(second, j), their)
+            kind, may_cut = kind_of(poses, t, int(first.axis[i]), u, int(second.axis[j]), error, work)
+            flush[item] = work[FLUSH]
+        if item < kinds.shape[0]:
+            kinds[item] = kind
+        is_free = is_free and not may_cut
+        if kind == FACE_FACE or flag[0] != 0 or not (is_free or item + 1 < kinds.shape[0]):
+            break
+    a, b = place_pair(first.extent, first_pose, 0, second.extent, second_pose, 0)
+    if only_touch(first, a, second, b, poses, contacts, flush, is_free and are_all, flag):
+        return ONLY_TOUCHING
+    return UNKNOWN if is_free else CUTTING

@@ -1,0 +1,15 @@
+"""Layers: polygons with attributes, as maps have them; GeoDataFrames in and out, and GeoJSON for HTTP and files."""
+
+from engine.layers.features import FeatureRows, dissolve_features, locate_features, overlay_features, polygon_of
+from engine.layers.frames import dissolve, overlay, sjoin
+
+__all__ = [
+    "FeatureRows",
+    "dissolve",
+    "dissolve_features",
+    "locate_features",
+    "overlay",
+    "overlay_features",
+    "polygon_of",
+    "sjoin",
+]

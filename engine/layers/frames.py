@@ -1,0 +1,222 @@
+"""Layers as GeoDataFrames: overlay, dissolve and sjoin, row for row as geopandas has them. Needs the extra ``geo``."""
+
+from __future__ import annotations
+
+import warnings
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from engine.errors import EngineError, InvalidInputError, InvalidOperationError, NotFiniteError, UnsupportedSolidError
+from engine.layers.rows import (
+    HOWS,
+    NONE,
+    Layer,
+    LayerRows,
+    Limits,
+    check_how,
+    dissolved,
+    held,
+    layer_of,
+    overlay_rows,
+)
+from engine.parallel import Cancel
+from engine.polygon_overlay.polygon_arrays import PolygonArrays, arrays_of
+from engine.solids.ragged import within
+
+if TYPE_CHECKING:
+    from geopandas import GeoDataFrame
+
+_POLYGONS = (3, 6)
+"""Shapely's numbers of polygons and of such of several parts."""
+
+
+def overlay(
+    left: GeoDataFrame,
+    right: GeoDataFrame,
+    how: str = "intersection",
+    keep_geom_type: bool | None = None,
+    *,
+    workers: int | None = None,
+    deadline: float | None = None,
+    cancel: Cancel | None = None,
+) -> GeoDataFrame:
+    """Overlay two layers of polygons, every feature with every one that it meets, as geopandas.overlay does.
+
+    The rows, their order, columns, suffixes and types are those of geopandas.overlay; the geometry is that of
+    `engine.overlay`: exact topology, coordinates rounded once, valid.
+
+    Parameters: left, right: GeoDataFrames of Polygon and MultiPolygon; missing and empty geometries are welcome. how:
+    "intersection", "union", "identity", "difference" or "symmetric_difference". keep_geom_type: None (as True, with a
+    warning where rows without geometry are left out), True, or False, which keeps these rows; points and lines in which
+    features touch are not made, so False is refused where rows of pairs are asked for. deadline in seconds.
+    Boundary, degenerate input: features that only touch make no row. A ring that crosses itself is even-odd; the parts
+    of a MultiPolygon that overlap are united. A z is refused.
+    Cost: that of `overlay_batch` on the pairs whose boxes meet, and some microseconds a feature.
+    Raises: InvalidInputError where geopandas is not installed; InvalidOperationError, UnsupportedSolidError,
+    NotFiniteError (each names the feature), NotRepresentableError, DeadlineExceededError, CancelledError.
+    """
+    _geopandas()
+    check_how(how)
+    if keep_geom_type is False and HOWS[how][0]:
+        raise InvalidOperationError(
+            f"keep_geom_type=False asks how={how!r} for points and lines too, which are not made here; leave it out, "
+            "or ask for difference or symmetric_difference",
+            ("keep_geom_type",),
+        )
+    if left.crs is not None and right.crs is not None and left.crs != right.crs:
+        warnings.warn("the layers have different CRS; coordinates are taken as they are", UserWarning, stacklevel=2)
+    limits = Limits(deadline, cancel, workers)
+    layers = _layer(left, "left", limits), _layer(right, "right", limits)
+    rows = overlay_rows(*layers, how, limits)
+    if rows.n_collapsed:
+        warnings.warn(f"rounding left nothing of {rows.n_collapsed} rows with area", UserWarning, stacklevel=2)
+    frame = _frame(left, right, rows, how)
+    if keep_geom_type is not False and (missing := frame.geometry.isna()).any():
+        frame = frame[~missing]
+        if keep_geom_type is None:
+            warnings.warn(f"{int(missing.sum())} rows without geometry are left out", UserWarning, stacklevel=2)
+    return frame.reset_index(drop=True)
+
+
+def dissolve(
+    layer: GeoDataFrame,
+    by: Any = None,
+    aggfunc: Any = "first",
+    *,
+    deadline: float | None = None,
+    cancel: Cancel | None = None,
+    **options: Any,
+) -> GeoDataFrame:
+    """Unite the polygons of each group exactly, and gather their attributes, as GeoDataFrame.dissolve does.
+
+    Parameters: by, aggfunc and further options as there (as_index, level, sort, observed, dropna); deadline, cancel as
+    `overlay`. A group without polygons has an empty geometry. Raises: as `overlay`.
+    """
+    geopandas, shapely = _geopandas()
+    limits = Limits(deadline, cancel)
+    name = layer.geometry.name
+    solids = _layer(layer, "layer", limits)
+    points = geopandas.points_from_xy(np.arange(len(layer)), np.zeros(len(layer)), crs=layer.crs)
+    places = layer.copy()
+    places[name] = points
+    # geopandas gathers rows and attributes; points on a line tell which features are in which group
+    found = places.dissolve(by, aggfunc, method="unary", **options)
+    at, group = shapely.get_coordinates(np.asarray(found.geometry.array), return_index=True)
+    groups = np.full(len(layer), NONE)
+    groups[at[:, 0].astype(int)] = group
+    rows = dissolved(solids, groups, len(found), limits)
+    found[name] = geopandas.array.GeometryArray(_geometries(rows, shapely.Polygon()), crs=layer.crs)
+    return found
+
+
+def sjoin(
+    left: GeoDataFrame,
+    right: GeoDataFrame,
+    how: Literal["inner", "left"] = "inner",
+    *,
+    deadline: float | None = None,
+    cancel: Cancel | None = None,
+) -> GeoDataFrame:
+    """Join points to the polygons that hold them, boundary included, decided exactly: geopandas.sjoin, "intersects".
+
+    Parameters: left: of points; missing ones are in nothing. right: of polygons. how: "inner" or "left".
+    Raises: as `overlay`.
+    """
+    _, shapely = _geopandas()
+    if how not in ("inner", "left"):
+        raise InvalidOperationError(f"how must be inner or left; got {how!r}", ("how",))
+    limits = Limits(deadline, cancel)
+    points = np.asarray(left.geometry.array)
+    if len(wrong := np.flatnonzero(~np.isin(shapely.get_type_id(points), (-1, 0)))):
+        raise _refused(
+            UnsupportedSolidError, left, ("left", int(wrong[0])), "is no point; sjoin joins points to polygons"
+        )
+    places, numbers = shapely.get_coordinates(points, return_index=True)
+    first, second = held(places, _layer(right, "right", limits), limits)
+    first = numbers[first]
+    if how == "left":
+        alone = np.setdiff1d(np.arange(len(left)), first)
+        order = np.argsort(np.concatenate([first, alone]), kind="stable")
+        first, second = (np.concatenate(each)[order] for each in ((first, alone), (second, np.full(len(alone), NONE))))
+    attributes = right.drop(columns=right.geometry.name)
+    shared = set(attributes.columns) & set(left.columns)
+    joined = left.iloc[first].rename(columns={column: f"{column}_left" for column in shared})
+    attributes = attributes.rename(columns={column: f"{column}_right" for column in shared})
+    attributes.insert(0, "index_right", right.index)
+    more = attributes.reset_index(drop=True).reindex(np.where(second == NONE, len(right), second))
+    return joined.assign(**{column: more[column].to_numpy() for column in more.columns})
+
+
+def _geopandas() -> tuple[Any, Any]:
+    """Return geopandas and shapely."""
+    try:
+        import geopandas
+        import shapely
+    except ImportError:
+        raise InvalidInputError("GeoDataFrames need geopandas: pip install 'exact-geometry[geo]'", ()) from None
+    return geopandas, shapely
+
+
+def _refused(error: type[EngineError], frame: GeoDataFrame, where: tuple[str, int], what: str) -> EngineError:
+    name, place = where
+    return error(f"{name}[{place}] (index {frame.index[place]}) {what}", where)
+
+
+def _layer(frame: GeoDataFrame, name: str, limits: Limits) -> Layer:
+    """Return the polygons of a frame's geometry, None where there is none."""
+    _, shapely = _geopandas()
+    array = np.asarray(frame.geometry.array)
+    if len(wrong := np.flatnonzero(~np.isin(shapely.get_type_id(array), (-1, *_POLYGONS)))):
+        what = f"is a {array[wrong[0]].geom_type}; layers are of polygons"
+        raise _refused(UnsupportedSolidError, frame, (name, int(wrong[0])), what)
+    if len(high := np.flatnonzero(shapely.has_z(array))):
+        what = "has a z; layers are plane: drop it with shapely.force_2d"
+        raise _refused(UnsupportedSolidError, frame, (name, int(high[0])), what)
+    is_missing = shapely.is_missing(array)
+    there = np.flatnonzero(~is_missing)
+    if not len(there):
+        none = np.zeros(len(array) + 1, np.int64)
+        return Layer(PolygonArrays(np.zeros((0, 2)), none[:1], none), is_missing)
+    _, positions, (rings, parts, *several) = shapely.to_ragged_array(array[there], include_z=False)
+    ends = several[0] if several else np.arange(len(there) + 1)
+    if len(broken := np.flatnonzero(~np.isfinite(positions).all(axis=1))):
+        owner = there[within(ends, within(parts, within(rings, broken[:1])))]
+        raise _refused(NotFiniteError, frame, (name, int(owner[0])), f"holds {positions[broken[0]].tolist()}")
+    counts = np.zeros(len(array), np.int64)
+    counts[there] = np.diff(ends)
+    return layer_of(arrays_of(positions, rings, parts), np.append(0, np.cumsum(counts)), is_missing, limits)
+
+
+def _geometries(rows: LayerRows, empty: Any = None) -> Any:
+    """Return the rows' geometries: Polygons, MultiPolygons of several pieces, `empty` for none."""
+    _, shapely = _geopandas()
+    positions, (rings, pieces, ends) = rows.ragged
+    single = shapely.from_ragged_array(shapely.GeometryType.POLYGON, positions, (rings, pieces))
+    sizes = np.diff(ends)
+    found = np.full(len(rows), empty, object)
+    found[sizes == 1] = single[ends[:-1][sizes == 1]]
+    if (several := sizes > 1).any():
+        owner = np.repeat(np.cumsum(several) - 1, np.where(several, sizes, 0))
+        found[several] = shapely.multipolygons(single[np.repeat(several, sizes)], indices=owner)
+    return found
+
+
+def _frame(left: GeoDataFrame, right: GeoDataFrame, rows: LayerRows, how: str) -> GeoDataFrame:
+    """Return the rows with the attributes of both sides; names that both have end in _1 and _2."""
+    geopandas, _ = _geopandas()
+    import pandas
+
+    geometry = geopandas.array.GeometryArray(_geometries(rows), crs=left.crs)
+    if how == "difference":
+        frame = left.iloc[rows.left].copy()
+        frame[left.geometry.name] = geometry
+        return frame
+    sides = [side.drop(columns=side.geometry.name) for side in (left, right)]
+    shared = set(sides[0].columns) & set(sides[1].columns)
+    first, second = (
+        side.rename(columns={column: f"{column}_{k}" for column in shared}) for k, side in enumerate(sides, 1)
+    )
+    halves = [half.reset_index(drop=True).reindex(rows_) for half, rows_ in ((first, rows.left), (second, rows.right))]
+    frame = pandas.concat([half.reset_index(drop=True) for half in halves], axis=1)  # -1 is no label: missing
+    return geopandas.GeoDataFrame(frame, geometry=geometry, crs=left.crs)

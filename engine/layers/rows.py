@@ -1,0 +1,312 @@
+"""Layers of polygons against each other: which meet, and what remains, as rows of flat arrays.
+
+A layer is a list of polygons, None where a feature has no geometry. Features are paired by their boxes; the pairs are
+overlaid together. Rows stand in the order of geopandas.overlay: the pairs by left, then right; then what is left of the
+left, then of the right.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any, Final, Literal, cast
+
+import numpy as np
+
+from engine.arrays import BoolArray, FloatArray, IntArray
+from engine.bounding.box_grid import pairs_of_boxes
+from engine.containment.scene.locate_scene import locate_scene
+from engine.errors import InvalidOperationError, NotRepresentableError
+from engine.parallel import Budget, Cancel
+from engine.polygon_overlay.batch import OverlayBatch, overlay_batch
+from engine.polygon_overlay.found import chained, summed
+from engine.polygon_overlay.polygon_arrays import Chosen, PolygonArrays, joined_arrays
+from engine.polygon_overlay.result import Output
+from engine.polygon_overlay.run import Operation
+from engine.polygon_overlay.union_all import union_all
+from engine.solids.checks import shown
+from engine.solids.polygon import Polygon
+from engine.solids.ragged import closed_rings
+from engine.types import Accuracy
+
+How = Literal["intersection", "union", "identity", "difference", "symmetric_difference"]
+HOWS: Final[dict[str, tuple[bool, bool, bool]]] = {
+    "intersection": (True, False, False),
+    "union": (True, True, True),
+    "identity": (True, True, False),
+    "difference": (False, True, False),
+    "symmetric_difference": (False, True, True),
+}
+"""Whether there are rows of pairs, of what is left of the left, and of the right."""
+NONE: Final = -1
+_PAIR_BYTES: Final = 16
+_ROW_BYTES: Final = 300
+"""Of a pair of boxes; of the overlay of a pair, at least."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Layer:
+    """The polygons of a layer's features, empty ones welcome, and which features have no geometry at all."""
+
+    arrays: PolygonArrays
+    is_missing: BoolArray
+
+    def __len__(self) -> int:
+        return len(self.is_missing)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LayerRows:
+    """Rows of an overlay of layers, as ragged arrays.
+
+    left, right: (m,) int64, the feature of either layer that a row comes from, -1 where of none.
+    vertices: (n, 2) float64. ring_offsets into them; no ring repeats its first vertex. piece_offsets into the rings, a
+    shell counter-clockwise before its holes, clockwise. row_offsets (m + 1,) into the pieces; a row without pieces is
+    that of a feature without geometry.
+    n_collapsed: rows that are not here because rounding left no piece of them.
+    """
+
+    left: IntArray
+    right: IntArray
+    vertices: FloatArray
+    ring_offsets: IntArray
+    piece_offsets: IntArray
+    row_offsets: IntArray
+    n_collapsed: int = 0
+
+    def __len__(self) -> int:
+        return len(self.left)
+
+    @property
+    def ragged(self) -> tuple[FloatArray, tuple[IntArray, IntArray, IntArray]]:
+        """Coordinates and offsets of rings, polygons and rows, rings closed: for shapely.from_ragged_array."""
+        positions, offsets = closed_rings(self.vertices, self.ring_offsets)
+        return positions, (offsets, self.piece_offsets, self.row_offsets)
+
+
+class Limits:
+    """What is left of the time of one call, for the calls that it makes, and how the decisions of these came about."""
+
+    def __init__(self, deadline: float | None, cancel: Cancel | None, workers: int | None = None) -> None:
+        self._end = None if deadline is None else time.monotonic() + deadline
+        self._cancel, self._workers = cancel, workers
+        self._ulps, self._counts = 0.5, [0, 0, 0]
+
+    def options(self) -> dict[str, Any]:
+        """Return the options of the next call."""
+        left = None if self._end is None else self._end - time.monotonic()
+        return {"deadline": left, "cancel": self._cancel, "workers": self._workers, "report": True}
+
+    def budget(self) -> Budget:
+        """Return deadline and cancel switch of what is done here."""
+        return Budget(self.options()["deadline"], self._cancel)
+
+    def noted(self, found: tuple[Any, Accuracy]) -> Any:
+        """Keep what a call says of its accuracy; return its result."""
+        result, accuracy = found
+        self._ulps = max(self._ulps, accuracy.coordinates_ulp or 0.0)
+        told = accuracy.n_items, accuracy.n_beyond_filter, accuracy.n_rational
+        self._counts = [count + more for count, more in zip(self._counts, told)]
+        return result
+
+    @property
+    def accuracy(self) -> Accuracy:
+        """The report of all calls together: its items are edges."""
+        n_items, n_beyond, n_rational = self._counts
+        return Accuracy("exact", self._ulps, n_items, n_beyond, n_rational, "arrangement")
+
+
+def overlay_rows(left: Layer, right: Layer, how: str, limits: Limits) -> LayerRows:
+    """Overlay two layers, every feature with every one that it meets.
+
+    Boundary: features that meet without common area make no row. Degenerate input: polygons without area likewise; one
+    without geometry stands as a row without pieces where what is left of its layer is asked for.
+    Accuracy: decisions exact. Of a feature what others leave is its difference with all of these at once; where they
+    overlap each other, with their union, rounded.
+    Cost: n log n for the boxes of both layers together, then that of `overlay_batch`.
+    Raises: InvalidOperationError, NotRepresentableError, DeadlineExceededError, CancelledError.
+    """
+    check_how(how)
+    of_pairs, of_left, of_right = HOWS[how]
+    pairs, rivals = meeting(left, right, limits, with_rivals=of_left or of_right)
+    parts = [_intersections(left, right, pairs, limits)] if of_pairs else []
+    if of_left:
+        parts.append(_differences(left, right, pairs, rivals[1], limits))
+    if of_right:
+        turned = pairs[np.lexsort((pairs[:, 0], pairs[:, 1]))][:, ::-1]
+        rest = _differences(right, left, turned, rivals[0], limits)
+        parts.append(replace(rest, left=rest.right, right=rest.left))
+    return parts[0] if len(parts) == 1 else _together(parts)
+
+
+def check_how(how: object) -> None:
+    if not isinstance(how, str) or how not in HOWS:
+        raise InvalidOperationError(f"how must be one of {', '.join(HOWS)}; got {shown(how)}", ("how",))
+
+
+def meeting(
+    left: Layer, right: Layer, limits: Limits, with_rivals: bool = False
+) -> tuple[IntArray, tuple[IntArray, IntArray]]:
+    """Return the pairs (n, 2) of features whose boxes meet, by left, then right; with_rivals: also those within each
+    layer."""
+    filled = [np.flatnonzero(layer.arrays.sizes()) for layer in (left, right)]
+    corners = [layer.arrays.boxes(numbers) for layer, numbers in zip((left, right), filled)]
+    low, high = (np.concatenate(each) for each in zip(*corners))
+    numbers = np.concatenate([filled[0], filled[1] + len(left)])
+    found = [np.zeros((0, 2), np.int64)]
+    rivals: tuple[list[IntArray], list[IntArray]] = ([found[0]], [found[0]])
+    with limits.budget() as budget:
+        for block in pairs_of_boxes(low, high, budget.flag) if len(low) else ():
+            budget.check()
+            pairs = numbers[block]
+            is_left = pairs < len(left)
+            found.append(pairs[is_left[:, 0] & ~is_left[:, 1]])
+            budget.take(_ROW_BYTES * len(found[-1]))
+            if with_rivals:
+                rivals[0].append(pairs[is_left[:, 1]])
+                rivals[1].append(pairs[~is_left[:, 0]] - len(left))
+                budget.take(_PAIR_BYTES * len(block))
+        budget.check()
+    pairs = np.concatenate(found) - np.array([0, len(left)])
+    order = np.lexsort((pairs[:, 1], pairs[:, 0])) if len(found) > 2 else slice(None)
+    return pairs[order], (np.concatenate(rivals[0]), np.concatenate(rivals[1]))
+
+
+def _intersections(left: Layer, right: Layer, pairs: IntArray, limits: Limits) -> LayerRows:
+    sides = Chosen(left.arrays, pairs[:, 0]), Chosen(right.arrays, pairs[:, 1])
+    return _rows(_overlaid(*sides, "intersection", limits), pairs[:, 0], pairs[:, 1])
+
+
+def _differences(layer: Layer, others: Layer, pairs: IntArray, rivals: IntArray, limits: Limits) -> LayerRows:
+    """Return what is left of each feature of `layer` without those of `others` that it is paired with.
+
+    pairs: by the first, then the second; rivals: of others whose boxes meet.
+    """
+    seconds, groups = pairs[:, 1], summed(np.bincount(pairs[:, 0], minlength=len(layer)))
+    clips, places = others.arrays.taken(seconds).merged(groups), np.arange(len(layer))
+    overlapping = np.flatnonzero(_overlapping(others, rivals, groups, seconds, limits))
+    if len(overlapping):
+        those = [
+            united(Chosen(others.arrays, seconds[groups[k] : groups[k + 1]]), limits) for k in overlapping.tolist()
+        ]
+        places[overlapping] = len(layer) + np.arange(len(those))
+        clips = joined_arrays([clips, *those])
+    numbers = np.flatnonzero(layer.arrays.sizes())
+    sides = Chosen(layer.arrays, numbers), Chosen(clips, places[numbers])
+    rows = _rows(_overlaid(*sides, "difference", limits), numbers, np.full(len(numbers), NONE))
+    missing = np.flatnonzero(layer.is_missing)
+    order = np.argsort(np.concatenate([rows.left, missing]), kind="stable")
+    left = np.concatenate([rows.left, missing])[order]
+    sizes = np.concatenate([np.diff(rows.row_offsets), np.zeros(len(missing), np.int64)])[order]
+    return replace(rows, left=left, right=np.full(len(left), NONE), row_offsets=summed(sizes))
+
+
+def _overlapping(others: Layer, rivals: IntArray, groups: IntArray, seconds: IntArray, limits: Limits) -> BoolArray:
+    """Tell of each group of others, seconds[groups[k]:groups[k + 1]], whether any two of them have common area."""
+    found = np.zeros(len(groups) - 1, np.bool_)
+    clash = rivals[_overlap(others.arrays, rivals, limits)]
+    enemies: dict[int, set[int]] = {}
+    for first, second in clash.tolist():
+        enemies.setdefault(first, set()).add(second)
+    for k in np.flatnonzero(np.diff(groups) > 1).tolist() if enemies else ():
+        here = set(seconds[groups[k] : groups[k + 1]].tolist())
+        found[k] = any(not here.isdisjoint(enemies[each]) for each in here & enemies.keys())
+    return found
+
+
+def _overlap(arrays: PolygonArrays, pairs: IntArray, limits: Limits) -> BoolArray:
+    """Tell of pairs of polygons whether they have common area, however little."""
+    sides = Chosen(arrays, pairs[:, 0]), Chosen(arrays, pairs[:, 1])
+    return _overlaid(*sides, "intersection", limits, "nearest").n_pieces_exact > 0
+
+
+def united(polygons: Sequence[Polygon], limits: Limits) -> PolygonArrays:
+    """Return the union of polygons as one that is valid."""
+    found = limits.noted(union_all(list(polygons), **limits.options()))
+    return PolygonArrays(found.vertices, found.ring_offsets, np.array([0, len(found.ring_offsets) - 1]))
+
+
+def layer_of(parts: PolygonArrays, offsets: IntArray, is_missing: BoolArray, limits: Limits) -> Layer:
+    """Return a layer of features, each of the parts from offsets[k] on; parts that overlap are united."""
+    owner = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
+    arrays = parts.merged(offsets)
+    filled = np.flatnonzero(parts.sizes())
+    several = filled[(np.diff(offsets) > 1)[owner[filled]]]
+    low, high = parts.boxes(several)
+    found = [np.zeros((0, 2), np.int64)]
+    with limits.budget() as budget:
+        for block in pairs_of_boxes(low, high, budget.flag) if len(low) else ():
+            budget.check()
+            pairs = several[block]
+            found.append(pairs[owner[pairs[:, 0]] == owner[pairs[:, 1]]])
+        budget.check()
+    pairs = np.concatenate(found)
+    overlapping = np.unique(owner[pairs[_overlap(parts, pairs, limits), 0]])
+    if len(overlapping):
+        those = [united(Chosen(parts, np.arange(offsets[k], offsets[k + 1])), limits) for k in overlapping.tolist()]
+        places = np.arange(len(offsets) - 1)
+        places[overlapping] = len(offsets) - 1 + np.arange(len(those))
+        arrays = joined_arrays([arrays, *those]).taken(places)
+    return Layer(arrays, is_missing)
+
+
+def _overlaid(
+    subjects: Chosen, clips: Chosen, operation: Operation, limits: Limits, output: Output = "valid"
+) -> OverlayBatch:
+    found: Any = overlay_batch(subjects, clips, operation, output=output, **limits.options())
+    return cast(OverlayBatch, limits.noted(found))
+
+
+def _rows(batch: OverlayBatch, left: IntArray, right: IntArray) -> LayerRows:
+    """Return the pairs of a batch that have pieces as rows."""
+    if batch.status.any():
+        row = int(np.flatnonzero(batch.status)[0])
+        raise NotRepresentableError(
+            f"feature {left[row]} of one layer and what it meets of the other cross beyond the largest double; scale "
+            "the layers down",
+            (),
+        )
+    n_pieces = np.diff(batch.pair_offsets)
+    kept = np.flatnonzero(n_pieces)
+    lost = int(((n_pieces == 0) & (batch.n_pieces_exact > 0)).sum())
+    sizes = summed(n_pieces[kept])
+    return LayerRows(left[kept], right[kept], batch.vertices, batch.ring_offsets, batch.piece_offsets, sizes, lost)
+
+
+def _together(parts: Sequence[LayerRows]) -> LayerRows:
+    """Return the rows of some parts one after another."""
+    return LayerRows(
+        np.concatenate([part.left for part in parts]),
+        np.concatenate([part.right for part in parts]),
+        np.concatenate([part.vertices for part in parts]),
+        chained([part.ring_offsets for part in parts]),
+        chained([part.piece_offsets for part in parts]),
+        chained([part.row_offsets for part in parts]),
+        sum(part.n_collapsed for part in parts),
+    )
+
+
+def dissolved(layer: Layer, groups: IntArray, n_groups: int, limits: Limits) -> LayerRows:
+    """Return the union of the features of each group; groups: of each feature, -1 for none. A row a group, all kept."""
+    order = np.argsort(groups, kind="stable")
+    ends = np.searchsorted(groups[order], np.arange(n_groups + 1)).tolist()
+    members = (list(Chosen(layer.arrays, order[start:stop])) for start, stop in pairwise(ends))
+    found = [limits.noted(union_all(some, **limits.options())) for some in members]
+    return LayerRows(
+        np.arange(n_groups),
+        np.full(n_groups, NONE),
+        np.concatenate([np.zeros((0, 2)), *(each.vertices for each in found)]),
+        chained([each.ring_offsets for each in found]),
+        chained([each.piece_offsets for each in found]),
+        summed(np.array([each.n_pieces for each in found], np.int64)),
+        sum(each.n_pieces == 0 < each.n_pieces_exact for each in found),
+    )
+
+
+def held(points: object, layer: Layer, limits: Limits) -> tuple[IntArray, IntArray]:
+    """Return the pairs of points and features that hold them, boundary included, by point, then feature."""
+    there = np.flatnonzero(layer.arrays.sizes())
+    found = limits.noted(locate_scene(points, list(Chosen(layer.arrays, there)), **limits.options()))
+    return np.repeat(np.arange(len(found.offsets) - 1), np.diff(found.offsets)), there[found.indices]

@@ -1,0 +1,324 @@
+"""Where along a segment a placed solid holds it, in exact arithmetic: every type of solid, under any pose.
+
+A profile cuts [0, 1] at nodes: the location of each, and of the open span after it. A pose maps the segment back into
+the solid's frame, where parameters are the same; a ball stays in the world, since it keeps its radius. Profiles of a
+CSG tree are combined span by span as locations are: max, min, min(A, -B). Pieces are the spans that are not outside.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from functools import cmp_to_key
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from engine.containment.rational_locate import over_tree, prism_walls, rational_location, to_body_frame, to_world_frame
+from engine.errors import UnsupportedSolidError
+from engine.parallel import Budget
+from engine.predicates.rational import Number, common_integers, nearest_with_root
+from engine.scenes.parameters import ONE, ZERO, Parameter, compare, parameter
+from engine.segment_clipping.boundary import elements_met
+from engine.segment_clipping.exact_pieces import Contact, contacts_of, nodes_with_locations
+from engine.segment_clipping.exact_segments import Piece
+from engine.segment_clipping.prepared_boundary import boundary_of
+from engine.solids.aabb import Aabb
+from engine.solids.base import Solid
+from engine.solids.convex import Convex
+from engine.solids.csg import Csg
+from engine.solids.half_space import HalfSpace
+from engine.solids.polygon import Polygon
+from engine.solids.polyhedron import Polyhedron
+from engine.solids.pose import Pose
+from engine.solids.sphere import Sphere
+from engine.solids.surface import Surface
+from engine.solids.triangle import Triangle
+
+OUTSIDE, BOUNDARY, INSIDE = -1, 0, 1
+TAKEN: Final = "half_space, aabb, convex, sphere, triangle, polygon, polyhedron, surface and csg of these"
+Point = Sequence[Number]
+
+
+class Node(NamedTuple):
+    """A parameter, the location there, the face through which the segment enters or leaves there (-1: none; a face that
+    holds an end of the segment is named where no other is), and the location of the open span up to the next node."""
+
+    t: Parameter
+    at: int
+    entered: int
+    left: int
+    after: int
+
+
+def exact_pieces(p: list[float], q: list[float], solid: Solid, pose: Pose | None, budget: Budget) -> list[ExactPiece]:
+    """Return the pieces of the segment p q within a placed solid, in order.
+
+    Raises: UnsupportedSolidError, what `Budget.check` raises.
+    """
+    if p == q:
+        is_in = located(p, solid, pose, budget) >= 0
+        return [ExactPiece(ZERO, ONE, (-1, -1))] if is_in else []
+    found, first = [], None
+    for node in profile_of(p, q, solid, pose, budget):
+        if first is None and node.at >= 0:
+            first = node
+        if first is not None and node.after < 0:
+            entered = -1 if first.t.near == 0.0 and compare(first.t, ZERO) == 0 else first.entered
+            left = -1 if node.t.near == 1.0 and compare(node.t, ONE) == 0 else node.left
+            found.append(ExactPiece(first.t, node.t, (entered, left)))
+            first = None
+    return found
+
+
+class ExactPiece(NamedTuple):
+    """A piece of a segment: its parameters, and the faces crossed at either end."""
+
+    first: Parameter
+    last: Parameter
+    faces: tuple[int, int]
+
+    def rounded(self, p: list[float], q: list[float]) -> Piece:
+        """Return the piece of p q with the doubles nearest to its numbers."""
+        numbers, scale = common_integers([*p, *q])
+        start, end = numbers[: len(p)], numbers[len(p) :]
+
+        def at(t: Parameter) -> list[float]:
+            moves = [(x, y - x) for x, y in zip(start, end)]
+            return [nearest_with_root(x * t.z + t.u * d, t.v * d, t.w, t.z * scale) for x, d in moves]
+
+        return Piece((self.first.near, self.last.near), at(self.first), at(self.last), self.faces)
+
+
+def located(p: Point, solid: Solid, pose: Pose | None, budget: Budget) -> int:
+    """Return the location of a point in a placed solid; on a surface it is BOUNDARY."""
+    if isinstance(solid, Surface):
+        own = p if pose is None else to_body_frame(p, pose)
+        return BOUNDARY if list(_contacts(own, own, solid, pose, budget)) else OUTSIDE
+    return rational_location(p, solid, pose, budget.check)
+
+
+def profile_of(p: list[float], q: list[float], solid: Solid, pose: Pose | None, budget: Budget) -> list[Node]:
+    """Return the nodes of the segment p q, p and q different, within a placed solid, from t = 0 to t = 1."""
+    start, end = (p, q) if pose is None else (to_body_frame(p, pose), to_body_frame(q, pose))
+
+    def of_leaf(leaf: Solid) -> list[Node]:
+        budget.check()
+        match leaf:
+            case Sphere():
+                center = leaf.center.tolist()
+                return _on_sphere(p, q, center if pose is None else to_world_frame(center, pose), leaf.radius)
+            case HalfSpace():
+                return _on_rows(start, end, [leaf.row.tolist()])
+            case Aabb():
+                return _on_rows(start, end, leaf.rows.tolist())
+            case Convex():
+                return _on_rows(start, end, leaf.planes.tolist())
+            case Triangle() if leaf.dimension == 3:
+                return _on_rows(start, end, prism_walls(leaf))
+            case Polygon() | Polyhedron() | Triangle() | Surface():
+                return _on_boundary(start, end, leaf, pose, budget)
+        raise unsupported(leaf)
+
+    if not isinstance(solid, Csg):
+        return of_leaf(solid)
+    offsets = solid.prepared("face_offsets", lambda: _face_offsets(solid))
+
+    def of_operand(leaf: Solid) -> list[Node]:
+        offset = offsets[id(leaf)]
+        return [
+            node._replace(
+                entered=node.entered + offset * (node.entered >= 0), left=node.left + offset * (node.left >= 0)
+            )
+            for node in of_leaf(leaf)
+        ]
+
+    found: list[Node] = over_tree(solid, of_operand, _combined)
+    return found
+
+
+def unsupported(solid: Solid) -> UnsupportedSolidError:
+    """Return the error for a solid that no segment is cut on."""
+    return UnsupportedSolidError(f"a segment is not cut on an {solid.type}; bodies may be {TAKEN}")
+
+
+def _face_offsets(solid: Csg) -> dict[int, int]:
+    """Return for each leaf of a tree, by its id, how many faces the leaves before it have."""
+    offsets: dict[int, int] = {}
+    total = 0
+    waiting: list[Solid] = [solid]
+    while waiting:  # bound: each distinct node enters once for each operand that names it
+        node = waiting.pop()
+        if id(node) in offsets:
+            continue
+        offsets[id(node)] = total
+        if isinstance(node, Csg):
+            waiting += node.operands[::-1]
+        else:
+            total += _n_faces(node)
+    return offsets
+
+
+def _n_faces(leaf: Any) -> int:
+    match leaf:
+        case Aabb():
+            return 2 * leaf.dimension
+        case Convex():
+            return len(leaf.planes)
+        case Polygon() | Triangle():
+            return len(leaf.vertices)
+        case Polyhedron():
+            return leaf.n_faces
+    return 1
+
+
+def _combined(operation: str, profiles: list[list[Node]]) -> list[Node]:
+    """Return the profile of a Boolean combination; faces are the smallest of those at a parameter."""
+    nodes = sorted((node.t for profile in profiles for node in profile), key=cmp_to_key(compare))
+    parameters = [t for i, t in enumerate(nodes) if i == 0 or compare(nodes[i - 1], t) != 0]
+    found, places = [], [0] * len(profiles)
+    for t in parameters:
+        at, after, faces = [], [], []
+        for i, profile in enumerate(profiles):
+            if places[i] < len(profile) and compare(profile[places[i]].t, t) == 0:
+                node = profile[places[i]]
+                places[i] += 1
+                at.append(node.at)
+                faces += [face for face in (node.entered, node.left) if face >= 0]
+            else:
+                at.append(profile[places[i] - 1].after)
+            after.append(profile[places[i] - 1].after)
+        face = min(faces, default=-1)
+        found.append(Node(t, _joined(operation, at), face, face, _joined(operation, after)))
+    return found
+
+
+def _joined(operation: str, located: list[int]) -> int:
+    """Return what `combine` does, for a few numbers."""
+    if operation == "difference":
+        return min(located[0], -located[1])
+    return max(located) if operation == "union" else min(located)
+
+
+def _interval(a: Node, b: Node, between: int) -> list[Node]:
+    """Return the profile of a segment that is not outside from one node to another, which may be the same place."""
+    nodes = [] if compare(a.t, ZERO) == 0 else [Node(ZERO, OUTSIDE, -1, -1, OUTSIDE)]
+    if compare(a.t, b.t) == 0:
+        nodes.append(Node(a.t, min(a.at, b.at), a.entered, b.left, OUTSIDE))
+    else:
+        nodes += [a._replace(after=between), b]
+    return nodes if compare(b.t, ONE) == 0 else [*nodes, Node(ONE, OUTSIDE, -1, -1, OUTSIDE)]
+
+
+_NOWHERE: Final = [Node(ZERO, OUTSIDE, -1, -1, OUTSIDE), Node(ONE, OUTSIDE, -1, -1, OUTSIDE)]
+
+
+def _on_rows(p: Point, q: Point, rows: Sequence[Sequence[float]]) -> list[Node]:
+    """Return the profile within the points for which every row (a, b, ..., d) has dot(row, (x, 1)) >= 0."""
+    n = len(p)
+    numbers, scale = common_integers([*p, *q])
+    start, end = numbers[:n], numbers[n:]
+    a = Node(ZERO, INSIDE, -1, -1, OUTSIDE)
+    b = Node(ONE, INSIDE, -1, -1, OUTSIDE)
+    between = INSIDE
+    for face, row in enumerate(rows):
+        (*normal, offset), _ = common_integers(row)
+        s_p = sum(x * y for x, y in zip(normal, start)) + offset * scale
+        s_q = sum(x * y for x, y in zip(normal, end)) + offset * scale
+        if s_p < 0 and s_q < 0:
+            return _NOWHERE
+        if s_p < 0:
+            t = parameter(s_p, 0, 0, s_p - s_q)
+            if a.entered < 0 or compare(t, a.t) > 0:
+                a = Node(t, BOUNDARY, face, -1, OUTSIDE)
+        elif s_q < 0:
+            t = parameter(s_p, 0, 0, s_p - s_q)
+            if b.left < 0 or compare(t, b.t) < 0:
+                b = Node(t, BOUNDARY, -1, face, OUTSIDE)
+        elif s_p == s_q == 0:
+            between = BOUNDARY
+        if s_p == 0 and a.entered < 0 and a.left < 0:
+            a = a._replace(at=BOUNDARY, left=face)
+        if s_q == 0 and b.left < 0 and b.entered < 0:
+            b = b._replace(at=BOUNDARY, entered=face)
+    return _NOWHERE if compare(a.t, b.t) > 0 else _interval(a, b, between)
+
+
+def _on_sphere(p: Point, q: Point, center: Point, radius: float) -> list[Node]:
+    """Return the profile within a ball: a t^2 + 2 b t + c <= 0, as in `clip_by_sphere`."""
+    n = len(p)
+    numbers, _ = common_integers([*p, *q, *center, radius])
+    start, end, middle, r = numbers[:n], numbers[n : 2 * n], numbers[2 * n : 3 * n], numbers[-1]
+    d, f = [y - x for x, y in zip(start, end)], [x - c for x, c in zip(start, middle)]
+    a, b = sum(x * x for x in d), sum(x * y for x, y in zip(d, f))
+    c = sum(x * x for x in f) - r * r
+    c_end = a + 2 * b + c
+    discriminant = b * b - a * c
+    if c > 0 and c_end > 0 and (discriminant < 0 or b >= 0 or a + b <= 0):
+        return _NOWHERE
+    first = Node(ZERO, INSIDE if c < 0 else BOUNDARY, -1, -1 if c else 0, OUTSIDE)
+    if c > 0:
+        first = Node(parameter(-b, -1, discriminant, a), BOUNDARY, 0, -1, OUTSIDE)
+    last = Node(ONE, INSIDE if c_end < 0 else BOUNDARY, -1 if c_end else 0, -1, OUTSIDE)
+    if c_end > 0:
+        last = Node(parameter(-b, 1, discriminant, a), BOUNDARY, -1, 0, OUTSIDE)
+    return _interval(first, last, INSIDE)
+
+
+def _on_boundary(p: Point, q: Point, solid: Any, pose: Pose | None, budget: Budget) -> list[Node]:
+    """Return the profile within a polygon, triangle of the plane or polyhedron, or on a surface."""
+    contacts = list(_contacts(p, q, solid, pose, budget))
+    if isinstance(solid, Surface):
+        contacts = [contact._replace(turns=False) for contact in contacts]
+        locations = (OUTSIDE, OUTSIDE)
+    else:
+        at_p = rational_location(p, solid, None, budget.check)
+        locations = at_p, (rational_location(q, solid, None, budget.check) if at_p == BOUNDARY else OUTSIDE)
+
+    def locate(t: Fraction) -> int:
+        point = [Fraction(x) + t * (Fraction(y) - Fraction(x)) for x, y in zip(p, q)]
+        return rational_location(point, solid, None, budget.check)
+
+    nodes: list[Node] = []
+    for t, met, is_along, is_in in nodes_with_locations(contacts, locations, locate):
+        after = BOUNDARY if is_along else INSIDE if is_in else OUTSIDE
+        face = min((contact.is_along, contact.face) for contact in met)[1] if met else -1
+        at = BOUNDARY if met else locations[0] if t == 0 else nodes[-1].after
+        top, bottom = t.as_integer_ratio()
+        nodes.append(Node(parameter(top, 0, 0, bottom), at, face, face, after if t < 1 else OUTSIDE))
+    return nodes
+
+
+def _contacts(p: Point, q: Point, solid: Any, pose: Pose | None, budget: Budget) -> Iterator[Contact]:
+    """Yield the contacts of p q, in the frame of the solid, with its elements."""
+    boundary = boundary_of(solid)
+    if pose is None and list(p) != list(q):
+        _, near = elements_met(np.array([[p, q]], np.float64), boundary, budget)
+    else:
+        near = _near(boundary.elements, p, q)
+    n = len(p)
+    corners = boundary.elements[near]
+    flat, _ = common_integers([*p, *q, *corners.ravel().tolist()])
+    points = [flat[i : i + n] for i in range(0, len(flat), n)]
+    size = corners.shape[1]
+    elements = [
+        (face, points[2 + size * i : 2 + size * (i + 1)]) for i, face in enumerate(boundary.faces[near].tolist())
+    ]
+    return contacts_of(points[0], points[1], elements, budget.check)
+
+
+def _near(elements: Any, p: Point, q: Point) -> Any:
+    """Return the elements (k, corners, dim) whose boxes p q may meet, ends known to their rounding, and more."""
+    with np.errstate(all="ignore"):  # what is no number keeps an element
+        a, b = (np.array([float(x) for x in point]) for point in (p, q))
+        low, high = elements.min(axis=1), elements.max(axis=1)
+        size = max(np.abs(a).max(), np.abs(b).max(), np.abs(low).max(), np.abs(high).max())
+        slack = 2.0**-40 * size + 2.0**-500
+        u, w = 0.5 * b - 0.5 * a, (0.5 * low + 0.5 * high) - (0.5 * a + 0.5 * b)
+        half = (0.5 * high - 0.5 * low) + slack
+        apart = (np.abs(w) > half + np.abs(u)).any(axis=1)
+        for i in range(len(a)):
+            for j in range(i):
+                reach = half[:, i] * abs(u[j]) + half[:, j] * abs(u[i]) + slack * (half[:, i] + half[:, j])
+                apart |= np.abs(u[i] * w[:, j] - u[j] * w[:, i]) > reach
+    return np.flatnonzero(~apart)

@@ -1,0 +1,410 @@
+"""Public: a scene that stays, whose structures are prepared once and serve every question."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, ClassVar, Final, Literal, Unpack, cast, overload
+
+import numpy as np
+
+from engine.arrays import BoolArray, FloatArray, IntArray
+from engine.collision.clearance.clearance import checked_distance
+from engine.collision.collide import check_pose
+from engine.collision.scenes.collide_scene import Asked, ScenePairs, collide_bodies, pair_keys
+from engine.containment.scene.locate_scene import SceneLocations, check_bodies, locate_in
+from engine.errors import EngineError, IndexOutOfRangeError, InvalidArrayError, InvalidOperationError
+from engine.parallel import Budget, Cancel, Options, Progress, check_options
+from engine.scenes.bodies import Bodies
+from engine.scenes.broad_phase import candidates
+from engine.scenes.clip import Placed, Question, clip_all, clip_first
+from engine.scenes.ends import ScenePieces, in_order, joined
+from engine.scenes.parameters import ONE, ZERO
+from engine.solids.base import Immutable, Solid, _collect_arrays
+from engine.solids.checks import as_point_groups, as_points
+from engine.solids.pose import Pose
+from engine.types import Accuracy
+
+_FEW: Final = 64
+_PART: Final = 4
+"""Bodies up to `_FEW`, or the scene's size divided by `_PART`, that moved are kept beside the others."""
+_BYTES_OF_POSE: Final = 1000
+Keep = Literal["all", "first", "any"]
+_OUTWARD: Final = np.array([[-1.001], [1.001]])
+"""Further than a pose may stretch lengths (posed_boxes.py)."""
+_MANY: Final = 1000
+"""Points of a question after which polyhedra may have got cells."""
+
+
+class Scene(Immutable):
+    """Many bodies, asked again and again: which hold a point, which collide, what of a segment lies in which.
+
+    What a question needs of all bodies (boxes, trees over them, tables of solids by kind) is prepared when it is asked
+    first, and kept; structures of single solids stay with these. Immutable, picklable (without what is prepared), safe
+    to share between threads. For one question about bodies that do not stay, `locate_scene` and `collide_scene` give
+    the same answers.
+
+    Parameters: solids, a list of solids of one dimension, the same object wherever it is the same solid; each question
+    takes the types that it takes elsewhere. poses: one `Pose` or None for each; the exact image is meant.
+    Degenerate input: no solids at all are welcome.
+    Raises: InvalidArrayError, WrongDimensionError, naming the body.
+
+    >>> from engine import Aabb, Pose
+    >>> box, turn = Aabb([0, 0], [1, 1]), [[1, 0], [0, 1]]
+    >>> scene = Scene([box, box], [None, Pose(turn, [3, 0])])
+    >>> len(scene.collide().first), len(scene.moved({1: Pose(turn, [1, 0])}).collide(moved=[1]).first)
+    (0, 1)
+    """
+
+    __slots__ = ("_all", "_base", "_few", "_places")
+
+    type: ClassVar[str] = "scene"
+    _base: Bodies
+    """All bodies, where they were when they were last prepared together."""
+    _few: Bodies | None
+    """Those that moved since, where they are."""
+    _places: dict[int, int]
+    """Which of `_few` a body is, ascending."""
+    _all: Bodies | None
+    """All bodies where they are, once it is asked for."""
+
+    def __init__(self, solids: Sequence[Solid], poses: Sequence[Pose | None] | None = None) -> None:
+        check_bodies(solids, poses)
+        self._set(Bodies(tuple(solids), (None,) * len(solids) if poses is None else tuple(poses)))
+
+    def _set(self, base: Bodies, few: Bodies | None = None, places: dict[int, int] | None = None) -> None:
+        object.__setattr__(self, "_base", base)
+        object.__setattr__(self, "_few", few)
+        object.__setattr__(self, "_places", places or {})
+        object.__setattr__(self, "_all", base if few is None else None)
+
+    def __len__(self) -> int:
+        return len(self._base.solids)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Scene, (self.solids, self.poses)
+
+    def __repr__(self) -> str:
+        return f"Scene({len(self)} bodies)"
+
+    @property
+    def solids(self) -> tuple[Solid, ...]:
+        """The solid of each body."""
+        return self._base.solids
+
+    @property
+    def poses(self) -> tuple[Pose | None, ...]:
+        """The pose of each body, None for one that stands where its solid does."""
+        if self._few is None:
+            return self._base.poses
+        poses = list(self._base.poses)
+        for body, place in self._places.items():
+            poses[body] = self._few.poses[place]
+        return tuple(poses)
+
+    @property
+    def bounds(self) -> FloatArray | None:
+        """``(2, dimension)`` low and high of a box that holds all bodies, rounded outward; infinite where they may have
+        no bounds. None where there are no bodies."""
+        if not len(self):
+            return None
+        budget = Budget()
+        boxes = self._base.tree(budget).boxes
+        if self._few is not None:
+            stay = np.delete(boxes, list(self._places), axis=0)
+            boxes = np.concatenate([stay, self._few.tree(budget).boxes])
+        return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+
+    @property
+    def memory(self) -> int:
+        """Bytes of all arrays held, of the solids and of what is prepared too, shared ones once."""
+        found: dict[int, int] = {}
+        _collect_arrays((self.solids, *(each.kept for each in self._layers())), found, set())
+        return sum(found.values()) + _BYTES_OF_POSE * sum(pose is not None for pose in self.poses)
+
+    def moved(self, poses: Mapping[int, Pose | None]) -> Scene:
+        """Return the scene with some bodies under other poses; what is prepared of the others is shared.
+
+        Parameters: poses, the new pose of each body that moves, None to put it where its solid is.
+        Cost: grows with the bodies that moved since all were prepared together; where these are more than a quarter,
+        and more than 64, all are prepared anew.
+        Raises: IndexOutOfRangeError for a body that is not there, InvalidArrayError, WrongDimensionError.
+        """
+        if not isinstance(poses, Mapping):
+            raise InvalidArrayError(f"poses must be a dict of poses by body, got {type(poses).__name__}", ("poses",))
+        solids = self.solids
+        bodies = self._named(list(poses), "poses")
+        for body in bodies:
+            check_pose(poses[body], solids[body], f"poses[{body}]")
+        given = {body: self._few.poses[place] for body, place in self._places.items()} if self._few else {}
+        given |= {body: poses[body] for body in bodies}
+        scene = object.__new__(Scene)
+        if len(given) > max(_FEW, len(self) // _PART):
+            everywhere = list(self._base.poses)
+            for body, pose in given.items():
+                everywhere[body] = pose
+            scene._set(Bodies(solids, tuple(everywhere)))
+        else:
+            places = {body: place for place, body in enumerate(sorted(given))}
+            few = Bodies(tuple(solids[body] for body in places), tuple(given[body] for body in places))
+            scene._set(self._base, few if places else None, places)
+        return scene
+
+    def locate(
+        self,
+        points: object,
+        *,
+        workers: int | None = None,
+        deadline: float | None = None,
+        cancel: Cancel | None = None,
+        progress: Progress | None = None,
+        report: bool = False,
+    ) -> SceneLocations | tuple[SceneLocations, Accuracy]:
+        """Find for each point the bodies that hold it; all is as in `locate_scene`, which prepares anew each time."""
+        check_options(workers, progress)
+        array = as_points(points, self.solids[0].dimension if len(self) else None)
+        with Budget(deadline, cancel) as budget:
+            found, accuracy = locate_in(array, self._base.tables(array.shape[1], budget), budget, workers, progress)
+            if len(array) >= _MANY:
+                self._base.kept["asked_often"] = True
+            if self._few is not None:
+                more, besides = locate_in(array, self._few.tables(array.shape[1], budget), budget, workers, None)
+                found, accuracy = self._merged(found, more), _both(accuracy, besides)
+        return (found, accuracy) if report else found
+
+    def collide(
+        self,
+        *,
+        moved: Sequence[int] | None = None,
+        skip: object = None,
+        only: object = None,
+        gap: float | None = None,
+        witnesses: bool = False,
+        boolean: bool = False,
+        detail: bool = False,
+        workers: int | None = None,
+        deadline: float | None = None,
+        cancel: Cancel | None = None,
+        progress: Progress | None = None,
+        report: bool = False,
+    ) -> ScenePairs | tuple[ScenePairs, Accuracy]:
+        """Find every pair of bodies with a common point; all is as in `collide_scene`, which prepares anew each time.
+
+        Parameters: moved, indices of bodies: only pairs with one of them are looked at. After `scene.moved(poses)` the
+        colliding pairs are those of the scene before without a body of `poses`, and these.
+        Raises: as `collide_scene`; IndexOutOfRangeError for a body that is not there.
+        """
+        check_options(workers, progress)
+        asked = Asked(skip, only, gap, witnesses, boolean, detail)
+        with Budget(deadline, cancel) as budget:
+            if moved is None or not len(self):
+                self._named([] if moved is None else moved, "moved")
+                found = collide_bodies(self._whole().batches(budget), asked, budget, workers, progress)
+            else:
+                found = self._collide_some(self._named(moved, "moved"), asked, budget, workers, progress)
+        return found if report else found[0]
+
+    def _collide_some(
+        self, named: list[int], asked: Asked, budget: Budget, workers: int | None, progress: Progress | None
+    ) -> tuple[ScenePairs, Accuracy]:
+        """Return the pairs with a body named: those whose boxes meet are put into a scene of their own."""
+        self._base.check_collidable(budget)
+        n, items = len(self), np.array(named, np.int64)
+        boxes, reach = self._boxes(items, budget), 0.0 if asked.gap is None else checked_distance(asked.gap, "gap")
+        if reach > 0.0:
+            with np.errstate(over="ignore"):
+                boxes = np.nextafter(boxes + reach * _OUTWARD, np.inf * _OUTWARD)
+        owners, partners = self._near(boxes, True, budget, workers)
+        pairs = np.sort(np.stack([items[owners], partners], axis=1), axis=1)
+        keys = np.unique(pairs[:, 0] * n + pairs[:, 1])
+        keys = keys[keys // n != keys % n]
+        if asked.only is not None:
+            keys = keys[np.isin(keys, pair_keys(asked.only, n, "only"))]
+        if asked.skip is not None:
+            keys = keys[~np.isin(keys, pair_keys(asked.skip, n, "skip"))]
+        pairs = np.stack(np.divmod(keys, n), axis=1)
+        bodies, local = np.unique(pairs, return_inverse=True)
+        names, solids = bodies.tolist(), self.solids
+        some = Bodies(tuple(solids[body] for body in names), tuple(self._pose(body) for body in names))
+        asked = asked._replace(skip=None, only=local.reshape(-1, 2))
+        try:
+            found, accuracy = collide_bodies(some.batches(budget), asked, budget, workers, progress)
+        except EngineError as error:
+            raise _renamed(error, names) from None
+        return replace(found, first=bodies[found.first], second=bodies[found.second]), accuracy
+
+    @overload
+    def clip_segments(
+        self,
+        segments: object,
+        *,
+        keep: Literal["all", "first"] = "all",
+        report: Literal[False] = False,
+        **options: Unpack[Options],
+    ) -> ScenePieces: ...
+    @overload
+    def clip_segments(
+        self, segments: object, *, keep: Literal["any"], report: Literal[False] = False, **options: Unpack[Options]
+    ) -> BoolArray: ...
+    @overload
+    def clip_segments(
+        self, segments: object, *, keep: Keep = "all", report: Literal[True], **options: Unpack[Options]
+    ) -> tuple[ScenePieces | BoolArray, Accuracy]: ...
+    def clip_segments(
+        self,
+        segments: object,
+        *,
+        keep: Keep = "all",
+        workers: int | None = None,
+        deadline: float | None = None,
+        cancel: Cancel | None = None,
+        progress: Progress | None = None,
+        report: bool = False,
+    ) -> ScenePieces | BoolArray | tuple[ScenePieces | BoolArray, Accuracy]:
+        """Return the pieces of segments within each body, in order along each segment.
+
+        A tree over the boxes of the bodies gives each segment's candidates; each body cuts those that may meet it, as
+        `clip_segments` does, in its own frame where it is posed. Ends that round to one double are put in order by
+        exact arithmetic, roots of spheres included.
+
+        Parameters
+            segments: (n, 2, dim) numbers; none at all are welcome.
+            keep: "all"; "first", of each segment the piece that begins first, of those that begin at one point that of
+                the first body (picking); "any", whether it meets a body at all (line of sight). The last two look at
+                nothing that cannot matter.
+            workers, deadline, cancel, progress (items are segments), report: as everywhere.
+        Returns
+            `ScenePieces`, with "any" a bool array (n,); with report=True a pair of it and an `Accuracy`.
+        Bodies
+            What `clip_segments` takes, and triangle (of the plane; in space the prism over it), surface, and csg of all
+            these. On a surface, which holds nothing, pieces are the points where it is crossed (t0 = t1), or stretches
+            that lie in it. Within a csg pieces are those of its closed set, joined where operands meet; faces are
+            counted through its distinct leaves, operands first, a leaf's own behind those of all before it.
+        Boundary, degenerate input, accuracy
+            As `clip_segments`: t and coordinates are the nearest doubles to those of the exact image of each body.
+        Cost
+            The boxes near a segment, and what a body costs; CSG trees and prisms some 0.1 ms for each segment near
+            them.
+        Raises
+            UnsupportedSolidError (implicit), InvalidOperationError, and as `clip_segments`.
+
+        >>> from engine import Aabb, Sphere
+        >>> scene = Scene([Sphere([5, 0], 1), Aabb([1, -1], [2, 1])])
+        >>> pieces = scene.clip_segments([[[0, 0], [8, 0]]])
+        >>> pieces.body.tolist(), pieces.t.tolist()
+        ([1, 0], [[0.125, 0.25], [0.5, 0.75]])
+        """
+        check_options(workers, progress)
+        if not isinstance(keep, str) or keep not in ("all", "first", "any"):
+            raise InvalidOperationError(f"keep must be all, first or any, got {keep!r:.50}", ("keep",))
+        array = as_point_groups(segments, 2, self.solids[0].dimension if len(self) else None, ("segments",))
+        n = len(array)
+        with Budget(deadline, cancel) as budget:
+            budget.check()
+            result: ScenePieces | BoolArray
+            if not len(self):
+                result = in_order(joined([], array.shape[2]), lambda *_: (ZERO, ONE))
+                result = np.zeros(n, np.bool_) if keep == "any" else result
+            else:
+                self._base.check_cut(budget)
+                owners, bodies = self._near(array, False, budget, workers)
+                question = Question(array, owners, bodies, self._placed)
+                if keep == "all":
+                    result = clip_all(question, budget, workers)
+                else:
+                    boxes = self._boxes(bodies, budget)
+                    result = clip_first(question, boxes, budget, workers, keep == "any")
+            budget.check()
+        if progress is not None and n:
+            progress(n)
+        return (result, Accuracy("exact", 0.5, n, 0, 0, "body_boxes")) if report else result
+
+    def _layers(self) -> list[Bodies]:
+        return [each for each in (self._base, self._few, self._all) if each is not None]
+
+    def _whole(self) -> Bodies:
+        """Return all bodies where they are."""
+        if self._all is None:
+            object.__setattr__(self, "_all", Bodies(self.solids, self.poses))
+        return cast(Bodies, self._all)
+
+    def _pose(self, body: int) -> Pose | None:
+        place = self._places.get(body)
+        return self._base.poses[body] if place is None or self._few is None else self._few.poses[place]
+
+    def _placed(self, body: int) -> Placed:
+        place = self._places.get(body)
+        return self._base.placed(body) if place is None or self._few is None else self._few.placed(place)
+
+    def _named(self, bodies: object, name: str) -> list[int]:
+        """Return indices of bodies, each once, ascending. Raises: IndexOutOfRangeError, InvalidArrayError."""
+        if not isinstance(bodies, (list, tuple, set, frozenset, np.ndarray)) or getattr(bodies, "ndim", 1) != 1:
+            raise InvalidArrayError(f"{name} must be a list of bodies, got {type(bodies).__name__}", (name,))
+        found = set()
+        for place, body in enumerate(bodies):
+            if isinstance(body, (bool, np.bool_)) or not isinstance(body, (int, np.integer)):
+                raise InvalidArrayError(f"{name} names bodies by index, got {type(body).__name__}", (name, place))
+            if not 0 <= body < len(self):
+                raise IndexOutOfRangeError(
+                    f"{name} names body {body}, which is not there; the scene has {len(self)}", (name, place)
+                )
+            found.add(int(body))
+        return sorted(found)
+
+    def _boxes(self, bodies: IntArray, budget: Budget) -> FloatArray:
+        """Return the boxes of bodies, one or more times each, where they are."""
+        boxes = self._base.tree(budget).boxes[bodies]
+        if self._few is not None:
+            moved = np.array(list(self._places), np.int64)
+            places = np.minimum(np.searchsorted(moved, bodies), len(moved) - 1)
+            are_moved = moved[places] == bodies
+            boxes[are_moved] = self._few.tree(budget).boxes[places[are_moved]]
+        return boxes
+
+    def _near(
+        self, items: FloatArray, are_boxes: bool, budget: Budget, workers: int | None
+    ) -> tuple[IntArray, IntArray]:
+        """Return pairs of an item and a body that it may meet where that is; see `candidates`."""
+        owners, bodies = candidates(self._base.tree(budget), items, are_boxes, budget, workers)
+        if self._few is None:
+            return owners, bodies
+        moved = np.array(list(self._places), np.int64)
+        stays = np.ones(len(self), np.bool_)
+        stays[moved] = False
+        stay = stays[bodies]
+        more, places = candidates(self._few.tree(budget), items, are_boxes, budget, workers)
+        owners, bodies = np.concatenate([owners[stay], more]), np.concatenate([bodies[stay], moved[places]])
+        order = np.argsort(owners, kind="stable")
+        return owners[order], bodies[order]
+
+    def _merged(self, found: SceneLocations, more: SceneLocations) -> SceneLocations:
+        """Return where points lie among all bodies, from where they lie among those of `_base` and of `_few`."""
+        moved = np.array(list(self._places), np.int64)
+        stays = np.ones(len(self), np.bool_)
+        stays[moved] = False
+        stay, n = stays[found.indices], len(found.offsets) - 1
+        owners = np.repeat(np.arange(n), np.diff(found.offsets))[stay]
+        owners = np.concatenate([owners, np.repeat(np.arange(n), np.diff(more.offsets))])
+        bodies = np.concatenate([found.indices[stay], moved[more.indices]])
+        order = np.lexsort((bodies, owners))
+        on_boundary = np.concatenate([found.on_boundary[stay], more.on_boundary])[order]
+        offsets = np.zeros(n + 1, np.int64)
+        np.cumsum(np.bincount(owners, minlength=n), out=offsets[1:])
+        return SceneLocations(offsets, bodies[order], on_boundary)
+
+
+def _both(first: Accuracy, second: Accuracy) -> Accuracy:
+    """Return the report on items asked about in two parts of a scene."""
+    decisions = first.decisions if first.decisions == "float64" else second.decisions
+    beyond = min(first.n_items, first.n_beyond_filter + second.n_beyond_filter)
+    rational = min(first.n_items, first.n_rational + second.n_rational)
+    return Accuracy(decisions, first.coordinates_ulp, first.n_items, beyond, rational, first.method)
+
+
+def _renamed(error: EngineError, bodies: list[int]) -> EngineError:
+    """Return an error about one of some bodies that names it as the scene does."""
+    if len(error.where) > 1 and error.where[0] == "solids":
+        place = cast(int, error.where[1])
+        message = error.message.replace(f"solids[{place}]", f"solids[{bodies[place]}]")
+        return type(error)(message, ("solids", bodies[place], *error.where[2:]))
+    return error

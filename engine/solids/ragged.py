@@ -1,0 +1,150 @@
+"""Ragged arrays: items of several lengths one after another, and where each begins, as Arrow and shapely hold them."""
+
+from __future__ import annotations
+
+from itertools import chain, pairwise
+from typing import Any
+
+import numpy as np
+
+from engine.arrays import FloatArray, IntArray, read_only
+from engine.errors import EngineError, InvalidArrayError
+from engine.solids.checks import Where, as_point_groups, as_points, frozen, shown, spell
+from engine.solids.polygon import Polygon
+
+
+def as_offsets(offsets: object, n_items: int, where: Where) -> IntArray:
+    """Return `offsets`, whole numbers that never fall, from 0 or later up to `n_items` or earlier, as int64."""
+    array = np.asarray(offsets)
+    if array.ndim != 1 or array.dtype.kind not in "iu" or not len(array):
+        what = f"an array of dtype {array.dtype} and shape {array.shape}"
+        raise InvalidArrayError(
+            f"{spell(where)} must be whole numbers in one row, one more than items; got {what}", where
+        )
+    found = array.astype(np.int64, copy=False)
+    falls = np.flatnonzero(np.diff(found) < 0)
+    if len(falls):
+        place = (*where, int(falls[0]) + 1)
+        raise InvalidArrayError(f"{spell(place)} is {found[falls[0] + 1]}, less than the one before it", place)
+    if found[0] < 0 or found[-1] > n_items:
+        raise InvalidArrayError(
+            f"{spell(where)} go from {found[0]} to {found[-1]}, but there are {n_items} items", where
+        )
+    return found
+
+
+def as_lines(lines: object, dimension: int) -> tuple[FloatArray, IntArray]:
+    """Return the vertices (n, dimension) of polylines and the offsets (n_lines + 1,) of each; see `clip_lines`."""
+    where: Where = ("lines",)
+    if isinstance(lines, tuple) and len(lines) == 2 and isinstance(lines[1], np.ndarray) and lines[1].ndim == 1:
+        vertices = as_points(lines[0], dimension, (*where, 0))
+        offsets = as_offsets(lines[1], len(vertices), (*where, 1))
+        vertices, offsets = vertices[offsets[0] : offsets[-1]], offsets - offsets[0]
+    elif isinstance(lines, np.ndarray):
+        groups = as_point_groups(lines, None, dimension, where)
+        vertices = groups.reshape(-1, dimension)
+        offsets = np.arange(len(groups) + 1) * groups.shape[1]
+    elif isinstance(lines, (list, tuple)):
+        vertices, offsets = _joined(lines, dimension, where)
+    else:
+        raise InvalidArrayError(f"lines must be a list of lists of positions, got {shown(lines)}", where)
+    short = np.flatnonzero(np.diff(offsets) == 1)
+    if len(short):
+        place = (*where, int(short[0]))
+        raise InvalidArrayError(f"{spell(place)} has 1 position; a line needs at least 2, or none", place)
+    return vertices, offsets
+
+
+def _joined(lines: list[Any] | tuple[Any, ...], dimension: int, where: Where) -> tuple[FloatArray, IntArray]:
+    """Return the positions of some lines one line after another, checked together, and their offsets."""
+    try:
+        offsets = np.cumsum([0, *map(len, lines)])
+        if all(isinstance(line, np.ndarray) for line in lines):
+            flat: Any = np.concatenate([np.zeros((0, dimension)), *lines])
+        else:
+            flat = list(chain.from_iterable(lines))
+        return as_points(flat, dimension, where), offsets
+    except (EngineError, TypeError, ValueError):
+        parts = [as_points(line, dimension, (*where, i_line)) for i_line, line in enumerate(lines)]
+    return np.concatenate([np.zeros((0, dimension)), *parts]), np.cumsum([0, *map(len, parts)])
+
+
+def within(offsets: IntArray, items: IntArray) -> IntArray:
+    """Return in which group each of some items stands: group g holds those from offsets[g] on; empty ones none."""
+    return np.searchsorted(offsets, items, "right") - 1
+
+
+def polygons(coordinates: object, ring_offsets: object, polygon_offsets: object) -> list[Polygon]:
+    """Return polygons from ragged arrays, as shapely.to_ragged_array, GeoArrow and `OverlayBatch` hold them.
+
+    Parameters: coordinates: (n, 2) numbers, all rings one after another, each with its first position repeated at its
+    end or not. ring_offsets: whole numbers, ring r holds coordinates ring_offsets[r] up to ring_offsets[r + 1].
+    polygon_offsets: polygon k holds likewise some of the rings, each even-odd.
+    Returns: a list of `Polygon`. Borrowed: a polygon looks at the caller's coordinates, float64 and contiguous, which
+    must not be changed afterwards; one of several rings with repeated ends, or with -0.0 anywhere, has a copy.
+    Raises: InvalidArrayError, WrongDimensionError, NotFiniteError, and as `Polygon` for a ring that is too short.
+
+    >>> import numpy as np
+    >>> square = np.array([[0, 0], [1, 0], [1, 1], [0, 0]], float)
+    >>> polygons(square, [0, 4], [0, 1])
+    [Polygon(1 rings, 3 vertices)]
+    """
+    vertices, starts, ends, groups = parted(coordinates, ring_offsets, polygon_offsets)
+    has_short = np.logical_or.reduceat(np.append(ends - starts < 3, False), groups)[:-1].tolist()
+    first_vertices, last_vertices = starts.tolist(), ends.tolist()
+    sizes: dict[int, IntArray] = {}
+    found = []
+    for k, (first, last) in enumerate(pairwise(groups.tolist())):
+        if last - first == 1 and not has_short[k]:
+            start, end = first_vertices[first], last_vertices[first]
+            offsets = sizes.get(end - start)
+            if offsets is None:
+                offsets = sizes[end - start] = read_only(np.array([0, end - start]))
+            found.append(Polygon.of_arrays(vertices[start:end], offsets))
+        else:
+            found.append(_of_rings(vertices, first_vertices[first:last], last_vertices[first:last], ring=first))
+    return found
+
+
+def parted(
+    coordinates: object, ring_offsets: object, polygon_offsets: object
+) -> tuple[FloatArray, IntArray, IntArray, IntArray]:
+    """Return the arguments of `polygons` checked: vertices, where rings begin, where they end without a repeated
+    position, and the offsets of polygons into the rings."""
+    vertices = as_points(coordinates, 2, ("coordinates",))
+    zeros = vertices == 0.0
+    if np.signbit(vertices[zeros]).any():
+        vertices = frozen(vertices)
+    rings = as_offsets(ring_offsets, len(vertices), ("ring_offsets",))
+    groups = as_offsets(polygon_offsets, len(rings) - 1, ("polygon_offsets",))
+    starts, ends = rings[:-1], rings[1:].copy()
+    long = np.flatnonzero(ends - starts > 2)
+    ends[long] -= (vertices[starts[long]] == vertices[ends[long] - 1]).all(axis=1)
+    return vertices, starts, ends, groups
+
+
+def _of_rings(vertices: FloatArray, starts: list[int], ends: list[int], ring: int) -> Polygon:
+    """Return the polygon of some rings, the first of which is the caller's number `ring`."""
+    try:
+        return Polygon([vertices[start:end] for start, end in zip(starts, ends)])
+    except EngineError as error:
+        place = ring + int(error.where[1]) if len(error.where) > 1 else ring
+        error.message = f"ring {place} of ring_offsets: {error.message}"
+        error.where = ("ring_offsets", place)
+        raise
+
+
+def closed_rings(vertices: FloatArray, ring_offsets: IntArray) -> tuple[FloatArray, IntArray]:
+    """Return rings whose first position is repeated at their end, as GeoJSON and Arrow have them, and their offsets."""
+    firsts = ring_offsets[:-1]
+    return np.insert(vertices, ring_offsets[1:], vertices[firsts], axis=0), ring_offsets + np.arange(len(firsts) + 1)
+
+
+def as_geojson(vertices: FloatArray, ring_offsets: IntArray, piece_offsets: IntArray) -> dict[str, Any]:
+    """Return pieces, each a shell and its holes, as a GeoJSON MultiPolygon; a Polygon where there is but one."""
+    positions, offsets = closed_rings(vertices, ring_offsets)
+    rings = [positions[start:stop].tolist() for start, stop in pairwise(offsets.tolist())]
+    pieces = [rings[start:stop] for start, stop in pairwise(piece_offsets.tolist())]
+    if len(pieces) == 1:
+        return {"type": "Polygon", "coordinates": pieces[0]}
+    return {"type": "MultiPolygon", "coordinates": pieces}

@@ -1,0 +1,140 @@
+"""Layers as GeoDataFrames: the rows of geopandas, exact areas, what is refused."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import engine
+from engine.errors import InvalidInputError, InvalidOperationError, NotFiniteError, UnsupportedSolidError
+from engine.layers.rows import HOWS
+from tests.unit.layers.cells import Cells, layer, runs
+
+geopandas = pytest.importorskip("geopandas")
+shapely = pytest.importorskip("shapely")
+testing = pytest.importorskip("pandas.testing")
+
+
+def shape(cells: Cells | None) -> Any:
+    if cells is None:
+        return None
+    if not cells:
+        return shapely.Polygon()
+    return shapely.union_all([shapely.box(x, y, x + 1, y + 1) for x, y in cells])
+
+
+def frame(seed: int, names: str, apart: bool = False, crs: Any = 3857) -> Any:
+    """Return a layer of sets of cells, one of them missing, with columns of several types."""
+    features = layer(np.random.default_rng(seed), 14, 9, apart)
+    features[0] = features[0] or frozenset({(0, 0)})  # geopandas refuses a layer that begins with a missing one
+    columns = {
+        "n": np.arange(14),
+        names[0]: [f"{names}{k}" for k in range(14)],
+        names[1]: np.linspace(0, 1, 14),
+        names[2]: np.arange(14) % 3 == 0,
+    }
+    return geopandas.GeoDataFrame(columns, geometry=[*map(shape, features)], index=np.arange(14) * 7 + 3, crs=crs)
+
+
+@pytest.mark.parametrize("how", HOWS)
+@pytest.mark.parametrize("apart", [False, True])
+def test_rows_are_those_of_geopandas(how: str, apart: bool, pytestconfig: pytest.Config) -> None:
+    for seed in range(50 if pytestconfig.getoption("--full") else 3):
+        left, right = frame(seed, "abc"), frame(seed + 100, "xyz", apart)
+        found = engine.layers.overlay(left, right, how, keep_geom_type=True)
+        expected = geopandas.overlay(left, right, how, keep_geom_type=True)
+        testing.assert_frame_equal(found.drop(columns="geometry"), expected.drop(columns="geometry"))
+        assert list(found.columns) == list(expected.columns)
+        assert found.geometry.normalize().geom_equals(expected.geometry.normalize()).all()
+        assert (found.area == expected.area).all()
+        assert found.is_valid.all()
+        assert found.crs == expected.crs
+    kept = how in ("difference", "symmetric_difference")
+    if kept:
+        found = engine.layers.overlay(left, right, how, keep_geom_type=False)
+        expected = geopandas.overlay(left, right, how, keep_geom_type=False)
+        testing.assert_frame_equal(found.drop(columns="geometry"), expected.drop(columns="geometry"))
+        assert (found.geometry.isna() == expected.geometry.isna()).all()
+
+
+def test_what_is_dropped_is_said() -> None:
+    left, right = frame(0, "abc"), frame(1, "xyz")
+    with pytest.warns(UserWarning, match="without geometry"):
+        engine.layers.overlay(left, right, "difference")
+    with pytest.warns(UserWarning, match="different CRS"):
+        engine.layers.overlay(left, right.set_crs(4326, allow_override=True))
+    with pytest.raises(InvalidOperationError, match="points and lines"):
+        engine.layers.overlay(left, right, keep_geom_type=False)
+    for how in HOWS:
+        none: Any = engine.layers.overlay(left, right[:0], how, keep_geom_type=True)
+        same: Any = engine.layers.overlay(left, right.translate(100).to_frame("geometry"), how, keep_geom_type=True)
+        assert len(none) <= len(same)
+        assert list(none.columns) == list(geopandas.overlay(left, right[:1], how, keep_geom_type=True).columns)
+
+
+def test_parts_that_overlap_are_united() -> None:
+    cells: Cells = frozenset({(0, 0), (1, 0), (1, 1), (2, 1)})
+    several = shapely.from_geojson(str({"type": "MultiPolygon", "coordinates": runs(cells)}).replace("'", '"'))
+    left = geopandas.GeoDataFrame(geometry=[several])
+    whole = geopandas.GeoDataFrame(geometry=[shapely.box(-1, -1, 5, 5)])
+    assert engine.layers.overlay(left, whole).area.tolist() == [4.0]
+    assert engine.layers.overlay(whole, left, "difference").area.tolist() == [32.0]
+
+
+@pytest.mark.parametrize(
+    "options", [{"by": "c"}, {}, {"by": ["c", "n"], "as_index": False}, {"by": "a", "sort": False}]
+)
+def test_dissolve_is_that_of_geopandas(options: Any) -> None:
+    given = frame(3, "abc").rename_geometry("shape")
+    given["a"] = ["q", "p"] * 7
+    found, expected = engine.layers.dissolve(given, **options), given.dissolve(**options)
+    testing.assert_frame_equal(found.drop(columns="shape"), expected.drop(columns="shape"))
+    assert list(found.columns) == list(expected.columns)
+    assert found.geometry.normalize().geom_equals(expected.geometry.normalize()).all()
+    assert found.crs == expected.crs
+
+
+@pytest.mark.parametrize("how", ["inner", "left"])
+def test_sjoin_is_that_of_geopandas(how: str) -> None:
+    at = np.stack(np.meshgrid(np.arange(0, 10, 0.5), np.arange(0, 10, 0.5)), axis=-1).reshape(-1, 2)
+    points = geopandas.GeoDataFrame({"n": np.arange(len(at))}, geometry=shapely.points(at), crs=3857)
+    points.loc[5, "geometry"] = None
+    areas = frame(4, "xyz")
+    found = engine.layers.sjoin(points, areas, how)
+    expected = geopandas.sjoin(points, areas, how=how)
+    assert list(found.columns) == list(expected.columns)
+    keys = ["n_left", "index_right"]
+    first, second = (each.sort_values(keys).drop(columns="geometry") for each in (found, expected))
+    testing.assert_frame_equal(first, second)
+    with pytest.raises(UnsupportedSolidError, match=r"left\[0\]"):
+        engine.layers.sjoin(areas, areas)
+    with pytest.raises(InvalidOperationError):
+        engine.layers.sjoin(points, areas, "outer")
+
+
+@pytest.mark.parametrize(
+    ("geometry", "error", "says"),
+    [
+        ("LINESTRING (0 0, 1 1)", UnsupportedSolidError, "LineString"),
+        ("POLYGON Z ((0 0 1, 1 0 1, 1 1 1, 0 0 1))", UnsupportedSolidError, "force_2d"),
+        ("POLYGON ((0 0, 1 0, 1 1, 0 0))", NotFiniteError, "nan"),
+    ],
+)
+def test_the_feature_at_fault_is_named(geometry: str, error: Any, says: str) -> None:
+    shapes = [shapely.box(0, 0, 1, 1), None, shapely.from_wkt(geometry)]
+    if error is NotFiniteError:
+        with np.errstate(invalid="ignore"):
+            shapes[2] = shapely.polygons([[0, 0], [1, 0], [1, np.nan], [0, 0]])
+    wrong = geopandas.GeoDataFrame(geometry=shapes, index=["p", "q", "r"])
+    with pytest.raises(error, match=says) as caught:
+        engine.layers.overlay(frame(0, "abc", crs=None), wrong)
+    assert caught.value.message.startswith("right[2] (index r)")
+    assert caught.value.where == ("right", 2)
+
+
+def test_without_geopandas(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "geopandas", None)
+    with pytest.raises(InvalidInputError, match=r"exact-geometry\[geo\]"):
+        engine.layers.overlay(None, None)

@@ -1,0 +1,238 @@
+"""Segments through scenes: every piece, every double and the order of all ends as in rational arithmetic."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from engine import (
+    Aabb,
+    CancelledError,
+    Convex,
+    Csg,
+    DeadlineExceededError,
+    HalfSpace,
+    Implicit,
+    InvalidOperationError,
+    NotFiniteError,
+    Polygon,
+    Polyhedron,
+    Pose,
+    Scene,
+    Solid,
+    Sphere,
+    Surface,
+    Triangle,
+    UnsupportedSolidError,
+    WrongDimensionError,
+    clip_segments,
+)
+from engine.parallel import Cancel
+from tests.reference.exact import nearest_double
+from tests.reference.scene_segments import Piece, pieces_in_scene, ranks, rounded_point
+from tests.unit.scenes.scenes import Random, pose_of, solids_of
+from tests.unit.segment_clipping.scenes import as_json
+
+
+def all_solids(dimension: int) -> list[Solid]:
+    more: list[Solid] = [Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.5]], [[0, 1, 2], [0, 2, 3]])]
+    return [*solids_of(dimension), *more * (dimension == 3)]
+
+
+def scene_of(rng: Random, dimension: int, n: int, grid: float) -> tuple[list[Solid], list[Pose | None]]:
+    solids = all_solids(dimension)
+    chosen = [solids[k] for k in rng.integers(len(solids), size=n).tolist()]
+    return chosen, [pose_of(rng, dimension, grid, 1.5) for _ in chosen]
+
+
+def expected_pieces(segments: Any, solids: list[Solid], poses: list[Pose | None]) -> list[list[Piece]]:
+    known = {id(solid): as_json(solid) for solid in solids}
+    placed: list[Any] = [
+        (known[id(solid)], pose and {"rotation": pose.rotation.tolist(), "translation": pose.translation.tolist()})
+        for solid, pose in zip(solids, poses)
+    ]
+    return [pieces_in_scene(segment, placed) for segment in segments.tolist()]
+
+
+def assert_exact(found: Any, segments: Any, expected: list[list[Piece]]) -> None:
+    flat = [(source, piece) for source, pieces in enumerate(expected) for piece in pieces]
+    assert [*zip(found.source.tolist(), found.body.tolist())] == [(source, piece.body) for source, piece in flat]
+    assert found.t.tolist() == [[nearest_double(piece.first), nearest_double(piece.last)] for _, piece in flat]
+    for ends, name in ((found.start, "first"), (found.end, "last")):
+        assert ends.tolist() == [rounded_point(segments[i].tolist(), getattr(piece, name)) for i, piece in flat]
+    assert found.ranks.tolist() == [rank for pieces in expected for rank in ranks(pieces)]
+    assert (found.faces[:, 0] < 0).tolist() == [piece.first == 0 for _, piece in flat]
+    assert (found.faces[:, 1] < 0).tolist() == [piece.last == 1 for _, piece in flat]
+
+
+def assert_first_and_any(scene: Scene, segments: Any, every: Any) -> None:
+    first: Any = scene.clip_segments(segments, keep="first")
+    rows = np.flatnonzero(np.append(True, every.source[1:] != every.source[:-1])[: len(every)])
+    for name in ("source", "body", "start", "end", "t", "faces"):
+        np.testing.assert_array_equal(getattr(first, name), getattr(every, name)[rows])
+    meets: Any = scene.clip_segments(segments, keep="any")
+    assert np.flatnonzero(meets).tolist() == sorted(set(every.source.tolist()))
+
+
+@pytest.mark.parametrize("grid", [0.0, 0.5])
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("seed", range(3))
+def test_is_what_rational_arithmetic_says(seed: int, dimension: int, grid: float) -> None:
+    rng = np.random.default_rng([seed, dimension, int(2 * grid)])
+    solids, poses = scene_of(rng, dimension, 6, grid)
+    segments = rng.uniform(-2.5, 2.5, (8, 2, dimension))
+    if grid:
+        segments = np.round(segments / grid) * grid  # along faces, through vertices, of no length
+    scene = Scene(solids, poses)
+    found = scene.clip_segments(segments)
+    assert_exact(found, segments, expected_pieces(segments, solids, poses))
+    assert_first_and_any(scene, segments, found)
+    step = pose_of(rng, dimension, grid)
+    after = scene.moved({2: step})
+    placed = [step if body == 2 else pose for body, pose in enumerate(poses)]
+    moved = after.clip_segments(segments)
+    assert_exact(moved, segments, expected_pieces(segments, solids, placed))
+    assert_first_and_any(after, segments, moved)
+
+
+def test_is_what_clip_segments_says_of_one_body() -> None:
+    rng = np.random.default_rng(3)
+    for dimension in (2, 3):
+        segments = np.round(rng.uniform(-2, 2, (200, 2, dimension)) * 4) / 4
+        for solid in solids_of(dimension):
+            if solid.type in ("triangle", "csg"):
+                continue
+            alone: Any = clip_segments(segments, solid)
+            for pose in (None, Pose.identity(dimension)):
+                found: Any = Scene([solid], [pose]).clip_segments(segments)
+                for name in ("source", "start", "end", "t", "faces"):
+                    np.testing.assert_array_equal(getattr(found, name), getattr(alone, name), solid.type)
+
+
+def test_ends_that_round_alike_are_put_in_exact_order() -> None:
+    """The faces of three boxes stand at 1/3, just before it and just behind: in doubles along the segment all alike."""
+    third = 1 / 3  # below 1/3 exactly
+    boxes: list[Solid] = [Aabb([3.0, -1], [4, 1]), HalfSpace([3, 0], -9.0), Sphere([6, 0], 3)]
+    segment = [[[0, 0], [9, 0]]]
+    found = Scene(boxes).clip_segments(segment)
+    assert found.ranks.tolist() == [[0, 1], [0, 2], [0, 2]]
+    assert found.t[:, 0].tolist() == [third] * 3
+    tilted: list[Solid] = [
+        HalfSpace([1, 0], -3.0),
+        HalfSpace([1.0, 2.0**-60], -3.0),
+        HalfSpace([1.0, -(2.0**-60)], -3.0),
+    ]
+    found = Scene(tilted).clip_segments([[[0, 1], [9, 1]]])
+    assert found.body.tolist() == [1, 0, 2]
+    assert found.ranks[:, 0].tolist() == [0, 1, 2]
+    assert found.t[:, 0].tolist() == [third] * 3
+    turned = Pose([[0.6, -0.8], [0.8, 0.6]], [0.3, -0.1])
+    found = Scene([Sphere([0, 0], 1), Sphere([0, 0], 1)], [turned, turned]).clip_segments([[[-3, 0], [3, 0.1]]])
+    assert found.body.tolist() == [0, 1]
+    assert found.ranks.tolist() == [[0, 1], [0, 1]]
+
+
+def test_pieces_and_gaps_make_up_the_segment() -> None:
+    rng = np.random.default_rng(11)
+    for dimension in (2, 3):
+        solids, poses = scene_of(rng, dimension, 8, 0.5)
+        segments = np.round(rng.uniform(-2, 2, (40, 2, dimension)) * 2) / 2
+        found = Scene(solids, poses).clip_segments(segments)
+        for source in range(40):
+            mine = found.source == source
+            marks = {int(rank): t for rank, t in zip(found.ranks[mine].ravel(), found.t[mine].ravel())}
+            assert sorted(marks) == list(range(len(marks)))
+            assert [marks[rank] for rank in sorted(marks)] == sorted(marks.values())
+            starts = found.ranks[mine, 0].tolist()
+            assert starts == sorted(starts)
+
+
+def test_a_surface_is_crossed_in_points() -> None:
+    sheet = Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]])
+    lid = Pose(np.eye(3), [0, 0, 0.5])
+    scene = Scene([sheet, sheet], [None, lid])
+    found = scene.clip_segments([[[0.25, 0.25, -1], [0.25, 0.25, 3]], [[-1, 0.5, 0], [3, 0.5, 0]]])
+    assert found.source.tolist() == [0, 0, 1]
+    assert found.body.tolist() == [0, 1, 0]
+    assert found.t.tolist() == [[0.25, 0.25], [0.375, 0.375], [0.25, 0.5]]
+    assert found.faces.tolist() == [[0, 0]] * 3
+
+
+def test_faces_of_a_csg_are_counted_through_its_leaves() -> None:
+    box, ball = Aabb([0, 0], [4, 4]), Sphere([2, 2], 1)
+    ring = Csg("difference", [box, ball])
+    found = Scene([ring]).clip_segments([[[-1, 2], [5, 2]]])
+    assert found.faces.tolist() == [[0, 4], [4, 1]]
+    assert found.start.tolist() == [[0, 2], [3, 2]]
+    joined = Csg("union", [Aabb([0, 0], [1, 1]), Aabb([1, 0], [2, 1])])
+    found = Scene([joined]).clip_segments([[[-1, 0.5], [3, 0.5]]])
+    assert found.t.tolist() == [[0.25, 0.75]]
+    assert found.faces.tolist() == [[0, 5]]
+
+
+def test_touching_is_a_point_and_no_length_is_a_point() -> None:
+    ball, cube = Sphere([0, 0, 0], 1), Aabb([-1, -1, -1], [1, 1, 1])
+    prism = Triangle([[0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    scene = Scene([ball, cube, prism], [None, None, Pose([[0, -1, 0], [1, 0, 0], [0, 0, 1]], [0, 0, 0])])
+    found = scene.clip_segments([[[-1, 1, 0], [1, 1, 0]], [[0, 0, 1], [0, 0, 1]], [[0, 0, 9], [0, 0, 9]]])
+    assert found.source.tolist() == [0, 0, 0, 1, 1, 1, 2]
+    assert found.body.tolist() == [1, 0, 2, 0, 1, 2, 2]
+    assert found.t.tolist() == [[0, 1], [0.5, 0.5], [0.5, 0.5], [0, 1], [0, 1], [0, 1], [0, 1]]
+
+
+def test_nothing_is_welcome() -> None:
+    scene = Scene([Sphere([0, 0], 1)])
+    assert len(scene.clip_segments([])) == 0
+    assert len(Scene([]).clip_segments([[[0, 0], [1, 1]]])) == 0
+    assert Scene([]).clip_segments([[[0, 0], [1, 1]]], keep="any").tolist() == [False]
+    assert scene.clip_segments([], keep="any").shape == (0,)
+    assert len(scene.clip_segments([[[5, 5], [6, 6]]], keep="first")) == 0
+    empty = Convex([[1, 0, -1], [-1, 0, -1]])
+    assert len(Scene([empty]).clip_segments([[[-5, 0], [5, 0]]])) == 0
+
+
+def test_says_what_is_wrong() -> None:
+    segments = [[[-2, 0], [2, 0]]]
+    waves = Implicit([{"powers": [2, 0], "coefficient": 1.0}])
+    with pytest.raises(UnsupportedSolidError, match=r"solids\[1\]: a segment is not cut on an implicit; bodies may be"):
+        Scene([Sphere([0, 0], 1), waves]).clip_segments(segments)
+    with pytest.raises(UnsupportedSolidError, match=r"solids\[0\]: a segment is not cut on an implicit"):
+        Scene([Csg("union", [waves, waves])]).clip_segments(segments, keep="any")
+    scene = Scene([Sphere([0, 0], 1)])
+    with pytest.raises(InvalidOperationError, match="keep must be all, first or any, got 'last'"):
+        scene.clip_segments(segments, keep="last")  # type: ignore[call-overload]
+    with pytest.raises(WrongDimensionError):
+        scene.clip_segments([[[0, 0, 0], [1, 1, 1]]])
+    with pytest.raises(NotFiniteError):
+        scene.clip_segments([[[0, 0], [1, np.inf]]])
+    with pytest.raises(DeadlineExceededError):
+        scene.clip_segments(segments, deadline=-1.0)
+    switch = Cancel()
+    switch.set()
+    with pytest.raises(CancelledError):
+        scene.clip_segments(segments, cancel=switch)
+
+
+def test_reports_and_counts_segments() -> None:
+    seen: list[int] = []
+    scene = Scene([Polygon([[[0, 0], [1, 0], [0, 1]]]), Triangle([[0, 0], [1, 0], [0, 1]])])
+    pieces, accuracy = scene.clip_segments([[[0, 0.25], [1, 0.25]]] * 3, report=True, progress=seen.append, workers=2)
+    assert (accuracy.decisions, accuracy.coordinates_ulp, accuracy.n_items, sum(seen)) == ("exact", 0.5, 3, 3)
+    assert len(pieces) == 6
+
+
+def test_a_mesh_of_many_faces_posed_and_not() -> None:
+    turn, rise = np.meshgrid(np.linspace(0, 2 * np.pi, 5, endpoint=False), np.linspace(-1, 1, 4), indexing="ij")
+    radius = np.sqrt(1.25 - rise**2)
+    belts = np.stack([radius * np.cos(turn), radius * np.sin(turn), rise], axis=2).reshape(-1, 3)
+    quads = [(4 * i + j, 4 * ((i + 1) % 5) + j) for i in range(5) for j in range(3)]
+    sides = [face for a, b in quads for face in ([a, b, b + 1], [a, b + 1, a + 1])]
+    body = Polyhedron(belts, [*sides, [16, 12, 8, 4, 0], [3, 7, 11, 15, 19]])
+    rng = np.random.default_rng(0)
+    pose = pose_of(np.random.default_rng(8), 3)
+    segments = rng.uniform(-2, 2, (6, 2, 3))
+    segments[:2, 0] = belts[:2]
+    expected = expected_pieces(segments, [body, body], [None, pose])
+    assert_exact(Scene([body, body], [None, pose]).clip_segments(segments), segments, expected)
