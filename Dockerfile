@@ -14,9 +14,10 @@ WORKDIR /src
 COPY pyproject.toml README.md LICENSE ./
 COPY engine engine
 COPY service service
+COPY exact_geometry exact_geometry
 
 RUN python -m venv /opt/exact-geometry
-RUN /opt/exact-geometry/bin/pip install --no-cache-dir . httptools uvloop
+RUN /opt/exact-geometry/bin/pip install --no-cache-dir ".[formats,mcp,telemetry]"
 # -P: the engine that was installed, not the one in this folder
 RUN /opt/exact-geometry/bin/python -P -m engine warm --into /opt/exact-geometry/kernels --cpu $CPU
 

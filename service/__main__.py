@@ -1,7 +1,8 @@
-"""`python -m service`: starts uvicorn with the settings."""
+"""`python -m service`: starts uvicorn with the settings, each of which is a flag too."""
 
 from __future__ import annotations
 
+import argparse
 import gc
 import ipaddress
 import logging.config
@@ -11,6 +12,7 @@ import sys
 import tempfile
 from contextlib import ExitStack
 from pathlib import Path
+from typing import NoReturn
 
 import uvicorn
 from pydantic import ValidationError
@@ -21,15 +23,22 @@ from service.settings import Settings
 log = logging.getLogger("service")
 
 
-def main() -> None:
+def main(arguments: list[str] | None = None) -> None:
     """Serve until SIGTERM or SIGINT, finish what is under way, exit with 0."""
     gc.disable()  # while modules are imported (app.py): an eighth of the time until ready
+    _take_flags(sys.argv[1:] if arguments is None else arguments)
     try:
         settings = Settings()
+        _check_folder(settings.store_folder)
     except ValidationError as error:
-        lines = [f"GEOMETRY_{'_'.join(map(str, item['loc'])).upper()}: {item['msg']}" for item in error.errors()]
-        print("a setting is wrong: " + "; ".join(lines), file=sys.stderr)
-        sys.exit(2)
+        _refuse(
+            "; ".join(
+                f"{_variable(item['loc'][0])}={item['input']}: {item['msg'].replace('Input should be', 'expected')}"
+                for item in error.errors()
+            )
+        )
+    except OSError as error:
+        _refuse(f"{_variable('store_folder')}={settings.store_folder}: {error.strerror or error}")
     config = logs.config_of(settings.log_level)
     logging.config.dictConfig(config)
     # uvicorn drains, restores these handlers and raises the signal again: that must end in 0, not in a kill
@@ -66,7 +75,54 @@ def main() -> None:
             access_log=False,
             timeout_graceful_shutdown=round(settings.drain_seconds),
             server_header=False,
+            forwarded_allow_ips=settings.trusted_proxies,
         )
+
+
+def _variable(name: object) -> str:
+    return f"GEOMETRY_{name}".upper()
+
+
+def _refuse(what: str) -> NoReturn:
+    print(f"a setting is wrong: {what}", file=sys.stderr)
+    sys.exit(2)
+
+
+def _take_flags(arguments: list[str]) -> None:
+    """Put flags into the environment, where worker processes find them too; `--help` and `--version` end here."""
+    if not arguments:
+        return
+    parser = argparse.ArgumentParser(
+        "python -m service",
+        usage="%(prog)s [--SETTING VALUE ...]",
+        description="Containment, collision and clipping with exact decisions, over HTTP.",
+        epilog="Each is an environment variable too: --max-points is GEOMETRY_MAX_POINTS. Sizes take units: 64MiB.",
+        allow_abbrev=False,
+    )
+    parser.add_argument("--version", action="store_true", help="Say which version this is.")
+    for name, field in Settings.model_fields.items():
+        default = field.get_default(call_default_factory=True)
+        said = " ".join((field.description or "").split()).replace("%", "%%")
+        shown = "none" if default in (None, (), "") else str(default).lower() if isinstance(default, bool) else default
+        flag = "--" + name.replace("_", "-")
+        parser.add_argument(flag, dest=name, metavar=name.rpartition("_")[2].upper(), help=f"{said} [{shown}]")
+    given = vars(parser.parse_args(arguments))
+    if given.pop("version"):
+        import engine
+
+        print(f"exact-geometry {engine.__version__}")
+        sys.exit(0)
+    for name, value in given.items():
+        if value is not None:
+            os.environ[_variable(name)] = value
+
+
+def _check_folder(folder: Path | None) -> None:
+    """Raise OSError unless files can be written there: worker processes would fail one by one, and be started again."""
+    if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
 
 
 def _is_loopback(host: str) -> bool:

@@ -10,21 +10,23 @@ import threading
 import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from typing import Final
+from functools import partial
+from typing import Any, Final
 
-from fastapi import FastAPI
+from fastapi import APIRouter, FastAPI
+from starlette.datastructures import State
 from starlette.exceptions import HTTPException
 from starlette.middleware.cors import CORSMiddleware
 from starlette.requests import Request
 from starlette.responses import Response
 
 import engine
-from service.docs import router as docs_router
+from service import traces
 from service.errors import faults_of, http_fault, problem
 from service.gate import Gate
 from service.metrics import Metrics
-from service.openapi import openapi_of
-from service.playground import add_playground
+from service.openapi import completed, openapi_of
+from service.pages import add_pages
 from service.route import posts_of
 from service.routes import (
     binary,
@@ -34,17 +36,30 @@ from service.routes import (
     compare,
     containment,
     health,
+    layers,
     overlay,
     polygons,
+    scenes,
     segments,
     solids,
 )
 from service.settings import Settings
 from service.store import Store
+from service.tools import add_tools, running
 from service.work import Memory, Pool
 
 log = logging.getLogger("service")
 
+ROUTERS: Final = (
+    *(
+        module.router
+        for module in (containment, collision, clearance, segments, polygons, overlay, layers, bounds, compare)
+    ),
+    *(module.router for module in (solids, scenes, binary, health)),
+    solids.lookup,
+    scenes.lookup,
+    scenes.binary,
+)
 SWITCH_SECONDS: Final = 0.0002
 """How long one thread keeps the interpreter while others wait: the event loop hands over several times a request, and
 with Python's 5 ms each time beside a batch, small requests would wait for tens of milliseconds."""
@@ -69,61 +84,111 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         redoc_url=None,
         redirect_slashes=False,
     )
-    app.state.settings = settings
-    app.state.store = Store(settings.store_bytes, settings.store_folder, settings.store_folder_bytes)
-    app.state.memory = Memory(settings.request_bytes)
-    app.state.metrics = Metrics()
-    app.state.warm, app.state.warm_error = threading.Event(), None
-    app.state.warm_begin, app.state.warm_hundredths = time.perf_counter(), 0
+    _prepare(app.state, settings)
     app.openapi = openapi_of(app, settings)  # type: ignore[method-assign]
-    modules = (containment, collision, clearance, segments, polygons, overlay, bounds, compare, solids, binary, health)
-    for module in modules:
-        app.include_router(module.router)
-    app.include_router(solids.lookup)
-    app.include_router(docs_router)
-    add_playground(app)
+    for router in ROUTERS:
+        app.include_router(router)
+    add_pages(app)
+    app.state.tools = add_tools(app, settings)
     app.add_exception_handler(HTTPException, _answer_http_exception)
     app.add_exception_handler(Exception, _answer_anything)
-    app.add_middleware(Gate, settings=settings, posts=posts_of(module.router for module in modules))
+    app.add_middleware(Gate, settings=settings, posts=posts_of(ROUTERS), metrics=app.state.metrics)
     if settings.cors_origins:
         app.add_middleware(
             CORSMiddleware,
             allow_origins=list(settings.cors_origins),
             allow_methods=["GET", "HEAD", "POST"],
-            allow_headers=["Authorization", "Content-Type", "X-API-Key", "X-Request-ID"],
-            expose_headers=["ETag", "Geometry-Accuracy", "Location", "Retry-After", "Server-Timing", "X-Request-ID"],
+            allow_headers=["Authorization", "Content-Type", "Traceparent", "X-API-Key", "X-Request-ID"],
+            expose_headers=[
+                "ETag",
+                "Geometry-Accuracy",
+                "Location",
+                "Retry-After",
+                "Server-Timing",
+                "Traceresponse",
+                "X-Request-ID",
+            ],
         )
+    traces.export(app)
     return app
+
+
+def create_router(settings: Settings | None = None) -> APIRouter:
+    """Return the calls of the service as a router for another FastAPI application.
+
+    Its lifespan, which FastAPI runs with the application's own, warms the kernels and keeps stored solids and threads;
+    `/readyz` tells when the kernels are warm. Keys, names of requests and log lines are the application's own matter.
+    Limits and examples are put into the application's OpenAPI document when it starts.
+    """
+    settings = settings or Settings()
+    router = APIRouter(lifespan=partial(_embedded, settings))
+    for each in ROUTERS:
+        router.include_router(each)
+    return router
+
+
+@asynccontextmanager
+async def _embedded(settings: Settings, app: FastAPI) -> AsyncIterator[None]:
+    state = app.state.geometry = State()
+    _prepare(state, settings)
+    make = app.openapi
+
+    def document() -> dict[str, Any]:
+        if app.openapi_schema is None:
+            app.openapi_schema = completed(make(), settings)
+        return app.openapi_schema
+
+    app.openapi_schema, app.openapi = None, document  # type: ignore[method-assign]
+    async with _running(state):
+        yield
+
+
+def _prepare(state: State, settings: Settings) -> None:
+    """Make what requests share."""
+    state.settings = settings
+    state.metrics = Metrics()
+    state.store = Store(settings.store_bytes, settings.store_folder, settings.store_folder_bytes, state.metrics)
+    state.memory = Memory(settings.request_bytes)
+    state.warm, state.warm_error = threading.Event(), None
+    state.warm_begin, state.warm_hundredths = time.perf_counter(), 0
 
 
 @asynccontextmanager
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
+    async with _running(app.state), running(app.state.tools):
+        yield
+
+
+@asynccontextmanager
+async def _running(state: State) -> AsyncIterator[None]:
     """Compile or load the kernels in a thread, so that /healthz answers meanwhile; drain the pool at the end."""
-    app.state.pool = Pool(app.state.settings)
+    state.pool = Pool(state.settings, state.metrics)
     sys.setswitchinterval(SWITCH_SECONDS)
-    threading.Thread(target=_warm, args=(app,), name="warm-up", daemon=True).start()
+    threading.Thread(target=_warm, args=(state,), name="warm-up", daemon=True).start()
     try:
         yield
     finally:
-        app.state.warm.clear()
-        app.state.pool.close()
+        state.warm.clear()
+        state.metrics.ready.set(0)
+        state.pool.close()
 
 
-def _warm(app: FastAPI) -> None:
+def _warm(state: State) -> None:
     before = time.perf_counter()
 
     def note(share: int) -> None:
-        app.state.warm_hundredths += share
+        state.warm_hundredths += share
 
     try:
         engine.warm(progress=note, processes=os.cpu_count() or 1)
     except Exception as error:
-        app.state.warm_error = f"warm-up failed: {error}; restart the service"
+        state.warm_error = f"warm-up failed: {error}; restart the service"
         log.exception("warm-up failed")
         return
     if not gc.get_freeze_count():
         gc.freeze()  # half a million objects of modules and compiler that no later collection has to walk through
-    app.state.warm.set()
+    state.warm.set()
+    state.metrics.ready.set(1)
     log.info("ready: kernels warm after %.1f s", time.perf_counter() - before)
 
 

@@ -26,7 +26,7 @@ from typing import Any, Final
 import numpy as np
 
 import engine
-from engine import Solid
+from engine import Scene, Solid
 from service.errors import ServiceError
 
 log = logging.getLogger("service")
@@ -72,7 +72,7 @@ def _told(path: Path) -> Iterator[None]:
 class Folder:
     """Writes, reads and forgets files of solids; safe to share between threads and processes."""
 
-    def __init__(self, path: Path, budget: int, name_of: Callable[[Solid], str]) -> None:
+    def __init__(self, path: Path, budget: int, name_of: Callable[[Any], str]) -> None:
         self._path = path
         self._budget = budget
         self._name_of = name_of
@@ -81,7 +81,7 @@ class Folder:
         path.mkdir(parents=True, exist_ok=True)
         self._shrink()
 
-    def put(self, name: str, solid: Solid) -> bool:
+    def put(self, name: str, solid: Solid | Scene) -> bool:
         """Write `solid` unless it is there; return whether it is new. It is on the disk when this returns.
 
         Raises: `store_full`, `store_unavailable`.
@@ -89,7 +89,7 @@ class Folder:
         with _told(self._path):
             return self._put(name, solid)
 
-    def _put(self, name: str, solid: Solid) -> bool:
+    def _put(self, name: str, solid: Solid | Scene) -> bool:
         final = self._path / name
         if self._touch(final):
             return False
@@ -113,7 +113,7 @@ class Folder:
             self._shrink()
         return True
 
-    def get(self, name: str) -> Solid | None:
+    def get(self, name: str) -> Solid | Scene | None:
         """Return the solid called `name`, or None if there is no file that holds it; `store_unavailable`."""
         if _NAME.fullmatch(name) is None:
             return None
@@ -194,7 +194,7 @@ def _content(path: Path) -> bytes | None:
         return file.read()
 
 
-def to_octets(solid: Solid) -> bytes:
+def to_octets(solid: Solid | Scene) -> bytes:
     """Return the file of `solid`: an npz archive of its arrays, and of the solids that it is made of, operands first,
     each once."""
     arrays: dict[str, Any] = {}
@@ -213,6 +213,9 @@ def _add_node(solid: Any, nodes: list[dict[str, Any]], arrays: dict[str, Any], p
     if solid.type == "csg":
         operands = [_add_node(operand, nodes, arrays, places) for operand in solid.operands]
         node |= {"operation": solid.operation, "operands": operands}
+    elif solid.type == "scene":
+        node |= {"solids": [_add_node(body, nodes, arrays, places) for body in solid.solids], "poses": "poses"}
+        arrays["poses"] = pose_rows(solid)
     else:
         for field in FIELDS[solid.type]:
             node[field] = f"array_{len(arrays)}"
@@ -222,16 +225,34 @@ def _add_node(solid: Any, nodes: list[dict[str, Any]], arrays: dict[str, Any], p
     return len(nodes) - 1
 
 
-def from_octets(octets: bytes) -> Solid:
-    """Return the solid in a file; raises whatever comes up if it is damaged."""
-    made: list[Solid] = []
+def pose_rows(scene: Scene) -> Any:
+    """Return the numbers of each body's pose, rotation and translation, those of none at all where it has none."""
+    dimension = scene.solids[0].dimension
+    none = np.concatenate([np.eye(dimension).ravel(), np.zeros(dimension)])
+    rows = [none if pose is None else [*pose.rotation.ravel(), *pose.translation] for pose in scene.poses]
+    return np.array(rows).reshape(len(scene), -1)
+
+
+def _posed(row: Any, dimension: int) -> engine.Pose | None:
+    pose = engine.Pose(row[: dimension**2].reshape(dimension, dimension), row[dimension**2 :])
+    return None if pose.is_identity else pose
+
+
+def from_octets(octets: bytes) -> Solid | Scene:
+    """Return the solid or scene in a file; raises whatever comes up if it is damaged."""
+    made: list[Any] = []
     with np.load(io.BytesIO(octets), allow_pickle=False) as arrays:
         for node in json.loads(arrays["nodes"].tobytes()):
             if node["type"] == "csg":
                 made.append(engine.Csg(node["operation"], [made[place] for place in node["operands"]]))
+            elif node["type"] == "scene":
+                solids = [made[place] for place in node["solids"]]
+                poses = [_posed(row, solids[0].dimension) for row in arrays[node["poses"]]]
+                return Scene(solids, poses)
             else:
                 made.append(_MAKERS[node["type"]](*(arrays[node[field]] for field in FIELDS[node["type"]])))
-    return made[-1]
+    found: Solid = made[-1]
+    return found
 
 
 def _split(items: Any, offsets: Any) -> Any:

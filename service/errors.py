@@ -15,6 +15,7 @@ from pydantic import ValidationError
 from starlette.responses import Response
 
 from engine import EngineError
+from service.metrics import count_refusal
 from service.schemas.arrays import MAX_ERRORS, Fault, Path
 
 PROBLEM_TYPE: Final = "urn:exact-geometry:problem:"
@@ -54,6 +55,7 @@ SERVICE_STATUS: Final[dict[str, int]] = {
     "wrong_key": 403,
     "not_found": 404,
     "unknown_solid": 404,
+    "unknown_scene": 404,
     "method_not_allowed": 405,
     "slow_body": 408,
     "slow_headers": 408,
@@ -147,6 +149,7 @@ def faults_of(error: Exception) -> list[Fault]:
 def problem(faults: list[Fault], headers: Mapping[str, str] = {}) -> Response:
     """Return the answer for `faults`; its code and status are those of the first."""
     first = faults[0]
+    count_refusal(first.code)
     status = STATUS[first.code]
     body = {
         "type": PROBLEM_TYPE + first.code,

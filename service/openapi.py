@@ -1,16 +1,41 @@
-"""The OpenAPI document: FastAPI's, with the limits of this service's settings and without what generators choke on."""
+"""The OpenAPI document: FastAPI's, with the limits of this service's settings, an example of every part, the keys that
+it may ask for, and without what generators choke on."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, Final
 
 from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 
+from service.errors import MEDIA_TYPE
 from service.schemas.arrays import LIMIT
 from service.schemas.problem import Problem
 from service.settings import Settings
+
+ANSWERS: Final = Path(__file__).with_name("answers.json")
+"""What the service answers to the examples of its questions, by model; written by tests/contract/test_openapi.py."""
+_SCHEMAS: Final = "#/components/schemas/"
+_TAGS: Final = {
+    "containment": "Which points are inside?",
+    "collision": "Do bodies meet?",
+    "clearance": "How far are bodies apart?",
+    "clipping": "What remains of segments and polygons?",
+    "layers": "Polygons with attributes, as maps have them: GeoJSON.",
+    "bounds": "The smallest box and ball.",
+    "compare": "The exact answer beside the textbook's plain float64 one.",
+    "solids": "Solids kept between requests.",
+    "binary": "Raw float64 there and back, and files of meshes.",
+    "health": "Is the service alive, ready, busy?",
+}
+_KEYS: Final = {
+    "bearer": {"type": "http", "scheme": "bearer", "description": "A key of this service, where it asks for one."},
+    "key": {"type": "apiKey", "in": "header", "name": "X-API-Key", "description": "The same, as a header of its own."},
+}
+_OPEN: Final = ("/healthz", "/readyz")
 
 
 def openapi_of(app: FastAPI, settings: Settings) -> Callable[[], dict[str, Any]]:
@@ -24,17 +49,44 @@ def openapi_of(app: FastAPI, settings: Settings) -> Callable[[], dict[str, Any]]
                 description=app.description,
                 routes=app.routes,
                 separate_input_output_schemas=False,
+                servers=[{"url": settings.root_path or "/", "description": "This service."}],
+                contact={"name": "exact-geometry"},
+                license_info={"name": "MIT", "identifier": "MIT"},
             )
-            schemas = made["components"]["schemas"]
-            problem = Problem.model_json_schema(ref_template="#/components/schemas/{model}")
-            schemas.update(problem.pop("$defs"))
-            _drop_foreign_errors(made)
-            schemas["Problem"] = problem
-            made["components"]["schemas"] = dict(sorted(schemas.items()))
-            app.openapi_schema = _finished(made, settings)
+            _describe_keys(made, bool(settings.api_keys))
+            found = {tag for item in made["paths"].values() for each in item.values() for tag in each["tags"]}
+            made["tags"] = [{"name": tag, "description": _TAGS.get(tag, tag)} for tag in sorted(found, key=_place)]
+            app.openapi_schema = completed(made, settings)
         return app.openapi_schema
 
     return document
+
+
+def completed(made: dict[str, Any], settings: Settings) -> dict[str, Any]:
+    """Return FastAPI's document with what our routes need of it: limits, the model of errors, examples."""
+    schemas = made["components"]["schemas"]
+    problem = Problem.model_json_schema(ref_template=_SCHEMAS + "{model}")
+    schemas.update(problem.pop("$defs"))
+    _drop_foreign_errors(made)
+    schemas["Problem"] = problem
+    if "Solid" in schemas:
+        schemas["Solid"]["type"] = "object"  # said by each member too; some programs look at the root alone
+    made["components"]["schemas"] = dict(sorted(schemas.items()))
+    done: dict[str, Any] = _finished(made, settings)
+    _illustrate(done)
+    return done
+
+
+def _place(tag: str) -> tuple[int, str]:
+    return ([*_TAGS].index(tag) if tag in _TAGS else len(_TAGS), tag)
+
+
+def _describe_keys(made: dict[str, Any], is_needed: bool) -> None:
+    made["components"]["securitySchemes"] = _KEYS
+    made["security"] = [{name: []} for name in _KEYS] if is_needed else [{}, *({name: []} for name in _KEYS)]
+    for path in _OPEN:
+        for operation in made["paths"][path].values():
+            operation["security"] = []
 
 
 def _drop_foreign_errors(made: dict[str, Any]) -> None:
@@ -58,9 +110,64 @@ def _finished(node: Any, settings: Settings) -> Any:
     for key, value in node.items():
         if key == LIMIT:
             key, value = "maxItems", getattr(settings, value)
-        if key == "title" and isinstance(value, str) and "openapi" not in node and "version" not in node:
+        if key == "title" and isinstance(value, str) and not {"openapi", "version", "code"} & set(node):
             continue
         if key == "default" and "type" in node:
             continue  # generators make a value of it that is always sent; the description says it
         done[key] = _finished(value, settings)
     return done
+
+
+def _answers() -> dict[str, list[Any]]:
+    found: dict[str, list[Any]] = json.loads(ANSWERS.read_text("utf-8")) if ANSWERS.is_file() else {}
+    return found
+
+
+def _illustrate(made: dict[str, Any]) -> None:
+    """Give every property a description and an example: its own, or the first that an example of a model holds."""
+    schemas = made["components"]["schemas"]
+    for name, answers in _answers().items():
+        if name in schemas:
+            schemas[name].setdefault("examples", answers)
+    for schema in schemas.values():
+        for value in schema.get("examples", ()):
+            for part, shown in list(_parts(schema, value, schemas)):
+                part.setdefault("examples", [shown])
+    for schema in schemas.values():
+        for part in schema.get("properties", {}).values():
+            if "const" in part:
+                part.setdefault("description", f"Always `{part['const']}`.")
+                part.setdefault("examples", [part["const"]])
+            elif "$ref" in part:
+                part.setdefault("description", schemas[_name(part)]["description"])
+    for item in made["paths"].values():
+        for operation in item.values():
+            found = [answer for status, answer in operation["responses"].items() if status < "300"]
+            for body in (operation.get("requestBody", {}), *found):
+                for media_type, content in body.get("content", {}).items():
+                    if media_type != MEDIA_TYPE and "$ref" in content.get("schema", {}):
+                        content["schema"] = {"$ref": content["schema"]["$ref"]}  # a field's description may stick to it
+                        shown = schemas[_name(content["schema"])].get("examples", ())
+                        content["examples"] = {
+                            f"example_{number}": {"value": value} for number, value in enumerate(shown, 1)
+                        }
+
+
+def _name(schema: dict[str, Any]) -> str:
+    return str(schema["$ref"]).removeprefix(_SCHEMAS)
+
+
+def _parts(schema: dict[str, Any], value: Any, schemas: dict[str, Any]) -> Iterator[tuple[dict[str, Any], Any]]:
+    """Yield each property that `value` has, at any depth, with its value there."""
+    if "$ref" in schema:
+        schema = schemas[_name(schema)]
+    if "discriminator" in schema:
+        schema = schemas[schema["discriminator"]["mapping"][value["type"]].removeprefix(_SCHEMAS)]
+    if isinstance(value, list) and "items" in schema:
+        for item in value:
+            yield from _parts(schema["items"], item, schemas)
+    elif isinstance(value, dict):
+        for key, part in schema.get("properties", {}).items():
+            if key in value:
+                yield part, value[key]
+                yield from _parts(part, value[key], schemas)

@@ -23,7 +23,7 @@ from starlette.responses import Response
 from starlette.types import Receive, Scope, Send
 
 from engine import EngineError
-from service import body, wire
+from service import body, traces, wire
 from service.body import JSON
 from service.convert.questions import existing, is_light
 from service.errors import STATUS, ServiceError, faults_of, faults_of_validation, problem
@@ -38,6 +38,11 @@ _CODING: Final = re.compile(rb"([a-z0-9*-]+)\s*(?:;\s*q=([01](?:\.\d{0,3})?))?\s
 Part = bytes | memoryview
 Query = dict[str, tuple[TypeAdapter[Any], bool]]
 Answer = Callable[[Request], Coroutine[Any, Any, Response]]
+
+
+def state_of(app: Any) -> Any:
+    """Return what the service keeps in `app`: in its own it is the app's state, in another's it has a name there."""
+    return getattr(app.state, "geometry", app.state)
 
 
 class GeometryRoute(APIRoute):
@@ -55,13 +60,16 @@ class GeometryRoute(APIRoute):
         }
 
         async def handle(request: Request) -> Response:
-            call = Call(request.app.state.settings, request.app.state.store, request.app.state.memory)
+            state = state_of(request.app)
+            call = Call(state.settings, state.store, state.memory)
             response = await answer(request, call)
-            request.app.state.metrics.count(self.operation_id or self.name, response.status_code, call.seconds)
+            operation = self.operation_id or self.name
+            state_of(request.app).metrics.count(operation, response.status_code, call.seconds)
+            traces.note(operation, call.seconds)
             return response
 
         async def answer(request: Request, call: Call) -> Response:
-            state = request.app.state
+            state = state_of(request.app)
             try:
                 headers = dict(request.scope["headers"])  # a look-up in the framework's reads them all
                 call.coding = _coding_wanted(headers.get(b"accept-encoding", b""))
@@ -76,6 +84,7 @@ class GeometryRoute(APIRoute):
                     if not is_small:
                         state.pool.check_room()
                     job.body = await body.read(request.receive, declared, call)
+                    state.metrics.bytes_in.inc(len(job.body))
                 if is_small and state.warm.is_set() and adapter is not None and job.coding is None:
                     job.decode()
                     call.is_light = is_light(job.question)

@@ -1,6 +1,7 @@
 """Every limit of the service, from the environment, each with its reason.
 
-A name is set as an environment variable with the prefix ``GEOMETRY_``, for example ``GEOMETRY_MAX_POINTS=50000``.
+A name is set as an environment variable with the prefix ``GEOMETRY_``, for example ``GEOMETRY_MAX_POINTS=50000``, or as
+a flag: ``--max-points 50000`` (__main__.py). Sizes take units: ``64MiB``.
 Limits on counts stand in the OpenAPI document too (openapi.py puts them there by name).
 """
 
@@ -8,12 +9,26 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
-from pydantic import Field, SecretStr, field_validator
+from pydantic import BeforeValidator, ByteSize, Field, SecretStr, TypeAdapter, field_validator
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
+_SIZE: Final = TypeAdapter(ByteSize)
+
+
+def _bytes(value: object) -> object:
+    return int(_SIZE.validate_python(value)) if isinstance(value, str) else value
+
+
 Count = Annotated[int, Field(ge=1)]
+Size = Annotated[int, BeforeValidator(_bytes), Field(ge=1)]
+
+
+def _lower(value: object) -> object:
+    return value.lower() if isinstance(value, str) else value
+
+
 Seconds = Annotated[float, Field(gt=0)]
 
 
@@ -24,24 +39,31 @@ def _cores() -> int:
 class Settings(BaseSettings):
     """Limits and addresses; the defaults serve one machine with a few GB of memory."""
 
-    model_config = SettingsConfigDict(env_prefix="GEOMETRY_", frozen=True, extra="forbid")
+    model_config = SettingsConfigDict(
+        env_prefix="GEOMETRY_", frozen=True, extra="forbid", use_attribute_docstrings=True
+    )
 
     host: str = "127.0.0.1"
-    """Loopback: nobody else's machine calls a service that its owner did not open on purpose."""
+    """Address to listen on. Loopback: nobody else's machine calls a service that its owner did not open on purpose."""
     port: Annotated[int, Field(ge=0, le=65535)] = 8000
-    """0 takes a free port (it is printed)."""
+    """Port to listen on; 0 takes a free port (it is printed)."""
     workers: Count = 1
     """Processes; one uses all cores already, more of them help JSON decoding. Each has a memory of its own: without a
     store folder they share a temporary one."""
-    log_level: Literal["debug", "info", "warning", "error"] = "info"
+    log_level: Annotated[Literal["debug", "info", "warning", "error"], BeforeValidator(_lower)] = "info"
+    """What is logged: debug, info, warning or error."""
     access_log: bool = True
     """A line for each request."""
     api_keys: Annotated[tuple[SecretStr, ...], NoDecode] = ()
     """Keys that requests must show one of, separated by commas; none by default: then anyone may call."""
     cors_origins: Annotated[tuple[str, ...], NoDecode] = ()
     """Origins that browsers may call from, separated by commas; none by default."""
+    root_path: Annotated[str, Field(pattern=r"^(/[^/?#]+)*$")] = ""
+    """Where a proxy shows the service, /geometry for example; requests may come with or without it."""
+    trusted_proxies: str = "127.0.0.1"
+    """Addresses and networks, separated by commas, whose X-Forwarded-For and -Proto are believed; * for all."""
 
-    max_body_bytes: Count = 64 * 2**20
+    max_body_bytes: Size = 64 * 2**20
     """JSON takes about 60 bytes a 3D point: this is a million points, or a mesh of half a million faces."""
     max_points: Count = 2_000_000
     """Points, vertices or segments in one list; decoding holds about 200 bytes for each."""
@@ -67,7 +89,7 @@ class Settings(BaseSettings):
     """Poses of one collision request."""
     max_polygons: Count = 100_000
     """Polygons of one clipping request."""
-    max_answer_bytes: Count = 256 * 2**20
+    max_answer_bytes: Size = 256 * 2**20
     """An answer before it is compressed; beyond it the request is refused, with what to ask for instead."""
 
     deadline_seconds: Seconds = 30.0
@@ -84,15 +106,15 @@ class Settings(BaseSettings):
     """Requests computed at once. More than cores: long calls run in chunks of 1-3 ms, so short ones slip between."""
     queue_length: Count = 64
     """Requests that may wait for their turn; beyond it the answer is 503 with Retry-After."""
-    inline_bytes: Annotated[int, Field(ge=0)] = 2048
+    inline_bytes: Annotated[int, BeforeValidator(_bytes), Field(ge=0)] = 2048
     """Bodies up to this size on simple solids are answered without a thread: a hand-over costs as much as the work."""
-    request_bytes: Count = 2**30
+    request_bytes: Size = 2**30
     """Memory for requests under way, from body to answer: 503 where others hold it, 422 where one wants more alone."""
-    store_bytes: Count = 512 * 2**20
+    store_bytes: Size = 512 * 2**20
     """Memory for stored solids; the least recently used leave first."""
     store_folder: Path | None = None
     """Folder for stored solids, kept over a restart and shared by all that are given it; none by default."""
-    store_folder_bytes: Count = 10 * 2**30
+    store_folder_bytes: Size = 10 * 2**30
     """Size of that folder; the files used longest ago leave first."""
 
     @field_validator("cors_origins", "api_keys", mode="before")

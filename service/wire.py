@@ -11,8 +11,10 @@ whole in memory.
 
 from __future__ import annotations
 
+import json
 import zlib
 from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 from typing import Any, Final, NamedTuple
 
 import jiter
@@ -121,7 +123,15 @@ def encoded(answer: Any) -> Iterator[bytes]:
 
 
 def _dumps(value: Any) -> bytes:
-    return orjson.dumps(value, default=_plain, option=orjson.OPT_SERIALIZE_NUMPY)
+    try:
+        return orjson.dumps(value, default=_plain, option=orjson.OPT_SERIALIZE_NUMPY)
+    except orjson.JSONEncodeError as error:
+        if "64-bit" not in str(error):
+            raise
+        plain = partial(
+            json.dumps, default=lambda item: item.tolist() if isinstance(item, np.ndarray) else _plain(item)
+        )
+        return str(plain(value)).encode()  # case: integers of any size, which layers pass through
 
 
 def _is_long(value: Any) -> bool:
@@ -202,4 +212,6 @@ def _plain(value: Any) -> Any:
 
 
 def _in_parts(value: Any) -> Any:
-    return orjson.Fragment(b"".join(_parts(value))) if _is_long(value) else value
+    if _is_long(value):
+        return orjson.Fragment(b"".join(_parts(value)))
+    return _plain(value) if isinstance(value, Series) else value

@@ -19,6 +19,7 @@ from fastapi import Depends
 
 from engine import Accuracy, Cancel, CancelledError, DeadlineExceededError, EngineError
 from service.errors import ServiceError
+from service.metrics import Metrics
 from service.settings import Settings
 from service.store import Store
 
@@ -38,7 +39,11 @@ _INSTEAD: Final = {
     "collide_poses": "ask for fewer poses at once",
     "clearance_poses": "ask for fewer poses at once",
     "clip_segments": "send fewer segments at once",
+    "clip_lines": "send fewer lines at once",
     "clip_polygons": "send fewer polygons at once",
+    "overlay_features": "send fewer features at once",
+    "locate_features": "send fewer points at once",
+    "overlay_batch": "send fewer pairs at once",
     "overlay": "cut both polygons by windows first and overlay window by window",
 }
 """What to ask where an answer would be too large."""
@@ -218,7 +223,8 @@ class _Lane:
 class Pool:
     """Two lanes, so that small questions need not wait behind large ones."""
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: Settings, metrics: Metrics) -> None:
+        self._metrics = metrics
         self._lanes = {False: _Lane(settings, "request"), True: _Lane(settings, "small")}
         self._lock = threading.Lock()
 
@@ -232,12 +238,21 @@ class Pool:
         with self._lock:
             lane.check_room()
             lane.under_way.add(call)
+        metrics, before = self._metrics, time.perf_counter()
+        metrics.queued.inc()
+
+        def begin() -> T:
+            metrics.queued.dec()
+            metrics.waited.observe(time.perf_counter() - before)
+            return job()
+
         try:
-            future = lane.executor.submit(job)
+            future = lane.executor.submit(begin)
         except RuntimeError:  # closed between two steps of this request
             self._forget(lane, call)
+            metrics.queued.dec()
             raise ServiceError("queue_full", "the service is shutting down; try again") from None
-        future.add_done_callback(lambda _: self._forget(lane, call))
+        future.add_done_callback(lambda done: self._forget(lane, call, done.cancelled()))
         try:
             return await asyncio.wrap_future(future)
         except asyncio.CancelledError:
@@ -252,6 +267,8 @@ class Pool:
         for lane in self._lanes.values():
             lane.executor.shutdown(wait=True, cancel_futures=True)
 
-    def _forget(self, lane: _Lane, call: Call) -> None:
+    def _forget(self, lane: _Lane, call: Call, never_began: bool = False) -> None:
         with self._lock:
             lane.under_way.discard(call)
+        if never_began:
+            self._metrics.queued.dec()

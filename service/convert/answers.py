@@ -10,13 +10,37 @@ import numpy as np
 
 import engine
 from engine import Solid
-from service.schemas import bounds, clearance, collision, compare, containment, overlay, polygons, segments, solids
+from service.schemas import (
+    bounds,
+    clearance,
+    collision,
+    compare,
+    containment,
+    layers,
+    overlay,
+    polygons,
+    segments,
+    solids,
+)
 from service.schemas.problem import Accuracy
 from service.wire import Series
+from service.work import Call
 
 _FREE_AREA: Final = 100
 """Vertices of an overlay up to which its area takes no longer than the rest of the answer."""
 _BOUNDARY: Final = int(engine.Location.BOUNDARY)  # numpy compares with an enum's member more slowly
+
+
+def from_features(found: Any, accuracy: engine.Accuracy, call: Call) -> layers.LayersResponse:
+    """Return an answer about layers, as GeoJSON."""
+    call.media_type = "application/geo+json"
+    return layers.LayersResponse.made(
+        type="FeatureCollection",
+        crs=found.crs,
+        features=Series(len(found), found.make, weight=10, offsets=found.offsets),
+        collapsed=found.collapsed,
+        accuracy=from_accuracy(accuracy),
+    )
 
 
 def from_accuracy(accuracy: engine.Accuracy) -> Accuracy:
@@ -113,17 +137,29 @@ def from_pieces(pieces: engine.SegmentPieces, accuracy: engine.Accuracy) -> segm
     )
 
 
+def from_line_pieces(pieces: engine.LinePieces, accuracy: engine.Accuracy) -> segments.ClipLinesResponse:
+    """Return the answer of `clip/lines`."""
+    columns = (pieces.source, pieces.segments, pieces.t, pieces.faces)
+
+    def some(start: int, stop: int) -> list[Any]:
+        rows = zip(*(column[start:stop].tolist() for column in columns))
+        return [
+            {"line": line, "positions": pieces[k], "segments": on, "t": t, "faces": faces}
+            for k, (line, on, t, faces) in enumerate(rows, start)
+        ]
+
+    return segments.ClipLinesResponse.made(
+        pieces=Series(len(pieces), some, weight=10, offsets=pieces.offsets), accuracy=from_accuracy(accuracy)
+    )
+
+
 def from_overlay(result: engine.Overlay, accuracy: engine.Accuracy, area: bool | None) -> overlay.OverlayResponse:
     """Return the answer of `overlay`; area: whether it was asked for, None for where it costs next to nothing."""
     wants_area = len(result.vertices) <= _FREE_AREA if area is None else area
-    rings, vertices = result.ring_offsets, result.vertices
+    rings = result.ring_offsets
 
     def pieces(start: int, stop: int) -> list[Any]:
-        found = []
-        for first, last in pairwise(result.piece_offsets[start : stop + 1].tolist()):
-            shell, *holes = [_closed(vertices[i:j]) for i, j in pairwise(rings[first : last + 1].tolist())]
-            found.append(overlay.OverlayPiece.made(shell=shell, holes=holes))
-        return found
+        return _overlay_pieces(result, start, stop)
 
     return overlay.OverlayResponse.made(
         pieces=Series(result.n_pieces, pieces, weight=10, offsets=rings[result.piece_offsets]),
@@ -147,6 +183,35 @@ def from_overlay(result: engine.Overlay, accuracy: engine.Accuracy, area: bool |
         ),
         accuracy=from_accuracy(accuracy),
     )
+
+
+def from_overlays(batch: engine.OverlayBatch, accuracy: engine.Accuracy) -> overlay.OverlayBatchResponse:
+    """Return the answer of `overlay/batch`."""
+    offsets = batch.pair_offsets
+
+    def some(first: int, last: int) -> list[Any]:
+        return [
+            overlay.OverlaidPair.made(
+                status="not_representable" if batch.status[pair] else "done",
+                pieces=_overlay_pieces(batch, *offsets[pair : pair + 2].tolist()),
+                largest_displacement=batch.displacement[pair].item(),
+            )
+            for pair in range(first, last)
+        ]
+
+    weights = batch.ring_offsets[batch.piece_offsets[offsets]] + np.arange(len(offsets))
+    return overlay.OverlayBatchResponse.made(
+        overlays=Series(len(batch), some, weight=10, offsets=weights), accuracy=from_accuracy(accuracy)
+    )
+
+
+def _overlay_pieces(result: engine.Overlay | engine.OverlayBatch, start: int, stop: int) -> list[Any]:
+    """Return some pieces of an overlay, or of many, as they are written."""
+    rings, vertices, found = result.ring_offsets, result.vertices, []
+    for first, last in pairwise(result.piece_offsets[start : stop + 1].tolist()):
+        shell, *holes = [_closed(vertices[i:j]) for i, j in pairwise(rings[first : last + 1].tolist())]
+        found.append(overlay.OverlayPiece.made(shell=shell, holes=holes))
+    return found
 
 
 def _closed(ring: Any) -> Any:
@@ -183,11 +248,10 @@ def from_clipped(clipped: engine.ClippedPolygons, accuracy: engine.Accuracy) -> 
     )
 
 
-def from_collision(collision_: engine.Collision, accuracy: engine.Accuracy, witness: bool) -> collision.CollideResponse:
+def from_collision(collision_: engine.Collision, accuracy: engine.Accuracy) -> collision.CollideResponse:
     """Return the answer of `collide` for one pose."""
-    named = collision_.witness if witness else None
     return collision.CollideResponse.made(
-        collisions=[_collision_answer(collision_.relation, named, collision_.detail)],
+        collisions=[_collision_answer(collision_.relation, collision_.witness, collision_.detail)],
         accuracy=from_accuracy(accuracy),
     )
 
@@ -276,6 +340,9 @@ def from_scene_pairs(pairs: engine.ScenePairs, accuracy: engine.Accuracy) -> col
         for pair, detail in zip(found, _details(pairs.detail, start, stop)):
             if detail is not None:
                 pair["detail"] = detail.label
+        if pairs.distance is not None:
+            for pair, distance in zip(found, pairs.distance[start:stop].tolist()):
+                pair["distance"] = distance
         return found
 
     return collision.CollideSceneResponse.made(

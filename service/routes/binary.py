@@ -30,7 +30,7 @@ MeshType = Annotated[
 ]
 
 
-def _answers_with(text: str) -> dict[int | str, dict[str, Any]]:
+def answers_with(text: str) -> dict[int | str, dict[str, Any]]:
     """Return the description of a binary answer."""
     header = {"description": "Members of the `accuracy` object of JSON answers.", "schema": {"type": "string"}}
     content = {OCTETS: {"schema": _BINARY}}
@@ -41,7 +41,7 @@ def _answers_with(text: str) -> dict[int | str, dict[str, Any]]:
     "/v1/solids/{solid_id}/contains",
     operation_id="contains_stored",
     response_class=octets.Response,
-    responses=_answers_with("N int8: 1 inside, 0 exactly on the boundary, -1 outside."),
+    responses=answers_with("N int8: 1 inside, 0 exactly on the boundary, -1 outside."),
 )
 def contains_stored(solid_id: Id, question: Octets, call: CallOf) -> Any:
     """Locate points, N x dimension little-endian float64, in a stored solid."""
@@ -54,7 +54,7 @@ def contains_stored(solid_id: Id, question: Octets, call: CallOf) -> Any:
     "/v1/solids/{solid_id}/clip/segments",
     operation_id="clip_segments_stored",
     response_class=octets.Response,
-    responses=_answers_with("N x 2 x dimension float64: the ends of what remains; NaN where nothing does."),
+    responses=answers_with("N x 2 x dimension float64: the ends of what remains; NaN where nothing does."),
 )
 def clip_segments_stored(solid_id: Id, question: Octets, call: CallOf) -> Any:
     """Clip segments, N x 2 x dimension little-endian float64, on a stored convex region: half_space, aabb, convex or

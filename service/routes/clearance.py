@@ -33,4 +33,8 @@ def clearance(question: ClearanceRequest, call: CallOf) -> ClearanceResponse:
             at_least=question.at_least,
             retold=questions.tell_of_poses,
         )
+        if len(translations) == 1 and question.at_least is None:  # of one pose the points are told, too
+            pose = engine.Pose(rotations[0], translations[0])
+            found, accuracy = call.compute(engine.clearance, first, second, second_pose=pose)
+            found = [found]
     return answers.from_clearances(found, accuracy, question.at_least is not None)

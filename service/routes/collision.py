@@ -19,7 +19,7 @@ def collide(question: CollideRequest, call: CallOf) -> CollideResponse:
     options = {"detail": bool(question.detail), "boolean": bool(question.boolean)}
     witness = not question.boolean if question.witness is None else question.witness
     if question.poses is None:
-        return answers.from_collision(*call.compute(engine.collide, first, second, **options), witness)
+        return answers.from_collision(*call.compute(engine.collide, first, second, witness=witness, **options))
     rotations, translations = questions.to_poses(question.poses, second.dimension)
     found = call.compute(
         engine.collide_poses,
@@ -36,9 +36,9 @@ def collide(question: CollideRequest, call: CallOf) -> CollideResponse:
 
 @router.post("/v1/collide/scene", operation_id="collide_scene")
 def collide_scene(question: CollideSceneRequest, call: CallOf) -> CollideSceneResponse:
-    """List every pair of bodies with a common point, and how each lies to the other."""
+    """List every pair of bodies with a common point, or nearer than a gap, and how each lies to the other."""
     solids, poses = questions.to_bodies(question.bodies, call)
     options = {"detail": bool(question.detail), "boolean": bool(question.boolean)}
-    named = {"skip": question.skip, "only": question.only}
+    named = {"skip": question.skip, "only": question.only, "gap": question.gap}
     found = call.compute(engine.collide_scene, solids, poses, **named, **options, retold=questions.tell_of_scene)
     return answers.from_scene_pairs(*found)

@@ -11,15 +11,18 @@ from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 
 from service.errors import problem
+from service.route import state_of
 from service.routes.base import responses
 from service.schemas.arrays import Fault
-from service.schemas.problem import Schema
+from service.schemas.problem import Schema, with_example
 
-router = APIRouter(tags=["health"])
+router = APIRouter(tags=["health"], responses=responses())
 
 
 class Health(Schema):
     """Alive, or ready."""
+
+    model_config = with_example({"status": "ok"})
 
     status: Literal["ok"]
 
@@ -32,18 +35,19 @@ async def healthz() -> Response:
 
 
 @router.head("/readyz", include_in_schema=False)
-@router.get("/readyz", operation_id="readyz", response_model=Health, responses=responses(503))
+@router.get("/readyz", operation_id="readyz", response_model=Health)
 async def readyz(request: Request) -> Response:
     """Ready: every kernel is compiled and no shutdown has begun."""
-    if request.app.state.warm.is_set():
+    state = state_of(request.app)
+    if state.warm.is_set():
         return _ok()
-    return problem([Fault((), "not_ready", request.app.state.warm_error or _how_far(request.app.state))])
+    return problem([Fault((), "not_ready", state.warm_error or _how_far(state))])
 
 
 @router.get("/metrics", operation_id="metrics", response_class=PlainTextResponse)
 async def metrics(request: Request) -> Response:
-    """Requests and phases counted by this process, in the text format of Prometheus."""
-    return PlainTextResponse(request.app.state.metrics.text(), media_type="text/plain; version=0.0.4")
+    """What is counted of requests, their phases, the queue, bytes, refusals and the store, for Prometheus."""
+    return PlainTextResponse(state_of(request.app).metrics.text(), media_type="text/plain; version=0.0.4")
 
 
 def _how_far(state: State) -> str:

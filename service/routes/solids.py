@@ -16,7 +16,7 @@ from service.work import Call, CallOf
 
 router = router_of("solids")
 lookup = APIRouter(route_class=GeometryRoute, tags=["solids"], responses=responses(401, 403, 404, 503))
-_KNOWN: Final[dict[int | str, dict[str, Any]]] = {
+KNOWN: Final[dict[int | str, dict[str, Any]]] = {
     304: {"description": "The client has it: one of the tags in If-None-Match is the id."}
 }
 
@@ -39,18 +39,18 @@ def keep(solid: engine.Solid, call: Call) -> StoredSolidSummary:
     """Put `solid` into the store and say so."""
     name, is_new = call.store.put(solid)
     call.status = 201 if is_new else 200
-    call.headers.update({"Location": f"/v1/solids/{name}", "ETag": f'"{name}"'})
+    call.headers.update({"Location": f"{call.settings.root_path}/v1/solids/{name}", "ETag": f'"{name}"'})
     return answers.from_stored(name, solid)
 
 
-@lookup.get("/v1/solids/{solid_id}", operation_id="get_solid", responses=_KNOWN)
+@lookup.get("/v1/solids/{solid_id}", operation_id="get_solid", responses=KNOWN)
 def get_solid(solid_id: Id, call: CallOf) -> StoredSolidSummary:
     """Return what the store holds under an id."""
     call.headers["ETag"] = f'"{solid_id}"'
     return answers.from_stored(solid_id, call.store.get(solid_id))
 
 
-@lookup.head("/v1/solids/{solid_id}", operation_id="has_solid", response_class=Response, responses=_KNOWN)
+@lookup.head("/v1/solids/{solid_id}", operation_id="has_solid", response_class=Response, responses=KNOWN)
 def has_solid(solid_id: Id, call: CallOf) -> None:
     """Tell by the status whether the store holds an id."""
     call.headers["ETag"] = f'"{solid_id}"'

@@ -19,11 +19,20 @@ class ClearanceRequest(Schema):
         {
             "first": {"type": "aabb", "min": [0, 0, 0], "max": [1, 1, 1]},
             "second": {"type": "sphere", "center": [4, 5, 1], "radius": 2},
-        }
+        },
+        {
+            "first": {"type": "polygon", "rings": [[[0, 0], [1, 0], [0, 1]]]},
+            "second": {"type": "aabb", "min": [0, 0], "max": [1, 1]},
+            "poses": [
+                {"rotation": [[1, 0], [0, 1]], "translation": [3, 0]},
+                {"rotation": [[0, -1], [1, 0]], "translation": [0, 0]},
+            ],
+            "at_least": 2,
+        },
     )
 
     first: Solid = Field(description="3D: polyhedron, surface, aabb, sphere, half_space. 2D: polygon, triangle, ...")
-    second: Solid
+    second: Solid = Field(description="The other body, of the same dimension.")
     poses: Annotated[list[RigidPose], AtMost("max_poses")] = left_out(
         "Poses of `second`, one answer each; without them one answer for where it stands."
     )
@@ -35,7 +44,7 @@ class ClearanceRequest(Schema):
 class ClearanceFeature(Schema):
     """What of a body its nearest point lies on."""
 
-    kind: Literal["vertex", "edge", "face", "ball", "plane"]
+    kind: Literal["vertex", "edge", "face", "ball", "plane"] = Field(description="Of a mesh, a ball or a half-space.")
     indices: list[Count] = Field(description="Of a vertex, an edge's two, or a face; none of a ball or a plane.")
 
 
@@ -43,7 +52,7 @@ class ClearanceAnswer(Schema):
     """How far two bodies are apart."""
 
     distance: Number = Field(description="The nearest double; 0 exactly where they have a common point.")
-    points: list[Position] = left_out("A point of each at that distance; left out where they meet, and for poses.")
+    points: list[Position] = left_out("A point of each at that distance; not where they meet, nor of several poses.")
     features: list[ClearanceFeature] = left_out("What these points lie on.")
 
 

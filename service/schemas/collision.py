@@ -9,7 +9,7 @@ from pydantic import Field
 from service.schemas.arrays import Array, Axis, Numbers
 from service.schemas.limits import AtMost, left_out
 from service.schemas.problem import Accuracy, Count, Schema, with_example
-from service.schemas.solids import Body, RigidPose, Solid
+from service.schemas.solids import Body, Number, RigidPose, Solid
 
 CollisionRelation = Literal["disjoint", "first_inside_second", "second_inside_first", "overlapping", "touching"]
 Detail = Literal["DC", "EC", "PO", "EQ", "TPP", "NTPP", "TPPi", "NTPPi"]
@@ -17,7 +17,8 @@ Pairs = Annotated[Array, Numbers(Axis(0, "max_pairs"), Axis(2, 2), kind="integer
 
 _CUBE = {"type": "aabb", "min": [0, 0, 0], "max": [1, 1, 1]}
 _BALL = {"type": "sphere", "center": [2, 0.5, 0.5], "radius": 1}
-_DETAIL = "Say which of the eight relations of RCC-8 holds too: tangentially inside (TPP), equal (EQ), ..."
+_CHIP = {"type": "aabb", "min": [0, 0, 0], "max": [0.25, 0.25, 0.25]}
+DETAIL = "Say which of the eight relations of RCC-8 holds too: tangentially inside (TPP), equal (EQ), ..."
 _BOOLEAN = "Ask for disjoint or not alone: any other relation may then be answered as touching, sooner."
 _FOUND = "Which relation of RCC-8, where asked for; left out if a body has no interior."
 
@@ -25,15 +26,28 @@ _FOUND = "Which relation of RCC-8, where asked for; left out if a body has no in
 class CollideRequest(Schema):
     """How does the first body lie to the second, for each pose of the second?"""
 
-    model_config = with_example({"first": _CUBE, "second": _BALL})
+    model_config = with_example(
+        {"first": _CUBE, "second": _BALL},
+        {
+            "first": _CUBE,
+            "second": _CHIP,
+            "poses": [
+                {"rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "translation": [0.5, 0.5, 0.5]},
+                {"rotation": [[0.6, -0.8, 0], [0.8, 0.6, 0], [0, 0, 1]], "translation": [1, 0, 0], "tolerance": 1e-6},
+            ],
+            "detail": True,
+            "boolean": False,
+            "witness": True,
+        },
+    )
 
     first: Solid = Field(description="3D: polyhedron, surface, aabb, sphere, half_space. 2D: polygon, triangle, ...")
-    second: Solid
+    second: Solid = Field(description="The other body, of the same dimension.")
     poses: Annotated[list[RigidPose], AtMost("max_poses")] = left_out(
         "Poses of `second`, one answer each; without them one answer for where it stands. Time is discrete: two poses "
         "may be free while a motion between them collides."
     )
-    detail: bool = left_out(_DETAIL)
+    detail: bool = left_out(DETAIL)
     boolean: bool = left_out(_BOOLEAN)
     witness: bool = left_out(
         "Name a reason for each contact: if left out, unless `boolean` is true; a single pair then has none."
@@ -58,7 +72,7 @@ class CollisionAnswer(Schema):
     """The first true line decides: no common point, disjoint; within the other's open interior, inside; the open
     interiors meet, overlapping; else touching."""
 
-    relation: CollisionRelation
+    relation: CollisionRelation = Field(description="How the first body lies to the second.")
     witness: CollisionWitness = left_out("Left out when disjoint, and where none was asked for.")
     detail: Detail = left_out(_FOUND)
 
@@ -66,7 +80,7 @@ class CollisionAnswer(Schema):
 class CollideResponse(Schema):
     """One answer for each pose, or a single one."""
 
-    collisions: list[CollisionAnswer]
+    collisions: list[CollisionAnswer] = Field(description="In the order of the poses.")
     accuracy: Accuracy
 
 
@@ -83,27 +97,49 @@ class CollideSceneRequest(Schema):
                     "pose": {"rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "translation": [1, 0, 0]},
                 },
             ]
-        }
+        },
+        {
+            "bodies": [{"solid": _CUBE}, {"solid": _CHIP}, {"solid": _BALL}],
+            "only": [[0, 1], [0, 2]],
+            "detail": True,
+            "boolean": False,
+        },
+        {
+            "bodies": [
+                {"solid": _CUBE},
+                {"solid": _CUBE},
+                {
+                    "solid": _CHIP,
+                    "pose": {"rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "translation": [1.5, 0, 0]},
+                },
+            ],
+            "skip": [[0, 1]],
+            "gap": 1,
+        },
     )
 
-    bodies: Annotated[list[Body], AtMost("max_bodies")]
+    bodies: Annotated[list[Body], AtMost("max_bodies")] = Field(description="Solids of one dimension in their places.")
     skip: Pairs = left_out("Pairs of bodies to leave out.")
     only: Pairs = left_out("The only pairs to look at.")
-    detail: bool = left_out(_DETAIL)
+    gap: Annotated[float, Numbers(minimum=0)] = left_out(
+        "A distance: pairs that do not meet but are nearer than that, decided exactly, are listed too, as disjoint."
+    )
+    detail: bool = left_out(DETAIL)
     boolean: bool = left_out(_BOOLEAN)
 
 
 class CollidingPair(Schema):
-    """Two bodies with a common point."""
+    """Two bodies with a common point, or nearer than the gap."""
 
-    first: Count
-    second: Count
-    relation: CollisionRelation
+    first: Count = Field(description="Index of a body.")
+    second: Count = Field(description="Index of a later body.")
+    relation: CollisionRelation = Field(description="How the first body lies to the second.")
     detail: Detail = left_out(_FOUND)
+    distance: Number = left_out("With `gap` and without `boolean`: how far apart, 0 where they meet.")
 
 
 class CollideSceneResponse(Schema):
-    """Every colliding pair, by first, then second."""
+    """Every pair found, by first, then second."""
 
-    pairs: list[CollidingPair]
+    pairs: list[CollidingPair] = Field(description="Pairs that do not meet are left out.")
     accuracy: Accuracy

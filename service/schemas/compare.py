@@ -20,6 +20,11 @@ NEEDED = {
     "clip_polygons": ("polygons", "region"),
 }
 """The fields of each operation, in the order of the engine's arguments."""
+_TETRAHEDRON = {
+    "type": "polyhedron",
+    "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]],
+    "faces": [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]],
+}
 
 
 class CompareRequest(Schema):
@@ -30,10 +35,28 @@ class CompareRequest(Schema):
             "operation": "clip_segments",
             "region": {"type": "aabb", "min": [0, 0], "max": [1, 3]},
             "segments": [[[-0.1, 0.3], [0.2, -0.6]], [[2, 2], [0.5, 0.5]]],
-        }
+        },
+        {
+            "operation": "contains",
+            "method": "half-line",
+            "solid": {"type": "polygon", "rings": [[[0, 0], [3, 1], [1, 3]]]},
+            "points": [[0.3, 0.1], [0.9, 0.3], [1, 1]],
+        },
+        {
+            "operation": "clip_polygons",
+            "region": {"type": "half_space", "normal": [-1, -3], "offset": 1},
+            "polygons": [[[0, 0], [1, 0], [0, 1]]],
+        },
+        {
+            "operation": "collide",
+            "first": _TETRAHEDRON,
+            "second": {**_TETRAHEDRON, "vertices": [[1, 0, 0], [2, 0, 0], [1, 1, 0], [1, 0, 1]]},
+        },
     )
 
-    operation: Literal["contains", "collide", "clip_segments", "clip_polygons"]
+    operation: Literal["contains", "collide", "clip_segments", "clip_polygons"] = Field(
+        description="What is asked of both; it says which other fields are needed."
+    )
     method: str = left_out("One of the textbook's methods; left out, the first. A wrong one is answered with a list.")
     solid: Solid = left_out("contains: half_space, convex, polyhedron, triangle or polygon.")
     points: Points = left_out("contains.")
@@ -59,6 +82,6 @@ class CompareResponse(Schema):
     methods: list[str] = Field(description="All that the textbook has for this question.")
     differing: Indices = Field(description="Items that plain float64 decides wrongly.")
     inexact: Indices = Field(description="Items decided rightly, with a coordinate that is not the nearest double.")
-    seconds_exact: Number
-    seconds_plain: Number
+    seconds_exact: Number = Field(description="What the exact answer took.")
+    seconds_plain: Number = Field(description="What the textbook's method took.")
     accuracy: Accuracy

@@ -27,8 +27,8 @@ class ContainsRequest(Schema):
         }
     )
 
-    solid: Solid
-    points: Points
+    solid: Solid = Field(description="Any but a surface.")
+    points: Points = Field(description="Positions of the solid's dimension.")
 
 
 class ContainsResponse(Schema):
@@ -55,8 +55,10 @@ class ContainsSceneRequest(Schema):
         }
     )
 
-    bodies: Annotated[list[Body], AtMost("max_bodies", low=1)]
-    points: Points
+    bodies: Annotated[list[Body], AtMost("max_bodies", low=1)] = Field(
+        description="Solids of one dimension in their places."
+    )
+    points: Points = Field(description="Positions of the bodies' dimension.")
 
 
 class ContainsSceneResponse(Schema):

@@ -49,6 +49,6 @@ def _without_default(schema: dict[str, Any]) -> None:
     schema.pop("default", None)
 
 
-def left_out(description: str | None = None) -> Any:
+def left_out(description: str | None = None, examples: list[Any] | None = None) -> Any:
     """Return a field that may be left out and is then None; JSON ``null`` is refused, and the schema has no default."""
-    return Field(default=None, description=description, json_schema_extra=_without_default)
+    return Field(default=None, description=description, examples=examples, json_schema_extra=_without_default)

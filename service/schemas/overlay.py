@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from service.schemas.arrays import Array, Axis, Numbers
-from service.schemas.limits import left_out
+from service.schemas.limits import AtMost, left_out
 from service.schemas.problem import Accuracy, Count, Schema, with_example
 from service.schemas.solids import Number, Position, Solid
 
@@ -23,17 +23,62 @@ class OverlayRequest(Schema):
             "subject": {"type": "polygon", "rings": [_SQUARE, [[1, 1], [2, 1], [1, 2]]]},
             "clip": {"type": "polygon", "rings": [[[2, 2], [6, 2], [6, 6], [2, 6]]]},
             "operation": "difference",
-        }
+        },
+        {
+            "subject": {"type": "polygon", "rings": [[[0, 0], [1, 0], [1, 1], [0, 1]]]},
+            "clip": {"type": "polygon", "rings": [[[0.9999999999999999, 0.3], [2, 0.2], [2, 0.4]]]},
+            "operation": "intersection",
+            "output": "valid",
+            "area": True,
+        },
+        {
+            "subject": {"type": "polygon", "rings": [_SQUARE]},
+            "clip": {"type": "polygon", "rings": [[[4.00001, 0], [8, 0], [8, 4], [3.99999, 4]]]},
+            "operation": "union",
+            "grid": 0.001,
+        },
     )
 
     subject: Solid = Field(description="A polygon.")
     clip: Solid = Field(description="A polygon.")
-    operation: Literal["intersection", "union", "difference", "symmetric_difference"]
+    operation: Literal["intersection", "union", "difference", "symmetric_difference"] = Field(
+        description="How the two are combined; difference is the subject without the clip."
+    )
     output: Literal["valid", "nearest"] = left_out(
         "valid (if left out): rings that are simple and cross nowhere; nearest: every vertex correctly rounded and no "
         "more, which may be invalid."
     )
     area: bool = left_out("Compute the area; if left out, where it costs next to nothing: up to 100 vertices.")
+    grid: Number = left_out(
+        "Snap the result to multiples of this power of two or ten, so that borders that nearly coincide do; no edge "
+        "moves by more than 0.71 of it. With output valid only; area is then that of the output."
+    )
+
+
+class OverlayBatchRequest(Schema):
+    """What is the intersection, union, difference or symmetric difference of these pairs of polygons?"""
+
+    model_config = with_example(
+        {
+            "subjects": [{"type": "polygon", "rings": [_SQUARE]}, {"type": "polygon", "rings": []}],
+            "clips": [
+                {"type": "polygon", "rings": [[[2, 2], [6, 2], [6, 6], [2, 6]]]},
+                {"type": "polygon", "rings": [_SQUARE]},
+            ],
+            "operation": "union",
+            "output": "valid",
+        }
+    )
+
+    subjects: Annotated[list[Solid], AtMost("max_polygons")] = Field(description="Polygons.")
+    clips: Annotated[list[Solid], AtMost("max_polygons")] = Field(description="As many polygons, each for one subject.")
+    operation: Literal["intersection", "union", "difference", "symmetric_difference"] = Field(
+        description="How the two of each pair are combined; difference is the subject without the clip."
+    )
+    output: Literal["valid", "nearest"] = left_out(
+        "valid (if left out): rings that are simple and cross nowhere; nearest: every vertex correctly rounded and no "
+        "more, which may be invalid."
+    )
 
 
 class OverlayPiece(Schema):
@@ -46,7 +91,7 @@ class OverlayPiece(Schema):
 class OverlayCollapse(Schema):
     """A part of the exact result that rounding lost."""
 
-    kind: Literal["piece", "hole"]
+    kind: Literal["piece", "hole"] = Field(description="What it was.")
     area: Number = left_out("Its area, correctly rounded; left out where it is beyond float64.")
     near: Position = Field(description="Its first vertex, rounded.")
 
@@ -62,21 +107,38 @@ class OverlayRounding(Schema):
     snapped: bool = Field(description="The coarser lattice of snap rounding was needed.")
     vertices_moved: Count = Field(description="Vertices that are not correctly rounded vertices of the exact result.")
     largest_displacement: Number = Field(description="Bound on the distance of an edge from its exact edge.")
-    pieces_exact: Count
-    holes_exact: Count
-    pieces_joined: Count
-    pieces_parted: Count
-    holes_joined: Count
-    holes_parted: Count
+    pieces_exact: Count = Field(description="Pieces of the exact result.")
+    holes_exact: Count = Field(description="Holes of the exact result.")
+    pieces_joined: Count = Field(description="Pieces fewer, since rounding joined some.")
+    pieces_parted: Count = Field(description="Pieces more, since rounding parted some.")
+    holes_joined: Count = Field(description="Holes fewer, since rounding joined some.")
+    holes_parted: Count = Field(description="Holes more, since rounding parted some.")
 
 
 class OverlayResponse(Schema):
     """The pieces: their coordinates together are those of a GeoJSON MultiPolygon."""
 
-    pieces: list[OverlayPiece]
+    pieces: list[OverlayPiece] = Field(description="Connected parts; none where the result is empty.")
     area: Number = left_out(
         "Area of the exact result, correctly rounded; left out where it is beyond float64, or was not asked for."
     )
-    collapsed: list[OverlayCollapse]
+    collapsed: list[OverlayCollapse] = Field(description="Parts that rounding lost; none where it lost nothing.")
     rounding: OverlayRounding
+    accuracy: Accuracy
+
+
+class OverlaidPair(Schema):
+    """The result of one pair."""
+
+    status: Literal["done", "not_representable"] = Field(
+        description="not_representable: a coordinate of the result is beyond float64; there are no pieces then."
+    )
+    pieces: list[OverlayPiece] = Field(description="Their coordinates together are those of a GeoJSON MultiPolygon.")
+    largest_displacement: Number = Field(description="Bound on the distance of an edge from its exact edge.")
+
+
+class OverlayBatchResponse(Schema):
+    """One entry for each pair."""
+
+    overlays: list[OverlaidPair] = Field(description="In the order of the request.")
     accuracy: Accuracy

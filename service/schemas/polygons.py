@@ -44,5 +44,5 @@ class ClippedPolygon(Schema):
 class ClipPolygonsResponse(Schema):
     """One entry for each polygon."""
 
-    polygons: list[ClippedPolygon]
+    polygons: list[ClippedPolygon] = Field(description="In the order of the request.")
     accuracy: Accuracy

@@ -26,24 +26,36 @@ class Schema(BaseModel):
         return answer
 
 
-def with_example(example: dict[str, Any]) -> ConfigDict:
-    """Return the configuration of a request model that shows `example`; a test sends each of them."""
-    return ConfigDict(json_schema_extra={"examples": [example]})
+def with_example(*examples: dict[str, Any]) -> ConfigDict:
+    """Return the configuration of a model that shows examples: of a question, which a test asks, or of the answers to
+    them, which it holds against what comes. Their parts are the examples of the properties (openapi.py)."""
+    return ConfigDict(json_schema_extra={"examples": [*examples]})
 
 
 class ProblemItem(Schema):
     """One place in the request and what is wrong with it."""
 
     pointer: str = Field(description="JSON pointer (RFC 6901) into the request body; empty for the body as a whole.")
-    detail: str
+    detail: str = Field(description="What was expected there, what came, and what to do.")
 
 
 class Problem(Schema):
     """An error (RFC 9457, `application/problem+json`)."""
 
+    model_config = with_example(
+        {
+            "type": "urn:exact-geometry:problem:min_above_max",
+            "title": "Unprocessable Entity",
+            "status": 422,
+            "detail": "min[2] = 2.0 is above max[2] = 1.0; swap them",
+            "code": "min_above_max",
+            "errors": [{"pointer": "/solid/min/2", "detail": "min[2] = 2.0 is above max[2] = 1.0; swap them"}],
+        }
+    )
+
     type: str = Field(description="URI of this kind of problem.")
     title: str = Field(description="The status in words.")
-    status: Annotated[int, Numbers(kind="integer", minimum=400)]
+    status: Annotated[int, Numbers(kind="integer", minimum=400)] = Field(description="The status of the answer.")
     detail: str = Field(description="What was expected, what came, where, and what to do.")
     code: str = Field(description="Stable name of the rule that was broken.")
     errors: list[ProblemItem] = Field(description="The places at fault, at most 20.", max_length=20)
@@ -52,7 +64,18 @@ class Problem(Schema):
 class Accuracy(Schema):
     """What this answer can say of its own accuracy."""
 
-    decisions: Literal["exact", "float64"]
+    model_config = with_example(
+        {
+            "decisions": "exact",
+            "coordinates_ulp": 0.5,
+            "items": 3,
+            "beyond_filter": 2,
+            "rational": 0,
+            "method": "sphere",
+        }
+    )
+
+    decisions: Literal["exact", "float64"] = Field(description="How every decision was made.")
     coordinates_ulp: Annotated[float, Numbers()] = left_out(
         "Bound on each constructed coordinate in units in the last place; left out where none is constructed."
     )

@@ -9,7 +9,7 @@ import { View2D } from "./view2d.js";
 import { View3D } from "./view3d.js";
 
 const $ = (id) => document.getElementById(id);
-const state = { question: "contains", dimension: 3, offset: [0, 0, 0], operation: "intersection", n: 1 };
+const state = { question: "proof", dimension: 2, offset: [0, 0, 0], operation: "intersection", n: 1 };
 const loaded = { 2: {}, 3: {} }; // solids made or opened, by key
 const LARGE = 20000; // characters of a solid's JSON from which it is stored once and named by its id
 
@@ -22,12 +22,21 @@ function move(step) {
   refresh();
 }
 
+// Corners that can be dragged, in the order of the view: those of the first solid, then those of the second under its pose.
+function corners(now) {
+  const shift = now.layout?.shifts[0] ?? [0, 0], offset = now.layout ? now.offset : [0, 0];
+  const place = { rotation: now.rotation, translation: now.offset.slice(0, 2) };
+  const found = [[now.first, (p) => p.map((v, k) => v + offset[k] + shift[k]), (p) => p.map((v, k) => v - offset[k] - shift[k])]];
+  if (now.second) found.push([now.second, (p) => turned(now.rotation, p).map((v, k) => v + place.translation[k]),
+    (p) => turned(now.rotation[0].map((_, k) => now.rotation.map((row) => row[k])), p.map((v, k) => v - place.translation[k]))]);
+  return found.filter(([solid]) => solid.json.type === "polygon" && solid.rings.flat().length <= 100)
+    .flatMap(([solid, to, from]) => solid.rings.flatMap((ring) => ring.map((p, i) => ({ at: to(p), set(q) { ring[i] = from(q); solid.isEdited = true; solid.asked = solid.json; } }))));
+}
+
+const turned = (rotation, p) => rotation.map((row) => row.reduce((sum, r, k) => sum + r * p[k], 0));
+
 function moveCorner(corner, position) {
-  for (const ring of state.first.rings) {
-    if (corner < ring.length) { ring[corner] = position; break; }
-    corner -= ring.length;
-  }
-  state.first.asked = state.first.json;
+  corners(state)[corner]?.set(position);
   refresh();
 }
 
@@ -63,6 +72,7 @@ async function open(file) {
   const key = `file ${file.name}`, json = { type: "polyhedron", vertices: placed, faces };
   loaded[3][key] = completed({ name: `${file.name} (${faces.length.toLocaleString("en")} faces)`, json, mesh: { vertices: placed, faces } });
   SOLIDS[3][key] = { name: loaded[3][key].name, convex: true, make: () => loaded[3][key] };
+  if (state.question === "overlay" || state.question === "proof") document.querySelector("[name=question][value=contains]").click();
   document.querySelector("[name=dimension][value='3']").click();
   fillSelects(key);
   refresh();
@@ -76,7 +86,7 @@ function fillSelects(wanted) {
     $(`${id}-label`).hidden = !allowed;
     if (!allowed) continue;
     const keys = Object.keys(SOLIDS[state.dimension]).filter((key) => allowed(SOLIDS[state.dimension][key]));
-    const kept = id === "first" && keys.includes(wanted) ? wanted : keys.includes($(id).value) ? $(id).value : keys[id === "second" ? 1 : 0];
+    const kept = id === "first" && keys.includes(wanted) ? wanted : question.preferred && id === "first" ? question.preferred : keys.includes($(id).value) ? $(id).value : keys[id === "second" ? 1 : 0];
     $(id).replaceChildren(...keys.map((key) => new Option(SOLIDS[state.dimension][key].name, key, false, key === kept)));
   }
 }
@@ -92,7 +102,9 @@ function chooseQuestion() {
   $("hint").textContent = `${question.hint} ${state.dimension === 3 ? "Drag turns, Shift-drag or two fingers move, the wheel zooms." : "Drag moves."}`;
   $("operation-label").hidden = !question.operations;
   $("count-label").hidden = !question.counts;
+  $("method-label").hidden = !question.methods;
   $("turn-label").hidden = !question.seconds;
+  $("plain-label").hidden = !question.plain;
   if (question.counts) [$("count").min, $("count").max, $("count").value] = question.counts;
   $("view3d").hidden = state.dimension !== 3;
   $("view2d").hidden = state.dimension !== 2;
@@ -107,7 +119,10 @@ function readControls() {
   state.n = Math.round(10 ** Number($("count").value));
   $("count-shown").textContent = state.n.toLocaleString("en");
   state.snap = $("snap").checked;
+  state.plain = $("plain").checked;
   state.operation = $("operation").value;
+  state.method = $("method").value;
+  state.layout = QUESTIONS[state.question].layout?.($("view2d"));
   state.first = solidOf($("first").value, state.dimension);
   state.second = QUESTIONS[state.question].seconds ? solidOf($("second").value, state.dimension) : null;
 }
@@ -134,11 +149,29 @@ async function once() {
   const { path, body, items } = question.ask(now), text = JSON.stringify(body);
   showRequest(path, text);
   const { answer, timing, seconds } = await ask(path, text);
+  const next = question.beside?.(now, body), other = next && (await ask(next.path, JSON.stringify(next.body))).answer;
+  const more = question.further?.(now, body, answer), also = more ? await asked(more) : null;
   $("problem").hidden = true;
-  const figures = question.figures(now, answer);
-  $("verdict").textContent = question.verdict(now, answer, figures);
+  $("stage").classList.remove("old");
+  shown = other ? { [path]: answer, [next.path]: other } : answer;
+  if (other?.methods && $("method").options.length !== other.methods.length) {
+    $("method").replaceChildren(...other.methods.map((name) => new Option(name, name, false, name === other.method)));
+  }
+  const figures = { ...question.figures(now, answer, other), ...also?.figures };
+  $("verdict").textContent = question.verdict(now, answer, figures, other);
   showFigures(figures, answer.accuracy, timing, seconds, items);
-  showPicture(now, question.draw(now, answer, body));
+  showPicture(now, [...question.draw(now, answer, body, other), ...(also?.items ?? [])]);
+  saveLink();
+}
+
+// The question that an answer raises: its figures and what it adds to the picture; a refusal is a figure.
+async function asked({ path, body, figures, draw }) {
+  try {
+    const { answer } = await ask(path, JSON.stringify(body));
+    return { figures: figures(answer), items: draw(answer) };
+  } catch (error) {
+    return { figures: { [path]: error.message }, items: [] };
+  }
 }
 
 async function ask(path, text) {
@@ -147,6 +180,9 @@ async function ask(path, text) {
   const before = performance.now();
   const response = await fetch(path.slice(1), { method: "POST", headers, body: text });
   const answer = await response.json(), seconds = (performance.now() - before) / 1000;
+  const isKeyAsked = response.status === 401 || response.status === 403;
+  $("key").classList.toggle("asked", isKeyAsked);
+  if (isKeyAsked) $("key").focus();
   if (!response.ok) throw new Error(`${response.status} ${answer.code}: ${answer.detail}`);
   return { answer, seconds, timing: timings(response.headers.get("Server-Timing") ?? "") };
 }
@@ -158,6 +194,7 @@ function timings(header) {
 function complain(message) {
   $("problem").textContent = message;
   $("problem").hidden = false;
+  $("stage").classList.add("old");
   $("verdict").textContent = "";
 }
 
@@ -185,7 +222,7 @@ function showFigures(figures, accuracy, timing, seconds, items) {
   }));
 }
 
-let request = { path: "", text: "" };
+let request = { path: "", text: "" }, shown = {};
 
 function showRequest(path, text) {
   request = { path, text };
@@ -202,26 +239,74 @@ function curl(text) {
 function showPicture(now, items) {
   const colors = styleColors();
   if (now.dimension === 2) {
-    const corners = now.first.json.type === "polygon" && now.first.rings.flat().length <= 100 ? now.first.rings.flat() : [];
-    view2d.show(prepared2d(items, colors), 2.1, corners);
+    view2d.show(prepared2d(items, colors), now.layout?.radius ?? 2.1, corners(now).map(({ at }) => at));
   } else if (view3d) view3d.show(prepared3d(items, [0, 0, 0], colors), 2.1);
+}
+
+// --- links: the whole state in the address, but for files that were opened ----------------------------------------------
+
+const FIELDS = ["first", "second", "operation", "method", "count", "turn"];
+let timer = 0;
+
+function link() {
+  const said = new URLSearchParams({ question: state.question, dimension: state.dimension, offset: state.offset.join(",") });
+  for (const id of FIELDS) if (!$(`${id}-label`).hidden) said.set(id, $(id).value);
+  for (const id of ["snap", "plain"]) if ($(id).checked) said.set(id, "1");
+  for (const name of ["first", "second"]) if (state[name]?.isEdited) said.set(`${name}-rings`, JSON.stringify(state[name].rings));
+  if (state.dimension === 3 && view3d) said.set("camera", [view3d.yaw, view3d.pitch, view3d.zoom].map((v) => v.toFixed(3)).join(","));
+  return `#${said}`;
+}
+
+function saveLink() {  // browsers take some hundred of these in half a minute
+  clearTimeout(timer);
+  timer = setTimeout(() => history.replaceState(null, "", link()), 300);
+}
+
+function readLink() {
+  const said = new URLSearchParams(location.hash.slice(1)), choose = (name) => document.querySelector(`[name=${name}][value="${CSS.escape(said.get(name) ?? "")}"]`);
+  for (const name of ["question", "dimension"]) if (choose(name)) choose(name).checked = true;
+  chooseQuestion();
+  if (said.get("method")) $("method").replaceChildren(new Option(said.get("method")));
+  for (const id of FIELDS) {
+    const has = $(id).options ? [...$(id).options].some((option) => option.value === said.get(id)) : said.has(id);
+    if (has) $(id).value = said.get(id);
+  }
+  for (const id of ["snap", "plain"]) $(id).checked = said.has(id);
+  const numbers = (name) => (said.get(name) ?? "").split(",").map(Number);
+  if (said.has("offset") && numbers("offset").length === 3 && numbers("offset").every(Number.isFinite)) state.offset = numbers("offset");
+  if (said.has("camera") && view3d && numbers("camera").every(Number.isFinite)) [view3d.yaw, view3d.pitch, view3d.zoom] = numbers("camera");
+  for (const name of ["first", "second"]) {
+    if (!said.has(`${name}-rings`) || $(`${name}-label`).hidden) continue;
+    try {
+      const solid = solidOf($(name).value, state.dimension), given = JSON.parse(said.get(`${name}-rings`));
+      solid.rings.splice(0, solid.rings.length, ...given.map((ring) => ring.map((p) => p.slice(0, 2).map(Number))));
+      solid.isEdited = true;
+    } catch { complain("the link holds rings that cannot be read; the example is shown"); }
+  }
 }
 
 // --- start ------------------------------------------------------------------------------------------------------------
 
 $("questions").addEventListener("change", () => { chooseQuestion(); refresh(); });
-$("controls").addEventListener("input", refresh);
+$("controls").addEventListener("input", (event) => { if (event.target.id !== "file") refresh(); });
+$("key").value = sessionStorage.getItem("key") ?? "";
+$("key").addEventListener("change", () => { sessionStorage.setItem("key", $("key").value); refresh(); });
+for (const kind of ["pointerup", "keyup", "wheel"]) $("view3d").addEventListener(kind, saveLink, { passive: true });
+addEventListener("resize", refresh);
+addEventListener("hashchange", () => { readLink(); refresh(); });
 $("centre").addEventListener("click", () => { state.offset = [0, 0, 0]; refresh(); });
 $("open").addEventListener("click", () => $("file").click());
-$("file").addEventListener("change", ({ target }) => { if (target.files[0]) open(target.files[0]).catch((error) => complain(error.message)); });
-for (const [id, text] of [["copy-request", () => request.text], ["copy-curl", () => curl(request.text)]]) {
+$("file").addEventListener("change", ({ target }) => { if (target.files[0]) open(target.files[0]).catch((error) => complain(error.message)); target.value = ""; });
+const copied = [["request", () => request.text], ["curl", () => curl(request.text)], ["answer", () => JSON.stringify(shown)], ["link", () => new URL(link(), location).href]];
+for (const [id, text] of copied.map(([name, text]) => [`copy-${name}`, text])) {
+  const label = $(id).textContent;
   $(id).addEventListener("click", async () => {
     await navigator.clipboard.writeText(text());
     $(id).textContent = "Copied";
-    setTimeout(() => { $(id).textContent = id === "copy-curl" ? "Copy curl" : "Copy JSON"; }, 1500);
+    setTimeout(() => { $(id).textContent = label; }, 1500);
   });
 }
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", refresh);
 for (const form of document.forms) form.addEventListener("submit", (event) => event.preventDefault());
-chooseQuestion();
+readLink();
 refresh();

@@ -7,7 +7,7 @@ export async function readMesh(file) {
   if (kind === "obj") return obj(text());
   if (kind === "off") return off(text());
   if (kind === "ply") return ply(bytes);
-  throw new Error(`${file.name}: the playground reads .stl, .obj, .off and .ply`);
+  throw new Error(`${file.name} cannot be drawn: the playground reads .stl, .obj, .off and .ply; ${kind === "glb" ? "POST /v1/solids/import takes .glb" : "convert it to one of these"}`);
 }
 
 const soup = (vertices) => ({ vertices, faces: Array.from({ length: vertices.length / 3 }, (_, i) => [3 * i, 3 * i + 1, 3 * i + 2]) });

@@ -41,14 +41,87 @@ function stars(state) {
   });
 }
 
+// The first solid, the second beside it, and the first again, turned: each with its pose.
+function sceneBodies(state) {
+  const turns = state.dimension === 3 ? [[[1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]] : [[[1, 0], [0, 1]], [[0, -1], [1, 0]]];
+  return [[state.first, [-1, 0, 0], 0], [state.second, [0.75, 0.5, 0], 0], [state.first, [1, -0.75, 0], 1]].map(([solid, place, turn]) => [
+    solid, { rotation: turns[turn], translation: place.slice(0, state.dimension) },
+  ]);
+}
+
 const unit = (a) => a.map((v) => v / Math.hypot(...a));
 const across = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 const counted = (n, thing) => `${n.toLocaleString("en")} ${thing}${n === 1 ? "" : "s"}`;
+// The textbook's plain float64 method beside the exact answer: what it gets wrong is painted over the picture.
+const compared = (state, operation, body, painted) => state.plain ? {
+  path: "/v1/compare", body: { operation, ...body },
+  figures: ({ method, differing, seconds_exact, seconds_plain }) => ({
+    "float64 wrong": differing.length, "float64 method": method, "exact against float64": `${(seconds_exact / seconds_plain).toPrecision(2)} times as long`,
+  }),
+  draw: ({ differing }) => [painted(differing)],
+} : null;
+
 const firstItems = (state) => (state.dimension === 3 ? solid3d(state.first, "first", 0.3) : solid2d(state.first, "first"));
 
+// Two pictures side by side, or one above the other, as the canvas allows: where their middles are, and the view's radius.
+function halves({ clientWidth: w, clientHeight: h }) {
+  const beside = Math.min(w / 6.8, h / 3.9), above = Math.min(w / 3.4, h / 8.4), far = 1.65;
+  const scale = Math.max(beside, above), shifts = beside >= above ? [[-far, -0.15], [far, -0.15]] : [[0, 2.2], [0, -1.5]];
+  return { shifts, radius: Math.min(w, h) / (2.3 * scale) };
+}
+
+// The doubles nearest to points on the edges of rings: as near to the boundary as data that was snapped to it.
+function onEdges(list, n) {
+  return list.flatMap((ring) => ring.flatMap((a, i) => {
+    const b = ring[(i + 1) % ring.length];
+    return Array.from({ length: n }, (_, k) => a.map((v, axis) => v + ((b[axis] - v) * (k + 0.5)) / n));
+  }));
+}
+
 export const QUESTIONS = {
+  proof: {
+    hint: "Points snapped to the edges of a polygon, as drawn data is: each is the nearest double, so it lies inside, outside or exactly on the edge, by less than can be drawn. First the exact answer, then the textbook's method in plain float64; what it gets wrong is crossed out. Drag the polygon or its corners.",
+    dimensions: [2],
+    firsts: (solid) => solid.polygon,
+    counts: [0, 2, 0.8],
+    methods: true,
+    preferred: "star",
+    layout: halves,
+    ask(state) {
+      const rings = state.first.rings.map((ring) => ring.map((position) => moved(state, position)));
+      const list = onEdges(rings, state.n);
+      return { path: "/v1/contains", body: { solid: { type: "polygon", rings }, points: list }, items: list.length };
+    },
+    beside: (state, body) => ({ path: "/v1/compare", body: { operation: "contains", ...(state.method ? { method: state.method } : {}), ...body } }),
+    figures(state, { contained, boundary }, { differing, seconds_exact, seconds_plain, method }) {
+      const inside = contained.filter(Boolean).length - boundary.length;
+      return {
+        inside, boundary: boundary.length, outside: contained.length - inside - boundary.length,
+        "plain float64, wrong": `${differing.length.toLocaleString("en")} of ${contained.length.toLocaleString("en")} (${method})`,
+        "seconds, exact beside plain": `${seconds_exact.toPrecision(2)} beside ${seconds_plain.toPrecision(2)}`,
+      };
+    },
+    verdict: (state, { contained }, figures, { differing, method }) => `Plain float64 (${method}): ${differing.length.toLocaleString("en")} of ${contained.length.toLocaleString("en")} points wrong`,
+    draw(state, { contained, boundary }, { solid, points: list }, { differing }) {
+      const on = new Set(boundary), wrong = new Set(differing), [left, right] = state.layout.shifts, items = [];
+      const shifted = (shift) => (p) => p.map((v, k) => v + shift[k]);
+      for (const [shift, isPlain] of [[left, false], [right, true]]) {
+        const groups = { outside: [], inside: [], boundary: [] };
+        list.forEach((point, i) => {
+          const isIn = contained[i] !== (isPlain && wrong.has(i));
+          groups[!isPlain && on.has(i) ? "boundary" : isIn ? "inside" : "outside"].push(shifted(shift)(point));
+        });
+        items.push({ kind: "rings", rings: solid.rings.map((ring) => ring.map(shifted(shift))), color: "first", fill: 0.2 });
+        for (const [color, group] of Object.entries(groups)) items.push({ kind: "points", points: group, color, width: 6 });
+        items.push({ kind: "text", text: isPlain ? "plain float64" : "exact", at: [shift[0], shift[1] + 1.68], color: "outside" });
+      }
+      items.push({ kind: "crosses", points: differing.map((i) => shifted(right)(list[i])), color: "wrong", size: 12, width: 2.5 });
+      return items;
+    },
+  },
+
   contains: {
-    hint: "Blue points are inside, orange ones exactly on the boundary, grey ones outside. The cloud is what you move; snapped to quarters, points meet faces, edges and corners.",
+    hint: "Blue points are inside, orange ones exactly on the boundary, grey ones outside. The cloud is what you move; snapped to quarters, points meet faces, edges and corners; float64 paints in red what the plain method gets wrong.",
     firsts: () => true,
     counts: [1, 5, 3.5],
     ask(state) {
@@ -59,19 +132,21 @@ export const QUESTIONS = {
       const inside = contained.filter(Boolean).length - boundary.length;
       return { inside, boundary: boundary.length, outside: contained.length - inside - boundary.length };
     },
+    plain: true,
+    further: (state, body) => compared(state, "contains", body, (wrong) => ({ kind: "points", points: wrong.map((i) => body.points[i]), color: "wrong", width: 9 })),
     verdict: (state, answer, { inside, boundary }) => `${inside.toLocaleString("en")} inside, ${boundary.toLocaleString("en")} on the boundary`,
     draw(state, { contained, boundary }, { points: list }) {
       const groups = { outside: [], inside: [], boundary: [] }, on = new Set(boundary);
       list.forEach((point, i) => groups[on.has(i) ? "boundary" : contained[i] ? "inside" : "outside"].push(point));
       const size = state.n > 20000 ? 0.6 : 1;
       return [...firstItems(state), ...Object.entries(groups).map(([color, group]) => ({
-        kind: "points", points: group, color, width: { outside: 2.5, inside: 5, boundary: 7 }[color] * size, alpha: color === "outside" ? 0.5 : 1,
+        kind: "points", points: group, color, width: { outside: 3, inside: 5, boundary: 7 }[color] * size, alpha: color === "outside" ? 0.85 : 1,
       }))];
     },
   },
 
   collide: {
-    hint: "Move the second body; the faces of the witness are orange. Try the same solid twice, snapped: touching is told from overlapping exactly.",
+    hint: "Move the second body; the faces of the witness are orange, and the shortest line between bodies that are apart. Try the same solid twice, snapped: touching is told from overlapping exactly.",
     firsts: () => true,
     seconds: () => true,
     ask(state) {
@@ -82,7 +157,12 @@ export const QUESTIONS = {
       const faces = ["first_face", "second_face"].filter((name) => name in (witness ?? {})).map((name) => witness[name]);
       return { relation: relation.replaceAll("_", " "), witness: witness ? `${witness.kind.replace("_", "-")}${faces.length ? ` (faces ${faces.join(", ")})` : ""}` : "none" };
     },
-    verdict: (state, answer, { relation }) => relation,
+    further: (state, body, { collisions: [{ relation }] }) => relation === "disjoint" ? {
+      path: "/v1/clearance", body,
+      figures: ({ clearances: [{ distance, features }] }) => ({ distance, "nearest features": features.map(({ kind }) => kind).join(", ") }),
+      draw: ({ clearances: [{ points }] }) => [{ kind: "lines", lines: [points], color: "boundary", width: 3 }, { kind: "points", points, color: "boundary", width: 7 }],
+    } : null,
+    verdict: (state, answer, { relation, distance }) => (distance === undefined ? relation : `${relation}, ${distance.toPrecision(6)} apart`),
     draw(state, { collisions: [{ witness }] }, { poses: [pose] }) {
       const second = posed(state.second, pose), draw = state.dimension === 3 ? solid3d : solid2d;
       const items = [...draw(state.first, "first", 0.45), ...draw(second, "second", 0.45)];
@@ -104,6 +184,8 @@ export const QUESTIONS = {
       return { path: "/v1/clip/segments", body: { region: state.first.asked, segments: list }, items: list.length };
     },
     figures: (state, { pieces }) => ({ pieces: pieces.length, "of segments": state.n }),
+    plain: true,
+    further: (state, body) => compared(state, "clip_segments", body, (wrong) => ({ kind: "lines", lines: wrong.map((i) => body.segments[i]), color: "wrong", width: 4 })),
     verdict: (state, { pieces }) => `${counted(pieces.length, "piece")} of ${counted(state.n, "segment")}`,
     draw(state, { pieces }, { segments: list }) {
       const width = state.n > 1000 ? 1 : 2.5;
@@ -113,6 +195,32 @@ export const QUESTIONS = {
         { kind: "lines", lines: pieces.map(({ start, end }) => [start, end]), color: "kept", width },
         { kind: "points", points: state.n > 1000 ? [] : pieces.flatMap(({ start, end }) => [start, end]), color: "kept", width: 5 },
       ];
+    },
+  },
+
+  scene: {
+    hint: "Drag the ray, turn it: what of it lies within which of three bodies, in the exact order of all ends. Green pieces and orange ones take turns along it; the first is the thickest.",
+    firsts: () => true,
+    seconds: () => true,
+    ask(state) {
+      const bodies = sceneBodies(state).map(([solid, pose]) => ({ solid: solid.asked, pose }));
+      const ends = [-2, 2].map((x) => moved(state, state.rotation.map((row) => x * row[0])));
+      return { path: "/v1/clip/segments/scene", body: { bodies, segments: [ends] }, items: 1 };
+    },
+    figures(state, { pieces }) {
+      const told = pieces.map(({ body, t, ranks }, i) => [`${i + 1}. in body ${body}`, `t ${t[0].toPrecision(6)} to ${t[1].toPrecision(6)} (ends ${ranks.join(", ")})`]);
+      return { pieces: pieces.length, ...Object.fromEntries(told) };
+    },
+    verdict: (state, { pieces }) => (pieces.length ? `first met: body ${pieces[0].body}, ${counted(pieces.length, "piece")}` : "nothing is met"),
+    draw(state, { pieces }, { segments: list }) {
+      const draw = state.dimension === 3 ? solid3d : solid2d;
+      const items = sceneBodies(state).flatMap(([solid, pose], i) => draw(posed(solid, pose), i % 2 ? "second" : "first", 0.3));
+      items.push({ kind: "lines", lines: list, color: "outside", width: 1.5 });
+      pieces.forEach(({ start, end }, i) => {
+        const color = i % 2 ? "boundary" : "kept";
+        items.push({ kind: "lines", lines: [[start, end]], color, width: Math.max(2, 6 - i) }, { kind: "points", points: [start, end], color, width: 7 });
+      });
+      return items;
     },
   },
 
@@ -143,7 +251,7 @@ export const QUESTIONS = {
     ask(state) {
       const pose = { rotation: state.rotation, translation: state.offset.slice(0, 2) };
       const rings = posed(state.second, pose).rings.map((ring) => ring.map((position) => snapped(state, position)));
-      return { path: "/v1/overlay", body: { subject: state.first.json, clip: { type: "polygon", rings }, operation: state.operation }, items: 1 };
+      return { path: "/v1/overlay", body: { subject: state.first.json, clip: { type: "polygon", rings }, operation: state.operation, area: true }, items: 1 };
     },
     figures: (state, { pieces, area, rounding, collapsed }) => ({
       pieces: pieces.length, holes: pieces.reduce((sum, { holes }) => sum + holes.length, 0), "exact area": area,

@@ -80,6 +80,7 @@ export const SOLIDS = {
     gear: { name: "gear with a hole", polygon: true, make: () => rings(round(48, (i) => (i % 4 < 2 ? 1.5 : 1.2)), round(24, () => 0.5).reverse()) },
     pentagram: { name: "pentagram (even-odd)", polygon: true, make: () => rings([0, 2, 4, 1, 3].map((i) => round(5, () => 1.5, Math.PI / 2)[i])) },
     comb: { name: "comb", polygon: true, make: () => rings([[-1.5, -1], ...Array.from({ length: 21 }, (_, i) => [-1.5 + 0.15 * i, i % 2 ? -0.6 : 1]), [1.5, -1]]) },
+    star: { name: "star", polygon: true, make: () => rings(round(10, (i) => (i % 2 ? 1.5 : 0.65), 0.1)) },
     blob: { name: "blob (400 vertices)", polygon: true, make: () => rings(round(400, (i) => 1 + 0.25 * Math.sin(at(5 * i, 400)) + 0.05 * Math.sin(at(37 * i, 400)))) },
     hexagon: { name: "hexagon by planes", planes: true, convex: true, make: () => ({ json: { type: "convex", planes: round(6, () => 1).map(([x, y]) => [x, y, 1]) }, drawn: [round(6, () => 2 / Math.sqrt(3), Math.PI / 6)] }) },
     square: { name: "box", convex: true, make: () => ({ json: { type: "aabb", min: [-1, -1], max: [1, 1] }, drawn: [[[-1, -1], [1, -1], [1, 1], [-1, 1]]] }) },

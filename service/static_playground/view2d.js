@@ -50,6 +50,7 @@ export class View2D {
     const s = this.scale() * ratio;
     context.setTransform(s, 0, 0, -s, canvas.width / 2, canvas.height / 2);
     for (const item of this.items) {
+      if (item.kind === "text") continue;
       context.beginPath();
       PATHS[item.kind](context, item, s / ratio);
       context.fillStyle = context.strokeStyle = item.color;
@@ -59,6 +60,14 @@ export class View2D {
       if (item.fill) { context.globalAlpha = item.fill; context.fill("evenodd"); context.globalAlpha = 1; }
       context.stroke();
     }
+    context.save();
+    context.setTransform(1, 0, 0, 1, canvas.width / 2, canvas.height / 2);
+    for (const { text, at, color } of this.items.filter(({ kind }) => kind === "text")) {
+      context.font = `600 ${14 * ratio}px system-ui, sans-serif`;
+      context.fillStyle = color; context.textAlign = "center";
+      context.fillText(text, at[0] * s, -at[1] * s);
+    }
+    context.restore();
     context.fillStyle = getComputedStyle(canvas).color;
     for (const [x, y] of this.corners) context.fillRect(x - (3 * ratio) / s, y - (3 * ratio) / s, (6 * ratio) / s, (6 * ratio) / s);
   }
@@ -83,6 +92,10 @@ const PATHS = {
   },
   lines(context, { lines }) {
     for (const [[ax, ay], [bx, by]] of lines) { context.moveTo(ax, ay); context.lineTo(bx, by); }
+  },
+  crosses(context, { points, size: pixels }, scale) {
+    const size = pixels / scale / 2;
+    for (const [x, y] of points) for (const sign of [-1, 1]) { context.moveTo(x - size, y - sign * size); context.lineTo(x + size, y + sign * size); }
   },
   points(context, { points, width = 4 }, scale) {
     const size = width / scale;

@@ -157,3 +157,32 @@ def test_openapi_generator_go(service: Service, tmp_path: Path) -> None:
     places = {"GO111MODULE": "off", "GOPATH": f"{tmp_path}{os.pathsep}{GO_PATH}", "GOCACHE": str(tmp_path / "cache")}
     printed = run("go", "run", CALLS / "call_openapi_generator.go", service.url, folder=folder, **places)
     assert printed.split() == ANSWERS
+
+
+@pytest.mark.full
+@needs_npm
+@pytest.mark.parametrize(
+    ("call", "package", "command"),
+    [
+        ("call_hey_api.ts", "@hey-api/openapi-ts@0.99", "openapi-ts -i {document} -o generated"),
+        (
+            "call_swagger_typescript_api.ts",
+            "swagger-typescript-api@13",
+            "swagger-typescript-api generate -p {document} -o generated -n api.ts",
+        ),
+        ("call_orval.ts", "orval@7", "orval --input {document} --output generated.ts --client fetch"),
+    ],
+)
+def test_more_generators_of_typescript(service: Service, tmp_path: Path, call: str, package: str, command: str) -> None:
+    packages = (package, "typescript@5.9", "esbuild@0.25")
+    run("npm", "install", "--silent", "--no-audit", "--no-fund", *packages, folder=tmp_path)
+    run("npx", *command.format(document=DOCUMENT).split(), folder=tmp_path)
+    shutil.copy(CALLS / call, tmp_path / "call.ts")
+    options = "--noEmit --strict --target es2022 --module esnext --moduleResolution bundler --skipLibCheck"
+    run("npx", "tsc", *options.split(), "--lib", "es2022,dom,dom.iterable", "call.ts", folder=tmp_path)
+    bundle = "--bundle --platform=node --format=esm --log-level=error --outfile=call.mjs"
+    run("npx", "esbuild", "call.ts", *bundle.split(), folder=tmp_path)
+    printed = run("node", "call.mjs", service.url, folder=tmp_path).split()
+    assert printed[0] in ("200", "201")
+    assert printed[1:4] == ANSWERS[1:]
+    assert printed[4:] in ([], ["[-1,0,1]"])  # the binary call too

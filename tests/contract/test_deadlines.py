@@ -24,7 +24,7 @@ pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="CP
 DEADLINE = 0.5
 AFTER = 0.25
 """Seconds of CPU after the end, all threads together."""
-LOOK_UPS = {"get_solid", "has_solid", "healthz", "readyz", "metrics"}
+LOOK_UPS = {"get_solid", "has_solid", "get_scene", "has_scene", "healthz", "readyz", "metrics"}
 """They do no work that could last."""
 
 
@@ -63,13 +63,31 @@ def stripes(n: int) -> list[Any]:
     return [[[0, 3 * i], [3 * n, 3 * i], [3 * n, 3 * i + 1], [0, 3 * i + 1]] for i in range(n)]
 
 
+def across(n: int) -> list[Any]:
+    return [[[y, x] for x, y in bar] for bar in stripes(n)]
+
+
+def features(shapes: list[Any], kind: str = "Polygon") -> dict[str, Any]:
+    """Return a layer of shapes: polygons of one ring, or points."""
+    made = [
+        {"type": "Feature", "properties": None, "geometry": {"type": kind, "coordinates": shape}} for shape in shapes
+    ]
+    return {"type": "FeatureCollection", "features": made}
+
+
+TINY = [[0, 0], [1e-200, 0], [0, 1e-200]]
+
+
 def far_apart() -> dict[str, Any]:
     """Return polygons whose exponents only integers hold."""
     rings = stripes(150)
-    tiny = [[[x * 1e-200, y * 1e-200] for x, y in ([0, 0], [1, 0], [0, 1])]]
-    across = [[[y, x] for x, y in ring] for ring in rings]
-    subject, clip = ({"type": "polygon", "rings": some} for some in (rings + tiny, across))
+    subject, clip = ({"type": "polygon", "rings": some} for some in ([*rings, TINY], across(150)))
     return {"subject": subject, "clip": clip, "operation": "union"}
+
+
+def far_apart_batch() -> dict[str, Any]:
+    asked = far_apart()
+    return {"subjects": [asked["subject"]] * 9, "clips": [asked["clip"]] * 9, "operation": "union"}
 
 
 POSE = {"rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "translation": [0, 0, 1]}
@@ -89,12 +107,39 @@ WORK: dict[str, Callable[[], Any]] = {
     "clip_segments": lambda: {
         "region": {"type": "polygon", "rings": [comb(3_000)]}, "segments": [[[-1, 0], [9_000, 0]]] * 20_000
     },
+    "clip_lines": lambda: {
+        "region": {"type": "polygon", "rings": [comb(3_000)]}, "lines": [[[-1, 0], [9_000, 0]] * 10] * 1_000
+    },
     "clip_polygons": lambda: {"region": MANY_SIDES, "polygons": [[ZIGZAG]] * 4},
     "overlay": far_apart,
+    "overlay_layers": lambda: {
+        "left": features([[bar] for bar in stripes(1_200)]), "right": features([[bar] for bar in across(1_200)]),
+        "operation": "union",
+    },
+    "unite_layer": lambda: {"layer": features([[bar] for bar in [*stripes(1_500), *across(1_500), TINY]])},
+    "locate_in_layer": lambda: {
+        "points": features([[1 + k / 5_000, 1 + k / 5_000] for k in range(5_000)], "Point"),
+        "polygons": features([[[[1e-300, 1e-300], [3, 0], [3, 3]]]] * 1_000),
+    },
+    "overlay_batch": far_apart_batch,
     "put_solid": lambda: prism(comb(1_200)),
     "contains_stored": lambda: (POLYNOMIAL, np.tile([3.0, 5.0], 100_000).tobytes()),
     "clip_segments_stored": lambda: (MANY_SIDES, np.tile([[-2.0, 0.1], [2.0, 0.2]], (60_000, 1)).tobytes()),
     "import_solid": lambda: b"v 0 0 0\nv 1 0 0\nv 0 1 0\n" + b"f 1 2 3\nf 1 2 3 1 2 3\n" * 75_000,
+}  # fmt: skip
+TINS = {"bodies": [{"solid": TIN, **({"pose": POSE} if i % 2 else {})} for i in range(60)]}
+COMBS = {"bodies": [{"solid": {"type": "polygon", "rings": [comb(3_000)]}}]}
+ALONG = [[[-1, 0], [9_000, 0]]] * 20_000
+WORK |= {
+    "put_scene": lambda: {"bodies": [{"solid": prism(comb(1_200))}]},
+    "contains_stored_scene": lambda: ({"bodies": [{"solid": POLYNOMIAL}]}, {"points": [[3, 5]] * 100_000}),
+    "contains_stored_scene_binary": lambda: (
+        {"bodies": [{"solid": POLYNOMIAL}]}, np.tile([3.0, 5.0], 100_000).tobytes()
+    ),
+    "collide_stored_scene": lambda: (TINS, {}),
+    "clip_segments_scene": lambda: {**COMBS, "segments": ALONG},
+    "clip_segments_stored_scene": lambda: (COMBS, {"segments": ALONG}),
+    "clip_segments_stored_scene_binary": lambda: (COMBS, np.array(ALONG, np.float64).tobytes()),
 }  # fmt: skip
 COMPILED = {"operation": "clip_segments", "region": MANY_SIDES, "segments": [[[-2, 0.1], [2, 0.2]]]}
 """The textbook's kernels are compiled by the first question that needs them, which nothing interrupts."""
@@ -143,10 +188,12 @@ def cpu_when_idle(service: Service) -> float:
 def request_of(service: Service, name: str) -> bytes:
     """Return the bytes that ask for the work of an operation."""
     path, work = OPERATIONS[name], WORK[name]()
-    kind = "application/json" if isinstance(work, dict) else "application/octet-stream"
     if isinstance(work, tuple):
-        solid, work = work
-        path = path.replace("{solid_id}", httpx.post(f"{service.url}/v1/solids", json=solid).json()["id"])
+        stored, work = work
+        where = "solids" if "bodies" not in stored else "scenes"
+        stored_id = httpx.post(f"{service.url}/v1/{where}", json=stored).json()["id"]
+        path = path.replace("{solid_id}", stored_id).replace("{scene_id}", stored_id)
+    kind = "application/json" if isinstance(work, dict) else "application/octet-stream"
     body = json.dumps(work).encode() if isinstance(work, dict) else work
     assert len(body) < 2**21
     query = "?format=obj" if name == "import_solid" else ""

@@ -18,7 +18,8 @@ import pytest
 import zstandard
 
 from benchmarks.load import memory_of
-from tests.contract.test_deadlines import MANY_SIDES, ZIGZAG, comb, stripes
+from service.schemas.scenes import SCENE_ID
+from tests.contract.test_deadlines import MANY_SIDES, ZIGZAG, across, comb, features, stripes
 from tests.unit.service.asking import SPHERE, examples
 from tests.unit.service.test_live import Service
 
@@ -27,6 +28,7 @@ MB = 2**20
 GIVEN = 512 * MB
 """With half of it, what Python and the allocator keep beside what is counted is more than a tenth."""
 BOX = {"solid": {"type": "aabb", "min": [0, 0], "max": [1, 1]}}
+SQUARE = [[0, 0], [2, 0], [2, 2], [0, 2]]
 POSE = {"rotation": [[1, 0], [0, 1]], "translation": [0, 0]}
 
 
@@ -34,18 +36,30 @@ def polygon(rings: Any) -> dict[str, Any]:
     return {"type": "polygon", "rings": rings}
 
 
+def layer(n: int, bars: Any = stripes) -> dict[str, Any]:
+    return features([[bar] for bar in bars(n)])
+
+
 def bodies() -> Iterator[tuple[str, bytes, dict[str, str]]]:
     """Yield path, body and headers of what wants far more memory than it sends."""
     bars = stripes(4_000)
-    across = [[[y, x] for x, y in bar] for bar in bars]
     made: list[tuple[str, Any]] = [
         ("contains/scene", {"bodies": [{"solid": SPHERE}] * 1_000, "points": [[0, 0, 0]] * 50_000}),
         ("collide/scene", {"bodies": [BOX] * 10_000}),
         ("collide", {"first": BOX["solid"], "second": BOX["solid"], "poses": [POSE] * 25_000}),
-        ("overlay", {"subject": polygon(bars), "clip": polygon(across), "operation": "intersection"}),
+        ("overlay", {"subject": polygon(bars), "clip": polygon(across(4_000)), "operation": "intersection"}),
+        (
+            "overlay/batch",
+            {"subjects": [polygon(bars)] * 4, "clips": [polygon(across(4_000))] * 4, "operation": "union"},
+        ),
+        ("overlay/batch", {"subjects": [polygon([])] * 30_000, "clips": [polygon([])] * 30_000, "operation": "union"}),
         ("overlay", {"subject": polygon([ZIGZAG * 5]), "clip": polygon([ZIGZAG]), "operation": "union"}),
         ("clip/segments", {"region": polygon([comb(20_000)]), "segments": [[[-1, 0.5], [30_000, 0.5]]] * 40_000}),
         ("clip/segments", {"region": polygon([comb(20_000)]), "segments": [[[-1, 0], [30_000, 0]]] * 40_000}),
+        ("clip/lines", {"region": polygon([comb(20_000)]), "lines": [[[-1, 0.5], [30_000, 0.5]] * 10] * 4_000}),
+        ("layers/overlay", {"left": layer(5_000), "right": layer(5_000, across), "operation": "union"}),
+        ("layers/union", {"layer": layer(10_000)}),
+        ("layers/contains", {"points": features([[1, 1]] * 9_000, "Point"), "polygons": features([[SQUARE]] * 9_000)}),
         ("clip/polygons", {"region": MANY_SIDES, "polygons": [[ZIGZAG]] * 4}),
         ("clip/polygons", {"region": BOX["solid"], "polygons": [[[[0, 0]]]] * 100_000}),
         ("contains", {"solid": polygon([[[0, 0], [1, 0], [0, 1]]] * 60_000), "points": []}),
@@ -91,7 +105,10 @@ def hold_within(service: Service, n_clients: int, turns: int) -> list[float]:
     """Send all bodies, some at once; return how long /healthz took each time."""
     messages = [*bodies()] * turns
     for path, example in examples(httpx.get(f"{service.url}/openapi.json").json()):
-        assert httpx.post(service.url + path, json=example, timeout=60).status_code in (200, 201)
+        assert httpx.post(service.url + path.replace("{scene_id}", SCENE_ID), json=example, timeout=60).status_code in (
+            200,
+            201,
+        )
     base, most, waited, is_over = memory_of(service.process.pid), 0.0, [0.0], threading.Event()
 
     def watch() -> None:
@@ -106,11 +123,13 @@ def hold_within(service: Service, n_clients: int, turns: int) -> list[float]:
 
     with ThreadPoolExecutor(n_clients + 9) as clients:
         watcher = clients.submit(watch)
-        idle = [clients.submit(never_read, service) for _ in range(8)]
-        statuses = set(clients.map(lambda message: ask(service, *message), messages))
-        for one in idle:
-            one.result()
-        is_over.set()
+        try:
+            idle = [clients.submit(never_read, service) for _ in range(8)]
+            statuses = set(clients.map(lambda message: ask(service, *message), messages))
+            for one in idle:
+                one.result()
+        finally:
+            is_over.set()
         watcher.result()
     assert statuses <= {200, 400, 413, 422, 503, 504}
     assert most - base < 1.1 * GIVEN / MB, (base, most)

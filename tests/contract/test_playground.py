@@ -19,7 +19,7 @@ from PIL import Image
 
 import engine
 from service.app import create_app
-from service.playground import FOLDER
+from service.pages import FOLDER
 from tests.unit.service.asking import client_of
 from tests.unit.service.test_live import Service
 
@@ -59,28 +59,63 @@ def test_every_imported_module_is_there() -> None:
 
 
 @pytest.fixture(scope="module")
-def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    """A page of a running service at a phone's or a desk's width; fails on script errors and outside requests."""
+def browser() -> Iterator[Any]:
     playwright = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
     if CHROMIUM is None:
         pytest.skip("no Chromium on this machine (Debian: apt-get install chromium)")
+    with playwright.sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        yield browser
+        browser.close()
+
+
+def test_the_calls_are_tried_on_their_page_with_a_key(browser: Any) -> None:
+    """Nothing of /docs and /redoc comes from outside; with keys the pages open, and Swagger UI asks for one."""
+    service = Service(api_keys="secret")
+    service.wait_until_ready()
+    loaded: list[str] = []
+    try:
+        page = browser.new_page(viewport={"width": 390, "height": 844})
+        page.on("response", lambda response: loaded.append(response.url))
+        page.goto(f"{service.url}/docs")
+        page.click("button.authorize")
+        page.fill(".auth-container input >> nth=0", "secret")
+        page.click(".auth-btn-wrapper button[type=submit] >> nth=0")
+        page.click(".auth-btn-wrapper .btn-done >> nth=0")
+        page.click("#operations-containment-contains .opblock-summary-control")
+        page.click("#operations-containment-contains button.execute")
+        page.wait_for_selector("#operations-containment-contains .live-responses-table")
+        shown = page.inner_text("#operations-containment-contains .live-responses-table")
+        assert "200" in shown
+        assert "contained" in shown
+        assert page.evaluate("document.documentElement.scrollWidth") == 390
+        page.goto(f"{service.url}/redoc")
+        page.wait_for_selector('text="/v1/contains"', state="attached")
+        page.close()
+    finally:
+        service.close()
+    assert len(loaded) > 5
+    assert all(url.startswith((service.url, "data:", "blob:")) for url in loaded)
+
+
+@pytest.fixture(scope="module")
+def page(browser: Any) -> Iterator[Any]:
+    """A page of a running service at a phone's or a desk's width; fails on script errors and outside requests."""
     service = Service()
     service.wait_until_ready()
     faults: list[str] = []
     try:
-        with playwright.sync_playwright() as driver:
-            browser = driver.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
-            page = browser.new_page(viewport={"width": 1200, "height": 820})
-            page.on("pageerror", lambda error: faults.append(str(error)))
-            page.on(
-                "request",
-                lambda request: (
-                    None if request.url.startswith((service.url, "data:", "blob:")) else faults.append(request.url)
-                ),
-            )
-            page.goto(f"{service.url}/")
-            yield page
-            browser.close()
+        page = browser.new_context(viewport={"width": 1200, "height": 820}).new_page()
+        page.on("pageerror", lambda error: faults.append(str(error)))
+        page.on(
+            "request",
+            lambda request: (
+                None if request.url.startswith((service.url, "data:", "blob:")) else faults.append(request.url)
+            ),
+        )
+        page.goto(f"{service.url}/")
+        yield page
+        page.context.close()
     finally:
         service.stop()
         assert service.process.stderr is not None
@@ -141,6 +176,7 @@ def request_of(page: Any) -> dict[str, Any]:
         ("contains", 3, "inside"), ("contains", 2, "inside"),
         ("collide", 3, "overlapping"), ("collide", 2, "overlapping"),
         ("segments", 3, "of 56 segments"), ("segments", 2, "of 56 segments"), ("polygons", 3, "of 6 polygons"),
+        ("scene", 3, "first met: body"), ("scene", 2, "first met: body"),
         ("polygons", 2, "of 6 polygons"), ("overlay", 2, "6 pieces"),
     ],
 )  # fmt: skip
@@ -167,8 +203,24 @@ def test_the_mouse_moves_the_second_body(page: Any) -> None:
     page.mouse.move(box["x"] + box["width"] - 5, box["y"] + box["height"] / 2, steps=5)
     page.mouse.up()
     page.keyboard.up("Shift")
-    assert verdict(page) == "disjoint"
+    assert verdict(page).startswith("disjoint, ")
+    shown = figures(page)
+    assert verdict(page) == f"disjoint, {float(shown['distance']):#.6g} apart"
+    assert len(shown["nearest features"].split(", ")) == 2
     page.uncheck("#snap")
+
+
+def test_the_switch_float64_asks_the_plain_method_too(page: Any) -> None:
+    choose(page, "contains", 2)
+    page.check("#snap")
+    page.check("#plain")
+    verdict(page)
+    wait_until(page, lambda: "float64 wrong" in figures(page))
+    assert int(figures(page)["float64 wrong"]) > 0  # of points on the boundary a half-line leaves out some
+    page.uncheck("#plain")
+    page.uncheck("#snap")
+    choose(page, "collide", 2)
+    assert page.is_hidden("#plain")
 
 
 def test_the_keyboard_moves_the_clip_polygon(page: Any) -> None:
@@ -239,3 +291,119 @@ def test_errors_of_the_service_are_shown(page: Any) -> None:
     page.unroute("**/v1/contains")
     page.fill("#count", "2.5")
     assert "inside" in verdict(page)
+
+
+def test_the_first_view_shows_where_plain_floats_are_wrong(page: Any) -> None:
+    assert "points wrong" in choose(page, "proof", 2)
+    asked = request_of(page)
+    page.click("#copy-answer")
+    answer = json.loads(page.evaluate("navigator.clipboard.readText()"))
+    polygon = engine.Polygon(asked["solid"]["rings"])
+    compared = engine.compare("contains", asked["points"], polygon)
+    assert answer["/v1/compare"]["differing"] == compared.differing.tolist()
+    assert len(compared.differing) > 5
+    assert answer["/v1/contains"]["contained"] == engine.contains(asked["points"], polygon).tolist()
+    page.select_option("#method", "same side")
+    assert "(same side)" in verdict(page)
+
+
+def test_a_link_holds_the_whole_state(page: Any) -> None:
+    choose(page, "overlay", 2)
+    page.select_option("#operation", "symmetric_difference")
+    page.fill("#turn", "30")
+    before = verdict(page)
+    for ring, index in (("subject", 7), ("clip", 3)):
+        asked = request_of(page)
+        page.evaluate("scrollTo(0, 0)")
+        box = page.locator("#view2d").bounding_box()
+        corner = asked[ring]["rings"][0][index]
+        scale = min(box["width"], box["height"]) / (2.3 * 2.1)
+        place = [box["x"] + box["width"] / 2 + scale * corner[0], box["y"] + box["height"] / 2 - scale * corner[1]]
+        page.mouse.move(*place)
+        page.mouse.down()
+        page.mouse.move(place[0] + 30, place[1] - 20, steps=3)
+        page.mouse.up()
+        now = verdict(page)
+        assert now != before, ring
+        before = now
+    asked = request_of(page)
+    page.click("#copy-link")
+    address = page.evaluate("navigator.clipboard.readText()")
+    other = page.context.new_page()
+    other.goto(address)
+    assert verdict(other) == before
+    assert np.allclose(np.concatenate(request_of(other)["clip"]["rings"]), np.concatenate(asked["clip"]["rings"]))
+    assert request_of(other)["subject"] == asked["subject"]
+    other.close()
+    page.wait_for_timeout(400)
+    assert page.evaluate("location.href") == address
+    page.goto(address.partition("#")[0])  # as a first visitor
+    assert "points wrong" in verdict(page)
+
+
+def test_a_link_that_is_no_link_shows_the_first_view(page: Any) -> None:
+    for odd in ("#question=nothing&dimension=9&first=x&count=many&offset=1,2&camera=a", "#first-rings=[[", "#%"):
+        other = page.context.new_page()
+        other.goto(page.evaluate("location.origin") + "/" + odd)
+        assert "points wrong" in verdict(other)
+        other.close()
+
+
+def test_a_file_that_cannot_be_read_is_said_so_until_the_next_answer(page: Any, tmp_path: Path) -> None:
+    choose(page, "contains", 3)
+    path = tmp_path / "mesh.glb"
+    path.write_bytes(b"glTF")
+    page.set_input_files("#file", path)
+    page.wait_for_timeout(700)
+    assert "mesh.glb cannot be drawn" in page.inner_text("#problem")
+    assert "old" in (page.get_attribute("#stage", "class") or "")
+    page.fill("#count", "2.25")
+    verdict(page)
+    assert "old" not in (page.get_attribute("#stage", "class") or "")
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_what_is_drawn_stands_out(page: Any, scheme: str) -> None:
+    """Contrast with the stage: 3 for what is drawn (WCAG 2.2, 1.4.11), 4.5 for text."""
+    page.emulate_media(color_scheme=scheme)
+    script = """name => {
+        const probe = document.body.appendChild(document.createElement('i'));
+        probe.style.color = `var(--${name})`;
+        const found = getComputedStyle(probe).color;
+        probe.remove();
+        return found;
+    }"""
+
+    def brightness(name: str) -> float:
+        shares = [int(part) / 255 for part in re.findall(r"\d+", page.evaluate(script, name))[:3]]
+        linear = [share / 12.92 if share <= 0.04045 else ((share + 0.055) / 1.055) ** 2.4 for share in shares]
+        return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+    def contrast(name: str, other: str) -> float:
+        low, high = sorted((brightness(name), brightness(other)))
+        return (high + 0.05) / (low + 0.05)
+
+    for name in ("inside", "boundary", "outside", "kept", "wrong", "second", "first"):
+        assert contrast(name, "stage") >= 3, name
+    for name in ("ink", "quiet", "inside", "wrong"):
+        assert contrast(name, "paper") >= 4.5, name
+    page.emulate_media(color_scheme="light")
+
+
+def test_a_key_is_asked_for_on_the_page(browser: Any) -> None:
+    service = Service(api_keys="secret")
+    service.wait_until_ready()
+    try:
+        page = browser.new_page()
+        page.goto(service.url)
+        page.wait_for_selector("#problem:visible")
+        assert "missing_key" in page.inner_text("#problem")
+        assert page.evaluate("document.activeElement.id") == "key"
+        page.keyboard.type("secret")
+        page.keyboard.press("Tab")
+        assert "points wrong" in verdict(page)
+        page.reload()
+        assert "points wrong" in verdict(page)
+        page.close()
+    finally:
+        service.close()

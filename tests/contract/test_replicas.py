@@ -5,11 +5,14 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import ssl
 import subprocess
 import threading
 import time
+from contextlib import suppress
 from pathlib import Path
 
+import httpx
 import numpy as np
 import orjson
 import pytest
@@ -30,9 +33,9 @@ def test_compose_states_the_same_topology() -> None:
     assert re.search(r"listen (\d+);", CONF)[1] in re.search(r'"(\d+:\d+)"', compose)[1]  # type: ignore[index]
 
 
-def config(folder: Path, port: int, replicas: list[Service]) -> Path:
-    """Write the file of deploy/ with these ports, and all that it writes below `folder`."""
-    text = CONF.replace("listen 8080", f"listen 127.0.0.1:{port}")
+def config(folder: Path, port: int, replicas: list[Service], text: str = CONF) -> Path:
+    """Write a file of deploy/ with these ports, and all that it writes below `folder`."""
+    text = text.replace("listen 8080", f"listen 127.0.0.1:{port}")
     for i_replica, replica in enumerate(replicas, 1):
         text = text.replace(f"geometry-{i_replica}:8000", f"127.0.0.1:{replica.port}")
     kinds = ("client_body", "proxy", "fastcgi", "uwsgi", "scgi")
@@ -93,3 +96,54 @@ def test_a_replica_killed_under_load_loses_nothing(tmp_path: Path) -> None:
         nginx.wait()
         for replica in replicas:
             replica.close()
+
+
+@pytest.mark.skipif(NGINX is None or shutil.which("openssl") is None, reason="nginx or openssl is not installed")
+def test_below_a_path_of_a_site_with_tls(tmp_path: Path) -> None:
+    """Everything is found below the path, links lead there, and the log names the client and not the proxy."""
+    service, port = Service(root_path="/geometry", trusted_proxies="127.0.0.1"), free_port()
+    made = (tmp_path / "cert.pem", tmp_path / "cert.key")
+    words = "req -x509 -newkey rsa:2048 -nodes -days 1 -subj /CN=127.0.0.1 -addext subjectAltName=IP:127.0.0.1"
+    subprocess.run(
+        ["openssl", *words.split(), "-out", made[0], "-keyout", made[1]], check=True, capture_output=True, timeout=60
+    )
+    text = (ROOT / "deploy" / "nginx-tls.conf").read_text("utf-8")
+    for shown, here in (
+        ("listen 443", f"listen 127.0.0.1:{port}"),
+        ("listen 80;", f"listen 127.0.0.1:{free_port()};"),
+        ("server 127.0.0.1:8000", f"server 127.0.0.1:{service.port}"),
+        ("/etc/ssl/geometry.example.pem", str(made[0])),
+        ("/etc/ssl/private/geometry.example.key", str(made[1])),
+    ):
+        assert text.count(shown) == 1
+        text = text.replace(shown, here)
+    path = config(tmp_path, port, [], text)
+    nginx = subprocess.Popen([str(NGINX), "-p", str(tmp_path), "-c", str(path)])
+    try:
+        service.wait_until_ready()
+        trust = ssl.create_default_context(cafile=made[0])
+        with httpx.Client(base_url=f"https://127.0.0.1:{port}", verify=trust, follow_redirects=True) as client:
+            end = time.monotonic() + 20
+            while time.monotonic() < end:
+                with suppress(httpx.ConnectError):
+                    client.get("/")
+                    break
+                time.sleep(0.05)
+            stored = client.post("/geometry/v1/solids", json={"type": "sphere", "center": [0, 0], "radius": 1})
+            assert client.get(stored.headers["location"]).json() == stored.json()
+            assert stored.headers["strict-transport-security"]
+            document = client.get("/geometry/openapi.json").json()
+            assert document["servers"][0]["url"] == "/geometry"
+            for page in ("/geometry", "/geometry/docs", "/geometry/playground/main.js", "/geometry/readyz"):
+                assert client.get(page).status_code == 200, page
+            assert client.get("/geometry/metrics").status_code == 404
+        # what the client itself says of its address is believed no further than the last proxy that is trusted
+        httpx.get(f"{service.url}/healthz", headers={"X-Forwarded-For": "198.51.100.1, 203.0.113.7"})
+        end = time.monotonic() + 5
+        while not any('"client":"203.0.113.7"' in line for line in service.log):
+            assert time.monotonic() < end, service.log[-3:]
+            time.sleep(0.05)
+    finally:
+        nginx.terminate()
+        nginx.wait()
+        service.close()

@@ -72,6 +72,12 @@ async def test_scene_lists_colliding_pairs(client: httpx.AsyncClient) -> None:
     answer = await client.post("/v1/collide/scene", json={"bodies": bodies, "only": [[2, 0]]})
     assert [(pair["first"], pair["second"]) for pair in answer.json()["pairs"]] == [(0, 2)]
     assert (await client.post("/v1/collide/scene", json={"bodies": []})).json()["pairs"] == []
+    bodies[1]["pose"] = moved(1.25, 0, 0)
+    answer = await client.post("/v1/collide/scene", json={"bodies": bodies, "only": [[0, 1], [0, 2]], "gap": 0.5})
+    assert answer.json()["pairs"] == [
+        {"first": 0, "second": 1, "relation": "disjoint", "distance": 0.25},
+        {"first": 0, "second": 2, "relation": "overlapping", "distance": 0.0},
+    ]
 
 
 async def test_the_eight_relations_are_told_when_asked_for(client: httpx.AsyncClient) -> None:

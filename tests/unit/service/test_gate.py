@@ -33,9 +33,9 @@ async def test_without_keys_anyone_may_call(client: httpx.AsyncClient) -> None:
 async def test_a_key_is_asked_for(monkeypatch: pytest.MonkeyPatch, anyio_backend: str) -> None:
     monkeypatch.setenv("GEOMETRY_API_KEYS", "first, second")
     async with client_of(guarded(monkeypatch)) as client:
-        for path in ("/healthz", "/readyz"):
+        for path in ("/healthz", "/readyz", "/", "/docs", "/redoc", "/openapi.json", "/playground/main.js"):
             assert (await client.get(path)).status_code == 200
-        for path in ("/docs", "/openapi.json", "/metrics", "/nothing"):
+        for path in ("/metrics", "/nothing", "/docs/x", "/v1/solids/1"):
             check_problem(await client.get(path), 401, "missing_key")
         answer = await client.post("/v1/solids", json=SPHERE)
         check_problem(answer, 401, "missing_key")
@@ -43,7 +43,7 @@ async def test_a_key_is_asked_for(monkeypatch: pytest.MonkeyPatch, anyio_backend
         assert "x-request-id" in answer.headers
         for headers in ({"Authorization": "Bearer wrong"}, {"X-API-Key": "firstsecond"}, {"X-API-Key": "first,second"}):
             check_problem(await client.post("/v1/solids", json=SPHERE, headers=headers), 403, "wrong_key")
-        check_problem(await client.get("/docs", headers={"Authorization": "Basic first"}), 401, "missing_key")
+        check_problem(await client.get("/metrics", headers={"Authorization": "Basic first"}), 401, "missing_key")
         for headers in ({"Authorization": "Bearer first"}, {"Authorization": "bearer second"}, {"X-API-Key": "second"}):
             assert (await client.post("/v1/solids", json=SPHERE, headers=headers)).status_code in (200, 201)
     assert "first" not in repr(Settings())
@@ -109,3 +109,16 @@ async def test_the_gate_knows_every_question(app: FastAPI, client: httpx.AsyncCl
     paths = {path for path, item in document["paths"].items() if "post" in item and "{" not in path}
     assert set(gate.kwargs["posts"]) == paths  # type: ignore[arg-type]
     assert (await client.put("/v1/contains", json={})).status_code == 405
+
+
+async def test_behind_a_proxy_with_a_path_of_its_own(monkeypatch: pytest.MonkeyPatch, anyio_backend: str) -> None:
+    """Whether the proxy takes its path off or not."""
+    async with client_of(guarded(monkeypatch, root_path="/geometry")) as client:
+        for prefix in ("", "/geometry"):
+            stored = await client.post(f"{prefix}/v1/solids", json=SPHERE)
+            place = stored.headers["location"]
+            assert place.startswith("/geometry/v1/solids/")
+            assert (await client.get(place)).status_code == 200
+            assert (await client.get(place.removeprefix("/geometry"))).status_code == 200
+            for page in ("/", "/docs", "/playground/main.js", "/healthz"):
+                assert (await client.get(prefix + page)).status_code == 200, page

@@ -1,4 +1,4 @@
-"""POST /v1/overlay."""
+"""POST /v1/overlay and /v1/overlay/batch."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 import httpx
 import pytest
 
-from service.schemas.overlay import OverlayResponse
+from service.schemas.overlay import OverlayBatchResponse, OverlayResponse
 from service.settings import Settings
 from tests.unit.service.asking import SPHERE, check_problem
 
@@ -76,9 +76,11 @@ async def test_area_beyond_float64_is_left_out(client: httpx.AsyncClient) -> Non
         ({"operation": "xor"}, "invalid_request", "/operation"),
         ({"output": "fast"}, "invalid_request", "/output"),
         ({"output": None}, "invalid_request", "/output"),
+        ({"grid": 3}, "invalid_input", "/grid"),
+        ({"grid": 0.1, "output": "nearest"}, "invalid_operation", "/output"),
         ({"subject": SPHERE}, "unsupported_solid", "/subject"),
         ({"clip": SPHERE}, "unsupported_solid", "/clip"),
-        ({"clip": polygon([[0, 0], [1, 1]])}, "ring_too_short", "/clip/rings/0"),
+        ({"clip": polygon([[0, 0]])}, "ring_too_short", "/clip/rings/0"),
         ({"clip": polygon(square(0, 1), [[0, 0, 0]] * 3)}, "invalid_array", "/clip/rings/1/0"),
     ],
 )
@@ -86,6 +88,45 @@ async def test_what_is_wrong_is_named(
     client: httpx.AsyncClient, change: dict[str, object], code: str, pointer: str
 ) -> None:
     problem = check_problem(await ask(client, **change), 422, code)
+    assert problem["errors"][0]["pointer"] == pointer
+
+
+async def test_borders_are_joined_on_a_grid(client: httpx.AsyncClient) -> None:
+    body = {"subject": polygon(square(0, 1)), "clip": polygon([[1.0000001, 0], [2, 0], [2, 1], [0.9999999, 1]])}
+    answer = (await ask(client, **body, operation="union", grid=1e-3)).json()
+    assert answer["pieces"] == [{"shell": [[0, 0], [2, 0], [2, 1], [0, 1], [0, 0]], "holes": []}]
+    assert (answer["area"], answer["rounding"]["snapped"]) == (2.0, True)
+    assert 0 < answer["rounding"]["largest_displacement"] < 1e-3
+
+
+async def test_batch_is_each_pair_alone(client: httpx.AsyncClient) -> None:
+    subjects = [polygon(square(0, 4)), polygon(), polygon(square(-1e300, 1e300))]
+    clips = [polygon(square(1, 2)), polygon(square(0, 1)), polygon([[0, 0], [1, 0]])]
+    for operation in ("difference", "union"):
+        body = {"subjects": subjects, "clips": clips, "operation": operation}
+        answer = await client.post("/v1/overlay/batch", json=body)
+        assert answer.status_code == 200, answer.text
+        for pair, subject, clip in zip(answer.json()["overlays"], subjects, clips, strict=True):
+            alone = (await ask(client, subject=subject, clip=clip, operation=operation)).json()
+            assert (pair["status"], pair["pieces"]) == ("done", alone["pieces"])
+            assert pair["largest_displacement"] == alone["rounding"]["largest_displacement"]
+        OverlayBatchResponse.model_validate_json(answer.content, context=Settings())
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "pointer"),
+    [
+        ({"clips": []}, "invalid_array", "/clips"),
+        ({"clips": [SPHERE]}, "unsupported_solid", "/clips/0"),
+        ({"subjects": [polygon([[0, 0]])]}, "ring_too_short", "/subjects/0/rings/0"),
+        ({"grid": 1}, "unknown_field", "/grid"),
+    ],
+)
+async def test_what_is_wrong_with_a_batch_is_named(
+    client: httpx.AsyncClient, change: dict[str, object], code: str, pointer: str
+) -> None:
+    body = {"subjects": [polygon(square(0, 1))], "clips": [polygon(square(0, 1))], "operation": "union", **change}
+    problem = check_problem(await client.post("/v1/overlay/batch", json=body), 422, code)
     assert problem["errors"][0]["pointer"] == pointer
 
 

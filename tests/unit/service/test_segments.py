@@ -1,11 +1,11 @@
-"""POST /v1/clip/segments."""
+"""POST /v1/clip/segments and /v1/clip/lines."""
 
 from __future__ import annotations
 
 import httpx
 import pytest
 
-from service.schemas.segments import ClipSegmentsResponse
+from service.schemas.segments import ClipLinesResponse, ClipSegmentsResponse
 from service.settings import Settings
 from tests.unit.service.asking import check_problem
 
@@ -49,3 +49,21 @@ async def test_what_is_wrong_is_named(
     body = {"region": BOX, "segments": [[[0, 0], [1, 1]]], **change}
     problem = check_problem(await client.post("/v1/clip/segments", json=body), 422, code)
     assert problem["errors"][0]["pointer"].startswith(pointer)
+
+
+async def test_lines_stay_connected(client: httpx.AsyncClient) -> None:
+    lines = [[[-1, 1], [1, 1], [1, 3]], [[5, 5], [6, 6]], [[2, -1], [2, 0], [3, 0], [2, 2]]]
+    answer = await client.post("/v1/clip/lines", json={"region": BOX, "lines": lines})
+    assert answer.status_code == 200
+    assert answer.json()["pieces"] == [
+        {"line": 0, "positions": [[0, 1], [1, 1], [1, 2]], "segments": [0, 1], "t": [0.5, 0.5], "faces": [0, 3]},
+        {"line": 2, "positions": [[2, 0], [2, 0]], "segments": [0, 1], "t": [1, 0], "faces": [2, 1]},
+        {"line": 2, "positions": [[2, 2], [2, 2]], "segments": [2, 2], "t": [1, 1], "faces": [1, -1]},
+    ]
+    ClipLinesResponse.model_validate_json(answer.content, context=Settings())
+    none = await client.post("/v1/clip/lines", json={"region": BOX, "lines": []})
+    assert (none.status_code, none.json()["pieces"]) == (200, [])
+    problem = check_problem(
+        await client.post("/v1/clip/lines", json={"region": BOX, "lines": [lines[0], [[1, 1]]]}), 422, "invalid_array"
+    )
+    assert problem["errors"][0]["pointer"] == "/lines/1"

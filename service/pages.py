@@ -1,0 +1,86 @@
+"""The pages: / is the playground, which asks this service and draws the answers; /docs is Swagger UI with *try it*,
+/redoc the same to read. Nothing of them comes from another host: their files are those that fastapi-offline keeps.
+
+With API keys the pages open all the same and ask for the key; what they show is the same for everybody.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import re
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Final
+
+from fastapi import FastAPI
+from fastapi.openapi.docs import get_redoc_html, get_swagger_ui_html
+from starlette.requests import Request
+from starlette.responses import FileResponse, HTMLResponse
+from starlette.staticfiles import StaticFiles
+
+FOLDER: Final = Path(__file__).parent / "static_playground"
+OPEN: Final = ("/", "/docs", "/redoc", "/openapi.json", "/playground/", "/docs-files/")
+"""Where pages are; with a slash at the end, all below too."""
+_FILES: Final = "docs-files"
+_POLICY: Final = (
+    "default-src 'none'; script-src 'self'{}; style-src 'self' 'unsafe-inline'; connect-src 'self'; "
+    "img-src 'self' data:; worker-src blob:; form-action 'none'; base-uri 'none'; frame-ancestors 'none'"
+)
+_WIDTH: Final = '<meta name="viewport" content="width=device-width, initial-scale=1">'
+_DARK: Final = """<style>@media (prefers-color-scheme: dark) { html { background: #111; }
+body { filter: invert(0.92) hue-rotate(180deg); } .microlight { filter: invert(1) hue-rotate(180deg); } }</style>"""
+_SCRIPT: Final = re.compile(r"<script>(.*?)</script>", re.DOTALL)
+
+
+def add_pages(app: FastAPI) -> None:
+    """Serve the pages."""
+    found = find_spec("fastapi_offline")
+    assert found is not None
+    assert found.origin is not None
+    app.mount("/playground", StaticFiles(directory=FOLDER), name="playground")
+    app.mount(f"/{_FILES}", StaticFiles(directory=Path(found.origin).parent / "static"), name=_FILES)
+    for path, page in (("/", _playground), ("/docs", _docs), ("/redoc", _redoc)):
+        app.add_api_route(path, page, methods=["GET", "HEAD"], include_in_schema=False)
+
+
+async def _playground() -> FileResponse:
+    return FileResponse(FOLDER / "index.html", headers=_headers(""))
+
+
+async def _docs(request: Request) -> HTMLResponse:
+    page = get_swagger_ui_html(
+        openapi_url="openapi.json",
+        title=f"{request.app.title}: calls",
+        swagger_js_url=f"{_FILES}/swagger-ui-bundle.js",
+        swagger_css_url=f"{_FILES}/swagger-ui.css",
+        swagger_favicon_url="data:,",
+        swagger_ui_parameters={"persistAuthorization": True, "tryItOutEnabled": True, "docExpansion": "list"},
+    )
+    return _answer(page, _WIDTH + _DARK)
+
+
+async def _redoc(request: Request) -> HTMLResponse:
+    page = get_redoc_html(
+        openapi_url="openapi.json",
+        title=f"{request.app.title}: reference",
+        redoc_js_url=f"{_FILES}/redoc.standalone.js",
+        redoc_favicon_url="data:,",
+        with_google_fonts=False,
+    )
+    return _answer(page)
+
+
+def _answer(page: HTMLResponse, style: str = "") -> HTMLResponse:
+    """Return FastAPI's page with a policy that allows its own script and nothing else that is written in it."""
+    text = bytes(page.body).decode().replace("</head>", f"{style}</head>", 1)
+    hashes = [base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in _SCRIPT.findall(text)]
+    return HTMLResponse(text, headers=_headers("".join(f" 'sha256-{each}'" for each in hashes)))
+
+
+def _headers(scripts: str) -> dict[str, str]:
+    return {
+        "Content-Security-Policy": _POLICY.format(scripts),
+        "Referrer-Policy": "no-referrer",
+        "X-Content-Type-Options": "nosniff",
+    }
