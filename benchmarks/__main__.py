@@ -9,6 +9,7 @@ from benchmarks import table
 
 TABLES = {
     "calls": "single calls of 1, 10 and 100 items",
+    "clearance": "how far apart, against peers",
     "collision": "poses, pairs, scenes and triangles, against peers",
     "containment": "points in every kind of solid, against peers",
     "overlay": "polygons on polygons, against GEOS and Clipper",
@@ -16,6 +17,7 @@ TABLES = {
     "segments": "segments clipped on every region, against peers",
 }
 NAMES = TABLES | {
+    "advice": "what the textbook's advice is worth: docs/textbook_advice.md",
     "answers": "a fixed set of questions: one hash an operation, compared with those stored",
     "checkouts": "two checkouts of the engine, every row of ours in turns",
     "cold_start": "what an empty kernel cache costs: a table of docs/speed_and_error.md",
@@ -24,6 +26,7 @@ NAMES = TABLES | {
     "filed": "inputs that users of the peers filed, replayed",
     "hard_cases": "who gets which hard family wrong: the figures of docs/hard_cases.md",
     "report": "every operation, speed against error: docs/speed_and_error.md and the README's table",
+    "scenes": "scenes that stay: segments through many bodies, and what moved, against peers",
     "wire": "what HTTP adds to a kernel, and what overload does",
 }
 

@@ -16,7 +16,8 @@ from benchmarks.workloads import Mesh, Rings, document
 try:
     from tests.reference import containment as reference
     from tests.reference.contact import triangles_meet
-    from tests.reference.exact import Q, vector
+    from tests.reference.distance import distance
+    from tests.reference.exact import Q, nearest_double_with_root, vector
     from tests.reference.many_points import locate_points
     from tests.reference.overlay import overlay, signed_area
     from tests.reference.segments import clip_segment
@@ -102,6 +103,12 @@ def collides(pair: Any, row: int) -> bool:
     return pair.is_closed and (a.holds_part_of(b) or b.holds_part_of(a))
 
 
+def exact_distances(couples: Any) -> np.ndarray:
+    """Return the doubles nearest to the distances of pairs of bodies that stand where they are, 0 where they meet."""
+    found = [distance(*(document(body.shape) for body in couple)) for couple in couples]
+    return np.array([0.0 if each is None else nearest_double_with_root(-each[1], Q(1), each[0]) for each in found])
+
+
 def first_pieces(segments: np.ndarray, region: Any) -> np.ndarray:
     """Return (n, 2 * dim) nearest doubles of the first piece's ends, NaN where nothing remains."""
     rows, told = np.full((len(segments), segments[0].size), np.nan), document(region)
@@ -183,6 +190,19 @@ def coordinates(answers: np.ndarray, exact: np.ndarray) -> dict[str, Any]:
     elif (values > 0).any():
         found["worst"] = int(np.flatnonzero(both)[np.argmax(ulps.max(axis=1))])
     return found
+
+
+def distances(answers: np.ndarray, exact: np.ndarray, tolerance: float = 1e-6) -> dict[str, Any]:
+    """Judge distances: NaN is a refusal, infinity out of domain; wrong: off by more than this part, 0 for apart."""
+    answers = np.asarray(answers, float)
+    refused, outside = np.isnan(answers), np.isinf(answers)
+    error = np.abs(np.where(refused | outside, exact, answers) - exact)
+    wrong = (error > tolerance * exact) | ((exact > 0.0) & (answers == 0.0))
+    ulps = error[~wrong] / np.spacing(np.maximum(exact[~wrong], np.finfo(float).tiny))
+    found = {"judged": len(exact), "wrong": int(wrong.sum()), "refused": int(refused.sum())}
+    found |= {"outside": int(outside.sum()), "ulp_largest": float(ulps.max(initial=0.0)), "off": int((ulps > 0).sum())}
+    found["coordinates"] = len(exact)
+    return found | ({"worst": int(np.argmax(wrong * error))} if wrong.any() else {})
 
 
 def areas(answers: np.ndarray, exact: np.ndarray) -> dict[str, Any]:

@@ -66,6 +66,15 @@ def large(family: str, n: int, seed: int) -> tuple[Rings, Rings]:
     return LARGE[family](generator(f"overlay/{family}/{n}", seed), n)
 
 
+def parcels(n: int, seed: int) -> np.ndarray:
+    """Return some n quadrilaterals (m, 4, 2) that share their borders, on a grid whose corners are moved at random."""
+    draw, side = generator("parcels", seed), int(n**0.5)
+    corners = np.stack(np.meshgrid(np.arange(side + 1.0), np.arange(side + 1.0), indexing="ij"), axis=-1)
+    corners += draw.uniform(-0.3, 0.3, corners.shape) + draw.uniform(0.0, 1.0, 2)
+    around = [corners[:-1, :-1], corners[1:, :-1], corners[1:, 1:], corners[:-1, 1:]]
+    return np.stack(around, axis=2).reshape(-1, 4, 2)
+
+
 def small(family: str, size: int, n_pairs: int, seed: int) -> list[tuple[Rings, Rings]]:
     """Return pairs of single rings that mostly meet: star (concave) or convex, or 6 to 9 vertices on a lattice."""
     draw = generator(f"overlay batch/{family}/{size}", seed)
@@ -109,3 +118,19 @@ def _flat(shapes: list) -> list:
 def _ring(positions: list[list[float]]) -> np.ndarray:
     ring = np.array([position[:2] for position in positions], float)
     return ring[:-1] if len(ring) > 1 and (ring[0] == ring[-1]).all() else ring
+
+
+def layer(family: str, part: int, seed: int) -> list[np.ndarray]:
+    """Return polygons of one ring each to be united; part: one over how many of the whole layer."""
+    random = np.random.default_rng(seed)
+    if family == "circles":
+        n = 1_000 // part
+        angles = np.arange(64) * 2.0 * np.pi / 64
+        unit = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        return [centre * np.sqrt(n) + (0.3 + 0.5 * random.random()) * unit for centre in random.random((n, 2))]
+    k = (120 if family == "parcels" else 150) // part
+    grid = np.stack(np.meshgrid(np.arange(k + 1.0), np.arange(k + 1.0), indexing="ij"), -1)
+    if family == "parcels":
+        grid += (random.random(grid.shape) - 0.5) / 2.0
+    return [np.array([grid[i, j], grid[i + 1, j], grid[i + 1, j + 1], grid[i, j + 1]])
+            for i in range(k) for j in range(k)]  # fmt: skip

@@ -12,7 +12,7 @@ import json
 import sys
 import time
 from collections.abc import Iterable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -36,13 +36,15 @@ def options(words: list[str] | None, description: str, **more: str) -> argparse.
     parser.add_argument("--seconds", type=float, help="of each contender in each row (3, report 2; quick: 0.3)")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", default="", metavar="WORD", help="only rows whose name contains WORD")
+    parser.add_argument("--contest", dest="only", metavar="WORD", help="the same as --only")
+    parser.add_argument("--contender", default="", metavar="WORD", help="ours and contenders whose name contains WORD")
     parser.add_argument("--dry", action="store_true", help="write no results file")
     for name, about in more.items():
         parser.add_argument(f"--{name}", action="store_true", help=about)
     given = parser.parse_args(words)
     given.rounds = given.rounds or (3 if given.quick else 7 if "pages" in more else 15)
     given.seconds = given.seconds or (0.3 if given.quick else 2.0 if "pages" in more else 3.0)
-    given.writes = not (given.dry or given.quick or given.only)
+    given.writes = not (given.dry or given.quick or given.only or given.contender)
     given.size = Size(given.seed, QUICK if given.quick else 1.0)
     return given
 
@@ -88,7 +90,11 @@ def lines_of(made: list[Row] | Figure) -> Iterable[str]:
             found, cpu = ratio(ours, row)
             between, said = f"{found.low:.3g} - {found.high:.3g}", verdict(found.median, *row.goals, is_ratio=True)
             figures += f" {found.median:>7.3g}x {between:>15} {cpu:>7.3g}x {_goals(*row.goals)} {said:<4}"
-        errors = ", ".join(f"{key} {row.errors[key]:.3g}" for key in SHOWN if row.errors.get(key))
+        errors = ", ".join(
+            f"{key} {row.errors[key]:{'.3g' if isinstance(row.errors[key], float) else ','}}"
+            for key in SHOWN
+            if row.errors.get(key)
+        )
         judged = f"of {row.errors['judged']} judged: {errors or 'all right'}" if "judged" in row.errors else errors
         yield "  ".join(part for part in (name + figures, judged, row.method) if part)
 
@@ -120,6 +126,9 @@ def measured(name: str, chosen: Iterable[Task], given: argparse.Namespace, has_l
             print(f"  ... {task.name}", end="\r", file=sys.stderr, flush=True)
         try:
             made = task.make()
+            if isinstance(made, Contest) and given.contender:
+                asked = [each for each in made.contenders if each.name == "ours" or given.contender in each.name]
+                made = replace(made, contenders=asked)
             held = hold(made, given.rounds, given.seconds, has_latency) if isinstance(made, Contest) else made
         except MissingDataError as error:
             print(f"{task.name}: skipped: {error}", flush=True)
@@ -144,10 +153,11 @@ def store(name: str, found: dict[str, Any]) -> None:
     """Write results/<machine>/<name>.json."""
     path = machine.results(name)
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(found, indent=1, default=_plain) + "\n")
+    path.write_text(json.dumps(found, indent=1, default=plain) + "\n")
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
+    """Return what JSON does not take as something that it takes."""
     return value.item() if isinstance(value, np.generic) else str(value)
 
 

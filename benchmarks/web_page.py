@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,8 @@ QUESTIONS = (
     ("Do two bodies meet?", "collision", "apart or crossing", "contact"),
     ("Bodies under poses", "collision", "", "near contact, 1k"),
     ("Which of five relations?", "collision", "", "contact, which relation"),
+    ("How far apart are two bodies?", "clearance", "1k faces, mixed", "nearly in contact"),
+    ("How far apart are two polygons?", "clearance", "", "polygons nearly in contact"),
     ("Segments, box, plane", "clipping segments", "box 2D, random", "box 2D, corners"),
     ("Segments, box, space", "clipping segments", "box 3D, random", "box 3D, corners"),
     ("Segments, 20 planes", "clipping segments", "", "20 planes, edges"),
@@ -67,10 +70,10 @@ def times(ratio: float) -> str:
     return "as fast as" if shown == "1" else f"{shown}x {'faster' if ratio > 1 else 'slower'} than"
 
 
-def questions(rows: list[Row]) -> list[dict[str, Any]]:
+def questions(rows: list[Row], titles: Sequence[tuple[str, str, str, str]] = QUESTIONS) -> list[dict[str, Any]]:
     """Return the questions that there are rows of, each with a sentence."""
     found = []
-    for title, operation, easy, hard in QUESTIONS:
+    for title, operation, easy, hard in titles:
         keys = [f"{operation}, {name}" for name in (easy, hard)]
         parts = [[row for row in rows if key_of(row) == key] for key in keys]
         if any(parts):
@@ -137,21 +140,28 @@ def _contest(rows: list[tuple[int, Row]]) -> dict[str, Any]:
         one = {"i": i, "name": row["contender"], "setting": row.get("setting"), "kind": kind, "absent": row["absent"]}
         one |= {key: errors.get(key, 0) for key in ("judged", *BAD, "off", "coordinates")}
         one |= {key: row.get(key) for key in ("rate", "build", "first", "latency", "worst")}
+        one["where"] = errors.get("where", ())
         made.append(one | {"ulp": errors.get("ulp_largest", 0)})
     first = rows[0][1]
     return {"name": first["contest"], "hard": first["is_hard"], "about": first.get("about", ""), "rows": made}
 
 
-def text_of(found: dict[str, Any], path: str) -> str:
-    """Return the page; path: of the results, from the root of the repository."""
+def text_of(
+    found: dict[str, Any],
+    path: str,
+    titles: Sequence[tuple[str, str, str, str]] = QUESTIONS,
+    judge: str = "rational arithmetic",
+) -> str:
+    """Return the page; path: of the results, from the root of the repository; titles: as `QUESTIONS`."""
     rows, contests = found["rows"], {}
-    asked = questions(rows)
+    asked = questions(rows, titles)
     for key in [question[side] for question in asked for side in ("easy", "hard") if question[side]]:
         contests[key] = _contest([(i, row) for i, row in enumerate(rows) if key_of(row) == key])
     ours = [row for row in rows if row["contender"] == "ours"]
     free = sum(question["tag"] == "exact is free" for question in asked)
     data = {
         "facts": {key: found[key] for key in FACTS} | {"results": path},
+        "judge": judge,
         "wrong": sum(map(failing, ours)),
         "judged": sum(row["errors"].get("judged", 0) for row in ours),
         "summary": f"In {free} of {len(asked)} questions that costs nothing; the others say what it costs.",

@@ -21,6 +21,12 @@ def segments_clipped(segments: Array, region: Any, workers: int | None) -> tuple
     return len(segments), [*found, accuracy.decisions, accuracy.coordinates_ulp]
 
 
+def lines_clipped(lines: Any, region: Any, workers: int | None) -> tuple[int, Any]:
+    pieces, accuracy = engine.clip_lines(lines, region, workers=workers, report=True)
+    found = [pieces.source, pieces.vertices, pieces.offsets, pieces.segments, pieces.t, pieces.faces]
+    return len(lines), [*found, accuracy.decisions, accuracy.coordinates_ulp]
+
+
 def polygons_clipped(polygons: Any, region: Any, workers: int | None) -> tuple[int, Any]:
     found, accuracy = engine.clip_polygons(polygons, region, workers=workers, report=True)
     rings = [found.vertices, found.ring_offsets, found.polygon_offsets, found.contours]
@@ -70,6 +76,17 @@ def batches(draw: Draw) -> Iterator[Question]:
     rings = solids.polygon_of(draw.pick([shapes.large_coast(draw), shapes.squares(draw, 15, 0.5)]))
     yield partial(segments_clipped, draw.uniform(-4.0, 4.0, 5000, 2, 2), rings.solid)
     yield partial(segments_clipped, _segments(draw, rings.targets, 20), rings.solid)
+
+
+@family("clip_lines", 6)
+def lines_on_all_regions(draw: Draw) -> Iterator[Question]:
+    """Walks over the ends of such segments: some closed, some with repeats."""
+    for dimension, makers in solids.REGIONS.items():
+        for maker in makers:
+            shape = maker(draw, dimension, draw.pick(NEAR_PLACES))
+            ends = _segments(draw, shape.targets, 120).reshape(40, 6, dimension)
+            closed = np.concatenate([ends[:20], ends[:20, :1]], axis=1)
+            yield partial(lines_clipped, [*closed, *np.repeat(ends[20:30], 2, axis=1), *ends[30:]], shape.solid)
 
 
 def _small_ball(draw: Draw) -> shapes.Mesh:

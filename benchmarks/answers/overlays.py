@@ -189,3 +189,86 @@ def batches_of_one_kind(draw: Draw) -> Iterator[Question]:
 def batches_far_away(draw: Draw) -> Iterator[Question]:
     pairs = [_drawn(draw, FAR_PLACES + NEAR_PLACES[:2]) for _ in range(10)]
     yield partial(batch_overlaid, [*pairs, *[_drawn(draw, NEAR_PLACES) for _ in range(10)]], draw.pick(OUTPUTS))
+
+
+def layers_overlaid(layers: list[Any], workers: int | None) -> tuple[int, Any]:
+    """Overlay two layers in every way: members and coordinates of every row."""
+    hows = ("intersection", "union", "identity", "difference", "symmetric_difference")
+    answers: list[Any] = []
+    for how in hows:
+        rows: Any = engine.layers.overlay_features(*layers, how)
+        for row in rows:
+            rings = _rings_of(row["geometry"])
+            answers += [row["properties"], row.get("id", ""), len(rings), *(np.asarray(ring, float) for ring in rings)]
+        answers.append(rows.collapsed)
+    return len(hows), answers
+
+
+def _rings_of(geometry: Any) -> list[Any]:
+    if geometry is None:
+        return []
+    parts = [geometry["coordinates"]] if geometry["type"] == "Polygon" else geometry["coordinates"]
+    return [ring for part in parts for ring in part]
+
+
+@family("layers", 8)
+def layers(draw: Draw) -> Iterator[Question]:
+    """Features of one to three parts, which overlap, within a layer and across; some without geometry."""
+    for _ in range(3):
+        sides = []
+        for name in "lr":
+            features: list[Any] = []
+            for k in range(12):
+                rings = [draw.whole(0, 6, 5, 2) * draw.pick([1.0, 1 / 3]) for _ in range(draw.one(1, 3))]
+                shape = {"type": "MultiPolygon", "coordinates": [[ring.tolist()] for ring in rings]}
+                geometry = None if draw.chance(0.1) else shape
+                properties = {"n": k, name: k}
+                features.append({"type": "Feature", "id": k, "properties": properties, "geometry": geometry})
+            sides.append({"type": "FeatureCollection", "features": features})
+        yield partial(layers_overlaid, sides)
+
+
+def _layer(draw: Draw) -> list[Rings]:
+    """Return polygons of one ring or two of several kinds, some of which share rings."""
+    pairs = [_drawn(draw, NEAR_PLACES[:2]) for _ in range(draw.one(1, 4))]
+    layer = [side for pair in pairs for side in pair]
+    return [*layer, layer[0][:1]] if draw.chance(0.3) else layer
+
+
+def _said_of_many(found: engine.Overlay) -> list[Any]:
+    return [*said(found), found.sources]
+
+
+def united(layer: list[Rings], output: Output, grid: float | None, workers: int | None) -> tuple[int, Any]:
+    polygons = [engine.Polygon(rings) for rings in layer]
+    return 1, _said_of_many(engine.union_all(polygons, output=output, grid=grid, workers=workers))
+
+
+def filled_by(rings: Rings, workers: int | None) -> tuple[int, Any]:
+    found = [engine.filled(rings, rule) for rule in ("non_zero", "positive", "negative")]  # type: ignore[arg-type]
+    return 3, [[each.vertices, each.ring_offsets] for each in found]
+
+
+def overlaid_on_grid(pair: Pair, grid: float, workers: int | None) -> tuple[int, Any]:
+    subject, clip = (engine.Polygon(rings) for rings in pair)
+    found = [engine.overlay(subject, clip, name, grid=grid, workers=workers) for name in OPERATIONS]
+    return 4, [_said_of_many(each) for each in found]
+
+
+@family("union_all", 12)
+def layers_of_all_kinds(draw: Draw) -> Iterator[Question]:
+    for _ in range(12):
+        yield partial(united, _layer(draw), draw.pick(OUTPUTS), None)
+        yield partial(united, _layer(draw), "valid", draw.pick([0.125, 0.1, 1e-6]))
+
+
+@family("filled", 8)
+def rings_under_fill_rules(draw: Draw) -> Iterator[Question]:
+    for _ in range(12):
+        yield partial(filled_by, [ring for rings in _layer(draw) for ring in rings])
+
+
+@family("grid", 8)
+def overlays_on_grids(draw: Draw) -> Iterator[Question]:
+    for kind in KINDS:
+        yield partial(overlaid_on_grid, _drawn(draw, NEAR_PLACES[:2], kind), draw.pick([0.25, 0.01, 2.0**-20, 1e-9]))

@@ -9,10 +9,14 @@ once; that is its build. It imports its package when it is imported itself, so o
     segments          a solid of ours         (n, 2, dim)                 (n, 2 * dim) first piece, NaN where nothing
     hits              Mesh                    (n, 2, 3)                   bool: meets a face
     pieces            Rings, a solid          (n, 2, dim)                 [(segment, start, end)]
+    lines             Polygon of one ring     (n, size, 2)                the line of each piece
+    layers            how                     two (n, size, 2)            areas of the rows
     kept polygons     Aabb                    (n, size, dim)              bool: something is left
     polygon areas     Aabb of the plane       (n, size, 2)                area of what is left
     pair              a couple                None                        bool: a common point
     poses             Pair                    rows of its poses           bool
+    clearance poses   Pair                    rows of its poses           distances
+    clearance pairs   None                    couples                     distances, NaN refused, infinite not taken
     crowd             Crowd                   frames of poses             first * n_bodies + second, sorted
     overlay           operation               pairs of lists of rings     areas, NaN where refused
 """
@@ -34,7 +38,7 @@ from benchmarks.workloads import Mesh, Rings
 PACKAGES = {
     "open3d": "open3d", "shapely": "shapely", "trimesh": "trimesh", "igl": "libigl", "vtk": "vtk", "cgal": "cgal",
     "matplotlib": "matplotlib", "coal": "coal", "fcl": "python-fcl", "manifold3d": "manifold3d", "numpy": "numpy",
-    "pyclipper": "pyclipper", "celltree": "numba-celltree",
+    "geopandas": "geopandas", "pyclipper": "pyclipper", "celltree": "numba-celltree",
 }  # fmt: skip
 """The distribution of each module; those of our own code have none."""
 SHOWN = {
@@ -175,6 +179,27 @@ def each_or_nan(area: Callable[[Any], float]) -> Callable[[Any], np.ndarray]:
             return np.nan
 
     return lambda items: np.array([one(item) for item in items])
+
+
+def _made_or_none(made: Callable[[Any], Any], item: Any) -> Any:
+    try:
+        return made(item)
+    except NotApplicable:
+        return None
+
+
+def each_alone(made: Callable[[Any], Any], ask: Callable[[Any], float]) -> Prepared:
+    """Return what makes item after item untimed, and asks each for a number; refusals as `each_or_nan` has them."""
+
+    def native(items: Any) -> list[Any]:
+        return [_made_or_none(made, item) for item in items]
+
+    def one(item: Any) -> float:
+        if item is None:
+            raise NotApplicable("not made")
+        return ask(item)
+
+    return Prepared(each_or_nan(one), native)
 
 
 def overlays(

@@ -12,7 +12,7 @@ import coal
 import numpy as np
 
 from benchmarks.bodies import Pair
-from benchmarks.contenders import Couple, Placed, Prepared, box_of
+from benchmarks.contenders import Couple, Placed, Prepared, box_of, each_alone
 from benchmarks.workloads import Mesh
 
 
@@ -78,7 +78,23 @@ def _pair(pair: Couple, threads: int, margin: float = 0.0) -> Prepared:
     return Prepared(ask)
 
 
+def _apart(first: tuple[Any, Any], second: tuple[Any, Any]) -> float:
+    return max(0.0, coal.distance(*first, *second, coal.DistanceRequest(), coal.DistanceResult()))
+
+
+def _clearance(pair: Pair, threads: int) -> Prepared:
+    first, second = (model(pair.first), coal.Transform3s()), model(pair.second)
+    return Prepared(
+        lambda poses: np.array([_apart(first, (second, pose)) for pose in poses]),
+        lambda rows: [coal.Transform3s(pair.rotations[row], pair.translations[row]) for row in rows],
+    )
+
+
 MAKERS = {
+    "clearance poses": _clearance,
+    "clearance pairs": lambda _, threads: each_alone(
+        lambda pair: [_shape(body) for body in pair], lambda p: _apart(*p)
+    ),
     "poses": lambda pair, threads: _calls(model(pair.first), model(pair.second), pair),
     "convex poses": lambda pair, threads: _calls(convex(pair.first), convex(pair.second), pair),
     "pair": _pair,

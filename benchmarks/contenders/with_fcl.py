@@ -9,7 +9,7 @@ import fcl
 import numpy as np
 
 from benchmarks.bodies import Crowd, Pair
-from benchmarks.contenders import Couple, Placed, Prepared, box_of
+from benchmarks.contenders import Couple, Placed, Prepared, box_of, each_alone
 from benchmarks.workloads import Mesh
 
 
@@ -100,7 +100,25 @@ def _pair(pair: Couple, threads: int) -> Prepared:
     return Prepared(lambda _: fcl.collide(first, second, request, fcl.CollisionResult()) > 0)
 
 
+def _apart(first: fcl.CollisionObject, second: fcl.CollisionObject) -> float:
+    return max(0.0, fcl.distance(first, second, fcl.DistanceRequest(), fcl.DistanceResult()))
+
+
+def _clearance(pair: Pair, threads: int) -> Prepared:
+    first, mesh = fcl.CollisionObject(model(pair.first), fcl.Transform()), model(pair.second)
+
+    def native(rows: np.ndarray) -> list[fcl.CollisionObject]:
+        turns, moves = pair.rotations[rows], pair.translations[rows]
+        return [fcl.CollisionObject(mesh, fcl.Transform(turn, move)) for turn, move in zip(turns, moves)]
+
+    return Prepared(lambda objects: np.array([_apart(first, other) for other in objects]), native)
+
+
 MAKERS = {
+    "clearance poses": _clearance,
+    "clearance pairs": lambda _, threads: each_alone(
+        lambda pair: [_object(body) for body in pair], lambda p: _apart(*p)
+    ),
     "poses": _poses,
     "crowd": _crowd,
     "pair": _pair,

@@ -8,7 +8,16 @@ import numpy as np
 from manifold3d import CrossSection, Error, FillRule, Manifold, Mesh64
 
 import engine
-from benchmarks.contenders import Couple, NotApplicable, Prepared, each_or_nan, meshes_of, overlays, rings_of
+from benchmarks.contenders import (
+    Couple,
+    NotApplicable,
+    Prepared,
+    each_alone,
+    each_or_nan,
+    meshes_of,
+    overlays,
+    rings_of,
+)
 
 
 def _combined(pair: Any, operation: str) -> Any:
@@ -33,10 +42,14 @@ def _polygon_areas(region: engine.Aabb, threads: int) -> Prepared:
     return Prepared(each_or_nan(lambda rings: _combined(_read((rings, box)), "intersection").area()))
 
 
+def _solids(pair: Couple) -> list[Manifold]:
+    return [Manifold(Mesh64(mesh.vertices, mesh.faces.astype(np.uint64))) for mesh in meshes_of(pair)]
+
+
 def _pair(pair: Couple, threads: int) -> Prepared:
     if not all(body.is_closed for body in pair):
         raise NotApplicable("solids only")
-    first, second = (Manifold(Mesh64(mesh.vertices, mesh.faces.astype(np.uint64))) for mesh in meshes_of(pair))
+    first, second = _solids(pair)
 
     def ask(_: object) -> bool:
         for solid in (first, second):
@@ -49,6 +62,7 @@ def _pair(pair: Couple, threads: int) -> Prepared:
 
 MAKERS = {
     "pair": _pair,
+    "clearance pairs": lambda _, threads: each_alone(_solids, lambda pair: pair[0].min_gap(pair[1], 1e3)),
     "polygon areas": _polygon_areas,
     **overlays(_read, _combined, lambda made, found: found.area()),
 }

@@ -8,7 +8,7 @@ import numpy as np
 
 import engine
 from benchmarks.bodies import Crowd, Pair
-from benchmarks.contenders import Couple, Placed, Prepared, each_or_nan
+from benchmarks.contenders import Couple, Placed, Prepared, each_alone, each_or_nan
 from benchmarks.workloads import Bodies, Mesh, Rings
 
 
@@ -147,6 +147,14 @@ def _poses(pair: Pair, threads: int, **options: bool) -> Prepared:
     )
 
 
+def _clearance_poses(pair: Pair, threads: int) -> Prepared:
+    first, second = pair.solids()
+    return Prepared(
+        lambda poses: engine.clearance_poses(first, second, *poses, workers=threads),
+        lambda rows: (pair.rotations[rows], pair.translations[rows]),
+    )
+
+
 def _tree(mesh: Mesh, threads: int) -> Prepared:
     """From arrays to the answer of a first question with nothing near: constructor and tree."""
     far = engine.Surface([[9, 9, 9], [9, 9, 9.5], [9, 9.5, 9]], [[0, 1, 2]])
@@ -194,12 +202,26 @@ def _exact_area(operation: Any, threads: int) -> Prepared:
     return Prepared(each_or_nan(area))
 
 
+def _lines(subject: Any, threads: int) -> Prepared:
+    region = solid_of(subject)
+    return Prepared(lambda lines: engine.clip_lines(lines, region, workers=threads), answer=lambda found: found.source)
+
+
+def _layers(how: str, threads: int) -> Prepared:
+    from benchmarks.contenders.with_geopandas import areas_of, frames_of
+
+    return Prepared(lambda frames: engine.layers.overlay(*frames, how, True, workers=threads), frames_of, areas_of)
+
+
 MAKERS = {
+    "lines": _lines, "layers": _layers,
     "points": _points, "scene": _scene, "segments": _segments, "hits": _hits, "kept polygons": _kept_polygons,
     "polygon areas": _polygon_areas, "pair": _pair, "relation": _relation, "poses": _poses, "convex poses": _poses,
     "witnesses": lambda pair, threads: _poses(pair, threads, witnesses=True),
     "detail": lambda pair, threads: _poses(pair, threads, detail=True),
     "relations": lambda pair, threads: _poses(pair, threads, boolean=False),
+    "clearance poses": _clearance_poses,
+    "clearance pairs": lambda _, threads: each_alone(_bodies_of, lambda made: engine.clearance(*made).distance),
     "tree": _tree, "crowd": _crowd, "overlay": _overlay, "overlay of made": _overlay_of_made,
     "exact area": _exact_area,
 }  # fmt: skip

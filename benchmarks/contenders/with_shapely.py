@@ -11,7 +11,7 @@ import numpy as np
 import shapely
 
 import engine
-from benchmarks.contenders import Couple, NotApplicable, Prepared, in_threads, overlays, without_poses
+from benchmarks.contenders import Couple, NotApplicable, Prepared, each_alone, in_threads, overlays, without_poses
 from benchmarks.workloads import Bodies, Rings
 
 
@@ -91,6 +91,12 @@ def _pieces(region: Rings | engine.Solid, threads: int) -> Prepared:
     return Prepared(lambda lines: shapely.intersection(lines, shape), shapely.linestrings, _pieces_of)
 
 
+def _lines(region: engine.Polygon, threads: int) -> Prepared:
+    shape = shapely.polygons(region.vertices)
+    shapely.prepare(shape)
+    return Prepared(lambda lines: shapely.intersection(lines, shape), shapely.linestrings)
+
+
 def _pieces_by_rectangle(region: engine.Solid, threads: int) -> Prepared:
     bounds = _bounds(region)
     return Prepared(lambda lines: shapely.clip_by_rect(lines, *bounds), shapely.linestrings, _pieces_of)
@@ -146,10 +152,14 @@ MAKERS = {
     "scene": _scene,
     "segments": _segments,
     "pieces": _pieces,
+    "lines": _lines,
     "pieces by rectangle": _pieces_by_rectangle,
     "kept polygons": _kept_polygons,
     "polygon areas": _polygon_areas,
     "pair": _pair,
+    "clearance pairs": lambda _, threads: each_alone(
+        lambda pair: [_made(body.shape.rings) for body in pair], lambda pair: float(shapely.distance(*pair))
+    ),
     "small pairs": _small_pairs,
     **overlays(
         _gridded,

@@ -13,7 +13,7 @@ from typing import Any
 
 from benchmarks.contest import Size, Task
 
-FIELDS = ("containment", "collision", "segments", "polygons", "overlay", "primitives", "calls")
+FIELDS = ("containment", "collision", "clearance", "segments", "polygons", "overlay", "primitives", "calls")
 
 
 @dataclass(slots=True)

@@ -74,14 +74,14 @@ def stored(name: str, cases: list[dict], about: str = "", peers: tuple[str, ...]
     """Return the contest of some pairs of the hard set; without peers: which of five relations."""
     couples = [tuple(Placed(_mesh(case[key])) for key in ("first", "second")) for case in cases]
     relations = np.array([RELATIONS[case["relation"]] for case in cases])
-    return _on_couples(name, True, couples, relations != engine.Relation.DISJOINT if peers else relations, about, peers)
+    return on_couples(name, True, couples, relations != engine.Relation.DISJOINT if peers else relations, about, peers)
 
 
 def _mesh(body: dict) -> Mesh:
     return Mesh("case", np.array(body["vertices"], float), np.array(body["faces"], np.int64))
 
 
-def _on_couples(
+def on_couples(
     name: str, is_hard: bool, couples: list[Any], exact: np.ndarray, about: str, peers: tuple[str, ...] = PEERS
 ) -> Contest:
     """Items are numbers of pairs: one call from Python for each, models are made beforehand."""
@@ -128,7 +128,7 @@ def _easy(size: Size) -> Contest:
         pairs.append((Placed(body), Placed(Mesh("moved", body.vertices + offset, body.faces))))
         exact.append(meet)
     about = "bumpy balls of 80 faces, half of them meeting, none closely"
-    return _on_couples("apart or crossing", False, pairs, np.array(exact), about)
+    return on_couples("apart or crossing", False, pairs, np.array(exact), about)
 
 
 # --- the table --------------------------------------------------------------------------------------------------------

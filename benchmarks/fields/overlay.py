@@ -30,6 +30,7 @@ PAGE = {
 LARGE: dict[str, Goals] = {"shapely": (6.0, 15.0), "pyclipper": (0.4, 1.0), "manifold3d": (0.4, 1.0)}
 SMALL: dict[str, Goals] = {"shapely:small pairs": (5.0, 15.0), "pyclipper:small pairs": (2.0, 5.0)}
 OPERATIONS = ("union", "difference", "symmetric_difference")
+UNIONS = ("circles", "parcels", "squares")
 
 
 def tasks(size: Size) -> Iterator[Task]:
@@ -49,6 +50,11 @@ def tasks(size: Size) -> Iterator[Task]:
         yield Task(f"batch of stars of {n}, two threads", partial(_batch, size, "star", n, "two threads"))
     for operation in OPERATIONS:
         yield Task(f"batch of stars of 10, {operation}", partial(_batch, size, "star", 10, operation))
+    for how in ("intersection", "difference", "union"):
+        yield Task(f"layers of 20,000, {how}", partial(_layers, size, how))
+
+    for family in UNIONS:
+        yield Task(f"union of {family}", partial(_union, size, family), is_figure=True)
     yield Task("public pairs", partial(_public, size))
     yield Task("exact area", partial(_area, size))
     yield Task("public pairs, four operations", partial(_identities, size), is_figure=True)
@@ -78,11 +84,12 @@ def _on_page(size: Size, name: str) -> Contest:
 def _exact_areas(pairs: list[Pair], rows: np.ndarray) -> np.ndarray:
     """Return exact areas and scales: by the reference where it is quick, else by our exact rings, which tests prove."""
     small = [sum(len(ring) for side in pairs[row] for ring in side) <= MOST_VERTICES for row in rows]
-    return np.array([overlay_area(pairs[row]) if is_small else _by_ours(pairs[row])
+    return np.array([overlay_area(pairs[row]) if is_small else by_ours(pairs[row])
                      for row, is_small in zip(rows, small)])  # fmt: skip
 
 
-def _by_ours(pair: Pair) -> tuple[float, float]:
+def by_ours(pair: Pair) -> tuple[float, float]:
+    """Return the area of the intersection by our exact rings, and the scale of a pair."""
     return engine.overlay(*map(engine.Polygon, pair)).area, scale_of(pair)
 
 
@@ -108,6 +115,33 @@ def _batch(size: Size, family: str, n: int, how: str = "intersection") -> Contes
                     n_sample=max(3, min(60, 1500 // n**2)), most=0)  # fmt: skip
 
 
+def _layers(size: Size, how: str) -> Contest:
+    """Two layers of parcels, each of which meets some four of the other; from frame to frame, one thread."""
+    layers = tuple(polygon_pairs.parcels(size.n(20_000, 2_000), size.seed + side) for side in range(2))
+    found = field_of("layers", how, {"geopandas": (5.0, 10.0)}, 1)
+    return Contest("layers", f"layers of 20,000, {how}", False, layers, None, areas, found, count=len(layers[0]))
+
+
+def _union(size: Size, family: str) -> Figure:
+    """Our seconds for one of shapely.union_all, turn by turn, medians; beside it, those of ours on a grid."""
+    import shapely
+
+    layer = polygon_pairs.layer(family, size.of(1, 10), size.seed)
+    ours, theirs = [engine.Polygon([ring]) for ring in layer], [shapely.Polygon(ring) for ring in layer]
+    engine.union_all(ours)
+    engine.union_all(ours, grid=1e-6)
+    turns = [
+        [clocked(ask)[0] for ask in (partial(shapely.union_all, theirs), partial(engine.union_all, ours),
+                                     partial(engine.union_all, ours, grid=1e-6))]
+        for _ in range(5)
+    ]  # fmt: skip
+    peer, plain, snapped = np.median(turns, axis=0)
+    about = (
+        f"{len(layer):,} polygons: shapely {peer * 1e3:.0f} ms, ours {plain * 1e3:.0f}, on a grid {snapped * 1e3:.0f}"
+    )
+    return Figure(f"union of {family}", "of the time of shapely.union_all", [plain / peer], 1 / 3, 1 / 6, about)
+
+
 def _filed(size: Size) -> list[Pair]:
     return list(polygon_pairs.public(size.of(5_000, 300)))
 
@@ -115,7 +149,7 @@ def _filed(size: Size) -> list[Pair]:
 def _public(size: Size) -> Contest:
     """Pairs of public suites, polygons made while the clock runs."""
     pairs = _filed(size)
-    exact = np.array([_by_ours(pair) for pair in pairs])
+    exact = np.array([by_ours(pair) for pair in pairs])
     found = field_of("overlay", "intersection", ["shapely", "pyclipper", "manifold3d"], 1)
     return Contest("overlay", "public pairs", True, pairs, exact, areas, found, count=len(pairs))
 

@@ -52,6 +52,17 @@ def tasks(size: Size) -> Iterator[Task]:
     for faces in ("1k", "86k")[: size.of(2, 1)]:
         yield Task(f"{faces} faces", partial(_mesh, size, faces, False))
     yield Task("first 100, 1k faces", partial(_mesh, size, "1k", True))
+    for step in (0.05, 0.3, 1.0)[: size.of(3, 2)]:
+        yield Task(f"lines of 10, steps of {step}", partial(_lines, size, step))
+
+
+def _lines(size: Size, step: float) -> Contest:
+    """Walks of 10 positions about a polygon of 1,000, from a point in its box, steps normal of that deviation."""
+    region, draw = _region("polygon of 1,000", size.seed), workloads.generator(f"lines/{step}", size.seed)
+    walks = draw.normal(size=(size.n(100_000), 10, 2)) * step
+    walks[:, 0] = draw.uniform(region.vertices.min(axis=0), region.vertices.max(axis=0), (len(walks), 2))
+    found, name = field_of("lines", region, {"shapely": (5.0, 10.0)}, 1), f"lines of 10, steps of {step}"
+    return Contest("lines", name, False, walks.cumsum(axis=1), None, errors.same, found)
 
 
 def _region(name: str, seed: int) -> Any:
