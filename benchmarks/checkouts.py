@@ -22,6 +22,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -96,10 +97,11 @@ class Side:
             raise SystemExit(f"the engine was imported from {found}, not from {checkout}")
 
     def send(self, **words: Any) -> None:
-        """Ask, and do not wait."""
+        """Ask, and do not wait; that a process is dead is told by `answer`."""
         assert self._process.stdin is not None
-        self._process.stdin.write(json.dumps(words) + "\n")
-        self._process.stdin.flush()
+        with suppress(BrokenPipeError):
+            self._process.stdin.write(json.dumps(words) + "\n")
+            self._process.stdin.flush()
 
     def answer(self) -> Any:
         """Wait for the answer."""
@@ -110,7 +112,8 @@ class Side:
     def close(self) -> None:
         """End the process."""
         assert self._process.stdin is not None
-        self._process.stdin.close()
+        with suppress(BrokenPipeError):
+            self._process.stdin.close()
         self._process.wait(60)
 
 

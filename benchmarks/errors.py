@@ -169,25 +169,26 @@ def same(answers: np.ndarray, exact: np.ndarray) -> dict[str, Any]:
     return found | {"outside": int(outside.sum())} | ({"worst": int(np.argmax(wrong))} if wrong.any() else {})
 
 
+def _ulps(errors: np.ndarray) -> dict[str, float]:
+    """Return the largest and the median of errors in ulps, 0 where there are none."""
+    return {
+        "ulp_largest": float(errors.max(initial=0.0)),
+        "ulp_median": float(np.median(errors)) if errors.size else 0.0,
+    }
+
+
 def coordinates(answers: np.ndarray, exact: np.ndarray) -> dict[str, Any]:
     """Judge rows of coordinates, NaN where nothing remains: wrong where that differs; else their errors in ulps."""
     kept, should = ~np.isnan(answers).any(axis=1), ~np.isnan(exact).any(axis=1)
     both, wrong = kept & should, kept != should
     ulps = np.abs(answers[both] - exact[both]) / np.spacing(np.maximum(np.abs(exact[both]), np.finfo(float).tiny))
-    values = ulps.ravel()
-    found = {
-        "judged": len(exact),
-        "wrong": int(wrong.sum()),
-        "refused": 0,
-        "ulp_largest": float(values.max(initial=0.0)),
-        "ulp_median": float(np.median(values)) if len(values) else 0.0,
-        "ulp_histogram": np.bincount(np.minimum(np.ceil(np.log2(values + 1)).astype(int), 20), minlength=21).tolist(),
-        "off": int((values > 0).sum()),
-        "coordinates": len(values),
-    }
+    found = {"judged": len(exact), "wrong": int(wrong.sum()), "refused": 0} | _ulps(ulps)
+    powers = np.minimum(np.ceil(np.log2(ulps.ravel() + 1)).astype(int), 20)
+    found |= {"ulp_histogram": np.bincount(powers, minlength=21).tolist(), "off": int((ulps > 0).sum())}
+    found["coordinates"] = ulps.size
     if wrong.any():
         found["worst"] = int(np.argmax(wrong))
-    elif (values > 0).any():
+    elif (ulps > 0).any():
         found["worst"] = int(np.flatnonzero(both)[np.argmax(ulps.max(axis=1))])
     return found
 
@@ -198,10 +199,10 @@ def distances(answers: np.ndarray, exact: np.ndarray, tolerance: float = 1e-6) -
     refused, outside = np.isnan(answers), np.isinf(answers)
     error = np.abs(np.where(refused | outside, exact, answers) - exact)
     wrong = (error > tolerance * exact) | ((exact > 0.0) & (answers == 0.0))
-    ulps = error[~wrong] / np.spacing(np.maximum(exact[~wrong], np.finfo(float).tiny))
-    found = {"judged": len(exact), "wrong": int(wrong.sum()), "refused": int(refused.sum())}
-    found |= {"outside": int(outside.sum()), "ulp_largest": float(ulps.max(initial=0.0)), "off": int((ulps > 0).sum())}
-    found["coordinates"] = len(exact)
+    near = ~(wrong | refused | outside)
+    ulps = error[near] / np.spacing(np.maximum(exact[near], np.finfo(float).tiny))
+    found = {"judged": len(exact), "wrong": int(wrong.sum()), "refused": int(refused.sum())} | _ulps(ulps)
+    found |= {"outside": int(outside.sum()), "off": int((ulps > 0).sum()), "coordinates": len(ulps)}
     return found | ({"worst": int(np.argmax(wrong * error))} if wrong.any() else {})
 
 
@@ -211,12 +212,6 @@ def areas(answers: np.ndarray, exact: np.ndarray) -> dict[str, Any]:
     refused, outside = np.isnan(answers), np.isinf(answers)
     error = np.abs(np.where(outside, np.nan, answers) - exact[:, 0]) / exact[:, 1]
     good = error[error <= AREA_TOLERANCE] * 2.0**53
-    found = {
-        "judged": len(exact),
-        "wrong": int((error > AREA_TOLERANCE).sum()),
-        "refused": int(refused.sum()),
-        "outside": int(outside.sum()),
-        "ulp_largest": float(good.max(initial=0.0)),
-        "ulp_median": float(np.median(good)) if len(good) else 0.0,
-    }
+    found = {"judged": len(exact), "wrong": int((error > AREA_TOLERANCE).sum()), "refused": int(refused.sum())}
+    found |= {"outside": int(outside.sum())} | _ulps(good)
     return found | ({"worst": int(np.nanargmax(error))} if found["wrong"] else {})

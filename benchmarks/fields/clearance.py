@@ -1,4 +1,8 @@
-"""How far apart are two bodies? Meshes under poses, and pairs so near that rounding decides."""
+"""How far apart are two bodies? Meshes under poses, and pairs so near that rounding decides.
+
+Pairs near contact are judged by rational arithmetic. Rows of poses compare the peers with ours: the distances of 1,280
+and of 20,480 faces are too many to ask the reference for; tests hold ours against rationals on smaller meshes.
+"""
 
 from __future__ import annotations
 
@@ -29,12 +33,12 @@ def tasks(size: Size) -> Iterator[Task]:
     yield Task("nearly in contact", partial(_hard, size, 3, PEERS), True)
     yield Task("polygons nearly in contact", partial(_hard, size, 2, ("shapely",)), True)
     for place in FAR:
-        yield Task(f"1k faces, {place}", partial(_poses, size, "1k", 4, place), place == "mixed")
-        yield Task(f"10k faces, {place}", partial(_poses, size, "10k", 11, place))
+        yield Task(f"1k faces, {place}", partial(_poses, size, "1k", 3, place), place == "mixed")
+        yield Task(f"20k faces, {place}", partial(_poses, size, "20k", 5, place))
 
 
 def _poses(size: Size, name: str, times: int, place: str) -> Contest:
-    """Peers' distances are compared with ours: the nearest doubles, which tests hold against rationals."""
+    """Bumpy balls, subdivided so many times; the exact answers are ours."""
     n_poses = size.n(400, 50)
     first, second = (bumpy_sphere(f"clearance {name} {seed}", seed, times) for seed in (1, 2))
     draw = generator(f"clearance {name} {place}", size.seed)

@@ -53,6 +53,15 @@ def test_areas_are_wrong_beyond_a_millionth() -> None:
     assert (found["wrong"], found["refused"], found["ulp_largest"]) == (1, 1, 0.0)
 
 
+def test_every_judge_of_numbers_tells_what_the_page_shows() -> None:
+    """A distance that is refused or not taken counts as neither right nor off."""
+    found = errors.distances(np.array([1.0, 2.0 + 2**-51, np.nan, np.inf, 0.0]), np.array([1.0, 2.0, 1.0, 1.0, 1.0]))
+    assert (found["wrong"], found["refused"], found["outside"], found["off"], found["coordinates"]) == (1, 1, 1, 1, 2)
+    pieces = errors.coordinates(np.ones((1, 2)), np.ones((1, 2)))
+    area = errors.areas(np.ones(1), np.ones((1, 2)))
+    assert all({"ulp_largest", "ulp_median"} <= set(each) for each in (found, pieces, area))
+
+
 @pytest.mark.parametrize("field", ["primitives", "polygons", "segments"])
 def test_ours_has_no_wrong_answer(field: str) -> None:
     for task in tasks(Size(0, 0.01), (field,), is_page=True):
