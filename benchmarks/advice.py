@@ -16,7 +16,7 @@ import engine
 from benchmarks.bodies import random_rotations
 from benchmarks.workloads import bumpy_sphere, generator, ring_around
 from engine.bounding.aabb import corners_of_box
-from engine.textbook import bounding_volumes, collide_by_volumes, polygon_angle_sum
+from engine.textbook import collision, polygons
 
 N = 20_000
 MARGIN = 1e-3
@@ -103,10 +103,8 @@ def volumes() -> Iterator[str]:
         corners = corners_of_box(*boxes[1])
         tests = (
             lambda radii=radii, move=move: np.linalg.norm(move) <= sum(radii),
-            lambda boxes=boxes: bounding_volumes.boxes_meet(*boxes[0], *boxes[1]),
-            lambda corners=corners: collide_by_volumes.meet(
-                mesh.vertices, mesh.faces, corners, collide_by_volumes.BOX_TRIANGLES
-            ),
+            lambda boxes=boxes: collision.boxes_meet(*boxes[0], *boxes[1]),
+            lambda corners=corners: collision.meet(mesh.vertices, mesh.faces, corners, collision.BOX_TRIANGLES),
             lambda: False,
         )
         for stage, test in enumerate(tests):
@@ -135,9 +133,9 @@ def angles() -> Iterator[str]:
         sets.append(a + t[:, None] * way + (off * sign)[:, None] * normal)
     exact = [engine.contains(points, polygon) for points in sets]
     for tolerance in (0.0, 1e-14, 1e-12, 1e-9, 1e-6, 1e-3):
-        found = [polygon_angle_sum.contains_unsigned(points, ring, tolerance) for points in sets]
+        found = [polygons.by_unsigned_angles(points, ring, tolerance) for points in sets]
         yield f"| {tolerance:g} | " + " | ".join(f"{np.mean(a != b):.2%}" for a, b in zip(found, exact)) + " |"
-    found = [polygon_angle_sum.contains_signed(points, ring) for points in sets]
+    found = [polygons.by_signed_angles(points, ring) for points in sets]
     yield "| the signed sum, none | " + " | ".join(f"{np.mean(a != b):.2%}" for a, b in zip(found, exact)) + " |"
 
 

@@ -16,7 +16,7 @@ import engine
 from benchmarks.bodies import Pair, belted_ball, bumpy_pair, crowd, near_contact
 from benchmarks.measure import clocked
 from benchmarks.workloads import Mesh
-from engine.textbook import collide_by_edges
+from engine.textbook import collision
 
 Line = tuple[str, str, str]
 """The approach, its time in words, what it settles."""
@@ -46,7 +46,7 @@ def naive(times: int) -> Line:
     free = int(np.flatnonzero(ask(pair)() == engine.Relation.DISJOINT)[0])
     moved = np.ascontiguousarray(pair.second.vertices @ pair.rotations[free].T + pair.translations[free])
     faces = pair.first.faces.astype(np.int64), pair.second.faces.astype(np.int64)
-    seconds = best(lambda: collide_by_edges.collide(pair.first.vertices, faces[0], moved, faces[1]))
+    seconds = best(lambda: collision.by_edges(pair.first.vertices, faces[0], moved, faces[1]))
     return f"all pairs, {len(faces[0]):,} x {len(faces[1]):,} faces", shown(seconds), "everything, in float64 only"
 
 

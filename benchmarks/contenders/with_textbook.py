@@ -14,22 +14,14 @@ from benchmarks.errors import REFUSED
 from benchmarks.workloads import Mesh, Rings
 from engine.textbook import (
     clip_batches,
-    cohen_sutherland,
-    collide_by_edges,
-    collide_by_vertices,
-    collide_by_volumes,
-    convex,
-    convex_cohen_sutherland,
+    clip_polygons,
+    clip_segments,
+    collision,
     greiner_hormann,
-    polygon_angle_sum,
-    polygon_ray_parity,
-    polygon_same_side,
-    polyhedron_ray_parity,
-    polyhedron_recast,
-    segment_sphere,
-    sutherland_hodgman,
-    triangle_cross_dot,
-    triangle_projection,
+    polygons,
+    polyhedra,
+    solids,
+    triangles,
 )
 
 OBLIQUE = np.array([0.5773, 0.2113, 0.7886])
@@ -48,9 +40,9 @@ def _points(subject: Any) -> Ask:
     """A half-line from the point."""
     match subject:
         case Mesh(vertices=vertices, faces=faces):
-            return lambda points: polyhedron_ray_parity.contains(points, vertices, faces, OBLIQUE)
+            return lambda points: polyhedra.by_half_line(points, vertices, faces, OBLIQUE)
         case Rings(rings=[ring]):
-            return lambda points: polygon_ray_parity.contains(points, ring, np.array([0, len(ring)]))
+            return lambda points: polygons.by_half_line(points, ring, np.array([0, len(ring)]))
     raise NotApplicable("a polyhedron, or a polygon of one ring")
 
 
@@ -58,7 +50,7 @@ def _recast(mesh: Mesh) -> Ask:
     directions = np.random.default_rng(1).normal(size=(16, 3))
 
     def ask(points: np.ndarray) -> np.ndarray:
-        contained, unfinished = polyhedron_recast.contains(points, mesh.vertices, mesh.faces, directions, 1e-9)
+        contained, unfinished = polyhedra.by_other_half_lines(points, mesh.vertices, mesh.faces, directions, 1e-9)
         return np.where(unfinished, REFUSED, contained)
 
     return ask
@@ -112,7 +104,7 @@ def _polygon_areas(region: engine.Aabb) -> Ask:
     rows = box_rows(region)
 
     def ask(rings: np.ndarray) -> np.ndarray:
-        clipped = [next(iter(sutherland_hodgman.clip_on_convex([ring], rows)), np.empty((0, 2))) for ring in rings]
+        clipped = [next(iter(clip_polygons.on_convex([ring], rows)), np.empty((0, 2))) for ring in rings]
         found, sizes = np.zeros(len(rings)), np.array([len(ring) for ring in clipped])
         kept = sizes > 0
         found[kept] = np.abs(ring_areas(np.concatenate(clipped), np.append(0, np.cumsum(sizes[kept]))))
@@ -142,17 +134,15 @@ def _pair(collide: Callable[..., bool]) -> Callable[[Couple, int], Prepared]:
 ASKS: dict[str, Callable[[Any], Ask]] = {
     "points": _points,
     "recast": _recast,
-    "signed angles": lambda subject: lambda points: polygon_angle_sum.contains_signed(points, subject.rings[0]),
-    "unsigned angles": lambda subject: (
-        lambda points: polygon_angle_sum.contains_unsigned(points, subject.rings[0], 1e-6)
-    ),
-    "same side": lambda subject: lambda points: polygon_same_side.contains(points, subject.rings[0]),
-    "cross and dot": lambda solid: lambda points: triangle_cross_dot.contains(points, solid.vertices),
-    "projection": lambda solid: lambda points: triangle_projection.contains(points, solid.vertices),
-    "planes": lambda solid: lambda points: convex.contains(points, solid.planes),
-    "segments": _clipped(cohen_sutherland.clip, "min", "max"),
-    "by planes": _clipped(convex_cohen_sutherland.clip, "planes"),
-    "quadratic": _clipped(segment_sphere.clip, "center", "radius"),
+    "signed angles": lambda subject: lambda points: polygons.by_signed_angles(points, subject.rings[0]),
+    "unsigned angles": lambda subject: lambda points: polygons.by_unsigned_angles(points, subject.rings[0], 1e-6),
+    "same side": lambda subject: lambda points: polygons.by_same_side(points, subject.rings[0]),
+    "cross and dot": lambda solid: lambda points: triangles.by_products(points, solid.vertices),
+    "projection": lambda solid: lambda points: triangles.by_projection(points, solid.vertices),
+    "planes": lambda solid: lambda points: solids.in_convex(points, solid.planes),
+    "segments": _clipped(clip_segments.on_box, "min", "max"),
+    "by planes": _clipped(clip_segments.on_convex, "planes"),
+    "quadratic": _clipped(clip_segments.on_sphere, "center", "radius"),
     "polygon areas": _polygon_areas,
     "overlay": _overlay,
 }
@@ -160,7 +150,7 @@ MAKERS: dict[str, Callable[[Any, int], Prepared]] = {
     **{kind: lambda subject, threads, make=make: Prepared(make(subject)) for kind, make in ASKS.items()},
     "naive segments": _naive_segments,
     "kept polygons": _naive_polygons,
-    "pair by vertices": _pair(collide_by_vertices.collide),
-    "pair by edges": _pair(collide_by_edges.collide),
-    "pair by volumes": _pair(collide_by_volumes.collide),
+    "pair by vertices": _pair(collision.by_vertices),
+    "pair by edges": _pair(collision.by_edges),
+    "pair by volumes": _pair(collision.by_volumes),
 }

@@ -1,32 +1,26 @@
-"""The textbook's own methods in plain float64, one file each: contenders in the report, never the default.
+"""The textbook's own methods in plain float64: contenders in the report, never the default.
 
-Source of all: section 22.4 of the chapter on computer graphics in Algorithms of Informatics. Each file says what goes
-wrong. They take plain arrays, do not check them, and never raise; where the textbook's loop may not end it is capped.
+Source of all: section 22.4 of the chapter on computer graphics in Algorithms of Informatics. Each function says what
+goes wrong. They take plain arrays, do not check them, and never raise; where the textbook's loop may not end it is
+capped.
 
-| textbook | file |
+| textbook | function |
 | --- | --- |
-| implicit solid f >= 0 | implicit.py |
-| half-space; clipping points | half_space.py |
-| convex polyhedron by half-spaces | convex.py |
-| polyhedron by the parity of a half-line | polyhedron_ray_parity.py (the intersection: ray_triangle.py) |
-| "find another half line" | polyhedron_recast.py |
-| polygon by the parity of a half-line | polygon_ray_parity.py |
-| convex polygon by the sum of angles, signed and unsigned | polygon_angle_sum.py |
-| convex polygon by the same side of all edges | polygon_same_side.py |
-| triangle in space by cross and scalar products | triangle_cross_dot.py |
-| triangle on the projection of largest area | triangle_projection.py |
-| polyhedra: vertices in the other, both ways | collide_by_vertices.py |
-| polyhedra: edges against faces | collide_by_edges.py |
-| bounding volumes first | collide_by_volumes.py |
-| segment on a half-space | segment_half_space.py |
-| Sutherland-Hodgman; multiply connected; cascade | sutherland_hodgman.py |
-| Cohen-Sutherland on a box | cohen_sutherland.py |
-| exercise 2: CSG tree | csg_tree.py |
-| exercise 3: polygon on a concave polygon | greiner_hormann.py |
-| exercise 4: bounding sphere and box | bounding_volumes.py |
-| exercise 5: two triangles in the plane | triangles_in_plane.py |
-| exercise 6: Cohen-Sutherland on a convex polyhedron | convex_cohen_sutherland.py |
-| exercise 7: segment on a sphere | segment_sphere.py |
+| implicit solid f >= 0; half-space; clipping points | solids.in_implicit, in_half_space, clip_points |
+| convex polyhedron by half-spaces; exercise 2: CSG tree | solids.in_convex, in_csg_tree |
+| polyhedron by the parity of a half-line; "find another half line" | polyhedra.by_half_line, by_other_half_lines |
+| polygon by the parity of a half-line | polygons.by_half_line |
+| convex polygon by the sum of angles, signed and unsigned | polygons.by_signed_angles, by_unsigned_angles |
+| convex polygon by the same side of all edges | polygons.by_same_side |
+| triangle in space by cross and scalar products | triangles.by_products |
+| triangle on the projection of largest area | triangles.by_projection |
+| polyhedra: vertices in the other, edges against faces | collision.by_vertices, by_edges |
+| bounding volumes first; exercise 4: bounding sphere and box | collision.by_volumes, bounding_sphere |
+| exercise 5: two triangles in the plane | collision.of_triangles |
+| segment on a half-space; exercise 7: on a sphere | clip_segments.on_half_space, on_sphere |
+| Cohen-Sutherland on a box; exercise 6: on a convex polyhedron | clip_segments.on_box, on_convex |
+| Sutherland-Hodgman; multiply connected; cascade | clip_polygons.clip_contour, clip_polygon, on_convex |
+| exercise 3: polygon on a concave polygon | greiner_hormann.intersection |
 
 Exercise 1, collision in less than quadratic time, is what engine.collision does.
 """

@@ -1,8 +1,8 @@
 """The textbook's clipping as careful code without exactness has it: scalars in the loop, nothing allocated there.
 
-The same steps as cohen_sutherland.py, segment_sphere.py and sutherland_hodgman.py, written out for speed; on planes one
-pass over the rows (Cyrus and Beck) in place of a code word after every cut. The yardstick of the tables of clipping:
-what exact decisions and correct rounding cost is the time of these.
+The same steps as clip_segments.py and clip_polygons.py, written out for speed; on planes one pass over the rows (Cyrus
+and Beck) in place of a code word after every cut. The yardstick of the tables of clipping: what exact decisions and
+correct rounding cost is the time of these.
 What goes wrong: the same as there.
 """
 
@@ -17,7 +17,7 @@ from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.jit import inline, kernel
 from engine.predicates.loading import as_point2, as_point3
 from engine.predicates.vectors import along
-from engine.textbook.cohen_sutherland import ACCEPTED, MAX_TURNS, REJECTED, UNFINISHED
+from engine.textbook.clip_segments import ACCEPTED, MAX_TURNS, REJECTED, UNFINISHED
 from engine.types import Point2, Point3
 
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from engine.arrays import FloatArray
-from engine.textbook.polygon_ray_parity import contains
+from engine.textbook.polygons import by_half_line
 
 
 @dataclass(slots=True, eq=False)
@@ -48,7 +48,7 @@ def link(ring: FloatArray, crossings: list[Node], other: FloatArray) -> list[Nod
     """Return the nodes of a ring in order, linked, crossings marked as entry into `other` or exit from it."""
     nodes = [Node(float(x), float(y), (i, 0.0)) for i, (x, y) in enumerate(ring)]
     nodes = sorted(nodes + crossings, key=lambda node: node.at)
-    inside = bool(contains(ring[:1], other, np.array([0, len(other)]))[0])
+    inside = bool(by_half_line(ring[:1], other, np.array([0, len(other)]))[0])
     for node, following in zip(nodes, nodes[1:] + nodes[:1]):
         node.after, following.before = following, node
         if node.twin is not None:
@@ -83,7 +83,7 @@ def intersection(subject: FloatArray, clip: FloatArray) -> list[FloatArray]:
 
 def _without_crossings(subject: FloatArray, clip: FloatArray) -> list[FloatArray]:
     for inner, outer in ((subject, clip), (clip, subject)):
-        if contains(inner[:1], outer, np.array([0, len(outer)]))[0]:
+        if by_half_line(inner[:1], outer, np.array([0, len(outer)]))[0]:
             return [inner]
     return []
 

@@ -8,24 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray
-from engine.textbook import (
-    cohen_sutherland,
-    collide_by_edges,
-    collide_by_vertices,
-    collide_by_volumes,
-    convex,
-    convex_cohen_sutherland,
-    half_space,
-    polygon_angle_sum,
-    polygon_ray_parity,
-    polygon_same_side,
-    polyhedron_ray_parity,
-    segment_half_space,
-    segment_sphere,
-    sutherland_hodgman,
-    triangle_cross_dot,
-    triangle_projection,
-)
+from engine.textbook import clip_polygons, clip_segments, collision, polygons, polyhedra, solids, triangles
 
 Methods = dict[str, tuple[Callable[..., Any], int]]
 """For each name how to ask, and how many steps an item takes."""
@@ -39,15 +22,15 @@ def of_points(solid: Any) -> Methods:
     """Return what tells of points (n, dim) whether a solid contains them."""
     match solid.type:
         case "half_space":
-            return {"half-space": (lambda points: half_space.contains(points, solid.normal, solid.offset), 1)}
+            return {"half-space": (lambda points: solids.in_half_space(points, solid.normal, solid.offset), 1)}
         case "convex":
-            return {"half-spaces": (lambda points: convex.contains(points, solid.planes), len(solid.planes))}
+            return {"half-spaces": (lambda points: solids.in_convex(points, solid.planes), len(solid.planes))}
         case "polyhedron":
             rest = solid.vertices, solid.triangles, AHEAD
-            return {"half-line": (lambda points: polyhedron_ray_parity.contains(points, *rest), len(rest[1]))}
+            return {"half-line": (lambda points: polyhedra.by_half_line(points, *rest), len(rest[1]))}
         case "triangle" if solid.dimension == 3:
-            both = {"cross and dot products": triangle_cross_dot, "projection": triangle_projection}
-            return {name: (lambda points, of=of: of.contains(points, solid.vertices), 1) for name, of in both.items()}
+            both = {"cross and dot products": triangles.by_products, "projection": triangles.by_projection}
+            return {name: (lambda points, of=of: of(points, solid.vertices), 1) for name, of in both.items()}
         case "triangle" | "polygon":
             return _of_rings(solid.vertices, getattr(solid, "ring_offsets", np.array([0, len(solid.vertices)])))
     return {}
@@ -55,21 +38,21 @@ def of_points(solid: Any) -> Methods:
 
 def _of_rings(vertices: FloatArray, offsets: Any) -> Methods:
     n = len(vertices)
-    found: Methods = {"half-line": (lambda points: polygon_ray_parity.contains(points, vertices, offsets), n)}
+    found: Methods = {"half-line": (lambda points: polygons.by_half_line(points, vertices, offsets), n)}
     if len(offsets) == 2:  # these are for convex polygons; for others they are wrong by more than rounding
-        found["signed angles"] = lambda points: polygon_angle_sum.contains_signed(points, vertices), n
-        found["unsigned angles"] = lambda points: polygon_angle_sum.contains_unsigned(points, vertices, ANGLES), n
-        found["same side"] = lambda points: polygon_same_side.contains(points, vertices), n
+        found["signed angles"] = lambda points: polygons.by_signed_angles(points, vertices), n
+        found["unsigned angles"] = lambda points: polygons.by_unsigned_angles(points, vertices, ANGLES), n
+        found["same side"] = lambda points: polygons.by_same_side(points, vertices), n
     return found
 
 
 def of_segments(region: Any) -> Methods:
     """Return what clips segments (n, 2, dim): rows of both ends, NaN where nothing is kept."""
     kernels: dict[str, tuple[str, Any, tuple[str, ...]]] = {
-        "half_space": ("half-space", segment_half_space.clip, ("normal", "offset")),
-        "aabb": ("Cohen-Sutherland", cohen_sutherland.clip, ("min", "max")),
-        "convex": ("Cohen-Sutherland by planes", convex_cohen_sutherland.clip, ("planes",)),
-        "sphere": ("quadratic", segment_sphere.clip, ("center", "radius")),
+        "half_space": ("half-space", clip_segments.on_half_space, ("normal", "offset")),
+        "aabb": ("Cohen-Sutherland", clip_segments.on_box, ("min", "max")),
+        "convex": ("Cohen-Sutherland by planes", clip_segments.on_convex, ("planes",)),
+        "sphere": ("quadratic", clip_segments.on_sphere, ("center", "radius")),
     }
     if region.type not in kernels:
         return {}
@@ -98,7 +81,7 @@ def of_polygons(region: Any) -> Methods:
             return {}
 
     def ask(polygons: FloatArray) -> BoolArray:
-        return np.array([bool(sutherland_hodgman.clip_on_convex([ring], rows)) for ring in polygons], np.bool_)
+        return np.array([bool(clip_polygons.on_convex([ring], rows)) for ring in polygons], np.bool_)
 
     return {"Sutherland-Hodgman": (ask, 4096 * len(rows))}
 
@@ -109,6 +92,9 @@ def of_pairs(first: Any, second: Any) -> Methods:
         return {}
     meshes = first.vertices, first.triangles, second.vertices, second.triangles
     n_steps = max(len(meshes[0]) * len(meshes[3]), len(meshes[2]) * len(meshes[1]))
-    shown = {"vertices in the other": collide_by_vertices, "edges through faces": collide_by_edges,
-             "volumes first": collide_by_volumes}  # fmt: skip
-    return {name: (lambda of=of: bool(of.collide(*meshes)), n_steps) for name, of in shown.items()}
+    shown: dict[str, Callable[..., bool]] = {
+        "vertices in the other": collision.by_vertices,
+        "edges through faces": collision.by_edges,
+        "volumes first": collision.by_volumes,
+    }
+    return {name: (lambda of=of: bool(of(*meshes)), n_steps) for name, of in shown.items()}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import engine
-from engine.textbook import cohen_sutherland, polygon_ray_parity
+from engine.textbook import clip_segments, polygons
 
 CORNERS = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 FACES = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
@@ -30,7 +30,7 @@ def test_points_differ_where_the_book_differs() -> None:
         assert np.array_equal(found.differing, np.flatnonzero(found.exact != found.plain))
         assert len(found.inexact) == 0
         assert min(found.seconds_exact, found.seconds_plain) > 0
-    plain = polygon_ray_parity.contains(points, polygon.vertices, polygon.ring_offsets)
+    plain = polygons.by_half_line(points, polygon.vertices, polygon.ring_offsets)
     assert np.array_equal(engine.compare("contains", points, polygon).plain, plain)
     assert len(engine.compare("contains", points, polygon).differing) > 0
 
@@ -40,7 +40,7 @@ def test_segments_differ_in_what_is_kept_and_in_coordinates() -> None:
     corners, reach = np.array([0.1, 0.9]), source.uniform(0.1, 1.0, (300, 2))
     segments = np.stack([corners - reach, corners + reach * source.uniform(0.5, 2.0, (300, 1))], axis=1)
     found = engine.compare("clip_segments", segments, box)
-    clipped, kept = cohen_sutherland.clip(segments, box.min, box.max)
+    clipped, kept = clip_segments.on_box(segments, box.min, box.max)
     exact = np.zeros(300, bool)
     exact[engine.clip_segments(segments, box).source] = True
     assert np.array_equal(found.differing, np.flatnonzero((kept == 1) != exact))

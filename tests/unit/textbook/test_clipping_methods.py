@@ -5,16 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from engine.textbook import (
-    clip_batches,
-    cohen_sutherland,
-    convex_cohen_sutherland,
-    greiner_hormann,
-    segment_half_space,
-    segment_sphere,
-    sutherland_hodgman,
-)
-from engine.textbook.cohen_sutherland import ACCEPTED, REJECTED, UNFINISHED
+from engine.textbook import clip_batches, clip_polygons, clip_segments, greiner_hormann
+from engine.textbook.clip_segments import ACCEPTED, REJECTED, UNFINISHED
 from tests.reference.overlay import overlay, signed_area
 from tests.reference.segments import clip_segment
 from tests.reference.shapes import aabb, polygon, sphere
@@ -37,17 +29,17 @@ def assert_equal_to_reference(segments: np.ndarray, clipped: np.ndarray, kept: n
 
 def test_segment_on_half_space() -> None:
     segments = np.array([[[0.0, 0.0], [4.0, 0.0]], [[2.0, 1.0], [3.0, 1.0]], [[0.0, 0.0], [1.0, 1.0]]])
-    clipped, kept = segment_half_space.clip(segments, np.array([1.0, 0.0]), -1.5)
+    clipped, kept = clip_segments.on_half_space(segments, np.array([1.0, 0.0]), -1.5)
     assert kept.tolist() == [True, True, False]
     assert clipped[0].tolist() == [[1.5, 0.0], [4.0, 0.0]]
-    clipped, _ = segment_half_space.clip(segments[:, ::-1].copy(), np.array([1.0, 0.0]), -1.5)
+    clipped, _ = clip_segments.on_half_space(segments[:, ::-1].copy(), np.array([1.0, 0.0]), -1.5)
     assert clipped[0].tolist() == [[4.0, 0.0], [1.5, 0.0]]
 
 
 @pytest.mark.parametrize("dim", [2, 3])
 def test_cohen_sutherland(dim: int) -> None:
     segments = scattered(150, dim)
-    clipped, status = cohen_sutherland.clip(segments, LOW[:dim], HIGH[:dim])
+    clipped, status = clip_segments.on_box(segments, LOW[:dim], HIGH[:dim])
     assert_equal_to_reference(segments, clipped, status == ACCEPTED, aabb([0] * dim, [4] * dim))
     assert 0 < (status == REJECTED).sum() < 150
 
@@ -55,14 +47,14 @@ def test_cohen_sutherland(dim: int) -> None:
 def test_cohen_sutherland_never_ends() -> None:
     """The cut point is rounded to just below the plane it was put on, again and again."""
     segment = np.array([[[1.0, 1.0], [-1.0, -1.0]]])
-    _, status = cohen_sutherland.clip(segment, np.array([1e-9, 1e-9]), np.array([3.0, 3.0]))
+    _, status = clip_segments.on_box(segment, np.array([1e-9, 1e-9]), np.array([3.0, 3.0]))
     assert status[0] == UNFINISHED
     assert clip_segment(segment[0].tolist(), aabb([1e-9, 1e-9], [3, 3]))
 
 
 def test_cohen_sutherland_accepts_what_misses_a_corner() -> None:
     segment = np.array([[[-7.5, 4.0], [6.0, -3.2]]])
-    _, status = cohen_sutherland.clip(segment, np.zeros(2), np.full(2, 9.0))
+    _, status = clip_segments.on_box(segment, np.zeros(2), np.full(2, 9.0))
     assert status[0] == ACCEPTED
     assert clip_segment(segment[0].tolist(), aabb([0, 0], [9, 9])) == []
 
@@ -71,7 +63,7 @@ def test_convex_cohen_sutherland() -> None:
     rows = [[1, 0, 0, 0], [-1, 0, 0, 4], [0, 1, 0, 0], [0, -1, 0, 4], [0, 0, 1, 0], [0, 0, -1, 4]]
     planes = np.array([*rows, [-1, -1, -1, 8]], float)
     segments = scattered(150, 3)
-    clipped, status = convex_cohen_sutherland.clip(segments, planes)
+    clipped, status = clip_segments.on_convex(segments, planes)
     done = status != UNFINISHED
     region = {"type": "convex", "planes": planes.tolist()}
     assert_equal_to_reference(segments[done], clipped[done], status[done] == ACCEPTED, region)
@@ -81,40 +73,40 @@ def test_convex_cohen_sutherland() -> None:
 def test_convex_cohen_sutherland_fails_to_end_often() -> None:
     planes = np.array([[3.0, 1.0, -1.0], [-1.0, 3.0, -1.1], [-1.0, -1.0, 7.3]])
     segment = np.array([[[3.4000000000000004, 1.7000000000000002], [-4.4, -4.2]]])
-    assert convex_cohen_sutherland.clip(segment, planes)[1][0] == UNFINISHED
-    _, status = convex_cohen_sutherland.clip(scattered(2000, 2), planes)
+    assert clip_segments.on_convex(segment, planes)[1][0] == UNFINISHED
+    _, status = clip_segments.on_convex(scattered(2000, 2), planes)
     assert (status == UNFINISHED).mean() > 0.02
 
 
 @pytest.mark.parametrize("dim", [2, 3])
 def test_segment_on_sphere(dim: int) -> None:
     segments = scattered(150, dim)
-    clipped, kept = segment_sphere.clip(segments, np.full(dim, 2.0), 3.0)
+    clipped, kept = clip_segments.on_sphere(segments, np.full(dim, 2.0), 3.0)
     assert_equal_to_reference(segments, clipped, kept, sphere([2] * dim, 3))
     points = np.array([[[2.0] * dim] * 2, [[9.0] * dim] * 2])
-    assert segment_sphere.clip(points, np.full(dim, 2.0), 3.0)[1].tolist() == [True, False]
+    assert clip_segments.on_sphere(points, np.full(dim, 2.0), 3.0)[1].tolist() == [True, False]
 
 
 def test_segment_on_sphere_is_wrong_beside_a_tangent() -> None:
     segment, center, radius = [[0.7000000000000001, 1.6], [9.1, 7.5]], [5.4, 0.4], 3.683394093369894
-    assert segment_sphere.clip(np.array([segment]), np.array(center), radius)[1][0]
+    assert clip_segments.on_sphere(np.array([segment]), np.array(center), radius)[1][0]
     assert clip_segment(segment, sphere(center, radius)) == []
 
 
 def test_sutherland_hodgman() -> None:
     triangle = np.array([[0.0, 0.0], [4.0, 0.0], [0.0, 4.0]])
     planes = np.array([[1.0, 0.0, -1.0], [0.0, 1.0, -1.0]])
-    (contour,) = sutherland_hodgman.clip_on_convex([triangle], planes)
+    (contour,) = clip_polygons.on_convex([triangle], planes)
     assert contour.tolist() == [[3.0, 1.0], [1.0, 3.0], [1.0, 1.0]]
-    assert sutherland_hodgman.clip_polygon([triangle], np.array([1.0, 0.0]), -9.0) == []
+    assert clip_polygons.clip_polygon([triangle], np.array([1.0, 0.0]), -9.0) == []
 
 
 def test_sutherland_hodgman_leaves_bridges_and_clips_holes() -> None:
     comb = np.array([[0, 0], [3, 0], [3, 3], [2, 3], [2, 1], [1, 1], [1, 3], [0, 3]], float)
-    (left,) = sutherland_hodgman.clip_polygon([comb], np.array([0.0, 1.0]), -2.0)
+    (left,) = clip_polygons.clip_polygon([comb], np.array([0.0, 1.0]), -2.0)
     assert len(left) == 8  # two parts, one ring
     frame = [np.array([[0, 0], [6, 0], [6, 6], [0, 6]], float), np.array([[2, 2], [4, 2], [4, 4], [2, 4]], float)]
-    outer, hole = sutherland_hodgman.clip_polygon(frame, np.array([1.0, 0.0]), -3.0)
+    outer, hole = clip_polygons.clip_polygon(frame, np.array([1.0, 0.0]), -3.0)
     assert (signed_area(outer.tolist()), signed_area(hole.tolist())) == (18, 2)
 
 
@@ -122,7 +114,7 @@ def test_sutherland_hodgman_keeps_what_an_earlier_step_rounded() -> None:
     """The exact crossing is outside the second plane by less than an ulp; its rounded stand-in is on it."""
     triangle = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 3.0]])
     third = -1.0 / 3.0
-    (contour,) = sutherland_hodgman.clip_on_convex([triangle], np.array([[0.0, 1.0, -1.0], [1.0, 0.0, 2 * third]]))
+    (contour,) = clip_polygons.on_convex([triangle], np.array([[0.0, 1.0, -1.0], [1.0, 0.0, 2 * third]]))
     assert len(contour) >= 1
     assert contour[:, 0].min() == 2.0 / 3.0  # the exact 2/3 is larger than the double: a whole sliver was kept
 
@@ -155,16 +147,16 @@ def test_batches_do_what_the_plain_methods_do(dim: int) -> None:
     rng = np.random.default_rng(dim)
     segments, low, high = rng.uniform(-2, 2, (400, 2, dim)), np.full(dim, -1.0), np.full(dim, 1.0)
     on_box = clip_batches.clip_on_box_2d if dim == 2 else clip_batches.clip_on_box_3d
-    plain, fast = cohen_sutherland.clip(segments, low, high), on_box(segments, low, high)
+    plain, fast = clip_segments.on_box(segments, low, high), on_box(segments, low, high)
     settled = plain[1] != UNFINISHED  # some never end; setting the cut coordinate helps the batches
     np.testing.assert_array_equal(plain[1][settled], fast[1][settled])
     np.testing.assert_allclose(plain[0][plain[1] == 1], fast[0][plain[1] == 1], atol=1e-12)
     if dim == 3:
         rows = np.c_[rng.normal(size=(9, 3)), np.ones(9)]
-        plain, fast = convex_cohen_sutherland.clip(segments, rows), clip_batches.clip_on_planes_3d(segments, rows)
+        plain, fast = clip_segments.on_convex(segments, rows), clip_batches.clip_on_planes_3d(segments, rows)
         settled = plain[1] != UNFINISHED
         np.testing.assert_array_equal(plain[1][settled] == 1, fast[1][settled])
-        plain, fast = segment_sphere.clip(segments, low, 1.0), clip_batches.clip_on_sphere_3d(segments, low, 1.0)
+        plain, fast = clip_segments.on_sphere(segments, low, 1.0), clip_batches.clip_on_sphere_3d(segments, low, 1.0)
         np.testing.assert_array_equal(plain[1], fast[1])
         np.testing.assert_allclose(plain[0][plain[1]], fast[0][plain[1]], atol=1e-12)
 
@@ -176,6 +168,6 @@ def test_rings_in_batches() -> None:
     offsets = np.concatenate([[0], np.cumsum([len(ring) for ring in rings])])
     vertices, ends = clip_batches.clip_rings_on_planes(np.concatenate(rings), offsets, rows)
     for i, ring in enumerate(rings):
-        expected = sutherland_hodgman.clip_on_convex([ring], rows)
+        expected = clip_polygons.on_convex([ring], rows)
         found = vertices[ends[i] : ends[i + 1]]
         np.testing.assert_allclose(found, expected[0] if expected else np.zeros((0, 3)), atol=1e-12)

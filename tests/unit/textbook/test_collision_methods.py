@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from engine.bounding.aabb import box_of_points
-from engine.textbook import bounding_volumes, collide_by_edges, collide_by_vertices, collide_by_volumes
-from engine.textbook.triangles_in_plane import collide as triangles_collide
+from engine.textbook import collision
 from tests.reference.bounds import exact_minimal_sphere
 from tests.reference.collision import DISJOINT, relation
 from tests.reference.exact import vector
@@ -36,14 +35,14 @@ def arrays(first: Solid, second: Solid) -> tuple[np.ndarray, ...]:
 )
 def test_vertices_and_edges(other: Solid, by_vertices: bool, by_edges: bool) -> None:
     """Neither test is enough alone: figure 22.25."""
-    assert collide_by_vertices.collide(*arrays(UNIT, other)) == by_vertices
-    assert collide_by_edges.collide(*arrays(UNIT, other)) == by_edges
+    assert collision.by_vertices(*arrays(UNIT, other)) == by_vertices
+    assert collision.by_edges(*arrays(UNIT, other)) == by_edges
     for pair in ((UNIT, other), (other, UNIT)):
-        assert collide_by_volumes.collide(*arrays(*pair)) == (relation(*pair) != DISJOINT)
+        assert collision.by_volumes(*arrays(*pair)) == (relation(*pair) != DISJOINT)
 
 
 def test_volumes_save_the_last_test() -> None:
-    assert not collide_by_volumes.collide(*arrays(UNIT, BESIDE))
+    assert not collision.by_volumes(*arrays(UNIT, BESIDE))
 
 
 def test_a_vertex_half_an_ulp_off_a_face_is_seen_to_touch_it() -> None:
@@ -51,22 +50,22 @@ def test_a_vertex_half_an_ulp_off_a_face_is_seen_to_touch_it() -> None:
     second = tetrahedron((0, 0, 0), (0.7, 0.1, 0.2), (0.1, 0.9, 0.3), (0.2, 0.3, 1.1))
     first = tetrahedron(tip, (2, 2, 2), (2, 2.5, 2), (2.5, 2, 2.1))
     assert relation(first, second) == DISJOINT
-    assert collide_by_volumes.collide(*arrays(first, second))
+    assert collision.by_volumes(*arrays(first, second))
 
 
 def test_boxes_and_spheres() -> None:
     low, high = box_of_points(np.array(UNIT["vertices"], float))
     assert (low.tolist(), high.tolist()) == ([0, 0, 0], [1, 1, 1])
-    assert bounding_volumes.boxes_meet(low, high, high, high + 1)
-    assert not bounding_volumes.boxes_meet(low, high, high + 1e-9, high + 1)
+    assert collision.boxes_meet(low, high, high, high + 1)
+    assert not collision.boxes_meet(low, high, high + 1e-9, high + 1)
     zero, x = np.zeros(3), np.array([3.0, 0.0, 0.0])
-    assert bounding_volumes.spheres_meet(zero, 1.0, x, 2.0)
-    assert not bounding_volumes.spheres_meet(zero, 1.0, x, 1.9)
+    assert collision.spheres_meet(zero, 1.0, x, 2.0)
+    assert not collision.spheres_meet(zero, 1.0, x, 1.9)
 
 
 def test_ritters_sphere_is_too_large() -> None:
     points = np.random.default_rng(2).normal(size=(12, 3))
-    center, radius = bounding_volumes.bounding_sphere(points)
+    center, radius = collision.bounding_sphere(points)
     assert (np.linalg.norm(points - center, axis=1) <= radius * (1 + 1e-15)).all()
     smallest = float(exact_minimal_sphere([vector(p) for p in points.tolist()])[1]) ** 0.5
     assert smallest * (1 + 1e-4) < radius < 1.25 * smallest
@@ -78,7 +77,7 @@ def test_triangles_in_the_plane() -> None:
     expected = [
         relation(polygon(a), polygon(b)) != DISJOINT for a, b in zip(first.tolist(), second.tolist(), strict=True)
     ]
-    assert triangles_collide(first, second).tolist() == expected
+    assert collision.of_triangles(first, second).tolist() == expected
 
 
 def test_triangles_in_the_plane_are_wrong_beside_an_edge() -> None:
@@ -86,4 +85,4 @@ def test_triangles_in_the_plane_are_wrong_beside_an_edge() -> None:
     first = [[0.0, 0.0], [0.3, 0.1], [0.3, -1.0]]
     second = [[0.1, 0.1 / 3.0 + 2.0**-57], [0.0, 1.0], [0.3, 1.0]]
     exact = relation(polygon(first), polygon(second)) != DISJOINT
-    assert triangles_collide(np.array([first]), np.array([second]))[0] != exact
+    assert collision.of_triangles(np.array([first]), np.array([second]))[0] != exact

@@ -7,19 +7,7 @@ from math import pi, tan
 import numpy as np
 import pytest
 
-from engine.textbook import (
-    convex,
-    csg_tree,
-    half_space,
-    implicit,
-    polygon_angle_sum,
-    polygon_ray_parity,
-    polygon_same_side,
-    polyhedron_ray_parity,
-    polyhedron_recast,
-    triangle_cross_dot,
-    triangle_projection,
-)
+from engine.textbook import polygons, polyhedra, solids, triangles
 from tests.reference.containment import locate, locate_many
 from tests.reference.shapes import box, polygon, reversed_faces, union_of
 from tests.reference.shapes import half_space as half_space_solid
@@ -37,7 +25,7 @@ def scattered(n: int, dim: int) -> np.ndarray:
 def test_implicit_sphere() -> None:
     powers = np.array([[0, 0, 0], [2, 0, 0], [0, 2, 0], [0, 0, 2]])
     points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.8, 0.8, 0.0]])
-    assert implicit.contains(points, powers, np.array([1.0, -1.0, -1.0, -1.0])).tolist() == [True, True, False]
+    assert solids.in_implicit(points, powers, np.array([1.0, -1.0, -1.0, -1.0])).tolist() == [True, True, False]
 
 
 def test_implicit_is_wrong_where_terms_cancel() -> None:
@@ -45,34 +33,34 @@ def test_implicit_is_wrong_where_terms_cancel() -> None:
     powers, coefficients = np.array([[1, 0], [2, 0], [0, 0]]), np.array([2.0, -1.0, -1.0])
     beside = np.array([[1.0 + 2.0**-30, 0.0]])
     terms = [{"powers": p, "coefficient": c} for p, c in zip(powers.tolist(), coefficients.tolist(), strict=True)]
-    assert implicit.contains(beside, powers, coefficients).tolist() == [True]
+    assert solids.in_implicit(beside, powers, coefficients).tolist() == [True]
     assert locate(beside[0].tolist(), {"type": "implicit", "terms": terms}) == -1
 
 
 def test_half_space() -> None:
     normal = np.array([0.0, 0.0, 1.0])
     points = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 2.0], [5.0, 5.0, 0.5]])
-    assert half_space.contains(points, normal, -1.0).tolist() == [True, True, False]
-    assert half_space.clip_points(points, normal, -1.0).tolist() == points[:2].tolist()
+    assert solids.in_half_space(points, normal, -1.0).tolist() == [True, True, False]
+    assert solids.clip_points(points, normal, -1.0).tolist() == points[:2].tolist()
 
 
 def test_half_space_is_wrong_beside_the_plane() -> None:
     normal, offset, point = [3.2, 1.5], -34.71000000000001, [6.300000000000001, 9.700000000000001]
-    assert half_space.contains(np.array([point]), np.array(normal), offset)[0]
+    assert solids.in_half_space(np.array([point]), np.array(normal), offset)[0]
     assert locate(point, half_space_solid(normal, offset)) == -1
 
 
 def test_convex() -> None:
     planes = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, -1.0, 2.0]])
-    assert convex.contains(np.array([[0.5, 0.5], [1.0, 1.0], [1.5, 1.0]]), planes).tolist() == [True, True, False]
+    assert solids.in_convex(np.array([[0.5, 0.5], [1.0, 1.0], [1.5, 1.0]]), planes).tolist() == [True, True, False]
 
 
 def test_polyhedron_parity_agrees_away_from_the_surface() -> None:
     points = scattered(200, 3)
     expected = [location > 0 for location in locate_many(points.tolist(), SHELL)]
-    assert polyhedron_ray_parity.contains(points, VERTICES, TRIANGLES, AHEAD).tolist() == expected
+    assert polyhedra.by_half_line(points, VERTICES, TRIANGLES, AHEAD).tolist() == expected
     directions = np.array([[0.0, 0.0, 1.0], AHEAD])
-    contained, unfinished = polyhedron_recast.contains(points, VERTICES, TRIANGLES, directions, 1e-9)
+    contained, unfinished = polyhedra.by_other_half_lines(points, VERTICES, TRIANGLES, directions, 1e-9)
     assert contained.tolist() == expected
     assert not unfinished.any()
 
@@ -80,9 +68,9 @@ def test_polyhedron_parity_agrees_away_from_the_surface() -> None:
 def test_polyhedron_parity_is_wrong_through_an_edge() -> None:
     """Straight up from (1, 1, 1) the half-line meets the diagonal of the top: both triangles are counted."""
     point, up = np.array([[1.0, 1.0, 1.0]]), np.array([0.0, 0.0, 1.0])
-    assert not polyhedron_ray_parity.contains(point, VERTICES, TRIANGLES, up)[0]
+    assert not polyhedra.by_half_line(point, VERTICES, TRIANGLES, up)[0]
     assert locate(point[0].tolist(), SHELL) == 1
-    contained, unfinished = polyhedron_recast.contains(point, VERTICES, TRIANGLES, np.array([up, AHEAD]), 1e-9)
+    contained, unfinished = polyhedra.by_other_half_lines(point, VERTICES, TRIANGLES, np.array([up, AHEAD]), 1e-9)
     assert contained[0]
     assert not unfinished[0]
 
@@ -90,24 +78,24 @@ def test_polyhedron_parity_is_wrong_through_an_edge() -> None:
 def test_recasting_cannot_finish_on_an_edge() -> None:
     """A point on an edge is close to it whatever the direction."""
     directions = np.random.default_rng(1).normal(size=(100, 3))
-    _, unfinished = polyhedron_recast.contains(np.array([[0.0, 0.0, 3.0]]), VERTICES, TRIANGLES, directions, 1e-9)
+    _, unfinished = polyhedra.by_other_half_lines(np.array([[0.0, 0.0, 3.0]]), VERTICES, TRIANGLES, directions, 1e-9)
     assert unfinished[0]
 
 
 def test_polygon_methods_agree_away_from_the_boundary() -> None:
     points = scattered(300, 2)
     expected = [location > 0 for location in locate_many(points.tolist(), polygon(PENTAGON.tolist()))]
-    assert polygon_ray_parity.contains(points, PENTAGON, np.array([0, 5])).tolist() == expected
-    assert polygon_same_side.contains(points, PENTAGON).tolist() == expected
-    assert polygon_same_side.contains(points, PENTAGON[::-1].copy()).tolist() == expected
-    assert polygon_angle_sum.contains_signed(points, PENTAGON).tolist() == expected
-    assert polygon_angle_sum.contains_unsigned(points, PENTAGON, 1e-9).tolist() == expected
+    assert polygons.by_half_line(points, PENTAGON, np.array([0, 5])).tolist() == expected
+    assert polygons.by_same_side(points, PENTAGON).tolist() == expected
+    assert polygons.by_same_side(points, PENTAGON[::-1].copy()).tolist() == expected
+    assert polygons.by_signed_angles(points, PENTAGON).tolist() == expected
+    assert polygons.by_unsigned_angles(points, PENTAGON, 1e-9).tolist() == expected
 
 
 def test_polygon_parity_with_a_hole() -> None:
     rings = np.array([[0, 0], [6, 0], [6, 6], [0, 6], [2, 2], [4, 2], [4, 4], [2, 4]], float)
     points = np.array([[1.0, 1.0], [3.0, 3.0], [7.0, 3.0]])
-    assert polygon_ray_parity.contains(points, rings, np.array([0, 4, 8])).tolist() == [True, False, False]
+    assert polygons.by_half_line(points, rings, np.array([0, 4, 8])).tolist() == [True, False, False]
 
 
 @pytest.mark.parametrize(
@@ -127,10 +115,10 @@ def test_polygon_methods_are_wrong_beside_an_edge(
 ) -> None:
     ring, points = np.array(vertices), np.array([point])
     found = {
-        "parity": lambda: polygon_ray_parity.contains(points, ring, np.array([0, 3])),
-        "side": lambda: polygon_same_side.contains(points, ring),
-        "signed": lambda: polygon_angle_sum.contains_signed(points, ring),
-        "unsigned": lambda: polygon_angle_sum.contains_unsigned(points, ring, 1e-9),
+        "parity": lambda: polygons.by_half_line(points, ring, np.array([0, 3])),
+        "side": lambda: polygons.by_same_side(points, ring),
+        "signed": lambda: polygons.by_signed_angles(points, ring),
+        "unsigned": lambda: polygons.by_unsigned_angles(points, ring, 1e-9),
     }[method]()
     assert (locate(point, polygon(vertices)) >= 0) == is_inside
     assert found[0] != is_inside
@@ -141,14 +129,14 @@ def test_the_unsigned_sum_needs_a_tolerance() -> None:
     ring = np.array([[-1.0, 0.0], [1.0, 0.0], [1.0, 2.0], [-1.0, 2.0]])
     for h in (1e-3, 1e-6):
         below, tolerance = np.array([[0.0, -h]]), 8.0 * tan(h) + 1e-12
-        assert polygon_angle_sum.contains_unsigned(below, ring, tolerance)[0]  # wrong: it is outside
-        assert not polygon_angle_sum.contains_unsigned(below, ring, 1e-7)[0]
-        assert not polygon_angle_sum.contains_signed(below, ring)[0]
+        assert polygons.by_unsigned_angles(below, ring, tolerance)[0]  # wrong: it is outside
+        assert not polygons.by_unsigned_angles(below, ring, 1e-7)[0]
+        assert not polygons.by_signed_angles(below, ring)[0]
     inside = np.random.default_rng(3).uniform((-0.9, 0.1), (0.9, 1.9), (200, 2))
-    without = polygon_angle_sum.contains_unsigned(inside, ring, 0.0)
+    without = polygons.by_unsigned_angles(inside, ring, 0.0)
     assert 0 < without.sum() < len(inside)  # without a tolerance rounding alone loses points of the inside
-    assert polygon_angle_sum.contains_unsigned(inside, ring, 1e-9).all()
-    assert polygon_angle_sum.unsigned_angle(0.0, 0.0, 1.0, 0.0) == pi
+    assert polygons.by_unsigned_angles(inside, ring, 1e-9).all()
+    assert polygons.unsigned_angle(0.0, 0.0, 1.0, 0.0) == pi
 
 
 def test_triangle_methods_agree() -> None:
@@ -159,22 +147,22 @@ def test_triangle_methods_agree() -> None:
     for order in ([0, 1, 2], [1, 0, 2]):
         for axes in ([0, 1, 2], [1, 2, 0], [2, 0, 1]):
             turned = np.ascontiguousarray(triangle[order][:, axes])
-            assert (triangle_cross_dot.contains(np.ascontiguousarray(points[:, axes]), turned) == expected).all()
-            assert (triangle_projection.contains(np.ascontiguousarray(points[:, axes]), turned) == expected).all()
+            assert (triangles.by_products(np.ascontiguousarray(points[:, axes]), turned) == expected).all()
+            assert (triangles.by_projection(np.ascontiguousarray(points[:, axes]), turned) == expected).all()
 
 
 def test_triangle_methods_are_wrong_beside_an_edge() -> None:
     triangle = [[8.8, 1.7000000000000002, 0.1], [1.9000000000000001, 9.8, 0.7], [1.9000000000000001, 4.9, 0.3]]
     point = [4.524423672699365, 6.719154819005095, 0.47178924585222914]
     assert locate(point, {"type": "triangle", "vertices": triangle}) == -1
-    assert triangle_cross_dot.contains(np.array([point]), np.array(triangle))[0]
-    assert triangle_projection.contains(np.array([point]), np.array(triangle))[0]
+    assert triangles.by_products(np.array([point]), np.array(triangle))[0]
+    assert triangles.by_projection(np.array([point]), np.array(triangle))[0]
 
 
 def test_prism_of_a_tiny_triangle_holds_everything() -> None:
     """The normal underflows to zero, and every product is >= 0."""
     tiny = np.array([[0.0, 0.0, 0.0], [1e-170, 0.0, 0.0], [0.0, 1e-170, 0.0]])
-    assert triangle_cross_dot.contains(np.array([[5.0, 5.0, 5.0]]), tiny)[0]
+    assert triangles.by_products(np.array([[5.0, 5.0, 5.0]]), tiny)[0]
 
 
 def test_csg_tree() -> None:
@@ -185,9 +173,9 @@ def test_csg_tree() -> None:
         return points[:, 0] >= 1.0
 
     points = np.array([[0.0], [1.5], [3.0], [2.0]])
-    assert csg_tree.contains(points, ("intersection", left, right)).tolist() == [False, True, False, True]
-    assert csg_tree.contains(points, ("union", left, right)).all()
+    assert solids.in_csg_tree(points, ("intersection", left, right)).tolist() == [False, True, False, True]
+    assert solids.in_csg_tree(points, ("union", left, right)).all()
     nested = ("difference", left, ("intersection", left, right))
-    assert csg_tree.contains(points, nested).tolist() == [True, False, False, False]
+    assert solids.in_csg_tree(points, nested).tolist() == [True, False, False, False]
     with pytest.raises(ValueError, match="'xor'"):
-        csg_tree.contains(points, ("xor", left, right))
+        solids.in_csg_tree(points, ("xor", left, right))

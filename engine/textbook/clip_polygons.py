@@ -15,7 +15,7 @@ import numpy as np
 
 from engine.arrays import FloatArray
 from engine.jit import kernel
-from engine.textbook.half_space import signed_distance
+from engine.textbook.solids import signed_distance
 
 
 @kernel
@@ -42,7 +42,7 @@ def clip_polygon(contours: list[FloatArray], normal: FloatArray, offset: float) 
     return [contour for contour in clipped if len(contour) > 0]
 
 
-def clip_on_convex(contours: list[FloatArray], planes: FloatArray) -> list[FloatArray]:
+def on_convex(contours: list[FloatArray], planes: FloatArray) -> list[FloatArray]:
     """Return what a convex polyhedron, given by rows (normal, offset), leaves of a polygon: one plane after another."""
     for row in planes:
         contours = clip_polygon(contours, row[:-1].copy(), float(row[-1]))
