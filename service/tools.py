@@ -12,6 +12,7 @@ from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, suppress
 from importlib.util import find_spec
 from typing import Any, Final
+from urllib.parse import quote
 
 import orjson
 from fastapi import FastAPI
@@ -51,8 +52,7 @@ class Tools:
     def __init__(self, app: FastAPI, settings: Settings) -> None:
         self._app = app
         self._most = min(_MOST, settings.max_body_bytes)
-        self._manager: Any = None
-        self._lock = asyncio.Lock()
+        self._manager: asyncio.Future[Any] | None = None
         self._ended = asyncio.Event()
         self._task: asyncio.Task[None] | None = None
 
@@ -62,20 +62,23 @@ class Tools:
             error = ServiceError("not_installed", "this service offers no tools; use its HTTP calls, /docs lists them")
             await problem(faults_of(error))(scope, receive, send)
             return
-        async with self._lock:
-            if self._manager is None:
-                began = asyncio.Event()
-                self._task = asyncio.create_task(self._hold(began))
-                await began.wait()
-        await self._manager.handle_request(scope, receive, send)
+        if self._manager is None or (self._manager.done() and self._manager.exception()):  # the last start failed
+            self._manager = asyncio.get_running_loop().create_future()
+            self._task = asyncio.create_task(self._hold(self._manager))
+        manager = await asyncio.shield(self._manager)  # who goes away takes it from nobody
+        await manager.handle_request(scope, receive, send)
 
-    async def _hold(self, began: asyncio.Event) -> None:
-        """Run the library's manager, which must be entered and left by one task."""
-        manager = await asyncio.to_thread(self._made)
-        async with manager.run():
-            self._manager = manager
-            began.set()
-            await self._ended.wait()
+    async def _hold(self, began: asyncio.Future[Any]) -> None:
+        """Run the library's manager, which must be entered and left by one task; hand it, or why not, to `began`."""
+        try:
+            manager = await asyncio.to_thread(self._made)
+            async with manager.run():
+                began.set_result(manager)
+                await self._ended.wait()
+        except Exception as error:
+            if began.done():
+                raise
+            began.set_exception(error)
 
     async def close(self) -> None:
         """End it."""
@@ -125,7 +128,10 @@ class Tools:
         if show is None or start is None:
             return "show and start are whole numbers, 0 or more", True
         for name in _parameters(path):
-            path = path.replace(f"{{{name}}}", str(given.pop(name, "")))
+            found = given.pop(name, None)
+            if not isinstance(found, str) or not found:
+                return f"{name} is missing: it is the id that the call which stored it answered with", True
+            path = path.replace(f"{{{name}}}", quote(found, safe=""))
         if path == "/v1/solids":
             given = given.get("solid", given)
         status, answer = await self._asked(path, orjson.dumps(given))

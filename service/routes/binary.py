@@ -9,10 +9,10 @@ from pydantic import WithJsonSchema
 
 import engine
 from service.body import OCTETS
-from service.convert import meshes, octets
+from service.convert import answers, meshes, octets
 from service.route import GeometryRoute
 from service.routes.base import responses
-from service.routes.solids import Id, keep
+from service.routes.solids import Id, put
 from service.schemas.solids import StoredSolidSummary
 from service.work import CallOf
 
@@ -74,4 +74,5 @@ def clip_segments_stored(solid_id: Id, question: Octets, call: CallOf) -> Any:
 def import_solid(question: Octets, format: Format, call: CallOf, type: MeshType = "polyhedron") -> StoredSolidSummary:
     """Keep a mesh from a file, vertices at equal coordinates merged, as `POST /v1/solids` keeps a solid. It must be
     closed unless it is to be a surface. Polygons are cut into triangles."""
-    return keep(meshes.to_solid(question, format, type, call), call)
+    solid = meshes.to_solid(question, format, type, call)
+    return answers.from_stored(put(solid, "solids", call), solid)

@@ -12,7 +12,7 @@ from service.convert import scenes as convert
 from service.route import GeometryRoute
 from service.routes.base import responses, router_of
 from service.routes.binary import Octets, answers_with
-from service.routes.solids import KNOWN
+from service.routes.solids import KNOWN, put
 from service.schemas.collision import CollideSceneResponse
 from service.schemas.containment import ContainsSceneResponse
 from service.schemas.scenes import (
@@ -49,10 +49,7 @@ def put_scene(question: SceneModel, call: CallOf) -> StoredSceneSummary:
     """Keep a scene, so that later questions can name it and find it prepared. The same bodies in the same places have
     the same id everywhere; it may leave the store when others need the room."""
     scene = convert.to_scene(question.bodies, call)
-    name, is_new = call.store.put(scene)
-    call.status = 201 if is_new else 200
-    call.headers.update({"Location": f"/v1/scenes/{name}", "ETag": f'"{name}"'})
-    return convert.from_stored(name, scene)
+    return convert.from_stored(put(scene, "scenes", call), scene)
 
 
 @lookup.get("/v1/scenes/{scene_id}", operation_id="get_scene", responses=KNOWN)

@@ -7,11 +7,11 @@ from typing import Annotated, Any, Final
 from fastapi import APIRouter, Path
 from starlette.responses import Response
 
-import engine
 from service.convert import answers, questions
 from service.route import GeometryRoute
 from service.routes.base import responses, router_of
 from service.schemas.solids import Solid, StoredSolidSummary
+from service.store import Kept
 from service.work import Call, CallOf
 
 router = router_of("solids")
@@ -32,15 +32,16 @@ Id = Annotated[str, Path(description="Name of a stored solid, from `POST /v1/sol
 def put_solid(question: Solid, call: CallOf) -> StoredSolidSummary:
     """Keep a solid, so that later requests can name it: `{"type": "stored", "id": ...}`. The same solid has the same
     id everywhere; it may leave the store when others need the room."""
-    return keep(questions.to_solid(question, call, ()), call)
+    solid = questions.to_solid(question, call, ())
+    return answers.from_stored(put(solid, "solids", call), solid)
 
 
-def keep(solid: engine.Solid, call: Call) -> StoredSolidSummary:
-    """Put `solid` into the store and say so."""
-    name, is_new = call.store.put(solid)
+def put(value: Kept, kind: str, call: Call) -> str:
+    """Put a solid or a scene into the store, say so, and return its name."""
+    name, is_new = call.store.put(value)
     call.status = 201 if is_new else 200
-    call.headers.update({"Location": f"{call.settings.root_path}/v1/solids/{name}", "ETag": f'"{name}"'})
-    return answers.from_stored(name, solid)
+    call.headers.update({"Location": f"{call.settings.root_path}/v1/{kind}/{name}", "ETag": f'"{name}"'})
+    return name
 
 
 @lookup.get("/v1/solids/{solid_id}", operation_id="get_solid", responses=KNOWN)

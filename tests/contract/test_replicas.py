@@ -129,9 +129,12 @@ def test_below_a_path_of_a_site_with_tls(tmp_path: Path) -> None:
                     client.get("/")
                     break
                 time.sleep(0.05)
-            stored = client.post("/geometry/v1/solids", json={"type": "sphere", "center": [0, 0], "radius": 1})
-            assert client.get(stored.headers["location"]).json() == stored.json()
-            assert stored.headers["strict-transport-security"]
+            disk = {"type": "sphere", "center": [0, 0], "radius": 1}
+            for kind, body in (("solids", disk), ("scenes", {"bodies": [{"solid": disk}]})):
+                stored = client.post(f"/geometry/v1/{kind}", json=body)
+                assert stored.headers["location"].startswith(f"/geometry/v1/{kind}/")
+                assert client.get(stored.headers["location"]).json() == stored.json()
+                assert stored.headers["strict-transport-security"]
             document = client.get("/geometry/openapi.json").json()
             assert document["servers"][0]["url"] == "/geometry"
             for page in ("/geometry", "/geometry/docs", "/geometry/playground/main.js", "/geometry/readyz"):

@@ -10,6 +10,7 @@ from typing import Any
 import anyio
 import httpx
 import pytest
+from fastapi import FastAPI
 
 from service import tools
 from service.app import create_app
@@ -73,6 +74,52 @@ def test_a_model_asks_about_a_stored_solid(service: Service) -> None:
     assert answers[3][1].startswith("wrong_dimension: ")
     assert "/points" in answers[4][1]
     assert "contains" in answers[6][1]
+
+
+@needs_mcp
+def test_a_model_asks_about_a_stored_scene(service: Service) -> None:
+    bodies = [{"solid": SPHERE}, {"solid": {**SPHERE, "center": [2, 0, 0]}}]
+    _, ((failed, text),) = talk(service.url, ("put_scene", {"bodies": bodies}))
+    assert not failed, text
+    scene, points = json.loads(text)["id"], {"points": [[1, 0, 0], [9, 0, 0]]}
+    _, answers = talk(
+        service.url,
+        ("contains_stored_scene", {"scene_id": scene, **points}),
+        ("collide_stored_scene", {"scene_id": scene}),
+        *(("contains_stored_scene", {**wrong, **points}) for wrong in ({}, {"scene_id": ""}, {"scene_id": 7})),
+        ("contains_stored_scene", {"scene_id": "../solids", **points}),
+        ("contains_stored_scene", {"scene_id": "0" * 64, **points}),
+    )
+    assert [failed for failed, _ in answers] == [False] * 2 + [True] * 5
+    held, met = (json.loads(text) for _, text in answers[:2])
+    assert held["bodies"]["items"] == [[0, 1], []]
+    assert met["pairs"]["items"] == [{"first": 0, "second": 1, "relation": "touching"}]
+    assert all(text.startswith("scene_id is missing") for _, text in answers[2:5])
+    assert all(text.startswith("unknown_scene: ") for _, text in answers[5:])
+
+
+@needs_mcp
+@pytest.mark.anyio
+async def test_tools_that_cannot_be_made_hold_nobody(client: httpx.AsyncClient, app: FastAPI) -> None:
+    """Everybody who waits is answered, and the next one tries again."""
+    head = {"Accept": "application/json", "Content-Type": "application/json"}
+    question = {"jsonrpc": "2.0", "id": 1, "method": "tools/list"}
+    made = app.state.tools._made
+    app.state.tools._made = lambda: {}["no such thing"]
+    answers: list[httpx.Response] = []
+
+    async def ask() -> None:
+        answers.append(await client.post("/mcp", json=question, headers=head))
+
+    with anyio.fail_after(60):
+        async with anyio.create_task_group() as group:
+            for _ in range(3):
+                group.start_soon(ask)
+        app.state.tools._made = made
+        await ask()
+    for answer in answers[:3]:
+        check_problem(answer, 500, "internal")
+    assert {tool["name"] for tool in answers[3].json()["result"]["tools"]} >= {"contains", "put_scene"}
 
 
 @needs_mcp
