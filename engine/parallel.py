@@ -201,17 +201,17 @@ class Budget:
             self._cancel.take(n_bytes)
 
 
-def check_options(workers: object, progress: object) -> None:
-    """Raise unless `workers` is a whole number from 1 or None, and `progress` callable or None.
-
-    Functions that use the pool get this from `run_chunks`; those that do not call it themselves.
-    """
+def check_options(workers: object, progress: object, **flags: object) -> None:
+    """Raise unless `workers` is a whole number from 1 or None, `progress` callable or None, and each flag a bool."""
     if workers is not None and (isinstance(workers, bool) or not isinstance(workers, (int, np.integer)) or workers < 1):
         raise InvalidInputError(
             f"workers must be at least 1, got {_shown(workers)}; leave it out for one per core", ("workers",)
         )
     if progress is not None and not callable(progress):
         raise InvalidInputError(f"progress must be callable or None, got {_shown(progress)}", ("progress",))
+    for name, flag in flags.items():
+        if flag is not True and flag is not False and not isinstance(flag, np.bool_):
+            raise InvalidInputError(f"{name} must be True or False, got {_shown(flag)}", (name,))
 
 
 def _shown(value: object) -> str:

@@ -196,8 +196,9 @@ def collide(
     if first_pose is not None or second_pose is not None:
         check_pose(first_pose, first, "first_pose")
         check_pose(second_pose, second, "second_pose")
-    if workers is not None or progress is not None:
-        check_options(workers, progress)
+    are_plain = type(report) is type(boolean) is type(witness) is type(detail) is bool
+    if workers is not None or progress is not None or not are_plain:
+        check_options(workers, progress, report=report, boolean=boolean, witness=witness, detail=detail)
     is_named = witness and not boolean
     if deadline is None and cancel is None and progress is None and not (detail or report):
         return collide_pair(first, second, first_pose, second_pose, Work(UNLIMITED, is_named, boolean))

@@ -22,7 +22,7 @@ from engine.collision.result import MESHES, Work
 from engine.collision.scenes.batches import convex_poses
 from engine.direct import entry_of
 from engine.errors import InvalidArrayError, WrongDimensionError
-from engine.parallel import Budget, Cancel, Progress, run_chunks
+from engine.parallel import Budget, Cancel, Progress, check_options, run_chunks
 from engine.solids.base import Solid
 from engine.solids.checks import as_floats
 from engine.solids.pose import Pose, check_rotations
@@ -68,6 +68,7 @@ def collide_poses(
     >>> collide_poses(box, box, turns, [[0.5, 0, 0], [1, 0, 0], [2, 0, 0]]).tolist()
     [3, 4, 0]
     """
+    check_options(workers, progress, report=report, witnesses=witnesses, boolean=boolean, detail=detail)
     pair_function(first, second)
     if detail:
         check_has_detail(((("first",), first), (("second",), second)), boolean)

@@ -26,7 +26,7 @@ from engine.collision.planar.outline import collide_outline_outline
 from engine.collision.result import Work
 from engine.errors import InvalidArrayError, WrongDimensionError
 from engine.jit import inline, kernel
-from engine.parallel import Budget, Cancel, Progress, run_chunks
+from engine.parallel import Budget, Cancel, Progress, check_options, run_chunks
 from engine.predicates.loading import as_point3
 from engine.predicates.orientation import orient2d
 from engine.solids.checks import as_point_groups
@@ -184,6 +184,7 @@ def collide_triangles(
     >>> collide_triangles([[[0, 0], [4, 0], [0, 4]]], [[[1, 1], [2, 1], [1, 2]]]).tolist()
     [2]
     """
+    check_options(workers, progress, report=report)
     a = as_point_groups(first, 3, None, ("first",))
     b = as_point_groups(second, 3, None, ("second",))
     if len(a) != len(b):

@@ -14,7 +14,7 @@ from engine.containment.at_once import located_at_once
 from engine.containment.cells.order import gathered
 from engine.containment.locators import locator_of
 from engine.errors import NotFiniteError
-from engine.parallel import Budget, Cancel, Options, Progress, run_chunks
+from engine.parallel import Budget, Cancel, Options, Progress, check_options, run_chunks
 from engine.solids.base import Solid
 from engine.solids.checks import as_points, check_finite
 from engine.types import Accuracy
@@ -67,10 +67,11 @@ def locate(
     >>> locate([[0.5, 0.5], [1.0, 0.2], [2.0, 2.0]], Aabb([0, 0], [1, 1])).tolist()
     [1, 0, -1]
     """
-    if workers is None and deadline is None and cancel is None and progress is None:
+    if workers is None and deadline is None and cancel is None and progress is None and isinstance(report, bool):
         found = located_at_once(points, solid)
         if found is not None:
             return (found[0], Accuracy("exact", None, len(found[0]), *found[1:])) if report else found[0]
+    check_options(workers, progress, report=report)
     choice = locator_of(solid)
     array = as_points(points, solid.dimension, must_be_finite=False)
     locations = np.empty(len(array), np.int8)
@@ -132,9 +133,10 @@ def contains(
     >>> contains([[3.0, 4.0], [3.1, 4.0]], Sphere([0, 0], 5)).tolist()
     [True, False]
     """
-    if not report:
+    if report is False:
         return locate(points, solid, workers=workers, deadline=deadline, cancel=cancel, progress=progress) >= 0
+    check_options(workers, progress, report=report)
     locations, accuracy = locate(
         points, solid, workers=workers, deadline=deadline, cancel=cancel, progress=progress, report=True
     )
-    return locations >= 0, accuracy
+    return (locations >= 0, accuracy) if report else locations >= 0

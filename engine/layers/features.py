@@ -27,7 +27,7 @@ from engine.errors import (
     WrongDimensionError,
 )
 from engine.layers.rows import NONE, Layer, LayerRows, Limits, dissolved, layer_of, overlay_rows
-from engine.parallel import Cancel
+from engine.parallel import Cancel, check_options
 from engine.polygon_overlay.polygon_arrays import Chosen, arrays_of
 from engine.polygon_overlay.union_all import union_all
 from engine.solids.checks import Where, as_points, shown
@@ -86,10 +86,11 @@ def overlay_features(
     Features with null geometry are kept with their properties where what is left of their layer is asked for.
     Raises: as there, with the path to what is at fault, and its id.
     """
+    check_options(None, None, report=report)
     limits = Limits(deadline, cancel)
     sides = [_collection(value, (name,)) for value, name in ((left, "left"), (right, "right"))]
     crs = [side.crs for side in sides if side.crs is not None]
-    if len(crs) == 2 and crs[0] != crs[1]:
+    if len(crs) == 2 and _key(crs[0], "crs") != _key(crs[1], "crs"):
         raise InvalidInputError("the crs of left and right differ; bring both layers into one", ("right", "crs"))
     layers = [_layer(side, (name,), limits) for side, name in zip(sides, ("left", "right"))]
     rows = overlay_rows(layers[0], layers[1], how, limits)
@@ -110,10 +111,11 @@ def dissolve_features(
 
     Groups stand in the order of their first features. Properties: those of `by`, and `count`, the features united.
     """
+    check_options(None, None, report=report)
     limits = Limits(deadline, cancel)
     side = _collection(layer, ("layer",))
     names = _checked_names(by)
-    keys = [json.dumps([each.get(name) for name in names], sort_keys=True, default=_listed) for each in side.properties]
+    keys = [_key([each.get(name) for name in names], "by") for each in side.properties]
     order = {key: k for k, key in enumerate(dict.fromkeys(keys if names else ["[]"]))}
     groups = np.array([order[key] for key in keys], np.int64)
     rows = dissolved(_layer(side, ("layer",), limits), groups, len(order), limits)
@@ -147,6 +149,7 @@ def locate_features(
 ) -> Answer:
     """Join each Point to the polygons that hold it, boundary included: a row each, with `boundary`, and properties of
     both; outside: also a row for a point that nothing holds."""
+    check_options(None, None, report=report, outside=outside)
     limits = Limits(deadline, cancel)
     sides = _collection(points, ("points",), ("Point",)), _collection(polygons, ("polygons",))
     there = [k for k, each in enumerate(sides[0].features) if each.get("geometry") is not None]
@@ -240,19 +243,19 @@ def _with_geometry(rows: LayerRows, told: Callable[[int], dict[str, Any]], crs: 
 
 def _collection(value: Any, where: Where, kinds: tuple[str, ...] = AREAS) -> _Collection:
     """Return a FeatureCollection whose features are of these kinds, or have null as geometry; coordinates unchecked."""
-    features = value.get("features") if isinstance(value, dict) else None
-    if not isinstance(features, list) or value.get("type") != "FeatureCollection":
+    features = value.get("features") if _type_of(value) == "FeatureCollection" else None
+    if not isinstance(features, list):
         raise InvalidInputError(f"{where[0]} must be a GeoJSON FeatureCollection, got {shown(value)}", where)
     for number, feature in enumerate(features):
-        if not isinstance(feature, dict) or feature.get("type") != "Feature":
+        if _type_of(feature) != "Feature":
             raise InvalidInputError(f"{where[0]}.features[{number}] is no Feature", (*where, "features", number))
         geometry, properties = feature.get("geometry"), feature.get("properties")
-        kind = geometry.get("type") if isinstance(geometry, dict) else None
-        if geometry is not None and not (isinstance(kind, str) and kind in kinds):
-            got = kind if isinstance(kind, str) else shown(geometry)
+        if geometry is not None and (kind := _type_of(geometry)) not in kinds:
+            got = kind or shown(geometry)
             raise _refused(UnsupportedSolidError, feature, number, where, f"is {got:.60}, not {' or '.join(kinds)}")
-        if properties is not None and not isinstance(properties, dict):
-            raise _refused(InvalidInputError, feature, number, where, "has properties that are no object")
+        if properties is not None and not (isinstance(properties, dict) and all(map(_is_text, properties))):
+            what = "has properties that are no object whose names are text"
+            raise _refused(InvalidInputError, feature, number, where, what)
     properties_of = [feature.get("properties") or {} for feature in features]
     try:
         json.dumps(properties_of, allow_nan=False, default=_listed)
@@ -267,6 +270,24 @@ def _collection(value: Any, where: Where, kinds: tuple[str, ...] = AREAS) -> _Co
                 what = f"has a property that JSON cannot hold: {error}"
                 raise _refused(InvalidInputError, features[number], number, where, what) from None
     return _Collection(features, properties_of, value.get("crs"))
+
+
+def _type_of(value: Any) -> str:
+    """Return the member `type` of a GeoJSON object; nothing if it has none."""
+    kind = value.get("type") if isinstance(value, dict) else None
+    return kind if isinstance(kind, str) else ""
+
+
+def _is_text(name: object) -> bool:
+    return isinstance(name, str)
+
+
+def _key(value: Any, name: str) -> str:
+    """Return a text that is one for equal JSON values."""
+    try:
+        return json.dumps(value, sort_keys=True, default=_listed)
+    except TypeError as error:
+        raise InvalidInputError(f"{name} compares a value that JSON cannot hold: {error}", (name,)) from None
 
 
 def _listed(value: Any) -> Any:

@@ -90,7 +90,8 @@ class Limits:
     """What is left of the time of one call, for the calls that it makes, and how the decisions of these came about."""
 
     def __init__(self, deadline: float | None, cancel: Cancel | None, workers: int | None = None) -> None:
-        self._end = None if deadline is None else time.monotonic() + deadline
+        seconds = Budget(deadline, cancel).deadline  # checks both
+        self._end = None if seconds is None else time.monotonic() + seconds
         self._cancel, self._workers = cancel, workers
         self._ulps, self._counts = 0.5, [0, 0, 0]
 

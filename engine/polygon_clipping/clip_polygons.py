@@ -132,6 +132,7 @@ def clip_polygons(
     >>> clipped.rings(0)[0].tolist()
     [[0.0, 0.0], [1.0, 0.0], [1.0, 3.0], [0.0, 4.0]]
     """
+    check_options(workers, progress, report=report)
     with Budget(deadline, cancel) as budget:
         planes = _planes(region, budget)
         contours = as_contours(polygons, region.dimension)
@@ -259,7 +260,6 @@ def _clip(
     """Clip every polygon; return the result, how many polygons needed more than the filter, and rational arithmetic."""
     vertices, ring_offsets, polygon_offsets, largest = contours
     n, dimension = len(polygon_offsets) - 1, vertices.shape[1]
-    check_options(workers, progress)
     status, may_have_bridges = np.zeros(n, np.int8), np.zeros(n, np.bool_)
     sizes = np.zeros(len(ring_offsets) - 1, np.int64)
     parts: dict[int, FloatArray] = {}

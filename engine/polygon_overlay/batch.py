@@ -11,7 +11,7 @@ import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, Int8Array, Int32Array, IntArray, read_only
 from engine.errors import InvalidArrayError, NotRepresentableError
-from engine.parallel import Budget, Cancel, Progress, run_chunks
+from engine.parallel import Budget, Cancel, Progress, check_options, run_chunks
 from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
 from engine.polygon_overlay.compiled.loading import LEFT_OUT, RingArrays
 from engine.polygon_overlay.found import NO_PAIRS, Found, chained, joined, one_pair, summed, taken
@@ -194,6 +194,7 @@ def overlay_batch(
     overlaid.
     """
     check_words(operation, output)
+    check_options(workers, progress, report=report)
     for solids, name in ((subjects, "subjects"), (clips, "clips")):
         if not isinstance(solids, (list, tuple, Chosen)):
             raise InvalidArrayError(f"{name} must be a list of polygons, got {type(solids).__name__}", (name,))

@@ -110,7 +110,7 @@ def overlay(
     """
     check_words(operation, output)
     first, second = rings_of(subject, "subject"), rings_of(clip, "clip")
-    check_options(workers, progress)
+    check_options(workers, progress, report=report)
     with _UNLIMITED if deadline is None and cancel is None else Budget(deadline, cancel) as budget:
         result, n_exact, n_rational = overlay_rings(first, second, operation, output, budget, UNNAMED, grid)
     if progress is not None:

@@ -75,7 +75,7 @@ def union_all(
     [[0.0, 0.0], [3.0, 0.0], [3.0, 1.0], [0.0, 1.0]]
     """
     check_words("union", output)
-    check_options(workers, progress)
+    check_options(workers, progress, report=report)
     if not isinstance(polygons, (list, tuple)):
         raise InvalidArrayError(f"polygons must be a list of polygons, got {type(polygons).__name__}", ("polygons",))
     rings, sources, starts = _together(polygons)

@@ -161,7 +161,7 @@ class Scene(Immutable):
         report: bool = False,
     ) -> SceneLocations | tuple[SceneLocations, Accuracy]:
         """Find for each point the bodies that hold it; all is as in `locate_scene`, which prepares anew each time."""
-        check_options(workers, progress)
+        check_options(workers, progress, report=report)
         array = as_points(points, self.solids[0].dimension if len(self) else None)
         with Budget(deadline, cancel) as budget:
             found, accuracy = locate_in(array, self._base.tables(array.shape[1], budget), budget, workers, progress)
@@ -194,7 +194,7 @@ class Scene(Immutable):
         colliding pairs are those of the scene before without a body of `poses`, and these.
         Raises: as `collide_scene`; IndexOutOfRangeError for a body that is not there.
         """
-        check_options(workers, progress)
+        check_options(workers, progress, report=report, witnesses=witnesses, boolean=boolean, detail=detail)
         asked = Asked(skip, only, gap, witnesses, boolean, detail)
         with Budget(deadline, cancel) as budget:
             if moved is None or not len(self):
@@ -294,7 +294,7 @@ class Scene(Immutable):
         >>> pieces.body.tolist(), pieces.t.tolist()
         ([1, 0], [[0.125, 0.25], [0.5, 0.75]])
         """
-        check_options(workers, progress)
+        check_options(workers, progress, report=report)
         if not isinstance(keep, str) or keep not in ("all", "first", "any"):
             raise InvalidOperationError(f"keep must be all, first or any, got {keep!r:.50}", ("keep",))
         array = as_point_groups(segments, 2, self.solids[0].dimension if len(self) else None, ("segments",))

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from engine.arrays import FloatArray, IntArray
 from engine.errors import UnsupportedSolidError
-from engine.parallel import Budget, Cancel, Options, Progress
+from engine.parallel import Budget, Cancel, Options, Progress, check_options
 from engine.predicates.scaling import balanced_rows
 from engine.segment_clipping.ball_cut import fill_on_sphere
 from engine.segment_clipping.ball_interval import decide_on_sphere
@@ -112,6 +112,7 @@ def clip_segments(
     >>> pieces.start.tolist(), pieces.end.tolist(), pieces.t.tolist(), pieces.faces.tolist()
     ([[0.0, 1.0]], [[2.0, 1.0]], [[0.25, 0.75]], [[0, 1]])
     """
+    check_options(workers, progress, report=report)
     method = method_for(region)
     array = as_point_groups(segments, 2, region.dimension, ("segments",), must_be_finite=False)  # kernels look at it
     with Budget(deadline, cancel) as budget:

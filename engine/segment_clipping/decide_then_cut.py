@@ -20,7 +20,7 @@ import numpy as np
 
 from engine.arrays import FloatArray, Int32Array, IntArray
 from engine.direct import entry_of
-from engine.parallel import Budget, Progress, check_options, run_chunks
+from engine.parallel import Budget, Progress, run_chunks
 from engine.predicates.scaling import exponent_of, scaled_back, shifted
 from engine.segment_clipping.exact_segments import Piece
 from engine.segment_clipping.pieces import Pieces, joined, room_for
@@ -81,7 +81,6 @@ def clip_on_convex(
 
     Raises: NotFiniteError.
     """
-    check_options(workers, progress)
     found = _clip_few(segments, method, budget, progress) if len(segments) <= _FEW else None
     if found is not None:
         return found

@@ -13,7 +13,7 @@ from typing import Any, Literal, Unpack, overload
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, IntArray
-from engine.parallel import Cancel, Options, Progress
+from engine.parallel import Cancel, Options, Progress, check_options
 from engine.segment_clipping.clip_segments import SegmentPieces, clip_segments
 from engine.solids.base import Solid
 from engine.solids.ragged import as_lines, within
@@ -103,6 +103,7 @@ def clip_lines(
     >>> pieces[0].tolist(), pieces.segments.tolist(), pieces.t.tolist(), pieces.faces.tolist()
     ([[0.0, 1.0], [1.0, 1.0], [1.0, 2.0]], [[0, 1]], [[0.5, 0.5]], [[0, 3]])
     """
+    check_options(workers, progress, report=report)
     dimension = getattr(region, "dimension", 2)  # what has none is refused below
     vertices, offsets = as_lines(lines, dimension)
     ends = offsets[1:][np.diff(offsets) > 0] - 1

@@ -73,7 +73,7 @@ def bounds(
         raise UnsupportedSolidError(
             f"bounds takes a solid, got {type(solid).__name__}; make one of {_TAKEN}", ("solid",)
         )
-    check_options(workers, progress)
+    check_options(workers, progress, report=report)
     with Budget(deadline, cancel) as budget:
         budget.check()
         result, accuracy = solid.prepared("bounds", lambda: _bounds_of(solid, budget), budget.check)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import datetime
+import inspect
 from collections.abc import Callable
 from decimal import Decimal
 from fractions import Fraction
@@ -21,6 +22,9 @@ POLYHEDRON = engine.Polyhedron(VERTICES, FACES)
 POLYGON = engine.Polygon([[[0, 0], [4, 0], [4, 3]]])
 POINT = [[0.1, 0.1, 0.1]]
 SEGMENT = [[[0, 0, 0], [1, 1, 1]]]
+NOTHING: dict[str, Any] = {"type": "FeatureCollection", "features": []}
+SQUARE = {"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [1, 1], [0, 0]]]}
+LAYER = {"type": "FeatureCollection", "features": [{"type": "Feature", "geometry": SQUARE, "properties": {"a": 1}}]}
 
 
 def nested(depth: int) -> list[Any]:
@@ -141,9 +145,32 @@ OPTIONS: dict[str, Callable[..., object]] = {
     "clip_polygons": lambda **given: engine.clip_polygons([], BOX, **given),
     "overlay": lambda **given: engine.overlay(POLYGON, POLYGON, **given),
     "collide": lambda **given: engine.collide(BOX, BOX, **given),
-    "collide_scene": lambda **given: engine.collide_scene([BOX], **given),
+    "collide_scene": lambda **given: engine.collide_scene([BOX, BOX], **given),
     "collide_triangles": lambda **given: engine.collide_triangles([], [], **given),
+    "collide_poses": lambda **given: engine.collide_poses(BOX, BOX, [np.eye(3)], [[0, 0, 0]], **given),
+    "clearance": lambda **given: engine.clearance(BOX, BOX, **given),
+    "clearance_poses": lambda **given: engine.clearance_poses(BOX, BOX, [np.eye(3)], [[0, 0, 0]], **given),
+    "clip_lines": lambda **given: engine.clip_lines([], BOX, **given),
+    "overlay_batch": lambda **given: engine.overlay_batch([POLYGON], [POLYGON], **given),
+    "union_all": lambda **given: engine.union_all([POLYGON], **given),
+    "Scene.locate": lambda **given: engine.Scene([BOX]).locate(POINT, **given),
+    "Scene.collide": lambda **given: engine.Scene([BOX, BOX]).collide(**given),
+    "Scene.clip_segments": lambda **given: engine.Scene([BOX]).clip_segments(SEGMENT, **given),
+    "overlay_features": lambda **given: engine.layers.overlay_features(LAYER, LAYER, **given),
+    "dissolve_features": lambda **given: engine.layers.dissolve_features(LAYER, **given),
+    "locate_features": lambda **given: engine.layers.locate_features(NOTHING, LAYER, **given),
 }
+
+
+def taken_by(name: str) -> set[str]:
+    """Return the parameters of a public function, or of a method of `Scene`."""
+    home, _, own = name.rpartition(".")
+    function = getattr(engine.Scene if home else engine, own, None) or getattr(engine.layers, own)
+    return set(inspect.signature(function).parameters)
+
+
+FLAGS = ("report", "boolean", "witness", "witnesses", "detail", "outside")
+FLAGGED = [(name, flag) for name, call in OPTIONS.items() for flag in FLAGS if flag in taken_by(name)]
 
 
 @pytest.mark.parametrize("call", CALLS.values(), ids=CALLS.keys())
@@ -159,9 +186,21 @@ def test_an_argument_is_taken_or_refused_with_a_short_message(call: Callable[[An
         assert 0 < len(message) < 700, name
 
 
+@pytest.mark.parametrize(("operation", "flag"), FLAGGED)
+def test_a_flag_is_a_bool(operation: str, flag: str) -> None:
+    for value in (True, False, np.True_, np.False_):
+        OPTIONS[operation](**{flag: value})
+    for name, value in MALFORMED.items():
+        if name != "true":
+            with pytest.raises(engine.InvalidInputError, match=f"^{flag} must be True or False, got "):
+                OPTIONS[operation](**{flag: value})
+
+
 @pytest.mark.parametrize("option", ["workers", "deadline", "cancel", "progress"])
 @pytest.mark.parametrize("call", OPTIONS.values(), ids=OPTIONS.keys())
 def test_an_option_is_taken_or_refused(call: Callable[..., object], option: str) -> None:
+    if option not in taken_by(next(name for name in OPTIONS if OPTIONS[name] is call)):
+        return
     for name, value in MALFORMED.items():
         if option == "progress" and callable(value):
             continue  # called, and then its own errors are the caller's

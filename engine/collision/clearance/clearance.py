@@ -80,7 +80,7 @@ def clearance(
     pair_function(first, second)
     check_pose(first_pose, first, "first_pose")
     check_pose(second_pose, second, "second_pose")
-    check_options(workers, progress)
+    check_options(workers, progress, report=report)
     least = None if at_least is None else checked_distance(at_least)
     if first_pose is not None and first_pose == second_pose:
         first_pose = second_pose = None  # as `collide_pair` does, so that the two agree

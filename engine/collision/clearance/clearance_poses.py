@@ -17,7 +17,7 @@ from engine.collision.collide import pair_function
 from engine.collision.collide_poses import as_poses, batch_of
 from engine.collision.meshes.mesh_arrays import STILL
 from engine.collision.meshes.placement import PoseArrays
-from engine.parallel import Budget, Cancel, Progress, run_chunks
+from engine.parallel import Budget, Cancel, Progress, check_options, run_chunks
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
 from engine.types import Accuracy
@@ -51,6 +51,7 @@ def clearance_poses(
     >>> clearance_poses(box, box, turns, [[0.5, 0, 0], [1.25, 0, 0], [4, 5, 0]]).tolist()
     [0.0, 0.25, 5.0]
     """
+    check_options(workers, progress, report=report)
     pair_function(first, second)
     least = None if at_least is None else checked_distance(at_least)
     poses = PoseArrays(*as_poses(rotations, translations, first.dimension), True)

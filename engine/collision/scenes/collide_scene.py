@@ -95,7 +95,7 @@ def collide_scene(
     >>> pairs.first.tolist(), pairs.second.tolist(), [Relation(code).label for code in pairs.relation]
     ([0], [1], ['touching'])
     """
-    check_options(workers, progress)
+    check_options(workers, progress, report=report, witnesses=witnesses, boolean=boolean, detail=detail)
     batches = SceneBatches(scene_bodies(solids, poses))
     asked = Asked(skip, only, gap, witnesses, boolean, detail)
     with Budget(deadline, cancel) as budget:

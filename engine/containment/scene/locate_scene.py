@@ -115,7 +115,7 @@ def locate_scene(
     ([0, 1, 3, 3], [0, 0, 1], [False, True, True])
     """
     check_bodies(solids, poses)
-    check_options(workers, progress)
+    check_options(workers, progress, report=report)
     array = as_points(points, solids[0].dimension if len(solids) else None)
     with Budget(deadline, cancel) as budget:
         found = locate_in(array, scene_of(solids, poses, array.shape[1], budget), budget, workers, progress)

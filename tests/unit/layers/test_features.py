@@ -226,6 +226,16 @@ def test_properties_that_json_cannot_hold_are_named() -> None:
     assert whole[0]["properties"] == {"n": 3, "m": [0, 1], "count": 1}
 
 
+def test_keys_that_are_no_text_are_named() -> None:
+    given = collection(layer(np.random.default_rng(1), 3, SIZE))
+    given["features"][1]["properties"] = {"a": 1, 2: "b"}
+    with pytest.raises(InvalidInputError, match=r"layer.features\[1\].* names are text"):
+        dissolve_features(given)
+    given["features"][1]["properties"] = {"a": {"b": 1, 2: 3}}
+    with pytest.raises(InvalidInputError, match=r"^by compares a value that JSON cannot hold"):
+        dissolve_features(given, ["a"])
+
+
 def test_deadline_and_arrays() -> None:
     rng = np.random.default_rng(7)
     sides = [collection(layer(rng, 40, SIZE)) for _ in range(2)]

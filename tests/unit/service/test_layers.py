@@ -21,6 +21,9 @@ LEFT, RIGHT = layer(RNG, 12, 9), layer(RNG, 9, 9)
 ONE: dict[str, Any] = collection(LEFT)
 OTHER: dict[str, Any] = collection(RIGHT)
 SIDES = {"left": ONE, "right": OTHER}
+AREA = ONE["features"][0]
+NUMBERS = list(range(2000))
+"""So many are read as an array."""
 
 
 async def test_rows_are_those_of_sets(client: httpx.AsyncClient) -> None:
@@ -64,6 +67,28 @@ async def test_integers_of_any_size_pass_through(client: httpx.AsyncClient) -> N
         ("overlay", {"operation": "xor"}, "invalid_request", "/operation"),
         ("overlay", {"right": {**OTHER, "crs": 1}, "left": {**ONE, "crs": 2}}, "invalid_input", "/right/crs"),
         ("overlay", {"right": {**OTHER, "features": [1]}}, "invalid_input", "/right/features/0"),
+        ("union", {"layer": {**ONE, "type": NUMBERS}}, "invalid_input", "/layer"),
+        ("union", {"layer": {**ONE, "features": NUMBERS}}, "invalid_input", "/layer"),
+        ("union", {"layer": {**ONE, "features": [{"type": NUMBERS}]}}, "invalid_input", "/layer/features/0"),
+        (
+            "union",
+            {"layer": {**ONE, "features": [{**AREA, "geometry": {"type": NUMBERS}}]}},
+            "unsupported_solid",
+            "/layer/features/0",
+        ),
+        (
+            "union",
+            {"layer": {**ONE, "features": [{**AREA, "properties": NUMBERS}]}},
+            "invalid_input",
+            "/layer/features/0",
+        ),
+        (
+            "overlay",
+            {"right": {**OTHER, "crs": NUMBERS}, "left": {**ONE, "crs": NUMBERS[1:]}},
+            "invalid_input",
+            "/right/crs",
+        ),
+        ("overlay", {"operation": NUMBERS}, "invalid_request", "/operation"),
         ("union", {"by": ["a", 1]}, "invalid_request", "/by/1"),
         ("contains", {"points": ONE}, "unsupported_solid", "/points/features/0"),
     ],
