@@ -12,8 +12,8 @@ import engine
 from benchmarks.answers.digest import digest
 from benchmarks.answers.draws import Draw
 
-Question = Callable[[int | None], tuple[int, Any]]
-"""Asked with a number of workers, returns how many questions it was and what goes into the hash."""
+Question = Callable[..., tuple[int, Any]]
+"""Asked with `workers`, a number of them, returns how many questions it was and what goes into the hash."""
 Drawn = Callable[[Draw], Iterator[Question]]
 
 
@@ -50,21 +50,37 @@ CHUNKS: dict[str, dict[str, Chunk]] = {}
 def answered(question: Question, workers: int | None) -> tuple[int, Any]:
     """Return the answer, an error's name, place and message if it is refused."""
     try:
-        return question(workers)
+        return question(workers=workers)
     except engine.EngineError as error:
         return 1, [type(error).__name__, error.code, list(error.where), str(error)]
 
 
-def family(operation: str, n_chunks: int) -> Callable[[Drawn], Drawn]:
+def family(operation: str, name: str, n_chunks: int, drawn: Drawn) -> None:
+    """Enter a family of questions under its name."""
+    for number in range(n_chunks):
+        chunk = Chunk(operation, f"{name}/{number}", drawn)
+        CHUNKS.setdefault(operation, {})[chunk.name] = chunk
+
+
+def drawn_by(operation: str, n_chunks: int) -> Callable[[Drawn], Drawn]:
     """Enter a family of questions; its name is that of the function."""
 
     def enter(drawn: Drawn) -> Drawn:
-        for number in range(n_chunks):
-            name = f"{drawn.__name__}/{number}"
-            CHUNKS.setdefault(operation, {})[name] = Chunk(operation, name, drawn)
+        family(operation, drawn.__name__, n_chunks, drawn)
         return drawn
 
     return enter
+
+
+def asker(ask: Callable[..., Any], names: str = "", accuracy: str = "decisions") -> Callable[..., tuple[int, Any]]:
+    """Return what asks an operation about many items: these columns of its answer and of what it says of itself."""
+
+    def asked(items: Any, *rest: Any, workers: int | None = None) -> tuple[int, Any]:
+        found, said = ask(items, *rest, workers=workers, report=True)
+        columns = [getattr(found, name) for name in names.split()] if names else [found]
+        return len(items), columns + [getattr(said, name) for name in accuracy.split()]
+
+    return asked
 
 
 class OrderMattersError(Exception):

@@ -4,33 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import partial
-from typing import Any
 
 import numpy as np
 
 import engine
 from benchmarks.answers import shapes, solids
-from benchmarks.answers.asking import Question, family
+from benchmarks.answers.asking import Question, asker, drawn_by, family
 from benchmarks.answers.draws import FAR_PLACES, NEAR_PLACES, Array, Draw, Place
 from benchmarks.answers.solids import Shape, points_about
 
-
-def segments_clipped(segments: Array, region: Any, workers: int | None) -> tuple[int, Any]:
-    pieces, accuracy = engine.clip_segments(segments, region, workers=workers, report=True)
-    found = [pieces.source, pieces.start, pieces.end, pieces.t, pieces.faces]
-    return len(segments), [*found, accuracy.decisions, accuracy.coordinates_ulp]
-
-
-def lines_clipped(lines: Any, region: Any, workers: int | None) -> tuple[int, Any]:
-    pieces, accuracy = engine.clip_lines(lines, region, workers=workers, report=True)
-    found = [pieces.source, pieces.vertices, pieces.offsets, pieces.segments, pieces.t, pieces.faces]
-    return len(lines), [*found, accuracy.decisions, accuracy.coordinates_ulp]
-
-
-def polygons_clipped(polygons: Any, region: Any, workers: int | None) -> tuple[int, Any]:
-    found, accuracy = engine.clip_polygons(polygons, region, workers=workers, report=True)
-    rings = [found.vertices, found.ring_offsets, found.polygon_offsets, found.contours]
-    return len(polygons), [*rings, found.status, found.may_have_bridges, accuracy.decisions, accuracy.coordinates_ulp]
+ROUNDED = "decisions coordinates_ulp"
+segments_clipped = asker(engine.clip_segments, "source start end t faces", ROUNDED)
+lines_clipped = asker(engine.clip_lines, "source vertices offsets segments t faces", ROUNDED)
+polygons_clipped = asker(
+    engine.clip_polygons, "vertices ring_offsets polygon_offsets contours status may_have_bridges", ROUNDED
+)
 
 
 def _segments(draw: Draw, targets: Array, n: int) -> Array:
@@ -47,24 +35,16 @@ def _segments(draw: Draw, targets: Array, n: int) -> Array:
 
 
 def _on_regions(draw: Draw, places: tuple[Place, ...], n: int) -> Iterator[Question]:
-    for dimension, makers in solids.REGIONS.items():
-        for maker in makers:
-            shape = maker(draw, dimension, draw.pick(places))
-            some = n // 4 if maker in (solids.polygon, solids.polyhedron) else n
-            yield partial(segments_clipped, _segments(draw, shape.targets, some), shape.solid)
+    for shape in solids.each(draw, solids.REGIONS, places):
+        some = n // 4 if shape.solid.type in ("polygon", "polyhedron") else n
+        yield partial(segments_clipped, _segments(draw, shape.targets, some), shape.solid)
 
 
-@family("clip_segments", 20)
-def on_all_regions(draw: Draw) -> Iterator[Question]:
-    yield from _on_regions(draw, NEAR_PLACES, 600)
+family("clip_segments", "on_all_regions", 20, lambda draw: _on_regions(draw, NEAR_PLACES, 600))
+family("clip_segments", "on_regions_far_away", 10, lambda draw: _on_regions(draw, FAR_PLACES, 24))
 
 
-@family("clip_segments", 10)
-def on_regions_far_away(draw: Draw) -> Iterator[Question]:
-    yield from _on_regions(draw, FAR_PLACES, 24)
-
-
-@family("clip_segments", 6)
+@drawn_by("clip_segments", 6)
 def batches(draw: Draw) -> Iterator[Question]:
     """Long batches of easy segments, on convex regions and on boundaries that the first batch prepares cells for."""
     for maker in (solids.aabb, solids.convex, solids.sphere):
@@ -78,15 +58,13 @@ def batches(draw: Draw) -> Iterator[Question]:
     yield partial(segments_clipped, _segments(draw, rings.targets, 20), rings.solid)
 
 
-@family("clip_lines", 6)
+@drawn_by("clip_lines", 6)
 def lines_on_all_regions(draw: Draw) -> Iterator[Question]:
     """Walks over the ends of such segments: some closed, some with repeats."""
-    for dimension, makers in solids.REGIONS.items():
-        for maker in makers:
-            shape = maker(draw, dimension, draw.pick(NEAR_PLACES))
-            ends = _segments(draw, shape.targets, 120).reshape(40, 6, dimension)
-            closed = np.concatenate([ends[:20], ends[:20, :1]], axis=1)
-            yield partial(lines_clipped, [*closed, *np.repeat(ends[20:30], 2, axis=1), *ends[30:]], shape.solid)
+    for shape in solids.each(draw, solids.REGIONS, NEAR_PLACES):
+        ends = _segments(draw, shape.targets, 120).reshape(40, 6, -1)
+        closed = np.concatenate([ends[:20], ends[:20, :1]], axis=1)
+        yield partial(lines_clipped, [*closed, *np.repeat(ends[20:30], 2, axis=1), *ends[30:]], shape.solid)
 
 
 def _small_ball(draw: Draw) -> shapes.Mesh:
@@ -106,22 +84,18 @@ def _contours(draw: Draw, shape: Shape, n: int) -> list[list[Array]]:
     return [[points_about(draw, shape.targets, size) for size in row] for row in sizes]
 
 
-@family("clip_polygons", 20)
-def contours_about_regions(draw: Draw) -> Iterator[Question]:
+def _contours_about(draw: Draw, places: tuple[Place, ...], n_regions: int, n: int) -> Iterator[Question]:
     for dimension in (2, 3):
-        for _ in range(4):
-            shape = _cutters(draw, dimension, draw.pick(NEAR_PLACES))
-            yield partial(polygons_clipped, _contours(draw, shape, 14), shape.solid)
+        for _ in range(n_regions):
+            shape = _cutters(draw, dimension, draw.pick(places))
+            yield partial(polygons_clipped, _contours(draw, shape, n), shape.solid)
 
 
-@family("clip_polygons", 8)
-def contours_far_away(draw: Draw) -> Iterator[Question]:
-    for dimension in (2, 3):
-        shape = _cutters(draw, dimension, draw.pick(FAR_PLACES))
-        yield partial(polygons_clipped, _contours(draw, shape, 12), shape.solid)
+family("clip_polygons", "contours_about_regions", 20, lambda draw: _contours_about(draw, NEAR_PLACES, 4, 14))
+family("clip_polygons", "contours_far_away", 8, lambda draw: _contours_about(draw, FAR_PLACES, 1, 12))
 
 
-@family("clip_polygons", 12)
+@drawn_by("clip_polygons", 12)
 def flat_polygons(draw: Draw) -> Iterator[Question]:
     """Arrays of triangles and quads, mostly plane; polygons as solids."""
     for dimension in (2, 3):

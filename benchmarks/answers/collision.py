@@ -10,7 +10,7 @@ import numpy as np
 
 import engine
 from benchmarks.answers import shapes, solids
-from benchmarks.answers.asking import Question, family, same
+from benchmarks.answers.asking import Drawn, Question, drawn_by, family, same
 from benchmarks.answers.draws import FAR_PLACES, HOME, NEAR_PLACES, Array, Draw, turned
 
 Pair = tuple[Any, Any]
@@ -111,37 +111,20 @@ def _touching(draw: Draw) -> Pair:
     return pair[0].solid, pair[1].solid
 
 
-NO_POSES = (None, None)
+def _pairs(ask: Any, n: int, places: Any) -> Drawn:
+    """Return what draws so many pairs of any types in the plane, and as many in space."""
+    return lambda draw: (partial(ask, *_pair(draw, dimension, places)) for dimension in (2, 3) for _ in range(n))
 
 
-def _pairs(ask: Any, n: int) -> Any:
-    def pairs_of_any_types(draw: Draw) -> Iterator[Question]:
-        for dimension in (2, 3):
-            for _ in range(n):
-                yield partial(ask, *_pair(draw, dimension, NEAR_PLACES))
-
-    return pairs_of_any_types
+def _touching_meshes(ask: Any) -> Drawn:
+    return lambda draw: (partial(ask, *_touching(draw), (None, None)) for _ in range(12))
 
 
-def _touching_meshes(ask: Any, n: int) -> Any:
-    def touching_meshes(draw: Draw) -> Iterator[Question]:
-        for _ in range(n):
-            yield partial(ask, *_touching(draw), NO_POSES)
-
-    return touching_meshes
-
-
-family("collide", 20)(_pairs(collided, 40))
-family("collide", 20)(_touching_meshes(collided, 12))
-family("witnesses", 12)(_pairs(witnessed, 40))
-family("witnesses", 12)(_touching_meshes(witnessed, 12))
-
-
-@family("collide", 10)
-def pairs_far_away(draw: Draw) -> Iterator[Question]:
-    for dimension in (2, 3):
-        for _ in range(6):
-            yield partial(collided, *_pair(draw, dimension, FAR_PLACES))
+family("collide", "pairs_of_any_types", 20, _pairs(collided, 40, NEAR_PLACES))
+family("collide", "touching_meshes", 20, _touching_meshes(collided))
+family("collide", "pairs_far_away", 10, _pairs(collided, 6, FAR_PLACES))
+family("witnesses", "pairs_of_any_types", 12, _pairs(witnessed, 40, NEAR_PLACES))
+family("witnesses", "touching_meshes", 12, _touching_meshes(witnessed))
 
 
 def _poses(draw: Draw, dimension: int, n: int) -> tuple[Array, Array]:
@@ -158,7 +141,7 @@ def _posed_pair(draw: Draw) -> Any:
     return draw.pick([shapes.smooth, shapes.bumpy, shapes.box, shapes.tetrahedron, shapes.frame, shapes.hollow])(draw)
 
 
-@family("collide_poses", 16)
+@drawn_by("collide_poses", 16)
 def posed_meshes(draw: Draw) -> Iterator[Question]:
     """Convex on convex by lanes, others by trees; few and many."""
     for n, ask in ((5, posed), (40, posed_in_detail), (150, posed)):
@@ -168,7 +151,7 @@ def posed_meshes(draw: Draw) -> Iterator[Question]:
     yield partial(posed, *convex, *_poses(draw, 3, 600))
 
 
-@family("collide_poses", 14)
+@drawn_by("collide_poses", 14)
 def posed_pairs_of_any_types(draw: Draw) -> Iterator[Question]:
     for dimension in (2, 3):
         for _ in range(5):
@@ -178,7 +161,7 @@ def posed_pairs_of_any_types(draw: Draw) -> Iterator[Question]:
                 yield partial(posed_in_detail, *pair, *_poses(draw, dimension, 5))
 
 
-@family("clearance", 12)
+@drawn_by("clearance", 12)
 def parted_pairs_of_any_types(draw: Draw) -> Iterator[Question]:
     for dimension in (2, 3):
         for _ in range(6):
@@ -186,18 +169,17 @@ def parted_pairs_of_any_types(draw: Draw) -> Iterator[Question]:
             yield partial(parted, *_pair(draw, dimension, (HOME,))[:2], turns, 2.0 * moves)
 
 
-@family("witnesses", 4)
+@drawn_by("witnesses", 4)
 def faces_of_many_vertices(draw: Draw) -> Iterator[Question]:
     for _ in range(12):
         pair = solids.prism(draw).solid, draw.pick([solids.prism, solids.polyhedron, solids.sphere])(draw, 3).solid
         yield partial(witnessed, *pair, (None, solids.pose(draw, 3) if draw.chance(0.5) else None))
 
 
-@family("witnesses", 6)
-def posed_witnesses(draw: Draw) -> Iterator[Question]:
-    for dimension in (2, 3):
-        for _ in range(3):
-            yield partial(posed_witnessed, *_pair(draw, dimension, (HOME,))[:2], *_poses(draw, dimension, 12))
+family("witnesses", "posed_witnesses", 6, lambda draw: (
+    partial(posed_witnessed, *_pair(draw, dimension, (HOME,))[:2], *_poses(draw, dimension, 12))
+    for dimension in (2, 3) for _ in range(3)
+))  # fmt: skip
 
 
 def _bodies(draw: Draw, dimension: int, n: int, makers: Any) -> tuple[list[Any], list[Any]]:
@@ -216,7 +198,7 @@ def _named(draw: Draw, n: int, n_pairs: int) -> Array:
     return draw.whole(0, n - 1, n_pairs, 2)
 
 
-@family("collide_scene", 12)
+@drawn_by("collide_scene", 12)
 def scenes_with_all_options(draw: Draw) -> Iterator[Question]:
     for dimension, n in (draw.pick([(2, 12), (2, 40)]), draw.pick([(3, 10), (3, 20)])):
         bounded = [maker for maker in solids.COLLIDED[dimension] if maker is not solids.surface]
@@ -228,7 +210,7 @@ def scenes_with_all_options(draw: Draw) -> Iterator[Question]:
         yield partial(scene_collided, bodies, poses, {"boolean": draw.chance(0.5)})
 
 
-@family("collide_scene", 10)
+@drawn_by("collide_scene", 10)
 def large_scenes(draw: Draw) -> Iterator[Question]:
     """Boxes on a lattice, unposed; convex bodies; so many that the grid is met, and one so large that it is left."""
     for dimension in (2, 3):
@@ -249,10 +231,9 @@ def large_scenes(draw: Draw) -> Iterator[Question]:
     yield partial(scene_collided, bodies, poses, {"boolean": draw.chance(0.5)})
 
 
-@family("witnesses", 6)
-def scene_witnesses(draw: Draw) -> Iterator[Question]:
-    for dimension in (2, 3):
-        yield partial(scene_witnessed, *_bodies(draw, dimension, 25, solids.COLLIDED[dimension]))
+family("witnesses", "scene_witnesses", 6, lambda draw: (
+    partial(scene_witnessed, *_bodies(draw, dimension, 25, solids.COLLIDED[dimension])) for dimension in (2, 3)
+))  # fmt: skip
 
 
 def _triangles(draw: Draw, n: int, dimension: int, place: Any) -> tuple[Array, Array]:
@@ -272,13 +253,11 @@ def _triangles(draw: Draw, n: int, dimension: int, place: Any) -> tuple[Array, A
     return first * place[0] + place[1], second * place[0] + place[1]
 
 
-@family("collide_triangles", 24)
-def triangles_near(draw: Draw) -> Iterator[Question]:
-    for dimension in (2, 3):
-        yield partial(triangles_collided, *_triangles(draw, 1000, dimension, draw.pick(NEAR_PLACES)))
+def _triangle_pairs(n: int, places: Any) -> Drawn:
+    return lambda draw: (
+        partial(triangles_collided, *_triangles(draw, n, dimension, draw.pick(places))) for dimension in (2, 3)
+    )
 
 
-@family("collide_triangles", 10)
-def triangles_far_away(draw: Draw) -> Iterator[Question]:
-    for dimension in (2, 3):
-        yield partial(triangles_collided, *_triangles(draw, 60, dimension, draw.pick(FAR_PLACES)))
+family("collide_triangles", "triangles_near", 24, _triangle_pairs(1000, NEAR_PLACES))
+family("collide_triangles", "triangles_far_away", 10, _triangle_pairs(60, FAR_PLACES))

@@ -10,23 +10,16 @@ import numpy as np
 
 import engine
 from benchmarks.answers import shapes, solids
-from benchmarks.answers.asking import Question, family, same
+from benchmarks.answers.asking import Question, asker, drawn_by, family, same
 from benchmarks.answers.draws import FAR_PLACES, NEAR_PLACES, Array, Draw, Place
 from benchmarks.answers.solids import Shape, points_about
 
-
-def located(points: Array, solid: Any, workers: int | None) -> tuple[int, Any]:
-    found, accuracy = engine.locate(points, solid, workers=workers, report=True)
-    return len(points), [found, accuracy.decisions]
+located = asker(engine.locate)
+scene_located = asker(engine.locate_scene, "offsets indices on_boundary")
 
 
 def contained(points: Array, solid: Any, workers: int | None) -> tuple[int, Any]:
     return len(points), engine.contains(points, solid, workers=workers)
-
-
-def scene_located(points: Array, bodies: list[Any], poses: Any, workers: int | None) -> tuple[int, Any]:
-    found, accuracy = engine.locate_scene(points, bodies, poses, workers=workers, report=True)
-    return len(points), [found.offsets, found.indices, found.on_boundary, accuracy.decisions]
 
 
 def _about(draw: Draw, shape: Shape, sizes: tuple[int, ...]) -> Iterator[Question]:
@@ -34,21 +27,16 @@ def _about(draw: Draw, shape: Shape, sizes: tuple[int, ...]) -> Iterator[Questio
         yield partial(located, points_about(draw, shape.targets, n), shape.solid)
 
 
-@family("locate", 16)
-def simple_solids(draw: Draw) -> Iterator[Question]:
-    for dimension, makers in solids.LOCATED.items():
-        for maker in makers:
-            yield from _about(draw, maker(draw, dimension, draw.pick(NEAR_PLACES)), (1, 300))
+def _about_each(draw: Draw, places: tuple[Place, ...], sizes: tuple[int, ...]) -> Iterator[Question]:
+    for shape in solids.each(draw, solids.LOCATED, places):
+        yield from _about(draw, shape, sizes)
 
 
-@family("locate", 8)
-def simple_solids_far_away(draw: Draw) -> Iterator[Question]:
-    for dimension, makers in solids.LOCATED.items():
-        for maker in makers:
-            yield from _about(draw, maker(draw, dimension, draw.pick(FAR_PLACES)), (12,))
+family("locate", "simple_solids", 16, lambda draw: _about_each(draw, NEAR_PLACES, (1, 300)))
+family("locate", "simple_solids_far_away", 8, lambda draw: _about_each(draw, FAR_PLACES, (12,)))
 
 
-@family("locate", 12)
+@drawn_by("locate", 12)
 def polyhedra_asked_again_and_again(draw: Draw) -> Iterator[Question]:
     """Few points, passes over all faces; then columns; then cells, where a batch pays for them."""
     shape = solids.polyhedron(draw, 3, draw.pick(NEAR_PLACES))
@@ -57,7 +45,7 @@ def polyhedra_asked_again_and_again(draw: Draw) -> Iterator[Question]:
         yield from _about(draw, shape, (17_000,))
 
 
-@family("locate", 12)
+@drawn_by("locate", 12)
 def polygons_asked_again_and_again(draw: Draw) -> Iterator[Question]:
     """Slabs of edges, then cells of the rings."""
     rings = draw.pick([shapes.large_coast, shapes.many_holes, *shapes.RINGS])(draw)
@@ -65,7 +53,7 @@ def polygons_asked_again_and_again(draw: Draw) -> Iterator[Question]:
     yield from _about(draw, shape, (1, 40, 700, 5000, 50))
 
 
-@family("locate", 1)
+@drawn_by("locate", 1)
 def large_mesh(draw: Draw) -> Iterator[Question]:
     """So large, and points so near to it, that they are asked in the order of their cells."""
     shape = solids.polyhedron_of(shapes.ball(draw, 6, 0.05))
@@ -73,13 +61,12 @@ def large_mesh(draw: Draw) -> Iterator[Question]:
     yield partial(located, near * draw.uniform(0.99, 1.01, len(near), 1), shape.solid)
 
 
-@family("locate", 6)
-def faces_of_many_vertices(draw: Draw) -> Iterator[Question]:
-    for _ in range(4):
-        yield from _about(draw, solids.prism(draw, 3, draw.pick(NEAR_PLACES)), (300,))
+family("locate", "faces_of_many_vertices", 6, lambda draw: (
+    question for _ in range(4) for question in _about(draw, solids.prism(draw, 3, draw.pick(NEAR_PLACES)), (300,))
+))  # fmt: skip
 
 
-@family("locate", 6)
+@drawn_by("locate", 6)
 def faces_in_another_order(draw: Draw) -> Iterator[Question]:
     for _ in range(4):
         vertices, faces = draw.pick(shapes.MESHES)(draw)
@@ -88,25 +75,23 @@ def faces_in_another_order(draw: Draw) -> Iterator[Question]:
         moved = np.argsort(names)[faces][draw.order(len(faces))]
         second = engine.Polyhedron(vertices[names], np.roll(moved, draw.one(0, 2), axis=1))
         points = points_about(draw, first.targets, draw.pick([30, 500]))
-        yield partial(_both, located, points, first.solid, second)
+        yield partial(_in_order, points, first.solid, second)
     for _ in range(4):
         shape = solids.polygon(draw)
         rings = np.split(shape.solid.vertices, shape.solid.ring_offsets[1:-1])
         turned = [np.roll(ring, draw.one(0, 5), axis=0)[:: draw.pick([1, -1])] for ring in rings[::-1]]
-        yield partial(_both, located, points_about(draw, shape.targets, 500), shape.solid, engine.Polygon(turned))
+        yield partial(_in_order, points_about(draw, shape.targets, 500), shape.solid, engine.Polygon(turned))
 
 
-def _both(ask: Any, points: Array, first: Any, second: Any, workers: int | None) -> tuple[int, Any]:
-    n, found = ask(points, first, workers)
-    return 2 * n, same(ask(points, second, workers)[1], found, "faces or vertices")
+def _in_order(points: Array, first: Any, second: Any, workers: int | None) -> tuple[int, Any]:
+    n, found = located(points, first, workers=workers)
+    return 2 * n, same(located(points, second, workers=workers)[1], found, "faces or vertices")
 
 
-@family("contains", 12)
+@drawn_by("contains", 12)
 def all_solids(draw: Draw) -> Iterator[Question]:
-    for dimension, makers in solids.LOCATED.items():
-        for maker in makers:
-            shape = maker(draw, dimension, draw.pick(NEAR_PLACES))
-            yield partial(contained, points_about(draw, shape.targets, 550), shape.solid)
+    for shape in solids.each(draw, solids.LOCATED, NEAR_PLACES):
+        yield partial(contained, points_about(draw, shape.targets, 550), shape.solid)
 
 
 def _scene(draw: Draw, dimension: int, n: int, place: Place, n_kinds: int, n_points: int) -> Question:
@@ -128,26 +113,19 @@ def _scene(draw: Draw, dimension: int, n: int, place: Place, n_kinds: int, n_poi
     return partial(scene_located, points, [shape.solid for shape in chosen], poses if draw.chance(0.8) else None)
 
 
-@family("locate_scene", 16)
-def few_bodies(draw: Draw) -> Iterator[Question]:
-    for dimension in (2, 3):
-        for n in (1, 3, 9):
-            yield _scene(draw, dimension, n, draw.pick(NEAR_PLACES), n, draw.pick([1, 40, 400]))
+family("locate_scene", "few_bodies", 16, lambda draw: (
+    _scene(draw, dimension, n, draw.pick(NEAR_PLACES), n, draw.pick([1, 40, 400])) for dimension in (2, 3)
+    for n in (1, 3, 9)
+))  # fmt: skip
+family("locate_scene", "many_bodies", 8, lambda draw: (
+    _scene(draw, dimension, draw.pick([60, 200, 700]), draw.pick(NEAR_PLACES), 9, 300) for dimension in (2, 3)
+))  # fmt: skip
+family("locate_scene", "scenes_far_away", 8, lambda draw: (
+    _scene(draw, dimension, 4, draw.pick(FAR_PLACES), 4, 12) for dimension in (2, 3)
+))  # fmt: skip
 
 
-@family("locate_scene", 8)
-def many_bodies(draw: Draw) -> Iterator[Question]:
-    for dimension in (2, 3):
-        yield _scene(draw, dimension, draw.pick([60, 200, 700]), draw.pick(NEAR_PLACES), 9, 300)
-
-
-@family("locate_scene", 8)
-def scenes_far_away(draw: Draw) -> Iterator[Question]:
-    for dimension in (2, 3):
-        yield _scene(draw, dimension, 4, draw.pick(FAR_PLACES), 4, 12)
-
-
-@family("locate_scene", 10)
+@drawn_by("locate_scene", 10)
 def one_kind(draw: Draw) -> Iterator[Question]:
     """Bodies of one type on a grid, with points enough for voxels; large polygons, for which lists are better."""
     makers = [solids.aabb, solids.sphere, solids.polygon, solids.convex, solids.triangle]

@@ -10,7 +10,7 @@ import numpy as np
 
 import engine
 from benchmarks.answers import shapes
-from benchmarks.answers.asking import Question, family, same
+from benchmarks.answers.asking import Drawn, Question, drawn_by, family, same
 from benchmarks.answers.draws import FAR_PLACES, NEAR_PLACES, Array, Draw, Place, around, put, turned
 
 Operation = Literal["intersection", "union", "difference", "symmetric_difference"]
@@ -127,19 +127,15 @@ def _drawn(draw: Draw, places: tuple[Place, ...], kind: Callable[[Draw], Pair] |
             return subject, clip
 
 
-@family("overlay", 24)
-def pairs_of_all_kinds(draw: Draw) -> Iterator[Question]:
-    for kind in KINDS * 3:
-        yield partial(overlaid, _drawn(draw, NEAR_PLACES, kind), draw.pick(OUTPUTS))
+def _of_each_kind(places: tuple[Place, ...], times: int) -> Drawn:
+    return lambda draw: (partial(overlaid, _drawn(draw, places, kind), draw.pick(OUTPUTS)) for kind in KINDS * times)
 
 
-@family("overlay", 10)
-def pairs_far_away(draw: Draw) -> Iterator[Question]:
-    for kind in KINDS:
-        yield partial(overlaid, _drawn(draw, FAR_PLACES, kind), draw.pick(OUTPUTS))
+family("overlay", "pairs_of_all_kinds", 24, _of_each_kind(NEAR_PLACES, 3))
+family("overlay", "pairs_far_away", 10, _of_each_kind(FAR_PLACES, 1))
 
 
-@family("overlay", 6)
+@drawn_by("overlay", 6)
 def rings_in_another_order(draw: Draw) -> Iterator[Question]:
     for kind in KINDS:
         pair = _drawn(draw, NEAR_PLACES, kind)
@@ -155,13 +151,11 @@ def displaced(pair: Pair, workers: int | None) -> tuple[int, Any]:
     return 3, [found.largest_displacement, accuracy.coordinates_ulp, batch.displacement]
 
 
-@family("displacements", 10)
-def bounds_on_displacement(draw: Draw) -> Iterator[Question]:
-    for kind in KINDS * 3:
-        yield partial(displaced, _drawn(draw, NEAR_PLACES, kind))
+family("displacements", "bounds_on_displacement", 10,
+       lambda draw: (partial(displaced, _drawn(draw, NEAR_PLACES, kind)) for kind in KINDS * 3))  # fmt: skip
 
 
-@family("overlay", 4)
+@drawn_by("overlay", 4)
 def large_rings(draw: Draw) -> Iterator[Question]:
     """Rings of thousands of vertices, of which most are near nothing; hundreds of rings; dense crossings."""
     coasts = [shapes.coast(draw, 3000), shapes.coast(draw, 2500) + draw.pick([0.1, 1.0, 3.5])]
@@ -173,19 +167,19 @@ def large_rings(draw: Draw) -> Iterator[Question]:
     yield partial(overlaid, ([shapes.star(draw, 60)], [shapes.star(draw, 80)]), draw.pick(OUTPUTS))
 
 
-@family("overlay_batch", 20)
+@drawn_by("overlay_batch", 20)
 def batches_of_all_kinds(draw: Draw) -> Iterator[Question]:
     places = draw.pick([NEAR_PLACES, ((1.0, 0.0),), ((1 / 3, 1e6),)])
     yield partial(batch_overlaid, [_drawn(draw, places) for _ in range(draw.pick([3, 40, 150]))], draw.pick(OUTPUTS))
 
 
-@family("overlay_batch", 10)
+@drawn_by("overlay_batch", 10)
 def batches_of_one_kind(draw: Draw) -> Iterator[Question]:
     kind = draw.pick([convex_pair, stars, lattice, turned_lattice])
     yield partial(batch_overlaid, [_drawn(draw, NEAR_PLACES, kind) for _ in range(500)], draw.pick(OUTPUTS))
 
 
-@family("overlay_batch", 6)
+@drawn_by("overlay_batch", 6)
 def batches_far_away(draw: Draw) -> Iterator[Question]:
     pairs = [_drawn(draw, FAR_PLACES + NEAR_PLACES[:2]) for _ in range(10)]
     yield partial(batch_overlaid, [*pairs, *[_drawn(draw, NEAR_PLACES) for _ in range(10)]], draw.pick(OUTPUTS))
@@ -211,7 +205,7 @@ def _rings_of(geometry: Any) -> list[Any]:
     return [ring for part in parts for ring in part]
 
 
-@family("layers", 8)
+@drawn_by("layers", 8)
 def layers(draw: Draw) -> Iterator[Question]:
     """Features of one to three parts, which overlap, within a layer and across; some without geometry."""
     for _ in range(3):
@@ -255,20 +249,17 @@ def overlaid_on_grid(pair: Pair, grid: float, workers: int | None) -> tuple[int,
     return 4, [_said_of_many(each) for each in found]
 
 
-@family("union_all", 12)
+@drawn_by("union_all", 12)
 def layers_of_all_kinds(draw: Draw) -> Iterator[Question]:
     for _ in range(12):
         yield partial(united, _layer(draw), draw.pick(OUTPUTS), None)
         yield partial(united, _layer(draw), "valid", draw.pick([0.125, 0.1, 1e-6]))
 
 
-@family("filled", 8)
-def rings_under_fill_rules(draw: Draw) -> Iterator[Question]:
-    for _ in range(12):
-        yield partial(filled_by, [ring for rings in _layer(draw) for ring in rings])
-
-
-@family("grid", 8)
-def overlays_on_grids(draw: Draw) -> Iterator[Question]:
-    for kind in KINDS:
-        yield partial(overlaid_on_grid, _drawn(draw, NEAR_PLACES[:2], kind), draw.pick([0.25, 0.01, 2.0**-20, 1e-9]))
+family("filled", "rings_under_fill_rules", 8, lambda draw: (
+    partial(filled_by, [ring for rings in _layer(draw) for ring in rings]) for _ in range(12)
+))  # fmt: skip
+family("grid", "overlays_on_grids", 8, lambda draw: (
+    partial(overlaid_on_grid, _drawn(draw, NEAR_PLACES[:2], kind), draw.pick([0.25, 0.01, 2.0**-20, 1e-9]))
+    for kind in KINDS
+))  # fmt: skip

@@ -12,7 +12,7 @@ import numpy as np
 
 import engine
 from benchmarks.answers import shapes, solids
-from benchmarks.answers.asking import Question, answered, family
+from benchmarks.answers.asking import Drawn, Question, answered, drawn_by, family
 from benchmarks.answers.draws import FAR_PLACES, NEAR_PLACES, Draw
 
 
@@ -21,27 +21,22 @@ def bounded(solid: Any, workers: int | None) -> tuple[int, Any]:
     return 1, [found.aabb.min, found.aabb.max, found.sphere.center, found.sphere.radius]
 
 
-_BOUNDED = {
+_BOUNDED: dict[int, tuple[solids.Maker, ...]] = {
     2: (solids.sphere, solids.aabb, solids.triangle, solids.polygon, solids.convex),
     3: (solids.sphere, solids.aabb, solids.triangle, solids.polyhedron, solids.surface, solids.convex),
 }
 
 
-@family("bounds", 20)
-def bounds_of_all_solids(draw: Draw) -> Iterator[Question]:
-    for dimension, makers in _BOUNDED.items():
-        for maker in makers * 5:
-            yield partial(bounded, maker(draw, dimension, draw.pick(NEAR_PLACES)).solid)
+def _bounds_of_each(places: Any, times: int) -> Drawn:
+    makers = {dimension: some * times for dimension, some in _BOUNDED.items()}
+    return lambda draw: (partial(bounded, shape.solid) for shape in solids.each(draw, makers, places))
 
 
-@family("bounds", 5)
-def bounds_far_away(draw: Draw) -> Iterator[Question]:
-    for dimension, makers in _BOUNDED.items():
-        for maker in makers:
-            yield partial(bounded, maker(draw, dimension, draw.pick(FAR_PLACES)).solid)
+family("bounds", "bounds_of_all_solids", 20, _bounds_of_each(NEAR_PLACES, 5))
+family("bounds", "bounds_far_away", 5, _bounds_of_each(FAR_PLACES, 1))
 
 
-@family("bounds", 4)
+@drawn_by("bounds", 4)
 def bounds_of_many_vertices(draw: Draw) -> Iterator[Question]:
     yield partial(bounded, solids.polyhedron_of(shapes.ball(draw, 4, draw.pick([0.0, 0.2]))).solid)
     yield partial(bounded, solids.polygon_of(shapes.large_coast(draw)).solid)
@@ -63,7 +58,7 @@ def made(value: Any) -> Any:
     return value
 
 
-@family("refusals", 1)
+@drawn_by("refusals", 1)
 def arguments_refused(draw: Draw) -> Iterator[Question]:
     for name, rows in REFUSED.items():
         for row in rows:
@@ -78,7 +73,7 @@ def _refused(name: str, row: Any, workers: int | None) -> tuple[int, Any]:
     return 1, [name, answered(ask, workers)[1]]
 
 
-@family("refusals", 10)
+@drawn_by("refusals", 10)
 def meshes_broken(draw: Draw) -> Iterator[Question]:
     """Good meshes with a face left out, turned, doubled or renamed: which element is named, and how."""
     for make in shapes.MESHES:

@@ -57,11 +57,5 @@ def _scenes(draw: Draw, places: tuple[Place, ...], n: int) -> Iterator[Question]
         yield partial(moved, scene, steps, segments[: n // 2])
 
 
-@family("scenes", 20)
-def segments_through_scenes(draw: Draw) -> Iterator[Question]:
-    yield from _scenes(draw, NEAR_PLACES, 40)
-
-
-@family("scenes", 6)
-def segments_through_scenes_far_away(draw: Draw) -> Iterator[Question]:
-    yield from _scenes(draw, FAR_PLACES, 20)
+family("scenes", "segments_through_scenes", 20, lambda draw: _scenes(draw, NEAR_PLACES, 40))
+family("scenes", "segments_through_scenes_far_away", 6, lambda draw: _scenes(draw, FAR_PLACES, 20))

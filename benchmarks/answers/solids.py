@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -157,6 +157,13 @@ REGIONS: dict[int, tuple[Maker, ...]] = {
     2: (half_space, aabb, convex, sphere, polygon),
     3: (half_space, aabb, convex, sphere, polyhedron),
 }
+
+
+def each(draw: Draw, makers: dict[int, tuple[Maker, ...]], places: Sequence[Place]) -> Iterator[Shape]:
+    """Yield a shape of every maker, each somewhere of its own."""
+    for dimension, some in makers.items():
+        for maker in some:
+            yield maker(draw, dimension, draw.pick(places))
 
 
 def pose(draw: Draw, dimension: int, place: Place = HOME) -> engine.Pose:

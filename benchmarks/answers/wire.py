@@ -13,7 +13,7 @@ import httpx
 
 import engine
 from benchmarks.answers import overlays, shapes, solids
-from benchmarks.answers.asking import Question, family
+from benchmarks.answers.asking import Question, drawn_by
 from benchmarks.answers.draws import NEAR_PLACES, Array, Draw
 from benchmarks.answers.solids import points_about
 from benchmarks.workloads import document
@@ -129,13 +129,13 @@ def _broken(draw: Draw, request: Request) -> Request:
     return path, json.dumps(body).encode()
 
 
-@family("http", 20)
+@drawn_by("http", 20)
 def json_requests(draw: Draw) -> Iterator[Question]:
     requests = [request for dimension in (2, 3) for request in _good(draw, dimension)]
     yield partial(answers_to, requests + [_broken(draw, request) for request in requests])
 
 
-@family("http", 10)
+@drawn_by("http", 10)
 def stored_solids(draw: Draw) -> Iterator[Question]:
     """Solids put twice, named by their id in JSON, asked by octets; octets that do not fit."""
     requests: list[Request] = []
@@ -159,7 +159,7 @@ def _id_of(solid: dict[str, Any]) -> str:
     return str(body["id"])
 
 
-@family("http", 2)
+@drawn_by("http", 2)
 def long_lists(draw: Draw) -> Iterator[Question]:
     """So many items that they are encoded in parts."""
     shape = solids.aabb(draw, 2)
@@ -171,7 +171,7 @@ def long_lists(draw: Draw) -> Iterator[Question]:
     yield partial(answers_to, requests)
 
 
-@family("http", 1)
+@drawn_by("http", 1)
 def mesh_files(draw: Draw) -> Iterator[Question]:
     """A file of the format that needs nothing but numbers (extra `formats`)."""
     requests: list[Request] = []
