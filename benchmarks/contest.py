@@ -102,7 +102,7 @@ class Contest:
     """Answers to the first items, as many as there are (see `judge`); or what settles the items with given numbers, to
     be asked about those on which contenders differ and some others; or None: nothing is judged."""
     judge: Callable[[Any, Any], dict[str, Any]]
-    """``judge(answers, exact)`` counts what is wrong; `worst` is the number of the worst."""
+    """``judge(answers, exact)`` counts what is wrong; `worst` names the worst, or the equally bad."""
     contenders: Sequence[Contender]
     about: str = ""
     n_sample: int = 20
@@ -324,12 +324,16 @@ def _note(contest: Contest, entry: _Entry, answers: Any, exact: Any, rows: np.nd
     found = contest.judge(answers, exact)
     worst = found.pop("worst", None)
     entry.row.errors = found
-    if worst is not None:
-        item = int(rows[worst])
-        entry.row.worst = {"item": item, "answer": errors.plain(answers[worst]), "exact": errors.plain(exact[worst])}
+    for place in [] if worst is None else np.atleast_1d(worst).tolist():
+        item = int(rows[place])
+        shown = {"item": item, "answer": errors.plain(answers[place]), "exact": errors.plain(exact[place])}
         if contest.request is not None:
             path, body = contest.request(item)
-            entry.row.worst["request"] = (path, body if len(json.dumps(body)) <= LARGEST else None)
+            shown["request"] = (path, body if len(json.dumps(body)) <= LARGEST else None)
+        if not entry.row.worst or shown.get("request", (None, None))[1] is not None:
+            entry.row.worst = shown
+        if contest.request is None or shown["request"][1] is not None:
+            break
 
 
 def _judge_differing(contest: Contest, entries: list[_Entry]) -> None:

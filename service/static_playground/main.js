@@ -2,6 +2,7 @@
 // the newest state waits.
 
 import { prepared2d, prepared3d, styleColors } from "./drawing.js";
+import { KEYS, framed, readRequest } from "./given.js";
 import { readMesh } from "./mesh_files.js";
 import { QUESTIONS } from "./questions.js";
 import { SOLIDS } from "./solids.js";
@@ -18,6 +19,7 @@ let view3d = null;
 try { view3d = new View3D($("view3d"), move); } catch (error) { complain(error.message); }
 
 function move(step) {
+  if (state.given) return;  // what a link gives stays as it is
   state.offset = state.offset.map((v, k) => v + (step[k] ?? 0));
   refresh();
 }
@@ -116,7 +118,7 @@ function readControls() {
   const angle = (Number($("turn").value) * Math.PI) / 180, [c, s] = [Math.cos(angle), Math.sin(angle)];
   state.rotation = state.dimension === 3 ? [[c, 0, s], [0, 1, 0], [-s, 0, c]] : [[c, -s], [s, c]];
   $("turn-shown").textContent = `${$("turn").value}°`;
-  state.n = Math.round(10 ** Number($("count").value));
+  state.n = state.given?.n ?? Math.round(10 ** Number($("count").value));
   $("count-shown").textContent = state.n.toLocaleString("en");
   state.snap = $("snap").checked;
   state.plain = $("plain").checked;
@@ -236,10 +238,10 @@ function curl(text) {
   return `curl -s ${address} -H 'content-type: application/json' -d '${text}'`;
 }
 
-function showPicture(now, items) {
-  const colors = styleColors();
+function showPicture(now, drawn) {
+  const colors = styleColors(), items = now.given ? framed(drawn, now.given.frame) : drawn;
   if (now.dimension === 2) {
-    view2d.show(prepared2d(items, colors), now.layout?.radius ?? 2.1, corners(now).map(({ at }) => at));
+    view2d.show(prepared2d(items, colors), now.layout?.radius ?? 2.1, now.given ? [] : corners(now).map(({ at }) => at));
   } else if (view3d) view3d.show(prepared3d(items, [0, 0, 0], colors), 2.1);
 }
 
@@ -249,6 +251,7 @@ const FIELDS = ["first", "second", "operation", "method", "count", "turn"];
 let timer = 0;
 
 function link() {
+  if (state.given) return `#${new URLSearchParams({ request: state.given.text })}`;
   const said = new URLSearchParams({ question: state.question, dimension: state.dimension, offset: state.offset.join(",") });
   for (const id of FIELDS) if (!$(`${id}-label`).hidden) said.set(id, $(id).value);
   for (const id of ["snap", "plain"]) if ($(id).checked) said.set(id, "1");
@@ -262,8 +265,27 @@ function saveLink() {  // browsers take some hundred of these in half a minute
   timer = setTimeout(() => history.replaceState(null, "", link()), 300);
 }
 
+// A request that the link holds: its solids stand among the examples, its items are asked about until a control is moved.
+function takeRequest(text) {
+  const given = readRequest(text);
+  for (const key of KEYS) delete loaded[given.dimension][key];
+  Object.assign(SOLIDS[given.dimension], given.examples);
+  for (const [name, value] of [["question", given.question], ["dimension", given.dimension]]) document.querySelector(`[name=${name}][value="${value}"]`).checked = true;
+  chooseQuestion();
+  for (const [i, key] of Object.keys(given.examples).entries()) $(["first", "second"][i]).value = key;
+  if (given.operation) $("operation").value = given.operation;
+  $("turn").value = 0;
+  $("snap").checked = false;
+  $("plain").checked = Boolean(QUESTIONS[given.question].plain);
+  Object.assign(state, { given, offset: [0, 0, 0] });
+}
+
 function readLink() {
   const said = new URLSearchParams(location.hash.slice(1)), choose = (name) => document.querySelector(`[name=${name}][value="${CSS.escape(said.get(name) ?? "")}"]`);
+  state.given = null;
+  if (said.has("request")) {
+    try { return takeRequest(said.get("request")); } catch (error) { complain(error.message); }
+  }
   for (const name of ["question", "dimension"]) if (choose(name)) choose(name).checked = true;
   chooseQuestion();
   if (said.get("method")) $("method").replaceChildren(new Option(said.get("method")));
@@ -287,8 +309,11 @@ function readLink() {
 
 // --- start ------------------------------------------------------------------------------------------------------------
 
-$("questions").addEventListener("change", () => { chooseQuestion(); refresh(); });
-$("controls").addEventListener("input", (event) => { if (event.target.id !== "file") refresh(); });
+$("questions").addEventListener("change", () => { state.given = null; chooseQuestion(); refresh(); });
+$("controls").addEventListener("input", ({ target }) => {
+  if (!["plain", "file"].includes(target.id)) state.given = null;
+  if (target.id !== "file") refresh();
+});
 $("key").value = sessionStorage.getItem("key") ?? "";
 $("key").addEventListener("change", () => { sessionStorage.setItem("key", $("key").value); refresh(); });
 for (const kind of ["pointerup", "keyup", "wheel"]) $("view3d").addEventListener(kind, saveLink, { passive: true });

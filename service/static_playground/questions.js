@@ -17,11 +17,13 @@ function randomPosition(next, dimension, size) {
 }
 
 function points(state) {
+  if (state.given) return state.given.items;
   const next = random(1);
   return Array.from({ length: state.n }, () => moved(state, randomPosition(next, state.dimension, 1.8)));
 }
 
 function segments(state) {
+  if (state.given) return state.given.items;
   const next = random(2);
   return Array.from({ length: state.n }, () => {
     const middle = randomPosition(next, state.dimension, 1), half = randomPosition(next, state.dimension, 1.6);
@@ -30,6 +32,7 @@ function segments(state) {
 }
 
 function stars(state) {
+  if (state.given) return state.given.items;
   const next = random(3);
   return Array.from({ length: state.n }, () => {
     const middle = randomPosition(next, state.dimension, 0.9), n = 5 + Math.floor(next() * 6), phase = 6.3 * next();

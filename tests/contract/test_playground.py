@@ -341,6 +341,27 @@ def test_a_link_holds_the_whole_state(page: Any) -> None:
     assert "points wrong" in verdict(page)
 
 
+@pytest.mark.parametrize(
+    ("path", "body", "words"),
+    [
+        ("/v1/contains", {"solid": {"type": "polygon", "rings": [[[1e6, 0.0], [1e6 + 3, 0.1], [1e6, 4.0]]]},
+                          "points": [[1000000.1, 0.1]]}, "1 inside"),
+        ("/v1/clip/segments", {"region": {"type": "aabb", "min": [0.0, 0.0, 0.0], "max": [1.0, 2.0, 3.0]},
+                               "segments": [[[-1.0, 0.1, 0.1], [2.0, 0.3, 0.7]]]}, "1 piece of 1 segment"),
+    ],
+)  # fmt: skip
+def test_a_link_of_the_report_asks_what_it_holds(page: Any, path: str, body: dict[str, Any], words: str) -> None:
+    """Every number as given, also far from the origin, until a control is moved."""
+    page.evaluate("text => { location.hash = new URLSearchParams({ request: text }).toString(); }",
+                  json.dumps([path, body]))  # fmt: skip
+    wait_until(page, lambda: words in page.inner_text("#verdict"))
+    assert request_of(page) == body
+    assert colours(page, f"#view{len(body.get('points', body.get('segments', [[]])[0])[0])}d") > 3
+    page.evaluate("location.hash = ''")
+    choose(page, "contains", 2)
+    assert page.evaluate("location.hash").startswith("#question=contains")
+
+
 def test_a_link_that_is_no_link_shows_the_first_view(page: Any) -> None:
     for odd in ("#question=nothing&dimension=9&first=x&count=many&offset=1,2&camera=a", "#first-rings=[[", "#%"):
         other = page.context.new_page()

@@ -6,6 +6,7 @@ import json
 import shutil
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 import pytest
 
@@ -94,5 +95,7 @@ def test_in_a_browser(browser: Any, tmp_path: Path, width: int, scheme: str) -> 
     assert "Item 7" in shown
     assert "curl -s http://127.0.0.1:8000/v1/contains" in shown
     assert "results/report.json, rows[4]" in shown
+    link = page.get_by_role("link", name="Open in the playground").get_attribute("href")
+    assert json.loads(unquote(link.removeprefix("http://127.0.0.1:8000/#request="))) == list(REQUEST)
     assert page.locator("#detail svg circle").count() == 1
     assert troubles == []
