@@ -22,8 +22,10 @@ from benchmarks import errors, machine, table, web_page
 from benchmarks.bodies import Pair
 from benchmarks.contenders import Placed, Prepared
 from benchmarks.contest import Contender, Contest, field_of, hold, refusing
-from benchmarks.fields.collision import on_couples
-from benchmarks.fields.overlay import by_ours
+from benchmarks.fields import collision as in_collision
+from benchmarks.fields import containment as in_containment
+from benchmarks.fields import overlay as in_overlay
+from benchmarks.fields import segments as in_segments
 from benchmarks.workloads import Mesh, Rings, document
 from engine.files.solids import from_json, read_solid, read_solids
 from engine.files.tables import read_rows
@@ -90,10 +92,17 @@ def contains(solid: engine.Solid, points: np.ndarray) -> Contest:
     subject = subject_of(solid)
     peers = MESHES if isinstance(subject, Mesh) else POLYGONS if isinstance(subject, Rings) else ()
     asked = [*field_of("points", subject, peers, 1), *books(methods.of_points, solid)]
-    request = lambda item: ("/v1/contains", {"solid": document(subject), "points": [points[item].tolist()]})  # noqa: E731
     exact = engine.contains(points, solid)
     return Contest(
-        "yours", "contains", True, points, exact, telling(errors.same), asked, "your points", request=request
+        "yours",
+        "contains",
+        True,
+        points,
+        exact,
+        telling(errors.same),
+        asked,
+        "your points",
+        request=partial(in_containment.request, subject, points),
     )
 
 
@@ -104,9 +113,9 @@ def segments(region: engine.Solid, items: np.ndarray) -> Contest:
     asked = [*field_of("segments", subject, peers, 1), *books(methods.of_segments, region)]
     ours = asked[0].make()
     exact = ours.answer(ours.ask(items))
-    request = lambda item: ("/v1/clip/segments", {"region": document(subject), "segments": [items[item].tolist()]})  # noqa: E731
     judge = telling(errors.coordinates)
-    return Contest("yours", "segments", True, items, exact, judge, asked, "your segments", request=request)
+    return Contest("yours", "segments", True, items, exact, judge, asked, "your segments",
+                   request=partial(in_segments.request, subject, items))  # fmt: skip
 
 
 def collide(first: engine.Solid, second: engine.Solid, poses: np.ndarray | None) -> Contest:
@@ -116,20 +125,16 @@ def collide(first: engine.Solid, second: engine.Solid, poses: np.ndarray | None)
         is_met = engine.collide(first, second, boolean=True).relation != engine.Relation.DISJOINT
         couple = [Placed(body, is_closed=not isinstance(solid, engine.Surface))
                   for body, solid in zip(bodies, (first, second))]  # fmt: skip
-        made = on_couples("collide", True, [couple], np.array([is_met]), "your bodies", BODIES)
+        made = in_collision.on_couples("collide", True, [couple], np.array([is_met]), "your bodies", BODIES)
         own = [replace(each, make=partial(_for_one, each)) for each in books(methods.of_pairs, first, second)]
         return replace(made, operation="yours", contenders=[*made.contenders, *own], judge=telling(errors.same))
     is_closed = all(isinstance(solid, engine.Polyhedron) for solid in (first, second))
     pair = Pair("yours", bodies[0], bodies[1], is_closed, poses[:, :, :3], poses[:, :, 3])
     exact = engine.collide_poses(first, second, pair.rotations, pair.translations, boolean=True)
-
-    def request(row: int) -> tuple[str, dict[str, Any]]:
-        pose = {"rotation": pair.rotations[row].tolist(), "translation": pair.translations[row].tolist()}
-        return "/v1/collide", {"first": document(bodies[0]), "second": document(bodies[1]), "poses": [pose]}
-
     rows, asked = np.arange(len(poses)), field_of("poses", pair, BODIES[:2], 1)
     met = np.asarray(exact) != engine.Relation.DISJOINT
-    return Contest("yours", "collide", True, rows, met, telling(errors.same), asked, "your poses", request=request)
+    return Contest("yours", "collide", True, rows, met, telling(errors.same), asked, "your poses",
+                   request=partial(in_collision.request, pair))  # fmt: skip
 
 
 def _for_one(contender: Contender) -> Prepared:
@@ -148,14 +153,10 @@ def overlay(subjects: Sequence[engine.Solid], clips: Sequence[engine.Solid]) -> 
         [subject_of(solid).rings for solid in (side if len(side) == n else side * n)] for side in (subjects, clips)
     ]
     pairs = list(zip(*sides, strict=True))
-    exact = np.array([by_ours(pair) for pair in pairs])
-
-    def request(item: int) -> tuple[str, dict[str, Any]]:
-        subject, clip = (document(Rings("yours", rings)) for rings in pairs[item])
-        return "/v1/overlay", {"subject": subject, "clip": clip, "operation": "intersection"}
-
+    exact = np.array([in_overlay.by_ours(pair) for pair in pairs])
     asked = field_of("overlay", "intersection", LAYERS, 1)
-    return Contest("yours", "overlay", True, pairs, exact, telling(errors.areas), asked, "your layers", request=request)
+    return Contest("yours", "overlay", True, pairs, exact, telling(errors.areas), asked, "your layers",
+                   request=partial(in_overlay.request, pairs))  # fmt: skip
 
 
 def contest_of(question: str | None, files: Sequence[str], poses: str | None) -> Contest:

@@ -15,6 +15,7 @@ import numpy as np
 import engine
 from benchmarks.bodies import Pair, belted_ball, bumpy_pair, crowd, near_contact
 from benchmarks.measure import clocked
+from benchmarks.page import seconds
 from benchmarks.workloads import Mesh
 from engine.textbook import collision
 
@@ -22,16 +23,10 @@ Line = tuple[str, str, str]
 """The approach, its time in words, what it settles."""
 
 
-def best(run: Callable[[], object]) -> float:
+def best(run: Callable[[], object], n_items: int = 1) -> str:
+    """Return the least time an item of three runs, in words."""
     run()
-    return min(clocked(run)[0] for _ in range(3))
-
-
-def shown(seconds: float) -> str:
-    for unit, size in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)):
-        if seconds >= size:
-            return f"{seconds / size:.3g} {unit}"
-    return f"{seconds / 1e-9:.3g} ns"
+    return seconds(min(clocked(run)[0] for _ in range(3)) / n_items)
 
 
 def ask(pair: Pair, **options: bool) -> Callable[[], np.ndarray]:
@@ -46,8 +41,8 @@ def naive(times: int) -> Line:
     free = int(np.flatnonzero(ask(pair)() == engine.Relation.DISJOINT)[0])
     moved = np.ascontiguousarray(pair.second.vertices @ pair.rotations[free].T + pair.translations[free])
     faces = pair.first.faces.astype(np.int64), pair.second.faces.astype(np.int64)
-    seconds = best(lambda: collision.by_edges(pair.first.vertices, faces[0], moved, faces[1]))
-    return f"all pairs, {len(faces[0]):,} x {len(faces[1]):,} faces", shown(seconds), "everything, in float64 only"
+    took = best(lambda: collision.by_edges(pair.first.vertices, faces[0], moved, faces[1]))
+    return f"all pairs, {len(faces[0]):,} x {len(faces[1]):,} faces", took, "everything, in float64 only"
 
 
 def volumes(pair: Pair) -> Iterator[Line]:
@@ -70,7 +65,7 @@ def volumes(pair: Pair) -> Iterator[Line]:
     places = pair.rotations @ middles[1] + pair.translations
     for name, test in (("bounding sphere", by_sphere), ("bounding box, turned with the body", by_box)):
         settled = f"{test(scattered).mean():.1%} of scattered poses, {test(places).mean():.1%} near contact"
-        yield name, shown(best(lambda test=test: test(places)) / n), settled
+        yield name, best(lambda test=test: test(places), n), settled
 
 
 def lines(is_quick: bool) -> Iterator[Line]:
@@ -82,25 +77,25 @@ def lines(is_quick: bool) -> Iterator[Line]:
         if times == 3:
             yield from volumes(pair)
         name = f"box trees, {len(pair.first.faces):,} x {len(pair.second.faces):,} faces"
-        yield name, shown(best(ask(pair)) / n_poses), "five relations, exact"
-    yield "the same, boolean only", shown(best(ask(pair, boolean=True)) / n_poses), "disjoint or not, exact"
+        yield name, best(ask(pair), n_poses), "five relations, exact"
+    yield "the same, boolean only", best(ask(pair, boolean=True), n_poses), "disjoint or not, exact"
     first, second = pair.solids()
     poses = [engine.Pose(r, t) for r, t in zip(pair.rotations[:100], pair.translations[:100], strict=True)]
-    seconds = best(lambda: [engine.collide(first, second, second_pose=pose, boolean=True) for pose in poses]) / 100
-    yield "the same, one call a pose", shown(seconds), "disjoint or not, exact"
+    took = best(lambda: [engine.collide(first, second, second_pose=pose, boolean=True) for pose in poses], 100)
+    yield "the same, one call a pose", took, "disjoint or not, exact"
     convex = belted_ball(100, 1)
     dented = Mesh("dented", convex.vertices.copy(), convex.faces)
     dented.vertices[50] *= 0.9
     for name, mesh in (("100 vertices, box trees (one dent)", dented), ("100 vertices, convex path", convex)):
-        seconds = best(ask(near_contact(name, mesh, mesh, True, n_poses, 1))) / n_poses
-        yield name, shown(seconds), "five relations, exact"
+        took = best(ask(near_contact(name, mesh, mesh, True, n_poses, 1)), n_poses)
+        yield name, took, "five relations, exact"
     for n_bodies in (300,) if is_quick else (1_000, 3_000):
         scene = crowd(n_bodies, 1)
         every, stand = scene.solids(), scene.poses()
         pairs = np.stack(np.triu_indices(n_bodies, 1), axis=1)
         for how, only in (("every pair's boxes", pairs), ("grid of boxes", None)):
             run = best(lambda only=only: engine.collide_scene(every, stand, only=only, workers=1))  # noqa: B023
-            yield f"{n_bodies:,} bodies, {how}", shown(run), "every colliding pair, exact"
+            yield f"{n_bodies:,} bodies, {how}", run, "every colliding pair, exact"
 
 
 def main(words: list[str] | None = None) -> int:

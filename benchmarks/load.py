@@ -8,10 +8,10 @@ from __future__ import annotations
 import multiprocessing
 import re
 import socket
-import threading
 import time
 from collections import Counter
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
@@ -125,14 +125,8 @@ def loop(port: int, message: bytes, seconds: float, pause: float = 0.0) -> Seen:
 
 def many(port: int, message: bytes, seconds: float, n_connections: int, pause: float = 0.0) -> Seen:
     """Run `loop` on several connections, a thread each; return what all saw."""
-    found: list[Seen] = []
-    threads = [
-        threading.Thread(target=lambda: found.append(loop(port, message, seconds, pause))) for _ in range(n_connections)
-    ]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    with ThreadPoolExecutor(n_connections) as pool:
+        found = list(pool.map(lambda _: loop(port, message, seconds, pause), range(n_connections)))
     total = Seen()
     for seen in found:
         total.statuses += seen.statuses
@@ -144,21 +138,7 @@ def many(port: int, message: bytes, seconds: float, n_connections: int, pause: f
 
 def in_process(function: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
     """Start `function` in a process of its own; return what waits for its result."""
-    context = multiprocessing.get_context("spawn")
-    ours, theirs = context.Pipe(duplex=False)
-    process = context.Process(target=_send_result, args=(theirs, function, arguments))
-    process.start()
-    theirs.close()
-
-    def result() -> Any:
-        value = ours.recv()
-        process.join()
-        ours.close()
-        return value
-
+    pool = ProcessPoolExecutor(1, multiprocessing.get_context("spawn"))
+    result = pool.submit(function, *arguments).result
+    pool.shutdown(wait=False)
     return result
-
-
-def _send_result(connection: Any, function: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
-    connection.send(function(*arguments))
-    connection.close()

@@ -5,6 +5,8 @@ from __future__ import annotations
 import io
 from typing import Any
 
+from benchmarks.web_page import error_share
+
 TONE = "#8a9099"
 OURS = "#d9480f"
 PEERS = {
@@ -17,6 +19,8 @@ PEERS = {
 MARKERS = ("s", "D", "^", "v", "P")
 ZERO_LANE = 1e-6
 """Where an error rate of 0 stands on the logarithmic axis."""
+SHARES: dict[str, Any] = {"ylim": (ZERO_LANE / 2, 1.5), "yticks": [ZERO_LANE, 1e-4, 1e-2, 1],
+                          "yticklabels": ["0", "0.01%", "1%", "100%"]}  # fmt: skip
 
 
 def draw(found: dict[str, Any]) -> dict[str, str]:
@@ -82,11 +86,10 @@ def _scatter(rows: list[dict[str, Any]]) -> str:
             shares = [error_share(row) or ZERO_LANE for row in mine]
             rates = [row["rate"] for row in mine]
             axis.scatter(rates, shares, label=name, s=110 if name == "ours" else 30, zorder=3, **look)
-        axis.set(ylim=(ZERO_LANE / 2, 1.5), title=operation)
         _log_axes(axis)
+        axis.set(title=operation, **SHARES)
         low, high = axis.get_xlim()
         axis.set_xlim(min(low, high / 200), high)  # two decades at least: a tick to read each by
-        axis.set_yticks([ZERO_LANE, 1e-4, 1e-2, 1], ["0", "0.01%", "1%", "100%"])
         axis.legend(fontsize=6.5, framealpha=0.0, loc="center left")
     for axis in axes[:, 0]:
         axis.set_ylabel("wrong or refused")
@@ -95,10 +98,13 @@ def _scatter(rows: list[dict[str, Any]]) -> str:
     return _svg(figure)
 
 
-def error_share(row: dict[str, Any]) -> float:
-    """Return the share of wrong, refused and not taken among those judged."""
-    errors = row["errors"]
-    return (errors["wrong"] + errors["refused"] + errors.get("outside", 0)) / max(1, errors["judged"])
+def _curves(axis: Any, curves: dict[str, tuple[Any, Any]]) -> None:
+    """Draw the places of each contender, both ways logarithmic."""
+    looks = _looks(list(curves))
+    for name, (x, y) in curves.items():
+        axis.plot(x, y, label=name, ms=4, lw=2.5 if name == "ours" else 1.2, **looks[name])
+    _log_axes(axis)
+    axis.legend(fontsize=7, framealpha=0.0)
 
 
 def _distance(found: dict[str, Any]) -> str:
@@ -107,16 +113,9 @@ def _distance(found: dict[str, Any]) -> str:
     figure, axes = plt.subplots(1, 2, figsize=(11, 3.6), sharey=True)
     places = [max(ulps, 0.5) for ulps in found["ulps"]]
     for axis, operation in zip(axes, ("containment 2D", "containment 3D")):
-        looks = _looks(list(found[operation]))
-        for name, shares in found[operation].items():
-            drawn = [share or ZERO_LANE for share in shares]
-            axis.plot(places, drawn, label=name, ms=4, lw=2.5 if name == "ours" else 1.2, **looks[name])
-        axis.set(
-            ylim=(ZERO_LANE / 2, 1.5), title=operation, xlabel="ulps of a coordinate off (leftmost: rounded onto it)"
-        )
-        _log_axes(axis)
-        axis.set_yticks([ZERO_LANE, 1e-4, 1e-2, 1], ["0", "0.01%", "1%", "100%"])
-        axis.legend(fontsize=7, framealpha=0.0)
+        drawn = {name: (places, [share or ZERO_LANE for share in shares]) for name, shares in found[operation].items()}
+        _curves(axis, drawn)
+        axis.set(title=operation, xlabel="ulps of a coordinate off (leftmost: rounded onto it)", **SHARES)
     axes[0].set_ylabel("wrong answers")
     return _svg(figure)
 
@@ -126,13 +125,8 @@ def _size(found: dict[str, Any]) -> str:
 
     figure, axes = plt.subplots(1, 2, figsize=(11, 3.6), sharey=True)
     for axis, (kind, label) in zip(axes, (("faces", "faces of the mesh"), ("batch", "points in one call"))):
-        looks = _looks(list(found[kind]))
-        for name, places in found[kind].items():
-            x, y = zip(*places)
-            axis.plot(x, y, label=name, ms=4, lw=2.5 if name == "ours" else 1.2, **looks[name])
-        axis.set(xlabel=label)
-        _log_axes(axis)
-        axis.legend(fontsize=7, framealpha=0.0)
+        _curves(axis, {name: tuple(zip(*places)) for name, places in found[kind].items()})
+        axis.set_xlabel(label)
     axes[0].set_ylabel("points a second, containment 3D")
     return _svg(figure)
 

@@ -47,6 +47,11 @@ def failing(row: Row) -> int:
     return sum(row["errors"].get(kind, 0) for kind in BAD)
 
 
+def error_share(row: Row) -> float:
+    """Return the share of wrong, refused and not taken among those judged."""
+    return failing(row) / max(1, row["errors"]["judged"])
+
+
 def percent(share: float) -> str:
     """Return a share in words."""
     return "0" if share == 0 else f"{100 * share:.2g}%" if share < 0.995 else "100%"
@@ -121,7 +126,7 @@ def _beside(how: str, ours: Row, others: list[Row]) -> list[str]:
     text = f"{how}: {times(ours['rate'] / best['rate'])} {best['contender']}"
     if failing(best):
         errors = best["errors"]
-        silent = f"silent in {percent(failing(best) / errors['judged'])}"
+        silent = f"silent in {percent(error_share(best))}"
         text += ", " + (f"wrong in {with_interval(best)}" if errors["wrong"] else silent)
         right = [other for other in others if not failing(other)]
         text += "; " + (

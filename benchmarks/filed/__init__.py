@@ -252,7 +252,8 @@ def _ask(pipe: Any, case: Case, limit: float) -> tuple[str, str]:
 
 def section(rows: list[dict[str, str]]) -> str:
     """Return the section of the report: contenders and their counts, then every case that a peer does not pass."""
-    cases = {case["id"]: case for case in load()}
+    replayed = {row["case"] for row in rows}
+    cases = {case["id"]: case for case in load() if case["id"] in replayed}
     threads = len({case["thread"] for case in cases.values()})
     lines = [
         "## Cases that users filed\n",
