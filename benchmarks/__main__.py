@@ -12,8 +12,10 @@ TABLES = {
     "clearance": "how far apart, against peers",
     "collision": "poses, pairs, scenes and triangles, against peers",
     "containment": "points in every kind of solid, against peers",
+    "ends": "CPU seconds of every operation after its deadline",
     "overlay": "polygons on polygons, against GEOS and Clipper",
     "polygons": "polygons clipped on convex regions, against peers",
+    "scenes": "scenes that stay: segments through many bodies, and what moved, against peers",
     "segments": "segments clipped on every region, against peers",
 }
 NAMES = TABLES | {
@@ -25,8 +27,8 @@ NAMES = TABLES | {
     "compare": "two stored reports, side by side",
     "filed": "inputs that users of the peers filed, replayed",
     "hard_cases": "who gets which hard family wrong: the figures of docs/hard_cases.md",
+    "publish": "the judged inputs and their exact answers as files with their hashes",
     "report": "every operation, speed against error: docs/speed_and_error.md and the README's table",
-    "scenes": "scenes that stay: segments through many bodies, and what moved, against peers",
     "wire": "what HTTP adds to a kernel, and what overload does",
 }
 

@@ -20,7 +20,7 @@ STORED = {
     "soup": ("fcl_env", "fcl_rob", 0),
 }
 """Two meshes, and how often a stand-in is subdivided; of soups (the environment and the robot of fcl) there is none."""
-BALLS = {10: (4, 2), 32: (10, 3), 100: (14, 7), 200: (18, 11)}
+BALLS = {10: (4, 2), 32: (10, 3), 100: (14, 7), 200: (18, 11), 502: (25, 20)}
 """Vertices, and how these stand: so many around each of so many belts, and one at either pole."""
 FILLING = 1.25
 """Side of a body's share of space, in radii of the ball around the body: most have one or two neighbours in contact."""
@@ -106,8 +106,8 @@ def bumpy_pair(name: str, times: int, n_poses: int) -> Pair:
     return near_contact(f"{name} {times}", first, second, True, n_poses, 1)
 
 
-def belted_ball(n_vertices: int, seed: int) -> Mesh:
-    """Return a convex polyhedron: the vertices of staggered belts on a sphere, under a random linear map."""
+def belted_ball(n_vertices: int, seed: int, is_round: bool = False) -> Mesh:
+    """Return a convex polyhedron: the vertices of staggered belts on a sphere, under a random linear map or none."""
     n_around, n_belts = BALLS[n_vertices]
     heights = -np.cos(np.pi * (np.arange(n_belts) + 1) / (n_belts + 1))
     turns = 2 * np.pi * (np.arange(n_around)[None, :] + np.arange(n_belts)[:, None] / 2) / n_around
@@ -122,7 +122,7 @@ def belted_ball(n_vertices: int, seed: int) -> Mesh:
         corners += [(a, b, a + n_around), (b, b + n_around, a + n_around)]
     name = f"belted_ball_{n_vertices}"
     random = generator(name, seed)
-    stretch = random_rotations(random, 1)[0] * random.uniform(0.6, 1.0, 3)
+    stretch = np.eye(3) if is_round else random_rotations(random, 1)[0] * random.uniform(0.6, 1.0, 3)
     return Mesh(name, np.ascontiguousarray(vertices @ stretch), np.concatenate([np.stack(abc, 1) for abc in corners]))
 
 

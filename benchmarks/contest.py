@@ -322,17 +322,17 @@ def _judge(contest: Contest, entries: list[_Entry]) -> None:
 def _note(contest: Contest, entry: _Entry, answers: Any, exact: Any, rows: np.ndarray) -> None:
     """Judge a contender; keep the worst of its answers."""
     found = contest.judge(answers, exact)
-    worst = found.pop("worst", None)
+    worst = np.atleast_1d(found.pop("worst", [])).astype(int).tolist()
     entry.row.errors = found
-    for place in [] if worst is None else np.atleast_1d(worst).tolist():
+    for place in worst:  # until one is small enough to be shown
         item = int(rows[place])
-        shown = {"item": item, "answer": errors.plain(answers[place]), "exact": errors.plain(exact[place])}
-        if contest.request is not None:
-            path, body = contest.request(item)
-            shown["request"] = (path, body if len(json.dumps(body)) <= LARGEST else None)
-        if not entry.row.worst or shown.get("request", (None, None))[1] is not None:
-            entry.row.worst = shown
-        if contest.request is None or shown["request"][1] is not None:
+        entry.row.worst = {"item": item, "answer": errors.plain(answers[place]), "exact": errors.plain(exact[place])}
+        if contest.request is None:
+            break
+        path, body = contest.request(item)
+        is_small = len(json.dumps(body)) <= LARGEST
+        entry.row.worst["request"] = (path, body if is_small else None)
+        if is_small:
             break
 
 

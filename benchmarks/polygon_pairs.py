@@ -66,11 +66,12 @@ def large(family: str, n: int, seed: int) -> tuple[Rings, Rings]:
     return LARGE[family](generator(f"overlay/{family}/{n}", seed), n)
 
 
-def parcels(n: int, seed: int) -> np.ndarray:
+def parcels(n: int, seed: int, jitter: float = 0.3) -> np.ndarray:
     """Return some n quadrilaterals (m, 4, 2) that share their borders, on a grid whose corners are moved at random."""
     draw, side = generator("parcels", seed), int(n**0.5)
     corners = np.stack(np.meshgrid(np.arange(side + 1.0), np.arange(side + 1.0), indexing="ij"), axis=-1)
-    corners += draw.uniform(-0.3, 0.3, corners.shape) + draw.uniform(0.0, 1.0, 2)
+    if jitter:
+        corners += draw.uniform(-jitter, jitter, corners.shape) + draw.uniform(0.0, 1.0, 2)
     around = [corners[:-1, :-1], corners[1:, :-1], corners[1:, 1:], corners[:-1, 1:]]
     return np.stack(around, axis=2).reshape(-1, 4, 2)
 
@@ -122,15 +123,10 @@ def _ring(positions: list[list[float]]) -> np.ndarray:
 
 def layer(family: str, part: int, seed: int) -> list[np.ndarray]:
     """Return polygons of one ring each to be united; part: one over how many of the whole layer."""
-    random = np.random.default_rng(seed)
-    if family == "circles":
-        n = 1_000 // part
-        angles = np.arange(64) * 2.0 * np.pi / 64
-        unit = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-        return [centre * np.sqrt(n) + (0.3 + 0.5 * random.random()) * unit for centre in random.random((n, 2))]
-    k = (120 if family == "parcels" else 150) // part
-    grid = np.stack(np.meshgrid(np.arange(k + 1.0), np.arange(k + 1.0), indexing="ij"), -1)
-    if family == "parcels":
-        grid += (random.random(grid.shape) - 0.5) / 2.0
-    return [np.array([grid[i, j], grid[i + 1, j], grid[i + 1, j + 1], grid[i, j + 1]])
-            for i in range(k) for j in range(k)]  # fmt: skip
+    if family != "circles":
+        return list(
+            parcels((120 // part) ** 2, seed) if family == "parcels" else parcels((150 // part) ** 2, seed, 0.0)
+        )
+    draw, n = generator("circles", seed), 1_000 // part
+    unit = ring_around(np.arange(64) * 2.0 * np.pi / 64)
+    return [centre + draw.uniform(0.3, 0.8) * unit for centre in draw.uniform(0.0, n**0.5, (n, 2))]

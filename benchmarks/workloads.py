@@ -284,27 +284,34 @@ def document(solid: engine.Solid | Mesh | Rings) -> dict[str, Any]:
     """Return a solid as requests have it, and as tests/reference reads it."""
     match solid:
         case Mesh():
-            return {"type": "polyhedron", "vertices": solid.vertices.tolist(), "faces": solid.faces.tolist()}
+            return _document_of(solid)
         case Rings():
             return {"type": "polygon", "rings": [ring.tolist() for ring in solid.rings]}
-        case engine.HalfSpace():
-            rest: dict[str, Any] = {"normal": solid.normal.tolist(), "offset": solid.offset}
-        case engine.Sphere():
-            rest = {"center": solid.center.tolist(), "radius": solid.radius}
-        case engine.Aabb():
-            rest = {"min": solid.min.tolist(), "max": solid.max.tolist()}
-        case engine.Convex():
-            rest = {"planes": solid.planes.tolist()}
         case engine.Polygon():
-            rest = {"rings": [ring.tolist() for ring in np.split(solid.vertices, solid.ring_offsets[1:-1])]}
-        case engine.Triangle():
-            rest = {"vertices": solid.vertices.tolist()}
+            rest: dict[str, Any] = {"rings": np.split(solid.vertices, solid.ring_offsets[1:-1])}
+        case engine.Polyhedron() | engine.Surface():
+            rest = {"vertices": solid.vertices, "faces": np.split(solid.face_indices, solid.face_offsets[1:-1])}
         case engine.Implicit():
             terms = zip(solid.powers.tolist(), solid.coefficients.tolist())
             rest = {"terms": [{"powers": powers, "coefficient": factor} for powers, factor in terms]}
         case engine.Csg():
             rest = {"operation": solid.operation, "operands": [document(operand) for operand in solid.operands]}
         case _:
-            faces = np.split(solid.face_indices, solid.face_offsets[1:-1])  # type: ignore[union-attr]
-            rest = {"vertices": solid.vertices.tolist(), "faces": [face.tolist() for face in faces]}  # type: ignore[union-attr]
-    return {"type": solid.type, **rest}
+            rest = {name: getattr(solid, name) for name in NAMES[solid.type]}
+    return {"type": solid.type} | {name: _listed(value) for name, value in rest.items()}
+
+
+@cache
+def _document_of(mesh: Mesh) -> dict[str, Any]:
+    return {"type": "polyhedron", "vertices": mesh.vertices.tolist(), "faces": mesh.faces.tolist()}
+
+
+def _listed(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_listed(each) for each in value]
+    return value.tolist() if isinstance(value, np.ndarray) else value
+
+
+NAMES = {"half_space": ("normal", "offset"), "sphere": ("center", "radius"), "aabb": ("min", "max"),
+         "convex": ("planes",), "triangle": ("vertices",)}  # fmt: skip
+"""Members of solids that are numbers and arrays only."""

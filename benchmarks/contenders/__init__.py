@@ -6,6 +6,7 @@ once; that is its build. It imports its package when it is imported itself, so o
 
     points            Mesh, Rings, Convex     points                      bool: contained, the boundary too
     scene             Bodies                  points                      point * n_bodies + body, sorted
+    scene all, any    Bodies                  (n, 2, 3)                   as scene; bool: any body is met (first, too)
     segments          a solid of ours         (n, 2, dim)                 (n, 2 * dim) first piece, NaN where nothing
     hits              Mesh                    (n, 2, 3)                   bool: meets a face
     pieces            Rings, a solid          (n, 2, dim)                 [(segment, start, end)]
@@ -28,12 +29,12 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 import engine
-from benchmarks.workloads import Mesh, Rings
+from benchmarks.workloads import Bodies, Mesh, Rings
 
 PACKAGES = {
     "open3d": "open3d", "shapely": "shapely", "trimesh": "trimesh", "igl": "libigl", "vtk": "vtk", "cgal": "cgal",
@@ -50,7 +51,7 @@ SHOWN = {
     "shapely polygon areas": "shapely clip_by_rect", "shapely kept polygons": "shapely clip_by_rect",
     "numpy determinant": "numpy determinant", "numpy linalg": "numpy.linalg.det", "fcl crowd": "fcl's manager",
     "manifold3d overlay": "Clipper2 by manifold3d", "manifold3d overlay of made": "Clipper2 by manifold3d",
-    "pyclipper emptied": "pyclipper, only made and filled", "plain_signs": "ours, plain signs",
+    "plain_signs": "ours, plain signs",
     "textbook points": "textbook: half-line", "textbook recast": "textbook: another half-line",
     "textbook planes": "textbook: half-spaces", "textbook signed angles": "textbook: signed angles",
     "textbook unsigned angles": "textbook: unsigned angles, 1e-6", "textbook same side": "textbook: same side",
@@ -97,6 +98,15 @@ def meshes_of(pair: Couple) -> list[Mesh]:
     if not all(isinstance(shape, Mesh) for shape in shapes):
         raise NotApplicable("meshes only")
     return shapes  # type: ignore[return-value]
+
+
+def merged(bodies: Bodies) -> tuple[Mesh, np.ndarray]:
+    """Return many meshes as one, and for each face the number of its body."""
+    sizes = [len(body.vertices) for body in bodies.bodies]
+    starts = np.cumsum([0, *sizes[:-1]])
+    faces = np.concatenate([body.faces + start for body, start in zip(bodies.bodies, starts)])
+    owners = np.repeat(np.arange(len(sizes)), [len(body.faces) for body in bodies.bodies])
+    return Mesh(bodies.name, np.concatenate([body.vertices for body in bodies.bodies]), faces), owners
 
 
 def rings_of(region: Rings | engine.Solid) -> list[np.ndarray]:
@@ -235,3 +245,47 @@ def box_of(body: Placed) -> tuple[np.ndarray, np.ndarray] | None:
         case engine.Sphere():
             return None
     raise NotApplicable(type(body.shape).__name__)
+
+
+class Library(NamedTuple):
+    """How a library of collision is called: one body a call, or one pose a call."""
+
+    model: Callable[[Mesh], Any]
+    """Its tree of a mesh."""
+    convex: Callable[[Mesh], Any]
+    place: Callable[..., Any]
+    """Rotation and translation as it takes them."""
+    body: Callable[[Any], Any]
+    """A model that stands where it is."""
+    shape: Callable[[Placed], Any]
+    """A body of any kind."""
+    at: Callable[[Any, Any], Any]
+    """A body moved to a place."""
+    meet: Callable[[Any, Any], bool]
+    apart: Callable[[Any, Any], float]
+
+
+def makers_of(library: Library) -> dict[str, Callable[..., Prepared]]:
+    """Return the makers of pairs and poses; putting a body to its pose is part of a question, and so it is timed."""
+
+    def posed(ask: Callable[[Any, Any], Any], model: Callable[[Mesh], Any]) -> Callable[..., Prepared]:
+        def make(pair: Any, threads: int) -> Prepared:
+            first, second = (library.body(model(mesh)) for mesh in (pair.first, pair.second))
+            return Prepared(
+                lambda places: [ask(first, library.at(second, place)) for place in places],
+                lambda rows: [library.place(pair.rotations[row], pair.translations[row]) for row in rows], np.array,
+            )  # fmt: skip
+
+        return make
+
+    def pair(couple: Couple, threads: int) -> Prepared:
+        first, second = map(library.shape, couple)
+        return Prepared(lambda _: library.meet(first, second))
+
+    return {
+        "pair": pair, "poses": posed(library.meet, library.model), "convex poses": posed(library.meet, library.convex),
+        "clearance poses": posed(library.apart, library.model),
+        "clearance pairs": lambda _, threads: each_alone(lambda couple: list(map(library.shape, couple)),
+                                                         lambda made: library.apart(*made)),
+        "tree": lambda mesh, threads: Prepared(lambda _: library.model(mesh), answer=lambda _: None),
+    }  # fmt: skip

@@ -1,6 +1,6 @@
 """coal: `coal.collide` called once a pose from Python, as its users must; surfaces, yes or no, the first contact ends.
 
-`BVHModelOBBRSS`, the model its documentation recommends, `Convex` for convex polyhedra; request and result are made
+`BVHModelOBBRSS`, the model its documentation recommends, `Convex` for convex polyhedra; requests and results are made
 once and reused.
 """
 
@@ -11,13 +11,16 @@ from typing import Any
 import coal
 import numpy as np
 
-from benchmarks.bodies import Pair
-from benchmarks.contenders import Couple, Placed, Prepared, box_of, each_alone
+from benchmarks.contenders import Couple, Library, Placed, Prepared, box_of, makers_of
 from benchmarks.workloads import Mesh
 
+Body = tuple[Any, coal.Transform3s]
+_MEET, _FOUND = coal.CollisionRequest(), coal.CollisionResult()
+_MEET.enable_contact = False
+_MEET.num_max_contacts = 1
 
-def model(mesh: Mesh) -> coal.BVHModelOBBRSS:
-    """Return coal's tree of a mesh."""
+
+def _model(mesh: Mesh) -> coal.BVHModelOBBRSS:
     made = coal.BVHModelOBBRSS()
     made.beginModel(len(mesh.faces), len(mesh.vertices))
     made.addVertices(mesh.vertices)
@@ -26,8 +29,7 @@ def model(mesh: Mesh) -> coal.BVHModelOBBRSS:
     return made
 
 
-def convex(mesh: Mesh) -> coal.Convex:
-    """Return coal's own type for a convex polyhedron."""
+def _convex(mesh: Mesh) -> coal.Convex:
     points, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
     for point in mesh.vertices:
         points.append(point)
@@ -36,29 +38,19 @@ def convex(mesh: Mesh) -> coal.Convex:
     return coal.Convex(points, triangles)
 
 
-def _calls(first: coal.CollisionGeometry, second: coal.CollisionGeometry, pair: Pair) -> Prepared:
-    request, result = coal.CollisionRequest(), coal.CollisionResult()
-    request.enable_contact = False
-    request.num_max_contacts = 1
-    still = coal.Transform3s()
-
-    def ask(poses: list[coal.Transform3s]) -> list[bool]:
-        found = []
-        for pose in poses:
-            result.clear()
-            found.append(coal.collide(first, still, second, pose, request, result) > 0)
-        return found
-
-    def native(rows: np.ndarray) -> list[coal.Transform3s]:
-        return [coal.Transform3s(pair.rotations[row], pair.translations[row]) for row in rows]
-
-    return Prepared(ask, native, np.array)
+def _meet(first: Body, second: Body, request: coal.CollisionRequest = _MEET) -> bool:
+    _FOUND.clear()
+    return coal.collide(*first, *second, request, _FOUND) > 0
 
 
-def _shape(body: Placed) -> tuple[Any, Any]:
+def _apart(first: Body, second: Body) -> float:
+    return max(0.0, coal.distance(*first, *second, coal.DistanceRequest(), coal.DistanceResult()))
+
+
+def _shape(body: Placed) -> Body:
     place = coal.Transform3s() if body.pose is None else coal.Transform3s(*body.pose)
     if isinstance(body.shape, Mesh):
-        return model(body.shape), place
+        return _model(body.shape), place
     if box := box_of(body):
         place.setTranslation((box[0] + box[1]) / 2)
         return coal.Box(*(box[1] - box[0])), place
@@ -67,36 +59,14 @@ def _shape(body: Placed) -> tuple[Any, Any]:
 
 
 def _pair(pair: Couple, threads: int, margin: float = 0.0) -> Prepared:
-    first, second = (_shape(body) for body in pair)
-    request, result = coal.CollisionRequest(), coal.CollisionResult()
+    first, second = map(_shape, pair)
+    request = coal.CollisionRequest()
     request.num_max_contacts, request.security_margin = 1, margin
-
-    def ask(_: object) -> bool:
-        result.clear()
-        return coal.collide(*first, *second, request, result) > 0
-
-    return Prepared(ask)
+    return Prepared(lambda _: _meet(first, second, request))
 
 
-def _apart(first: tuple[Any, Any], second: tuple[Any, Any]) -> float:
-    return max(0.0, coal.distance(*first, *second, coal.DistanceRequest(), coal.DistanceResult()))
-
-
-def _clearance(pair: Pair, threads: int) -> Prepared:
-    first, second = (model(pair.first), coal.Transform3s()), model(pair.second)
-    return Prepared(
-        lambda poses: np.array([_apart(first, (second, pose)) for pose in poses]),
-        lambda rows: [coal.Transform3s(pair.rotations[row], pair.translations[row]) for row in rows],
-    )
-
-
-MAKERS = {
-    "clearance poses": _clearance,
-    "clearance pairs": lambda _, threads: each_alone(
-        lambda pair: [_shape(body) for body in pair], lambda p: _apart(*p)
-    ),
-    "poses": lambda pair, threads: _calls(model(pair.first), model(pair.second), pair),
-    "convex poses": lambda pair, threads: _calls(convex(pair.first), convex(pair.second), pair),
-    "pair": _pair,
-    "tree": lambda mesh, threads: Prepared(lambda _: model(mesh), answer=lambda _: None),
-}
+LIBRARY = Library(
+    model=_model, convex=_convex, place=coal.Transform3s, body=lambda model: (model, coal.Transform3s()), shape=_shape,
+    at=lambda body, place: (body[0], place), meet=_meet, apart=_apart,
+)  # fmt: skip
+MAKERS = makers_of(LIBRARY) | {"pair": _pair}

@@ -13,7 +13,7 @@ import open3d
 from open3d.core import Tensor
 from open3d.t.geometry import RaycastingScene
 
-from benchmarks.contenders import Couple, Prepared, meshes_of
+from benchmarks.contenders import Couple, Prepared, merged, meshes_of
 from benchmarks.workloads import Bodies, Mesh
 
 open3d.utility.set_verbosity_level(open3d.utility.VerbosityLevel.Error)
@@ -61,6 +61,32 @@ def _scene(bodies: Bodies, threads: int) -> Prepared:
     return Prepared(ask, lambda points: points.astype(np.float32), lambda found: np.sort(np.concatenate(found)))
 
 
+def _through(keep: str) -> Callable[[Bodies, int], Prepared]:
+    """Return the maker of one raycasting scene of all bodies: all hits of rays, the first, or whether there is any."""
+
+    def make(bodies: Bodies, threads: int) -> Prepared:
+        mesh, owners = merged(bodies)
+        scene = _scene_of(mesh, threads)
+
+        def native(segments: np.ndarray) -> Tensor:
+            return Tensor(np.concatenate([segments[:, 0], segments[:, 1] - segments[:, 0]], axis=1).astype(np.float32))
+
+        def all_met(found: dict[str, Tensor]) -> np.ndarray:
+            hits = found["t_hit"].numpy() <= 1.0
+            rays, faces = found["ray_ids"].numpy().astype(np.int64)[hits], found["primitive_ids"].numpy()[hits]
+            return np.unique(rays * len(bodies.bodies) + owners[faces])
+
+        if keep == "all":
+            return Prepared(lambda rays: scene.list_intersections(rays, nthreads=threads), native, all_met)
+        if keep == "first":
+            return Prepared(lambda rays: scene.cast_rays(rays, nthreads=threads), native,
+                            lambda found: found["t_hit"].numpy() <= 1.0)  # fmt: skip
+        return Prepared(lambda rays: scene.test_occlusions(rays, 0.0, 1.0, nthreads=threads), native,
+                        lambda found: found.numpy())  # fmt: skip
+
+    return make
+
+
 def _pair(pair: Couple, threads: int) -> Prepared:
     vector = open3d.utility
     make: Callable = open3d.geometry.TriangleMesh
@@ -71,4 +97,6 @@ def _pair(pair: Couple, threads: int) -> Prepared:
     return Prepared(lambda _: first.is_intersecting(second))
 
 
-MAKERS = {"points": _points, "scene": _scene, "pair": _pair}
+MAKERS = {"points": _points, "scene": _scene, "pair": _pair} | {
+    f"scene {keep}": _through(keep) for keep in ("all", "first", "any")
+}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -202,6 +203,36 @@ def _exact_area(operation: Any, threads: int) -> Prepared:
     return Prepared(each_or_nan(area))
 
 
+def _simple(body: Mesh) -> engine.Solid:
+    """Return a body as what its name says it is."""
+    low, high = body.vertices.min(axis=0), body.vertices.max(axis=0)
+    if body.name == "ball":
+        return engine.Sphere((low + high) / 2, 0.5 * (high - low).max())
+    return engine.Aabb(low, high) if body.name == "box" else solid_of(body)
+
+
+def _through(keep: Any) -> Callable[[Bodies, int], Prepared]:
+    """Return the maker of a kept scene that is asked about segments, its boxes and balls as such."""
+
+    def make(bodies: Bodies, threads: int) -> Prepared:
+        n = len(bodies.bodies)
+        scene = engine.Scene([_simple(body) for body in bodies.bodies])
+
+        def ask(segments: np.ndarray) -> tuple[int, Any]:
+            return len(segments), scene.clip_segments(segments, keep=keep, workers=threads)
+
+        def answer(found: tuple[int, Any]) -> np.ndarray:
+            if keep == "any":
+                return found[1]
+            if keep == "first":
+                return np.bincount(found[1].source, minlength=found[0]) > 0
+            return np.unique(found[1].source * n + found[1].body)
+
+        return Prepared(ask, answer=answer)
+
+    return make
+
+
 def _lines(subject: Any, threads: int) -> Prepared:
     region = solid_of(subject)
     return Prepared(lambda lines: engine.clip_lines(lines, region, workers=threads), answer=lambda found: found.source)
@@ -223,5 +254,5 @@ MAKERS = {
     "clearance poses": _clearance_poses,
     "clearance pairs": lambda _, threads: each_alone(_bodies_of, lambda made: engine.clearance(*made).distance),
     "tree": _tree, "crowd": _crowd, "overlay": _overlay, "overlay of made": _overlay_of_made,
-    "exact area": _exact_area,
+    "exact area": _exact_area, **{f"scene {keep}": _through(keep) for keep in ("all", "first", "any")},
 }  # fmt: skip

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -83,36 +82,10 @@ def _polygon_areas(region: engine.Aabb, threads: int) -> Prepared:
     )  # fmt: skip
 
 
-def _filled_pairs(executes: bool) -> Callable[[str, int], Prepared]:
-    """Pairs of single rings, called one by one: with the operation, or only making and filling a Clipper."""
-
-    def ask(paths: tuple[list[Any], list[Any]]) -> list[Any]:
-        found = []
-        for subject, clip in zip(*paths, strict=True):
-            clipper = pyclipper.Pyclipper()
-            clipper.AddPath(subject, pyclipper.PT_SUBJECT, True)
-            clipper.AddPath(clip, pyclipper.PT_CLIP, True)
-            if executes:
-                found.append(clipper.Execute(pyclipper.CT_INTERSECTION))
-        return found
-
-    def native(pairs: list[Any]) -> list[Any]:
-        return [np.rint(np.array([pair[side][0] for pair in pairs]) * 2.0**BITS).astype(np.int64).tolist()
-                for side in range(2)]  # fmt: skip
-
-    def answer(found: list[Any]) -> np.ndarray | None:
-        areas = [sum(map(pyclipper.Area, paths)) / 4.0**BITS for paths in found]
-        return np.array(areas) if executes else None
-
-    return lambda operation, threads: Prepared(ask, native, answer)
-
-
 MAKERS = {
     "points": _points,
     "pieces": _pieces,
     "polygon areas": _polygon_areas,
-    "small pairs": _filled_pairs(True),
-    "emptied": _filled_pairs(False),
     **overlays(
         lambda pair, bits=BITS: _integers(list(pair), bits),
         lambda made, operation: _clipped(*made[0], operation),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import embreex  # noqa: F401, without it trimesh would use a slower method
@@ -10,8 +11,8 @@ import trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 import engine
-from benchmarks.contenders import Prepared
-from benchmarks.workloads import Mesh
+from benchmarks.contenders import Prepared, merged
+from benchmarks.workloads import Bodies, Mesh
 
 
 def _points(mesh: Mesh, threads: int) -> Prepared:
@@ -25,13 +26,20 @@ def _hits(mesh: Mesh, threads: int) -> Prepared:
     def native(segments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return np.ascontiguousarray(segments[:, 0]), segments[:, 1] - segments[:, 0]
 
-    def ask(rays: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    def ask(rays: tuple[np.ndarray, np.ndarray]) -> tuple[int, np.ndarray, np.ndarray]:
         origins, directions = rays
-        points, ray, _ = intersector.intersects_location(origins, directions, multiple_hits=True)
+        points, ray, face = intersector.intersects_location(origins, directions, multiple_hits=True)
         t = ((points - origins[ray]) * directions[ray]).sum(axis=1) / (directions[ray] ** 2).sum(axis=1)
-        return np.bincount(ray[t <= 1.0], minlength=len(origins))
+        return len(origins), ray[t <= 1.0], face[t <= 1.0]
 
-    return Prepared(ask, native, lambda found: found > 0)
+    return Prepared(ask, native, lambda found: np.bincount(found[1], minlength=found[0]) > 0)
+
+
+def _through(bodies: Bodies, threads: int) -> Prepared:
+    mesh, owners = merged(bodies)
+    return replace(
+        _hits(mesh, threads), answer=lambda found: np.unique(found[1] * len(bodies.bodies) + owners[found[2]])
+    )
 
 
 def _pieces(region: engine.Polyhedron, threads: int) -> Prepared:
@@ -69,4 +77,7 @@ def _kept_polygons(region: engine.Aabb, threads: int) -> Prepared:
     return Prepared(ask, native, lambda found: None)
 
 
-MAKERS = {"points": _points, "hits": _hits, "pieces": _pieces, "kept polygons": _kept_polygons}
+MAKERS = {
+    "points": _points, "hits": _hits, "pieces": _pieces, "kept polygons": _kept_polygons, "scene all": _through,
+    "scene any": lambda bodies, threads: _hits(merged(bodies)[0], threads),
+}  # fmt: skip

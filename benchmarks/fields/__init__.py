@@ -13,7 +13,8 @@ from typing import Any
 
 from benchmarks.contest import Size, Task
 
-FIELDS = ("containment", "collision", "clearance", "segments", "polygons", "overlay", "primitives", "calls")
+FIELDS = ("containment", "collision", "clearance", "segments", "scenes", "polygons", "overlay", "primitives", "calls",
+          "ends")  # fmt: skip
 
 
 @dataclass(slots=True)

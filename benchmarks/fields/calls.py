@@ -52,17 +52,37 @@ def _calls(size: Size) -> Iterator[Call]:
                 items = partial(_rings, size.seed, solid.dimension, n) if shape is None else partial(
                     _draw, size.seed, shown, n, *shape, solid.dimension)  # fmt: skip
                 yield f"{shown.format(n)} {name}", partial(_second, ask, solid), items, n
-    first, second = (solids["polyhedron of 80"]() for _ in range(2))
+    star, first, second = (solids[name]() for name in ("polygon of 16", *["polyhedron of 80"] * 2))
     poses, sides = partial(_poses, size.seed), partial(_sides, size.seed)
     for n in COUNTS:
         yield f"collide {n} poses of 80", lambda one: engine.collide_poses(first, second, *one), partial(poses, n), n
+        yield f"clearance of {n} poses of 80", lambda p: engine.clearance_poses(first, second, *p), partial(poses, n), n
         triangles = partial(_triangles, size.seed, n)
         yield f"collide {n} triangles", lambda both: engine.collide_triangles(*both), triangles, n
         yield f"overlay {n} pairs of 8", lambda both: engine.overlay_batch(*both), partial(sides, n), n
+        yield f"unite {n} polygons of 8", lambda both: engine.union_all(both[0]), partial(sides, n), n
+        rings = partial(_rings, size.seed, 2, n)
+        yield f"fill {n} rings of 8", lambda some: engine.filled(list(some), "non_zero"), rings, n
+        yield f"clip {n} lines of 8", lambda some: engine.clip_lines(some, star), rings, n
+    yield from _scenes(size.seed, solids)
+    yield "clearance of polyhedra of 80", lambda p: engine.clearance(first, second, second_pose=p), partial(poses, 0), 1
     yield "collide polyhedra of 80", lambda one: engine.collide(first, second, second_pose=one), partial(poses, 0), 1
     yield "overlay of a pair of 8", lambda both: engine.overlay(both[0][0], both[1][0]), partial(sides, 1), 1
     pairs = partial(polygon_pairs.small, "star", 8, TURNS, size.seed)
     yield "overlay of a pair of 8, from arrays to pieces", _from_arrays, pairs, 1
+
+
+def _scenes(seed: int, solids: dict[str, Callable[[], Any]]) -> Iterator[Call]:
+    """Yield questions to ten posed balls, boxes and polyhedra of 80, in turn: given anew, and kept as a scene."""
+    names = ("sphere 3D", "aabb 3D", "polyhedron of 80")
+    bodies, poses = [solids[names[k % 3]]() for k in range(10)], _poses(seed, 0)[:10]
+    scene = engine.Scene(bodies, poses)
+    yield "collide 10 bodies", lambda _: engine.collide_scene(bodies, poses), lambda: [None], 10
+    for n in COUNTS:
+        points, segments = (partial(_draw, seed, f"scene {n}", n, *shape) for shape in ((3,), (2, 3)))
+        yield f"locate {n} in 10 bodies", lambda some: engine.locate_scene(some, bodies, poses), points, n
+        yield f"locate {n} in a kept scene", scene.locate, points, n
+        yield f"clip {n} segments on a kept scene", scene.clip_segments, segments, n
 
 
 def _second(ask: Callable[..., object], solid: engine.Solid, items: Any) -> object:

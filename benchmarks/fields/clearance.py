@@ -13,18 +13,18 @@ from typing import Any
 import numpy as np
 
 import engine
+from benchmarks.answers.shapes import BOX, SQUARE, corners
 from benchmarks.bodies import Pair, random_rotations
 from benchmarks.contenders import Couple, Placed
 from benchmarks.contest import Contest, Goals, Size, Task, field_of
 from benchmarks.errors import distances, exact_distances
+from benchmarks.fields.collision import request
 from benchmarks.workloads import Mesh, Rings, bumpy_sphere, document, generator
 
 POSES: dict[str, Goals] = {"coal": (3.0, 6.0), "fcl": (3.0, 6.0)}
 FAR: dict[str, tuple[float, float]] = {"near": (2.05, 2.15), "far": (5.0, 8.0), "mixed": (1.5, 4.0)}
 """How far apart the middles are, in radii of the bumpy balls."""
-CUBE = np.array([[i & 1, i >> 1 & 1, i >> 2] for i in range(8)], float)
-FACES = np.array([[0, 4, 6], [0, 6, 2], [1, 3, 7], [1, 7, 5], [0, 1, 5], [0, 5, 4], [2, 6, 7], [2, 7, 3], [0, 2, 3],
-                  [0, 3, 1], [4, 5, 7], [4, 7, 6]])  # fmt: skip
+CUBE = corners(np.zeros(3), np.ones(3))
 PEERS = ("coal", "fcl", "manifold3d")
 
 
@@ -49,7 +49,8 @@ def _poses(size: Size, name: str, times: int, place: str) -> Contest:
     exact = engine.clearance_poses(*pair.solids(), pair.rotations, pair.translations)
     about = f"bumpy balls of {len(first.faces):,} faces, middles {FAR[place][0]} to {FAR[place][1]} radii apart"
     rows, asked = np.arange(n_poses), field_of("clearance poses", pair, POSES, 1)
-    return Contest("clearance", f"{name} faces, {place}", False, rows, exact, distances, asked, about)
+    return Contest("clearance", f"{name} faces, {place}", False, rows, exact, distances, asked, about,
+                   request=partial(request, pair, path="/v1/clearance"))  # fmt: skip
 
 
 def _hard(size: Size, dimension: int, peers: tuple[str, ...]) -> Contest:
@@ -58,14 +59,14 @@ def _hard(size: Size, dimension: int, peers: tuple[str, ...]) -> Contest:
     is_apart = exact > 0.0
     couples, exact = [couple for couple, kept in zip(couples, is_apart) if kept], exact[is_apart]
 
-    def request(item: int) -> tuple[str, dict[str, Any]]:
+    def asked(item: int) -> tuple[str, dict[str, Any]]:
         first, second = (document(body.shape) for body in couples[item])
         return "/v1/clearance", {"first": first, "second": second}
 
     about = "balls and boxes an ulp apart, turned boxes whose faces are flush, bars that cross, all of them apart"
     found = field_of("clearance pairs", None, peers, 1)
     name = "nearly in contact" if dimension == 3 else "polygons nearly in contact"
-    return Contest("clearance", name, True, couples, exact, distances, found, about, request=request)
+    return Contest("clearance", name, True, couples, exact, distances, found, about, request=asked)
 
 
 def _couple(draw: np.random.Generator, dimension: int, k: int) -> Couple:
@@ -74,9 +75,8 @@ def _couple(draw: np.random.Generator, dimension: int, k: int) -> Couple:
     if dimension == 2:
         angle = draw.uniform(0.0, 6.3)
         turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-        corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)
-        moved = corners + np.array([1.0 + 10.0 ** draw.uniform(-16, -6), draw.uniform(-0.5, 0.5)])
-        bodies = corners @ turn.T, moved @ turn.T
+        moved = SQUARE + np.array([1.0 + 10.0 ** draw.uniform(-16, -6), draw.uniform(-0.5, 0.5)])
+        bodies = SQUARE @ turn.T, moved @ turn.T
         return Placed(Rings("a", [bodies[0]])), Placed(Rings("b", [bodies[1]]))
     if k % 3 == 0:
         a, b, c = draw.uniform(0.5, 3.0, 3)
@@ -91,7 +91,7 @@ def _couple(draw: np.random.Generator, dimension: int, k: int) -> Couple:
         return Placed(engine.Aabb(low, high)), Placed(engine.Aabb(start, start + wide))
     if k % 2:
         moved = CUBE + np.array([1.0 + 10.0 ** draw.uniform(-15, -6), *draw.uniform(-0.5, 0.5, 2)])
-        return Placed(Mesh("a", CUBE @ turn.T, FACES)), Placed(Mesh("b", moved @ turn.T, FACES))
+        return Placed(Mesh("a", CUBE @ turn.T, BOX)), Placed(Mesh("b", moved @ turn.T, BOX))
     bar, tilt = CUBE * [100.0, 0.01, 0.01], 10.0 ** draw.uniform(-9, -4)
     crossed = bar @ np.array([[1, tilt, 0], [-tilt, 1, 0], [0, 0, 1.0]]) + [0, 0, 0.01 + 10.0 ** draw.uniform(-12, -6)]
-    return Placed(Mesh("a", bar @ turn.T, FACES)), Placed(Mesh("b", crossed @ turn.T, FACES))
+    return Placed(Mesh("a", bar @ turn.T, BOX)), Placed(Mesh("b", crossed @ turn.T, BOX))

@@ -12,11 +12,11 @@ import numpy as np
 
 import engine
 from benchmarks import errors, workloads
-from benchmarks.bodies import BALLS, Pair, convex_pair, crowd, pair_of_size, random_rotations
+from benchmarks.answers.shapes import QUADS, TETRAHEDRON, corners
+from benchmarks.bodies import Pair, convex_pair, crowd, pair_of_size, random_rotations
 from benchmarks.contenders import Couple, Placed, Prepared, make
 from benchmarks.contest import Contender, Contest, Goals, Size, Task, contender, field_of, refusing, two_threads
 from benchmarks.errors import same
-from benchmarks.fields import Figure
 from benchmarks.measure import clocked
 from benchmarks.workloads import Mesh, bumpy_sphere, document, generator, hard_pairs
 
@@ -47,7 +47,7 @@ def tasks(size: Size) -> Iterator[Task]:
         yield Task(f"near contact, {faces}", partial(_near_contact, size, faces), faces == "1k")
     for kind in ("relations", "witnesses", "detail"):
         yield Task(f"near contact, 1k, {kind}", partial(_alone, size, kind))
-    for n_vertices in BALLS:
+    for n_vertices in CONVEX:
         yield Task(f"convex of {n_vertices}", partial(_convex, size, n_vertices))
     n_bodies = size.of(10_000, 1_000)
     for name in (f"{n_bodies:,} bodies", f"{n_bodies:,} bodies, all moved before"):
@@ -57,7 +57,6 @@ def tasks(size: Size) -> Iterator[Task]:
     yield Task("near contact, two threads", partial(_two_threads, size))
     for name in ALONE:
         yield Task(name, partial(_ours, size, name))
-    yield Task("flush stack, wrong answers", partial(_flush_wrong, size), is_figure=True)
 
 
 # --- the page ---------------------------------------------------------------------------------------------------------
@@ -111,8 +110,8 @@ def _net(one: Contender) -> Contender:
 def _overhead(module: str) -> float:
     """Return what one call costs on two triangles' worth of bodies far apart."""
     vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
-    faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
-    call = make(module, "pair", (Placed(Mesh("a", vertices, faces)), Placed(Mesh("b", vertices + 100.0, faces))), 1).ask
+    couple = (Placed(Mesh("a", vertices, TETRAHEDRON)), Placed(Mesh("b", vertices + 100.0, TETRAHEDRON)))
+    call = make(module, "pair", couple, 1).ask
     return clocked(lambda: [call(None) for _ in range(1000)])[0] / 1000
 
 
@@ -138,19 +137,20 @@ def _poses(name: str, pair: Pair, kind: str, goals: Mapping[str, Goals], is_page
     """Who is right where contenders differ is settled in rationals; a large mesh takes seconds."""
     found = [_net(each) for each in field_of(kind, pair, goals, 1)]
     if kind == "poses":
-        found += [contender("ours:relations", "", pair, 1), contender("plain_signs:relations", "", pair, 1)]
-        found[-2] = replace(found[-2], name="ours, five relations")
+        found.append(replace(contender("ours:relations", "", pair, 1), name="ours, five relations"))
 
     def exact(chosen: np.ndarray) -> np.ndarray:
         return np.array([errors.collides(pair, row) for row in chosen])
 
-    def request(row: int) -> tuple[str, dict[str, Any]]:
-        pose = {"rotation": pair.rotations[row].tolist(), "translation": pair.translations[row].tolist()}
-        return "/v1/collide", {"first": document(pair.first), "second": document(pair.second), "poses": [pose]}
-
     about = f"{pair.name}, {'solids' if pair.is_closed else 'surfaces'}, poses near contact"
     return Contest("collision", name, True, np.arange(len(pair.rotations)), exact, same, found, about,
-                   n_sample=20 * is_page, most=20, request=request if is_page else None)  # fmt: skip
+                   n_sample=20 * is_page, most=20, request=partial(request, pair) if is_page else None)  # fmt: skip
+
+
+def request(pair: Pair, row: int, path: str = "/v1/collide") -> tuple[str, dict[str, Any]]:
+    """Return path and body that ask about one pose."""
+    pose = {"rotation": pair.rotations[row].tolist(), "translation": pair.translations[row].tolist()}
+    return path, {"first": document(pair.first), "second": document(pair.second), "poses": [pose]}
 
 
 def _near_contact(size: Size, faces: str) -> Contest:
@@ -194,22 +194,9 @@ def _stack(size: Size) -> tuple[list[engine.Polyhedron], engine.Pose]:
     """Return 300 boxes on one another, heights in decimals, and one pose: each must touch the next."""
     draw = generator("flush stacks", size.seed)
     pose = engine.Pose(random_rotations(draw, 1)[0], draw.normal(size=3))
-    faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]]
-    boxes = [
-        engine.Polyhedron([[i & 1, i >> 1 & 1, (low, high)[i >> 2]] for i in range(8)], faces)
-        for low, high in pairwise([0.1 * level for level in range(301)])
-    ]
+    boxes = [engine.Polyhedron(corners(np.array([0, 0, low]), np.array([1, 1, high])), QUADS)
+             for low, high in pairwise(0.1 * level for level in range(301))]  # fmt: skip
     return boxes, pose
-
-
-def _flush_wrong(size: Size) -> Figure:
-    boxes, pose = _stack(size)
-    relations = engine.collide_scene(boxes, [pose] * len(boxes), workers=1).relation
-    missed = len(boxes) - 1 - int((relations == engine.Relation.TOUCHING).sum())
-    found = [engine.collide(a, b, first_pose=pose, second_pose=pose).relation for a, b in pairwise(boxes)]
-    wrong = sum(each != engine.Relation.TOUCHING for each in found)
-    note = f"{len(boxes)} boxes; as a scene {missed} wrong"
-    return Figure("flush stack, wrong answers", "wrong", [wrong + missed], 0, 0, note)
 
 
 def _ours(size: Size, name: str) -> Contest:
@@ -243,7 +230,6 @@ def _run(name: str, ask: Any, count: int) -> Contest:
 
 def _simple_pairs() -> list[tuple[Any, Any]]:
     """Return every simple solid with every other that collision is defined for, and a tetrahedron."""
-    corners = [[0.0, 0, 0], [2, 0, 0], [0, 2, 0], [0, 0, 2]]
     solids = [make() for make in workloads.SIMPLE.values()]
-    solids.append(engine.Polyhedron(corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]))
+    solids.append(engine.Polyhedron([[0.0, 0, 0], [2, 0, 0], [0, 2, 0], [0, 0, 2]], TETRAHEDRON))
     return [pair for pair in product(solids, solids) if refusing(lambda each: engine.collide(*each), pair, None)]

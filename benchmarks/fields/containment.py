@@ -74,11 +74,12 @@ def contest(
     settle = (lambda rows: locations(points[rows], subject)) if peers else None
     exact = settle(slice(n_exact)) if n_exact and settle else settle
     asked, is_hard = field_of("points", subject, peers, **more), bool(n_exact) and tail != "uniform"
-    request = partial(_request, subject, points) if n_exact else None
-    return Contest(operation, shown, is_hard, points, exact, same, asked, about, request=request)
+    how = partial(request, subject, points) if n_exact else None
+    return Contest(operation, shown, is_hard, points, exact, same, asked, about, request=how)
 
 
-def _request(subject: Any, points: np.ndarray, item: int) -> tuple[str, dict[str, Any]]:
+def request(subject: Any, points: np.ndarray, item: int) -> tuple[str, dict[str, Any]]:
+    """Return path and body that ask about one point."""
     return "/v1/contains", {"solid": document(subject), "points": [points[item].tolist()]}
 
 
@@ -111,7 +112,7 @@ def _hard_3d(size: Size, name: str) -> Contest:
     found = [replace(each, make=partial(_on_many, each, meshes, owner, rows))
              for each in field_of("points", None, PAGE_PEERS)]  # fmt: skip
     return Contest("containment 3D", "boundary", True, np.arange(len(rows)), exact[: size.n(4_000, 1_000)], same, found,
-                   about, request=lambda item: _request(meshes[owner[item]], rows, item))  # fmt: skip
+                   about, request=lambda item: request(meshes[owner[item]], rows, item))  # fmt: skip
 
 
 def _on_many(each: Contender, meshes: list[Mesh], owner: np.ndarray, points: np.ndarray) -> Prepared:
@@ -231,11 +232,11 @@ def _bodies(what: str, n_bodies: int, seed: int) -> Bodies:
 
 
 def _scene(size: Size, name: str, what: str, n_bodies: int, is_new: bool) -> Contest:
-    """Answers are told apart by how many bodies hold a point, and the sum of their numbers."""
+    """Points in many bodies; answers are told apart as `summed` has them."""
     bodies, (peer, goals) = _bodies(what, n_bodies, size.seed), SCENES[what]
     points = _points(bodies, "uniform", size)
     found = field_of("scene", bodies, {peer: None if is_new else goals}, is_new=is_new)
-    told = [replace(each, make=partial(_summed, each, n_bodies)) for each in found]
+    told = [replace(each, make=partial(summed, each, n_bodies)) for each in found]
     boxes = np.array([extent_of(body) for body in bodies.bodies])
 
     def exact(rows: np.ndarray) -> np.ndarray:
@@ -246,11 +247,12 @@ def _scene(size: Size, name: str, what: str, n_bodies: int, is_new: bool) -> Con
             held.append((len(owners), sum(owners)))
         return np.array(held)
 
-    return Contest("containment", name, False, points, None if is_new else exact, _same_rows, told,
+    return Contest("containment", name, False, points, None if is_new else exact, same_rows, told,
                    count=len(points) * is_new)  # fmt: skip
 
 
-def _summed(one: Contender, n_bodies: int) -> Prepared:
+def summed(one: Contender, n_bodies: int) -> Prepared:
+    """Return a contender that answers with how many bodies an item is in, and the sum of their numbers."""
     made = one.make()
 
     def answer(found: tuple[int, Any]) -> np.ndarray:
@@ -265,7 +267,8 @@ def _summed(one: Contender, n_bodies: int) -> Prepared:
     )
 
 
-def _same_rows(answers: np.ndarray, exact: np.ndarray) -> dict[str, Any]:
+def same_rows(answers: np.ndarray, exact: np.ndarray) -> dict[str, Any]:
+    """Judge rows of labels: all of a row are equal, or it is wrong."""
     return same((answers != exact).any(axis=1), np.zeros(len(exact)))
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import time
 from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import Any
@@ -16,6 +14,7 @@ from benchmarks.contest import Contest, Goals, Size, Task, field_of, two_threads
 from benchmarks.errors import areas, overlay_area, scale_of
 from benchmarks.fields import Figure
 from benchmarks.measure import clocked
+from benchmarks.workloads import Rings, document
 
 Pair = tuple[list[np.ndarray], list[np.ndarray]]
 MOST_VERTICES = 40
@@ -28,7 +27,7 @@ PAGE = {
     "lattice": (True, "lattice", 5, "6 to 9 vertices on a lattice of 5 x 5: shared edges and vertices, self-crossings"),
 }
 LARGE: dict[str, Goals] = {"shapely": (6.0, 15.0), "pyclipper": (0.4, 1.0), "manifold3d": (0.4, 1.0)}
-SMALL: dict[str, Goals] = {"shapely:small pairs": (5.0, 15.0), "pyclipper:small pairs": (2.0, 5.0)}
+SMALL: dict[str, Goals] = {"shapely:small pairs": (5.0, 15.0), "pyclipper": (2.0, 5.0)}
 OPERATIONS = ("union", "difference", "symmetric_difference")
 UNIONS = ("circles", "parcels", "squares")
 
@@ -57,8 +56,6 @@ def tasks(size: Size) -> Iterator[Task]:
         yield Task(f"union of {family}", partial(_union, size, family), is_figure=True)
     yield Task("public pairs", partial(_public, size))
     yield Task("exact area", partial(_area, size))
-    yield Task("public pairs, four operations", partial(_identities, size), is_figure=True)
-    yield Task("late after a deadline", partial(_deadline, size), is_figure=True)
 
 
 def _on_page(size: Size, name: str) -> Contest:
@@ -69,13 +66,14 @@ def _on_page(size: Size, name: str) -> Contest:
         pairs, is_hard = list(polygon_pairs.public(MOST_VERTICES))[: size.n(200, 60)], True
         about = f"at most {MOST_VERTICES} vertices, filed by users and suites of GEOS, polygon-clipping and Clipper"
     exact = np.array([overlay_area(pair) for pair in pairs])
-
-    def request(item: int) -> tuple[str, dict[str, Any]]:
-        subject, clip = ({"type": "polygon", "rings": [ring.tolist() for ring in rings]} for rings in pairs[item])
-        return "/v1/overlay", {"subject": subject, "clip": clip, "operation": "intersection"}
-
     found = field_of("overlay", "intersection", PEERS)
-    return Contest("overlay", name, is_hard, pairs, exact, areas, found, about, request=request)
+    return Contest("overlay", name, is_hard, pairs, exact, areas, found, about, request=partial(request, pairs))
+
+
+def request(pairs: list[Pair], item: int) -> tuple[str, dict[str, Any]]:
+    """Return path and body that ask about one pair."""
+    subject, clip = (document(Rings("", rings)) for rings in pairs[item])
+    return "/v1/overlay", {"subject": subject, "clip": clip, "operation": "intersection"}
 
 
 # --- the table --------------------------------------------------------------------------------------------------------
@@ -109,7 +107,7 @@ def _batch(size: Size, family: str, n: int, how: str = "intersection") -> Contes
     pairs = polygon_pairs.small(family, n, max(1000, size.n(120_000) // n), size.seed)
     if how == "two threads":
         return _contest(f"{name}, {how}", pairs, two_threads("overlay of made", "intersection"), False)
-    peers: Mapping[str, Any] = SMALL | {"pyclipper:emptied": None} if how == "intersection" else {}
+    peers: Mapping[str, Any] = SMALL if how == "intersection" else {}
     found = field_of("overlay of made", how, peers, 1)
     return _contest(name if peers else f"{name}, {how}", pairs, found, bool(peers),
                     n_sample=max(3, min(60, 1500 // n**2)), most=0)  # fmt: skip
@@ -154,36 +152,6 @@ def _public(size: Size) -> Contest:
     return Contest("overlay", "public pairs", True, pairs, exact, areas, found, count=len(pairs))
 
 
-def _identities(size: Size) -> Figure:
-    """How many areas of ours do not add up exactly over the four operations."""
-    wrong, pairs = 0, _filed(size)
-    for pair in pairs:
-        first, second = map(engine.Polygon, pair)
-        both, union, only, either = (
-            engine.overlay(first, second, operation).area_exact  # type: ignore[call-overload]
-            for operation in ("intersection", *OPERATIONS)
-        )
-        other = engine.overlay(second, first, "difference").area_exact
-        wrong += (either + both != union) or (only + other != either)
-    return Figure("public pairs, four operations", "wrong", [wrong], 0, 0, f"{len(pairs)} pairs")
-
-
 def _area(size: Size) -> Contest:
     pairs = [polygon_pairs.large("spiky", 300, size.seed)]
     return _contest("exact area", pairs, field_of("exact area", "intersection", (), 1), False)
-
-
-def _deadline(size: Size) -> Figure:
-    """How long after its deadline a large overlay returns at the latest, for deadlines all over its time."""
-    first, second = map(engine.Polygon, polygon_pairs.large("comb", size.of(100_000, 1_000), size.seed))
-    engine.overlay(first, second)
-    whole = clocked(partial(engine.overlay, first, second))[0]
-    late = [0.0]
-    for share in np.linspace(0.02, 0.98, 13):
-        start = time.perf_counter()
-        with contextlib.suppress(engine.DeadlineExceededError):
-            engine.overlay(first, second, deadline=whole * share)
-            continue
-        late.append(time.perf_counter() - start - whole * share)
-    note = f"the longest of {len(late) - 1} deadlines; the whole takes {whole:.3g} s"
-    return Figure("late after a deadline", "s", [max(late)], note=note)

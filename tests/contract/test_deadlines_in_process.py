@@ -170,6 +170,11 @@ def operations() -> set[str]:
 
 @pytest.fixture(scope="module", autouse=True)
 def _warm() -> None:
+    prepare()
+
+
+@cache
+def prepare() -> None:
     """Compile, which nothing interrupts, and make what takes long to make."""
     engine.warm()
     for name in MADE:

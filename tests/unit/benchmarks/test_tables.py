@@ -81,7 +81,9 @@ def test_a_row_runs(capsys: pytest.CaptureFixture[str]) -> None:
     words = ["--quick", "--dry", "--rounds", "2", "--seconds", "0.01", "--only"]
     assert table.main([*words, "sphere 3D"], "segments") == 0
     printed = capsys.readouterr().out
-    ours = next(line for line in printed.splitlines() if line.startswith("sphere 3D") and " ours " in line)
+    ours = next(
+        line for line in printed.splitlines() if line.startswith("clipping segments, sphere 3D") and " ours " in line
+    )
     assert "judged" in ours
     assert "wrong" not in ours
     assert "off" not in ours
