@@ -11,7 +11,8 @@ import numpy as np
 
 from engine.arrays import FloatArray, IntArray
 from engine.errors import EmptyGeometryError, IndexOutOfRangeError, InvalidInputError
-from engine.solids.mesh import first_equal_points
+from engine.solids.checks import frozen
+from engine.solids.mesh import first_equal
 from engine.solids.polyhedron import Polyhedron
 
 FORMATS: Final = ("stl", "obj", "ply", "off", "glb")
@@ -77,7 +78,7 @@ def read_mesh(file: IO[bytes], file_format: str) -> tuple[FloatArray, IntArray]:
 
 def _merged(vertices: Any, faces: Any) -> tuple[FloatArray, IntArray]:
     """Return the vertices at different coordinates in their first order, and the faces with their new indices."""
-    first = first_equal_points(vertices + 0.0)
+    first = first_equal(frozen(vertices))
     if first is None:
         return vertices, faces
     is_first = first == np.arange(len(first))

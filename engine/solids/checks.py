@@ -11,13 +11,14 @@ from __future__ import annotations
 import math
 import reprlib
 from itertools import chain
-from typing import Any, Final, cast
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from engine.arrays import BoolArray, FloatArray
 from engine.errors import EmptyGeometryError, InvalidArrayError, NotFiniteError, WrongDimensionError
+from engine.parallel import poll
 
 Where = tuple[str | int, ...]
 
@@ -149,9 +150,21 @@ def plain_floats(values: Any, depth: int) -> FloatArray | None:
     return None
 
 
+def _plain_parts(values: list[Any] | tuple[Any, ...], depth: int) -> FloatArray | None:
+    """Do as `plain_floats` does, part by part."""
+    parts: list[FloatArray] = []
+    for first in range(0, len(values) or 1, _AT_ONCE):
+        poll()
+        part = plain_floats(values if len(values) <= _AT_ONCE else values[first : first + _AT_ONCE], depth)
+        if part is None or (parts and part.shape[1:] != parts[0].shape[1:]):
+            return None
+        parts.append(part)
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+
 def _from_lists(values: list[Any] | tuple[Any, ...], depth: int, where: Where) -> FloatArray:
     """Flatten nested lists level by level, each level checked for equal lengths, then the leaves for their type."""
-    if (plain := plain_floats(values, depth)) is not None:
+    if (plain := _plain_parts(values, depth)) is not None:
         return plain
     shape, items = [len(values)], list(values)
     for level in range(1, depth):
@@ -250,8 +263,10 @@ def as_vector(vector: object, dimension: int | None, where: Where) -> FloatArray
 
 
 def frozen(array: FloatArray) -> FloatArray:
-    """Return a read-only C-contiguous copy in which -0.0 is 0.0."""
-    copy = cast(FloatArray, np.array(array, np.float64, order="C"))
-    copy += 0.0  # -0.0 + 0.0 = +0.0; every other value stays
+    """Return a read-only C-contiguous copy in which -0.0 is 0.0; every other value stays."""
+    copy = np.empty(array.shape)
+    for first in range(0, len(array), _AT_ONCE):
+        poll()
+        np.add(array[first : first + _AT_ONCE], 0.0, out=copy[first : first + _AT_ONCE])  # -0.0 + 0.0 = +0.0
     copy.setflags(write=False)
     return copy

@@ -41,6 +41,7 @@ from engine.solids.simple_ring import ENDED_EARLY, SIMPLE, TURNS_BACK, Ring, fin
 
 _TINY: Final = 1e-300  # far above what underflow takes from a sum of products (a few times 2^-1075)
 _ROUNDOFF: Final = 2.0**-53
+_CORNERS_AT_ONCE: Final = 1 << 15
 _SPREAD: Final = (
     (16, 0x0000FFFF0000FFFF), (8, 0x00FF00FF00FF00FF), (4, 0x0F0F0F0F0F0F0F0F), (2, 0x3333333333333333),
     (1, 0x5555555555555555),
@@ -59,9 +60,8 @@ def cut_faces(
     counts = np.diff(offsets)
     starts = np.append(np.int64(0), np.cumsum(counts - 2))
     corners = np.empty((int(starts[-1]), 3), np.int64)  # positions in `merged`
-    for count in np.unique(counts).tolist():
+    for count, faces in _groups(counts):
         budget.check()
-        faces = np.flatnonzero(counts == count)
         if count == 3:
             corners[starts[faces]] = offsets[faces, None] + np.arange(3)
             continue
@@ -75,6 +75,15 @@ def cut_faces(
             corners[starts[face] : starts[face + 1]] = offsets[face] + ears
     triangle_faces = np.repeat(np.arange(len(counts)), counts - 2)
     return merged[corners.ravel()], triangle_faces
+
+
+def _groups(counts: IntArray) -> Iterator[tuple[int, IntArray]]:
+    """Yield the faces of every number of corners, so many at a time that each step takes some milliseconds."""
+    for count in np.unique(counts).tolist():
+        faces = np.flatnonzero(counts == count)
+        at_once = _CORNERS_AT_ONCE // count + 1
+        for first in range(0, len(faces), at_once):
+            yield count, faces[first : first + at_once]
 
 
 def _certify_convex(rings: FloatArray) -> BoolArray:

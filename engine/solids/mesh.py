@@ -8,18 +8,24 @@ without repeated positions, the common case, keeps one array for both.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from itertools import chain
+from typing import Any, ClassVar, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from engine.arrays import FloatArray, IntArray, read_only
+from engine.direct import entry_of
 from engine.errors import IndexOutOfRangeError, InvalidArrayError, RepeatedIndexError, RingTooShortError
-from engine.parallel import Budget, Cancel
+from engine.parallel import Budget, Cancel, poll
 from engine.solids.base import Solid
 from engine.solids.checks import as_points, check_not_empty, frozen, shown
 from engine.solids.ear_cutting import cut_faces
-from engine.solids.sound_triangles import MOST_CORNERS, MOST_VERTICES, are_sound
+from engine.solids.mesh_checks import look_over
+from engine.solids.unbalanced_edges import unbalanced_edges
+
+_AT_ONCE: Final = 1 << 15
+"""Faces of a list looked at between two looks at the clock."""
 
 
 class Mesh(Solid):
@@ -48,39 +54,32 @@ class Mesh(Solid):
         check_not_empty(len(points), "vertex", ("vertices",))
         budget.check()
         points = frozen(points)
-        offsets, indices = as_faces(faces, len(points))
-        triangles, triangle_faces = indices, None
-        if offsets is not None or not self._is_small_and_sound(points, indices):
-            budget.check()
-            check_repeated_indices(offsets, indices)
-            budget.check()
-            first_equal = first_equal_points(points)
-            triangles = merged = indices if first_equal is None else first_equal[indices]
-            budget.check()
-            self._check_faces(points, offsets, indices, merged)
-            budget.check()
-            if offsets is not None:
-                triangles, triangle_faces = cut_faces(points, offsets, indices, merged, budget)
-        for array in (offsets, indices, triangles, triangle_faces):
+        given, indices = as_faces(faces, len(points))
+        budget.check()
+        offsets = np.arange(0, len(indices) + 1, 3) if given is None else given
+        merged = np.empty(len(indices), np.int64)
+        i_face, n_different, n_unbalanced = entry_of(look_over)(
+            points.view(np.uint64), offsets, indices, self._must_close, merged, budget.flag
+        )
+        budget.check()
+        if i_face >= 0:
+            raise _repeated_index(i_face, indices[offsets[i_face] : offsets[i_face + 1]])
+        triangles, triangle_faces = indices if n_different == len(points) else merged, None
+        if n_unbalanced > 0:
+            raise unbalanced_edges(points, offsets, indices, triangles, budget)
+        if given is not None:
+            triangles, triangle_faces = cut_faces(points, offsets, indices, triangles, budget)
+        for array in (given, indices, triangles, triangle_faces):
             if array is not None:
                 array.setflags(write=False)
         self._set(
             dimension=3,
             vertices=points,
             face_indices=indices,
-            _face_offsets=offsets,
+            _face_offsets=given,
             _triangles=None if triangles is indices else triangles,
             _triangle_faces=triangle_faces,
         )
-
-    def _is_small_and_sound(self, points: FloatArray, indices: IntArray) -> bool:
-        """Tell whether these are few triangles without any fault or equal points: no other check is needed then."""
-        if len(points) > MOST_VERTICES or len(indices) > MOST_CORNERS:
-            return False
-        return bool(are_sound(points, indices, self._must_close))
-
-    def _check_faces(self, vertices: FloatArray, offsets: IntArray | None, indices: IntArray, merged: IntArray) -> None:
-        """Raise if the faces break an invariant of this kind of mesh."""
 
     @property
     def n_faces(self) -> int:
@@ -141,29 +140,43 @@ def as_faces(faces: object, n_vertices: int) -> tuple[IntArray | None, IntArray]
                 f"faces[{i_face}] has {counts[i_face]} vertices; a face needs at least 3", ("faces", i_face)
             )
         offsets = None if counts.max() == 3 else np.append(np.int64(0), np.cumsum(counts))
-    if flat.min() < 0 or flat.max() >= n_vertices:
-        position = int(np.argmax((flat < 0) | (flat >= n_vertices)))
+    indices = np.array(flat if flat.dtype != object else flat.clip(-1, n_vertices), np.int64)
+    if indices.view(np.uint64).max() >= n_vertices:  # negative numbers are the largest
+        position = int(np.argmax(indices.view(np.uint64) >= n_vertices))
         i_face, i_corner = _place(offsets, position)
         raise IndexOutOfRangeError(
             f"faces[{i_face}][{i_corner}] is {shown(int(flat[position]))}, "
             f"but the vertices are numbered 0 to {n_vertices - 1}",
             ("faces", i_face, i_corner),
         )
-    return offsets, np.array(flat, np.int64)
+    return offsets, indices
 
 
 def _flatten(faces: Sequence[Any]) -> tuple[IntArray, npt.NDArray[Any]]:
     """Return the number of corners of each face and all indices; every index must be a whole number."""
-    rows = [face.tolist() if isinstance(face, np.ndarray) else face for face in faces]
-    for i_face, face in enumerate(rows):
-        if not isinstance(face, (list, tuple)):
-            raise InvalidArrayError(
-                f"faces[{i_face}] must be a list of vertex indices, got {shown(face)}", ("faces", i_face)
-            )
-    counts = np.array([len(face) for face in rows], np.int64)
-    items = [index for face in rows for index in face]
+    parts = []
+    for first in range(0, len(faces) or 1, _AT_ONCE):
+        poll()
+        parts.append(_flatten_some(faces[first : first + _AT_ONCE], first))
+    if len(parts) == 1:
+        return parts[0]
+    return np.concatenate([counts for counts, _ in parts]), np.concatenate([indices for _, indices in parts])
+
+
+def _flatten_some(faces: Sequence[Any], first: int) -> tuple[IntArray, npt.NDArray[Any]]:
+    """Do as `_flatten` does with the faces from number `first` on."""
+    rows = faces
+    if not set(map(type, faces)) <= {list, tuple}:
+        rows = [face.tolist() if isinstance(face, np.ndarray) else face for face in faces]
+        for i_face, face in enumerate(rows, first):
+            if not isinstance(face, (list, tuple)):
+                raise InvalidArrayError(
+                    f"faces[{i_face}] must be a list of vertex indices, got {shown(face)}", ("faces", i_face)
+                )
+    counts = np.array(list(map(len, rows)), np.int64)
+    items = list(chain.from_iterable(rows))
     if not set(map(type, items)) <= {int}:
-        for i_face, face in enumerate(rows):
+        for i_face, face in enumerate(rows, first):
             for i_corner, index in enumerate(face):
                 if isinstance(index, (bool, np.bool_)) or not isinstance(index, (int, np.integer)):
                     raise InvalidArrayError(
@@ -185,25 +198,19 @@ def _place(offsets: IntArray | None, position: int) -> tuple[int, int]:
     return i_face, position - int(offsets[i_face])
 
 
-def check_repeated_indices(offsets: IntArray | None, indices: IntArray) -> None:
-    """Raise if a face names one vertex twice."""
-    if offsets is None:
-        a, b, c = indices[0::3], indices[1::3], indices[2::3]
-        is_repeated = (a == b) | (b == c) | (c == a)
-        if not is_repeated.any():
-            return
-        i_face = int(np.argmax(is_repeated))
-        face = indices[3 * i_face : 3 * i_face + 3]
-    else:
-        faces = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
-        order = np.lexsort((indices, faces))
-        is_same = (faces[order][1:] == faces[order][:-1]) & (indices[order][1:] == indices[order][:-1])
-        if not is_same.any():
-            return
-        i_face = int(faces[order][int(np.argmax(is_same))])
-        face = indices[offsets[i_face] : offsets[i_face + 1]]
+def first_equal(points: FloatArray) -> IntArray | None:
+    """Return for each point the first index with equal coordinates, None if no two are equal; points as `frozen`."""
+    n = len(points)
+    every, first = np.arange(n), np.empty(n, np.int64)
+    one_face, no_flag = np.array([0, n]), np.zeros(1, np.uint8)
+    _, n_different, _ = entry_of(look_over)(points.view(np.uint64), one_face, every, False, first, no_flag)
+    return None if n_different == n else first
+
+
+def _repeated_index(i_face: int, face: IntArray) -> RepeatedIndexError:
+    """Return the error that says which vertex a face names twice."""
     values, counts = np.unique(face, return_counts=True)
-    raise RepeatedIndexError(
+    return RepeatedIndexError(
         f"faces[{i_face}] = {_shortened(face.tolist())} names vertex {int(values[counts > 1][0])} more than once; "
         "leave the face out or split it there",
         ("faces", i_face),
@@ -212,34 +219,3 @@ def check_repeated_indices(offsets: IntArray | None, indices: IntArray) -> None:
 
 def _shortened(items: list[int]) -> str:
     return repr(items) if len(items) <= 12 else repr(items[:12])[:-1] + ", ...]"
-
-
-def first_equal_points(points: FloatArray) -> IntArray | None:
-    """Return for each point the first index with equal coordinates; None if no two points are equal.
-
-    points: ``(n, 3)`` without -0.0, so that equal means equal bits. Sorts a 64-bit mix of the bits, then compares the
-    neighbours in full; should two different points ever mix to one value, all coordinates are sorted instead.
-    """
-    bits = points.view(np.uint64)
-    mixed = _mix(bits)
-    order = np.argsort(mixed, kind="stable")
-    is_same = mixed[order][1:] == mixed[order][:-1]
-    if not is_same.any():
-        return None
-    is_equal = (points[order][1:] == points[order][:-1]).all(axis=1)
-    if (is_same != is_equal).any():
-        order = np.lexsort(bits.T)
-        is_equal = (points[order][1:] == points[order][:-1]).all(axis=1)
-    starts = np.flatnonzero(np.append(True, ~is_equal))
-    first = np.empty(len(points), np.int64)
-    first[order] = np.repeat(order[starts], np.diff(np.append(starts, len(points))))
-    return first
-
-
-def _mix(bits: npt.NDArray[np.uint64]) -> npt.NDArray[np.uint64]:
-    """Return one number for each row ``(n, 3)``, seldom the same for two different rows."""
-    mixed = bits[:, 0] * np.uint64(0x9E3779B97F4A7C15)  # odd constants of splitmix64; products wrap around
-    for column in range(1, bits.shape[1]):
-        mixed ^= mixed >> np.uint64(29)
-        mixed = (mixed + bits[:, column]) * np.uint64(0xBF58476D1CE4E5B9)
-    return mixed

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import engine
-from engine.solids.mesh import first_equal_points
 
 VERTICES = [[0.1, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 FACES = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
@@ -38,25 +37,6 @@ def test_equal_coordinates_are_merged_to_the_first_index() -> None:
     solid = engine.Polyhedron(soup, np.arange(12).reshape(4, 3))
     assert solid.face_indices.tolist() == list(range(12))
     assert solid.triangles.tolist() == [[0, 1, 2], [0, 2, 5], [2, 1, 5], [1, 0, 5]]
-
-
-def test_first_equal_points() -> None:
-    assert first_equal_points(np.array([[0.0, 1.0, 2.0], [0.0, 2.0, 1.0]])) is None
-    points = np.random.default_rng(0).integers(0, 3, (200, 3)).astype(float)
-    expected = [points.tolist().index(point) for point in points.tolist()]
-    found = first_equal_points(points)
-    assert found is not None
-    assert found.tolist() == expected
-
-
-def test_first_equal_points_when_the_mix_collides(monkeypatch: pytest.MonkeyPatch) -> None:
-    points = np.random.default_rng(0).integers(0, 3, (200, 3)).astype(float)
-    expected = first_equal_points(points)
-    monkeypatch.setattr("engine.solids.mesh._mix", lambda bits: bits[:, 0] * np.uint64(0))
-    found = first_equal_points(points)
-    assert found is not None
-    assert expected is not None
-    assert found.tolist() == expected.tolist()
 
 
 def test_shells_that_are_accepted() -> None:

@@ -1,0 +1,211 @@
+"""What is looked for in every mesh, each in time linear in its size: equal vertices, repeated indices, open edges.
+
+The kernels poll `flag` and return early when it is raised: the caller checks its budget before it believes them. What
+they are handed: ``indices[offsets[i] : offsets[i + 1]]`` are the vertices of face i, all in range.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+
+from engine.jit import inline, kernel
+
+_POLL: Final = 0x3FFF
+"""Items between two looks at the flag, one less than a power of two: a fraction of a millisecond."""
+_FREE: Final = -1
+_ODD: Final = np.uint64(0x9E3779B97F4A7C15)
+_ODD_TOO: Final = np.uint64(0xBF58476D1CE4E5B9)
+"""Constants of splitmix64; products wrap around."""
+_HALF: Final = np.uint64(32)
+_ODD_USES: Final = 1
+_TURNED: Final = 2
+
+
+@inline
+def _mixed(bits: Any, row: int) -> Any:
+    """Return one number for the three of a row, seldom the same for two different rows."""
+    mixed = bits[row, 0] * _ODD
+    for column in range(1, 3):
+        mixed = (mixed ^ (mixed >> _HALF)) + bits[row, column]
+        mixed *= _ODD_TOO
+    return (mixed ^ (mixed >> _HALF)) * _ODD
+
+
+@inline
+def _find_equal_rows(bits: Any, first: Any, flag: Any) -> int:
+    """Set `first` (n,) to the first row of `bits` (n, 3) uint64 that equals each row; return the number of different
+    ones.
+
+    A table of at least twice as many slots, tried from the slot of the mixed row onwards.
+    """
+    n, n_different, n_bits = bits.shape[0], 0, 1
+    while (1 << n_bits) < 2 * n:  # bound: the bits of a number
+        n_bits += 1
+    slots, last = np.empty(1 << n_bits, np.int64), (1 << n_bits) - 1
+    shift = np.uint64(64 - n_bits)
+    for place in range(last + 1):
+        if place & _POLL == 0 and flag[0] != 0:
+            return 0
+        slots[place] = _FREE
+    for row in range(n):
+        if row & _POLL == 0 and flag[0] != 0:
+            break
+        slot: Any = np.int64(_mixed(bits, row) >> shift)
+        first[row] = row
+        for tried in range(n):  # bound: every row before is met once at most
+            if tried & _POLL == _POLL and flag[0] != 0:
+                break
+            other = slots[slot]
+            if other == _FREE:
+                slots[slot] = row
+                n_different += 1
+                break
+            if bits[other, 0] == bits[row, 0] and bits[other, 1] == bits[row, 1] and bits[other, 2] == bits[row, 2]:
+                first[row] = other
+                break
+            slot = (slot + 1) & last
+    return n_different
+
+
+@inline
+def _find_repeat(offsets: Any, indices: Any, n_vertices: int, flag: Any) -> int:
+    """Return the first face that names a vertex twice, -1 if none does."""
+    last_face = np.full(n_vertices, -1, np.int64)
+    for face in range(offsets.shape[0] - 1):
+        if face & _POLL == 0 and flag[0] != 0:
+            break
+        for corner in range(offsets[face], offsets[face + 1]):
+            if last_face[indices[corner]] == face:
+                return face
+            last_face[indices[corner]] = face
+    return -1
+
+
+@inline
+def _following(offsets: Any, face: int, corner: int) -> int:
+    """Return the next corner of a face."""
+    return corner + 1 if corner + 1 < offsets[face + 1] else offsets[face]
+
+
+@inline
+def _group_edges(offsets: Any, indices: Any, starts: Any, ends: Any, flag: Any) -> None:
+    """Put the edges of all faces into `ends`, those with the lower vertex v at ``starts[v]`` to ``starts[v + 1]``.
+
+    ends: the higher vertex h of an edge that runs up to it, ~h of one that runs down. starts: zeros, (n_vertices + 2,).
+    An edge between a vertex and itself is left out. Two looks at every edge, the first to count.
+    """
+    for is_second in range(2):
+        for face in range(offsets.shape[0] - 1):
+            if face & _POLL == 0 and flag[0] != 0:
+                return
+            for corner in range(offsets[face], offsets[face + 1]):
+                start, end = indices[corner], indices[_following(offsets, face, corner)]
+                if start != end:
+                    low = min(start, end)
+                    if is_second == 0:
+                        starts[low + 2] += 1
+                    else:
+                        ends[starts[low + 1]] = end if end > start else ~start
+                        starts[low + 1] += 1
+        if is_second == 0:
+            for vertex in range(2, starts.shape[0]):
+                starts[vertex] += starts[vertex - 1]
+
+
+@inline
+def _count_unbalanced(starts: Any, ends: Any, marks: Any, flag: Any) -> tuple[int, int]:
+    """Return how many edges are used an odd number of times, and how many others more often in one direction.
+
+    starts, ends: from `_group_edges`. marks: int8, set to _ODD_USES or _TURNED at every use of such edges, else 0; an
+    empty array where only the numbers are asked for.
+    """
+    uses, n_odd, n_turned = np.zeros(starts.shape[0], np.int64), 0, 0
+    for low in range(starts.shape[0] - 2):
+        if low & _POLL == 0 and flag[0] != 0:
+            break
+        for place in range(starts[low], starts[low + 1]):
+            end = ends[place]
+            if end >= 0:
+                uses[end] += 1
+            else:
+                uses[~end] -= 1
+        for place in range(starts[low], min(starts[low + 1], marks.shape[0])):
+            net = uses[max(ends[place], ~ends[place])]
+            marks[place] = 0 if net == 0 else _ODD_USES if net & 1 == 1 else _TURNED
+        for place in range(starts[low], starts[low + 1]):
+            high = max(ends[place], ~ends[place])
+            if uses[high] & 1 == 1:
+                n_odd += 1
+            elif uses[high] != 0:
+                n_turned += 1
+            uses[high] = 0
+    return n_odd, n_turned
+
+
+@kernel
+def look_over(bits: Any, offsets: Any, indices: Any, must_close: bool, merged: Any, flag: Any) -> tuple[int, int, int]:
+    """Return the first face that names a vertex twice (-1: none), the number of different vertices, and the number of
+    edges that are not used equally often in both directions (0 unless it must be so).
+
+    bits: the vertices (n, 3) uint64. merged: set to the first of all equal vertices at each corner, if two are equal.
+    """
+    n = bits.shape[0]
+    repeated = _find_repeat(offsets, indices, n, flag)
+    if repeated >= 0 or flag[0] != 0:
+        return repeated, n, 0
+    first = np.empty(n, np.int64)
+    n_different = _find_equal_rows(bits, first, flag)
+    if n_different < n:
+        for corner in range(indices.shape[0]):
+            if corner & _POLL == 0 and flag[0] != 0:
+                break
+            merged[corner] = first[indices[corner]]
+    if not must_close or flag[0] != 0:
+        return -1, n_different, 0
+    corners = merged if n_different < n else indices
+    starts, ends = np.zeros(n + 2, np.int64), np.empty(indices.shape[0], np.int64)
+    _group_edges(offsets, corners, starts, ends, flag)
+    n_odd, n_turned = _count_unbalanced(starts, ends, np.empty(0, np.int8), flag)
+    return -1, n_different, n_odd + n_turned
+
+
+@kernel
+def name_unbalanced(offsets: Any, corners: Any, n_vertices: int, named: Any, flag: Any) -> tuple[int, int]:
+    """Return what `_count_unbalanced` does and set `named` (k, 5) to the first edges of the first kind that there is.
+
+    A row: the face and the corner where the edge is used first, the next corner, how often it is used in this direction
+    and in the other; -1 where there is no further edge.
+    """
+    starts, ends = np.zeros(n_vertices + 2, np.int64), np.empty(corners.shape[0], np.int64)
+    marks = np.empty(corners.shape[0], np.int8)
+    _group_edges(offsets, corners, starts, ends, flag)
+    n_odd, n_turned = _count_unbalanced(starts, ends, marks, flag)
+    wanted, places = _ODD_USES if n_odd > 0 else _TURNED, starts.copy()
+    named[:] = -1
+    n_named = 0
+    for face in range(offsets.shape[0] - 1):
+        if face & _POLL == 0 and flag[0] != 0:
+            break
+        for corner in range(offsets[face], offsets[face + 1]):
+            following = _following(offsets, face, corner)
+            start, end = corners[corner], corners[following]
+            low, high = min(start, end), max(start, end)
+            place = places[low]
+            if start != end:
+                places[low] += 1  # the uses of its edges stand in the order of the faces
+            if start != end and marks[place] == wanted:
+                up, down = 0, 0
+                for other in range(starts[low], starts[low + 1]):
+                    up += ends[other] == high
+                    down += ends[other] == ~high
+                    if ends[other] == high or ends[other] == ~high:
+                        marks[other] = 0  # named once
+                named[n_named] = (
+                    (face, corner, following, up, down) if start == low else (face, corner, following, down, up)
+                )
+                n_named += 1
+                if n_named == named.shape[0]:
+                    return n_odd, n_turned
+    return n_odd, n_turned
