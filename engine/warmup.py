@@ -210,7 +210,8 @@ def _warm_bounds() -> None:
         for solid in _regions(dimension):
             with contextlib.suppress(Exception):  # unbounded ones are refused
                 bounds(solid)
-    clearance(Sphere([0, 0, 0], 1), Sphere([3, 0, 0], 1))
+    for body in (Sphere([0, 0, 0], 1), HalfSpace([1, 0, 0], -9), _cube(5.0)):
+        clearance(body, Sphere([3, 0, 0], 1))
 
 
 STEPS = (

@@ -6,7 +6,16 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.collision.clearance.boxes import Candidates, Search, View, box_bound, lane_centre, lane_half, set_line
+from engine.collision.clearance.boxes import (
+    Candidates,
+    Search,
+    View,
+    box_bound,
+    lane_centre,
+    lane_half,
+    scaled,
+    set_line,
+)
 from engine.collision.clearance.near_triangles import nearest_points, rounding_of, seen_from, slab
 from engine.collision.meshes.mesh_arrays import triangle_of
 from engine.collision.meshes.placement import placed
@@ -14,6 +23,7 @@ from engine.collision.meshes.triangle_triangle import Triangle3
 from engine.jit import inline
 from engine.lanes.boxes import EMPTY
 from engine.lanes.tracing import LANES
+from engine.predicates.loading import as_point3
 from engine.predicates.vectors import dot, largest_of, minus
 from engine.types import Point3
 
@@ -29,11 +39,8 @@ asked; by the flag."""
 def _triangle(view: View, item: int) -> Triangle3:
     """Return a placed triangle, rounded, times the unit."""
     t, place, unit = triangle_of(view.mesh, item), view.place, view.unit
-    p, q, r = placed(t.p, place), placed(t.q, place), placed(t.r, place)
     return Triangle3(
-        Point3(p.x * unit, p.y * unit, p.z * unit),
-        Point3(q.x * unit, q.y * unit, q.z * unit),
-        Point3(r.x * unit, r.y * unit, r.z * unit),
+        scaled(placed(t.p, place), unit), scaled(placed(t.q, place), unit), scaled(placed(t.r, place), unit)
     )
 
 
@@ -84,9 +91,10 @@ def block_reach(s: Search, view: View, row: int, node: int) -> float:
         child = int(view.mesh.child[node, lane])
         if child == EMPTY:
             break
-        t = triangle_of(view.mesh, -1 - child)
-        reach = max(reach, sign * dot(d, t.p), sign * dot(d, t.q), sign * dot(d, t.r))
-    reach = sign * reach * view.unit + s.room.line[9 + row]
+        for corner in range(3):
+            p = scaled(as_point3(view.mesh.vertices, view.mesh.triangles[-1 - child, corner]), view.unit)
+            reach = max(reach, sign * dot(d, p))
+    reach = sign * reach + s.room.line[9 + row]
     s.room.kept[node, 2 * row], s.room.kept[node, 2 * row + 1] = turn, reach
     return reach
 

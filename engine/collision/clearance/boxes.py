@@ -122,8 +122,8 @@ def frame_of(a: View, b: View) -> Frame:
     x, y, z = Point3(1.0, 0.0, 0.0), Point3(0.0, 1.0, 0.0), Point3(0.0, 0.0, 1.0)
     u, v, w = turned_back(p, turned(q, x)), turned_back(p, turned(q, y)), turned_back(p, turned(q, z))
     origin, other = a.mesh.origin, b.mesh.origin
-    there = turned(q, Point3(other[0] * b.unit, other[1] * b.unit, other[2] * b.unit))
-    moved = Point3((q.x - p.x) * a.unit, (q.y - p.y) * a.unit, (q.z - p.z) * a.unit)
+    there = turned(q, scaled(Point3(other[0], other[1], other[2]), b.unit))
+    moved = scaled(Point3(q.x - p.x, q.y - p.y, q.z - p.z), a.unit)
     t = turned_back(p, Point3(there.x + moved.x, there.y + moved.y, there.z + moved.z))
     shift = Point3(t.x - origin[0] * a.unit, t.y - origin[1] * a.unit, t.z - origin[2] * a.unit)
     size = 4.0 * (a.mesh.extent.reach * a.unit + b.mesh.extent.reach * b.unit) + 2.0 * largest_of(moved)
@@ -132,6 +132,12 @@ def frame_of(a: View, b: View) -> Frame:
         Point3(u.x, v.x, w.x), Point3(u.y, v.y, w.y), Point3(u.z, v.z, w.z), shift,
         1.0 - 8.0 * defect - 2.0**-40, (_BOX_ROUNDING + 16.0 * defect) * size + 1e-300,
     )  # fmt: skip
+
+
+@merged
+def scaled(p: Point3, unit: float) -> Point3:
+    """Return a point times the unit; order: before any product, which would be lost where coordinates are denormal."""
+    return Point3(p.x * unit, p.y * unit, p.z * unit)
 
 
 @merged
@@ -205,6 +211,6 @@ def set_line(line: Any, a: View, b: View, d: Point3) -> None:
     line[0], line[1], line[2] = e.x, e.y, e.z
     line[3], line[4], line[5] = f.x, f.y, f.z
     line[6], line[7], line[8] = d.x, d.y, d.z
-    line[9] = dot(d, Point3(a.place.x, a.place.y, a.place.z)) * a.unit
-    line[10] = dot(d, Point3(b.place.x, b.place.y, b.place.z)) * b.unit
+    line[9] = dot(d, scaled(Point3(a.place.x, a.place.y, a.place.z), a.unit))
+    line[10] = dot(d, scaled(Point3(b.place.x, b.place.y, b.place.z), b.unit))
     line[11] += 1.0

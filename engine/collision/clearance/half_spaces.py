@@ -6,25 +6,22 @@ A linear function over a body is largest at a vertex. Floats leave the vertices 
 from __future__ import annotations
 
 from fractions import Fraction
-from math import lcm
 
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
 from engine.collision.clearance.bodies import feature_of, radius_of, spread_of
-from engine.collision.clearance.exact import Gap, Rational
+from engine.collision.clearance.forms import PLANE, scaled_gap
 from engine.collision.clearance.result import Feature
 from engine.collision.clearance.rounded import ScaledGap
 from engine.collision.exact_images import HalfSpaceImage, Vector, image_half_space, image_map, value_at
 from engine.collision.meshes.mesh_arrays import MeshBody
 from engine.collision.simple.boundary import pulled_back
 from engine.parallel import Budget
-from engine.predicates.exact_vectors import minus, squared_length
+from engine.predicates.exact_vectors import squared_length
 from engine.solids.base import Solid
 from engine.solids.half_space import HalfSpace
 from engine.solids.pose import Pose
-
-PLANE = Feature("plane")
 
 
 def gap_of_planes(
@@ -36,16 +33,16 @@ def gap_of_planes(
                           image_half_space(other.normal, other.offset, other_pose)), (PLANE, PLANE)  # fmt: skip
     if isinstance(solid, HalfSpace):
         foot, point, feature = _foot_and_vertex(solid, pose, other, other_pose, budget)
-        return _scaled(foot, point, (0.0, radius_of(other))), (PLANE, feature)
+        return scaled_gap(foot, point, (0.0, radius_of(other))), (PLANE, feature)
     assert isinstance(other, HalfSpace)
     foot, point, feature = _foot_and_vertex(other, other_pose, solid, pose, budget)
-    return _scaled(point, foot, (radius_of(solid), 0.0)), (feature, PLANE)
+    return scaled_gap(point, foot, (radius_of(solid), 0.0)), (feature, PLANE)
 
 
 def _of_planes(first: HalfSpaceImage, second: HalfSpaceImage) -> ScaledGap:
     """Return the gap of two half-spaces: their planes are parallel. Of all lines across, that through the origin."""
     p, q = (tuple(-offset * x / squared_length(normal) for x in normal) for normal, offset in (first, second))
-    return _scaled(p, q, (0.0, 0.0))
+    return scaled_gap(p, q, (0.0, 0.0))
 
 
 def _foot_and_vertex(
@@ -55,18 +52,19 @@ def _foot_and_vertex(
     mesh, d = spread_of(body), body.dimension
     plane = image_half_space(half_space.normal, half_space.offset, half_space_pose)
     image = image_map(body_pose)
-    best: tuple[Fraction, Vector, int] | None = None
+    best: tuple[Fraction, Vector, Feature] | None = None
     for vertex in _highest(pulled_back(plane, body_pose), mesh, d).tolist():
         budget.check()
         point = image(mesh.arrays.vertices[vertex, :d].tolist())
         value = value_at(plane, point)
-        if best is None or value > best[0]:
-            best = value, point, vertex
+        if best is None or value >= best[0]:
+            triangle, corner = np.argwhere(mesh.arrays.triangles == vertex)[0].tolist()
+            feature = feature_of(body, mesh, triangle, corner)
+            if best is None or value > best[0] or feature.indices < best[2].indices:
+                best = value, point, feature
     assert best is not None
-    value, point, vertex = best
-    foot = tuple(x - value * n / squared_length(plane[0]) for x, n in zip(point, plane[0]))
-    triangle, corner = np.argwhere(mesh.arrays.triangles == vertex)[0].tolist()
-    return foot, point, feature_of(body, mesh, triangle, corner)
+    value, point, feature = best
+    return tuple(x - value * n / squared_length(plane[0]) for x, n in zip(point, plane[0])), point, feature
 
 
 def _highest(pulled: HalfSpaceImage, mesh: MeshBody, dimension: int) -> IntArray:
@@ -80,13 +78,3 @@ def _highest(pulled: HalfSpaceImage, mesh: MeshBody, dimension: int) -> IntArray
         bounds = 2.0**-49 * (np.abs(points) @ np.abs(weights)) + 2.0**-1000 + 2.0**-1073 * np.abs(points).sum(axis=1)
         is_below = values + bounds < np.max(values - bounds)
     return np.flatnonzero(~is_below)
-
-
-def _scaled(p: Vector, q: Vector, radii: tuple[float, float]) -> ScaledGap:
-    numbers = [*p, *q, *map(Fraction, radii)]
-    scale = lcm(*(x.denominator for x in numbers))
-    whole = [int(x * scale) for x in numbers]
-    n = len(p)
-    a, b = tuple(whole[:n]), tuple(whole[n : 2 * n])
-    gap = Gap(Rational(a, 1), Rational(b, 1), 0, 0, squared_length(minus(b, a)), 1)
-    return ScaledGap(gap, (whole[-2], whole[-1]), scale)

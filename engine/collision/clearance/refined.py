@@ -18,27 +18,25 @@ import numpy as np
 from engine.collision.clearance.blocks import keep_below
 from engine.collision.clearance.boxes import Search, View
 from engine.collision.clearance.near_triangles import FACE
+from engine.collision.clearance.wide import (
+    Wide,
+    Wide3,
+    along_wide,
+    dot_wide,
+    less,
+    minus_wide,
+    over,
+    plus,
+    product,
+    root,
+    times,
+)
 from engine.jit import called, inline
-from engine.predicates.double_double import dd_add, dd_div, dd_mul, dd_sub, surely_rounded
-from engine.predicates.error_free import fast_two_sum, two_diff, two_prod
+from engine.predicates.double_double import surely_rounded
+from engine.predicates.error_free import two_diff
 from engine.types import Point3
 
 _ROUNDING: Final = 2.0**-94
-
-
-class Wide(NamedTuple):
-    """A double-double."""
-
-    h: float
-    low: float
-
-
-class Wide3(NamedTuple):
-    """A point."""
-
-    x: Wide
-    y: Wide
-    z: Wide
 
 
 class Triangle(NamedTuple):
@@ -50,69 +48,18 @@ class Triangle(NamedTuple):
 
 
 @inline
-def _times(a: Wide, b: Wide) -> Wide:
-    h, low = dd_mul(a.h, a.low, b.h, b.low)
-    return Wide(h, low)
-
-
-@inline
-def _less(a: Wide, b: Wide) -> Wide:
-    h, low = dd_sub(a.h, a.low, b.h, b.low)
-    return Wide(h, low)
-
-
-@inline
-def _minus(a: Wide3, b: Wide3) -> Wide3:
-    return Wide3(_less(a.x, b.x), _less(a.y, b.y), _less(a.z, b.z))
-
-
-@called
-def _dot(a: Wide3, b: Wide3) -> Wide:
-    x, y, z = _times(a.x, b.x), _times(a.y, b.y), _times(a.z, b.z)
-    s, t = dd_add(x.h, x.low, y.h, y.low)
-    h, low = dd_add(s, t, z.h, z.low)
-    return Wide(h, low)
-
-
-@inline
-def _moved(a: Wide, t: Wide, u: Wide) -> Wide:
-    x = _times(t, u)
-    h, low = dd_add(a.h, a.low, x.h, x.low)
-    return Wide(h, low)
-
-
-@inline
-def _along(a: Wide3, t: Wide, u: Wide3) -> Wide3:
-    """Return a + t u."""
-    return Wide3(_moved(a.x, t, u.x), _moved(a.y, t, u.y), _moved(a.z, t, u.z))
-
-
-@inline
 def _share(top: Wide, bottom: Wide) -> Wide:
     """Return top / bottom, but from 0 to 1."""
     if not (bottom.h > 0.0 and top.h > 0.0):
         return Wide(0.0, 0.0)
-    h, low = dd_div(top.h, top.low, bottom.h, bottom.low)
-    return Wide(h, low) if h < 1.0 else Wide(1.0, 0.0)
-
-
-@inline
-def _root(a: Wide) -> Wide:
-    """Return the root of a positive number."""
-    h = np.sqrt(a.h)
-    p, e = two_prod(h, h)
-    r, low = fast_two_sum(h, ((a.h - p) - e + a.low) / (2.0 * h))
-    return Wide(r, low)
+    share = over(top, bottom)
+    return share if share.h < 1.0 else Wide(1.0, 0.0)
 
 
 @inline
 def _row(a: Point3, p: Point3, shift: Wide) -> Wide:
     """Return a . p + shift."""
-    h, low = shift
-    for x, y in ((a.x, p.x), (a.y, p.y), (a.z, p.z)):
-        product = two_prod(x, y)
-        h, low = dd_add(h, low, product[0], product[1])
-    return Wide(h, low)
+    return plus(plus(plus(shift, product(a.x, p.x)), product(a.y, p.y)), product(a.z, p.z))
 
 
 @called
@@ -141,7 +88,7 @@ def _vertex(t: Triangle, k: int) -> Wide3:
 def _edge(t: Triangle, k: int) -> tuple[Wide3, Wide3]:
     """Return the start of an edge, and the vector to its end."""
     a = _vertex(t, k)
-    return a, _minus(_vertex(t, (k + 1) % 3), a)
+    return a, minus_wide(_vertex(t, (k + 1) % 3), a)
 
 
 @called
@@ -150,16 +97,16 @@ def _foot(point: Wide3, t: Triangle, feature: int) -> Wide3:
     if feature < 3:
         return _vertex(t, feature)
     a, u = _edge(t, feature % 3)
-    w, uu = _minus(point, a), _dot(u, u)
+    w, uu = minus_wide(point, a), dot_wide(u, u)
     if feature < FACE:
-        return _along(a, _share(_dot(w, u), uu), u)
-    v = _minus(t.r, a)
-    uv, vv, uw, vw = _dot(u, v), _dot(v, v), _dot(u, w), _dot(v, w)
-    size = _less(_times(uu, vv), _times(uv, uv))
-    x = _share(_less(_times(vv, uw), _times(uv, vw)), size)
-    y = _share(_less(_times(uu, vw), _times(uv, uw)), size)
-    rest = _less(Wide(1.0, 0.0), x)
-    return _along(_along(a, x, u), y if _less(y, rest).h <= 0.0 else rest, v)
+        return along_wide(a, _share(dot_wide(w, u), uu), u)
+    v = minus_wide(t.r, a)
+    uv, vv, uw, vw = dot_wide(u, v), dot_wide(v, v), dot_wide(u, w), dot_wide(v, w)
+    size = less(times(uu, vv), times(uv, uv))
+    x = _share(less(times(vv, uw), times(uv, vw)), size)
+    y = _share(less(times(uu, vw), times(uv, uw)), size)
+    rest = less(Wide(1.0, 0.0), x)
+    return along_wide(along_wide(a, x, u), y if less(y, rest).h <= 0.0 else rest, v)
 
 
 @called
@@ -170,10 +117,10 @@ def _ends(s: Triangle, t: Triangle, first: int, second: int) -> tuple[Wide3, Wid
         return _foot(q, s, first), q
     if 3 <= first < FACE and second < FACE:
         (a, u), (b, v) = _edge(s, first - 3), _edge(t, second - 3)
-        w = _minus(a, b)
-        uu, uv, vv, uw, vw = _dot(u, u), _dot(u, v), _dot(v, v), _dot(u, w), _dot(v, w)
-        size = _less(_times(uu, vv), _times(uv, uv))
-        p = _along(a, _share(_less(_times(uv, vw), _times(vv, uw)), size), u)
+        w = minus_wide(a, b)
+        uu, uv, vv, uw, vw = dot_wide(u, u), dot_wide(u, v), dot_wide(v, v), dot_wide(u, w), dot_wide(v, w)
+        size = less(times(uu, vv), times(uv, uv))
+        p = along_wide(a, _share(less(times(uv, vw), times(vv, uw)), size), u)
     else:
         p = _vertex(s, first % 3)
     return p, _foot(p, t, second)
@@ -182,7 +129,7 @@ def _ends(s: Triangle, t: Triangle, first: int, second: int) -> tuple[Wide3, Wid
 @inline
 def _height(n: Wide3, p: Wide3, base: Wide3) -> Wide:
     """Return n . (p - base)."""
-    return _dot(n, _minus(p, base))
+    return dot_wide(n, minus_wide(p, base))
 
 
 @called
@@ -190,14 +137,14 @@ def _bounds(s: Triangle, t: Triangle, first: int, second: int) -> tuple[Wide, fl
     """Return the distance of two points of the triangles, and by how much the triangles may be nearer at most but for
     rounding."""
     p, q = _ends(s, t, first, second)
-    n = _minus(q, p)
-    square = _dot(n, n)
+    n = minus_wide(q, p)
+    square = dot_wide(n, n)
     if not square.h > 2.0**-300:
         return Wide(0.0, 0.0), 0.0
     beyond = 0.0
     for k in range(3):
         beyond = max(beyond, _height(n, _vertex(s, k), p).h, -_height(n, _vertex(t, k), q).h)
-    size = _root(square)
+    size = root(square)
     return size, 2.0 * beyond / size.h
 
 
@@ -217,13 +164,13 @@ def refine(s: Search, start: Any, other: Any, radii: Any, n: int) -> tuple[float
     for k in range(n):
         t = _corners(s.a, found.pairs[k, 0], Wide3(origin, origin, origin))
         size, beyond = _bounds(t, _corners(s.b, found.pairs[k, 1], shift), found.pairs[k, 2], found.pairs[k, 3])
-        low = _less(size, Wide(beyond, 0.0))
+        low = less(size, Wide(beyond, 0.0))
         found.bounds[k] = low.h * (1.0 - 2.0**-50) - _ROUNDING
-        least = size if _less(size, least).h < 0.0 or k == 0 else least
-        lowest = low if _less(low, lowest).h < 0.0 or k == 0 else lowest
+        least = size if less(size, least).h < 0.0 or k == 0 else least
+        lowest = low if less(low, lowest).h < 0.0 or k == 0 else lowest
     n = keep_below(found, n, least.h * (1.0 + 2.0**-50) + _ROUNDING)
-    distance = _less(_less(least, Wide(radii[0], 0.0)), Wide(radii[1], 0.0))
+    distance = less(less(least, Wide(radii[0], 0.0)), Wide(radii[1], 0.0))
     value = distance.h / unit
     is_sure = 2.0**-1000 < value < 2.0**1000
-    is_sure = is_sure and surely_rounded(distance.h, distance.low, _less(least, lowest).h + _ROUNDING)
+    is_sure = is_sure and surely_rounded(distance.h, distance.low, less(least, lowest).h + _ROUNDING)
     return value if is_sure else -1.0, n

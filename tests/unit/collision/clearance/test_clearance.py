@@ -137,6 +137,14 @@ def test_equal_poses_are_left_out_and_a_denormal_gap_is_kept() -> None:
         clearance(*wide)
 
 
+def test_denormal_coordinates_are_made_larger_before_they_are_multiplied() -> None:
+    """No pair of triangles was left where products of denormal coordinates were rounded."""
+    flat = Aabb([5.1383e-320, 5.898e-320, -4.0474e-320], [1.3233e-319, 5.898e-320, 4.0474e-320])
+    other = Aabb([1.3234e-319, 1.2142e-319, 1.2142e-319], [1.87024e-319, 2.0237e-319, 2.6068e-319])
+    step = Pose(np.eye(3), [5.9e-321, 0.0, 0.0])
+    assert clearance(flat, other, first_pose=step).distance == 1.0223e-319  # type: ignore[union-attr]
+
+
 @pytest.mark.parametrize("wrong", [-1.0, math.nan, math.inf, "1", True, None.__class__])
 def test_refuses_what_is_no_distance(wrong: Any) -> None:
     with pytest.raises(InvalidInputError, match="at_least must be a distance"):

@@ -1,0 +1,243 @@
+"""How far apart are boxes along the axes, balls and half-spaces: a few sums and one root in double-doubles.
+
+A box is an interval on each axis, a ball one without length and a radius about it. On each axis two of them are apart,
+or share an interval: the distance is the root of the squares of what parts them, less the radii. Where they share
+intervals every point of those is as near, and `ends_of_shared` chooses.
+
+**Bound.** A coordinate of a body that is not turned, shifted or not, is a double-double without error; a turned centre
+is off by `error`. A difference of two is off by 3 u^2 of itself (and by `error`), not at all where both are doubles;
+squares, their sum and its root together are below 32 u^2 of the root. What the bounds leave open (a tie, a contact or
+almost, exponents) is decided in rationals.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from engine.collision.clearance.wide import Wide, less, over, plus, product, root, times
+from engine.jit import bare_kernel, inline
+from engine.predicates.double_double import U2, surely_rounded
+from engine.predicates.error_free import two_sum, workspace
+
+RADIUS: Final = 6
+IS_BALL: Final = 7
+N_NUMBERS: Final = 8
+"""Of a form: low and high on three axes, the radius, and whether it is a ball (1.0)."""
+UNSURE: Final = -1.0
+"""In place of a distance."""
+_LARGEST: Final = 2.0**1021
+_TINY: Final = 2.0**-1060
+_PLANE_TINY: Final = 2.0**-600
+_EDGES: Final = (2, 1, 3, 0, 0, 0)
+"""The edges of a box of the plane, in the order of its outline, as 2 axis + side; in space faces are numbered so."""
+_GAPS, _ROOM = 24, 30
+
+
+def touched(up: int, down: int, lows: int, highs: int) -> tuple[int, int]:
+    """Return on which sides of an axis each of two boxes has nearest points, low 1, high 2.
+
+    up, down: the signs of the second's low less the first's high, and of the first's low less the second's high; lows,
+    highs: of the first's bounds less the second's.
+    """
+    if up > 0:
+        return 2, 1
+    if down > 0:
+        return 1, 2
+    return int(lows >= 0) | int(highs <= 0) << 1, int(lows <= 0) | int(highs >= 0) << 1
+
+
+def ends_of_shared(faces: int, theirs: int, free: int, d: int) -> tuple[int, int]:
+    """Return on which faces of two boxes the nearest points lie that are chosen: a bit each, 2 axis + side.
+
+    faces, theirs: those with nearest points; free: the axes on which there are several. The smallest face of the first
+    is taken, then the smallest of the second that is left, then the end nearest to where the first's face begins.
+    """
+    is_high = False
+    for turn in range(2):
+        own = theirs if turn else faces
+        for place in range(2 * d):
+            face = place if d == 3 else _EDGES[place]
+            if own >> face & 1:
+                is_high = is_high if turn else (d == 2 and (face == 0 or face == 3))
+                if free >> (face >> 1) & 1:
+                    free &= ~(1 << (face >> 1))
+                    faces, theirs = faces & ~(1 << (face ^ 1)), theirs & ~(1 << (face ^ 1))
+                break
+    for axis in range(d):
+        if free >> axis & 1:
+            left_out = ~(1 << (2 * axis + (0 if is_high else 1)))
+            faces, theirs = faces & left_out, theirs & left_out
+    return faces, theirs
+
+
+_touched, _ends_of_shared = inline(touched), inline(ends_of_shared)
+
+
+@inline
+def _sign(x: Wide, error: float) -> int:
+    """Return the sign of a number known within an error, 2 where that is not sure."""
+    if error > 0.0 and abs(x.h) <= error:
+        return 2
+    return (1 if x.h > 0.0 else 0) - (1 if x.h < 0.0 else 0)
+
+
+@inline
+def _wide(w: Any, at: int) -> Wide:
+    return Wide(w[at], w[at + 1])
+
+
+@inline
+def _place(form: Any, turn: Any, move: Any, w: Any, first: int) -> float:
+    """Write the bounds of a placed form to w, low and high of each axis; return a bound on their error, infinite for a
+    box that is turned and beyond the range of the bounds.
+
+    A turned coordinate takes three exact products and three sums, each off by 4 u^2 of all terms.
+    """
+    d, is_turned, size = move.shape[0], False, 0.0
+    for k in range(d):
+        for m in range(d):
+            is_turned = is_turned or turn[k, m] != (1.0 if k == m else 0.0)
+    for k in range(d):
+        for side in range(2):
+            h, low = two_sum(form[3 * side + k], move[k])
+            x = Wide(h, low)
+            if is_turned:
+                x, terms = Wide(move[k], 0.0), abs(move[k])
+                for m in range(d):
+                    x = plus(x, product(turn[k, m], form[m]))
+                    terms += abs(turn[k, m] * form[m])
+                size = max(size, terms)
+            w[first + 4 * k + 2 * side], w[first + 4 * k + 2 * side + 1] = x.h, x.low
+            if not abs(x.h) < _LARGEST:
+                return float("inf")
+    if not is_turned:
+        return 0.0
+    return 16.0 * U2 * size + _TINY if form[IS_BALL] > 0.0 else float("inf")
+
+
+@inline
+def gap_of_forms(
+    form: Any, turn: Any, move: Any, other: Any, their_turn: Any, their_move: Any, w: Any
+) -> tuple[float, int, int, Wide, float]:
+    """Return the distance, 0.0 where they surely meet, or UNSURE; on which faces the nearest points lie; the root; and
+    the error of coordinates.
+
+    w (30,): work space, of the bounds of both forms, then of the gap on each axis.
+    """
+    d, error = move.shape[0], _place(form, turn, move, w, 0) + _place(other, their_turn, their_move, w, 12)
+    faces = theirs = free = n_apart = 0
+    square, rest = Wide(0.0, 0.0), Wide(0.0, 0.0)
+    is_sure, bound = error < float("inf"), 0.0
+    for k in range(d):
+        low, high, their_low, their_high = (
+            _wide(w, 4 * k), _wide(w, 4 * k + 2), _wide(w, 4 * k + 12), _wide(w, 4 * k + 14),
+        )  # fmt: skip
+        up, down = less(their_low, high), less(low, their_high)
+        signs = (
+            _sign(up, error), _sign(down, error),
+            _sign(less(low, their_low), error), _sign(less(high, their_high), error),
+        )  # fmt: skip
+        is_sure = is_sure and max(signs) < 2
+        here, there = _touched(signs[0], signs[1], signs[2], signs[3])
+        faces, theirs = faces | here << 2 * k, theirs | there << 2 * k
+        gap = up if signs[0] > 0 else (Wide(-down.h, -down.low) if signs[1] > 0 else Wide(0.0, 0.0))
+        w[_GAPS + 2 * k], w[_GAPS + 2 * k + 1] = gap.h, gap.low
+        if gap.h != 0.0:
+            n_apart += 1
+            square = plus(square, times(gap, gap))
+            rest = Wide(abs(gap.h), gap.low if gap.h > 0.0 else -gap.low)
+            is_exact = low.low == 0.0 and high.low == 0.0 and their_low.low == 0.0 and their_high.low == 0.0
+            bound = 0.0 if is_exact else 4.0 * U2 * rest.h
+        elif signs[0] < 0 and signs[1] < 0 and form[IS_BALL] + other[IS_BALL] == 0.0:
+            free |= 1 << k
+    faces, theirs = _ends_of_shared(faces, theirs, free, d)
+    if n_apart > 1:
+        is_sure = is_sure and 2.0**-900 < square.h < 2.0**1000
+        rest = root(square)
+        bound = 32.0 * U2 * rest.h
+    h, low = two_sum(form[RADIUS], other[RADIUS])
+    distance = less(rest, Wide(h, low))
+    bound += 2.0 * error + (4.0 * U2 * abs(distance.h) if h > 0.0 else 0.0)
+    if not is_sure:
+        return UNSURE, faces, theirs, rest, error
+    if distance.h < -bound or (distance.h == 0.0 and bound == 0.0):
+        return 0.0, faces, theirs, rest, error
+    is_sure = distance.h > bound and surely_rounded(distance.h, distance.low, bound)
+    return distance.h if is_sure else UNSURE, faces, theirs, rest, error
+
+
+@bare_kernel
+def nearest_of_forms(
+    form: Any, turn: Any, move: Any, other: Any, their_turn: Any, their_move: Any, points: Any
+) -> tuple[float, int, int]:
+    """Return what `gap_of_forms` does, and fill points (2, d); UNSURE points are told by -1 in place of the faces."""
+    w = workspace(_ROOM)
+    distance, faces, theirs, size, error = gap_of_forms(form, turn, move, other, their_turn, their_move, w)
+    if not distance > 0.0:
+        return distance, -1, -1
+    d, is_sure = move.shape[0], True
+    for end in range(2):
+        radius, own, across = (form[RADIUS], faces, theirs) if end == 0 else (other[RADIUS], theirs, faces)
+        for k in range(d):
+            is_own = own >> 2 * k & 3 != 0  # else the other's bound is within
+            face, first = (own if is_own else across) >> 2 * k, (12 * end if is_own else 12 - 12 * end)
+            at = first + 4 * k + (0 if face & 1 else 2)
+            x, gap, bound = _wide(w, at), _wide(w, _GAPS + 2 * k), error
+            if radius > 0.0 and gap.h != 0.0:
+                share = over(gap, size)
+                is_whole = abs(share.h) == 1.0 and share.low == 0.0
+                step = times(share, Wide(radius if end == 0 else -radius, 0.0))
+                bound = 0.0 if is_whole and x.low == 0.0 and error == 0.0 else 4.0 * U2
+                x = plus(x, step)
+                bound *= abs(x.h)
+                if not is_whole:
+                    bound += 96.0 * U2 * abs(step.h) + _TINY * (1.0 + radius + radius / size.h)
+                bound += error * (1.0 + 4.0 * radius / size.h)
+            points[end, k] = x.h + 0.0
+            is_sure = is_sure and surely_rounded(x.h, x.low, bound)
+    return distance, faces if is_sure else -1, theirs
+
+
+@bare_kernel
+def nearest_of_plane(row: Any, form: Any, turn: Any, move: Any, points: Any) -> tuple[float, int, int]:
+    """Return the distance of a form from the half-space row (d + 1,), 0.0 where they meet, or UNSURE; 0, or -1 where
+    the points (2, d) are not sure; and the faces on which the form's nearest point lies, of several the low ones.
+
+    With v = n . x + d at the form's furthest point, off by `slack`, the distance is -v / |n| less the radius, and
+    the foot x - v n / n . n. Eight operations of at most 16 u^2 each are below 128 u^2.
+    """
+    w, d = workspace(_ROOM), move.shape[0]
+    error = _place(form, turn, move, w, 0)
+    value, square, terms, size, faces = Wide(row[d], 0.0), Wide(0.0, 0.0), abs(row[d]), 0.0, 0
+    for k in range(d):
+        side = 1 if row[k] > 0.0 else 0
+        x = _wide(w, 4 * k + 2 * side)
+        faces |= 1 << (2 * k + side)
+        value = plus(value, times(product(row[k], 1.0), x))
+        square = plus(square, product(row[k], row[k]))
+        terms, size = terms + abs(row[k] * x.h), size + abs(row[k])
+    slack = 32.0 * U2 * terms + size * error + _PLANE_TINY
+    if not (2.0**-400 < square.h < 2.0**400 and terms < 2.0**500 and error < float("inf")):
+        return UNSURE, -1, faces
+    norm = root(square)
+    away = over(value, norm)
+    distance = less(Wide(-away.h, -away.low), Wide(form[RADIUS], 0.0))
+    bound = 2.0 * slack / norm.h + 128.0 * U2 * abs(away.h) + 4.0 * U2 * abs(distance.h)
+    if distance.h < -bound:
+        return 0.0, -1, faces
+    if not (distance.h > bound and surely_rounded(distance.h, distance.low, bound)):
+        return UNSURE, -1, faces
+    is_sure = True
+    for k in range(d):
+        x, n = _wide(w, 4 * k + (2 if row[k] > 0.0 else 0)), Wide(row[k], 0.0)
+        step, outward = over(times(n, value), square), over(times(n, Wide(form[RADIUS], 0.0)), norm)
+        foot, p = less(x, step), (plus(x, outward) if row[k] != 0.0 and form[RADIUS] > 0.0 else x)
+        points[0, k], points[1, k] = foot.h + 0.0, p.h + 0.0
+        if row[k] != 0.0:
+            bound = 128.0 * U2 * abs(step.h) + 2.0 * slack * abs(row[k]) / square.h + 4.0 * U2 * abs(foot.h)
+            is_sure = is_sure and surely_rounded(foot.h, foot.low, bound + error + _PLANE_TINY)
+            bound = 128.0 * U2 * abs(outward.h) + 4.0 * U2 * abs(p.h) + _PLANE_TINY if form[RADIUS] > 0.0 else 0.0
+        else:
+            bound = 0.0
+        is_sure = is_sure and surely_rounded(p.h, p.low, bound + error)
+    return distance.h, 0 if is_sure else -1, faces

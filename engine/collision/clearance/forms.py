@@ -1,0 +1,184 @@
+"""Boxes along the axes, balls and half-spaces: how far apart, by `closed_forms.py`, in rationals where that is not
+sure."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from math import lcm
+from typing import Final
+
+import numpy as np
+
+from engine.arrays import FloatArray, read_only
+from engine.collision.clearance.closed_forms import (
+    N_NUMBERS,
+    UNSURE,
+    ends_of_shared,
+    nearest_of_forms,
+    nearest_of_plane,
+    touched,
+)
+from engine.collision.clearance.exact import Gap, Rational
+from engine.collision.clearance.result import Clearance, Feature
+from engine.collision.clearance.rounded import ScaledGap
+from engine.collision.exact_images import Vector, as_vector, image_point
+from engine.direct import entry_of
+from engine.predicates.exact_vectors import minus, squared_length
+from engine.predicates.rational import sign_of
+from engine.solids.aabb import Aabb
+from engine.solids.base import Solid
+from engine.solids.half_space import HalfSpace
+from engine.solids.pose import Pose
+from engine.solids.sphere import Sphere
+
+BALL, PLANE = Feature("ball"), Feature("plane")
+MEETING: Final = Clearance(0.0)
+"""The answer for bodies with a common point."""
+_STILL = {d: (read_only(np.eye(d)), read_only(np.zeros(d))) for d in (2, 3)}
+
+
+def _feature(faces: int, d: int) -> Feature:
+    """Return what of a box lies on all of some faces, a bit each, 2 axis + side."""
+    numbers = [0]
+    for axis in range(d):
+        is_within = not faces >> 2 * axis & 3
+        sides = (0, 1) if is_within else (faces >> 2 * axis + 1 & 1,)
+        numbers = [number | side << axis for side in sides for number in numbers]
+    if len(numbers) == 4:
+        return Feature("face", (faces.bit_length() - 1,))
+    return Feature("edge" if len(numbers) == 2 else "vertex", tuple(sorted(numbers)))
+
+
+FEATURES = {d: [_feature(faces, d) for faces in range(1 << 2 * d)] for d in (2, 3)}
+"""By dimension and faces."""
+
+
+def form_of(solid: Solid) -> FloatArray | None:
+    """Return a box that is not flat or a ball as kernels take it, None for others."""
+    return solid.prepared("form", lambda: _form(solid))
+
+
+def _form(solid: Solid) -> FloatArray | None:
+    d, form = solid.dimension, np.zeros(N_NUMBERS)
+    if isinstance(solid, Sphere):
+        form[:d] = form[3 : 3 + d] = solid.center
+        form[6:] = solid.radius, 1.0
+        return read_only(form)
+    if isinstance(solid, Aabb) and bool((solid.min < solid.max).all()):
+        form[:d], form[3 : 3 + d] = solid.min, solid.max
+        return read_only(form)
+    return None
+
+
+def between_forms(
+    first: Solid, second: Solid, first_pose: Pose | None, second_pose: Pose | None, least: float | None
+) -> Clearance | bool | None:
+    """Return the clearance of two boxes or balls, or whether it is at least so much; None for other bodies, and boxes
+    that are turned."""
+    form, other = form_of(first), form_of(second)
+    if form is None or other is None:
+        return None
+    d = first.dimension
+    still, points = _STILL[d], np.empty((2, d))
+    turn, move = still if first_pose is None else (first_pose.rotation, first_pose.translation)
+    their_turn, their_move = still if second_pose is None else (second_pose.rotation, second_pose.translation)
+    distance, faces, theirs = entry_of(nearest_of_forms)(form, turn, move, other, their_turn, their_move, points)
+    if least is not None and distance not in (UNSURE, least):
+        return bool(distance > least)  # as the distance rounded to nearest is
+    if distance == 0.0:
+        return MEETING
+    if distance > 0.0 and faces >= 0 and least is None:
+        return _answer(distance, points, _named(first, faces), _named(second, theirs))
+    placed = _placed_exactly(first, first_pose), _placed_exactly(second, second_pose)
+    if placed[0] is None or placed[1] is None:
+        return None
+    return _settled((first, second), placed[0], placed[1], least)
+
+
+def between_form_and_plane(
+    first: Solid, second: Solid, first_pose: Pose | None, second_pose: Pose | None, least: float | None
+) -> Clearance | bool | None:
+    """Return what `between_forms` does, one of the two a half-space without a pose; None where that is not sure."""
+    is_second = isinstance(second, HalfSpace)
+    plane, body, pose = (second, first, first_pose) if is_second else (first, second, second_pose)
+    form = form_of(body)
+    if form is None or not isinstance(plane, HalfSpace) or (second_pose if is_second else first_pose) is not None:
+        return None
+    d = body.dimension
+    points = np.empty((2, d))
+    turn, move = _STILL[d] if pose is None else (pose.rotation, pose.translation)
+    distance, told, faces = entry_of(nearest_of_plane)(plane.row, form, turn, move, points)
+    if least is not None and distance not in (UNSURE, least):
+        return bool(distance > least)
+    if distance == 0.0:
+        return MEETING
+    if not distance > 0.0 or told < 0 or least is not None:
+        return None
+    feature = _named(body, faces)
+    return (
+        _answer(distance, points[::-1].copy(), feature, PLANE)
+        if is_second
+        else _answer(distance, points, PLANE, feature)
+    )
+
+
+def _answer(distance: float, points: FloatArray, first: Feature, second: Feature) -> Clearance:
+    points.setflags(write=False)
+    return Clearance(distance, points, (first, second))
+
+
+def _named(solid: Solid, faces: int) -> Feature:
+    return BALL if isinstance(solid, Sphere) else FEATURES[solid.dimension][faces]
+
+
+def _placed_exactly(solid: Solid, pose: Pose | None) -> tuple[Vector, Vector] | None:
+    """Return low and high of a placed box or ball; None for a box that is turned."""
+    if isinstance(solid, Sphere):
+        center = image_point(solid.center.tolist(), pose)
+        return center, center
+    assert isinstance(solid, Aabb)
+    if pose is None:
+        return as_vector(solid.min.tolist()), as_vector(solid.max.tolist())
+    if not (pose.rotation == _STILL[solid.dimension][0]).all():
+        return None
+    return image_point(solid.min.tolist(), pose), image_point(solid.max.tolist(), pose)
+
+
+def _settled(
+    solids: tuple[Solid, Solid], first: tuple[Vector, Vector], second: tuple[Vector, Vector], least: float | None
+) -> Clearance | bool:
+    """Return what `between_forms` does, in rationals."""
+    d, faces, theirs, free = solids[0].dimension, 0, 0, 0
+    for k, (low, high, their_low, their_high) in enumerate(zip(*first, *second)):
+        up, down = sign_of(their_low - high), sign_of(low - their_high)
+        here, there = touched(up, down, sign_of(low - their_low), sign_of(high - their_high))
+        faces, theirs = faces | here << 2 * k, theirs | there << 2 * k
+        free |= (up < 0 and down < 0 and low < high and their_low < their_high) << k
+    faces, theirs = ends_of_shared(faces, theirs, free, d)
+    p, q = _point(first, second, faces, theirs), _point(second, first, theirs, faces)
+    radii = tuple(float(solid.radius) if isinstance(solid, Sphere) else 0.0 for solid in solids)
+    gap = scaled_gap(p, q, (radii[0], radii[1]))
+    if gap.gap.top <= sum(gap.radii) ** 2 * gap.gap.bottom:
+        return MEETING if least is None else False
+    if least is not None:
+        return gap.is_at_least(Fraction(least))
+    return gap.clearance((_named(solids[0], faces), _named(solids[1], theirs)), d)
+
+
+def _point(own: tuple[Vector, Vector], across: tuple[Vector, Vector], faces: int, theirs: int) -> Vector:
+    """Return the point on some faces of a box that is nearest to the one on some faces of another."""
+    return tuple(
+        (own if faces >> 2 * k & 3 else across)[not (faces if faces >> 2 * k & 3 else theirs) >> 2 * k & 1][k]
+        for k in range(len(own[0]))
+    )
+
+
+def scaled_gap(p: Vector, q: Vector, radii: tuple[float, float]) -> ScaledGap:
+    """Return the gap between two points, and radii about them."""
+    numbers = [*p, *q, *map(Fraction, radii)]
+    scale = lcm(*(x.denominator for x in numbers))
+    whole = [int(x * scale) for x in numbers]
+    n = len(p)
+    a, b = tuple(whole[:n]), tuple(whole[n : 2 * n])
+    gap = Gap(Rational(a, 1), Rational(b, 1), 0, 0, squared_length(minus(b, a)), 1)
+    return ScaledGap(gap, (whole[-2], whole[-1]), scale)

@@ -1,0 +1,114 @@
+"""Boxes, balls and half-spaces in closed form: what double-doubles are sure of is what rationals say, with points."""
+
+from __future__ import annotations
+
+import random
+from math import nextafter
+from typing import Any
+
+import numpy as np
+import pytest
+
+import engine.collision.clearance.forms as forms
+from engine import Aabb, HalfSpace, Pose, Sphere, clearance
+from engine.collision.clearance.closed_forms import UNSURE
+from engine.collision.clearance.forms import MEETING, between_form_and_plane, between_forms
+from engine.collision.clearance.half_spaces import gap_of_planes
+from engine.collision.clearance.result import Clearance, Feature
+from engine.parallel import Budget
+from tests.unit.collision.clearance.makers import turn
+
+
+def number(rng: random.Random, size: float) -> float:
+    return rng.choice([float(rng.randint(-4, 4)), rng.uniform(-4.0, 4.0)]) * size
+
+
+def body(rng: random.Random, d: int, size: float) -> Any:
+    low = [number(rng, size) for _ in range(d)]
+    if rng.random() < 0.5:
+        return Sphere(low, abs(number(rng, size)) / 2.0)
+    return Aabb(low, [x + rng.choice([1.0, 2.0, rng.uniform(0.1, 3.0)]) * size for x in low])
+
+
+def pose(rng: random.Random, d: int, size: float) -> Pose | None:
+    return rng.choice([
+        None, Pose(np.eye(d), [number(rng, size) for _ in range(d)]), Pose(turn(rng, d), [number(rng, size)] * d),
+    ])  # fmt: skip
+
+
+def said(found: Clearance | bool | None) -> Any:
+    if not isinstance(found, Clearance):
+        return found
+    return found.distance, None if found.points is None else found.points.tolist(), found.features
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-9, 1e150, 1e-150, 1e300, 5e-324 * 2**55])
+def test_boxes_and_balls_are_what_rationals_say(size: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    rng, n_sure = random.Random(int(np.log2(size))), 0
+    real = forms.entry_of
+    for _ in range(300):
+        d = rng.choice([2, 3])
+        first, second, poses = body(rng, d, size), body(rng, d, size), (pose(rng, d, size), pose(rng, d, size))
+        sure: list[bool] = []
+
+        def told(kernel: Any, sure: list[bool] = sure) -> Any:
+            def call(*arguments: Any) -> Any:
+                found = real(kernel)(*arguments)
+                sure.append(found[0] == 0.0 or (found[0] > 0.0 and found[1] >= 0))
+                return found
+
+            return call
+
+        monkeypatch.setattr(forms, "entry_of", told)
+        found: Any = between_forms(first, second, *poses, None)
+        monkeypatch.setattr(forms, "entry_of", lambda _: lambda *_: (UNSURE, -1, -1))
+        exact = between_forms(first, second, *poses, None)
+        n_sure += sum(sure)
+        assert said(found) == said(exact), (first, second, poses)
+        if exact is None:
+            continue
+        for least in (nextafter(found.distance, 0.0), found.distance, nextafter(found.distance, 1e308)):
+            if least > 0.0:
+                monkeypatch.setattr(forms, "entry_of", lambda _: lambda *_: (UNSURE, -1, -1))
+                settled = between_forms(first, second, *poses, least)
+                monkeypatch.setattr(forms, "entry_of", real)
+                assert between_forms(first, second, *poses, least) is settled, (first, second, poses, least)
+    assert n_sure > 50 or not 1e-140 < size < 1e140
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-9, 1e100, 1e300])
+def test_half_spaces_are_what_rationals_say(size: float) -> None:
+    rng, n_sure = random.Random(int(np.log2(size))), 0
+    for _ in range(200):
+        d = rng.choice([2, 3])
+        normal = [rng.choice([0.0, 0.0, 1.0, -1.0, rng.uniform(-1.0, 1.0)]) for _ in range(d)]
+        plane = HalfSpace(normal if any(normal) else [1.0, *normal[1:]], number(rng, size) - 8.0 * size)
+        other, other_pose = body(rng, d, size), pose(rng, d, size)
+        found: Any = between_form_and_plane(plane, other, None, other_pose, None)
+        mirrored: Any = between_form_and_plane(other, plane, other_pose, None, None)
+        if found is None or found is MEETING:
+            continue
+        n_sure += 1
+        with Budget() as budget:
+            gap, features = gap_of_planes(plane, other, None, other_pose, budget)
+        assert said(found) == said(gap.clearance(features, d)), (plane, other, other_pose)
+        assert (mirrored.distance, mirrored.features) == (found.distance, found.features[::-1])
+        assert mirrored.points.tolist() == found.points.tolist()[::-1]
+        assert between_form_and_plane(plane, other, None, other_pose, nextafter(found.distance, 0.0)) is True
+        assert between_form_and_plane(plane, other, None, other_pose, nextafter(found.distance, 1e308)) is False
+    assert n_sure > 50 or size > 1e150
+
+
+def test_of_several_nearest_points_those_on_the_smallest_faces_then_where_the_first_face_begins() -> None:
+    box = Aabb([0, 0, 0], [4, 4, 4])
+    for other, points, features in [
+        (Aabb([6, 1, 1], [7, 2, 2]), [[4, 1, 1], [6, 1, 1]], (Feature("face", (1,)), Feature("vertex", (0,)))),
+        (Aabb([1, 1, 6], [5, 5, 7]), [[4, 1, 4], [4, 1, 6]], (Feature("edge", (5, 7)), Feature("edge", (0, 1)))),
+        (Aabb([-3, 2, 6], [2, 3, 7]), [[0, 2, 4], [0, 2, 6]], (Feature("edge", (4, 6)), Feature("edge", (0, 1)))),
+    ]:
+        found: Any = clearance(box, other)
+        assert (found.points.tolist(), found.features) == (points, features)
+    flat: Any = clearance(Aabb([0, 0], [4, 4]), Aabb([1, 6], [2, 7]))  # the upper edge begins at its right end
+    assert (flat.points.tolist(), flat.features[1]) == ([[2, 4], [2, 6]], Feature("vertex", (1,)))
+    plane: Any = clearance(HalfSpace([0, 0, 1], -6), box)
+    assert plane.features[1] == Feature("vertex", (4,))
