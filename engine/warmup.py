@@ -212,6 +212,7 @@ def _warm_bounds() -> None:
                 bounds(solid)
     for body in (Sphere([0, 0, 0], 1), HalfSpace([1, 0, 0], -9), _cube(5.0)):
         clearance(body, Sphere([3, 0, 0], 1))
+    collide_scene([Sphere([0, 0, 0], 1), Sphere([3, 0, 0], 1)], gap=2.0)
 
 
 STEPS = (

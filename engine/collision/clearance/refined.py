@@ -16,7 +16,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.collision.clearance.blocks import keep_below
-from engine.collision.clearance.boxes import Search, View
+from engine.collision.clearance.boxes import Search, View, scaled
 from engine.collision.clearance.near_triangles import FACE
 from engine.collision.clearance.wide import (
     Wide,
@@ -31,12 +31,14 @@ from engine.collision.clearance.wide import (
     root,
     times,
 )
+from engine.collision.meshes.mesh_arrays import triangle_of
+from engine.collision.meshes.placement import Placement
 from engine.jit import called, inline
 from engine.predicates.double_double import surely_rounded
 from engine.predicates.error_free import two_diff
 from engine.types import Point3
 
-_ROUNDING: Final = 2.0**-94
+ROUNDING: Final = 2.0**-94
 
 
 class Triangle(NamedTuple):
@@ -63,20 +65,18 @@ def _row(a: Point3, p: Point3, shift: Wide) -> Wide:
 
 
 @called
-def _corner(view: View, vertex: int, shift: Wide3) -> Wide3:
-    """Return a placed vertex, times the unit."""
-    p, m = view.mesh.vertices, view.place
-    v = Point3(p[vertex, 0] * view.unit, p[vertex, 1] * view.unit, p[vertex, 2] * view.unit)
-    x = _row(Point3(m.xx, m.xy, m.xz), v, shift.x)
-    y = _row(Point3(m.yx, m.yy, m.yz), v, shift.y)
-    return Wide3(x, y, _row(Point3(m.zx, m.zy, m.zz), v, shift.z))
+def corner_of(place: Placement, p: Point3, shift: Wide3) -> Wide3:
+    """Return a placed point, with `shift` in place of the translation."""
+    x = _row(Point3(place.xx, place.xy, place.xz), p, shift.x)
+    y = _row(Point3(place.yx, place.yy, place.yz), p, shift.y)
+    return Wide3(x, y, _row(Point3(place.zx, place.zy, place.zz), p, shift.z))
 
 
 @inline
 def _corners(view: View, triangle: int, shift: Wide3) -> Triangle:
-    t = view.mesh.triangles
-    p, q = _corner(view, t[triangle, 0], shift), _corner(view, t[triangle, 1], shift)
-    return Triangle(p, q, _corner(view, t[triangle, 2], shift))
+    t = triangle_of(view.mesh, triangle)
+    p, q = corner_of(view.place, scaled(t.p, view.unit), shift), corner_of(view.place, scaled(t.q, view.unit), shift)
+    return Triangle(p, q, corner_of(view.place, scaled(t.r, view.unit), shift))
 
 
 @inline
@@ -110,7 +110,7 @@ def _foot(point: Wide3, t: Triangle, feature: int) -> Wide3:
 
 
 @called
-def _ends(s: Triangle, t: Triangle, first: int, second: int) -> tuple[Wide3, Wide3]:
+def ends_of(s: Triangle, t: Triangle, first: int, second: int) -> tuple[Wide3, Wide3]:
     """Return the nearest points of two features, or some others of them."""
     if second < 3:
         q = _vertex(t, second)
@@ -127,7 +127,7 @@ def _ends(s: Triangle, t: Triangle, first: int, second: int) -> tuple[Wide3, Wid
 
 
 @inline
-def _height(n: Wide3, p: Wide3, base: Wide3) -> Wide:
+def height_above(n: Wide3, p: Wide3, base: Wide3) -> Wide:
     """Return n . (p - base)."""
     return dot_wide(n, minus_wide(p, base))
 
@@ -136,14 +136,14 @@ def _height(n: Wide3, p: Wide3, base: Wide3) -> Wide:
 def _bounds(s: Triangle, t: Triangle, first: int, second: int) -> tuple[Wide, float]:
     """Return the distance of two points of the triangles, and by how much the triangles may be nearer at most but for
     rounding."""
-    p, q = _ends(s, t, first, second)
+    p, q = ends_of(s, t, first, second)
     n = minus_wide(q, p)
     square = dot_wide(n, n)
     if not square.h > 2.0**-300:
         return Wide(0.0, 0.0), 0.0
     beyond = 0.0
     for k in range(3):
-        beyond = max(beyond, _height(n, _vertex(s, k), p).h, -_height(n, _vertex(t, k), q).h)
+        beyond = max(beyond, height_above(n, _vertex(s, k), p).h, -height_above(n, _vertex(t, k), q).h)
     size = root(square)
     return size, 2.0 * beyond / size.h
 
@@ -165,12 +165,12 @@ def refine(s: Search, start: Any, other: Any, radii: Any, n: int) -> tuple[float
         t = _corners(s.a, found.pairs[k, 0], Wide3(origin, origin, origin))
         size, beyond = _bounds(t, _corners(s.b, found.pairs[k, 1], shift), found.pairs[k, 2], found.pairs[k, 3])
         low = less(size, Wide(beyond, 0.0))
-        found.bounds[k] = low.h * (1.0 - 2.0**-50) - _ROUNDING
+        found.bounds[k] = low.h * (1.0 - 2.0**-50) - ROUNDING
         least = size if less(size, least).h < 0.0 or k == 0 else least
         lowest = low if less(low, lowest).h < 0.0 or k == 0 else lowest
-    n = keep_below(found, n, least.h * (1.0 + 2.0**-50) + _ROUNDING)
+    n = keep_below(found, n, least.h * (1.0 + 2.0**-50) + ROUNDING)
     distance = less(less(least, Wide(radii[0], 0.0)), Wide(radii[1], 0.0))
     value = distance.h / unit
     is_sure = 2.0**-1000 < value < 2.0**1000
-    is_sure = is_sure and surely_rounded(distance.h, distance.low, less(least, lowest).h + _ROUNDING)
+    is_sure = is_sure and surely_rounded(distance.h, distance.low, less(least, lowest).h + ROUNDING)
     return value if is_sure else -1.0, n

@@ -47,8 +47,11 @@ class SceneBatches:
             return found
         if not (found == UNSETTLED).any():
             return found
-        pool, convex = self._pool or self._prepared(budget)
-        rows, poses = np.append(np.int64(-1), convex), PoseArrays(bodies.rotations, bodies.translations, True)
+        pool, convex = self.pool(budget)
+        rows, poses = (
+            np.append(np.int64(-1), convex[bodies.kinds]),
+            PoseArrays(bodies.rotations, bodies.translations, True),
+        )
 
         def task(start: int, stop: int) -> None:
             with np.errstate(all="ignore"):  # uncompiled runs only
@@ -82,17 +85,18 @@ class SceneBatches:
         found[boxes] = details_of_boxes(self.bodies.low, self.bodies.high, pairs[boxes], relations[boxes])
         return found
 
-    def _prepared(self, budget: Budget) -> tuple[ConvexArrays, IntArray]:
-        """Look at each solid once: is it convex?"""
-        kinds = np.full(len(self.bodies.distinct), -1, np.int64)
-        convex: list[ConvexBody] = []
-        for kind, solid in enumerate(self.bodies.distinct):
-            budget.check()
-            body = convex_body_of(solid)
-            if body is not None:
-                kinds[kind] = len(convex)
-                convex.append(body)
-        self._pool = pooled(convex), kinds[self.bodies.kinds]
+    def pool(self, budget: Budget) -> tuple[ConvexArrays, IntArray]:
+        """Return the convex bodies, and the place of each solid among them, -1 for others; each is looked at once."""
+        if self._pool is None:
+            kinds = np.full(len(self.bodies.distinct), -1, np.int64)
+            convex: list[ConvexBody] = []
+            for kind, solid in enumerate(self.bodies.distinct):
+                budget.check()
+                body = convex_body_of(solid)
+                if body is not None:
+                    kinds[kind] = len(convex)
+                    convex.append(body)
+            self._pool = pooled(convex), kinds
         return self._pool
 
 

@@ -138,7 +138,7 @@ def collide_bodies(
         answers = Answers(budget, boolean, relations, [None] * len(pairs) if witnesses else None, details)
         _settle(bodies, pairs, answers, workers, progress)
         works += answers.works
-        near = None if gap is None else _near(bodies, pairs, answers, gap, workers)
+        near = None if gap is None else _near(batches, pairs, answers, gap, workers)
         parts.append(_found(bodies, pairs, answers, near))
         budget.take((_BYTES + _BYTES_OF_WITNESS * witnesses) * len(parts[-1].pairs))
     budget.check()
@@ -175,11 +175,11 @@ def _settle(
     run_chunks(task, len(left), budget=answers.budget, first_chunk=4, workers=workers, progress=progress)
 
 
-def _near(bodies: SceneBodies, pairs: IntArray, answers: Answers, gap: float, workers: int | None) -> FloatArray:
+def _near(batches: SceneBatches, pairs: IntArray, answers: Answers, gap: float, workers: int | None) -> FloatArray:
     """Return how far apart the pairs of a block are, 0 where they meet, infinite where no nearer than the gap."""
     distances, disjoint = np.zeros(len(pairs)), np.flatnonzero(answers.relations == Relation.DISJOINT)
     is_measured = not answers.boolean
-    distances[disjoint] = distances_below(bodies, pairs[disjoint], gap, is_measured, answers.budget, workers)
+    distances[disjoint] = distances_below(batches, pairs[disjoint], gap, is_measured, answers.budget, workers)
     return distances
 
 

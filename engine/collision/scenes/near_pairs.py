@@ -1,8 +1,7 @@
 """Which pairs of a scene that do not meet are nearer than a gap, and how far apart they are.
 
-Boxes around the bodies tell in doubles, with room for rounding, which pairs are surely clear; of two boxes that are
-bodies themselves the same numbers tell which are surely near, of two balls the distance of the middles of their boxes.
-`clearance` decides the others.
+Boxes around the bodies tell in doubles, with room for rounding, which pairs are surely clear. Boxes along the axes,
+balls and convex bodies are measured in batches (closed_forms.py, convex_gaps.py), all others as by `clearance_poses`.
 """
 
 from __future__ import annotations
@@ -15,14 +14,17 @@ import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.collision.clearance.bodies import in_space
+from engine.collision.clearance.clearance import has_plane
+from engine.collision.clearance.closed_forms import N_NUMBERS
+from engine.collision.clearance.convex_gaps import gaps_of_pairs
+from engine.collision.clearance.forms import form_of
 from engine.collision.clearance.half_spaces import gap_of_planes
 from engine.collision.clearance.spreads import SpreadPair
+from engine.collision.convex.body import pooled
+from engine.collision.meshes.placement import PoseArrays
+from engine.collision.scenes.batches import SceneBatches
 from engine.collision.scenes.bodies import SceneBodies
 from engine.parallel import Budget, run_chunks
-from engine.solids.aabb import Aabb
-from engine.solids.base import Solid
-from engine.solids.half_space import HalfSpace
-from engine.solids.sphere import Sphere
 
 _ROUNDING: Final = 2.0**-48
 """Of a distance of two boxes: differences, two hypotenuses and the products here round by less than 16 u."""
@@ -32,109 +34,94 @@ _STRETCHED: Final = 1.0 + 2.0**-38
 from the boxes."""
 
 
+_NONE: Final = pooled([])
+
+
 def enlarged(bodies: SceneBodies, gap: float | None) -> FloatArray:
     """Return the low corners (n, d) moved outward by the gap: boxes of bodies that are nearer have a common point."""
     return bodies.low if gap is None else np.nextafter(bodies.low - gap * _STRETCHED, -np.inf)
 
 
 def distances_below(
-    bodies: SceneBodies, pairs: IntArray, gap: float, is_measured: bool, budget: Budget, workers: int | None
+    batches: SceneBatches, pairs: IntArray, gap: float, is_measured: bool, budget: Budget, workers: int | None
 ) -> FloatArray:
     """Return ``(n,)`` the distances of pairs without a common point that are nearer than the gap, infinite for others.
 
-    is_measured: else only whether they are nearer is told, and those that are have NaN.
+    is_measured: else only whether they are nearer is told, and those that are have 0.0.
     """
-    result = np.full(len(pairs), np.inf)
+    bodies, result = batches.bodies, np.full(len(pairs), np.inf)
     if not gap:
         return result
-    apart = _apart_on_axes(bodies, pairs)
-    left = np.flatnonzero(~_is_above(apart, gap * _STRETCHED))
-    apart = apart[left]
-    are_boxes, are_balls = (_of_type(bodies, kind)[pairs[left]].all(axis=1) for kind in (Aabb, Sphere))
-    is_near, is_clear = are_boxes & _is_below(apart, gap), np.zeros(len(left), np.bool_)
-    balls = np.flatnonzero(are_balls)
-    is_near[balls], is_clear[balls] = _near_and_clear_balls(bodies, pairs[left[balls]], gap)
-    # along one axis a difference is the nearest double
-    is_known = is_near & (are_boxes & ((apart > 0.0).sum(axis=1) == 1) if is_measured else True)
-    result[left[is_known]] = apart[is_known].max(axis=1) if is_measured else np.nan
-    is_left = ~(is_known | is_clear)
-    left, is_near = left[is_left], is_near[is_left]
-    order = np.lexsort(bodies.kinds[pairs[left]].T)  # pairs of the same two solids are asked together
-    left, is_near = left[order], is_near[order]
+    left = np.flatnonzero(_may_be_near(bodies, pairs, gap))
+    kinds, (i, j) = bodies.kinds[pairs[left]], pairs[left].T + 1
+    left = left[np.lexsort(kinds.T)]  # pairs of the same two solids are asked together
+    kinds, (i, j), found = bodies.kinds[pairs[left]], pairs[left].T + 1, np.empty(len(left))
+    turns, moves = bodies.rotations, bodies.translations
+    is_equal = (turns[i] == turns[j]).all(axis=(1, 2)) & (moves[i] == moves[j]).all(axis=1)  # left out, as by `collide`
+    places = np.where(is_equal, 0, (i, j)).T.copy()
+    forms = _forms(bodies, kinds)
+    pool, convex = _NONE, np.full(len(forms), -1, np.int64)
+    if bodies.is_posed[pairs[left]].any() or np.isnan(forms[kinds, 0]).any():
+        pool, convex = batches.pool(budget)
 
-    def task(start: int, stop: int) -> None:
-        kinds = bodies.kinds[pairs[left[start:stop]]]
-        ends = [*(start + 1 + np.flatnonzero((kinds[1:] != kinds[:-1]).any(axis=1))).tolist(), stop]
+    def by_batch(start: int, stop: int) -> None:
+        with np.errstate(all="ignore"):  # uncompiled runs only
+            gaps_of_pairs(
+                forms, pool, convex, kinds[start:stop], PoseArrays(turns, moves, True), places[start:stop], gap,
+                is_measured, found[start:stop], budget.flag,
+            )  # fmt: skip
+
+    run_chunks(by_batch, len(left), budget=budget, workers=workers)
+    still = np.flatnonzero(np.isnan(found))
+
+    def by_search(start: int, stop: int) -> None:
+        some = kinds[still[start:stop]]
+        ends = [*(start + 1 + np.flatnonzero((some[1:] != some[:-1]).any(axis=1))).tolist(), stop]
         for begin, end in pairwise([start, *ends]):
-            some = left[begin:end]
-            result[some] = _asked(bodies, pairs[some], is_near[begin:end], gap, is_measured, budget)
+            rows = still[begin:end]
+            found[rows] = _asked(bodies, pairs[left[rows]], places[rows], gap, is_measured, budget)
 
-    run_chunks(task, len(left), budget=budget, first_chunk=4, workers=workers)
+    run_chunks(by_search, len(still), budget=budget, first_chunk=4, workers=workers)
+    result[left] = found
     return result
 
 
+def _forms(bodies: SceneBodies, kinds: IntArray) -> FloatArray:
+    """Return the form of each solid that some kinds name, NaN for those that have none."""
+    forms = np.full((len(bodies.distinct), N_NUMBERS), np.nan)
+    for kind in np.unique(kinds).tolist():
+        form = form_of(bodies.distinct[kind])
+        if form is not None:
+            forms[kind] = form
+    return forms
+
+
 def _asked(
-    bodies: SceneBodies, pairs: IntArray, is_near: BoolArray, gap: float, is_measured: bool, budget: Budget
+    bodies: SceneBodies, pairs: IntArray, places: IntArray, gap: float, is_measured: bool, budget: Budget
 ) -> FloatArray:
-    """Return the distances of pairs of the same two solids, as `distances_below` does; is_near: those proven so."""
+    """Return the distances of pairs of the same two solids under the poses of some rows, as `distances_below` does."""
     first, second = (bodies.solids[number] for number in pairs[0].tolist())
-    found = np.where(is_near, 0.0, np.nan)
-    if isinstance(first, HalfSpace) or isinstance(second, HalfSpace):
-        for item, (i, j) in enumerate(pairs.tolist()):
+    found = np.full(len(pairs), np.nan)
+    if has_plane(first, second):
+        for item, ((i, j), place) in enumerate(zip(pairs.tolist(), places[:, 0].tolist())):
             budget.check()
-            p, q = bodies.poses[i], bodies.poses[j]
-            p, q = (None, None) if p == q else (p, q)
+            p, q = (bodies.poses[i], bodies.poses[j]) if place else (None, None)
             apart, _ = gap_of_planes(first, second, p, q, budget)
-            found[item] = np.inf if apart.is_at_least(Fraction(gap)) else apart.distance() if is_measured else np.nan
+            found[item] = np.inf if apart.is_at_least(Fraction(gap)) else apart.distance() if is_measured else 0.0
         return found
-    turns, moves, (i, j) = bodies.rotations, bodies.translations, pairs.T + 1
-    is_equal = (turns[i] == turns[j]).all(axis=(1, 2)) & (moves[i] == moves[j]).all(axis=1)
-    own, others = (in_space(turns[rows], moves[rows]) for rows in (np.where(is_equal, 0, i), np.where(is_equal, 0, j)))
+    own, others = (in_space(bodies.rotations[rows], bodies.translations[rows]) for rows in places.T)
     pair = SpreadPair(first, second, own, others, budget)
     pair.fill(0, len(pairs), found, Fraction(gap))
-    found[found == 0.0] = np.nan
     if is_measured:
+        found[found == 0.0] = np.nan
         pair.fill(0, len(pairs), found)
     return found
 
 
 @np.errstate(all="ignore")
-def _apart_on_axes(bodies: SceneBodies, pairs: IntArray) -> FloatArray:
-    """Return ``(n, d)`` how far the boxes of pairs are apart on each axis, 0 where they are not."""
+def _may_be_near(bodies: SceneBodies, pairs: IntArray, gap: float) -> BoolArray:
+    """Tell for pairs whether their boxes are not surely further apart than the gap."""
     (i, j), low, high = pairs.T, bodies.low, bodies.high
-    return np.fmax(np.fmax(low[j] - high[i], low[i] - high[j]), 0.0)
-
-
-def _of_type(bodies: SceneBodies, kind: type[Solid]) -> BoolArray:
-    """Tell which bodies are of a type; boxes only where they are their own."""
-    found = np.array([isinstance(solid, kind) for solid in bodies.distinct], np.bool_)[bodies.kinds]
-    return found & ~bodies.is_posed if kind is Aabb else found
-
-
-@np.errstate(all="ignore")
-def _near_and_clear_balls(bodies: SceneBodies, pairs: IntArray, gap: float) -> tuple[BoolArray, BoolArray]:
-    """Tell which pairs of balls are surely nearer than the gap, and which surely not.
-
-    Bound: the middle of a ball's box is off by a few roundings of its corners, which the largest of them bounds.
-    """
-    (i, j), low, high = pairs.T, bodies.low, bodies.high
-    radii = np.array([getattr(solid, "radius", 0.0) for solid in bodies.distinct])[bodies.kinds]
-    size = np.maximum(np.abs(low), np.abs(high)).max(axis=1)
-    middles = 0.5 * low + 0.5 * high
-    apart = _distance(middles[i] - middles[j]) - radii[i] - radii[j]
-    slack = 64.0 * _ROUNDING * (size[i] + size[j] + gap) + _TINY
-    return apart + slack < gap * (2.0 - _STRETCHED), apart - slack > gap * _STRETCHED
-
-
-def _distance(apart: FloatArray) -> FloatArray:
-    return np.hypot.reduce(apart, axis=1)
-
-
-def _is_above(apart: FloatArray, gap: float) -> BoolArray:
-    """Tell which boxes are surely further apart than the gap."""
-    return _distance(apart) * (1.0 - _ROUNDING) > gap * (1.0 + _ROUNDING) + _TINY
-
-
-def _is_below(apart: FloatArray, gap: float) -> BoolArray:
-    """Tell which boxes are surely nearer than the gap."""
-    return _distance(apart) * (1.0 + _ROUNDING) + _TINY < gap * (1.0 - _ROUNDING)
+    apart = np.hypot.reduce(np.fmax(np.fmax(low[j] - high[i], low[i] - high[j]), 0.0), axis=1)
+    reach = gap * _STRETCHED
+    return ~(apart * (1.0 - _ROUNDING) > reach * (1.0 + _ROUNDING) + _TINY)

@@ -1,0 +1,242 @@
+"""How far apart many pairs of convex bodies are: a walk to the nearest points in float64, proven in double-doubles.
+
+Of the differences M = {a - b} of two bodies the point nearest to the origin is sought: by turns the corner of M
+furthest toward the origin is added to a simplex of at most three corners, of which those stay that the nearest point
+of all needs. Whatever direction that gives, the slab across it parts the bodies: all vertices are looked at.
+
+**Clear** is proven as *apart* is in `xenocollide.py`, by a slab wider than the gap; **near** by two points, each off by
+the error of a placed point and 2^-48 of the largest corner of M, which covers their weights. The distance itself is
+that of the nearest points of the two features that the last simplex names, bounded as in `refined.py`.
+
+Source: E. Gilbert, D. Johnson, S. Keerthi, A fast procedure for computing the distance between complex objects in
+three-dimensional space, 1988; C. Ericson, Real-Time Collision Detection, 2005, 5.1.5 (triangle), 9.5 (this walk).
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from engine.collision.clearance.closed_forms import gap_of_forms
+from engine.collision.clearance.near_triangles import FACE
+from engine.collision.clearance.refined import ROUNDING, Triangle, corner_of, ends_of, height_above
+from engine.collision.clearance.wide import Wide, Wide3, dot_wide, less, minus_wide, root
+from engine.collision.convex.body import ASIDE, CENTER, REACH, ConvexArrays
+from engine.collision.convex.pair import inner_point
+from engine.collision.convex.xenocollide import PlacedBody, farthest, largest, placed_body, point_of
+from engine.collision.meshes.placement import PoseArrays, placed, turned_back
+from engine.jit import bare_kernel, called, inline, merged
+from engine.predicates.double_double import surely_rounded
+from engine.predicates.error_free import two_diff, two_sum, workspace
+from engine.predicates.vectors import dot, largest_of, length, minus, negative
+from engine.types import Point3
+
+_TURNS: Final = 40
+_SMALLEST, _LARGEST = 2.0**-140, 2.0**200
+"""Of lengths that the bounds hold for."""
+_POLL_EVERY: Final = 64
+
+
+class Corner(NamedTuple):
+    """A corner of M, and the vertices of both bodies that it is the difference of."""
+
+    at: Point3
+    i: int
+    j: int
+
+
+class Simplex(NamedTuple):
+    """At most three corners, the unused ones equal to one that is used, and their number."""
+
+    a: Corner
+    b: Corner
+    c: Corner
+    n: int
+
+
+@inline
+def _weights(a: Point3, b: Point3, c: Point3) -> tuple[float, float, float]:
+    """Return the weights of the point of a triangle that is nearest to the origin; it may be a segment or point."""
+    u, v = minus(b, a), minus(c, a)
+    ua, va, ub, vb, uc, vc = -dot(u, a), -dot(v, a), -dot(u, b), -dot(v, b), -dot(u, c), -dot(v, c)
+    if ua <= 0.0 and va <= 0.0:
+        return 1.0, 0.0, 0.0
+    if ub >= 0.0 and vb <= ub:
+        return 0.0, 1.0, 0.0
+    of_c = ua * vb - ub * va
+    if of_c <= 0.0 and ua >= 0.0 and ub <= 0.0:
+        share = ua / (ua - ub)
+        return 1.0 - share, share, 0.0
+    if vc >= 0.0 and uc <= vc:
+        return 0.0, 0.0, 1.0
+    of_b = uc * va - ua * vc
+    if of_b <= 0.0 and va >= 0.0 and vc <= 0.0:
+        share = va / (va - vc)
+        return 1.0 - share, 0.0, share
+    of_a = ub * vc - uc * vb
+    if of_a <= 0.0 and vb - ub >= 0.0 and uc - vc >= 0.0:
+        share = (vb - ub) / ((vb - ub) + (uc - vc))
+        return 0.0, 1.0 - share, share
+    whole = of_a + of_b + of_c
+    return of_a / whole, of_b / whole, of_c / whole
+
+
+@inline
+def _with(s: Simplex, new: Corner) -> tuple[Simplex, Point3]:
+    """Return the corners of a simplex and a new one that the point nearest to the origin needs, and that point."""
+    best, kept, nearest = np.inf, s, new.at
+    for turn in range(3):
+        p, q = (s.b if turn == 2 else s.a), (s.b if turn == 0 else s.c)
+        x, y, z = _weights(new.at, p.at, q.at)
+        v = Point3(
+            x * new.at.x + y * p.at.x + z * q.at.x,
+            x * new.at.y + y * p.at.y + z * q.at.y,
+            x * new.at.z + y * p.at.z + z * q.at.z,
+        )
+        if dot(v, v) < best:
+            best, nearest = dot(v, v), v
+            first = new if x > 0.0 else (p if y > 0.0 else q)
+            last = q if z > 0.0 else (p if y > 0.0 else new)
+            kept = Simplex(first, p if x > 0.0 and y > 0.0 else last, last, (x > 0.0) + (y > 0.0) + (z > 0.0))
+        if s.n < 3:
+            break
+    return kept, nearest
+
+
+@inline
+def _start(pool: ConvexArrays, a: PlacedBody, b: PlacedBody, v: Point3) -> tuple[Corner, float]:
+    """Return the corner of M furthest against v, and its v . at."""
+    i = farthest(pool.points, pool.graph, a, turned_back(a.place, negative(v)), -1)
+    j = farthest(pool.points, pool.graph, b, turned_back(b.place, v), -1)
+    at = minus(placed(point_of(pool.points, i), a.place), placed(point_of(pool.points, j), b.place))
+    return Corner(at, i, j), dot(v, at)
+
+
+@inline
+def _slab(pool: ConvexArrays, a: PlacedBody, b: PlacedBody, v: Point3, error: float) -> float:
+    """Return a lower bound on the distance of two bodies: the slab between them across v."""
+    d = negative(v)
+    size = abs(d.x) + abs(d.y) + abs(d.z)
+    return (-(largest(pool.points, a, d) + largest(pool.points, b, v)) - 2.25 * error * size) / (
+        length(d) * (1.0 + 2.0**-50)
+    )
+
+
+@inline
+def gap_of_convex(pool: ConvexArrays, first: int, second: int, a: PlacedBody, b: PlacedBody, gap: float,
+                  is_measured: bool) -> float:  # fmt: skip
+    """Return the distance of two bodies without a common point, infinity where it is surely at least the gap, NaN where
+    this is not sure; where it is not to be measured 0.0 for one that is surely below."""
+    error = a.place.error + b.place.error
+    v = minus(inner_point(pool.numbers, first, a, CENTER), inner_point(pool.numbers, second, b, ASIDE))
+    corner, _ = _start(pool, a, b, v)
+    simplex, v, reach = Simplex(corner, corner, corner, 1), corner.at, largest_of(corner.at)
+    if not (error < _LARGEST and reach < _LARGEST):
+        return np.nan
+    for _ in range(_TURNS):
+        square = dot(v, v)
+        if not square > _SMALLEST:
+            return np.nan
+        if (
+            not is_measured
+            and np.sqrt(square) - a.round - b.round + error + 2.0**-46 * (reach + a.round + b.round) < gap
+        ):
+            return 0.0
+        corner, along = _start(pool, a, b, v)
+        reach = max(reach, largest_of(corner.at))
+        if along > (gap + a.round + b.round) * np.sqrt(square) and _slab(pool, a, b, v, error) > gap:
+            return np.inf
+        if square - along <= 2.0**-44 * square:
+            break
+        grown, nearest = _with(simplex, corner)
+        if not dot(nearest, nearest) < square:
+            break
+        simplex, v = grown, nearest
+    distance = _proven(pool, simplex, a, b, pool.numbers[first, REACH] + pool.numbers[second, REACH])
+    return np.inf if distance > gap else (np.nan if not distance < gap else distance)
+
+
+@merged
+def _dual(pool: ConvexArrays, f: PlacedBody, vertex: int, shift: Wide3) -> Wide3:
+    return corner_of(f.place, point_of(pool.points, vertex), shift)
+
+
+@called
+def _proven(pool: ConvexArrays, s: Simplex, a: PlacedBody, b: PlacedBody, reach: float) -> float:
+    """Return the double nearest to the distance, NaN where the features of a simplex do not prove it."""
+    origin, p, q = Wide(0.0, 0.0), a.place, b.place
+    x, y, z = two_diff(q.x, p.x), two_diff(q.y, p.y), two_diff(q.z, p.z)
+    here, there = Wide3(origin, origin, origin), Wide3(Wide(x[0], x[1]), Wide(y[0], y[1]), Wide(z[0], z[1]))
+    i, j = _kinds(s.a.i, s.b.i, s.c.i), _kinds(s.a.j, s.b.j, s.c.j)
+    t = Triangle(_dual(pool, a, i[0], here), _dual(pool, a, i[1], here), _dual(pool, a, i[2], here))
+    u = Triangle(_dual(pool, b, j[0], there), _dual(pool, b, j[1], there), _dual(pool, b, j[2], there))
+    p_end, q_end = ends_of(t, u, i[3], j[3])
+    n = minus_wide(q_end, p_end)
+    square = dot_wide(n, n)
+    size_of_all = reach + max(abs(x[0]), abs(y[0]), abs(z[0]))
+    if not (square.h > _SMALLEST and square.h > 2.0**-80 * size_of_all * size_of_all):
+        return np.nan
+    beyond = max(
+        _beyond(pool, a, n, p_end, here, size_of_all), _beyond(pool, b, minus_wide(here, n), q_end, there, size_of_all)
+    )
+    size = root(square)
+    h, low = two_sum(a.round, b.round)
+    distance = less(size, Wide(h, low))
+    bound = 2.0 * beyond / size.h + ROUNDING * (size_of_all + h)
+    is_sure = distance.h > bound and surely_rounded(distance.h, distance.low, bound)
+    return distance.h if is_sure else np.nan
+
+
+@inline
+def _kinds(i: int, j: int, k: int) -> tuple[int, int, int, int]:
+    """Return three vertices, different ones first, and which feature of their triangle they are: of one vertex a
+    vertex, of two an edge."""
+    if i == j:
+        j, k = k, j
+    if i == j:
+        return i, i, i, 0
+    return (i, j, j, 3) if k in (i, j) else (i, j, k, FACE)
+
+
+@inline
+def _beyond(pool: ConvexArrays, f: PlacedBody, n: Wide3, base: Wide3, shift: Wide3, reach: float) -> float:
+    """Return how far the vertices of a body reach beyond the plane through `base` across n, times |n|.
+
+    Those that do not in doubles, by more than their rounding, are left out.
+    """
+    d, most = Point3(n.x.h, n.y.h, n.z.h), 0.0
+    local = turned_back(f.place, d)
+    level = d.x * (base.x.h - shift.x.h) + d.y * (base.y.h - shift.y.h) + d.z * (base.z.h - shift.z.h)
+    slack = 2.0**-44 * reach * (abs(d.x) + abs(d.y) + abs(d.z))
+    for vertex in range(f.first, f.stop):
+        if dot(local, point_of(pool.points, vertex)) - level > -slack:
+            most = max(most, height_above(n, _dual(pool, f, vertex, shift), base).h)
+    return most
+
+
+@bare_kernel
+def gaps_of_pairs(
+    forms: Any, pool: ConvexArrays, bodies: Any, kinds: Any, poses: PoseArrays, places: Any, gap: float,
+    is_measured: bool, distances: Any, flag: Any,
+) -> None:  # fmt: skip
+    """Fill distances (n,) of pairs without a common point: as `gap_of_convex` says, NaN where this is not sure.
+
+    kinds (n, 2): the solids; forms (n_solids, 8): NaN for those that are none; bodies (n_solids,): their place in the
+    pool, or -1. places (n, 2): rows of the poses, 0 for none. Returns early when the flag is raised.
+    """
+    w = workspace(30)
+    for item in range(places.shape[0]):
+        if item % _POLL_EVERY == 0 and flag[0] != 0:
+            return
+        (i, j), (first, second) = (places[item, 0], places[item, 1]), (kinds[item, 0], kinds[item, 1])
+        turns, moves = poses.rotations, poses.translations
+        distances[item] = np.nan
+        if forms[first, 0] == forms[first, 0] and forms[second, 0] == forms[second, 0]:
+            distance, _, _, _, _ = gap_of_forms(forms[first], turns[i], moves[i], forms[second], turns[j], moves[j], w)
+            if distance > 0.0 and distance != gap:
+                distances[item] = distance if distance < gap else np.inf
+                continue
+        if bodies[first] >= 0 and bodies[second] >= 0:
+            a, b = placed_body(pool, bodies[first], poses, i), placed_body(pool, bodies[second], poses, j)
+            distances[item] = gap_of_convex(pool, bodies[first], bodies[second], a, b, gap, is_measured)
