@@ -93,17 +93,8 @@ def contains(solid: engine.Solid, points: np.ndarray) -> Contest:
     peers = MESHES if isinstance(subject, Mesh) else POLYGONS if isinstance(subject, Rings) else ()
     asked = [*field_of("points", subject, peers, 1), *books(methods.of_points, solid)]
     exact = engine.contains(points, solid)
-    return Contest(
-        "yours",
-        "contains",
-        True,
-        points,
-        exact,
-        telling(errors.same),
-        asked,
-        "your points",
-        request=partial(in_containment.request, subject, points),
-    )
+    return Contest("yours", "contains", True, points, exact, telling(errors.same), asked, "your points",
+                   request=partial(in_containment.request, subject, points))  # fmt: skip
 
 
 def segments(region: engine.Solid, items: np.ndarray) -> Contest:

@@ -21,7 +21,7 @@ import numpy as np
 
 from benchmarks import contenders, errors
 from benchmarks.contenders import Prepared
-from benchmarks.measure import LEAST_SECONDS, clocked, memory_of, percentile
+from benchmarks.measure import LEAST_SECONDS, clocked, percentile
 
 PROBE = 40
 """Items of the first, untimed question; the least that a slow contender gets."""
@@ -159,8 +159,6 @@ class Row:
     absent: str = ""
     n_items: int = 0
     build: float = 0.0
-    memory: int = 0
-    """Bytes by which the process grew while it was built."""
     seconds: list[float] = field(default_factory=list)
     """One value a round, for `n_items`."""
     cpu: list[float] = field(default_factory=list)
@@ -235,11 +233,10 @@ def _repeat(entry: _Entry) -> None:
 def _entered(contest: Contest, each: Contender, row: Row, seconds: float) -> _Entry | None:
     """Build a contender and ask it until it is warm; None if it is absent or refuses, for which ours has no excuse."""
     gc.collect()
-    resident, before = memory_of(), time.perf_counter()
+    before = time.perf_counter()
     try:
         prepared = each.make()
         row.build = time.perf_counter() - before
-        row.memory = int(max(0.0, memory_of() - resident) * 2**20)
         probe = contest.items if contest.count else contest.items[:PROBE]
         row.cold = clocked(partial(prepared.ask, prepared.native(probe)))[0]
         row.n_items = contest.count or _how_many(prepared, contest.items, seconds)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, partial
 from typing import Any
@@ -42,16 +42,19 @@ def tasks(size: Size) -> Iterator[Task]:
         yield Task(name, partial(of, size, name), True)
     for faces, goals in list(MESHES.items())[: size.of(3, 1)]:
         for place, goal in zip(("uniform", "near"), goals, strict=True):
-            yield Task(f"{faces} faces, {place}", partial(_mesh, size, faces, place, goal))
+            name, mesh = f"{faces} faces, {place}", partial(workloads.mesh_of_size, faces, size.seed)
+            yield Task(name, partial(_row, size, name, mesh, place, {"open3d": goal, "plain_signs": (None, None)}))
     faces = size.of("86k", "1k")
     yield Task(f"build, {faces} faces", partial(_from_arrays, size, faces, 0))
     for n_points in (1, 1_000):
         yield Task(f"first {n_points}, {faces} faces", partial(_from_arrays, size, faces, n_points))
     for n_vertices, goal in list(POLYGONS.items())[: size.of(3, 2)]:
         for place, goals in (("uniform", goal), ("near", (5.0, 10.0))):
-            yield Task(f"polygon of {n_vertices:,}, {place}", partial(_polygon, size, n_vertices, place, goals))
+            name, rings = f"polygon of {n_vertices:,}, {place}", partial(workloads.star_polygon, n_vertices, size.seed)
+            yield Task(name, partial(_row, size, name, rings, place, {"shapely": goals}))
     for n_planes in (6, 20, 100):
-        yield Task(f"convex of {n_planes} planes", partial(_planes, size, n_planes))
+        name, solid = f"convex of {n_planes} planes", partial(workloads.convex_of, n_planes, size.seed)
+        yield Task(name, partial(_row, size, name, solid, "uniform", {"numpy": (4.0, 8.0)}))
     for what, n_bodies in (("polygons", size.of(10_000, 1_000)), ("polyhedra", size.of(1_000, 27))):
         for is_new in (False, True):
             name = f"scene of {n_bodies:,} {what}" + ", first time" * is_new
@@ -203,9 +206,9 @@ def _points(subject: Any, place: str, size: Size, n: int = 1_000_000) -> np.ndar
     return draw(subject, size.n(n), size.seed)
 
 
-def _mesh(size: Size, faces: str, place: str, goals: Goals) -> Contest:
-    mesh, peers = workloads.mesh_of_size(faces, size.seed), {"open3d": goals, "plain_signs": (None, None)}
-    return contest(f"{faces} faces, {place}", mesh, _points(mesh, place, size), peers)
+def _row(size: Size, name: str, make: Callable[[], Any], place: str, peers: Mapping[str, Goals]) -> Contest:
+    subject = make()
+    return contest(name, subject, _points(subject, place, size), peers)
 
 
 def _from_arrays(size: Size, faces: str, n_points: int) -> Contest:
@@ -214,16 +217,6 @@ def _from_arrays(size: Size, faces: str, n_points: int) -> Contest:
     points = workloads.points_in_box(mesh, n_points or memory.points_that_pay(len(mesh.faces)), size.seed)
     name = f"first {n_points}, {faces} faces" if n_points else f"build, {faces} faces"
     return replace(contest(name, mesh, points, ["open3d"], is_new=True), exact=None, count=len(points))
-
-
-def _polygon(size: Size, n_vertices: int, place: str, goals: Goals) -> Contest:
-    rings = workloads.star_polygon(n_vertices, size.seed)
-    return contest(f"polygon of {n_vertices:,}, {place}", rings, _points(rings, place, size), {"shapely": goals})
-
-
-def _planes(size: Size, n_planes: int) -> Contest:
-    solid = workloads.convex_of(n_planes, size.seed)
-    return contest(f"convex of {n_planes} planes", solid, _points(solid, "uniform", size), {"numpy": (4.0, 8.0)})
 
 
 @cache
