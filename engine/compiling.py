@@ -32,7 +32,7 @@ from numba.core.types.misc import unliteral
 from engine.kernel_cache import COMPLETE, cache_folder, keep, kept, source_digest
 
 _ASKED_FOR = {
-    JITCodeLibrary: ("_finalize_final_module", "_finalize_dynamic_globals"),
+    JITCodeLibrary: ("_finalize_final_module", "_finalize_dynamic_globals", "add_linking_library", "finalize"),
     JITCodeLibrary.__mro__[1]: ("_set_compiled_object", "enable_object_caching"),
     JITCPUCodegen: ("set_env", "create_library", "_library_class"),
     NullCache: ("load_overload", "save_overload"),
@@ -76,7 +76,34 @@ def signs() -> list[str]:
     return [f"{COMPLETE}-{name}-{hashlib.sha256(features.encode()).hexdigest()[:8]}" for name, features in cpus()]
 
 
-class _InnerLibrary(JITCodeLibrary):  # type: ignore[misc] # numba carries no types
+class _Library(JITCodeLibrary):  # type: ignore[misc] # numba carries no types
+    """Code that takes in what is `called` below it as late as can be, that is with the kernel.
+
+    Linked into each inner function on the way, it would be optimised again with each: a fifteenth of all compiling.
+    """
+
+    def __init__(self, codegen: JITCPUCodegen, name: str) -> None:
+        super().__init__(codegen, name)
+        self.below: dict[_CalledLibrary, None] = {}  # what is called, directly or not, before its callers
+
+    def add_linking_library(self, library: JITCodeLibrary) -> None:
+        self.below |= getattr(library, "below", {})  # numba's own have none
+        if isinstance(library, _CalledLibrary):
+            self.below[library] = None
+        else:
+            super().add_linking_library(library)
+
+
+class _KernelLibrary(_Library):
+    """Machine code that Python calls, and all that it needs."""
+
+    def finalize(self) -> None:
+        for library in reversed(self.below):  # callers first: the linker drops what nobody has asked for yet
+            super(_Library, self).add_linking_library(library)
+        super().finalize()
+
+
+class _InnerLibrary(_Library):
     """Code of a function that only compiled code calls: linked into its callers, without machine code of its own.
 
     It is optimised before it is linked, and again within each caller. To leave out the first of these spares a tenth of
@@ -86,6 +113,10 @@ class _InnerLibrary(JITCodeLibrary):  # type: ignore[misc] # numba carries no ty
     def _finalize_final_module(self) -> None:
         self._finalize_dynamic_globals()
         self._finalized = True
+
+
+class _CalledLibrary(_InnerLibrary):
+    """Code that is never copied into its callers."""
 
 
 class _InnerCodegen(JITCPUCodegen):  # type: ignore[misc]
@@ -117,7 +148,7 @@ class _KernelLowering(NativeLowering):  # type: ignore[misc]
         return done
 
     def _library(self, name: str, codegen: JITCPUCodegen) -> JITCodeLibrary:
-        library = codegen.create_library(name)
+        library = _KernelLibrary(codegen, name)
         library.enable_object_caching()
         return library
 
@@ -150,6 +181,9 @@ class _CalledLower(Lower):  # type: ignore[misc]
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _CalledLowering(_InnerLowering):
     _name = "engine_called_lowering"
+
+    def _library(self, name: str, codegen: JITCPUCodegen) -> JITCodeLibrary:
+        return _CalledLibrary(_InnerCodegen(codegen), name)
 
     @property
     def lowering_class(self) -> type[Lower]:
