@@ -16,7 +16,6 @@ from typing import Any, Final
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
-from engine.containment.scene.locate_scene import locate_scene
 from engine.errors import (
     EngineError,
     InvalidArrayError,
@@ -26,16 +25,15 @@ from engine.errors import (
     UnsupportedSolidError,
     WrongDimensionError,
 )
-from engine.layers.rows import NONE, Layer, LayerRows, Limits, dissolved, layer_of, overlay_rows
+from engine.layers.rows import NONE, Layer, LayerRows, Limits, dissolved, held, layer_of, overlay_rows, with_alone
 from engine.parallel import Cancel, check_options
-from engine.polygon_overlay.polygon_arrays import Chosen, arrays_of
+from engine.polygon_overlay.polygon_arrays import arrays_of
 from engine.polygon_overlay.union_all import union_all
 from engine.solids.checks import Where, as_points, shown
 from engine.solids.polygon import Polygon
 from engine.types import Accuracy
 
 AREAS: Final = ("Polygon", "MultiPolygon")
-_PAIR_BYTES: Final = 40
 _CHECKED: Final = 1000
 """Features read between two looks at the clock."""
 
@@ -159,18 +157,10 @@ def locate_features(
     except EngineError:
         positions = _named(there, sides[0], ("points",), lambda each: as_points([each["coordinates"]], 2)[0])
     layer = _layer(sides[1], ("polygons",), limits)
-    solid = np.flatnonzero(layer.arrays.sizes())
-    held = limits.noted(locate_scene(positions, list(Chosen(layer.arrays, solid)), **limits.options()))
-    limits.budget().take(_PAIR_BYTES * len(held.indices))
-    first = np.repeat(np.array(there, np.int64), np.diff(held.offsets))
-    second, on_boundary = solid[held.indices], held.on_boundary
+    first, second, on_boundary = held(positions, layer, limits)
+    first = np.array(there, np.int64)[first]
     if outside:
-        alone = np.setdiff1d(np.arange(len(sides[0].features)), first)
-        order = np.argsort(np.concatenate([first, alone]), kind="stable")
-        first, second, on_boundary = (
-            np.concatenate(each)[order]
-            for each in ((first, alone), (second, np.full(len(alone), NONE)), (on_boundary, np.zeros(len(alone), bool)))
-        )
+        first, second, on_boundary = with_alone(len(sides[0].features), first, second, on_boundary)
     told = _told(*sides, ("point", "polygon"))
 
     def some(start: int, stop: int) -> list[dict[str, Any]]:

@@ -19,6 +19,7 @@ from engine.layers.rows import (
     held,
     layer_of,
     overlay_rows,
+    with_alone,
 )
 from engine.parallel import Cancel
 from engine.polygon_overlay.polygon_arrays import PolygonArrays, arrays_of
@@ -133,12 +134,10 @@ def sjoin(
             UnsupportedSolidError, left, ("left", int(wrong[0])), "is no point; sjoin joins points to polygons"
         )
     places, numbers = shapely.get_coordinates(points, return_index=True)
-    first, second = held(places, _layer(right, "right", limits), limits)
+    first, second, on_boundary = held(places, _layer(right, "right", limits), limits)
     first = numbers[first]
     if how == "left":
-        alone = np.setdiff1d(np.arange(len(left)), first)
-        order = np.argsort(np.concatenate([first, alone]), kind="stable")
-        first, second = (np.concatenate(each)[order] for each in ((first, alone), (second, np.full(len(alone), NONE))))
+        first, second, _ = with_alone(len(left), first, second, on_boundary)
     attributes = right.drop(columns=right.geometry.name)
     shared = set(attributes.columns) & set(left.columns)
     joined = left.iloc[first].rename(columns={column: f"{column}_left" for column in shared})
@@ -177,7 +176,7 @@ def _layer(frame: GeoDataFrame, name: str, limits: Limits) -> Layer:
     there = np.flatnonzero(~is_missing)
     if not len(there):
         none = np.zeros(len(array) + 1, np.int64)
-        return Layer(PolygonArrays(np.zeros((0, 2)), none[:1], none), is_missing)
+        return layer_of(PolygonArrays(np.zeros((0, 2)), none[:1], none[:1]), none, is_missing, limits)
     _, positions, (rings, parts, *several) = shapely.to_ragged_array(array[there], include_z=False)
     ends = several[0] if several else np.arange(len(there) + 1)
     if len(broken := np.flatnonzero(~np.isfinite(positions).all(axis=1))):

@@ -21,11 +21,11 @@ from engine.containment.scene.locate_scene import locate_scene
 from engine.errors import InvalidOperationError, NotRepresentableError
 from engine.parallel import Budget, Cancel
 from engine.polygon_overlay.batch import OverlayBatch, overlay_batch
-from engine.polygon_overlay.found import chained, summed
+from engine.polygon_overlay.found import chained, places_of, summed
 from engine.polygon_overlay.polygon_arrays import Chosen, PolygonArrays, joined_arrays
-from engine.polygon_overlay.result import Output
+from engine.polygon_overlay.result import Output, Overlay
 from engine.polygon_overlay.run import Operation
-from engine.polygon_overlay.union_all import union_all
+from engine.polygon_overlay.union_all import less_all, union_all
 from engine.solids.checks import shown
 from engine.solids.polygon import Polygon
 from engine.solids.ragged import closed_rings
@@ -43,15 +43,21 @@ HOWS: Final[dict[str, tuple[bool, bool, bool]]] = {
 NONE: Final = -1
 _PAIR_BYTES: Final = 16
 _ROW_BYTES: Final = 300
-"""Of a pair of boxes; of the overlay of a pair, at least."""
+_HELD_BYTES: Final = 40
+"""Of a pair of boxes; of the overlay of a pair, at least; of a point and a feature that holds it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Layer:
-    """The polygons of a layer's features, empty ones welcome, and which features have no geometry at all."""
+    """The polygons of a layer's features, empty ones welcome, and which features have no geometry at all.
+
+    parts, owners: of features whose parts overlap the parts as given, and of each the feature; arrays: their union.
+    """
 
     arrays: PolygonArrays
     is_missing: BoolArray
+    parts: PolygonArrays
+    owners: IntArray
 
     def __len__(self) -> int:
         return len(self.is_missing)
@@ -124,8 +130,8 @@ def overlay_rows(left: Layer, right: Layer, how: str, limits: Limits) -> LayerRo
 
     Boundary: features that meet without common area make no row. Degenerate input: polygons without area likewise; one
     without geometry stands as a row without pieces where what is left of its layer is asked for.
-    Accuracy: decisions exact. Of a feature what others leave is its difference with all of these at once; where they
-    overlap each other, with their union, rounded.
+    Accuracy: decisions exact, coordinates rounded once. Of a feature what others leave is its difference with all of
+    these at once, in one arrangement.
     Cost: n log n for the boxes of both layers together, then that of `overlay_batch`.
     Raises: InvalidOperationError, NotRepresentableError, DeadlineExceededError, CancelledError.
     """
@@ -186,22 +192,28 @@ def _differences(layer: Layer, others: Layer, pairs: IntArray, rivals: IntArray,
     pairs: by the first, then the second; rivals: of others whose boxes meet.
     """
     seconds, groups = pairs[:, 1], summed(np.bincount(pairs[:, 0], minlength=len(layer)))
-    clips, places = others.arrays.taken(seconds).merged(groups), np.arange(len(layer))
-    overlapping = np.flatnonzero(_overlapping(others, rivals, groups, seconds, limits))
-    if len(overlapping):
-        those = [
-            united(Chosen(others.arrays, seconds[groups[k] : groups[k + 1]]), limits) for k in overlapping.tolist()
-        ]
-        places[overlapping] = len(layer) + np.arange(len(those))
-        clips = joined_arrays([clips, *those])
-    numbers = np.flatnonzero(layer.arrays.sizes())
-    sides = Chosen(layer.arrays, numbers), Chosen(clips, places[numbers])
-    rows = _rows(_overlaid(*sides, "difference", limits), numbers, np.full(len(numbers), NONE))
+    overlap = _overlapping(others, rivals, groups, seconds, limits)
+    clips, is_there = others.arrays.taken(seconds).merged(groups), layer.arrays.sizes() > 0
+    at_once, apart = np.flatnonzero(is_there & ~overlap), np.flatnonzero(is_there & overlap)
+    sides = Chosen(layer.arrays, at_once), Chosen(clips, at_once)
+    rows = _rows(_overlaid(*sides, "difference", limits), at_once, np.full(len(at_once), NONE))
+    if len(apart):
+        found = []
+        for k in apart.tolist():
+            with limits.budget() as budget:
+                rest = list(Chosen(others.arrays, seconds[groups[k] : groups[k + 1]]))
+                found.append(limits.noted(less_all(layer.arrays.polygon(k), rest, budget)))
+        rows = _together([rows, _rows_of(found, apart)])
     missing = np.flatnonzero(layer.is_missing)
-    order = np.argsort(np.concatenate([rows.left, missing]), kind="stable")
-    left = np.concatenate([rows.left, missing])[order]
-    sizes = np.concatenate([np.diff(rows.row_offsets), np.zeros(len(missing), np.int64)])[order]
-    return replace(rows, left=left, right=np.full(len(left), NONE), row_offsets=summed(sizes))
+    left = np.concatenate([rows.left, missing])
+    stays = np.concatenate([np.diff(rows.row_offsets) > 0, np.ones(len(missing), np.bool_)])
+    order = np.flatnonzero(stays)[np.argsort(left[stays], kind="stable")]
+    offsets = np.append(rows.row_offsets, np.full(len(missing), rows.row_offsets[-1]))
+    pieces = PolygonArrays(rows.vertices, rows.ring_offsets, rows.piece_offsets)
+    if len(apart):
+        pieces = pieces.taken(places_of(offsets, order))
+    sizes = summed(np.diff(offsets)[order])
+    return LayerRows(left[order], np.full(len(order), NONE), *pieces, sizes, rows.n_collapsed)
 
 
 def _overlapping(others: Layer, rivals: IntArray, groups: IntArray, seconds: IntArray, limits: Limits) -> BoolArray:
@@ -250,7 +262,8 @@ def layer_of(parts: PolygonArrays, offsets: IntArray, is_missing: BoolArray, lim
         places = np.arange(len(offsets) - 1)
         places[overlapping] = len(offsets) - 1 + np.arange(len(those))
         arrays = joined_arrays([arrays, *those]).taken(places)
-    return Layer(arrays, is_missing)
+    kept = np.flatnonzero(np.isin(owner, overlapping) & (parts.sizes() > 0))
+    return Layer(arrays, is_missing, parts.taken(kept), owner[kept])
 
 
 def _overlaid(
@@ -295,9 +308,14 @@ def dissolved(layer: Layer, groups: IntArray, n_groups: int, limits: Limits) -> 
     ends = np.searchsorted(groups[order], np.arange(n_groups + 1)).tolist()
     members = (list(Chosen(layer.arrays, order[start:stop])) for start, stop in pairwise(ends))
     found = [limits.noted(union_all(some, **limits.options())) for some in members]
+    return _rows_of(found, np.arange(n_groups))
+
+
+def _rows_of(found: Sequence[Overlay], left: IntArray) -> LayerRows:
+    """Return overlays as rows, also those without pieces."""
     return LayerRows(
-        np.arange(n_groups),
-        np.full(n_groups, NONE),
+        left,
+        np.full(len(left), NONE),
         np.concatenate([np.zeros((0, 2)), *(each.vertices for each in found)]),
         chained([each.ring_offsets for each in found]),
         chained([each.piece_offsets for each in found]),
@@ -306,8 +324,36 @@ def dissolved(layer: Layer, groups: IntArray, n_groups: int, limits: Limits) -> 
     )
 
 
-def held(points: object, layer: Layer, limits: Limits) -> tuple[IntArray, IntArray]:
-    """Return the pairs of points and features that hold them, boundary included, by point, then feature."""
+def held(points: object, layer: Layer, limits: Limits) -> tuple[IntArray, IntArray, BoolArray]:
+    """Return points and the features that hold them, boundary included, by point, then feature; whether they are on it.
+
+    Where parts of a feature overlap it holds what one of them does, boundary, spikes and all; a point on the boundary
+    of some, in the interior of none, is on the feature's unless it is in the interior of their union.
+    """
     there = np.flatnonzero(layer.arrays.sizes())
-    found = limits.noted(locate_scene(points, list(Chosen(layer.arrays, there)), **limits.options()))
-    return np.repeat(np.arange(len(found.offsets) - 1), np.diff(found.offsets)), there[found.indices]
+    solids = [*Chosen(layer.arrays, there), *Chosen(layer.parts, np.arange(len(layer.owners)))]
+    found = limits.noted(locate_scene(points, solids, **limits.options()))
+    limits.budget().take(_HELD_BYTES * len(found.indices))
+    first, second = np.repeat(np.arange(len(found.offsets) - 1), np.diff(found.offsets)), found.indices
+    features, on_boundary = np.concatenate([there, layer.owners])[second], found.on_boundary
+    if len(layer.owners):
+        counts = (second >= len(there)) | ~np.isin(features, layer.owners)
+        order = np.lexsort((features, first))
+        first, features, on_boundary, counts = (each[order] for each in (first, features, on_boundary, counts))
+        starts = np.flatnonzero(np.append(True, (np.diff(first) != 0) | (np.diff(features) != 0))[: len(first)])
+        if len(starts):
+            on_boundary = np.logical_and.reduceat(on_boundary, starts)
+            kept = np.logical_or.reduceat(counts, starts)
+            first, features, on_boundary = first[starts][kept], features[starts][kept], on_boundary[kept]
+    return first, features, on_boundary
+
+
+def with_alone(
+    n: int, first: IntArray, second: IntArray, on_boundary: BoolArray
+) -> tuple[IntArray, IntArray, BoolArray]:
+    """Add to the pairs of `held` a row for each of n points that nothing holds, its feature `NONE`."""
+    alone = np.setdiff1d(np.arange(n), first)
+    rows = (first, alone), (second, np.full(len(alone), NONE)), (on_boundary, np.zeros(len(alone), np.bool_))
+    order = np.argsort(np.concatenate(rows[0]), kind="stable")
+    first, second, on_boundary = (np.concatenate(each)[order] for each in rows)
+    return first, second, on_boundary

@@ -4,23 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 from typing import Final, NamedTuple, cast
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray, Int8Array, Int32Array, IntArray, read_only
+from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray, read_only
 from engine.errors import InvalidArrayError, NotRepresentableError
 from engine.parallel import Budget, Cancel, Progress, check_options, run_chunks
 from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
-from engine.polygon_overlay.compiled.loading import LEFT_OUT, RingArrays
+from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.found import NO_PAIRS, Found, chained, joined, one_pair, summed, taken
-from engine.polygon_overlay.implicit_rings import ImplicitRings
+from engine.polygon_overlay.implicit_rings import ImplicitRings, areas_of
+from engine.polygon_overlay.nearest import nearest_pairs
 from engine.polygon_overlay.overlay import accuracy_of, check_words, overlay_rings, rings_of, ulps_moved
-from engine.polygon_overlay.polygon_arrays import Chosen
+from engine.polygon_overlay.polygon_arrays import Chosen, PolygonArrays, gathered
 from engine.polygon_overlay.result import Output, Overlay
-from engine.polygon_overlay.rounds_of_many_pairs import SettledPairs, nearest_pairs, settle_pairs
-from engine.polygon_overlay.run import Operation, Polygons, as_overlay, gathered, run_kernel
+from engine.polygon_overlay.rounds import SettledPairs, settle_pairs
+from engine.polygon_overlay.run import Operation, arranged_again, as_overlay, run_kernel
 from engine.solids.base import Solid
 from engine.solids.polygon import Polygon
 from engine.solids.ragged import closed_rings
@@ -42,11 +42,9 @@ class OverlayBatch:
     piece_offsets: (n_pieces + 1,) int64 into the rings, a shell before its holes. pair_offsets: (n_pairs + 1,) int64
         into the pieces.
     displacement: (n_pairs,) float64, how far an edge may lie from the exact one, as `Overlay.largest_displacement`.
-    _exact: what the first call of the kernel found; sources as those of `ImplicitRings`, but counted as _bases says.
-    _bases: (n_pairs, 3), what is added to the numbers of the subject's vertices, to those of the clip's, and from where
-        on they are the clip's. _is_rounded_again: (n_pairs,) bool, whose rings were not valid once rounded, or without
-        area: such a pair is overlaid again for its object, which tells what became of all parts. _apart: objects made
-        already, by pair.
+    _exact: what the first call of the kernel found. _is_rounded_again: (n_pairs,) bool, whose rings were not valid once
+        rounded, or without area: such a pair is overlaid again for its object, which tells what became of all parts.
+        _apart: objects made already, by pair.
     """
 
     status: Int8Array
@@ -60,7 +58,6 @@ class OverlayBatch:
     _operation: Operation = field(repr=False)
     _output: Output = field(repr=False)
     _exact: Found = field(repr=False)
-    _bases: Int32Array = field(repr=False)
     _is_rounded_again: BoolArray = field(repr=False)
     _apart: dict[int, Overlay] = field(repr=False)
 
@@ -79,27 +76,13 @@ class OverlayBatch:
             return None
         if pair in self._apart:
             return self._apart[pair]
-        if self._is_rounded_again[pair]:
-            both = _arrays(self._subjects[pair]), _arrays(self._clips[pair])
-            return overlay_rings(*both, self._operation, self._output, Budget())[0]
-        first, last = self.pair_offsets[pair], self.pair_offsets[pair + 1]
-        rings = self.piece_offsets[first : last + 1]
-        stops = self.ring_offsets[rings[0] : rings[-1] + 1]
-        sources = taken(self._exact, np.array([pair])).sources
         subject, clip = _arrays(self._subjects[pair]), _arrays(self._clips[pair])
-        in_subjects, in_clips, n_subjects = self._bases[pair].tolist()
-        is_edge = sources < LEFT_OUT  # as `overlay_pairs` tells it
-        sources[is_edge] = LEFT_OUT - 1 - sources[is_edge]
-        is_clip = sources >= n_subjects
-        sources[is_clip] += len(subject.vertices) - n_subjects - in_clips
-        sources[~is_clip & (sources >= 0)] -= in_subjects
-        sources[is_edge] = LEFT_OUT - 1 - sources[is_edge]
-        vertices = self.vertices[stops[0] : stops[-1]].copy()
-        arrays = vertices, rings - rings[0], sources, stops - stops[0]
-        for array in arrays:
-            array.setflags(write=False)
-        exact = ImplicitRings(subject, clip, *arrays[2:])
-        return as_overlay(vertices, arrays[1], float(self.displacement[pair]), exact, self._output)
+        if self._is_rounded_again[pair]:
+            return overlay_rings(subject, clip, self._operation, self._output, Budget())[0]
+        one = taken(self._exact, np.array([pair]))
+        exact = ImplicitRings(subject, clip, read_only(one.sources), one.ring_offsets)
+        vertices, displacement = read_only(one.vertices), float(one.displacement[0])
+        return as_overlay(vertices, one.piece_offsets, displacement, exact, self._output)
 
     @property
     def areas(self) -> FloatArray:
@@ -108,15 +91,9 @@ class OverlayBatch:
         NaN where status is not 0, infinity for what is beyond the largest double.
         """
         exact = self._exact
-        areas = np.full(len(self), np.nan)
         groups = exact.piece_offsets[summed(exact.counts[:, 0])]
-        starts = np.flatnonzero((self._bases[:, :2] == 0).all(axis=1)).tolist()
-        for start, stop in pairwise([*starts, len(self)]):  # as they were gathered
-            both = [RingArrays(*_gathered(side[start:stop])[:2]) for side in (self._subjects, self._clips)]
-            rings = groups[start : stop + 1]
-            stops = exact.ring_offsets[rings[0] : rings[-1] + 1]
-            part = ImplicitRings(both[0], both[1], exact.sources[stops[0] : stops[-1]], read_only(stops - stops[0]))
-            areas[start:stop], _ = part.sure_areas(rings - rings[0])
+        sides = [(RingArrays(*each[:2]), each[2]) for each in (_gathered(self._subjects), _gathered(self._clips))]
+        areas, _ = areas_of(*sides[0], *sides[1], read_only(exact.sources), read_only(exact.ring_offsets), groups)
         unsure = np.isnan(areas) | (exact.status == OPEN)
         areas[self.status != DONE] = np.nan
         for pair in np.flatnonzero(unsure & (self.status == DONE)).tolist():
@@ -155,22 +132,8 @@ def _n_vertices(solids: Sequence[Solid]) -> int:
     return solids.n_vertices if isinstance(solids, Chosen) else sum(len(_arrays(each).vertices) for each in solids)
 
 
-def _gathered(solids: Sequence[Solid]) -> Polygons:
-    if isinstance(solids, Chosen):
-        arrays = solids.together()
-        most = (int(sizes.max()) for sizes in (arrays.sizes(), np.diff(arrays.polygon_offsets)))
-        return Polygons(*arrays, *most)
-    polygons = cast("Sequence[Polygon]", solids)
-    return gathered([each.vertices for each in polygons], [each.ring_offsets for each in polygons])
-
-
-def _bases(subjects: Polygons, clips: Polygons) -> Int32Array:
-    """Return `OverlayBatch._bases` of pairs that were overlaid together."""
-    bases = np.empty((len(subjects.polygon_offsets) - 1, 3), np.int32)
-    bases[:, 0] = subjects.ring_offsets[subjects.polygon_offsets[:-1]]
-    bases[:, 1] = clips.ring_offsets[clips.polygon_offsets[:-1]]
-    bases[:, 2] = len(subjects.vertices)
-    return bases
+def _gathered(solids: Sequence[Solid]) -> PolygonArrays:
+    return solids.together() if isinstance(solids, Chosen) else gathered(cast("Sequence[Polygon]", solids))
 
 
 def overlay_batch(
@@ -206,17 +169,15 @@ def overlay_batch(
         if not isinstance(solids, Chosen) and set(map(type, solids)) - {Polygon}:
             for i_pair, solid in enumerate(solids):
                 rings_of(solid, name, i_pair)
-    parts: dict[int, tuple[Found, Int32Array]] = {}
+    parts: dict[int, Found] = {}
     with Budget(deadline, cancel) as budget:
 
         def task(start: int, stop: int) -> None:
             # Gathered here, chunk by chunk: one thread does while another's kernel runs, and what it wrote is near.
-            first, second = _gathered(subjects[start:stop]), _gathered(clips[start:stop])
-            parts[start] = run_kernel(first, second, operation, budget), _bases(first, second)
+            parts[start] = run_kernel(_gathered(subjects[start:stop]), _gathered(clips[start:stop]), operation, budget)
 
         run_chunks(task, len(subjects), budget=budget, first_chunk=_FIRST_CHUNK, workers=workers, progress=progress)
-        chunks = [parts[start] for start in sorted(parts)]
-        found = first_found = joined([NO_PAIRS, *(found for found, _ in chunks)])
+        found = first_found = joined([NO_PAIRS, *(parts[start] for start in sorted(parts))])
         rest = _Rest(np.zeros(len(subjects), np.int8), np.zeros(len(subjects), np.bool_), {})
         ulps, n_rational = 0.5, 0
         if found.status.any():
@@ -235,7 +196,6 @@ def overlay_batch(
         _operation=operation,
         _output=output,
         _exact=first_found,
-        _bases=np.concatenate([np.zeros((0, 3), np.int32), *(bases for _, bases in chunks)]),
         _is_rounded_again=rest.is_rounded_again,
         _apart=rest.apart,
     )
@@ -272,7 +232,7 @@ def _settled(
     def settle(start: int, stop: int) -> None:
         some = doubtful[start * _DOUBTFUL : stop * _DOUBTFUL]
         pairs = taken(found, some)
-        more = settle_pairs(pairs, budget) if output == "valid" else nearest_pairs(pairs, budget)
+        more = settle_pairs(pairs, arranged_again, budget) if output == "valid" else nearest_pairs(pairs, budget)
         settled[start] = more._replace(pairs=some[more.pairs])
 
     def overlay_alone(start: int, stop: int) -> None:
@@ -324,7 +284,6 @@ def join_batches(batches: Sequence[OverlayBatch]) -> OverlayBatch:
         _operation=batches[0]._operation,
         _output=batches[0]._output,
         _exact=joined([part._exact for part in batches]),
-        _bases=np.concatenate([part._bases for part in batches]),
         _is_rounded_again=np.concatenate([part._is_rounded_again for part in batches]),
         _apart=apart,
     )

@@ -21,12 +21,11 @@ from engine.direct import entry_of
 from engine.errors import InvalidInputError, NotRepresentableError
 from engine.parallel import Budget
 from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
-from engine.polygon_overlay.compiled.loading import RingArrays
-from engine.polygon_overlay.compiled.snapping import find_passages
+from engine.polygon_overlay.compiled.snapping import find_passages, stay_apart
 from engine.polygon_overlay.compiled.workspace import keep, scratch_for
-from engine.polygon_overlay.found import Found, one_pair, ring_numbers, summed
-from engine.polygon_overlay.implicit_rings import NOTHING, ImplicitRings, edges_along
-from engine.polygon_overlay.result import Collapse, Overlay
+from engine.polygon_overlay.found import Found, next_in_ring, one_pair, ring_numbers, summed
+from engine.polygon_overlay.implicit_rings import ImplicitRings, edges_along, rings_alone
+from engine.polygon_overlay.result import Overlay
 from engine.solids.checks import shown
 
 _MOST: Final = 2.0**51
@@ -157,20 +156,15 @@ def _bent(
 ) -> tuple[FloatArray, IntArray, IntArray]:
     """Return rings led through the pixels that they pass, none twice in succession, and of each vertex its edge."""
     edges, others = passages.T
-    after = np.arange(1, len(vertices) + 1)
-    after[offsets[1:] - 1] = offsets[:-1]
-    ways = np.sign(vertices[after[edges]] - vertices[edges])
+    ways = np.sign(vertices[next_in_ring(offsets)[edges]] - vertices[edges])
     along = (ways * pixels[others]).sum(axis=1)  # order: an edge that rises passes no pixel further left or below
     in_order = np.lexsort((along, edges))
-    numbers = np.concatenate([np.arange(len(vertices)), edges[in_order]])
-    placed = np.argsort(numbers, kind="stable")  # a vertex before what its edge passes
-    chain = np.concatenate([pixels, pixels[others[in_order]]])[placed]
-    edge = numbers[placed]
+    edges, others = edges[in_order], others[in_order]
+    chain = np.insert(pixels, edges + 1, pixels[others], axis=0)  # a vertex before what its edge passes
+    edge = np.insert(np.arange(len(vertices)), edges + 1, edges)
     ring = ring_numbers(offsets)[edge]
     stops = summed(np.bincount(ring, minlength=len(offsets) - 1))
-    following = np.arange(1, len(chain) + 1)
-    following[stops[1:] - 1] = stops[:-1]
-    kept = (chain != chain[following]).any(axis=1)  # of equal ones the last, whose edge goes on
+    kept = (chain != chain[next_in_ring(stops)]).any(axis=1)  # of equal ones the last, whose edge goes on
     kept[stops[1:] - 1] |= np.bincount(ring[kept], minlength=len(offsets) - 1) == 0  # rings that shrink to a point
     return chain[kept], edge[kept], summed(np.bincount(ring[kept], minlength=len(offsets) - 1))
 
@@ -179,38 +173,49 @@ def _own_sources(n: int) -> Any:
     return np.repeat(np.arange(n, dtype=np.int32), 2).reshape(-1, 2)
 
 
-def from_units(result: Overlay, grid: Grid, starts: IntArray, is_valid: Any) -> Overlay:
+def _stay_apart(result: Overlay, budget: Budget) -> bool:
+    """Tell whether the doubles nearest to multiples of the grid surely leave rings valid: none is off by more than half
+    a unit in the last place of its own, which is a thirtieth of what `stay_apart` has room for."""
+    vertices, offsets = result.vertices, result.ring_offsets
+    _, points = np.unique(np.ascontiguousarray(vertices).view(np.complex128).ravel(), return_inverse=True)
+    scratch = scratch_for(len(vertices), len(offsets) - 1, max(256, len(offsets)), 0, 0)
+    are_apart = entry_of(stay_apart)(
+        read_only(vertices), read_only(points.astype(np.int32)), read_only(offsets), budget.flag, scratch.buffers
+    )
+    budget.check()
+    keep(scratch, len(vertices), len(offsets), 0)
+    return bool(are_apart)
+
+
+def from_units(result: Overlay, grid: Grid, starts: IntArray, again: Any, budget: Budget) -> Overlay:
     """Return an overlay in units of the grid as one in the units of its input; its exact rings are its own then.
 
-    starts: as `Overlay._starts`. is_valid: tells of vertices whether rings are valid with them.
+    starts: as `Overlay._starts`. again: arranges rings.
     """
     vertices = grid.places_of(result.vertices)
-    is_near = not len(vertices) or np.abs(result.vertices).max() <= _SURELY_VALID
-    if grid.base == 10 and not is_near and not is_valid(vertices):
-        raise NotRepresentableError(
-            f"multiples of {float(grid.size)!r} are not told apart well enough by float64 here; take a power of two"
-        )
+    is_valid = grid.base == 2 or not len(vertices) or np.abs(result.vertices).max() <= _SURELY_VALID
+    if not is_valid and not _stay_apart(result, budget):
+        rings = one_pair(vertices, result.ring_offsets, result.piece_offsets, 0.0, 0, status=MAY_CROSS)
+        is_valid = np.array_equal(again(rings, budget).vertices, vertices)
+        if not is_valid:
+            raise NotRepresentableError(
+                f"multiples of {float(grid.size)!r} are not told apart well enough by float64 here; take a power of two"
+            )
     size = grid.size
     moved = float(size) * result.largest_displacement
     if grid.base == 10 and len(vertices):  # units are rounded, and what they stand for
         moved += 2.0 * float(np.spacing(np.abs(vertices).max()))
-    lost = [
-        Collapse(part.kind, part.area * size**2, (part.near[0] * float(size), part.near[1] * float(size)))
-        for part in result.collapsed
-    ]
     edges = result._edges
     if edges is None:
         assert isinstance(result.exact, ImplicitRings)
         edges = edges_along(result.exact.sources)
-    own = RingArrays(read_only(vertices), result.ring_offsets)
-    sources = np.full((len(vertices), 2), -1, np.int32)
-    sources[:, 0] = np.arange(len(vertices))
+    exact = rings_alone(vertices, result.ring_offsets)
     return replace(
         result,
-        vertices=own.vertices,
-        exact=ImplicitRings(own, NOTHING, read_only(sources), own.offsets),
+        vertices=exact.subject.vertices,
+        exact=exact,
         largest_displacement=float(np.nextafter(moved, np.inf)) if moved else 0.0,
-        collapsed=tuple(lost),
+        _lost=result._lost and result._lost._replace(unit=size),
         _edges=edges,
         _starts=starts,
     )

@@ -6,6 +6,7 @@ fractions made then, from the polygons given.
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Sequence
 from typing import Final, NamedTuple
@@ -32,6 +33,22 @@ def edges_along(sources: npt.NDArray[np.signedinteger]) -> IntArray:
     return np.where(sources[:, 1] < LEFT_OUT, LEFT_OUT - 1 - sources[:, 1], sources[:, 0]).astype(np.int64)
 
 
+@functools.lru_cache(64)
+def one_polygon(n_rings: int) -> IntArray:
+    """Return the ring offsets of one polygon."""
+    return read_only(np.array([0, n_rings]))
+
+
+def areas_of(
+    subjects: RingArrays, subject_items: IntArray, clips: RingArrays, clip_items: IntArray,
+    sources: npt.NDArray[np.signedinteger], offsets: IntArray, groups: IntArray,
+) -> tuple[FloatArray, int]:  # fmt: skip
+    """Return what `sum_areas` fills, and how many it is not sure of."""
+    areas = np.empty(len(groups) - 1)
+    sum_them = entry_of(sum_areas)
+    return areas, sum_them(subjects, subject_items, clips, clip_items, sources, offsets, groups, _NEVER, areas)
+
+
 class ImplicitRings(NamedTuple):
     """Exact rings over two polygons, made when asked for.
 
@@ -54,9 +71,8 @@ class ImplicitRings(NamedTuple):
 
         And how many are NaN.
         """
-        areas = np.empty(len(groups) - 1)
-        sum_them = entry_of(sum_areas)
-        return areas, sum_them(self.subject, self.clip, self.sources, self.offsets, groups, _NEVER, areas)
+        items = one_polygon(len(self.subject.offsets) - 1), one_polygon(len(self.clip.offsets) - 1)
+        return areas_of(self.subject, items[0], self.clip, items[1], self.sources, self.offsets, groups)
 
     def nearest_areas(self, groups: IntArray) -> FloatArray:
         """Return those areas, the exact sums where a bound is not enough.
@@ -102,6 +118,14 @@ class ImplicitRings(NamedTuple):
                 made.append(crossing(*lines))
         stops = self.offsets.tolist()
         return ExactRings(tuple(tuple(made[a:b]) for a, b in itertools.pairwise(stops)), nodes.exponent)
+
+
+def rings_alone(vertices: FloatArray, offsets: IntArray) -> ImplicitRings:
+    """Return rings of doubles as rings over themselves."""
+    sources = np.full((len(vertices), 2), -1, np.int32)
+    sources[:, 0] = np.arange(len(vertices))
+    own = RingArrays(read_only(vertices), read_only(offsets))
+    return ImplicitRings(own, NOTHING, read_only(sources), own.offsets)
 
 
 def _ends_of_edges(vertices: FloatArray, offsets: IntArray, firsts: IntArray) -> IntArray:

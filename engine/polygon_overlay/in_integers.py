@@ -22,7 +22,7 @@ from engine.errors import TooComplexError
 from engine.parallel import Budget
 from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
 from engine.polygon_overlay.compiled.loading import RingArrays
-from engine.polygon_overlay.compiled.ring_nesting import NEGATIVE, NON_ZERO, POSITIVE, Nesting
+from engine.polygon_overlay.compiled.ring_nesting import FIRST_ALONE, NEGATIVE, NON_ZERO, PAIR, POSITIVE, Nesting
 from engine.polygon_overlay.found import Found, one_pair, ring_sizes
 from engine.polygon_overlay.nearest import leave_nearest
 from engine.polygon_overlay.result import Output, Overlay
@@ -48,17 +48,19 @@ def overlay_exactly(
     arrangement = arrange_rings(vertices, offsets, None, budget)
     subdivision = subdivide(arrangement, budget)
     sources = nesting.shells
-    if not len(sources):  # two polygons
+    if nesting.rule == PAIR:
         sources = np.repeat([0, 1], [len(subject.offsets) - 1, len(clip.offsets) - 1])
-    if nesting.rule >= NON_ZERO:
+    if nesting.rule in (NON_ZERO, POSITIVE, NEGATIVE):
         labels = label_faces(subdivision, _windings(arrangement, vertices, offsets), winds=True)
         inside = [{NON_ZERO: label != 0, POSITIVE: label > 0, NEGATIVE: label < 0}[nesting.rule] for label in labels]
     else:
         source_of = np.repeat(sources, np.diff(offsets)).tolist()
         masks = [_odd(source_of[k] for k in edges) for edges in arrangement.cover]
         labels = [label or frozenset() for label in label_faces(subdivision, masks)]  # 0 where there is no edge
-        kept = KEPT[operation] if nesting is UNNAMED else None
-        inside = [bool(label) if kept is None else kept[sum(1 << source for source in label)] for label in labels]
+        if nesting.rule == PAIR:
+            inside = [KEPT[operation][sum(1 << source for source in label)] for label in labels]
+        else:
+            inside = [label == {0} if nesting.rule == FIRST_ALONE else bool(label) for label in labels]
     budget.check()
     pieces = trace_pieces(subdivision, inside, [frozenset()] * subdivision.n_faces, budget)
     nodes = arrangement.nodes

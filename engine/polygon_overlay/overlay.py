@@ -18,13 +18,10 @@ from typing import Final, Literal, Unpack, overload
 
 import numpy as np
 
-from engine.arrays import FloatArray
 from engine.errors import InvalidOperationError, UnsupportedSolidError
 from engine.parallel import Budget, Cancel, Options, Progress, check_options
-from engine.polygon_overlay.compiled.kernel import MAY_CROSS
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.compiled.ring_nesting import Nesting
-from engine.polygon_overlay.found import one_pair
 from engine.polygon_overlay.grid import from_units, grid_of
 from engine.polygon_overlay.in_integers import overlay_exactly
 from engine.polygon_overlay.result import Output, Overlay
@@ -165,14 +162,11 @@ def overlay_rings(
     else:
         result, n_exact = overlay_exactly(first, second, operation, output, budget, nesting, units is not None)
         n_rational = n_exact
-    if units is None:
-        return result, n_exact, n_rational
-
-    def is_valid(vertices: FloatArray) -> bool:
-        rings = one_pair(vertices, result.ring_offsets, result.piece_offsets, 0.0, 0, status=MAY_CROSS)
-        return np.array_equal(arranged_again(rings, budget).vertices, vertices)
-
-    return from_units(result, units, np.array([len(subject.vertices)]), is_valid), n_exact, n_rational
+    if units is not None:
+        result = from_units(result, units, np.array([len(subject.vertices)]), arranged_again, budget)
+    if result._lost is not None and budget.deadline is not None:  # who set one waits no longer for what was lost
+        vars(result)["collapsed"] = result._lost.parts(budget)
+    return result, n_exact, n_rational
 
 
 def ulps_moved(result: Overlay) -> float:

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from itertools import pairwise
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from engine.arrangement.exact_area import ExactRings
+from engine.arrangement.nodes import nearest_quotient
 from engine.arrays import FloatArray, IntArray
+from engine.parallel import Budget
 from engine.polygon_overlay.implicit_rings import ImplicitRings, edges_along
 from engine.solids.ragged import as_geojson
 
@@ -42,6 +46,59 @@ class Collapse:
     near: tuple[float, float]
 
 
+Exact = ExactRings | ImplicitRings
+_Place = tuple[Fraction, Fraction]
+
+
+class Lost(NamedTuple):
+    """Parts of an exact result that rounding lost: shells of pieces, and holes, by their numbers among all rings.
+
+    piece_offsets: of the exact result. unit: what coordinates are multiples of.
+    """
+
+    exact: Exact
+    piece_offsets: IntArray
+    pieces: list[int]
+    holes: list[int]
+    unit: Fraction = Fraction(1)
+
+    def parts(self, budget: Budget) -> tuple[Collapse, ...]:
+        """Return the pieces, then the holes, each in lexicographic order; raises as `Budget.check`."""
+        if not self.pieces and not self.holes:
+            return ()
+        ends = dict(pairwise(self.piece_offsets.tolist()))
+        shell_of = np.repeat(self.piece_offsets[:-1], np.diff(self.piece_offsets)).tolist()
+        around = {shell_of[ring] for ring in self.holes}
+        if len(around) == 1:  # order: of one shell, which may be large, holes need no more than their own vertices
+            around.clear()
+        rings = {ring for shell in self.pieces for ring in range(shell, ends[shell])}
+        numbers = sorted(rings.union(self.holes, around))
+        some = self.exact.some(numbers)
+        made = {ring: ExactRings((points,), some.exponent) for ring, points in zip(numbers, some.rings, strict=True)}
+
+        def entry(kind: Literal["piece", "hole"], rings: Sequence[int]) -> tuple[list[_Place], Collapse]:
+            budget.check()
+            whole = [made[ring] for ring in rings]
+            place, (x, y) = _first_vertex(whole[0])
+            area = abs(ExactRings(tuple(ring for each in whole for ring in each.rings), whole[0].exponent).area())
+            return place, Collapse(kind, area * self.unit**2, (x * float(self.unit), y * float(self.unit)))
+
+        of_shell = {ring: _first_vertex(made[ring])[0] for ring in around}
+        pieces = [entry("piece", range(shell, ends[shell])) for shell in self.pieces]
+        holes = [(of_shell.get(shell_of[ring], []), *entry("hole", [ring])) for ring in self.holes]
+        pieces.sort(key=lambda each: each[0])
+        holes.sort(key=lambda each: each[:2])
+        return (*(each[-1] for each in pieces), *(each[-1] for each in holes))
+
+
+def _first_vertex(ring: ExactRings) -> tuple[list[_Place], tuple[float, float]]:
+    """Return a ring from its first vertex on, and the doubles nearest to that vertex."""
+    (places,) = ring.places()
+    k = places.index(min(places))
+    x, y = (nearest_quotient(*value.as_integer_ratio()) for value in places[k])
+    return places[k:] + places[:k], (x, y)
+
+
 @dataclass(frozen=True)
 class Overlay:
     """The result of a Boolean operation on two polygons.
@@ -53,7 +110,6 @@ class Overlay:
         lexicographic order.
     output: "valid" or "nearest", as asked for; may_be_invalid: "nearest" was asked for and rounding moved a vertex.
     n_pieces_exact, n_holes_exact: how many the exact result has, before rounding.
-    collapsed: parts of the exact result that are lost to rounding, with exact areas.
     pieces_joined, holes_joined: by how many the count fell because parts closer than rounding grew together.
     pieces_parted, holes_parted: by how many it rose because parts fell apart, or rounding enclosed a new hole.
         Always: n_pieces = n_pieces_exact - collapsed pieces - pieces_joined + pieces_parted; likewise for holes.
@@ -62,6 +118,7 @@ class Overlay:
     largest_displacement: proven bound on the distance between an edge of the exact result and its image.
     snapped: the coarser lattice of snap rounding was needed.
     exact: the rings of the exact result, from which `area_exact` and `area` are computed when asked for.
+    _lost: of what `collapsed` is made when asked for; None where rounding lost nothing.
     _edges: by vertex the input edge along which its ring goes on, by its first vertex; None: that of ``exact``.
     _starts: the first vertex of each input but the first, all inputs one after another; None: that of the clip.
     """
@@ -73,12 +130,12 @@ class Overlay:
     may_be_invalid: bool
     n_pieces_exact: int
     n_holes_exact: int
-    exact: ExactRings | ImplicitRings
+    exact: Exact
+    _lost: Lost | None = field(default=None, repr=False)
     _edges: IntArray | None = field(default=None, repr=False)
     _starts: IntArray | None = field(default=None, repr=False)
     largest_displacement: float = 0.0
     rounds: int = 0
-    collapsed: tuple[Collapse, ...] = ()
     pieces_joined: int = 0
     pieces_parted: int = 0
     holes_joined: int = 0
@@ -95,6 +152,11 @@ class Overlay:
     def n_holes(self) -> int:
         """Number of holes in the output."""
         return len(self.ring_offsets) - len(self.piece_offsets)
+
+    @functools.cached_property
+    def collapsed(self) -> tuple[Collapse, ...]:
+        """Parts of the exact result that are lost to rounding, with exact areas."""
+        return () if self._lost is None else self._lost.parts(Budget())
 
     @property
     def rings(self) -> list[FloatArray]:

@@ -15,32 +15,27 @@ round is the kernel's (run.py), or that of integers (in_integers.py).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from fractions import Fraction
-from itertools import pairwise
+from collections.abc import Callable
 from math import frexp, hypot, inf, nextafter, ulp
-from typing import Any, Final, Literal
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.arrangement.exact_area import ExactRings
-from engine.arrangement.nodes import nearest_quotient
 from engine.arrangement.snap_rounding import snap_rings
 from engine.arrangement.union_find import UnionFind
 from engine.arrays import BoolArray, FloatArray, IntArray, read_only
 from engine.parallel import Budget
 from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
-from engine.polygon_overlay.found import Found, one_pair, places_of
+from engine.polygon_overlay.found import Found, joined, one_pair, places_of, taken
 from engine.polygon_overlay.grid import snapped_to_units
-from engine.polygon_overlay.implicit_rings import ImplicitRings, edges_along
-from engine.polygon_overlay.result import Collapse, Output, Overlay
+from engine.polygon_overlay.implicit_rings import edges_along
+from engine.polygon_overlay.result import Exact, Lost, Output, Overlay
 from engine.types import OPEN
 
 MAX_ROUNDS: Final = 12
 """Rounds before snapping: on 4,296 results of public test pairs all but 14 had ended by then."""
 
 
-Exact = ExactRings | ImplicitRings
 Again = Callable[[Found, Budget], Found]
 
 
@@ -84,10 +79,6 @@ def settle_rings(
             if rings.status[0] != DONE:
                 return None
             origins, edges = _composed(rings.evidence, origins), edges[edges_along(rings.sources)]
-    is_shell, was_shell = _shells(rings), _shells(first)
-    of_shells = is_shell[origins[:, 0]]
-    lost_pieces, pieces_joined, pieces_parted = count_changes(was_shell, origins[of_shells], int(is_shell.sum()))
-    lost_holes, holes_joined, holes_parted = count_changes(~was_shell, origins[~of_shells], int((~is_shell).sum()))
     return overlay_of(
         rings,
         first,
@@ -97,13 +88,24 @@ def settle_rings(
         rounds=rounds,
         largest_displacement=displacement,
         snapped=snapped,
-        vertices_moved=n_moved(first.vertices, rings.vertices) if has_crossings else 0,
-        collapsed=collapses(first, exact, lost_pieces, lost_holes, budget),
-        pieces_joined=pieces_joined,
-        pieces_parted=pieces_parted,
-        holes_joined=holes_joined,
-        holes_parted=holes_parted,
+        vertices_moved=n_moved(first.vertices, rings.vertices, is_on_grid) if has_crossings else 0,
+        **({} if origins is own else _changes(first, rings, origins, exact)),
     )
+
+
+def _changes(first: Found, rings: Found, origins: IntArray, exact: Exact) -> dict[str, Any]:
+    """Return what became of the parts of a pair, as fields of `Overlay`."""
+    is_shell, was_shell = _shells(rings), _shells(first)
+    of_shells = is_shell[origins[:, 0]]
+    pieces, pieces_joined, pieces_parted = count_changes(was_shell, origins[of_shells], int(is_shell.sum()))
+    holes, holes_joined, holes_parted = count_changes(~was_shell, origins[~of_shells], int((~is_shell).sum()))
+    return {
+        "_lost": Lost(exact, first.piece_offsets, pieces, holes),
+        "pieces_joined": pieces_joined,
+        "pieces_parted": pieces_parted,
+        "holes_joined": holes_joined,
+        "holes_parted": holes_parted,
+    }
 
 
 def _shells(found: Found) -> BoolArray:
@@ -148,52 +150,12 @@ def _snapped(first: Found, exact: Exact, budget: Budget) -> tuple[Found, float]:
     return rings, nextafter(hypot(spacing, spacing) / 2, inf)
 
 
-def n_moved(images: FloatArray, vertices: FloatArray) -> int:
-    """Return how many vertices are none of ``images``."""
+def n_moved(images: FloatArray, vertices: FloatArray, are_whole: bool = False) -> int:
+    """Return how many vertices, all of them whole numbers or not, are none of ``images``."""
+    if are_whole:  # order: few images are, and a search among all takes longer than an overlay
+        images = images[(images == np.rint(images)).all(axis=1)]
     known, places = (np.ascontiguousarray(each).view(np.complex128).ravel() for each in (images, vertices))
     return int((~np.isin(places, known)).sum())
-
-
-def collapses(
-    first: Found, exact: Exact, lost_pieces: Sequence[int], lost_holes: Sequence[int], budget: Budget
-) -> tuple[Collapse, ...]:
-    """Return lost pieces, given by their shells, then lost holes, each by its exact ring from the first vertex on."""
-    if not lost_pieces and not lost_holes:
-        return ()
-    ends = dict(pairwise(first.piece_offsets.tolist()))
-    shell_of = np.repeat(first.piece_offsets[:-1], np.diff(first.piece_offsets)).tolist()
-    around = {shell_of[ring] for ring in lost_holes}
-    if len(around) == 1:  # order: of one shell, which may be large, holes need no more than their own vertices
-        around.clear()
-    rings = {ring for shell in lost_pieces for ring in range(shell, ends[shell])}
-    numbers = sorted(rings.union(lost_holes, around))
-    some = exact.some(numbers)
-    made = {ring: ExactRings((points,), some.exponent) for ring, points in zip(numbers, some.rings, strict=True)}
-
-    def entry(kind: Literal["piece", "hole"], rings: Sequence[int]) -> tuple[list[_Place], Collapse]:
-        budget.check()
-        whole = [made[ring] for ring in rings]
-        place, near = _first_vertex(whole[0])
-        area = abs(ExactRings(tuple(ring for each in whole for ring in each.rings), whole[0].exponent).area())
-        return place, Collapse(kind, area, near)
-
-    of_shell = {ring: _first_vertex(made[ring])[0] for ring in around}
-    pieces = [entry("piece", range(shell, ends[shell])) for shell in lost_pieces]
-    lost = [(of_shell.get(shell_of[ring], []), *entry("hole", [ring])) for ring in lost_holes]
-    pieces.sort(key=lambda each: each[0])
-    lost.sort(key=lambda each: each[:2])
-    return (*(each[-1] for each in pieces), *(each[-1] for each in lost))
-
-
-_Place = tuple[Fraction, Fraction]
-
-
-def _first_vertex(ring: ExactRings) -> tuple[list[_Place], tuple[float, float]]:
-    """Return a ring from its first vertex on, and the doubles nearest to that vertex."""
-    (places,) = ring.places()
-    k = places.index(min(places))
-    x, y = (nearest_quotient(*value.as_integer_ratio()) for value in places[k])
-    return places[k:] + places[:k], (x, y)
 
 
 def count_changes(is_exact: BoolArray, origins: IntArray, n_found: int) -> tuple[list[int], int, int]:
@@ -216,3 +178,65 @@ def count_changes(is_exact: BoolArray, origins: IntArray, n_found: int) -> tuple
             n_groups -= linked.find(part) != linked.find(other)
             linked.unite(part, other)
     return np.flatnonzero(is_lost).tolist(), len(survivors) - n_groups, n_found - n_groups
+
+
+_NONE: Final = np.zeros(0, np.int64)
+
+
+class SettledPairs(NamedTuple):
+    """pairs: (n,) int64, their numbers; found: their rings, one pair after another; ulps: by how many units in the last
+    place of the largest coordinate a vertex of one of them may be off."""
+
+    pairs: IntArray
+    found: Found
+    ulps: float
+
+
+def settle_pairs(first: Found, again: Again, budget: Budget) -> SettledPairs:
+    """Arrange the pairs of ``first`` that are MAY_CROSS until they are valid, all in one call of ``again`` a round.
+
+    A pair leaves when it is valid, with no more than its rings: what became of the parts of the exact result is found
+    for a single pair, when asked for. Left out are those that the kernel leaves open, or that are not valid after the
+    last round. Raises as `Budget.check` when the call must end.
+    """
+    pairs = np.flatnonzero(first.status == MAY_CROSS)
+    rings = taken(first, pairs)
+    displacement = rings.displacement
+    has_crossings = np.zeros(len(pairs), np.bool_)
+    settled = [SettledPairs(_NONE, taken(first, _NONE), 0.5)]
+    rounds = 1  # invariant: those of all pairs that are left, since each moved in every round
+    while len(pairs):  # bound: MAX_ROUNDS, in whose last no pair goes on that moved
+        rings = again(rings, budget)
+        moved = rings.displacement
+        displacement = np.where(moved > 0.0, np.nextafter(displacement + moved, np.inf), displacement)
+        crossings = np.repeat(np.arange(len(pairs)), rings.counts[:, 2])[rings.sources[:, 1] >= 0]
+        has_crossings[crossings] = True
+        goes_on = (rings.status != OPEN) & ((moved == 0.0) | (rounds < MAX_ROUNDS))
+        done = np.flatnonzero(goes_on & (rings.status == DONE))
+        valid = taken(rings, done)._replace(displacement=displacement[done])
+        valid.counts[:, 3] = first.counts[pairs[done], 3]
+        ulps = _ulps_moved(first, pairs[done], valid, np.flatnonzero(has_crossings[done]))
+        settled.append(SettledPairs(pairs[done], valid, ulps))
+        left = np.flatnonzero(goes_on & (rings.status == MAY_CROSS))
+        pairs, rings, displacement, has_crossings = (
+            pairs[left],
+            taken(rings, left),
+            displacement[left],
+            has_crossings[left],
+        )
+        rounds += 1
+    return SettledPairs(
+        np.concatenate([each.pairs for each in settled]),
+        joined([each.found for each in settled]),
+        max(each.ulps for each in settled),
+    )
+
+
+def _ulps_moved(first: Found, pairs: IntArray, valid: Found, doubtful: IntArray) -> float:
+    """Return `SettledPairs.ulps` of ``valid``, the ``pairs`` of ``first``, some of which may have other vertices."""
+    ulps = 0.5
+    for k in range(len(doubtful)):
+        before, now = taken(first, pairs[doubtful[k : k + 1]]), taken(valid, doubtful[k : k + 1])
+        if n_moved(before.vertices, now.vertices):
+            ulps = max(ulps, float(now.displacement[0] / np.spacing(np.abs(now.vertices).max())))
+    return ulps

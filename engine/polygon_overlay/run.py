@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Final, Literal, NamedTuple, cast
+from typing import Any, Final, Literal
 
 import numpy as np
 
@@ -16,8 +15,9 @@ from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.compiled.ring_nesting import AGAIN, Nesting
 from engine.polygon_overlay.compiled.workspace import Outcomes, keep, more_contacts, scratch_for
 from engine.polygon_overlay.found import Found, one_pair, put_together, ring_sizes, summed
-from engine.polygon_overlay.implicit_rings import ImplicitRings
+from engine.polygon_overlay.implicit_rings import NOTHING, ImplicitRings
 from engine.polygon_overlay.nearest import leave_nearest
+from engine.polygon_overlay.polygon_arrays import PolygonArrays
 from engine.polygon_overlay.result import Output, Overlay
 from engine.polygon_overlay.rounds import settle_rings
 from engine.polygon_overlay.run_pair import BY_CONTACT, NOT_REDUCED, UNNAMED, run_pair
@@ -34,51 +34,16 @@ KEPT: Final = {  # by the label of a face: in neither, in the subject, in the cl
 }
 KEPT_ARRAYS: Final = {name: np.array(kept, np.uint8) for name, kept in KEPT.items()}
 
-_NO_BYTES: Final = read_only(np.zeros(0))
-
-
-class Polygons(NamedTuple):
-    """Some polygons as flat arrays: vertices (n, 2) float64, rings by vertex offsets, polygons by ring offsets.
-
-    most_vertices, most_rings: of one polygon.
-    """
-
-    vertices: FloatArray
-    ring_offsets: IntArray
-    polygon_offsets: IntArray
-    most_vertices: int
-    most_rings: int
-
-
-def gathered(vertices: Sequence[FloatArray], ring_offsets: Sequence[IntArray]) -> Polygons:
-    """Return polygons, given by the arrays of each, as flat arrays; at least one polygon.
-
-    Joined as bytes: numpy takes three times as long to put small arrays one after another.
-    """
-    n = len(vertices)
-    joined = np.frombuffer(b"".join(cast("Sequence[bytes]", vertices)) or _NO_BYTES).reshape(-1, 2)
-    offsets = np.frombuffer(b"".join(cast("Sequence[bytes]", ring_offsets)), np.int64)
-    if len(offsets) == 2 * n and not offsets[::2].any():  # one ring each
-        sizes = offsets[1::2]
-        return Polygons(joined, summed(sizes), read_only(np.arange(n + 1)), int(sizes.max()), 1)
-    starts = np.flatnonzero(offsets == 0)  # of each polygon's: no ring is empty
-    ends = np.append(starts[1:], len(offsets)) - 1
-    sizes, n_rings = offsets[ends], ends - starts
-    first_vertices = np.cumsum(sizes) - sizes
-    ring_starts = np.delete(offsets + np.repeat(first_vertices, n_rings + 1), ends)
-    rings = read_only(np.append(ring_starts, len(joined)))
-    return Polygons(joined, rings, summed(n_rings), int(sizes.max()), int(n_rings.max()))
-
 
 def run_kernel(
-    subjects: Polygons, clips: Polygons, operation: Operation, budget: Budget, nesting: Nesting = UNNAMED
+    subjects: PolygonArrays, clips: PolygonArrays, operation: Operation, budget: Budget, nesting: Nesting = UNNAMED
 ) -> Found:
     """Overlay polygons pair by pair. Raises as `Budget.check` when the call must end.
 
     nesting: of the rings of subjects, to be arranged each as a source of its own, as `overlay_pairs` takes it.
     """
     n = len(subjects.polygon_offsets) - 1
-    n_vertices, n_rings = subjects.most_vertices + clips.most_vertices, subjects.most_rings + clips.most_rings
+    n_vertices, n_rings = map(sum, zip(subjects.most(), clips.most(), strict=True))
     first, second = RingArrays(*subjects[:2]), RingArrays(*clips[:2])
     outcomes = Outcomes(np.empty(n, np.int8), np.empty((n, 4), np.int64), np.empty(n))
     reached = 0
@@ -168,11 +133,10 @@ def arranged_again(rings: Found, budget: Budget) -> Found:
     n_rings = rings.counts[:, 1]
     items = summed(n_rings)
     shells = np.repeat(rings.piece_offsets[:-1], np.diff(rings.piece_offsets))
-    largest = (int(rings.counts[:, k].max(initial=0)) for k in (2, 1))
-    subjects = Polygons(read_only(rings.vertices), read_only(rings.ring_offsets), items, *largest)
-    none = read_only(np.zeros((0, 2))), read_only(np.zeros(1, np.int64)), read_only(np.zeros_like(items))
+    subjects = PolygonArrays(read_only(rings.vertices), read_only(rings.ring_offsets), items)
+    none = PolygonArrays(*NOTHING, read_only(np.zeros_like(items)))
     nesting = Nesting(shells - np.repeat(items[:-1], n_rings), ring_sizes(rings)[shells], AGAIN)
-    return run_kernel(subjects, Polygons(*none, 0, 0), "union", budget, nesting)
+    return run_kernel(subjects, none, "union", budget, nesting)
 
 
 def as_overlay(

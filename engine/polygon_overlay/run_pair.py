@@ -17,8 +17,9 @@ from engine.parallel import Budget
 from engine.polygon_overlay.compiled.kernel import DONE, FINISHED, NEEDS_CONTACTS, overlay_pairs
 from engine.polygon_overlay.compiled.loading import Loaded, RingArrays
 from engine.polygon_overlay.compiled.reducing import expand_rings, reduce_pair
-from engine.polygon_overlay.compiled.ring_nesting import ANY, Nesting
+from engine.polygon_overlay.compiled.ring_nesting import PAIR, Nesting
 from engine.polygon_overlay.compiled.workspace import Output, keep, more_contacts, scratch_for
+from engine.polygon_overlay.implicit_rings import one_polygon
 
 NOT_REDUCED: Final = Loaded(0, 0, 0, 0.0)
 """What stands in the place of the result of reduce_pair."""
@@ -37,7 +38,8 @@ _BY_VERTEX: Final = 200
 _FEW_CONTACTS: Final = 1024
 _FEW_PIECES: Final = 64
 """Pieces without holes up to which offsets are kept, since many results have the same."""
-UNNAMED: Final = Nesting(np.zeros(0, np.int64), np.zeros(0), ANY)
+UNNAMED: Final = Nesting(np.zeros(0, np.int64), np.zeros(0), PAIR)
+"""That of two polygons."""
 _INT32: Final = np.dtype(np.int32)
 _INT64: Final = np.dtype(np.int64)
 """Types that numpy need not look up."""
@@ -67,9 +69,8 @@ def run_pair(
 ) -> FoundPair:
     """Overlay two polygons, or the rings of one by a rule. Raises as `Budget.check` when the call must end."""
     n_vertices = len(subject.vertices) + len(clip.vertices)
-    is_named = nesting is not UNNAMED
     if (
-        not is_named
+        nesting.rule == PAIR
         and n_vertices >= _MANY
         and n_vertices >= _MANY_IN_RING * (len(subject.offsets) + len(clip.offsets) - 2)
     ):
@@ -96,7 +97,7 @@ def run_blocks(
     when the call must end.
     """
     n_vertices, n_rings = len(subject.vertices) + len(clip.vertices), len(subject.offsets) + len(clip.offsets) - 2
-    subject_item, clip_item = _one_polygon(len(subject.offsets) - 1), _one_polygon(len(clip.offsets) - 1)
+    subject_item, clip_item = one_polygon(len(subject.offsets) - 1), one_polygon(len(clip.offsets) - 1)
     if size:
         reduced, n_contacts, n_out, n_out_rings = NOT_REDUCED, _FEW_CONTACTS, 0, 0
     else:
@@ -172,11 +173,3 @@ def _copied(array: npt.NDArray[Any], n: int) -> npt.NDArray[Any]:
 def _counted(n: int) -> IntArray:
     """Return 0 .. n, the ring offsets of so many pieces without holes; its memory cannot be written to."""
     return np.frombuffer(np.arange(n + 1).tobytes(), np.int64)
-
-
-@functools.lru_cache(64)
-def _one_polygon(n_rings: int) -> IntArray:
-    """Return the ring offsets of one polygon."""
-    offsets = np.array([0, n_rings])
-    offsets.setflags(write=False)
-    return offsets

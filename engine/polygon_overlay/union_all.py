@@ -16,11 +16,11 @@ from engine.arrays import IntArray
 from engine.errors import InvalidArrayError, InvalidOperationError
 from engine.parallel import Budget, Cancel, Options, Progress, check_options
 from engine.polygon_overlay.compiled.loading import RingArrays
-from engine.polygon_overlay.compiled.ring_nesting import ANY, NEGATIVE, NON_ZERO, POSITIVE, Nesting
+from engine.polygon_overlay.compiled.ring_nesting import ANY, FIRST_ALONE, NEGATIVE, NON_ZERO, POSITIVE, Nesting
 from engine.polygon_overlay.implicit_rings import NOTHING
 from engine.polygon_overlay.overlay import accuracy_of, check_words, overlay_rings, rings_of, ulps_moved
+from engine.polygon_overlay.polygon_arrays import gathered
 from engine.polygon_overlay.result import Output, Overlay
-from engine.polygon_overlay.run import gathered
 from engine.solids.base import Solid
 from engine.solids.checks import shown
 from engine.solids.polygon import Polygon
@@ -78,16 +78,16 @@ def union_all(
     check_options(workers, progress, report=report)
     if not isinstance(polygons, (list, tuple)):
         raise InvalidArrayError(f"polygons must be a list of polygons, got {type(polygons).__name__}", ("polygons",))
-    rings, sources, starts = _together(polygons)
     with Budget(deadline, cancel) as budget:
-        nesting = Nesting(sources, np.zeros(0), ANY)
-        result, n_exact, n_rational = overlay_rings(rings, NOTHING, "union", output, budget, nesting, grid)
-    object.__setattr__(result, "_starts", starts)
+        result, accuracy = _arranged(polygons, ANY, output, budget, grid)
     if progress is not None:
         progress(1)
-    if not report:
-        return result
-    return result, accuracy_of(ulps_moved(result), len(rings.vertices), n_exact, n_rational)
+    return (result, accuracy) if report else result
+
+
+def less_all(subject: Polygon, clips: Sequence[Polygon], budget: Budget) -> tuple[Overlay, Accuracy]:
+    """Return what is left of a polygon, which has rings, without any of some others, which may overlap each other."""
+    return _arranged([subject, *clips], FIRST_ALONE, "valid", budget)
 
 
 def filled(rings: object, rule: FillRule, *, deadline: float | None = None, cancel: Cancel | None = None) -> Polygon:
@@ -114,6 +114,17 @@ def filled(rings: object, rule: FillRule, *, deadline: float | None = None, canc
     return Polygon(result.rings)
 
 
+def _arranged(
+    polygons: Sequence[Solid], rule: int, output: Output, budget: Budget, grid: float | None = None
+) -> tuple[Overlay, Accuracy]:
+    """Arrange the rings of all polygons, each a source of its own."""
+    rings, sources, starts = _together(polygons)
+    nesting = Nesting(sources, np.zeros(0), rule)
+    result, n_exact, n_rational = overlay_rings(rings, NOTHING, "union", output, budget, nesting, grid)
+    object.__setattr__(result, "_starts", starts)
+    return result, accuracy_of(ulps_moved(result), len(rings.vertices), n_exact, n_rational)
+
+
 def _together(polygons: Sequence[Solid]) -> tuple[RingArrays, IntArray, IntArray]:
     """Return the rings of all polygons, by ring the number of its polygon, and the first vertex of all but the first.
 
@@ -125,7 +136,7 @@ def _together(polygons: Sequence[Solid]) -> tuple[RingArrays, IntArray, IntArray
     each = cast("Sequence[Polygon]", polygons)
     if not each:
         return NOTHING, np.zeros(0, np.int64), np.zeros(0, np.int64)
-    flat = gathered([one.vertices for one in each], [one.ring_offsets for one in each])
+    flat = gathered(each)
     n_rings = np.diff(flat.polygon_offsets)
     sources = np.repeat(np.cumsum(n_rings > 0) - 1, n_rings)
     return RingArrays(*flat[:2]), sources, flat.ring_offsets[flat.polygon_offsets[1:-1]]

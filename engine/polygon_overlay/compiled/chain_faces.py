@@ -1,10 +1,9 @@
-"""Faces of chains and their labels.
+"""Faces of chains.
 
 The face of a half-chain lies to its left. A cycle of half-chains is one part of the boundary of a face; two parts of
 one face are joined by a stab from the last vertex (rightmost, then topmost) of each component of rings: straight up, an
 infinitesimal step to its right, to the next edge above. That vertex belongs to the input, so the stab decides about
-doubles. Labels (bit k: inside source k, even-odd) spread over the same forest that joins the cycles: crossing a chain
-changes them by its mask.
+doubles.
 """
 
 from __future__ import annotations
@@ -14,9 +13,9 @@ from typing import Any, Final, NamedTuple
 from engine.jit import inline, merged
 from engine.polygon_overlay.compiled.chains import Chains, Stars, is_live, place_before, standing
 from engine.polygon_overlay.compiled.crossing_signs import Edges, crossing_against, exact_weight, orient, turn_of_edges
-from engine.polygon_overlay.compiled.edge_contacts import POLL, Events
+from engine.polygon_overlay.compiled.edge_contacts import Events
 from engine.polygon_overlay.compiled.edge_events import Along
-from engine.polygon_overlay.compiled.edge_tree import LEAF, BoxTree, leaves_of, push_children
+from engine.polygon_overlay.compiled.edge_tree import LEAF, POLL, BoxTree, leaves_of, push_children
 from engine.predicates.error_free import two_diff, workspace
 from engine.predicates.expansion import add_scaled, sign
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
@@ -26,14 +25,13 @@ NOTHING: Final = -1
 
 class Faces(NamedTuple):
     """By half-chain: cycle, or -1 where another half-chain stands for it; following: the one that goes on around its
-    face. By cycle, of which entry n_cycles is the unbounded face: joined, a forest of those of one component of faces,
-    with the difference of labels to the next in label; regions, a forest of those of one region of the result; inside:
-    whether it is in the result. bounds: by chain, whether it bounds the result; fan: by node, how many that do."""
+    face. By cycle, of which entry n_cycles is the unbounded face: joined, a forest of those of one face; regions, of
+    those of one region of the result; inside: whether it is in the result. bounds: by chain, whether it bounds the
+    result; fan: by node, how many that do."""
 
     cycle: Any
     following: Any
     joined: Any
-    label: Any
     regions: Any
     inside: Any
     bounds: Any
@@ -66,31 +64,6 @@ def number_cycles(chains: Chains, stars: Stars, faces: Faces, n_chains: int, n_s
                 half = following[half]
             n_cycles += 1
     return n_cycles
-
-
-@merged
-def find_label(parent: Any, label: Any, i: int) -> tuple[int, int]:
-    """Return the root of i in a forest, and the difference of their labels; halves the path."""
-    difference = 0
-    while parent[i] != i:  # bound: the path, which only gets shorter
-        above = parent[i]
-        label[i] ^= label[above]
-        parent[i] = parent[above]
-        difference ^= label[i]
-        i = parent[i]
-    return i, difference
-
-
-@merged
-def join(parent: Any, label: Any, i: int, j: int, difference: int) -> None:
-    """Join the trees of i and j, whose labels differ by ``difference``."""
-    i, from_i = find_label(parent, label, i)
-    j, from_j = find_label(parent, label, j)
-    if i != j:
-        if i < j:
-            i, j = j, i
-        parent[i] = j
-        label[i] = from_i ^ from_j ^ difference
 
 
 @inline

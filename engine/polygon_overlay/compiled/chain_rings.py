@@ -10,11 +10,10 @@ from typing import Any, Final, NamedTuple
 
 from engine.arrangement.union_find import root_of, unite
 from engine.jit import inline, merged
-from engine.polygon_overlay.compiled.chain_faces import Faces, find_label, join
+from engine.polygon_overlay.compiled.chain_faces import Faces
 from engine.polygon_overlay.compiled.chains import Chains, Stars, is_live, leaving_edge, origin, place_before
 from engine.polygon_overlay.compiled.crossing_signs import Edges, orient, turn_of_edges
-from engine.polygon_overlay.compiled.edge_contacts import POLL
-from engine.polygon_overlay.compiled.edge_tree import BENT, DOUBTFUL, RUN
+from engine.polygon_overlay.compiled.edge_tree import BENT, DOUBTFUL, POLL, RUN
 from engine.polygon_overlay.compiled.ring_nesting import Holders, enter_beyond
 
 MEETS: Final = 1
@@ -38,22 +37,6 @@ class Walk(NamedTuple):
     seen: Any
     path: Any
     place: Any
-
-
-@inline
-def spread_labels(chains: Chains, faces: Faces, kept: Any, n_chains: int, n_cycles: int, stop: Any) -> None:
-    """Spread labels and fill ``inside``. kept: (4,) uint8, whether a face of that label is in the result."""
-    cycle = faces.cycle
-    for chain in range(n_chains):
-        if chain & POLL == 0 and stop[0]:
-            return
-        if is_live(chains, chain):
-            join(faces.joined, faces.label, cycle[2 * chain], cycle[2 * chain + 1], chains.mask[chain])
-    _, unbounded = find_label(faces.joined, faces.label, n_cycles)
-    for i in range(n_cycles):
-        if i & POLL == 0 and stop[0]:
-            return
-        faces.inside[i] = kept[find_label(faces.joined, faces.label, i)[1] ^ unbounded]
 
 
 @inline

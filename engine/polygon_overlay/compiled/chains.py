@@ -15,8 +15,9 @@ from typing import Any, Final, NamedTuple
 from engine.arrangement.union_find import root_of
 from engine.jit import called, inline, merged
 from engine.polygon_overlay.compiled.crossing_signs import Edges, turn_of_edges
-from engine.polygon_overlay.compiled.edge_contacts import LEFT, NOT_SIMPLE, POLL, Events, Unions
+from engine.polygon_overlay.compiled.edge_contacts import LEFT, NOT_SIMPLE, Events, Unions
 from engine.polygon_overlay.compiled.edge_events import Along
+from engine.polygon_overlay.compiled.edge_tree import POLL
 from engine.polygon_overlay.compiled.loading import Given
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
 

@@ -13,7 +13,7 @@ whole way to their rounded places: no stretch touches, passes or folds onto anot
 those of any result.
 
 For the stretches of two edges no more is needed than what is said of these two. So where it fails both get the mark
-DOUBTFUL, and ring_certificate.py looks at what is left of edges with that mark in the rounded rings of the result:
+DOUBTFUL, and `certify` looks at what is left of edges with that mark in the rounded rings of the result:
 
 - of two edges that are near each other, or whose contact floating point is not sure of, whatever it is, both;
 - of nodes near each other on an edge, or near an end of it, that edge and all that cross it in one of them;
@@ -24,29 +24,46 @@ DOUBTFUL, and ring_certificate.py looks at what is left of edges with that mark 
 A vertex on an edge is a node whose distance from others is sure: the edges that meet there are in doubt by their
 contact, and its reach is the slack of its parameter.
 
-Distances are computed in floating point. An orientation is off by 3 u in each length that it multiplies, so a distance
-from a line by less than 12 u; with the two vertices that move that makes 14 u. `CLEARANCE` is four times as much.
+Where that leaves doubt, the rounded rings of the result are looked at themselves. Every vertex moves by less than the
+unit u of the largest coordinate, on a straight way. Two edges that have no vertex in common cannot touch on that way if
+they end more than 2 u apart; nor can two edges fold that have one in common, if the far end of each ends more than 2 u
+away from the other. If that holds for every pair with a vertex that moves, and edges in doubt, the rings after rounding
+are the exact ones deformed without a touch: valid, with the same pieces, holes and turns.
+
+Distances are computed in floating point. Differences of rounded coordinates are off by u each, so the distance from a
+line by less than 12 u more: `MARGIN` = 16 holds both. Before rounding an orientation is off by 3 u in each length that
+it multiplies, so a distance from a line by less than 12 u; with the two vertices that move that makes 14 u. `CLEARANCE`
+is four times as much.
 """
 
 from __future__ import annotations
 
 from typing import Any, Final
 
-from engine.jit import inline
+from engine.jit import inline, merged
+from engine.polygon_overlay.compiled.chain_rings import MEETS, Rings
 from engine.polygon_overlay.compiled.crossing_signs import Edges
-from engine.polygon_overlay.compiled.edge_contacts import POLL
 from engine.polygon_overlay.compiled.edge_events import Along
-from engine.polygon_overlay.compiled.edge_tree import DOUBTFUL
-from engine.polygon_overlay.compiled.ring_certificate import segments_are_far
+from engine.polygon_overlay.compiled.edge_tree import (
+    ANYWHERE,
+    DOUBTFUL,
+    FEW,
+    POLL,
+    RUN,
+    BoxTree,
+    begin_pairs,
+    boxes_meet,
+    build_tree,
+    next_pairs,
+)
+from engine.polygon_overlay.compiled.rounded_crossings import Rounded
+from engine.polygon_overlay.compiled.segment_distance import is_far, segments_are_far
+from engine.predicates.orientation import orient2d
+from engine.types import Point2
 
 CLEARANCE: Final = 64.0 * 2.0**-52
-"""The margin, in units of the largest coordinate."""
-
-
-@inline
-def edges_are_far(edges: Edges, e: int, f: int, margin: float) -> bool:
-    """Tell whether two edges that do not meet are surely further apart than the margin."""
-    return segments_are_far(edges.x, edges.y, e, edges.after[e], f, edges.after[f], margin * margin)
+MARGIN: Final = 16.0 * 2.0**-52
+"""The margins before rounding, and after it, in units of the largest coordinate."""
 
 
 @inline
@@ -93,3 +110,81 @@ def corners_are_clear(edges: Edges, n: int, along: Along, margin: float, marks: 
             marks[e] |= DOUBTFUL
             marks[after] |= DOUBTFUL
     return are_clear
+
+
+@merged
+def _is_apart(points: Any, x: Any, y: Any, a: int, b: int, c: int, d: int, square: float) -> bool:
+    """Tell whether the edges ab and cd cannot touch, or fold, on the way to their rounded places."""
+    if points[a] == points[d]:
+        c, d = d, c
+    elif points[b] == points[c]:
+        a, b = b, a
+    elif points[b] == points[d]:
+        a, b, c, d = b, a, d, c
+    elif points[a] != points[c]:
+        return segments_are_far(x, y, a, b, c, d, square)
+    return is_far(x[b], y[b], x[c], y[c], x[d], y[d], square) and is_far(x[d], y[d], x[a], y[a], x[b], y[b], square)
+
+
+@inline
+def has_straight_point(rings: Rings, n_rings: int, rounded: Rounded, stop: Any) -> bool:
+    """Tell whether rounding put a point, one where rings do not meet, on a straight line with its neighbours."""
+    x, y, moved = rounded.x, rounded.y, rounded.moved
+    for ring in range(n_rings):
+        first, last = rings.offset[ring], rings.offset[ring + 1]
+        i, j = last - 2, last - 1
+        for k in range(first, last):
+            if k & POLL == 0 and stop[0]:
+                return True
+            if (moved[i] | moved[j] | moved[k]) and not rings.meets[j] & (MEETS | RUN):
+                if orient2d(Point2(x[i], y[i]), Point2(x[j], y[j]), Point2(x[k], y[k])) == 0:
+                    return True
+            i, j = j, k
+    return False
+
+
+@inline
+def certify(
+    rings: Rings, n_rings: int, n: int, rounded: Rounded, tree: BoxTree, tails: Any, heads: Any, stop: Any
+) -> bool:
+    """Tell whether the rings are certainly valid after rounding, no edges near each other that do not meet.
+
+    n: points of ``rings``. tree, tails, heads: scratch for as many. Only edges with the mark DOUBTFUL are looked at.
+    What is left out (RUN) is away from all that moves.
+    """
+    x, y, moved, boxes, pairs = rounded.x, rounded.y, rounded.moved, tree.boxes, tree.pairs
+    largest = 0.0
+    for k in range(n):
+        largest = max(largest, abs(x[k]), abs(y[k]))
+    margin = MARGIN * largest
+    square = margin * margin
+    n_edges = 0
+    for ring in range(n_rings):
+        first, last = rings.offset[ring], rings.offset[ring + 1]
+        for k in range(first, last):
+            if k & POLL == 0 and stop[0]:
+                return False
+            if rings.meets[k] & (DOUBTFUL | RUN) != DOUBTFUL:
+                continue
+            j = k + 1 if k + 1 < last else first
+            tails[n_edges], heads[n_edges], tree.marks[n_edges] = k, j, ANYWHERE
+            boxes[n_edges, 0], boxes[n_edges, 1] = min(x[k], x[j]) - margin, max(x[k], x[j]) + margin
+            boxes[n_edges, 2], boxes[n_edges, 3] = min(y[k], y[j]) - margin, max(y[k], y[j]) + margin
+            n_edges += 1
+    if n_edges > FEW:
+        build_tree(tree, n_edges, stop)
+    depth = begin_pairs(tree, n_edges, stop)
+    while depth > 0:  # bound: the walk through the tree
+        if stop[0]:
+            return False
+        found, depth = next_pairs(tree, n_edges, depth)
+        for k in range(found):
+            i, j = pairs[k, 0], pairs[k, 1]
+            a, b, c, d = tails[i], heads[i], tails[j], heads[j]
+            if (
+                (moved[a] | moved[b] | moved[c] | moved[d])
+                and boxes_meet(boxes, i, boxes, j)
+                and not _is_apart(rings.point, x, y, a, b, c, d, square)
+            ):
+                return False
+    return True

@@ -19,13 +19,23 @@ from __future__ import annotations
 from typing import Any, Final, NamedTuple
 
 from engine.arrangement.union_find import root_of, unite
-from engine.jit import inline, merged
-from engine.polygon_overlay.compiled.chain_faces import NOTHING, Faces, edge_above, half_below, join, test_edge
+from engine.jit import inline
+from engine.polygon_overlay.compiled.chain_faces import NOTHING, Faces, edge_above, half_below, test_edge
 from engine.polygon_overlay.compiled.chains import Chains, Stars
 from engine.polygon_overlay.compiled.crossing_signs import Edges
-from engine.polygon_overlay.compiled.edge_contacts import OFTEN, POLL, Events, Unions
+from engine.polygon_overlay.compiled.edge_contacts import Events, Unions
 from engine.polygon_overlay.compiled.edge_events import Along
-from engine.polygon_overlay.compiled.edge_tree import LEAF, RUN, BoxTree, build_tree, leaves_of, push_children
+from engine.polygon_overlay.compiled.edge_tree import (
+    LEAF,
+    OFTEN,
+    POLL,
+    RUN,
+    BoxTree,
+    box_holds,
+    build_tree,
+    leaves_of,
+    push_children,
+)
 from engine.polygon_overlay.compiled.loading import Given
 
 _SMALL: Final = 32
@@ -84,12 +94,6 @@ def _box_of(edges: Edges, components: Components, k: int) -> tuple[float, float,
     return x_min, x_max, y_min, y_max
 
 
-@merged
-def _holds(boxes: Any, i: int, box: tuple[float, float, float, float]) -> bool:
-    """Tell whether box i holds another."""
-    return (boxes[i, 0] <= box[0]) & (boxes[i, 1] >= box[1]) & (boxes[i, 2] <= box[2]) & (boxes[i, 3] >= box[3])
-
-
 @inline
 def _test_component(edges: Edges, marks: Any, components: Components, v: int, k: int, nearest: int) -> int:
     """Return what is nearest above vertex v, of the edges of component k and ``nearest``, or TOO_MANY."""
@@ -111,13 +115,13 @@ def _test_component(edges: Edges, marks: Any, components: Components, v: int, k:
 def _look_in_boxes(edges: Edges, components: Components, k: int, n: int, tree: BoxTree) -> int:
     """Return the edge next above component k, or NOTHING, if those whose boxes hold its own are small; else its state
     is open."""
-    stack, n_leaves, box = tree.stack, leaves_of(n), _box_of(edges, components, k)
+    stack, n_leaves, boxes = tree.stack, leaves_of(n), tree.boxes
     nearest, v = NOTHING, components.highest[components.ring[k]]
     stack[0, 0], depth = 1, 1
     while depth > 0:  # bound: each node enters the stack once
         depth -= 1
         node = stack[depth, 0]
-        if not _holds(tree.nodes, node, box):
+        if not box_holds(tree.nodes, node, boxes, k):
             continue
         if node < n_leaves:
             depth = push_children(tree, node, depth)
@@ -125,7 +129,7 @@ def _look_in_boxes(edges: Edges, components: Components, k: int, n: int, tree: B
         first = LEAF * (node - n_leaves)
         for place in range(first, min(first + LEAF, n)):
             other = tree.places[place]
-            if other != k and _holds(tree.boxes, other, box):
+            if other != k and box_holds(boxes, other, boxes, k):
                 components.state[other] |= _HOLDS
                 found = _test_component(edges, tree.marks, components, v, other, nearest)
                 if found == TOO_MANY:
@@ -171,7 +175,6 @@ def join_faces(
         if i & POLL == 0 and stop[0]:
             return
         faces.joined[i] = faces.regions[i] = i
-        faces.label[i] = 0
     edges, boxes, endless = given.edges, tree.boxes, float("inf")
     n_components = _find_components(given, unions.rings, n, n_rings, components)
     for k in range(n_components if n_components > 1 else 0):
@@ -181,11 +184,12 @@ def join_faces(
     if n_components > 1:
         build_tree(tree, n_components, stop)
     n_open = 0
-    for k in range(n_components):
+    for place in range(n_components):
         if stop[0]:
             return
-        above = NOTHING
+        k, above = 0, NOTHING
         if n_components > 1:
+            k = tree.places[place]  # order: neighbours in the plane look at the same nodes
             above = _look_in_boxes(edges, components, k, n_components, tree)
             if components.state[k] & _IS_OPEN:
                 n_open += 1
@@ -215,5 +219,5 @@ def _join_one(
     outer, beyond = faces.cycle[stars.half[stars.ends[node] - 1]], n_cycles
     if above != NOTHING:
         beyond = faces.cycle[half_below(given.edges, events, along, unions.points, chains, above, top)]
-    join(faces.joined, faces.label, outer, beyond, 0)
+    unite(faces.joined, outer, beyond)
     unite(faces.regions, outer, beyond)

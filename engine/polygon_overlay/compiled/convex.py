@@ -22,8 +22,8 @@ import numpy as np
 
 from engine.jit import inline, merged
 from engine.polygon_overlay.compiled.crossing_signs import Edges
-from engine.polygon_overlay.compiled.edge_contacts import POLL
-from engine.polygon_overlay.compiled.edge_crossings import agree, smaller_of, turns
+from engine.polygon_overlay.compiled.edge_contacts import agree, smaller_of, turns
+from engine.polygon_overlay.compiled.edge_tree import POLL
 from engine.polygon_overlay.compiled.loading import Given
 from engine.polygon_overlay.compiled.rounded_crossings import distance_of, round_crossing
 from engine.predicates.expansion import is_safe
@@ -87,11 +87,11 @@ def _rise_of(x: Any, y: Any, size: int) -> int:
 
 
 @inline
-def _first_of(vertices: Any, first: int, last: int) -> int:
+def _first_of(vertices: Any) -> int:
     """Return which of some vertices is the first in the order of x, then y."""
-    low = first
-    px, py = vertices[first, 0], vertices[first, 1]
-    for k in range(first + 1, last):
+    low = 0
+    px, py = vertices[0, 0], vertices[0, 1]
+    for k in range(1, vertices.shape[0]):
         qx = vertices[k, 0]
         if qx <= px and (qx < px or vertices[k, 1] < py):
             low, px, py = k, qx, vertices[k, 1]
@@ -100,16 +100,16 @@ def _first_of(vertices: Any, first: int, last: int) -> int:
 
 @inline
 def load_convex(
-    vertices: Any, first: int, last: int, base: int, edges: Edges, origins: Any, start: int, stop: Any
-) -> tuple[int, int]:
+    vertices: Any, base: int, edges: Edges, origins: Any, start: int, stop: Any
+) -> tuple[int, int]:  # fmt: skip
     """Load a ring to where ``start`` is, counter-clockwise from its first vertex, with that again at its end.
 
     Returns its last vertex in the order of x, then y, or GENERAL if it is not strictly convex, and 1 or -1, along or
     against the ring as given.
     """
-    size = last - first
-    low = _first_of(vertices, first, last)
-    after, before = (low + 1 if low + 1 < last else first), (low - 1 if low > first else last - 1)
+    size = vertices.shape[0]
+    low = _first_of(vertices)
+    after, before = (low + 1 if low + 1 < size else 0), (low if low > 0 else size) - 1
     ux, uy = vertices[after, 0] - vertices[low, 0], vertices[after, 1] - vertices[low, 1]
     wx, wy = vertices[before, 0] - vertices[low, 0], vertices[before, 1] - vertices[low, 1]
     step = 1 if ux * wy - uy * wx > 0.0 else -1  # a guess: the turns below must all be to the left
@@ -121,7 +121,7 @@ def load_convex(
         edges.x[i], edges.y[i], edges.after[i], origins[i] = px, py, i + 1, base + k
         is_range_safe &= is_safe(px) & is_safe(py)
         k += step
-        k = first if k == last else last - 1 if k < first else k
+        k = 0 if k == size else size - 1 if k < 0 else k
     if not is_range_safe or stop[0]:
         return GENERAL, step
     n_rising = _rise_of(edges.x[start:end], edges.y[start:end], size)
@@ -306,22 +306,21 @@ def _walk(
 
 @inline
 def intersect_convex(
-    subjects: Any, first: int, first_end: int, clips: Any, second: int, second_end: int, given: Given,
-    passages: Passages, points: Points, stop: Any,
+    subject: Any, clip: Any, given: Given, passages: Passages, points: Points, stop: Any
 ) -> tuple[int, int, float]:  # fmt: skip
     """Intersect two rings: return the number of points, which of them is first, and how far one moved; or GENERAL.
 
-    points: filled, counter-clockwise; vertices by their numbers in the input, those of clips after all subjects. The
-    arrays of given and passages need room for two more than all vertices, those of points for four times as many.
+    points: filled, counter-clockwise; vertices by their numbers, those of clip after those of subject.
+    The arrays of given and passages need room for two more than all vertices, those of points for four times as many.
     """
     edges, origins, x, y = given.edges, given.origins, points.x, points.y
-    top, step = load_convex(subjects, first, first_end, 0, edges, origins, 0, stop)
+    n = subject.shape[0]
+    top, step = load_convex(subject, 0, edges, origins, 0, stop)
     if top == GENERAL:
         return GENERAL, 0, 0.0
-    n = first_end - first
     other = n + 1  # after the first vertex of the first ring once more
-    end = other + second_end - second
-    top_second, step_second = load_convex(clips, second, second_end, subjects.shape[0], edges, origins, other, stop)
+    end = other + clip.shape[0]
+    top_second, step_second = load_convex(clip, n, edges, origins, other, stop)
     if top_second == GENERAL:
         return GENERAL, 0, 0.0
     passages.enters[:end] = _NONE

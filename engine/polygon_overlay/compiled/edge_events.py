@@ -10,8 +10,8 @@ from typing import Any, Final, NamedTuple
 from engine.arrangement.union_find import unite
 from engine.jit import called, inline
 from engine.polygon_overlay.compiled.crossing_signs import Edges, order_of_crossings, orient
-from engine.polygon_overlay.compiled.edge_contacts import NOT_SIMPLE, POLL, Events, Unions
-from engine.polygon_overlay.compiled.edge_tree import DOUBTFUL
+from engine.polygon_overlay.compiled.edge_contacts import NOT_SIMPLE, Events, Unions
+from engine.polygon_overlay.compiled.edge_tree import DOUBTFUL, POLL
 
 _RUN: Final = 16
 """Events that are sorted by insertion; more are merged."""

@@ -26,8 +26,11 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.jit import allocating, inline, merged
-from engine.polygon_overlay.compiled.edge_contacts import POLL
 
+POLL: Final = 0x3FFF
+"""Steps of some 10 to 100 ns between two looks at the flag that ends a call, as a mask of their number."""
+OFTEN: Final = 0x3FF
+"""The same for steps of some microseconds."""
 LEAF: Final = 4
 FEW: Final = 40
 """Boxes up to which all pairs are looked at: fewer steps than a tree, and no more pairs than a portion."""
@@ -88,6 +91,17 @@ def boxes_meet(boxes: Any, i: int, others: Any, j: int) -> bool:
         & (others[j, 0] <= boxes[i, 1])
         & (boxes[i, 2] <= others[j, 3])
         & (others[j, 2] <= boxes[i, 3])
+    )
+
+
+@merged
+def box_holds(boxes: Any, i: int, others: Any, j: int) -> bool:
+    """Tell whether a box holds another, which may be equal."""
+    return (
+        (boxes[i, 0] <= others[j, 0])
+        & (boxes[i, 1] >= others[j, 1])
+        & (boxes[i, 2] <= others[j, 2])
+        & (boxes[i, 3] >= others[j, 3])
     )
 
 

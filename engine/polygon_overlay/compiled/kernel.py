@@ -9,8 +9,8 @@ number of crossings. Decisions are exact throughout. A pair is left OPEN, for th
 - a coordinate of the result cannot be rounded from double-doubles and exact signs;
 - it has rings of which rounding left no sure shell.
 
-A pair is left MAY_CROSS where rounding came so near another edge that neither clearance.py nor ring_certificate.py
-vouches for the rounded rings, or put a vertex on the line of its neighbours: its rounded rings may cross. They come
+A pair is left MAY_CROSS where rounding came so near another edge that clearance.py does not
+vouch for the rounded rings, or put a vertex on the line of its neighbours: its rounded rings may cross. They come
 back as another pair then, each ring a source of its own (ring_nesting.py).
 
 The intersection of two convex rings is convex.py's where floating point is sure of all that it asks.
@@ -25,16 +25,15 @@ from typing import Any, Final, NamedTuple
 
 from engine.jit import bare_kernel, merged
 from engine.polygon_overlay.compiled.chain_faces import number_cycles
-from engine.polygon_overlay.compiled.chain_rings import choose_boundary, spread_labels, walk_rings
+from engine.polygon_overlay.compiled.chain_rings import choose_boundary, walk_rings
 from engine.polygon_overlay.compiled.chains import build_chains, build_stars
-from engine.polygon_overlay.compiled.clearance import CLEARANCE, corners_are_clear
+from engine.polygon_overlay.compiled.clearance import CLEARANCE, certify, corners_are_clear, has_straight_point
 from engine.polygon_overlay.compiled.components import join_faces
 from engine.polygon_overlay.compiled.convex import GENERAL, Passages, Points, intersect_convex
 from engine.polygon_overlay.compiled.crossing_signs import turn_of_edges
-from engine.polygon_overlay.compiled.edge_contacts import POLL
-from engine.polygon_overlay.compiled.edge_crossings import find_contacts
+from engine.polygon_overlay.compiled.edge_contacts import find_contacts
 from engine.polygon_overlay.compiled.edge_events import sort_events
-from engine.polygon_overlay.compiled.edge_tree import FEW, RUN, build_tree
+from engine.polygon_overlay.compiled.edge_tree import FEW, POLL, RUN, build_tree
 from engine.polygon_overlay.compiled.loading import (
     EVERYTHING,
     LEFT_OUT,
@@ -51,13 +50,13 @@ from engine.polygon_overlay.compiled.loading import (
     mark_short,
 )
 from engine.polygon_overlay.compiled.reducing import count_left_out
-from engine.polygon_overlay.compiled.ring_certificate import certify, has_straight_point
 from engine.polygon_overlay.compiled.ring_nesting import (
     AGAIN,
     NO_ROOM,
+    PAIR,
     Nesting,
     gather_evidence,
-    spread_rings,
+    spread_sources,
     write_evidence,
 )
 from engine.polygon_overlay.compiled.ring_order import rank_rings
@@ -115,8 +114,8 @@ def _intersect_convex(
     """Intersect the only ring of each polygon, where both are convex; returns as `intersect_convex`."""
     first, second = span.first, span.second
     return intersect_convex(
-        subjects.vertices, subjects.offsets[first], subjects.offsets[first + 1],
-        clips.vertices, clips.offsets[second], clips.offsets[second + 1], w.given,
+        subjects.vertices[subjects.offsets[first] : subjects.offsets[first + 1]],
+        clips.vertices[clips.offsets[second] : clips.offsets[second + 1]], w.given,
         Passages(w.unions.points, w.stars.node_of),
         Points(w.rounded.x, w.rounded.y, w.found.point, w.tree.places), stop,
     )  # fmt: skip
@@ -140,12 +139,14 @@ def _load_pair(
     stop: Any,
 ) -> tuple[int, int, bool]:  # fmt: skip
     """Load the rings of both polygons; return the numbers of vertices and rings, and whether none is too small."""
+    first, second = subjects.offsets[span.first], clips.offsets[span.second]
+    n_subject = subjects.offsets[span.first_end] - first
     n, n_rings, safe = load_rings(
-        subjects.vertices, subjects.offsets, span.first, span.first_end, 1, is_named, 0,
+        subjects.vertices, subjects.offsets, span.first, span.first_end, 1, is_named, -first,
         EVERYTHING if kept[1] else common, w.given, 0, 0, stop,
     )  # fmt: skip
     n, n_rings, also_safe = load_rings(
-        clips.vertices, clips.offsets, span.second, span.second_end, 2, False, subjects.vertices.shape[0],
+        clips.vertices, clips.offsets, span.second, span.second_end, 2, False, n_subject - second,
         EVERYTHING if kept[2] else common, w.given, n, n_rings, stop,
     )  # fmt: skip
     return n, n_rings, safe and also_safe
@@ -193,13 +194,10 @@ def _arrange(w: Workspace, loaded: Loaded, kept: Any, nesting: Nesting, stop: An
         w.given, w.events, w.along, w.unions, w.tree, w.chains, w.stars, w.faces, w.components, w.found.point,
         (n, n_rings, n_cycles, loaded.n_runs), stop,
     )  # fmt: skip
-    tells, n_entries = nesting.rule == AGAIN, 0
-    if nesting.shells.shape[0] > 0:
-        n_entries = spread_rings(w.given, w.chains, w.faces, nesting, w.holders, (n_chains, n_cycles), stop)
-        if n_entries == NO_ROOM:
-            return _Arranged(0, 0, 0, 0, False, room + 1)
-    else:
-        spread_labels(w.chains, w.faces, kept, n_chains, n_cycles, stop)
+    tells = nesting.rule == AGAIN
+    n_entries = spread_sources(w.given, w.chains, w.faces, nesting, kept, w.holders, (n_chains, n_cycles), stop)
+    if n_entries == NO_ROOM:
+        return _Arranged(0, 0, 0, 0, False, room + 1)
     choose_boundary(w.chains, w.faces, n_chains, n_nodes, stop)
     if tells:
         gather_evidence(w.faces, w.holders, n_entries, n_cycles, nesting.shells.shape[0], stop)
@@ -290,19 +288,19 @@ def overlay_pairs(
     """Overlay the pairs from ``begin`` on; fill outcomes, by pair, and output from its beginning.
 
     subject_items, clip_items: the first ring of each polygon, and the end of the last one's. kept: (4,) uint8 by label.
-    nesting: empty; or, without clips, and kept all but the first, that of the rings of subjects (ring_nesting.py),
-    numbers counted from the pair's first ring; by the rule AGAIN evidence is filled too, with numbers of rings.
-    A source is an input vertex and -1, where the ring goes on along an edge of that vertex, or -3 - e, along edge e; or
-    two edges that cross, the one that it goes on along first. Edges by their first vertices; clip vertices are counted
-    after those of all subjects. The input vertex and LEFT_OUT where the vertices up to the next source are left out.
-    reduced: what reduce_pair returned for the only pair; no vertices, no such pair.
-    Returns the pair reached, FINISHED or what is needed to go on with it, numbers of vertices, rings, pieces, rows of
-    evidence, how many contacts there was scratch used for at most, and how many vertices are left out.
+    nesting: of the rule PAIR; or, without clips, and kept all but the first, that of the rings of subjects
+    (ring_nesting.py), numbers counted from the pair's first ring; by the rule AGAIN evidence is filled too, with
+    numbers of rings. A source is an input vertex and -1, where the ring goes on along an edge of that vertex, or -3 -
+    e, along edge e; or two edges that cross, the one that it goes on along first. Edges by their first vertices;
+    vertices are counted from the pair's first, those of its clip after those of its subject. The input vertex and
+    LEFT_OUT where the vertices up to the next source are left out. reduced: what reduce_pair returned for the only
+    pair; no vertices, no such pair. Returns the pair reached, FINISHED or what is needed to go on with it, numbers of
+    vertices, rings, pieces, rows of evidence, how many contacts there was scratch used for at most, and how many
+    vertices are left out.
     """
     w = rows_of(buffers)
     is_intersection = not (kept[0] or kept[1] or kept[2])
     filled = _Filled(0, 0, 0, 0)
-    is_named = nesting.shells.shape[0] > 0
     used = n_left_out = 0
     status, counts, displacement = outcomes.status, outcomes.counts, outcomes.displacement
     for pair in range(begin, status.shape[0]):
@@ -331,7 +329,7 @@ def overlay_pairs(
                         counts[pair, 0], counts[pair, 1], counts[pair, 2] = 1, 1, m
                     status[pair], displacement[pair] = DONE, moved_by
                     continue
-            n, n_rings, safe = _load_pair(w, subjects, clips, span, common, kept, is_named, stop)
+            n, n_rings, safe = _load_pair(w, subjects, clips, span, common, kept, nesting.rule != PAIR, stop)
             loaded = Loaded(n, n_rings, 0, max(magnitude(subject_box), magnitude(clip_box)))
             if not (safe and loaded.largest <= LARGEST):
                 continue
@@ -348,7 +346,7 @@ def overlay_pairs(
         if moved_by == LOST:
             continue
         n_found, m = arranged.n_found, arranged.n_points
-        n_pieces = rank_rings(w.found, n_found, w.rounded, w.ranking, is_valid, w.faces.label, w.tree.boxes, stop)
+        n_pieces = rank_rings(w.found, n_found, w.rounded, w.ranking, is_valid, w.faces.joined, w.tree.boxes, stop)
         if stop[0]:
             break
         if n_pieces < 0:

@@ -13,8 +13,7 @@ import numpy as np
 from engine.arrays import FloatArray, IntArray
 from engine.jit import inline
 from engine.polygon_overlay.compiled.crossing_signs import Edges
-from engine.polygon_overlay.compiled.edge_contacts import POLL
-from engine.polygon_overlay.compiled.edge_tree import ANYWHERE, BENT, DOUBTFUL, RUN, BoxTree, heading
+from engine.polygon_overlay.compiled.edge_tree import ANYWHERE, BENT, DOUBTFUL, POLL, RUN, BoxTree, heading
 from engine.predicates.expansion import SMALLEST
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
 

@@ -22,8 +22,7 @@ import numpy as np
 from engine.jit import bare_kernel, inline, merged
 from engine.polygon_overlay.compiled.block_tree import count_active, wake_above, wake_near
 from engine.polygon_overlay.compiled.clearance import CLEARANCE
-from engine.polygon_overlay.compiled.edge_contacts import POLL
-from engine.polygon_overlay.compiled.edge_tree import BoxTree, build_tree
+from engine.polygon_overlay.compiled.edge_tree import POLL, BoxTree, build_tree
 from engine.polygon_overlay.compiled.loading import (
     EVERYTHING,
     LEFT_OUT,

@@ -36,39 +36,54 @@ class _Place(NamedTuple):
     error: float
 
 
-@merged
-def _end_of(ring: Any, v: int, known: Any, side: int) -> int:
-    """Return the next vertex of the ring of vertex v that is not at its place (v if there is none).
+class _Pair(NamedTuple):
+    """Polygons, and of a pair of them: first vertex of its subject, number of its vertices, first vertex of its clip;
+    known: the ring that was found last, of either polygon."""
 
-    known: the ring that was found last, of both polygons.
-    """
+    subjects: Any
+    clips: Any
+    first: int
+    n: int
+    second: int
+    known: Any
+
+
+@merged
+def _found(pair: _Pair, v: int) -> tuple[Any, int, int]:
+    """Return the vertices that vertex v of a pair is one of, its place there, and 0 or 1 as it is the subject's."""
+    if v < pair.n:
+        return pair.subjects.vertices, pair.first + v, 0
+    return pair.clips.vertices, pair.second + v - pair.n, 1
+
+
+@merged
+def _end_of(vertices: Any, offsets: Any, v: int, known: Any, side: int) -> int:
+    """Return the next vertex of the ring of vertex v that is not at its place (v if there is none)."""
     low = int(known[side])
-    if not ring.offsets[low] <= v < ring.offsets[low + 1]:
-        low, high = 0, ring.offsets.shape[0] - 1
+    if not offsets[low] <= v < offsets[low + 1]:
+        low, high = 0, offsets.shape[0] - 1
         while high - low > 1:  # bound: halves
             middle = (low + high) // 2
-            if ring.offsets[middle] <= v:
+            if offsets[middle] <= v:
                 low = middle
             else:
                 high = middle
         known[side] = low
-    start, stop = ring.offsets[low], ring.offsets[low + 1]
+    start, stop = offsets[low], offsets[low + 1]
     after = v
     for _ in range(stop - start):
         after = after + 1 if after + 1 < stop else start
-        if ring.vertices[after, 0] != ring.vertices[v, 0] or ring.vertices[after, 1] != ring.vertices[v, 1]:
+        if vertices[after, 0] != vertices[v, 0] or vertices[after, 1] != vertices[v, 1]:
             break
     return after
 
 
 @merged
-def _edge(subjects: Any, clips: Any, known: Any, v: int) -> tuple[float, float, float, float]:
-    """Return the ends of the edge that begins with vertex v."""
-    n = subjects.vertices.shape[0]
-    side = int(v >= n)
-    rings, v = (subjects, v) if v < n else (clips, v - n)
-    after = _end_of(rings, v, known, side)
-    return rings.vertices[v, 0], rings.vertices[v, 1], rings.vertices[after, 0], rings.vertices[after, 1]
+def _edge(pair: _Pair, e: int) -> tuple[float, float, float, float]:
+    """Return the ends of the edge that begins with vertex e."""
+    vertices, v, side = _found(pair, e)
+    after = _end_of(vertices, pair.clips.offsets if side else pair.subjects.offsets, v, pair.known, side)
+    return vertices[v, 0], vertices[v, 1], vertices[after, 0], vertices[after, 1]
 
 
 @called
@@ -85,10 +100,10 @@ def _exact_weight(
 
 
 @inline
-def _crossing(subjects: Any, clips: Any, known: Any, e: int, f: int, ox: float, oy: float) -> _Place:
+def _crossing(pair: _Pair, e: int, f: int, ox: float, oy: float) -> _Place:
     """Return where two edges cross, counted from o."""
-    ax, ay, bx, by = _edge(subjects, clips, known, e)
-    cx, cy, dx, dy = _edge(subjects, clips, known, f)
+    ax, ay, bx, by = _edge(pair, e)
+    cx, cy, dx, dy = _edge(pair, f)
     ah, al, ae = weight_of(cx, cy, dx, dy, ax, ay)
     bh, bl, be = weight_of(cx, cy, dx, dy, bx, by)
     if ae > 0.001 * abs(ah) or be > 0.001 * abs(bh):
@@ -113,33 +128,29 @@ def _crossing(subjects: Any, clips: Any, known: Any, e: int, f: int, ox: float, 
 
 
 @inline
-def _place(subjects: Any, clips: Any, known: Any, sources: Any, k: int, ox: float, oy: float) -> _Place:
+def _place(pair: _Pair, sources: Any, k: int, ox: float, oy: float) -> _Place:
     """Return point k, counted from o."""
-    v, n = sources[k, 0], subjects.vertices.shape[0]
     if sources[k, 1] >= 0:
-        return _crossing(subjects, clips, known, v, sources[k, 1], ox, oy)
-    vertices, v = (subjects.vertices, v) if v < n else (clips.vertices, v - n)
+        return _crossing(pair, sources[k, 0], sources[k, 1], ox, oy)
+    vertices, v, _ = _found(pair, sources[k, 0])
     xh, xl = two_diff(vertices[v, 0], ox)
     yh, yl = two_diff(vertices[v, 1], oy)
     return _Place(xh, xl, yh, yl, 0.0)
 
 
 @inline
-def _twice_area(
-    subjects: Any, clips: Any, known: Any, sources: Any, first: int, last: int
-) -> tuple[float, float, float, float]:
+def _twice_area(pair: _Pair, sources: Any, first: int, last: int) -> tuple[float, float, float, float]:
     """Return twice the area of a ring as a double-double, the bound of its terms, and the sum of their sizes."""
-    v, n = sources[first, 0], subjects.vertices.shape[0]
-    vertices, v = (subjects.vertices, v) if v < n else (clips.vertices, v - n)
+    vertices, v, _ = _found(pair, sources[first, 0])
     ox, oy = vertices[v, 0], vertices[v, 1]
-    before = _place(subjects, clips, known, sources, last - 1, ox, oy)
-    now = _place(subjects, clips, known, sources, first, ox, oy)
+    before = _place(pair, sources, last - 1, ox, oy)
+    now = _place(pair, sources, first, ox, oy)
     total = rest = error = size = 0.0
     start, end = now, before
     for k in range(first, last):
         after = start if k + 1 == last else end
         if k + 2 < last:
-            after = _place(subjects, clips, known, sources, k + 1, ox, oy)
+            after = _place(pair, sources, k + 1, ox, oy)
         dh, dl = dd_sub(after.yh, after.yl, before.yh, before.yl)
         ph, pl = dd_mul(now.xh, now.xl, dh, dl)
         total, lost = two_sum(total, ph)
@@ -154,25 +165,27 @@ def _twice_area(
 
 @bare_kernel
 def sum_areas(
-    subjects: Any, clips: Any, sources: Any, offsets: Any, groups: Any, stop: Any, areas: Any
+    subjects: Any, subject_items: Any, clips: Any, clip_items: Any, sources: Any, offsets: Any, groups: Any, stop: Any,
+    areas: Any,
 ) -> int:  # fmt: skip
     """Fill ``areas``, (n,) float64, with the doubles nearest to the areas of some rings each, NaN where that is unsure.
 
-    sources, offsets: of rings, as those of `ImplicitRings`. groups: (n + 1,) int64 into the rings. Returns how many are
-    unsure.
+    subjects, subject_items, clips, clip_items: as of overlay_pairs, a pair for each area, or one for all. sources,
+    offsets: of rings, as overlay_pairs fills them. groups: (n + 1,) int64 into the rings. Returns how many are unsure.
     """
     n_unsure = 0
     known = workspace(2)
     known[0] = known[1] = 0.0
     for k in range(areas.shape[0]):
+        number = min(k, subject_items.shape[0] - 2)
+        first, end = subjects.offsets[subject_items[number]], subjects.offsets[subject_items[number + 1]]
+        pair = _Pair(subjects, clips, first, end - first, clips.offsets[clip_items[number]], known)
         total_h = total_l = error = size = 0.0
         n_points = 0
         for ring in range(groups[k], groups[k + 1]):
             if stop[0]:
                 return 0
-            h, low, ring_error, ring_size = _twice_area(
-                subjects, clips, known, sources, offsets[ring], offsets[ring + 1]
-            )
+            h, low, ring_error, ring_size = _twice_area(pair, sources, offsets[ring], offsets[ring + 1])
             total_h, total_l = dd_add(total_h, total_l, h, low)
             error, size = error + ring_error, size + ring_size
             n_points += offsets[ring + 1] - offsets[ring]

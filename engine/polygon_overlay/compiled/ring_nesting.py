@@ -1,8 +1,9 @@
-"""Faces of many sources: which are inside, and for rounded rings that are arranged again which rings tell so.
+"""Which faces are inside, and for rounded rings that are arranged again which rings tell so.
 
 The faces are walked as a tree, from the unbounded one and back: each step takes up or lays down the sources that it
-crosses, however many there are. What is inside is a rule: where any source is (even-odd within each), where all rings
-together have a winding number that is not zero, positive, or negative; or that of a round of rounding:
+crosses, however many there are. What is inside is a rule: a table over the labels of two polygons (bit k: inside source
+k, even-odd); where any source is (even-odd within each), or the first alone; where all rings together have a winding
+number that is not zero, positive, or negative; or that of a round of rounding:
 
 A face is inside where it lies (even-odd) in a shell and in no hole of that shell. Its evidence names those shells; that
 of a face outside names the holes that it lies in, the innermost of them: those whose shell is smallest. Evidence tells,
@@ -26,7 +27,7 @@ from engine.arrangement.union_find import root_of
 from engine.jit import called, merged
 from engine.polygon_overlay.compiled.chain_faces import Faces
 from engine.polygon_overlay.compiled.chains import Chains, is_live
-from engine.polygon_overlay.compiled.edge_contacts import POLL
+from engine.polygon_overlay.compiled.edge_tree import POLL
 from engine.polygon_overlay.compiled.loading import Given
 
 NO_ROOM: Final = -1
@@ -36,14 +37,17 @@ ANY: Final = 1
 NON_ZERO: Final = 2
 POSITIVE: Final = 3
 NEGATIVE: Final = 4
-"""Rules: shells and holes of a round, within any source, winding numbers."""
+PAIR: Final = 5
+FIRST_ALONE: Final = 6
+"""Rules: shells and holes of a round, within any source, winding numbers, the table of two polygons, within source 0
+and no other."""
 
 
 class Nesting(NamedTuple):
     """AGAIN: by ring the number of its shell, its own where it is one, int64, and how large that shell is, float64.
 
-    ANY: by ring the number of its source, no larger than that of the ring. Winding numbers: by ring any number.
-    No rings: labels are those of two polygons.
+    ANY, FIRST_ALONE: by ring the number of its source, no larger than that of the ring. Winding numbers: by ring any
+    number. PAIR: no rings.
     """
 
     shells: Any
@@ -77,12 +81,14 @@ class Holders(NamedTuple):
 def _cross(given: Given, chains: Chains, nesting: Nesting, h: Holders, half: int, n_held: int) -> int:
     """Go over a half-chain, from its left, and take up or lay down all that it stands for; return how many are held.
 
-    Of winding numbers: return the one beyond, ``n_held`` being the one here.
+    Of winding numbers, and labels of two polygons: return the one beyond, ``n_held`` being the one here.
     """
     chain = half >> 1
+    if nesting.rule == PAIR:
+        return n_held ^ chains.mask[chain]
     while chain >= 0:  # bound: the chains that coincide
         ring = given.masks[given.edges.ring[chains.first[chain]]]
-        if nesting.rule >= NON_ZERO:
+        if NON_ZERO <= nesting.rule <= NEGATIVE:
             n_held += 1 if (chains.stands[chain] ^ half) & 1 else -1
         else:
             source = ring if nesting.rule == AGAIN else nesting.shells[ring]
@@ -99,8 +105,12 @@ def _cross(given: Given, chains: Chains, nesting: Nesting, h: Holders, half: int
 
 
 @merged
-def _is_inside(rule: int, n_held: int) -> bool:
+def _is_inside(rule: int, kept: Any, h: Holders, n_held: int) -> bool:
     """Tell whether a face is inside by a rule other than AGAIN."""
+    if rule == PAIR:
+        return bool(kept[n_held])
+    if rule == FIRST_ALONE:
+        return n_held == 1 and h.place[0] == 0
     return n_held < 0 if rule == NEGATIVE else n_held > 0 if rule != NON_ZERO else n_held != 0
 
 
@@ -130,12 +140,14 @@ def _judge(nesting: Nesting, h: Holders, face: int, n_held: int, n: int) -> tupl
 
 
 @called
-def spread_rings(
-    given: Given, chains: Chains, faces: Faces, nesting: Nesting, h: Holders, sizes: tuple[int, int], stop: Any
+def spread_sources(
+    given: Given, chains: Chains, faces: Faces, nesting: Nesting, kept: Any, h: Holders, sizes: tuple[int, int],
+    stop: Any,
 ) -> int:  # fmt: skip
     """Fill ``faces.inside`` and the entries of evidence, ``after`` with their faces; return how many, or NO_ROOM.
 
-    sizes: the numbers of chains and cycles. ``faces.joined`` joins the cycles of one face.
+    kept: (4,) uint8, by the label of two polygons whether a face of it is inside. sizes: the numbers of chains and
+    cycles. ``faces.joined`` joins the cycles of one face.
     """
     n_chains, n_cycles = sizes
     cycle, joined, inside = faces.cycle, faces.joined, faces.inside
@@ -161,7 +173,7 @@ def spread_rings(
             if h.entered[other] == _NOT_YET:
                 n_held = _cross(given, chains, nesting, h, half, n_held)
                 if nesting.rule != AGAIN:
-                    inside[other] = _is_inside(nesting.rule, n_held)
+                    inside[other] = _is_inside(nesting.rule, kept, h, n_held)
                 else:
                     inside[other], n_entries = _judge(nesting, h, other, n_held, n_entries)
                     if n_entries == NO_ROOM:

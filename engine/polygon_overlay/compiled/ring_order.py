@@ -11,7 +11,7 @@ import numpy as np
 
 from engine.jit import inline
 from engine.polygon_overlay.compiled.chain_rings import Rings
-from engine.polygon_overlay.compiled.edge_contacts import OFTEN, POLL
+from engine.polygon_overlay.compiled.edge_tree import OFTEN, POLL, box_holds
 from engine.polygon_overlay.compiled.rounded_crossings import Rounded
 from engine.predicates.orientation import orient2d
 from engine.types import Point2
@@ -92,25 +92,14 @@ def find_shells(rings: Rings, n_rings: int, rounded: Rounded, ranking: Ranking, 
         boxes[ring, 0], boxes[ring, 1], boxes[ring, 2], boxes[ring, 3] = x_min, x_max, y_min, y_max
         widest[rings.region[ring]] = ring
     for ring in range(n_rings):
-        if _holds(boxes, ring, widest[rings.region[ring]]):
+        if box_holds(boxes, ring, boxes, widest[rings.region[ring]]):
             widest[rings.region[ring]] = ring
     for ring in range(n_rings):
         shell = widest[rings.region[ring]]
-        if ring != shell and (not _holds(boxes, shell, ring) or _holds(boxes, ring, shell)):
+        if ring != shell and (not box_holds(boxes, shell, boxes, ring) or box_holds(boxes, ring, boxes, shell)):
             return False
         ranking.is_hole[ring] = ring != shell
     return True
-
-
-@inline
-def _holds(boxes: Any, i: int, j: int) -> bool:
-    """Tell whether box i holds box j, which may be equal."""
-    return (
-        (boxes[i, 0] <= boxes[j, 0])
-        & (boxes[i, 1] >= boxes[j, 1])
-        & (boxes[i, 2] <= boxes[j, 2])
-        & (boxes[i, 3] >= boxes[j, 3])
-    )
 
 
 @inline

@@ -17,7 +17,8 @@ import numpy as np
 
 from engine.jit import called, inline, merged
 from engine.polygon_overlay.compiled.crossing_signs import Edges, crossing_against, exact_weight, weight
-from engine.polygon_overlay.compiled.edge_contacts import OFTEN, Events
+from engine.polygon_overlay.compiled.edge_contacts import Events
+from engine.polygon_overlay.compiled.edge_tree import OFTEN
 from engine.predicates.double_double import U2, dd_add, dd_div, dd_scale, surely_rounded
 from engine.predicates.error_free import fast_two_sum, workspace
 from engine.predicates.expansion import add_scaled, compress, sign

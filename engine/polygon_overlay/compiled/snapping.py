@@ -21,9 +21,17 @@ from typing import Any
 import numpy as np
 
 from engine.jit import bare_kernel, called, inline, merged
+from engine.polygon_overlay.compiled.clearance import certify
 from engine.polygon_overlay.compiled.crossing_signs import Edges
-from engine.polygon_overlay.compiled.edge_contacts import POLL
-from engine.polygon_overlay.compiled.edge_tree import FEW, begin_pairs, boxes_meet, build_tree, next_pairs
+from engine.polygon_overlay.compiled.edge_tree import (
+    DOUBTFUL,
+    FEW,
+    POLL,
+    begin_pairs,
+    boxes_meet,
+    build_tree,
+    next_pairs,
+)
 from engine.polygon_overlay.compiled.loading import EVERYTHING, fill_boxes, load_rings
 from engine.polygon_overlay.compiled.workspace import Buffers, rows_of
 from engine.predicates.orientation import orient2d
@@ -118,3 +126,20 @@ def find_passages(
                     m += 1
                 e, f = f, e
     return m, stays and m == 0
+
+
+@bare_kernel
+def stay_apart(vertices: Any, points: Any, offsets: Any, stop: Any, buffers: Buffers) -> bool:
+    """Tell whether valid rings surely stay so when vertices move by no more than clearance.py has room for.
+
+    That is a unit in the last place of the largest coordinate. points: (n,) int32, equal for vertices at one place.
+    There is scratch for as many contacts as rings.
+    """
+    w = rows_of(buffers)
+    found, rounded, n = w.found, w.rounded, vertices.shape[0]
+    for k in range(n):
+        rounded.x[k], rounded.y[k], rounded.moved[k] = vertices[k, 0], vertices[k, 1], 1
+        found.point[k], found.meets[k] = points[k], DOUBTFUL
+    for ring in range(offsets.shape[0]):
+        found.offset[ring] = offsets[ring]
+    return certify(found, offsets.shape[0] - 1, n, rounded, w.tree, w.chains.at, w.stars.node_of, stop)

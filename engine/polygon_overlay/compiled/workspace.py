@@ -204,7 +204,7 @@ def rows_of(buffers: Buffers) -> Workspace:
         chains=Chains(c[5], c[6], c[7], c[8], hl[1], c[9], c[18], p[1]),
         stars=Stars(p[4], c[13], c[14], c[15], h[0], h[1]),
         loose=Loose(h[3], hl[0], px[0], px[1]),
-        faces=Faces(h[2], h[3], h[4], hl[0], h[5], hb[1], hb[2], c[16]),
+        faces=Faces(h[2], h[3], h[4], h[5], hb[1], hb[2], c[16]),
         components=Components(r[3], r[4], r[5], r[6], r[7]),
         holders=Holders(r[4], r[5], r[6], h[3], h[6], hl[0], h[7], h[8], h[9], h[10], c[19]),
         walk=Walk(hb[3], h[6], c[17]),

@@ -122,6 +122,21 @@ def test_points_in_features() -> None:
     assert len(every) == len(expected) + len(alone)
 
 
+def test_spikes_of_parts_that_overlap_are_boundary() -> None:
+    """As those of one polygon are: a part is closed, whatever it is united with."""
+    spiked = [[(0, 0), (2, 0), (2, 1), (5, 1), (2, 1), (2, 2), (0, 2), (0, 0)]]
+    square = [[(1, 0), (3, 0), (3, 2), (1, 2), (1, 0)]]
+    flat = [[(6, 0), (8, 0), (7, 0), (6, 0)]]
+    geometry = {"type": "MultiPolygon", "coordinates": [spiked, square, flat]}
+    layer = {"type": "FeatureCollection", "features": [{"type": "Feature", "properties": {}, "geometry": geometry}]}
+    expected = {(4, 1): True, (5, 1): True, (2.5, 1): False, (2, 0.5): False, (2, 0): True, (7, 0): True, (4, 2): None}
+    points = [
+        {"type": "Feature", "properties": {}, "geometry": {"type": "Point", "coordinates": place}} for place in expected
+    ]
+    found: Any = locate_features({"type": "FeatureCollection", "features": points}, layer, outside=True)
+    assert [row.get("boundary") for row in found] == list(expected.values())
+
+
 def test_what_is_beside_the_geometry_passes_through() -> None:
     left = collection([frozenset({(0, 0)}), None], deep={"a": [1, None, 2.5], "big": 10**30})
     left["crs"] = {"type": "name", "properties": {"name": "EPSG:3857"}}

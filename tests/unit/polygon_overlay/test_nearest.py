@@ -64,7 +64,9 @@ def nearest(*pieces: list[list[tuple[float, float]]]) -> Any:
 
 
 def places(found: NearestRings) -> list[Any]:
-    return [[[vertex[:2] for vertex in ring] for ring in piece] for piece in found.pieces]
+    rings = np.split(found.vertices, found.ring_offsets[1:-1])
+    pieces = [rings[start:stop] for start, stop in zip(found.piece_offsets, found.piece_offsets[1:])]
+    return [[list(map(tuple, ring.tolist())) for ring in piece] for piece in pieces]
 
 
 def test_rings_without_area_are_left_out() -> None:
@@ -76,7 +78,7 @@ def test_rings_without_area_are_left_out() -> None:
     assert Fraction(flat[1][1]) * 1 == 2 * Fraction(flat[0][1])
     found = nearest([square, eight, sliver, [(1, 1), (1, 1), (1, 1)]], [flat], [eight, sliver], [[(3, 3), (4, 4)]])
     assert places(found) == [[square, sliver]]
-    assert found.numbers().tolist() == [0, 1, 2, 3, 8, 9, 10]
+    assert found.numbers.tolist() == [0, 1, 2, 3, 8, 9, 10]
     assert (found.lost_pieces, found.lost_holes) == ([4, 5, 7], [1, 3, 6])
 
 
@@ -84,5 +86,5 @@ def test_a_ring_that_passes_its_first_vertex_twice_begins_where_it_comes_first()
     twice: list[tuple[float, float]] = [(3, 0), (3, 1), (0, 0), (0, 0), (2, 1), (2, 2), (0, 0)]
     found = nearest([twice], [[(0, 0), (1, 0), (0, 1)]])
     assert places(found) == [[[(0, 0), (1, 0), (0, 1)]], [[(0, 0), (2, 1), (2, 2), (0, 0), (3, 0), (3, 1)]]]
-    vertices, ring_offsets, piece_offsets = found.arrays()
-    assert (len(vertices), ring_offsets.tolist(), piece_offsets.tolist()) == (9, [0, 3, 9], [0, 1, 2])
+    assert (len(found.vertices), found.ring_offsets.tolist()) == (9, [0, 3, 9])
+    assert (found.piece_offsets.tolist(), found.numbers.tolist()) == ([0, 1, 2], [7, 8, 9, 3, 4, 5, 6, 0, 1])

@@ -11,9 +11,14 @@ import pytest
 from engine.parallel import Budget
 from engine.polygon_overlay import rounds as overlay_rounds
 from engine.polygon_overlay.batch import overlay_batch
+from engine.polygon_overlay.compiled.kernel import MAY_CROSS
+from engine.polygon_overlay.found import Found, joined, taken
 from engine.polygon_overlay.in_integers import overlay_exactly
+from engine.polygon_overlay.nearest import nearest_pairs
 from engine.polygon_overlay.overlay import overlay
-from engine.polygon_overlay.run import overlay_compiled
+from engine.polygon_overlay.polygon_arrays import gathered
+from engine.polygon_overlay.rounds import settle_pairs
+from engine.polygon_overlay.run import arranged_again, overlay_compiled, run_kernel
 from engine.solids.polygon import Polygon
 from tests.unit.polygon_overlay import families as families
 from tests.unit.polygon_overlay.checks import OPERATIONS
@@ -153,3 +158,28 @@ def test_pieces_in_holes_stay_what_they_are_where_a_round_is_taken() -> None:
             assert agree(crossed, [*clip, [(0.1, -0.1), (0.4, 0.2), (0.5, 0.1)]], operation)
     result, _ = overlay_exactly(arrays(frames), arrays(clip), "difference", "valid", Budget())
     assert (result.n_holes, result.holes_joined, result.holes_parted) == (result.n_holes_exact, 0, 0)
+
+
+def doubtful() -> Found:
+    found = []
+    for family in (families.slivers, families.pencils, families.nearly_coincident):
+        for seed in range(8):
+            first, second = (gathered([Polygon(list(each))]) for each in families.drawn(family, seed))
+            found.append(run_kernel(first, second, "union", Budget()))
+    return joined(found)
+
+
+def test_pairs_together_are_pairs_alone() -> None:
+    found = doubtful()
+    n_doubtful = int((found.status == MAY_CROSS).sum())
+    assert n_doubtful > 3
+    for settle in (
+        lambda some: settle_pairs(some, arranged_again, Budget()),
+        lambda some: nearest_pairs(some, Budget()),
+    ):
+        together = settle(found)
+        assert len(together.pairs) <= n_doubtful
+        for k, pair in enumerate(together.pairs.tolist()):
+            alone, now = settle(taken(found, np.array([pair]))).found, taken(together.found, np.array([k]))
+            for name in ("vertices", "ring_offsets", "piece_offsets", "displacement"):
+                assert getattr(alone, name).tolist() == getattr(now, name).tolist()

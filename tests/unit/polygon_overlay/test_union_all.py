@@ -13,8 +13,9 @@ import pytest
 import engine
 from engine.parallel import Budget
 from engine.polygon_overlay.compiled.ring_nesting import ANY, NEGATIVE, NON_ZERO, POSITIVE, Nesting
+from engine.polygon_overlay.implicit_rings import NOTHING
 from engine.polygon_overlay.in_integers import overlay_exactly
-from engine.polygon_overlay.nearest import NOTHING
+from engine.polygon_overlay.union_all import less_all
 from tests.reference import fast_overlay
 from tests.reference import overlay as reference
 from tests.reference.exact import Q
@@ -138,6 +139,17 @@ def assert_union(draw: Callable[[Random], list[Rings]], seed: int) -> None:
         for ring, sources in zip(result.rings, np.split(result.sources, result.ring_offsets[1:-1]), strict=False):
             for (a, b), source in zip(pairwise([*ring.tolist(), ring[0].tolist()]), sources.tolist(), strict=True):
                 assert runs_along(layer, source, a, b)
+
+
+@pytest.mark.parametrize("draw", LAYERS)
+@pytest.mark.parametrize("seed", range(12))
+def test_what_others_leave_of_the_first(draw: Callable[[Random], list[Rings]], seed: int) -> None:
+    """Compiled, and beside what only integers hold."""
+    for layer in (draw(np.random.default_rng(seed)), far(draw(np.random.default_rng(seed)))):
+        there = [rings for rings in listed(layer) if engine.Polygon(rings).n_rings]
+        first, *others = (engine.Polygon(rings) for rings in there)
+        result, _ = less_all(first, others, Budget())
+        check(result, there, lambda windings: windings[0] % 2 > 0 and not is_in_any(windings[1:]))
 
 
 @pytest.mark.parametrize("seed", range(20))

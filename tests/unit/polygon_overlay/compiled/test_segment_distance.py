@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from engine.polygon_overlay.compiled.ring_certificate import segments_are_far
+from engine.polygon_overlay.compiled.segment_distance import segments_are_far
 from tests.unit.polygon_overlay.compiled.test_crossing_signs import Point, cross
 
 
