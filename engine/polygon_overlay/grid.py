@@ -140,6 +140,8 @@ def _passages_of(vertices: FloatArray, offsets: IntArray, budget: Budget) -> tup
 
 def _are_in_order(pixels: FloatArray, rings: Found) -> bool:
     """Tell whether pieces, and the holes of each, stand in their order, by their first vertices."""
+    if len(rings.ring_offsets) <= 2:
+        return True
     firsts, shells = pixels[rings.ring_offsets[:-1]], rings.piece_offsets[:-1]
     is_hole = np.ones(len(firsts), np.bool_)
     is_hole[shells] = False
