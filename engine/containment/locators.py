@@ -33,7 +33,7 @@ from engine.errors import InvalidArrayError, NotFiniteError
 from engine.parallel import Budget
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
-from engine.solids.convex import Convex
+from engine.solids.convex import Convex, rows_of
 from engine.solids.csg import Csg
 from engine.solids.half_space import HalfSpace
 from engine.solids.implicit import Implicit
@@ -133,7 +133,7 @@ def _by_choice(method: str, choose: Callable[[int, Budget], Locator]) -> Locator
 
 
 def _in_rows(solid: HalfSpace | Convex) -> Locator:
-    rows = solid.row[None] if isinstance(solid, HalfSpace) else solid.planes
+    rows = rows_of(solid)
     kernel = locate_in_half_planes if solid.dimension == 2 else locate_in_half_spaces
     return _by_kernel("half_spaces", kernel, solid, rows, np.ones(len(rows), np.bool_))
 

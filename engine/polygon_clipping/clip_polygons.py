@@ -22,7 +22,7 @@ from engine.predicates.scaling import largest_of
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.checks import as_point_groups, as_points, check_dimension, check_finite
-from engine.solids.convex import Convex
+from engine.solids.convex import Convex, rows_of
 from engine.solids.half_space import HalfSpace
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
@@ -148,12 +148,8 @@ def _planes(region: Solid, budget: Budget) -> list[Row]:
     if kept is not None:
         return cast(list[Row], kept)
     match region:
-        case HalfSpace():
-            rows = region.row[None, :]
-        case Aabb():
-            rows = region.rows
-        case Convex():
-            rows = region.planes
+        case HalfSpace() | Aabb() | Convex():
+            rows = rows_of(region)
         case Polyhedron():
             return convex_planes(region, budget.check)
         case _:

@@ -52,7 +52,12 @@ def _fill_powers(points: Any, row: int, powers: Components) -> None:
 
 @inline
 def sign_of_polynomial_filter(powers: Any, coefficients: Any, degree: int, points: Any, row: int) -> int:
-    """Return the sign at a point where rounding cannot have changed it, else UNDECIDED; arguments as below."""
+    """Return the sign of the sum of coefficient * prod(p[k] ** powers[k]) at p = points[row] where rounding cannot have
+    changed it, else UNDECIDED.
+
+    powers (t, dim) int64, coefficients (t,) float64, points (n, dim) float64, dim 2 or 3. Caller guarantees finite
+    numbers, powers >= 0 with row sums <= degree <= MAX_DEGREE, and t <= MAX_TERMS.
+    """
     table = workspace(N_TABLE)
     _fill_powers(points, row, table)
     value, magnitude = 0.0, 0.0
@@ -74,19 +79,6 @@ def sign_of_polynomial_filter(powers: Any, coefficients: Any, degree: int, point
 
 
 @inline
-def sign_of_polynomial(powers: Any, coefficients: Any, degree: int, points: Any, row: int) -> int:
-    """Return the sign of the sum of coefficient * prod(p[k] ** powers[k]) at p = points[row], or UNDECIDED.
-
-    powers (t, dim) int64, coefficients (t,) float64, points (n, dim) float64, dim 2 or 3. Caller guarantees finite
-    numbers, powers >= 0 with row sums <= degree <= MAX_DEGREE, and t <= MAX_TERMS.
-    """
-    side = sign_of_polynomial_filter(powers, coefficients, degree, points, row)
-    if side != UNDECIDED:
-        return side
-    return sign_of_polynomial_exact(powers, coefficients, points, row)
-
-
-@inline
 def _term_exponent(powers: Any, coefficients: Any, points: Any, row: int, i_term: int) -> int:
     """Return k with |term| < 2^k, NO_TERM for a term that is zero."""
     if coefficients[i_term] == 0.0:
@@ -101,7 +93,7 @@ def _term_exponent(powers: Any, coefficients: Any, points: Any, row: int, i_term
 
 @inline
 def sign_of_polynomial_exact(powers: Any, coefficients: Any, points: Any, row: int) -> int:
-    """Return the sign from an expansion, or UNDECIDED; arguments as for `sign_of_polynomial`."""
+    """Return the sign from an expansion, or UNDECIDED; arguments as for `sign_of_polynomial_filter`."""
     top = NO_TERM
     for i_term in range(coefficients.shape[0]):
         top = max(top, _term_exponent(powers, coefficients, points, row, i_term))

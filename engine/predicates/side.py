@@ -1,9 +1,9 @@
-"""side_of_line and side_of_plane: the sign of dot(row, (p, 1)), exact for every float64 input.
+"""side_of_plane: the sign of dot(row, (p, 1)), exact for every float64 input; in the plane c and z are 0.
 
 **The filter.** With u = 2^-53 and h = 2^-1075, a rounded product carries u |a x| + h and each sum u of its result, so
-the rounded sum of k products and an offset is off by at most (k + 1)(u + 2u^2) S + k h, S the sum of magnitudes. The
-thresholds 4u S + 8h (k = 2) and 8u S + 8h (k = 3) also pay for their own rounding. An infinity or NaN on the way makes
-both comparisons false.
+the rounded sum of 3 products and an offset is off by at most 4 (u + 2u^2) S + 3 h, S the sum of magnitudes. The
+threshold 8u S + 8h also pays for its own rounding, and for that of coefficients that are correctly rounded (a posed
+plane, a wall of a prism: another u each). An infinity or NaN on the way makes both comparisons false.
 
 **The exact stage** adds the products to an expansion. Where a product is too large or too small for that, each factor
 is split into significand and exponent and the terms are brought to a common exponent. Terms more than 2^1968 below the
@@ -18,9 +18,8 @@ from math import frexp, ldexp
 from engine.jit import inline
 from engine.predicates.error_free import two_prod, workspace
 from engine.predicates.expansion import Components, grow, grow_product, sign
-from engine.types import UNDECIDED, HalfSpace2, HalfSpace3, Point2, Point3
+from engine.types import UNDECIDED, HalfSpace3, Point3
 
-BOUND_LINE = 2.0**-51  # 4u
 BOUND_PLANE = 2.0**-50  # 8u
 GUARD = 2.0**-1072  # 8h
 
@@ -30,28 +29,6 @@ COMMON_TOP = 1000  # exponent given to the largest term when terms are brought t
 LOWEST_SHIFT = -968  # a product of significands has its lowest bit at 2^-106; -106 - 968 = -1074
 CLEAR = 2.0**-960  # more than three left-out terms, each below 2^LOWEST_SHIFT, add up to
 NO_TERM = -(1 << 20)  # exponent of a zero term
-
-
-@inline
-def side_of_line_filter(h: HalfSpace2, p: Point2) -> int:
-    """Return the sign of a x + b y + c where rounding cannot have changed it, else UNDECIDED."""
-    ax, by = h.a * p.x, h.b * p.y
-    value = ax + by + h.c
-    threshold = BOUND_LINE * (abs(ax) + abs(by) + abs(h.c)) + GUARD
-    if value > threshold:
-        return 1
-    if -value > threshold:
-        return -1
-    return UNDECIDED
-
-
-@inline
-def side_of_line(h: HalfSpace2, p: Point2) -> int:
-    """Return 1 if p is inside the half-plane h, 0 on its line, -1 outside, or UNDECIDED."""
-    side = side_of_line_filter(h, p)
-    if side != UNDECIDED:
-        return side
-    return _side_exact(HalfSpace3(h.a, h.b, 0.0, h.c), Point3(p.x, p.y, 0.0))
 
 
 @inline

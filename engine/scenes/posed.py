@@ -19,7 +19,7 @@ from engine.segment_clipping.pieces import Pieces, joined, room_for
 from engine.segment_clipping.prepared_boundary import Mesh, boundary_of
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
-from engine.solids.convex import Convex
+from engine.solids.convex import Convex, rows_in_space, rows_of
 from engine.solids.half_space import HalfSpace
 from engine.solids.polyhedron import Polyhedron
 from engine.solids.pose import Pose
@@ -48,26 +48,13 @@ def posed_body(solid: Solid, pose: Pose) -> PosedBody | None:
             fits = _are_safe(center[:, :1]) and _are_safe(np.array([solid.radius]))
             return PosedBody(center=np.concatenate([center, np.zeros((3 - len(center), 2))])) if fits else None
         case HalfSpace() | Aabb() | Convex():
-            planes = (
-                solid.row[None] if isinstance(solid, HalfSpace) else solid.rows if isinstance(solid, Aabb) else None
-            )
-            planes = solid.planes if isinstance(solid, Convex) else planes
-            assert planes is not None
-            rows = np.zeros((len(planes), 4))
-            rows[:, : solid.dimension], rows[:, 3] = planes[:, :-1], planes[:, -1]
-            frame = _frame_of(pose)
+            rows, frame = rows_in_space(rows_of(solid)), _frame_of(pose)
             return PosedBody(frame, rows=rows) if frame is not None and _are_safe(rows) else None
         case Polyhedron() | Surface():
             frame, mesh = _frame_of(pose), boundary_of(solid)
             locator = posed_locator(solid, pose) if isinstance(solid, Polyhedron) else None
             return None if frame is None else PosedBody(frame, mesh=mesh, locator=locator)  # type: ignore[arg-type]
     return None
-
-
-def _planes_of(solid: HalfSpace | Aabb | Convex) -> FloatArray:
-    if isinstance(solid, HalfSpace):
-        return solid.row[None]
-    return solid.rows if isinstance(solid, Aabb) else solid.planes
 
 
 def _frame_of(pose: Pose) -> Frame | None:

@@ -8,8 +8,10 @@ import numpy as np
 
 from engine.arrays import FloatArray
 from engine.errors import ZeroNormalError
+from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.checks import as_floats, check_dimension, check_not_empty, digits, frozen
+from engine.solids.half_space import HalfSpace
 
 
 class Convex(Solid):
@@ -43,3 +45,13 @@ class Convex(Solid):
 
     def __repr__(self) -> str:
         return f"Convex({len(self.planes)} planes, {self.dimension}D)"
+
+
+def rows_of(solid: HalfSpace | Aabb | Convex) -> FloatArray:
+    """Return the rows ``(m, dimension + 1)`` of the planes that bound a solid; of a box xmin, xmax, ymin, ymax, ..."""
+    return solid.row[None] if isinstance(solid, HalfSpace) else solid.rows if isinstance(solid, Aabb) else solid.planes
+
+
+def rows_in_space(rows: FloatArray) -> FloatArray:
+    """Return rows as ``(m, 4)``: those of the plane with 0 in the third place."""
+    return rows if rows.shape[1] == 4 else np.insert(rows, 2, 0.0, axis=1)

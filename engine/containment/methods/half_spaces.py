@@ -29,7 +29,7 @@ import numpy as np
 from engine.containment.posed.filters import NOT_FINITE, has_not_finite, in_space
 from engine.jit import inline, kernel
 from engine.predicates.loading import as_half_space2, as_half_space3, as_point2, as_point3
-from engine.predicates.side import side_of_plane
+from engine.predicates.side import side_of_plane, side_of_plane_filter
 from engine.types import UNDECIDED, HalfSpace3, Point3
 
 _SLACK: Final = 8.0 * 2.0**-53
@@ -52,21 +52,12 @@ def _row(planes: Any, row: int) -> HalfSpace3:
 
 
 @inline
-def _filter(h: Any, p: Any) -> int:
-    """Return the sign of h at p where floating point proves it, else UNDECIDED."""
-    ax, by, cz = h.a * p.x, h.b * p.y, h.c * p.z
-    distance = ax + by + cz + h.d
-    bound = _SLACK * (abs(ax) + abs(by) + abs(cz) + abs(h.d)) + _TINY
-    return 1 if distance > bound else -1 if -distance > bound else UNDECIDED
-
-
-@inline
 def _locate_one(points: Any, item: int, planes: Any, is_exact: Any) -> tuple[int, bool]:
     """Return the location of a point (n, 2 or 3) and whether it needed more than the filter."""
     x, y, z = in_space(points, item)
     p, location, is_unsure = Point3(x, y, z), 1, False
     for row in range(len(planes)):
-        side = _filter(_row(planes, row), p)
+        side = side_of_plane_filter(_row(planes, row), p)
         if side == 1:
             continue
         if side == UNDECIDED:

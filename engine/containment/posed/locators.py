@@ -33,7 +33,7 @@ from engine.containment.rational_locate import Check, to_world_frame
 from engine.parallel import Budget
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
-from engine.solids.convex import Convex
+from engine.solids.convex import Convex, rows_in_space, rows_of
 from engine.solids.csg import Csg
 from engine.solids.half_space import HalfSpace
 from engine.solids.implicit import Implicit
@@ -105,9 +105,7 @@ def _blurred_kernel(solid: Solid) -> Blurred:
     if isinstance(solid, Aabb):
         kernel, prepared = locate_in_box_blurred, lambda _: (solid.min, solid.max)
     elif isinstance(solid, (HalfSpace, Convex)) or (isinstance(solid, Triangle) and solid.dimension == 3):
-        planes = _rows(solid)
-        rows = np.zeros((len(planes), 4))
-        rows[:, : planes.shape[1] - 1], rows[:, 3] = planes[:, :-1], planes[:, -1]
+        rows = rows_in_space(prism_rows(solid)[0] if isinstance(solid, Triangle) else rows_of(solid))
         kernel, prepared = locate_in_rows_blurred, lambda _: (rows,)
     elif isinstance(solid, Triangle):
         kernel, prepared = locate_by_ring_pass, lambda _: (solid.vertices, ring_offsets_of(solid))
@@ -120,15 +118,6 @@ def _blurred_kernel(solid: Solid) -> Blurred:
         degree = int(solid.powers.sum(axis=1).max())
         kernel, prepared = locate_by_polynomial_blurred, lambda _: (solid.powers, solid.coefficients, degree)
     return lambda points, blurs, out, budget: int(kernel(points, blurs, *prepared(budget.check), out, budget.flag))
-
-
-def _rows(solid: Solid) -> FloatArray:
-    if isinstance(solid, HalfSpace):
-        return solid.row[None]
-    if isinstance(solid, Convex):
-        return solid.planes
-    assert isinstance(solid, Triangle)
-    return prism_rows(solid)[0]
 
 
 def posed_center(solid: Sphere, pose: Pose) -> tuple[FloatArray, float]:

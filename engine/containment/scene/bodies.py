@@ -8,11 +8,9 @@ from engine.arrays import FloatArray, Int32Array
 from engine.bounding.posed_boxes import place_boxes
 from engine.containment.posed.frames import Frames, frames_of
 from engine.containment.rational_locate import Check, over_tree
-from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
+from engine.solids.bounds import own_box
 from engine.solids.csg import Csg
-from engine.solids.polygon import Polygon
-from engine.solids.polyhedron import Polyhedron
 from engine.solids.pose import Pose
 from engine.solids.sphere import Sphere
 from engine.solids.triangle import Triangle
@@ -21,7 +19,7 @@ Box = tuple[FloatArray, FloatArray]
 
 
 def moved_boxes(lows: FloatArray, highs: FloatArray, frames: Frames, rows: Int32Array) -> Box:
-    """Return boxes (n, 3) around the images of finite boxes under poses, of each its row; -1 for none."""
+    """Return boxes (n, 2 or 3) around the images of finite boxes under poses, of each its row; -1 for none."""
     low, high, n = np.empty_like(lows), np.empty_like(highs), len(rows)
     boxes, moves = np.stack([lows, highs], axis=1), (frames.rotations, frames.translations)
     with np.errstate(all="ignore"):
@@ -30,7 +28,7 @@ def moved_boxes(lows: FloatArray, highs: FloatArray, frames: Frames, rows: Int32
 
 
 def grown_boxes(centers: FloatArray, reach: FloatArray) -> Box:
-    """Return boxes (n, 3) around balls of a radius (n,), rounded outward."""
+    """Return boxes (n, 2 or 3) around balls of a radius (n,), rounded outward."""
     with np.errstate(over="ignore"):
         low, high = centers - reach[:, None], centers + reach[:, None]
         return np.nextafter(np.nextafter(low, -np.inf), -np.inf), np.nextafter(np.nextafter(high, np.inf), np.inf)
@@ -44,29 +42,15 @@ def body_box(solid: Solid, pose: Pose | None, check: Check) -> Box:
     if isinstance(solid, Csg):
         found: Box = over_tree(solid, lambda leaf: body_box(leaf, pose, check), _csg_box)
         return found
-    low, high = own_box(solid, check)
-    if np.isinf(low).any() or (pose is None and not isinstance(solid, Sphere)):
-        return low, high
-    lows, highs = np.zeros((1, 3)), np.zeros((1, 3))
-    lows[0, : len(low)], highs[0, : len(high)] = low, high
+    low, high, _ = own_box(solid, check)
+    if np.isinf(low).any() or (isinstance(solid, Triangle) and solid.dimension == 3):  # a prism
+        return np.full(solid.dimension, -np.inf), np.full(solid.dimension, np.inf)
     frames = frames_of([pose], len(low))
-    lows, highs = moved_boxes(lows, highs, frames, frames.rows)
+    lows, highs = moved_boxes(low[None], high[None], frames, frames.rows)
     if isinstance(solid, Sphere):  # its box was that of its centre
-        lows = grown_boxes(lows, np.array([solid.radius]))[0]
-        highs = grown_boxes(highs, np.array([solid.radius]))[1]
-    return lows[0, : len(low)], highs[0, : len(high)]
-
-
-def own_box(solid: Solid, check: Check) -> Box:
-    """Return the box of a solid in its own frame, of a sphere that of its centre."""
-    if isinstance(solid, Sphere):
-        return solid.center, solid.center
-    if isinstance(solid, Aabb):
-        return solid.min, solid.max
-    if isinstance(solid, (Polygon, Polyhedron)) or (isinstance(solid, Triangle) and solid.dimension == 2):
-        vertices = solid.vertices
-        return solid.prepared("vertex_box", lambda: (vertices.min(axis=0), vertices.max(axis=0)), check)
-    return np.full(solid.dimension, -np.inf), np.full(solid.dimension, np.inf)
+        reach = np.array([solid.radius])
+        lows, highs = grown_boxes(lows, reach)[0], grown_boxes(highs, reach)[1]
+    return lows[0], highs[0]
 
 
 def _csg_box(operation: str, boxes: list[Box]) -> Box:

@@ -17,14 +17,15 @@ from engine.containment.locators import Locator
 from engine.containment.methods.polygon_one_pass import close_rings
 from engine.containment.posed.frames import frames_of
 from engine.containment.posed.locators import posed_locator
-from engine.containment.scene.bodies import body_box, grown_boxes, moved_boxes, own_box
+from engine.containment.scene.bodies import body_box, grown_boxes, moved_boxes
 from engine.containment.scene.first_pass import BALL, BOX, CELLS, RINGS, ROWS, SECOND_PASS, SceneTables
 from engine.containment.scene.grid import SceneGrid, build_scene_grid
 from engine.errors import EngineError
 from engine.parallel import Budget
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
-from engine.solids.convex import Convex
+from engine.solids.bounds import own_box
+from engine.solids.convex import Convex, rows_in_space, rows_of
 from engine.solids.half_space import HalfSpace
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
@@ -196,13 +197,9 @@ class _Kinds:
 
     def _set_rows(self, indices: list[int]) -> None:
         solids = self._chosen(indices, ROWS)
-        planes = [solid.planes if isinstance(solid, Convex) else solid.row[None] for solid in solids]
-        offsets = _offsets(np.array([len(each) for each in planes], np.int64))
-        rows = np.zeros((int(offsets[-1]), 4))
-        if planes:
-            together = np.concatenate(planes)
-            rows[:, : self._dimension], rows[:, 3] = together[:, :-1], together[:, -1]
-        self.row_offsets, self.rows = offsets, rows
+        planes = [rows_of(solid) for solid in solids]
+        self.row_offsets = _offsets(np.array([len(each) for each in planes], np.int64))
+        self.rows = rows_in_space(np.concatenate([np.zeros((0, self._dimension + 1)), *planes]))
 
     def _set_cells(self, indices: list[int], budget: Budget) -> None:
         """Take the cells that are there; a polyhedron without waits for the second pass."""
@@ -211,7 +208,7 @@ class _Kinds:
             if turn % _CHECK_EVERY == 0:
                 budget.check()
             solid = self._solids[index]
-            self.lows[index], self.highs[index] = own_box(solid, budget.check)
+            self.lows[index], self.highs[index], _ = own_box(solid, budget.check)
             cells = solid.kept("top_cells")
             if cells is not None:
                 found.append((index, cells))

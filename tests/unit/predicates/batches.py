@@ -7,10 +7,11 @@ from typing import Any
 import numba
 
 from engine.jit import _OPTIONS
-from engine.predicates.loading import as_half_space2, as_half_space3, as_point2, as_point3
+from engine.predicates.loading import as_half_space3, as_point2, as_point3
 from engine.predicates.orientation import orient2d, orient2d_filter, orient3d_filter
-from engine.predicates.polynomial import sign_of_polynomial
-from engine.predicates.side import side_of_line, side_of_plane
+from engine.predicates.polynomial import sign_of_polynomial_exact, sign_of_polynomial_filter
+from engine.predicates.side import side_of_plane
+from engine.types import UNDECIDED
 
 kernel = numba.njit(**_OPTIONS)
 
@@ -38,16 +39,11 @@ def orient3d_filter_batch(a: Any, b: Any, c: Any, d: Any, sides: Any) -> None:
 
 @kernel
 def sign_of_polynomial_batch(powers: Any, coefficients: Any, degree: int, points: Any, sides: Any) -> None:
-    """Fill sides (n,) int8 with sign_of_polynomial at the rows of points (n, dim) float64."""
+    """Fill sides (n,) int8 with the sign of the polynomial at the rows of points (n, dim) float64."""
     for item in range(sides.shape[0]):
-        sides[item] = sign_of_polynomial(powers, coefficients, degree, points, item)
-
-
-@kernel
-def side_of_line_batch(rows: Any, points: Any, sides: Any) -> None:
-    """Fill sides (n,) int8 with side_of_line of the rows (n, 3) and the points (n, 2) float64."""
-    for item in range(sides.shape[0]):
-        sides[item] = side_of_line(as_half_space2(rows, item), as_point2(points, item))
+        sides[item] = sign_of_polynomial_filter(powers, coefficients, degree, points, item)
+        if sides[item] == UNDECIDED:
+            sides[item] = sign_of_polynomial_exact(powers, coefficients, points, item)
 
 
 @kernel

@@ -1,8 +1,6 @@
-"""side_of_line and side_of_plane against rational arithmetic, at every exponent."""
+"""side_of_plane against rational arithmetic, at every exponent."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -10,15 +8,18 @@ import pytest
 
 from engine.predicates.rational import side_rational
 from engine.types import UNDECIDED
-from tests.unit.predicates.batches import side_of_line_batch, side_of_plane_batch
+from tests.unit.predicates.batches import side_of_plane_batch
 
 Array = npt.NDArray[np.float64]
 
 
-def run(batch: Any, rows: Array, points: Array) -> npt.NDArray[np.int8]:
+def run(rows: Array, points: Array) -> npt.NDArray[np.int8]:
+    """Ask for planes, or for lines as planes along z."""
+    if points.shape[1] == 2:
+        rows, points = np.insert(rows, 2, 0.0, axis=1), np.insert(points, 2, 0.0, axis=1)
     sides = np.empty(len(points), np.int8)
     with np.errstate(all="ignore"):
-        batch(np.ascontiguousarray(rows), np.ascontiguousarray(points), sides)
+        side_of_plane_batch(np.ascontiguousarray(rows), np.ascontiguousarray(points), sides)
     return sides
 
 
@@ -41,8 +42,7 @@ def near_planes(dimension: int, n: int, seed: int) -> tuple[Array, Array]:
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_points_near_planes(dimension: int) -> None:
     rows, points = near_planes(dimension, 10_000, 1)
-    batch = side_of_line_batch if dimension == 2 else side_of_plane_batch
-    sides = run(batch, rows, points)
+    sides = run(rows, points)
     assert (sides == exact(rows, points)).all()
     assert {-1, 0, 1} == set(sides.tolist())
 
@@ -54,8 +54,7 @@ def test_every_exponent(dimension: int) -> None:
     by_axis = draw.integers(-1000, 1000, rows.shape)
     rows = np.ldexp(rows, np.where(draw.random(len(rows)) < 0.3, by_axis.T, by_axis[:, :1].T).T)
     points = np.ldexp(points, np.clip(by_axis[:, -1:] - by_axis[:, :-1], -1000, 1000))
-    batch = side_of_line_batch if dimension == 2 else side_of_plane_batch
-    sides = run(batch, rows, points)
+    sides = run(rows, points)
     assert (sides == exact(rows, points))[sides != UNDECIDED].all()
     assert (sides != UNDECIDED).mean() > 0.99
 
@@ -64,7 +63,7 @@ def test_random_bit_patterns() -> None:
     draw = np.random.default_rng(4)
     bits = draw.integers(0, 2**64, (6000, 7), dtype=np.uint64).view(np.float64)
     bits = np.where(np.isfinite(bits), bits, 0.0)
-    sides = run(side_of_plane_batch, bits[:, :4], bits[:, 4:])
+    sides = run(bits[:, :4], bits[:, 4:])
     assert (sides == exact(bits[:, :4], bits[:, 4:]))[sides != UNDECIDED].all()
 
 
@@ -78,4 +77,4 @@ def test_terms_that_underflow_or_overflow() -> None:
         ((0.0, 1.0, -tiny), (huge, tiny), 0),
     ]
     for row, point, expected in cases:
-        assert run(side_of_line_batch, np.array([row]), np.array([point])).tolist() == [expected]
+        assert run(np.array([row]), np.array([point])).tolist() == [expected]

@@ -14,7 +14,6 @@ from numba import config as numba_config
 from engine.predicates.orientation import orient3d_batch
 from tests.unit.predicates.batches import (
     orient2d_batch,
-    side_of_line_batch,
     side_of_plane_batch,
     sign_of_polynomial_batch,
 )
@@ -37,7 +36,7 @@ def all_signs() -> str:
     with np.errstate(all="ignore"):
         orient2d_batch(*flat[:3], answers[0])
         orient3d_batch(*points, answers[1])
-        side_of_line_batch(np.ascontiguousarray(rows[:, :3]), flat[2], answers[2])
+        side_of_plane_batch(rows * [1.0, 1.0, 0.0, 1.0], points[2], answers[2])
         side_of_plane_batch(rows, points[2], answers[3])
         sign_of_polynomial_batch(powers, np.array([9.0, 9.0, 9.0, -9.0]), 2, points[3], answers[4])
         orient3d_posed_batch(poses, points, bodies, 0.0, True, answers[5])
