@@ -32,7 +32,7 @@ from engine.predicates.rational import (
 )
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
-from engine.solids.convex import Convex
+from engine.solids.convex import Convex, rows_of
 from engine.solids.csg import Csg
 from engine.solids.half_space import HalfSpace
 from engine.solids.implicit import Implicit
@@ -213,13 +213,6 @@ def _in_sphere(center: Sequence[Number], radius: float, point: Sequence[Number])
     return sign_of(r * r - sum((flat[k] - flat[k + dimension]) ** 2 for k in range(dimension)))
 
 
-def _in_aabb(solid: Aabb, point: Sequence[Number]) -> int:
-    return min(
-        [sign_of(Fraction(value) - Fraction(low)) for value, low in zip(point, solid.min.tolist())]
-        + [sign_of(Fraction(high) - Fraction(value)) for value, high in zip(point, solid.max.tolist())]
-    )
-
-
 def _in_implicit(solid: Implicit, point: Sequence[Number]) -> int:
     if solid.function is not None:
         value = np.asarray(solid.function(np.array([[float(x) for x in point]])), dtype=np.float64).ravel()[0]
@@ -293,12 +286,8 @@ def rational_location(point: Sequence[Number], solid: Solid, pose: Pose | None =
             return min(side_rational(wall, point) for wall in prism_walls(solid))
         case Polygon() | Triangle():
             return _in_polygon(point, solid, check)
-        case Aabb():
-            return _in_aabb(solid, point)
-        case HalfSpace():
-            return side_rational(solid.row.tolist(), point)
-        case Convex():
-            return min([side_rational(row, point) for row in solid.planes.tolist()])
+        case HalfSpace() | Aabb() | Convex():
+            return min(side_rational(row, point) for row in rows_of(solid).tolist())
         case Implicit():
             return _in_implicit(solid, point)
     raise unsupported(solid)

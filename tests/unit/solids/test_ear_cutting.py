@@ -10,6 +10,7 @@ import pytest
 
 import engine
 from engine.parallel import Budget
+from engine.solids.convex_faces import UNSURE
 from engine.solids.ear_cutting import cut_faces, cut_ring
 from tests.reference.exact import vector
 from tests.reference.solids import cut_face
@@ -106,7 +107,7 @@ def test_the_certificate_for_many_faces_changes_nothing() -> None:
     together, faces = cut_faces(vertices, offsets, indices, indices, Budget())
     one_by_one = []
     for i_ring, ring in enumerate(rings):
-        ears = cut_ring(ring, i_ring, np.arange(len(ring)), Budget()).tolist()
+        ears = cut_ring(ring, UNSURE, i_ring, np.arange(len(ring)), Budget()).tolist()
         one_by_one += [[offsets[i_ring] + corner for corner in ear] for ear in ears]
     assert together.reshape(-1, 3).tolist() == one_by_one
     assert faces.tolist() == [i_ring for i_ring, ring in enumerate(rings) for _ in range(len(ring) - 2)]
