@@ -49,8 +49,12 @@ def convex_planes(region: Polyhedron, check: Check) -> list[Row]:
     """
 
     def build() -> list[Row]:
-        corners = region.vertices[_outward_triangles(region, check)].tolist()
-        return list(dict.fromkeys(reduced(plane_through(a, b, c)) for a, b, c in corners))
+        found: dict[Row, None] = {}
+        for turn, (a, b, c) in enumerate(region.vertices[_outward_triangles(region, check)].tolist()):
+            if turn % 256 == 0:
+                check()
+            found[reduced(plane_through(a, b, c))] = None
+        return list(found)
 
     return region.prepared("convex_planes", build)
 
