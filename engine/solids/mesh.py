@@ -16,16 +16,23 @@ import numpy.typing as npt
 
 from engine.arrays import FloatArray, IntArray, read_only
 from engine.direct import entry_of
-from engine.errors import IndexOutOfRangeError, InvalidArrayError, RepeatedIndexError, RingTooShortError
+from engine.errors import (
+    InconsistentOrientationError,
+    IndexOutOfRangeError,
+    InvalidArrayError,
+    NotClosedError,
+    RepeatedIndexError,
+    RingTooShortError,
+)
 from engine.parallel import Budget, Cancel, poll
 from engine.solids.base import Solid
-from engine.solids.checks import as_points, check_not_empty, frozen, shown
+from engine.solids.checks import as_points, check_not_empty, digits, frozen, shown
 from engine.solids.ear_cutting import cut_faces
-from engine.solids.mesh_checks import look_over
-from engine.solids.unbalanced_edges import unbalanced_edges
+from engine.solids.mesh_checks import look_over, name_unbalanced
 
 _AT_ONCE: Final = 1 << 15
 """Faces of a list looked at between two looks at the clock."""
+_N_NAMED: Final = 3  # edges that a message names
 
 
 class Mesh(Solid):
@@ -66,7 +73,7 @@ class Mesh(Solid):
             raise _repeated_index(i_face, indices[offsets[i_face] : offsets[i_face + 1]])
         triangles, triangle_faces = indices if n_different == len(points) else merged, None
         if n_unbalanced > 0:
-            raise unbalanced_edges(points, offsets, indices, triangles, budget)
+            raise _unbalanced_edges(points, offsets, indices, triangles, budget)
         if given is not None:
             triangles, triangle_faces = cut_faces(points, offsets, indices, triangles, budget)
         for array in (given, indices, triangles, triangle_faces):
@@ -215,6 +222,34 @@ def _repeated_index(i_face: int, face: IntArray) -> RepeatedIndexError:
         "leave the face out or split it there",
         ("faces", i_face),
     )
+
+
+def _unbalanced_edges(
+    vertices: FloatArray, offsets: IntArray, indices: IntArray, merged: IntArray, budget: Budget
+) -> NotClosedError | InconsistentOrientationError:
+    """Return the error that names the first edges that are not used equally often in both directions.
+
+    indices, merged: the corners of all faces, as given and with equal positions made one index. An edge between two
+    corners at one position has no length and both directions at once: it is left out.
+    """
+    named = np.empty((_N_NAMED, 5), np.int64)
+    n_odd, n_turned = name_unbalanced(offsets, merged, len(vertices), named, budget.flag)
+    budget.check()
+    kind: type[NotClosedError | InconsistentOrientationError]
+    if n_odd > 0:
+        kind, n, claim = NotClosedError, n_odd, "are open"
+        advice = "close the mesh, or use a surface for collision only"
+    else:
+        kind, n, claim = InconsistentOrientationError, n_turned, "are not used equally often in both directions"
+        advice = "turn the faces that run the wrong way"
+    lines = [
+        f"edge {indices[corner]}-{indices[following]} of face {face}, "
+        f"from {digits(vertices[indices[corner]])} to {digits(vertices[indices[following]])}, "
+        f"used {forth} times in this direction and {back} in the other"
+        for face, corner, following, forth, back in named[named[:, 0] >= 0].tolist()
+    ]
+    more = "; ..." if n > len(lines) else ""
+    return kind(f"{n} edges {claim}: {'; '.join(lines)}{more}; {advice}", ("faces", int(named[0, 0])))
 
 
 def _shortened(items: list[int]) -> str:
