@@ -28,7 +28,7 @@ from engine.parallel import Budget, Cancel, poll
 from engine.solids.base import Solid
 from engine.solids.checks import as_points, check_not_empty, digits, frozen, shown
 from engine.solids.ear_cutting import cut_faces
-from engine.solids.mesh_checks import look_over, name_unbalanced
+from engine.solids.mesh_checks import look_over
 
 _AT_ONCE: Final = 1 << 15
 """Faces of a list looked at between two looks at the clock."""
@@ -65,15 +65,16 @@ class Mesh(Solid):
         budget.check()
         offsets = np.arange(0, len(indices) + 1, 3) if given is None else given
         merged = np.empty(len(indices), np.int64)
-        i_face, n_different, n_unbalanced = entry_of(look_over)(
-            points.view(np.uint64), offsets, indices, self._must_close, merged, budget.flag
+        named = np.full((_N_NAMED, 5), -1)
+        i_face, n_different, n_odd, n_turned = entry_of(look_over)(
+            points.view(np.uint64), offsets, indices, self._must_close, merged, named, budget.flag
         )
         budget.check()
         if i_face >= 0:
             raise _repeated_index(i_face, indices[offsets[i_face] : offsets[i_face + 1]])
         triangles, triangle_faces = indices if n_different == len(points) else merged, None
-        if n_unbalanced > 0:
-            raise _unbalanced_edges(points, offsets, indices, triangles, budget)
+        if n_odd + n_turned > 0:
+            raise _unbalanced_edges(points, indices, named, n_odd, n_turned)
         if given is not None:
             triangles, triangle_faces = cut_faces(points, offsets, indices, triangles, budget)
         for array in (given, indices, triangles, triangle_faces):
@@ -210,7 +211,8 @@ def first_equal(points: FloatArray) -> IntArray | None:
     n = len(points)
     every, first = np.arange(n), np.empty(n, np.int64)
     one_face, no_flag = np.array([0, n]), np.zeros(1, np.uint8)
-    _, n_different, _ = entry_of(look_over)(points.view(np.uint64), one_face, every, False, first, no_flag)
+    none = np.empty((0, 5), np.int64)
+    n_different = entry_of(look_over)(points.view(np.uint64), one_face, every, False, first, none, no_flag)[1]
     return None if n_different == n else first
 
 
@@ -225,16 +227,9 @@ def _repeated_index(i_face: int, face: IntArray) -> RepeatedIndexError:
 
 
 def _unbalanced_edges(
-    vertices: FloatArray, offsets: IntArray, indices: IntArray, merged: IntArray, budget: Budget
+    vertices: FloatArray, indices: IntArray, named: IntArray, n_odd: int, n_turned: int
 ) -> NotClosedError | InconsistentOrientationError:
-    """Return the error that names the first edges that are not used equally often in both directions.
-
-    indices, merged: the corners of all faces, as given and with equal positions made one index. An edge between two
-    corners at one position has no length and both directions at once: it is left out.
-    """
-    named = np.empty((_N_NAMED, 5), np.int64)
-    n_odd, n_turned = name_unbalanced(offsets, merged, len(vertices), named, budget.flag)
-    budget.check()
+    """Return the error that names some of the edges that are not used equally often in both directions."""
     kind: type[NotClosedError | InconsistentOrientationError]
     if n_odd > 0:
         kind, n, claim = NotClosedError, n_odd, "are open"

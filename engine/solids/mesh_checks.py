@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.jit import inline, kernel
+from engine.jit import called, inline, kernel
 
 _POLL: Final = 0x3FFF
 """Items between two looks at the flag, one less than a power of two: a fraction of a millisecond."""
@@ -33,7 +33,7 @@ def _mixed(bits: Any, row: int) -> Any:
     return (mixed ^ (mixed >> _HALF)) * _ODD
 
 
-@inline
+@called
 def _find_equal_rows(bits: Any, first: Any, flag: Any) -> int:
     """Set `first` (n,) to the first row of `bits` (n, 3) uint64 that equals each row; return the number of different
     ones.
@@ -89,7 +89,7 @@ def _following(offsets: Any, face: int, corner: int) -> int:
     return corner + 1 if corner + 1 < offsets[face + 1] else offsets[face]
 
 
-@inline
+@called
 def _group_edges(offsets: Any, indices: Any, starts: Any, ends: Any, flag: Any) -> None:
     """Put the edges of all faces into `ends`, those with the lower vertex v at ``starts[v]`` to ``starts[v + 1]``.
 
@@ -114,12 +114,11 @@ def _group_edges(offsets: Any, indices: Any, starts: Any, ends: Any, flag: Any) 
                 starts[vertex] += starts[vertex - 1]
 
 
-@inline
+@called
 def _count_unbalanced(starts: Any, ends: Any, marks: Any, flag: Any) -> tuple[int, int]:
     """Return how many edges are used an odd number of times, and how many others more often in one direction.
 
-    starts, ends: from `_group_edges`. marks: int8, set to _ODD_USES or _TURNED at every use of such edges, else 0; an
-    empty array where only the numbers are asked for.
+    starts, ends: from `_group_edges`. marks: int8, set to _ODD_USES or _TURNED at every use of such edges, else 0.
     """
     uses, n_odd, n_turned = np.zeros(starts.shape[0], np.int64), 0, 0
     for low in range(starts.shape[0] - 2):
@@ -131,7 +130,7 @@ def _count_unbalanced(starts: Any, ends: Any, marks: Any, flag: Any) -> tuple[in
                 uses[end] += 1
             else:
                 uses[~end] -= 1
-        for place in range(starts[low], min(starts[low + 1], marks.shape[0])):
+        for place in range(starts[low], starts[low + 1]):
             net = uses[max(ends[place], ~ends[place])]
             marks[place] = 0 if net == 0 else _ODD_USES if net & 1 == 1 else _TURNED
         for place in range(starts[low], starts[low + 1]):
@@ -144,50 +143,19 @@ def _count_unbalanced(starts: Any, ends: Any, marks: Any, flag: Any) -> tuple[in
     return n_odd, n_turned
 
 
-@kernel
-def look_over(bits: Any, offsets: Any, indices: Any, must_close: bool, merged: Any, flag: Any) -> tuple[int, int, int]:
-    """Return the first face that names a vertex twice (-1: none), the number of different vertices, and the number of
-    edges that are not used equally often in both directions (0 unless it must be so).
-
-    bits: the vertices (n, 3) uint64. merged: set to the first of all equal vertices at each corner, if two are equal.
-    """
-    n = bits.shape[0]
-    repeated = _find_repeat(offsets, indices, n, flag)
-    if repeated >= 0 or flag[0] != 0:
-        return repeated, n, 0
-    first = np.empty(n, np.int64)
-    n_different = _find_equal_rows(bits, first, flag)
-    if n_different < n:
-        for corner in range(indices.shape[0]):
-            if corner & _POLL == 0 and flag[0] != 0:
-                break
-            merged[corner] = first[indices[corner]]
-    if not must_close or flag[0] != 0:
-        return -1, n_different, 0
-    corners = merged if n_different < n else indices
-    starts, ends = np.zeros(n + 2, np.int64), np.empty(indices.shape[0], np.int64)
-    _group_edges(offsets, corners, starts, ends, flag)
-    n_odd, n_turned = _count_unbalanced(starts, ends, np.empty(0, np.int8), flag)
-    return -1, n_different, n_odd + n_turned
-
-
-@kernel
-def name_unbalanced(offsets: Any, corners: Any, n_vertices: int, named: Any, flag: Any) -> tuple[int, int]:
-    """Return what `_count_unbalanced` does and set `named` (k, 5) to the first edges of the first kind that there is.
-
-    A row: the face and the corner where the edge is used first, the next corner, how often it is used in this direction
-    and in the other; -1 where there is no further edge.
-    """
-    starts, ends = np.zeros(n_vertices + 2, np.int64), np.empty(corners.shape[0], np.int64)
-    marks = np.empty(corners.shape[0], np.int8)
-    _group_edges(offsets, corners, starts, ends, flag)
-    n_odd, n_turned = _count_unbalanced(starts, ends, marks, flag)
-    wanted, places = _ODD_USES if n_odd > 0 else _TURNED, starts.copy()
-    named[:] = -1
+@called
+def _name_unbalanced(
+    offsets: Any, corners: Any, starts: Any, ends: Any, marks: Any, wanted: int, named: Any, flag: Any
+) -> None:
+    """Set `named` (k, 5) to the first edges that are marked so: the face and the corner where the edge is used first,
+    the next corner, how often it is used in this direction and in the other."""
+    places = np.empty_like(starts)
+    for vertex in range(len(starts)):
+        places[vertex] = starts[vertex]
     n_named = 0
     for face in range(offsets.shape[0] - 1):
         if face & _POLL == 0 and flag[0] != 0:
-            break
+            return
         for corner in range(offsets[face], offsets[face + 1]):
             following = _following(offsets, face, corner)
             start, end = corners[corner], corners[following]
@@ -202,10 +170,41 @@ def name_unbalanced(offsets: Any, corners: Any, n_vertices: int, named: Any, fla
                     down += ends[other] == ~high
                     if ends[other] == high or ends[other] == ~high:
                         marks[other] = 0  # named once
-                named[n_named] = (
-                    (face, corner, following, up, down) if start == low else (face, corner, following, down, up)
-                )
+                named[n_named, 0], named[n_named, 1], named[n_named, 2] = face, corner, following
+                named[n_named, 3], named[n_named, 4] = (up, down) if start == low else (down, up)
                 n_named += 1
                 if n_named == named.shape[0]:
-                    return n_odd, n_turned
-    return n_odd, n_turned
+                    return
+
+
+@kernel
+def look_over(
+    bits: Any, offsets: Any, indices: Any, must_close: bool, merged: Any, named: Any, flag: Any
+) -> tuple[int, int, int, int]:
+    """Return the first face that names a vertex twice (-1: none), the number of different vertices, and what
+    `_count_unbalanced` does (0, 0 unless each edge must be used equally often in both directions).
+
+    bits: the vertices (n, 3) uint64. merged: set to the first of all equal vertices at each corner, if two are equal.
+    named: set by `_name_unbalanced`, of the first kind that there is.
+    """
+    n = bits.shape[0]
+    repeated = _find_repeat(offsets, indices, n, flag)
+    if repeated >= 0 or flag[0] != 0:
+        return repeated, n, 0, 0
+    first = np.empty(n, np.int64)
+    n_different = _find_equal_rows(bits, first, flag)
+    if n_different < n:
+        for corner in range(indices.shape[0]):
+            if corner & _POLL == 0 and flag[0] != 0:
+                break
+            merged[corner] = first[indices[corner]]
+    if not must_close or flag[0] != 0:
+        return -1, n_different, 0, 0
+    corners = merged if n_different < n else indices
+    starts, ends = np.zeros(n + 2, np.int64), np.empty(indices.shape[0], np.int64)
+    _group_edges(offsets, corners, starts, ends, flag)
+    marks = np.empty(indices.shape[0], np.int8)
+    n_odd, n_turned = _count_unbalanced(starts, ends, marks, flag)
+    if n_odd + n_turned > 0:
+        _name_unbalanced(offsets, corners, starts, ends, marks, _ODD_USES if n_odd > 0 else _TURNED, named, flag)
+    return -1, n_different, n_odd, n_turned

@@ -14,15 +14,15 @@ from engine.direct import entry_of
 from engine.solids import mesh_checks
 from engine.solids.checks import frozen
 from engine.solids.mesh import first_equal
-from engine.solids.mesh_checks import look_over, name_unbalanced
+from engine.solids.mesh_checks import look_over
 
 STILL = np.zeros(1, np.uint8)
 
 
-def looked_over(points: Any, offsets: Any, indices: Any, flag: Any = STILL) -> tuple[Any, list[int]]:
-    merged = np.array(indices)
-    bits = frozen(points).view(np.uint64)
-    return entry_of(look_over)(bits, np.asarray(offsets), np.asarray(indices), True, merged, flag), merged.tolist()
+def looked_over(points: Any, offsets: Any, indices: Any, flag: Any = STILL) -> tuple[Any, list[int], Any]:
+    merged, named, bits = np.array(indices), np.full((3, 5), -1), frozen(points).view(np.uint64)
+    found = entry_of(look_over)(bits, np.asarray(offsets), np.asarray(indices), True, merged, named, flag)
+    return found, merged.tolist(), named
 
 
 def test_equal_rows() -> None:
@@ -60,16 +60,13 @@ def test_edges_against_a_count() -> None:
         corners = [[first[corner] for corner in face] for face in faces]
         uses = Counter(edge for face in corners for edge in zip(face, face[1:] + face[:1]) if edge[0] != edge[1])
         balance = {(a, b): uses[a, b] - uses[b, a] for a in range(n_vertices) for b in range(a + 1, n_vertices)}
-        expected = [[*edge, net % 2] for edge, net in sorted(balance.items()) if net]
-        found, merged = looked_over(points, offsets, indices)
+        found, merged, named = looked_over(points, offsets, indices)
         if any(repeated):
-            assert found == (repeated.index(True), n_vertices, 0)
+            assert found == (repeated.index(True), n_vertices, 0, 0)
             continue
-        assert found == (-1, len(set(first)), len(expected))
-        assert merged == [corner for face in corners for corner in face]
-        named = np.empty((3, 5), np.int64)
         n_odd = sum(net % 2 for net in balance.values())
-        assert name_unbalanced(offsets, np.array(merged), n_vertices, named, STILL) == (n_odd, len(expected) - n_odd)
+        assert found == (-1, len(set(first)), n_odd, sum(net != 0 for net in balance.values()) - n_odd)
+        assert merged == [corner for face in corners for corner in face]
         kept = dict.fromkeys(
             (min(edge), max(edge))
             for edge in uses
@@ -86,9 +83,8 @@ def edges_of(named: Any, merged: list[int]) -> dict[tuple[int, int], tuple[int, 
 
 def test_a_raised_flag_ends_every_kernel() -> None:
     raised, offsets, indices = np.ones(1, np.uint8), np.array([0, 3, 6]), np.array([0, 1, 0, 0, 1, 2])
-    assert looked_over(np.zeros((3, 3)), offsets, indices, raised) == ((-1, 3, 0), indices.tolist())
-    named = np.empty((2, 5), np.int64)
-    assert name_unbalanced(offsets, indices, 3, named, raised) == (0, 0)
+    found, merged, named = looked_over(np.zeros((3, 3)), offsets, indices, raised)
+    assert (found, merged) == ((-1, 3, 0, 0), indices.tolist())
     assert (named == -1).all()
 
 
