@@ -40,5 +40,5 @@ def _late(size: Size, name: str, ask: Any, is_first: bool = False) -> Figure:
         again = partial(ask, ends.new(ends.solid("fine"))) if is_first else ask
         found.append(ends.cpu_after(again, seconds, False))
     return Figure(
-        name, "s", [max(found)], AFTER, AIM, f"CPU after a deadline of {seconds} s, the worst of {len(found)}"
+        name, "s", [max(0.0, *found)], AFTER, AIM, f"CPU after a deadline of {seconds} s, the worst of {len(found)}"
     )
