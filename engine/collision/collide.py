@@ -26,8 +26,8 @@ from engine.collision.simple.closed_forms import (
     collide_half_space_half_space,
     collide_half_space_sphere,
     collide_sphere_sphere,
-    flush_boxes,
     relate_boxes,
+    touching_boxes,
 )
 from engine.errors import InvalidArrayError, UnsupportedPairError, UnsupportedSolidError, WrongDimensionError
 from engine.parallel import Budget, Cancel, Options, Progress, check_options
@@ -48,7 +48,7 @@ def _aabb_aabb(first: Aabb, second: Aabb, first_pose: Pose | None, second_pose: 
             return UNNAMED[relation]
         if relation < OVERLAPPING:
             return FIRST_WITHIN if relation == FIRST_INSIDE_SECOND else SECOND_WITHIN
-        if relation == TOUCHING and first.dimension == 3 and (witness := flush_boxes(*bounds)) is not None:
+        if relation == TOUCHING and first.dimension == 3 and (witness := touching_boxes(*bounds)) is not None:
             return Collision(Relation.TOUCHING, witness)
     bodies = mesh_mesh if first.dimension == 3 else collide_outline_outline
     return bodies(first, second, first_pose, second_pose, work)

@@ -10,12 +10,12 @@ import numpy as np
 from engine.arrays import FloatArray, Int8Array, IntArray, read_only
 from engine.collision.answers import Answers, Witnesses, accuracy_of
 from engine.collision.codes import DISJOINT, UNSETTLED
-from engine.collision.collide import pair_function
+from engine.collision.collide import collide_pair, pair_function
 from engine.collision.detail import NO_DETAIL, check_has_detail, details_where_proven, has_interior
 from engine.collision.meshes.contact_kinds import N_NAMED
 from engine.collision.meshes.mesh_arrays import STILL, mesh_body_of
-from engine.collision.meshes.mesh_mesh import SPACE, witness_of
-from engine.collision.meshes.mesh_pair import what_to_seek
+from engine.collision.meshes.mesh_mesh import answer_of
+from engine.collision.meshes.mesh_pair import SPACE, what_to_seek
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.meshes.pose_batch import N_COLUMNS, RELATION, relate_poses
 from engine.collision.result import MESHES, Work
@@ -74,6 +74,13 @@ def collide_poses(
         check_has_detail(((("first",), first), (("second",), second)), boolean)
     poses = PoseArrays(*as_poses(rotations, translations, first.dimension), True)
     n_poses = len(poses.rotations)
+    if n_poses == 1 and progress is None and not (detail or report):
+        with Budget(deadline, cancel) as budget:
+            budget.check()
+            work = Work(budget, witness=bool(witnesses), boolean=bool(boolean))
+            one = collide_pair(first, second, None, Pose.of_checked(poses.rotations[0], poses.translations[0]), work)
+        relations = np.array([one.relation], np.int8)
+        return (relations, [one.witness]) if witnesses else relations
     with Budget(deadline, cancel) as budget:
         budget.check()
         has_detail = detail and has_interior(first, budget) and has_interior(second, budget)
@@ -90,7 +97,7 @@ def collide_poses(
                 details[start:stop] = details_where_proven(relations[start:stop])
             answers.settle(
                 answers.left(start, stop),
-                lambda item: (first, second, None, Pose(poses.rotations[item], poses.translations[item])),
+                lambda item: (first, second, None, Pose.of_checked(poses.rotations[item], poses.translations[item])),
             )
 
         run_chunks(task, n_poses, budget=budget, first_chunk=8, workers=workers, progress=progress)
@@ -128,9 +135,9 @@ def batch_of(first: Solid, second: Solid, poses: PoseArrays, answers: Answers) -
         return None
     budget, relations, witnesses = answers.budget, answers.relations, answers.witnesses
     poses = PoseArrays(read_only(poses.rotations), read_only(poses.translations), True)
-    convex = convex_poses(first, second, poses, relations, budget, answers.boolean)
+    is_named = witnesses is not None  # then a search for contacts has to follow, and tells all relations
+    convex = convex_poses(first, second, poses, relations, budget, answers.boolean or is_named)
     a, b = mesh_body_of(first), mesh_body_of(second)
-    is_named = witnesses is not None
     seek = what_to_seek(a, b, Work(budget, is_named, answers.boolean))
 
     def fill(start: int, stop: int) -> None:
@@ -150,6 +157,7 @@ def batch_of(first: Solid, second: Solid, poses: PoseArrays, answers: Answers) -
             N_NAMED if is_named else 0,
             SPACE.descent,
             SPACE.found,
+            0,
             rows,
             budget.flag,
         )
@@ -158,7 +166,7 @@ def batch_of(first: Solid, second: Solid, poses: PoseArrays, answers: Answers) -
         if witnesses is not None:
             numbers = range(start, stop) if isinstance(items, slice) else items.tolist()
             for item, row in zip(numbers, rows.tolist()):
-                if row[RELATION] > DISJOINT:
-                    witnesses[item] = witness_of(row, a, b, seek)
+                if row[RELATION] > DISJOINT and (answer := answer_of(row, a, b, seek)) is not None:
+                    witnesses[item] = answer.witness
 
     return fill

@@ -18,9 +18,8 @@ import numpy as np
 
 from engine.arrays import FloatArray, Int8Array
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
-from engine.collision.meshes.exact_body import Corners, on_lattice
 from engine.collision.meshes.exact_triangles import classify_exact
-from engine.collision.meshes.mesh_arrays import NO_AREA, UNKNOWN_AXIS, axis_of, lattice_shift
+from engine.collision.meshes.mesh_arrays import NO_AREA, UNKNOWN_AXIS, axis_of
 from engine.collision.meshes.triangle_triangle import APART, Triangle3, classify_exactly, classify_near, with_pose
 from engine.collision.planar.outline import collide_outline_outline
 from engine.collision.result import Work
@@ -29,6 +28,7 @@ from engine.jit import inline, kernel
 from engine.parallel import Budget, Cancel, Progress, check_options, run_chunks
 from engine.predicates.loading import as_point3
 from engine.predicates.orientation import orient2d
+from engine.predicates.rational import scaled_integers
 from engine.solids.checks import as_point_groups
 from engine.solids.triangle import Triangle
 from engine.types import UNDECIDED, Accuracy, Point2, Relation
@@ -50,14 +50,17 @@ def as_triangle2(triangles: Any, item: int) -> Triangle2:
 
 
 @inline
-def are_boxes_apart(t: Triangle2, u: Triangle2) -> bool:
-    """Tell whether the bounding boxes have no common point."""
-    return (
-        max(t.p.x, t.q.x, t.r.x) < min(u.p.x, u.q.x, u.r.x)
-        or max(u.p.x, u.q.x, u.r.x) < min(t.p.x, t.q.x, t.r.x)
-        or max(t.p.y, t.q.y, t.r.y) < min(u.p.y, u.q.y, u.r.y)
-        or max(u.p.y, u.q.y, u.r.y) < min(t.p.y, t.q.y, t.r.y)
-    )
+def are_apart_on_axis(p: float, q: float, r: float, s: float, t: float, u: float) -> bool:
+    """Tell whether the intervals around three numbers each have no common point."""
+    return max(p, q, r) < min(s, t, u) or max(s, t, u) < min(p, q, r)
+
+
+@inline
+def are_boxes_apart(t: Any, u: Any) -> bool:
+    """Tell whether the boxes around two triangles have no common point on the first two axes."""
+    if are_apart_on_axis(t.p.x, t.q.x, t.r.x, u.p.x, u.q.x, u.r.x):
+        return True
+    return are_apart_on_axis(t.p.y, t.q.y, t.r.y, u.p.y, u.q.y, u.r.y)
 
 
 @inline
@@ -124,19 +127,6 @@ def as_triangle3(triangles: Any, item: int) -> Triangle3:
     return Triangle3(as_point3(triangles[item], 0), as_point3(triangles[item], 1), as_point3(triangles[item], 2))
 
 
-@inline
-def are_apart_by_boxes(t: Triangle3, u: Triangle3) -> bool:
-    """Tell whether the bounding boxes have no common point."""
-    return (
-        max(t.p.x, t.q.x, t.r.x) < min(u.p.x, u.q.x, u.r.x)
-        or max(u.p.x, u.q.x, u.r.x) < min(t.p.x, t.q.x, t.r.x)
-        or max(t.p.y, t.q.y, t.r.y) < min(u.p.y, u.q.y, u.r.y)
-        or max(u.p.y, u.q.y, u.r.y) < min(t.p.y, t.q.y, t.r.y)
-        or max(t.p.z, t.q.z, t.r.z) < min(u.p.z, u.q.z, u.r.z)
-        or max(u.p.z, u.q.z, u.r.z) < min(t.p.z, t.q.z, t.r.z)
-    )
-
-
 @kernel
 def relate_triangles_3d(first: Any, second: Any, relations: Any) -> None:
     """Fill relations (n,) int8 for the pairs of rows of two (n, 3, 3) float64 arrays, degenerate ones UNSETTLED."""
@@ -144,7 +134,7 @@ def relate_triangles_3d(first: Any, second: Any, relations: Any) -> None:
     for item in range(relations.shape[0]):
         t, u = as_triangle3(first, item), as_triangle3(second, item)
         relations[item] = UNSETTLED
-        if are_apart_by_boxes(t, u):
+        if are_boxes_apart(t, u) or are_apart_on_axis(t.p.z, t.q.z, t.r.z, u.p.z, u.q.z, u.r.z):
             relations[item] = DISJOINT
             continue
         axis, other_axis = axis_of(t.p, t.q, t.r), axis_of(u.p, u.q, u.r)
@@ -217,11 +207,6 @@ def _settled(t: FloatArray, u: FloatArray, budget: Budget) -> Relation:
     """Return the relation of one pair by integer or rational arithmetic."""
     if t.shape[1] == 2:
         return collide_outline_outline(Triangle(t), Triangle(u), None, None, Work(budget, witness=False)).relation
-    shift = lattice_shift(np.concatenate([t, u]))
-    how = classify_exact(_on_lattice(t, shift), _on_lattice(u, shift))
-    return Relation.DISJOINT if how == APART else Relation.TOUCHING
-
-
-def _on_lattice(triangle: FloatArray, shift: int) -> Corners:
-    a, b, c = (tuple(on_lattice(x, shift) for x in corner) for corner in triangle.tolist())
-    return a, b, c
+    numbers = scaled_integers([*t.ravel().tolist(), *u.ravel().tolist()])
+    a, b, c, d, e, f = (tuple(numbers[k : k + 3]) for k in range(0, 18, 3))
+    return Relation.DISJOINT if classify_exact((a, b, c), (d, e, f)) == APART else Relation.TOUCHING

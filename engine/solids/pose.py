@@ -123,6 +123,11 @@ class Pose(Immutable):
             )
         return cls(rows[:-1, :-1], rows[:-1, -1], tolerance=tolerance)
 
+    @classmethod
+    def of_checked(cls, rotation: FloatArray, translation: FloatArray) -> Pose:
+        """Return the pose of arrays that `check_rotations` and the like have passed, copied."""
+        return _restored(rotation, translation)
+
     @property
     def dimension(self) -> int:
         """2 or 3."""

@@ -8,12 +8,12 @@ from __future__ import annotations
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray, read_only
+from engine.bounding.aabb import corners_of_box
 from engine.collision.clearance.near_triangles import FACE
 from engine.collision.clearance.result import Feature
 from engine.collision.meshes.mesh_arrays import (
     BOX_TRIANGLES,
     MeshBody,
-    box_corners,
     mesh_body_of,
     mesh_body_of_triangles,
 )
@@ -91,7 +91,7 @@ def _ring(solid: Solid, face: int) -> tuple[IntArray, FloatArray]:
     if isinstance(solid, Aabb) and solid.dimension == 3:
         (a, b, c), (_, _, d) = BOX_TRIANGLES[face]
         numbers = np.array([a, b, c, d])
-        return numbers, box_corners(solid)[numbers]
+        return numbers, corners_of_box(solid.min, solid.max)[numbers]
     points, ends = _points_and_ends(solid)
     numbers = ends[face]
     return numbers, np.column_stack([points[numbers], np.zeros(2)])

@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
-from engine.collision.meshes.mesh_arrays import BOX_TRIANGLES, box_corners
+from engine.bounding.aabb import corners_of_box
+from engine.collision.meshes.mesh_arrays import BOX_TRIANGLES
 from engine.jit import kernel
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
@@ -83,7 +84,7 @@ def _described(solid: Solid) -> ConvexBody | None:
         with np.errstate(all="ignore"):
             center = 0.5 * solid.min + 0.5 * solid.max
         if bool(((solid.min < center) & (center < solid.max)).all()):
-            return _hull(box_corners(solid), BOX_TRIANGLES.reshape(-1, 3), center)
+            return _hull(corners_of_box(solid.min, solid.max), BOX_TRIANGLES.reshape(-1, 3), center)
     if isinstance(solid, Polyhedron) and len(solid.triangles) <= MOST_FACES:
         certificate = convexity(solid)
         if certificate is not None:

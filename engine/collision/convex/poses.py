@@ -1,7 +1,7 @@
 """One pair of convex bodies under many poses of the second: the search of `xenocollide.py`, eight at once, in float32.
 
 The first body rests, the second is posed. Coordinates count from a point inside each body, in units of a power of two
-that no coordinate exceeds in magnitude (`lane_points`); T stands for the largest coordinate of the shift v0 between the
+that no coordinate exceeds in magnitude (`lane_arrays`); T stands for the largest coordinate of the shift v0 between the
 two points, computed in float64. All vertices are looked at, so a largest value is that of the whole body. What a lane
 proves is proven as in `xenocollide.py`, with wider margins, for every entry rounded to float32 (u = 2^-24); a lane that
 proves nothing is searched again in float64.
@@ -42,23 +42,6 @@ N_ROWS = 27
 
 _TURNS = 48
 _GUARD = 2.0**-40
-
-
-def lane_scale(first: ConvexBody, first_middle: Any, second: ConvexBody, second_middle: Any) -> float:
-    """Return the unit of a pair: a power of two above all its coordinates, 0.0 where lanes do not pay or not fit."""
-    n_vertices = first.points.shape[1] + second.points.shape[1]
-    if n_vertices > MOST_VERTICES or not (len(first.anchors) and len(second.anchors)):
-        return 0.0
-    with np.errstate(all="ignore"):
-        reach = max(
-            np.abs(first.points - first_middle[:, None]).max(), np.abs(second.points - second_middle[:, None]).max()
-        )
-    return float(2.0 ** np.frexp(reach)[1]) if 2.0**-900 < reach < 2.0**250 else 0.0
-
-
-def lane_points(body: ConvexBody, middle: Any, scale: float) -> Float32Array:
-    """Return the vertices (3, n) from a point inside the body, in units of `scale`."""
-    return np.ascontiguousarray((body.points - middle[:, None]) / scale, np.float32)
 
 
 @merged
@@ -182,11 +165,20 @@ class LaneArrays(NamedTuple):
 
 def lane_arrays(first: ConvexBody, second: ConvexBody) -> LaneArrays | None:
     """Return the pair for the lanes, None where these do not pay or its numbers do not fit."""
-    middle, their_middle = first.numbers[CENTER : CENTER + 3], second.numbers[ASIDE : ASIDE + 3]
-    scale = lane_scale(first, middle, second, their_middle)
-    if scale == 0.0:
+    if first.points.shape[1] + second.points.shape[1] > MOST_VERTICES or not (
+        len(first.anchors) and len(second.anchors)
+    ):
         return None
-    return LaneArrays(lane_points(first, middle, scale), lane_points(second, their_middle, scale), scale)
+    with np.errstate(all="ignore"):
+        points = first.points - first.numbers[CENTER : CENTER + 3, None]
+        their_points = second.points - second.numbers[ASIDE : ASIDE + 3, None]
+        reach = max(np.abs(points).max(), np.abs(their_points).max())
+    if not 2.0**-900 < reach < 2.0**250:
+        return None
+    scale = float(2.0 ** np.frexp(reach)[1])
+    return LaneArrays(
+        np.ascontiguousarray(points / scale, np.float32), np.ascontiguousarray(their_points / scale, np.float32), scale
+    )
 
 
 @inline

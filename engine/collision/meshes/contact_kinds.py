@@ -19,6 +19,7 @@ from engine.collision.meshes.triangle_triangle import (
     is_same,
     is_straddling,
     separation,
+    sides_of,
     sign_of_four,
     turn_in_plane,
 )
@@ -181,22 +182,12 @@ def kind_of(
 ) -> tuple[int, bool]:
     """Return the kind of the contact of two faces with area, UNSETTLED where a sign is open, and whether it may cut an
     open face: False where all that they share is one point, or on the borders of both. Sets FLUSH."""
-    work[_BAD] = 0
-    sides = (
-        _side(poses, u.p, u.q, u.r, t.p, error, work),
-        _side(poses, u.p, u.q, u.r, t.q, error, work),
-        _side(poses, u.p, u.q, u.r, t.r, error, work),
-    )
-    their_sides = (
-        _side(poses, t.p, t.q, t.r, u.p, error, work),
-        _side(poses, t.p, t.q, t.r, u.q, error, work),
-        _side(poses, t.p, t.q, t.r, u.r, error, work),
-    )
-    work[FLUSH] = 0
+    work[_BAD] = work[FLUSH] = 0
+    sides, their_sides = sides_of(poses, u, t, error), sides_of(poses, t, u, error)
     for k in range(3):
+        if sides[k] == UNDECIDED or their_sides[k] == UNDECIDED:
+            return UNSETTLED, True
         work[FLUSH] |= int(sides[k] == 0) << k | int(their_sides[k] == 0) << 3 + k
-    if work[_BAD] != 0:
-        return UNSETTLED, True
     own, their = lone_zero(sides), lone_zero(their_sides)
     for k in range(3):
         if (own >= 0 and is_same(corner(t, own), corner(u, k))) or (

@@ -3,9 +3,7 @@
 Two trees are descended together: a pair of nodes is replaced by those pairs of their children whose boxes
 (`box_lanes.meeting`) and discs (`lanes/discs.py`) may meet, two blocks of faces by the pairs of faces that neither
 boxes nor planes part (`lanes/faces.py`); those are classified by signs. All of these are conservative under a pose, so
-no contact is missed.
-
-The search can be left when its room for pairs is full and taken up again: what it still has to do is in `Descent`.
+no contact is missed. Pairs beyond the room for them are counted: who wants them makes that much room and asks again.
 """
 
 from __future__ import annotations
@@ -35,7 +33,7 @@ from engine.collision.meshes.triangle_triangle import (
     classify_near,
     with_pose,
 )
-from engine.jit import called, inline, merged
+from engine.jit import inline, merged
 from engine.lanes.boxes import FRAME_ROWS, meeting
 from engine.lanes.discs import discs_meeting
 from engine.lanes.faces import WORK_ROWS, faces_meeting
@@ -51,28 +49,25 @@ SEEK_CONTACT = 3
 """What ends a search early: a crossing that proves overlapping interiors; one that proves that the first (second) body,
 a surface, passes through the interior of the other; any contact at all."""
 
-DONE = 0
-SETTLED = 1
-FULL = 2
-INTERRUPTED = 3
-"""How a search ended: all pairs seen; the pair at row 0 settles the question; no room for more pairs (go on with the
-same `Descent`); the flag was raised."""
+DONE, SETTLED, FULL, INTERRUPTED = range(4)
+"""How a search ended: all pairs seen; the pair at row 0 settles the question; too many pairs for the room; the flag was
+raised."""
+LEAST_LOOK = 4096
+"""So many pairs are counted, however little room there is: a later one may settle the question."""
 
 STACK_ROWS = LANES * LANES * 2 * MAX_DEPTH
 """A pair of nodes is replaced by at most 64, one of the two nodes a level deeper: bound of what is waiting."""
 
 
 class Descent(NamedTuple):
-    """Work space of a search, and what it still has to do.
+    """Work space of a search.
 
-    stack (STACK_ROWS, 2) int32: pairs of nodes. rest (5,) int64: pairs waiting; then, of the pair of blocks at hand,
-    nodes i, j and the two halves of the bits of `faces_meeting` not looked at yet. frames (2, 22, 8) float32: see
-    `lanes/boxes.py`. work (28, 8) float32: of `lanes/discs.py` and `lanes/faces.py`, for one pair of nodes. poses (2,
-    12) float64: rotation and translation of either body, for exact signs. signs (11,) int8: of `contact_kinds.py`.
+    stack (STACK_ROWS, 2) int32: pairs of nodes waiting. frames (2, 22, 8) float32: see `lanes/boxes.py`. work (28, 8)
+    float32: of `lanes/discs.py` and `lanes/faces.py`, for one pair of nodes. poses (2, 12) float64: rotation and
+    translation of either body, for exact signs. signs (11,) int8: of `contact_kinds.py`.
     """
 
     stack: Int32Array
-    rest: IntArray
     frames: Float32Array
     work: Float32Array
     poses: FloatArray
@@ -111,7 +106,6 @@ def new_descent() -> Descent:
     """Return work space for one search at a time."""
     return Descent(
         np.empty((STACK_ROWS, 2), np.int32),
-        np.empty(5, np.int64),
         np.empty((2, FRAME_ROWS, LANES), np.float32),
         np.empty((WORK_ROWS, LANES), np.float32),
         np.zeros((2, 12)),
@@ -160,20 +154,12 @@ def place_bodies(
 
 
 @inline
-def begin(descent: Descent, is_apart: bool) -> None:
-    """Begin with the two roots; nothing is left to do where the bodies are surely apart."""
-    descent.stack[0, 0], descent.stack[0, 1] = 0, 0
-    descent.rest[:] = 0
-    descent.rest[0] = 0 if is_apart else 1
-
-
-@inline
 def placed_triangle(t: Triangle3, place: Placement) -> Triangle3:
     """Return the rounded posed triangle."""
     return Triangle3(placed(t.p, place), placed(t.q, place), placed(t.r, place))
 
 
-@called
+@merged
 def settle_class(s: Search, i: int, j: int) -> int:
     """Return the class of two faces that `classify_near` leaves open; UNDECIDED without area, or out of range."""
     place, poses = s.place, s.descent.poses
@@ -188,7 +174,7 @@ def settle_class(s: Search, i: int, j: int) -> int:
     return classify_exactly(poses, t_posed, u_posed, int(s.first.axis[i]), place.posed_error)
 
 
-@inline
+@merged
 def settles(s: Search, kind: int, i: int, j: int) -> bool:
     """Tell whether a contact of class `kind` answers what is sought."""
     if s.seek == SEEK_CONTACT:
@@ -210,11 +196,11 @@ def take_bit(low: int, high: int) -> tuple[int, int, int]:
     return 32 + lowest_bit(high), low, high & (high - 1)
 
 
-@inline
-def classify_faces(s: Search, i: int, j: int, low: int, high: int, n_pairs: int) -> tuple[int, int, int, int]:
+@merged
+def classify_faces(s: Search, i: int, j: int, low: int, high: int, n_pairs: int) -> tuple[int, int]:
     """Classify the pairs of faces of blocks i and j that the bits low and high name; write those that are not apart.
 
-    Returns DONE, or what ended it early; the number of pairs written; the bits not looked at yet.
+    Returns DONE, or what ended it early; the number of pairs found.
     """
     pairs, kinds = s.found
     while low != 0 or high != 0:  # bound: each turn takes a bit
@@ -229,14 +215,15 @@ def classify_faces(s: Search, i: int, j: int, low: int, high: int, n_pairs: int)
             continue
         if kind != UNDECIDED and settles(s, kind, i_face, j_face):
             pairs[0, 0], pairs[0, 1], kinds[0] = i_face, j_face, kind
-            return SETTLED, 1, low, high
-        pairs[n_pairs, 0], pairs[n_pairs, 1], kinds[n_pairs] = i_face, j_face, kind
+            return SETTLED, 1
+        if n_pairs < kinds.shape[0]:
+            pairs[n_pairs, 0], pairs[n_pairs, 1], kinds[n_pairs] = i_face, j_face, kind
         n_pairs += 1
+        if n_pairs > max(LEAST_LOOK, kinds.shape[0]):
+            return FULL, n_pairs
         if s.flag[0] != 0:
-            return INTERRUPTED, n_pairs, low, high
-        if n_pairs == kinds.shape[0]:
-            return FULL, n_pairs, low, high
-    return DONE, n_pairs, low, high
+            return INTERRUPTED, n_pairs
+    return DONE, n_pairs
 
 
 @merged
@@ -279,19 +266,21 @@ def replace_pair(s: Search, i: int, j: int, n_stack: int) -> tuple[int, int, int
     return n_stack, 0, 0
 
 
-@inline
+@merged
 def search(s: Search) -> tuple[int, int]:
-    """Write the pairs of faces not apart and their classes, one that settles to row 0; return how it ended, n."""
-    stack, rest = s.descent.stack, s.descent.rest
-    n_stack, n_pairs = rest[0], 0
-    i, j, low, high = rest[1], rest[2], rest[3], rest[4]
-    while True:  # bound: each pair of nodes, and each pair of faces, enters once
-        how = DONE if n_stack == 0 or s.flag[0] == 0 else INTERRUPTED
-        if low != 0 or high != 0:
-            how, n_pairs, low, high = classify_faces(s, i, j, low, high, n_pairs)
-        if how != DONE or n_stack == 0:
-            rest[0], rest[1], rest[2], rest[3], rest[4] = n_stack, i, j, low, high
-            return how, n_pairs
+    """Write the pairs of faces not apart and their classes, one that settles to row 0; return how it ended, and how
+    many there are, more than the room holds maybe."""
+    stack = s.descent.stack
+    stack[0, 0], stack[0, 1] = 0, 0
+    n_stack, n_pairs = 1, 0
+    while n_stack > 0:  # bound: each pair of nodes enters once
+        if s.flag[0] != 0:
+            return INTERRUPTED, n_pairs
         n_stack -= 1
         i, j = int(stack[n_stack, 0]), int(stack[n_stack, 1])
         n_stack, low, high = replace_pair(s, i, j, n_stack)
+        if low != 0 or high != 0:
+            how, n_pairs = classify_faces(s, i, j, low, high, n_pairs)
+            if how != DONE:
+                return how, n_pairs
+    return DONE, n_pairs

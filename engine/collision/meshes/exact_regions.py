@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 from engine.arrays import IntArray
 from engine.collision.meshes.exact_body import Corners, ExactBody, Plane, Vector, rounded_outward
-from engine.collision.meshes.exact_triangles import meets_open_face, open_face, separation_exact, value_at, without_axis
+from engine.collision.meshes.exact_triangles import meets_open_face, open_face, share_area, value_at, without_axis
 from engine.parallel import Budget
 from engine.predicates.exact_vectors import cross, dot, largest_axis, minus
 from engine.predicates.rational import sign_of
@@ -91,7 +91,7 @@ def sides_within(body: ExactBody, face: int, other: ExactBody, met: IntArray) ->
         points = other.corners(their_face)
         if any(value_at(plane, p) for p in points) or not any(other.plane(their_face)):
             continue
-        if separation_exact(corners, points, plane) < 0 and other.is_clean(their_face):
+        if share_area(corners, points, body.axis(face)) and other.is_clean(their_face):
             theirs = sides_of_clean(other, their_face)
             if theirs is not None:
                 return ours, theirs

@@ -13,10 +13,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from engine.arrays import Float32Array, FloatArray, Int8Array, Int32Array, IntArray, read_only
+from engine.bounding.aabb import corners_of_box
 from engine.bounding.bvh import WIDTH, build_bvh
 from engine.bounding.disc_tree import fill_discs
 from engine.collision.meshes.placement import Extent, PoseArrays
 from engine.collision.meshes.triangle_triangle import Triangle3, projected
+from engine.containment.methods.polyhedron_ray_parity import fill_triangle_boxes
 from engine.jit import inline, kernel
 from engine.lanes.boxes import EMPTY
 from engine.lanes.discs import DISC_ROWS
@@ -49,7 +51,7 @@ STILL = PoseArrays(read_only(np.eye(3)[None]), read_only(np.zeros((1, 3))), Fals
 
 BOX_TRIANGLES = np.array([[(a, b, c), (a, c, d)] for a, b, c, d in
     ([0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6])])  # fmt: skip
-"""Of each face of a box (6, 2, 3), counter-clockwise from outside; numbers of corners as in `box_corners`."""
+"""Of each face of a box (6, 2, 3), counter-clockwise from outside; numbers of corners as in `corners_of_box`."""
 
 
 class MeshArrays(NamedTuple):
@@ -128,7 +130,7 @@ def mesh_body_of_triangles(vertices: FloatArray, triangles: IntArray, faces: Int
     vertices, triangles, faces = read_only(vertices), read_only(triangles), read_only(faces)
     n_triangles = len(triangles)
     boxes = np.empty((n_triangles, 6))
-    _fill_boxes(vertices, triangles, boxes)
+    fill_triangle_boxes(vertices, triangles, boxes)
     tree = build_bvh(boxes)
     child, order = tree.child.copy(), np.empty(n_triangles, np.int64)
     ordered, axis = np.empty((n_triangles, 3), np.int64), np.empty(n_triangles, np.int8)
@@ -160,17 +162,6 @@ def mesh_body_of_triangles(vertices: FloatArray, triangles: IntArray, faces: Int
         has_inside,
     )
     return MeshBody(arrays, shift)
-
-
-@kernel
-def _fill_boxes(vertices: Any, triangles: Any, boxes: Any) -> None:
-    """Fill boxes (n, 6) with the smallest and the largest coordinates of each triangle."""
-    for item in range(triangles.shape[0]):
-        for k in range(3):
-            p = vertices[triangles[item, 0], k]
-            q = vertices[triangles[item, 1], k]
-            r = vertices[triangles[item, 2], k]
-            boxes[item, k], boxes[item, 3 + k] = min(p, q, r), max(p, q, r)
 
 
 @kernel
@@ -268,15 +259,10 @@ def lattice_shift(values: FloatArray) -> int:
     return max(0, 53 - int(exponents.min())) if exponents.size else 0
 
 
-def box_corners(box: Aabb) -> FloatArray:
-    """Return the corners (8, 3) of a box; bit k of a corner's number says low or high on axis k."""
-    return np.array([[(box.min, box.max)[i >> k & 1][k] for k in range(3)] for i in range(8)])
-
-
 def _box_triangles(box: Aabb) -> tuple[FloatArray, IntArray, IntArray]:
     """Return the triangles of a box by face (xmin, xmax, ymin, ymax, zmin, zmax); of a flat one each place once."""
     flat = box.min == box.max
-    corners = box_corners(box)
+    corners = corners_of_box(box.min, box.max)
     faces = np.arange(6)
     if flat.any():  # the two faces across a flat axis are one: keep that; a segment or point: any face will do
         faces = faces[2 * int(np.argmax(flat)) :][:1]

@@ -18,8 +18,7 @@ import numpy as np
 from engine.arrays import FloatArray, IntArray
 from engine.collision.meshes.exact_regions import Sides, even_sides, regions_of, sides_at, sides_within
 from engine.collision.meshes.mesh_arrays import STATE_CLEAN, MeshBody, mesh_body_of
-from engine.collision.meshes.mesh_mesh import find_all_contacts
-from engine.collision.meshes.mesh_pair import MeshPair, met_by_face, simplest
+from engine.collision.meshes.mesh_pair import MeshPair, met_by_face, unless_identity
 from engine.collision.meshes.parity import INSIDE, OUTSIDE
 from engine.collision.result import Parts, Work
 from engine.solids.base import Solid
@@ -31,10 +30,11 @@ _BOTH, _NEITHER = Sides(True, True, True), Sides(False, False, False)
 def mesh_parts(first: Solid, second: Solid, first_pose: Pose | None, second_pose: Pose | None, work: Work) -> Parts:
     """Return what of two overlapping polyhedra or boxes lies outside the other."""
     with np.errstate(all="ignore"):  # kernels, where they run uncompiled
-        pair = simplest(mesh_body_of(first), first_pose, mesh_body_of(second), second_pose)
-        if pair[1] is None and pair[3] is None and _have_equal_faces(pair[0], pair[2]):
+        a, b = mesh_body_of(first), mesh_body_of(second)
+        first_pose, second_pose = unless_identity(first_pose), unless_identity(second_pose)
+        if first_pose is None and second_pose is None and _have_equal_faces(a, b):
             return Parts(False, False, True)
-        return _OverlappingPair(*pair, Work(work.budget, witness=False)).parts()
+        return _OverlappingPair(a, first_pose, b, second_pose, Work(work.budget, witness=False)).parts()
 
 
 def _have_equal_faces(first: MeshBody, second: MeshBody) -> bool:
@@ -60,12 +60,12 @@ class _OverlappingPair(MeshPair):
     def parts(self) -> Parts:
         """Return the answer; what is not needed for it is left out."""
         self._sticks_out = [False, False]
-        contacts, is_crossing = find_all_contacts(self, looks_at_regions=False)  # overlapping is known
-        if is_crossing:
+        self.find_contacts()
+        if self.is_settled:  # by a crossing: overlapping is known
             return Parts(True, True, True)
-        self._search(contacts)
+        self._search(self.contacts)
         first, second = self._sticks_out
-        return Parts(first, second, len(contacts) > 0)
+        return Parts(first, second, len(self.contacts) > 0)
 
     def _search(self, contacts: IntArray) -> None:
         for own in (0, 1):

@@ -15,40 +15,27 @@ Faces that cancel under even-odd (stacked) have nothing to show for themselves; 
 
 from __future__ import annotations
 
-import threading
-from typing import Literal
+from functools import lru_cache
 
 import numpy as np
 
-from engine.arrays import Int8Array, IntArray
-from engine.collision.codes import DISJOINT, UNSETTLED
-from engine.collision.meshes.contact_kinds import N_NAMED, STRENGTH
-from engine.collision.meshes.dual_traversal import (
-    FULL,
-    SEEK_CONTACT,
-    SEEK_OVERLAP,
-    SEEK_PIERCING_BY_FIRST,
-    SEEK_PIERCING_BY_SECOND,
-    SETTLED,
-    new_descent,
-    new_found,
-)
+from engine.arrays import IntArray
+from engine.collision.codes import DISJOINT, TOUCHING, UNSETTLED
+from engine.collision.meshes.contact_kinds import STRENGTH
+from engine.collision.meshes.dual_traversal import SEEK_OVERLAP, SEEK_PIERCING_BY_FIRST, SEEK_PIERCING_BY_SECOND
 from engine.collision.meshes.exact_regions import even_sides, pieces_of_segment, regions_of, sides_at, sides_within
-from engine.collision.meshes.exact_triangles import as_simplex, classify_exact
-from engine.collision.meshes.mesh_arrays import STATE_CLEAN, STATE_CROSSED, MeshBody, mesh_body_of
-from engine.collision.meshes.mesh_pair import MeshPair, met_by_face, simplest, what_to_seek
+from engine.collision.meshes.exact_triangles import as_simplex
+from engine.collision.meshes.mesh_arrays import STATE_CLEAN, MeshBody, mesh_body_of
+from engine.collision.meshes.mesh_pair import MeshPair, met_by_face, relate, unless_identity, what_to_seek
 from engine.collision.meshes.parity import INSIDE
-from engine.collision.meshes.pose_batch import N_COLUMNS, N_CONTACTS, RELATION, find_contacts, relate_poses
-from engine.collision.meshes.touching import CUTTING, ONLY_TOUCHING
-from engine.collision.meshes.triangle_triangle import APART, COPLANAR, CROSSING
-from engine.collision.result import NO_CONTACT, RELATIONS, UNNAMED, Collision, Witness, Work
-from engine.direct import entry_of
+from engine.collision.meshes.pose_batch import N_CONTACTS, ONE_SETTLES, RELATION
+from engine.collision.result import NO_CONTACT, RELATIONS, UNNAMED, Collision, Containing, Witness, Work
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
-from engine.types import UNDECIDED, Relation
+from engine.types import Relation
 
 
-def look_at_regions(pair: MeshPair, own: int, face: int, met: IntArray | None) -> tuple[bool, bool]:
+def look_at_regions(pair: MeshPair, own: int, face: int, met: IntArray) -> tuple[bool, bool]:
     """Tell whether both insides come up to one side of a region of a face; and whether one is inside the other."""
     body, other = pair.exact[own], pair.exact[1 - own]
     axis = body.axis(face)
@@ -57,7 +44,7 @@ def look_at_regions(pair: MeshPair, own: int, face: int, met: IntArray | None) -
     cutters = [other]
     if body.mesh.has_inside and pair.state(own, face) != STATE_CLEAN:
         cutters.append(body)
-    elif body.mesh.has_inside and met is not None:
+    elif body.mesh.has_inside:
         overlaps = _overlaps_evenly(pair, own, face, met)
         if overlaps is not None:
             return overlaps, False
@@ -104,130 +91,58 @@ def pierces_without_area(pair: MeshPair, own: int, face: int) -> bool:
     return any(all(sides_at(other, q, axis).at for axis in range(3)) for q in pieces)
 
 
-_ROOM = 1024
-ROOM_AT_ONCE = 256
-_PROBED = 8
-
-
-def find_all_contacts(pair: MeshPair, *, looks_at_regions: bool = True) -> tuple[IntArray, bool]:
-    """Return the pairs of faces (n, 2) with a common point, ascending, or the one that settles all; tell if it does.
-
-    looks_at_regions: whether regions that prove overlapping settle it too; without, only a crossing does.
-    """
-    found, descent, budget = new_found(_ROOM), new_descent(), pair.work.budget
-    found_pairs: list[IntArray] = []
-    found_kinds: list[Int8Array] = []
-    (first, second), (first_pose, second_pose) = (mesh.arrays for mesh in pair.meshes), pair.posed
-    how = FULL
-    while how == FULL:  # bound: each turn finds new pairs
-        how, n_pairs = find_contacts(
-            first, first_pose, second, second_pose, pair.seek, not found_pairs, descent, found, budget.flag
-        )
-        budget.check()
-        if how == SETTLED:
-            return found.pairs[:1], True
-        found_pairs.append(found.pairs[:n_pairs].copy())
-        found_kinds.append(found.kinds[:n_pairs].copy())
-        may_probe = how == FULL and len(found_pairs) == 1 and looks_at_regions and pair.seek == SEEK_OVERLAP
-        if may_probe and pair.judge(found_pairs[0], are_all=False) == CUTTING and _is_overlap_near(pair, *found):
-            return found.pairs[:1], True
-    pairs, kinds = np.concatenate(found_pairs), np.concatenate(found_kinds)
-    faces = [pair.meshes[own].faces[pairs[:, own]] for own in (0, 1)]
-    order = np.lexsort((pairs[:, 1], pairs[:, 0], faces[1], faces[0]))  # the caller's faces, then triangles
-    return _settled(pair, pairs[order], kinds[order])
-
-
-def _settled(pair: MeshPair, pairs: IntArray, kinds: Int8Array) -> tuple[IntArray, bool]:
-    """Find the classes that kernels left open; return the pairs with a common point, or the one that settles all."""
-    open_ones = np.flatnonzero(kinds == UNDECIDED)
-    pair.work.n_beyond_filter += len(pairs)
-    pair.work.n_rational += len(open_ones)
-    for index in open_ones:
-        pair.work.budget.check()
-        i, j = int(pairs[index, 0]), int(pairs[index, 1])
-        a, b = pair.exact
-        kinds[index] = classify_exact(a.corners(i), b.corners(j), a.plane(i), b.plane(j))
-        if kinds[index] != APART and _is_settled_by(pair, int(kinds[index]), i, j):
-            return pairs[index : index + 1], True
-    meet = np.concatenate([np.flatnonzero(kinds == COPLANAR), np.flatnonzero((kinds != APART) & (kinds != COPLANAR))])
-    return pairs[meet], False
-
-
-def _is_overlap_near(pair: MeshPair, pairs: IntArray, kinds: Int8Array) -> bool:
-    """Tell whether the regions of a few faces in contact prove overlapping; such a pair is put first."""
-    sure = np.flatnonzero(kinds != UNDECIDED)
-    for index in sure[:: max(1, len(sure) // _PROBED)].tolist():
-        if look_at_regions(pair, 0, int(pairs[index, 0]), None)[0]:
-            pairs[0] = pairs[index]
-            return True
-    return False
-
-
-def _is_settled_by(pair: MeshPair, kind: int, i: int, j: int) -> bool:
-    """The rule of `dual_traversal.settles` for a class found exactly."""
-    if pair.seek == SEEK_CONTACT:
-        return True
-    if kind != CROSSING:
-        return False
-    first, second = pair.state(0, i), pair.state(1, j)
-    if pair.seek == SEEK_PIERCING_BY_FIRST:
-        return second == STATE_CLEAN
-    if pair.seek == SEEK_PIERCING_BY_SECOND:
-        return first == STATE_CLEAN
-    return max(first, second) <= STATE_CROSSED and min(first, second) == STATE_CLEAN
-
-
-class _WorkSpace(threading.local):
-    """What one call of a kernel fills; calls of one thread take turns."""
-
-    def __init__(self) -> None:
-        self.descent, self.found, self.rows = new_descent(), new_found(ROOM_AT_ONCE), np.empty((1, N_COLUMNS), np.int64)
-
-
-SPACE = _WorkSpace()
-
-
 def mesh_mesh(first: Solid, second: Solid, first_pose: Pose | None, second_pose: Pose | None, work: Work) -> Collision:
     """Return the relation of two polyhedra, surfaces or 3D boxes."""
     a, b = mesh_body_of(first), mesh_body_of(second)
     if first_pose is not None or second_pose is not None:
-        a, first_pose, b, second_pose = simplest(a, first_pose, b, second_pose)
-    seek, rows, n_named = what_to_seek(a, b, work), SPACE.rows, N_NAMED if work.witness else 0
-    entry_of(relate_poses)(
-        a.arrays, b.arrays, a.posed(first_pose), b.posed(second_pose), seek, n_named,
-        SPACE.descent, SPACE.found, rows, work.budget.flag,
-    )  # fmt: skip
-    row: list[int] = rows[0].tolist()
-    if row[RELATION] != UNSETTLED:
-        work.n_beyond_filter += row[N_CONTACTS]
-        if row[RELATION] == DISJOINT or not work.witness:
-            return UNNAMED[row[RELATION]]
-        return Collision(RELATIONS[row[RELATION]], witness_of(row, a, b, seek))
+        first_pose, second_pose = unless_identity(first_pose), unless_identity(second_pose)
+    seek = what_to_seek(a, b, work)
+    row, found = relate(a, first_pose, b, second_pose, seek, work)
+    relation = row[RELATION]
+    is_unnamed = relation == DISJOINT or not (work.witness or relation == UNSETTLED)
+    answer = UNNAMED[relation] if is_unnamed else answer_of(row, a, b, seek)
+    if answer is not None:
+        work.n_beyond_filter += max(0, row[N_CONTACTS])
+        return answer
     work.budget.check()
     with np.errstate(all="ignore"):  # kernels, where they run uncompiled
-        return _relation(MeshPair(a, first_pose, b, second_pose, work))
+        pair = MeshPair(a, first_pose, b, second_pose, work)
+        pair.find_contacts((row, found))
+        return _relation(pair)
 
 
-def witness_of(row: list[int], first: MeshBody, second: MeshBody, seek: int) -> Witness:
-    """Return the witness that a row of `relate_poses` holds, of two bodies that are not disjoint."""
+def answer_of(row: list[int], first: MeshBody, second: MeshBody, seek: int) -> Collision | None:
+    """Return what a row of `relate_poses` says of bodies that are not disjoint; None where it does not say all."""
     relation, kind, first_face, second_face, n_contacts = row
-    if kind != UNSETTLED:
-        pierces = n_contacts == 0 and seek in (SEEK_PIERCING_BY_FIRST, SEEK_PIERCING_BY_SECOND)
-        return Witness(STRENGTH[kind], first_face, second_face, "", pierces)
     if relation == Relation.FIRST_INSIDE_SECOND:
-        return Witness("containment", first.arrays.first_face, -1, "second")
-    return Witness("containment", -1, second.arrays.first_face, "first")
+        return _contained(relation, first.arrays.first_face, -1, "second")
+    if relation == Relation.SECOND_INSIDE_FIRST:
+        return _contained(relation, -1, second.arrays.first_face, "first")
+    if relation == UNSETTLED or kind == UNSETTLED:
+        return None
+    pierces = n_contacts == ONE_SETTLES and seek in (SEEK_PIERCING_BY_FIRST, SEEK_PIERCING_BY_SECOND)
+    return _in_contact(relation, kind, first_face, second_face, pierces)
+
+
+@lru_cache(4096)
+def _in_contact(relation: int, kind: int, first_face: int, second_face: int, pierces: bool) -> Collision:
+    """Return an answer, made once: that takes longer than to find the contact."""
+    return Collision(RELATIONS[relation], Witness(STRENGTH[kind], first_face, second_face, "", pierces))
+
+
+@lru_cache(256)
+def _contained(relation: int, first_face: int, second_face: int, containing: Containing) -> Collision:
+    return Collision(RELATIONS[relation], Witness("containment", first_face, second_face, containing))
 
 
 def _relation(pair: MeshPair) -> Collision:
     """Return the answer: by contacts, by patches, by regions."""
-    contacts, is_settled = find_all_contacts(pair)
-    if is_settled:
+    contacts = pair.contacts
+    if pair.is_settled:
         relation = Relation.OVERLAPPING if pair.seek == SEEK_OVERLAP else Relation.TOUCHING
-        pierces = pair.seek in (SEEK_PIERCING_BY_FIRST, SEEK_PIERCING_BY_SECOND)
-        return Collision(relation, pair.named(contacts, piercing=pierces))
-    if len(contacts) and pair.judge(contacts, are_all=True) == ONLY_TOUCHING:
-        return Collision(Relation.TOUCHING, pair.named(contacts))
+        return Collision(relation, pair.named(piercing=pair.seek in (SEEK_PIERCING_BY_FIRST, SEEK_PIERCING_BY_SECOND)))
+    if pair.row[RELATION] == TOUCHING:
+        return Collision(Relation.TOUCHING, pair.named())
     patches = [pair.patches(own, contacts[:, own], INSIDE) for own in (0, 1)]
     if not len(contacts):
         n_inside = [sum(map(len, found)) for found in patches]
@@ -237,18 +152,18 @@ def _relation(pair: MeshPair) -> Collision:
             if n_inside[own] == len(pair.meshes[own].faces) and n_inside[1 - own] == 0:
                 relation = (Relation.FIRST_INSIDE_SECOND, Relation.SECOND_INSIDE_FIRST)[own]
                 return _contain(pair, relation, own, patches[own][0])
-    return _overlap_or_touch(pair, contacts, patches)
+    return _overlap_or_touch(pair, patches)
 
 
-def _overlap_or_touch(pair: MeshPair, contacts: IntArray, patches: list[list[IntArray]]) -> Collision:
+def _overlap_or_touch(pair: MeshPair, patches: list[list[IntArray]]) -> Collision:
     """Return overlapping or touching, where no crossing has proven the first."""
-    piercing = bool(patches[0] or patches[1])
+    contacts, piercing = pair.contacts, bool(patches[0] or patches[1])
     both = pair.meshes[0].has_inside and pair.meshes[1].has_inside
     for own in (0, 1):
         for patch in patches[own]:
             if both and any(sides.above or sides.below for sides in pair.sides_beside(own, patch)):
                 if len(contacts):
-                    return Collision(Relation.OVERLAPPING, pair.named(contacts))
+                    return Collision(Relation.OVERLAPPING, pair.named())
                 return _contain(pair, Relation.OVERLAPPING, own, patch)
     for own in (0, 1):
         if not both and (piercing or not pair.work.witness or not pair.meshes[1 - own].has_inside):
@@ -257,14 +172,14 @@ def _overlap_or_touch(pair: MeshPair, contacts: IntArray, patches: list[list[Int
             pair.work.budget.check()
             overlaps, pierces = look_at_regions(pair, own, face, met)
             if overlaps:
-                return Collision(Relation.OVERLAPPING, pair.named(contacts))
+                return Collision(Relation.OVERLAPPING, pair.named())
             piercing = piercing or pierces
     if pair.work.witness and not piercing:
         piercing = any(
             pierces_without_area(pair, own, face) for own in (0, 1) for face in np.unique(contacts[:, own]).tolist()
         )
     if len(contacts):
-        return Collision(Relation.TOUCHING, pair.named(contacts, piercing=piercing))
+        return Collision(Relation.TOUCHING, pair.named(piercing=piercing))
     own = 0 if patches[0] else 1
     return _contain(pair, Relation.TOUCHING, own, patches[own][0], piercing=piercing)
 
@@ -274,7 +189,7 @@ def _contain(pair: MeshPair, relation: Relation, own: int, patch: IntArray, *, p
     if not pair.work.witness:
         return Collision(relation)
     face = int(pair.meshes[own].faces[patch].min())
-    containing: Literal["first", "second"] = "second" if own == 0 else "first"
+    containing: Containing = "second" if own == 0 else "first"
     return Collision(
         relation, Witness("containment", face if own == 0 else -1, face if own == 1 else -1, containing, piercing)
     )

@@ -1,4 +1,4 @@
-"""Two placed meshes in one question: their exact coordinates, the states of their faces, where their vertices lie.
+"""Two placed meshes in one question: their contacts, exact coordinates, states of faces, where their vertices lie.
 
 Patches: faces without contact, connected through vertices, lie wholly inside or wholly outside the other body, so one
 vertex tells. Without any contact the patches are the components of the surfaces.
@@ -6,64 +6,92 @@ vertex tells. Without any contact the patches are the components of the surfaces
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 
 import numpy as np
 
 from engine.arrays import Int8Array, IntArray
 from engine.collision.codes import UNSETTLED
-from engine.collision.meshes.contact_kinds import FACE_FACE, N_NAMED, STRENGTH
+from engine.collision.meshes.contact_kinds import N_NAMED, STRENGTH
 from engine.collision.meshes.dual_traversal import (
+    LEAST_LOOK,
     SEEK_CONTACT,
     SEEK_OVERLAP,
     SEEK_PIERCING_BY_FIRST,
     SEEK_PIERCING_BY_SECOND,
+    Found,
+    new_descent,
+    new_found,
 )
 from engine.collision.meshes.exact_body import ExactBody, exact_pair
 from engine.collision.meshes.exact_regions import Sides, regions_of, sides_at
-from engine.collision.meshes.exact_triangles import kind_of_contact
+from engine.collision.meshes.exact_triangles import classify_exact, kind_of_contact
 from engine.collision.meshes.face_state import states_of
-from engine.collision.meshes.mesh_arrays import NO_AREA, STATE_STACKED, MeshBody, join_vertices, mesh_body_of_triangles
+from engine.collision.meshes.mesh_arrays import (
+    NO_AREA,
+    STATE_CLEAN,
+    STATE_CROSSED,
+    STATE_STACKED,
+    MeshBody,
+    join_vertices,
+)
 from engine.collision.meshes.parity import INSIDE, OUTSIDE, locate_vertices
-from engine.collision.meshes.touching import ONLY_TOUCHING, judge_contacts
+from engine.collision.meshes.pose_batch import (
+    KIND,
+    N_COLUMNS,
+    N_CONTACTS,
+    ONE_SETTLES,
+    relate_poses,
+)
+from engine.collision.meshes.triangle_triangle import APART, CROSSING
 from engine.collision.result import Witness, Work
+from engine.direct import entry_of
 from engine.solids.pose import Pose
 from engine.types import UNDECIDED
 
-_SAFE_POWER = 300
 _BLOCK = 64
 
 
-def simplest(
-    first: MeshBody, first_pose: Pose | None, second: MeshBody, second_pose: Pose | None
-) -> tuple[MeshBody, Pose | None, MeshBody, Pose | None]:
-    """Return a placed pair that has the same relation: no pose for the identity, and posed bodies near the ends of the
-    exponent range scaled by a power of two, where that is exact.
+class _WorkSpace(threading.local):
+    """What one call of a kernel fills; calls of one thread take turns."""
 
-    Without poses the predicates scale by themselves; the filter for rounded posed coordinates does not.
-    """
-    first_pose, second_pose = (None if pose is None or pose.is_identity else pose for pose in (first_pose, second_pose))
-    poses = [pose for pose in (first_pose, second_pose) if pose is not None]
-    if not poses:
-        return first, first_pose, second, second_pose
-    shifts = [float(np.abs(pose.translation).max()) for pose in poses]
-    largest = max(first.arrays.extent.reach, second.arrays.extent.reach, *shifts, 0.0)
-    power = int(np.frexp(largest)[1])
-    if abs(power) <= _SAFE_POWER or largest == 0.0:
-        return first, first_pose, second, second_pose
-    arrays = [first.arrays.vertices, second.arrays.vertices, *(pose.translation for pose in poses)]
-    scaled = [np.ldexp(array, -power) for array in arrays]
-    if any((np.ldexp(small, power) != array).any() for small, array in zip(scaled, arrays)):
-        return first, first_pose, second, second_pose
-    meshes = [
-        mesh_body_of_triangles(vertices, mesh.arrays.triangles, mesh.faces, mesh.has_inside)
-        for vertices, mesh in zip(scaled, (first, second))
-    ]
-    moved = [
-        None if pose is None else Pose(pose.rotation, np.ldexp(pose.translation, -power))
-        for pose in (first_pose, second_pose)
-    ]
-    return meshes[0], moved[0], meshes[1], moved[1]
+    def __init__(self) -> None:
+        self.descent, self.found, self.rows = new_descent(), new_found(ROOM_AT_ONCE), np.empty((1, N_COLUMNS), np.int64)
+
+
+ROOM_AT_ONCE = 256
+SPACE = _WorkSpace()
+
+
+def unless_identity(pose: Pose | None) -> Pose | None:
+    """Return None for the identity."""
+    return None if pose is None or pose.is_identity else pose
+
+
+def relate(
+    first: MeshBody,
+    first_pose: Pose | None,
+    second: MeshBody,
+    second_pose: Pose | None,
+    seek: int,
+    work: Work,
+    known: Found | None = None,
+) -> tuple[list[int], Found]:
+    """Return what `relate_poses` says of a pair, and where its contacts are, all of them, until the next call; known:
+    all contacts, their classes too, where they are found already."""
+    found, n_known = (SPACE.found, 0) if known is None else (known, len(known.kinds))
+    while True:  # bound: each turn has more room
+        entry_of(relate_poses)(
+            first.arrays, second.arrays, first.posed(first_pose), second.posed(second_pose), seek,
+            N_NAMED if work.witness else 0, SPACE.descent, found, n_known, SPACE.rows, work.budget.flag,
+        )  # fmt: skip
+        row: list[int] = SPACE.rows[0].tolist()
+        if row[N_CONTACTS] <= len(found.kinds):
+            return row, found
+        work.budget.check()
+        n = row[N_CONTACTS]
+        found = new_found(n if n <= LEAST_LOOK else 16 * n)
 
 
 def what_to_seek(first: MeshBody, second: MeshBody, work: Work) -> int:
@@ -85,7 +113,11 @@ def met_by_face(contacts: IntArray, own: int) -> Iterator[tuple[int, IntArray]]:
 
 
 class MeshPair:
-    """One question, and the exact coordinates computed for it so far."""
+    """One question, what kernels say of it, and the exact coordinates computed for it so far.
+
+    row: of `relate_poses`; contacts (n, 2): the pairs of faces with a common point, in order, or the one that settles
+    all, as is_settled tells; filled by `find_contacts`.
+    """
 
     def __init__(
         self, first: MeshBody, first_pose: Pose | None, second: MeshBody, second_pose: Pose | None, work: Work
@@ -95,8 +127,6 @@ class MeshPair:
         self.posed = (first.posed(first_pose), second.posed(second_pose))
         self.work = work
         self.seek = what_to_seek(first, second, work)
-        self._only_touch = False
-        self._judged: tuple[IntArray, Int8Array] | None = None
         self._exact: tuple[ExactBody, ExactBody] | None = None
 
     @property
@@ -106,35 +136,64 @@ class MeshPair:
             self._exact = exact_pair(self.meshes[0], self.poses[0], self.meshes[1], self.poses[1])
         return self._exact
 
-    def judge(self, contacts: IntArray, *, are_all: bool) -> int:
-        """Say what contacts prove (`judge_contacts`), ONLY_TOUCHING once it is known; keep the kinds of the first."""
-        kinds = np.full(min(N_NAMED, len(contacts)) if self.work.witness else 0, UNSETTLED, np.int8)
-        self._judged = contacts, kinds
-        (first, second), (a, b), flag = self.meshes, self.posed, self.work.budget.flag
-        found = judge_contacts(
-            first.arrays, a, second.arrays, b, contacts, are_all and not self._only_touch, kinds, flag
-        )
-        self._only_touch |= found == ONLY_TOUCHING
+    def find_contacts(self, seen: tuple[list[int], Found] | None = None) -> None:
+        """Find all contacts; seen: what `relate` said of the pair, where it was asked already."""
+        (first, second), (first_pose, second_pose) = self.meshes, self.poses
+        self.row, found = seen or relate(first, first_pose, second, second_pose, self.seek, self.work)
         self.work.budget.check()
-        return ONLY_TOUCHING if self._only_touch else int(found)
+        n, self.is_settled = abs(self.row[N_CONTACTS]), self.row[N_CONTACTS] == ONE_SETTLES
+        self.contacts, kinds = found.pairs[:n].copy(), found.kinds[:n].copy()
+        self.work.n_beyond_filter += n
+        if not self.is_settled and (kinds == UNDECIDED).any():
+            self._settle_classes(kinds)
 
-    def named(self, contacts: IntArray, *, piercing: bool = False) -> Witness | None:
+    def _settle_classes(self, kinds: Int8Array) -> None:
+        """Find the classes that kernels left open, and let them judge all contacts then."""
+        open_ones = np.flatnonzero(kinds == UNDECIDED)
+        self.work.n_rational += len(open_ones)
+        a, b = self.exact
+        for index in open_ones.tolist():
+            self.work.budget.check()
+            i, j = self.contacts[index].tolist()
+            kinds[index] = classify_exact(a.corners(i), b.corners(j))
+            if kinds[index] != APART and self._is_settled_by(int(kinds[index]), i, j):
+                self.contacts, self.is_settled = self.contacts[index : index + 1], True
+                return
+        self.contacts, kinds = self.contacts[kinds != APART], kinds[kinds != APART]
+        if len(kinds):
+            (first, second), (a_pose, b_pose), found = self.meshes, self.poses, Found(self.contacts, kinds)
+            self.row, _ = relate(first, a_pose, second, b_pose, self.seek, self.work, found)
+            self.work.budget.check()
+
+    def _is_settled_by(self, kind: int, i: int, j: int) -> bool:
+        """The rule of `dual_traversal.settles` for a class found exactly."""
+        if self.seek == SEEK_CONTACT:
+            return True
+        if kind != CROSSING:
+            return False
+        first, second = self.state(0, i), self.state(1, j)
+        if self.seek == SEEK_PIERCING_BY_FIRST:
+            return second == STATE_CLEAN
+        if self.seek == SEEK_PIERCING_BY_SECOND:
+            return first == STATE_CLEAN
+        return max(first, second) <= STATE_CROSSED and min(first, second) == STATE_CLEAN
+
+    def named(self, *, piercing: bool = False) -> Witness | None:
         """Return the strongest of the first contacts, of equal ones that of the first faces; None if none is asked."""
         if not self.work.witness:
             return None
-        if self._judged is None or self._judged[0] is not contacts:
-            self.judge(contacts, are_all=False)
-        assert self._judged is not None
-        kinds, found = self._judged[1].tolist(), []
-        n = kinds.index(FACE_FACE) + 1 if FACE_FACE in kinds else len(kinds)
-        for kind, (i, j) in zip(kinds[:n], contacts[:n].tolist()):
-            if kind == UNSETTLED:
+        best = tuple(self.row[KIND:N_CONTACTS])
+        if best[0] == UNSETTLED:
+            a, b = self.exact
+            found = []
+            for i, j in self.contacts[:N_NAMED].tolist():
                 self.work.budget.check()
-                a, b = self.exact
-                kind = STRENGTH.index(kind_of_contact(a.corners(i), b.corners(j), a.plane(i), b.plane(j)))
-            found.append((kind, int(self.meshes[0].faces[i]), int(self.meshes[1].faces[j])))
-        kind, first_face, second_face = min(found)
-        return Witness(STRENGTH[kind], first_face, second_face, "", piercing)
+                kind = kind_of_contact(a.corners(i), b.corners(j))
+                found.append((STRENGTH.index(kind), int(self.meshes[0].faces[i]), int(self.meshes[1].faces[j])))
+                if kind == "face_face":
+                    break
+            best = min(found)
+        return Witness(STRENGTH[best[0]], best[1], best[2], "", piercing)
 
     def states(self, own: int, faces: IntArray) -> Int8Array:
         return states_of(self.meshes[own].arrays, faces)

@@ -20,26 +20,20 @@ from typing import Any
 
 import numpy as np
 
-from engine.collision.codes import UNSETTLED
-from engine.collision.meshes.contact_kinds import FACE_FACE, FLUSH, N_SIGNS, kind_of
-from engine.collision.meshes.dual_traversal import store_pose
+from engine.collision.meshes.dual_traversal import Search
 from engine.collision.meshes.mesh_arrays import MeshArrays, triangle_of
 from engine.collision.meshes.parity import OUTSIDE, brought_back, locate_point
-from engine.collision.meshes.placement import Placement, PoseArrays, defect_of, place_pair
+from engine.collision.meshes.placement import Placement, defect_of
 from engine.collision.meshes.triangle_triangle import corner, sign_of_four, with_pose
-from engine.jit import allocating, called, inline, kernel
+from engine.jit import allocating, called, inline
 from engine.predicates.loading import as_point3
-from engine.predicates.posed import UNPOSED, PosedPoint3, posed_error
+from engine.predicates.posed import UNPOSED, PosedPoint3
 from engine.types import UNDECIDED
 
 N_FACES = 32
 N_EDGES = 8
 """So many contacts give the planes of their faces, so many those of their edges."""
 _SAMPLED = 16
-
-UNKNOWN, ONLY_TOUCHING, CUTTING = range(3)
-"""What `judge_contacts` says of the two bodies: nothing; that they only touch; nothing, and some contact may cut a
-face or is flush, so that interiors may well meet at it."""
 
 
 @called
@@ -83,33 +77,30 @@ def separates(
 
 
 @called
-def are_separated(
-    poses: Any, first: MeshArrays, own: int, second: MeshArrays, their: int, contacts: Any, error: float, flag: Any
-) -> bool:
-    """Tell whether a plane through faces or edges of contacts (n, 2) is known to separate the two bodies.
-
-    own, their: the numbers of their poses, error: the larger `posed_error`.
-    """
+def are_separated(s: Search, contacts: Any) -> bool:
+    """Tell whether a plane through faces or edges of contacts (n, 2) is known to separate the two bodies."""
+    poses, first, second, error = s.descent.poses, s.first, s.second, s.place.posed_error
+    own, their = 0 if s.place.a.is_posed else UNPOSED, 1 if s.place.b.is_posed else UNPOSED
     u, v = first.vertices, second.vertices
     for item in range(min(N_FACES, contacts.shape[0])):
-        s = with_pose(triangle_of(first, contacts[item, 0]), own)
-        t = with_pose(triangle_of(second, contacts[item, 1]), their)
-        if separates(poses, s.p, s.q, s.r, u, own, v, their, error):
-            return True
+        t = with_pose(triangle_of(first, contacts[item, 0]), own)
+        w = with_pose(triangle_of(second, contacts[item, 1]), their)
         if separates(poses, t.p, t.q, t.r, u, own, v, their, error):
             return True
-        if flag[0] != 0:
+        if separates(poses, w.p, w.q, w.r, u, own, v, their, error):
+            return True
+        if s.flag[0] != 0:
             return False
     for item in range(min(N_EDGES, contacts.shape[0])):  # order: a plane of a face is likelier, and tried with all
-        s = with_pose(triangle_of(first, contacts[item, 0]), own)
-        t = with_pose(triangle_of(second, contacts[item, 1]), their)
+        t = with_pose(triangle_of(first, contacts[item, 0]), own)
+        w = with_pose(triangle_of(second, contacts[item, 1]), their)
         for edge in range(6):
-            one, other = (s, t) if edge < 3 else (t, s)
+            one, other = (t, w) if edge < 3 else (w, t)
             for end in range(3):
                 a, b, c = corner(one, edge), corner(one, edge + 1), corner(other, end)
                 if separates(poses, a, b, c, u, own, v, their, error):
                     return True
-        if flag[0] != 0:
+        if s.flag[0] != 0:
             return False
     return False
 
@@ -165,64 +156,16 @@ def are_outside(
 
 
 @called
-def only_touch(
-    first: MeshArrays,
-    a: Placement,
-    second: MeshArrays,
-    b: Placement,
-    poses: Any,
-    contacts: Any,
-    flush: Any,
-    is_free: bool,
-    flag: Any,
-) -> bool:
-    """Tell whether two placed bodies are known only to touch. contacts (n, 2): all of them where is_free, which says
-    that none is flush or cuts an open face; else any. flush (n,): as for `are_outside`."""
-    if is_free and first.has_inside and second.has_inside:
-        if are_outside(first, a, contacts, flush, 0, second, b) and are_outside(
-            second, b, contacts, flush, 1, first, a
+def only_touch(s: Search, n: int, is_free: bool) -> bool:
+    """Tell whether two placed bodies are known only to touch, by their n contacts, or the first n of them.
+
+    is_free: the n are all, and none is flush or cuts an open face; the classes then hold the corners in the plane of
+    the other face, as for `are_outside`.
+    """
+    contacts, flush = s.found.pairs[:n], s.found.kinds[:n]
+    if is_free and s.first.has_inside and s.second.has_inside:
+        if are_outside(s.first, s.place.a, contacts, flush, 0, s.second, s.place.b) and are_outside(
+            s.second, s.place.b, contacts, flush, 1, s.first, s.place.a
         ):
             return True
-    own, their = 0 if a.is_posed else UNPOSED, 1 if b.is_posed else UNPOSED
-    error = max(posed_error(poses, own, first.extent.reach), posed_error(poses, their, second.extent.reach))
-    return are_separated(poses, first, own, second, their, contacts, error, flag)
-
-
-@kernel
-def judge_contacts(
-    first: MeshArrays,
-    first_pose: PoseArrays,
-    second: MeshArrays,
-    second_pose: PoseArrays,
-    contacts: Any,
-    are_all: bool,
-    kinds: Any,
-    flag: Any,
-) -> int:
-    """Say what contacts (n, 2) prove (UNKNOWN, ONLY_TOUCHING, CUTTING); are_all: whether there are no others.
-
-    Fills kinds (m <= n,) int8 of the first contacts; UNSETTLED stands for what is open. Beyond a contact of FACE_FACE,
-    than which nothing is stronger, nothing is filled.
-    """
-    poses, work, is_free = np.zeros((2, 12)), np.zeros(N_SIGNS, np.int8), True
-    flush = np.zeros(contacts.shape[0], np.int8)
-    store_pose(poses, 0, first_pose, 0)
-    store_pose(poses, 1, second_pose, 0)
-    own, their = 0 if first_pose.is_posed else UNPOSED, 1 if second_pose.is_posed else UNPOSED
-    error = max(posed_error(poses, own, first.extent.reach), posed_error(poses, their, second.extent.reach))
-    for item in range(contacts.shape[0]):
-        i, j = contacts[item, 0], contacts[item, 1]
-        kind, may_cut = UNSETTLED, True
-        if first.axis[i] >= 0 and second.axis[j] >= 0:
-            t, u = with_pose(triangle_of(first, i), own), with_pose(triangle_of(second, j), their)
-            kind, may_cut = kind_of(poses, t, int(first.axis[i]), u, int(second.axis[j]), error, work)
-            flush[item] = work[FLUSH]
-        if item < kinds.shape[0]:
-            kinds[item] = kind
-        is_free = is_free and not may_cut
-        if kind == FACE_FACE or flag[0] != 0 or not (is_free or item + 1 < kinds.shape[0]):
-            break
-    a, b = place_pair(first.extent, first_pose, 0, second.extent, second_pose, 0)
-    if only_touch(first, a, second, b, poses, contacts, flush, is_free and are_all, flag):
-        return ONLY_TOUCHING
-    return UNKNOWN if is_free else CUTTING
+    return are_separated(s, contacts)

@@ -19,9 +19,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from engine.jit import called, inline
+from engine.jit import called, inline, merged
 from engine.predicates.orientation import orient2d
-from engine.predicates.posed import UNPOSED, PosedPoint3, orient3d_posed
+from engine.predicates.posed import UNPOSED, PosedPoint3, orient3d_posed, posed_point
 from engine.predicates.vectors import cross, dot, largest_of, minus
 from engine.types import UNDECIDED, Point2, Point3
 
@@ -107,19 +107,25 @@ def with_lone_first(t: Triangle3, p: float, q: float, r: float) -> Triangle3:
     return Triangle3(t.r, t.p, t.q)
 
 
+@merged
+def bound_near(u: Point3, v: Point3, p: Point3, q: Point3, r: Point3, error: float) -> float:
+    """Return a bound on the error of determinants of differences of six points, five of them given from the sixth.
+
+    All differences of two of the six points are at most M = 2 m, m the largest of these. A determinant of three of them
+    is off by at most 11 u P with P <= 6 M^3 for rounding (7 u P as in `orient3d_filter`; some of the differences are
+    rounded twice), 18 e (M + e)^2 for the error of coordinates (e: twice it), and what underflows (`placement.py`).
+    """
+    m = 2.0 * max(max(largest_of(u), largest_of(v)), max(largest_of(p), largest_of(q), largest_of(r)))
+    e = 2.0 * error
+    return 2.0**-46 * (m * m * m) + 18.5 * e * ((m + e) * (m + e)) + 2.0**-1068 * (1.0 + m)
+
+
 @inline
 def classify_near(t1: Triangle3, t2: Triangle3, error: float) -> int:
-    """Return APART, CROSSING or UNDECIDED for two triangles of rounded points, each coordinate off by at most `error`.
-
-    **bound.** All differences of two of the six points are at most M = 2 m, m the largest from t1.p. A determinant of
-    three of them is off by at most 11 u P with P <= 6 M^3 for rounding (7 u P as in `orient3d_filter`; some of the
-    differences are rounded twice), 18 e (M + e)^2 for the error (e: twice it), and what underflows (`placement.py`).
-    """
+    """Return APART, CROSSING or UNDECIDED for two triangles of points rounded by at most `error` a coordinate."""
     u, v = minus(t1.q, t1.p), minus(t1.r, t1.p)
     p2, q2, r2 = minus(t2.p, t1.p), minus(t2.q, t1.p), minus(t2.r, t1.p)
-    m = 2.0 * max(max(largest_of(u), largest_of(v)), max(largest_of(p2), largest_of(q2), largest_of(r2)))
-    e = 2.0 * error
-    bound = 2.0**-46 * (m * m * m) + 18.5 * e * ((m + e) * (m + e)) + 2.0**-1068 * (1.0 + m)
+    bound = bound_near(u, v, p2, q2, r2, error)
     n1 = cross(u, v)
     a, b, c = dot(n1, p2), dot(n1, q2), dot(n1, r2)
     if (a > bound and b > bound and c > bound) or (a < -bound and b < -bound and c < -bound):
@@ -188,20 +194,31 @@ def sign_of_four(poses: Any, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d: 
 
 
 @called
+def sides_of(poses: Any, t: PosedTriangle, u: PosedTriangle, error: float) -> tuple[int, int, int]:
+    """Return the sides of the plane of t on which the corners of u lie, each as `sign_of_four`."""
+    a = posed_point(poses, t.p)
+    v, w = minus(posed_point(poses, t.q), a), minus(posed_point(poses, t.r), a)
+    p, q, r = minus(posed_point(poses, u.p), a), minus(posed_point(poses, u.q), a), minus(posed_point(poses, u.r), a)
+    n, bound = cross(v, w), bound_near(v, w, p, q, r, error)
+    by_p, by_q, by_r = dot(n, p), dot(n, q), dot(n, r)
+    return (
+        sign_of_four(poses, t.p, t.q, t.r, u.p, error) if not abs(by_p) > bound else (1 if by_p > 0.0 else -1),
+        sign_of_four(poses, t.p, t.q, t.r, u.q, error) if not abs(by_q) > bound else (1 if by_q > 0.0 else -1),
+        sign_of_four(poses, t.p, t.q, t.r, u.r, error) if not abs(by_r) > bound else (1 if by_r > 0.0 else -1),
+    )
+
+
+@called
 def classify_exactly(poses: Any, t1: PosedTriangle, t2: PosedTriangle, axis: int, error: float) -> int:
     """Return the class of two triangles that both have an area; UNDECIDED only where exponents leave the range.
 
     poses (n, 12), error: as for `orient3d_posed`. axis: a coordinate axis, before its pose, along which the projection
     of t1 has an area.
     """
-    p2 = sign_of_four(poses, t1.p, t1.q, t1.r, t2.p, error)
-    q2 = sign_of_four(poses, t1.p, t1.q, t1.r, t2.q, error)
-    r2 = sign_of_four(poses, t1.p, t1.q, t1.r, t2.r, error)
+    p2, q2, r2 = sides_of(poses, t1, t2, error)
     if is_one_side(p2, q2, r2):
         return APART
-    p1 = sign_of_four(poses, t2.p, t2.q, t2.r, t1.p, error)
-    q1 = sign_of_four(poses, t2.p, t2.q, t2.r, t1.q, error)
-    r1 = sign_of_four(poses, t2.p, t2.q, t2.r, t1.r, error)
+    p1, q1, r1 = sides_of(poses, t2, t1, error)
     if is_one_side(p1, q1, r1):
         return APART
     if p1 == UNDECIDED or q1 == UNDECIDED or r1 == UNDECIDED:

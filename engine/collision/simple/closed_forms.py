@@ -13,7 +13,17 @@ from typing import Any
 
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING
 from engine.collision.exact_images import as_vector, image_half_space, image_point, value_at
-from engine.collision.result import FIRST_WITHIN, NO_CONTACT, OVERLAP, SECOND_WITHIN, TOUCH, Collision, Witness, Work
+from engine.collision.result import (
+    FIRST_WITHIN,
+    NO_CONTACT,
+    OVERLAP,
+    SECOND_WITHIN,
+    TOUCH,
+    Collision,
+    Kind,
+    Witness,
+    Work,
+)
 from engine.collision.simple.against_boundary import collide_body_sphere
 from engine.jit import bare_kernel, inline
 from engine.predicates.exact_vectors import largest_axis, minus, squared_length
@@ -56,17 +66,26 @@ def relate_box_pairs(low: Any, high: Any, is_box: Any, pairs: Any, relations: An
             relations[item] = _relate(low[i], high[i], low[j], high[j])
 
 
-def flush_boxes(low: list[float], high: list[float], their_low: list[float], their_high: list[float]) -> Witness | None:
-    """Return the witness of two touching boxes of space whose faces share an area, else None."""
-    found: Witness | None = None
+def touching_boxes(
+    low: list[float], high: list[float], their_low: list[float], their_high: list[float]
+) -> Witness | None:
+    """Return the witness of two touching boxes of space, None where one is flat.
+
+    They share a part of a face, an edge or a vertex, by on how many axes they only touch; of the faces that meet there
+    the first is on the first of these axes.
+    """
+    n, first_face, second_face = -1, 0, 0
     for axis, (a0, a1, b0, b1) in enumerate(zip(low, high, their_low, their_high)):
         if a0 == a1 or b0 == b1:
             return None
         if a1 == b0 or b1 == a0:
-            if found is not None:
-                return None
-            found = Witness("face_face", 2 * axis + (a1 == b0), 2 * axis + (a1 != b0))
-    return found
+            n += 1
+            if n == 0:
+                first_face, second_face = 2 * axis + (a1 == b0), 2 * axis + (a1 != b0)
+    return Witness(_SHARED[n], first_face, second_face)
+
+
+_SHARED: tuple[Kind, ...] = ("face_face", "edge_edge", "vertex_vertex")
 
 
 def collide_aabb_sphere(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from engine.collision.meshes.exact_body import Corners, plane_through
+from engine.collision.meshes.exact_body import Corners
 from engine.collision.meshes.exact_triangles import as_simplex, classify_exact, kind_of_contact
 from engine.collision.meshes.triangle_triangle import APART
 from tests.reference.contact import triangles_meet
@@ -37,6 +37,5 @@ def test_degenerate_ones_agree_with_proper_ones_moved_to_them() -> None:
     ],
 )
 def test_kinds(other: Corners, kind: str) -> None:
-    planes = plane_through(FACE), plane_through(other)
-    assert kind_of_contact(FACE, other, *planes) == kind
-    assert kind_of_contact(other, FACE, *planes[::-1]) == kind
+    assert kind_of_contact(FACE, other) == kind
+    assert kind_of_contact(other, FACE) == kind

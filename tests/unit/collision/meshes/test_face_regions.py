@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from engine import Pose
-from engine.collision.meshes.mesh_mesh import find_all_contacts, look_at_regions
+from engine.collision.meshes.mesh_mesh import look_at_regions
 from engine.collision.meshes.mesh_pair import MeshPair
 from engine.collision.result import Work
 from tests.unit.collision.meshes.bodies import TURN, mesh
@@ -17,12 +17,10 @@ from tests.unit.collision.meshes.bodies import TURN, mesh
 def test_flush_boxes(at: tuple[float, float, float], overlaps: bool, pose: Pose | None) -> None:
     pair = MeshPair(mesh(2), pose, mesh(2, at), pose, Work())
     with np.errstate(all="ignore"):
-        contacts, _ = find_all_contacts(pair, looks_at_regions=False)
-        for met_known in (True, False):
-            found = False
-            for face in np.unique(contacts[:, 0]).tolist():
-                met = contacts[contacts[:, 0] == face, 1] if met_known else None
-                is_overlap, pierces = look_at_regions(pair, 0, face, met)
-                found |= is_overlap
-                assert not pierces or overlaps
-            assert found == overlaps
+        pair.find_contacts()
+        found = False
+        for face in np.unique(pair.contacts[:, 0]).tolist():
+            is_overlap, pierces = look_at_regions(pair, 0, face, pair.contacts[pair.contacts[:, 0] == face, 1])
+            found |= is_overlap
+            assert not pierces or overlaps
+        assert found == overlaps

@@ -32,7 +32,17 @@ def test_agrees_with_single_questions(size: int, room: int) -> None:
         poses = PoseArrays(read_only(turns), read_only(moves), True)  # the kind that the kernel is compiled for
         with np.errstate(all="ignore"):
             relate_poses(
-                a.arrays, b.arrays, STILL, poses, seek, 0, new_descent(), new_found(room), rows, np.zeros(1, np.uint8)
+                a.arrays,
+                b.arrays,
+                STILL,
+                poses,
+                seek,
+                0,
+                new_descent(),
+                new_found(room),
+                0,
+                rows,
+                np.zeros(1, np.uint8),
             )
         found = rows[:, RELATION]
         assert (found != UNSETTLED).sum() > 20

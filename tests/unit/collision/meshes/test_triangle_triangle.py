@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.collision.meshes.exact_body import plane_through
 from engine.collision.meshes.exact_triangles import classify_exact, kind_of_contact
 from engine.collision.meshes.placement import orient3d_near
 from engine.collision.meshes.triangle_triangle import (
@@ -84,8 +83,7 @@ def test_compiled_exact_and_reference_agree_on_a_lattice() -> None:
         if area:
             assert kind == exact
         if exact != APART:
-            one, other = plane_through(t1), plane_through(t2)
-            assert kind_of_contact(t1, t2, one, other) == kind_of_contact(t2, t1, other, one)
+            assert kind_of_contact(t1, t2) == kind_of_contact(t2, t1)
 
 
 def test_class_does_not_depend_on_the_order_of_vertices_or_triangles() -> None:
@@ -121,7 +119,7 @@ def test_named_cases(other: Corners, kind: int, contact: str | None) -> None:
     assert classify_exact(BASE, other) == kind
     assert classify_exact(other, BASE) == kind
     if contact is not None:
-        assert kind_of_contact(BASE, other, plane_through(BASE), plane_through(other)) == contact
+        assert kind_of_contact(BASE, other) == contact
 
 
 def test_signs_near_zero_are_left_open_and_others_survive_the_error() -> None:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
 from engine import Aabb, collide
 from engine.collision.codes import UNSETTLED
+from engine.collision.meshes.mesh_mesh import mesh_mesh
+from engine.collision.result import Work
 from engine.collision.simple.closed_forms import relate_box_pairs
 from tests.unit.collision.lattices import COUNTS, Maker, aabb, check_pairs
 
@@ -23,6 +27,19 @@ def test_a_flat_box_touches_and_may_pierce(z: float, piercing: bool) -> None:
     assert found.relation.label == "touching"
     assert found.witness is not None
     assert found.witness.piercing == piercing
+
+
+def test_witnesses_of_touching_boxes_are_those_of_their_meshes() -> None:
+    spans = [(0.0, 2.0), (1.0, 2.0), (-1.0, 1.0), (-1.0, 3.0), (2.0, 3.0), (-2.0, 0.0)]
+    box = Aabb([0, 0, 0], [2, 2, 2])
+    kinds = set()
+    for spots in itertools.product(spans, repeat=3):
+        other = Aabb(*zip(*spots))
+        found = collide(box, other)
+        if found.relation.label == "touching":
+            assert found == mesh_mesh(box, other, None, None, Work())
+            kinds.add(found.witness and found.witness.kind)
+    assert kinds == {"face_face", "edge_edge", "vertex_vertex"}
 
 
 @pytest.mark.parametrize("d", [2, 3])
