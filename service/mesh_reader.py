@@ -28,16 +28,23 @@ _starter: Final = futures.ThreadPoolExecutor(1, thread_name_prefix="mesh reader"
 _METHOD: Final = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
 
 
+def context() -> Any:
+    """Return how children are started here; its server imports what readers need, if it is the first of this process
+    to start one."""
+    found: Any = multiprocessing.get_context(_METHOD)
+    if _METHOD == "forkserver":
+        found.set_forkserver_preload(["service.mesh_reader", "service.__main__", "trimesh.exchange.load"])
+    return found
+
+
 def read(octets: bytes | bytearray | memoryview, kind: str, call: Call) -> tuple[Any, Any]:
     """Return vertices and triangles of a mesh file; `invalid_mesh` where it cannot be read, in time or at all."""
     if find_spec("trimesh") is None:
         raise ServiceError("not_installed", "this service reads no mesh files; send vertices and faces as JSON")
-    context: Any = multiprocessing.get_context(_METHOD)
-    if _METHOD == "forkserver":
-        context.set_forkserver_preload(["service.mesh_reader", "service.__main__", "trimesh.exchange.load"])
-    mine, theirs = context.Pipe(duplex=False)
+    around = context()
+    mine, theirs = around.Pipe(duplex=False)
     room = _ROOM + _FOOTPRINT * len(octets)
-    child = context.Process(target=_child, args=(theirs, bytes(octets), kind, room, call.remaining()), daemon=True)
+    child = around.Process(target=_child, args=(theirs, bytes(octets), kind, room, call.remaining()), daemon=True)
     starting = _starter.submit(child.start)  # the first waits for the server, which takes seconds
     try:
         while not futures.wait([starting], _POLL_SECONDS).done or not wait([mine], _POLL_SECONDS):

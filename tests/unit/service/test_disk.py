@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import logging
-import multiprocessing
 import os
 import random
 import sys
@@ -17,6 +16,7 @@ import numpy as np
 import pytest
 
 import engine
+from service import mesh_reader
 from service.disk import Folder
 from service.errors import ServiceError
 from service.store import Store, solid_id
@@ -116,8 +116,7 @@ def write_on(folder: Path, seed: int, told: Connection) -> None:
 def kill_writers(folder: Path, times: int) -> None:
     """Kill processes that write to `folder` at random moments; all files must be whole, all that was told there."""
     source, told = random.Random(6), set()
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["service.store"])
+    context = mesh_reader.context()  # a process has one server of forks: another's would lack what its readers need
     for turn in range(times):
         ours, theirs = context.Pipe(duplex=False)
         writer = context.Process(target=write_on, args=(folder, turn, theirs))
