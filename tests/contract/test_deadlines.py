@@ -6,6 +6,7 @@ An endpoint that is not in `WORK` fails, so that a new one cannot be forgotten. 
 from __future__ import annotations
 
 import json
+import math
 import os
 import socket
 import time
@@ -38,6 +39,16 @@ def after() -> float:
         np.sort(numbers, kind="stable")
         spent.append(time.process_time() - start)
     return AFTER * max(1.0, min(spent) / SORTED)
+
+
+def check_ends(cpu_after: Callable[[], float]) -> None:
+    """Assert that some work ends in time: within one of three attempts, and on a slow machine in proportion."""
+    spent = math.inf
+    for _ in range(3):
+        spent = min(spent, cpu_after())
+        if spent < AFTER:
+            return
+    assert spent < after()
 
 
 def ball(n: int) -> dict[str, Any]:
@@ -164,13 +175,15 @@ OPERATIONS = {
 
 
 @pytest.fixture(scope="module")
-def services() -> Iterator[dict[str, Service]]:
-    """One that ends requests by itself, and one that waits for the client to go."""
-    found = {"deadline": Service(deadline_seconds=DEADLINE), "disconnect": Service(deadline_seconds=60)}
+def services(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Service]]:
+    """One that ends requests by itself, and one that waits for the client to go and takes what is to be stored."""
+    folder = tmp_path_factory.mktemp("solids")
+    seconds = {"deadline": DEADLINE, "disconnect": 300}
+    found = {end: Service(deadline_seconds=seconds[end], store_folder=folder) for end in seconds}
     try:
         for service in found.values():
             service.wait_until_ready()
-            httpx.post(f"{service.url}/v1/compare", json=COMPILED, timeout=60)
+            httpx.post(f"{service.url}/v1/compare", json=COMPILED, timeout=300)
         yield found
         for service in found.values():
             assert service.stop() == 0, "".join(service.log)
@@ -197,13 +210,13 @@ def cpu_when_idle(service: Service) -> float:
     return spent
 
 
-def request_of(service: Service, name: str) -> bytes:
-    """Return the bytes that ask for the work of an operation."""
+def request_of(storing: Service, name: str) -> bytes:
+    """Return the bytes that ask for the work of an operation; storing: where to put what it is about."""
     path, work = OPERATIONS[name], WORK[name]()
     if isinstance(work, tuple):
         stored, work = work
         where = "solids" if "bodies" not in stored else "scenes"
-        stored_id = httpx.post(f"{service.url}/v1/{where}", json=stored).json()["id"]
+        stored_id = httpx.post(f"{storing.url}/v1/{where}", json=stored, timeout=300).json()["id"]
         path = path.replace("{solid_id}", stored_id).replace("{scene_id}", stored_id)
     kind = "application/json" if isinstance(work, dict) else "application/octet-stream"
     body = json.dumps(work).encode() if isinstance(work, dict) else work
@@ -221,11 +234,15 @@ def test_every_operation_has_its_work() -> None:
 @pytest.mark.parametrize("name", WORK)
 def test_work_ends(services: dict[str, Service], name: str, end: str) -> None:
     service = services[end]
-    message = request_of(service, name)
-    with socket.create_connection(("127.0.0.1", service.port), timeout=60) as connection:
-        connection.sendall(message)
-        time.sleep(DEADLINE)
-        at_the_end = cpu_of(service)
-        if end == "deadline":
-            assert connection.recv(2**16)[9:12] in (b"504", b"201")
-    assert cpu_when_idle(service) - at_the_end < after()
+    message = request_of(services["disconnect"], name)
+
+    def cpu_after() -> float:
+        with socket.create_connection(("127.0.0.1", service.port), timeout=300) as connection:
+            connection.sendall(message)
+            time.sleep(DEADLINE)
+            at_the_end = cpu_of(service)
+            if end == "deadline":
+                assert connection.recv(2**16)[9:12] in (b"504", b"201", b"200")
+        return cpu_when_idle(service) - at_the_end
+
+    check_ends(cpu_after)

@@ -11,7 +11,7 @@ import inspect
 import threading
 import time
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ import pytest
 
 import engine
 from engine.solids.base import _restored
-from tests.contract.test_deadlines import MANY_SIDES, TIN, ZIGZAG, after, ball, circle, comb, far_apart, prism
+from tests.contract.test_deadlines import MANY_SIDES, TIN, ZIGZAG, ball, check_ends, circle, comb, far_apart, prism
 from tests.contract.test_deadlines import vanishing as vanishing_terms
 
 DEADLINE, SOON = 0.2, 0.05
@@ -228,10 +228,9 @@ def test_every_operation_has_its_work() -> None:
 @pytest.mark.parametrize("is_cancelled", [False, True])
 @pytest.mark.parametrize("name", WORK)
 def test_work_ends(name: str, is_cancelled: bool) -> None:
-    assert cpu_after(WORK[name], DEADLINE, is_cancelled) < after()
+    check_ends(lambda: cpu_after(WORK[name], DEADLINE, is_cancelled))
 
 
 @pytest.mark.parametrize("name", FIRST)
 def test_building_for_a_first_question_ends(name: str) -> None:
-    body = new(solid("fine"))
-    assert cpu_after(lambda **end: FIRST[name](body, **end), SOON, False) < after()
+    check_ends(lambda: cpu_after(partial(FIRST[name], new(solid("fine"))), SOON, False))

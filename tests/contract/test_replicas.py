@@ -47,8 +47,17 @@ def config(folder: Path, port: int, replicas: list[Service], text: str = CONF) -
     return path
 
 
+def wait_for(statuses: list[int], count: int) -> None:
+    """Wait until there are so many answers."""
+    end = time.monotonic() + 300
+    while len(statuses) < count:
+        assert time.monotonic() < end, len(statuses)
+        time.sleep(0.05)
+
+
 @pytest.mark.skipif(NGINX is None, reason="nginx is not installed (Debian's package nginx)")
 def test_a_replica_killed_under_load_loses_nothing(tmp_path: Path) -> None:
+    is_over = threading.Event()
     replicas = [Service(store_folder=tmp_path / "solids", access_log=False) for _ in range(2)]
     port = free_port()
     nginx = subprocess.Popen([str(NGINX), "-p", str(tmp_path), "-c", str(config(tmp_path, port, replicas))])
@@ -56,13 +65,14 @@ def test_a_replica_killed_under_load_loses_nothing(tmp_path: Path) -> None:
         for replica in replicas:
             replica.wait_until_ready()
         wait_until(port, "/readyz")
-        names, statuses, lost, wrong, end = set(), [], [], [], time.monotonic() + 4
+        names, lost, wrong = set(), [], []
+        statuses: list[int] = []
         points = np.random.default_rng(0).random((500, 3))
 
         def work(seed: int) -> None:
             connection = Connection(port)
             source = np.random.default_rng(seed)
-            while time.monotonic() < end:
+            while not is_over.is_set():
                 radius = 0.25 + int(source.integers(8)) / 16
                 body = orjson.dumps({"type": "sphere", "center": [0, 0, 0], "radius": radius})
                 try:
@@ -82,16 +92,18 @@ def test_a_replica_killed_under_load_loses_nothing(tmp_path: Path) -> None:
         workers = [threading.Thread(target=work, args=(seed,)) for seed in range(4)]
         for worker in workers:
             worker.start()
-        time.sleep(1.5)
+        wait_for(statuses, 200)
         replicas[0].process.kill()
+        wait_for(statuses, 400)
+        is_over.set()
         for worker in workers:
             worker.join()
         assert not lost, (tmp_path / "error.log").read_text()[-2000:]
-        assert len(statuses) > 100
         assert set(statuses) <= {200, 201}
         assert not any(wrong)
         assert len(names) == len({radius for radius, _ in names}) == 8
     finally:
+        is_over.set()
         nginx.terminate()
         nginx.wait()
         for replica in replicas:
@@ -123,7 +135,7 @@ def test_below_a_path_of_a_site_with_tls(tmp_path: Path) -> None:
         service.wait_until_ready()
         trust = ssl.create_default_context(cafile=made[0])
         with httpx.Client(base_url=f"https://127.0.0.1:{port}", verify=trust, follow_redirects=True) as client:
-            end = time.monotonic() + 20
+            end = time.monotonic() + 120
             while time.monotonic() < end:
                 with suppress(httpx.ConnectError):
                     client.get("/")
@@ -142,7 +154,7 @@ def test_below_a_path_of_a_site_with_tls(tmp_path: Path) -> None:
             assert client.get("/geometry/metrics").status_code == 404
         # what the client itself says of its address is believed no further than the last proxy that is trusted
         httpx.get(f"{service.url}/healthz", headers={"X-Forwarded-For": "198.51.100.1, 203.0.113.7"})
-        end = time.monotonic() + 5
+        end = time.monotonic() + 120
         while not any('"client":"203.0.113.7"' in line for line in service.log):
             assert time.monotonic() < end, service.log[-3:]
             time.sleep(0.05)

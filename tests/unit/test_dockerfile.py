@@ -107,11 +107,11 @@ def test_steps_build_a_service_that_starts_without_compiling(tmp_path: Path) -> 
     try:
         before = time.monotonic()
         while subprocess.run(check, env=surroundings, check=False, capture_output=True).returncode:
-            assert time.monotonic() - before < 60
+            assert time.monotonic() - before < 600
             assert service.poll() is None
         with urllib.request.urlopen("http://127.0.0.1:18765/docs", timeout=5) as answer:
             assert answer.status == 200
         assert not list((tmp_path / "tmp/kernels").rglob("*.nbc"))  # nothing was compiled
     finally:
         service.terminate()
-        assert service.wait(30) == 0
+        assert service.wait(300) == 0

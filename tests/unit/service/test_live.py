@@ -18,9 +18,14 @@ from pathlib import Path
 import httpx
 import pytest
 
+from service.settings import Settings
 from tests.unit.service.asking import SPHERE, check_problem
 
 ROOT = Path(__file__).resolve().parents[3]
+
+
+PATIENCE = 1.5
+"""Seconds for headers and bodies: a request of this process must not be as slow by itself, on a busy machine either."""
 
 
 class Service:
@@ -46,7 +51,7 @@ class Service:
         self.port = 0
         self._found = threading.Event()
         threading.Thread(target=self._read, daemon=True).start()
-        assert self._found.wait(60), "".join(self.log)
+        assert self._found.wait(300), "".join(self.log)
         self.url = f"http://127.0.0.1:{self.port}"
 
     def _read(self) -> None:
@@ -68,7 +73,7 @@ class Service:
 
     def stop(self) -> int:
         self.process.send_signal(signal.SIGTERM)
-        return self.process.wait(60)
+        return self.process.wait(300)
 
     def close(self) -> None:
         with suppress(ProcessLookupError):
@@ -77,9 +82,16 @@ class Service:
         assert self.process.stderr is not None
         self.process.stderr.close()
 
+    def wait_until_in_flight(self, count: int) -> None:
+        """Wait until so many requests are under way, the one that asks for it left out."""
+        end, asked = time.monotonic() + 300, f"\ngeometry_requests_in_flight {count + 1}.0\n"
+        while asked not in httpx.get(f"{self.url}/metrics", timeout=120).text:
+            assert time.monotonic() < end, "".join(self.log)
+            time.sleep(0.05)
+
     def send(self, *parts: bytes, half_close: bool = False) -> bytes:
         """Send raw bytes over a socket of their own and return what comes back until it is closed or an object ends."""
-        with socket.create_connection(("127.0.0.1", self.port), timeout=20) as connection:
+        with socket.create_connection(("127.0.0.1", self.port), timeout=120) as connection:
             for part in parts:
                 connection.sendall(part)
                 time.sleep(0.02)
@@ -95,7 +107,7 @@ class Service:
 
 @pytest.fixture(scope="module")
 def service() -> Iterator[Service]:
-    service = Service(max_body_bytes=10_000, header_seconds=0.7, body_seconds=0.7)
+    service = Service(max_body_bytes=10_000, header_seconds=PATIENCE, body_seconds=PATIENCE)
     try:
         yield service
         assert service.stop() == 0, "".join(service.log)
@@ -185,11 +197,11 @@ def test_slow_headers_and_bodies_are_given_up(service: Service) -> None:
         assert answer.startswith(b"HTTP/1.1 408 "), answer
         assert b'"code":"' + code in answer
         assert b"\nconnection: close" in answer.lower()
-        assert 0.5 < time.monotonic() - before < 5
+        assert PATIENCE - 0.2 < time.monotonic() - before < Settings().header_seconds
     with httpx.Client() as client:  # an idle connection is no slow request
         for _ in range(2):
             assert client.get(f"{service.url}/healthz").status_code == 200
-            time.sleep(1)
+            time.sleep(PATIENCE + 0.5)
 
 
 def test_headers_without_end_are_given_up(service: Service) -> None:
@@ -206,7 +218,7 @@ def test_a_length_of_many_digits_is_a_number(service: Service) -> None:
 
 def test_a_client_that_does_not_read_is_dropped() -> None:
     """And what its answer held is given back."""
-    service = Service(write_seconds=0.5)
+    service = Service(write_seconds=PATIENCE)
     try:
         service.wait_until_ready()
         solid = httpx.post(f"{service.url}/v1/solids", json=SPHERE).headers["location"].encode()
@@ -214,16 +226,17 @@ def test_a_client_that_does_not_read_is_dropped() -> None:
         head = b"POST %s/clip/segments HTTP/1.1\r\nHost: x\r\nContent-Length: %d\r\n\r\n" % (solid, len(body))
         with socket.socket() as connection:
             connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2**12)
-            connection.settimeout(30)
+            connection.settimeout(120)
             connection.connect(("127.0.0.1", service.port))
             connection.sendall(head + body)
-            time.sleep(2)
+            service.wait_until_in_flight(1)
+            service.wait_until_in_flight(0)
             received = 0
             with suppress(ConnectionError):
                 while part := connection.recv(2**20):
                     received += len(part)
             assert received < len(body)
-        answer = httpx.post(service.url + solid.decode() + "/clip/segments", content=body, timeout=60)
+        answer = httpx.post(service.url + solid.decode() + "/clip/segments", content=body, timeout=300)
         assert len(answer.content) == len(body)  # who reads gets it all
         assert service.stop() == 0, "".join(service.log)
     finally:
@@ -245,17 +258,17 @@ def test_a_stop_lets_requests_end() -> None:
         service.wait_until_ready()
         body = json.dumps({"solid": SPHERE, "points": [[0.1, 0.2, 0.3]] * 20_000}).encode()
         head = b"POST /v1/contains HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: %d\r\n\r\n"
-        connections = [socket.create_connection(("127.0.0.1", service.port), timeout=20) for _ in range(3)]
+        connections = [socket.create_connection(("127.0.0.1", service.port), timeout=120) for _ in range(3)]
         for connection in connections:
             connection.sendall(head % len(body) + body[:-1])
-        time.sleep(0.3)
+        service.wait_until_in_flight(3)
         service.process.send_signal(signal.SIGTERM)
         time.sleep(0.3)
         for connection in connections:
             with connection:
                 connection.sendall(body[-1:])
                 assert connection.recv(2**16).startswith(b"HTTP/1.1 200 ")
-        assert service.process.wait(60) == 0, "".join(service.log)
+        assert service.process.wait(300) == 0, "".join(service.log)
     finally:
         service.close()
 
@@ -294,7 +307,7 @@ def test_a_wrong_setting_is_named() -> None:
         env={**os.environ, "GEOMETRY_MAX_POINTS": "many"},
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=300,
         check=False,
     )
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)

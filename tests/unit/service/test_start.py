@@ -26,7 +26,7 @@ def start(*flags: str, **environment: str) -> subprocess.CompletedProcess[str]:
     """Run `python -m service` with flags that end it."""
     command = [sys.executable, "-m", "service", *flags]
     around = {**os.environ, **environment}
-    return subprocess.run(command, cwd=ROOT, env=around, capture_output=True, text=True, timeout=60, check=False)
+    return subprocess.run(command, cwd=ROOT, env=around, capture_output=True, text=True, timeout=300, check=False)
 
 
 def test_help_names_every_setting_with_its_reason() -> None:
@@ -84,6 +84,7 @@ def test_what_is_counted_while_it_runs() -> None:
         body = {"solid": {"type": "sphere", "center": [0, 0], "radius": 1}, "points": [[0, 0]]}
         assert httpx.post(f"{service.url}/v1/contains", json=body).status_code == 200
         assert b" 400 " in service.send(b"nonsense\r\n\r\n")
+        service.wait_until_in_flight(0)
         text = httpx.get(f"{service.url}/metrics").text
     finally:
         service.close()
