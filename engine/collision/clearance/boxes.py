@@ -73,7 +73,7 @@ class Room(NamedTuple):
     the axes of both bodies and in space; where the two origins are along it; how often it turned. corners (2, 8, 3, 3),
     reaches (2, 8): of the triangles of two blocks, and how far they reach along the line. kept (n_nodes, 4): of either
     body the turn at which `block_reach` was found, and it. waiting, waiting_bounds (n_nodes,), listed (2, MOST_LISTED):
-    nodes of one body.
+    nodes of one body. points (2, 3): the nearest.
     """
 
     heap: Heap
@@ -86,6 +86,7 @@ class Room(NamedTuple):
     waiting: Any
     waiting_bounds: Any
     listed: Any
+    points: Any
 
 
 def new_room(room: int, n_nodes: int) -> Room:
@@ -101,6 +102,7 @@ def new_room(room: int, n_nodes: int) -> Room:
         np.empty(n_nodes + LANES, np.int32),
         np.empty(n_nodes + LANES),
         np.empty((2, MOST_LISTED), np.int32),
+        np.empty((2, 3)),
     )
 
 

@@ -171,7 +171,7 @@ def _proven(pool: ConvexArrays, s: Simplex, a: PlacedBody, b: PlacedBody, reach:
     i, j = _kinds(s.a.i, s.b.i, s.c.i), _kinds(s.a.j, s.b.j, s.c.j)
     t = Triangle(_dual(pool, a, i[0], here), _dual(pool, a, i[1], here), _dual(pool, a, i[2], here))
     u = Triangle(_dual(pool, b, j[0], there), _dual(pool, b, j[1], there), _dual(pool, b, j[2], there))
-    p_end, q_end = ends_of(t, u, i[3], j[3])
+    p_end, q_end, _, _ = ends_of(t, u, i[3], j[3])
     n = minus_wide(q_end, p_end)
     square = dot_wide(n, n)
     size_of_all = reach + max(abs(x[0]), abs(y[0]), abs(z[0]))

@@ -73,57 +73,61 @@ def corner_of(place: Placement, p: Point3, shift: Wide3) -> Wide3:
 
 
 @inline
-def _corners(view: View, triangle: int, shift: Wide3) -> Triangle:
+def corners_of(view: View, triangle: int, shift: Wide3) -> Triangle:
     t = triangle_of(view.mesh, triangle)
     p, q = corner_of(view.place, scaled(t.p, view.unit), shift), corner_of(view.place, scaled(t.q, view.unit), shift)
     return Triangle(p, q, corner_of(view.place, scaled(t.r, view.unit), shift))
 
 
 @inline
-def _vertex(t: Triangle, k: int) -> Wide3:
+def vertex_of(t: Triangle, k: int) -> Wide3:
     return t.p if k == 0 else (t.q if k == 1 else t.r)
 
 
 @inline
 def _edge(t: Triangle, k: int) -> tuple[Wide3, Wide3]:
     """Return the start of an edge, and the vector to its end."""
-    a = _vertex(t, k)
-    return a, minus_wide(_vertex(t, (k + 1) % 3), a)
+    a = vertex_of(t, k)
+    return a, minus_wide(vertex_of(t, (k + 1) % 3), a)
 
 
 @called
-def _foot(point: Wide3, t: Triangle, feature: int) -> Wide3:
-    """Return the point of a vertex, edge or triangle that is nearest to a point, or some other of it."""
+def _foot(point: Wide3, t: Triangle, feature: int) -> tuple[Wide3, float, float]:
+    """Return the point of a vertex, edge or triangle that is nearest to a point, or some other of it; by how much its
+    weights times their denominator are above 0, and the lengths of the edges over the denominator."""
     if feature < 3:
-        return _vertex(t, feature)
+        return vertex_of(t, feature), np.inf, 0.0
     a, u = _edge(t, feature % 3)
     w, uu = minus_wide(point, a), dot_wide(u, u)
+    uw = dot_wide(u, w)
     if feature < FACE:
-        return along_wide(a, _share(dot_wide(w, u), uu), u)
+        return along_wide(a, _share(uw, uu), u), min(uw.h, uu.h - uw.h), np.sqrt(uu.h) / uu.h
     v = minus_wide(t.r, a)
-    uv, vv, uw, vw = dot_wide(u, v), dot_wide(v, v), dot_wide(u, w), dot_wide(v, w)
+    uv, vv, vw = dot_wide(u, v), dot_wide(v, v), dot_wide(v, w)
     size = less(times(uu, vv), times(uv, uv))
-    x = _share(less(times(vv, uw), times(uv, vw)), size)
-    y = _share(less(times(uu, vw), times(uv, uw)), size)
+    top, their_top = less(times(vv, uw), times(uv, vw)), less(times(uu, vw), times(uv, uw))
+    x, y = _share(top, size), _share(their_top, size)
     rest = less(Wide(1.0, 0.0), x)
-    return along_wide(along_wide(a, x, u), y if less(y, rest).h <= 0.0 else rest, v)
+    foot = along_wide(along_wide(a, x, u), y if less(y, rest).h <= 0.0 else rest, v)
+    return foot, min(top.h, their_top.h, size.h - top.h - their_top.h), (np.sqrt(uu.h) + np.sqrt(vv.h)) / size.h
 
 
 @called
-def ends_of(s: Triangle, t: Triangle, first: int, second: int) -> tuple[Wide3, Wide3]:
-    """Return the nearest points of two features, or some others of them."""
+def ends_of(s: Triangle, t: Triangle, first: int, second: int) -> tuple[Wide3, Wide3, float, float]:
+    """Return the nearest points of two features, or some others of them, and of both together what `_foot` tells."""
     if second < 3:
-        q = _vertex(t, second)
-        return _foot(q, s, first), q
+        q = vertex_of(t, second)
+        p, inside, steepness = _foot(q, s, first)
+        return p, q, inside, steepness
+    p, inside, steepness = vertex_of(s, first % 3), np.inf, 0.0
     if 3 <= first < FACE and second < FACE:
         (a, u), (b, v) = _edge(s, first - 3), _edge(t, second - 3)
         w = minus_wide(a, b)
         uu, uv, vv, uw, vw = dot_wide(u, u), dot_wide(u, v), dot_wide(v, v), dot_wide(u, w), dot_wide(v, w)
-        size = less(times(uu, vv), times(uv, uv))
-        p = along_wide(a, _share(less(times(uv, vw), times(vv, uw)), size), u)
-    else:
-        p = _vertex(s, first % 3)
-    return p, _foot(p, t, second)
+        size, top = less(times(uu, vv), times(uv, uv)), less(times(uv, vw), times(vv, uw))
+        p, inside, steepness = along_wide(a, _share(top, size), u), min(top.h, size.h - top.h), np.sqrt(uu.h) / size.h
+    q, their_inside, their_steepness = _foot(p, t, second)
+    return p, q, min(inside, their_inside), steepness + their_steepness
 
 
 @inline
@@ -136,16 +140,25 @@ def height_above(n: Wide3, p: Wide3, base: Wide3) -> Wide:
 def _bounds(s: Triangle, t: Triangle, first: int, second: int) -> tuple[Wide, float]:
     """Return the distance of two points of the triangles, and by how much the triangles may be nearer at most but for
     rounding."""
-    p, q = ends_of(s, t, first, second)
+    p, q, _, _ = ends_of(s, t, first, second)
     n = minus_wide(q, p)
     square = dot_wide(n, n)
     if not square.h > 2.0**-300:
         return Wide(0.0, 0.0), 0.0
     beyond = 0.0
     for k in range(3):
-        beyond = max(beyond, height_above(n, _vertex(s, k), p).h, -height_above(n, _vertex(t, k), q).h)
+        beyond = max(beyond, height_above(n, vertex_of(s, k), p).h, -height_above(n, vertex_of(t, k), q).h)
     size = root(square)
     return size, 2.0 * beyond / size.h
+
+
+@inline
+def shift_of(s: Search, start: Any, other: Any) -> Wide3:
+    """Return the translation of the second body less that of the first, times the unit."""
+    unit = s.a.unit
+    x, y = two_diff(other[0] * unit, start[0] * unit), two_diff(other[1] * unit, start[1] * unit)
+    z = two_diff(other[2] * unit, start[2] * unit)
+    return Wide3(Wide(x[0], x[1]), Wide(y[0], y[1]), Wide(z[0], z[1]))
 
 
 @called
@@ -157,13 +170,10 @@ def refine(s: Search, start: Any, other: Any, radii: Any, n: int) -> tuple[float
     """
     found, unit = s.room.found, s.a.unit
     least, lowest, origin = Wide(np.inf, 0.0), Wide(np.inf, 0.0), Wide(0.0, 0.0)
-    x = two_diff(other[0] * unit, start[0] * unit)
-    y = two_diff(other[1] * unit, start[1] * unit)
-    z = two_diff(other[2] * unit, start[2] * unit)
-    shift = Wide3(Wide(x[0], x[1]), Wide(y[0], y[1]), Wide(z[0], z[1]))
+    shift = shift_of(s, start, other)
     for k in range(n):
-        t = _corners(s.a, found.pairs[k, 0], Wide3(origin, origin, origin))
-        size, beyond = _bounds(t, _corners(s.b, found.pairs[k, 1], shift), found.pairs[k, 2], found.pairs[k, 3])
+        t = corners_of(s.a, found.pairs[k, 0], Wide3(origin, origin, origin))
+        size, beyond = _bounds(t, corners_of(s.b, found.pairs[k, 1], shift), found.pairs[k, 2], found.pairs[k, 3])
         low = less(size, Wide(beyond, 0.0))
         found.bounds[k] = low.h * (1.0 - 2.0**-50) - ROUNDING
         least = size if less(size, least).h < 0.0 or k == 0 else least

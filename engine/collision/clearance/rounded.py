@@ -24,10 +24,16 @@ class ScaledGap(NamedTuple):
 
     def clearance(self, features: tuple[Feature, Feature], dimension: int) -> Clearance:
         """Return distance, points and features, of `dimension` coordinates."""
-        p, q = self.gap.p, self.gap.q
-        points = np.array([self._toward(p, q, self.radii[0]), self._toward(q, p, self.radii[1])])[:, :dimension]
+        p, q, distance = self.gap.p, self.gap.q, self.distance()
+        try:
+            ends = self._toward(p, q, self.radii[0]), self._toward(q, p, self.radii[1])
+        except OverflowError:
+            raise NotRepresentableError(
+                "a nearest point is beyond the largest double, 1.8e308; scale both bodies down by a power of two", ()
+            ) from None
+        points = np.array(ends)[:, :dimension]
         points.setflags(write=False)
-        return Clearance(self.distance(), points, features)
+        return Clearance(distance, points, features)
 
     def distance(self) -> float:
         """Return the double nearest to the distance, the smallest denormal where that would be 0.

@@ -16,12 +16,13 @@ from engine.collision.clearance.blocks import DONE
 from engine.collision.clearance.bodies import feature_of, in_space, radius_of, spread_of
 from engine.collision.clearance.boxes import Room, new_room
 from engine.collision.clearance.exact import Gap, Wall, is_beyond, nearest_of_triangles, walls
-from engine.collision.clearance.result import Clearance
+from engine.collision.clearance.result import Clearance, Feature
 from engine.collision.clearance.rounded import ScaledGap
-from engine.collision.clearance.traversal import BEYOND, Asked, find_nearest
+from engine.collision.clearance.traversal import BEYOND, TOLD, Asked, find_nearest
 from engine.collision.meshes.exact_body import exact_pair, on_lattice
 from engine.collision.meshes.mesh_arrays import STILL, MeshBody, lattice_shift
 from engine.collision.meshes.placement import PoseArrays
+from engine.direct import entry_of
 from engine.parallel import Budget
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
@@ -57,44 +58,58 @@ class SpreadPair:
 
     def clearance(self, item: int) -> Clearance:
         """Return distance, points and features under pose `item`; the bodies have no common point there."""
-        asked = Asked(np.inf, -1.0, *self._radii, self._reach, True)
-        _, pairs = next(self._left(item, item + 1, np.full(len(self.poses[1].translations), np.nan), asked))
-        gap, triangles = self._least(item, pairs)
-        codes = gap.gap.first, gap.gap.second
+        asked, answers = Asked(np.inf, -1.0, *self._radii, self._reach, True), np.full(item + 1, np.nan)
+        how, _, pairs = next(self._left(item, item + 1, answers, asked))
+        d = self.solids[0].dimension
+        if how != TOLD:
+            gap, triangles = self._least(item, pairs)
+            return gap.clearance(self._features(triangles, (gap.gap.first, gap.gap.second)), d)
+        i, j, *codes = next(iter(pairs))
+        points = self._room.points[:, :d].copy()
+        points.setflags(write=False)
+        return Clearance(float(answers[item]), points, self._features((i, j), codes))
+
+    def _features(self, triangles: Sequence[int], codes: Sequence[int]) -> tuple[Feature, Feature]:
         first, second = map(feature_of, self.solids, self.meshes, triangles, codes)
-        return gap.clearance((first, second), self.solids[0].dimension)
+        return first, second
 
     def fill(self, start: int, stop: int, answers: FloatArray, least: Fraction | None = None) -> None:
         """Answer for the poses of a range whose answers are NaN: how far apart the triangles are, those of bodies that
         have no common point; where a distance is given 0.0 if they are nearer than that, else infinity."""
         if least is None:
-            for item, pairs in self._left(start, stop, answers, Asked(np.inf, -1.0, *self._radii, self._reach, False)):
+            for _, item, pairs in self._left(
+                start, stop, answers, Asked(np.inf, -1.0, *self._radii, self._reach, False)
+            ):
                 answers[item] = self._least(item, pairs)[0].distance()
             return
         limits = _around(least + Fraction(self._radii[0]) + Fraction(self._radii[1]))
-        for item, pairs in self._left(start, stop, answers, Asked(*limits, *self._radii, self._reach, False)):
+        for _, item, pairs in self._left(start, stop, answers, Asked(*limits, *self._radii, self._reach, False)):
             answers[item] = np.inf if self._least(item, pairs)[0].is_at_least(least) else 0.0
 
     def _left(
         self, start: int, stop: int, answers: FloatArray, asked: Asked
-    ) -> Iterator[tuple[int, Iterable[Sequence[int]]]]:
-        """Yield the poses that the search leaves, and the candidates: two triangles and two features each.
+    ) -> Iterator[tuple[int, int, Iterable[Sequence[int]]]]:
+        """Yield how it ended, the pose, and the candidates, two triangles and two features each, for those it leaves.
 
         Whoever takes them fills the answer.
         """
         (a, b), (own, poses) = self.meshes, self.poses
         while True:  # bound: an answer is filled, or the room doubles
             with np.errstate(all="ignore"):
-                start, how, n = find_nearest(
+                start, how, n = entry_of(find_nearest)(
                     a.arrays, own, b.arrays, poses, (start, stop), asked, answers, self._room, self.budget.flag
                 )
             self.budget.check()
             if start == stop:
                 return
-            if how == DONE:
-                yield start, self._room.found.pairs[:n].tolist()
+            if how in (DONE, TOLD):
+                yield how, start, self._room.found.pairs[:n].tolist()
             elif how == BEYOND:
-                yield start, product(range(len(a.faces)), range(len(b.faces)), (0,), (0,))  # never held all at once
+                yield (
+                    how,
+                    start,
+                    product(range(len(a.faces)), range(len(b.faces)), (0,), (0,)),
+                )  # never held all at once
             else:
                 self._room = new_room(2 * len(self._room.found.bounds), len(self._room.kept))
 

@@ -35,6 +35,7 @@ from engine.collision.clearance.boxes import (
     lane_half,
     set_line,
 )
+from engine.collision.clearance.certified import certify
 from engine.collision.clearance.refined import refine
 from engine.collision.meshes.mesh_arrays import MeshArrays
 from engine.collision.meshes.placement import PoseArrays, place_pair, turned
@@ -46,6 +47,8 @@ from engine.types import Point3
 
 BEYOND: Final = 4
 """How a search ended that was none: beyond `_LARGEST` sums of coordinates may overflow."""
+TOLD: Final = 5
+"""How one ended whose answer and points are known, on the first candidate."""
 _LARGEST: Final = 1e300
 
 
@@ -200,6 +203,8 @@ def find_nearest(
             distance, n = refine(s, start, move, radii, n)
             if distance > 0.0:
                 answers[item] = distance
+                if asked.is_told and certify(s, start, move, radii, n, room.points):
+                    return item, TOLD, 1
         if answers[item] != answers[item] or asked.is_told:
             return item, how, n
     return span[1], DONE, 0

@@ -137,6 +137,13 @@ def test_equal_poses_are_left_out_and_a_denormal_gap_is_kept() -> None:
         clearance(*wide)
 
 
+def test_a_nearest_point_beyond_the_largest_double_is_an_error_with_what_to_do() -> None:
+    far = Pose(np.eye(2), [1.5e308, 0.0])
+    bodies = Aabb([1e308, 0.0], [1.1e308, 1.0]), Aabb([1e308, 3.0], [1.1e308, 4.0])
+    with pytest.raises(NotRepresentableError, match="a nearest point is beyond"):
+        clearance(*bodies, first_pose=far, second_pose=Pose(np.eye(2), [1.5e308, 1.0]))
+
+
 def test_denormal_coordinates_are_made_larger_before_they_are_multiplied() -> None:
     """No pair of triangles was left where products of denormal coordinates were rounded."""
     flat = Aabb([5.1383e-320, 5.898e-320, -4.0474e-320], [1.3233e-319, 5.898e-320, 4.0474e-320])

@@ -1,4 +1,4 @@
-"""Distances that double-doubles are sure of are those of integers; candidates they leave out were none."""
+"""Distances and points that double-doubles are sure of are those of integers; candidates they leave out were none."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ import pytest
 
 from engine import Aabb, Polyhedron, Sphere, Triangle
 from engine.collision.clearance.bodies import in_space
+from engine.collision.clearance.result import Feature
 from engine.collision.clearance.spreads import SpreadPair
-from engine.collision.clearance.traversal import Asked
+from engine.collision.clearance.traversal import TOLD, Asked
 from engine.collision.meshes.mesh_arrays import STILL
 from engine.parallel import Budget
 
@@ -31,7 +32,7 @@ def pairs(draw: np.random.Generator, size: float) -> list[tuple[Any, Any]]:
 @pytest.mark.parametrize("gap", [1.0, 1e-3, 1e-9, 1e-14, 1e6])
 def test_a_sure_distance_is_that_of_integers(size: float, gap: float) -> None:
     draw = np.random.default_rng(int(-np.log10(gap)) + 100)
-    n_sure, n = 0, 8
+    n_sure, n_told, n = 0, 0, 8
     for first, second in pairs(draw, size):
         d = first.dimension
         turns = np.linalg.qr(draw.normal(size=(n, d, d)))[0]
@@ -45,10 +46,16 @@ def test_a_sure_distance_is_that_of_integers(size: float, gap: float) -> None:
             answers, sure = np.full(n, np.nan), np.full(n, np.nan)
             pair.fill(0, n, answers)
             asked = Asked(np.inf, -1.0, *pair._radii, pair._reach, True)
-            for item, rows in pair._left(0, n, sure, asked):
-                exact = pair._least(item, rows)[0].distance()
+            for how, item, rows in pair._left(0, n, sure, asked):
+                points = pair._room.points[:, :d].tolist()
+                least = pair._least(item, rows)[0]
+                exact = least.distance()
+                if how == TOLD:
+                    n_told += 1
+                    assert points == least.clearance((Feature("ball"), Feature("ball")), d).points.tolist()  # type: ignore[union-attr]
+                    assert [[least.gap.first, least.gap.second]] == [row[2:] for row in rows]
                 n_sure += bool(sure[item] > 0.0)
                 assert answers[item] == exact
                 assert not sure[item] > 0.0 or sure[item] == exact
                 sure[item] = exact
-    assert n_sure > 0 or size < 1e-300
+    assert (n_sure > 0 and n_told > 0) or size < 1e-300

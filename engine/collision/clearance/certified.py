@@ -1,0 +1,103 @@
+"""The nearest points of two bodies from double-doubles, where they are sure: one pair of features, and no tie.
+
+**Proof.** All candidates that are left name the same two features, vertex, edge or triangle. The nearest points of
+their lines or planes have weights, quotients of numbers of degree four at most that are off by less than 2^-88 (no
+number is above 2); `ends_of` tells by how much all weights times their denominators are above 0, so that the exact
+points lie within both features. Where all other corners of both triangles lie strictly beyond the planes across the
+exact connection, no other points of the triangles are as near. A weight is off by 2^-88 over its denominator, a point
+by that times the lengths of the edges (`steepness`): `error`. A direction off by 2 `error` brings a height, of lengths
+below 4, off by less than 16 of it.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from engine.collision.clearance.boxes import Search, View
+from engine.collision.clearance.near_triangles import FACE
+from engine.collision.clearance.refined import Triangle, corners_of, ends_of, height_above, shift_of, vertex_of
+from engine.collision.clearance.wide import Wide, Wide3, dot_wide, minus_wide, over, plus, root, times
+from engine.jit import called, inline
+from engine.predicates.double_double import surely_rounded
+
+_SLACK: Final = 2.0**-86
+
+
+@inline
+def _named(view: View, triangle: int, feature: int) -> tuple[int, int, int]:
+    """Return the vertices of a feature, of an edge the smaller first, -1 for none."""
+    t, k = view.mesh.triangles, feature % 3
+    i, j = t[triangle, k], t[triangle, (k + 1) % 3]
+    if feature < 3:
+        return i, -1, -1
+    return (min(i, j), max(i, j), -1) if feature < FACE else (i, j, t[triangle, 2])
+
+
+@inline
+def _is_beyond(view: View, triangle: int, named: tuple[int, int, int], t: Triangle, n: Wide3, base: Wide3,
+               slack: float) -> bool:  # fmt: skip
+    """Tell whether the corners of a triangle that are none of a feature lie strictly beyond the plane across n."""
+    for k in range(3):
+        if view.mesh.triangles[triangle, k] in named:
+            continue
+        if not height_above(n, vertex_of(t, k), base).h < -slack:
+            return False
+    return True
+
+
+@inline
+def _write(view: View, named: tuple[int, int, int], p: Wide3, n: Wide3, radius: float, start: Any, error: float,
+           point: Any) -> bool:  # fmt: skip
+    """Write the point (d,) at a radius from p along n, from the origin of space; tell whether it is sure."""
+    size, is_sure, v = root(dot_wide(n, n)), True, view.mesh.vertices
+    bound = error + 4.0 * radius * (error / size.h + 2.0**-98)
+    is_given = radius == 0.0 and not view.place.is_posed
+    for k, at, way in ((0, p.x, n.x), (1, p.y, n.y), (2, p.z, n.z)):
+        if k >= point.shape[0]:
+            continue
+        first, second, third = (
+            named[0],
+            (named[1] if named[1] >= 0 else named[0]),
+            (named[2] if named[2] >= 0 else named[0]),
+        )
+        if is_given and v[first, k] == v[second, k] and v[first, k] == v[third, k]:
+            point[k] = v[first, k]  # of the whole feature
+            continue
+        x = plus(plus(at, times(over(way, size), Wide(radius, 0.0))), Wide(start[k] * view.unit, 0.0))
+        point[k] = x.h / view.unit
+        is_sure = is_sure and surely_rounded(x.h, x.low, bound) and 2.0**-1000 < abs(point[k]) < 2.0**1000
+    return is_sure
+
+
+@called
+def certify(s: Search, start: Any, other: Any, radii: Any, n: int, points: Any) -> bool:
+    """Fill points (2, d) with the nearest points of two bodies and put the candidate they are on first, of equal ones
+    that of the smallest faces; False where n candidates leave them open. Other arguments as for `refine`.
+    """
+    pairs, best = s.room.found.pairs, 0
+    faces, their_faces = s.a.mesh.faces, s.b.mesh.faces
+    here, there = _named(s.a, pairs[0, 0], pairs[0, 2]), _named(s.b, pairs[0, 1], pairs[0, 3])
+    for k in range(n):
+        if _named(s.a, pairs[k, 0], pairs[k, 2]) != here or _named(s.b, pairs[k, 1], pairs[k, 3]) != there:
+            return False
+        own, least = faces[pairs[k, 0]], faces[pairs[best, 0]]
+        if own < least or (own == least and their_faces[pairs[k, 1]] < their_faces[pairs[best, 1]]):
+            best = k
+    for column in range(4):
+        pairs[0, column] = pairs[best, column]
+    none = Wide(0.0, 0.0)
+    t, u = (
+        corners_of(s.a, pairs[0, 0], Wide3(none, none, none)),
+        corners_of(s.b, pairs[0, 1], shift_of(s, start, other)),
+    )
+    p, q, inside, steepness = ends_of(t, u, pairs[0, 2], pairs[0, 3])
+    error = _SLACK * steepness + 2.0**-92
+    slack, way, back = _SLACK + 16.0 * error, minus_wide(q, p), minus_wide(p, q)
+    if not (inside > slack and way.x.h * way.x.h + way.y.h * way.y.h + way.z.h * way.z.h > 2.0**-300):
+        return False
+    if not (
+        _is_beyond(s.a, pairs[0, 0], here, t, way, p, slack) and _is_beyond(s.b, pairs[0, 1], there, u, back, q, slack)
+    ):
+        return False
+    is_sure = _write(s.a, here, p, way, radii[0], start, error, points[0])
+    return _write(s.b, there, q, back, radii[1], start, error, points[1]) and is_sure
