@@ -79,51 +79,28 @@ def keep_below(found: Candidates, n: int, most: float) -> int:
 
 
 @inline
+def _reach(s: Search, view: View, row: int, item: int) -> float:
+    """Return how far a triangle reaches along the line, toward the other body."""
+    d = Point3(s.room.line[3 * row], s.room.line[3 * row + 1], s.room.line[3 * row + 2])
+    sign, reach = 1.0 - 2.0 * row, -np.inf
+    for corner in range(3):
+        p = scaled(as_point3(view.mesh.vertices, view.mesh.triangles[item, corner]), view.unit)
+        reach = max(reach, sign * dot(d, p))
+    return sign * reach + s.room.line[9 + row]
+
+
+@inline
 def block_reach(s: Search, view: View, row: int, node: int) -> float:
     """Return how far the triangles of a block reach along the line, toward the other body; kept until that turns."""
-    turn = s.room.line[11]
+    turn, sign, reach = s.room.line[11], 1.0 - 2.0 * row, -np.inf
     if s.room.kept[node, 2 * row] == turn:
         return float(s.room.kept[node, 2 * row + 1])
-    d = Point3(s.room.line[3 * row], s.room.line[3 * row + 1], s.room.line[3 * row + 2])
-    sign = 1.0 if row == 0 else -1.0
-    reach = -np.inf
     for lane in range(LANES):
-        child = int(view.mesh.child[node, lane])
-        if child == EMPTY:
+        if view.mesh.child[node, lane] == EMPTY:
             break
-        for corner in range(3):
-            p = scaled(as_point3(view.mesh.vertices, view.mesh.triangles[-1 - child, corner]), view.unit)
-            reach = max(reach, sign * dot(d, p))
-    reach = sign * reach + s.room.line[9 + row]
-    s.room.kept[node, 2 * row], s.room.kept[node, 2 * row + 1] = turn, reach
-    return reach
-
-
-@inline
-def _load_block(s: Search, view: View, row: int, node: int) -> int:
-    """Place the triangles of a block, and find how far each reaches along the line; return how many there are."""
-    n = 0
-    d = Point3(s.room.line[6], s.room.line[7], s.room.line[8])
-    while n < LANES and view.mesh.child[node, n] != EMPTY:
-        t = _triangle(view, -1 - int(view.mesh.child[node, n]))
-        c = s.room.corners
-        c[row, n, 0, 0], c[row, n, 0, 1], c[row, n, 0, 2] = t.p.x, t.p.y, t.p.z
-        c[row, n, 1, 0], c[row, n, 1, 1], c[row, n, 1, 2] = t.q.x, t.q.y, t.q.z
-        c[row, n, 2, 0], c[row, n, 2, 1], c[row, n, 2, 2] = t.r.x, t.r.y, t.r.z
-        along = (dot(d, t.p), dot(d, t.q), dot(d, t.r))
-        s.room.reaches[row, n] = max(along[0], along[1], along[2]) if row == 0 else min(along[0], along[1], along[2])
-        n += 1
-    return n
-
-
-@inline
-def _loaded(s: Search, row: int, n: int) -> Triangle3:
-    c = s.room.corners
-    return Triangle3(
-        Point3(c[row, n, 0, 0], c[row, n, 0, 1], c[row, n, 0, 2]),
-        Point3(c[row, n, 1, 0], c[row, n, 1, 1], c[row, n, 1, 2]),
-        Point3(c[row, n, 2, 0], c[row, n, 2, 1], c[row, n, 2, 2]),
-    )
+        reach = max(reach, sign * _reach(s, view, row, -1 - int(view.mesh.child[node, lane])))
+    s.room.kept[node, 2 * row], s.room.kept[node, 2 * row + 1] = turn, sign * reach
+    return sign * reach
 
 
 @inline
@@ -150,18 +127,25 @@ def measure_blocks(s: Search, i: int, j: int, n_found: int, limits: Any) -> tupl
     (c, h), (other, half) = _box_of_block(s.a, i), _box_of_block(s.b, j)
     if box_bound(s, limits[0], c, h, other, half) > limits[0]:
         return DONE, n_found
-    n_first, n_second = _load_block(s, s.a, 0, i), _load_block(s, s.b, 1, j)
-    for k in range(n_first):
-        t, c, h = _loaded(s, 0, k), lane_centre(s.a, i * LANES + k), lane_half(s.a, i * LANES + k)
+    for k in range(LANES):
+        own = int(s.a.mesh.child[i, k])
+        if own == EMPTY:
+            break
+        c, h = lane_centre(s.a, i * LANES + k), lane_half(s.a, i * LANES + k)
         if box_bound(s, limits[0], c, h, other, half) > limits[0]:
             continue
-        for m in range(n_second):
-            if s.room.reaches[1, m] - s.room.reaches[0, k] - s.frame.margin > limits[0]:
+        t = _triangle(s.a, -1 - own)
+        for m in range(LANES):
+            their = int(s.b.mesh.child[j, m])
+            if their == EMPTY:
+                break
+            # order: both by one line, which turns below
+            if _reach(s, s.b, 1, -1 - their) - _reach(s, s.a, 0, -1 - own) - s.frame.margin > limits[0]:
                 continue
             at = j * LANES + m
             if box_bound(s, limits[0], c, h, lane_centre(s.b, at), lane_half(s.b, at)) > limits[0]:
                 continue
-            low, high, d, features = _measure(t, _loaded(s, 1, m), s.error)
+            low, high, d, features = _measure(t, _triangle(s.b, -1 - their), s.error)
             if high < limits[1]:
                 return CLOSER, 0
             if high < limits[0]:
@@ -175,7 +159,7 @@ def measure_blocks(s: Search, i: int, j: int, n_found: int, limits: Any) -> tupl
                     return FULL, 0
             pairs = s.room.found.pairs
             s.room.found.bounds[n_found] = low
-            pairs[n_found, 0], pairs[n_found, 1] = -1 - s.a.mesh.child[i, k], -1 - s.b.mesh.child[j, m]
+            pairs[n_found, 0], pairs[n_found, 1] = -1 - own, -1 - their
             pairs[n_found, 2], pairs[n_found, 3] = features
             n_found += 1
     return DONE, n_found

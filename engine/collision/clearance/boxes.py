@@ -70,18 +70,15 @@ class Room(NamedTuple):
     """Work space of searches, one at a time.
 
     limits (2,): of a search (traversal.py). line (12,): the direction of the nearest pair so far, not longer than 1, in
-    the axes of both bodies and in space; where the two origins are along it; how often it turned. corners (2, 8, 3, 3),
-    reaches (2, 8): of the triangles of two blocks, and how far they reach along the line. kept (n_nodes, 4): of either
-    body the turn at which `block_reach` was found, and it. waiting, waiting_bounds (n_nodes,), listed (2, MOST_LISTED):
-    nodes of one body. points (2, 3): the nearest.
+    the axes of both bodies and in space; where the two origins are along it; how often it turned. kept (n_nodes, 4): of
+    either body the turn at which `block_reach` was found, and it. waiting, waiting_bounds (n_nodes,), listed (2,
+    MOST_LISTED): nodes of one body. points (2, 3): the nearest.
     """
 
     heap: Heap
     found: Candidates
     limits: Any
     line: Any
-    corners: Any
-    reaches: Any
     kept: Any
     waiting: Any
     waiting_bounds: Any
@@ -96,8 +93,6 @@ def new_room(room: int, n_nodes: int) -> Room:
         Candidates(np.empty((room, 4), np.int64), np.empty(room)),
         np.empty(2),
         np.zeros(12),
-        np.empty((2, LANES, 3, 3)),
-        np.empty((2, LANES)),
         np.zeros((n_nodes, 4)),
         np.empty(n_nodes + LANES, np.int32),
         np.empty(n_nodes + LANES),

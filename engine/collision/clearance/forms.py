@@ -18,9 +18,8 @@ from engine.collision.clearance.closed_forms import (
     nearest_of_plane,
     touched,
 )
-from engine.collision.clearance.exact import Gap, Rational
+from engine.collision.clearance.exact import Gap, Rational, ScaledGap
 from engine.collision.clearance.result import Clearance, Feature
-from engine.collision.clearance.rounded import ScaledGap
 from engine.collision.exact_images import Vector, as_vector, image_point
 from engine.direct import entry_of
 from engine.predicates.exact_vectors import minus, squared_length

@@ -11,9 +11,9 @@ import numpy as np
 
 from engine.arrays import FloatArray, IntArray
 from engine.collision.clearance.bodies import feature_of, radius_of, spread_of
+from engine.collision.clearance.exact import ScaledGap
 from engine.collision.clearance.forms import PLANE, scaled_gap
 from engine.collision.clearance.result import Feature
-from engine.collision.clearance.rounded import ScaledGap
 from engine.collision.exact_images import HalfSpaceImage, Vector, image_half_space, image_map, value_at
 from engine.collision.meshes.mesh_arrays import MeshBody
 from engine.collision.simple.boundary import pulled_back
