@@ -137,11 +137,13 @@ async function refresh() {
   isStale = true;
   if (isAsking) return;
   isAsking = true;
+  $("stage").ariaBusy = "true";
   while (isStale) {
     isStale = false;
     try { await once(); } catch (error) { complain(error.message); }
   }
   isAsking = false;
+  $("stage").ariaBusy = "false";
 }
 
 async function once() {

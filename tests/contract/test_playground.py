@@ -132,11 +132,11 @@ def choose(page: Any, question: str, dimension: int) -> str:
 
 
 def verdict(page: Any) -> str:
-    """Return the verdict when it has not changed for a while."""
-    last, since, end = None, time.monotonic(), time.monotonic() + 60
+    """Return the verdict when nothing is asked any more and it has not changed for a while."""
+    last, since, end = None, time.monotonic(), time.monotonic() + 180
     while time.monotonic() < end:
         text = page.inner_text("#verdict")
-        if text != last:
+        if text != last or page.get_attribute("#stage", "aria-busy") != "false":
             last, since = text, time.monotonic()
         elif text and time.monotonic() - since > 0.6:
             assert not page.is_visible("#problem"), page.inner_text("#problem")
@@ -147,7 +147,7 @@ def verdict(page: Any) -> str:
 
 def wait_until(page: Any, condition: Callable[[], bool]) -> None:
     """Wait here: the page's own policy forbids the strings that `wait_for_function` evaluates again and again."""
-    end = time.monotonic() + 60
+    end = time.monotonic() + 180
     while not condition():
         assert time.monotonic() < end
         page.wait_for_timeout(50)
@@ -335,8 +335,7 @@ def test_a_link_holds_the_whole_state(page: Any) -> None:
     assert np.allclose(np.concatenate(request_of(other)["clip"]["rings"]), np.concatenate(asked["clip"]["rings"]))
     assert request_of(other)["subject"] == asked["subject"]
     other.close()
-    page.wait_for_timeout(400)
-    assert page.evaluate("location.href") == address
+    wait_until(page, lambda: page.evaluate("location.href") == address)
     page.goto(address.partition("#")[0])  # as a first visitor
     assert "points wrong" in verdict(page)
 
@@ -375,7 +374,8 @@ def test_a_file_that_cannot_be_read_is_said_so_until_the_next_answer(page: Any, 
     path = tmp_path / "mesh.glb"
     path.write_bytes(b"glTF")
     page.set_input_files("#file", path)
-    page.wait_for_timeout(700)
+    page.wait_for_selector("#problem:visible")
+    page.wait_for_timeout(700)  # it stays
     assert "mesh.glb cannot be drawn" in page.inner_text("#problem")
     assert "old" in (page.get_attribute("#stage", "class") or "")
     page.fill("#count", "2.25")
