@@ -197,6 +197,7 @@ def _warm_overlay_rest() -> None:
     circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     overlay(Polygon([circle]), Polygon([circle + 0.5]))  # large ones, of which few edges are looked at
     overlay(Polygon([circle]), Polygon([circle + 0.5]), grid=0.5)
+    overlay(Polygon([circle]), Polygon([circle + 0.5]), grid=1e-14)  # units that doubles tell apart, but not surely
     # Edges an ulp apart are left to the path in integers, whose kernels look for pairs of boxes.
     near = 1.0 + 2.0**-52
     overlay(Polygon([[[0, 0], [1, 1], [0, 1]]]), Polygon([[[0, 0], [1, near], [near, 0.5]]]), "union")
