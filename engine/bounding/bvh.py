@@ -36,6 +36,8 @@ N_BINS = 16
 HEURISTIC_DEPTH = 40
 """Below this depth runs are halved, so no block lies deeper than `MAX_DEPTH`."""
 MAX_DEPTH = HEURISTIC_DEPTH + 40  # 2^40 items and more do not fit into memory
+STACK = WIDTH * (MAX_DEPTH + 1)
+"""Nodes that wait on a way down a tree at most: eight for each level."""
 UNUSED = np.float32(-1e30)
 ENLARGED = 2.0**-22
 """Added to half widths: a centre rounded to float32 is off by 2^-24 of at most 2, the half width by as much."""
@@ -62,7 +64,7 @@ def build_bvh(boxes: FloatArray) -> Bvh:
     Raises: what `poll` does.
     """
     n_items, origin = len(boxes), np.empty(3)
-    local, order, stack = np.empty((n_items, 6)), np.arange(n_items), np.zeros((WIDTH * MAX_DEPTH + WIDTH, 2), np.int64)
+    local, order, stack = np.empty((n_items, 6)), np.arange(n_items), np.zeros((STACK, 2), np.int64)
     halves, runs = np.empty((2 * n_items - 1, 6)), np.empty((2 * n_items - 1, 2), np.int64)
     left, state = np.empty(2 * n_items - 1, np.int64), np.array([1, 1])
     with np.errstate(all="ignore"):  # what underflows here is far below the enlargement of the boxes

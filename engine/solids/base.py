@@ -1,7 +1,7 @@
 """What every solid has in common: immutable fields, a place for prepared structures, pickling, memory.
 
 A solid is checked once, in its constructor, and never changes; it is compared by identity and may be shared between
-threads. Structures that speed up queries are built lazily by `Solid.prepared` and are left out of pickles.
+threads. Structures that speed up queries are built lazily by `prepared` and are left out of pickles.
 """
 
 from __future__ import annotations
@@ -34,29 +34,19 @@ class Immutable:
         raise AttributeError(f"a {self.type} is immutable: {name!r} cannot be deleted")
 
 
-class Solid(Immutable):
-    """Base of the ten solids. `type` is the name used in JSON, `dimension` is 2 or 3."""
+class Preparing:
+    """Keeps what is built when it is asked for first; whoever inherits sets `_lock`, an RLock, and `_prepared`, {}."""
 
-    __slots__ = (*_RUNTIME, "dimension")
+    __slots__ = ()
 
-    dimension: int
     _lock: Any
     _prepared: dict[str, Any]
-
-    def _set(self, **values: object) -> None:
-        """Fill the fields, once; called at the end of each constructor, when every check has passed."""
-        if hasattr(self, "_prepared"):
-            raise AttributeError(f"a {self.type} is immutable: make a new one instead of calling __init__ again")
-        for name, value in values.items():
-            object.__setattr__(self, name, value)
-        object.__setattr__(self, "_lock", threading.RLock())
-        object.__setattr__(self, "_prepared", {})
 
     def prepared(self, key: str, build: Callable[[], T], check: Callable[[], object] | None = None) -> T:
         """Return the structure kept under `key`; the first caller builds it, others wait for that one build.
 
         build: called without arguments, at most once unless it raises (then nothing is kept and the next caller tries
-        again). It may ask this solid for other keys. What it returns must not be changed afterwards.
+        again). It may ask for other keys. What it returns must not be changed afterwards.
         check: called every few milliseconds while another thread builds; what it raises ends the waiting.
         """
         try:
@@ -78,6 +68,29 @@ class Solid(Immutable):
     def kept(self, key: str) -> Any:
         """Return the structure kept under `key`, None if there is none yet."""
         return self._prepared.get(key)
+
+    def drop(self, *keys: str) -> None:
+        """Forget the structures kept under these keys, where there are any."""
+        with self._lock:
+            for key in keys:
+                self._prepared.pop(key, None)
+
+
+class Solid(Preparing, Immutable):
+    """Base of the ten solids. `type` is the name used in JSON, `dimension` is 2 or 3."""
+
+    __slots__ = (*_RUNTIME, "dimension")
+
+    dimension: int
+
+    def _set(self, **values: object) -> None:
+        """Fill the fields, once; called at the end of each constructor, when every check has passed."""
+        if hasattr(self, "_prepared"):
+            raise AttributeError(f"a {self.type} is immutable: make a new one instead of calling __init__ again")
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+        object.__setattr__(self, "_lock", threading.RLock())
+        object.__setattr__(self, "_prepared", {})
 
     @property
     def memory(self) -> int:

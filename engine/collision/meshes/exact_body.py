@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from engine.arrays import IntArray
-from engine.bounding.bvh import WIDTH
+from engine.bounding.bvh import STACK, WIDTH
 from engine.collision.exact_images import rounded_quotient
-from engine.collision.meshes.face_state import STACK_ROWS, states_of
+from engine.collision.meshes.face_state import states_of
 from engine.collision.meshes.mesh_arrays import STATE_CLEAN, MeshArrays, MeshBody, lattice_shift
 from engine.collision.meshes.placement import PoseArrays
 from engine.jit import inline, kernel
@@ -153,7 +153,7 @@ def _faces_in_box(mesh: MeshArrays, pose: PoseArrays, bounds: Any, found: Any) -
     t = pose.translations[0]
     shift = max(abs(t[0]), abs(t[1]), abs(t[2]))
     margin = 2.0**-47 * (3.0 * mesh.extent.reach + shift) + 2.0**-1060  # 8 times the error of `placement.py`
-    stack = np.empty(STACK_ROWS, np.int32)
+    stack = np.empty(STACK, np.int32)
     stack[0] = 0
     n_stack, n_found = 1, 0
     while n_stack > 0:  # bound: each node enters once

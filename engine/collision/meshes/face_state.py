@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from engine.arrays import Int8Array, IntArray
-from engine.bounding.bvh import MAX_DEPTH, WIDTH
+from engine.bounding.bvh import STACK
 from engine.collision.meshes.mesh_arrays import (
     STATE_CLEAN,
     STATE_CROSSED,
@@ -40,7 +40,6 @@ from engine.lanes.lanes import lowest_bit
 from engine.predicates.orientation import orient2d, orient3d
 from engine.types import UNDECIDED, Point3
 
-STACK_ROWS = WIDTH * MAX_DEPTH + WIDTH
 SLACK = 2.0**-20
 """By how much a box in the tree's coordinates is widened for its rounding to float32."""
 
@@ -138,7 +137,7 @@ def state_among(mesh: MeshArrays, face: int, poses: Any) -> int:
         np.float32(max(p.y, q.y, r.y) + SLACK),
         np.float32(max(p.z, q.z, r.z) + SLACK),
     )
-    stack = np.empty(STACK_ROWS, np.int32)
+    stack = np.empty(STACK, np.int32)
     stack[0] = 0
     n_stack, state = 1, STATE_CLEAN
     while n_stack > 0 and state != STATE_STACKED:  # bound: each node enters once

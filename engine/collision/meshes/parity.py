@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from engine.collision.meshes.face_state import SLACK, STACK_ROWS
+from engine.bounding.bvh import STACK
+from engine.collision.meshes.face_state import SLACK
 from engine.collision.meshes.mesh_arrays import MeshArrays, in_tree, triangle_of
 from engine.collision.meshes.placement import (
     Placement,
@@ -115,7 +116,7 @@ def locate_point(own: OwnPoint, mesh: MeshArrays) -> int:
         return OUTSIDE
     low = (np.float32(local.x - slack), np.float32(local.y - slack), np.float32(local.z - slack))
     high = (np.float32(local.x + slack), np.float32(local.y + slack), np.float32(ABOVE_ALL))
-    stack = np.empty(STACK_ROWS, np.int32)
+    stack = np.empty(STACK, np.int32)
     stack[0] = 0
     n_stack, n_above = 1, 0
     unsure, on_face = False, False

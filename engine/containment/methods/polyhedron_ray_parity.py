@@ -28,7 +28,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.bounding.bvh import MAX_DEPTH, WIDTH
+from engine.bounding.bvh import STACK, WIDTH
 from engine.containment.posed.filters import NOT_FINITE, has_not_finite, orient2d_blurred, orient3d_blurred
 from engine.jit import bare, inline, kernel, merged
 from engine.lanes.boxes import EMPTY, inside_box
@@ -44,7 +44,6 @@ ON_FACE: Final = 3
 """How a ray meets a triangle; UNDECIDED where a sign is out of the compiled range, for rational arithmetic."""
 BEYOND: Final = 4
 """Added to one of these where the filter was not enough."""
-STACK: Final = WIDTH * MAX_DEPTH + WIDTH
 _SLACK: Final = 2.0**-20
 """By how much a point in the tree's coordinates, at most 4, is widened for its rounding to float32."""
 _ABOVE_ALL: Final = np.float32(8.0)

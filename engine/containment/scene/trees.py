@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from engine.arrays import FloatArray, Int32Array, IntArray
-from engine.bounding.bvh import WIDTH
+from engine.bounding.bvh import STACK, WIDTH
 from engine.containment.cells.side import side_in_cell
-from engine.containment.methods.polyhedron_ray_parity import STACK, locate_in_tree
+from engine.containment.methods.polyhedron_ray_parity import locate_in_tree
 from engine.containment.posed.body_frame import to_frame
 from engine.containment.posed.filters import in_space
 from engine.containment.prepared import TriangleTree
@@ -49,7 +49,8 @@ def tree_line(tree: TriangleTree) -> tuple[tuple[int, ...], tuple[int, ...], tup
 
 
 @inline
-def _tree_of(tables: Any, row: int) -> TriangleTree:
+def tree_at(tables: Any, row: int) -> TriangleTree:
+    """Return the tree of a row of what has `addresses`, `sizes` and `places` as `TreeTables` does."""
     addresses, sizes, places = tables.addresses, tables.sizes, tables.places
     return TriangleTree(
         array_at(addresses[row, 0], (sizes[row, 0], 3), np.float64),
@@ -87,7 +88,7 @@ def locate_groups(
         row, frame = tables.rows[body], scene.frames[body]
         if row < 0 or points.shape[1] == 2:
             continue
-        tree = _tree_of(tables, row)
+        tree = tree_at(tables, row)
         has_cells = tables.cell_places[row, 0] != 0 and scene.kinds[body] == SECOND_PASS  # else they have been asked
         for place in range(begins[group], ends[group]):
             if flag[0]:

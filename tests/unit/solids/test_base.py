@@ -100,6 +100,8 @@ def test_prepared_is_built_once_under_concurrency() -> None:
         thread.join()
     assert builds == [1]
     assert len(set(map(id, found))) == 1
+    solid.drop("tree", "what is not there")
+    assert solid.kept("tree") is None
 
 
 def test_a_build_that_fails_is_tried_again_and_builds_may_nest() -> None:
