@@ -151,10 +151,11 @@ def _warm_scenes() -> None:
     for dimension in (2, 3):
         some = [*_regions(dimension), *_bodies()[1:2] * (dimension == 3)]
         pose = turned if dimension == 3 else Pose([[0.6, -0.8], [0.8, 0.6]], [0.25, 0])
-        Scene(some * 2, [None] * len(some) + [pose] * len(some)).clip_segments(np.array(segments)[:, :, :dimension])
+        scene = Scene(some * 2, [None] * len(some) + [pose] * len(some))
+        for keep in ("all", "first", "any"):
+            scene.clip_segments(np.array(segments)[:, :, :dimension], keep=keep)
     many = [Aabb([k, 0, 0], [k + 2, 1, 1]) for k in range(300)]
     collide_scene(many)  # their boxes go into a grid
-    Scene(many).clip_segments(segments)  # and into a tree that looks at eight at a time
     flat: list[Solid] = [Polygon([[[0, 0], [4, 0], [1, 1], [0, 4]]]), Triangle([[0, 0], [1, 0], [0, 1]])]
     collide_scene(flat)
     for dimension in (2, 3):

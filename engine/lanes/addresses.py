@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import carray, types
 from numba import config as numba_config
+from numba import types
+from numba.core import cgutils
 from numba.extending import intrinsic
-
-from engine.jit import inline
+from numba.np.arrayobj import populate_array
 
 
 def plain_array_at(address: int, shape: Any, dtype: Any) -> Any:
@@ -26,23 +26,25 @@ def plain_array_at(address: int, shape: Any, dtype: Any) -> Any:
     return np.frombuffer((ctypes.c_char * n_bytes).from_address(int(address)), dtype).reshape(shape)
 
 
-def _pointer_intrinsic(typing_context: Any, address: Any) -> Any:
-    """Return an address as a pointer."""
+def _array_intrinsic(typing_context: Any, address: Any, shape: Any, dtype: Any) -> Any:
+    """Return what `plain_array_at` does; nothing is counted, so that bare kernels may call it."""
+    made = types.Array(dtype.dtype, len(shape), "C")
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.inttoptr(arguments[0], ir.IntType(8).as_pointer())
+        array = context.make_array(made)(context, builder)
+        sizes = cgutils.unpack_tuple(builder, arguments[1])
+        item = context.get_constant(types.intp, context.get_abi_sizeof(context.get_data_type(made.dtype)))
+        strides = [item]
+        for size in sizes[:0:-1]:
+            strides.insert(0, builder.mul(strides[0], size))
+        data = builder.inttoptr(arguments[0], array.data.type)
+        populate_array(array, data, sizes, strides, item, None)
+        return array._getvalue()
 
-    return types.voidptr(types.int64), generate
+    return made(types.int64, shape, dtype), generate
 
 
-_pointer: Any = intrinsic(_pointer_intrinsic)
-
-
-def _compiled_array_at(address: int, shape: Any, dtype: Any) -> Any:
-    return carray(_pointer(address), shape, dtype)
-
-
-array_at: Any = plain_array_at if numba_config.DISABLE_JIT else inline(_compiled_array_at)
+array_at: Any = plain_array_at if numba_config.DISABLE_JIT else intrinsic(_array_intrinsic)
 
 
 def plain_int8_at(address: int, place: int) -> int:

@@ -12,7 +12,7 @@ Only original end points enter, never a point cut before. Three tries, each dear
    double-double leaves one midpoint open, so that one sign does.
 
 The first two say whether the double is surely the nearest; where the third has no range, rational arithmetic settles
-the item (exact_segments.py).
+the item (profiles.py).
 
 Bound of the weighted form. Weights are exact expansions, compressed: two components hold them within 8 u^2. Products
 add 2 u^2, their sum 4 u^2, the sum of the weights 12 u^2, the quotient 16 u^2, the test `surely_rounded` 2 u^2: with

@@ -6,18 +6,18 @@ Boxes are rounded outward (posed_boxes.py), so no body is missed; those without 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray
-from engine.bounding.bvh import Bvh, build_bvh
+from engine.arrays import FloatArray, IntArray, read_only
+from engine.bounding.bvh import UNUSED, WIDTH, Bvh, build_bvh
 from engine.bounding.posed_boxes import place_boxes
 from engine.containment.scene.bodies import body_box
 from engine.direct import entry_of
+from engine.lanes.boxes import BOX_ROWS, EMPTY
 from engine.parallel import Budget, run_chunks
-from engine.scenes.near_boxes import list_candidates, list_near_segments
-from engine.segment_clipping.box_tree import build_box_tree
+from engine.scenes.near_boxes import list_near
 from engine.solids.base import Solid
 from engine.solids.bounds import own_box
 from engine.solids.csg import Csg
@@ -25,8 +25,6 @@ from engine.solids.pose import Pose
 from engine.solids.triangle import Triangle
 
 _CHECK_EVERY = 256
-_FEW = 32
-"""Bodies up to which one tree does."""
 
 
 class BodyTree(NamedTuple):
@@ -34,14 +32,11 @@ class BodyTree(NamedTuple):
 
     boxes: FloatArray
     """(n, 2, dimension) low and high of every body, infinite where it may have no bounds."""
-    bodies: IntArray
-    """Those of the tree, by leaf."""
-    nodes: FloatArray
-    """See `build_box_tree`; no rows where no body is bounded."""
-    lanes: Bvh | None
-    """In space, and where they are many, the same as a tree that segments go down faster."""
+    tree: Bvh
+    inverse: float
+    """1 / its scale."""
     bounded: IntArray
-    """The bodies of `lanes` by their place there."""
+    """The bodies of the tree by their place there."""
     unbounded: IntArray
 
 
@@ -76,13 +71,18 @@ def body_tree(solids: Sequence[Solid], poses: Sequence[Pose | None], dimension: 
     is_bounded = np.isfinite(low).all(axis=1) & np.isfinite(high).all(axis=1)
     bounded, unbounded = np.flatnonzero(is_bounded), np.flatnonzero(~is_bounded & (low <= high).all(axis=1))
     together = np.stack([low, high], axis=1)
-    if not len(bounded):
-        return BodyTree(together, bounded, np.empty((0, 2, dimension)), None, bounded, unbounded)
-    order, nodes = build_box_tree(low[bounded], high[bounded])
-    lanes = None
-    if dimension == 3 and len(bounded) > _FEW:
-        lanes = build_bvh(np.concatenate([low[bounded], high[bounded]], axis=1))
-    return BodyTree(together, bounded[order], nodes, lanes, bounded, unbounded)
+    flat = np.zeros((len(bounded), 6))  # in the plane z is 0
+    flat[:, :dimension], flat[:, 3 : 3 + dimension] = low[bounded], high[bounded]
+    tree = build_bvh(flat) if len(bounded) else _NO_TREE
+    return BodyTree(together, tree, 1.0 / tree.scale, bounded, unbounded)
+
+
+_NO_TREE: Final = Bvh(
+    read_only(np.full((1, BOX_ROWS, WIDTH), UNUSED)),
+    read_only(np.full((1, WIDTH), EMPTY, np.int32)),
+    read_only(np.zeros(3)),
+    1.0,
+)
 
 
 def candidates(
@@ -92,7 +92,7 @@ def candidates(
 
     items: (n, 2, dimension), segments, or where `are_boxes` boxes, which may be infinite.
     """
-    n, chunks = len(items), dict[int, tuple[IntArray, IntArray]]()
+    n, items, chunks = len(items), read_only(items), dict[int, tuple[IntArray, IntArray]]()
 
     def task(first: int, last: int) -> None:
         chunks[first] = _of_some(tree, items[first:last], are_boxes, budget, first)
@@ -110,21 +110,13 @@ def _of_some(
 ) -> tuple[IntArray, IntArray]:
     n, start, room = len(items), 0, 4 * len(items) + 64
     owners, found = [np.repeat(np.arange(n), len(tree.unbounded))], [np.tile(tree.unbounded, n)]
-    lanes = None if are_boxes else tree.lanes
-    while start < n and len(tree.nodes):  # bound: the room doubles until the bodies of an item find it
+    while start < n:  # bound: the room doubles until the bodies of an item find it
         pairs = np.empty((2, room), np.int64)
-        if lanes is not None:
-            stop, m = entry_of(list_near_segments)(items, start, lanes, 1.0 / lanes.scale, pairs, budget.flag)
-            bodies = tree.bounded[pairs[1, :m]]
-        else:
-            stop, m = entry_of(list_candidates)(
-                items, start, are_boxes, tree.nodes, tree.bodies, tree.boxes, pairs, budget.flag
-            )
-            bodies = pairs[1, :m]
+        stop, m = entry_of(list_near)(items, start, are_boxes, tree, pairs, budget.flag)
         budget.check()
         budget.take(2 * pairs.itemsize * int(m))
         owners.append(pairs[0, :m])
-        found.append(bodies)
+        found.append(pairs[1, :m])
         room *= 2
         start = int(stop)
     owner, body = np.concatenate(owners) + first, np.concatenate(found)

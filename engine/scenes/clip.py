@@ -1,105 +1,239 @@
-"""Segments through a scene: the bodies that each may meet by their boxes, then one body after another, and the order.
+"""Segments through a scene: what the kernels settle (through.py), and what they leave.
 
-Bodies that stand where their solid does are cut by the methods of `clip_segments`; posed ones in their own frame
-(posed_cut.py). What these leave, and all of CSG trees and prisms, is settled in exact arithmetic (profiles.py).
+A body that stands where its solid does then cuts a segment as `clip_segments` does; posed ones, CSG trees and prisms in
+exact arithmetic (profiles.py).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import fields
-from typing import Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.containment.locators import locator_of
-from engine.errors import UnsupportedSolidError
+from engine.direct import entry_of
 from engine.parallel import Budget, run_chunks
-from engine.scenes.ends import Found, ScenePieces, in_order, joined, taken
-from engine.scenes.parameters import Parameter
-from engine.scenes.posed import PosedBody, completed, cut_posed
-from engine.scenes.profiles import exact_pieces, unsupported
-from engine.segment_clipping.boundary import clip_chunk, cut_at_crossings
+from engine.scenes.bodies import Bodies
+from engine.scenes.broad_phase import candidates
+from engine.scenes.ends import Exact, Found, ScenePieces, in_order, joined
+from engine.scenes.posed_mesh import MOST_MET
+from engine.scenes.standing import Layer, Standing
+from engine.scenes.through import MET, cut_pairs, find_first
+from engine.segment_clipping.boundary import clip_chunk
+from engine.segment_clipping.boundary_cut import SETTLED
 from engine.segment_clipping.clip_segments import method_for
 from engine.segment_clipping.decide_then_cut import clip_on_convex
-from engine.segment_clipping.pieces import Pieces
-from engine.segment_clipping.prepared_boundary import boundary_of
+from engine.segment_clipping.parameters import Parameter
+from engine.segment_clipping.pieces import Pieces, first_of, room_for
+from engine.segment_clipping.profiles import ExactPiece, exact_pieces, settled
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.convex import Convex
-from engine.solids.csg import Csg
 from engine.solids.half_space import HalfSpace
-from engine.solids.implicit import Implicit
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
 from engine.solids.pose import Pose
 from engine.solids.sphere import Sphere
 from engine.solids.surface import Surface
 from engine.solids.triangle import Triangle
+from engine.types import OPEN
 
 _BYTES: Final = 400
 """Of a piece, in its part, joined and in order."""
+_CROWD: Final = 48
+"""Segments that go down the tree of a mesh together (mesh_streams.py) faster than one by one."""
 _MOST_IN_GROUP: Final = 1 << 13
 """Segments that are cut on one body in one piece of work."""
-_NEAR: Final = 1.0 - 2.0**-50
-"""Parameters at which boxes are entered are quotients of differences: three roundings."""
 
 
-class Placed(NamedTuple):
-    """A body: its solid, its pose unless that leaves it where it is, and what kernels for posed bodies want of it."""
+class Counts:
+    """Which segments the kernels left, and which took rational arithmetic."""
 
-    solid: Solid
-    pose: Pose | None
-    posed: Callable[[], PosedBody | None]
+    def __init__(self, n: int) -> None:
+        self.is_beyond, self.is_rational = np.zeros(n, np.bool_), np.zeros(n, np.bool_)
 
-
-class Question(NamedTuple):
-    """Segments and the bodies that each may meet: pairs, by segment."""
-
-    segments: FloatArray
-    owners: IntArray
-    bodies: IntArray
-    placed: Callable[[int], Placed]
-    """Tells what a body is."""
+    def take(self, items: IntArray, counts: Counts) -> None:
+        """Add those of some segments, all of which a search left."""
+        self.is_beyond[items], self.is_rational[items] = True, counts.is_rational
 
 
-def check_cut(solids: Sequence[Solid]) -> bool:
-    """Return True; raise UnsupportedSolidError for the first solid that no segment is cut on."""
-    for body, solid in enumerate(solids):
-        waiting = [solid]
-        while waiting:  # bound: a tree has so many leaves at most
-            node = waiting.pop()
-            if isinstance(node, Implicit):
-                error: UnsupportedSolidError = unsupported(node)
-                raise UnsupportedSolidError(f"solids[{body}]: {error.message}", ("solids", body))
-            if isinstance(node, Csg):
-                waiting += node.operands
-    return True
+def clip_all(
+    segments: FloatArray, standing: Standing, counts: Counts, budget: Budget, workers: int | None
+) -> ScenePieces:
+    """Return all pieces of segments (n, 2, dim)."""
+    parts = [part for layer in standing.layers for part in _of_layer(segments, layer, counts, budget, workers)]
+    return in_order(joined(parts, segments.shape[2]), _exact_ends(segments, standing, budget))
 
 
-def clip_all(question: Question, budget: Budget, workers: int | None) -> ScenePieces:
-    """Return all pieces."""
-    parts = _cut(question, np.arange(len(question.owners)), budget, workers)
-    return in_order(joined(parts, question.segments.shape[2]), _exact_ends(question, budget))
+def _exact_ends(segments: FloatArray, standing: Standing, budget: Budget) -> Exact:
+    """Return what tells the exact parameters of a piece; those of the pieces asked about last are kept."""
+    asked, known = (-1, -1), list[ExactPiece]()
 
-
-def _exact_ends(question: Question, budget: Budget) -> Callable[[int, int, int], tuple[Parameter, Parameter]]:
     def exact(source: int, body: int, number: int) -> tuple[Parameter, Parameter]:
+        nonlocal asked, known
         budget.check()
-        p, q = question.segments[source].tolist()
-        placed = question.placed(body)
-        piece = exact_pieces(p, q, placed.solid, placed.pose, budget)[number]
-        return piece.first, piece.last
+        if asked != (source, body):
+            p, q = segments[source].tolist()
+            known = exact_pieces(p, q, *standing.placed(body), budget)
+            asked = (source, body)
+        return known[number].first, known[number].last
 
     return exact
 
 
-def _cut(question: Question, pairs: IntArray, budget: Budget, workers: int | None) -> list[Found]:
-    """Return the pieces of some of the pairs, body by body."""
-    bodies = question.bodies[pairs]
+def clip_first(
+    segments: FloatArray, standing: Standing, counts: Counts, budget: Budget, workers: int | None
+) -> ScenePieces:
+    """Return the first piece of each segment that meets a body, of those that begin at one point that of the first."""
+    state, bodies, out = _searched(segments, standing, False, budget, workers)
+    left, met = np.flatnonzero(state == OPEN), np.flatnonzero(state == MET)
+    ranks = np.stack([np.zeros(len(met), np.int64), np.ones(len(met), np.int64)], axis=1)
+    for place in np.flatnonzero(out.t[met, 0] == out.t[met, 1]).tolist():  # what was settled of others has a length
+        ranks[place, 1] = not isinstance(standing.base.solids[bodies[met[place]]], Surface)
+    sure = ScenePieces(met, bodies[met], out.ends[0, met], out.ends[1, met], out.t[met], out.faces[met], ranks)
+    if not len(left):
+        return sure
+    more = Counts(len(left))
+    some = clip_all(segments[left], standing, more, budget, workers)
+    counts.take(left, more)
+    first = np.flatnonzero(np.append(True, some.source[1:] != some.source[:-1])[: len(some)])
+    some.ranks[:, 1] = some.ranks[:, 1] > some.ranks[:, 0]
+    some.source[:] = left[some.source]
+    found = [np.concatenate([getattr(sure, field.name), getattr(some, field.name)[first]]) for field in fields(sure)]
+    order = np.argsort(found[0])
+    return ScenePieces(*(each[order] for each in found))
+
+
+def meets_any(
+    segments: FloatArray, standing: Standing, counts: Counts, budget: Budget, workers: int | None
+) -> BoolArray:
+    """Return of each segment whether it meets a body."""
+    state, _, _ = _searched(segments, standing, True, budget, workers)
+    found: BoolArray = state == MET
+    left = np.flatnonzero(state == OPEN)
+    more = Counts(len(left))
+    for layer in standing.layers if len(left) else ():
+        for part in _of_layer(segments[left], layer, more, budget, workers):
+            found[left[part.source]] = True
+    counts.take(left, more)
+    return found
+
+
+def _searched(
+    segments: FloatArray, standing: Standing, is_any: bool, budget: Budget, workers: int | None
+) -> tuple[Any, IntArray, Pieces]:
+    """Return of each segment the state, and where it is MET a body and, unless `is_any`, in its row the first piece."""
+    n, dimension = len(segments), segments.shape[2]
+    best: Any = None
+    for layer in standing.layers:
+        found = np.empty(n, np.uint8), np.empty(n, np.int64), room_for(0 if is_any else n, dimension)
+
+        def task(first: int, last: int, layer: Layer = layer, found: Any = found) -> None:
+            _search(segments, layer, is_any, first, last, found, budget)
+
+        run_chunks(task, n, budget=budget, workers=workers)
+        if layer.names is not None:
+            found = found[0], layer.names[found[1]], found[2]
+        best = found if best is None else _better(best, found, is_any)
+    return best
+
+
+def _search(
+    segments: FloatArray, layer: Layer, is_any: bool, first: int, last: int, found: Any, budget: Budget
+) -> None:
+    """Fill rows first .. last - 1 of what `_searched` finds in one layer."""
+    tree, table = layer.bodies.tree(budget), layer.bodies.table(budget)
+    n, room = np.array([first, 0, 0]), room_for(0 if is_any else MOST_MET, segments.shape[2])
+    while n[0] < last:  # bound: each turn reaches the end, or prepares what a body wants
+        entry_of(find_first)(
+            segments,
+            last,
+            tree,
+            layer.is_away,
+            table.of_kernels,
+            is_any,
+            budget.flag,
+            *found,
+            room,
+            n,
+        )
+        budget.check()
+        if n[1] < 0:
+            layer.bodies.prepare(int(n[2]), int(n[1]), budget)
+
+
+def _better(one: Any, other: Any, is_any: bool) -> Any:
+    """Return what is found first in one of two layers: of ends that round alike only the segment's own are known to be
+    equal."""
+    (state, bodies, out), (more, names, room) = one, other
+    is_open = (state == OPEN) | (more == OPEN)
+    are_met = (state == MET) & (more == MET)
+    if is_any:
+        return np.where((state == MET) | (more == MET), MET, np.where(is_open, OPEN, SETTLED)), bodies, out
+    t, u = out.t[:, 0], room.t[:, 0]
+    are_own = (out.faces[:, 0] < 0) & (room.faces[:, 0] < 0)
+    is_open |= are_met & (t == u) & ~are_own
+    takes = (more == MET) & ((state != MET) | (u < t) | ((u == t) & (names < bodies)))
+    for mine, theirs in ((bodies, names), (out.t, room.t), (out.faces, room.faces)):
+        mine[takes] = theirs[takes]
+    out.ends[:, takes] = room.ends[:, takes]
+    return np.where(is_open, OPEN, np.maximum(state, more)), bodies, out
+
+
+def _of_layer(segments: FloatArray, layer: Layer, counts: Counts, budget: Budget, workers: int | None) -> list[Found]:
+    """Return the pieces within the bodies of one layer."""
+    owners, bodies = candidates(layer.bodies.tree(budget), segments, False, budget, workers)
+    if len(layer.is_away):
+        stays = ~layer.is_away[bodies]
+        owners, bodies = owners[stays], bodies[stays]
+    table, rest = layer.bodies.table(budget), list[Found]()
+    if len(segments) >= _CROWD:
+        is_crowded = (np.bincount(bodies, minlength=len(table.are_streamed)) >= _CROWD) & table.are_streamed
+        together = np.flatnonzero(is_crowded[bodies])
+        rest = _cut(segments, owners[together], bodies[together], layer.bodies, counts, budget, workers)
+        owners, bodies = (np.delete(each, together) for each in (owners, bodies))
+    state, parts = np.empty(len(owners), np.uint8), dict[int, list[Found]]()
+
+    def named(places: IntArray) -> IntArray:
+        return places if layer.names is None else layer.names[places]
+
+    def task(first: int, last: int) -> None:
+        parts[first], n = [], np.zeros(3, np.int64)
+        mine, theirs = owners[first:last], bodies[first:last]
+        while n[0] < last - first:  # bound: each turn has room for a pair, or prepares what a body wants
+            out = room_for(MOST_MET + 2 * (last - first - int(n[0])), segments.shape[2])
+            entry_of(cut_pairs)(segments, mine, theirs, table.of_kernels, budget.flag, out, state[first:last], n)
+            budget.check()
+            if n[2] < 0:
+                layer.bodies.prepare(int(theirs[n[0]]), int(n[2]), budget)
+            budget.take(_BYTES * int(n[1]))
+            found = first_of(out, int(n[1]))
+            pairs = found.source
+            parts[first].append(Found(mine[pairs], named(theirs[pairs]), *found[1:]))
+
+    run_chunks(task, len(owners), budget=budget, workers=workers)
+    left = np.flatnonzero(state == OPEN)
+    if len(left):
+        counts.is_beyond[owners[left]] = True
+        rest += _cut(segments, owners[left], bodies[left], layer.bodies, counts, budget, workers)
+    done = [part for first in sorted(parts) for part in parts[first] if len(part.source)]
+    return done + [part._replace(body=named(part.body)) for part in rest]
+
+
+def _cut(
+    segments: FloatArray,
+    owners: IntArray,
+    bodies: IntArray,
+    placed: Bodies,
+    counts: Counts,
+    budget: Budget,
+    workers: int | None,
+) -> list[Found]:
+    """Return the pieces of pairs of a segment and a body that the kernels left, body by body."""
     order = np.argsort(bodies, kind="stable")
-    pairs, bodies = pairs[order], bodies[order]
+    owners, bodies = owners[order], bodies[order]
     starts = np.flatnonzero(np.append(True, bodies[1:] != bodies[:-1])[: len(bodies)]).tolist()
     groups = [
         (first, min(first + _MOST_IN_GROUP, last))
@@ -111,109 +245,29 @@ def _cut(question: Question, pairs: IntArray, budget: Budget, workers: int | Non
     def task(first: int, last: int) -> None:
         for group in range(first, last):
             begin, end = groups[group]
-            body, items = int(bodies[begin]), question.owners[pairs[begin:end]]
-            pieces = _on_body(question.segments[items], question.placed(body), budget)
+            body, items = int(bodies[begin]), owners[begin:end]
+            pieces, rational = _on_body(segments[items], *placed.placed(body), budget)
+            counts.is_beyond[items[rational]] = counts.is_rational[items[rational]] = True
             m = len(pieces.source)
             if m:
                 budget.take(_BYTES * m)
-                found[group] = Found(items[pieces.source], np.full(m, body), pieces.ends, pieces.t, pieces.faces)
+                found[group] = Found(items[pieces.source], np.full(m, body), *pieces[1:])
 
     run_chunks(task, len(groups), budget=budget, first_chunk=1, workers=workers)
     return [found[group] for group in sorted(found)]
 
 
-def _on_body(segments: FloatArray, body: Placed, budget: Budget) -> Pieces:
-    """Return the pieces of segments (n, 2, dim) within a placed solid, by source and t."""
-    solid, pose, n = body.solid, body.pose, len(segments)
-
-    def settle(items: IntArray) -> Pieces:
-        return _exactly(segments, items, solid, pose, budget)
-
-    if pose is not None:
-        posed = body.posed()
-        if posed is None:
-            return settle(np.arange(n))
-        radius = solid.radius if isinstance(solid, Sphere) else 0.0
-        return completed(*cut_posed(segments, posed, radius, budget), isinstance(solid, Surface), settle)
-    match solid:
-        case HalfSpace() | Convex() | Aabb() | Sphere():
-            method = method_for(solid)
-            return clip_on_convex(segments, method, budget, 1, None)[0]  # type: ignore[arg-type]
-        case Surface():
-            outside = np.full(n, -1, np.int8)
-            return completed(*cut_at_crossings(segments, outside, boundary_of(solid), budget), True, settle)
-        case Polygon() | Polyhedron() | Triangle() if solid.dimension == 2 or solid.type == "polyhedron":
-            return clip_chunk(segments, 0, n, solid, locator_of(solid).chosen(n, budget), budget)[0]
-    return settle(np.arange(n))
-
-
-def _exactly(segments: FloatArray, items: IntArray, solid: Solid, pose: Pose | None, budget: Budget) -> Pieces:
-    """Return the pieces of some segments by exact arithmetic."""
-    sources, pieces = [], []
-    for item in items.tolist():
-        budget.check()
-        p, q = segments[item].tolist()
-        found = [piece.rounded(p, q) for piece in exact_pieces(p, q, solid, pose, budget)]
-        budget.take(_BYTES * len(found))
-        pieces += found
-        sources += [item] * len(found)
-    ends = np.array([(piece.start, piece.end) for piece in pieces], np.float64).reshape(-1, 2, segments.shape[2])
-    return Pieces(
-        np.array(sources, np.int64),
-        np.ascontiguousarray(ends.swapaxes(0, 1)) + 0.0,
-        np.array([piece.t for piece in pieces], np.float64).reshape(-1, 2),
-        np.array([piece.faces for piece in pieces], np.int64).reshape(-1, 2),
-    )
-
-
-def clip_first(
-    question: Question, boxes: FloatArray, budget: Budget, workers: int | None, is_any: bool
-) -> ScenePieces | BoolArray:
-    """Return the first piece of each segment that meets a body, of those that begin at one point that of the first
-    body; where `is_any`, whether it meets one.
-
-    boxes: of the body of each pair. Bodies are asked in the order in which their boxes are entered, one, two, four, ...
-    of them at a time, until what is left begins behind the first end found.
-    """
-    segments, owners = question.segments, question.owners
-    if is_any:  # each is as likely to be met as the others
-        entered, order = np.zeros(len(owners)), np.arange(len(owners))
-    else:
-        entered = _entered(segments[owners], boxes)
-        order = np.lexsort((entered, owners))
-    n, width, parts = len(segments), 1, []
-    begins = np.searchsorted(owners, np.arange(n + 1))
-    best, reached = np.full(n, np.inf), begins[:-1].copy()
-    is_open = reached < begins[1:]
-    while is_open.any():  # bound: each turn passes a pair of every open segment, more each time
-        left = np.flatnonzero(is_open)
-        sizes = np.minimum(width, begins[left + 1] - reached[left])
-        places = np.repeat(reached[left] - (np.cumsum(sizes) - sizes), sizes) + np.arange(int(sizes.sum()))
-        pairs = order[places]
-        some = _cut(question, pairs[entered[pairs] <= best[owners[pairs]]], budget, workers)
-        for part in some:
-            np.minimum.at(best, part.source, part.t[:, 0])
-        parts += some
-        reached[left] += sizes
-        is_open = reached < begins[1:]
-        following = order[np.minimum(reached, len(order) - 1)]
-        is_open &= ~np.isfinite(best) if is_any else entered[following] <= best
-        width *= 2
-    if is_any:
-        return np.isfinite(best)
-    found = joined(parts, segments.shape[2])
-    is_first = np.append(True, (found.source[1:] != found.source[:-1]) | (found.body[1:] != found.body[:-1]))
-    pieces = in_order(taken(found, np.flatnonzero(is_first[: len(found.source)])), _exact_ends(question, budget))
-    rows = np.flatnonzero(np.append(True, pieces.source[1:] != pieces.source[:-1])[: len(pieces)])
-    return ScenePieces(*(getattr(pieces, field.name)[rows] for field in fields(pieces)))
-
-
-def _entered(segments: FloatArray, boxes: FloatArray) -> FloatArray:
-    """Return for pairs of a segment and a box a parameter before which the segment is not in the box."""
-    p, q = segments[:, 0], segments[:, 1]
-    with np.errstate(all="ignore"):
-        low, high = (boxes[:, 0] - p) / (q - p), (boxes[:, 1] - p) / (q - p)
-        is_known = (p != q) & ~np.isnan(low) & ~np.isnan(high)
-        first = np.where(is_known, np.minimum(low, high), 0.0).max(axis=1, initial=0.0)
-    found: FloatArray = np.where(first > 0.0, np.nextafter(first * _NEAR, 0.0), 0.0)
-    return found
+def _on_body(segments: FloatArray, solid: Solid, pose: Pose | None, budget: Budget) -> tuple[Pieces, Any]:
+    """Return the pieces of segments (n, 2, dim) within a placed solid, by source and t, and which of them took rational
+    arithmetic: all where some did and it is not told which."""
+    n = len(segments)
+    every = np.arange(n)
+    if pose is None:
+        match solid:
+            case HalfSpace() | Convex() | Aabb() | Sphere():
+                method = method_for(solid)
+                pieces, _, n_rational = clip_on_convex(segments, solid, method, budget, 1, None)  # type: ignore[arg-type]
+                return pieces, every[: n * bool(n_rational)]
+            case Polygon() | Polyhedron() | Triangle() if solid.dimension == 2 or solid.type == "polyhedron":
+                return clip_chunk(segments, 0, n, solid, locator_of(solid).chosen(n, budget), budget)
+    return settled(segments, every, solid, pose, budget), every

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
-from engine.scenes.parameters import ONE, ZERO, Parameter, compare
+from engine.segment_clipping.parameters import ONE, ZERO, Parameter, compare
 
 
 @dataclass(frozen=True, slots=True, eq=False)

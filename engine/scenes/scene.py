@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Final, Literal, Unpack, cast, overload
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray, IntArray
+from engine.arrays import BoolArray, FloatArray
 from engine.collision.clearance.clearance import checked_distance
 from engine.collision.collide import check_pose
 from engine.collision.scenes.collide_scene import Asked, ScenePairs, collide_bodies, pair_keys
@@ -16,22 +16,21 @@ from engine.containment.scene.locate_scene import SceneLocations, check_bodies, 
 from engine.errors import EngineError, IndexOutOfRangeError, InvalidArrayError, InvalidOperationError
 from engine.parallel import Budget, Cancel, Options, Progress, check_options
 from engine.scenes.bodies import Bodies
-from engine.scenes.broad_phase import candidates
-from engine.scenes.clip import Placed, Question, clip_all, clip_first
+from engine.scenes.clip import Counts, clip_all, clip_first, meets_any
 from engine.scenes.ends import ScenePieces, in_order, joined
-from engine.scenes.parameters import ONE, ZERO
+from engine.scenes.standing import Standing
+from engine.segment_clipping.parameters import ONE, ZERO
 from engine.solids.base import Immutable, Solid, _collect_arrays
 from engine.solids.checks import as_point_groups, as_points
 from engine.solids.pose import Pose
 from engine.types import Accuracy
 
-_FEW: Final = 64
-_PART: Final = 4
-"""Bodies up to `_FEW`, or the scene's size divided by `_PART`, that moved are kept beside the others."""
 _BYTES_OF_POSE: Final = 1000
 Keep = Literal["all", "first", "any"]
 _OUTWARD: Final = np.array([[-1.001], [1.001]])
 """Further than a pose may stretch lengths (posed_boxes.py)."""
+_FEW: Final = 4
+"""Points of a question that are asked body by body."""
 _MANY: Final = 1000
 """Points of a question after which polyhedra may have got cells."""
 
@@ -56,30 +55,18 @@ class Scene(Immutable):
     (0, 1)
     """
 
-    __slots__ = ("_all", "_base", "_few", "_places")
+    __slots__ = ("_standing",)
 
     type: ClassVar[str] = "scene"
-    _base: Bodies
-    """All bodies, where they were when they were last prepared together."""
-    _few: Bodies | None
-    """Those that moved since, where they are."""
-    _places: dict[int, int]
-    """Which of `_few` a body is, ascending."""
-    _all: Bodies | None
-    """All bodies where they are, once it is asked for."""
+    _standing: Standing
 
     def __init__(self, solids: Sequence[Solid], poses: Sequence[Pose | None] | None = None) -> None:
         check_bodies(solids, poses)
-        self._set(Bodies(tuple(solids), (None,) * len(solids) if poses is None else tuple(poses)))
-
-    def _set(self, base: Bodies, few: Bodies | None = None, places: dict[int, int] | None = None) -> None:
-        object.__setattr__(self, "_base", base)
-        object.__setattr__(self, "_few", few)
-        object.__setattr__(self, "_places", places or {})
-        object.__setattr__(self, "_all", base if few is None else None)
+        bodies = Bodies(tuple(solids), (None,) * len(solids) if poses is None else tuple(poses))
+        object.__setattr__(self, "_standing", Standing(bodies, {}))
 
     def __len__(self) -> int:
-        return len(self._base.solids)
+        return len(self.solids)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Scene, (self.solids, self.poses)
@@ -90,17 +77,12 @@ class Scene(Immutable):
     @property
     def solids(self) -> tuple[Solid, ...]:
         """The solid of each body."""
-        return self._base.solids
+        return self._standing.base.solids
 
     @property
     def poses(self) -> tuple[Pose | None, ...]:
         """The pose of each body, None for one that stands where its solid does."""
-        if self._few is None:
-            return self._base.poses
-        poses = list(self._base.poses)
-        for body, place in self._places.items():
-            poses[body] = self._few.poses[place]
-        return tuple(poses)
+        return self._standing.poses
 
     @property
     def bounds(self) -> FloatArray | None:
@@ -108,18 +90,14 @@ class Scene(Immutable):
         no bounds. None where there are no bodies."""
         if not len(self):
             return None
-        budget = Budget()
-        boxes = self._base.tree(budget).boxes
-        if self._few is not None:
-            stay = np.delete(boxes, list(self._places), axis=0)
-            boxes = np.concatenate([stay, self._few.tree(budget).boxes])
+        boxes = self._standing.boxes(np.arange(len(self)), Budget())
         return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
 
     @property
     def memory(self) -> int:
         """Bytes of all arrays held, of the solids and of what is prepared too, shared ones once."""
         found: dict[int, int] = {}
-        _collect_arrays((self.solids, *(each.kept for each in self._layers())), found, set())
+        _collect_arrays((self.solids, *self._standing.kept), found, set())
         return sum(found.values()) + _BYTES_OF_POSE * sum(pose is not None for pose in self.poses)
 
     def moved(self, poses: Mapping[int, Pose | None]) -> Scene:
@@ -136,18 +114,8 @@ class Scene(Immutable):
         bodies = self._named(list(poses), "poses")
         for body in bodies:
             check_pose(poses[body], solids[body], f"poses[{body}]")
-        given = {body: self._few.poses[place] for body, place in self._places.items()} if self._few else {}
-        given |= {body: poses[body] for body in bodies}
         scene = object.__new__(Scene)
-        if len(given) > max(_FEW, len(self) // _PART):
-            everywhere = list(self._base.poses)
-            for body, pose in given.items():
-                everywhere[body] = pose
-            scene._set(Bodies(solids, tuple(everywhere)))
-        else:
-            places = {body: place for place, body in enumerate(sorted(given))}
-            few = Bodies(tuple(solids[body] for body in places), tuple(given[body] for body in places))
-            scene._set(self._base, few if places else None, places)
+        object.__setattr__(scene, "_standing", self._standing.moved({body: poses[body] for body in bodies}))
         return scene
 
     def locate(
@@ -164,12 +132,19 @@ class Scene(Immutable):
         check_options(workers, progress, report=report)
         array = as_points(points, self.solids[0].dimension if len(self) else None)
         with Budget(deadline, cancel) as budget:
-            found, accuracy = locate_in(array, self._base.tables(array.shape[1], budget), budget, workers, progress)
-            if len(array) >= _MANY:
-                self._base.kept["asked_often"] = True
-            if self._few is not None:
-                more, besides = locate_in(array, self._few.tables(array.shape[1], budget), budget, workers, None)
-                found, accuracy = self._merged(found, more), _both(accuracy, besides)
+            standing = self._standing
+            tables = [layer.bodies.tables(array.shape[1], budget) for layer in standing.layers]
+            if 0 < len(array) <= _FEW and len(self):
+                found, accuracy = standing.located(array, tables, budget)
+                if progress is not None:
+                    progress(len(array))
+            else:
+                found, accuracy = locate_in(array, tables[0], budget, workers, progress)
+                if len(array) >= _MANY:
+                    standing.base.prepared("asked_often", lambda: True)
+                if standing.few is not None:
+                    more, besides = locate_in(array, tables[1], budget, workers, None)
+                    found, accuracy = standing.merged(found, more), _both(accuracy, besides)
         return (found, accuracy) if report else found
 
     def collide(
@@ -199,7 +174,7 @@ class Scene(Immutable):
         with Budget(deadline, cancel) as budget:
             if moved is None or not len(self):
                 self._named([] if moved is None else moved, "moved")
-                found = collide_bodies(self._whole().batches(budget), asked, budget, workers, progress)
+                found = collide_bodies(self._standing.whole().batches(budget), asked, budget, workers, progress)
             else:
                 found = self._collide_some(self._named(moved, "moved"), asked, budget, workers, progress)
         return found if report else found[0]
@@ -208,13 +183,14 @@ class Scene(Immutable):
         self, named: list[int], asked: Asked, budget: Budget, workers: int | None, progress: Progress | None
     ) -> tuple[ScenePairs, Accuracy]:
         """Return the pairs with a body named: those whose boxes meet are put into a scene of their own."""
-        self._base.check_collidable(budget)
+        standing = self._standing
+        standing.base.check_collidable(budget)
         n, items = len(self), np.array(named, np.int64)
-        boxes, reach = self._boxes(items, budget), 0.0 if asked.gap is None else checked_distance(asked.gap, "gap")
+        boxes, reach = standing.boxes(items, budget), 0.0 if asked.gap is None else checked_distance(asked.gap, "gap")
         if reach > 0.0:
             with np.errstate(over="ignore"):
                 boxes = np.nextafter(boxes + reach * _OUTWARD, np.inf * _OUTWARD)
-        owners, partners = self._near(boxes, True, budget, workers)
+        owners, partners = standing.near(boxes, budget, workers)
         pairs = np.sort(np.stack([items[owners], partners], axis=1), axis=1)
         keys = np.unique(pairs[:, 0] * n + pairs[:, 1])
         keys = keys[keys // n != keys % n]
@@ -225,7 +201,7 @@ class Scene(Immutable):
         pairs = np.stack(np.divmod(keys, n), axis=1)
         bodies, local = np.unique(pairs, return_inverse=True)
         names, solids = bodies.tolist(), self.solids
-        some = Bodies(tuple(solids[body] for body in names), tuple(self._pose(body) for body in names))
+        some = Bodies(tuple(solids[body] for body in names), tuple(standing.pose(body) for body in names))
         asked = asked._replace(skip=None, only=local.reshape(-1, 2))
         try:
             found, accuracy = collide_bodies(some.batches(budget), asked, budget, workers, progress)
@@ -299,42 +275,24 @@ class Scene(Immutable):
             raise InvalidOperationError(f"keep must be all, first or any, got {keep!r:.50}", ("keep",))
         array = as_point_groups(segments, 2, self.solids[0].dimension if len(self) else None, ("segments",))
         n = len(array)
+        counts = Counts(n)
         with Budget(deadline, cancel) as budget:
             budget.check()
+            self._standing.base.check_cut(budget)
             result: ScenePieces | BoolArray
             if not len(self):
                 result = in_order(joined([], array.shape[2]), lambda *_: (ZERO, ONE))
                 result = np.zeros(n, np.bool_) if keep == "any" else result
             else:
-                self._base.check_cut(budget)
-                owners, bodies = self._near(array, False, budget, workers)
-                question = Question(array, owners, bodies, self._placed)
-                if keep == "all":
-                    result = clip_all(question, budget, workers)
-                else:
-                    boxes = self._boxes(bodies, budget)
-                    result = clip_first(question, boxes, budget, workers, keep == "any")
+                cut: Any = {"all": clip_all, "first": clip_first, "any": meets_any}[keep]
+                result = cut(array, self._standing, counts, budget, workers)
             budget.check()
         if progress is not None and n:
             progress(n)
-        return (result, Accuracy("exact", 0.5, n, 0, 0, "body_boxes")) if report else result
-
-    def _layers(self) -> list[Bodies]:
-        return [each for each in (self._base, self._few, self._all) if each is not None]
-
-    def _whole(self) -> Bodies:
-        """Return all bodies where they are."""
-        if self._all is None:
-            object.__setattr__(self, "_all", Bodies(self.solids, self.poses))
-        return cast(Bodies, self._all)
-
-    def _pose(self, body: int) -> Pose | None:
-        place = self._places.get(body)
-        return self._base.poses[body] if place is None or self._few is None else self._few.poses[place]
-
-    def _placed(self, body: int) -> Placed:
-        place = self._places.get(body)
-        return self._base.placed(body) if place is None or self._few is None else self._few.placed(place)
+        if not report:
+            return result
+        n_beyond, n_rational = int(counts.is_beyond.sum()), int(counts.is_rational.sum())
+        return result, Accuracy("exact", 0.5, n, n_beyond, n_rational, "body_boxes")
 
     def _named(self, bodies: object, name: str) -> list[int]:
         """Return indices of bodies, each once, ascending. Raises: IndexOutOfRangeError, InvalidArrayError."""
@@ -350,47 +308,6 @@ class Scene(Immutable):
                 )
             found.add(int(body))
         return sorted(found)
-
-    def _boxes(self, bodies: IntArray, budget: Budget) -> FloatArray:
-        """Return the boxes of bodies, one or more times each, where they are."""
-        boxes = self._base.tree(budget).boxes[bodies]
-        if self._few is not None:
-            moved = np.array(list(self._places), np.int64)
-            places = np.minimum(np.searchsorted(moved, bodies), len(moved) - 1)
-            are_moved = moved[places] == bodies
-            boxes[are_moved] = self._few.tree(budget).boxes[places[are_moved]]
-        return boxes
-
-    def _near(
-        self, items: FloatArray, are_boxes: bool, budget: Budget, workers: int | None
-    ) -> tuple[IntArray, IntArray]:
-        """Return pairs of an item and a body that it may meet where that is; see `candidates`."""
-        owners, bodies = candidates(self._base.tree(budget), items, are_boxes, budget, workers)
-        if self._few is None:
-            return owners, bodies
-        moved = np.array(list(self._places), np.int64)
-        stays = np.ones(len(self), np.bool_)
-        stays[moved] = False
-        stay = stays[bodies]
-        more, places = candidates(self._few.tree(budget), items, are_boxes, budget, workers)
-        owners, bodies = np.concatenate([owners[stay], more]), np.concatenate([bodies[stay], moved[places]])
-        order = np.argsort(owners, kind="stable")
-        return owners[order], bodies[order]
-
-    def _merged(self, found: SceneLocations, more: SceneLocations) -> SceneLocations:
-        """Return where points lie among all bodies, from where they lie among those of `_base` and of `_few`."""
-        moved = np.array(list(self._places), np.int64)
-        stays = np.ones(len(self), np.bool_)
-        stays[moved] = False
-        stay, n = stays[found.indices], len(found.offsets) - 1
-        owners = np.repeat(np.arange(n), np.diff(found.offsets))[stay]
-        owners = np.concatenate([owners, np.repeat(np.arange(n), np.diff(more.offsets))])
-        bodies = np.concatenate([found.indices[stay], moved[more.indices]])
-        order = np.lexsort((bodies, owners))
-        on_boundary = np.concatenate([found.on_boundary[stay], more.on_boundary])[order]
-        offsets = np.zeros(n + 1, np.int64)
-        np.cumsum(np.bincount(owners, minlength=n), out=offsets[1:])
-        return SceneLocations(offsets, bodies[order], on_boundary)
 
 
 def _both(first: Accuracy, second: Accuracy) -> Accuracy:

@@ -4,7 +4,7 @@ A point is found from t in doubles by one step of Newton whose residual F(t) is 
 within (E_F + s E_G + A s^2) / |F'| of t - F / F', where E bounds the errors of F and F' and s the step. F is convex
 and quadratic, so that is a proof for whatever t came in, and no square root has to be precise.
 
-What is not sure goes to integers and their square roots (exact_segments.py).
+What is not sure goes to integers and their square roots (profiles.py).
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ With d = q - p and f = p - c (g = q - c at the other end) the points of the ball
 
 The signs of C at either end say which ends are inside. With both outside, the ball is met exactly if D >= 0 and the
 foot of the centre lies between the ends: d.f < 0 < d.g. Doubles with a bound settle most items; then double-double;
-what is still open (tangent lines, ends on the sphere) goes to integers and their square roots (exact_segments.py).
+what is still open (tangent lines, ends on the sphere) goes to integers and their square roots (profiles.py).
 
 Source: the textbook's exercise, a segment on a sphere; bounds: see the comments at each constant.
 """

@@ -19,7 +19,6 @@ from engine.segment_clipping.box_cut import fill_on_boxes
 from engine.segment_clipping.cohen_sutherland import decide_on_boxes
 from engine.segment_clipping.cyrus_beck import as_columns, decide_on_rows
 from engine.segment_clipping.decide_then_cut import Method, Scaled, clip_on_convex, scaled
-from engine.segment_clipping.exact_segments import clip_by_planes, clip_by_sphere
 from engine.segment_clipping.planes_cut import fill_on_rows
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
@@ -117,7 +116,7 @@ def clip_segments(
     array = as_point_groups(segments, 2, region.dimension, ("segments",), must_be_finite=False)  # kernels look at it
     with Budget(deadline, cancel) as budget:
         if isinstance(method, Method):
-            found, n_beyond, n_rational = clip_on_convex(array, method, budget, workers, progress)
+            found, n_beyond, n_rational = clip_on_convex(array, region, method, budget, workers, progress)
         else:
             found, n_beyond, n_rational = clip_on_boundary(array, method, budget, workers, progress)
     pieces = SegmentPieces(found.source, found.ends[0], found.ends[1], found.t, found.faces)
@@ -135,7 +134,7 @@ def method_for(region: Solid) -> Method | Polygon | Polyhedron:
         case Convex():
             return region.prepared("segment_method", lambda: _on_rows(region.planes))
         case Aabb():
-            return region.prepared("segment_method", lambda: _on_box(region.min, region.max, region.rows.tolist()))
+            return region.prepared("segment_method", lambda: _on_box(region.min, region.max))
         case Sphere():
             return region.prepared("segment_method", lambda: _on_ball(region.center, float(region.radius)))
         case Polygon() | Polyhedron():
@@ -147,19 +146,17 @@ def method_for(region: Solid) -> Method | Polygon | Polyhedron:
     )
 
 
-def _on_box(low: FloatArray, high: FloatArray, planes: list[list[float]]) -> Method:
+def _on_box(low: FloatArray, high: FloatArray) -> Method:
     return Method(
         "cohen_sutherland",
         decide_on_boxes,
         fill_on_boxes,
         (low, high),
-        lambda p, q: clip_by_planes(p, q, planes),
         lambda segments: scaled(segments, low, high),
     )
 
 
 def _on_rows(rows: FloatArray) -> Method:
-    planes = rows.tolist()
     plain = balanced_rows(rows, 0)
 
     def scale(segments: FloatArray) -> Scaled | None:
@@ -172,14 +169,11 @@ def _on_rows(rows: FloatArray) -> Method:
         decide_on_rows,
         fill_on_rows,
         (as_columns(rows if plain is None else plain),),
-        lambda p, q: clip_by_planes(p, q, planes),
         scale,
     )
 
 
 def _on_ball(center: FloatArray, radius: float) -> Method:
-    place = center.tolist()
-
     def scale(segments: FloatArray) -> Scaled | None:
         found = scaled(segments, center, np.array([radius]))
         return found and replace(found, region=(found.region[0], float(found.region[1][0])))
@@ -189,6 +183,5 @@ def _on_ball(center: FloatArray, radius: float) -> Method:
         decide_on_sphere,
         fill_on_sphere,
         (center, radius),
-        lambda p, q: clip_by_sphere(p, q, place, radius),
         scale,
     )

@@ -27,6 +27,8 @@ from engine.segment_clipping.box_tree import DEEPEST, LEAF_SIZE, may_meet
 APART: Final = 0
 PROPER: Final = 1
 DEGENERATE: Final = 2
+TOUCHING: Final = 3
+"""DEGENERATE, and surely one common point."""
 GROUP: Final = 2048
 """Segments that are looked at together at most."""
 NO_ROOM: Final = -1

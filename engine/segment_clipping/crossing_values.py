@@ -25,16 +25,19 @@ from engine.predicates.cut_point import point_at
 from engine.predicates.double_double import U2, dd_div
 from engine.predicates.error_free import two_diff, two_prod, two_sum
 from engine.predicates.expansion import is_safe
+from engine.segment_clipping.pieces import Triple
 from engine.segment_clipping.plane_meeting import T_BOUND
 from engine.segment_clipping.triangle_contact import corner
+from engine.types import Point3
 
 VALUE_BOUND: Final = 80.0 * U2
 
+Normal = tuple[Triple, Triple, Triple]
+Vector = tuple[tuple[float, float], tuple[float, float], tuple[float, float]]
+
 
 @merged
-def minor(
-    u: float, u_low: float, v: float, v_low: float, x: float, x_low: float, y: float, y_low: float
-) -> tuple[float, float, float]:
+def minor(u: float, u_low: float, v: float, v_low: float, x: float, x_low: float, y: float, y_low: float) -> Triple:
     """Return U V - X Y for pairs without error as a sum of two doubles, and |u v| + |x y|."""
     ph, pl = two_prod(u, v)
     qh, ql = two_prod(x, y)
@@ -44,25 +47,30 @@ def minor(
 
 
 @merged
-def product(n: tuple[float, float, float], w: float, w_low: float) -> tuple[float, float, float]:
+def product(n: Triple, w: float, w_low: float) -> Triple:
     """Return (h + low) (w + w_low) for what `minor` returns as a sum of two doubles, and its size m |w|."""
     g, tail = two_prod(n[0], w)
     return g, tail + (n[0] * w_low + n[1] * w), n[2] * abs(w)
 
 
 @merged
-def dot(
-    nx: tuple[float, float, float],
-    ny: tuple[float, float, float],
-    nz: tuple[float, float, float],
-    wx: tuple[float, float],
-    wy: tuple[float, float],
-    wz: tuple[float, float],
-) -> tuple[float, float, float]:
+def normal_of(a: Point3, b: Point3, c: Point3) -> Normal:
+    """Return (b - a) x (c - a), each component as `minor` does."""
+    ux, uy, uz = two_diff(b.x, a.x), two_diff(b.y, a.y), two_diff(b.z, a.z)
+    vx, vy, vz = two_diff(c.x, a.x), two_diff(c.y, a.y), two_diff(c.z, a.z)
+    return (
+        minor(uy[0], uy[1], vz[0], vz[1], uz[0], uz[1], vy[0], vy[1]),
+        minor(uz[0], uz[1], vx[0], vx[1], ux[0], ux[1], vz[0], vz[1]),
+        minor(ux[0], ux[1], vy[0], vy[1], uy[0], uy[1], vx[0], vx[1]),
+    )
+
+
+@merged
+def dot(n: Normal, w: Vector) -> Triple:
     """Return n . w as a double-double, and its bound."""
-    x, x_low, x_size = product(nx, wx[0], wx[1])
-    y, y_low, y_size = product(ny, wy[0], wy[1])
-    z, z_low, z_size = product(nz, wz[0], wz[1])
+    x, x_low, x_size = product(n[0], w[0][0], w[0][1])
+    y, y_low, y_size = product(n[1], w[1][0], w[1][1])
+    z, z_low, z_size = product(n[2], w[2][0], w[2][1])
     h, first = two_sum(x, y)
     h, second = two_sum(h, z)
     h, low = two_sum(h, ((x_low + y_low) + (z_low + first)) + second)
@@ -92,17 +100,9 @@ def plane_values(elements: Any, element: int, segments: Any, item: int) -> tuple
     """Return s(p) and d for one of some triangles (k, 3, 3) as double-doubles, each with its bound."""
     a, b, c = corner(elements, element, 0), corner(elements, element, 1), corner(elements, element, 2)
     p, q = corner(segments, item, 0), corner(segments, item, 1)
-    ux, ux_low = two_diff(b.x, a.x)
-    uy, uy_low = two_diff(b.y, a.y)
-    uz, uz_low = two_diff(b.z, a.z)
-    vx, vx_low = two_diff(c.x, a.x)
-    vy, vy_low = two_diff(c.y, a.y)
-    vz, vz_low = two_diff(c.z, a.z)
-    nx = minor(uy, uy_low, vz, vz_low, uz, uz_low, vy, vy_low)
-    ny = minor(uz, uz_low, vx, vx_low, ux, ux_low, vz, vz_low)
-    nz = minor(ux, ux_low, vy, vy_low, uy, uy_low, vx, vx_low)
-    at_p = dot(nx, ny, nz, two_diff(p.x, a.x), two_diff(p.y, a.y), two_diff(p.z, a.z))
-    along = dot(nx, ny, nz, two_diff(p.x, q.x), two_diff(p.y, q.y), two_diff(p.z, q.z))
+    normal = normal_of(a, b, c)
+    at_p = dot(normal, (two_diff(p.x, a.x), two_diff(p.y, a.y), two_diff(p.z, a.z)))
+    along = dot(normal, (two_diff(p.x, q.x), two_diff(p.y, q.y), two_diff(p.z, q.z)))
     return at_p, along
 
 

@@ -22,11 +22,11 @@ from engine.arrays import FloatArray, Int32Array, IntArray
 from engine.direct import entry_of
 from engine.parallel import Budget, Progress, run_chunks
 from engine.predicates.scaling import exponent_of, scaled_back, shifted
-from engine.segment_clipping.exact_segments import Piece
-from engine.segment_clipping.pieces import Pieces, joined, room_for
+from engine.segment_clipping.pieces import Pieces, completed, first_of, room_for
+from engine.segment_clipping.profiles import settled
+from engine.solids.base import Solid
 from engine.solids.checks import check_finite
 
-Settle = Callable[[list[float], list[float]], Piece | None]
 Clipped = tuple[Pieces, int, int]
 """Pieces, how many items needed more than the filter, and how many rational arithmetic."""
 
@@ -62,20 +62,19 @@ def scaled(points: FloatArray, *region: FloatArray) -> Scaled | None:
 class Method:
     """How segments are clipped on one region.
 
-    decide, fill: kernels; see cohen_sutherland.py, box_cut.py. region: their arguments. settle: rational arithmetic on
-    one segment. scale: returns the batch scaled, None where it is well as it is or cannot be scaled exactly.
+    decide, fill: kernels; see cohen_sutherland.py, box_cut.py. region: their arguments. scale: returns the batch
+    scaled, None where it is well as it is or cannot be scaled exactly.
     """
 
     name: str
     decide: Any
     fill: Any
     region: tuple[Any, ...]
-    settle: Settle
     scale: Callable[[FloatArray], Scaled | None]
 
 
 def clip_on_convex(
-    segments: FloatArray, method: Method, budget: Budget, workers: int | None, progress: Progress | None
+    segments: FloatArray, region: Solid, method: Method, budget: Budget, workers: int | None, progress: Progress | None
 ) -> Clipped:
     """Return the piece of each segment that has one. segments: (n, 2, dim) float64, not yet looked at for NaN.
 
@@ -85,10 +84,12 @@ def clip_on_convex(
     if found is not None:
         return found
     scene = Scaled(segments, method.region, 0)
-    found = _clip(segments, method, scene, _FEW + len(segments) // 256, budget, workers, progress)
+    found = _clip(segments, region, method, scene, _FEW + len(segments) // 256, budget, workers, progress)
     if found is None:
         better = method.scale(segments)
-        found = _clip(segments, method, better or scene, len(segments), budget, workers, None)  # progress is told
+        found = _clip(
+            segments, region, method, better or scene, len(segments), budget, workers, None
+        )  # progress is told
     assert found is not None
     return found
 
@@ -120,6 +121,7 @@ def _clip_few(segments: FloatArray, method: Method, budget: Budget, progress: Pr
 
 def _clip(
     segments: FloatArray,
+    region: Solid,
     method: Method,
     scene: Scaled,
     most_open: int,
@@ -137,11 +139,9 @@ def _clip(
     if n_rational > most_open:
         return None
     m = batch.n_rows
-    filled = batch.pieces
-    if m < len(segments):
-        filled = Pieces(filled.source[:m], filled.ends[:, :m], filled.t[:m], filled.faces[:m])
+    filled = first_of(batch.pieces, m) if m < len(segments) else batch.pieces
     if n_rational:
-        filled = _settle(filled, batch, segments, method.settle, budget)
+        filled = _settle(filled, batch, segments, region, budget)
     return filled, min(len(segments), batch.n_beyond + n_open), n_rational
 
 
@@ -214,23 +214,10 @@ class _Batch:
                 self.unsure_rows.append(unsure)
 
 
-def _settle(filled: Pieces, batch: _Batch, segments: FloatArray, settle: Settle, budget: Budget) -> Pieces:
+def _settle(filled: Pieces, batch: _Batch, segments: FloatArray, region: Solid, budget: Budget) -> Pieces:
     """Return the pieces with those rows made anew that are not sure, and with what is left of open items."""
+    rows = np.concatenate([np.zeros(0, np.int64), *batch.unsure_rows])
+    again = settled(segments, filled.source[rows], region, None, budget)
+    filled.t[rows], filled.ends[:, rows], filled.faces[rows] = again.t, again.ends, again.faces
     open_items = np.concatenate([np.zeros(0, np.int64), *batch.open_items])
-    unsure_rows = np.concatenate([np.zeros(0, np.int64), *batch.unsure_rows])
-    pieces: dict[int, Piece] = {}
-    for item in [*open_items.tolist(), *filled.source[unsure_rows].tolist()]:
-        budget.check()
-        piece = settle(*segments[item].tolist())
-        if piece is not None:
-            pieces[item] = piece
-    missing = [item for item in open_items.tolist() if item in pieces]
-    if missing:
-        items = np.append(filled.source, missing)
-        order = np.argsort(items, kind="stable")
-        filled = joined([filled, room_for(len(missing), segments.shape[2])])
-        filled = Pieces(items[order], filled.ends[:, order], filled.t[order], filled.faces[order])
-    rows = np.searchsorted(filled.source, np.array(list(pieces), np.int64))
-    for row, piece in zip(rows.tolist(), pieces.values()):
-        filled.t[row], filled.ends[:, row], filled.faces[row] = piece.t, (piece.start, piece.end), piece.faces
-    return filled
+    return completed([filled, settled(segments, open_items, region, None, budget)])

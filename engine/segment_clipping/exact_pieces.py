@@ -1,4 +1,4 @@
-"""The pieces of one segment within a polygon or polyhedron, in exact integer arithmetic.
+"""Where one segment meets a polygon, a polyhedron or a surface, in exact integer arithmetic.
 
 The segment's contacts with the boundary cut [0, 1] into open spans. A span along which the segment lies in an element
 is kept (the boundary counts as in). Any other meets no element, so one location holds for all of it, and for the line
@@ -17,8 +17,7 @@ from fractions import Fraction
 from itertools import groupby
 from typing import Final, NamedTuple
 
-from engine.predicates.rational import common_integers, nearest
-from engine.segment_clipping.exact_segments import Piece
+from engine.predicates.rational import nearest
 
 Integers = Sequence[int]
 ZERO, ONE = Fraction(0), Fraction(1)
@@ -169,56 +168,3 @@ def nodes_with_locations(
         is_first_in = (locate((nodes[i][0] + nodes[i + 1][0]) / 2) > 0) ^ have_turned[i]
     for (t, met), is_along, turned in zip(nodes, are_along, have_turned):
         yield t, met, is_along, is_first_in ^ turned
-
-
-def spans_of(
-    contacts: Sequence[Contact], locations: tuple[int, int], locate: Callable[[Fraction], int]
-) -> Iterator[tuple[Fraction, Fraction, tuple[int, int]]]:
-    """Yield the first and the last parameter of each piece, and the faces there, -1 for an end of the segment.
-
-    locations, locate: see `nodes_with_locations`. Of several faces at one parameter the smallest is named, those along
-    the segment last.
-    """
-    is_open, first, entered = False, ZERO, -1
-    for t, met, is_along, is_in in nodes_with_locations(contacts, locations, locate):
-        goes_on = t < 1 and (is_along or is_in)
-        face = min((contact.is_along, contact.face) for contact in met)[1] if met else -1
-        if not is_open:
-            first, entered = t, -1 if t == 0 else face
-        if not goes_on and (is_open or met):
-            yield first, t, (entered, -1 if t == 1 else face)
-        is_open = goes_on
-
-
-def pieces_of(
-    p: Sequence[float],
-    q: Sequence[float],
-    elements: Sequence[tuple[int, Sequence[Sequence[float]]]],
-    locations: tuple[int, int],
-    locate: Callable[[list[Fraction]], int],
-    check: Callable[[], object],
-) -> Iterator[Piece]:
-    """Yield the pieces of the segment p q, p and q different.
-
-    elements: the face and the corners (two or three) of each element that the segment may meet; others it misses.
-    locations: of p and q. locate: see `spans_of`. check: called now and then.
-    """
-    n = len(p)
-    flat, scale = common_integers([*p, *q, *(x for _, corners in elements for corner in corners for x in corner)])
-    points = iter([flat[i : i + n] for i in range(0, len(flat), n)])
-    start, end = next(points), next(points)
-    whole = [(face, [next(points) for _ in corners]) for face, corners in elements]
-
-    def at(t: Fraction) -> list[Fraction]:
-        return [Fraction(x, scale) + t * Fraction(y - x, scale) for x, y in zip(start, end)]
-
-    def rounded(t: Fraction) -> list[float]:
-        top, bottom = t.as_integer_ratio()
-        return [nearest(x * (bottom - top) + y * top, bottom * scale) for x, y in zip(start, end)]
-
-    contacts = list(contacts_of(start, end, whole, check))
-    for i, (first, last, faces) in enumerate(spans_of(contacts, locations, lambda t: locate(at(t)))):
-        if i % _CHECK_EVERY == 0:
-            check()
-        t0, t1 = (nearest(*t.as_integer_ratio()) for t in (first, last))
-        yield Piece((t0, t1), rounded(first), rounded(last), faces)

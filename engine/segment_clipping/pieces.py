@@ -12,6 +12,15 @@ from engine.jit import merged
 Triple = tuple[float, float, float]
 
 
+class Piece(NamedTuple):
+    """What remains of one segment: parameters and points correctly rounded, the faces crossed (-1: own end)."""
+
+    t: tuple[float, float]
+    start: list[float]
+    end: list[float]
+    faces: tuple[int, int]
+
+
 class Pieces(NamedTuple):
     """Pieces in order, see `SegmentPieces`: source (m,), ends (2, m, dim), t and faces (m, 2)."""
 
@@ -30,6 +39,29 @@ def joined(parts: Sequence[Pieces]) -> Pieces:
     """Return the pieces of some parts one after another."""
     source, ends, t, faces = zip(*parts)
     return Pieces(np.concatenate(source), np.concatenate(ends, axis=1), np.concatenate(t), np.concatenate(faces))
+
+
+def first_of(pieces: Pieces, m: int) -> Pieces:
+    """Return the first m pieces."""
+    return Pieces(pieces.source[:m], pieces.ends[:, :m], pieces.t[:m], pieces.faces[:m])
+
+
+def as_pieces(sources: Sequence[int], pieces: Sequence[Piece], dimension: int) -> Pieces:
+    """Return pieces that were settled one by one, without negative zeros."""
+    ends = np.array([(piece.start, piece.end) for piece in pieces], np.float64).reshape(-1, 2, dimension) + 0.0
+    return Pieces(
+        np.array(sources, np.int64),
+        np.ascontiguousarray(ends.swapaxes(0, 1)),
+        np.array([piece.t for piece in pieces], np.float64).reshape(-1, 2) + 0.0,
+        np.array([piece.faces for piece in pieces], np.int64).reshape(-1, 2),
+    )
+
+
+def completed(parts: Sequence[Pieces]) -> Pieces:
+    """Return the pieces of some parts by source; those of one source stand together in one part."""
+    found = joined(parts)
+    order = np.argsort(found.source, kind="stable")
+    return Pieces(found.source[order], found.ends[:, order], found.t[order], found.faces[order])
 
 
 @merged

@@ -10,6 +10,9 @@ its permanent, at most 2 S^2 L (orientation.py): 2^-49 S^2 L; s(p) likewise, its
 s(q) carries both, thrice that of an edge, and three roundings of at most 6 S^2 L + 6 S^3: below 2^-46 S^2 (S + L). The
 bounds used are twice that, so their own rounding is covered, and 2^-700 more for products that underflow: where S is
 below 2^300 they lose less, where it is not the relative part is more. What overflows is unsure.
+
+Where p and q are known to `blur` a coordinate only, below 2^-20 S, the edges move by less than 16 blur S (S + L), the
+ends by less than 64 blur S (S + L).
 """
 
 from __future__ import annotations
@@ -18,7 +21,7 @@ from typing import Any, Final
 
 from engine.jit import called, merged
 from engine.predicates.orientation import orient3d
-from engine.segment_clipping.contacts import APART, DEGENERATE, PROPER
+from engine.segment_clipping.contacts import APART, DEGENERATE, PROPER, TOUCHING
 from engine.types import UNDECIDED, Point3
 
 EDGE_BOUND: Final = 2.0**-48
@@ -28,7 +31,11 @@ UNDERFLOW: Final = 2.0**-700
 
 @called
 def exact_contact(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3) -> int:
-    """Return how a segment p q and a triangle a b c meet, by exact signs."""
+    """Return how a segment p q and a triangle a b c meet, by exact signs.
+
+    TOUCHING: where an end is off the plane, the triangle has an area, and the line meets the plane in one point, within
+    the segment unless both ends are on one side. That point is outside of the triangle only where two edges tell so.
+    """
     of_p, of_q = orient3d(a, b, c, p), orient3d(a, b, c, q)
     if of_p == of_q and (of_p == 1 or of_p == -1):
         return APART
@@ -39,12 +46,14 @@ def exact_contact(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3) -> int:
             return APART
     if ab == bc and bc == ca and abs(ab) == 1 and abs(of_p) == 1 and abs(of_q) == 1:
         return PROPER
-    return DEGENERATE
+    is_sure = ab != UNDECIDED and bc != UNDECIDED and ca != UNDECIDED and of_p != UNDECIDED and of_q != UNDECIDED
+    return TOUCHING if is_sure and (of_p != 0 or of_q != 0) else DEGENERATE
 
 
 @merged
-def contact_filter(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3) -> int:
-    """Return how a segment and a triangle meet where rounding cannot have changed it, else UNDECIDED."""
+def contact_filter(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3, blur: float) -> int:
+    """Return how a segment and a triangle meet where rounding cannot have changed it, else UNDECIDED; p and q are known
+    to `blur` a coordinate."""
     ex, ey, ez = q.x - p.x, q.y - p.y, q.z - p.z
     ax, ay, az = a.x - p.x, a.y - p.y, a.z - p.z
     bx, by, bz = b.x - p.x, b.y - p.y, b.z - p.z
@@ -55,19 +64,25 @@ def contact_filter(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3) -> int
     ca = ex * (cy * az - cz * ay) + ey * (cz * ax - cx * az) + ez * (cx * ay - cy * ax)
     size = max(abs(ax), abs(ay), abs(az), abs(bx), abs(by), abs(bz), abs(cx), abs(cy), abs(cz))
     length = abs(ex) + abs(ey) + abs(ez)
-    bound = EDGE_BOUND * (size * size * length) + UNDERFLOW
+    moved = 0.0
+    if blur > 0.0:
+        if not blur < 2.0**-20 * size:
+            return UNDECIDED
+        moved = blur * size * (size + length)
+    bound = EDGE_BOUND * (size * size * length) + UNDERFLOW + 16.0 * moved
     least, most = min(ab, bc, ca), max(ab, bc, ca)
     if least < -bound and most > bound:
         return APART
-    if not (least > bound or most < -bound):
+    is_through = least > bound or most < -bound
+    if blur == 0.0 and not is_through:
         return UNDECIDED
     of_p = -(ax * nx + ay * ny + az * nz)
     of_q = of_p + (ab + bc + ca)
-    bound = END_BOUND * (size * size * (size + length)) + UNDERFLOW
+    bound = END_BOUND * (size * size * (size + length)) + UNDERFLOW + 64.0 * moved
     least, most = min(of_p, of_q), max(of_p, of_q)
     if least > bound or most < -bound:
         return APART
-    return PROPER if least < -bound and most > bound else UNDECIDED
+    return PROPER if is_through and least < -bound and most > bound else UNDECIDED
 
 
 @merged
@@ -75,7 +90,7 @@ def triangle_contact(elements: Any, element: int, segments: Any, item: int) -> i
     """Return how one of some segments (m, 2, 3) and one of some triangles (k, 3, 3) meet."""
     a, b, c = corner(elements, element, 0), corner(elements, element, 1), corner(elements, element, 2)
     p, q = corner(segments, item, 0), corner(segments, item, 1)
-    kind = contact_filter(a, b, c, p, q)
+    kind = contact_filter(a, b, c, p, q, 0.0)
     return kind if kind != UNDECIDED else exact_contact(a, b, c, p, q)
 
 

@@ -32,7 +32,7 @@ from engine import (
 from engine.parallel import Cancel
 from tests.reference.exact import nearest_double
 from tests.reference.scene_segments import Piece, pieces_in_scene, ranks, rounded_point
-from tests.unit.scenes.scenes import Random, pose_of, solids_of
+from tests.unit.scenes.scenes import FACES, OCTAHEDRON, Random, pose_of, solids_of
 from tests.unit.segment_clipping.scenes import as_json
 
 
@@ -158,6 +158,8 @@ def test_a_surface_is_crossed_in_points() -> None:
     assert found.body.tolist() == [0, 1, 0]
     assert found.t.tolist() == [[0.25, 0.25], [0.375, 0.375], [0.25, 0.5]]
     assert found.faces.tolist() == [[0, 0]] * 3
+    points = scene.clip_segments([[[0.5, 0, 0]] * 2, [[0.25, 0.25, 0]] * 2, [[0.25, 0.25, 0.1]] * 2])
+    assert (points.source.tolist(), points.body.tolist(), points.t.tolist()) == ([0, 1], [0, 0], [[0, 1]] * 2)
 
 
 def test_faces_of_a_csg_are_counted_through_its_leaves() -> None:
@@ -221,6 +223,28 @@ def test_reports_and_counts_segments() -> None:
     pieces, accuracy = scene.clip_segments([[[0, 0.25], [1, 0.25]]] * 3, report=True, progress=seen.append, workers=2)
     assert (accuracy.decisions, accuracy.coordinates_ulp, accuracy.n_items, sum(seen)) == ("exact", 0.5, 3, 3)
     assert len(pieces) == 6
+    assert accuracy.n_beyond_filter == accuracy.n_rational == 3
+
+
+def test_counts_what_the_kernels_leave() -> None:
+    scene = Scene([Aabb([0.5, 0.5], [1, 1]), Sphere([3, 0], 1)], [None, Pose([[0, -1], [1, 0]], [1, 0])])
+    segments = [[[-1, 0.75], [2, 0.7]], [[-1, 1], [2, 1]], [[0, 4], [2, 4]], [[5, 5], [6, 6]]]
+    _, accuracy = scene.clip_segments(segments, report=True)
+    assert (accuracy.n_beyond_filter, accuracy.n_rational) == (2, 1)  # along a wall, and the tangent
+
+
+def test_mesh_pieces_are_the_same_one_by_one_and_many_at_a_time() -> None:
+    rng = np.random.default_rng(5)
+    body = Polyhedron(OCTAHEDRON, FACES)
+    segments = np.concatenate([rng.uniform(-2, 2, (150, 2, 3)), rng.integers(-2, 3, (50, 2, 3)) * 0.5])
+    scene = Scene([body, body, Aabb([0, 0, 0], [1, 1, 1])], [None, Pose(np.eye(3), [0.25, 0, 0]), None])
+    every = scene.clip_segments(segments)
+    alone = [scene.clip_segments(segment[None]) for segment in segments]
+    for name in ("body", "start", "end", "t", "faces", "ranks"):
+        np.testing.assert_array_equal(getattr(every, name), np.concatenate([getattr(each, name) for each in alone]))
+    assert_first_and_any(scene, segments, every)
+    moved = scene.moved({0: Pose(np.eye(3), [0.5, 0, 0]), 2: Pose(np.eye(3), [-1, 0, 0])})
+    assert_first_and_any(moved, segments, moved.clip_segments(segments))
 
 
 def test_a_mesh_of_many_faces_posed_and_not() -> None:

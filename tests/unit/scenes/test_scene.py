@@ -52,6 +52,8 @@ def test_locates_as_a_scene_of_its_own_whatever_moved(dimension: int, seed: int)
     scene = Scene(solids, poses)
     for turn in range(4):
         assert_same_locations(scene.locate(points), locate_scene(points, solids, poses))
+        for few in (points[:1], points[1:4]):  # asked body by body
+            assert_same_locations(scene.locate(few), locate_scene(few, solids, poses))
         named = rng.choice(30, size=3 + 20 * (turn == 2), replace=False).tolist()
         steps: dict[int, Pose | None] = {body: pose_of(rng, dimension, 0.5) for body in named}
         scene = scene.moved(steps)

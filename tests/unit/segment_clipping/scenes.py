@@ -6,7 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from engine.parallel import Budget
 from engine.segment_clipping.clip_segments import SegmentPieces, clip_segments
+from engine.segment_clipping.pieces import Piece
+from engine.segment_clipping.profiles import exact_pieces
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.convex import Convex
@@ -103,3 +106,10 @@ def families(rng: np.random.Generator, targets: Floats, n: int) -> dict[str, Flo
         "mixed": random_segments(rng, n, dimension) * 10.0 ** rng.integers(-300, 300, (n, 2, dimension)),
         "denormal": random_segments(rng, n, dimension) * 5e-324 * 100,
     }
+
+
+def settled_alone(p: list[float], q: list[float], solid: Any) -> Piece | None:
+    """Return the one piece of p q within a convex solid by exact arithmetic, None where there is none."""
+    with Budget() as budget:
+        found = [piece.rounded(p, q) for piece in exact_pieces(p, q, solid, None, budget)]
+    return found[0] if found else None

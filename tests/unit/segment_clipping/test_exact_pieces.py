@@ -6,13 +6,11 @@ import itertools
 from fractions import Fraction
 
 from engine.segment_clipping.exact_pieces import (
-    ONE,
     ZERO,
     Contact,
     edge_stretch,
     is_crossed,
-    pieces_of,
-    spans_of,
+    nodes_with_locations,
     triangle_stretch,
 )
 
@@ -47,20 +45,21 @@ def test_triangles_are_met_whichever_way_they_are_turned() -> None:
     assert triangle_stretch((0, 1, 0), (4, 1, 0), (2, 0, 0), (2, 2, 0), (2, 1, 0)) == (half, half, True)  # no area
 
 
-def test_spans_that_hang_together_are_one_piece() -> None:
+def test_what_holds_in_the_spans_between_contacts() -> None:
     t = [Fraction(k, 8) for k in range(9)]
     contacts = [Contact(t[2], t[4], 7, True, False), Contact(t[4], t[4], 3, False, True)]
     contacts.append(Contact(t[6], t[6], 1, False, False))
 
-    def spans(p: int, q: int, asked: int = 0) -> list[tuple[Fraction, Fraction, tuple[int, int]]]:
-        return list(spans_of(contacts, (p, q), lambda at: {t[1]: asked}[at]))
+    def spans(p: int, q: int, asked: int = 0) -> list[tuple[Fraction, bool, bool]]:
+        found = nodes_with_locations(contacts, (p, q), lambda at: {t[1]: asked}[at])
+        return [(at, is_along, is_in) for at, _, is_along, is_in in found]
 
-    outside_first = [(t[2], ONE, (7, -1))]
-    inside_first = [(ZERO, t[4], (-1, 3)), (t[6], t[6], (1, 1))]
-    assert spans(-1, 0) == spans(0, 1) == spans(0, 0, -1) == outside_first
-    assert spans(1, 0) == spans(0, -1) == spans(0, 0, 1) == inside_first
-    assert list(spans_of([], (1, 1), lambda at: 0)) == [(ZERO, ONE, (-1, -1))]
-    assert list(spans_of([Contact(ZERO, ONE, 4, True, False)], (0, 0), lambda at: 0)) == [(ZERO, ONE, (-1, -1))]
+    outside_first = [(ZERO, False, False), (t[2], True, False), (t[4], False, True), (t[6], False, True)]
+    inside_first = [(at, is_along, not is_in) for at, is_along, is_in in outside_first]
+    for case in ((-1, 0), (0, 1), (0, 0, -1)):
+        assert spans(*case)[:-1] == outside_first
+    for case in ((1, 0), (0, -1), (0, 0, 1)):
+        assert spans(*case)[:-1] == inside_first
 
 
 def test_the_line_beside_crosses_what_meets_in_a_vertex_or_an_edge_an_even_number_of_times_around() -> None:
@@ -86,13 +85,3 @@ def test_the_line_beside_crosses_what_meets_in_a_vertex_or_an_edge_an_even_numbe
             assert sum(is_crossed(p, q, [corners[k] for k in face]) for face in faces) in (0, 2)
         if p[:2] != q[:2]:
             assert sum(is_crossed(p[:2], q[:2], edge) for edge in zip(ring, ring[1:] + ring[:1])) in (0, 2, 4)
-
-
-def test_thousands_of_crossings_are_sorted_and_polled() -> None:
-    """Teeth of a comb, crossed in an order of their own: the count of looks at the clock grows with them."""
-    n, asked = 3000, []
-    edges = [(k, [[float(x), -1.0], [float(x), 1.0]]) for k, x in enumerate([*range(1, n, 2), *range(2, n + 1, 2)])]
-    found = list(pieces_of([0.5, 0.0], [n + 0.5, 0.0], edges, (-1, 1), lambda point: 0, lambda: asked.append(1)))
-    assert len(found) == n // 2
-    assert [piece.start[0] for piece in found] == [float(x) for x in range(1, n, 2)]
-    assert len(asked) > n // 64

@@ -14,20 +14,31 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.containment.rational_locate import over_tree, prism_walls, rational_location, to_body_frame, to_world_frame
+from engine.arrays import FloatArray, IntArray
+from engine.containment.rational_locate import (
+    combine,
+    over_tree,
+    prism_walls,
+    rational_location,
+    to_body_frame,
+    to_world_frame,
+)
+from engine.direct import entry_of
 from engine.errors import UnsupportedSolidError
 from engine.parallel import Budget
 from engine.predicates.rational import Number, common_integers, nearest_with_root
-from engine.scenes.parameters import ONE, ZERO, Parameter, compare, parameter
-from engine.segment_clipping.boundary import elements_met
+from engine.segment_clipping.contacts import NO_ROOM, find_contacts_2d
 from engine.segment_clipping.exact_pieces import Contact, contacts_of, nodes_with_locations
-from engine.segment_clipping.exact_segments import Piece
-from engine.segment_clipping.prepared_boundary import boundary_of
+from engine.segment_clipping.mesh_streams import find_mesh_contacts
+from engine.segment_clipping.parameters import ONE, ZERO, Parameter, compare, parameter
+from engine.segment_clipping.pieces import Piece, Pieces, as_pieces
+from engine.segment_clipping.prepared_boundary import Mesh, Outline, boundary_of
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.convex import Convex
 from engine.solids.csg import Csg
 from engine.solids.half_space import HalfSpace
+from engine.solids.implicit import Implicit
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
 from engine.solids.pose import Pose
@@ -36,6 +47,10 @@ from engine.solids.surface import Surface
 from engine.solids.triangle import Triangle
 
 OUTSIDE, BOUNDARY, INSIDE = -1, 0, 1
+_LEAST_ROOM: Final = 1 << 8
+"""Contacts looked for at once; doubled where a segment has more."""
+_BYTES: Final = 1000
+"""Of a piece, as Python holds it."""
 TAKEN: Final = "half_space, aabb, convex, sphere, triangle, polygon, polyhedron, surface and csg of these"
 Point = Sequence[Number]
 
@@ -51,16 +66,35 @@ class Node(NamedTuple):
     after: int
 
 
-def exact_pieces(p: list[float], q: list[float], solid: Solid, pose: Pose | None, budget: Budget) -> list[ExactPiece]:
-    """Return the pieces of the segment p q within a placed solid, in order.
+def settled(
+    segments: FloatArray, items: IntArray, solid: Solid, pose: Pose | None, budget: Budget, locations: Any = None
+) -> Pieces:
+    """Return the pieces of some of segments (n, 2, dim) by exact arithmetic; locations: of both ends of each, if known.
 
     Raises: UnsupportedSolidError, what `Budget.check` raises.
     """
+    sources: list[int] = []
+    pieces: list[Piece] = []
+    for place, item in enumerate(items.tolist()):
+        budget.check()
+        p, q = segments[item].tolist()
+        known = None if locations is None else locations[place]
+        found = [piece.rounded(p, q) for piece in exact_pieces(p, q, solid, pose, budget, known)]
+        budget.take(_BYTES * len(found))
+        pieces += found
+        sources += [item] * len(found)
+    return as_pieces(sources, pieces, segments.shape[2])
+
+
+def exact_pieces(
+    p: list[float], q: list[float], solid: Solid, pose: Pose | None, budget: Budget, locations: Any = None
+) -> list[ExactPiece]:
+    """Return the pieces of the segment p q within a placed solid, in order; locations: of p and q, if known."""
     if p == q:
-        is_in = located(p, solid, pose, budget) >= 0
+        is_in = (located(p, solid, pose, budget) if locations is None else locations[0]) >= 0
         return [ExactPiece(ZERO, ONE, (-1, -1))] if is_in else []
     found, first = [], None
-    for node in profile_of(p, q, solid, pose, budget):
+    for node in profile_of(p, q, solid, pose, budget, locations):
         if first is None and node.at >= 0:
             first = node
         if first is not None and node.after < 0:
@@ -98,7 +132,9 @@ def located(p: Point, solid: Solid, pose: Pose | None, budget: Budget) -> int:
     return rational_location(p, solid, pose, budget.check)
 
 
-def profile_of(p: list[float], q: list[float], solid: Solid, pose: Pose | None, budget: Budget) -> list[Node]:
+def profile_of(
+    p: list[float], q: list[float], solid: Solid, pose: Pose | None, budget: Budget, locations: Any = None
+) -> list[Node]:
     """Return the nodes of the segment p q, p and q different, within a placed solid, from t = 0 to t = 1."""
     start, end = (p, q) if pose is None else (to_body_frame(p, pose), to_body_frame(q, pose))
 
@@ -117,7 +153,7 @@ def profile_of(p: list[float], q: list[float], solid: Solid, pose: Pose | None, 
             case Triangle() if leaf.dimension == 3:
                 return _on_rows(start, end, prism_walls(leaf))
             case Polygon() | Polyhedron() | Triangle() | Surface():
-                return _on_boundary(start, end, leaf, pose, budget)
+                return _on_boundary(start, end, leaf, pose, budget, locations)
         raise unsupported(leaf)
 
     if not isinstance(solid, Csg):
@@ -140,6 +176,20 @@ def profile_of(p: list[float], q: list[float], solid: Solid, pose: Pose | None, 
 def unsupported(solid: Solid) -> UnsupportedSolidError:
     """Return the error for a solid that no segment is cut on."""
     return UnsupportedSolidError(f"a segment is not cut on an {solid.type}; bodies may be {TAKEN}")
+
+
+def check_cut(solids: Sequence[Solid]) -> bool:
+    """Return True; raise UnsupportedSolidError for the first solid that no segment is cut on."""
+    for body, solid in enumerate(solids):
+        waiting = [solid]
+        while waiting:  # bound: a tree has so many leaves at most
+            node = waiting.pop()
+            if isinstance(node, Implicit):
+                error: UnsupportedSolidError = unsupported(node)
+                raise UnsupportedSolidError(f"solids[{body}]: {error.message}", ("solids", body))
+            if isinstance(node, Csg):
+                waiting += node.operands
+    return True
 
 
 def _face_offsets(solid: Csg) -> dict[int, int]:
@@ -189,15 +239,8 @@ def _combined(operation: str, profiles: list[list[Node]]) -> list[Node]:
                 at.append(profile[places[i] - 1].after)
             after.append(profile[places[i] - 1].after)
         face = min(faces, default=-1)
-        found.append(Node(t, _joined(operation, at), face, face, _joined(operation, after)))
+        found.append(Node(t, int(combine(operation, at)), face, face, int(combine(operation, after))))
     return found
-
-
-def _joined(operation: str, located: list[int]) -> int:
-    """Return what `combine` does, for a few numbers."""
-    if operation == "difference":
-        return min(located[0], -located[1])
-    return max(located) if operation == "union" else min(located)
 
 
 def _interval(a: Node, b: Node, between: int) -> list[Node]:
@@ -265,13 +308,15 @@ def _on_sphere(p: Point, q: Point, center: Point, radius: float) -> list[Node]:
     return _interval(first, last, INSIDE)
 
 
-def _on_boundary(p: Point, q: Point, solid: Any, pose: Pose | None, budget: Budget) -> list[Node]:
+def _on_boundary(
+    p: Point, q: Point, solid: Any, pose: Pose | None, budget: Budget, locations: Any = None
+) -> list[Node]:
     """Return the profile within a polygon, triangle of the plane or polyhedron, or on a surface."""
     contacts = list(_contacts(p, q, solid, pose, budget))
     if isinstance(solid, Surface):
         contacts = [contact._replace(turns=False) for contact in contacts]
         locations = (OUTSIDE, OUTSIDE)
-    else:
+    elif locations is None:
         at_p = rational_location(p, solid, None, budget.check)
         locations = at_p, (rational_location(q, solid, None, budget.check) if at_p == BOUNDARY else OUTSIDE)
 
@@ -293,7 +338,7 @@ def _contacts(p: Point, q: Point, solid: Any, pose: Pose | None, budget: Budget)
     """Yield the contacts of p q, in the frame of the solid, with its elements."""
     boundary = boundary_of(solid)
     if pose is None and list(p) != list(q):
-        _, near = elements_met(np.array([[p, q]], np.float64), boundary, budget)
+        near = _elements_met(np.array([[p, q]], np.float64), boundary, budget)
     else:
         near = _near(boundary.elements, p, q)
     n = len(p)
@@ -305,6 +350,17 @@ def _contacts(p: Point, q: Point, solid: Any, pose: Pose | None, budget: Budget)
         (face, points[2 + size * i : 2 + size * (i + 1)]) for i, face in enumerate(boundary.faces[near].tolist())
     ]
     return contacts_of(points[0], points[1], elements, budget.check)
+
+
+def _elements_met(segment: FloatArray, boundary: Outline | Mesh, budget: Budget) -> IntArray:
+    """Return the elements that a segment (1, 2, dim) may meet."""
+    kernel: Any = find_mesh_contacts if isinstance(boundary, Mesh) else find_contacts_2d
+    room, found, met = _LEAST_ROOM, NO_ROOM, np.zeros(0, np.int64)
+    while found == NO_ROOM:  # bound: room is doubled, and a segment meets an element once
+        found, met, _, _ = entry_of(kernel)(segment, boundary, budget.flag, room)
+        budget.check()
+        room *= 2
+    return met[:found]
 
 
 def _near(elements: Any, p: Point, q: Point) -> Any:
