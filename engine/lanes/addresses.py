@@ -15,7 +15,6 @@ from numba import config as numba_config
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
-from numba.np.arrayobj import populate_array
 
 
 def plain_array_at(address: int, shape: Any, dtype: Any) -> Any:
@@ -31,6 +30,8 @@ def _array_intrinsic(typing_context: Any, address: Any, shape: Any, dtype: Any) 
     made = types.Array(dtype.dtype, len(shape), "C")
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        from numba.np.arrayobj import populate_array  # 0.1 s to import, and only the compiler needs it
+
         array = context.make_array(made)(context, builder)
         sizes = cgutils.unpack_tuple(builder, arguments[1])
         item = context.get_constant(types.intp, context.get_abi_sizeof(context.get_data_type(made.dtype)))
