@@ -152,14 +152,16 @@ def plain_floats(values: Any, depth: int) -> FloatArray | None:
 
 def _plain_parts(values: list[Any] | tuple[Any, ...], depth: int) -> FloatArray | None:
     """Do as `plain_floats` does, part by part."""
+    if len(values) <= _AT_ONCE:
+        return plain_floats(values, depth)
     parts: list[FloatArray] = []
-    for first in range(0, len(values) or 1, _AT_ONCE):
+    for first in range(0, len(values), _AT_ONCE):
         poll()
-        part = plain_floats(values if len(values) <= _AT_ONCE else values[first : first + _AT_ONCE], depth)
+        part = plain_floats(values[first : first + _AT_ONCE], depth)
         if part is None or (parts and part.shape[1:] != parts[0].shape[1:]):
             return None
         parts.append(part)
-    return parts[0] if len(parts) == 1 else np.concatenate(parts)
+    return np.concatenate(parts)
 
 
 def _from_lists(values: list[Any] | tuple[Any, ...], depth: int, where: Where) -> FloatArray:
@@ -264,9 +266,12 @@ def as_vector(vector: object, dimension: int | None, where: Where) -> FloatArray
 
 def frozen(array: FloatArray) -> FloatArray:
     """Return a read-only C-contiguous copy in which -0.0 is 0.0; every other value stays."""
-    copy = np.empty(array.shape)
-    for first in range(0, len(array), _AT_ONCE):
-        poll()
-        np.add(array[first : first + _AT_ONCE], 0.0, out=copy[first : first + _AT_ONCE])  # -0.0 + 0.0 = +0.0
+    if len(array) <= _AT_ONCE:
+        copy = np.add(array, 0.0, dtype=np.float64, order="C")  # -0.0 + 0.0 = +0.0
+    else:
+        copy = np.empty(array.shape)
+        for first in range(0, len(array), _AT_ONCE):
+            poll()
+            np.add(array[first : first + _AT_ONCE], 0.0, out=copy[first : first + _AT_ONCE])
     copy.setflags(write=False)
     return copy
