@@ -247,9 +247,9 @@ def find_first(
     """Find the first piece of segments (n, 2, dim) before `last`, or where `is_any` whether there is one.
 
     tree: a `BodyTree`. is_away: of each body whether it is left out, or (0,)
-    where none is. state: (n,) uint8, SETTLED, MET or OPEN; bodies, out: of
-    those that are MET the body and in row i the piece. room: for MOST_MET pieces. n: the segment to begin with,
-    afterwards where to go on; and 0, or why it is not asked (what `crossings_in` wants), and the body.
+    where none is. state: (n,) uint8, SETTLED, MET or OPEN; bodies, out: of those that are MET the body and in row i
+    the piece. room: for MOST_MET pieces. n: the segment to begin with, afterwards where to go on; and 0, or why it
+    is not asked (what `crossings_in` wants), and the body.
     """
     n_bodies = tree.bounded.size + tree.unbounded.size
     near = Crossings(np.empty(n_bodies), np.empty((0, 3)), np.empty(n_bodies, np.int64), np.empty(n_bodies, np.int64))

@@ -86,10 +86,8 @@ def clip_on_convex(
     scene = Scaled(segments, method.region, 0)
     found = _clip(segments, region, method, scene, _FEW + len(segments) // 256, budget, workers, progress)
     if found is None:
-        better = method.scale(segments)
-        found = _clip(
-            segments, region, method, better or scene, len(segments), budget, workers, None
-        )  # progress is told
+        scene = method.scale(segments) or scene
+        found = _clip(segments, region, method, scene, len(segments), budget, workers, None)  # progress is told
     assert found is not None
     return found
 

@@ -115,10 +115,9 @@ class ExactPiece(NamedTuple):
     def rounded(self, p: list[float], q: list[float]) -> Piece:
         """Return the piece of p q with the doubles nearest to its numbers."""
         numbers, scale = common_integers([*p, *q])
-        start, end = numbers[: len(p)], numbers[len(p) :]
+        moves = [(x, y - x) for x, y in zip(numbers[: len(p)], numbers[len(p) :])]
 
         def at(t: Parameter) -> list[float]:
-            moves = [(x, y - x) for x, y in zip(start, end)]
             return [nearest_with_root(x * t.z + t.u * d, t.v * d, t.w, t.z * scale) for x, d in moves]
 
         return Piece((self.first.near, self.last.near), at(self.first), at(self.last), self.faces)
@@ -288,7 +287,7 @@ def _on_rows(p: Point, q: Point, rows: Sequence[Sequence[float]]) -> list[Node]:
 
 
 def _on_sphere(p: Point, q: Point, center: Point, radius: float) -> list[Node]:
-    """Return the profile within a ball: a t^2 + 2 b t + c <= 0, as in `clip_by_sphere`."""
+    """Return the profile within a ball: where a t^2 + 2 b t + c <= 0; c and c_end are its values at t = 0 and t = 1."""
     n = len(p)
     numbers, _ = common_integers([*p, *q, *center, radius])
     start, end, middle, r = numbers[:n], numbers[n : 2 * n], numbers[2 * n : 3 * n], numbers[-1]

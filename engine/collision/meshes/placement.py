@@ -4,7 +4,7 @@ A posed vertex is exactly R p + t. Kernels see its rounded value and `error`, a 
 coordinate; a sign that this error could change is settled by expansions of the exact posed coordinates
 (`triangle_triangle.py`) or UNDECIDED. Two bodies are placed together (`place_pair`): where both are posed, both are
 moved back by the first translation, so that only their distance counts and not where they are. A pose that turns a
-lattice into itself (`is_lattice_pose`) rounds nothing: error 0, and so does a body without a pose.
+lattice into itself (`is_lattice_rotation`) rounds nothing: error 0, and so does a body without a pose.
 
 **error.** Four rounded terms of a coordinate, and the rounded difference of two translations: |rounded - exact| <=
 g4 (|R| |p| + |t|) + u |t| + 4h with u = 2^-53, g4 = 4u / (1 - 4u), h = 2^-1075. With |R| <= 1 + 1e-12 and |p| <= reach
