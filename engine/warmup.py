@@ -158,6 +158,9 @@ def _warm_scenes() -> None:
     collide_scene(many)  # their boxes go into a grid
     flat: list[Solid] = [Polygon([[[0, 0], [4, 0], [1, 1], [0, 4]]]), Triangle([[0, 0], [1, 0], [0, 1]])]
     collide_scene(flat)
+    crossing = Triangle([[0.5, 0.25], [5, 1], [1, 5]])
+    collide(flat[0], crossing)
+    clearance(flat[0], crossing)
     for dimension in (2, 3):
         corners = np.vstack([np.zeros(dimension), np.eye(dimension)])[None, :3]
         collide_triangles(corners, corners + 0.25)

@@ -7,7 +7,7 @@ from typing import Literal, Unpack, overload
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, TOUCHING
 from engine.collision.detail import check_has_detail, detail_of
 from engine.collision.meshes.mesh_mesh import mesh_mesh
-from engine.collision.planar.outline import collide_outline_outline
+from engine.collision.planar.outline_batch import collide_outlines
 from engine.collision.result import (
     BODIES,
     FIRST_WITHIN,
@@ -50,13 +50,13 @@ def _aabb_aabb(first: Aabb, second: Aabb, first_pose: Pose | None, second_pose: 
             return FIRST_WITHIN if relation == FIRST_INSIDE_SECOND else SECOND_WITHIN
         if relation == TOUCHING and first.dimension == 3 and (witness := touching_boxes(*bounds)) is not None:
             return Collision(Relation.TOUCHING, witness)
-    bodies = mesh_mesh if first.dimension == 3 else collide_outline_outline
+    bodies = mesh_mesh if first.dimension == 3 else collide_outlines
     return bodies(first, second, first_pose, second_pose, work)
 
 
 PAIRS: dict[tuple[int, str, str], PairFunction] = {
     **{(3, first, second): mesh_mesh for first in MESHES for second in MESHES},
-    **{(2, first, second): collide_outline_outline for first in OUTLINES for second in OUTLINES},
+    **{(2, first, second): collide_outlines for first in OUTLINES for second in OUTLINES},
     **{(d, "half_space", body): collide_half_space_body for d, body in BODIES},
     **{(d, body, "sphere"): collide_body_sphere for d, body in BODIES},
 }

@@ -18,7 +18,7 @@ from engine.collision.meshes.mesh_arrays import (
     mesh_body_of_triangles,
 )
 from engine.collision.meshes.placement import PoseArrays
-from engine.collision.planar.outline import rings_of
+from engine.collision.planar.outline_batch import outline_arrays
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.mesh import Mesh
@@ -33,22 +33,18 @@ def spread_of(solid: Solid) -> MeshBody:
 
 
 def _built(solid: Solid) -> MeshBody:
-    points, ends = _points_and_ends(solid)
+    points, following = outline_of(solid)
     vertices = np.zeros((len(points), 3))
     vertices[:, : solid.dimension] = points
-    triangles = np.column_stack([ends, ends[:, 1]])
-    return mesh_body_of_triangles(vertices, triangles, np.arange(len(ends)), False)
+    triangles = np.column_stack([np.arange(len(points)), following, following])
+    return mesh_body_of_triangles(vertices, triangles, np.arange(len(points)), False)
 
 
-def _points_and_ends(solid: Solid) -> tuple[FloatArray, IntArray]:
-    """Return the points (n, d) of a ball or a planar body and the two ends of each edge (m, 2)."""
+def outline_of(solid: Solid) -> tuple[FloatArray, IntArray]:
+    """Return the vertices (n, d) of a ball or a body of the plane, and for each edge the vertex at its end."""
     if isinstance(solid, Sphere):
-        return solid.center[None], np.zeros((1, 2), np.int64)
-    vertices, offsets = rings_of(solid)
-    starts = np.arange(len(vertices))
-    following = starts + 1
-    following[offsets[1:] - 1] = offsets[:-1]
-    return vertices, np.column_stack([starts, following])
+        return solid.prepared("centre", lambda: (read_only(solid.center[None]), read_only(np.zeros(1, np.int64))))
+    return outline_arrays(solid)
 
 
 def radius_of(solid: Solid) -> float:
@@ -77,10 +73,10 @@ def feature_of(solid: Solid, mesh: MeshBody, triangle: int, code: int) -> Featur
         return Feature("face", (face,))
     places = [_first(points, corner) for corner in (corners[code % 3], corners[(code + 1) % 3])]
     if code < 3 or places[0] == places[1]:
-        return Feature("vertex", (_named(solid, int(numbers[places[0]])),))
+        return Feature("vertex", (named(solid, int(numbers[places[0]])),))
     if solid.dimension == 3 and abs(places[0] - places[1]) not in (1, len(numbers) - 1):
         return Feature("face", (face,))  # an edge of the triangulation only
-    return Feature("edge", tuple(sorted(_named(solid, int(numbers[place])) for place in places)))
+    return Feature("edge", tuple(sorted(named(solid, int(numbers[place])) for place in places)))
 
 
 def _ring(solid: Solid, face: int) -> tuple[IntArray, FloatArray]:
@@ -92,8 +88,8 @@ def _ring(solid: Solid, face: int) -> tuple[IntArray, FloatArray]:
         (a, b, c), (_, _, d) = BOX_TRIANGLES[face]
         numbers = np.array([a, b, c, d])
         return numbers, corners_of_box(solid.min, solid.max)[numbers]
-    points, ends = _points_and_ends(solid)
-    numbers = ends[face]
+    points, following = outline_of(solid)
+    numbers = np.array([face, following[face]])
     return numbers, np.column_stack([points[numbers], np.zeros(2)])
 
 
@@ -101,6 +97,6 @@ def _first(points: FloatArray, corner: FloatArray) -> int:
     return int(np.argmax((points == corner).all(axis=1)))
 
 
-def _named(solid: Solid, number: int) -> int:
+def named(solid: Solid, number: int) -> int:
     """Return the vertex's number as the caller knows it: a box of the plane counts its corners as one of space."""
     return (0, 1, 3, 2)[number] if isinstance(solid, Aabb) and solid.dimension == 2 else number

@@ -7,7 +7,7 @@ from typing import Any, Literal, Unpack, overload
 
 import numpy as np
 
-from engine.collision.clearance.forms import MEETING, between_form_and_plane, between_forms
+from engine.collision.clearance.forms import MEETING, between_form_and_plane, between_forms, between_outlines
 from engine.collision.clearance.half_spaces import gap_of_planes
 from engine.collision.clearance.result import Clearance
 from engine.collision.clearance.spreads import spread_pair
@@ -125,6 +125,8 @@ def _answer(
         return True
     planes = has_plane(first, second)
     closed = (between_form_and_plane if planes else between_forms)(first, second, first_pose, second_pose, least)
+    if closed is None and first.dimension == 2 and not planes:
+        closed = between_outlines(first, second, first_pose, second_pose, least)
     if closed is not None:
         return closed
     if least is not None and not planes:

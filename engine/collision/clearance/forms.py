@@ -1,5 +1,5 @@
 """Boxes along the axes, balls and half-spaces: how far apart, by `closed_forms.py`, in rationals where that is not
-sure."""
+sure. Small bodies of the plane by `outlines.py`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from typing import Final
 
 import numpy as np
 
-from engine.arrays import FloatArray, read_only
+from engine.arrays import FloatArray, IntArray, read_only
+from engine.collision.clearance.bodies import named, outline_of, radius_of
 from engine.collision.clearance.closed_forms import (
     N_NUMBERS,
     UNSURE,
@@ -19,6 +20,7 @@ from engine.collision.clearance.closed_forms import (
     touched,
 )
 from engine.collision.clearance.exact import Gap, Rational, ScaledGap
+from engine.collision.clearance.outlines import nearest_of_outlines
 from engine.collision.clearance.result import Clearance, Feature
 from engine.collision.exact_images import Vector, as_vector, image_point
 from engine.direct import entry_of
@@ -30,6 +32,8 @@ from engine.solids.half_space import HalfSpace
 from engine.solids.pose import Pose
 from engine.solids.sphere import Sphere
 
+_MOST_PAIRS: Final = 4096
+"""Of edges of two outlines; beyond, trees are faster."""
 BALL, PLANE = Feature("ball"), Feature("plane")
 MEETING: Final = Clearance(0.0)
 """The answer for bodies with a common point."""
@@ -119,6 +123,39 @@ def between_form_and_plane(
         if is_second
         else _answer(distance, points, PLANE, feature)
     )
+
+
+def between_outlines(
+    first: Solid, second: Solid, first_pose: Pose | None, second_pose: Pose | None, least: float | None
+) -> Clearance | bool | None:
+    """Return what `between_forms` does, of two bodies of the plane; None where that is not sure, or they are large."""
+    (vertices, following), (other, their_following) = outline_of(first), outline_of(second)
+    if len(vertices) * len(other) > _MOST_PAIRS:
+        return None
+    points = np.empty((2, 2))
+    turn, move = _STILL[2] if first_pose is None else (first_pose.rotation, first_pose.translation)
+    their_turn, their_move = _STILL[2] if second_pose is None else (second_pose.rotation, second_pose.translation)
+    distance, own, theirs = entry_of(nearest_of_outlines)(
+        vertices, following, turn, move, other, their_following, their_turn, their_move,
+        (radius_of(first), radius_of(second)), points,
+    )  # fmt: skip
+    if distance == 0.0:
+        return MEETING if least is None else False
+    if least is not None and distance not in (UNSURE, least):
+        return bool(distance > least)
+    if own < 0 or least is not None:
+        return None
+    return _answer(distance, points, _of_outline(first, following, own), _of_outline(second, their_following, theirs))
+
+
+def _of_outline(solid: Solid, following: IntArray, code: int) -> Feature:
+    """Return the vertex, or the number of vertices + the edge, as the caller knows it."""
+    if isinstance(solid, Sphere):
+        return BALL
+    if code < len(following):
+        return Feature("vertex", (named(solid, code),))
+    start = code - len(following)
+    return Feature("edge", tuple(sorted((named(solid, start), named(solid, int(following[start]))))))
 
 
 def _answer(distance: float, points: FloatArray, first: Feature, second: Feature) -> Clearance:

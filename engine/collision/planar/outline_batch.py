@@ -1,4 +1,5 @@
-"""Pairs of planar bodies in batches: polygons, triangles and boxes whose edges meet only where they follow each other.
+"""Pairs of planar bodies in compiled code: polygons, triangles and boxes whose edges meet only where they follow each
+other.
 
 One strict crossing of two edges, by signs with a bound, proves overlapping: about it lie all combinations of inside and
 outside, for no other edge comes near. Where all edges are surely apart, a vertex of each ring tells whether it lies in
@@ -12,53 +13,74 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray
+from engine.arrays import FloatArray, IntArray, read_only
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, UNSETTLED
 from engine.collision.meshes.placement import PoseArrays, orient2d_near
-from engine.collision.planar.outline import rings_of
+from engine.collision.planar.outline import collide_outline_outline, rings_of
+from engine.collision.result import FIRST_WITHIN, SECOND_WITHIN, UNNAMED, Collision, Witness, Work
+from engine.direct import entry_of
 from engine.jit import inline, kernel
 from engine.predicates.loading import as_point2
 from engine.predicates.orientation import orient2d
 from engine.solids.base import Solid
-from engine.types import UNDECIDED, Point2
+from engine.solids.pose import Pose
+from engine.types import UNDECIDED, Point2, Relation
 
 MOST_EDGES = 1024
 """Beyond, pairs of edges are too many to look at all of them."""
 
+STILL = read_only(np.eye(2)), read_only(np.zeros(2))
+"""Of a body without a pose."""
 _NO_RINGS = np.empty((0, 2)), np.zeros(1, np.int64)
-_UNSURE = 2
+UNSURE = 2
 _POLL_EVERY = 64
 
 
 class OutlineArrays(NamedTuple):
-    """Several bodies, one after another. vertices (n, 2); following (n,): the vertex at the end of each edge; firsts
-    (n_bodies + 1,): of each body; reach (n_bodies,): the largest magnitude of a coordinate."""
+    """Several bodies, one after another. vertices (n, 2); following (n,): the vertex at the end of each edge, counted
+    within its body; firsts (n_bodies + 1,): of each body."""
 
     vertices: FloatArray
     following: IntArray
     firsts: IntArray
-    reach: FloatArray
 
 
 def outline_pool(bodies: Sequence[Solid]) -> tuple[OutlineArrays, IntArray]:
     """Return the bodies as arrays, and for each its number there, -1 for one that the batches do not take."""
     rings = [rings_of(body) if body.type in ("polygon", "triangle", "aabb") else _NO_RINGS for body in bodies]
     firsts = np.append(np.int64(0), np.cumsum([len(vertices) for vertices, _ in rings]))
-    starts = np.repeat(firsts[:-1], [len(offsets) - 1 for _, offsets in rings])
-    ends = np.concatenate([np.empty(0, np.int64), *(offsets[1:] for _, offsets in rings)]) + starts
-    starts += np.concatenate([np.empty(0, np.int64), *(offsets[:-1] for _, offsets in rings)])
-    following = np.arange(1, firsts[-1] + 1)
-    following[ends - 1] = starts
+    following = np.concatenate([np.empty(0, np.int64), *(following_of(offsets) for _, offsets in rings)])
     vertices = np.concatenate([np.empty((0, 2)), *(vertices for vertices, _ in rings)])
-    pool = OutlineArrays(vertices, following, firsts, np.zeros(len(bodies)))
-    numbers = np.full(len(bodies), -1, np.int64)
+    pool, numbers = OutlineArrays(vertices, following, firsts), np.full(len(bodies), -1, np.int64)
     _find_simple(pool, numbers)
     return pool, numbers
 
 
+def outline_arrays(solid: Solid) -> tuple[FloatArray, IntArray]:
+    """Return the vertices (n, 2) of a polygon, triangle or box, and for each edge the vertex at its end."""
+    return solid.prepared("outline", lambda: _arrays(*rings_of(solid)))
+
+
+def _arrays(vertices: FloatArray, offsets: IntArray) -> tuple[FloatArray, IntArray]:
+    return read_only(vertices), read_only(following_of(offsets))
+
+
+def following_of(offsets: IntArray) -> IntArray:
+    """Return the vertex at the end of each edge, of rings that end at offsets (n_rings + 1,)."""
+    following = np.arange(1, offsets[-1] + 1)
+    following[offsets[1:] - 1] = offsets[:-1]
+    return following
+
+
+@inline
+def _is_in_box(p: Point2, a: Point2, b: Point2) -> bool:
+    """Tell whether a point lies in the box of an edge."""
+    return min(a.x, b.x) <= p.x <= max(a.x, b.x) and min(a.y, b.y) <= p.y <= max(a.y, b.y)
+
+
 @inline
 def _crossing(a: Point2, b: Point2, c: Point2, d: Point2, error: float) -> int:
-    """Return 1 if two open edges surely cross in one point, 0 if they are surely apart, else _UNSURE."""
+    """Return 1 if two open edges surely cross in one point, 0 if they are surely apart, else UNSURE."""
     slack = 2.0 * error
     if max(a.x, b.x) + slack < min(c.x, d.x) or max(c.x, d.x) + slack < min(a.x, b.x):
         return 0
@@ -70,13 +92,19 @@ def _crossing(a: Point2, b: Point2, c: Point2, d: Point2, error: float) -> int:
     by_a, by_b = orient2d_near(c, d, a, error), orient2d_near(c, d, b, error)
     if by_a * by_b == 1:
         return 0
-    return 1 if by_c * by_d == -1 and by_a * by_b == -1 else _UNSURE
+    if by_c * by_d == -1 and by_a * by_b == -1:
+        return 1
+    if UNDECIDED in (by_a, by_b, by_c, by_d):
+        return UNSURE
+    is_met = (by_a == 0 and _is_in_box(a, c, d)) or (by_b == 0 and _is_in_box(b, c, d))
+    is_met = is_met or (by_c == 0 and _is_in_box(c, a, b)) or (by_d == 0 and _is_in_box(d, a, b))
+    return UNSURE if is_met else 0
 
 
 @inline
-def _is_simple(vertices: Any, following: Any, first: int, stop: int) -> bool:
+def is_simple(vertices: Any, following: Any) -> bool:
     """Tell whether no two edges of these rings meet but in the vertex between them, and none has length 0."""
-    for i in range(first, stop):
+    for i in range(len(vertices)):
         a, b, c = (
             as_point2(vertices, i),
             as_point2(vertices, following[i]),
@@ -87,7 +115,7 @@ def _is_simple(vertices: Any, following: Any, first: int, stop: int) -> bool:
         is_ahead = (b.x - a.x) * (c.x - b.x) + (b.y - a.y) * (c.y - b.y) > 0.0
         if not is_ahead and orient2d(a, b, c) in (0, UNDECIDED):
             return False
-        for j in range(first, i):
+        for j in range(i):
             if following[i] == j or following[j] == i:
                 continue
             if _crossing(a, b, as_point2(vertices, j), as_point2(vertices, following[j]), 0.0) != 0:
@@ -97,89 +125,88 @@ def _is_simple(vertices: Any, following: Any, first: int, stop: int) -> bool:
 
 @kernel
 def _find_simple(pool: OutlineArrays, numbers: Any) -> None:
-    """Fill reach, and the number of each body whose edges meet only where they follow each other."""
+    """Fill the number of each body whose edges meet only where they follow each other."""
     for body in range(numbers.shape[0]):
         first, stop = pool.firsts[body], pool.firsts[body + 1]
-        for vertex in range(first, stop):
-            pool.reach[body] = max(pool.reach[body], abs(pool.vertices[vertex, 0]), abs(pool.vertices[vertex, 1]))
-        if 0 < stop - first <= MOST_EDGES and _is_simple(pool.vertices, pool.following, first, stop):
+        if 0 < stop - first <= MOST_EDGES and is_simple(pool.vertices[first:stop], pool.following[first:stop]):
             numbers[body] = body
 
 
 @inline
-def _place(pool: OutlineArrays, body: int, poses: PoseArrays, item: int, placed: Any) -> float:
+def _place(vertices: Any, turn: Any, move: Any, is_posed: bool, placed: Any) -> float:
     """Write the rounded posed vertices of a body; return a bound on the error of each coordinate (`placement.py`)."""
-    r, t, first = poses.rotations, poses.translations, pool.firsts[body]
-    for vertex in range(first, pool.firsts[body + 1]):
-        x, y = pool.vertices[vertex, 0], pool.vertices[vertex, 1]
+    reach = 0.0
+    for vertex in range(len(vertices)):
+        x, y = vertices[vertex, 0], vertices[vertex, 1]
+        reach = max(reach, abs(x), abs(y))
         for axis in range(2):
             value = x if axis == 0 else y
-            if item != 0:
-                value = r[item, axis, 0] * x + r[item, axis, 1] * y + t[item, axis]
-            placed[vertex - first, axis] = value
-    shift = max(abs(t[item, 0]), abs(t[item, 1]))
-    return 0.0 if item == 0 else 2.0**-49 * (3.0 * pool.reach[body] + shift) + 2.0**-1060
+            if is_posed:
+                value = turn[axis, 0] * x + turn[axis, 1] * y + move[axis]
+            placed[vertex, axis] = value
+    return 2.0**-49 * (3.0 * reach + max(abs(move[0]), abs(move[1]))) + 2.0**-1060 if is_posed else 0.0
 
 
 @inline
-def _inside(p: Point2, vertices: Any, following: Any, first: int, n: int, error: float) -> int:
-    """Return 1 for a point inside the rings, 0 outside, _UNSURE where a bound does not tell."""
+def inside(p: Point2, vertices: Any, following: Any, error: float) -> int:
+    """Return 1 for a point inside the rings, 0 outside, UNSURE where a bound does not tell."""
     is_inside = 0
-    for edge in range(n):
-        a, b = as_point2(vertices, edge), as_point2(vertices, following[first + edge] - first)
+    for edge in range(len(following)):
+        a, b = as_point2(vertices, edge), as_point2(vertices, following[edge])
         if max(a.x, b.x) + 2.0 * error < p.x or min(a.y, b.y) > p.y + 2.0 * error or max(a.y, b.y) + 2.0 * error < p.y:
             continue
         if error != 0.0 and min(abs(a.y - p.y), abs(b.y - p.y)) <= 2.0 * error:
-            return _UNSURE
+            return UNSURE
         if (a.y <= p.y) == (b.y <= p.y):
             continue
         side = orient2d_near(a, b, p, error)
         if side == UNDECIDED or side == 0:
-            return _UNSURE
+            return UNSURE
         if (side > 0) == (b.y > a.y):
             is_inside = 1 - is_inside
     return is_inside
 
 
 @inline
-def _rings_inside(pool: OutlineArrays, inner: int, points: Any, outer: int, vertices: Any, error: float) -> int:
-    """Return 1 if all rings of a body lie inside another one that they do not meet, 0 if none does, else _UNSURE."""
-    first, n = pool.firsts[inner], pool.firsts[inner + 1] - pool.firsts[inner]
-    their_first, their_n = pool.firsts[outer], pool.firsts[outer + 1] - pool.firsts[outer]
+def _rings_inside(points: Any, following: Any, vertices: Any, their_following: Any, error: float) -> int:
+    """Return 1 if all rings of a body lie inside another one that they do not meet, 0 if none does, else UNSURE."""
     found = -1
-    for vertex in range(n):
-        if pool.following[first + vertex] > first + vertex:  # not the last of its ring
+    for vertex in range(len(following)):
+        if following[vertex] > vertex:  # not the last of its ring
             continue
-        where = _inside(as_point2(points, vertex), vertices, pool.following, their_first, their_n, error)
-        if where == _UNSURE or (found >= 0 and where != found):
-            return _UNSURE
+        where = inside(as_point2(points, vertex), vertices, their_following, error)
+        if where == UNSURE or (found >= 0 and where != found):
+            return UNSURE
         found = where
     return found
 
 
 @inline
-def _relate(pool: OutlineArrays, i: int, j: int, points: Any, vertices: Any, error: float) -> int:
-    """Return the relation of two placed bodies, or UNSETTLED."""
-    first, n = pool.firsts[i], pool.firsts[i + 1] - pool.firsts[i]
-    their_first, their_n = pool.firsts[j], pool.firsts[j + 1] - pool.firsts[j]
+def relate_placed(
+    points: Any, following: Any, vertices: Any, their_following: Any, error: float
+) -> tuple[int, int, int]:
+    """Return the relation of two placed bodies, or UNSETTLED, and the edges that cross, -1 for none or not the first.
+
+    Of bodies that are not simple OVERLAPPING says no more than that they meet. error: of each coordinate.
+    """
     is_unsure = False
-    for edge in range(n):
-        a, b = as_point2(points, edge), as_point2(points, pool.following[first + edge] - first)
-        for other in range(their_n):
-            c, d = as_point2(vertices, other), as_point2(vertices, pool.following[their_first + other] - their_first)
+    for edge in range(len(following)):
+        a, b = as_point2(points, edge), as_point2(points, following[edge])
+        for other in range(len(their_following)):
+            c, d = as_point2(vertices, other), as_point2(vertices, their_following[other])
             how = _crossing(a, b, c, d, error)
             if how == 1:
-                return OVERLAPPING
+                return OVERLAPPING, (-1 if is_unsure else edge), other
             is_unsure |= how != 0
     if is_unsure:
-        return UNSETTLED
-    in_second = _rings_inside(pool, i, points, j, vertices, error)
-    in_first = _rings_inside(pool, j, vertices, i, points, error)
+        return UNSETTLED, -1, -1
+    in_second = _rings_inside(points, following, vertices, their_following, error)
+    in_first = _rings_inside(vertices, their_following, points, following, error)
     if in_second == 0 and in_first == 0:
-        return DISJOINT
+        return DISJOINT, -1, -1
     if in_second + in_first == 1:
-        return FIRST_INSIDE_SECOND if in_second == 1 else SECOND_INSIDE_FIRST
-    return UNSETTLED
+        return FIRST_INSIDE_SECOND if in_second == 1 else SECOND_INSIDE_FIRST, -1, -1
+    return UNSETTLED, -1, -1
 
 
 @kernel
@@ -198,6 +225,54 @@ def relate_outline_pairs(
         i, j = bodies[pairs[item, 0]], bodies[pairs[item, 1]]
         if relations[item] != UNSETTLED or i < 0 or j < 0:
             continue
-        error = _place(pool, i, poses, rows[pairs[item, 0]], placed[0])
-        error = max(error, _place(pool, j, poses, rows[pairs[item, 1]], placed[1]))
-        relations[item] = _relate(pool, i, j, placed[0], placed[1], error)
+        i_row, j_row = rows[pairs[item, 0]], rows[pairs[item, 1]]
+        own, their = slice(pool.firsts[i], pool.firsts[i + 1]), slice(pool.firsts[j], pool.firsts[j + 1])
+        r, t = poses.rotations, poses.translations
+        error = _place(pool.vertices[own], r[i_row], t[i_row], i_row != 0, placed[0])
+        error = max(error, _place(pool.vertices[their], r[j_row], t[j_row], j_row != 0, placed[1]))
+        relations[item], _, _ = relate_placed(placed[0], pool.following[own], placed[1], pool.following[their], error)
+
+
+@kernel
+def _relate_two(
+    vertices: Any, following: Any, turn: Any, move: Any, other: Any, their_following: Any, their_turn: Any,
+    their_move: Any, are_posed: tuple[bool, bool],
+) -> tuple[int, int, int]:  # fmt: skip
+    """Return what `relate_placed` does, of two bodies under poses."""
+    n = len(vertices)
+    placed = np.empty((n + len(other), 2))
+    error = _place(vertices, turn, move, are_posed[0], placed[:n])
+    error = max(error, _place(other, their_turn, their_move, are_posed[1], placed[n:]))
+    return relate_placed(placed[:n], following, placed[n:], their_following, error)
+
+
+@kernel
+def _is_outline_simple(vertices: Any, following: Any) -> bool:
+    return is_simple(vertices, following)
+
+
+def collide_outlines(
+    first: Solid, second: Solid, first_pose: Pose | None, second_pose: Pose | None, work: Work
+) -> Collision:
+    """Return what `collide_outline_outline` does, which decides what is not sure here."""
+    (vertices, following), (other, their_following) = outline_arrays(first), outline_arrays(second)
+    if max(len(following), len(their_following)) > MOST_EDGES:
+        return collide_outline_outline(first, second, first_pose, second_pose, work)
+    turn, move = STILL if first_pose is None else (first_pose.rotation, first_pose.translation)
+    their_turn, their_move = STILL if second_pose is None else (second_pose.rotation, second_pose.translation)
+    relation, i, j = entry_of(_relate_two)(
+        vertices, following, turn, move, other, their_following, their_turn, their_move,
+        (first_pose is not None, second_pose is not None),
+    )  # fmt: skip
+    is_sure = relation != UNSETTLED and (relation == DISJOINT or (_is_simple(first) and _is_simple(second)))
+    if not is_sure or (relation == OVERLAPPING and work.witness and i < 0):
+        return collide_outline_outline(first, second, first_pose, second_pose, work)
+    if relation == DISJOINT or not work.witness:
+        return UNNAMED[relation]
+    if relation == OVERLAPPING:
+        return Collision(Relation.OVERLAPPING, Witness("edge_edge", i, j))
+    return FIRST_WITHIN if relation == FIRST_INSIDE_SECOND else SECOND_WITHIN
+
+
+def _is_simple(solid: Solid) -> bool:
+    return solid.prepared("is_simple", lambda: bool(_is_outline_simple(*outline_arrays(solid))))

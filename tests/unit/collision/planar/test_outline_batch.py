@@ -7,7 +7,9 @@ import pytest
 
 from engine import Aabb, Polygon, Pose, Solid, Triangle, collide
 from engine.collision.codes import UNSETTLED
-from engine.collision.planar.outline_batch import outline_pool
+from engine.collision.planar.outline import collide_outline_outline
+from engine.collision.planar.outline_batch import collide_outlines, outline_pool
+from engine.collision.result import Work
 from engine.collision.scenes.batches import SceneBatches
 from engine.collision.scenes.bodies import scene_bodies
 from engine.parallel import Budget
@@ -58,3 +60,30 @@ def test_agrees_with_single_pairs_where_it_answers(is_posed: bool, size: float) 
     if is_posed and size == 1.0:
         assert (found != UNSETTLED).mean() > 0.9
         assert set(found.tolist()) >= {0, 1, 2, 3}
+
+
+def test_single_pairs_are_what_the_arrangement_says_witnesses_too() -> None:
+    rng = np.random.default_rng(5)
+    shapes = [[SQUARE], [[[0, 0], [6, 1], [3, 2], [5, 5], [1, 4]]], [SQUARE, [[1, 1], [3, 1], [3, 3]]],
+              [[[0, 0], [4, 0], [0, 4], [4, 4]]]]  # fmt: skip
+    for _ in range(200):
+        first, second = (
+            Polygon([np.array(ring) * rng.choice([0.2, 1.0]) + rng.integers(-3, 4, 2) for ring in shapes[k]])
+            for k in rng.integers(0, 4, 2)
+        )
+        angle = rng.choice([0.0, rng.uniform(0, 7)])
+        pose = Pose([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]], rng.uniform(-1, 1, 2))
+        for placed in (None, pose):
+            work = Work(Budget(None, None))
+            assert collide_outlines(first, second, None, placed, work) == collide_outline_outline(
+                first, second, None, placed, work
+            )
+
+
+def test_collinear_edges_that_are_apart_are_no_contact() -> None:
+    tilted = np.array([[0.0, 0.0], [3.0, 4.0], [-1.0, 7.0], [-4.0, 3.0]])
+    first, second = Polygon([tilted]), Polygon([tilted + np.array([3.75, 5.0])])  # their sides lie on one line
+    assert collide(first, second).relation.label == "disjoint"
+    assert SceneBatches(scene_bodies([first, second], [None, None])).relations(
+        np.array([[0, 1]]), False, False, Budget(None, None), None
+    ).tolist() == [0]
