@@ -201,6 +201,23 @@ class Budget:
             self._cancel.take(n_bytes)
 
 
+class _Unlimited(Budget):
+    """Neither deadline nor switch: nothing is set up to enter it."""
+
+    def __enter__(self) -> Budget:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def check(self) -> None:
+        """Let the call go on."""
+
+
+UNLIMITED: Final = _Unlimited()
+"""Shared by all calls without a limit that hand it to no other thread: nothing ever raises its flag."""
+
+
 def check_options(workers: object, progress: object, **flags: object) -> None:
     """Raise unless `workers` is a whole number from 1 or None, `progress` callable or None, and each flag a bool."""
     if workers is not None and (isinstance(workers, bool) or not isinstance(workers, (int, np.integer)) or workers < 1):

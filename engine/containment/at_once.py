@@ -17,9 +17,9 @@ from engine.containment.posed.filters import NOT_FINITE
 from engine.containment.rational_locate import combine, over_tree, rational_location
 from engine.direct import entry_of
 from engine.errors import NotFiniteError
-from engine.parallel import Budget
+from engine.parallel import UNLIMITED
 from engine.solids.base import Solid
-from engine.solids.checks import as_points, check_finite, plain_floats
+from engine.solids.checks import as_points, check_finite, is_ready, plain_floats
 from engine.solids.csg import Csg
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
@@ -30,8 +30,6 @@ MOST: Final = 1024
 _SMALL: Final = 32
 """Edges of a polygon that is passed over whatever the number of points."""
 _NO_FLAG: Final = np.zeros(1, np.uint8)
-_NO_LIMIT: Final = Budget()
-_DOUBLE: Final = np.dtype(np.float64)
 _KEYS: Final = {PASS: "pass_plan", LISTS: "list_plan"}
 
 Plan: TypeAlias = tuple[Any, tuple[Any, ...], str]
@@ -45,13 +43,7 @@ def located_at_once(points: object, solid: Solid) -> Located | None:
     if not isinstance(solid, Solid):
         return None
     array: Any = points
-    if (
-        type(array) is not np.ndarray
-        or array.dtype is not _DOUBLE
-        or array.ndim != 2
-        or array.shape[1] != solid.dimension
-        or not array.flags.carray
-    ):
+    if not is_ready(array, solid.dimension):
         if not isinstance(points, (np.ndarray, list, tuple)) or not 0 < _length(points) <= MOST:
             return None
         if solid.type == "surface":
@@ -94,9 +86,9 @@ def _settled(array: Any, solid: Solid, locations: Int8Array, n_beyond: int, meth
 
 def _in_cells(array: Any, solid: Solid) -> Located:
     by: Any = polygon_by if isinstance(solid, Polygon) else polyhedron_by
-    locator, locations = by(solid, CELLS, _NO_LIMIT), np.empty(len(array), np.int8)
+    locator, locations = by(solid, CELLS, UNLIMITED), np.empty(len(array), np.int8)
     try:
-        counts = locator.fill(array, locations, _NO_LIMIT)
+        counts = locator.fill(array, locations, UNLIMITED)
     except NotFiniteError:
         check_finite(array, ("points",))
         raise
@@ -107,16 +99,16 @@ def _plan_of(solid: Solid, n_points: int) -> tuple[int, Plan | None]:
     """Return the choice of policy.py and a plan, kept where one is made; None where no kernel is compiled yet."""
     if isinstance(solid, Polygon):
         if len(solid.vertices) <= _SMALL:
-            return PASS, _kept(solid, "plan", polygon_by(solid, PASS, _NO_LIMIT))
+            return PASS, _kept(solid, "plan", polygon_by(solid, PASS, UNLIMITED))
         by: Any = polygon_by
         choice = choose_for_rings(solid, n_points)
     elif isinstance(solid, Polyhedron):
-        choice, by = choose_for_mesh(solid, n_points, _NO_LIMIT), polyhedron_by
+        choice, by = choose_for_mesh(solid, n_points, UNLIMITED), polyhedron_by
     else:
-        return PASS, _kept(solid, "plan", locator_of(solid).chosen(n_points, _NO_LIMIT))
+        return PASS, _kept(solid, "plan", locator_of(solid).chosen(n_points, UNLIMITED))
     if choice == CELLS:
         return choice, None
-    return choice, solid.kept(_KEYS[choice]) or _kept(solid, _KEYS[choice], by(solid, choice, _NO_LIMIT))
+    return choice, solid.kept(_KEYS[choice]) or _kept(solid, _KEYS[choice], by(solid, choice, UNLIMITED))
 
 
 def _kept(solid: Solid, key: str, locator: Any) -> Plan | None:

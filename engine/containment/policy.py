@@ -13,7 +13,6 @@ import numpy as np
 
 from engine.containment.cells.top import can_have_cells, lattice_of
 from engine.containment.prepared import tree_of
-from engine.containment.rational_locate import triangle_boxes
 from engine.parallel import Budget
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
@@ -32,11 +31,12 @@ _TREE_A_FACE: Final = 450.0
 _SOON: Final = 1.0 / 16.0
 """Share of the tree's cost that earlier passes may have taken: in general the second question builds it."""
 _CELLS_FROM, _CELLS_PER_FACE = 1 << 14, 5
-_CELLS_A_FACE: Final = 5_000.0
+"""Points from which cells are built on ordinary meshes, where a tree has taken half as long by then."""
+_CELLS, _CELLS_A_FACE = 2_500_000.0, 1_500.0
 _SAMPLE: Final = 256
 _IN_TREE, _IN_TREE_A_FACE_OVER = 150.0, 2.0
-_VISIT: Final = 4.5
-"""A look at one cell of the box of a triangle, when cells are built."""
+_ENTRIES_A_FACE, _CELLS_AN_ENTRY = 3.0, 900.0
+"""On level 0; and what more of them cost, with all that deeper levels make of them."""
 
 _PASS_AN_EDGE: Final = 0.8
 _SLABS_AN_EDGE: Final = 410.0
@@ -66,13 +66,13 @@ def cost_in_tree(solid: Polyhedron) -> float:
 
 
 def cost_of_cells(solid: Polyhedron, budget: Budget) -> float:
-    """Return what cells cost to build: those that the box of each face reaches into are looked at one by one."""
+    """Return what cells cost to build: by how many the faces reach into on level 0."""
 
     def find() -> float:
-        boxes, lattice = triangle_boxes(solid), lattice_of(tree_of(solid, budget.check))
-        budget.check()
-        n_cells = (boxes[1::2] - boxes[0::2]) * np.array(lattice.scale)[:, None] + 1.5
-        return _CELLS_A_FACE * len(solid.triangles) + _VISIT * float(n_cells.prod(axis=0).sum())
+        tree = tree_of(solid, budget.check)
+        _, entries = solid.prepared("lattice", lambda: lattice_of(tree, budget), budget.check)
+        beyond = max(entries - _ENTRIES_A_FACE * len(solid.triangles), 0.0)
+        return _CELLS + _CELLS_A_FACE * len(solid.triangles) + _CELLS_AN_ENTRY * beyond
 
     return solid.prepared("cost_of_cells", find, budget.check)
 
@@ -84,19 +84,30 @@ def choose_for_mesh(solid: Polyhedron, n_points: int, budget: Budget) -> int:
         return PASS
     if n_points > _FEW and solid.kept("cells") is not None:
         return CELLS
-    if n_points > _FEW and seen >= _CELLS_FROM + _CELLS_PER_FACE * n_faces:
-        if solid.prepared("can_have_cells", lambda: can_have_cells(solid)):
-            gain = seen * cost_in_tree(solid) + 2.0 * _CELLS_A_FACE * n_faces  # on ordinary meshes it pays at once
-            if gain > cost_of_cells(solid, budget):
-                return CELLS
+    if n_points > _FEW and _pay_cells(solid, seen, budget):
+        return CELLS
     if solid.kept("tree") is not None:
         return LISTS
-    spent = solid.prepared("spent_on_passes", lambda: [0.0])
-    earlier, tree = spent[0], _TREE + _TREE_A_FACE * n_faces
-    spent[0] += _PASS_A_FACE * n_faces * (1 + (n_points - 1) // _POINTS_A_PASS)
-    if n_points > _SAMPLE:
-        spent[0] += n_points * (_PASS_A_FACE * faces_over(solid) - cost_in_tree(solid))
-    return PASS if spent[0] <= tree and earlier <= _SOON * tree else LISTS
+    calls = solid.prepared("passes", lambda: [0.0])
+    earlier, tree = calls[0] * _PASS_A_FACE * n_faces, _TREE + _TREE_A_FACE * n_faces
+    calls[0] += 1 + (n_points - 1) // _POINTS_A_PASS
+    if earlier > 0.0 or n_points > _SAMPLE:  # it takes 30 us to find out
+        met = _PASS_A_FACE * faces_over(solid)
+        earlier += (seen - n_points) * met
+        tree += n_points * cost_in_tree(solid) - n_points * met
+    return PASS if calls[0] * _PASS_A_FACE * n_faces <= tree and earlier <= _SOON * tree else LISTS
+
+
+def _pay_cells(solid: Polyhedron, seen: int, budget: Budget) -> bool:
+    """Tell whether so many points are worth cells: soon on bad shapes, where a point is dear in the tree."""
+    n_faces = len(solid.triangles)
+    least, are_many = _CELLS + _CELLS_A_FACE * n_faces, seen >= _CELLS_FROM + _CELLS_PER_FACE * n_faces
+    if not are_many and seen * (_IN_TREE + _IN_TREE_A_FACE_OVER * n_faces) <= least:
+        return False
+    by_tree = seen * cost_in_tree(solid)
+    if not (are_many or by_tree > least) or not solid.prepared("can_have_cells", lambda: can_have_cells(solid)):
+        return False
+    return (are_many and cost_in_tree(solid) < 2.0 * _IN_TREE) or by_tree > cost_of_cells(solid, budget)
 
 
 def choose_for_rings(solid: Polygon, n_points: int) -> int:

@@ -21,6 +21,7 @@ from engine.predicates.scaling import exponent_above, scaled_back, shifted
 from engine.solids.base import Solid
 from engine.types import OPEN
 
+_AXES: Final = {2: (0, 1), 3: (0, 1, 2)}
 _DEEPEST: Final = -900
 """Scenes below 2^-900 have subnormal results, which the kernel would round twice."""
 
@@ -41,7 +42,7 @@ def kernel_scene(
 
     largest: magnitude of any coordinate. planes: those of the region.
     """
-    exponent = 0 if 1.0 <= largest <= 2.0**60 else exponent_above(largest)  # the latter takes longer
+    exponent = exponent_above(largest)
     points = shifted(vertices, -exponent) if exponent else vertices
     if points is None or exponent < _DEEPEST or not planes:
         return None
@@ -95,6 +96,29 @@ def _double_double_quotient(top: int, bottom: int) -> tuple[float, float]:
     return high, nearest(top * denominator - numerator * bottom, bottom * denominator)
 
 
+def room_for(n_numbers: int, tables: PlaneTables) -> int:
+    """Return for how many numbers there should be room at first: a convex ring gains a vertex a plane."""
+    return n_numbers + (4 * len(tables.high) + 64) * (tables.high.shape[1] - 1)
+
+
+def clip_some(
+    scene: tuple[FloatArray, IntArray, IntArray, PlaneTables],
+    first: int,
+    last: int,
+    budget: Budget,
+    room: int,
+    found: tuple[IntArray, FlagArray, BoolArray],
+) -> tuple[int, FloatArray]:
+    """Clip polygons from `first` on; return the one reached, and the vertices of those the kernel settled, in order.
+
+    scene: vertices as a row of numbers, both offsets, the planes. room: for how many numbers. found: sizes (of rings),
+    state and may_have_bridges (of polygons), to be filled; see `clip_rings`.
+    """
+    d, out = scene[3].high.shape[1] - 1, np.empty(room)
+    reached, written = entry_of(clip_rings, d)(*scene, first, last, budget.flag, out, *found, _AXES[d])
+    return reached, out[: written * d].reshape(-1, d)
+
+
 def clip_chunk(
     scene: KernelScene,
     ring_offsets: IntArray,
@@ -111,29 +135,17 @@ def clip_chunk(
     Fills sizes (of rings), state and may_have_bridges (of polygons); see `clip_rings`.
     """
     n_vertices = int(ring_offsets[polygon_offsets[last]] - ring_offsets[polygon_offsets[first]])
-    d, room, done, parts = scene.vertices.shape[1], n_vertices + 4 * len(scene.tables.high) + 64, first, []
+    d, done, parts = scene.vertices.shape[1], first, list[FloatArray]()
+    room = room_for(n_vertices * d, scene.tables)
+    arrays = scene.vertices.reshape(-1), ring_offsets, polygon_offsets, scene.tables
     while done < last:
-        out = np.empty(room * d)
-        reached, written = entry_of(clip_rings, d)(
-            scene.vertices.reshape(-1),
-            ring_offsets,
-            polygon_offsets,
-            scene.tables,
-            done,
-            last,
-            budget.flag,
-            out,
-            sizes,
-            state,
-            may_have_bridges,
-            tuple(range(d)),
-        )
+        reached, part = clip_some(arrays, done, last, budget, room, (sizes, state, may_have_bridges))
         budget.check()
-        budget.take(2 * out[: written * d].nbytes)
-        parts.append(out[: written * d].reshape(-1, d))
+        budget.take(2 * part.nbytes)
+        parts.append(part)
         if reached == done:
             room *= 2
-            budget.take(room * d * out.itemsize)
+            budget.take(room * part.itemsize)
         done = reached
     vertices = parts[0] if len(parts) == 1 else np.concatenate([np.zeros((0, d)), *parts])
     if scene.exponent:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
@@ -13,15 +14,15 @@ import numpy.typing as npt
 
 from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray
 from engine.errors import EmptyGeometryError, InvalidArrayError, TooComplexError, UnsupportedSolidError
-from engine.parallel import Budget, Cancel, Options, Progress, check_options, run_chunks
-from engine.polygon_clipping.batches import clip_chunk, kernel_scene
+from engine.parallel import UNLIMITED, Budget, Cancel, Options, Progress, check_options, run_chunks
+from engine.polygon_clipping.batches import clip_chunk, clip_some, kernel_scene, room_for
 from engine.polygon_clipping.convex_planes import convex_planes
 from engine.polygon_clipping.in_integers import Row, clip_polygon, integer_row, reduced
-from engine.polygon_clipping.rings import CLIPPED
+from engine.polygon_clipping.rings import CLIPPED, PlaneTables
 from engine.predicates.scaling import largest_of
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
-from engine.solids.checks import as_point_groups, as_points, check_dimension, check_finite
+from engine.solids.checks import as_point_groups, as_points, check_dimension, check_finite, is_ready
 from engine.solids.convex import Convex, rows_of
 from engine.solids.half_space import HalfSpace
 from engine.solids.polygon import Polygon
@@ -132,6 +133,10 @@ def clip_polygons(
     >>> clipped.rings(0)[0].tolist()
     [[0.0, 0.0], [1.0, 0.0], [1.0, 3.0], [0.0, 4.0]]
     """
+    if workers is None and deadline is None and cancel is None and progress is None and report is False:
+        few = _clip_array(polygons, region) if isinstance(region, Solid) and isinstance(polygons, np.ndarray) else None
+        if few is not None:
+            return few
     check_options(workers, progress, report=report)
     with Budget(deadline, cancel) as budget:
         planes = _planes(region, budget)
@@ -140,6 +145,45 @@ def clip_polygons(
     if not report:
         return clipped
     return clipped, Accuracy("exact", 0.5, len(clipped), n_beyond, n_rational, "sutherland_hodgman")
+
+
+def _clip_array(polygons: npt.NDArray[Any], region: Solid) -> ClippedPolygons | None:
+    """Clip an array of few polygons; None where the region has no tables yet, or an item is for the general way."""
+    tables = region.kept("clipping_tables")
+    if tables is None or polygons.ndim != 3 or not is_ready(polygons, polygons.shape[1], region.dimension):
+        return None
+    n, size, _ = polygons.shape
+    flat = polygons.reshape(-1)
+    # the largest coordinate lies between the root of this sum, and that over the root of how many there are
+    if not (0 < n * size <= _FEW and 2.0**-100 < flat.dot(flat) < 2.0**120):
+        return None
+    found = _clip_few(flat, tables, *_offsets_of_array(n, size))
+    return None if found is None else found[0]
+
+
+@functools.lru_cache(64)
+def _offsets_of_array(n: int, size: int) -> tuple[IntArray, IntArray]:
+    """Return the offsets of n rings of one size, one a polygon."""
+    return size * np.arange(n + 1), np.arange(n + 1)
+
+
+def _clip_few(
+    vertices: FloatArray, tables: PlaneTables, ring_offsets: IntArray, polygon_offsets: IntArray
+) -> tuple[ClippedPolygons, int] | None:
+    """Clip few polygons, of a row of numbers; return the result, and how many needed more than the filter.
+
+    None where one is left open, or has no room.
+    """
+    n = len(polygon_offsets) - 1
+    state, may_have_bridges = np.empty(n, np.uint8), np.empty(n, np.bool_)
+    sizes = np.empty(len(ring_offsets) - 1, np.int64)
+    scene = vertices, ring_offsets, polygon_offsets, tables
+    reached, kept = clip_some(scene, 0, n, UNLIMITED, room_for(len(vertices), tables), (sizes, state, may_have_bridges))
+    states = state.tolist()
+    if reached < n or OPEN in states:
+        return None
+    clipped = _gathered(kept, sizes.tolist(), polygon_offsets.tolist(), np.zeros(n, np.int8), may_have_bridges)
+    return clipped, n - states.count(CLIPPED)
 
 
 def _planes(region: Solid, budget: Budget) -> list[Row]:
@@ -191,10 +235,10 @@ def as_contours(polygons: Any, dimension: int) -> Contours:
         n, size = array.shape[:2]
         if n and not size:
             raise EmptyGeometryError("polygons[0] has no vertices; leave it out", ("polygons", 0))
-        largest = largest_of(array) if array.size > _FEW else float(np.abs(array).max(initial=0.0))
+        largest = largest_of(array)
         if not np.isfinite(largest):
             check_finite(array, ("polygons",))
-        return Contours(array.reshape(-1, dimension), size * np.arange(n + 1), np.arange(n + 1), largest)
+        return Contours(array.reshape(-1, dimension), *_offsets_of_array(n, size), largest)
     if not isinstance(polygons, (list, tuple)):
         raise InvalidArrayError(
             f"polygons must be a list of polygons, got {type(polygons).__name__}; put a single one into a list",
@@ -256,18 +300,18 @@ def _clip(
     """Clip every polygon; return the result, how many polygons needed more than the filter, and rational arithmetic."""
     vertices, ring_offsets, polygon_offsets, largest = contours
     n, dimension = len(polygon_offsets) - 1, vertices.shape[1]
+    scene = kernel_scene(region, vertices, largest, planes, budget)
+    if scene is not None and len(vertices) <= _FEW and not scene.exponent:
+        few = _clip_few(scene.vertices.reshape(-1), scene.tables, ring_offsets, polygon_offsets)
+        budget.check()
+        if few is not None:
+            if progress is not None and n:
+                progress(n)
+            return *few, 0
     status, may_have_bridges = np.zeros(n, np.int8), np.zeros(n, np.bool_)
     sizes = np.zeros(len(ring_offsets) - 1, np.int64)
     parts: dict[int, FloatArray] = {}
-    scene = kernel_scene(region, vertices, largest, planes, budget)
     state = np.full(n, OPEN, np.uint8)
-    if scene is not None and len(vertices) <= _FEW:
-        kept = clip_chunk(scene, ring_offsets, polygon_offsets, 0, n, budget, sizes, state, may_have_bridges)
-        if OPEN not in (states := state.tolist()):
-            if progress is not None and n:
-                progress(n)
-            n_exact = n - states.count(CLIPPED)
-            return _gathered(kept, sizes.tolist(), polygon_offsets.tolist(), status, may_have_bridges), n_exact, 0
 
     def settle(i: int) -> FloatArray:
         rings = range(polygon_offsets[i], polygon_offsets[i + 1])

@@ -19,7 +19,7 @@ from typing import Final, Literal, Unpack, overload
 import numpy as np
 
 from engine.errors import InvalidOperationError, UnsupportedSolidError
-from engine.parallel import Budget, Cancel, Options, Progress, check_options
+from engine.parallel import UNLIMITED, Budget, Cancel, Options, Progress, check_options
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.compiled.ring_nesting import Nesting
 from engine.polygon_overlay.grid import from_units, grid_of
@@ -33,8 +33,6 @@ from engine.solids.polygon import Polygon
 from engine.types import Accuracy
 
 _OUTPUTS: Final = ("valid", "nearest")
-_UNLIMITED: Final = Budget()
-"""Shared by all calls without a limit: nothing ever raises its flag."""
 
 
 @overload
@@ -108,7 +106,7 @@ def overlay(
     check_words(operation, output)
     first, second = rings_of(subject, "subject"), rings_of(clip, "clip")
     check_options(workers, progress, report=report)
-    with _UNLIMITED if deadline is None and cancel is None else Budget(deadline, cancel) as budget:
+    with UNLIMITED if deadline is None and cancel is None else Budget(deadline, cancel) as budget:
         result, n_exact, n_rational = overlay_rings(first, second, operation, output, budget, UNNAMED, grid)
     if progress is not None:
         progress(1)

@@ -8,6 +8,7 @@ or up to the smallest normal one, would be rounded twice, so they are settled ag
 
 from __future__ import annotations
 
+from math import frexp
 from typing import Final
 
 import numpy as np
@@ -21,7 +22,7 @@ SMALLEST_NORMAL: Final = 2.0**-1022
 
 def largest_of(*arrays: FloatArray) -> float:
     """Return the largest magnitude of any coordinate, no finite number where one is none."""
-    return max((max(float(array.max()), -float(array.min())) for array in arrays if array.size), default=0.0)
+    return max((max(array.max().item(), -array.min().item()) for array in arrays if array.size), default=0.0)
 
 
 def exponent_of(*arrays: FloatArray) -> int:
@@ -31,7 +32,7 @@ def exponent_of(*arrays: FloatArray) -> int:
 
 def exponent_above(largest: float) -> int:
     """Return e such that a coordinate is below 2^e, and 0 where no scaling is needed."""
-    exponent = int(np.frexp(largest)[1])
+    exponent = frexp(largest)[1]
     return 0 if largest == 0.0 or abs(exponent) <= COMFORTABLE else exponent
 
 

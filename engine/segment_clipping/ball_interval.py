@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from engine.jit import inline, kernel, merged
+from engine.jit import bare_kernel, inline, merged
 from engine.predicates.double_double import U2, dd_add, dd_mul, dd_sub
 from engine.predicates.error_free import two_diff, two_prod, workspace
 from engine.predicates.expansion import grow_product, is_safe, sign
@@ -141,7 +141,7 @@ def decide_roughly(
     return OPEN, -1, -1
 
 
-@kernel
+@bare_kernel
 def decide_on_sphere(
     segments: Any,
     center: Any,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal, Unpack, overload
+from typing import Any, Literal, Unpack, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -18,11 +18,12 @@ from engine.segment_clipping.boundary import clip_on_boundary
 from engine.segment_clipping.box_cut import fill_on_boxes
 from engine.segment_clipping.cohen_sutherland import decide_on_boxes
 from engine.segment_clipping.cyrus_beck import as_columns, decide_on_rows
-from engine.segment_clipping.decide_then_cut import Method, Scaled, clip_on_convex, scaled
+from engine.segment_clipping.decide_then_cut import FEW, Method, Scaled, clip_few, clip_on_convex, scaled
+from engine.segment_clipping.pieces import Pieces
 from engine.segment_clipping.planes_cut import fill_on_rows
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
-from engine.solids.checks import as_point_groups
+from engine.solids.checks import as_point_groups, is_ready
 from engine.solids.convex import Convex
 from engine.solids.half_space import HalfSpace
 from engine.solids.polygon import Polygon
@@ -111,6 +112,10 @@ def clip_segments(
     >>> pieces.start.tolist(), pieces.end.tolist(), pieces.t.tolist(), pieces.faces.tolist()
     ([[0.0, 1.0]], [[2.0, 1.0]], [[0.25, 0.75]], [[0, 1]])
     """
+    if workers is None and deadline is None and cancel is None and progress is None and report is False:
+        few = _clip_array(segments, region)
+        if few is not None:
+            return few
     check_options(workers, progress, report=report)
     method = method_for(region)
     array = as_point_groups(segments, 2, region.dimension, ("segments",), must_be_finite=False)  # kernels look at it
@@ -119,11 +124,26 @@ def clip_segments(
             found, n_beyond, n_rational = clip_on_convex(array, region, method, budget, workers, progress)
         else:
             found, n_beyond, n_rational = clip_on_boundary(array, method, budget, workers, progress)
-    pieces = SegmentPieces(found.source, found.ends[0], found.ends[1], found.t, found.faces)
+    pieces = _as_result(found)
     if not report:
         return pieces
     name = method.name if isinstance(method, Method) else "box_tree"
     return pieces, Accuracy("exact", 0.5, len(array), n_beyond, n_rational, name)
+
+
+def _clip_array(segments: Any, region: Solid) -> SegmentPieces | None:
+    """Clip an array of few segments; None where nothing is kept with the region yet, or a segment is left open."""
+    method = region.kept("segment_method") if isinstance(region, Solid) else None
+    if method is None or not is_ready(segments, 2, region.dimension) or not 0 < len(segments) <= FEW:
+        return None
+    found = clip_few(segments, method)
+    return None if found is None else _as_result(found[0])
+
+
+def _as_result(found: Pieces) -> SegmentPieces:
+    """Return pieces as callers get them."""
+    source, (start, end), t, faces = found
+    return SegmentPieces(source, start, end, t, faces)
 
 
 def method_for(region: Solid) -> Method | Polygon | Polyhedron:

@@ -29,9 +29,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-import numpy as np
-
-from engine.jit import called, inline, kernel, merged
+from engine.jit import bare_kernel, called, inline, merged
 from engine.predicates.error_free import workspace
 from engine.predicates.expansion import is_safe
 from engine.predicates.parameters import compare_differences, compare_differences_filter
@@ -182,7 +180,7 @@ def corners_of(low: Any, high: Any) -> tuple[Triple, Triple]:
     return (low[0], low[1], (-1.0 if is_flat else low[2])), (high[0], high[1], (1.0 if is_flat else high[2]))
 
 
-@kernel
+@bare_kernel
 def decide_on_boxes(
     segments: Any, low: Any, high: Any, first: int, last: int, stop: Any, items: Any, planes: Any, still: Any, n: Any
 ) -> None:
@@ -197,7 +195,7 @@ def decide_on_boxes(
     px, py, pz, qx, qy, qz = (
         workspace(64), workspace(64), workspace(64), workspace(64), workspace(64), workspace(64),
     )  # fmt: skip
-    state, entered, left, unsure = workspace(64), workspace(64), workspace(64), np.empty(BLOCK, np.int64)
+    state, entered, left, unsure = workspace(64), workspace(64), workspace(64), workspace(64)
     kept, n_open, beyond = 0, 0, 0
     for start in range(first, last, BLOCK):
         if stop[0]:
@@ -215,13 +213,13 @@ def decide_on_boxes(
                 unsure[n_unsure] = j
                 n_unsure += 1
         for k in range(n_unsure):
-            px[k], py[k], pz[k] = point_of(segments, start + unsure[k], 0, is_flat)
-            qx[k], qy[k], qz[k] = point_of(segments, start + unsure[k], 1, is_flat)
+            px[k], py[k], pz[k] = point_of(segments, start + int(unsure[k]), 0, is_flat)
+            qx[k], qy[k], qz[k] = point_of(segments, start + int(unsure[k]), 1, is_flat)
         for k in range((n_unsure + 7) >> 3 << 3):  # whole vectors
             p, q = (px[k], py[k], pz[k]), (qx[k], qy[k], qz[k])
             px[k], py[k], pz[k] = decide_closely(p, q, lowest, highest)
         for k in range(n_unsure):
-            j = unsure[k]
+            j = int(unsure[k])
             state[j], entered[j], left[j] = px[k], py[k], pz[k]
             if state[j] == OPEN:
                 state[j], entered[j], left[j] = decide_exactly(segments, start + j, low, high)

@@ -20,7 +20,7 @@ import numpy as np
 
 from engine.arrays import FloatArray, Int32Array, IntArray
 from engine.direct import entry_of
-from engine.parallel import Budget, Progress, run_chunks
+from engine.parallel import UNLIMITED, Budget, Progress, run_chunks
 from engine.predicates.scaling import exponent_of, scaled_back, shifted
 from engine.segment_clipping.pieces import Pieces, completed, first_of, room_for
 from engine.segment_clipping.profiles import settled
@@ -30,11 +30,13 @@ from engine.solids.checks import check_finite
 Clipped = tuple[Pieces, int, int]
 """Pieces, how many items needed more than the filter, and how many rational arithmetic."""
 
-_FEW: Final = 32
+FEW: Final = 32
 """Open items that rational arithmetic settles in the time in which a batch is looked through for its exponent; segments
 that are clipped in the time that it takes to plan more."""
 
 
+_spare: list[tuple[Int32Array, Int32Array, Int32Array, IntArray]] = []
+"""Scratch for so few segments that no call works in now."""
 _AT_ONCE: Final = 1 << 12
 """Segments that are decided on before their pieces are filled."""
 
@@ -80,11 +82,14 @@ def clip_on_convex(
 
     Raises: NotFiniteError.
     """
-    found = _clip_few(segments, method, budget, progress) if len(segments) <= _FEW else None
+    found = clip_few(segments, method) if len(segments) <= FEW else None
     if found is not None:
+        budget.check()
+        if progress is not None and len(segments):
+            progress(len(segments))
         return found
     scene = Scaled(segments, method.region, 0)
-    found = _clip(segments, region, method, scene, _FEW + len(segments) // 256, budget, workers, progress)
+    found = _clip(segments, region, method, scene, FEW + len(segments) // 256, budget, workers, progress)
     if found is None:
         scene = method.scale(segments) or scene
         found = _clip(segments, region, method, scene, len(segments), budget, workers, None)  # progress is told
@@ -92,29 +97,24 @@ def clip_on_convex(
     return found
 
 
-def _clip_few(segments: FloatArray, method: Method, budget: Budget, progress: Progress | None) -> Clipped | None:
-    """Return the pieces of a few segments; None where anything is left open."""
+def clip_few(segments: FloatArray, method: Method) -> Clipped | None:
+    """Return the pieces of up to `FEW` segments, (n, 2, dim) float64, not yet looked at for NaN; None where anything is
+    left open."""
     n, _, dimension = segments.shape
-    items, planes, still, counts = (
-        np.empty(n, np.int32),
-        np.empty((n, 2), np.int32),
-        np.empty(n, np.int32),
-        np.zeros(3, np.int64),
-    )
-    budget.check()
-    entry_of(method.decide)(segments, *method.region, 0, n, budget.flag, items, planes, still, counts)
+    try:
+        scratch = _spare.pop()
+    except IndexError:
+        scratch = np.empty(FEW, np.int32), np.empty((FEW, 2), np.int32), np.empty(FEW, np.int32), np.zeros(3, np.int64)
+    items, planes, still, counts = scratch
+    entry_of(method.decide)(segments, *method.region, 0, n, UNLIMITED.flag, items, planes, still, counts)
     m, n_open, n_beyond = counts.tolist()
-    if n_open:
-        return None
     pieces = room_for(m, dimension)
-    entry_of(method.fill)(segments, *method.region, items, planes, 0, m, budget.flag, pieces, still, counts)
-    budget.check()
-    n_open, n_more, _ = counts.tolist()
-    if n_open:
-        return None
-    if progress is not None and n:
-        progress(n)
-    return pieces, min(n, n_beyond + n_more), 0
+    if not n_open:
+        entry_of(method.fill)(segments, *method.region, items, planes, 0, m, UNLIMITED.flag, pieces, still, counts)
+        n_open, n_more, _ = counts.tolist()
+        n_beyond = min(n, n_beyond + n_more)
+    _spare.append(scratch)
+    return None if n_open else (pieces, n_beyond, 0)
 
 
 def _clip(

@@ -24,6 +24,7 @@ Where = tuple[str | int, ...]
 
 DIMENSIONS: Final = (2, 3)
 _FLOAT_INTEGERS: Final = 2**53  # every integer up to this size is a float64
+_DOUBLE: Final = np.dtype(np.float64)
 _AT_ONCE: Final = 1 << 15
 """Numbers looked at together: what is noted of them stays in the first-level cache."""
 
@@ -93,6 +94,17 @@ def as_floats(values: object, depth: int, where: Where, must_be_finite: bool = T
     result = _as_floats(values, depth, where, must_be_finite).view()
     result.setflags(write=False)
     return result
+
+
+def is_ready(values: object, *shape: int) -> bool:
+    """Tell whether values, as they are, are an array of doubles for kernels, (n, *shape), not looked at for NaN."""
+    return (
+        type(values) is np.ndarray
+        and values.dtype is _DOUBLE
+        and values.shape[1:] == shape
+        and values.flags.c_contiguous
+        and values.flags.aligned
+    )
 
 
 def _as_floats(values: object, depth: int, where: Where, must_be_finite: bool) -> FloatArray:

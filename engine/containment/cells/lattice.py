@@ -1,14 +1,10 @@
 """The grid of cells over a polyhedron: where cells lie, and which triangles reach into them.
 
-Level 0 is a dense grid; a cell with a long list is cut into a brick of 4 x 4 x 4, and so once more. Sizes are powers
-of two, so an index on the finest level, shifted right, is the index on a coarser one. An index is ``int((x - low) *
-scale)``, each step monotone, so the doubles of a cell are those between two borders; a triangle is listed in every
-cell from the index of its least to that of its largest coordinate, but where a separating axis proves that it stays
-outside.
-
-A border in exact arithmetic may lie off the lattice by the rounding of x - low, at most 2^-53 times the number of
-cells along the axis: far less than `_MARGIN`, by which the separating-axis tests widen the cell. Their own rounding
-is bounded as in entries.py. The lists are conservative.
+Level 0 is a dense grid; a cell with a long list is cut into a brick of 4 x 4 x 4, and so on. Sizes are powers of two,
+so an index on the finest level, shifted right, is the index on a coarser one. An index is ``int((x - low) * scale)``,
+each step monotone, so the doubles of a cell are those between two borders; a triangle is listed in every cell from the
+index of its least to that of its largest coordinate, but where a separating axis proves that it stays outside
+(reach.py). The lists are conservative.
 """
 
 from __future__ import annotations
@@ -16,15 +12,15 @@ from __future__ import annotations
 from typing import Any, Final, NamedTuple
 
 from engine.arrays import FloatArray, Int8Array, Int32Array, IntArray
+from engine.containment.cells.reach import layer_reached, row_reached, walls_of
 from engine.jit import inline, kernel
 
-LEVELS: Final = 3
+LEVELS: Final = 12
+"""At most: 96 cells cut eleven times have indices below 2^30."""
 SPLIT: Final = 4
 """Parts of a cell along each axis."""
 PARTS: Final = SPLIT**3
 _FINEST: Final = 2.0 ** (2 * (LEVELS - 1))
-_MARGIN: Final = 0.5 + 2.0**-20
-_ROUNDING: Final = 16.0 * 2.0**-53
 UNKNOWN: Final = 0
 """Status of a cell that is not known, or whose reference point lies on the surface or in another cell."""
 PLACE: Final = (0.5 + 287.0 / 4096.0, 0.5 - 413.0 / 4096.0, 0.5 + 101.0 / 4096.0)
@@ -84,13 +80,13 @@ def finest(value: float, low: float, scale: float) -> int:
 @inline
 def parts_of(level: int) -> float:
     """Return how many cells of a level there are to one of level 0 along an axis."""
-    return 1.0 if level == 0 else 4.0 if level == 1 else 16.0
+    return float(1 << 2 * level)
 
 
 @inline
 def share_of(level: int) -> float:
     """Return 1 / parts_of(level)."""
-    return 1.0 if level == 0 else 0.25 if level == 1 else 0.0625
+    return 1.0 / float(1 << 2 * level)
 
 
 @inline
@@ -126,72 +122,40 @@ def scaled_difference(a: Any, b: Any, scale: Any, parts: float) -> Any:
 
 
 @inline
-def _misses_plane(u: Any, v: Any, w: Any) -> bool:
-    """Tell whether the plane of a triangle surely misses the unit cell about its centre; w: centre less corner a."""
-    size = abs(w[0]) + abs(w[1]) + abs(w[2]) + 2.0
-    nx, ny, nz = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
-    permanent = (abs(u[0]) + abs(u[1]) + abs(u[2])) * (abs(v[0]) + abs(v[1]) + abs(v[2]))
-    distance = abs(nx * w[0] + ny * w[1] + nz * w[2])
-    return distance > _MARGIN * (abs(nx) + abs(ny) + abs(nz)) + _ROUNDING * permanent * size
-
-
-@inline
-def _misses_edge(ex: float, ey: float, wx: float, wy: float, turn: float, error: float) -> bool:
-    """Tell whether a unit square is surely outside an edge (ex, ey), seen from its start by (wx, wy)."""
-    return (ex * wy - ey * wx) * turn < -(_MARGIN * (abs(ex) + abs(ey)) + error)
-
-
-@inline
-def _misses_projection(ux: float, uy: float, vx: float, vy: float, wx: float, wy: float) -> bool:
-    """Tell whether a projected triangle (0, u, v) surely misses the unit square about w."""
-    area = ux * vy - uy * vx
-    if not abs(area) > _ROUNDING * (abs(ux * vy) + abs(uy * vx)):
-        return False
-    turn = 1.0 if area > 0.0 else -1.0
-    size = abs(ux) + abs(uy) + abs(vx) + abs(vy)
-    error = _ROUNDING * size * (abs(wx) + abs(wy) + size + 1.0)  # of differences of u, v, w and of the products
-    if _misses_edge(ux, uy, wx, wy, turn, error) or _misses_edge(-vx, -vy, wx - vx, wy - vy, turn, error):
-        return True
-    return _misses_edge(vx - ux, vy - uy, wx - ux, wy - uy, turn, error)
-
-
-@inline
-def misses_cell(u: Any, v: Any, w: Any) -> bool:
-    """Tell whether a triangle with edges u, v from corner a surely misses the cell whose centre less a is w."""
-    return (
-        _misses_plane(u, v, w)
-        or _misses_projection(u[0], u[1], v[0], v[1], w[0], w[1])
-        or _misses_projection(u[1], u[2], v[1], v[2], w[1], w[2])
-        or _misses_projection(u[2], u[0], v[2], v[0], w[2], w[0])
-    )
-
-
-@inline
 def _list_triangle(mesh: Any, triangle: int, block: Any, ends: Any, items: Any, is_fill: bool) -> None:
     """Count or list a triangle in the cells of a block that it reaches into, in scanning order."""
     low, scale, (depth, x_low, y_low, z_low, nx, ny, nz, first_cell) = mesh.lattice.low, mesh.lattice.scale, block
     parts, shift = parts_of(depth), 2 * (LEVELS - 1 - depth)
     a, b, c = corners(mesh.vertices, mesh.triangles, triangle)
-    u, v = scaled_difference(b, a, scale, parts), scaled_difference(c, a, scale, parts)
-    base = scaled_difference(low, a, scale, parts)
     x_first = max((finest(min(a[0], b[0], c[0]), low[0], scale[0]) >> shift) - x_low, 0)
     x_last = min((finest(max(a[0], b[0], c[0]), low[0], scale[0]) >> shift) - x_low, nx - 1)
     y_first = max((finest(min(a[1], b[1], c[1]), low[1], scale[1]) >> shift) - y_low, 0)
     y_last = min((finest(max(a[1], b[1], c[1]), low[1], scale[1]) >> shift) - y_low, ny - 1)
     z_first = max((finest(min(a[2], b[2], c[2]), low[2], scale[2]) >> shift) - z_low, 0)
     z_last = min((finest(max(a[2], b[2], c[2]), low[2], scale[2]) >> shift) - z_low, nz - 1)
-    # on level 0 no test helps a triangle in two cells at most
-    is_small = depth == 0 and (x_last - x_first) + (y_last - y_first) + (z_last - z_first) <= 1
+    # nothing helps a triangle in one cell, on level 0 in two
+    if (x_last - x_first) + (y_last - y_first) + (z_last - z_first) <= (depth == 0):
+        for z in range(z_first, z_last + 1):
+            for y in range(y_first, y_last + 1):
+                for x in range(x_first, x_last + 1):
+                    _list_in(triangle, first_cell + (z * ny + y) * nx + x, ends, items, is_fill)
+        return
+    walls = walls_of(scaled_difference(b, a, scale, parts), scaled_difference(c, a, scale, parts))
+    base = scaled_difference(low, a, scale, parts)
+    x0, y0, z0 = base[0] + (x_low + 0.5), base[1] + (y_low + 0.5), base[2] + (z_low + 0.5)
     for z in range(z_first, z_last + 1):
-        for y in range(y_first, y_last + 1):
-            for x in range(x_first, x_last + 1):
-                w = (base[0] + (x_low + x + 0.5), base[1] + (y_low + y + 0.5), base[2] + (z_low + z + 0.5))
-                if not is_small and misses_cell(u, v, w):
-                    continue
-                cell = first_cell + (z * ny + y) * nx + x
-                if is_fill:
-                    items[ends[cell]] = triangle
-                ends[cell] += 1
+        y_from, y_to = layer_reached(walls, z0 + z, y0, y_first, y_last)
+        for y in range(y_from, y_to + 1):
+            x_from, x_to = row_reached(walls, z0 + z, y0 + y, x0, x_first, x_last)
+            for x in range(x_from, x_to + 1):
+                _list_in(triangle, first_cell + (z * ny + y) * nx + x, ends, items, is_fill)
+
+
+@inline
+def _list_in(triangle: int, cell: int, ends: Any, items: Any, is_fill: bool) -> None:
+    if is_fill:
+        items[ends[cell]] = triangle
+    ends[cell] += 1
 
 
 @kernel

@@ -175,7 +175,7 @@ def locate_by_cells(points: Any, cells: Any, locations: Any, flag: Any) -> int:
         if n_kept < _FEWEST and end < len(points):
             continue
         n_waiting = _enter(points, cells, kept_points, n_kept)
-        for level in range(1, LEVELS):
+        for level in range(1, cells.n_levels):
             n_waiting = _descend(cells, kept_points, n_waiting, level, locations)
         ask_leaves(points, cells, kept_points, n_waiting, locations)
         n_open += _count_open(locations, item_of, n_kept)

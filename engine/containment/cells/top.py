@@ -28,6 +28,10 @@ _WANTED: Final = 4.0
 _MOST_CELLS: Final = 64.0
 _MOST_OF_ALL: Final = 96.0
 """Where finer levels follow: more than fit the cache cost uniform points more than they save."""
+_FEWEST_CELLS: Final = 12
+_MOST_ENTRIES: Final = 12.0
+"""Cells that list a triangle, in the mean, from which level 0 is made coarser, to so many along an axis at least."""
+_SAMPLE: Final = 1024
 _RANGE: Final = 2.0**400
 """Largest extent, and 1 / smallest, of a solid that gets cells: products of three stay far from its ends."""
 _AT_ONCE: Final = 4096
@@ -102,9 +106,23 @@ def make_lattice(tree: TriangleTree, wanted: float, most: float) -> Lattice:
     )
 
 
-def lattice_of(tree: TriangleTree) -> Lattice:
-    """Return level 0 of all levels: finer than that of scenes, as far as it fits the cache."""
-    return make_lattice(tree, _WANTED, _MOST_OF_ALL)
+def lattice_of(tree: TriangleTree, budget: Budget) -> tuple[Lattice, float]:
+    """Return level 0 of all levels, and how long its lists are in all, as a sample of the triangles says.
+
+    It is finer than that of scenes, as far as it fits the cache, but that long needles and large faces are not listed
+    in more than some cells each.
+    """
+    some = tree.triangles[:: len(tree.triangles) // _SAMPLE + 1].copy()
+    most = _MOST_OF_ALL
+    while True:
+        lattice = make_lattice(tree, _WANTED, most)
+        counts = np.zeros(lattice.n[0] * lattice.n[1] * lattice.n[2], np.int64)
+        list_top(Mesh(tree.vertices, some, lattice), counts, np.empty(0, np.int32), False, budget.flag)
+        budget.check()
+        entries = float(counts.sum()) / len(some)
+        if entries <= _MOST_ENTRIES or max(lattice.n) <= _FEWEST_CELLS:
+            return lattice, entries * len(tree.triangles)
+        most = min(most, max(lattice.n)) / 2.0
 
 
 def _power_of_two(value: float) -> float:

@@ -18,8 +18,10 @@ from __future__ import annotations
 
 from typing import Any, Final, NamedTuple
 
+import numpy as np
+
 from engine.arrangement.union_find import root_of, unite
-from engine.jit import inline
+from engine.jit import inline, merged
 from engine.polygon_overlay.compiled.chain_faces import NOTHING, Faces, edge_above, half_below, test_edge
 from engine.polygon_overlay.compiled.chains import Chains, Stars
 from engine.polygon_overlay.compiled.crossing_signs import Edges
@@ -34,12 +36,14 @@ from engine.polygon_overlay.compiled.edge_tree import (
     box_holds,
     build_tree,
     leaves_of,
-    push_children,
 )
 from engine.polygon_overlay.compiled.loading import Given
+from engine.predicates.error_free import workspace
 
 _SMALL: Final = 32
 """Edges of a component up to which each is looked at."""
+_TOGETHER: Final = 16
+"""Components, neighbours in the plane, for which those that hold them are looked for at once."""
 TOO_MANY: Final = -2
 _HOLDS: Final = 1
 _IS_OPEN: Final = 2
@@ -111,32 +115,56 @@ def _test_component(edges: Edges, marks: Any, components: Components, v: int, k:
     return nearest
 
 
+@merged
+def _may_hold(boxes: Any, i: int, low: Any, high: Any) -> bool:
+    """Tell whether a box reaches beyond the innermost of some boxes' sides, as one that holds any of them does."""
+    return (boxes[i, 0] <= low[0]) & (boxes[i, 1] >= high[0]) & (boxes[i, 2] <= low[1]) & (boxes[i, 3] >= high[1])
+
+
 @inline
-def _look_in_boxes(edges: Edges, components: Components, k: int, n: int, tree: BoxTree) -> int:
-    """Return the edge next above component k, or NOTHING, if those whose boxes hold its own are small; else its state
-    is open."""
-    stack, n_leaves, boxes = tree.stack, leaves_of(n), tree.boxes
-    nearest, v = NOTHING, components.highest[components.ring[k]]
+def _look_in_boxes(edges: Edges, components: Components, begin: int, n: int, tree: BoxTree, above: Any) -> None:
+    """Set ``above`` to the edges next above the components at places ``begin`` to begin + 15, or NOTHING, if those
+    whose boxes hold theirs are small; else their states are open."""
+    stack, n_leaves, boxes, places = tree.stack, leaves_of(n), tree.boxes, tree.places
+    size, low, high = min(_TOGETHER, n - begin), workspace(2), workspace(2)
+    low[0] = low[1] = -np.inf
+    high[0] = high[1] = np.inf
+    for j in range(size):
+        k, above[j] = places[begin + j], NOTHING
+        low[0], high[0] = max(low[0], boxes[k, 0]), min(high[0], boxes[k, 1])
+        low[1], high[1] = max(low[1], boxes[k, 2]), min(high[1], boxes[k, 3])
     stack[0, 0], depth = 1, 1
     while depth > 0:  # bound: each node enters the stack once
         depth -= 1
         node = stack[depth, 0]
-        if not box_holds(tree.nodes, node, boxes, k):
+        if not _may_hold(tree.nodes, node, low, high):
             continue
         if node < n_leaves:
-            depth = push_children(tree, node, depth)
+            stack[depth, 0], stack[depth + 1, 0] = 2 * node + 1, 2 * node
+            depth += 2
             continue
         first = LEAF * (node - n_leaves)
         for place in range(first, min(first + LEAF, n)):
-            other = tree.places[place]
-            if other != k and box_holds(boxes, other, boxes, k):
-                components.state[other] |= _HOLDS
-                found = _test_component(edges, tree.marks, components, v, other, nearest)
-                if found == TOO_MANY:
-                    components.state[k] |= _IS_OPEN
-                else:
-                    nearest = found
-    return nearest
+            other = places[place]
+            if _may_hold(boxes, other, low, high):
+                _look_at(edges, components, other, begin, size, tree, above)
+
+
+@merged
+def _look_at(
+    edges: Edges, components: Components, other: int, begin: int, size: int, tree: BoxTree, above: Any
+) -> None:
+    """Look at one component for those at ``size`` places."""
+    for j in range(size):
+        k = tree.places[begin + j]
+        if other != k and box_holds(tree.boxes, other, tree.boxes, k):
+            components.state[other] |= _HOLDS
+            v, nearest = components.highest[components.ring[k]], int(above[j])
+            found = _test_component(edges, tree.marks, components, v, other, nearest)
+            if found == TOO_MANY:
+                components.state[k] |= _IS_OPEN
+            else:
+                above[j] = found
 
 
 @inline
@@ -183,19 +211,21 @@ def join_faces(
             boxes[k, 0], boxes[k, 1], boxes[k, 2], boxes[k, 3] = -endless, endless, -endless, endless
     if n_components > 1:
         build_tree(tree, n_components, stop)
-    n_open = 0
+    else:
+        tree.places[0] = 0
+    n_open, above = 0, workspace(_TOGETHER)
     for place in range(n_components):
-        if stop[0]:
-            return
-        k, above = 0, NOTHING
-        if n_components > 1:
-            k = tree.places[place]  # order: neighbours in the plane look at the same nodes
-            above = _look_in_boxes(edges, components, k, n_components, tree)
-            if components.state[k] & _IS_OPEN:
-                n_open += 1
-                continue
+        j = place % _TOGETHER
+        if j == 0:  # order: neighbours in the plane look at the same nodes
+            if stop[0]:
+                return
+            _look_in_boxes(edges, components, place, n_components, tree, above)
+        k = tree.places[place]
+        if components.state[k] & _IS_OPEN:
+            n_open += 1
+            continue
         top = components.highest[components.ring[k]]
-        _join_one(given, events, along, unions, chains, stars, faces, top, above, n_cycles)
+        _join_one(given, events, along, unions, chains, stars, faces, top, int(above[j]), n_cycles)
     if n_open == 0:
         return
     m = _gather_edges(edges, components, n_components, tree, names)

@@ -127,8 +127,11 @@ def _spread(bits: int) -> int:
 
 
 @allocating
-def _order_boxes(boxes: Any, n: int, places: Any, stop: Any) -> bool:
-    """Fill ``places`` with the boxes in the order in which the leaves take them; tell whether it is another order."""
+def order_boxes(boxes: Any, n: int, places: Any, stop: Any) -> bool:
+    """Fill ``places`` with the boxes in the order in which the leaves take them; tell whether it is another order.
+
+    Only the lower left corners are looked at.
+    """
     x_min = y_min = float("inf")
     x_max = y_max = float("-inf")
     way, x_last, y_last = 0.0, boxes[0, 0], boxes[0, 2]
@@ -148,25 +151,31 @@ def _order_boxes(boxes: Any, n: int, places: Any, stop: Any) -> bool:
     for k in range(n):
         x, y = boxes[k, 0] - x_min, boxes[k, 2] - y_min
         keys[k] = _spread(min(int(x * by_x), 65535)) | (_spread(min(int(y * by_y), 65535)) << 1)
+    sort_by_keys(keys, places, n, stop)
+    return True
+
+
+@allocating
+def sort_by_keys(keys: Any, places: Any, n: int, stop: Any) -> None:
+    """Sort keys, below 2^33, and places with them."""
     spare_keys, spare, counts = np.empty(n, np.int64), np.empty(n, np.int64), np.empty(_DIGITS + 1, np.int64)
     for shift in (0, 11, 22):  # the last digit first: each pass keeps the order of those before it
         counts[:] = 0
         for k in range(n):
             if k & POLL == 0 and stop[0]:
-                return True
+                return
             counts[((keys[k] >> shift) & (_DIGITS - 1)) + 1] += 1
         for digit in range(_DIGITS):
             counts[digit + 1] += counts[digit]
         for k in range(n):
             if k & POLL == 0 and stop[0]:
-                return True
+                return
             digit = (keys[k] >> shift) & (_DIGITS - 1)
             at = counts[digit]
             spare_keys[at], spare[at] = keys[k], places[k]
             counts[digit] = at + 1
         for k in range(n):
             keys[k], places[k] = spare_keys[k], spare[k]
-    return True
 
 
 @inline
@@ -174,7 +183,7 @@ def build_tree(tree: BoxTree, n: int, stop: Any) -> None:
     """Fill the nodes, their marks and the places of the first n boxes; empty nodes are inverted."""
     boxes, nodes, node_marks, places = tree.boxes, tree.nodes, tree.node_marks, tree.places
     n_leaves = leaves_of(n)
-    added = ANYWHERE if _order_boxes(boxes, n, places, stop) else 0
+    added = ANYWHERE if order_boxes(boxes, n, places, stop) else 0
     for leaf in range(n_leaves):
         if leaf & POLL == 0 and stop[0]:
             return

@@ -142,12 +142,12 @@ def _load_pair(
     first, second = subjects.offsets[span.first], clips.offsets[span.second]
     n_subject = subjects.offsets[span.first_end] - first
     n, n_rings, safe = load_rings(
-        subjects.vertices, subjects.offsets, span.first, span.first_end, 1, is_named, -first,
-        EVERYTHING if kept[1] else common, w.given, 0, 0, stop,
+        subjects, span.first, span.first_end, 1, is_named, -first, EVERYTHING if kept[1] else common, w.given, w.tree,
+        0, 0, stop,
     )  # fmt: skip
     n, n_rings, also_safe = load_rings(
-        clips.vertices, clips.offsets, span.second, span.second_end, 2, False, n_subject - second,
-        EVERYTHING if kept[2] else common, w.given, n, n_rings, stop,
+        clips, span.second, span.second_end, 2, False, n_subject - second, EVERYTHING if kept[2] else common, w.given,
+        w.tree, n, n_rings, stop,
     )  # fmt: skip
     return n, n_rings, safe and also_safe
 
@@ -346,7 +346,7 @@ def overlay_pairs(
         if moved_by == LOST:
             continue
         n_found, m = arranged.n_found, arranged.n_points
-        n_pieces = rank_rings(w.found, n_found, w.rounded, w.ranking, is_valid, w.faces.joined, w.tree.boxes, stop)
+        n_pieces = rank_rings(w.found, n_found, w.rounded, w.ranking, is_valid, w.faces.joined, w.tree, stop)
         if stop[0]:
             break
         if n_pieces < 0:

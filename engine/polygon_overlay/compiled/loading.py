@@ -13,7 +13,7 @@ import numpy as np
 from engine.arrays import FloatArray, IntArray
 from engine.jit import inline
 from engine.polygon_overlay.compiled.crossing_signs import Edges
-from engine.polygon_overlay.compiled.edge_tree import ANYWHERE, BENT, DOUBTFUL, POLL, RUN, BoxTree, heading
+from engine.polygon_overlay.compiled.edge_tree import ANYWHERE, BENT, DOUBTFUL, POLL, RUN, BoxTree, heading, order_boxes
 from engine.predicates.expansion import SMALLEST
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
 
@@ -22,6 +22,7 @@ Box = tuple[float, float, float, float]
 EVERYTHING: Final = (-np.inf, np.inf, -np.inf, np.inf)
 
 
+_MANY_RINGS: Final = 256
 LEFT_OUT: Final = -2
 """Second source of a vertex after which those up to the next one are left out."""
 
@@ -74,19 +75,30 @@ def end_ring(given: Given, start: int, n: int, n_rings: int, mask: int) -> tuple
 
 @inline
 def load_rings(
-    vertices: Any, offsets: Any, first_ring: int, last_ring: int, mask: int, is_named: bool, base: int,
-    box: Box, given: Given, n: int, n_rings: int, stop: Any,
+    rings: RingArrays, first_ring: int, last_ring: int, mask: int, is_named: bool, base: int, box: Box, given: Given,
+    tree: BoxTree, n: int, n_rings: int, stop: Any,
 ) -> tuple[int, int, bool]:  # fmt: skip
     """Append rings without repeated points; return the numbers of vertices and rings, and whether none is too small.
 
     is_named: the mask of each ring is its number instead, from ``first_ring`` on. base: what is added to the number of
     a vertex in ``origins``. box: of vertices beyond one of its sides, one after another, the first and the last count.
+    tree: scratch. Many rings that are not named are taken in the order of a space-filling curve: whatever looks at
+    neighbours then finds them in the cache.
     """
+    vertices, offsets, order = rings.vertices, rings.offsets, tree.places
+    if is_named or last_ring - first_ring < _MANY_RINGS:
+        for k in range(last_ring - first_ring):
+            order[k] = k
+    else:
+        for k in range(last_ring - first_ring):
+            first = offsets[first_ring + k]
+            tree.boxes[k, 0], tree.boxes[k, 2] = vertices[first, 0], vertices[first, 1]
+        order_boxes(tree.boxes, last_ring - first_ring, order, stop)
     x_min, x_max, y_min, y_max = box
     x, y, origins = given.edges.x, given.edges.y, given.origins
     safe = True
-    for ring in range(first_ring, last_ring):
-        start = n
+    for place in range(last_ring - first_ring):
+        start, ring = n, first_ring + order[place]
         qx = qy = np.nan  # the last vertex
         sides = sides_before = 0  # of the last vertex and of the one before it: which sides of the box it is beyond
         for k in range(offsets[ring], offsets[ring + 1]):

@@ -5,16 +5,20 @@ The first vertex of a ring is its leftmost, then lowest; rings are compared vert
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from engine.jit import inline
 from engine.polygon_overlay.compiled.chain_rings import Rings
-from engine.polygon_overlay.compiled.edge_tree import OFTEN, POLL, box_holds
+from engine.polygon_overlay.compiled.edge_tree import OFTEN, POLL, BoxTree, box_holds, sort_by_keys
 from engine.polygon_overlay.compiled.rounded_crossings import Rounded
 from engine.predicates.orientation import orient2d
 from engine.types import Point2
+
+_MANY: Final = 256
+_STRIPS: Final = (1 << 22) - 1
+_ROWS: Final = (1 << 11) - 1
 
 
 class Ranking(NamedTuple):
@@ -50,12 +54,19 @@ def _is_before(rings: Rings, ranking: Ranking, rounded: Rounded, i: int, j: int)
 
 @inline
 def _sort(rings: Rings, ranking: Ranking, rounded: Rounded, n: int, is_by_piece: bool, stop: Any) -> None:
-    """Sort the first n entries of ``ranking.order``: merging runs of doubling length. is_by_piece: pieces differ."""
+    """Sort the first n entries of ``ranking.order``: merging runs of doubling length that are not in order.
+
+    is_by_piece: pieces differ.
+    """
     order, spare, first_x = ranking.order, ranking.spare, ranking.x
     width = 1
     while width < n:  # bound: log n turns
-        for low in range(0, n, 2 * width):
-            middle, high = min(low + width, n), min(low + 2 * width, n)
+        for low in range(0, n - width, 2 * width):
+            middle, high = low + width, min(low + 2 * width, n)
+            if low & POLL == 0 and stop[0]:
+                return
+            if not _is_before(rings, ranking, rounded, order[middle], order[middle - 1]):
+                continue
             i, j = low, middle
             for k in range(low, high):
                 if k & POLL == 0 and stop[0]:
@@ -70,9 +81,29 @@ def _sort(rings: Rings, ranking: Ranking, rounded: Rounded, n: int, is_by_piece:
                 spare[k] = q if takes_second else p
                 i += not takes_second
                 j += takes_second
-        for k in range(n):
-            order[k] = spare[k]
+            for k in range(low, high):
+                order[k] = spare[k]
         width *= 2
+
+
+@inline
+def _sort_nearly(ranking: Ranking, rounded: Rounded, n: int, keys: Any, stop: Any) -> None:
+    """Put the first n entries of ``ranking.order`` into the order of their first vertices, but for those that lie
+    near each other in x, and then in y. keys: scratch."""
+    order, x, y = ranking.order, ranking.x, rounded.y
+    x_min = y_min = np.inf
+    x_max = y_max = -np.inf
+    for k in range(n):
+        ring = order[k]
+        x_min, x_max = min(x_min, x[ring]), max(x_max, x[ring])
+        y_min, y_max = min(y_min, y[ranking.start[ring]]), max(y_max, y[ranking.start[ring]])
+    by_x = _STRIPS / (x_max - x_min) if x_max > x_min else 0.0
+    by_y = _ROWS / (y_max - y_min) if y_max > y_min else 0.0
+    for k in range(n):
+        ring = order[k]
+        column, row = int((x[ring] - x_min) * by_x), int((y[ranking.start[ring]] - y_min) * by_y)
+        keys[k] = min(column, _STRIPS) << 11 | min(row, _ROWS)
+    sort_by_keys(keys, order, n, stop)
 
 
 @inline
@@ -104,13 +135,20 @@ def find_shells(rings: Rings, n_rings: int, rounded: Rounded, ranking: Ranking, 
 
 @inline
 def rank_rings(
-    rings: Rings, n_rings: int, rounded: Rounded, ranking: Ranking, is_valid: bool, piece_of: Any, boxes: Any, stop: Any
+    rings: Rings,
+    n_rings: int,
+    rounded: Rounded,
+    ranking: Ranking,
+    is_valid: bool,
+    piece_of: Any,
+    tree: BoxTree,
+    stop: Any,
 ) -> int:
     """Fill ``ranking``; return the number of pieces, -1 if a region has not exactly one shell, or none that is sure.
 
-    is_valid: whether rounding left the rings what they were. piece_of: scratch by region; boxes: by ring.
+    is_valid: whether rounding left the rings what they were. piece_of: scratch by region; tree: scratch.
     """
-    if not is_valid and not find_shells(rings, n_rings, rounded, ranking, piece_of, boxes):
+    if not is_valid and not find_shells(rings, n_rings, rounded, ranking, piece_of, tree.boxes):
         return -1
     n_pieces = 0
     for ring in range(n_rings):
@@ -126,6 +164,8 @@ def rank_rings(
             n_pieces += 1
     if n_rings == 1:
         return n_pieces if n_pieces == 1 else -1
+    if n_pieces > _MANY:
+        _sort_nearly(ranking, rounded, n_pieces, tree.lows, stop)
     _sort(rings, ranking, rounded, n_pieces, False, stop)
     if stop[0]:
         return -1

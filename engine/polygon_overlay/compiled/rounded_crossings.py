@@ -69,6 +69,10 @@ def round_crossing(edges: Edges, e: int, f: int) -> tuple[float, float, float, f
     it in rationals).
     """
     a, b, fb = e, edges.after[e], edges.after[f]
+    x, knows_x = _common(edges.x[a], edges.x[b], edges.x[f], edges.x[fb])
+    y, knows_y = _common(edges.y[a], edges.y[b], edges.y[f], edges.y[fb])
+    if knows_x and knows_y:
+        return x, y, 0.0, 0.0
     ah, al, ae = weight(edges, f, fb, a)
     bh, bl, be = weight(edges, f, fb, b)
     ah, al = _abs2(ah, al)
@@ -79,9 +83,18 @@ def round_crossing(edges: Edges, e: int, f: int) -> tuple[float, float, float, f
     relative = 2.5 * max(ae / ah, be / bh)
     sum_h, sum_l = dd_add(ah, al, bh, bl)
     cut = _Cut(e, f, ah, al, bh, bl, sum_h, sum_l, relative)
-    x, x_error = _coordinate(edges, cut, 0, edges.x[a], edges.x[b])
-    y, y_error = _coordinate(edges, cut, 1, edges.y[a], edges.y[b])
+    x_error = y_error = 0.0
+    if not knows_x:
+        x, x_error = _coordinate(edges, cut, 0, edges.x[a], edges.x[b])
+    if not knows_y:
+        y, y_error = _coordinate(edges, cut, 1, edges.y[a], edges.y[b])
     return x, y, x_error, y_error
+
+
+@merged
+def _common(p: float, q: float, r: float, s: float) -> tuple[float, bool]:
+    """Return the coordinate that all of an edge from p to q, or of one from r to s, has; and whether one has one."""
+    return (p if p == q else r), (p == q) | (r == s)
 
 
 @called
@@ -107,8 +120,6 @@ def leading(e: Any, n: int) -> tuple[float, float]:
 @merged
 def _coordinate(edges: Edges, cut: _Cut, axis: int, p: float, q: float) -> tuple[float, float]:
     """Return the double nearest to one coordinate, and a bound of its error; p and q are those of the ends of e."""
-    if p == q:
-        return p, 0.0
     rh, rl = dd_scale(cut.bh, cut.bl, p)
     sh, sl = dd_scale(cut.ah, cut.al, q)
     nh, nl = dd_add(rh, rl, sh, sl)

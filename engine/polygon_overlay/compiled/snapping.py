@@ -32,7 +32,7 @@ from engine.polygon_overlay.compiled.edge_tree import (
     build_tree,
     next_pairs,
 )
-from engine.polygon_overlay.compiled.loading import EVERYTHING, fill_boxes, load_rings
+from engine.polygon_overlay.compiled.loading import EVERYTHING, RingArrays, fill_boxes, load_rings
 from engine.polygon_overlay.compiled.workspace import Buffers, rows_of
 from engine.predicates.orientation import orient2d
 from engine.types import Point2
@@ -96,7 +96,8 @@ def find_passages(
     """
     w = rows_of(buffers)
     edges, tree = w.given.edges, w.tree
-    n, _, _ = load_rings(vertices, offsets, 0, offsets.shape[0] - 1, 0, False, 0, EVERYTHING, w.given, 0, 0, stop)
+    rings, n_rings = RingArrays(vertices, offsets), offsets.shape[0] - 1
+    n, _, _ = load_rings(rings, 0, n_rings, 0, True, 0, EVERYTHING, w.given, tree, 0, 0, stop)
     fill_boxes(edges, n, 0.5, tree, stop)
     stays = _is_simple(edges, n, stop)
     x, y, after = edges.x, edges.y, edges.after

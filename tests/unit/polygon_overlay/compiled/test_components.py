@@ -74,3 +74,26 @@ def test_the_order_of_rings_does_not_matter(name: str) -> None:
         assert found.vertices.tolist() == expected.vertices.tolist()
         assert found.ring_offsets.tolist() == expected.ring_offsets.tolist()
         assert found.piece_offsets.tolist() == expected.piece_offsets.tolist()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_many_rings_in_any_order(seed: int) -> None:
+    """Cells of a raster tell what squares over it leave, whatever their order: so many are sorted when loaded."""
+    random = np.random.default_rng(seed)
+
+    def scattered(n: int) -> tuple[list[np.ndarray], np.ndarray]:
+        rings, covered = [], np.zeros((40, 40), np.bool_)
+        for x, y in random.integers(0, 38, (n, 2)).tolist():
+            w, h = np.minimum(random.integers(1, 20 if random.random() < 0.05 else 3, 2), (40 - x, 40 - y)).tolist()
+            rings.append(np.array([[x, y], [x + w, y], [x + w, y + h], [x, y + h]], np.float64))
+            covered[x : x + w, y : y + h] ^= True
+        return rings, covered
+
+    (first, in_first), (second, in_second) = scattered(700), scattered(300)
+    expected = in_first & in_second, in_first | in_second, in_first & ~in_second, in_first ^ in_second
+    for operation, kept in zip(OPERATIONS, expected, strict=True):
+        found = overlay(Polygon(first), Polygon(second), operation)
+        again = overlay(Polygon([first[k] for k in random.permutation(len(first))]), Polygon(second[::-1]), operation)
+        for name in ("vertices", "ring_offsets", "piece_offsets", "sources"):
+            assert np.array_equal(getattr(found, name), getattr(again, name))
+        assert found.area_exact == kept.sum()
