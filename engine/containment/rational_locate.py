@@ -237,12 +237,12 @@ def to_body_frame(point: Sequence[Number], pose: Pose) -> list[Fraction]:
     """Return R^-1 (point - t), the exact preimage of `point` under `pose`."""
     numbers, common = common_integers((*point, *pose.translation.tolist()))
     moved = [value - shift for value, shift in zip(numbers, numbers[len(point) :])]
-    rows, below = _exact_inverse(pose)
+    rows, below = exact_inverse(pose)
     return [Fraction(sum(a * x for a, x in zip(row, moved)), below * common) for row in rows]
 
 
 @functools.lru_cache(maxsize=64)
-def _exact_inverse(pose: Pose) -> tuple[list[list[int]], int]:
+def exact_inverse(pose: Pose) -> tuple[list[list[int]], int]:
     """Return R^-1 as integers over one denominator."""
     entries, common = common_integers(pose.rotation.ravel().tolist())
     dimension = len(pose.rotation)

@@ -42,11 +42,27 @@ def near_bodies(segments: Any, item: int, bodies: Any, stack: Any, found: Any) -
             elif below != EMPTY:
                 found[n_found] = bodies.bounded[-1 - below]
                 n_found += 1
+    for place in range(bodies.listed.size):
+        found[n_found] = body = bodies.listed[place]
+        meet = True
+        for k in range(segments.shape[2]):
+            p, q = segments[item, 0, k], segments[item, 1, k]
+            meet &= (min(p, q) <= bodies.boxes[body, 1, k]) & (max(p, q) >= bodies.boxes[body, 0, k])
+        n_found += meet
     return n_found
 
 
 @inline
-def _bodies_in(items: Any, item: int, bodies: Any, stack: Any, found: Any) -> int:
+def _is_met(items: Any, item: int, bodies: Any, body: int) -> bool:
+    """Tell whether a box meets that of a body."""
+    meet = True
+    for k in range(items.shape[2]):
+        meet &= (items[item, 0, k] <= bodies.boxes[body, 1, k]) & (items[item, 1, k] >= bodies.boxes[body, 0, k])
+    return meet
+
+
+@inline
+def bodies_in(items: Any, item: int, bodies: Any, stack: Any, found: Any) -> int:
     """Fill `found` with the bodies of a `BodyTree` whose boxes a box meets, which may be infinite; return how many."""
     tree, inverse = bodies.tree, bodies.inverse
     is_flat, n_found, depth, stack[0] = items.shape[2] == 2, 0, 1, 0
@@ -73,13 +89,11 @@ def _bodies_in(items: Any, item: int, bodies: Any, stack: Any, found: Any) -> in
                 stack[depth] = below
                 depth += 1
             elif below != EMPTY:
-                body, meet = bodies.bounded[-1 - below], True
-                for k in range(items.shape[2]):
-                    meet &= (items[item, 0, k] <= bodies.boxes[body, 1, k]) & (
-                        items[item, 1, k] >= bodies.boxes[body, 0, k]
-                    )
-                found[n_found] = body
-                n_found += meet
+                found[n_found] = bodies.bounded[-1 - below]
+                n_found += _is_met(items, item, bodies, found[n_found])
+    for place in range(bodies.listed.size):
+        found[n_found] = bodies.listed[place]
+        n_found += _is_met(items, item, bodies, found[n_found])
     return n_found
 
 
@@ -87,12 +101,13 @@ def _bodies_in(items: Any, item: int, bodies: Any, stack: Any, found: Any) -> in
 def list_near(items: Any, start: int, are_boxes: bool, bodies: Any, pairs: Any, flag: Any) -> tuple[int, int]:
     """List in pairs (2, room) the items (n, 2, dim) from `start` on, segments or boxes, and the bodies that they may
     meet; return the item reached, and how many pairs there are. An item whose bodies find no room is not begun."""
-    stack, found, n_pairs = np.empty(STACK, np.int32), np.empty(bodies.bounded.size, np.int64), 0
+    n_bodies = bodies.bounded.size + bodies.listed.size
+    stack, found, n_pairs = np.empty(STACK, np.int32), np.empty(n_bodies + 1, np.int64), 0
     for item in range(start, items.shape[0]):
         if flag[0]:
             return item, n_pairs
         if are_boxes:
-            n_found = _bodies_in(items, item, bodies, stack, found)
+            n_found = bodies_in(items, item, bodies, stack, found)
         else:
             n_found = near_bodies(items, item, bodies, stack, found)
         if n_pairs + n_found > pairs.shape[1]:

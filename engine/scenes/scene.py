@@ -10,6 +10,7 @@ import numpy as np
 
 from engine.arrays import BoolArray, FloatArray
 from engine.collision.clearance.clearance import checked_distance
+from engine.collision.codes import TOUCHING, UNSETTLED
 from engine.collision.collide import check_pose
 from engine.collision.scenes.collide_scene import Asked, ScenePairs, collide_bodies, pair_keys
 from engine.containment.scene.locate_scene import SceneLocations, check_bodies, locate_in
@@ -27,8 +28,6 @@ from engine.types import Accuracy
 
 _BYTES_OF_POSE: Final = 1000
 Keep = Literal["all", "first", "any"]
-_OUTWARD: Final = np.array([[-1.001], [1.001]])
-"""Further than a pose may stretch lengths (posed_boxes.py)."""
 _FEW: Final = 4
 """Points of a question that are asked body by body."""
 _MANY: Final = 1000
@@ -90,7 +89,7 @@ class Scene(Immutable):
         no bounds. None where there are no bodies."""
         if not len(self):
             return None
-        boxes = self._standing.boxes(np.arange(len(self)), Budget())
+        boxes = self._standing.boxes(Budget())
         return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
 
     @property
@@ -133,17 +132,18 @@ class Scene(Immutable):
         array = as_points(points, self.solids[0].dimension if len(self) else None)
         with Budget(deadline, cancel) as budget:
             standing = self._standing
-            tables = [layer.bodies.tables(array.shape[1], budget) for layer in standing.layers]
+            tables = standing.base.tables(array.shape[1], budget)
             if 0 < len(array) <= _FEW and len(self):
-                found, accuracy = standing.located(array, tables, budget)
+                found, accuracy = standing.located(array, budget)
                 if progress is not None:
                     progress(len(array))
             else:
-                found, accuracy = locate_in(array, tables[0], budget, workers, progress)
+                found, accuracy = locate_in(array, tables, budget, workers, progress)
                 if len(array) >= _MANY:
                     standing.base.prepared("asked_often", lambda: True)
                 if standing.few is not None:
-                    more, besides = locate_in(array, tables[1], budget, workers, None)
+                    tables = standing.few.tables(array.shape[1], budget)
+                    more, besides = locate_in(array, tables, budget, workers, None)
                     found, accuracy = standing.merged(found, more), _both(accuracy, besides)
         return (found, accuracy) if report else found
 
@@ -182,31 +182,29 @@ class Scene(Immutable):
     def _collide_some(
         self, named: list[int], asked: Asked, budget: Budget, workers: int | None, progress: Progress | None
     ) -> tuple[ScenePairs, Accuracy]:
-        """Return the pairs with a body named: those whose boxes meet are put into a scene of their own."""
-        standing = self._standing
-        standing.base.check_collidable(budget)
-        n, items = len(self), np.array(named, np.int64)
-        boxes, reach = standing.boxes(items, budget), 0.0 if asked.gap is None else checked_distance(asked.gap, "gap")
-        if reach > 0.0:
-            with np.errstate(over="ignore"):
-                boxes = np.nextafter(boxes + reach * _OUTWARD, np.inf * _OUTWARD)
-        owners, partners = standing.near(boxes, budget, workers)
-        pairs = np.sort(np.stack([items[owners], partners], axis=1), axis=1)
-        keys = np.unique(pairs[:, 0] * n + pairs[:, 1])
-        keys = keys[keys // n != keys % n]
+        """Return the pairs with a body named: convex bodies at once, else a scene of their own."""
+        standing, n = self._standing, len(self)
+        reach = 0.0 if asked.gap is None else checked_distance(asked.gap, "gap")
+        keys, relations = standing.pairs_with(np.array(named, np.int64), reach, bool(asked.boolean), budget)
+        is_plain = not (asked.witnesses or asked.detail) and asked.gap is asked.only is asked.skip is None
+        if is_plain and not (relations == UNSETTLED).any():
+            met = np.flatnonzero(relations)
+            order = met[np.argsort(keys[met])]
+            first, second = np.divmod(keys[order], n)
+            relations = np.full(len(met), TOUCHING, np.int8) if asked.boolean else relations[order]
+            return ScenePairs(first, second, relations), Accuracy("exact", None, len(keys), 0, 0, "named pairs")
+        keys.sort()
         if asked.only is not None:
             keys = keys[np.isin(keys, pair_keys(asked.only, n, "only"))]
         if asked.skip is not None:
             keys = keys[~np.isin(keys, pair_keys(asked.skip, n, "skip"))]
         pairs = np.stack(np.divmod(keys, n), axis=1)
         bodies, local = np.unique(pairs, return_inverse=True)
-        names, solids = bodies.tolist(), self.solids
-        some = Bodies(tuple(solids[body] for body in names), tuple(standing.pose(body) for body in names))
-        asked = asked._replace(skip=None, only=local.reshape(-1, 2))
+        some = standing.base.batches(budget).under(bodies, [standing.pose(body) for body in bodies.tolist()])
         try:
-            found, accuracy = collide_bodies(some.batches(budget), asked, budget, workers, progress)
+            found, accuracy = collide_bodies(some, asked, budget, workers, progress, local.reshape(-1, 2))
         except EngineError as error:
-            raise _renamed(error, names) from None
+            raise _renamed(error, bodies.tolist()) from None
         return replace(found, first=bodies[found.first], second=bodies[found.second]), accuracy
 
     @overload

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray, IntArray, read_only
+from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray
+from engine.collision.scenes.bodies import SceneBodies
 from engine.containment.scene.locate_scene import SceneLocations
-from engine.containment.scene.tables import Scene as Tables
+from engine.direct import entry_of
 from engine.parallel import Budget
 from engine.scenes.bodies import Bodies
 from engine.scenes.broad_phase import candidates
+from engine.scenes.moved_pairs import PairRows, Placed, list_pairs
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
 from engine.types import Accuracy
@@ -33,6 +35,10 @@ class Layer(NamedTuple):
     """(n,) of each whether it moved since, or (0,) where none did."""
 
 
+def _where(bodies: SceneBodies) -> Placed:
+    return Placed(bodies.kinds, bodies.rotations, bodies.translations)
+
+
 class Standing:
     """Bodies, and those that moved since: safe to share between threads, as `Bodies` are."""
 
@@ -47,7 +53,8 @@ class Standing:
         self._whole: Bodies | None = base
         self.layers = [Layer(base, None, _NONE)]
         if moved:
-            self.few = Bodies(tuple(base.solids[body] for body in self.places), tuple(moved[b] for b in self.places))
+            solids, poses = zip(*((base.solids[body], moved[body]) for body in self.places))
+            self.few = Bodies(solids, poses, base, self.names)
             self._whole = None
             is_away = np.zeros(len(base.solids), np.bool_)
             is_away[self.names] = True
@@ -93,35 +100,66 @@ class Standing:
         place = self.places.get(body)
         return self.base.placed(body) if place is None or self.few is None else self.few.placed(place)
 
-    def boxes(self, bodies: IntArray, budget: Budget) -> FloatArray:
-        """Return the boxes of bodies, one or more times each, where they are."""
-        boxes = self.base.tree(budget).boxes[bodies]
+    def boxes(self, budget: Budget) -> FloatArray:
+        """Return the boxes of all bodies where they are."""
+        boxes = self.base.tree(budget).boxes
         if self.few is not None:
-            places = np.minimum(np.searchsorted(self.names, bodies), len(self.names) - 1)
-            are_moved = self.names[places] == bodies
-            boxes[are_moved] = self.few.tree(budget).boxes[places[are_moved]]
+            boxes = boxes.copy()
+            boxes[self.names] = self.few.tree(budget).boxes
         return boxes
 
-    def near(self, boxes: FloatArray, budget: Budget, workers: int | None) -> tuple[IntArray, IntArray]:
-        """Return pairs of one of some boxes and a body that it may meet."""
-        found = []
-        for layer in self.layers:
-            owners, bodies = candidates(layer.bodies.tree(budget), boxes, True, budget, workers)
-            stays = slice(None) if not len(layer.is_away) else ~layer.is_away[bodies]
-            found.append((owners[stays], bodies[stays] if layer.names is None else layer.names[bodies]))
-        owners, bodies = (np.concatenate(each) for each in zip(*found))
-        return owners, bodies
+    def pairs_with(self, named: IntArray, reach: float, boolean: bool, budget: Budget) -> tuple[IntArray, Int8Array]:
+        """Return the pairs of a body named and another whose boxes, grown by `reach`, meet, by first * n + second and
+        in no order, and how the batch of convex bodies relates them, UNSETTLED where it does not.
 
-    def located(self, points: FloatArray, tables: Sequence[Tables], budget: Budget) -> tuple[SceneLocations, Accuracy]:
-        """Return where a few points lie, body by body: for many `locate_in` is faster. tables: those of the layers."""
+        Raises: as `collide_scene` where it does not take a body.
+        """
+        batches, tree, room = self.base.batches(budget), self.base.tree(budget), 16 + 16 * len(named)
+        bodies, few = batches.bodies, self.base if self.few is None else self.few
+        still, moved = (_where(each.arrays(budget)) for each in (self.base, few))
+        while True:  # bound: the second turn has room
+            d, n_rows = bodies.dimension, 2 * room + 1
+            arrays = np.empty((n_rows, d, d)), np.empty((n_rows, d))
+            rows = PairRows(np.empty(room, np.int64), np.empty(n_rows, np.int64), *arrays)
+            n = int(
+                entry_of(list_pairs)(
+                    named,
+                    reach,
+                    tree,
+                    self.layers[0].is_away,
+                    few.tree(budget),
+                    self.names,
+                    still,
+                    moved,
+                    rows,
+                    budget.flag,
+                )
+            )
+            budget.check()
+            if n <= room:
+                return rows.keys[:n], batches.related(rows.kinds, rows.rotations, rows.translations, n, boolean, budget)
+            room = n
+
+    def near(self, points: FloatArray, budget: Budget) -> tuple[IntArray, IntArray]:
+        """Return pairs of one of some points and a body that it may meet."""
+        boxes = np.stack([points, points], axis=1)
+        owners, bodies = candidates(self.base.tree(budget), boxes, True, budget, 1)
+        if self.few is None:
+            return owners, bodies
+        stays = ~self.layers[0].is_away[bodies]
+        more, places = candidates(self.few.tree(budget), boxes, True, budget, 1)
+        return np.concatenate([owners[stays], more]), np.concatenate([bodies[stays], self.names[places]])
+
+    def located(self, points: FloatArray, budget: Budget) -> tuple[SceneLocations, Accuracy]:
+        """Return where a few points lie, body by body: for many `locate_in` is faster."""
         n, beyond, rational, is_exact = len(points), 0, 0, True
         budget.check()
-        owners, bodies = self.near(read_only(np.stack([points, points], axis=1)), budget, 1)
+        owners, bodies = self.near(points, budget)
         order = np.lexsort((bodies, owners))
         owners, bodies, at = owners[order], bodies[order], np.empty(len(order), np.int8)
         for pair, (item, body) in enumerate(zip(owners.tolist(), bodies.tolist())):
             place = self.places.get(body)
-            locator = tables[0].locator(body) if place is None else tables[1].locator(place)
+            locator = self.base.locator(body) if place is None or self.few is None else self.few.locator(place)
             counts = locator.chosen(1, budget).fill(points[item : item + 1], at[pair : pair + 1], budget)
             beyond, rational = beyond + counts.beyond, rational + counts.rational
             is_exact &= locator.decisions == "exact"

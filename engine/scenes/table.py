@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from typing import Any, Final
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from engine.arrays import FloatArray
 from engine.containment.prepared import tree_of
-from engine.containment.rational_locate import adjugate, to_world_frame
+from engine.containment.rational_locate import exact_inverse, to_world_frame
 from engine.containment.scene.trees import tree_line
 from engine.predicates.expansion import LARGEST, SMALLEST
 from engine.scenes.posed_mesh import WANTS_TREE, Lines
@@ -18,6 +18,7 @@ from engine.scenes.through import BALL, MESH, OTHER, ROWS, UNREADY, BodyTable
 from engine.segment_clipping.prepared_boundary import boundary_of
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
+from engine.solids.bounds import own_box
 from engine.solids.convex import Convex, rows_in_space, rows_of
 from engine.solids.half_space import HalfSpace
 from engine.solids.polyhedron import Polyhedron
@@ -31,15 +32,20 @@ _TREE_SIZES: Final = 5, 3, 10
 
 
 class Table:
-    """The bodies of a scene for the kernels; `of_kernels` is filled body by body, its kinds last."""
+    """The bodies of a scene for the kernels; `of_kernels` is filled body by body, its kinds last.
 
-    def __init__(self, solids: Sequence[Solid], poses: Sequence[Pose | None]) -> None:
+    like: the table of bodies that these are some of, which share what stands there of solids.
+    """
+
+    def __init__(self, solids: Sequence[Solid], poses: Sequence[Pose | None], like: Table | None = None) -> None:
         self._solids, self._poses = solids, poses
-        n, slots = len(solids), dict[int, int]()
+        n = len(solids)
+        self._slots: dict[int, int] = {} if like is None else like._slots
+        self._rows: dict[int, int] = {} if like is None else like._rows
         self.are_streamed = np.array([isinstance(solid, Polyhedron) for solid in solids], np.bool_)
         """(n,): polyhedra without a pose."""
         begins, n_rows, n_balls, n_posed = np.zeros(n, np.int64), 0, 0, 0
-        frames, known = np.full(n, -1, np.int64), dict[int, int]()
+        frames = np.full(n, -1, np.int64)
         for body, solid in enumerate(solids):
             if isinstance(solid, Sphere):
                 begins[body], n_balls = n_balls, n_balls + 1
@@ -48,11 +54,15 @@ class Table:
                 self.are_streamed[body] = False
                 frames[body], n_posed = n_posed, n_posed + 1
             if isinstance(solid, (Polyhedron, Surface)):
-                begins[body] = slots.setdefault(id(solid), len(slots))
+                begins[body] = self._slots.setdefault(id(solid), len(self._slots))
             elif isinstance(solid, (HalfSpace, Aabb, Convex)):
-                if id(solid) not in known:
-                    known[id(solid)], n_rows = n_rows, n_rows + len(rows_of(solid))
-                begins[body] = known[id(solid)]
+                if id(solid) not in self._rows:
+                    self._rows[id(solid)], n_rows = n_rows, n_rows + len(rows_of(solid))
+                begins[body] = self._rows[id(solid)]
+        n_slots = len(self._slots)
+        of_solids = (np.zeros((n_rows, 4)), _lines(n_slots, *_MESH_SIZES), _lines(n_slots, *_TREE_SIZES))
+        rows, meshes, trees = of_solids if like is None else like.of_solids
+        self.of_solids: tuple[FloatArray, Lines, Lines] = rows, meshes, trees
         self.of_kernels = BodyTable(
             np.full(n, UNREADY, np.int8),
             begins,
@@ -60,11 +70,11 @@ class Table:
             frames,
             np.zeros((n_posed, 3, 3, 2)),
             np.zeros((n_posed, 3)),
-            np.zeros((n_rows, 4)),
+            rows,
             np.zeros((n_balls, 3, 2)),
             np.zeros(n_balls),
-            _lines(len(slots), *_MESH_SIZES),
-            _lines(len(slots), *_TREE_SIZES),
+            meshes,
+            trees,
         )
 
     def prepare(self, body: int, wanted: int) -> None:
@@ -83,9 +93,9 @@ class Table:
             if not _are_safe([*solid.center, solid.radius, *(() if pose is None else pose.translation)]):
                 return OTHER
             center = solid.center.tolist() if pose is None else to_world_frame(solid.center.tolist(), pose)
-            table.centers[place, : len(center)] = doubles = _doubles([Fraction(x) for x in center])
-            table.radii[place] = solid.radius
-            return BALL if _are_safe(doubles[:, 0]) else OTHER
+            doubles = [_double(*Fraction(x).as_integer_ratio()) for x in center]
+            table.centers[place, : len(center)], table.radii[place] = doubles, solid.radius
+            return BALL if _are_safe([head for head, _ in doubles]) else OTHER
         frame = int(table.frames[body])
         if pose is not None and pose.is_identity:
             table.frames[body] = -1
@@ -95,12 +105,14 @@ class Table:
             planes = rows_of(solid)
             table.ends[body] = place + len(planes)
             table.rows[place : place + len(planes)] = rows_in_space(planes)
-            return ROWS if _are_safe(planes) else OTHER
+            return ROWS if _are_safe(planes.ravel().tolist()) else OTHER
         if isinstance(solid, (Polyhedron, Surface)):
             table.ends[body] = isinstance(solid, Polyhedron)
+            if table.meshes.addresses[place, 0]:
+                return MESH
             mesh: Any = boundary_of(solid)
-            corners = mesh.elements.reshape(-1, 3)
-            numbers = *mesh.origin, mesh.inverse, mesh.are_safe, *corners.min(axis=0), *corners.max(axis=0)
+            low, high, _ = own_box(solid)
+            numbers = *mesh.origin, mesh.inverse, mesh.are_safe, *low, *high
             arrays = mesh.elements, mesh.faces, mesh.boxes, mesh.child, mesh.corners
             addresses = tuple(array.ctypes.data for array in arrays)
             _put_line(table.meshes, place, addresses, (len(mesh.elements), len(mesh.child), mesh.n_inner), numbers)
@@ -120,20 +132,19 @@ def _put_line(lines: Lines, row: int, addresses: Any, sizes: Any, places: Any) -
 
 def _put_frame(table: BodyTable, frame: int, pose: Pose) -> bool:
     """Fill the frame of a pose; tell whether kernels take its numbers."""
-    entries, determinant = adjugate([[Fraction(entry) for entry in row] for row in pose.rotation.tolist()])
-    n, inverse, shift = pose.dimension, table.inverses[frame], table.shifts[frame]
-    inverse[2, 2, 0] = 1.0
-    inverse[:n, :n] = _doubles([entry / determinant for row in entries for entry in row]).reshape(n, n, 2)
-    shift[:n] = pose.translation
-    return _are_safe(inverse[:, :, 0]) and _are_safe(shift)
+    entries, below = exact_inverse(pose)
+    n, inverse = pose.dimension, [[_double(entry, below) for entry in row] for row in entries]
+    table.inverses[frame, 2, 2, 0] = 1.0
+    table.inverses[frame, :n, :n], table.shifts[frame, :n] = inverse, pose.translation
+    return _are_safe([head for row in inverse for head, _ in row]) and _are_safe(pose.translation.tolist())
 
 
-def _doubles(numbers: Sequence[Fraction]) -> FloatArray:
-    """Return numbers as double-doubles."""
-    heads = [float(x) for x in numbers]
-    return np.array([(head, float(x - Fraction(head))) for head, x in zip(heads, numbers)])
+def _double(above: int, below: int) -> tuple[float, float]:
+    """Return a quotient as a double-double; division of integers rounds to nearest. below: positive."""
+    head = above / below
+    n, d = head.as_integer_ratio()
+    return head, (above * d - n * below) / (below * d)
 
 
-def _are_safe(numbers: Any) -> bool:
-    sizes = np.abs(numbers)
-    return bool(((sizes == 0.0) | ((sizes >= SMALLEST) & (sizes <= LARGEST))).all())
+def _are_safe(numbers: Iterable[float]) -> bool:
+    return all(x == 0.0 or SMALLEST <= abs(x) <= LARGEST for x in numbers)

@@ -251,7 +251,7 @@ def find_first(
     the piece. room: for MOST_MET pieces. n: the segment to begin with, afterwards where to go on; and 0, or why it
     is not asked (what `crossings_in` wants), and the body.
     """
-    n_bodies = tree.bounded.size + tree.unbounded.size
+    n_bodies = tree.bounded.size + tree.listed.size + 1
     near = Crossings(np.empty(n_bodies), np.empty((0, 3)), np.empty(n_bodies, np.int64), np.empty(n_bodies, np.int64))
     stack = np.empty(STACK, np.int32)
     _find_first(
@@ -284,9 +284,6 @@ def _find_first(
         if stop[0]:
             return
         n_near = near_bodies(segments, item, tree, stack, near.faces)
-        for place in range(tree.unbounded.size):
-            near.faces[n_near] = tree.unbounded[place]
-            n_near += 1
         if is_away.size > 0:
             n_near = _that_stay(near.faces, n_near, is_away)
         found, body = SETTLED, -1

@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Final
 import numpy as np
 
 from engine.arrays import FloatArray, read_only
+from engine.direct import entry_of
 from engine.errors import InvalidArrayError, NotRigidError, WrongDimensionError
 from engine.jit import kernel
 from engine.predicates.exact_vectors import cross, determinant
@@ -60,13 +61,15 @@ class Pose(Immutable):
         check_dimension(matrix.shape[0], None, ("rotation",), "rows of")
         if matrix.shape[0] != matrix.shape[1]:
             raise WrongDimensionError(f"rotation must be square, got shape {matrix.shape}", ("rotation",))
-        if not 0.0 <= as_number(tolerance, ("tolerance",)) <= MOST_TOLERANCE:
-            raise InvalidArrayError(
-                f"tolerance is {tolerance!r}; it must be from 0.0 to {MOST_TOLERANCE}", ("tolerance",)
-            )
-        limit = TOLERANCE if tolerance == float(TOLERANCE) else Fraction(float(tolerance))
+        limit = TOLERANCE
+        if tolerance != 1e-12:
+            if not 0.0 <= as_number(tolerance, ("tolerance",)) <= MOST_TOLERANCE:
+                raise InvalidArrayError(
+                    f"tolerance is {tolerance!r}; it must be from 0.0 to {MOST_TOLERANCE}", ("tolerance",)
+                )
+            limit = Fraction(float(tolerance))
         check_rotations(matrix[None], ("rotation",), one=True, limit=limit)
-        if limit > TOLERANCE and _exact_defect(matrix) > TOLERANCE:
+        if limit is not TOLERANCE and limit > TOLERANCE and _exact_defect(matrix) > TOLERANCE:
             matrix = _nearest_rotation(matrix)
         self._set(frozen(matrix), as_vector(translation, len(matrix), ("translation",)))
 
@@ -178,10 +181,11 @@ def check_rotations(
     """
     if rotations.ndim != 3 or rotations.shape[1] != rotations.shape[2]:
         raise InvalidArrayError(f"{spell(where)} must have shape (n, d, d), got {rotations.shape}", where)
-    is_suspect = np.zeros(len(rotations), np.bool_)
-    with np.errstate(all="ignore"):  # huge entries overflow, and are far from orthogonal
-        find_suspects(read_only(rotations), float(limit) - _UNSURE, is_suspect)
-    for index in np.flatnonzero(is_suspect):
+    is_suspect, sure = np.zeros(len(rotations), np.bool_), (1e-12 if limit is TOLERANCE else float(limit)) - _UNSURE
+    entry_of(find_suspects)(
+        read_only(rotations), sure, is_suspect
+    )  # huge entries overflow, and are far from orthogonal
+    for index in np.flatnonzero(is_suspect) if is_suspect.any() else ():
         matrix = rotations[index]
         path = where if one else (*where, int(index))
         defect = _exact_defect(matrix)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from typing import Final
 
 import numpy as np
 
-from engine.arrays import BoolArray, Int8Array, IntArray
+from engine.arrays import FloatArray, Int8Array, IntArray
 from engine.collision.codes import UNSETTLED
 from engine.collision.convex.body import ConvexArrays, ConvexBody, convex_body_of, pooled
 from engine.collision.convex.pair import relate_convex_pairs
@@ -16,26 +16,42 @@ from engine.collision.detail import details_of_boxes, details_where_proven
 from engine.collision.meshes.mesh_arrays import STILL
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.planar.outline_batch import OutlineArrays, outline_pool, relate_outline_pairs
-from engine.collision.scenes.bodies import SceneBodies
+from engine.collision.scenes.bodies import SceneBodies, scene_bodies
 from engine.collision.simple.closed_forms import relate_box_pairs
+from engine.direct import entry_of
 from engine.parallel import Budget, run_chunks
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
+from engine.solids.pose import Pose
+
+_FEW: Final = 64
+"""Distinct solids that are all described for a question about some of them."""
 
 
-@dataclass(slots=True, eq=False)
+class _Pools:
+    """The distinct solids of a scene as the batches take them; made when they are wanted."""
+
+    def __init__(self, distinct: Sequence[Solid]) -> None:
+        self.are_boxes = np.array([isinstance(solid, Aabb) for solid in distinct], np.bool_)
+        self.convex: tuple[ConvexArrays, IntArray] | None = None
+        self.outlines: tuple[OutlineArrays, IntArray] | None = None
+
+
 class SceneBatches:
-    """Which bodies of a scene the batches take, and the arrays that they want, made when they are."""
+    """Which bodies of a scene the batches take, and the arrays that they want."""
 
-    bodies: SceneBodies
-    _is_box: BoolArray = field(init=False)
-    _pool: tuple[ConvexArrays, IntArray] | None = None
-    _outlines: tuple[OutlineArrays, IntArray] | None = None
+    __slots__ = ("_is_box", "_pools", "bodies")
 
-    def __post_init__(self) -> None:
-        """Note which bodies are boxes that stand where their solid does."""
-        is_box = np.array([isinstance(solid, Aabb) for solid in self.bodies.distinct], np.bool_)
-        self._is_box = is_box[self.bodies.kinds] & ~self.bodies.is_posed
+    def __init__(self, bodies: SceneBodies, pools: _Pools | None = None) -> None:
+        self.bodies, self._pools = bodies, _Pools(bodies.distinct) if pools is None else pools
+        self._is_box = self._pools.are_boxes[bodies.kinds] & ~bodies.is_posed
+
+    def under(self, names: IntArray, poses: list[Pose | None]) -> SceneBatches:
+        """Return the batches of some bodies under poses that fit them."""
+        bodies, pools = self.bodies, self._pools
+        if len(bodies.distinct) > _FEW and pools.convex is None and pools.outlines is None:
+            return SceneBatches(scene_bodies([bodies.solids[body] for body in names.tolist()], poses))
+        return SceneBatches(bodies.under(names, poses), pools)
 
     def relations(self, pairs: IntArray, boolean: bool, detail: bool, budget: Budget, workers: int | None) -> Int8Array:
         """Return the relations ``(n,)`` of pairs ``(n, 2)`` of bodies, UNSETTLED where no batch decides."""
@@ -54,21 +70,35 @@ class SceneBatches:
         )
 
         def task(start: int, stop: int) -> None:
-            with np.errstate(all="ignore"):  # uncompiled runs only
-                relate_convex_pairs(
-                    pool, rows, poses, pairs[start:stop] + 1, boolean, not detail, found[start:stop], flag
-                )
+            of_some = pairs[start:stop] + 1
+            entry_of(relate_convex_pairs)(pool, rows, poses, of_some, boolean, not detail, found[start:stop], flag)
 
         run_chunks(task, len(pairs), budget=budget, workers=workers)
+        return found
+
+    def related(
+        self, kinds: IntArray, rotations: FloatArray, translations: FloatArray, n: int, boolean: bool, budget: Budget
+    ) -> Int8Array:
+        """Return the relations of n pairs of bodies of some kinds, UNSETTLED where the batch of convex ones does not
+        decide; pair i: rows 2 i + 1 and 2 i + 2; row 0: the identity, of any kind."""
+        found = np.full(n, UNSETTLED, np.int8)
+        pools = self._pools
+        if n and self.bodies.dimension == 3 and (pools.convex is not None or len(self.bodies.distinct) <= _FEW):
+            pool, convex = self.pool(budget)
+            pairs, poses = np.arange(1, 2 * n + 1).reshape(n, 2), PoseArrays(rotations, translations, True)
+            entry_of(relate_convex_pairs)(
+                pool, convex[kinds[: 2 * n + 1]], poses, pairs, boolean, True, found, budget.flag
+            )
+            budget.check()
         return found
 
     def _relate_outlines(self, pairs: IntArray, found: Int8Array, budget: Budget, workers: int | None) -> None:
         """Fill the relations of pairs of polygons, triangles and boxes of the plane, UNSETTLED where they are open."""
         bodies, flag = self.bodies, budget.flag
-        if self._outlines is None:
-            pool, numbers = outline_pool(bodies.distinct)
-            self._outlines = pool, numbers[bodies.kinds]
-        outlines, simple = self._outlines
+        if self._pools.outlines is None:
+            self._pools.outlines = outline_pool(bodies.distinct)
+        outlines, simple = self._pools.outlines
+        simple = simple[bodies.kinds]
         rows = np.where(bodies.is_posed, np.arange(1, len(bodies.solids) + 1), 0)
         poses = PoseArrays(bodies.rotations, bodies.translations, True)
 
@@ -87,7 +117,7 @@ class SceneBatches:
 
     def pool(self, budget: Budget) -> tuple[ConvexArrays, IntArray]:
         """Return the convex bodies, and the place of each solid among them, -1 for others; each is looked at once."""
-        if self._pool is None:
+        if self._pools.convex is None:
             kinds = np.full(len(self.bodies.distinct), -1, np.int64)
             convex: list[ConvexBody] = []
             for kind, solid in enumerate(self.bodies.distinct):
@@ -96,8 +126,8 @@ class SceneBatches:
                 if body is not None:
                     kinds[kind] = len(convex)
                     convex.append(body)
-            self._pool = pooled(convex), kinds
-        return self._pool
+            self._pools.convex = pooled(convex), kinds
+        return self._pools.convex
 
 
 def convex_poses(

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.bounding.posed_boxes import place_boxes
 from engine.collision.collide import TAKEN, check_pose, pair_function
+from engine.direct import entry_of
 from engine.errors import InvalidArrayError, UnsupportedPairError, UnsupportedSolidError, WrongDimensionError
 from engine.jit import kernel
 from engine.solids.base import Solid
@@ -24,55 +25,91 @@ class SceneBodies:
 
     solids, poses: one a body. distinct: each solid object once; kinds: (n,) which of these a body is. is_posed: (n,).
     rotations (n + 1, d, d), translations (n + 1, d): row 0 the identity, then one row a body. low, high: (n, d) boxes
-    around the posed bodies, exact where there is no pose and the solid is a box.
+    around the posed bodies, exact where there is no pose and the solid is a box. own: those of the distinct solids.
     """
 
-    solids: list[Solid]
-    poses: list[Pose | None]
-    distinct: list[Solid]
+    solids: Sequence[Solid]
+    poses: Sequence[Pose | None]
+    distinct: Sequence[Solid]
     kinds: IntArray
     is_posed: BoolArray
     rotations: FloatArray
     translations: FloatArray
     low: FloatArray
     high: FloatArray
+    own: OwnBoxes
 
     @property
     def dimension(self) -> int:
         """2 or 3."""
         return self.translations.shape[1]
 
+    def under(self, names: IntArray, poses: Sequence[Pose | None]) -> SceneBodies:
+        """Return some bodies under poses that fit them; the distinct solids are those of all."""
+        solids = [self.solids[body] for body in names.tolist()]
+        return _placed(solids, poses, self.distinct, self.kinds[names], self.own)
+
+
+_UNTURNED: Final = {dimension: np.eye(dimension) for dimension in (2, 3)}
+
+
+class OwnBoxes(NamedTuple):
+    """The boxes of distinct solids where they are, as `place_boxes` takes them."""
+
+    boxes: FloatArray
+    reaches: FloatArray
+    radii: FloatArray
+
 
 def scene_bodies(solids: Sequence[Solid], poses: Sequence[Pose | None] | None) -> SceneBodies:
     """Return the bodies as arrays; raise with the index of the body that is wrong."""
-    for name, given in (("solids", solids), ("poses", () if poses is None else poses)):
-        if not isinstance(given, (list, tuple)):
-            raise InvalidArrayError(f"{name} must be a list, got {type(given).__name__}", (name,))
+    for name, each in (("solids", solids), ("poses", () if poses is None else poses)):
+        if not isinstance(each, (list, tuple)):
+            raise InvalidArrayError(f"{name} must be a list, got {type(each).__name__}", (name,))
     bodies = list(solids)
-    placed: list[Pose | None] = [None] * len(bodies) if poses is None else list(poses)
-    if len(placed) != len(bodies):
-        raise InvalidArrayError(f"poses must be as many as solids, {len(bodies)}, got {len(placed)}", ("poses",))
-    distinct, kinds = check_collidable(bodies)
-    dimension = distinct[0].dimension if distinct else 3
-    is_posed, numbers = _pose_numbers(placed, dimension, bodies)
-    rotations, translations = np.empty((len(bodies) + 1, dimension, dimension)), np.zeros((len(bodies) + 1, dimension))
-    rotations[0] = np.eye(dimension)
+    given: list[Pose | None] = [None] * len(bodies) if poses is None else list(poses)
+    if len(given) != len(bodies):
+        raise InvalidArrayError(f"poses must be as many as solids, {len(bodies)}, got {len(given)}", ("poses",))
+    return bodies_of(bodies, given, *check_collidable(bodies))
+
+
+def bodies_of(
+    solids: Sequence[Solid],
+    poses: Sequence[Pose | None],
+    distinct: list[Solid],
+    kinds: IntArray,
+    check: Callable[[], object] | None = None,
+) -> SceneBodies:
+    """Return bodies of any type as arrays; check: as for `Solid.prepared`."""
+    own = [own_box(solid, check) for solid in distinct]
+    boxes = np.array([box[:2] for box in own]).reshape(-1, 2, distinct[0].dimension if distinct else 3)
+    radii = np.array([getattr(solid, "radius", 0.0) for solid in distinct])
+    return _placed(solids, poses, distinct, kinds, OwnBoxes(boxes, np.array([box[2] for box in own]), radii))
+
+
+def _placed(
+    solids: Sequence[Solid], poses: Sequence[Pose | None], distinct: Sequence[Solid], kinds: IntArray, own: OwnBoxes
+) -> SceneBodies:
+    """Return bodies where their poses put them."""
+    n, dimension = len(kinds), own.boxes.shape[2]
+    is_posed, numbers = _pose_numbers(poses, dimension, solids)
+    rotations, translations = np.empty((n + 1, dimension, dimension)), np.zeros((n + 1, dimension))
+    rotations[0] = _UNTURNED[dimension]
     rows: IntArray | slice = slice(1, None)
-    if len(numbers) < len(bodies):
-        rotations[1:], rows = np.eye(dimension), np.flatnonzero(is_posed) + 1
+    pose_rows = np.arange(1, n + 1)
+    if len(numbers) < n:
+        rotations[1:], rows = rotations[0], np.flatnonzero(is_posed) + 1
+        pose_rows[~is_posed] = -1
     rotations[rows] = numbers[:, : dimension**2].reshape(-1, dimension, dimension)
     translations[rows] = numbers[:, dimension**2 :]
-    own = [own_box(solid) for solid in distinct]
-    boxes, reaches = np.array([box[:2] for box in own]).reshape(-1, 2, dimension), np.array([box[2] for box in own])
-    pose_rows = np.where(is_posed, np.arange(1, len(bodies) + 1), -1)
-    radii = np.array([getattr(solid, "radius", 0.0) for solid in distinct])
-    low, high = np.empty((len(bodies), dimension)), np.empty((len(bodies), dimension))
-    with np.errstate(all="ignore"):  # uncompiled runs only
-        place_boxes(boxes, reaches, radii, kinds, pose_rows, rotations, translations, low, high)
-    return SceneBodies(bodies, placed, distinct, kinds, is_posed, rotations, translations, low, high)
+    low, high = np.empty((n, dimension)), np.empty((n, dimension))
+    entry_of(place_boxes)(*own, kinds, pose_rows, rotations, translations, low, high)
+    return SceneBodies(solids, poses, distinct, kinds, is_posed, rotations, translations, low, high, own)
 
 
-def _pose_numbers(placed: list[Pose | None], dimension: int, bodies: list[Solid]) -> tuple[BoolArray, FloatArray]:
+def _pose_numbers(
+    placed: Sequence[Pose | None], dimension: int, bodies: Sequence[Solid]
+) -> tuple[BoolArray, FloatArray]:
     """Return which bodies have a pose, and rows of rotation and translation; raise on the first that is none."""
     types, moving, is_posed = set(map(type, placed)), placed, np.ones(len(placed), np.bool_)
     if type(None) in types:
@@ -89,8 +126,7 @@ def _pose_numbers(placed: list[Pose | None], dimension: int, bodies: list[Solid]
 def check_collidable(bodies: Sequence[Solid]) -> tuple[list[Solid], IntArray]:
     """Return each solid once and which of them each body is; raise unless every solid is one that `collide` takes, all
     of one dimension."""
-    kinds, firsts = numbered(np.fromiter(map(id, bodies), np.int64, len(bodies)))
-    distinct = [bodies[first] for first in firsts.tolist()]
+    distinct, kinds, firsts = distinct_of(bodies)
     for index, body in zip(firsts.tolist(), distinct):
         try:
             pair_function(body, body)
@@ -108,6 +144,12 @@ def check_collidable(bodies: Sequence[Solid]) -> tuple[list[Solid], IntArray]:
                 ("solids", index),
             )
     return distinct, kinds
+
+
+def distinct_of(bodies: Sequence[Solid]) -> tuple[list[Solid], IntArray, IntArray]:
+    """Return each solid once, which of them each body is, and where each first appears."""
+    kinds, firsts = numbered(np.fromiter(map(id, bodies), np.int64, len(bodies)))
+    return [bodies[first] for first in firsts.tolist()], kinds, firsts
 
 
 def numbered(keys: IntArray) -> tuple[IntArray, IntArray]:
