@@ -67,34 +67,30 @@ def feature_of(solid: Solid, mesh: MeshBody, triangle: int, code: int) -> Featur
     if isinstance(solid, Sphere):
         return Feature("ball")
     face = int(mesh.faces[triangle])
-    corners = mesh.arrays.vertices[mesh.arrays.triangles[triangle]]
-    numbers, points = _ring(solid, face)
     if code == FACE:
         return Feature("face", (face,))
-    places = [_first(points, corner) for corner in (corners[code % 3], corners[(code + 1) % 3])]
+    numbers, points = _ring(solid, face)
+    corners, vertices = mesh.arrays.triangles[triangle].tolist(), mesh.arrays.vertices
+    places = [points.index(vertices[corners[k]].tolist()[: solid.dimension]) for k in (code % 3, (code + 1) % 3)]
     if code < 3 or places[0] == places[1]:
-        return Feature("vertex", (named(solid, int(numbers[places[0]])),))
+        return Feature("vertex", (named(solid, numbers[places[0]]),))
     if solid.dimension == 3 and abs(places[0] - places[1]) not in (1, len(numbers) - 1):
         return Feature("face", (face,))  # an edge of the triangulation only
-    return Feature("edge", tuple(sorted(named(solid, int(numbers[place])) for place in places)))
+    return Feature("edge", tuple(sorted(named(solid, numbers[place]) for place in places)))
 
 
-def _ring(solid: Solid, face: int) -> tuple[IntArray, FloatArray]:
-    """Return the numbers and the points (n, 3) of the vertices of a face or edge, in order."""
+def _ring(solid: Solid, face: int) -> tuple[list[int], list[list[float]]]:
+    """Return the numbers and the points of the vertices of a face or edge, in order."""
     if isinstance(solid, Mesh):
-        numbers = solid.face_indices[solid.face_offsets[face] : solid.face_offsets[face + 1]]
-        return numbers, solid.vertices[numbers]
+        indices = solid.face_indices[solid.face_offsets[face] : solid.face_offsets[face + 1]]
+        return indices.tolist(), solid.vertices[indices].tolist()
     if isinstance(solid, Aabb) and solid.dimension == 3:
-        (a, b, c), (_, _, d) = BOX_TRIANGLES[face]
-        numbers = np.array([a, b, c, d])
-        return numbers, corners_of_box(solid.min, solid.max)[numbers]
-    points, following = outline_of(solid)
-    numbers = np.array([face, following[face]])
-    return numbers, np.column_stack([points[numbers], np.zeros(2)])
-
-
-def _first(points: FloatArray, corner: FloatArray) -> int:
-    return int(np.argmax((points == corner).all(axis=1)))
+        (a, b, c), (_, _, d) = BOX_TRIANGLES[face].tolist()
+        points, numbers = corners_of_box(solid.min, solid.max), [a, b, c, d]
+    else:
+        points, following = outline_of(solid)
+        numbers = [face, int(following[face])]
+    return numbers, points[numbers].tolist()
 
 
 def named(solid: Solid, number: int) -> int:

@@ -94,10 +94,9 @@ class SpreadPair:
         """
         (a, b), (own, poses) = self.meshes, self.poses
         while True:  # bound: an answer is filled, or the room doubles
-            with np.errstate(all="ignore"):
-                start, how, n = entry_of(find_nearest)(
-                    a.arrays, own, b.arrays, poses, (start, stop), asked, answers, self._room, self.budget.flag
-                )
+            start, how, n = entry_of(find_nearest)(
+                a.arrays, own, b.arrays, poses, (start, stop), asked, answers, self._room, self.budget.flag
+            )
             self.budget.check()
             if start == stop:
                 return
