@@ -16,7 +16,7 @@ from engine.collision.clearance.boxes import (
     scaled,
     set_line,
 )
-from engine.collision.clearance.near_triangles import nearest_points, rounding_of, seen_from, slab
+from engine.collision.clearance.near_triangles import nearest_points, rounding_of, seen_from
 from engine.collision.meshes.mesh_arrays import triangle_of
 from engine.collision.meshes.placement import placed
 from engine.collision.meshes.triangle_triangle import Triangle3
@@ -24,7 +24,7 @@ from engine.jit import inline
 from engine.lanes.boxes import EMPTY
 from engine.lanes.tracing import LANES
 from engine.predicates.loading import as_point3
-from engine.predicates.vectors import dot, largest_of, minus
+from engine.predicates.vectors import dot, minus
 from engine.types import Point3
 
 DONE: Final = 0
@@ -45,24 +45,17 @@ def _triangle(view: View, item: int) -> Triangle3:
 
 
 @inline
-def _measure(s: Triangle3, t: Triangle3, error: float) -> tuple[float, float, Point3, tuple[int, int]]:
+def _measure(s: Triangle3, t: Triangle3, error: float, most: float) -> tuple[float, float, Point3, tuple[int, int]]:
     """Return bounds on the distance of two triangles, from below and above, and direction and features of nearly
-    nearest points.
+    nearest points; of any where the lower bound is above `most`.
 
     error: bound on the distance of a point from its rounded one, both bodies together.
     """
     origin = s.p
     s, t = seen_from(origin, s), seen_from(origin, t)
     slack = rounding_of(s, t) + error
-    best = nearest_points(s, t)
-    gap = minus(best.q, best.p)
-    largest = largest_of(gap)
-    if not largest > 0.0:
-        return 0.0, slack, Point3(0.0, 0.0, 0.0), (best.first, best.second)
-    d = Point3(gap.x / largest, gap.y / largest, gap.z / largest)  # order: squares of small numbers are none
-    size = np.sqrt(dot(d, d))
-    low, high = max(slab(s, t, d, size) - slack, 0.0), largest * size + slack
-    return low, high, Point3(d.x / size, d.y / size, d.z / size), (best.first, best.second)
+    best, across = nearest_points(s, t, most + slack)
+    return max(across.low - slack, 0.0), across.size + slack, across.way, (best.first, best.second)
 
 
 @inline
@@ -145,7 +138,7 @@ def measure_blocks(s: Search, i: int, j: int, n_found: int, limits: Any) -> tupl
             at = j * LANES + m
             if box_bound(s, limits[0], c, h, lane_centre(s.b, at), lane_half(s.b, at)) > limits[0]:
                 continue
-            low, high, d, features = _measure(t, _triangle(s.b, -1 - their), s.error)
+            low, high, d, features = _measure(t, _triangle(s.b, -1 - their), s.error, limits[0])
             if high < limits[1]:
                 return CLOSER, 0
             if high < limits[0]:

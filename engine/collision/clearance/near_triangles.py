@@ -26,6 +26,8 @@ _ROUNDING: Final = 2.0**-47
 """Of the largest coordinate as seen from a corner: a point on an edge or face takes 4 roundings in each coordinate,
 three dots of 3 products and the differences less than 30 u in all."""
 _TINY: Final = 1e-300
+_AS_GOOD: Final = 1.0 - 2.0**-45
+"""Of a distance: points within that are taken for the nearest."""
 
 
 class Nearest(NamedTuple):
@@ -95,35 +97,55 @@ def _foot(p: Point3, t: Triangle3) -> tuple[bool, Point3]:
     return True, foot
 
 
+class Across(NamedTuple):
+    """A lower bound on the distance of two triangles, the distance of the nearest points so far, the direction from one
+    to the other, and whether no nearer ones are wanted."""
+
+    low: float
+    size: float
+    way: Point3
+    is_done: bool
+
+
 @inline
-def nearest_points(s: Triangle3, t: Triangle3) -> Nearest:
-    """Return nearly nearest points of two triangles that are apart."""
-    best = Nearest(s.p, t.p, 0, 0, np.inf)
+def _across(s: Triangle3, t: Triangle3, found: Nearest, before: Across, most: float) -> Across:
+    """Return what is known once nearer points are found: the slab between the triangles across their line."""
+    gap = minus(found.q, found.p)
+    largest = largest_of(gap)
+    if not largest > 0.0:
+        return Across(0.0, 0.0, Point3(0.0, 0.0, 0.0), True)
+    d = Point3(gap.x / largest, gap.y / largest, gap.z / largest)  # order: squares of small numbers are none
+    size = np.sqrt(dot(d, d))
+    furthest = max(dot(d, s.p), dot(d, s.q), dot(d, s.r))
+    low = max(before.low, (min(dot(d, t.p), dot(d, t.q), dot(d, t.r)) - furthest) / size)
+    way = Point3(d.x / size, d.y / size, d.z / size)
+    return Across(low, largest * size, way, low > most or low >= _AS_GOOD * largest * size)
+
+
+@inline
+def nearest_points(s: Triangle3, t: Triangle3, most: float) -> tuple[Nearest, Across]:
+    """Return nearly nearest points of two triangles that are apart, and bounds; any points of them where they prove to
+    be further apart than `most`."""
+    best, across = Nearest(s.p, t.p, 0, 0, np.inf), Across(-np.inf, np.inf, Point3(0.0, 0.0, 0.0), False)
     for i in range(3):
         for j in range(3):
-            best = _edges(best, s, i, t, j)
-    for k in range(3):
-        corner = _corner(s, k)
-        is_over, foot = _foot(corner, t)
+            found = _edges(best, s, i, t, j)
+            if found.square < best.square:
+                best, across = found, _across(s, t, found, across, most)
+                if across.is_done:
+                    return best, across
+    for turn in range(6):
+        k, is_first = turn % 3, turn < 3
+        corner = _corner(s, k) if is_first else _corner(t, k)
+        is_over, foot = _foot(corner, t if is_first else s)
         gap = minus(foot, corner)
         if is_over and dot(gap, gap) < best.square:
-            best = Nearest(corner, foot, k, FACE, dot(gap, gap))
-        corner = _corner(t, k)
-        is_over, foot = _foot(corner, s)
-        gap = minus(foot, corner)
-        if is_over and dot(gap, gap) < best.square:
-            best = Nearest(foot, corner, FACE, k, dot(gap, gap))
-    return best
-
-
-@inline
-def slab(s: Triangle3, t: Triangle3, d: Point3, size: float) -> float:
-    """Return a lower bound on the distance of two triangles: the width of the slab between them across d, |d| = size.
-
-    Negative where they overlap along d.
-    """
-    furthest = max(dot(d, s.p), dot(d, s.q), dot(d, s.r))
-    return (min(dot(d, t.p), dot(d, t.q), dot(d, t.r)) - furthest) / size
+            best = Nearest(corner, foot, k, FACE, dot(gap, gap)) if is_first else Nearest(
+                foot, corner, FACE, k, dot(gap, gap))  # fmt: skip
+            across = _across(s, t, best, across, most)
+            if across.is_done:
+                break
+    return best, across
 
 
 @inline

@@ -6,10 +6,9 @@ import random
 
 import numpy as np
 
-from engine.collision.clearance.near_triangles import nearest_points, rounding_of, seen_from, slab
+from engine.collision.clearance.near_triangles import nearest_points, rounding_of, seen_from
 from engine.collision.meshes.triangle_triangle import Triangle3
 from engine.jit import kernel
-from engine.predicates.vectors import length, minus
 from engine.types import Point3
 from tests.reference.distance import squared_distance
 from tests.reference.exact import q, vector
@@ -19,10 +18,9 @@ from tests.reference.exact import q, vector
 def bounds(s: Triangle3, t: Triangle3) -> tuple[float, float]:
     origin = s.p
     s, t = seen_from(origin, s), seen_from(origin, t)
-    best = nearest_points(s, t)
-    gap = minus(best.q, best.p)
-    size, slack = length(gap), rounding_of(s, t)
-    return slab(s, t, gap, size) - slack, size + slack
+    _, across = nearest_points(s, t, np.inf)
+    slack = rounding_of(s, t)
+    return across.low - slack, across.size + slack
 
 
 def test_bounds_enclose_the_exact_distance_closely() -> None:
