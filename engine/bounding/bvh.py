@@ -25,10 +25,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from engine.arrays import Float32Array, FloatArray, Int32Array, read_only
+from engine.arrays import Float32Array, FloatArray, Int32Array, IntArray, read_only
 from engine.jit import inline, kernel
 from engine.lanes.boxes import EMPTY
 from engine.lanes.lanes import aligned
+from engine.lanes.rows import exchange, fill, join
 from engine.parallel import poll
 
 WIDTH = 8
@@ -39,10 +40,16 @@ MAX_DEPTH = HEURISTIC_DEPTH + 40  # 2^40 items and more do not fit into memory
 STACK = WIDTH * (MAX_DEPTH + 1)
 """Nodes that wait on a way down a tree at most: eight for each level."""
 UNUSED = np.float32(-1e30)
-ENLARGED = 2.0**-22
-"""Added to half widths: a centre rounded to float32 is off by 2^-24 of at most 2, the half width by as much."""
+ENLARGED = 2.0**-21
+"""Added to half widths. Numbers of at most 2 are off by 2^-24 in float32: low and high, so their middle and half their
+distance by as much each, and both of these once more."""
 
 _FEW_ROWS = 64
+_FEW_ITEMS, _FEW_BINS = 64, 8
+"""A run of so few items is cut by fewer bins: there the bins cost more than the items."""
+_FINITE = 1e30
+_NO_BOX = np.float32(np.inf)
+"""What joins any box as nothing."""
 _WORK = 1 << 18
 """Items looked at, or nodes filled, between two looks at the deadline: a hundredth of a second."""
 
@@ -57,6 +64,30 @@ class Bvh(NamedTuple):
     scale: float
 
 
+class Items(NamedTuple):
+    """The items, in the order of the tree."""
+
+    boxes: Float32Array
+    """(n, 8), as lanes/rows.py has them."""
+    centres: Float32Array
+    """(n, 8): boxes without extent."""
+    order: IntArray
+    """(n,): which item it is."""
+
+
+class Halves(NamedTuple):
+    """A binary tree whose leaves are runs of at most eight items."""
+
+    boxes: Float32Array
+    """(2 n - 1, 8): around the items of a node."""
+    centres: Float32Array
+    """(2 n - 1, 8): around their centres."""
+    left: IntArray
+    """The left child, the right one follows; or -1."""
+    runs: IntArray
+    """(2 n - 1, 2): first item and end."""
+
+
 def build_bvh(boxes: FloatArray) -> Bvh:
     """Return the tree over `boxes` (n_items, 6) float64: xmin ymin zmin xmax ymax zmax; n_items >= 1.
 
@@ -64,20 +95,25 @@ def build_bvh(boxes: FloatArray) -> Bvh:
     Raises: what `poll` does.
     """
     n_items, origin = len(boxes), np.empty(3)
-    local, order, stack = np.empty((n_items, 6)), np.arange(n_items), np.zeros((STACK, 2), np.int64)
-    halves, runs = np.empty((2 * n_items - 1, 6)), np.empty((2 * n_items - 1, 2), np.int64)
-    left, state = np.empty(2 * n_items - 1, np.int64), np.array([1, 1])
+    n_halves = 2 * n_items - 1
+    items = Items(np.empty((n_items, WIDTH), np.float32), np.empty((n_items, WIDTH), np.float32), np.arange(n_items))
+    halves = Halves(
+        np.empty((n_halves, WIDTH), np.float32),
+        np.empty((n_halves, WIDTH), np.float32),
+        np.empty(n_halves, np.int64),
+        np.empty((n_halves, 2), np.int64),
+    )
+    stack, state = np.zeros((STACK, 2), np.int64), np.array([int(n_items > WIDTH), 1])
     with np.errstate(all="ignore"):  # what underflows here is far below the enlargement of the boxes
-        scale = _normalise(read_only(boxes), origin, local)
-        runs[0] = 0, n_items
+        scale = _normalise(read_only(boxes), origin, items, halves)
         while state[0] > 0:  # bound: each turn ends a node
             poll()
-            _halve(local, order, halves, left, runs, stack, state)
+            _halve(items, halves, stack, state)
         nodes, child = np.empty((state[1], 6, WIDTH), np.float32), np.empty((state[1], WIDTH), np.int32)
         stack[0], state[:] = 0, 1
         while state[0] > 0:  # bound: each turn fills a node
             poll()
-            _widen(local, order, halves, left, runs, nodes, child, stack, state)
+            _widen(items, halves, nodes, child, stack, state)
     origin.setflags(write=False)
     return Bvh(on_lines(nodes[: state[1]]), on_lines(child[: state[1]]), origin, scale)
 
@@ -91,8 +127,8 @@ def on_lines(array: Any) -> Any:
 
 
 @kernel
-def _normalise(boxes: Any, origin: Any, local: Any) -> float:
-    """Fill origin (3,) and local (n, 6) with the boxes in the coordinates of the tree; return scale."""
+def _normalise(boxes: Any, origin: Any, items: Any, halves: Any) -> float:
+    """Fill origin (3,), items with the boxes in the coordinates of the tree, and the root of halves; return scale."""
     n_items, half = boxes.shape[0], 0.0
     for axis in range(3):
         low, high = boxes[0, axis], boxes[0, 3 + axis]
@@ -103,37 +139,67 @@ def _normalise(boxes: Any, origin: Any, local: Any) -> float:
     power = frexp(half)[1] - 1 if half > 0.0 else 0
     once = ldexp(1.0, -power // 2)
     again = ldexp(1.0, -power - (-power // 2))  # order: two factors, since 2^-power may be no float
+    halves.runs[0, 0], halves.runs[0, 1], halves.left[0] = 0, n_items, -1
+    _clear(halves, 0)
     for item in range(n_items):
-        for side in range(6):
-            local[item, side] = boxes[item, side] * once * again - origin[side % 3] * once * again
+        for axis in range(4):
+            low, high = 0.0, 0.0
+            if axis < 3:
+                moved = origin[axis] * once * again
+                low, high = boxes[item, axis] * once * again - moved, boxes[item, 3 + axis] * once * again - moved
+            items.boxes[item, axis], items.boxes[item, 4 + axis] = low, -high
+            items.centres[item, axis], items.centres[item, 4 + axis] = 0.5 * (low + high), -0.5 * (low + high)
+        _include(halves, 0, items, item)
     return ldexp(1.0, power)
 
 
-@kernel
-def _halve(items: Any, order: Any, boxes: Any, left: Any, runs: Any, stack: Any, state: Any) -> None:
-    """Go on with a binary tree whose leaves are runs of `order` of at most eight items, for `_WORK` items.
+@inline
+def _clear(halves: Any, node: int) -> None:
+    """Make a node's boxes those of nothing."""
+    fill(halves.boxes, node, _NO_BOX)
+    fill(halves.centres, node, _NO_BOX)
 
-    items (n, 6). Fills boxes (n_nodes, 6), left (n_nodes,): the left child, the right one follows, or -1, and runs
-    (n_nodes, 2): first and end in `order`. Caller guarantees 2 n - 1 rows, of which runs has the first. stack: rows of
-    node and depth; state: how many rows wait there, and how many nodes there are.
+
+@inline
+def _include(halves: Any, node: int, others: Any, other: int) -> None:
+    """Join boxes and centres of an item, or of another node, to a node's."""
+    join(halves.boxes, node, others.boxes, other)
+    join(halves.centres, node, others.centres, other)
+
+
+@kernel
+def _halve(items: Any, halves: Any, stack: Any, state: Any) -> None:
+    """Go on with the binary tree for `_WORK` items.
+
+    Caller guarantees 2 n - 1 rows, of which the first is there. stack: rows of node and depth; state: how many rows
+    wait there, and how many nodes there are.
     """
     n_stack, n_nodes, n_seen = state[0], state[1], 0
-    bins = np.empty((N_BINS, 7))  # box and number of items of each bin
+    bins = Halves(
+        np.empty((N_BINS, WIDTH), np.float32),
+        np.empty((N_BINS, WIDTH), np.float32),
+        np.empty(N_BINS, np.int64),  # how many items
+        halves.runs,  # of no use here
+    )
+    from_right = np.empty(N_BINS, np.float32)
     while n_stack > 0 and n_seen < _WORK:  # bound: each turn ends one of the 2 n - 1 nodes
         n_stack -= 1
         node, depth = stack[n_stack, 0], stack[n_stack, 1]
-        start, end = runs[node, 0], runs[node, 1]
+        start, end = halves.runs[node, 0], halves.runs[node, 1]
         n_seen += end - start
-        _unite(items, order, start, end, boxes[node])
         if end - start <= WIDTH:
-            left[node] = -1
+            halves.left[node] = -1
             continue
-        middle = (start + end) // 2
-        if depth < HEURISTIC_DEPTH:
-            middle = _split(items, order, start, end, bins)
-        left[node] = n_nodes
-        runs[n_nodes, 0], runs[n_nodes, 1] = start, middle
-        runs[n_nodes + 1, 0], runs[n_nodes + 1, 1] = middle, end
+        middle = _split(items, halves, node, bins, from_right, n_nodes) if depth < HEURISTIC_DEPTH else start
+        if middle == start:
+            middle = (start + end) // 2
+            for side, (first, last) in enumerate(((start, middle), (middle, end))):
+                _clear(halves, n_nodes + side)
+                for item in range(first, last):
+                    _include(halves, n_nodes + side, items, item)
+        halves.left[node] = n_nodes
+        halves.runs[n_nodes, 0], halves.runs[n_nodes, 1] = start, middle
+        halves.runs[n_nodes + 1, 0], halves.runs[n_nodes + 1, 1] = middle, end
         for side in range(2):
             stack[n_stack, 0], stack[n_stack, 1] = n_nodes + side, depth + 1
             n_stack += 1
@@ -142,15 +208,13 @@ def _halve(items: Any, order: Any, boxes: Any, left: Any, runs: Any, stack: Any,
 
 
 @kernel
-def _widen(
-    items: Any, order: Any, halves: Any, left: Any, runs: Any, boxes: Any, child: Any, stack: Any, state: Any
-) -> None:
+def _widen(items: Any, halves: Any, boxes: Any, child: Any, stack: Any, state: Any) -> None:
     """Go on to join binary nodes to nodes of eight, the largest boxes opened first, for `_WORK` / 8 nodes.
 
     stack: rows of binary node and node; state: how many rows wait there, and how many nodes are filled or wait.
     """
     n_stack, n_nodes = state[0], state[1]
-    gathered = np.empty(WIDTH, np.int64)
+    gathered, left, runs = np.empty(WIDTH, np.int64), halves.left, halves.runs
     for _ in range(_WORK // WIDTH):
         if n_stack == 0:
             break
@@ -163,16 +227,16 @@ def _widen(
         if left[half] < 0:
             for place in range(runs[half, 0], runs[half, 1]):
                 lane = place - runs[half, 0]
-                child[node, lane] = -1 - order[place]
-                _set_lane(boxes, node, lane, items[order[place]])
+                child[node, lane] = -1 - items.order[place]
+                _set_lane(boxes, node, lane, items.boxes, place)
             continue
         gathered[0], gathered[1] = left[half], left[half] + 1
         n_gathered = 2
         for _ in range(WIDTH - 2):
-            largest, area = -1, -1.0
+            largest, area = -1, np.float32(-1.0)
             for lane in range(n_gathered):
-                if left[gathered[lane]] >= 0 and _half_area(halves[gathered[lane]]) > area:
-                    largest, area = lane, _half_area(halves[gathered[lane]])
+                if left[gathered[lane]] >= 0 and _half_area(halves.boxes, gathered[lane]) > area:
+                    largest, area = lane, _half_area(halves.boxes, gathered[lane])
             if largest < 0:
                 break
             opened = left[gathered[largest]]
@@ -180,7 +244,7 @@ def _widen(
             n_gathered += 1
         for lane in range(n_gathered):
             child[node, lane] = n_nodes
-            _set_lane(boxes, node, lane, halves[gathered[lane]])
+            _set_lane(boxes, node, lane, halves.boxes, gathered[lane])
             stack[n_stack, 0], stack[n_stack, 1] = gathered[lane], n_nodes
             n_stack += 1
             n_nodes += 1
@@ -188,106 +252,81 @@ def _widen(
 
 
 @inline
-def _set_lane(boxes: Any, node: int, lane: int, box: Any) -> None:
-    """Store a box as float32, enlarged."""
+def _set_lane(boxes: Any, node: int, lane: int, rows: Any, row: int) -> None:
+    """Store a box as centre and half width, enlarged."""
     for axis in range(3):
-        boxes[node, axis, lane] = 0.5 * (box[axis] + box[3 + axis])
-        boxes[node, 3 + axis, lane] = 0.5 * (box[3 + axis] - box[axis]) + ENLARGED
+        low, high = float(rows[row, axis]), -float(rows[row, 4 + axis])
+        boxes[node, axis, lane] = 0.5 * (low + high)
+        boxes[node, 3 + axis, lane] = 0.5 * (high - low) + ENLARGED
 
 
 @inline
-def _unite(items: Any, order: Any, start: int, end: int, box: Any) -> None:
-    """Set `box` to the union of the items of one run."""
-    box[:] = items[order[start]]
-    for place in range(start + 1, end):
-        _grow(box, items, order[place])
-
-
-@inline
-def _centre(items: Any, item: int, axis: int) -> float:
-    return 0.5 * items[item, axis] + 0.5 * items[item, 3 + axis]
-
-
-@inline
-def _half_area(box: Any) -> float:
-    x, y, z = box[3] - box[0], box[4] - box[1], box[5] - box[2]
+def _half_area(rows: Any, row: int) -> float:
+    x, y, z = -rows[row, 4] - rows[row, 0], -rows[row, 5] - rows[row, 1], -rows[row, 6] - rows[row, 2]
     return x * y + y * z + z * x
 
 
 @inline
-def _split(items: Any, order: Any, start: int, end: int, bins: Any) -> int:
-    """Reorder one run so that its left and right part make a good pair of children; return where the right one
-    starts."""
-    axis, low, width = 0, 0.0, -1.0
+def _split(items: Any, halves: Any, node: int, bins: Any, from_right: Any, parts: int) -> int:
+    """Reorder the run of a node so that its left and right part make a good pair of children, and set the boxes of the
+    nodes `parts` and `parts` + 1 to theirs; return where the right part starts, where the run does if there is none."""
+    start, end, low, width, axis = halves.runs[node, 0], halves.runs[node, 1], np.float32(0.0), np.float32(-1.0), 0
     for candidate in range(3):
-        smallest = largest = _centre(items, order[start], candidate)
-        for place in range(start + 1, end):
-            centre = _centre(items, order[place], candidate)
-            smallest, largest = min(smallest, centre), max(largest, centre)
+        smallest, largest = halves.centres[node, candidate], -halves.centres[node, 4 + candidate]
         if largest - smallest > width:
             axis, low, width = candidate, smallest, largest - smallest
-    scale = N_BINS / width
-    if not (0.0 < scale < 1e300 and width < 1e300):  # case: one centre for all, or exponents at the ends of the range
-        return (start + end) // 2
-    _fill_bins(items, order, start, end, bins, axis, low, scale)
-    cut = _best_cut(bins)
+    n_bins = N_BINS if end - start > _FEW_ITEMS else _FEW_BINS
+    scale = np.float32(n_bins) / width
+    if not (0.0 < scale < _FINITE):  # case: one centre for all
+        return start
+    for index in range(n_bins):
+        _clear(bins, index)
+        bins.left[index] = 0
+    for item in range(start, end):
+        index = _bin_of(items.centres[item, axis], low, scale, n_bins)
+        _include(bins, index, items, item)
+        bins.left[index] += 1
+    cut = _best_cut(halves.boxes, parts, bins, n_bins, from_right)
     if cut == 0:
-        return (start + end) // 2
-    left, right = start, end - 1
-    while left <= right:  # bound: each turn moves one end inward
-        if _bin_of(_centre(items, order[left], axis), low, scale) < cut:
-            left += 1
-        else:
-            order[left], order[right] = order[right], order[left]
-            right -= 1
+        return start
+    left = start  # the end of the left part; what is exchanged in vain costs less than a branch that nobody foresees
+    for item in range(start, end):
+        is_left = _bin_of(items.centres[item, axis], low, scale, n_bins) < cut
+        exchange(items.boxes, left, item)
+        exchange(items.centres, left, item)
+        items.order[left], items.order[item] = items.order[item], items.order[left]
+        left += int(is_left)
+    for side in range(2):
+        _clear(halves, parts + side)
+    for index in range(n_bins):
+        _include(halves, parts + (index >= cut), bins, index)
     return left
 
 
 @inline
-def _bin_of(centre: float, low: float, scale: float) -> int:
-    return min(N_BINS - 1, int((centre - low) * scale))
+def _bin_of(centre: float, low: float, scale: float, n_bins: int) -> int:
+    return min(n_bins - 1, int((centre - low) * scale))
 
 
 @inline
-def _fill_bins(items: Any, order: Any, start: int, end: int, bins: Any, axis: int, low: float, scale: float) -> None:
-    for index in range(N_BINS):
-        bins[index, :3] = np.inf
-        bins[index, 3:6] = -np.inf
-        bins[index, 6] = 0.0
-    for place in range(start, end):
-        item = order[place]
-        index = _bin_of(_centre(items, item, axis), low, scale)
-        for side in range(3):
-            bins[index, side] = min(bins[index, side], items[item, side])
-            bins[index, 3 + side] = max(bins[index, 3 + side], items[item, 3 + side])
-        bins[index, 6] += 1.0
+def _best_cut(boxes: Any, scratch: int, bins: Any, n_bins: int, from_right: Any) -> int:
+    """Return the number of bins to the left of the cheapest cut, 0 where no cut has a finite cost.
 
-
-@inline
-def _best_cut(bins: Any) -> int:
-    """Return the number of bins to the left of the cheapest cut, 0 where no cut has a finite cost."""
-    from_right = np.empty(N_BINS)
-    box = np.empty(6)
-    box[:3], box[3:] = np.inf, -np.inf
-    number = 0.0
-    for index in range(N_BINS - 1, 0, -1):
-        number += bins[index, 6]
-        _grow(box, bins, index)
-        from_right[index] = number * _half_area(box) if number > 0.0 else np.inf
-    box[:3], box[3:] = np.inf, -np.inf
-    number, best, cut = 0.0, np.inf, 0
-    for index in range(1, N_BINS):
-        number += bins[index - 1, 6]
-        _grow(box, bins, index - 1)
-        if number > 0.0:
-            cost = number * _half_area(box) + from_right[index]
+    boxes: of which the row `scratch` may be used.
+    """
+    fill(boxes, scratch, _NO_BOX)
+    number = 0
+    for index in range(n_bins - 1, 0, -1):
+        number += bins.left[index]
+        join(boxes, scratch, bins.boxes, index)
+        from_right[index] = np.float32(number) * _half_area(boxes, scratch) if number > 0 else np.float32(np.inf)
+    fill(boxes, scratch, _NO_BOX)
+    number, best, cut = 0, np.float32(np.inf), 0
+    for index in range(1, n_bins):
+        number += bins.left[index - 1]
+        join(boxes, scratch, bins.boxes, index - 1)
+        if number > 0:
+            cost = np.float32(number) * _half_area(boxes, scratch) + from_right[index]
             if cost < best:
                 best, cut = cost, index
     return cut
-
-
-@inline
-def _grow(box: Any, boxes: Any, row: int) -> None:
-    for axis in range(3):
-        box[axis] = min(box[axis], boxes[row, axis])
-        box[3 + axis] = max(box[3 + axis], boxes[row, 3 + axis])

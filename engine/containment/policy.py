@@ -26,8 +26,8 @@ _FEW_RAYS: Final = 256
 """Of points through faces: a pass over so many costs less than to hand over a tree."""
 _POINTS_A_PASS: Final = 1024
 _PASS_A_FACE: Final = 20.0
-_TREE: Final = 60_000.0
-_TREE_A_FACE: Final = 450.0
+_TREE: Final = 40_000.0
+_TREE_A_FACE: Final = 280.0
 _SOON: Final = 1.0 / 16.0
 """Share of the tree's cost that earlier passes may have taken: in general the second question builds it."""
 _CELLS_FROM, _CELLS_PER_FACE = 1 << 14, 5

@@ -74,11 +74,10 @@ def _build_tree(solid: Polyhedron, check: Check) -> TriangleTree:
     child, blocks = np.empty_like(tree.child), np.zeros((len(tree.child), OVERHEAD_ROWS, WIDTH), np.float32)
     lay_out(solid.vertices, solid.triangles, tree, child, triangles, blocks)
     check()
-    low, high = boxes[:, :3].min(axis=0).tolist(), boxes[:, 3:].max(axis=0).tolist()
+    x, y, z, u, v, w = boxes.T
+    low, high = (float(x.min()), float(y.min()), float(z.min())), (float(u.max()), float(v.max()), float(w.max()))
     origin = tuple(tree.origin.tolist())
-    return TriangleTree(
-        solid.vertices, triangles, tree.boxes, child, on_lines(blocks), origin, tree.scale, tuple(low), tuple(high)
-    )
+    return TriangleTree(solid.vertices, triangles, tree.boxes, child, on_lines(blocks), origin, tree.scale, low, high)
 
 
 def rings_of(solid: Polygon, check: Check = no_check) -> Rings:

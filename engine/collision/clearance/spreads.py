@@ -125,21 +125,31 @@ class SpreadPair:
     def _least(self, item: int, pairs: Iterable[Sequence[int]]) -> tuple[ScaledGap, tuple[int, int]]:
         """Return the least gap of the candidates, of equal ones that of the smallest faces, and its triangles."""
         exact, (a, b) = self._exact(item), self.meshes
+
+        def rank(i: int, j: int) -> tuple[int, int, list[float], list[float]]:
+            """Order by faces, of one face by corners: the order of the tree is nobody's."""
+            return int(a.faces[i]), int(b.faces[j]), _corners(a, i), _corners(b, j)
+
         best: ScaledGap | None = None
-        kept, faces = (-1, -1), (-1, -1)
+        kept = (-1, -1)
         if isinstance(pairs, list) and len(pairs) > 1:
-            pairs.sort(key=lambda row: (int(a.faces[row[0]]), int(b.faces[row[1]])))  # ties fall to the first
+            pairs.sort(key=lambda row: rank(row[0], row[1]))  # ties fall to the first
         for i, j, first, second in self._polled(pairs):
-            own = int(a.faces[i]), int(b.faces[j])
-            if best is not None and own >= faces and exact.are_beyond(i, j):
+            is_later = best is not None and rank(i, j) >= rank(*kept)
+            if is_later and exact.are_beyond(i, j):
                 continue
             found = exact.gap(i, j, first, second)
             is_less = best is None or found.gap.is_less(best.gap)
-            if is_less or (own < faces and best is not None and not best.gap.is_less(found.gap)):
-                best, kept, faces = found, (i, j), own
+            if is_less or (not is_later and best is not None and not best.gap.is_less(found.gap)):
+                best, kept = found, (i, j)
                 exact.hold(found.gap)
         assert best is not None
         return best, kept
+
+
+def _corners(body: MeshBody, triangle: int) -> list[float]:
+    corners: list[float] = body.arrays.vertices[body.arrays.triangles[triangle]].ravel().tolist()
+    return corners
 
 
 class _ExactPair:

@@ -32,7 +32,7 @@ SOLIDS = [
     (engine.Sphere([0, 0, 0], 1), [locate_in_ball]),
     (engine.Aabb([0, 0], [1, 1]), [locate_in_box]),
     (engine.HalfSpace([1, 0], 0), [locate_in_half_planes]),
-    (engine.Polygon([[[0, 0], [1, 0], [0, 1]]]), [locate_in_rings]),
+    (engine.Polygon([np.column_stack([np.arange(600.0), np.arange(600.0) ** 2])]), [locate_in_rings]),
     (engine.Triangle([[0, 0], [1, 0], [0, 1]]), [locate_by_ring_pass]),
     (engine.Implicit([{"powers": [1, 0], "coefficient": 1}]), [locate_by_polynomial]),
 ]
@@ -41,7 +41,8 @@ SOLIDS = [
 @pytest.mark.skipif(bool(numba_config.DISABLE_JIT), reason="about compiled code")
 @pytest.mark.parametrize(("solid", "kernels"), SOLIDS)
 def test_a_kernel_sees_one_kind_of_array(solid: engine.Solid, kernels: list[Any]) -> None:
-    points = np.random.default_rng(0).random((6, solid.dimension))
+    n_points = 600 if isinstance(solid, engine.Polygon) else 6  # beyond one pass over the edges
+    points = np.random.default_rng(0).random((n_points, solid.dimension))
     frozen = points.copy()
     frozen.setflags(write=False)
     turn = engine.Pose([row[: solid.dimension] for row in TURN[: solid.dimension]], [0.25] * solid.dimension)
