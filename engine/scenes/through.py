@@ -159,7 +159,7 @@ def _entered(segments: Any, item: int, box: Any) -> float:
     for k in range(box.shape[1]):
         p, d = segments[item, 0, k], segments[item, 1, k] - segments[item, 0, k]
         if d != 0.0:
-            entered = min((box[0, k] - p) / d, (box[1, k] - p) / d)
+            entered = (box[0 if d > 0.0 else 1, k] - p) / d
             first = entered if entered > first else first
     return first * NEAR
 

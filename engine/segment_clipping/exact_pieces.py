@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from itertools import groupby
+from operator import mul, sub
 from typing import Final, NamedTuple
 
 from engine.predicates.rational import nearest
@@ -36,11 +37,11 @@ class Contact(NamedTuple):
 
 
 def _minus(a: Integers, b: Integers) -> list[int]:
-    return [x - y for x, y in zip(a, b)]
+    return list(map(sub, a, b))
 
 
 def _dot(a: Integers, b: Integers) -> int:
-    return sum(x * y for x, y in zip(a, b))
+    return sum(map(mul, a, b))
 
 
 def _cross(u: Integers, v: Integers) -> list[int]:
@@ -71,36 +72,40 @@ def edge_stretch(p: Integers, q: Integers, a: Integers, b: Integers) -> tuple[Fr
 def triangle_stretch(
     p: Integers, q: Integers, a: Integers, b: Integers, c: Integers
 ) -> tuple[Fraction, Fraction, bool] | None:
-    """Return where the segment p q meets the closed triangle a b c, and whether it runs in its plane (no area: yes)."""
-    normal = _cross(_minus(b, a), _minus(c, a))
+    """Return where the segment p q meets the closed triangle a b c, and whether it runs in its plane (no area: yes).
+
+    With corners seen from p and u = q - p, the normal is B x C + C x A + A x B; the line meets the triangle unless
+    signs of the volumes u . (B x C), ... differ, and their sum is n . u.
+    """
+    u, *seen = (_minus(x, p) for x in (q, a, b, c))
+    around = [_cross(seen[k - 2], seen[k - 1]) for k in range(3)]
+    normal = [sum(each) for each in zip(*around)]
     if not any(normal):  # case: no area; the triangle is its edges
         found = [edge_stretch(p, q, *edge) for edge in ((a, b), (b, c), (c, a))]
         met = [stretch for stretch in found if stretch is not None]
         if not met:
             return None
         return min(s[0] for s in met), max(s[1] for s in met), True
-    s_p, s_q = _dot(normal, _minus(p, a)), _dot(normal, _minus(q, a))
-    first, last = ZERO, ONE
-    if s_p != s_q:
-        first = last = Fraction(s_p, s_p - s_q)
-        if not 0 <= first <= 1:
+    volumes, from_p = [_dot(u, each) for each in around], _dot(seen[0], around[0])
+    if along := sum(volumes):
+        if min(volumes) < 0 < max(volumes) or not 0 <= from_p * (1 if along > 0 else -1) <= abs(along):
             return None
-    elif s_p:
+        t = Fraction(from_p, along)
+        return t, t, False
+    if from_p:
         return None
+    first, last = ZERO, ONE
     for corner, following in ((a, b), (b, c), (c, a)):
         inward = _cross(normal, _minus(following, corner))
         v_p, v_q = _dot(inward, _minus(p, corner)), _dot(inward, _minus(q, corner))
-        if s_p != s_q:
-            if v_p + first * (v_q - v_p) < 0:
-                return None
-        elif v_p == v_q:
+        if v_p == v_q:
             if v_p < 0:
                 return None
         elif v_p < v_q:
             first = max(first, Fraction(v_p, v_p - v_q))
         else:
             last = min(last, Fraction(v_p, v_p - v_q))
-    return (first, last, s_p == s_q) if first <= last else None
+    return (first, last, True) if first <= last else None
 
 
 def is_crossed(p: Integers, q: Integers, corners: Sequence[Integers]) -> bool:
