@@ -71,33 +71,26 @@ _NO_TREE: Final = Bvh(
 )
 
 
-def candidates(
-    tree: BodyTree, items: FloatArray, are_boxes: bool, budget: Budget, workers: int | None
-) -> tuple[IntArray, IntArray]:
-    """Return pairs of an item and a body that it may meet, by item; bodies of an item in no order.
-
-    items: (n, 2, dimension), segments, or where `are_boxes` boxes, which may be infinite.
-    """
+def candidates(tree: BodyTree, items: FloatArray, budget: Budget, workers: int | None) -> tuple[IntArray, IntArray]:
+    """Return pairs of a segment (n, 2, dimension) and a body that it may meet, by item; bodies of one in no order."""
     n, items, chunks = len(items), read_only(items), dict[int, tuple[IntArray, IntArray]]()
     if n <= _FEW:
-        return _of_some(tree, items, are_boxes, budget, 0)
+        return _of_some(tree, items, budget, 0)
 
     def task(first: int, last: int) -> None:
-        chunks[first] = _of_some(tree, items[first:last], are_boxes, budget, first)
+        chunks[first] = _of_some(tree, items[first:last], budget, first)
 
     run_chunks(task, n, budget=budget, workers=workers)
     owners, bodies = zip(*(chunks[first] for first in sorted(chunks)))
     return np.concatenate(owners), np.concatenate(bodies)
 
 
-def _of_some(
-    tree: BodyTree, items: FloatArray, are_boxes: bool, budget: Budget, first: int
-) -> tuple[IntArray, IntArray]:
+def _of_some(tree: BodyTree, items: FloatArray, budget: Budget, first: int) -> tuple[IntArray, IntArray]:
     n, start, room = len(items), 0, 4 * len(items) + 64
     parts: list[IntArray] = []
     while start < n:  # bound: the room doubles until the bodies of an item find it
         pairs = np.empty((2, room), np.int64)
-        stop, m = entry_of(list_near)(items, start, are_boxes, tree, pairs, budget.flag)
+        stop, m = entry_of(list_near)(items, start, tree, pairs, budget.flag)
         budget.check()
         budget.take(2 * pairs.itemsize * int(m))
         parts.append(pairs[:, :m])

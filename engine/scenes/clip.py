@@ -18,7 +18,7 @@ from engine.parallel import Budget, run_chunks
 from engine.scenes.bodies import Bodies
 from engine.scenes.broad_phase import candidates
 from engine.scenes.ends import Exact, Found, ScenePieces, in_order, joined
-from engine.scenes.posed_mesh import MOST_MET
+from engine.scenes.posed_mesh import MOST_MET, scratch_for
 from engine.scenes.standing import Layer, Standing
 from engine.scenes.through import MET, cut_pairs, find_first
 from engine.segment_clipping.boundary import clip_chunk
@@ -146,6 +146,7 @@ def _search(
     """Fill rows first .. last - 1 of what `_searched` finds in one layer."""
     tree, table = layer.bodies.tree(budget), layer.bodies.table(budget)
     n, room = np.array([first, 0, 0]), room_for(0 if is_any else MOST_MET, segments.shape[2])
+    scratch = scratch_for(len(tree.boxes))
     while n[0] < last:  # bound: each turn reaches the end, or prepares what a body wants
         entry_of(find_first)(
             segments,
@@ -153,6 +154,7 @@ def _search(
             tree,
             layer.is_away,
             table.of_kernels,
+            scratch,
             is_any,
             budget.flag,
             *found,
@@ -184,7 +186,7 @@ def _better(one: Any, other: Any, is_any: bool) -> Any:
 
 def _of_layer(segments: FloatArray, layer: Layer, counts: Counts, budget: Budget, workers: int | None) -> list[Found]:
     """Return the pieces within the bodies of one layer."""
-    owners, bodies = candidates(layer.bodies.tree(budget), segments, False, budget, workers)
+    owners, bodies = candidates(layer.bodies.tree(budget), segments, budget, workers)
     if len(layer.is_away):
         stays = ~layer.is_away[bodies]
         owners, bodies = owners[stays], bodies[stays]
@@ -200,11 +202,12 @@ def _of_layer(segments: FloatArray, layer: Layer, counts: Counts, budget: Budget
         return places if layer.names is None else layer.names[places]
 
     def task(first: int, last: int) -> None:
-        parts[first], n = [], np.zeros(3, np.int64)
+        parts[first], n, scratch = [], np.zeros(3, np.int64), scratch_for(0)
         mine, theirs = owners[first:last], bodies[first:last]
         while n[0] < last - first:  # bound: each turn has room for a pair, or prepares what a body wants
             out = room_for(MOST_MET + 2 * (last - first - int(n[0])), segments.shape[2])
-            entry_of(cut_pairs)(segments, mine, theirs, table.of_kernels, budget.flag, out, state[first:last], n)
+            of_some = state[first:last]
+            entry_of(cut_pairs)(segments, mine, theirs, table.of_kernels, scratch, budget.flag, out, of_some, n)
             budget.check()
             if n[2] < 0:
                 layer.bodies.prepare(int(theirs[n[0]]), int(n[2]), budget)

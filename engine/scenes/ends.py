@@ -76,11 +76,13 @@ def taken(found: Found, rows: Any) -> Found:
 
 def in_order(found: Found, exact: Exact) -> ScenePieces:
     """Return pieces, given by source and body, in the exact order of their starts."""
-    m = len(found.source)
+    m, starts_source = len(found.source), found.source[1:] != found.source[:-1]
+    if starts_source.all() and (found.t[:, 0] < found.t[:, 1]).all():
+        ranks = np.array([[0, 1]]).repeat(m, axis=0)
+        return ScenePieces(found.source, found.body, found.ends[0], found.ends[1], found.t, found.faces, ranks)
     number = np.arange(m)  # of a piece among those of its source and body
-    if m > 1:
-        is_new = np.append(True, (found.source[1:] != found.source[:-1]) | (found.body[1:] != found.body[:-1]))
-        number = number - np.maximum.accumulate(np.where(is_new, number, 0))
+    is_new = np.append(True, starts_source | (found.body[1:] != found.body[:-1]))
+    number -= np.maximum.accumulate(np.where(is_new, number, 0))
     source = np.concatenate([found.source, found.source])
     order = np.lexsort((found.t.T.ravel(), source))  # all starts, then all ends
     ranks = np.empty(2 * m, np.int64)

@@ -98,18 +98,15 @@ def bodies_in(items: Any, item: int, bodies: Any, stack: Any, found: Any) -> int
 
 
 @kernel
-def list_near(items: Any, start: int, are_boxes: bool, bodies: Any, pairs: Any, flag: Any) -> tuple[int, int]:
-    """List in pairs (2, room) the items (n, 2, dim) from `start` on, segments or boxes, and the bodies that they may
-    meet; return the item reached, and how many pairs there are. An item whose bodies find no room is not begun."""
+def list_near(items: Any, start: int, bodies: Any, pairs: Any, flag: Any) -> tuple[int, int]:
+    """List in pairs (2, room) the segments (n, 2, dim) from `start` on and the bodies that they may meet; return the
+    item reached, and how many pairs there are. An item whose bodies find no room is not begun."""
     n_bodies = bodies.bounded.size + bodies.listed.size
     stack, found, n_pairs = np.empty(STACK, np.int32), np.empty(n_bodies + 1, np.int64), 0
     for item in range(start, items.shape[0]):
         if flag[0]:
             return item, n_pairs
-        if are_boxes:
-            n_found = bodies_in(items, item, bodies, stack, found)
-        else:
-            n_found = near_bodies(items, item, bodies, stack, found)
+        n_found = near_bodies(items, item, bodies, stack, found)
         if n_pairs + n_found > pairs.shape[1]:
             return item, n_pairs
         for place in range(n_found):

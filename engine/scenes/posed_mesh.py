@@ -22,7 +22,7 @@ from engine.lanes.tracing import LANES
 from engine.lanes.triangles import AXES_BEFORE, CORNER_ROWS, longest_axis, near_triangles
 from engine.predicates.double_double import dd_div, dd_sub
 from engine.scenes.posed_cut import in_frame, put_point, slack_of
-from engine.segment_clipping.boundary_cut import Crossings, crossings_for, sort_crossings
+from engine.segment_clipping.boundary_cut import Crossings, sort_crossings
 from engine.segment_clipping.contacts import APART, PROPER, TOUCHING
 from engine.segment_clipping.crossing_values import Vector, dot, is_item_safe, normal_of
 from engine.segment_clipping.mesh_contacts import local_segment
@@ -65,12 +65,17 @@ class Scratch(NamedTuple):
     stack: Any
     met: Any
     cuts: Crossings
+    near: Crossings
+    """The bodies near it, by where it enters their boxes."""
 
 
-@inline
-def scratch_for() -> Scratch:
+def scratch_for(n_bodies: int) -> Scratch:
     """Return room for the work on one segment at a time."""
-    return Scratch(np.empty(STACK, np.int32), np.empty(MOST_MET, np.int64), crossings_for(MOST_MET, 3))
+    cuts, near = (
+        Crossings(np.empty(n), np.empty((n, 3)), np.empty(n, np.int64), np.empty(n, np.int64))
+        for n in (MOST_MET, n_bodies + 1)
+    )
+    return Scratch(np.empty(STACK, np.int32), np.empty(MOST_MET, np.int64), cuts, near)
 
 
 @inline

@@ -142,12 +142,12 @@ class Standing:
 
     def near(self, points: FloatArray, budget: Budget) -> tuple[IntArray, IntArray]:
         """Return pairs of one of some points and a body that it may meet."""
-        boxes = np.stack([points, points], axis=1)
-        owners, bodies = candidates(self.base.tree(budget), boxes, True, budget, 1)
+        ends = np.stack([points, points], axis=1)
+        owners, bodies = candidates(self.base.tree(budget), ends, budget, 1)
         if self.few is None:
             return owners, bodies
         stays = ~self.layers[0].is_away[bodies]
-        more, places = candidates(self.few.tree(budget), boxes, True, budget, 1)
+        more, places = candidates(self.few.tree(budget), ends, budget, 1)
         return np.concatenate([owners[stays], more]), np.concatenate([bodies[stays], self.names[places]])
 
     def located(self, points: FloatArray, budget: Budget) -> tuple[SceneLocations, Accuracy]:

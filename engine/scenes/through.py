@@ -12,11 +12,10 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.bounding.bvh import STACK
-from engine.jit import bare, inline, kernel
+from engine.jit import bare_kernel, inline
 from engine.scenes.near_boxes import near_bodies
 from engine.scenes.posed_cut import between_planes, in_ball, put_piece
-from engine.scenes.posed_mesh import MOST_MET, UNSURE, WANTS_BODY, crossings_in, scratch_for
+from engine.scenes.posed_mesh import MOST_MET, UNSURE, WANTS_BODY, crossings_in
 from engine.segment_clipping.boundary_cut import SETTLED, Crossings, emit, sort_crossings
 from engine.segment_clipping.crossing_values import is_item_safe
 from engine.segment_clipping.pieces import Pieces
@@ -113,29 +112,23 @@ def _meets(table: Any, body: int, segments: Any, item: int, scratch: Any, stop: 
     return 0 if meets == -1 else 1 if meets == 1 else UNSURE
 
 
-@kernel
-def cut_pairs(segments: Any, owners: Any, bodies: Any, table: Any, stop: Any, out: Pieces, state: Any, n: Any) -> None:
+@bare_kernel
+def cut_pairs(
+    segments: Any,
+    owners: Any,
+    bodies: Any,
+    table: Any,
+    scratch: Any,
+    stop: Any,
+    out: Pieces,
+    state: Any,
+    n: Any,
+) -> None:
     """Cut pairs of a segment (n, 2, dim) and a body; the source of a piece is its pair.
 
     state: of each pair SETTLED or OPEN. n: the pair to begin with, afterwards where to go on; how many rows of `out`
     are filled; and 0, or why the next is not cut: what `crossings_in` wants. There is to be room for MOST_MET pieces.
     """
-    _cut_pairs(segments, owners, bodies, table, stop, out, state, n, scratch_for())
-
-
-@bare
-def _cut_pairs(
-    segments: Any,
-    owners: Any,
-    bodies: Any,
-    table: Any,
-    stop: Any,
-    out: Pieces,
-    state: Any,
-    n: Any,
-    scratch: Any,
-) -> None:
-    """Do what `cut_pairs` does, without counting references."""
     n[1], n[2] = 0, 0
     for pair in range(n[0], owners.size):
         n[0] = pair
@@ -229,13 +222,14 @@ def _that_stay(bodies: Any, n: int, is_away: Any) -> int:
     return n_left
 
 
-@kernel
+@bare_kernel
 def find_first(
     segments: Any,
     last: int,
     tree: Any,
     is_away: Any,
     table: Any,
+    scratch: Any,
     is_any: bool,
     stop: Any,
     state: Any,
@@ -251,39 +245,13 @@ def find_first(
     the piece. room: for MOST_MET pieces. n: the segment to begin with, afterwards where to go on; and 0, or why it
     is not asked (what `crossings_in` wants), and the body.
     """
-    n_bodies = tree.bounded.size + tree.listed.size + 1
-    near = Crossings(np.empty(n_bodies), np.empty((0, 3)), np.empty(n_bodies, np.int64), np.empty(n_bodies, np.int64))
-    stack = np.empty(STACK, np.int32)
-    _find_first(
-        segments, last, tree, is_away, table, is_any, stop, state, bodies, out, room, n, (near, stack), scratch_for()
-    )
-
-
-@bare
-def _find_first(
-    segments: Any,
-    last: int,
-    tree: Any,
-    is_away: Any,
-    table: Any,
-    is_any: bool,
-    stop: Any,
-    state: Any,
-    bodies: Any,
-    out: Pieces,
-    room: Pieces,
-    n: Any,
-    places: Any,
-    scratch: Any,
-) -> None:
-    """Do what `find_first` does, without counting references."""
-    near, stack = places
+    near = scratch.near
     n[1] = 0
     for item in range(n[0], last):
         n[0] = item
         if stop[0]:
             return
-        n_near = near_bodies(segments, item, tree, stack, near.faces)
+        n_near = near_bodies(segments, item, tree, scratch.stack, near.faces)
         if is_away.size > 0:
             n_near = _that_stay(near.faces, n_near, is_away)
         found, body = SETTLED, -1

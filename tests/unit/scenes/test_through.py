@@ -10,7 +10,7 @@ import pytest
 from engine import Aabb, Convex, HalfSpace, Polyhedron, Pose, Solid, Sphere, Surface
 from engine.parallel import Budget
 from engine.scenes.bodies import Bodies
-from engine.scenes.posed_mesh import MOST_MET, WANTS_BODY
+from engine.scenes.posed_mesh import MOST_MET, WANTS_BODY, scratch_for
 from engine.scenes.through import OTHER, cut_pairs
 from engine.segment_clipping.boundary_cut import SETTLED
 from engine.segment_clipping.pieces import Pieces, first_of, joined, room_for
@@ -37,7 +37,7 @@ def cut_on(segments: Any, solid: Solid, pose: Pose | None) -> tuple[Pieces, Any]
     with Budget() as budget:
         while n[0] < len(segments):
             table = bodies.table(budget).of_kernels
-            cut_pairs(segments, places, places * 0, table, budget.flag, out, state, n)
+            cut_pairs(segments, places, places * 0, table, scratch_for(1), budget.flag, out, state, n)
             parts.append(Pieces(*(each.copy() for each in first_of(out, int(n[1])))))
             if n[2] < 0:
                 bodies.prepare(0, int(n[2]), budget)
