@@ -193,16 +193,16 @@ class Scene(Immutable):
             first, second = np.divmod(keys[order], n)
             relations = np.full(len(met), TOUCHING, np.int8) if asked.boolean else relations[order]
             return ScenePairs(first, second, relations), Accuracy("exact", None, len(keys), 0, 0, "named pairs")
-        keys.sort()
         if asked.only is not None:
             keys = keys[np.isin(keys, pair_keys(asked.only, n, "only"))]
         if asked.skip is not None:
             keys = keys[~np.isin(keys, pair_keys(asked.skip, n, "skip"))]
         pairs = np.stack(np.divmod(keys, n), axis=1)
         bodies, local = np.unique(pairs, return_inverse=True)
+        asked = asked._replace(skip=None, only=local.reshape(-1, 2))
         some = standing.base.batches(budget).under(bodies, [standing.pose(body) for body in bodies.tolist()])
         try:
-            found, accuracy = collide_bodies(some, asked, budget, workers, progress, local.reshape(-1, 2))
+            found, accuracy = collide_bodies(some, asked, budget, workers, progress)
         except EngineError as error:
             raise _renamed(error, bodies.tolist()) from None
         return replace(found, first=bodies[found.first], second=bodies[found.second]), accuracy
@@ -296,14 +296,13 @@ class Scene(Immutable):
         """Return indices of bodies, each once, ascending. Raises: IndexOutOfRangeError, InvalidArrayError."""
         if not isinstance(bodies, (list, tuple, set, frozenset, np.ndarray)) or getattr(bodies, "ndim", 1) != 1:
             raise InvalidArrayError(f"{name} must be a list of bodies, got {type(bodies).__name__}", (name,))
-        found = set()
+        found, n = set(), len(self)
         for place, body in enumerate(bodies):
             if isinstance(body, (bool, np.bool_)) or not isinstance(body, (int, np.integer)):
                 raise InvalidArrayError(f"{name} names bodies by index, got {type(body).__name__}", (name, place))
-            if not 0 <= body < len(self):
-                raise IndexOutOfRangeError(
-                    f"{name} names body {body}, which is not there; the scene has {len(self)}", (name, place)
-                )
+            if not 0 <= body < n:
+                message = f"{name} names body {body}, which is not there; the scene has {n}"
+                raise IndexOutOfRangeError(message, (name, place))
             found.add(int(body))
         return sorted(found)
 

@@ -114,7 +114,7 @@ class Standing:
 
         Raises: as `collide_scene` where it does not take a body.
         """
-        batches, tree, room = self.base.batches(budget), self.base.tree(budget), 16 + 16 * len(named)
+        batches, tree, room = self.base.batches(budget), self.base.tree(budget), 16 + 6 * len(named)
         bodies, few = batches.bodies, self.base if self.few is None else self.few
         still, moved = (_where(each.arrays(budget)) for each in (self.base, few))
         while True:  # bound: the second turn has room

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
@@ -115,32 +115,21 @@ class Asked(NamedTuple):
 
 
 def collide_bodies(
-    batches: SceneBatches,
-    asked: Asked,
-    budget: Budget,
-    workers: int | None,
-    progress: Progress | None,
-    near: IntArray | None = None,
+    batches: SceneBatches, asked: Asked, budget: Budget, workers: int | None, progress: Progress | None
 ) -> tuple[ScenePairs, Accuracy]:
-    """Return the colliding pairs of a prepared scene; near (n, 2): the only ones whose boxes may meet, sorted, where
-    that is known; then `skip` and `only` are not looked at."""
+    """Return the colliding pairs of a prepared scene."""
     bodies, (skip, only, gap, witnesses, boolean, detail) = batches.bodies, asked
     boolean, detail = bool(boolean), bool(detail)  # what is not a bool would compile kernels of its own
     if detail:
         check_has_detail(((("solids", i), solid) for i, solid in enumerate(bodies.solids)), boolean)
     gap = None if gap is None else checked_distance(gap, "gap")
     budget.check()
-    blocks: Iterable[IntArray]
-    if near is None:
-        skipped = None if skip is None else pair_keys(skip, len(bodies.solids), "skip")
-        wanted = None if only is None else pair_keys(only, len(bodies.solids), "only")
-        blocks = _candidates(bodies, enlarged(bodies, gap), wanted, skipped, budget)
-    else:
-        blocks = _meeting(enlarged(bodies, gap), bodies.high, near)
+    skipped = None if skip is None else pair_keys(skip, len(bodies.solids), "skip")
+    wanted = None if only is None else pair_keys(only, len(bodies.solids), "only")
     parts: list[_Part] = []
     works: list[Work] = []
     n_candidates = n_open = 0
-    for pairs in blocks:
+    for pairs in _candidates(bodies, enlarged(bodies, gap), wanted, skipped, budget):
         budget.check()
         relations = batches.relations(pairs, boolean, detail, budget, workers)
         n_candidates += len(pairs)
@@ -149,11 +138,11 @@ def collide_bodies(
         answers = Answers(budget, boolean, relations, [None] * len(pairs) if witnesses else None, details)
         _settle(bodies, pairs, answers, workers, progress)
         works += answers.works
-        apart = None if gap is None else _near(batches, pairs, answers, gap, workers)
-        parts.append(_found(bodies, pairs, answers, apart))
+        near = None if gap is None else _near(batches, pairs, answers, gap, workers)
+        parts.append(_found(bodies, pairs, answers, near))
         budget.take((_BYTES + _BYTES_OF_WITNESS * witnesses) * len(parts[-1].pairs))
     budget.check()
-    method = "boxes" if only is None and near is None else "named pairs"
+    method = "boxes" if only is None else "named pairs"
     result = _joined(parts, witnesses, detail, gap is not None and not boolean)
     return result, accuracy_of(n_candidates, n_open, works, method)
 
@@ -242,17 +231,15 @@ def _candidates(
     if n_bodies < 2 or (wanted is not None and not len(wanted)):
         return
     high = bodies.high
-    if wanted is None:
-        blocks = pairs_of_boxes(low, high, budget.flag)
-    else:
-        named = np.stack(np.divmod(np.unique(wanted), n_bodies), axis=1)
-        blocks = _meeting(low, high, named[named[:, 0] < named[:, 1]])
+    blocks = pairs_of_boxes(low, high, budget.flag) if wanted is None else _wanted_pairs(low, high, wanted)
     for pairs in blocks:
         yield pairs if skipped is None else pairs[~np.isin(pairs[:, 0] * n_bodies + pairs[:, 1], skipped)]
 
 
-def _meeting(low: FloatArray, high: FloatArray, pairs: IntArray) -> Iterator[IntArray]:
-    """Yield those of some pairs whose boxes meet, in blocks."""
+def _wanted_pairs(low: FloatArray, high: FloatArray, wanted: IntArray) -> Iterator[IntArray]:
+    """Yield the pairs with the keys wanted whose boxes meet, in blocks."""
+    pairs = np.stack(np.divmod(np.unique(wanted), len(low)), axis=1)
+    pairs = pairs[pairs[:, 0] < pairs[:, 1]]
     for start in range(0, len(pairs), BLOCK):
         first, second = pairs[start : start + BLOCK].T
         meet = ((low[first] <= high[second]) & (low[second] <= high[first])).all(axis=1)
