@@ -210,9 +210,6 @@ class _Unlimited(Budget):
     def __exit__(self, *_: object) -> None:
         pass
 
-    def check(self) -> None:
-        """Let the call go on."""
-
 
 UNLIMITED: Final = _Unlimited()
 """Shared by all calls without a limit that hand it to no other thread: nothing ever raises its flag."""

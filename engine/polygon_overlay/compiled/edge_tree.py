@@ -151,31 +151,25 @@ def order_boxes(boxes: Any, n: int, places: Any, stop: Any) -> bool:
     for k in range(n):
         x, y = boxes[k, 0] - x_min, boxes[k, 2] - y_min
         keys[k] = _spread(min(int(x * by_x), 65535)) | (_spread(min(int(y * by_y), 65535)) << 1)
-    sort_by_keys(keys, places, n, stop)
-    return True
-
-
-@allocating
-def sort_by_keys(keys: Any, places: Any, n: int, stop: Any) -> None:
-    """Sort keys, below 2^33, and places with them."""
     spare_keys, spare, counts = np.empty(n, np.int64), np.empty(n, np.int64), np.empty(_DIGITS + 1, np.int64)
     for shift in (0, 11, 22):  # the last digit first: each pass keeps the order of those before it
         counts[:] = 0
         for k in range(n):
             if k & POLL == 0 and stop[0]:
-                return
+                return True
             counts[((keys[k] >> shift) & (_DIGITS - 1)) + 1] += 1
         for digit in range(_DIGITS):
             counts[digit + 1] += counts[digit]
         for k in range(n):
             if k & POLL == 0 and stop[0]:
-                return
+                return True
             digit = (keys[k] >> shift) & (_DIGITS - 1)
             at = counts[digit]
             spare_keys[at], spare[at] = keys[k], places[k]
             counts[digit] = at + 1
         for k in range(n):
             keys[k], places[k] = spare_keys[k], spare[k]
+    return True
 
 
 @inline

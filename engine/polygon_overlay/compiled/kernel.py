@@ -346,7 +346,7 @@ def overlay_pairs(
         if moved_by == LOST:
             continue
         n_found, m = arranged.n_found, arranged.n_points
-        n_pieces = rank_rings(w.found, n_found, w.rounded, w.ranking, is_valid, w.faces.joined, w.tree, stop)
+        n_pieces = rank_rings(w.found, n_found, w.rounded, w.ranking, is_valid, w.faces.joined, w.tree.boxes, stop)
         if stop[0]:
             break
         if n_pieces < 0:

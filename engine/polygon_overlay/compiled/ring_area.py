@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 from engine.jit import bare_kernel, called, inline, merged
 from engine.polygon_overlay.compiled.crossing_signs import weight_of
-from engine.polygon_overlay.compiled.rounded_crossings import leading
+from engine.polygon_overlay.compiled.rounded_crossings import common_place, leading
 from engine.predicates.double_double import U2, dd_add, dd_div, dd_mul, dd_sub, surely_rounded
 from engine.predicates.error_free import fast_two_sum, two_diff, two_sum, workspace
 from engine.predicates.expansion import is_safe
@@ -59,16 +59,18 @@ def _found(pair: _Pair, v: int) -> tuple[Any, int, int]:
 @merged
 def _end_of(vertices: Any, offsets: Any, v: int, known: Any, side: int) -> int:
     """Return the next vertex of the ring of vertex v that is not at its place (v if there is none)."""
-    low = int(known[side])
+    low, n = int(known[side]), offsets.shape[0] - 1
     if not offsets[low] <= v < offsets[low + 1]:
-        low, high = 0, offsets.shape[0] - 1
+        low = (v - offsets[0]) * n // (offsets[n] - offsets[0])  # where all rings are of one size
+    if not offsets[low] <= v < offsets[low + 1]:
+        low, high = 0, n
         while high - low > 1:  # bound: halves
             middle = (low + high) // 2
             if offsets[middle] <= v:
                 low = middle
             else:
                 high = middle
-        known[side] = low
+    known[side] = low
     start, stop = offsets[low], offsets[low + 1]
     after = v
     for _ in range(stop - start):
@@ -99,11 +101,23 @@ def _exact_weight(
     return h, low, 4.0 * U2 * abs(h)
 
 
+@merged
+def _exactly(x: float, y: float, ox: float, oy: float) -> _Place:
+    """Return a point of doubles, counted from o."""
+    xh, xl = two_diff(x, ox)
+    yh, yl = two_diff(y, oy)
+    return _Place(xh, xl, yh, yl, 0.0)
+
+
 @inline
 def _crossing(pair: _Pair, e: int, f: int, ox: float, oy: float) -> _Place:
-    """Return where two edges cross, counted from o."""
+    """Return where two edges cross, counted from o; exactly where both run along the axes."""
     ax, ay, bx, by = _edge(pair, e)
     cx, cy, dx, dy = _edge(pair, f)
+    x, knows_x = common_place(ax, bx, cx, dx)
+    y, knows_y = common_place(ay, by, cy, dy)
+    if knows_x and knows_y:
+        return _exactly(x, y, ox, oy)
     ah, al, ae = weight_of(cx, cy, dx, dy, ax, ay)
     bh, bl, be = weight_of(cx, cy, dx, dy, bx, by)
     if ae > 0.001 * abs(ah) or be > 0.001 * abs(bh):
@@ -133,9 +147,7 @@ def _place(pair: _Pair, sources: Any, k: int, ox: float, oy: float) -> _Place:
     if sources[k, 1] >= 0:
         return _crossing(pair, sources[k, 0], sources[k, 1], ox, oy)
     vertices, v, _ = _found(pair, sources[k, 0])
-    xh, xl = two_diff(vertices[v, 0], ox)
-    yh, yl = two_diff(vertices[v, 1], oy)
-    return _Place(xh, xl, yh, yl, 0.0)
+    return _exactly(vertices[v, 0], vertices[v, 1], ox, oy)
 
 
 @inline

@@ -5,20 +5,16 @@ The first vertex of a ring is its leftmost, then lowest; rings are compared vert
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from engine.jit import inline
 from engine.polygon_overlay.compiled.chain_rings import Rings
-from engine.polygon_overlay.compiled.edge_tree import OFTEN, POLL, BoxTree, box_holds, sort_by_keys
+from engine.polygon_overlay.compiled.edge_tree import OFTEN, POLL, box_holds
 from engine.polygon_overlay.compiled.rounded_crossings import Rounded
 from engine.predicates.orientation import orient2d
 from engine.types import Point2
-
-_MANY: Final = 256
-_STRIPS: Final = (1 << 22) - 1
-_ROWS: Final = (1 << 11) - 1
 
 
 class Ranking(NamedTuple):
@@ -87,26 +83,6 @@ def _sort(rings: Rings, ranking: Ranking, rounded: Rounded, n: int, is_by_piece:
 
 
 @inline
-def _sort_nearly(ranking: Ranking, rounded: Rounded, n: int, keys: Any, stop: Any) -> None:
-    """Put the first n entries of ``ranking.order`` into the order of their first vertices, but for those that lie
-    near each other in x, and then in y. keys: scratch."""
-    order, x, y = ranking.order, ranking.x, rounded.y
-    x_min = y_min = np.inf
-    x_max = y_max = -np.inf
-    for k in range(n):
-        ring = order[k]
-        x_min, x_max = min(x_min, x[ring]), max(x_max, x[ring])
-        y_min, y_max = min(y_min, y[ranking.start[ring]]), max(y_max, y[ranking.start[ring]])
-    by_x = _STRIPS / (x_max - x_min) if x_max > x_min else 0.0
-    by_y = _ROWS / (y_max - y_min) if y_max > y_min else 0.0
-    for k in range(n):
-        ring = order[k]
-        column, row = int((x[ring] - x_min) * by_x), int((y[ranking.start[ring]] - y_min) * by_y)
-        keys[k] = min(column, _STRIPS) << 11 | min(row, _ROWS)
-    sort_by_keys(keys, order, n, stop)
-
-
-@inline
 def find_shells(rings: Rings, n_rings: int, rounded: Rounded, ranking: Ranking, widest: Any, boxes: Any) -> bool:
     """Fill ``ranking.is_hole`` of rings whose rounded points may turn either way; tell whether it is sure.
 
@@ -135,20 +111,13 @@ def find_shells(rings: Rings, n_rings: int, rounded: Rounded, ranking: Ranking, 
 
 @inline
 def rank_rings(
-    rings: Rings,
-    n_rings: int,
-    rounded: Rounded,
-    ranking: Ranking,
-    is_valid: bool,
-    piece_of: Any,
-    tree: BoxTree,
-    stop: Any,
+    rings: Rings, n_rings: int, rounded: Rounded, ranking: Ranking, is_valid: bool, piece_of: Any, boxes: Any, stop: Any
 ) -> int:
     """Fill ``ranking``; return the number of pieces, -1 if a region has not exactly one shell, or none that is sure.
 
-    is_valid: whether rounding left the rings what they were. piece_of: scratch by region; tree: scratch.
+    is_valid: whether rounding left the rings what they were. piece_of: scratch by region; boxes: by ring.
     """
-    if not is_valid and not find_shells(rings, n_rings, rounded, ranking, piece_of, tree.boxes):
+    if not is_valid and not find_shells(rings, n_rings, rounded, ranking, piece_of, boxes):
         return -1
     n_pieces = 0
     for ring in range(n_rings):
@@ -164,8 +133,6 @@ def rank_rings(
             n_pieces += 1
     if n_rings == 1:
         return n_pieces if n_pieces == 1 else -1
-    if n_pieces > _MANY:
-        _sort_nearly(ranking, rounded, n_pieces, tree.lows, stop)
     _sort(rings, ranking, rounded, n_pieces, False, stop)
     if stop[0]:
         return -1

@@ -69,8 +69,8 @@ def round_crossing(edges: Edges, e: int, f: int) -> tuple[float, float, float, f
     it in rationals).
     """
     a, b, fb = e, edges.after[e], edges.after[f]
-    x, knows_x = _common(edges.x[a], edges.x[b], edges.x[f], edges.x[fb])
-    y, knows_y = _common(edges.y[a], edges.y[b], edges.y[f], edges.y[fb])
+    x, knows_x = common_place(edges.x[a], edges.x[b], edges.x[f], edges.x[fb])
+    y, knows_y = common_place(edges.y[a], edges.y[b], edges.y[f], edges.y[fb])
     if knows_x and knows_y:
         return x, y, 0.0, 0.0
     ah, al, ae = weight(edges, f, fb, a)
@@ -92,7 +92,7 @@ def round_crossing(edges: Edges, e: int, f: int) -> tuple[float, float, float, f
 
 
 @merged
-def _common(p: float, q: float, r: float, s: float) -> tuple[float, bool]:
+def common_place(p: float, q: float, r: float, s: float) -> tuple[float, bool]:
     """Return the coordinate that all of an edge from p to q, or of one from r to s, has; and whether one has one."""
     return (p if p == q else r), (p == q) | (r == s)
 

@@ -118,7 +118,8 @@ def scratch_for(n_vertices: int, n_rings: int, n_contacts: int, n_out: int, n_ou
     """
     kept: Scratch | None = vars(_kept).pop("scratch", None)
     if kept is not None and (kept.n_vertices < n_vertices or kept.n_rings < n_rings or kept.n_contacts < n_contacts):
-        kept = None
+        n_vertices, n_rings = max(n_vertices, kept.n_vertices), max(n_rings, kept.n_rings)
+        n_contacts, kept = max(n_contacts, kept.n_contacts), None
     if kept is not None and len(kept.output.vertices) >= n_out and len(kept.output.rings) > n_out_rings:
         return kept
     n_out, n_out_rings = max(n_out, n_vertices + n_contacts), max(n_out_rings, n_contacts)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from engine.polygon_overlay.compiled.chain_rings import Rings
-from engine.polygon_overlay.compiled.edge_tree import BoxTree
 from engine.polygon_overlay.compiled.ring_order import Ranking, find_shells, rank_rings
 from engine.polygon_overlay.compiled.rounded_crossings import Rounded
 
@@ -22,7 +21,7 @@ def turned(ring: Ring) -> Ring:
 def test_pieces_by_shells_and_holes_after_their_shell(seed: int) -> None:
     random = np.random.default_rng(seed)
     pieces: list[list[Ring]] = []
-    for x, y in random.integers(0, 3, (7 if seed % 2 else 300, 2)).tolist():  # many are sorted by strips first
+    for x, y in random.integers(0, 3, (7 if seed % 2 else 300, 2)).tolist():
         far = len(pieces)  # many begin at one x, or in one point
         shell: Ring = [(x, y), (x + 50 + far, y), (x + 50 + far, y + 50)]
         holes: list[Ring] = [
@@ -41,8 +40,7 @@ def test_pieces_by_shells_and_holes_after_their_shell(seed: int) -> None:
     x, y = np.ascontiguousarray(points.T)
     none = np.zeros(0)
     rounded = Rounded(x, y, np.zeros(len(x), np.uint8), none, none, none)
-    tree = BoxTree(np.zeros((n, 4)), *(np.zeros(n, np.int64) for _ in range(8)))
-    scratch = np.zeros(n, np.int64), tree, np.zeros(1, np.uint8)
+    scratch = np.zeros(n, np.int64), np.zeros((n, 4)), np.zeros(1, np.uint8)
     assert rank_rings(found, n, rounded, ranking, True, *scratch) == len(pieces)
     expected = sorted([turned(piece[0]), *sorted(map(turned, piece[1:]))] for piece in pieces)
     assert [turned(rings[k][1]) for k in ranking.order.tolist()] == [ring for piece in expected for ring in piece]
