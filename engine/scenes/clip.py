@@ -63,7 +63,11 @@ def clip_all(
     segments: FloatArray, standing: Standing, counts: Counts, budget: Budget, workers: int | None
 ) -> ScenePieces:
     """Return all pieces of segments (n, 2, dim)."""
-    parts = [part for layer in standing.layers for part in _of_layer(segments, layer, counts, budget, workers)]
+    parts = [
+        part
+        for layer in standing.layers_near(segments, budget)
+        for part in _of_layer(segments, layer, counts, budget, workers)
+    ]
     return in_order(joined(parts, segments.shape[2]), _exact_ends(segments, standing, budget))
 
 
@@ -114,7 +118,7 @@ def meets_any(
     found: BoolArray = state == MET
     left = np.flatnonzero(state == OPEN)
     more = Counts(len(left))
-    for layer in standing.layers if len(left) else ():
+    for layer in standing.layers_near(segments[left], budget) if len(left) else ():
         for part in _of_layer(segments[left], layer, more, budget, workers):
             found[left[part.source]] = True
     counts.take(left, more)
@@ -127,7 +131,7 @@ def _searched(
     """Return of each segment the state, and where it is MET a body and, unless `is_any`, in its row the first piece."""
     n, dimension = len(segments), segments.shape[2]
     best: Any = None
-    for layer in standing.layers:
+    for layer in standing.layers_near(segments, budget):
         found = np.empty(n, np.uint8), np.empty(n, np.int64), room_for(0 if is_any else n, dimension)
 
         def task(first: int, last: int, layer: Layer = layer, found: Any = found) -> None:

@@ -108,6 +108,14 @@ class Standing:
             boxes[self.names] = self.few.tree(budget).boxes
         return boxes
 
+    def layers_near(self, segments: FloatArray, budget: Budget) -> list[Layer]:
+        """Return the layers that segments (n, 2, dim) may meet: where few, and away from what moved, the first."""
+        if self.few is None or not 0 < len(segments) <= _FEW:
+            return self.layers
+        boxes = self.few.tree(budget).boxes
+        meet = (boxes[:, 0] <= segments.max(axis=(0, 1))) & (boxes[:, 1] >= segments.min(axis=(0, 1)))
+        return self.layers[: 1 + bool(meet.all(axis=1).any())]
+
     def pairs_with(self, named: IntArray, reach: float, boolean: bool, budget: Budget) -> tuple[IntArray, Int8Array]:
         """Return the pairs of a body named and another whose boxes, grown by `reach`, meet, by first * n + second and
         in no order, and how the batch of convex bodies relates them, UNSETTLED where it does not.
