@@ -1,12 +1,15 @@
 """The nearest points of two bodies from double-doubles, where they are sure: one pair of features, and no tie.
 
 **Proof.** All candidates that are left name the same two features, vertex, edge or triangle. The nearest points of
-their lines or planes have weights, quotients of numbers of degree four at most that are off by less than 2^-88 (no
-number is above 2); `ends_of` tells by how much all weights times their denominators are above 0, so that the exact
-points lie within both features. Where all other corners of both triangles lie strictly beyond the planes across the
-exact connection, no other points of the triangles are as near. A weight is off by 2^-88 over its denominator, a point
-by that times the lengths of the edges (`steepness`): `error`. A direction off by 2 `error` brings a height, of lengths
-below 4, off by less than 16 of it.
+their lines or planes have weights, quotients of differences of products of two scalar products. Vectors are off by e = 2^-97
+in each coordinate (no coordinate is above 2); with L the longest coordinate of edges, M that of the vector between
+their starts, a scalar product is off by 3 e (L + L) or 3 e (L + M), and a difference of products by 72 e L^2 (L + M),
+below 2^-90 L^2 (L + M); on one edge a scalar product itself by 2^-90 (L + M). `ends_of` counts in these: it tells by
+how much all weights times their denominators are above 0, so that the exact points lie within both features, and what
+an error of the weights brings to a point, times the lengths of the edges over the denominator (`steepness`): `error`,
+with room for the errors of denominators and for sums of three. Where all other corners of both triangles lie strictly
+beyond the planes across the exact connection, no other points of the triangles are as near. A direction off by 2
+`error` brings a height, of lengths below 4, off by less than 16 of it.
 """
 
 from __future__ import annotations
@@ -93,7 +96,7 @@ def certify(s: Search, start: Any, other: Any, radii: Any, n: int, points: Any) 
     p, q, inside, steepness = ends_of(t, u, pairs[0, 2], pairs[0, 3])
     error = _SLACK * steepness + 2.0**-92
     slack, way, back = _SLACK + 16.0 * error, minus_wide(q, p), minus_wide(p, q)
-    if not (inside > slack and way.x.h * way.x.h + way.y.h * way.y.h + way.z.h * way.z.h > 2.0**-300):
+    if not (inside > _SLACK and way.x.h * way.x.h + way.y.h * way.y.h + way.z.h * way.z.h > 2.0**-300):
         return False
     if not (
         _is_beyond(s.a, pairs[0, 0], here, t, way, p, slack) and _is_beyond(s.b, pairs[0, 1], there, u, back, q, slack)

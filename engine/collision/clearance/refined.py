@@ -91,25 +91,35 @@ def _edge(t: Triangle, k: int) -> tuple[Wide3, Wide3]:
     return a, minus_wide(vertex_of(t, (k + 1) % 3), a)
 
 
+@inline
+def _reach(u: Wide3) -> float:
+    return max(abs(u.x.h), abs(u.y.h), abs(u.z.h))
+
+
 @called
 def _foot(point: Wide3, t: Triangle, feature: int) -> tuple[Wide3, float, float]:
     """Return the point of a vertex, edge or triangle that is nearest to a point, or some other of it; by how much its
-    weights times their denominator are above 0, and the lengths of the edges over the denominator."""
+    weights times their denominator are above 0, and the lengths of the edges over the denominator: the former over,
+    the latter times what errors of the weights are to be counted in (`certified.py`)."""
     if feature < 3:
         return vertex_of(t, feature), np.inf, 0.0
     a, u = _edge(t, feature % 3)
     w, uu = minus_wide(point, a), dot_wide(u, u)
     uw = dot_wide(u, w)
     if feature < FACE:
-        return along_wide(a, _share(uw, uu), u), min(uw.h, uu.h - uw.h), np.sqrt(uu.h) / uu.h
+        scale = _reach(u) + _reach(w)
+        return along_wide(a, _share(uw, uu), u), min(uw.h, uu.h - uw.h) / scale, np.sqrt(uu.h) / uu.h * scale
     v = minus_wide(t.r, a)
+    length = max(_reach(u), _reach(v))
+    scale = length * length * (length + _reach(w))
     uv, vv, vw = dot_wide(u, v), dot_wide(v, v), dot_wide(v, w)
     size = less(times(uu, vv), times(uv, uv))
     top, their_top = less(times(vv, uw), times(uv, vw)), less(times(uu, vw), times(uv, uw))
     x, y = _share(top, size), _share(their_top, size)
     rest = less(Wide(1.0, 0.0), x)
     foot = along_wide(along_wide(a, x, u), y if less(y, rest).h <= 0.0 else rest, v)
-    return foot, min(top.h, their_top.h, size.h - top.h - their_top.h), (np.sqrt(uu.h) + np.sqrt(vv.h)) / size.h
+    inside = min(top.h, their_top.h, size.h - top.h - their_top.h) / scale
+    return foot, inside, (np.sqrt(uu.h) + np.sqrt(vv.h)) / size.h * scale
 
 
 @called
@@ -125,7 +135,10 @@ def ends_of(s: Triangle, t: Triangle, first: int, second: int) -> tuple[Wide3, W
         w = minus_wide(a, b)
         uu, uv, vv, uw, vw = dot_wide(u, u), dot_wide(u, v), dot_wide(v, v), dot_wide(u, w), dot_wide(v, w)
         size, top = less(times(uu, vv), times(uv, uv)), less(times(uv, vw), times(vv, uw))
-        p, inside, steepness = along_wide(a, _share(top, size), u), min(top.h, size.h - top.h), np.sqrt(uu.h) / size.h
+        length = max(_reach(u), _reach(v))
+        scale = length * length * (length + _reach(w))
+        p, inside = along_wide(a, _share(top, size), u), min(top.h, size.h - top.h) / scale
+        steepness = np.sqrt(uu.h) / size.h * scale
     q, their_inside, their_steepness = _foot(p, t, second)
     return p, q, min(inside, their_inside), steepness + their_steepness
 
