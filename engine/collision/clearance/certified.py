@@ -1,15 +1,15 @@
 """The nearest points of two bodies from double-doubles, where they are sure: one pair of features, and no tie.
 
 **Proof.** All candidates that are left name the same two features, vertex, edge or triangle. The nearest points of
-their lines or planes have weights, quotients of differences of products of two scalar products. Vectors are off by e = 2^-97
-in each coordinate (no coordinate is above 2); with L the longest coordinate of edges, M that of the vector between
-their starts, a scalar product is off by 3 e (L + L) or 3 e (L + M), and a difference of products by 72 e L^2 (L + M),
-below 2^-90 L^2 (L + M); on one edge a scalar product itself by 2^-90 (L + M). `ends_of` counts in these: it tells by
-how much all weights times their denominators are above 0, so that the exact points lie within both features, and what
-an error of the weights brings to a point, times the lengths of the edges over the denominator (`steepness`): `error`,
-with room for the errors of denominators and for sums of three. Where all other corners of both triangles lie strictly
-beyond the planes across the exact connection, no other points of the triangles are as near. A direction off by 2
-`error` brings a height, of lengths below 4, off by less than 16 of it.
+their lines or planes have weights, quotients of differences of products of two scalar products. Vectors are off by e =
+2^-97 in each coordinate (none is above 2); with L the longest coordinate of edges, M that of the vector between their
+starts, a scalar product is off by 3 e (L + L) or 3 e (L + M), and a difference of products by 72 e L^2 (L + M), below
+2^-90 L^2 (L + M); on one edge a scalar product itself by 2^-90 (L + M). `ends_of` counts in these: it tells by how much
+all weights times their denominators are above 0, so that the exact points lie within both features, and what an error
+of the weights brings to a point, times the lengths of the edges over the denominator (`steepness`): `error`, with room
+for the errors of denominators and for sums of three. Where all other corners of both triangles lie strictly beyond the
+planes across the exact connection, no other points of the triangles are as near. A direction off by 2 `error` brings a
+height, of lengths below 4, off by less than 16 of it.
 """
 
 from __future__ import annotations

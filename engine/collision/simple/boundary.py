@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from fractions import Fraction
 from functools import reduce
 
 import numpy as np
@@ -13,7 +12,7 @@ from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray
 from engine.collision.exact_images import HalfSpaceImage, Vector, as_vector, image_map, rounded, value_at
 from engine.collision.meshes.exact_body import exact_pair, faces_in
 from engine.collision.meshes.exact_regions import sides_at
-from engine.collision.meshes.live_faces import LivePiece, live_piece, simplex_distance
+from engine.collision.meshes.live_faces import LivePiece, live_piece
 from engine.collision.meshes.mesh_arrays import mesh_body_of
 from engine.collision.planar.outline import is_clean, live_edges, outline_of
 from engine.collision.result import Work
@@ -72,10 +71,6 @@ class Boundary:
         """Return the exact corners of a face."""
         return tuple(self.exact(vertex) for vertex in self.ends[face].tolist())
 
-    def distance(self, face: int, center: Vector) -> Fraction:
-        """Return the exact squared distance from a point to a face."""
-        return simplex_distance(center, self.corners(face))
-
     def face_bounds(self, center: Vector, faces: IntArray | slice = _ALL) -> tuple[FloatArray, FloatArray]:
         """Return bounds of the squared distances from a point to what the boxes of faces hold."""
         ends = self.ends[faces]
@@ -115,9 +110,9 @@ def _mesh_boundary(body: Solid, pose: Pose | None, work: Work) -> Boundary:
             return vertices[where] if pose is None else vertices[where] @ pose.rotation.T + pose.translation
 
     def near(center: Vector, radius: float) -> IntArray:
-        low = [np.nextafter(rounded(x - Fraction(radius)), -np.inf) for x in center]
-        high = [np.nextafter(rounded(x + Fraction(radius)), np.inf) for x in center]
-        return faces_in(mesh.arrays, mesh.posed(pose), low, high)
+        around = np.array([rounded(x) for x in center])
+        reach = radius + 2.0**-50 * (radius + np.abs(around)) + 2.0**-1070  # four roundings of 2^-53
+        return faces_in(mesh.arrays, mesh.posed(pose), (around - reach).tolist(), (around + reach).tolist())
 
     def is_inside(center: Vector) -> bool:
         exact, _ = exact_pair(mesh, pose, mesh, pose)

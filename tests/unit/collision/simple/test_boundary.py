@@ -9,6 +9,7 @@ import pytest
 
 from engine import Aabb, Polygon, Pose, Solid
 from engine.collision.exact_images import image_half_space, value_at
+from engine.collision.meshes.live_faces import simplex_distance
 from engine.collision.result import Work
 from engine.collision.simple.boundary import boundary_of
 from engine.predicates.exact_vectors import minus, squared_length
@@ -36,7 +37,7 @@ def test_rounded_vertices_bounds_and_signs_hold_the_exact_ones(body: Solid, pose
     for face in range(len(boundary.ends)):
         assert (
             lower[face]
-            <= boundary.distance(face, center)
+            <= simplex_distance(center, boundary.corners(face))
             == min(
                 piece.squared_distance(center)
                 for piece in boundary.live([face])
