@@ -43,6 +43,7 @@ from engine.files.meshes import read_mesh
 from engine.parallel import Cancel
 from engine.polygon_clipping.clip_polygons import ClippedPolygons, PolygonStatus, clip_polygons
 from engine.polygon_overlay.batch import OverlayBatch, overlay_batch
+from engine.polygon_overlay.compiled.workspace import release
 from engine.polygon_overlay.overlay import overlay
 from engine.polygon_overlay.result import Collapse, Overlay, OverlayPiece
 from engine.polygon_overlay.union_all import filled, union_all
@@ -150,6 +151,7 @@ __all__ = [
     "overlay_batch",
     "polygons",
     "read_mesh",
+    "release",
     "union_all",
     "warm",
 ]

@@ -132,7 +132,7 @@ def _passages_of(vertices: FloatArray, offsets: IntArray, budget: Budget) -> tup
             read_only(vertices), read_only(offsets), budget.flag, scratch.buffers, passages
         )
         budget.check()
-        keep(scratch, len(vertices), 0, 0)
+        keep(scratch)
         if n <= n_most:
             return passages[:n].astype(np.int64), stays
         n_most = n
@@ -185,7 +185,7 @@ def _stay_apart(result: Overlay, budget: Budget) -> bool:
         read_only(vertices), read_only(points.astype(np.int32)), read_only(offsets), budget.flag, scratch.buffers
     )
     budget.check()
-    keep(scratch, len(vertices), len(offsets), 0)
+    keep(scratch)
     return bool(are_apart)
 
 

@@ -53,7 +53,7 @@ def run_kernel(
     while reached < n:  # bound: each turn goes on, or makes room for one pair, geometrically
         scratch = scratch_for(n_vertices, n_rings, n_contacts, n_out, n_out_rings)
         n_known = sum(len(part[2]) - 1 for part in parts)
-        reached, needs, filled, n_filled, n_pieces, n_evidence, used, _ = entry_of(overlay_pairs)(
+        reached, needs, filled, n_filled, n_pieces, n_evidence, _ = entry_of(overlay_pairs)(
             first,
             subjects.polygon_offsets,
             second,
@@ -71,7 +71,7 @@ def run_kernel(
         sizes = filled, filled, n_filled + 1, n_pieces + 1, n_evidence
         parts.append([array[:size].copy() for array, size in zip(scratch.output, sizes, strict=True)])
         parts[-1][4][:, 0] += n_known
-        keep(scratch, n_vertices, used, filled)
+        keep(scratch)
         if needs == NEEDS_CONTACTS:
             n_contacts = more_contacts(scratch.n_contacts)
             budget.take(BY_CONTACT * n_contacts)

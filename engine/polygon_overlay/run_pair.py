@@ -102,20 +102,18 @@ def run_blocks(
         reduced, n_contacts, n_out, n_out_rings = NOT_REDUCED, _FEW_CONTACTS, 0, 0
     else:
         reduced, n_contacts, n_out, n_out_rings = NOT_REDUCED, max(256, 4 * n_vertices), 8 + n_vertices, 2
-    n_touched = n_vertices
     if n_vertices >= _MANY:
         budget.take(_BY_VERTEX * n_vertices)
     while True:  # bound: each turn makes room, geometrically
         scratch = scratch_for(n_vertices, n_rings, n_contacts, n_out, n_out_rings)
         if size:
             reduced = entry_of(reduce_pair)(subject, clip, size, n_most, kept, budget.flag, scratch.buffers)
-            n_touched = reduced.n + n_vertices // 4
             if reduced.n == 0:
                 budget.check()
-                keep(scratch, n_touched, 0, 0)
+                keep(scratch)
                 return None
         (status, counts, displacement), output = scratch.outcome, scratch.output
-        _, needs, n, n_found, n_pieces, _, used, n_left_out = entry_of(overlay_pairs)(
+        _, needs, n, n_found, n_pieces, _, n_left_out = entry_of(overlay_pairs)(
             subject,
             subject_item,
             clip,
@@ -132,7 +130,7 @@ def run_blocks(
         budget.check()
         if needs == FINISHED:
             break
-        keep(scratch, n_touched, used, n)
+        keep(scratch)
         if needs == NEEDS_CONTACTS:
             n_contacts = more_contacts(scratch.n_contacts)
             budget.take(BY_CONTACT * n_contacts)
@@ -146,7 +144,7 @@ def run_blocks(
             found = _copied(output.vertices, n), _copied(output.sources, n), _copied(output.rings, n_found + 1)
         pieces = _counted(n_pieces) if n_pieces == n_found <= _FEW_PIECES else _copied(output.pieces, n_pieces + 1)
         made = FoundPair(status.item(0), counts.item(3), displacement.item(0), *found, pieces)
-    keep(scratch, n_touched, used, n)
+    keep(scratch)
     return made
 
 

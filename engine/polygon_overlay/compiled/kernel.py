@@ -273,18 +273,16 @@ def _tell(w: Workspace, n_found: int, first: int, output: Output, filled: _Fille
 
 
 @merged
-def _ended(
-    pair: int, needs: int, filled: _Filled, used: int, n_left_out: int
-) -> tuple[int, int, int, int, int, int, int, int]:
+def _ended(pair: int, needs: int, filled: _Filled, n_left_out: int) -> tuple[int, int, int, int, int, int, int]:
     n_vertices, n_rings, n_pieces, n_evidence = filled
-    return pair, needs, n_vertices, n_rings, n_pieces, n_evidence, used, n_left_out
+    return pair, needs, n_vertices, n_rings, n_pieces, n_evidence, n_left_out
 
 
 @bare_kernel
 def overlay_pairs(
     subjects: RingArrays, subject_items: Any, clips: RingArrays, clip_items: Any, begin: int, reduced: Loaded,
     kept: Any, nesting: Nesting, stop: Any, buffers: Buffers, outcomes: Outcomes, output: Output,
-) -> tuple[int, int, int, int, int, int, int, int]:  # fmt: skip
+) -> tuple[int, int, int, int, int, int, int]:  # fmt: skip
     """Overlay the pairs from ``begin`` on; fill outcomes, by pair, and output from its beginning.
 
     subject_items, clip_items: the first ring of each polygon, and the end of the last one's. kept: (4,) uint8 by label.
@@ -295,13 +293,12 @@ def overlay_pairs(
     vertices are counted from the pair's first, those of its clip after those of its subject. The input vertex and
     LEFT_OUT where the vertices up to the next source are left out. reduced: what reduce_pair returned for the only
     pair; no vertices, no such pair. Returns the pair reached, FINISHED or what is needed to go on with it, numbers of
-    vertices, rings, pieces, rows of evidence, how many contacts there was scratch used for at most, and how many
-    vertices are left out.
+    vertices, rings, pieces, rows of evidence, and how many vertices are left out.
     """
     w = rows_of(buffers)
     is_intersection = not (kept[0] or kept[1] or kept[2])
     filled = _Filled(0, 0, 0, 0)
-    used = n_left_out = 0
+    n_left_out = 0
     status, counts, displacement = outcomes.status, outcomes.counts, outcomes.displacement
     for pair in range(begin, status.shape[0]):
         status[pair], displacement[pair] = OPEN, 0.0
@@ -322,7 +319,7 @@ def overlay_pairs(
                 if m != GENERAL:
                     if not _has_room(output, filled, m, 1):
                         counts[pair, 1], counts[pair, 2] = 1, m
-                        return _ended(pair, NEEDS_OUTPUT, filled, used, 0)
+                        return _ended(pair, NEEDS_OUTPUT, filled, 0)
                     if m > 0:
                         _write_convex(w, m, low, output, filled)
                         filled = _Filled(filled.n_vertices + m, filled.n_rings + 1, filled.n_pieces + 1, 0)
@@ -338,10 +335,8 @@ def overlay_pairs(
         arranged = _arrange(w, loaded, kept, own, stop)
         if stop[0]:
             break
-        room = w.along.order.shape[0] - 9
-        if arranged.n_contacts > room:
-            return _ended(pair, NEEDS_CONTACTS, filled, room, 0)
-        used = max(used, arranged.n_contacts)
+        if arranged.n_contacts > w.along.order.shape[0] - 9:
+            return _ended(pair, NEEDS_CONTACTS, filled, 0)
         moved_by, is_valid = _round(w, loaded.n, arranged, stop)
         if moved_by == LOST:
             continue
@@ -353,11 +348,11 @@ def overlay_pairs(
             continue
         if not _has_room(output, filled, m, n_found):
             counts[pair, 1], counts[pair, 2] = n_found, m
-            return _ended(pair, NEEDS_OUTPUT, filled, used, 0)
+            return _ended(pair, NEEDS_OUTPUT, filled, 0)
         n_evidence = _tell(w, n_found, span.first, output, filled) if nesting.rule == AGAIN else 0
         if n_evidence == NO_ROOM:
             counts[pair, 2] = 2 * output.vertices.shape[0]
-            return _ended(pair, NEEDS_OUTPUT, filled, used, 0)
+            return _ended(pair, NEEDS_OUTPUT, filled, 0)
         _write(w, loaded.n, n_found, output, filled, stop)
         if stop[0]:
             break
@@ -367,7 +362,7 @@ def overlay_pairs(
         filled = _Filled(filled.n_vertices + m, filled.n_rings + n_found, filled.n_pieces + n_pieces, n_evidence)
         counts[pair, 0], counts[pair, 1], counts[pair, 2], counts[pair, 3] = n_pieces, n_found, m, arranged.n_exact
         status[pair], displacement[pair] = (DONE if is_valid else MAY_CROSS), moved_by
-    return _ended(status.shape[0], FINISHED, filled, used, n_left_out)
+    return _ended(status.shape[0], FINISHED, filled, n_left_out)
 
 
 @merged

@@ -5,7 +5,6 @@ The kernel is handed the few arrays and takes their rows itself: handing over ei
 
 from __future__ import annotations
 
-import threading
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
@@ -25,14 +24,11 @@ from engine.polygon_overlay.compiled.ring_nesting import Holders
 from engine.polygon_overlay.compiled.ring_order import Ranking
 from engine.polygon_overlay.compiled.rounded_crossings import Rounded
 
-_kept = threading.local()
-_MOST_KEPT: Final = 80_000_000
-"""Bytes that were written to up to which a thread keeps its scratch."""
+_kept: list[Scratch] = []
+"""Scratch that nobody uses now, for whichever thread is next: the last used first, whose pages are in the cache."""
+_MOST_KEPT: Final = 128_000_000
+"""Bytes of all that is kept; of most of them a fifth was ever written to."""
 _MANY_CONTACTS: Final = 2**18
-_BY_VERTEX: Final = 184
-_BY_CONTACT: Final = 278
-_BY_OUTPUT: Final = 40
-"""Bytes of scratch for each vertex, contact, and vertex of the output."""
 
 
 class Buffers(NamedTuple):
@@ -101,6 +97,7 @@ class Outcomes(NamedTuple):
 class Scratch:
     """What the kernel writes to, for pairs of up to so many vertices, rings and contacts; outcome: of one pair."""
 
+    n_bytes: int
     n_vertices: int
     n_rings: int
     n_contacts: int
@@ -110,13 +107,16 @@ class Scratch:
 
 
 def scratch_for(n_vertices: int, n_rings: int, n_contacts: int, n_out: int, n_out_rings: int) -> Scratch:
-    """Return scratch of that size at least: what this thread kept if that suffices, or else new.
+    """Return scratch of that size at least: what was kept if that suffices, or else new.
 
     It is the caller's until `keep`: a signal handler may overlay while what the kernel left is not copied yet.
     One pair of that size always finds room in the output: every contact adds a vertex and a ring at most. What is not
     written to costs nothing; pages that are for the first time cost more than the kernel does.
     """
-    kept: Scratch | None = vars(_kept).pop("scratch", None)
+    try:
+        kept: Scratch | None = _kept.pop()
+    except IndexError:  # whether there is any, only taking it tells: another thread may be quicker
+        kept = None
     if kept is not None and (kept.n_vertices < n_vertices or kept.n_rings < n_rings or kept.n_contacts < n_contacts):
         n_vertices, n_rings = max(n_vertices, kept.n_vertices), max(n_rings, kept.n_rings)
         n_contacts, kept = max(n_contacts, kept.n_contacts), None
@@ -129,8 +129,11 @@ def scratch_for(n_vertices: int, n_rings: int, n_contacts: int, n_out: int, n_ou
     output = Output(np.empty((n_out, 2)), np.empty((n_out, 2), np.int32), rings, pieces, evidence)
     outcome = Outcomes(np.empty(1, np.int8), np.empty((1, 4), np.int64), np.empty(1))
     if kept is not None:
-        return Scratch(kept.n_vertices, kept.n_rings, kept.n_contacts, kept.buffers, output, outcome)
-    return Scratch(n_vertices, n_rings, n_contacts, buffers_for(n_vertices, n_rings, n_contacts), output, outcome)
+        n_vertices, n_rings, n_contacts, buffers = kept.n_vertices, kept.n_rings, kept.n_contacts, kept.buffers
+    else:
+        buffers = buffers_for(n_vertices, n_rings, n_contacts)
+    n_bytes = sum(array.nbytes for array in (*buffers, *output))
+    return Scratch(n_bytes, n_vertices, n_rings, n_contacts, buffers, output, outcome)
 
 
 def more_contacts(n: int) -> int:
@@ -142,10 +145,21 @@ def more_contacts(n: int) -> int:
     return 8 * n if n < _MANY_CONTACTS else 2 * n
 
 
-def keep(scratch: Scratch, n_vertices: int, n_contacts: int, n_out: int) -> None:
-    """Let this thread keep scratch of which so much was written to, unless that is too much."""
-    if _BY_VERTEX * n_vertices + _BY_CONTACT * n_contacts + _BY_OUTPUT * n_out <= _MOST_KEPT:
-        _kept.scratch = scratch
+def keep(scratch: Scratch) -> None:
+    """Keep scratch for the next call, unless that is too much with what is kept."""
+    if scratch.n_bytes + sum([other.n_bytes for other in _kept]) <= _MOST_KEPT:
+        _kept.append(scratch)
+
+
+def release() -> None:
+    """Give back memory that calls keep for later ones: what large overlays wrote to, 128 MB at most.
+
+    The next overlay takes it anew, which lasts 0.3 ms for each megabyte that it writes to.
+
+    >>> import engine
+    >>> engine.release()
+    """
+    _kept.clear()
 
 
 def _spread(length: int) -> int:

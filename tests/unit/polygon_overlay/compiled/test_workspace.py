@@ -30,14 +30,18 @@ def test_rows_in_use_together_lie_apart() -> None:
         assert all(end <= start for (_, end), (start, _) in itertools.pairwise(spans))
 
 
-def test_a_thread_keeps_what_suffices() -> None:
+def test_what_suffices_is_kept() -> None:
+    workspace.release()
     first = workspace.scratch_for(100, 2, 300, 50, 5)
-    workspace.keep(first, 100, 300, 50)
+    workspace.keep(first)
     assert workspace.scratch_for(50, 1, 200, 40, 4) is first
     assert workspace.scratch_for(50, 1, 200, 40, 4) is not first  # it is the caller's until it is kept
-    workspace.keep(first, 100, 300, 50)
-    wider = workspace.scratch_for(100, 2, 300, 10**6, 5)
+    workspace.keep(first)
+    wider = workspace.scratch_for(100, 2, 300, 10**7, 5)
     assert wider.buffers is first.buffers
-    assert len(wider.output.vertices) >= 10**6
-    workspace.keep(wider, 10**9, 0, 0)  # too much was written to
+    assert len(wider.output.vertices) >= 10**7
+    workspace.keep(wider)  # it is too large
     assert workspace.scratch_for(1, 1, 1, 1, 1) is not wider
+    workspace.keep(first)
+    workspace.release()
+    assert workspace.scratch_for(50, 1, 200, 40, 4) is not first
