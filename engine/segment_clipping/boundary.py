@@ -35,6 +35,8 @@ _CONTACTS: Final = 4
 """Of each segment of a group; likewise."""
 _BYTES: Final = 180
 """Of a piece, in its part and joined."""
+_CONTACT_BYTES: Final = 60
+"""Of a contact, while a kernel runs."""
 
 
 def clip_on_boundary(
@@ -87,13 +89,17 @@ def cut_at_crossings(
     kernel: Any = cut_on_mesh if isinstance(boundary, Mesh) else cut_on_outline
     parts, room = [], _LEAST_ROOM + n
     done = np.array([0, 0, _LEAST_ROOM + _CONTACTS * min(GROUP, n)])
+    counted = least = int(done[2])
     while done[0] < n:
         reached, pieces = int(done[0]), room_for(room, segments.shape[2])
         entry_of(kernel)(segments, locations, boundary, budget.flag, pieces, state, done)
         budget.check()
         if done[0] == reached:
             room *= 2  # of rows, if not of contacts
-        m = int(done[1])
-        budget.take(_BYTES * m)
+        m, n_contacts = int(done[1]), int(done[2])
+        budget.take(_BYTES * m + _CONTACT_BYTES * (n_contacts - counted))
+        counted = n_contacts
         parts.append(first_of(pieces, m))
+    if counted > least:
+        budget.take(_CONTACT_BYTES * (least - counted))
     return parts or [room_for(0, segments.shape[2])], state
