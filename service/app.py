@@ -63,6 +63,8 @@ ROUTERS: Final = (
 SWITCH_SECONDS: Final = 0.0002
 """How long one thread keeps the interpreter while others wait: the event loop hands over several times a request, and
 with Python's 5 ms each time beside a batch, small requests would wait for tens of milliseconds."""
+NEVER: Final = 2**31 - 1
+"""Collections of younger objects until the oldest are looked at."""
 DESCRIPTION = """Containment, collision and clipping with exact decisions.
 
 Every float64 given is taken as the exact number it is; every yes/no, side, order, count and relation equals what exact
@@ -187,6 +189,7 @@ def _warm(state: State) -> None:
         return
     if not gc.get_freeze_count():
         gc.freeze()  # half a million objects of modules and compiler that no later collection has to walk through
+    gc.set_threshold(*gc.get_threshold()[:2], NEVER)  # work.py looks at all objects when there are few
     state.warm.set()
     state.metrics.ready.set(1)
     log.info("ready: kernels warm after %.1f s", time.perf_counter() - before)

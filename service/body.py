@@ -71,6 +71,7 @@ def declared_length(headers: dict[bytes, bytes], limit: int) -> int:
 async def read(receive: Receive, declared: int, call: Call) -> Body:
     """Return the body, refused as soon as it is known to be too long, declared or not, or too slow."""
     limit, seconds = call.settings.max_body_bytes, call.settings.body_seconds
+    await call.wait_for(FOOTPRINT * declared)
     call.take(FOOTPRINT * declared)
     room = _room(declared) if declared >= LARGE else None
     parts: list[bytes] = []

@@ -62,7 +62,12 @@ class GeometryRoute(APIRoute):
         async def handle(request: Request) -> Response:
             state = state_of(request.app)
             call = Call(state.settings, state.store, state.memory)
-            response = await answer(request, call)
+            response = None
+            try:
+                response = await answer(request, call)
+            finally:
+                if not isinstance(response, _Answer):  # it ended early, and what it held is gone
+                    call.free()
             operation = self.operation_id or self.name
             state_of(request.app).metrics.count(operation, response.status_code, call.seconds)
             traces.note(operation, call.seconds)
@@ -95,12 +100,8 @@ class GeometryRoute(APIRoute):
                 is_known = b"if-none-match" in headers and _is_known(headers[b"if-none-match"], call, request.method)
                 return _Answer([] if is_known else parts, call, 304 if is_known else call.status or status)
             except ClientDisconnect:
-                call.free()
                 return Response(status_code=STATUS["bad_request"])  # nobody reads it
-            except BaseException as error:
-                call.free()
-                if not isinstance(error, Exception):
-                    raise
+            except Exception as error:
                 return _failed(error, request)
 
         return handle
@@ -243,7 +244,10 @@ def _failed(error: Exception, request: Request) -> Response:
     faults = error.faults if isinstance(error, _InvalidBody) else faults_of(error)
     if faults[0].code == "internal":
         log.error("%s %s failed", request.method, request.url.path, exc_info=error)
-    error.with_traceback(None)  # its frames hold the body, and lead back to it
+    known: BaseException | None = error
+    while known is not None:  # bound: each is raised while the next was handled
+        known.with_traceback(None)  # its frames hold the body, and lead back to it
+        known = known.__context__
     return problem(faults, getattr(error, "headers", None) or {})
 
 

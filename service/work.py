@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import ctypes
+import gc
 import os
 import threading
 import time
@@ -17,6 +18,7 @@ from typing import Annotated, Any, Final, TypeVar
 
 from fastapi import Depends
 
+import engine
 from engine import Accuracy, Cancel, CancelledError, DeadlineExceededError, EngineError
 from service.errors import ServiceError
 from service.metrics import Metrics
@@ -29,8 +31,14 @@ FOOTPRINT: Final = 4
 """Bytes held for each byte of a body, at most: itself, its numbers, a solid of them, the answer."""
 SMALL: Final = 2**16
 """Bytes that a request is given whatever others hold: there are no more requests than fit into the queue."""
-_MUCH: Final = 2**25
-"""Bytes that a request held from which on the system gets back what was freed."""
+_KEPT: Final = 16
+"""Of what requests may hold, one part in so many may have been freed before the system gets it back."""
+_LEAST: Final = 2**12
+"""Bytes that a request is taken to free at least."""
+_LATER: Final = 0.05
+"""Seconds after which what an answer was made of is gone."""
+_FEW: Final = 2**20
+"""Bytes held by requests under way up to which their objects are gone through in a few milliseconds."""
 _trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if os.name == "posix" else None
 """glibc keeps what was freed in arenas of each thread, some hundred MB after a large request."""
 _INSTEAD: Final = {
@@ -55,8 +63,37 @@ class Memory:
 
     def __init__(self, limit: int) -> None:
         self.limit = limit
-        self.taken = 0
+        self.taken = self.freed = self.leaving = 0
         self.lock = threading.Lock()
+
+    def free(self, taken: int, most: int) -> None:
+        """Count the end of a request that holds, or held at most, so much: it is free once the system has it back."""
+        with self.lock:
+            self.freed += max(most, _LEAST)
+            is_much = self.freed > self.limit // _KEPT
+            if is_much:
+                self.freed = 0
+                self.leaving += taken
+            else:
+                self.taken -= taken
+        if is_much:
+            threading.Thread(target=self._give_back, args=(taken,), daemon=True).start()
+
+    def _give_back(self, taken: int) -> None:
+        """Give freed memory back to the system; and what only cycles hold, while there are few objects to look at.
+
+        Python would look for cycles by itself, at all objects again and again while a large body becomes more and more
+        of them: that held up all threads for up to 0.46 s (app.py turns it off).
+        """
+        time.sleep(_LATER)
+        if self.taken - self.leaving <= _FEW:
+            gc.collect()
+        engine.release()
+        if _trim is not None:
+            _trim(0)
+        with self.lock:
+            self.taken -= taken
+            self.leaving -= taken
 
     def refusal(self, size: int) -> ServiceError:
         """Return what is said where there is no room for so many bytes more."""
@@ -131,6 +168,12 @@ class Call(Cancel):
             self._taken += n_bytes
             self._most = max(self._most, self._taken)
 
+    async def wait_for(self, n_bytes: int) -> None:
+        """Wait while there is no room for so many bytes only because others are about to give theirs back."""
+        memory = self._memory
+        while memory.leaving and memory.taken - self._taken + n_bytes > memory.limit:  # bound: until they have
+            await asyncio.sleep(_LATER / 10)
+
     def take_part(self, part: Sized) -> None:
         """Account for a part of the answer; `answer_too_large` beyond its limit."""
         self.remaining()
@@ -146,12 +189,9 @@ class Call(Cancel):
 
     def free(self) -> None:
         """Account for the end of the request."""
-        with self._memory.lock:
-            self._memory.taken -= self._taken
-            self._taken = 0
-        if self._most > _MUCH and _trim is not None:
-            self._most = 0
-            threading.Thread(target=_trim, args=(0,), daemon=True).start()
+        taken, self._taken = self._taken, 0
+        self._memory.free(taken, self._most)
+        self._most = 0
 
     def remaining(self) -> float:
         """Return the seconds left; `deadline_exceeded` if there are none, `cancelled` if nobody waits any more."""
