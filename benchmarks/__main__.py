@@ -29,6 +29,7 @@ NAMES = TABLES | {
     "hard_cases": "who gets which hard family wrong: the figures of docs/hard_cases.md",
     "publish": "the judged inputs and their exact answers as files with their hashes",
     "report": "every operation, speed against error: docs/speed_and_error.md and the README's table",
+    "soak": "hostile load for an hour beside small questions: statuses, seconds, memory",
     "wire": "what HTTP adds to a kernel, and what overload does",
 }
 
