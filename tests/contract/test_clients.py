@@ -1,7 +1,8 @@
 """Clients generated from the stored document are called against the running service, and Java's own client too.
 
 Each part runs where its tools are installed: openapi-python-client (the extra `test`), openapi-generator-cli (from
-PyPI, with its Java program inside), npm, a JDK, Debian's Jackson, Go with Debian's validator.
+PyPI, with its Java program inside), npm, a JDK, Debian's Jackson, Go with Debian's validator, Ruby with Debian's
+Typhoeus, PHP with Debian's Guzzle.
 """
 
 from __future__ import annotations
@@ -23,6 +24,8 @@ CALLS = Path(__file__).with_name("clients")
 ANSWERS = ["201", "[false,true,true]", "touching", "422"]
 JACKSON = [Path("/usr/share/java") / f"jackson-{part}.jar" for part in ("core", "annotations", "databind")]
 GO_PATH = Path("/usr/share/gocode")
+SHARED = {"ruby": "rubygems-integration/all/gems/typhoeus-*", "php": "php/GuzzleHttp"}
+"""Where Debian has what a generated client sends its requests with, below /usr/share."""
 STAND_INS = {
     "javax/annotation/Generated": "@interface Generated { String value(); String comments(); }",
     "javax/annotation/Nonnull": "@interface Nonnull {}",
@@ -157,6 +160,25 @@ def test_openapi_generator_go(service: Service, tmp_path: Path) -> None:
     places = {"GO111MODULE": "off", "GOPATH": f"{tmp_path}{os.pathsep}{GO_PATH}", "GOCACHE": str(tmp_path / "cache")}
     printed = run("go", "run", CALLS / "call_openapi_generator.go", service.url, folder=folder, **places)
     assert printed.split() == ANSWERS
+
+
+@pytest.mark.full
+@needs_java
+@pytest.mark.parametrize(
+    ("language", "call", "program", "words"),
+    [
+        ("ruby", "call_openapi_generator.rb", "ruby", ("-I", "lib")),
+        ("php", "call_openapi_generator.php", "php", ()),
+    ],
+)
+def test_openapi_generator_ruby_and_php(
+    service: Service, tmp_path: Path, language: str, call: str, program: str, words: tuple[str, ...]
+) -> None:
+    if shutil.which(program) is None or not [*Path("/usr/share").glob(SHARED[language])]:
+        pytest.skip(f"no {program} with Debian's {SHARED[language]} is installed")
+    folder = generate(tmp_path, language)
+    shutil.copy(CALLS / call, folder)
+    assert run(program, *words, call, service.url, folder=folder).split() == ANSWERS
 
 
 @pytest.mark.full
