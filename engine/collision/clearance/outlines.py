@@ -226,11 +226,6 @@ def _found(a: Placed, b: Placed, vertex: int, edge: int, is_first: bool) -> tupl
 
 
 @inline
-def _is_tie_better(found: Found, best: Found) -> bool:
-    return found.face < best.face or (found.face == best.face and found.their_face < best.their_face)
-
-
-@inline
 def _search(a: Placed, b: Placed) -> tuple[Found, float, bool]:
     """Return the nearest pair, of equal ones that of the least faces; by how much another may be nearer; and whether
     this is surely the one."""
@@ -266,7 +261,7 @@ def _search(a: Placed, b: Placed) -> tuple[Found, float, bool]:
                     further = best if more < 0.0 else found
                     low = less(further.distance, Wide(further.bound, 0.0))
                     rival = low if low.h < rival.h or (low.h == rival.h and low.low < rival.low) else rival
-                if more < 0.0 or (bound == 0.0 and _is_tie_better(found, best)):
+                if more < 0.0 or (bound == 0.0 and (found.face, found.their_face) < (best.face, best.their_face)):
                     best, is_sure = found, is_placed
     if rival.h == np.inf:
         return best, 0.0, is_sure
