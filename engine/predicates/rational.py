@@ -109,13 +109,13 @@ def nearest_with_root(u: int, v: int, w: int, z: int) -> float:
     Bound: if w is no square and v is not zero the number is irrational, so it is no double and no midpoint of two, and
     the enclosing quotients round alike once they are close enough; each turn doubles the digits.
     """
-    root = math.isqrt(w)
-    if v == 0 or root * root == w:
-        return nearest(u + v * root, z)
+    if v == 0:
+        return nearest(u, z)
     bits = 64
     while True:
-        root = math.isqrt(w << 2 * bits)
-        ends = [nearest((u << bits) + v * (root + step), z << bits) for step in (0, 1)]
-        if ends[0] == ends[1]:
-            return ends[0]
+        square, low = w << 2 * bits, u << bits
+        root, size = math.isqrt(square), z << bits
+        found = nearest(low + v * root, size)
+        if root * root == square or nearest(low + v * (root + 1), size) == found:
+            return found
         bits *= 2
