@@ -7,9 +7,10 @@
     unused   centre 0, half width -1e30: apart from every box            EMPTY
 
 Node 0 is the root. Coordinates are those of the tree: x = origin + scale * local with a power of two for scale, so that
-every local coordinate is at most 2 in magnitude and float32 will do. Half widths are enlarged by what the conversion
-may lose: a child's box holds its items. Lanes are asked side by side by `lanes/boxes.py`; a block of eight items costs
-what one costs.
+every local coordinate is at most 2 in magnitude and float32 will do. The origin lies where most items are, in the
+median of a few: there float32 is fine enough for details that are small beside the whole. Half widths are enlarged by
+what the conversion may lose: a child's box holds its items. Lanes are asked side by side by `lanes/boxes.py`; a block
+of eight items costs what one costs.
 
 The heuristic only decides how fast a query is: where its areas overflow, or many items share one centre, a run of items
 is halved as it stands.
@@ -41,8 +42,13 @@ STACK = WIDTH * (MAX_DEPTH + 1)
 """Nodes that wait on a way down a tree at most: eight for each level."""
 UNUSED = np.float32(-1e30)
 ENLARGED = 2.0**-21
-"""Added to half widths. Numbers of at most 2 are off by 2^-24 in float32: low and high, so their middle and half their
-distance by as much each, and both of these once more."""
+"""Part of |centre| + half width that is added to half widths: low and high are off by 2^-24 of themselves in float32,
+their middle and half their distance by as much each, and both of these once more."""
+LEAST = 2.0**-100
+"""Added to that: more than what is lost where numbers underflow, less than what any query tells apart."""
+_SAMPLE = 31
+_HUGE = 2.0**1022
+"""Half of an extent whose origin is its middle: from an end, twice as far could be no double."""
 
 _FEW_ROWS = 64
 _FEW_ITEMS, _FEW_BINS = 64, 8
@@ -134,9 +140,10 @@ def _normalise(boxes: Any, origin: Any, items: Any, halves: Any) -> float:
         low, high = boxes[0, axis], boxes[0, 3 + axis]
         for item in range(1, n_items):
             low, high = min(low, boxes[item, axis]), max(high, boxes[item, 3 + axis])
-        origin[axis] = 0.5 * low + 0.5 * high
-        half = max(half, 0.5 * high - 0.5 * low)
-    power = frexp(half)[1] - 1 if half > 0.0 else 0
+        is_huge = 0.5 * high - 0.5 * low >= _HUGE
+        origin[axis] = 0.5 * low + 0.5 * high if is_huge else _middle_of(boxes, axis)
+        half = max(half, 0.5 * high - 0.5 * origin[axis], 0.5 * origin[axis] - 0.5 * low)
+    power = frexp(half)[1] if half > 0.0 else 0  # half: of what is to be at most 2
     once = ldexp(1.0, -power // 2)
     again = ldexp(1.0, -power - (-power // 2))  # order: two factors, since 2^-power may be no float
     halves.runs[0, 0], halves.runs[0, 1], halves.left[0] = 0, n_items, -1
@@ -151,6 +158,21 @@ def _normalise(boxes: Any, origin: Any, items: Any, halves: Any) -> float:
             items.centres[item, axis], items.centres[item, 4 + axis] = 0.5 * (low + high), -0.5 * (low + high)
         _include(halves, 0, items, item)
     return ldexp(1.0, power)
+
+
+@inline
+def _middle_of(boxes: Any, axis: int) -> float:
+    """Return the median of some boxes' centres along an axis."""
+    n_seen, step = 0, (len(boxes) - 1) // _SAMPLE + 1
+    sorted_centres = np.empty(_SAMPLE)
+    for item in range(0, len(boxes), step):
+        centre, place = 0.5 * boxes[item, axis] + 0.5 * boxes[item, 3 + axis], n_seen
+        while place > 0 and sorted_centres[place - 1] > centre:
+            sorted_centres[place] = sorted_centres[place - 1]
+            place -= 1
+        sorted_centres[place] = centre
+        n_seen += 1
+    return sorted_centres[n_seen // 2]
 
 
 @inline
@@ -257,7 +279,7 @@ def _set_lane(boxes: Any, node: int, lane: int, rows: Any, row: int) -> None:
     for axis in range(3):
         low, high = float(rows[row, axis]), -float(rows[row, 4 + axis])
         boxes[node, axis, lane] = 0.5 * (low + high)
-        boxes[node, 3 + axis, lane] = 0.5 * (high - low) + ENLARGED
+        boxes[node, 3 + axis, lane] = 0.5 * (high - low) + ENLARGED * max(abs(low), abs(high)) + LEAST
 
 
 @inline

@@ -28,12 +28,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.bounding.bvh import STACK, WIDTH
+from engine.bounding.bvh import LEAST, STACK, WIDTH
 from engine.containment.posed.filters import NOT_FINITE, has_not_finite, orient2d_blurred, orient3d_blurred
 from engine.jit import bare, inline, kernel, merged
 from engine.lanes.boxes import EMPTY, inside_box
 from engine.lanes.lanes import count_bits, lowest_bit
-from engine.lanes.overhead import BAND, GROWTH, OVERHEAD_ROWS, overhead
+from engine.lanes.overhead import BAND, GROWTH, LEAST_REACH, OVERHEAD_ROWS, overhead
 from engine.predicates.loading import as_point3
 from engine.predicates.orientation import orient2d, orient2d_exact, orient2d_filter, orient3d_exact, orient3d_filter
 from engine.types import UNDECIDED, Point2, Point3
@@ -44,8 +44,9 @@ ON_FACE: Final = 3
 """How a ray meets a triangle; UNDECIDED where a sign is out of the compiled range, for rational arithmetic."""
 BEYOND: Final = 4
 """Added to one of these where the filter was not enough."""
-_SLACK: Final = 2.0**-20
-"""By how much a point in the tree's coordinates, at most 4, is widened for its rounding to float32."""
+_SLACK: Final = 2.0**-22
+"""Part of a coordinate in the tree's coordinates by which a point is widened, for its rounding to float32 and that of
+the ends of boxes near it."""
 _ABOVE_ALL: Final = np.float32(8.0)
 
 
@@ -171,12 +172,16 @@ def _meet_blurred(a: Any, b: Any, c: Any, q: Any, blur: float) -> int:
 
 
 @merged
-def _in_tree(tree: Any, q: Any, blur: float) -> tuple[float, float, float, float, bool]:
-    """Return q in the coordinates of the tree, by how much it is widened, and whether it is near enough for that."""
+def _in_tree(tree: Any, q: Any, blur: float) -> tuple[Any, Any, Any, float, bool]:
+    """Return q in the coordinates of the tree, the least and the most that the rays up from the blurred one may reach
+    there, the blur there, and whether q is near enough for that."""
     origin, scale = tree.origin, tree.scale
-    x, y, z = (q.x - origin[0]) / scale, (q.y - origin[1]) / scale, (q.z - origin[2]) / scale
-    slack = _SLACK + blur / scale
-    return x, y, z, slack, abs(x) < 4.0 and abs(y) < 4.0 and abs(z) < 4.0 and slack < 1.0  # not NaN
+    x, y, z, wide = (q.x - origin[0]) / scale, (q.y - origin[1]) / scale, (q.z - origin[2]) / scale, blur / scale
+    u, v, w = _SLACK * abs(x) + wide + LEAST, _SLACK * abs(y) + wide + LEAST, _SLACK * abs(z) + wide + LEAST
+    least = np.float32(x - u), np.float32(y - v), np.float32(z - w)
+    most = np.float32(x + u), np.float32(y + v), _ABOVE_ALL
+    is_near = abs(x) < 4.0 and abs(y) < 4.0 and abs(z) < 4.0 and wide < 1.0  # not NaN
+    return Point3(x, y, z + w), least, most, wide, is_near
 
 
 @kernel
@@ -187,11 +192,9 @@ def list_unsure(tree: Any, x: float, y: float, z: float, blur: float, found: Any
     The number is -1 where there is no room, or the point is too far from the tree.
     """
     q, stack, n_found, is_odd, n_stack = Point3(x, y, z), np.empty(STACK, np.int32), 0, False, 1
-    u, v, w, slack, is_near = _in_tree(tree, q, blur)
+    _, least, most, _, is_near = _in_tree(tree, q, blur)
     if not is_near:
         return -1, False
-    least = np.float32(u - slack), np.float32(v - slack), np.float32(w - slack)
-    most = np.float32(u + slack), np.float32(v + slack), _ABOVE_ALL
     stack[0] = 0
     while n_stack > 0:  # bound: each node enters once
         n_stack -= 1
@@ -227,11 +230,9 @@ def locate_in_tree(tree: Any, q: Any, blur: float, stack: Any, flag: Any) -> tup
     is_out = (q.x + blur < low[0]) | (q.x - blur > high[0]) | (q.y + blur < low[1]) | (q.y - blur > high[1])
     if is_out | (q.z + blur < low[2]) | (q.z - blur > high[2]):
         return -1, False
-    x, y, z, slack, is_near = _in_tree(tree, q, blur)
+    local, least, most, wide, is_near = _in_tree(tree, q, blur)
     if not is_near:
         return UNDECIDED, True
-    least = np.float32(x - slack), np.float32(y - slack), np.float32(z - slack)
-    most = np.float32(x + slack), np.float32(y + slack), _ABOVE_ALL
     n_stack, is_odd, is_open, beyond = 1, False, False, 0
     stack[0] = 0
     while n_stack > 0 and not flag[0]:  # bound: each node enters once
@@ -239,8 +240,8 @@ def locate_in_tree(tree: Any, q: Any, blur: float, stack: Any, flag: Any) -> tup
         node = int(stack[n_stack])
         lanes = inside_box(tree.boxes, node, least, most)
         if lanes != 0 and tree.child[node, 0] < 0:
-            u, v = x - float(tree.boxes[node, 0, 0]), y - float(tree.boxes[node, 1, 0])
-            over, beside = overhead(tree.blocks, tree.boxes, node, u, v, z + slack, blur / tree.scale)
+            u, v = local.x - float(tree.boxes[node, 0, 0]), local.y - float(tree.boxes[node, 1, 0])
+            over, beside = overhead(tree.blocks, tree.boxes, node, u, v, local.z, wide)
             is_odd ^= (count_bits(lanes & over) & 1) == 1
             lanes &= ~(over | beside)
         while lanes != 0:
@@ -322,7 +323,7 @@ def lay_out(vertices: Any, triangles: Any, tree: Any, child: Any, ordered: Any, 
                 ordered[place, corner] = vertex
             child[node, lane] = -1 - place
             place += 1
-        reach += 2.0 * _SLACK
+        reach += 2.0 * _SLACK * (reach + max(abs(centre_x), abs(centre_y))) + LEAST_REACH
         for lane in range(WIDTH):
             blocks[node, OVERHEAD_ROWS - 2, lane] = BAND * reach * reach
             blocks[node, OVERHEAD_ROWS - 1, lane] = GROWTH * reach
