@@ -21,7 +21,7 @@ from engine.scenes.ends import Exact, Found, ScenePieces, in_order, joined
 from engine.scenes.posed_mesh import MOST_MET, scratch_for
 from engine.scenes.standing import Layer, Standing
 from engine.scenes.through import MET, cut_pairs, find_first
-from engine.segment_clipping.boundary import clip_chunk
+from engine.segment_clipping.boundary import clip_chunk, cut_exactly
 from engine.segment_clipping.boundary_cut import SETTLED
 from engine.segment_clipping.clip_segments import method_for
 from engine.segment_clipping.decide_then_cut import clip_on_convex
@@ -198,7 +198,7 @@ def _of_layer(segments: FloatArray, layer: Layer, counts: Counts, budget: Budget
     if len(segments) >= _CROWD:
         is_crowded = (np.bincount(bodies, minlength=len(table.are_streamed)) >= _CROWD) & table.are_streamed
         together = np.flatnonzero(is_crowded[bodies])
-        rest = _cut(segments, owners[together], bodies[together], layer.bodies, counts, budget, workers)
+        rest = _cut(segments, owners[together], bodies[together], False, layer.bodies, counts, budget, workers)
         owners, bodies = (np.delete(each, together) for each in (owners, bodies))
     state, parts = np.empty(len(owners), np.uint8), dict[int, list[Found]]()
 
@@ -224,7 +224,7 @@ def _of_layer(segments: FloatArray, layer: Layer, counts: Counts, budget: Budget
     left = np.flatnonzero(state == OPEN)
     if len(left):
         counts.is_beyond[owners[left]] = True
-        rest += _cut(segments, owners[left], bodies[left], layer.bodies, counts, budget, workers)
+        rest += _cut(segments, owners[left], bodies[left], True, layer.bodies, counts, budget, workers)
     done = [part for first in sorted(parts) for part in parts[first] if len(part.source)]
     return done + [part._replace(body=named(part.body)) for part in rest]
 
@@ -233,12 +233,13 @@ def _cut(
     segments: FloatArray,
     owners: IntArray,
     bodies: IntArray,
+    are_left: bool,
     placed: Bodies,
     counts: Counts,
     budget: Budget,
     workers: int | None,
 ) -> list[Found]:
-    """Return the pieces of pairs of a segment and a body that the kernels left, body by body."""
+    """Return the pieces of pairs of a segment and a body that the kernels left or were not asked, body by body."""
     order = np.argsort(bodies, kind="stable")
     owners, bodies = owners[order], bodies[order]
     starts = np.flatnonzero(np.append(True, bodies[1:] != bodies[:-1])[: len(bodies)]).tolist()
@@ -253,7 +254,7 @@ def _cut(
         for group in range(first, last):
             begin, end = groups[group]
             body, items = int(bodies[begin]), owners[begin:end]
-            pieces, rational = _on_body(segments[items], *placed.placed(body), budget)
+            pieces, rational = _on_body(segments[items], *placed.placed(body), are_left, budget)
             counts.is_beyond[items[rational]] = counts.is_rational[items[rational]] = True
             m = len(pieces.source)
             if m:
@@ -264,7 +265,9 @@ def _cut(
     return [found[group] for group in sorted(found)]
 
 
-def _on_body(segments: FloatArray, solid: Solid, pose: Pose | None, budget: Budget) -> tuple[Pieces, Any]:
+def _on_body(
+    segments: FloatArray, solid: Solid, pose: Pose | None, are_left: bool, budget: Budget
+) -> tuple[Pieces, Any]:
     """Return the pieces of segments (n, 2, dim) within a placed solid, by source and t, and which of them took rational
     arithmetic: all where some did and it is not told which."""
     n = len(segments)
@@ -276,5 +279,9 @@ def _on_body(segments: FloatArray, solid: Solid, pose: Pose | None, budget: Budg
                 pieces, _, n_rational = clip_on_convex(segments, solid, method, budget, 1, None)  # type: ignore[arg-type]
                 return pieces, every[: n * bool(n_rational)]
             case Polygon() | Polyhedron() | Triangle() if solid.dimension == 2 or solid.type == "polyhedron":
-                return clip_chunk(segments, 0, n, solid, locator_of(solid).chosen(n, budget), budget)
+                locator = locator_of(solid).chosen(n, budget)
+                if not are_left or solid.dimension == 2:
+                    return clip_chunk(segments, 0, n, solid, locator, budget)
+                locator.fill(segments[:, 0].copy(), locations := np.empty(n, np.int8), budget)
+                return cut_exactly(segments, every, locations, solid, budget), every
     return settled(segments, every, solid, pose, budget), every

@@ -71,13 +71,18 @@ def clip_chunk(
     parts, state = cut_at_crossings(part, locations, boundary, budget)
     left = np.flatnonzero(state != SETTLED)
     if len(left):
-        both = np.stack([locations[left], np.zeros(len(left), np.int8)], axis=1)
-        on_boundary = both[:, 0] == 0
-        locator_of(region).fill(part[left[on_boundary], 1], found := np.empty(int(on_boundary.sum()), np.int8), budget)
-        both[on_boundary, 1] = found
-        parts.append(settled(part, left, region, None, budget, both.tolist()))
+        parts.append(cut_exactly(part, left, locations[left], region, budget))
     pieces = completed(parts) if len(left) else joined(parts) if len(parts) > 1 else parts[0]
     return pieces._replace(source=pieces.source + first), left
+
+
+def cut_exactly(segments: FloatArray, items: IntArray, locations: Int8Array, region: Bounded, budget: Budget) -> Pieces:
+    """Return the pieces of some segments by exact arithmetic; locations: of the first end of each."""
+    both = np.stack([locations, np.zeros(len(items), np.int8)], axis=1)
+    on_boundary = locations == 0
+    locator_of(region).fill(segments[items[on_boundary], 1], found := np.empty(int(on_boundary.sum()), np.int8), budget)
+    both[on_boundary, 1] = found
+    return settled(segments, items, region, None, budget, both.tolist())
 
 
 def cut_at_crossings(
