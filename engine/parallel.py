@@ -166,6 +166,8 @@ class Budget:
         self.around: Budget | None = None
 
     def __enter__(self) -> Budget:
+        if self._cancel is None and self._end is None:  # nothing to poll for
+            return self
         self.around, _here.budget = getattr(_here, "budget", None), self
         if self._cancel is not None:
             self._cancel.attach(self.flag)
@@ -174,6 +176,8 @@ class Budget:
         return self
 
     def __exit__(self, *_: object) -> None:
+        if self._cancel is None and self._end is None:
+            return
         _here.budget = self.around
         if self._waiting is not None:
             _clock.drop(self._waiting)
@@ -201,17 +205,7 @@ class Budget:
             self._cancel.take(n_bytes)
 
 
-class _Unlimited(Budget):
-    """Neither deadline nor switch: nothing is set up to enter it."""
-
-    def __enter__(self) -> Budget:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        pass
-
-
-UNLIMITED: Final = _Unlimited()
+UNLIMITED: Final = Budget()
 """Shared by all calls without a limit that hand it to no other thread: nothing ever raises its flag."""
 
 

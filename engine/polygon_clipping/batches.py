@@ -96,29 +96,6 @@ def _double_double_quotient(top: int, bottom: int) -> tuple[float, float]:
     return high, nearest(top * denominator - numerator * bottom, bottom * denominator)
 
 
-def room_for(n_numbers: int, tables: PlaneTables) -> int:
-    """Return for how many numbers there should be room at first: a convex ring gains a vertex a plane."""
-    return n_numbers + (4 * len(tables.high) + 64) * (tables.high.shape[1] - 1)
-
-
-def clip_some(
-    scene: tuple[FloatArray, IntArray, IntArray, PlaneTables],
-    first: int,
-    last: int,
-    budget: Budget,
-    room: int,
-    found: tuple[IntArray, FlagArray, BoolArray],
-) -> tuple[int, FloatArray]:
-    """Clip polygons from `first` on; return the one reached, and the vertices of those the kernel settled, in order.
-
-    scene: vertices as a row of numbers, both offsets, the planes. room: for how many numbers. found: sizes (of rings),
-    state and may_have_bridges (of polygons), to be filled; see `clip_rings`.
-    """
-    d, out = scene[3].high.shape[1] - 1, np.empty(room)
-    reached, written = entry_of(clip_rings, d)(*scene, first, last, budget.flag, out, *found, _AXES[d])
-    return reached, out[: written * d].reshape(-1, d)
-
-
 def clip_chunk(
     scene: KernelScene,
     ring_offsets: IntArray,
@@ -135,17 +112,21 @@ def clip_chunk(
     Fills sizes (of rings), state and may_have_bridges (of polygons); see `clip_rings`.
     """
     n_vertices = int(ring_offsets[polygon_offsets[last]] - ring_offsets[polygon_offsets[first]])
-    d, done, parts = scene.vertices.shape[1], first, list[FloatArray]()
-    room = room_for(n_vertices * d, scene.tables)
-    arrays = scene.vertices.reshape(-1), ring_offsets, polygon_offsets, scene.tables
+    vertices, tables, done, parts = scene.vertices, scene.tables, first, list[FloatArray]()
+    d = vertices.shape[1]
+    room, clip = d * (n_vertices + 4 * len(tables.high) + 64), entry_of(clip_rings, d)
+    flat, found = vertices.reshape(-1), (sizes, state, may_have_bridges)
     while done < last:
-        reached, part = clip_some(arrays, done, last, budget, room, (sizes, state, may_have_bridges))
+        out = np.empty(room)
+        reached, written = clip(
+            flat, ring_offsets, polygon_offsets, tables, done, last, budget.flag, out, *found, _AXES[d]
+        )
         budget.check()
-        budget.take(2 * part.nbytes)
-        parts.append(part)
+        parts.append(out[: written * d].reshape(-1, d))
+        budget.take(2 * parts[-1].nbytes)
         if reached == done:
             room *= 2
-            budget.take(room * part.itemsize)
+            budget.take(room * out.itemsize)
         done = reached
     vertices = parts[0] if len(parts) == 1 else np.concatenate([np.zeros((0, d)), *parts])
     if scene.exponent:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
@@ -15,10 +14,10 @@ import numpy.typing as npt
 from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray
 from engine.errors import EmptyGeometryError, InvalidArrayError, TooComplexError, UnsupportedSolidError
 from engine.parallel import UNLIMITED, Budget, Cancel, Options, Progress, check_options, run_chunks
-from engine.polygon_clipping.batches import clip_chunk, clip_some, kernel_scene, room_for
+from engine.polygon_clipping.batches import KernelScene, clip_chunk, kernel_scene
 from engine.polygon_clipping.convex_planes import convex_planes
 from engine.polygon_clipping.in_integers import Row, clip_polygon, integer_row, reduced
-from engine.polygon_clipping.rings import CLIPPED, PlaneTables
+from engine.polygon_clipping.rings import CLIPPED
 from engine.predicates.scaling import largest_of
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
@@ -157,33 +156,30 @@ def _clip_array(polygons: npt.NDArray[Any], region: Solid) -> ClippedPolygons | 
     # the largest coordinate lies between the root of this sum, and that over the root of how many there are
     if not (0 < n * size <= _FEW and 2.0**-100 < flat.dot(flat) < 2.0**120):
         return None
-    found = _clip_few(flat, tables, *_offsets_of_array(n, size))
+    scene = KernelScene(polygons.reshape(-1, region.dimension), 0, tables)
+    found = _clip_few(scene, size * (numbers := np.arange(n + 1)), numbers, UNLIMITED)
     return None if found is None else found[0]
 
 
-@functools.lru_cache(64)
-def _offsets_of_array(n: int, size: int) -> tuple[IntArray, IntArray]:
-    """Return the offsets of n rings of one size, one a polygon."""
-    return size * np.arange(n + 1), np.arange(n + 1)
-
-
 def _clip_few(
-    vertices: FloatArray, tables: PlaneTables, ring_offsets: IntArray, polygon_offsets: IntArray
+    scene: KernelScene, ring_offsets: IntArray, polygon_offsets: IntArray, budget: Budget
 ) -> tuple[ClippedPolygons, int] | None:
-    """Clip few polygons, of a row of numbers; return the result, and how many needed more than the filter.
-
-    None where one is left open, or has no room.
-    """
+    """Clip few polygons; return the result, and how many needed more than the filter, None where one is left open."""
     n = len(polygon_offsets) - 1
-    state, may_have_bridges = np.empty(n, np.uint8), np.empty(n, np.bool_)
-    sizes = np.empty(len(ring_offsets) - 1, np.int64)
-    scene = vertices, ring_offsets, polygon_offsets, tables
-    reached, kept = clip_some(scene, 0, n, UNLIMITED, room_for(len(vertices), tables), (sizes, state, may_have_bridges))
-    states = state.tolist()
-    if reached < n or OPEN in states:
+    ring_sizes, status = np.empty(len(ring_offsets) - 1, np.int64), np.zeros(n, np.int8)
+    state, bridges = np.empty(n, np.uint8), np.empty(n, np.bool_)
+    vertices = clip_chunk(scene, ring_offsets, polygon_offsets, 0, n, budget, ring_sizes, state, bridges)
+    if OPEN in (states := state.tolist()):
         return None
-    clipped = _gathered(kept, sizes.tolist(), polygon_offsets.tolist(), np.zeros(n, np.int8), may_have_bridges)
-    return clipped, n - states.count(CLIPPED)
+    rings, polygons, contours, sizes = [0], [0], list[int](), ring_sizes.tolist()
+    for begin, end in pairwise(polygon_offsets.tolist()):
+        for ring in range(begin, end):
+            if sizes[ring]:
+                rings.append(rings[-1] + sizes[ring])
+                contours.append(ring - begin)
+        polygons.append(len(contours))
+    first, second, third = (np.array(numbers, np.int64) for numbers in (rings, polygons, contours))
+    return ClippedPolygons(vertices, first, second, third, status, bridges), n - states.count(CLIPPED)
 
 
 def _planes(region: Solid, budget: Budget) -> list[Row]:
@@ -238,7 +234,7 @@ def as_contours(polygons: Any, dimension: int) -> Contours:
         largest = largest_of(array)
         if not np.isfinite(largest):
             check_finite(array, ("polygons",))
-        return Contours(array.reshape(-1, dimension), *_offsets_of_array(n, size), largest)
+        return Contours(array.reshape(-1, dimension), size * np.arange(n + 1), np.arange(n + 1), largest)
     if not isinstance(polygons, (list, tuple)):
         raise InvalidArrayError(
             f"polygons must be a list of polygons, got {type(polygons).__name__}; put a single one into a list",
@@ -274,21 +270,6 @@ def _offsets(counts: Sequence[int] | IntArray) -> IntArray:
     return offsets
 
 
-def _gathered(
-    vertices: FloatArray, sizes: list[int], offsets: list[int], status: Int8Array, may_have_bridges: BoolArray
-) -> ClippedPolygons:
-    """Return what is left of a few polygons: vertices, how many of each ring, and the polygons' first rings."""
-    ring_offsets, polygon_offsets, contours = [0], [0], list[int]()
-    for first, last in pairwise(offsets):
-        for ring in range(first, last):
-            if sizes[ring]:
-                ring_offsets.append(ring_offsets[-1] + sizes[ring])
-                contours.append(ring - first)
-        polygon_offsets.append(len(contours))
-    rings, polygons, names = (np.array(numbers, np.int64) for numbers in (ring_offsets, polygon_offsets, contours))
-    return ClippedPolygons(vertices, rings, polygons, names, status, may_have_bridges)
-
-
 def _clip(
     contours: Contours,
     region: Solid,
@@ -301,9 +282,8 @@ def _clip(
     vertices, ring_offsets, polygon_offsets, largest = contours
     n, dimension = len(polygon_offsets) - 1, vertices.shape[1]
     scene = kernel_scene(region, vertices, largest, planes, budget)
-    if scene is not None and len(vertices) <= _FEW and not scene.exponent:
-        few = _clip_few(scene.vertices.reshape(-1), scene.tables, ring_offsets, polygon_offsets)
-        budget.check()
+    if scene is not None and len(vertices) <= _FEW:
+        few = _clip_few(scene, ring_offsets, polygon_offsets, budget)
         if few is not None:
             if progress is not None and n:
                 progress(n)

@@ -272,13 +272,13 @@ def join_batches(batches: Sequence[OverlayBatch]) -> OverlayBatch:
     for part in batches:
         apart.update((n_pairs + pair, result) for pair, result in part._apart.items())
         n_pairs += len(part)
-    batch = OverlayBatch(
-        status=np.concatenate([part.status for part in batches]),
-        vertices=np.concatenate([part.vertices for part in batches]),
+    return OverlayBatch(
+        status=read_only(np.concatenate([part.status for part in batches])),
+        vertices=read_only(np.concatenate([part.vertices for part in batches])),
         ring_offsets=chained([part.ring_offsets for part in batches]),
         piece_offsets=chained([part.piece_offsets for part in batches]),
         pair_offsets=chained([part.pair_offsets for part in batches]),
-        displacement=np.concatenate([part.displacement for part in batches]),
+        displacement=read_only(np.concatenate([part.displacement for part in batches])),
         _subjects=tuple(solid for part in batches for solid in part._subjects),
         _clips=tuple(solid for part in batches for solid in part._clips),
         _operation=batches[0]._operation,
@@ -287,6 +287,3 @@ def join_batches(batches: Sequence[OverlayBatch]) -> OverlayBatch:
         _is_rounded_again=np.concatenate([part._is_rounded_again for part in batches]),
         _apart=apart,
     )
-    for name in ("status", "vertices", "ring_offsets", "piece_offsets", "pair_offsets", "displacement"):
-        getattr(batch, name).setflags(write=False)
-    return batch

@@ -104,15 +104,14 @@ def snapped_to_units(rings: Found, budget: Budget) -> Found:
     vertices, offsets = rings.vertices, rings.ring_offsets
     pixels = _pixels_of(vertices)
     if np.array_equal(pixels, vertices):
-        return rings._replace(sources=_own_sources(len(vertices)))
+        return rings._replace(sources=_along(np.arange(len(vertices))))
     passages, stays = _passages_of(vertices, offsets, budget)
     if stays and _are_in_order(pixels, rings):
         snapped, edges = pixels, np.arange(len(vertices))
     else:
         snapped, edges, offsets = _bent(vertices, pixels, offsets, passages)
-    sources = np.column_stack([edges, edges]).astype(np.int32)
     status = DONE if snapped is pixels else MAY_CROSS
-    return one_pair(snapped, offsets, rings.piece_offsets, HALF_DIAGONAL, 0, sources, status)
+    return one_pair(snapped, offsets, rings.piece_offsets, HALF_DIAGONAL, 0, _along(edges), status)
 
 
 def _pixels_of(vertices: FloatArray) -> FloatArray:
@@ -171,8 +170,9 @@ def _bent(
     return chain[kept], edge[kept], summed(np.bincount(ring[kept], minlength=len(offsets) - 1))
 
 
-def _own_sources(n: int) -> Any:
-    return np.repeat(np.arange(n, dtype=np.int32), 2).reshape(-1, 2)
+def _along(edges: IntArray) -> Any:
+    """Return the sources of vertices from which rings go on along these edges."""
+    return np.repeat(edges.astype(np.int32), 2).reshape(-1, 2)
 
 
 def _stay_apart(result: Overlay, budget: Budget) -> bool:

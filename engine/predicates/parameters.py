@@ -5,9 +5,8 @@ t = s_p / (s_p - s_q), which grows with |s_p| / |s_q|. So two planes i and j com
 
     |s_p(i)| |s_q(j)|   against   |s_p(j)| |s_q(i)|
 
-and for planes of a box, where the differences n = c - p and d = q - p are to hand, t = n / d compares the same way:
-n_i d_j against n_j d_i. One core serves both: the sign of a b - c d for four numbers that are known roughly with a
-bound each (the filter), or exactly as expansions.
+The core is the sign of a b - c d for four numbers that are known roughly with a bound each (the filter), or exactly as
+expansions, or as differences of doubles.
 
 Precondition of the exact form: components are zero or so large that products of four components' lowest bits stay
 above 2^-1074, and nothing overflows; callers look at the range of their input.
@@ -22,32 +21,12 @@ from engine.predicates.error_free import two_diff, two_prod
 from engine.predicates.expansion import Components, add_scaled, grow_product, sign
 from engine.types import UNDECIDED
 
-ROUNDED_DIFFERENCES: Final = 8.0 * 2.0**-53
-"""Bound of the filter when each factor is a difference of two doubles rounded once.
-
-Each product carries (1 + u)^3, its comparison one more rounding of the difference and of the sum: below 5 u in all;
-8 u leaves room for the rounding of the bound itself.
-"""
-
 EXACT_DIFFERENCES: Final = 24.0 * 2.0**-106
 """Bound of the second stage, whose leading products are exact: four products of a tail, below u of a product each, are
 rounded once, and six sums of such terms."""
 
 TINY: Final = 2.0**-1000
 """Added to the bound: covers products that underflow, so that the filter is safe for every finite input."""
-
-
-@inline
-def compare_differences_filter(a: float, b: float, c: float, d: float) -> int:
-    """Return the sign of a b - c d for differences rounded once each; UNDECIDED when unsure (NaN, infinity too)."""
-    left, right = a * b, c * d
-    gap = left - right
-    bound = ROUNDED_DIFFERENCES * (abs(left) + abs(right)) + TINY
-    if gap > bound:
-        return 1
-    if -gap > bound:
-        return -1
-    return UNDECIDED
 
 
 @inline

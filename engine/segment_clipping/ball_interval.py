@@ -21,9 +21,8 @@ from engine.jit import bare_kernel, inline, merged
 from engine.predicates.double_double import U2, dd_add, dd_mul, dd_sub
 from engine.predicates.error_free import two_diff, two_prod, workspace
 from engine.predicates.expansion import grow_product, is_safe, sign
-from engine.segment_clipping.cohen_sutherland import DROPPED, KEPT
 from engine.segment_clipping.cyrus_beck import is_segment_safe
-from engine.segment_clipping.pieces import Triple, point_of
+from engine.segment_clipping.pieces import DROPPED, KEPT, Triple, point_of
 from engine.types import OPEN
 
 ROUGH_BOUND: Final = 32.0 * 2.0**-53

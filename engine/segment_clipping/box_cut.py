@@ -10,12 +10,12 @@ from __future__ import annotations
 from typing import Any
 
 from engine.jit import bare_kernel, inline, merged
-from engine.predicates.cut_point import parameter_and_point, point_at
-from engine.predicates.error_free import two_diff, workspace
-from engine.predicates.expansion import is_safe
-from engine.segment_clipping.cohen_sutherland import BLOCK, corners_of, plane_value
-from engine.segment_clipping.pieces import Pieces, Triple, point_of, put_end
+from engine.predicates.cut_point import point_at
+from engine.predicates.error_free import workspace
+from engine.segment_clipping.cohen_sutherland import corners_of
+from engine.segment_clipping.pieces import BLOCK, Pieces, Triple, point_of, put_end
 from engine.segment_clipping.plane_meeting import LONGEST, SHORTEST, T_BOUND, meeting
+from engine.segment_clipping.planes_cut import cut_by_signs
 
 
 @merged
@@ -48,38 +48,16 @@ def cut_end(
 
 
 @inline
-def cut_by_signs(segment: Any, low: Any, high: Any, plane: int, point: Any) -> tuple[float, bool]:
-    """Set `point` to where `segment` crosses `plane`, settled by exact signs; return t and whether all is sure."""
-    axis, at = plane >> 1, plane_value(low, high, plane)
-    p, q = segment[0, axis], segment[1, axis]
-    if not (is_safe(p) and is_safe(q) and is_safe(at)):
-        return 0.0, False
-    wp, wq, e = workspace(2), workspace(2), workspace(24)
-    flip = 1.0 if q > p else -1.0
-    n_wp, n_wq = difference(flip * at, flip * p, wp), difference(flip * q, flip * at, wq)
-    return parameter_and_point(segment, wp, n_wp, wq, n_wq, axis, at, point, e)
-
-
-@inline
-def difference(a: float, b: float, e: Any) -> int:
-    """Set e to a - b as an expansion; two places."""
-    h, low = two_diff(a, b)
-    n = 0
-    for part in (low, h):
-        if part != 0.0:
-            e[n] = part
-            n += 1
-    return n
-
-
-@inline
-def cut_again(segments: Any, low: Any, high: Any, row: int, unsure: int, pieces: Pieces) -> bool:
+def cut_again(
+    segments: Any, low: Any, high: Any, columns: Any, row: int, unsure: int, pieces: Pieces
+) -> bool:  # fmt: skip
     """Make those ends of a piece again whose bit of `unsure` is set, by exact signs; return whether all is sure."""
     all_sure = True
     for end in range(2):
         if unsure >> end & 1 == 1:
-            segment, point = segments[pieces.source[row]], pieces.ends[end, row]
-            pieces.t[row, end], is_sure = cut_by_signs(segment, low, high, pieces.faces[row, end], point)
+            segment, point, plane = segments[pieces.source[row]], pieces.ends[end, row], pieces.faces[row, end]
+            at = high[plane >> 1] if plane & 1 else low[plane >> 1]
+            pieces.t[row, end], is_sure = cut_by_signs(columns[:-2, plane], segment, point, plane >> 1, at)
             all_sure = all_sure and is_sure
     return all_sure
 
@@ -89,6 +67,7 @@ def fill_on_boxes(
     segments: Any,
     low: Any,
     high: Any,
+    columns: Any,
     items: Any,
     planes: Any,
     begin: int,
@@ -100,8 +79,9 @@ def fill_on_boxes(
 ) -> None:
     """Fill the pieces, from row `begin` on, of the first `size` items, ``segments`` ((n, 2, dim) float64) on a box.
 
-    items: (m,) int32, planes: (m, 2) int32, as decided on the box `low`, `high`. still: the rows that are not surely
-    rounded. n: how many of them, and how many needed more than the first try. stop: one uint8, polled.
+    items: (m,) int32, planes: (m, 2) int32, as decided on the box `low`, `high`; columns: of its rows.
+    still: the rows that are not surely rounded. n: how many of them, and how many needed more than the first try.
+    stop: one uint8, polled.
     """
     is_flat = low.size == 2
     lowest, highest = corners_of(low, high)
@@ -133,7 +113,7 @@ def fill_on_boxes(
         for j in range(n_here):
             if unsure[j] != 0.0:
                 beyond += 1
-                if not cut_again(segments, low, high, begin + start + j, int(unsure[j]), pieces):
+                if not cut_again(segments, low, high, columns, begin + start + j, int(unsure[j]), pieces):
                     still[n_open] = begin + start + j
                     n_open += 1
     n[0], n[1] = n_open, beyond

@@ -21,7 +21,7 @@ from engine.segment_clipping.cyrus_beck import as_columns, decide_on_rows
 from engine.segment_clipping.decide_then_cut import FEW, Method, Scaled, clip_few, clip_on_convex, scaled
 from engine.segment_clipping.pieces import Pieces
 from engine.segment_clipping.planes_cut import fill_on_rows
-from engine.solids.aabb import Aabb
+from engine.solids.aabb import Aabb, rows_between
 from engine.solids.base import Solid
 from engine.solids.checks import as_point_groups, is_ready
 from engine.solids.convex import Convex
@@ -167,13 +167,14 @@ def method_for(region: Solid) -> Method | Polygon | Polyhedron:
 
 
 def _on_box(low: FloatArray, high: FloatArray) -> Method:
-    return Method(
-        "cohen_sutherland",
-        decide_on_boxes,
-        fill_on_boxes,
-        (low, high),
-        lambda segments: scaled(segments, low, high),
-    )
+    def with_columns(low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        return low, high, as_columns(rows_between(low, high))
+
+    def scale(segments: FloatArray) -> Scaled | None:
+        found = scaled(segments, low, high)
+        return found and replace(found, region=with_columns(*found.region))
+
+    return Method("cohen_sutherland", decide_on_boxes, fill_on_boxes, with_columns(low, high), scale)
 
 
 def _on_rows(rows: FloatArray) -> Method:

@@ -12,8 +12,8 @@ The textbook cuts the outside end at one plane after another until the codes say
 1. Its loop can run for ever by rounding, (1, 1)-(-1, -1) on the box [1e-9, 3]^2. Here each plane is looked at once:
    the last plane entered and the first one left bound the piece, if in this order.
 2. It decides from rounded points. Here the parameters of the planes, quotients of differences of original coordinates,
-   are compared in doubles beyond their bound, then in double-doubles, else exactly: n_i / d_i against n_j / d_j as
-   n_i d_j against n_j d_i. The cut coordinate is the plane's own value.
+   are compared in doubles beyond their bound, then in double-doubles, else exactly, as rows of planes are
+   (cyrus_beck.py). The cut coordinate is the plane's own value.
 
 The first two comparisons are made for a block of segments at once, without branches: so the compiler uses vectors, and
 no processor has to foretell on which side of a plane a point lies. In the plane z is 0 throughout.
@@ -29,92 +29,17 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from engine.jit import bare_kernel, called, inline, merged
+from engine.jit import bare_kernel, merged
 from engine.predicates.error_free import workspace
-from engine.predicates.expansion import is_safe
-from engine.predicates.parameters import compare_differences, compare_differences_filter
-from engine.segment_clipping.pieces import Triple, point_of
+from engine.segment_clipping.cyrus_beck import coordinate_limit, decide_alone
+from engine.segment_clipping.pieces import BLOCK, KEPT, Triple, is_plain, point_of
 from engine.segment_clipping.plane_meeting import gap_between, meetings
-from engine.types import OPEN, UNDECIDED
+from engine.types import OPEN
 
-DROPPED: Final = 0
-KEPT: Final = 1
-LARGE: Final = 2.0**1000
-"""Items whose absolute coordinates add up to more, or to nothing (NaN, infinity), are left open."""
 T_GAP: Final = 16.0 * 2.0**-53
 """Parameters t are quotients of two differences, within 3 u (1 + u)^2 of themselves; two of them and this test: 8 u."""
 T_TINY: Final = 2.0**-1060
 """Parameters that underflow."""
-BLOCK: Final = 64
-"""Segments looked at together: fifteen numbers each stay in the nearest cache."""
-
-
-@inline
-def plane_outside(value: float, low: float, high: float, axis: int) -> int:
-    """Return the plane of `axis` that `value` lies outside of, -1 if none: 2 axis for low, 2 axis + 1 for high."""
-    if value < low:
-        return 2 * axis
-    if value > high:
-        return 2 * axis + 1
-    return -1
-
-
-@inline
-def plane_value(low: Any, high: Any, plane: int) -> float:
-    """Return the coordinate at which `plane` cuts its axis."""
-    return high[plane >> 1] if plane & 1 else low[plane >> 1]
-
-
-@called
-def compare_planes(p_i: float, q_i: float, c_i: float, p_j: float, q_j: float, c_j: float) -> int:
-    """Return the sign of t_i - t_j for two planes that a segment meets: at c, from p to q on their axes."""
-    # n and d of one plane have one sign, so absolute values keep the ratio and make the products comparable
-    order = compare_differences_filter(abs(c_i - p_i), abs(q_j - p_j), abs(c_j - p_j), abs(q_i - p_i))
-    if order != UNDECIDED:
-        return order
-    if not (is_safe(p_i) and is_safe(q_i) and is_safe(c_i) and is_safe(p_j) and is_safe(q_j) and is_safe(c_j)):
-        return UNDECIDED
-    e = workspace(16)
-    order = compare_differences(c_i, p_i, q_j, p_j, c_j, p_j, q_i, p_i, e)
-    return order if (q_i > p_i) == (q_j > p_j) else -order
-
-
-@inline
-def decide_exactly(segments: Any, item: int, low: Any, high: Any) -> tuple[int, int, int]:
-    """Decide on a segment whose outcodes share no bit: state, plane entered, plane left."""
-    entered = left = -1
-    size, dimension = 0.0, low.size
-    for axis in range(dimension):
-        size += abs(segments[item, 0, axis]) + abs(segments[item, 1, axis])
-    if not (size < LARGE):
-        return OPEN, -1, -1
-    for turn in range(2 * dimension + 1):
-        axis, side = turn >> 1, turn & 1
-        if axis < dimension:
-            plane = plane_outside(segments[item, side, axis], low[axis], high[axis], axis)
-            other = left if side else entered
-        else:  # at last the last plane entered and the first one left
-            plane, other = left, entered
-        order = 0
-        if plane >= 0 and other >= 0:
-            i, j = plane >> 1, other >> 1
-            order = compare_planes(
-                segments[item, 0, i],
-                segments[item, 1, i],
-                plane_value(low, high, plane),
-                segments[item, 0, j],
-                segments[item, 1, j],
-                plane_value(low, high, other),
-            )
-            if order == UNDECIDED:
-                return OPEN, -1, -1
-        if axis == dimension:
-            return (DROPPED, -1, -1) if order < 0 else (KEPT, entered, left)
-        if side == 0 and (other < 0 or order > 0) and plane >= 0:  # equal: the smaller plane stays
-            entered = plane
-        if side == 1 and (other < 0 or order < 0) and plane >= 0:
-            left = plane
-    return OPEN, -1, -1  # not reached
 
 
 @merged
@@ -168,12 +93,6 @@ def decide_closely(p: Triple, q: Triple, low: Triple, high: Triple) -> Triple:
 
 
 @merged
-def is_plain(p: Triple, q: Triple) -> bool:
-    """Tell whether no coordinate of a segment is too large, or none."""
-    return abs(p[0]) + abs(p[1]) + abs(p[2]) + abs(q[0]) + abs(q[1]) + abs(q[2]) < LARGE
-
-
-@merged
 def corners_of(low: Any, high: Any) -> tuple[Triple, Triple]:
     """Return the corners of a box, in the plane with z from -1 to 1."""
     is_flat = low.size == 2
@@ -182,9 +101,10 @@ def corners_of(low: Any, high: Any) -> tuple[Triple, Triple]:
 
 @bare_kernel
 def decide_on_boxes(
-    segments: Any, low: Any, high: Any, first: int, last: int, stop: Any, items: Any, planes: Any, still: Any, n: Any
-) -> None:
-    """Decide on ``segments[first:last]`` ((n, 2, dim) float64) and the box `low`, `high`.
+    segments: Any, low: Any, high: Any, columns: Any, first: int, last: int, stop: Any, items: Any, planes: Any,
+    still: Any, n: Any,
+) -> None:  # fmt: skip
+    """Decide on ``segments[first:last]`` ((n, 2, dim) float64) and the box `low`, `high`; columns: of its rows.
 
     items: (m,) the segments that are kept, in order, in planes (m, 2) the planes entered and left, -1 for an end of the
     segment; there is room for all. still: likewise the segments left open. n: how many are kept, open, and went beyond
@@ -196,6 +116,7 @@ def decide_on_boxes(
         workspace(64), workspace(64), workspace(64), workspace(64), workspace(64), workspace(64),
     )  # fmt: skip
     state, entered, left, unsure = workspace(64), workspace(64), workspace(64), workspace(64)
+    numbers, chosen, limit = (workspace(8), workspace(8), workspace(8)), workspace(8), coordinate_limit(columns)
     kept, n_open, beyond = 0, 0, 0
     for start in range(first, last, BLOCK):
         if stop[0]:
@@ -222,7 +143,7 @@ def decide_on_boxes(
             j = int(unsure[k])
             state[j], entered[j], left[j] = px[k], py[k], pz[k]
             if state[j] == OPEN:
-                state[j], entered[j], left[j] = decide_exactly(segments, start + j, low, high)
+                state[j], entered[j], left[j], _ = decide_alone(segments, start + j, columns, limit, numbers, chosen)
             if state[j] == OPEN:
                 still[n_open] = start + j
                 n_open += 1

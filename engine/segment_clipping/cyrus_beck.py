@@ -26,8 +26,7 @@ from engine.jit import inline, kernel, merged
 from engine.predicates.error_free import workspace
 from engine.predicates.expansion import Components, compress, grow, grow_product, is_safe, sign
 from engine.predicates.parameters import compare_products, compare_ratios_filter
-from engine.segment_clipping.cohen_sutherland import BLOCK, DROPPED, KEPT, is_plain
-from engine.segment_clipping.pieces import point_of
+from engine.segment_clipping.pieces import BLOCK, DROPPED, KEPT, is_plain, point_of
 from engine.types import OPEN, UNDECIDED
 
 VALUE_BOUND: Final = 8.0 * 2.0**-53
@@ -57,11 +56,16 @@ class Latest(NamedTuple):
 def as_columns(rows: FloatArray) -> FloatArray:
     """Return plane rows (m, dim + 1) as columns (dim + 3, m).
 
-    The last two bound the error of a value in doubles: times the largest coordinate, and by themselves.
+    The last two bound the error of a value in doubles: times the largest coordinate, and by themselves. They are zero
+    where a value is a coordinate and a number, rounded once: its sign is exact, and what compares values has room for
+    a rounding of each.
     """
     with np.errstate(all="ignore"):  # what overflows bounds nothing, and is left to exact arithmetic
         slope = VALUE_BOUND * np.abs(rows[:, :-1]).sum(axis=1)
-        columns = np.ascontiguousarray(np.vstack([rows.T, slope, VALUE_BOUND * np.abs(rows[:, -1]) + VALUE_TINY]))
+        floor = VALUE_BOUND * np.abs(rows[:, -1]) + VALUE_TINY
+        is_rounded_once = (np.sort(np.abs(rows[:, :-1]))[:, -2:] == (0.0, 1.0)).all(axis=1) & (floor < WIDEST)
+        slope[is_rounded_once] = floor[is_rounded_once] = 0.0
+        columns = np.ascontiguousarray(np.vstack([rows.T, slope, floor]))
     columns.setflags(write=False)
     return columns
 
@@ -122,12 +126,13 @@ def decide_by_rows(
     entered = left = -1
     beyond, checked = 0, False
     for i in range(n):
-        sign_p = 1 if s_p[i] > bounds[i] else (-1 if -s_p[i] > bounds[i] else UNDECIDED)
-        sign_q = 1 if s_q[i] > bounds[i] else (-1 if -s_q[i] > bounds[i] else UNDECIDED)
+        unsure = UNDECIDED if bounds[i] > 0.0 else 0
+        sign_p = 1 if s_p[i] > bounds[i] else (-1 if -s_p[i] > bounds[i] else unsure)
+        sign_q = 1 if s_q[i] > bounds[i] else (-1 if -s_q[i] > bounds[i] else unsure)
         if sign_p == UNDECIDED or sign_q == UNDECIDED:
             beyond = 1
             checked = checked or is_segment_safe(segment)
-            row = columns[:-2, chosen[i]]
+            row = columns[:-2, int(chosen[i])]
             if not (checked and is_row_safe(row)):
                 return OPEN, -1, -1, 1
             if sign_p == UNDECIDED:
@@ -166,7 +171,7 @@ def compare_rows(
     order = compare_ratios_filter(s_p[i], bounds[i], s_q[j], bounds[j], s_p[j], bounds[j], s_q[i], bounds[i])
     if order != UNDECIDED:
         return order, True
-    row_i, row_j = columns[:-2, chosen[i]], columns[:-2, chosen[j]]
+    row_i, row_j = columns[:-2, int(chosen[i])], columns[:-2, int(chosen[j])]
     if not (is_segment_safe(segment) and is_row_safe(row_i) and is_row_safe(row_j)):
         return UNDECIDED, False
     return exact_order(row_i, row_j, segment), False
@@ -233,7 +238,7 @@ def decide_alone(
         bounds[n], chosen[n] = columns[-2, j] * most + columns[-1, j], j
         n += not min(s_p[n], s_q[n]) > bounds[n]
     state, entered, left, beyond = decide_by_rows(segments[item], columns, s_p, s_q, bounds, chosen, n)
-    return state, (chosen[entered] if entered >= 0 else -1), (chosen[left] if left >= 0 else -1), beyond
+    return state, (int(chosen[entered]) if entered >= 0 else -1), (int(chosen[left]) if left >= 0 else -1), beyond
 
 
 @kernel

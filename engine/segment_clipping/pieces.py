@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from engine.jit import merged
 
 Triple = tuple[float, float, float]
+DROPPED: Final = 0
+KEPT: Final = 1
+"""States of a segment, beside OPEN."""
+LARGE: Final = 2.0**1000
+"""Items whose absolute coordinates add up to more, or to nothing (NaN, infinity), are left open."""
+BLOCK: Final = 64
+"""Segments looked at together: fifteen numbers each stay in the nearest cache."""
 
 
 class Piece(NamedTuple):
@@ -62,6 +69,12 @@ def completed(parts: Sequence[Pieces]) -> Pieces:
     found = joined(parts)
     order = np.argsort(found.source, kind="stable")
     return Pieces(found.source[order], found.ends[:, order], found.t[order], found.faces[order])
+
+
+@merged
+def is_plain(p: Triple, q: Triple) -> bool:
+    """Tell whether no coordinate of a segment is too large, or none."""
+    return abs(p[0]) + abs(p[1]) + abs(p[2]) + abs(q[0]) + abs(q[1]) + abs(q[2]) < LARGE
 
 
 @merged

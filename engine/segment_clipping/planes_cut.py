@@ -49,8 +49,11 @@ def parameter_of(sp: Triple, sq: Triple) -> tuple[float, float, float, bool]:
 
 
 @inline
-def cut_by_signs(row: Any, segment: Any, point: Any) -> tuple[float, bool]:
-    """Set `point` to where `segment` crosses the plane of `row`, by exact signs; return t and whether all is sure."""
+def cut_by_signs(row: Any, segment: Any, point: Any, axis: int, at: float) -> tuple[float, bool]:
+    """Set `point` to where `segment` crosses the plane of `row`, by exact signs; return t and whether all is sure.
+
+    axis, at: across an axis, where; else -1 and anything.
+    """
     if not (is_row_safe(row) and is_segment_safe(segment)):
         return 0.0, False
     wp, wq, e = workspace(8), workspace(8), workspace(96)
@@ -59,7 +62,7 @@ def cut_by_signs(row: Any, segment: Any, point: Any) -> tuple[float, bool]:
         if sign(e_w, n_w) < 0:
             for i in range(n_w):
                 e_w[i] = -e_w[i]
-    return parameter_and_point(segment, wp, n_wp, wq, n_wq, -1, 0.0, point, e)
+    return parameter_and_point(segment, wp, n_wp, wq, n_wq, axis, at, point, e)
 
 
 @merged
@@ -110,7 +113,7 @@ def fill_on_rows(
                 put_end(pieces, row, end, (x, y, z), is_flat)
             else:
                 tried = False
-                pieces.t[row, end], sure = cut_by_signs(columns[:-2, j], segments[i], pieces.ends[end, row])
+                pieces.t[row, end], sure = cut_by_signs(columns[:-2, j], segments[i], pieces.ends[end, row], -1, 0.0)
                 all_sure = all_sure and sure
         beyond += not tried
         if not all_sure:

@@ -43,10 +43,15 @@ class Aabb(Solid):
     @property
     def rows(self) -> FloatArray:
         """``(2 dimension, dimension + 1)``: its planes, in the order xmin, xmax, ymin, ymax, zmin, zmax."""
-        unit = np.eye(self.dimension)
-        rows = np.empty((2 * self.dimension, self.dimension + 1))
-        rows[0::2, :-1], rows[1::2, :-1], rows[0::2, -1], rows[1::2, -1] = unit, -unit, -self.min, self.max
-        return read_only(rows + 0.0)
+        return rows_between(self.min, self.max)
 
     def __repr__(self) -> str:
         return f"Aabb(min={digits(self.min)}, max={digits(self.max)})"
+
+
+def rows_between(low: FloatArray, high: FloatArray) -> FloatArray:
+    """Return the planes of a box, see `Aabb.rows`."""
+    unit = np.eye(len(low))
+    rows = np.empty((2 * len(low), len(low) + 1))
+    rows[0::2, :-1], rows[1::2, :-1], rows[0::2, -1], rows[1::2, -1] = unit, -unit, -low, high
+    return read_only(rows + 0.0)

@@ -146,25 +146,15 @@ def _look_in_boxes(edges: Edges, components: Components, begin: int, n: int, tre
         first = LEAF * (node - n_leaves)
         for place in range(first, min(first + LEAF, n)):
             other = places[place]
-            if _may_hold(boxes, other, low, high):
-                _look_at(edges, components, other, begin, size, tree, above)
-
-
-@merged
-def _look_at(
-    edges: Edges, components: Components, other: int, begin: int, size: int, tree: BoxTree, above: Any
-) -> None:
-    """Look at one component for those at ``size`` places."""
-    for j in range(size):
-        k = tree.places[begin + j]
-        if other != k and box_holds(tree.boxes, other, tree.boxes, k):
-            components.state[other] |= _HOLDS
-            v, nearest = components.highest[components.ring[k]], int(above[j])
-            found = _test_component(edges, tree.marks, components, v, other, nearest)
-            if found == TOO_MANY:
-                components.state[k] |= _IS_OPEN
-            else:
-                above[j] = found
+            for j in range(size if _may_hold(boxes, other, low, high) else 0):
+                k = places[begin + j]
+                if other == k or not box_holds(boxes, other, boxes, k):
+                    continue
+                components.state[other] |= _HOLDS
+                v, nearest = components.highest[components.ring[k]], int(above[j])
+                found = _test_component(edges, tree.marks, components, v, other, nearest)
+                components.state[k] |= _IS_OPEN * (found == TOO_MANY)
+                above[j] = nearest if found == TOO_MANY else found
 
 
 @inline

@@ -13,7 +13,6 @@ from engine.predicates.error_free import workspace
 from engine.predicates.expansion import grow
 from engine.predicates.parameters import (
     compare_differences,
-    compare_differences_filter,
     compare_products,
     compare_ratios_filter,
 )
@@ -21,13 +20,12 @@ from engine.types import UNDECIDED
 
 
 @kernel
-def compare_all(rows: Any, exact: Any, rough: Any) -> None:
+def compare_all(rows: Any, exact: Any) -> None:
     """rows (n, 8): a0, a1, b0, b1, c0, c1, d0, d1; signs of (a0 - a1)(b0 - b1) - (c0 - c1)(d0 - d1)."""
     for i in range(rows.shape[0]):
         a0, a1, b0, b1, c0, c1, d0, d1 = rows[i]
         e = workspace(16)
         exact[i] = compare_differences(a0, a1, b0, b1, c0, c1, d0, d1, e)
-        rough[i] = compare_differences_filter(a0 - a1, b0 - b1, c0 - c1, d0 - d1)
 
 
 @kernel
@@ -62,23 +60,21 @@ def rows_of(rng: np.random.Generator, n: int) -> Any:
 def test_signs_are_exact(pytestconfig: pytest.Config) -> None:
     rng = np.random.default_rng(3)
     rows = rows_of(rng, 20_000 if pytestconfig.getoption("--full") else 400)
-    signed, rough, absolute, ratio = (np.empty(len(rows), np.int64) for _ in range(4))
-    compare_all(rows, signed, rough)
+    signed, absolute, ratio = (np.empty(len(rows), np.int64) for _ in range(3))
+    compare_all(rows, signed)
     compare_sums(rows, absolute, ratio)
     for i, row in enumerate(rows.tolist()):
         a, b, c, d = (Fraction(row[k]) - Fraction(row[k + 1]) for k in (0, 2, 4, 6))
         expected, of_sizes = a * b - c * d, abs(a * b) - abs(c * d)
         assert signed[i] == (expected > 0) - (expected < 0), row
-        assert rough[i] in (UNDECIDED, signed[i]), row
         assert absolute[i] == (of_sizes > 0) - (of_sizes < 0), row
         assert ratio[i] in (UNDECIDED, absolute[i]), row
     assert (signed == 0).sum() > len(rows) // 20, "the sample holds ties"
-    assert (rough != UNDECIDED).sum() > len(rows) // 4, "the filter is of use"
+    assert (ratio != UNDECIDED).sum() > len(rows) // 4, "the filter is of use"
 
 
 @pytest.mark.parametrize("value", [1e300, 1e-300, 5e-324, np.inf, np.nan])
 def test_filters_are_unsure_where_they_must_be(value: float) -> None:
     with np.errstate(all="ignore"):
-        assert compare_differences_filter(value, value, value, value) == UNDECIDED
         assert compare_ratios_filter(value, 0.0, value, 0.0, value, 0.0, value, 0.0) == UNDECIDED
         assert compare_ratios_filter(value, np.inf, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0) == UNDECIDED
