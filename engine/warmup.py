@@ -112,7 +112,7 @@ def _locate(dimension: int) -> None:
 
 
 def _warm_cells() -> None:
-    """Ask a ball of 560 faces and a ring of 300 edges about so many points that cells pay, and lists get long."""
+    """Ask two balls of 560 faces and a ring of 300 edges about so many points that cells pay, and lists get long."""
     turn, rise = np.linspace(0, 2 * np.pi, 20, endpoint=False), np.linspace(-1, 1, 15)
     belts = np.array([[r * np.cos(turn), r * np.sin(turn), 0 * turn + z] for r, z in zip(1.1 - rise**2, rise)])
     vertices = np.concatenate([belts.transpose(0, 2, 1).reshape(-1, 3), [[0, 0, -1.0], [0, 0, 1.0]]])
@@ -123,7 +123,8 @@ def _warm_cells() -> None:
             faces += [[belt + a, belt + b, belt + 20 + b], [belt + a, belt + 20 + b, belt + 20 + a]]
         faces += [[300, b, a], [301, 280 + a, 280 + b]]
     many = np.random.default_rng(0).uniform(-1.2, 1.2, (_MANY, 3))
-    ball = Polyhedron(vertices, faces)
+    tiny = [[301 + 1 + vertex for vertex in face] for face in faces]  # a detail, for which cells go deep
+    ball = Polyhedron(np.concatenate([vertices, 1e-3 * vertices + 2.0]), faces + tiny)
     locate(many, ball)
     locate_scene(many, [ball])  # so many that level 0 of its cells pays
     points = as_points(many, 3)

@@ -30,7 +30,7 @@ _TREE: Final = 40_000.0
 _TREE_A_FACE: Final = 280.0
 _SOON: Final = 1.0 / 16.0
 """Share of the tree's cost that earlier passes may have taken: in general the second question builds it."""
-_CELLS_FROM, _CELLS_PER_FACE = 1 << 14, 5
+_CELLS_FROM, _CELLS_PER_FACE = 1 << 14, 3
 """Points from which cells are built on ordinary meshes, where a tree has taken half as long by then."""
 _CELLS, _CELLS_A_FACE = 2_500_000.0, 1_500.0
 _SAMPLE: Final = 256

@@ -20,9 +20,9 @@ from engine.containment.cells.lattice import (
     Lattice,
     Level,
     Mesh,
+    keep_of_details,
     list_parts,
     list_top,
-    parts_of,
 )
 from engine.containment.cells.locate import CODE_SHIFT, INSIDE_CELL, MIXED_CELL, OUTSIDE_CELL
 from engine.containment.cells.status import fill_leaves, locate_parts
@@ -84,7 +84,9 @@ def build_cells(solid: Polyhedron, budget: Budget) -> Cells:
         if depth == LEVELS - 1 or len(level.lists) > _MOST_ENTRIES * len(tree.triangles) + (1 << 14):
             is_cut[:] = False
         elif depth >= _COARSE:
-            is_cut &= 2 * _small_ones(tree, lattice, level) > lengths
+            long = np.flatnonzero(is_cut)
+            keep_of_details(mesh, level, long, is_cut, budget.flag)
+            budget.check()
         parents = np.flatnonzero(is_cut)
         kept = np.flatnonzero(~is_cut & (level.statuses != UNKNOWN) & (lengths <= longest))
         sizes = (lengths[kept] + LANES - 1) // LANES
@@ -111,13 +113,6 @@ def build_cells(solid: Polyhedron, budget: Budget) -> Cells:
         len(codes),
         groups,
     )
-
-
-def _small_ones(tree: TriangleTree, lattice: Lattice, level: Level) -> IntArray:
-    """Return how many triangles of each list are smaller than a cell of the level along each axis."""
-    corners = tree.vertices[tree.triangles]
-    extents = (corners.max(axis=1) - corners.min(axis=1)) * lattice.scale * parts_of(level.depth)
-    return np.add.reduceat((extents.max(axis=1) < 1.0)[level.lists], level.firsts[:-1], dtype=np.int64)
 
 
 def _listed(

@@ -182,3 +182,21 @@ def list_parts(mesh: Any, level: Any, parents: Any, ends: Any, items: Any, is_fi
         block = Block(level.depth + 1, x, y, z, SPLIT, SPLIT, SPLIT, parent * PARTS)
         for entry in range(level.firsts[cell], level.firsts[cell + 1]):
             _list_triangle(mesh, level.lists[entry], block, ends, items, is_fill)
+
+
+@kernel
+def keep_of_details(mesh: Any, level: Any, cells: Any, is_kept: Any, flag: Any) -> None:
+    """Set is_kept of each of `cells`: whether most triangles of its list are smaller than a cell along each axis."""
+    scale, parts = mesh.lattice.scale, parts_of(level.depth)
+    for cell in cells:
+        if flag[0]:
+            break
+        first, end, n_small = level.firsts[cell], level.firsts[cell + 1], 0
+        for entry in range(first, end):
+            a, b, c = corners(mesh.vertices, mesh.triangles, level.lists[entry])
+            largest = 0.0
+            for axis in range(3):
+                low, high = min(a[axis], b[axis], c[axis]), max(a[axis], b[axis], c[axis])
+                largest = max(largest, (high - low) * (scale[axis] * parts))
+            n_small += largest < 1.0
+        is_kept[cell] = 2 * n_small > end - first
