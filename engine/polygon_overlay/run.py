@@ -13,7 +13,7 @@ from engine.parallel import Budget
 from engine.polygon_overlay.compiled.kernel import DONE, NEEDS_CONTACTS, NEEDS_OUTPUT, overlay_pairs
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.compiled.ring_nesting import AGAIN, Nesting
-from engine.polygon_overlay.compiled.workspace import Outcomes, keep, more_contacts, scratch_for
+from engine.polygon_overlay.compiled.workspace import Outcomes, first_contacts, keep, more_contacts, scratch_for
 from engine.polygon_overlay.found import Found, one_pair, put_together, ring_sizes, summed
 from engine.polygon_overlay.implicit_rings import NOTHING, ImplicitRings
 from engine.polygon_overlay.nearest import leave_nearest
@@ -48,7 +48,7 @@ def run_kernel(
     outcomes = Outcomes(np.empty(n, np.int8), np.empty((n, 4), np.int64), np.empty(n))
     reached = 0
     parts: list[list[Any]] = []
-    n_contacts = max(256, 4 * n_vertices)
+    n_contacts = first_contacts(n_vertices)
     n_out, n_out_rings = 8 * n + len(subjects.vertices) + len(clips.vertices), 2 * n
     while reached < n:  # bound: each turn goes on, or makes room for one pair, geometrically
         scratch = scratch_for(n_vertices, n_rings, n_contacts, n_out, n_out_rings)

@@ -18,7 +18,7 @@ from engine.polygon_overlay.compiled.kernel import DONE, FINISHED, NEEDS_CONTACT
 from engine.polygon_overlay.compiled.loading import Loaded, RingArrays
 from engine.polygon_overlay.compiled.reducing import expand_rings, reduce_pair
 from engine.polygon_overlay.compiled.ring_nesting import PAIR, Nesting
-from engine.polygon_overlay.compiled.workspace import Output, keep, more_contacts, scratch_for
+from engine.polygon_overlay.compiled.workspace import Output, first_contacts, keep, more_contacts, scratch_for
 from engine.polygon_overlay.implicit_rings import one_polygon
 
 NOT_REDUCED: Final = Loaded(0, 0, 0, 0.0)
@@ -101,7 +101,7 @@ def run_blocks(
     if size:
         reduced, n_contacts, n_out, n_out_rings = NOT_REDUCED, _FEW_CONTACTS, 0, 0
     else:
-        reduced, n_contacts, n_out, n_out_rings = NOT_REDUCED, max(256, 4 * n_vertices), 8 + n_vertices, 2
+        reduced, n_contacts, n_out, n_out_rings = NOT_REDUCED, first_contacts(n_vertices), 8 + n_vertices, 2
     if n_vertices >= _MANY:
         budget.take(_BY_VERTEX * n_vertices)
     while True:  # bound: each turn makes room, geometrically

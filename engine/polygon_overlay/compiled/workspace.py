@@ -28,7 +28,8 @@ _kept: list[Scratch] = []
 """Scratch that nobody uses now, for whichever thread is next: the last used first, whose pages are in the cache."""
 _MOST_KEPT: Final = 128_000_000
 """Bytes of all that is kept; of most of them a fifth was ever written to."""
-_MANY_CONTACTS: Final = 2**18
+_MORE_CONTACTS: Final = 2**15
+_MANY_CONTACTS: Final = 2**15
 
 
 class Buffers(NamedTuple):
@@ -134,6 +135,11 @@ def scratch_for(n_vertices: int, n_rings: int, n_contacts: int, n_out: int, n_ou
         buffers = buffers_for(n_vertices, n_rings, n_contacts)
     n_bytes = sum(array.nbytes for array in (*buffers, *output))
     return Scratch(n_bytes, n_vertices, n_rings, n_contacts, buffers, output, outcome)
+
+
+def first_contacts(n_vertices: int) -> int:
+    """Return for how many contacts to try first; of large polygons few, so that the scratch is not too much to keep."""
+    return max(256, min(4 * n_vertices, n_vertices + _MORE_CONTACTS))
 
 
 def more_contacts(n: int) -> int:
