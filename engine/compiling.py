@@ -12,6 +12,7 @@ import gc
 import hashlib
 import pickle
 from collections.abc import Callable
+from types import CodeType
 from typing import Any, Final
 
 import llvmlite.binding
@@ -26,8 +27,11 @@ from numba.core.lowering import Lower
 from numba.core.registry import CPUDispatcher
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
-from numba.core.typed_passes import NativeLowering
+from numba.core.typed_passes import NativeLowering, NopythonRewrites
+from numba.core.types import Dispatcher
 from numba.core.types.misc import unliteral
+from numba.core.typing import Context
+from numba.core.untyped_passes import InlineClosureLikes
 
 from engine.kernel_cache import COMPLETE, cache_folder, keep, kept, source_digest
 
@@ -38,6 +42,7 @@ _ASKED_FOR = {
     NullCache: ("load_overload", "save_overload"),
     CompileResult: ("_reduce",),
     CompilerBase: ("compile_extra",),
+    Context: ("resolve_function_type", "resolve_getattr"),
     CPUDispatcher: ("get_call_template",),
     Lower: ("setup_function",),
     NativeLowering: ("run_pass", "lowering_class"),
@@ -190,10 +195,46 @@ class _CalledLowering(_InnerLowering):
         return _CalledLower
 
 
+class _Typing(Context):  # type: ignore[misc]
+    """numba's own knowledge of types, all of its state shared, asked once what a built-in function gives for types.
+
+    numba compiles those that it writes in Python (`max`, `np.empty`) with options of the first caller; of ours, one
+    matters there: `_typing`.
+    """
+
+    def __init__(self, shared: Context) -> None:
+        self.__dict__.update(vars(shared))
+        self._shared = shared
+        self._known: dict[Any, Any] = {}
+
+    def resolve_function_type(self, func: Any, args: Any, kws: Any) -> Any:
+        if kws or isinstance(func, (Dispatcher, str)):  # "static_getitem" takes numbers, slices
+            return self._shared.resolve_function_type(func, args, kws)
+        return self._once((func, args), self._shared.resolve_function_type, func, args, kws)
+
+    def resolve_getattr(self, typ: Any, attr: str) -> Any:
+        return self._once((attr, typ), self._shared.resolve_getattr, typ, attr)
+
+    def _once(self, key: Any, ask: Callable[..., Any], *asked: Any) -> Any:
+        if key not in self._known:
+            self._known[key] = ask(*asked)
+        return self._known[key]
+
+
+@functools.cache
+def _typing(shared: Context, counts: bool) -> _Typing:
+    """Return the one for functions that do, or do not, count references."""
+    return _Typing(shared)
+
+
 class KernelCompiler(CompilerBase):  # type: ignore[misc]
     """numba's own steps, but for how a function is written."""
 
     lowering: type[NativeLowering] = _KernelLowering
+
+    def __init__(self, typing: Context, *more: Any) -> None:
+        super().__init__(typing, *more)
+        self.state.typingctx = _typing(typing, bool(self.state.flags.nrt))
 
     def compile_extra(self, function: Any) -> Any:
         """Compile; to look for cycles as often as Python does, among so much that lives long, takes a tenth of it."""
@@ -205,8 +246,12 @@ class KernelCompiler(CompilerBase):  # type: ignore[misc]
             gc.set_threshold(*usual)
 
     def define_pipelines(self) -> list[Any]:
+        """Leave out what joins operations on whole arrays, and what looks for functions in a function that has none."""
         steps = DefaultPassBuilder.define_nopython_pipeline(self.state)
-        steps.passes = [(self.lowering if step is NativeLowering else step, text) for step, text in steps.passes]
+        has_inner = any(isinstance(item, CodeType) for item in self.state.func_id.code.co_consts)
+        without = {NopythonRewrites} if has_inner else {NopythonRewrites, InlineClosureLikes}
+        kept = [item for item in steps.passes if item[0] not in without]
+        steps.passes = [(self.lowering if step is NativeLowering else step, text) for step, text in kept]
         steps.finalize()
         return [steps]
 

@@ -196,7 +196,7 @@ def _lay_out(
                 vertex = triangles[order[item], corner]
                 if number[vertex] < 0:
                     number[vertex] = n_used
-                    used[n_used] = vertices[vertex]
+                    used[n_used, 0], used[n_used, 1], used[n_used, 2] = as_point3(vertices, vertex)
                     n_used += 1
                 ordered[item, corner] = number[vertex]
             axis[item] = axis_of(
