@@ -26,7 +26,7 @@ from engine.polygon_overlay.compiled.rounded_crossings import Rounded
 
 _kept: list[Scratch] = []
 """Scratch that nobody uses now, for whichever thread is next: the last used first, whose pages are in the cache."""
-_MOST_KEPT: Final = 128_000_000
+_MOST_KEPT: Final = 256_000_000
 """Bytes of all that is kept; of most of them a fifth was ever written to."""
 _MORE_CONTACTS: Final = 2**15
 _MANY_CONTACTS: Final = 2**15
@@ -158,7 +158,7 @@ def keep(scratch: Scratch) -> None:
 
 
 def release() -> None:
-    """Give back memory that calls keep for later ones: what large overlays wrote to, 128 MB at most.
+    """Give back memory that calls keep for later ones: what large overlays wrote to, of arrays of 256 MB at most.
 
     The next overlay takes it anew, which lasts 0.3 ms for each megabyte that it writes to.
 
