@@ -94,6 +94,18 @@ class Halves(NamedTuple):
     """(2 n - 1, 2): first item and end."""
 
 
+class Bins(NamedTuple):
+    """Items of a run by where their centres lie along an axis."""
+
+    boxes: Float32Array
+    """(16, 8)"""
+    centres: Float32Array
+    numbers: IntArray
+    """(16,): how many items."""
+    costs: Float32Array
+    """(16,): of what lies from a bin on, to the right."""
+
+
 def build_bvh(boxes: FloatArray) -> Bvh:
     """Return the tree over `boxes` (n_items, 6) float64: xmin ymin zmin xmax ymax zmax; n_items >= 1.
 
@@ -177,14 +189,14 @@ def _middle_of(boxes: Any, axis: int) -> float:
 
 @inline
 def _clear(halves: Any, node: int) -> None:
-    """Make a node's boxes those of nothing."""
+    """Make the boxes of a node, or of a bin, those of nothing."""
     fill(halves.boxes, node, _NO_BOX)
     fill(halves.centres, node, _NO_BOX)
 
 
 @inline
 def _include(halves: Any, node: int, others: Any, other: int) -> None:
-    """Join boxes and centres of an item, or of another node, to a node's."""
+    """Join boxes and centres of an item, or of a bin, to those of a node or a bin."""
     join(halves.boxes, node, others.boxes, other)
     join(halves.centres, node, others.centres, other)
 
@@ -197,13 +209,12 @@ def _halve(items: Any, halves: Any, stack: Any, state: Any) -> None:
     wait there, and how many nodes there are.
     """
     n_stack, n_nodes, n_seen = state[0], state[1], 0
-    bins = Halves(
+    bins = Bins(
         np.empty((N_BINS, WIDTH), np.float32),
         np.empty((N_BINS, WIDTH), np.float32),
-        np.empty(N_BINS, np.int64),  # how many items
-        halves.runs,  # of no use here
+        np.empty(N_BINS, np.int64),
+        np.empty(N_BINS, np.float32),
     )
-    from_right = np.empty(N_BINS, np.float32)
     while n_stack > 0 and n_seen < _WORK:  # bound: each turn ends one of the 2 n - 1 nodes
         n_stack -= 1
         node, depth = stack[n_stack, 0], stack[n_stack, 1]
@@ -212,7 +223,7 @@ def _halve(items: Any, halves: Any, stack: Any, state: Any) -> None:
         if end - start <= WIDTH:
             halves.left[node] = -1
             continue
-        middle = _split(items, halves, node, bins, from_right, n_nodes) if depth < HEURISTIC_DEPTH else start
+        middle = _split(items, halves, node, bins, n_nodes) if depth < HEURISTIC_DEPTH else start
         if middle == start:
             middle = (start + end) // 2
             for side, (first, last) in enumerate(((start, middle), (middle, end))):
@@ -289,7 +300,7 @@ def _half_area(rows: Any, row: int) -> float:
 
 
 @inline
-def _split(items: Any, halves: Any, node: int, bins: Any, from_right: Any, parts: int) -> int:
+def _split(items: Any, halves: Any, node: int, bins: Any, parts: int) -> int:
     """Reorder the run of a node so that its left and right part make a good pair of children, and set the boxes of the
     nodes `parts` and `parts` + 1 to theirs; return where the right part starts, where the run does if there is none."""
     start, end, low, width, axis = halves.runs[node, 0], halves.runs[node, 1], np.float32(0.0), np.float32(-1.0), 0
@@ -303,12 +314,12 @@ def _split(items: Any, halves: Any, node: int, bins: Any, from_right: Any, parts
         return start
     for index in range(n_bins):
         _clear(bins, index)
-        bins.left[index] = 0
+        bins.numbers[index] = 0
     for item in range(start, end):
         index = _bin_of(items.centres[item, axis], low, scale, n_bins)
         _include(bins, index, items, item)
-        bins.left[index] += 1
-    cut = _best_cut(halves.boxes, parts, bins, n_bins, from_right)
+        bins.numbers[index] += 1
+    cut = _best_cut(halves.boxes, parts, bins, n_bins)
     if cut == 0:
         return start
     left = start  # the end of the left part; what is exchanged in vain costs less than a branch that nobody foresees
@@ -331,7 +342,7 @@ def _bin_of(centre: float, low: float, scale: float, n_bins: int) -> int:
 
 
 @inline
-def _best_cut(boxes: Any, scratch: int, bins: Any, n_bins: int, from_right: Any) -> int:
+def _best_cut(boxes: Any, scratch: int, bins: Any, n_bins: int) -> int:
     """Return the number of bins to the left of the cheapest cut, 0 where no cut has a finite cost.
 
     boxes: of which the row `scratch` may be used.
@@ -339,16 +350,16 @@ def _best_cut(boxes: Any, scratch: int, bins: Any, n_bins: int, from_right: Any)
     fill(boxes, scratch, _NO_BOX)
     number = 0
     for index in range(n_bins - 1, 0, -1):
-        number += bins.left[index]
+        number += bins.numbers[index]
         join(boxes, scratch, bins.boxes, index)
-        from_right[index] = np.float32(number) * _half_area(boxes, scratch) if number > 0 else np.float32(np.inf)
+        bins.costs[index] = np.float32(number) * _half_area(boxes, scratch) if number > 0 else np.float32(np.inf)
     fill(boxes, scratch, _NO_BOX)
     number, best, cut = 0, np.float32(np.inf), 0
     for index in range(1, n_bins):
-        number += bins.left[index - 1]
+        number += bins.numbers[index - 1]
         join(boxes, scratch, bins.boxes, index - 1)
         if number > 0:
-            cost = np.float32(number) * _half_area(boxes, scratch) + from_right[index]
+            cost = np.float32(number) * _half_area(boxes, scratch) + bins.costs[index]
             if cost < best:
                 best, cut = cost, index
     return cut

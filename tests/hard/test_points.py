@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from engine import Polyhedron, locate
-from engine.containment import policy
+from engine.containment import locators
+from engine.containment.cells.top import can_have_cells
+from engine.containment.policy import CELLS, LISTS, PASS
 from tests.hard.points import STORED, generated_solids, hard_points
 from tests.reference.many_points import locate_points
 
-NEVER = 1 << 60
-METHODS = {"pass": (NEVER, NEVER), "tree": (0, NEVER), "cells": (0, 0)}
-"""What a tree is said to cost, and points before cells are built."""
+METHODS = {"pass": PASS, "tree": LISTS, "cells": CELLS}
 MESHES = {
     "c3d_spot": (0.0, 1e6),
     "syn_sliver_uv": (0.0, 1e9),
@@ -36,13 +36,12 @@ PLACES = [(name, offset) for name, offsets in MESHES.items() for offset in offse
 
 
 def assert_exact(points: Any, vertices: Any, faces: Any, exact: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(policy, "_CELLS_PER_FACE", 0)
-    monkeypatch.setattr(policy, "_VISIT", 0.0)
-    for name, (tree, points_of_cells) in METHODS.items():
-        monkeypatch.setattr(policy, "_TREE", tree)
-        monkeypatch.setattr(policy, "_TREE_A_FACE", 0)
-        monkeypatch.setattr(policy, "_CELLS_FROM", points_of_cells)
-        found = locate(points, Polyhedron(vertices, faces))
+    solid = Polyhedron(vertices, faces)
+    for name, method in METHODS.items():
+        if method == CELLS and not can_have_cells(solid):
+            continue
+        monkeypatch.setattr(locators, "choose_for_mesh", lambda *_, method=method: method)
+        found = locate(points, solid)
         wrong = np.flatnonzero(found != exact)
         assert not len(wrong), (name, len(wrong), points[wrong[0]].tolist(), int(found[wrong[0]]), int(exact[wrong[0]]))
 
