@@ -92,9 +92,9 @@ def choose_for_mesh(solid: Polyhedron, n_points: int, budget: Budget) -> int:
     earlier, tree = calls[0] * _PASS_A_FACE * n_faces, _TREE + _TREE_A_FACE * n_faces
     calls[0] += 1 + (n_points - 1) // _POINTS_A_PASS
     if earlier > 0.0 or n_points > _SAMPLE:  # it takes 30 us to find out
-        met = _PASS_A_FACE * faces_over(solid)
-        earlier += (seen - n_points) * met
-        tree += n_points * cost_in_tree(solid) - n_points * met
+        more = _PASS_A_FACE * faces_over(solid) - cost_in_tree(solid)  # that a point costs in a pass
+        earlier += (seen - n_points) * more
+        tree -= n_points * more
     return PASS if calls[0] * _PASS_A_FACE * n_faces <= tree and earlier <= _SOON * tree else LISTS
 
 

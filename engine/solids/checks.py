@@ -24,7 +24,7 @@ Where = tuple[str | int, ...]
 
 DIMENSIONS: Final = (2, 3)
 _FLOAT_INTEGERS: Final = 2**53  # every integer up to this size is a float64
-_DOUBLE: Final = np.dtype(np.float64)
+DOUBLE: Final = np.dtype(np.float64)
 _AT_ONCE: Final = 1 << 15
 """Numbers looked at together: what is noted of them stays in the first-level cache."""
 
@@ -100,7 +100,7 @@ def is_ready(values: object, *shape: int) -> bool:
     """Tell whether values, as they are, are an array of doubles for kernels, (n, *shape), not looked at for NaN."""
     return (
         type(values) is np.ndarray
-        and values.dtype is _DOUBLE
+        and values.dtype is DOUBLE
         and values.shape[1:] == shape
         and values.flags.c_contiguous
         and values.flags.aligned

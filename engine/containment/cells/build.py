@@ -34,17 +34,15 @@ from engine.lanes.tracing import LANES
 from engine.parallel import Budget
 from engine.solids.polyhedron import Polyhedron
 
-_LONG_ON_TOP: Final = 24
-_LONG: Final = 32
-"""Lists longer than this are cut into parts, on level 0 and below: more than one group, or four: finer parts take more
-memory than they save time."""
+_LONG_ON_TOP, _LONG_IN_SMALL, _LONG = 24, 8, 32
+"""Lists longer than this are cut into parts: on level 0, there in meshes so small that the memory of short lists stays
+in the cache, and below. Finer parts take more memory than they save time."""
+_SMALL_MESH: Final = 1 << 12
 _MOST_ENTRIES: Final = 24
 """Entries a face (and 2^14 more) above which a level is not cut further."""
 _GROUP: Final = 8.0
 """Nanoseconds that a group of a list costs a point: lists that cost more than the tree are left to it."""
 _FEWEST_GROUPS: Final = 32
-
-
 _COARSE: Final = 2
 """Cuts that every long list gets: deeper ones are for detail, where most triangles are smaller than the cell. What
 meets in a vertex or runs side by side is not told apart by finer cells."""
@@ -76,11 +74,12 @@ def build_cells(solid: Polyhedron, budget: Budget) -> Cells:
     mesh = Mesh(tree.vertices, tree.triangles, lattice)
     level, index, found = _top_level(tree, mesh, budget)
     codes, leaves = [], []
+    long_on_top = _LONG_IN_SMALL if len(tree.triangles) <= _SMALL_MESH else _LONG_ON_TOP
     longest = LANES * max(_FEWEST_GROUPS, cost_in_tree(solid) / _GROUP)
     n_groups = n_bricks = 0
     for depth in range(LEVELS):
         lengths = np.diff(level.firsts)
-        is_cut = lengths > (_LONG if depth else _LONG_ON_TOP)
+        is_cut = lengths > (_LONG if depth else long_on_top)
         if depth == LEVELS - 1 or len(level.lists) > _MOST_ENTRIES * len(tree.triangles) + (1 << 14):
             is_cut[:] = False
         elif depth >= _COARSE:

@@ -80,13 +80,13 @@ def finest(value: float, low: float, scale: float) -> int:
 @inline
 def parts_of(level: int) -> float:
     """Return how many cells of a level there are to one of level 0 along an axis."""
-    return float(1 << 2 * level)
+    return 1.0 if level == 0 else 4.0 if level == 1 else 16.0 if level == 2 else float(1 << 2 * level)
 
 
 @inline
 def share_of(level: int) -> float:
     """Return 1 / parts_of(level)."""
-    return 1.0 / float(1 << 2 * level)
+    return 1.0 if level == 0 else 0.25 if level == 1 else 0.0625 if level == 2 else 1.0 / parts_of(level)
 
 
 @inline

@@ -15,7 +15,7 @@ import numpy as np
 
 from engine.containment.cells.lattice import LEVELS, PARTS, PLACE, finest, parts_of, reference_coordinate, share_of
 from engine.containment.posed.filters import NOT_FINITE
-from engine.jit import inline, kernel, merged
+from engine.jit import called, inline, kernel, merged
 from engine.lanes.cells import ROWS, group_parity, prefetch_group
 from engine.types import UNDECIDED
 
@@ -89,7 +89,7 @@ def _enter(points: Any, cells: Any, kept_points: Any, n_kept: Any) -> Any:
     return n_waiting
 
 
-@merged
+@called
 def _descend(cells: Any, kept_points: Any, n_waiting: Any, level: int, locations: Any) -> Any:
     """Look up the codes of a level for the points that wait in a brick; returns how many wait after it."""
     n, codes = cells.lattice.n, cells.codes

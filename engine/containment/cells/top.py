@@ -30,7 +30,9 @@ _MOST_OF_ALL: Final = 96.0
 """Where finer levels follow: more than fit the cache cost uniform points more than they save."""
 _FEWEST_CELLS: Final = 12
 _MOST_ENTRIES: Final = 12.0
-"""Cells that list a triangle, in the mean, from which level 0 is made coarser, to so many along an axis at least."""
+_FEW_ENTRIES: Final = 1 << 16
+"""Cells that list a triangle, in the mean, and in all, from which level 0 is made coarser, to so many along an axis at
+least."""
 _SAMPLE: Final = 1024
 _RANGE: Final = 2.0**400
 """Largest extent, and 1 / smallest, of a solid that gets cells: products of three stay far from its ends."""
@@ -119,9 +121,9 @@ def lattice_of(tree: TriangleTree, budget: Budget) -> tuple[Lattice, float]:
         counts = np.zeros(lattice.n[0] * lattice.n[1] * lattice.n[2], np.int64)
         list_top(Mesh(tree.vertices, some, lattice), counts, np.empty(0, np.int32), False, budget.flag)
         budget.check()
-        entries = float(counts.sum()) / len(some)
-        if entries <= _MOST_ENTRIES or max(lattice.n) <= _FEWEST_CELLS:
-            return lattice, entries * len(tree.triangles)
+        entries = float(counts.sum()) / len(some) * len(tree.triangles)
+        if entries <= _MOST_ENTRIES * len(tree.triangles) + _FEW_ENTRIES or max(lattice.n) <= _FEWEST_CELLS:
+            return lattice, entries
         most = min(most, max(lattice.n)) / 2.0
 
 
