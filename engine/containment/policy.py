@@ -12,7 +12,6 @@ from typing import Final
 import numpy as np
 
 from engine.containment.cells.top import can_have_cells, lattice_of
-from engine.containment.prepared import tree_of
 from engine.parallel import Budget
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
@@ -69,8 +68,7 @@ def cost_of_cells(solid: Polyhedron, budget: Budget) -> float:
     """Return what cells cost to build: by how many the faces reach into on level 0."""
 
     def find() -> float:
-        tree = tree_of(solid, budget.check)
-        _, entries = solid.prepared("lattice", lambda: lattice_of(tree, budget), budget.check)
+        _, entries = lattice_of(solid, budget)
         beyond = max(entries - _ENTRIES_A_FACE * len(solid.triangles), 0.0)
         return _CELLS + _CELLS_A_FACE * len(solid.triangles) + _CELLS_AN_ENTRY * beyond
 

@@ -70,7 +70,7 @@ def cells_of(solid: Polyhedron, budget: Budget) -> Cells:
 def build_cells(solid: Polyhedron, budget: Budget) -> Cells:
     """Return the cells of `solid`. Raises what `Budget.check` raises."""
     tree = tree_of(solid, budget.check)
-    lattice, _ = solid.prepared("lattice", lambda: lattice_of(tree, budget), budget.check)
+    lattice, _ = lattice_of(solid, budget)
     mesh = Mesh(tree.vertices, tree.triangles, lattice)
     level, index, found = _top_level(tree, mesh, budget)
     codes, leaves = [], []

@@ -108,12 +108,16 @@ def make_lattice(tree: TriangleTree, wanted: float, most: float) -> Lattice:
     )
 
 
-def lattice_of(tree: TriangleTree, budget: Budget) -> tuple[Lattice, float]:
-    """Return level 0 of all levels, and how long its lists are in all, as a sample of the triangles says.
+def lattice_of(solid: Polyhedron, budget: Budget) -> tuple[Lattice, float]:
+    """Return level 0 of all levels, and how long its lists are in all, as a sample of the triangles says; found once.
 
     It is finer than that of scenes, as far as it fits the cache, but that long needles and large faces are not listed
     in more than some cells each.
     """
+    return solid.prepared("lattice", lambda: _find_lattice(tree_of(solid, budget.check), budget), budget.check)
+
+
+def _find_lattice(tree: TriangleTree, budget: Budget) -> tuple[Lattice, float]:
     some = tree.triangles[:: len(tree.triangles) // _SAMPLE + 1].copy()
     most = _MOST_OF_ALL
     while True:

@@ -173,8 +173,8 @@ def _meet_blurred(a: Any, b: Any, c: Any, q: Any, blur: float) -> int:
 
 @merged
 def _in_tree(tree: Any, q: Any, blur: float) -> tuple[Any, Any, Any, float, bool]:
-    """Return q in the coordinates of the tree, the least and the most that the rays up from the blurred one may reach
-    there, the blur there, and whether q is near enough for that."""
+    """Return q in the coordinates of the tree, its z widened upwards, the least and the most that the rays up from the
+    blurred one may reach there, the blur there, and whether q is near enough for that."""
     origin, scale = tree.origin, tree.scale
     x, y, z, wide = (q.x - origin[0]) / scale, (q.y - origin[1]) / scale, (q.z - origin[2]) / scale, blur / scale
     u, v, w = _SLACK * abs(x) + wide + LEAST, _SLACK * abs(y) + wide + LEAST, _SLACK * abs(z) + wide + LEAST
