@@ -39,6 +39,7 @@ from engine.solids.implicit import Implicit
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
 from engine.solids.pose import Pose
+from engine.solids.ragged import next_in_rings
 from engine.solids.sphere import Sphere
 from engine.solids.triangle import Triangle
 
@@ -158,13 +159,9 @@ def _in_polyhedron(point: Sequence[Number], solid: Polyhedron, check: Check) -> 
 def next_in_ring(solid: Polygon | Triangle) -> IntArray:
     """Return for each vertex the index of the one after it in its ring, prepared once."""
 
-    def build() -> IntArray:
-        ends = solid.ring_offsets[1:] if isinstance(solid, Polygon) else np.array([3])
-        following = np.arange(1, len(solid.vertices) + 1, dtype=np.int64)
-        following[ends - 1] = np.append(0, ends[:-1])
-        return following
-
-    return solid.prepared("next_in_ring", build)
+    return solid.prepared(
+        "next_in_ring", lambda: next_in_rings(solid.ring_offsets if isinstance(solid, Polygon) else np.array([0, 3]))
+    )
 
 
 def _in_polygon(point: Sequence[Number], solid: Polygon | Triangle, check: Check) -> int:

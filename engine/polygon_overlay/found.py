@@ -112,13 +112,6 @@ def ring_numbers(offsets: IntArray) -> IntArray:
     return np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
 
 
-def next_in_ring(offsets: IntArray) -> IntArray:
-    """Return by vertex the next one of its ring."""
-    after = np.arange(1, offsets[-1] + 1)
-    after[offsets[1:] - 1] = offsets[:-1]
-    return after
-
-
 def ring_sizes(rings: Found) -> FloatArray:
     """Return by ring the sum of both sides of its box."""
     starts = rings.ring_offsets[:-1]

@@ -23,10 +23,11 @@ from engine.parallel import Budget
 from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
 from engine.polygon_overlay.compiled.snapping import find_passages, stay_apart
 from engine.polygon_overlay.compiled.workspace import keep, scratch_for
-from engine.polygon_overlay.found import Found, next_in_ring, one_pair, ring_numbers, summed
+from engine.polygon_overlay.found import Found, one_pair, ring_numbers, summed
 from engine.polygon_overlay.implicit_rings import ImplicitRings, edges_along, rings_alone
 from engine.polygon_overlay.result import Overlay
 from engine.solids.checks import shown
+from engine.solids.ragged import next_in_rings
 
 _MOST: Final = 2.0**51
 """Cells from zero up to which halves of cells are doubles, with room for sums."""
@@ -157,7 +158,7 @@ def _bent(
 ) -> tuple[FloatArray, IntArray, IntArray]:
     """Return rings led through the pixels that they pass, none twice in succession, and of each vertex its edge."""
     edges, others = passages.T
-    ways = np.sign(vertices[next_in_ring(offsets)[edges]] - vertices[edges])
+    ways = np.sign(vertices[next_in_rings(offsets)[edges]] - vertices[edges])
     along = (ways * pixels[others]).sum(axis=1)  # order: an edge that rises passes no pixel further left or below
     in_order = np.lexsort((along, edges))
     edges, others = edges[in_order], others[in_order]
@@ -165,7 +166,7 @@ def _bent(
     edge = np.insert(np.arange(len(vertices)), edges + 1, edges)
     ring = ring_numbers(offsets)[edge]
     stops = summed(np.bincount(ring, minlength=len(offsets) - 1))
-    kept = (chain != chain[next_in_ring(stops)]).any(axis=1)  # of equal ones the last, whose edge goes on
+    kept = (chain != chain[next_in_rings(stops)]).any(axis=1)  # of equal ones the last, whose edge goes on
     kept[stops[1:] - 1] |= np.bincount(ring[kept], minlength=len(offsets) - 1) == 0  # rings that shrink to a point
     return chain[kept], edge[kept], summed(np.bincount(ring[kept], minlength=len(offsets) - 1))
 

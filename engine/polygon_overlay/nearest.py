@@ -13,10 +13,11 @@ import numpy as np
 from engine.arrays import BoolArray, FloatArray, IntArray, read_only
 from engine.parallel import Budget
 from engine.polygon_overlay.compiled.kernel import MAY_CROSS
-from engine.polygon_overlay.found import NO_PAIRS, Found, joined, next_in_ring, one_pair, taken
+from engine.polygon_overlay.found import NO_PAIRS, Found, joined, one_pair, taken
 from engine.polygon_overlay.implicit_rings import edges_along, rings_alone
 from engine.polygon_overlay.result import Exact, Lost, Overlay
 from engine.polygon_overlay.rounds import SettledPairs, overlay_of
+from engine.solids.ragged import next_in_rings
 
 _Ring = tuple[list[tuple[float, float]], list[int]]
 """Places of vertices, and their numbers among those given."""
@@ -42,7 +43,7 @@ def nearest_rings(
     shells = np.repeat(piece_offsets[:-1], np.diff(piece_offsets))
     stays, is_hole = have_area & have_area[shells], shells != np.arange(len(shells))
     kept = np.flatnonzero(
-        (vertices != vertices[next_in_ring(ring_offsets)]).any(axis=1)
+        (vertices != vertices[next_in_rings(ring_offsets)]).any(axis=1)
     )  # of equal ones the last, whose edge goes on
     starts = np.searchsorted(kept, ring_offsets)
     pieces: list[list[_Ring]] = []

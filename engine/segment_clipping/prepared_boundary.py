@@ -15,6 +15,7 @@ from engine.predicates.expansion import LARGEST, SMALLEST
 from engine.segment_clipping.box_tree import build_box_tree
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
+from engine.solids.ragged import next_in_rings
 from engine.solids.surface import Surface
 from engine.solids.triangle import Triangle
 
@@ -62,8 +63,7 @@ def boundary_of(region: Polygon | Triangle | Polyhedron | Surface) -> Outline | 
         if isinstance(region, Polyhedron | Surface):
             return mesh_of(region.vertices[region.triangles], region.triangle_faces)
         offsets = region.ring_offsets if isinstance(region, Polygon) else np.array([0, 3])
-        following = np.arange(1, len(region.vertices) + 1, dtype=np.int64)
-        following[offsets[1:] - 1] = offsets[:-1]
+        following = next_in_rings(offsets)
         first = np.arange(len(following), dtype=np.int64)  # an edge is named by its first vertex
         return outline_of(region.vertices[np.stack([first, following], axis=1)], first)
 

@@ -28,6 +28,8 @@ from engine.solids.checks import (
 TOLERANCE: Final = Fraction(1, 10**12)
 """Largest entry of ``R^T R - I`` that is still taken for a rotation; part of the contract, compared exactly."""
 
+_TOLERANCE: Final = float(TOLERANCE)
+"""What is tested for, and handed on, without a Fraction: most poses are made with it."""
 MOST_TOLERANCE: Final = 0.1
 
 _UNSURE: Final = 2.0**-45  # more than 8 roundings of sums of three products of numbers below 1.01
@@ -62,7 +64,7 @@ class Pose(Immutable):
         if matrix.shape[0] != matrix.shape[1]:
             raise WrongDimensionError(f"rotation must be square, got shape {matrix.shape}", ("rotation",))
         limit = TOLERANCE
-        if tolerance != 1e-12:
+        if tolerance != _TOLERANCE:
             if not 0.0 <= as_number(tolerance, ("tolerance",)) <= MOST_TOLERANCE:
                 raise InvalidArrayError(
                     f"tolerance is {tolerance!r}; it must be from 0.0 to {MOST_TOLERANCE}", ("tolerance",)
@@ -154,6 +156,14 @@ class Pose(Immutable):
         return f"Pose(rotation={digits(self.rotation)}, translation={digits(self.translation)})"
 
 
+_STILL: Final = {d: (read_only(np.eye(d)), read_only(np.zeros(d))) for d in (2, 3)}
+
+
+def motion_of(pose: Pose | None, dimension: int) -> tuple[FloatArray, FloatArray]:
+    """Return rotation and translation of a pose, those that leave everything where it is for a body without one."""
+    return _STILL[dimension] if pose is None else (pose.rotation, pose.translation)
+
+
 _IDENTITIES: Final = tuple(np.eye(d).tobytes() + np.zeros(d).tobytes() for d in (2, 3))
 
 
@@ -181,10 +191,11 @@ def check_rotations(
     """
     if rotations.ndim != 3 or rotations.shape[1] != rotations.shape[2]:
         raise InvalidArrayError(f"{spell(where)} must have shape (n, d, d), got {rotations.shape}", where)
-    is_suspect, sure = np.zeros(len(rotations), np.bool_), (1e-12 if limit is TOLERANCE else float(limit)) - _UNSURE
-    entry_of(find_suspects)(
-        read_only(rotations), sure, is_suspect
-    )  # huge entries overflow, and are far from orthogonal
+    is_suspect, sure = (
+        np.zeros(len(rotations), np.bool_),
+        (_TOLERANCE if limit is TOLERANCE else float(limit)) - _UNSURE,
+    )
+    entry_of(find_suspects)(read_only(rotations), sure, is_suspect)  # huge entries overflow, far from orthogonal
     for index in np.flatnonzero(is_suspect) if is_suspect.any() else ():
         matrix = rotations[index]
         path = where if one else (*where, int(index))

@@ -74,6 +74,13 @@ def within(offsets: IntArray, items: IntArray) -> IntArray:
     return np.searchsorted(offsets, items, "right") - 1
 
 
+def next_in_rings(ring_offsets: IntArray) -> IntArray:
+    """Return by vertex the next one of its ring, (n,) int64, for rings that begin and end at ring_offsets."""
+    following = np.arange(1, ring_offsets[-1] + 1, dtype=np.int64)
+    following[ring_offsets[1:] - 1] = ring_offsets[:-1]
+    return following
+
+
 def polygons(coordinates: object, ring_offsets: object, polygon_offsets: object) -> list[Polygon]:
     """Return polygons from ragged arrays, as shapely.to_ragged_array, GeoArrow and `OverlayBatch` hold them.
 

@@ -29,7 +29,7 @@ from engine.predicates.rational import sign_of
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.half_space import HalfSpace
-from engine.solids.pose import Pose
+from engine.solids.pose import Pose, motion_of
 from engine.solids.sphere import Sphere
 
 _MOST_PAIRS: Final = 4096
@@ -37,7 +37,6 @@ _MOST_PAIRS: Final = 4096
 BALL, PLANE = Feature("ball"), Feature("plane")
 MEETING: Final = Clearance(0.0)
 """The answer for bodies with a common point."""
-_STILL = {d: (read_only(np.eye(d)), read_only(np.zeros(d))) for d in (2, 3)}
 
 
 def _feature(faces: int, d: int) -> Feature:
@@ -82,9 +81,8 @@ def between_forms(
     if form is None or other is None:
         return None
     d = first.dimension
-    still, points = _STILL[d], np.empty((2, d))
-    turn, move = still if first_pose is None else (first_pose.rotation, first_pose.translation)
-    their_turn, their_move = still if second_pose is None else (second_pose.rotation, second_pose.translation)
+    points = np.empty((2, d))
+    (turn, move), (their_turn, their_move) = motion_of(first_pose, d), motion_of(second_pose, d)
     distance, faces, theirs = entry_of(nearest_of_forms)(form, turn, move, other, their_turn, their_move, points)
     if least is not None and distance not in (UNSURE, least):
         return bool(distance > least)  # as the distance rounded to nearest is
@@ -109,7 +107,7 @@ def between_form_and_plane(
         return None
     d = body.dimension
     points = np.empty((2, d))
-    turn, move = _STILL[d] if pose is None else (pose.rotation, pose.translation)
+    turn, move = motion_of(pose, d)
     distance, told, faces = entry_of(nearest_of_plane)(plane.row, form, turn, move, points)
     if least is not None and distance not in (UNSURE, least):
         return bool(distance > least)
@@ -133,8 +131,7 @@ def between_outlines(
     if len(vertices) * len(other) > _MOST_PAIRS:
         return None
     points = np.empty((2, 2))
-    turn, move = _STILL[2] if first_pose is None else (first_pose.rotation, first_pose.translation)
-    their_turn, their_move = _STILL[2] if second_pose is None else (second_pose.rotation, second_pose.translation)
+    (turn, move), (their_turn, their_move) = motion_of(first_pose, 2), motion_of(second_pose, 2)
     distance, own, theirs = entry_of(nearest_of_outlines)(
         vertices, following, turn, move, other, their_following, their_turn, their_move,
         (radius_of(first), radius_of(second)), points,
@@ -175,7 +172,7 @@ def _placed_exactly(solid: Solid, pose: Pose | None) -> tuple[Vector, Vector] | 
     assert isinstance(solid, Aabb)
     if pose is None:
         return as_vector(solid.min.tolist()), as_vector(solid.max.tolist())
-    if not (pose.rotation == _STILL[solid.dimension][0]).all():
+    if not (pose.rotation == np.eye(solid.dimension)).all():
         return None
     return image_point(solid.min.tolist(), pose), image_point(solid.max.tolist(), pose)
 

@@ -23,14 +23,13 @@ from engine.jit import inline, kernel
 from engine.predicates.loading import as_point2
 from engine.predicates.orientation import orient2d
 from engine.solids.base import Solid
-from engine.solids.pose import Pose
+from engine.solids.pose import Pose, motion_of
+from engine.solids.ragged import next_in_rings
 from engine.types import UNDECIDED, Point2, Relation
 
 MOST_EDGES = 1024
 """Beyond, pairs of edges are too many to look at all of them."""
 
-STILL = read_only(np.eye(2)), read_only(np.zeros(2))
-"""Of a body without a pose."""
 _NO_RINGS = np.empty((0, 2)), np.zeros(1, np.int64)
 UNSURE = 2
 _POLL_EVERY = 64
@@ -49,7 +48,7 @@ def outline_pool(bodies: Sequence[Solid]) -> tuple[OutlineArrays, IntArray]:
     """Return the bodies as arrays, and for each its number there, -1 for one that the batches do not take."""
     rings = [rings_of(body) if body.type in ("polygon", "triangle", "aabb") else _NO_RINGS for body in bodies]
     firsts = np.append(np.int64(0), np.cumsum([len(vertices) for vertices, _ in rings]))
-    following = np.concatenate([np.empty(0, np.int64), *(following_of(offsets) for _, offsets in rings)])
+    following = np.concatenate([np.empty(0, np.int64), *(next_in_rings(offsets) for _, offsets in rings)])
     vertices = np.concatenate([np.empty((0, 2)), *(vertices for vertices, _ in rings)])
     pool, numbers = OutlineArrays(vertices, following, firsts), np.full(len(bodies), -1, np.int64)
     _find_simple(pool, numbers)
@@ -62,14 +61,7 @@ def outline_arrays(solid: Solid) -> tuple[FloatArray, IntArray]:
 
 
 def _arrays(vertices: FloatArray, offsets: IntArray) -> tuple[FloatArray, IntArray]:
-    return read_only(vertices), read_only(following_of(offsets))
-
-
-def following_of(offsets: IntArray) -> IntArray:
-    """Return the vertex at the end of each edge, of rings that end at offsets (n_rings + 1,)."""
-    following = np.arange(1, offsets[-1] + 1)
-    following[offsets[1:] - 1] = offsets[:-1]
-    return following
+    return read_only(vertices), read_only(next_in_rings(offsets))
 
 
 @inline
@@ -258,8 +250,7 @@ def collide_outlines(
     (vertices, following), (other, their_following) = outline_arrays(first), outline_arrays(second)
     if max(len(following), len(their_following)) > MOST_EDGES:
         return collide_outline_outline(first, second, first_pose, second_pose, work)
-    turn, move = STILL if first_pose is None else (first_pose.rotation, first_pose.translation)
-    their_turn, their_move = STILL if second_pose is None else (second_pose.rotation, second_pose.translation)
+    (turn, move), (their_turn, their_move) = motion_of(first_pose, 2), motion_of(second_pose, 2)
     relation, i, j = entry_of(_relate_two)(
         vertices, following, turn, move, other, their_following, their_turn, their_move,
         (first_pose is not None, second_pose is not None),
