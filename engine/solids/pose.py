@@ -191,10 +191,8 @@ def check_rotations(
     """
     if rotations.ndim != 3 or rotations.shape[1] != rotations.shape[2]:
         raise InvalidArrayError(f"{spell(where)} must have shape (n, d, d), got {rotations.shape}", where)
-    is_suspect, sure = (
-        np.zeros(len(rotations), np.bool_),
-        (_TOLERANCE if limit is TOLERANCE else float(limit)) - _UNSURE,
-    )
+    sure = (_TOLERANCE if limit is TOLERANCE else float(limit)) - _UNSURE
+    is_suspect = np.zeros(len(rotations), np.bool_)
     entry_of(find_suspects)(read_only(rotations), sure, is_suspect)  # huge entries overflow, far from orthogonal
     for index in np.flatnonzero(is_suspect) if is_suspect.any() else ():
         matrix = rotations[index]
