@@ -176,7 +176,8 @@ def _warm(options: Options) -> None:
 
 def _warm_elsewhere(options: Options) -> None:
     """Run the command again, where the compiler finds another CPU and another folder: it looks for them but once."""
-    command = [sys.executable, "-P", "-m", "engine", "warm", "--processes", str(options.processes)]
+    package = (__package__ or "engine").partition(".")[0]
+    command = [sys.executable, "-P", "-m", package, "warm", "--processes", str(options.processes)]
     surroundings = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     if options.cpu:
         surroundings |= {"NUMBA_CPU_NAME": options.cpu, "NUMBA_CPU_FEATURES": ""}

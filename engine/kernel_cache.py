@@ -42,6 +42,8 @@ COMPLETE = "complete"
 """How the name of the empty file begins that says that nothing is left to compile for a CPU (cold_start.py)."""
 
 _ROOT = Path(__file__).resolve().parent
+_PREFIX = __name__.removesuffix("engine.kernel_cache")
+"""What stands before the names of our modules: nothing, or ``exact_geometry.`` where `engine` is another's."""
 _MADE_BY = "MADE_BY"
 """The file of a seed that says what `tools` made it."""
 _LARGEST_SEED = 1 << 28  # bytes, unpacked; all kernels for one CPU are 5 MB
@@ -99,13 +101,13 @@ def source_digest(module: str) -> str:
 
     Not of this one: how code is kept changes no code.
     """
-    reached, waiting = set(), {module, "engine.jit"}
+    reached, waiting = set(), {module.removeprefix(_PREFIX), "engine.jit"}
     while waiting:
         name = waiting.pop()
         reached.add(name)
         waiting |= read_source(name)[1] - reached
-    digest = hashlib.sha256(tools().encode())
-    for name in sorted(reached - {__name__}):
+    digest = hashlib.sha256((tools() + _PREFIX).encode())  # what is kept names our modules as they are imported
+    for name in sorted(reached - {"engine.kernel_cache"}):
         digest.update(f"\0{name}\0".encode() + read_source(name)[0])
     return digest.hexdigest()[:20]
 
