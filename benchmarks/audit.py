@@ -197,5 +197,5 @@ def main(words: Sequence[str] | None = None) -> int:
     elif given.output:
         title = " and ".join(Path(name).name for name in given.files)
         asked = ((title, "yours", "", contest.name),)
-        Path(given.output).write_text(web_page.text_of(found, "this page", asked, "the exact engine"), "utf-8")
+        Path(given.output).write_text(web_page.text_of(found, "this page", asked), "utf-8")
     return 0

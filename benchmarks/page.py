@@ -8,7 +8,7 @@ from typing import Any
 from benchmarks import filed
 from benchmarks.measure import interval, spread
 from benchmarks.table import named
-from benchmarks.web_page import error_share, key_of, percent, questions
+from benchmarks.web_page import error_share, faults, key_of, percent, questions, times
 
 TEMPLATE = Path(__file__).with_suffix(".md")
 LISTED = 8
@@ -89,9 +89,22 @@ def _weaknesses(contests: dict[str, list[Row]]) -> str:
 
 
 def _summary(rows: list[Row]) -> str:
-    """One line a question, in words; the page beside draws them."""
-    lines = [[each["title"], f"**{each['tag']}**", each["say"]] for each in questions(rows)]
-    return table(("question", "", "ours, with the 95% interval of a share that is not 0"), lines).rstrip()
+    """One line a question: how much faster ours is than the fastest peer, and who is wrong."""
+    parts = []
+    for is_alone, beside in ((False, "fastest peer"), (True, "textbook's fastest formula")):
+        lines = [
+            [each["title"], *(_ratio(each["sides"][side]) for side in ("easy", "hard")),
+             "; ".join(map(faults, each["seen"])) or "ours alone"]
+            for each in questions(rows) if each["is_alone"] == is_alone
+        ]  # fmt: skip
+        head = (f"ours, beside the {beside}", "easy input", "hard input", "wrong on hard input, the fastest first")
+        parts += [table(head, lines)] if lines else []
+    return "\n".join(parts).rstrip()
+
+
+def _ratio(side: dict[str, Any]) -> str:
+    """Return how many times faster or slower ours is, and than whom."""
+    return "" if side["ratio"] is None else f"{times(side['ratio'])} {side['name']}"
 
 
 def smallest(found: dict[str, Any]) -> str:

@@ -16,6 +16,7 @@ from typing import Any
 
 from benchmarks import curves, filed, machine, page, pictures, table, web_page
 from benchmarks.fields import tasks
+from benchmarks.filed import museum
 
 DOCS, README = machine.ROOT / "docs", machine.ROOT / "README.md"
 BEGIN, END = "<!-- benchmarks report writes this table -->", "<!-- to here -->"
@@ -46,6 +47,13 @@ def main(words: list[str] | None = None) -> int:
     return 1 if wrong else 0
 
 
+def keep(name: str, part: Any) -> None:
+    """Put a part that is not timed into the stored results, and write the pages."""
+    found = json.loads(machine.results("report").read_text()) | {name: part}
+    table.store("report", found)
+    _write_pages(found)
+
+
 def _write_pages(found: dict[str, Any]) -> None:
     if machine.results("cold_start").exists():
         found["cold_start"] = json.loads(machine.results("cold_start").read_text())
@@ -55,5 +63,6 @@ def _write_pages(found: dict[str, Any]) -> None:
     (DOCS / "speed_and_error.md").write_text(page.text_of(found))
     path = machine.results("report").relative_to(machine.ROOT).as_posix()
     (DOCS / "speed_and_error.html").write_text(web_page.text_of(found, path))
+    (DOCS / "museum.html").write_text(museum.text_of(found["filed"], filed.load(), path))
     head, _, rest = README.read_text().partition(BEGIN)
     README.write_text(f"{head}{BEGIN}\n{page.smallest(found)}{END}{rest.partition(END)[2]}")

@@ -3,37 +3,40 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from benchmarks.measure import interval
 
-TEMPLATE = Path(__file__).with_name("web_page.html")
+PAGES = Path(__file__).with_name("pages")
 QUESTIONS = (
     ("Points in a mesh", "containment 3D", "uniform", "boundary"),
     ("Points in a polygon", "containment 2D", "uniform", "boundary"),
-    ("Points in a convex polygon", "containment, convex polygon", "uniform", "boundary"),
+    ("Points, convex polygon", "containment, convex polygon", "uniform", "boundary"),
     ("Points in half-spaces", "containment, half-spaces", "uniform", "on a plane"),
     ("Points in a prism", "containment, triangle in space", "", "on its walls"),
     ("Do two bodies meet?", "collision", "apart or crossing", "contact"),
     ("Bodies under poses", "collision", "", "near contact, 1k"),
     ("Which of five relations?", "collision", "", "contact, which relation"),
-    ("How far apart are two bodies?", "clearance", "1k faces, mixed", "nearly in contact"),
-    ("How far apart are two polygons?", "clearance", "", "polygons nearly in contact"),
-    ("Segments, box, plane", "clipping segments", "box 2D, random", "box 2D, corners"),
-    ("Segments, box, space", "clipping segments", "box 3D, random", "box 3D, corners"),
-    ("Segments, 20 planes", "clipping segments", "", "20 planes, edges"),
-    ("Segments, sphere", "clipping segments", "", "sphere, tangents"),
+    ("Distance of two bodies", "clearance", "1k faces, mixed", "nearly in contact"),
+    ("Distance of two polygons", "clearance", "", "polygons nearly in contact"),
+    ("Segments on a box, 2D", "clipping segments", "box 2D, random", "box 2D, corners"),
+    ("Segments on a box, 3D", "clipping segments", "box 3D, random", "box 3D, corners"),
+    ("Segments on 20 planes", "clipping segments", "", "20 planes, edges"),
+    ("Segments on a sphere", "clipping segments", "", "sphere, tangents"),
     ("Polygons on a box", "clipping polygons", "random stars", "along the box"),
     ("Polygons on polygons", "overlay", "random stars", "lattice"),
-    ("Polygons that users filed", "overlay", "", "public suites"),
-    ("Sign of a determinant, 2D", "orientation 2D", "random", "nearly degenerate"),
-    ("Sign of a determinant, 3D", "orientation 3D", "random", "nearly degenerate"),
+    ("Polygons of test suites", "overlay", "", "public suites"),
+    ("Determinant's sign, 2D", "orientation 2D", "random", "nearly degenerate"),
+    ("Determinant's sign, 3D", "orientation 3D", "random", "nearly degenerate"),
 )
 """Title, operation, its easy and its hard contest."""
 FACTS = ("commit", "processor", "cores", "seed", "load_before", "load_after", "seconds", "versions", "quick")
 BAD = ("wrong", "refused", "outside")
+SAME = 1 / 1.1
+"""Ours counts as fast from this ratio on."""
 Row = dict[str, Any]
 
 
@@ -54,7 +57,7 @@ def error_share(row: Row) -> float:
 
 def percent(share: float) -> str:
     """Return a share in words."""
-    return "0" if share == 0 else f"{100 * share:.2g}%" if share < 0.995 else "100%"
+    return "0" if share == 0 else f"{100 * share + 1e-9:.2g}%" if share < 0.995 else "100%"
 
 
 def with_interval(row: Row, kind: str = "wrong") -> str:
@@ -76,16 +79,19 @@ def times(ratio: float) -> str:
 
 
 def questions(rows: list[Row], titles: Sequence[tuple[str, str, str, str]] = QUESTIONS) -> list[dict[str, Any]]:
-    """Return the questions that there are rows of, each with a sentence."""
+    """Return the questions that there are rows of: who is faster by how much, who is wrong, and both in a sentence."""
     found = []
     for title, operation, easy, hard in titles:
         keys = [f"{operation}, {name}" for name in (easy, hard)]
         parts = [[row for row in rows if key_of(row) == key] for key in keys]
-        if any(parts):
-            sides = {side: key if part else None for side, key, part in zip(("easy", "hard"), keys, parts)}
-            tag, tone, say = _said(*parts)
-            names = {"title": title, "id": title.lower().translate({ord(c): "-" for c in " ,?"}).strip("-")}
-            found.append(names | sides | {"tag": tag, "tone": tone, "say": say})
+        if not any(parts):
+            continue
+        is_alone = not any(map(_peers, parts))
+        sides = {side: _side(part, is_alone) for side, part in zip(("easy", "hard"), parts)}
+        seen = [_seen(row) for row in _peers(parts[1] or parts[0], is_alone)]
+        names = {"title": title, "id": title.lower().translate({ord(c): "-" for c in " ,?"}).strip("-")}
+        keyed = {side: key if part else None for side, key, part in zip(("easy", "hard"), keys, parts)}
+        found.append(names | keyed | {"sides": sides, "seen": seen, "is_alone": is_alone, "say": _said(*parts)})
     return found
 
 
@@ -96,45 +102,92 @@ def _peers(rows: list[Row], is_book: bool = False) -> list[Row]:
     return sorted(kept, key=lambda row: -row["rate"])
 
 
-def _said(easy: list[Row], hard: list[Row]) -> tuple[str, str, str]:
-    """Return two words, their tone and a sentence: who is faster on easy and on hard input, and who is wrong."""
-    words, ratios, is_wrong = [], [], False
+def _ours(rows: list[Row]) -> Row | None:
+    return next((row for row in rows if row["contender"] == "ours"), None)
+
+
+def _side(rows: list[Row], is_book: bool) -> dict[str, Any]:
+    """Return how many times faster ours is than the fastest, who that is and how often it fails."""
+    ours, others = _ours(rows), _peers(rows, is_book)
+    if ours is None or not others:
+        return {"ratio": None}
+    return {"ratio": ours["rate"] / others[0]["rate"], "name": short(others[0]), "fails": error_share(others[0])}
+
+
+def short(row: Row) -> str:
+    """Return the name of a package, or of a formula, without what it is called for."""
+    name = row["contender"].removeprefix("textbook: ")
+    return re.split(r",? |, ", name)[0] if row["package"] else name
+
+
+def _seen(row: Row) -> dict[str, Any]:
+    errors = row["errors"]
+    return {"name": short(row), "judged": max(1, errors["judged"])} | {kind: errors.get(kind, 0) for kind in BAD}
+
+
+def faults(each: dict[str, Any]) -> str:
+    """Say how often one of the `seen` is wrong, refuses or does not take an item."""
+    said = [f"{percent(each[kind] / each['judged'])}{' ' * bool(word)}{word}"
+            for kind, word in zip(BAD, ("", "refused", "not taken")) if each[kind]]  # fmt: skip
+    return f"{each['name']} {', '.join(said) or '0'}"
+
+
+def _said(easy: list[Row], hard: list[Row]) -> str:
+    """Say who is faster on easy and on hard input, and who is wrong."""
+    words = []
     for how, rows in (("Easy input", easy), ("Hard input", hard)):
-        ours, peers = next((row for row in rows if row["contender"] == "ours"), None), _peers(rows)
+        ours = _ours(rows)
         if ours is None:
             continue
         if bad := failing(ours):
             words.append(f"{how}: OURS IS WRONG in {bad} of {ours['errors']['judged']}.")
-            is_wrong = True
-        if peers:
-            ratios.append(ours["rate"] / peers[0]["rate"])
-        words += _beside(how, ours, peers or _peers(rows, is_book=True))
-    text = " ".join(words) or "Ours alone."
-    if is_wrong:
-        return "ours is wrong", "bad", text
-    if not ratios:
-        return "no peer", "", text
-    cost = 1 / min(ratios)
-    return ("exact is free", "good", text) if cost < 1.1 else (f"exact costs {number(cost)}x", "", text)
+        words += _beside(how, ours, _peers(rows) or _peers(rows, is_book=True))
+    return " ".join(words) or "Ours alone."
 
 
 def _beside(how: str, ours: Row, others: list[Row]) -> list[str]:
-    """Say how ours compares with the fastest, and where that one is wrong with the fastest that is not."""
+    """Say how ours compares with the fastest, and where that one fails with the fastest that does not."""
     if not others:
         return []
     best = others[0]
     text = f"{how}: {times(ours['rate'] / best['rate'])} {best['contender']}"
     if failing(best):
-        errors = best["errors"]
-        silent = f"silent in {percent(error_share(best))}"
-        text += ", " + (f"wrong in {with_interval(best)}" if errors["wrong"] else silent)
-        right = [other for other in others if not failing(other)]
-        text += "; " + (
-            f"{times(ours['rate'] / right[0]['rate'])} {right[0]['contender']}, never wrong here"
-            if right
-            else "none of them is always right"
-        )
+        errors, silent = best["errors"], percent(error_share(best))
+        text += ", " + (f"wrong in {with_interval(best)}" if errors["wrong"] else f"silent in {silent}")
+        if right := next((other for other in others if not failing(other)), None):
+            text += f"; {times(ours['rate'] / right['rate'])} {right['contender']}, never wrong here"
+        else:
+            quiet = [other["contender"] for other in others if not other["errors"]["wrong"]]
+            text += f"; {' and '.join(quiet)} never wrong, but silent at times" if quiet else "; none is always right"
     return [f"{text}."]
+
+
+def summary(asked: list[dict[str, Any]], rows: list[Row]) -> list[tuple[str, str, str]]:
+    """Return three facts as a figure, its tone and what it counts: ours wrong, easy input, hard input."""
+    ours = [row for row in rows if row["contender"] == "ours"]
+    wrong, judged = sum(map(failing, ours)), sum(row["errors"].get("judged", 0) for row in ours)
+    facts = [(f"{wrong:,} of {judged:,}", "bad" if wrong else "good", "of our answers are wrong, by exact arithmetic")]
+    for side in ("easy", "hard"):
+        held = [each["sides"][side] for each in asked if not each["is_alone"] and each["sides"][side]["ratio"]]
+        slow = [each for each in held if each["ratio"] < SAME]
+        words = f"questions on {side} input: exact is as fast as the fastest peer, or faster"
+        failed = [each["fails"] for each in slow if each["fails"]]
+        if failed:
+            words += f"; {len(failed)} of the {len(slow)} faster peers fail, in {percent(min(failed))} to "
+            words += percent(max(failed))
+        if held:
+            facts.append((f"{len(held) - len(slow)} of {len(held)}", "good" if not slow else "", words))
+    return facts
+
+
+def verdicts(rows: list[Row]) -> list[tuple[str, str, str]]:
+    """Return what an audit found, ours being the judge: how many are wrong, and the worst."""
+    others = [row for row in rows if row["contender"] != "ours" and not row["absent"]]
+    wrong = sorted((row for row in others if failing(row)), key=error_share)
+    facts = [(f"{len(wrong)} of {len(others)}", "bad" if wrong else "good", "contenders differ from the exact engine")]
+    if wrong:
+        facts.append((percent(error_share(wrong[-1])), "bad", f"of its answers: {wrong[-1]['contender']}, the worst"))
+    return facts
 
 
 def _contest(rows: list[tuple[int, Row]]) -> dict[str, Any]:
@@ -142,9 +195,9 @@ def _contest(rows: list[tuple[int, Row]]) -> dict[str, Any]:
     for i, row in rows:
         errors = row["errors"]
         kind = "ours" if row["contender"] == "ours" else "peer" if row["package"] else "book"
-        one = {"i": i, "name": row["contender"], "setting": row.get("setting"), "kind": kind, "absent": row["absent"]}
+        one = {"i": i, "name": row["contender"], "label": short(row), "kind": kind}
         one |= {key: errors.get(key, 0) for key in ("judged", *BAD, "off", "coordinates")}
-        one |= {key: row.get(key) for key in ("rate", "build", "first", "latency", "worst")}
+        one |= {key: row.get(key) for key in ("absent", "setting", "rate", "build", "first", "latency", "worst")}
         one["where"] = errors.get("where", ())
         made.append(one | {"ulp": errors.get("ulp_largest", 0)})
     first = rows[0][1]
@@ -155,23 +208,28 @@ def text_of(
     found: dict[str, Any],
     path: str,
     titles: Sequence[tuple[str, str, str, str]] = QUESTIONS,
-    judge: str = "rational arithmetic",
 ) -> str:
     """Return the page; path: of the results, from the root of the repository; titles: as `QUESTIONS`."""
     rows, contests = found["rows"], {}
     asked = questions(rows, titles)
     for key in [question[side] for question in asked for side in ("easy", "hard") if question[side]]:
         contests[key] = _contest([(i, row) for i, row in enumerate(rows) if key_of(row) == key])
-    ours = [row for row in rows if row["contender"] == "ours"]
-    free = sum(question["tag"] == "exact is free" for question in asked)
     data = {
         "facts": {key: found[key] for key in FACTS} | {"results": path},
-        "judge": judge,
-        "wrong": sum(map(failing, ours)),
-        "judged": sum(row["errors"].get("judged", 0) for row in ours),
-        "summary": f"In {free} of {len(asked)} questions that costs nothing; the others say what it costs.",
+        "summary": summary(asked, rows) if titles is QUESTIONS else verdicts(rows),
+        "versus": "Ours, beside the fastest peer" if titles is QUESTIONS else "Your data",
+        "museum": titles is QUESTIONS,
         "questions": asked,
         "contests": contests,
     }
-    text = json.dumps(data, separators=(",", ":")).replace("</", "<\\/")
-    return TEMPLATE.read_text("utf-8").replace("/*DATA*/", text)
+    return written("speed_and_error", data)
+
+
+def written(name: str, data: dict[str, Any]) -> str:
+    """Return a page with its style, its script and its data within."""
+    text = (PAGES / f"{name}.html").read_text("utf-8")
+    parts = {"STYLE": (PAGES / "style.css").read_text("utf-8"), "DRAWING": (PAGES / "drawing.js").read_text("utf-8"),
+             "DATA": json.dumps(data, separators=(",", ":")).replace("</", "<\\/")}  # fmt: skip
+    for mark, part in parts.items():
+        text = text.replace(f"/*{mark}*/", part)
+    return text

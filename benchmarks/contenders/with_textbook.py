@@ -114,6 +114,9 @@ def _polygon_areas(region: engine.Aabb) -> Ask:
 
 
 def _overlay(operation: str) -> Ask:
+    if operation != "intersection":
+        raise NotApplicable(operation)
+
     def area(pair: Any) -> float:
         if len(pair[0]) > 1 or len(pair[1]) > 1:
             raise NotApplicable("single rings only")

@@ -2,6 +2,7 @@
 
     python -m benchmarks filed                 # the tables; --cases: also one line for each case
     python -m benchmarks filed --answers       # compute the exact answers anew and write them into cases.json
+    python -m benchmarks filed --keep          # put the answers into the stored results, and write the pages again
 
 Each contender runs in a process of its own, so that one that crashes or never returns costs its own case only. Points
 on a boundary count as contained, bodies that touch as meeting. An area is wrong when it is off by more than a millionth
@@ -24,15 +25,16 @@ import numpy as np
 
 import engine
 from benchmarks.contenders import PACKAGES, NotApplicable, Placed, answers
+from benchmarks.filed import museum
 from benchmarks.machine import version_of
 from benchmarks.workloads import Mesh, Rings
 
 PATH = Path(__file__).resolve().parent / "cases.json"
-OUTCOMES = ("right", "wrong", "refused", "crashed", "no answer in time", "not applicable")
+OUTCOMES = ("right", "wrong", "refused", "crashed", "no answer in time")
 LIMIT = 20.0
 """Seconds for one case; imports count towards the first."""
 COMPILING = 600.0
-"""The same for ours, which may have to compile its kernels."""
+"""The same for ours and the textbook's methods, which may have to compile their kernels."""
 TOLERANCE = 2.0**-20
 """Of the extent: more than rounding coordinates does, less than any piece anyone would miss."""
 Case = dict[str, Any]
@@ -49,8 +51,10 @@ class Peer(NamedTuple):
 POINTS, PIECES, PAIR = {"locate 3D": "points"}, {"clip_segments 3D": "pieces"}, {"collide 3D": "pair"}
 OVERLAY, CLIPPING = {"overlay 2D": "overlay of made"}, {"clip_polygons 2D": "polygon areas"}
 PLANE = {"locate 2D": "points", "clip_segments 2D": "pieces", **OVERLAY}
+BY_VOLUMES = "pair by volumes"
 PEERS = (
     Peer("ours", "", {}),
+    Peer("textbook", "textbook", POINTS | {"locate 2D": "points", "overlay 2D": "overlay", "collide 3D": BY_VOLUMES}),
     Peer("shapely", "shapely", PLANE | {"collide 2D": "pair"}),
     Peer("shapely clip_by_rect", "shapely", {"clip_segments 2D": "pieces by rectangle", **CLIPPING}),
     Peer("matplotlib", "matplotlib", {"locate 2D": "points"}),
@@ -168,25 +172,28 @@ def _asked(module: str, kind: str, operation: str, data: dict[str, Any]) -> Any:
             polygons = [[np.array(ring, float) for ring in rings] for rings in data["polygons"]]
             return answers(module, kind, _subject(data["region"], True), polygons)
         case "overlay":
-            return answers(module, kind, data["operation"], [(_rings(data["subject"]), _rings(data["clip"]))])[0]
+            area = answers(module, kind, data["operation"], [(_rings(data["subject"]), _rings(data["clip"]))])[0]
+            if np.isinf(area):
+                raise NotApplicable("out of its domain")
+            return area
     return answers(module, kind, (_placed(data, "first"), _placed(data, "second")), None)
 
 
-def _answer(peer: Peer, case: Case) -> tuple[str, str]:
-    """Return the outcome of one case and a note; in the contender's own process."""
+def _answer(peer: Peer, case: Case) -> tuple[str, str, list[int]]:
+    """Return the outcome of one case, a note and the items that are wrong; in the contender's own process."""
     try:
         if peer.name == "ours":
             from tests.hard.operations import OPERATIONS
 
             is_ok = OPERATIONS[case["operation"]].by_engine(case["input"]) == case["answer"]
-        else:
-            is_ok = is_right(case, _asked(peer.module, peer.calls[kind_of(case)], case["operation"], case["input"]))
-        return "right" if is_ok else "wrong", ""
+            return "right" if is_ok else "wrong", "", []
+        answer = _asked(peer.module, peer.calls[kind_of(case)], case["operation"], case["input"])
+        return ("right", "", []) if is_right(case, answer) else ("wrong", *museum.said(case, answer))
     except NotApplicable:
-        return "not applicable", ""
+        return "not applicable", "", []
     except Exception as error:  # whatever a peer raises
         outcome = "absent" if isinstance(error, ImportError | OSError) else "refused"
-        return outcome, f"{type(error).__name__}: {error}".splitlines()[0]
+        return outcome, f"{type(error).__name__}: {error}".splitlines()[0], []
 
 
 def _serve(pipe: Connection, name: str) -> None:
@@ -196,26 +203,27 @@ def _serve(pipe: Connection, name: str) -> None:
         pipe.send(_answer(peer, case))
 
 
-def replay(names: Sequence[str] = (), limit: float = LIMIT, cases: list[Case] | None = None) -> list[dict[str, str]]:
-    """Return one row for each contender and case: `case`, `kind`, `contender`, `version`, `outcome`, `note`.
+def replay(names: Sequence[str] = (), limit: float = LIMIT, cases: list[Case] | None = None) -> list[dict[str, Any]]:
+    """Return a row for each contender and case that it takes: its outcome, what it said, and which items are wrong.
 
     A contender that cannot be imported has one row, with the outcome `absent`. cases: those that users filed, if None.
     """
     asked = load() if cases is None else cases
-    return [row for peer in PEERS if not names or peer.name in names for row in _replay_one(peer, asked, limit)]
+    rows = [row for peer in PEERS if not names or peer.name in names for row in _replay_one(peer, asked, limit)]
+    return [row for row in rows if row["outcome"] != "not applicable"]
 
 
-def _replay_one(peer: Peer, cases: list[Case], limit: float) -> list[dict[str, str]]:
-    rows: list[dict[str, str]] = []
+def _replay_one(peer: Peer, cases: list[Case], limit: float) -> list[dict[str, Any]]:
+    rows: list[dict[str, Any]] = []
     process, pipe = None, None
     package = PACKAGES.get(peer.module)
     about = {"contender": peer.name, "version": version_of(package) if package else ""}
     for case in cases:
-        kind, outcome, note = kind_of(case), "not applicable", ""
+        kind, outcome, note, where = kind_of(case), "not applicable", "", list[int]()
         if peer.name == "ours" or kind in peer.calls:
             if process is None:
                 pipe, process = _started(peer.name)
-            outcome, note = _ask(pipe, case, limit if peer.module else COMPILING)
+            outcome, note, where = _ask(pipe, case, limit if peer.module not in ("", "textbook") else COMPILING)
             if outcome == "absent":
                 rows = [about | {"case": "", "kind": "", "outcome": outcome, "note": note}]
                 break
@@ -223,7 +231,8 @@ def _replay_one(peer: Peer, cases: list[Case], limit: float) -> list[dict[str, s
                 process.kill()
                 process.join()
                 note, process = note or f"exit code {process.exitcode}", None
-        rows.append(about | {"case": case["id"], "kind": kind, "outcome": outcome, "note": note})
+        row = about | {"case": case["id"], "kind": kind, "outcome": outcome, "note": note}
+        rows.append(row | ({"where": where} if where else {}))
     if process is not None:
         process.kill()
         process.join()
@@ -239,49 +248,40 @@ def _started(name: str) -> tuple[Any, Any]:
     return pipe, process
 
 
-def _ask(pipe: Any, case: Case, limit: float) -> tuple[str, str]:
+def _ask(pipe: Any, case: Case, limit: float) -> tuple[str, str, list[int]]:
     try:
         pipe.send(case)
-        return pipe.recv() if pipe.poll(limit) else ("no answer in time", f"{limit:g} s")
+        return pipe.recv() if pipe.poll(limit) else ("no answer in time", f"{limit:g} s", [])
     except (EOFError, ConnectionError):
-        return "crashed", ""
+        return "crashed", "", []
 
 
 # --- writing ----------------------------------------------------------------------------------------------------------
 
 
-def section(rows: list[dict[str, str]]) -> str:
-    """Return the section of the report: contenders and their counts, then every case that a peer does not pass."""
+def section(rows: list[dict[str, Any]]) -> str:
+    """Return the section of the report: contenders and their counts; the museum shows each case."""
     replayed = {row["case"] for row in rows}
-    cases = {case["id"]: case for case in load() if case["id"] in replayed}
-    threads = len({case["thread"] for case in cases.values()})
+    threads = {case["thread"] for case in load() if case["id"] in replayed}
     lines = [
         "## Cases that users filed\n",
-        f"{len(cases)} inputs from {threads} public threads about peers and other libraries, replayed on the installed "
-        "versions ([benchmarks/filed](../benchmarks/filed/README.md)). A boundary counts as contained, contact as "
-        "meeting; areas and pieces may be off by a millionth of the extent; ours must be exact to the last bit.\n",
-        "| contender | version | asked | " + " | ".join(OUTCOMES[:-1]) + " |",
-        "|---|---|---|" + "---|" * (len(OUTCOMES) - 1),
+        f"{len(replayed - {''})} inputs from {len(threads)} public threads about peers and other libraries, replayed "
+        "on the installed versions; [the museum](museum.html) draws each, with what every library says of it today "
+        "([how one is added](../benchmarks/filed/README.md)). A boundary counts as contained, contact as meeting; "
+        "areas and pieces may be off by a millionth of the extent; ours must be exact to the last bit.\n",
+        "| contender | version | asked | " + " | ".join(OUTCOMES) + " |",
+        "|---|---|---|" + "---|" * len(OUTCOMES),
     ]
     for name in dict.fromkeys(row["contender"] for row in rows):
         mine = [row for row in rows if row["contender"] == name]
         if mine[0]["outcome"] == "absent":
-            lines.append(f"| {name} | not installed: {mine[0]['note']} |" + " |" * len(OUTCOMES))
+            lines.append(f"| {name} | not installed: {mine[0]['note']} |" + " |" * (1 + len(OUTCOMES)))
             continue
         count = Counter(row["outcome"] for row in mine)
-        cells = " | ".join(str(count[outcome]) for outcome in OUTCOMES[:-1])
-        lines.append(f"| {name} | {mine[0]['version']} | {len(mine) - count['not applicable']} | {cells} |")
-    failed: dict[str, list[str]] = {}
-    for row in rows:
-        if row["outcome"] not in ("right", "not applicable", "absent"):
-            how = "" if row["outcome"] == "wrong" else f" ({row['outcome']})"
-            failed.setdefault(row["case"], []).append(row["contender"] + how)
-    lines += [f"\nAll contenders pass {len(cases) - len(failed)} of the cases today; not these:\n"]
-    lines += ["| case | reported | wrong today |", "|---|---|---|"]
-    for name, contenders in failed.items():
-        repository, number = cases[name]["thread"].split("#")
-        link = f"[{name}](https://github.com/{repository}/issues/{number})"
-        lines.append(f"| {link} | {cases[name]['about']} | {', '.join(contenders)} |")
+        cells = " | ".join(str(count[outcome]) for outcome in OUTCOMES)
+        lines.append(f"| {name} | {mine[0]['version']} | {len(mine)} | {cells} |")
+    failed = {row["case"] for row in rows if row["outcome"] not in ("right", "absent")}
+    lines += [f"\nAll contenders pass {len(replayed - failed - {''})} of the cases today."]
     return "\n".join(lines) + "\n"
 
 
@@ -299,6 +299,7 @@ def main(words: list[str] | None = None) -> int:
     parser.add_argument("--answers", action="store_true", help="write the exact answers into cases.json")
     parser.add_argument("--only", nargs="*", default=(), metavar="NAME", help="only these contenders")
     parser.add_argument("--cases", action="store_true", help="print every answer that is not right, with its note")
+    parser.add_argument("--keep", action="store_true", help="into the stored results, and the pages")
     parser.add_argument("--quick", action="store_true", help="the first twenty cases")
     options = parser.parse_args(words)
     if options.answers:
@@ -306,7 +307,11 @@ def main(words: list[str] | None = None) -> int:
         return 0
     rows = replay(options.only, cases=load()[: 20 if options.quick else None])
     for row in rows:
-        if options.cases and row["outcome"] not in ("right", "not applicable"):
+        if options.cases and row["outcome"] != "right":
             print(f"{row['contender']:<24} {row['outcome']:<18} {row['case']:<50} {row['note']}")
     print(section(rows))
+    if options.keep and not (options.quick or options.only):
+        from benchmarks import report
+
+        report.keep("filed", rows)
     return int(any(row["contender"] == "ours" and row["outcome"] != "right" for row in rows))

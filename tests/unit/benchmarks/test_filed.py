@@ -1,12 +1,15 @@
-"""The judge of the filed cases takes the exact answers, and not others; the section names what fails."""
+"""The judge of the filed cases takes the exact answers, and not others; the museum says what a contender answers."""
 
 from __future__ import annotations
 
+import json
 import multiprocessing
+from pathlib import Path
 
 import pytest
 
 from benchmarks import filed
+from benchmarks.filed import museum
 
 CASES = {case["id"]: case for case in filed.load()}
 
@@ -33,12 +36,12 @@ def test_the_judge(name: str, right: object, wrong: object) -> None:
 
 def test_contenders_that_die_or_hang_are_told_apart() -> None:
     here, there = multiprocessing.Pipe()
-    assert filed._ask(here, {}, 0.01) == ("no answer in time", "0.01 s")
+    assert filed._ask(here, {}, 0.01) == ("no answer in time", "0.01 s", [])
     there.close()
-    assert filed._ask(here, {}, 0.01) == ("crashed", "")
+    assert filed._ask(here, {}, 0.01) == ("crashed", "", [])
 
 
-def test_the_section_names_what_fails() -> None:
+def test_the_section_counts_what_fails() -> None:
     rows = [
         {"case": name, "kind": "", "contender": contender, "version": "", "outcome": outcome, "note": ""}
         for name in CASES
@@ -47,5 +50,30 @@ def test_the_section_names_what_fails() -> None:
     rows.append({"case": "", "kind": "", "contender": "third", "version": "", "outcome": "absent", "note": "no module"})
     text = filed.section(rows)
     assert f"| ours |  | {len(CASES)} | {len(CASES)} | 0 | 0 | 0 | 0 |" in text
-    assert "| a point exactly on an edge was expected to be contained | other (crashed) |" in text
+    assert f"All contenders pass {len(CASES) - 1} of the cases today." in text
     assert "not installed: no module" in text
+
+
+@pytest.mark.parametrize(
+    ("name", "answer", "said", "is_rule"),
+    [
+        ("shapely/shapely#1189", [False], "outside, where exact is on the boundary", True),
+        ("matplotlib/matplotlib#2708", [True] * 6, "3 of 6 points, the first inside, where exact is outside", False),
+        ("mikedh/trimesh#1860 equal", False, "no common point", True),
+        ("AngusJohnson/Clipper2#821", [0.25], "area 0.25", False),
+    ],
+)
+def test_the_museum_says_what_a_contender_answers(name: str, answer: object, said: str, is_rule: bool) -> None:
+    words, where = museum.said(CASES[name], answer)
+    assert words == said
+    assert museum.is_on_boundary(CASES[name], where) == is_rule
+
+
+def test_every_case_is_a_request() -> None:
+    """What the museum shows is the service's: a path that it has, with the fields that it takes."""
+    document = json.loads((Path(__file__).parents[2] / "contract" / "openapi.json").read_text("utf-8"))
+    for case in CASES.values():
+        path, body = museum.request(case)
+        named = document["paths"][path]["post"]["requestBody"]["content"]["application/json"]["schema"]["$ref"]
+        assert set(body) <= set(document["components"]["schemas"][named.rpartition("/")[2]]["properties"])
+        assert museum.exact_words(case)

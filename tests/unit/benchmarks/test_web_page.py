@@ -17,6 +17,7 @@ CHROMIUM = next(
 )
 REQUEST = ("/v1/contains", {"solid": {"type": "polygon", "rings": [[[0, 0], [4, 0], [0, 4]]]}, "points": [[2, 2]]})
 WORST = {"item": 7, "answer": 0, "exact": 1, "request": REQUEST}
+DOCS = Path(__file__).resolve().parents[3] / "docs"
 SCRIPT = "</script><b>not markup</b>"
 
 
@@ -42,12 +43,22 @@ FOUND: dict[str, Any] = dict.fromkeys(web_page.FACTS, 0) | {"versions": {"numpy"
 
 def test_a_question_is_said_in_words() -> None:
     (asked,) = web_page.questions(ROWS)
-    assert asked["tag"] == "exact costs 3x"
+    assert asked["sides"]["easy"] == {"ratio": 2.0, "name": "peer", "fails": 0}
+    assert asked["sides"]["hard"] == {"ratio": 1 / 3, "name": "peer", "fails": 0.25}
+    assert list(map(web_page.faults, asked["seen"])) == ["peer 25%", "picky 1.5% not taken"]
     assert "Easy input: 2x faster than peer." in asked["say"]
-    assert "3x slower than peer, wrong in 25% (20% to 31%); none of them is always right." in asked["say"]
+    assert "3x slower than peer, wrong in 25% (20% to 31%); picky never wrong, but silent at times." in asked["say"]
     wrong = [row("boundary", "ours", 1.0, 3), row("boundary", "peer", 1.0, 0)]
-    assert web_page.questions(wrong)[0]["tone"] == "bad"
     assert "OURS IS WRONG in 3 of 200" in web_page.questions(wrong)[0]["say"]
+
+
+def test_the_first_words_count_ours_then_who_is_faster() -> None:
+    ours, easy, hard = web_page.summary(web_page.questions(ROWS), ROWS)
+    assert ours[:2] == ("0 of 400", "good")
+    assert easy[0] == "1 of 1"
+    assert hard[0] == "0 of 1"
+    assert hard[2].endswith("1 of the 1 faster peers fail, in 25% to 25%")
+    assert web_page.summary([], [row("boundary", "ours", 1.0, 3)])[0][:2] == ("3 of 200", "bad")
 
 
 def test_numbers_on_the_page_name_their_line_of_results() -> None:
@@ -57,7 +68,7 @@ def test_numbers_on_the_page_name_their_line_of_results() -> None:
     for contest in data["contests"].values():
         for shown in contest["rows"]:
             assert (shown["rate"], shown["wrong"]) == (ROWS[shown["i"]]["rate"], ROWS[shown["i"]]["errors"]["wrong"])
-    assert (data["wrong"], data["judged"]) == (0, 400)
+    assert data["summary"][0][0] == "0 of 400"
 
 
 @pytest.fixture
@@ -80,11 +91,14 @@ def test_in_a_browser(browser: Any, tmp_path: Path, width: int, scheme: str) -> 
     page.on("pageerror", lambda error: troubles.append(str(error)))
     page.on("request", lambda asked: troubles.append(asked.url) if not asked.url.startswith("file:") else None)
     page.goto(file.as_uri())
-    assert page.locator("#questions button").count() == 1
+    button = page.locator("#questions button")
+    assert button.inner_text().split("\n")[0] == "Points in a polygon"
+    assert "peer 25%" in button.inner_text()
+    assert button.get_attribute("aria-expanded") == "true"  # the only question is open
     assert page.locator("g.mark").count() == 3  # a setting that easy rows have not cannot be mixed
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     assert page.locator("b", has_text="not markup").count() == 0
-    assert "one answer in 4.00 is wrong" in page.locator("#pays").inner_text()
+    assert "one answer in 4 is wrong" in page.locator("#pays").inner_text()
     page.locator("#share").focus()
     page.keyboard.press("Home")
     assert "with no wrong answer seen" in page.locator("#pays").inner_text()
@@ -98,4 +112,33 @@ def test_in_a_browser(browser: Any, tmp_path: Path, width: int, scheme: str) -> 
     link = page.get_by_role("link", name="Open in the playground").get_attribute("href")
     assert json.loads(unquote(link.removeprefix("http://127.0.0.1:8000/#request="))) == list(REQUEST)
     assert page.locator("#detail svg circle").count() == 1
+    button.click()
+    assert page.locator("#panel").is_hidden()
+    assert troubles == []
+
+
+@pytest.mark.parametrize("name", ["speed_and_error", "museum"])
+@pytest.mark.parametrize(("width", "scheme"), [(1280, "light"), (390, "dark")])
+def test_the_pages_as_committed(browser: Any, name: str, width: int, scheme: str) -> None:
+    """No other host, nothing beside the screen, every label of every chart beside the others."""
+    page = browser.new_page(viewport={"width": width, "height": 800}, color_scheme=scheme)
+    troubles: list[str] = []
+    page.on("pageerror", lambda error: troubles.append(str(error)))
+    page.on("request", lambda asked: troubles.append(asked.url) if not asked.url.startswith("file:") else None)
+    page.goto((DOCS / f"{name}.html").as_uri())
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    for button in page.locator("#questions button").all():
+        button.click()
+        boxes = [label.bounding_box() for label in page.locator("#chart g.mark > text").all()]
+        for i, a in enumerate(boxes):
+            for b in boxes[:i]:
+                apart = max(a["x"] - b["x"] - b["width"], b["x"] - a["x"] - a["width"],
+                            a["y"] - b["y"] - b["height"], b["y"] - a["y"] - a["height"])  # fmt: skip
+                assert apart > -4, (button.inner_text(), a, b)  # letters reach less far than their boxes
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+    if name == "museum":
+        n_failed = page.locator("article").count()
+        page.locator("nav button", has_text="all").first.click()
+        assert page.locator("article").count() >= 120 > n_failed > 0
+        assert page.locator("article svg").count() == page.locator("article").count()
     assert troubles == []
