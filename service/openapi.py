@@ -4,6 +4,7 @@ it may ask for, and without what generators choke on."""
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Final
@@ -124,7 +125,8 @@ def _answers() -> dict[str, list[Any]]:
 
 
 def _illustrate(made: dict[str, Any]) -> None:
-    """Give every property a description and an example: its own, or the first that an example of a model holds."""
+    """Give every operation a line, every property a description and an example, its own or the first that an example of
+    a model holds."""
     schemas = made["components"]["schemas"]
     for name, answers in _answers().items():
         if name in schemas:
@@ -142,6 +144,7 @@ def _illustrate(made: dict[str, Any]) -> None:
                 part.setdefault("description", schemas[_name(part)]["description"])
     for item in made["paths"].values():
         for operation in item.values():
+            operation["summary"] = re.split("[.,:;]", operation["description"])[0]  # FastAPI's is the function's name
             found = [answer for status, answer in operation["responses"].items() if status < "300"]
             for body in (operation.get("requestBody", {}), *found):
                 for media_type, content in body.get("content", {}).items():
