@@ -14,9 +14,17 @@ from typing import Any, Final
 
 from engine.jit import bare_kernel, inline, merged
 from engine.predicates.cut_point import TINY as CUT_TINY
-from engine.predicates.double_double import U2, dd_add, dd_mul
+from engine.predicates.double_double import U2, dd_add, dd_div, dd_mul
 from engine.predicates.error_free import fast_two_sum, two_diff, two_prod, two_sum
-from engine.segment_clipping.ball_interval import TINY, axis_terms, center_of
+from engine.segment_clipping.ball_interval import (
+    DOT_BOUND,
+    TINY,
+    axis_terms,
+    center_of,
+    dd_dot,
+    discriminant,
+    is_ball_safe,
+)
 from engine.segment_clipping.pieces import Pieces, Triple, point_of, put_end, put_own_end
 
 RESIDUAL_BOUND: Final = 48.0 * U2
@@ -108,6 +116,32 @@ def cut_by_ball(p: Triple, q: Triple, c: Triple, radius: float, side: int) -> tu
     return x, y, z, guess + step + 0.0, sure & is_x & is_y & is_z & is_t
 
 
+@inline
+def cut_by_root(p: Triple, q: Triple, c: Triple, radius: float, side: int) -> tuple[float, float, float, float, bool]:
+    """Return what `cut_by_ball` does, by t = (-B -+ sqrt(D)) / A in double-doubles: a line that is nearly tangent.
+
+    A and B are within `DOT_BOUND`, the root within half the bound of D over itself and the 8 u^2 that it is rounded by;
+    their sum has 4 u^2, the quotient 16 u^2 of t and what A has.
+    """
+    h, low, bound = discriminant(p, q, c, radius)
+    ah, al, _ = dd_dot(p, q, p, q)
+    bh, bl, size = dd_dot(p, q, c, p)
+    sign = -1.0 if side == 0 else 1.0
+    root = math.sqrt(max(h, 0.0))
+    rh, rl = two_prod(root, root)
+    tail = 0.0 if root == 0.0 else ((h - rh) + (low - rl)) / (2.0 * root)
+    nh, nl = dd_add(-bh, -bl, sign * root, sign * tail)
+    th, tl = dd_div(nh, nl, ah, al)
+    slack = DOT_BOUND * size + 8.0 * U2 * root + (0.0 if bound == 0.0 else bound / root)
+    slack = 1.01 * slack / ah + 64.0 * U2 * abs(th)
+    x, is_x = coordinate_at(p[0], q[0], th, tl, slack)
+    y, is_y = coordinate_at(p[1], q[1], th, tl, slack)
+    z, is_z = coordinate_at(p[2], q[2], th, tl, slack)
+    is_t = th + (tl - slack) == th + (tl + slack)
+    sure = is_ball_safe(p, q, c, radius) & ((h > bound) | (bound == 0.0))
+    return x, y, z, th + tl + 0.0, sure & is_x & is_y & is_z & is_t
+
+
 @bare_kernel
 def fill_on_sphere(
     segments: Any,
@@ -137,7 +171,10 @@ def fill_on_sphere(
                 put_own_end(pieces, row, end, segments, i, is_flat)
                 continue
             pieces.faces[row, end] = planes[place, end]
-            x, y, z, pieces.t[row, end], sure = cut_by_ball(p, q, c, radius, end)
+            x, y, z, t, sure = cut_by_ball(p, q, c, radius, end)
+            if not sure:
+                x, y, z, t, sure = cut_by_root(p, q, c, radius, end)
+            pieces.t[row, end] = t
             put_end(pieces, row, end, (x, y, z), is_flat)
             all_sure &= sure
         if not all_sure:

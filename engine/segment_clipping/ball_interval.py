@@ -20,8 +20,7 @@ from typing import Any, Final
 from engine.jit import bare_kernel, inline, merged
 from engine.predicates.double_double import U2, dd_add, dd_mul, dd_sub
 from engine.predicates.error_free import two_diff, two_prod, workspace
-from engine.predicates.expansion import grow_product, is_safe, sign
-from engine.segment_clipping.cyrus_beck import is_segment_safe
+from engine.predicates.expansion import add_product, add_scaled, grow_product, is_safe, sign
 from engine.segment_clipping.pieces import DROPPED, KEPT, Triple, point_of
 from engine.types import OPEN
 
@@ -29,81 +28,122 @@ ROUGH_BOUND: Final = 32.0 * 2.0**-53
 """Doubles: differences, products and three sums, each term at most (1 + u)^8, squared terms (1 + u)^14."""
 DISCRIMINANT_BOUND: Final = 96.0 * U2
 """D: A r^2 carries 42 u^2; a squared component of the cross product 2 * 9 + 5 u^2 of (|d_i f_j| + |d_j f_i|)^2."""
+DOT_BOUND: Final = 24.0 * U2
+"""A sum of three products of differences in double-double: 5 u^2 a product, 4 u^2 a sum, of which r^2 is one more."""
 TINY: Final = 2.0**-960
 """Added to bounds in doubles for products that underflow."""
 
 
 @inline
-def power_sign(point: Any, center: Any, radius: float) -> int:
-    """Return the exact sign of |point - center|^2 - radius^2, all within the safe range."""
+def dd_dot(a: Triple, b: Triple, c: Triple, d: Triple) -> Triple:
+    """Return (b - a) . (d - c) as a double-double within `DOT_BOUND` of the sum of absolute terms, and that sum."""
+    h = low = size = 0.0
+    for k in range(3):
+        uh, ul = two_diff(b[k], a[k])
+        vh, vl = two_diff(d[k], c[k])
+        th, tl = dd_mul(uh, ul, vh, vl)
+        h, low = dd_add(h, low, th, tl)
+        size += abs(th)
+    return h, low, size
+
+
+@inline
+def expand_dot(a: Triple, b: Triple, c: Triple, d: Triple, e: Any, n: int) -> int:
+    """Add (b - a) . (d - c) to the expansion e of n components; 24 places."""
+    for k in range(3):
+        uh, ul = two_diff(b[k], a[k])
+        vh, vl = two_diff(d[k], c[k])
+        n = grow_product(e, n, ul, vl)
+        n = grow_product(e, n, ul, vh)
+        n = grow_product(e, n, uh, vl)
+        n = grow_product(e, n, uh, vh)
+    return n
+
+
+@inline
+def dot_sign(a: Triple, b: Triple, c: Triple, d: Triple, radius: float) -> int:
+    """Return the exact sign of (b - a) . (d - c) - radius^2, all within the safe range."""
+    h, low, size = dd_dot(a, b, c, d)
+    rh, rl = two_prod(radius, radius)
+    h, low = dd_sub(h, low, rh, rl)
+    if abs(h) > DOT_BOUND * (size + rh):
+        return 1 if h > 0.0 else -1
     e = workspace(26)
-    n = grow_product(e, 0, -radius, radius)
-    for k in range(center.size):
-        h, low = two_diff(point[k], center[k])
-        n = grow_product(e, n, low, low)
-        n = grow_product(e, n, 2.0 * low, h)
-        n = grow_product(e, n, h, h)
-    return sign(e, n)
+    return sign(e, expand_dot(a, b, c, d, e, grow_product(e, 0, -radius, radius)))
 
 
 @inline
-def direction_sign(segment: Any, point: Any, center: Any) -> int:
-    """Return the exact sign of (q - p) . (point - center), all within the safe range."""
-    e = workspace(24)
-    n = 0
-    for k in range(center.size):
-        dh, dl = two_diff(segment[1, k], segment[0, k])
-        fh, fl = two_diff(point[k], center[k])
-        n = grow_product(e, n, dl, fl)
-        n = grow_product(e, n, dl, fh)
-        n = grow_product(e, n, dh, fl)
-        n = grow_product(e, n, dh, fh)
-    return sign(e, n)
+def cross_of(p: Triple, q: Triple, c: Triple, k: int) -> tuple[float, float, float, float, float, float, float, float]:
+    """Return the four differences whose products, first two less last two, are component k of (q - p) x (p - c)."""
+    i, j = (k + 1) % 3, (k + 2) % 3
+    dh, dl = two_diff(q[i], p[i])
+    gh, gl = two_diff(p[j], c[j])
+    eh, el = two_diff(q[j], p[j])
+    fh, fl = two_diff(p[i], c[i])
+    return dh, dl, gh, gl, eh, el, fh, fl
 
 
 @inline
-def discriminant(segment: Any, center: Any, radius: float) -> tuple[float, float]:
-    """Return A r^2 - |d x f|^2, from double-doubles, and its bound."""
-    ah = al = 0.0
-    for k in range(center.size):
-        dh, dl = two_diff(segment[1, k], segment[0, k])
-        sh, sl = dd_mul(dh, dl, dh, dl)
-        ah, al = dd_add(ah, al, sh, sl)
+def discriminant(p: Triple, q: Triple, c: Triple, radius: float) -> Triple:
+    """Return A r^2 - |d x f|^2 as a double-double, and its bound; that is 0 where it is exact."""
+    ah, al, _ = dd_dot(p, q, p, q)
     rh, rl = two_prod(radius, radius)
     h, low = dd_mul(ah, al, rh, rl)
-    size = h
-    for k in range(center.size):
-        dh, dl = two_diff(segment[1, k], segment[0, k])
-        fh, fl = two_diff(segment[0, k], center[k])
-        for j in range(k):
-            eh, el = two_diff(segment[1, j], segment[0, j])
-            gh, gl = two_diff(segment[0, j], center[j])
-            uh, ul = dd_mul(dh, dl, gh, gl)
-            vh, vl = dd_mul(eh, el, fh, fl)
-            ch, cl = dd_sub(uh, ul, vh, vl)
-            sh, sl = dd_mul(ch, cl, ch, cl)
-            h, low = dd_sub(h, low, sh, sl)
-            size += (abs(uh) + abs(vh)) * (abs(uh) + abs(vh))
-    return h, DISCRIMINANT_BOUND * size
+    size, lost = h, 0.0
+    for k in range(3):
+        dh, dl, gh, gl, eh, el, fh, fl = cross_of(p, q, c, k)
+        uh, ul = dd_mul(dh, dl, gh, gl)
+        vh, vl = dd_mul(eh, el, fh, fl)
+        ch, cl = dd_sub(uh, ul, vh, vl)
+        sh, sl = dd_mul(ch, cl, ch, cl)
+        h, low = dd_sub(h, low, sh, sl)
+        size += (abs(uh) + abs(vh)) * (abs(uh) + abs(vh))
+        lost += abs(dl) + abs(gl) + abs(el) + abs(fl)
+    bound = DISCRIMINANT_BOUND * size
+    if abs(h) > bound or lost != 0.0:
+        return h, low, bound
+    side = float(short_sign(p, q, c, radius))  # case: numbers of few bits, a lattice
+    return (0.0, 0.0, 0.0) if side == 0.0 else (h, low, bound)
 
 
 @inline
-def decide_exactly(segment: Any, center: Any, radius: float) -> tuple[int, int, int]:
+def short_sign(p: Triple, q: Triple, c: Triple, radius: float) -> int:
+    """Return the exact sign of A r^2 - |d x f|^2; caller guarantees that all differences are doubles."""
+    e, square, part = workspace(128), workspace(24), workspace(4)
+    n_square = grow_product(part, 0, radius, radius)
+    n = add_product(e, 0, square, expand_dot(p, q, p, q, square, 0), part, n_square)
+    for k in range(3):
+        d, _, g, _, b, _, f, _ = cross_of(p, q, c, k)
+        n_part = grow_product(part, 0, d, g)
+        n_part = grow_product(part, n_part, -b, f)
+        for i in range(n_part):
+            n = add_scaled(e, n, part, n_part, -part[i])
+    return sign(e, n)
+
+
+@merged
+def is_ball_safe(p: Triple, q: Triple, c: Triple, radius: float) -> bool:
+    """Tell whether all numbers are zero or of a size for which expansions are exact."""
+    safe = is_safe(radius)
+    for point in (p, q, c):
+        safe = safe & is_safe(point[0]) & is_safe(point[1]) & is_safe(point[2])
+    return safe
+
+
+@inline
+def decide_exactly(p: Triple, q: Triple, c: Triple, radius: float) -> tuple[int, int, int]:
     """Decide on one segment by exact signs: state, and 0 for an end on the sphere, -1 for one of the segment."""
-    safe = is_segment_safe(segment) and is_safe(radius)
-    for k in range(center.size):
-        safe = safe and is_safe(center[k])
-    if not safe:
+    if not is_ball_safe(p, q, c, radius):
         return OPEN, -1, -1
-    p_out, q_out = power_sign(segment[0], center, radius) > 0, power_sign(segment[1], center, radius) > 0
+    p_out, q_out = dot_sign(c, p, c, p, radius) > 0, dot_sign(c, q, c, q, radius) > 0
     if not (p_out and q_out):
         return KEPT, 0 if p_out else -1, 0 if q_out else -1
-    if direction_sign(segment, segment[0], center) >= 0 or direction_sign(segment, segment[1], center) <= 0:
+    if dot_sign(p, q, c, p, 0.0) >= 0 or dot_sign(p, q, c, q, 0.0) <= 0:
         return DROPPED, -1, -1  # a point too
-    value, bound = discriminant(segment, center, radius)
+    value, _, bound = discriminant(p, q, c, radius)
     if -value > bound:
         return DROPPED, -1, -1
-    return (KEPT, 0, 0) if value > bound else (OPEN, -1, -1)  # case: tangent, or nearly so
+    return (KEPT, 0, 0) if value > bound or bound == 0.0 else (OPEN, -1, -1)  # case: nearly tangent
 
 
 @merged
@@ -181,7 +221,7 @@ def decide_on_sphere(
         )
         if state == OPEN:
             beyond += 1
-            state, entered, left = decide_exactly(segments[i], center, radius)
+            state, entered, left = decide_exactly(p, q, c, radius)
             if state == OPEN:
                 still[n_open] = i
                 n_open += 1

@@ -7,7 +7,7 @@ import pytest
 
 from engine.segment_clipping.clip_segments import clip_segments
 from engine.solids.sphere import Sphere
-from tests.unit.segment_clipping.scenes import settled_alone
+from tests.unit.segment_clipping.scenes import check, settled_alone
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
@@ -20,3 +20,28 @@ def test_points_are_those_of_whole_numbers(dimension: int) -> None:
     assert list(zip(*(array.tolist() for array in (pieces.t, pieces.start, pieces.end, pieces.faces)))) == [
         ([*piece.t], piece.start, piece.end, [*piece.faces]) for piece in exact if piece is not None
     ]
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_tangents_as_near_as_doubles_come_need_no_whole_numbers(dimension: int) -> None:
+    random = np.random.default_rng(dimension)
+    touch = random.normal(size=(200, 3)) * (1.0, 1.0, dimension - 2.0)
+    touch /= np.linalg.norm(touch, axis=1, keepdims=True)
+    along = np.cross(
+        touch, random.normal(size=(200, 3)) if dimension == 3 else np.broadcast_to([0.0, 0.0, 1.0], (200, 3))
+    )
+    segments = np.ascontiguousarray(np.stack([touch - along, touch + 2.0 * along], axis=1)[:, :, :dimension])
+    pieces, accuracy = clip_segments(segments, Sphere([0.0] * dimension, 1.0), report=True)
+    assert accuracy.n_rational <= 2
+    assert 50 < len(pieces) < 150
+    check(segments, Sphere([0.0] * dimension, 1.0))
+
+
+def test_a_tangent_of_whole_numbers_is_a_point() -> None:
+    lengths = np.arange(1.0, 9.0)[:, None]
+    touch, along = np.array([3.0, 4.0]), np.array([-4.0, 3.0])
+    segments = np.stack([touch - lengths * along, touch + 3.0 * along * np.ones((8, 1))], axis=1)
+    pieces, accuracy = clip_segments(segments, Sphere([0.0, 0.0], 5.0), report=True)
+    assert accuracy.n_rational == 0
+    assert pieces.start.tolist() == pieces.end.tolist() == [[3.0, 4.0]] * 8
+    check(segments, Sphere([0.0, 0.0], 5.0))
