@@ -94,11 +94,13 @@ def fill_on_boxes(
         if stop[0]:
             return
         n_here = min(BLOCK, size - start)
-        for j in range(n_here):
-            px[j], py[j], pz[j] = point_of(segments, items[start + j], 0, is_flat)
-            qx[j], qy[j], qz[j] = point_of(segments, items[start + j], 1, is_flat)
-            entered[j], left[j] = planes[start + j, 0], planes[start + j, 1]
-        for j in range((n_here + 7) >> 3 << 3):  # whole vectors
+        n_lanes = (n_here + 7) >> 3 << 3  # whole vectors
+        for j in range(n_lanes):
+            place = min(start + j, size - 1)
+            px[j], py[j], pz[j] = point_of(segments, items[place], 0, is_flat)
+            qx[j], qy[j], qz[j] = point_of(segments, items[place], 1, is_flat)
+            entered[j], left[j] = planes[place, 0], planes[place, 1]
+        for j in range(n_lanes):
             p, q = (px[j], py[j], pz[j]), (qx[j], qy[j], qz[j])
             px[j], py[j], pz[j], t0[j], p_sure = cut_end(p, q, lowest, highest, entered[j], 0.0)
             qx[j], qy[j], qz[j], t1[j], q_sure = cut_end(p, q, lowest, highest, left[j], 1.0)

@@ -122,10 +122,11 @@ def decide_on_boxes(
         if stop[0]:
             return
         size = min(BLOCK, last - start)
-        for j in range(size):
-            px[j], py[j], pz[j] = point_of(segments, start + j, 0, is_flat)
-            qx[j], qy[j], qz[j] = point_of(segments, start + j, 1, is_flat)
-        for j in range((size + 7) >> 3 << 3):  # whole vectors; what is past `size` is not looked at
+        n_lanes = (size + 7) >> 3 << 3  # whole vectors; what is past `size` is not looked at
+        for j in range(n_lanes):
+            px[j], py[j], pz[j] = point_of(segments, min(start + j, last - 1), 0, is_flat)
+            qx[j], qy[j], qz[j] = point_of(segments, min(start + j, last - 1), 1, is_flat)
+        for j in range(n_lanes):
             p, q = (px[j], py[j], pz[j]), (qx[j], qy[j], qz[j])
             state[j], entered[j], left[j] = decide_roughly(p, q, lowest, highest)
         n_unsure = 0

@@ -263,10 +263,10 @@ def decide_on_rows(
     kept, n_open, beyond = 0, 0, 0
     for begin in range(first, last, BLOCK):
         size = min(BLOCK, last - begin)
-        n_lanes = (size + 7) >> 3 << 3  # whole vectors
-        for i in range(size):
-            px[i], py[i], pz[i] = point_of(segments, begin + i, 0, is_flat)
-            qx[i], qy[i], qz[i] = point_of(segments, begin + i, 1, is_flat)
+        n_lanes = (size + 7) >> 3 << 3  # whole vectors, filled by the last one: what lies there may take long to divide
+        for i in range(n_lanes):
+            px[i], py[i], pz[i] = point_of(segments, min(begin + i, last - 1), 0, is_flat)
+            qx[i], qy[i], qz[i] = point_of(segments, min(begin + i, last - 1), 1, is_flat)
         for i in range(n_lanes):
             largest = max(abs(px[i]), abs(py[i]), abs(pz[i]), abs(qx[i]), abs(qy[i]), abs(qz[i]))
             is_good = is_plain((px[i], py[i], pz[i]), (qx[i], qy[i], qz[i])) & (largest < limit)

@@ -11,8 +11,8 @@ from typing import Any, Final
 from engine.jit import bare_kernel, inline, merged
 from engine.predicates.cut_point import parameter_and_point, point_at
 from engine.predicates.double_double import U2, dd_add, dd_div
-from engine.predicates.error_free import two_prod, two_sum, workspace
-from engine.predicates.expansion import sign
+from engine.predicates.error_free import two_diff, two_prod, two_sum, workspace
+from engine.predicates.expansion import Components, grow, is_safe, sign
 from engine.segment_clipping.cyrus_beck import VALUE_TINY, columns_of, expand_value, is_row_safe, is_segment_safe
 from engine.segment_clipping.pieces import Pieces, Triple, point_of, put_end, put_own_end
 from engine.segment_clipping.plane_meeting import T_BOUND
@@ -49,15 +49,28 @@ def parameter_of(sp: Triple, sq: Triple) -> tuple[float, float, float, bool]:
 
 
 @inline
+def expand_difference(x: float, y: float, e: Components) -> int:
+    """Set e to x - y as an expansion; two places. Returns its length."""
+    h, low = two_diff(x, y)
+    return grow(e, grow(e, 0, low), h)
+
+
+@inline
 def cut_by_signs(row: Any, segment: Any, point: Any, axis: int, at: float) -> tuple[float, bool]:
     """Set `point` to where `segment` crosses the plane of `row`, by exact signs; return t and whether all is sure.
 
-    axis, at: across an axis, where; else -1 and anything.
+    axis, at: across an axis, where, so that values are differences; else -1 and anything.
     """
-    if not (is_row_safe(row) and is_segment_safe(segment)):
-        return 0.0, False
     wp, wq, e = workspace(8), workspace(8), workspace(96)
-    n_wp, n_wq = expand_value(row, segment[0], wp), expand_value(row, segment[1], wq)
+    if axis >= 0:
+        p, q = segment[0, axis], segment[1, axis]
+        if not (is_safe(p) and is_safe(q) and is_safe(at)):
+            return 0.0, False
+        n_wp, n_wq = expand_difference(p, at, wp), expand_difference(q, at, wq)
+    else:
+        if not (is_row_safe(row) and is_segment_safe(segment)):
+            return 0.0, False
+        n_wp, n_wq = expand_value(row, segment[0], wp), expand_value(row, segment[1], wq)
     for e_w, n_w in ((wp, n_wp), (wq, n_wq)):
         if sign(e_w, n_w) < 0:
             for i in range(n_w):
