@@ -60,7 +60,10 @@ _IMPORT = re.compile(
 
 @functools.cache
 def _file(module: str) -> Path | None:
-    """Return the source of the dotted engine `module`, None if there is no such file."""
+    """Return the source of the dotted `module`, of the engine or one that has kernels of its own; None if none is."""
+    if module.partition(".")[0] != "engine":
+        own = getattr(sys.modules.get(module), "__file__", None)
+        return None if own is None else Path(own)
     base = _folder(module)
     found = (path for path in (base.with_suffix(".py"), base / "__init__.py") if path.is_file())
     return None if module == "engine" else next(found, None)
@@ -68,7 +71,7 @@ def _file(module: str) -> Path | None:
 
 @functools.cache
 def read_source(module: str) -> tuple[bytes, set[str]]:
-    """Return a hash of an engine module, and the engine modules that its import lines name, `engine` left out."""
+    """Return a hash of a module, and the engine modules that its import lines name, `engine` left out."""
     path, named = _file(module), set()
     text = "" if path is None else path.read_text("utf-8")
     for match in _IMPORT.finditer(text):

@@ -8,12 +8,20 @@ from typing import Any
 import numpy as np
 
 import engine
-from benchmarks.contenders import Couple, NotApplicable, Prepared, each_or_nan, in_threads, meshes_of, rows_of
+from benchmarks.contenders import (
+    Couple,
+    NotApplicable,
+    Prepared,
+    each_or_nan,
+    in_threads,
+    meshes_of,
+    naive_clipping,
+    rows_of,
+)
 from benchmarks.contenders.with_ours import ring_areas
 from benchmarks.errors import REFUSED
 from benchmarks.workloads import Mesh, Rings
 from engine.textbook import (
-    clip_batches,
     clip_polygons,
     clip_segments,
     collision,
@@ -74,12 +82,12 @@ def _naive_segments(region: Any, threads: int) -> Prepared:
     """All segments in one compiled pass over the rows (Cyrus and Beck), on threads."""
     match region:
         case engine.Aabb():
-            kernel = clip_batches.clip_on_box_2d if region.dimension == 2 else clip_batches.clip_on_box_3d
+            kernel = naive_clipping.clip_on_box_2d if region.dimension == 2 else naive_clipping.clip_on_box_3d
             rest: tuple[Any, ...] = (region.min, region.max)
         case engine.Convex():
-            kernel, rest = clip_batches.clip_on_planes_3d, (region.planes,)
+            kernel, rest = naive_clipping.clip_on_planes_3d, (region.planes,)
         case _:
-            kernel, rest = clip_batches.clip_on_sphere_3d, (region.center, region.radius)
+            kernel, rest = naive_clipping.clip_on_sphere_3d, (region.center, region.radius)
 
     def ask(segments: np.ndarray) -> list[Any]:
         return in_threads(lambda part: kernel(segments[part], *rest), len(segments), threads)
@@ -95,7 +103,7 @@ def _naive_polygons(region: engine.Aabb, threads: int) -> Prepared:
         return polygons.reshape(-1, dimension), size * np.arange(n + 1)
 
     def ask(rings: tuple[np.ndarray, np.ndarray]) -> Any:
-        return clip_batches.clip_rings_on_planes(*rings, rows)
+        return naive_clipping.clip_rings_on_planes(*rings, rows)
 
     return Prepared(ask, native, lambda found: np.diff(found[1]) > 0)
 

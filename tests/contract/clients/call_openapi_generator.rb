@@ -5,13 +5,13 @@ include OpenapiClient
 
 config = Configuration.new { |it| it.scheme, it.host = ARGV[0].split("://") }
 client = ApiClient.new(config)
-sphere = SphereSolid.new(type: "sphere", center: [0, 0, 0], radius: 1.375)
+sphere = SphereSolid.new(type: "sphere", center: [0, 0, 0], radius: 1.3125)
 stored, status = SolidsApi.new(client).put_solid_with_http_info(sphere)
 puts status
 solid = StoredSolid.new(type: "stored", id: stored.id)
-question = ContainsRequest.new(solid: solid, points: [[2, 0, 0], [1.375, 0, 0], [0, 0, 0]])
+question = ContainsRequest.new(solid: solid, points: [[2, 0, 0], [1.3125, 0, 0], [0, 0, 0]])
 puts ContainmentApi.new(client).contains(question).contained.to_s.delete(" ")
-box = AabbSolid.new(type: "aabb", min: [1.375, -1, -1], max: [3, 1, 1])
+box = AabbSolid.new(type: "aabb", min: [1.3125, -1, -1], max: [3, 1, 1])
 puts CollisionApi.new(client).collide(CollideRequest.new(first: sphere, second: box)).collisions[0].relation
 begin
   wrong = SphereSolid.new(type: "sphere", center: [0, 0, 0], radius: -1)

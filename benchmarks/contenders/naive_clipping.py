@@ -1,8 +1,8 @@
 """The textbook's clipping as careful code without exactness has it: scalars in the loop, nothing allocated there.
 
-The same steps as clip_segments.py and clip_polygons.py, written out for speed; on planes one pass over the rows (Cyrus
-and Beck) in place of a code word after every cut. The yardstick of the tables of clipping: what exact decisions and
-correct rounding cost is the time of these.
+The same steps as `engine.textbook.clip_segments` and `clip_polygons`, written out for speed; on planes one pass over
+the rows (Cyrus and Beck) in place of a code word after every cut. The yardstick of the tables of clipping: what exact
+decisions and correct rounding cost is the time of these.
 What goes wrong: the same as there.
 """
 
