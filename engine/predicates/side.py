@@ -5,6 +5,8 @@ the rounded sum of 3 products and an offset is off by at most 4 (u + 2u^2) S + 3
 threshold 8u S + 8h also pays for its own rounding, and for that of coefficients that are correctly rounded (a posed
 plane, a wall of a prism: another u each). An infinity or NaN on the way makes both comparisons false.
 
+**The second stage** takes the value in double-double.
+
 **The exact stage** adds the products to an expansion. Where a product is too large or too small for that, each factor
 is split into significand and exponent and the terms are brought to a common exponent. Terms more than 2^1968 below the
 largest are left out; if the rest then is not clearly larger than they are, the answer is UNDECIDED (`rational.py`
@@ -16,12 +18,15 @@ from __future__ import annotations
 from math import frexp, ldexp
 
 from engine.jit import inline
-from engine.predicates.error_free import two_prod, workspace
+from engine.predicates.double_double import U2
+from engine.predicates.error_free import two_prod, two_sum, workspace
 from engine.predicates.expansion import Components, grow, grow_product, sign
 from engine.types import UNDECIDED, HalfSpace3, Point3
 
 BOUND_PLANE = 2.0**-50  # 8u
 GUARD = 2.0**-1072  # 8h
+DD_VALUE_BOUND = 32.0 * U2
+VALUE_TINY = 2.0**-1070
 
 SMALLEST_PRODUCT = 2.0**-967  # error_free.py: two_prod is exact from here
 LARGEST_PRODUCT = 2.0**1000  # a few of them add up below the overflow
@@ -47,10 +52,29 @@ def side_of_plane_filter(h: HalfSpace3, p: Point3) -> int:
 @inline
 def side_of_plane(h: HalfSpace3, p: Point3) -> int:
     """Return 1 if p is inside the half-space h, 0 on its plane, -1 outside, or UNDECIDED."""
-    side = side_of_plane_filter(h, p)
-    if side != UNDECIDED:
-        return side
-    return _side_exact(h, p)
+    value, _, bound = dd_value(h.a, h.b, h.c, h.d, p)
+    if value > bound:
+        return 1
+    return -1 if -value > bound else _side_exact(h, p)
+
+
+@inline
+def dd_value(a: float, b: float, c: float, d: float, point: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Return the value of a row at a point as an unevaluated sum of two doubles and a bound of its error.
+
+    Products are exact, or lose 2^-1074 where they underflow; the tails of them and of sums, together below 4 u of the
+    sum of absolute terms, are added up with six roundings. An infinity on the way gives no number.
+    """
+    x, y, z = point
+    ah, al = two_prod(a, x)
+    bh, bl = two_prod(b, y)
+    ch, cl = two_prod(c, z)
+    h, first = two_sum(ah, bh)
+    h, second = two_sum(h, ch)
+    h, third = two_sum(h, d)
+    bound = DD_VALUE_BOUND * (abs(ah) + abs(bh) + abs(ch) + abs(d)) + VALUE_TINY
+    h, low = two_sum(h, (al + bl) + (cl + first) + (second + third))
+    return h, low, bound
 
 
 @inline

@@ -6,35 +6,17 @@ expansions of both plane values (cut_point.py). In the plane z is 0.
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any
 
 from engine.jit import bare_kernel, inline, merged
 from engine.predicates.cut_point import parameter_and_point, point_at
-from engine.predicates.double_double import U2, dd_add, dd_div
-from engine.predicates.error_free import two_diff, two_prod, two_sum, workspace
+from engine.predicates.double_double import dd_add, dd_div
+from engine.predicates.error_free import two_diff, workspace
 from engine.predicates.expansion import Components, grow, is_safe, sign
-from engine.segment_clipping.cyrus_beck import VALUE_TINY, columns_of, expand_value, is_row_safe, is_segment_safe
+from engine.predicates.side import dd_value
+from engine.segment_clipping.cyrus_beck import columns_of, expand_value, is_row_safe, is_segment_safe
 from engine.segment_clipping.pieces import Pieces, Triple, point_of, put_end, put_own_end
 from engine.segment_clipping.plane_meeting import T_BOUND
-
-DD_VALUE_BOUND: Final = 32.0 * U2
-"""Bound of a plane value in double-double: exact products and sums, whose tails, together below 4 u of the sum of
-absolute terms, are added up with six roundings."""
-
-
-@inline
-def dd_value(a: float, b: float, c: float, d: float, point: Triple) -> Triple:
-    """Return the value of a row at a point as an unevaluated sum of two doubles and a bound of its error."""
-    x, y, z = point
-    ah, al = two_prod(a, x)
-    bh, bl = two_prod(b, y)
-    ch, cl = two_prod(c, z)
-    h, first = two_sum(ah, bh)
-    h, second = two_sum(h, ch)
-    h, third = two_sum(h, d)
-    bound = DD_VALUE_BOUND * (abs(ah) + abs(bh) + abs(ch) + abs(d)) + VALUE_TINY
-    h, low = two_sum(h, (al + bl) + (cl + first) + (second + third))
-    return h, low, bound
 
 
 @inline
