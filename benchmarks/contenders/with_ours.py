@@ -177,7 +177,16 @@ def _crowd(crowd: Crowd, threads: int) -> Prepared:
 
 
 def _sides(pairs: Any) -> list[list[engine.Polygon]]:
-    return [[engine.Polygon(pair[side]) for pair in pairs] for side in range(2)]
+    if len(pairs) == 1:
+        return [[engine.Polygon(rings)] for rings in pairs[0]]
+    return [_made([pair[side] for pair in pairs]) for side in range(2)]
+
+
+def _made(shapes: list[list[np.ndarray]]) -> list[engine.Polygon]:
+    """Return many polygons from their rings, put one after another, as arrays of geometries hold them."""
+    rings = [ring for shape in shapes for ring in shape]
+    sizes = [np.cumsum([0, *map(len, parts)]) for parts in (rings, shapes)]
+    return engine.polygons(np.concatenate(rings), *sizes)
 
 
 def _overlay(operation: Any, threads: int) -> Prepared:

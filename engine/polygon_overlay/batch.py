@@ -81,8 +81,7 @@ class OverlayBatch:
             return overlay_rings(subject, clip, self._operation, self._output, Budget())[0]
         one = taken(self._exact, np.array([pair]))
         exact = ImplicitRings(subject, clip, read_only(one.sources), one.ring_offsets)
-        vertices, displacement = read_only(one.vertices), float(one.displacement[0])
-        return as_overlay(vertices, one.piece_offsets, displacement, exact, self._output)
+        return as_overlay(read_only(one.vertices), one.piece_offsets, float(one.displacement[0]), exact, self._output)
 
     @property
     def areas(self) -> FloatArray:
@@ -177,12 +176,12 @@ def overlay_batch(
             parts[start] = run_kernel(_gathered(subjects[start:stop]), _gathered(clips[start:stop]), operation, budget)
 
         run_chunks(task, len(subjects), budget=budget, first_chunk=_FIRST_CHUNK, workers=workers, progress=progress)
-        found = first_found = joined([NO_PAIRS, *(parts[start] for start in sorted(parts))])
+        found = first_found = joined([parts[start] for start in sorted(parts)] or [NO_PAIRS])
         rest = _Rest(np.zeros(len(subjects), np.int8), np.zeros(len(subjects), np.bool_), {})
         ulps, n_rational = 0.5, 0
         if found.status.any():
             found, ulps, n_rational = _settled(found, rest, subjects, clips, operation, output, workers, budget)
-    for array in (rest.status, *found, *first_found):
+    for array in (rest.status, *found, *(first_found if first_found is not found else ())):
         array.setflags(write=False)
     batch = OverlayBatch(
         status=rest.status,

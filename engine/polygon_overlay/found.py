@@ -84,6 +84,8 @@ def places_of(offsets: IntArray, items: IntArray) -> IntArray:
 
 def joined(parts: list[Found]) -> Found:
     """Return the pairs of all parts, at least one, one part after another; no evidence."""
+    if len(parts) == 1:
+        return parts[0]._replace(evidence=NO_EVIDENCE)
     outcomes = (np.concatenate(arrays) for arrays in list(zip(*parts, strict=True))[:3])
     return Found(*outcomes, *put_together([(*part[3:7], NO_EVIDENCE) for part in parts]))
 

@@ -9,23 +9,25 @@ or collapses parts, rings are arranged once more, without another rounding.
 
 from __future__ import annotations
 
+import functools
 from dataclasses import replace
 from fractions import Fraction
-from math import frexp, isfinite, log10, nextafter
+from math import frexp, inf, isfinite, log10, nextafter, ulp
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray, read_only
+from engine.arrays import FloatArray, Int32Array, IntArray, read_only
 from engine.direct import entry_of
 from engine.errors import InvalidInputError, NotRepresentableError
 from engine.parallel import Budget
 from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
-from engine.polygon_overlay.compiled.snapping import find_passages, stay_apart
+from engine.polygon_overlay.compiled.snapping import FOLDS, Snapped, scale, snap, stay_apart
 from engine.polygon_overlay.compiled.workspace import keep, scratch_for
 from engine.polygon_overlay.found import Found, one_pair, ring_numbers, summed
 from engine.polygon_overlay.implicit_rings import ImplicitRings, edges_along, rings_alone
-from engine.polygon_overlay.result import Overlay
+from engine.polygon_overlay.result import Overlay, made_overlay
+from engine.polygon_overlay.run_pair import FoundPair
 from engine.solids.checks import shown
 from engine.solids.ragged import next_in_rings
 
@@ -43,118 +45,148 @@ HALF_DIAGONAL: Final = nextafter(0.5**0.5, 1.0)
 
 
 class Grid(NamedTuple):
-    """Multiples of ``base ** power``; base: 2 or 10."""
+    """Multiples of ``base ** power``; base: 2 or 10. spacing: their distance, the nearest double.
+
+    into, back: by what coordinates are divided, and twice multiplied, to be counted in units, and these to be
+    coordinates. Of two factors of a power of two, which no double may be, the first loses nothing.
+    """
 
     base: int
     power: int
-
-    @property
-    def size(self) -> Fraction:
-        """The spacing, exactly."""
-        return Fraction(self.base) ** self.power
+    spacing: float
+    into: tuple[float, float, float]
+    back: tuple[float, float, float]
 
     def units_of(self, vertices: FloatArray) -> FloatArray:
         """Return coordinates in units of the grid; by powers of ten these are rounded to doubles."""
-        with np.errstate(over="ignore"):
-            if self.base == 2:
-                units = np.ldexp(vertices, -self.power)
-            else:
-                units = vertices / 10.0**self.power if self.power > 0 else vertices * 10.0**-self.power
-        if len(units) and not np.abs(units).max() < _MOST:
+        near_by = _ROUNDED if self.base == 10 else 0.0  # multiples, rounded twice, are whole numbers again
+        units = np.empty_like(vertices)
+        if not entry_of(scale)(vertices, *self.into, near_by, _LEAST, _MOST, units):
             raise InvalidInputError(
                 f"grid must be no finer than 2^-51 of the largest coordinate, {np.abs(vertices).max().item()!r}; got "
-                f"{float(self.size)!r}",
+                f"{self.spacing!r}",
                 ("grid",),
             )
-        if self.base == 10:  # multiples, rounded twice, are whole numbers again
-            near = np.rint(units)
-            units = np.where(np.abs(units - near) <= _ROUNDED * np.abs(units), near, units)
-        return read_only(np.where(np.abs(units) < _LEAST, 0.0, units))
+        return read_only(units)
 
     def places_of(self, units: FloatArray) -> FloatArray:
         """Return the doubles nearest to whole multiples of the grid."""
-        with np.errstate(over="ignore"):
-            if self.base == 2:
-                places = np.ldexp(units, self.power)
-            else:
-                places = units * 10.0**self.power if self.power > 0 else units / 10.0**-self.power
-        if not np.isfinite(places).all():
+        places = np.empty_like(units)
+        if not entry_of(scale)(units, *self.back, 0.0, 0.0, inf, places):
             raise NotRepresentableError("a multiple of the grid is beyond the largest float64; scale the input down")
-        return places + 0.0
+        return read_only(places)
 
 
 def grid_of(size: object) -> Grid:
     """Return the grid of a spacing; refuse what is no power of two or ten."""
     if isinstance(size, (int, float, np.floating)) and not isinstance(size, bool) and isfinite(size) and size > 0:
-        mantissa, exponent = frexp(size)
-        if mantissa == 0.5:
-            return Grid(2, exponent - 1)
-        power = round(log10(size))
-        if abs(power) <= _TENS and float(size) == float(f"1e{power}"):
-            return Grid(10, power)
+        if (found := _grid_of(float(size))) is not None:
+            return found
     raise InvalidInputError(
         f"grid must be a power of two, or of ten from 1e-{_TENS} to 1e{_TENS}; got {shown(size)}", ("grid",)
     )
 
 
-def snapped_to_units(rings: Found, budget: Budget) -> Found:
-    """Return valid rings of one pair snapped to whole numbers: DONE, or MAY_CROSS if they are to be arranged again.
-
-    Displacement is 0 where no vertex moved. sources: twice the vertex whose edge goes on from there.
-    """
-    vertices, offsets = rings.vertices, rings.ring_offsets
-    pixels = _pixels_of(vertices)
-    if np.array_equal(pixels, vertices):
-        return rings._replace(sources=_along(np.arange(len(vertices))))
-    passages, stays = _passages_of(vertices, offsets, budget)
-    if stays and _are_in_order(pixels, rings):
-        snapped, edges = pixels, np.arange(len(vertices))
-    else:
-        snapped, edges, offsets = _bent(vertices, pixels, offsets, passages)
-    status = DONE if snapped is pixels else MAY_CROSS
-    return one_pair(snapped, offsets, rings.piece_offsets, HALF_DIAGONAL, 0, _along(edges), status)
+@functools.lru_cache(64)
+def _grid_of(size: float) -> Grid | None:
+    mantissa, exponent = frexp(size)
+    if mantissa == 0.5:
+        half = (exponent - 1) // 2
+        first, second = 2.0**half, 2.0 ** (exponent - 1 - half)
+        return Grid(2, exponent - 1, size, (1.0, 1.0 / first, 1.0 / second), (1.0, first, second))
+    power = round(log10(size))
+    if abs(power) > _TENS or size != float(f"1e{power}"):
+        return None
+    ten = 10.0 ** abs(power)
+    ways = (ten, 1.0, 1.0), (1.0, ten, 1.0)
+    return Grid(10, power, size, *(ways if power > 0 else ways[::-1]))
 
 
-def _pixels_of(vertices: FloatArray) -> FloatArray:
-    """Return the whole numbers whose pixels, half open, vertices lie in."""
-    near = np.rint(vertices)
-    return near + (vertices - near == 0.5) + 0.0
+class _OnGrid(NamedTuple):
+    """What becomes of valid rings on whole numbers. n_moved: vertices that are none; stays: whether rings stay what
+    they are. vertices, offsets, edges: rings then, and by vertex the one whose edge goes on from there; else the whole
+    points of all vertices, and of passages which edge passes the pixel of which vertex."""
+
+    n_moved: int
+    stays: bool
+    vertices: FloatArray
+    offsets: IntArray
+    edges: Int32Array | None
+    passages: Int32Array
 
 
-def _passages_of(vertices: FloatArray, offsets: IntArray, budget: Budget) -> tuple[IntArray, bool]:
-    """Return what `find_passages` does."""
-    n_most, n_rings = max(64, len(vertices)), len(offsets) - 1
+def snap_vertices(vertices: FloatArray, offsets: IntArray, piece_offsets: IntArray, budget: Budget) -> _OnGrid:
+    """Return what becomes of valid rings, read-only arrays. Raises as `Budget.check`."""
+    n = len(vertices)
+    n_most, n_rings = max(64, n), len(offsets) - 1
+    made = Snapped(np.empty((n, 2)), np.empty(n, np.int32), np.empty(n_rings + 1, np.int64), np.empty(0))
     while True:  # bound: the second turn has room
-        passages = np.empty((n_most, 2), np.int32)
+        made = made._replace(passages=np.empty((n_most, 2), np.int32))
         budget.take(8 * n_most)
-        scratch = scratch_for(len(vertices), n_rings, 256, 0, 0)
-        n, stays = entry_of(find_passages)(
-            read_only(vertices), read_only(offsets), budget.flag, scratch.buffers, passages
-        )
+        scratch = scratch_for(n, n_rings, 256, 0, 0)
+        n_moved, m, n_corners = entry_of(snap)(vertices, offsets, piece_offsets, budget.flag, scratch.buffers, made)
         budget.check()
         keep(scratch)
-        if n <= n_most:
-            return passages[:n].astype(np.int64), stays
-        n_most = n
+        if m <= n_most:
+            break
+        n_most = m
+    passages = made.passages[:m]
+    if n_corners in (n, FOLDS):
+        return _OnGrid(n_moved, n_corners == n, read_only(made.pixels), offsets, None, passages)
+    corners = made.corners[:n_corners]
+    pixels = made.pixels[corners]
+    n_moved = int((pixels != vertices[corners]).any(axis=1).sum())
+    return _OnGrid(n_moved, True, read_only(pixels), read_only(made.starts), corners, passages)
 
 
-def _are_in_order(pixels: FloatArray, rings: Found) -> bool:
-    """Tell whether pieces, and the holes of each, stand in their order, by their first vertices."""
-    if len(rings.ring_offsets) <= 2:
-        return True
-    firsts, shells = pixels[rings.ring_offsets[:-1]], rings.piece_offsets[:-1]
-    is_hole = np.ones(len(firsts), np.bool_)
-    is_hole[shells] = False
+def snapped_to_units(rings: Found, budget: Budget, known: _OnGrid | None = None) -> Found:
+    """Return valid rings of one pair snapped to whole numbers: DONE, or MAY_CROSS if they are to be arranged again.
 
-    def ascend(some: FloatArray) -> Any:
-        before, after = some[:-1], some[1:]
-        return (before[:, 0] < after[:, 0]) | ((before[:, 0] == after[:, 0]) & (before[:, 1] < after[:, 1]))
+    Displacement is 0 where no vertex moved. sources: twice the vertex whose edge goes on from there. known: what
+    `snap_vertices` returned for these rings.
+    """
+    vertices, offsets = rings.vertices, rings.ring_offsets
+    found = known or snap_vertices(read_only(vertices), read_only(offsets), read_only(rings.piece_offsets), budget)
+    edges = np.arange(len(vertices)) if found.edges is None else found.edges.astype(np.int64)
+    if found.n_moved == 0 and found.edges is None:
+        return rings._replace(sources=_along(edges))
+    snapped, ends, status = found.vertices, found.offsets, DONE
+    if not found.stays:
+        snapped, edges, ends = _bent(vertices, snapped, offsets, found.passages.astype(np.int64))
+        status = MAY_CROSS
+    return one_pair(snapped, ends, rings.piece_offsets, HALF_DIAGONAL, 0, _along(edges), status)
 
-    return bool(ascend(firsts[shells]).all() and (ascend(firsts) | ~(is_hole[1:] & is_hole[:-1])).all())
+
+def as_it_stays(found: FoundPair, snapped: _OnGrid, grid: Grid, start: int) -> Overlay | None:
+    """Return the overlay of a pair whose rings stay what they are on the grid, in the units of its input.
+
+    start: of the vertices of the clip among all. The same as `settle_rings` and `from_units`; None where they do not,
+    or doubles may not tell its multiples apart.
+    """
+    if not snapped.stays or (grid.base == 10 and not _are_told_apart(snapped.vertices)):
+        return None
+    places, edges = grid.places_of(snapped.vertices), edges_along(found.sources)
+    has_moved = snapped.n_moved > 0 or snapped.edges is not None
+    displacement = nextafter(found.displacement + HALF_DIAGONAL, inf) if has_moved else found.displacement
+    n_pieces = len(found.piece_offsets) - 1
+    return made_overlay(
+        vertices=places,
+        ring_offsets=snapped.offsets,
+        piece_offsets=found.piece_offsets,
+        n_pieces_exact=n_pieces,
+        n_holes_exact=len(snapped.offsets) - 1 - n_pieces,
+        exact=rings_alone(places, snapped.offsets),
+        largest_displacement=_displacement(displacement, grid, places),
+        rounds=int(found.displacement > 0.0) + int(has_moved),
+        snapped=has_moved,
+        vertices_moved=snapped.n_moved,
+        _edges=edges if snapped.edges is None else edges[snapped.edges],
+        _starts=np.array([start]),
+    )
 
 
 def _bent(
-    vertices: FloatArray, pixels: FloatArray, offsets: IntArray, passages: IntArray
+    vertices: FloatArray, pixels: FloatArray, offsets: IntArray, passages: Int32Array
 ) -> tuple[FloatArray, IntArray, IntArray]:
     """Return rings led through the pixels that they pass, none twice in succession, and of each vertex its edge."""
     edges, others = passages.T
@@ -190,35 +222,43 @@ def _stay_apart(result: Overlay, budget: Budget) -> bool:
     return bool(are_apart)
 
 
-def from_units(result: Overlay, grid: Grid, starts: IntArray, again: Any, budget: Budget) -> Overlay:
+def _are_told_apart(units: FloatArray) -> bool:
+    """Tell whether the doubles nearest to these multiples of a power of ten surely lie to each other as they do."""
+    return not len(units) or max(-float(units.min()), float(units.max())) <= _SURELY_VALID
+
+
+def _displacement(displacement: float, grid: Grid, places: FloatArray) -> float:
+    """Return a bound in units, with what is rounded between these and places, as one between places."""
+    moved = grid.spacing * displacement
+    if grid.base == 10 and len(places):  # units are rounded, and what they stand for
+        moved += 2.0 * ulp(max(-float(places.min()), float(places.max())))
+    return nextafter(moved, inf) if moved else 0.0
+
+
+def from_units(result: Overlay, grid: Grid, start: int, again: Any, budget: Budget) -> Overlay:
     """Return an overlay in units of the grid as one in the units of its input; its exact rings are its own then.
 
-    starts: as `Overlay._starts`. again: arranges rings.
+    start: of the vertices of the clip among all. again: arranges rings.
     """
-    vertices = grid.places_of(result.vertices)
-    is_valid = grid.base == 2 or not len(vertices) or np.abs(result.vertices).max() <= _SURELY_VALID
+    vertices = grid.places_of(read_only(result.vertices))
+    is_valid = grid.base == 2 or _are_told_apart(result.vertices)
     if not is_valid and not _stay_apart(result, budget):
         rings = one_pair(vertices, result.ring_offsets, result.piece_offsets, 0.0, 0, status=MAY_CROSS)
         is_valid = np.array_equal(again(rings, budget).vertices, vertices)
         if not is_valid:
             raise NotRepresentableError(
-                f"multiples of {float(grid.size)!r} are not told apart well enough by float64 here; take a power of two"
+                f"multiples of {grid.spacing!r} are not told apart well enough by float64 here; take a power of two"
             )
-    size = grid.size
-    moved = float(size) * result.largest_displacement
-    if grid.base == 10 and len(vertices):  # units are rounded, and what they stand for
-        moved += 2.0 * float(np.spacing(np.abs(vertices).max()))
     edges = result._edges
     if edges is None:
         assert isinstance(result.exact, ImplicitRings)
         edges = edges_along(result.exact.sources)
-    exact = rings_alone(vertices, result.ring_offsets)
     return replace(
         result,
-        vertices=exact.subject.vertices,
-        exact=exact,
-        largest_displacement=float(np.nextafter(moved, np.inf)) if moved else 0.0,
-        _lost=result._lost and result._lost._replace(unit=size),
+        vertices=vertices,
+        exact=rings_alone(vertices, result.ring_offsets),
+        largest_displacement=_displacement(result.largest_displacement, grid, vertices),
+        _lost=result._lost and result._lost._replace(unit=Fraction(grid.base) ** grid.power),
         _edges=edges,
-        _starts=starts,
+        _starts=np.array([start]),
     )

@@ -122,10 +122,20 @@ class ImplicitRings(NamedTuple):
 
 def rings_alone(vertices: FloatArray, offsets: IntArray) -> ImplicitRings:
     """Return rings of doubles as rings over themselves."""
-    sources = np.full((len(vertices), 2), -1, np.int32)
-    sources[:, 0] = np.arange(len(vertices))
     own = RingArrays(read_only(vertices), read_only(offsets))
-    return ImplicitRings(own, NOTHING, read_only(sources), own.offsets)
+    n, few = len(vertices), _FEW_THEMSELVES
+    sources = few[:n] if n <= len(few) else _themselves(n)
+    return ImplicitRings(own, NOTHING, sources, own.offsets)
+
+
+def _themselves(n: int) -> npt.NDArray[np.int32]:
+    sources = np.full((n, 2), -1, np.int32)
+    sources[:, 0] = np.arange(n)
+    return read_only(sources)
+
+
+_FEW_THEMSELVES: Final = _themselves(1024)
+"""Those of small rings, which are asked for often."""
 
 
 def _ends_of_edges(vertices: FloatArray, offsets: IntArray, firsts: IntArray) -> IntArray:

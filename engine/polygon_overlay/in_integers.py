@@ -24,6 +24,7 @@ from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.compiled.ring_nesting import FIRST_ALONE, NEGATIVE, NON_ZERO, PAIR, POSITIVE, Nesting
 from engine.polygon_overlay.found import Found, one_pair, ring_sizes
+from engine.polygon_overlay.grid import snapped_to_units
 from engine.polygon_overlay.nearest import leave_nearest
 from engine.polygon_overlay.result import Output, Overlay
 from engine.polygon_overlay.rounds import settle_rings
@@ -72,7 +73,7 @@ def overlay_exactly(
     else:
         moved = first.displacement
         first = first._replace(displacement=np.where(moved, np.nextafter(moved, np.inf), 0.0))
-        settled = settle_rings(first, exact, arranged_again, True, budget, is_on_grid)
+        settled = settle_rings(first, exact, arranged_again, True, budget, snapped_to_units if is_on_grid else None)
         if settled is None:
             raise TooComplexError("snap rounding left a vertex off its lattice; please report this input")
         result = settled

@@ -153,15 +153,16 @@ def overlay_rings(
     if units is not None:
         if output != "valid":
             raise InvalidOperationError(f'a grid goes with output="valid" only; got {shown(output)}', ("output",))
-        first, second = (rings._replace(vertices=units.units_of(rings.vertices)) for rings in (subject, clip))
-    compiled = overlay_compiled(first, second, operation, output, budget, nesting, units is not None)
+        first = RingArrays(units.units_of(subject.vertices), subject.offsets)
+        second = RingArrays(units.units_of(clip.vertices), clip.offsets)
+    compiled = overlay_compiled(first, second, operation, output, budget, nesting, units)
     if compiled is not None:
         result, n_exact, n_rational = *compiled, 0
     else:
         result, n_exact = overlay_exactly(first, second, operation, output, budget, nesting, units is not None)
         n_rational = n_exact
-    if units is not None:
-        result = from_units(result, units, np.array([len(subject.vertices)]), arranged_again, budget)
+        if units is not None:
+            result = from_units(result, units, len(subject.vertices), arranged_again, budget)
     if result._lost is not None and budget.deadline is not None:  # who set one waits no longer for what was lost
         vars(result)["collapsed"] = result._lost.parts(budget)
     return result, n_exact, n_rational

@@ -10,6 +10,7 @@ import numpy as np
 from engine.arrays import FloatArray, IntArray, read_only
 from engine.errors import RingTooShortError
 from engine.polygon_overlay.found import chained, places_of, summed
+from engine.polygon_overlay.implicit_rings import one_polygon
 from engine.solids.polygon import Polygon
 from engine.solids.ragged import parted
 
@@ -44,11 +45,13 @@ class PolygonArrays(NamedTuple):
 
     def sizes(self) -> IntArray:
         """Return the number of vertices of each."""
-        return np.diff(self.ring_offsets[self.polygon_offsets])
+        starts = self.ring_offsets[self.polygon_offsets]
+        return starts[1:] - starts[:-1]
 
     def most(self) -> tuple[int, int]:
         """Return the most vertices, and the most rings, that one has."""
-        return int(self.sizes().max(initial=0)), int(np.diff(self.polygon_offsets).max(initial=0))
+        starts = self.polygon_offsets
+        return int(self.sizes().max(initial=0)), int((starts[1:] - starts[:-1]).max(initial=0))
 
     def boxes(self, numbers: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return the low and the high corners (n, 2) of some, none of which is empty and which are in order."""
@@ -88,6 +91,8 @@ def gathered(polygons: Sequence[Polygon]) -> PolygonArrays:
 
     Joined as bytes: numpy takes three times as long to put small arrays one after another.
     """
+    if len(polygons) == 1:
+        return PolygonArrays(polygons[0].vertices, polygons[0].ring_offsets, one_polygon(polygons[0].n_rings))
     vertices = np.frombuffer(b"".join(cast("list[bytes]", [each.vertices for each in polygons])))
     offsets = np.frombuffer(b"".join(cast("list[bytes]", [each.ring_offsets for each in polygons])), np.int64)
     if len(offsets) == 2 * len(polygons) and not offsets[::2].any():  # one ring each: a small batch waits for this

@@ -27,9 +27,8 @@ from engine.arrays import BoolArray, FloatArray, IntArray, read_only
 from engine.parallel import Budget
 from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
 from engine.polygon_overlay.found import Found, joined, one_pair, places_of, taken
-from engine.polygon_overlay.grid import snapped_to_units
 from engine.polygon_overlay.implicit_rings import edges_along
-from engine.polygon_overlay.result import Exact, Lost, Output, Overlay
+from engine.polygon_overlay.result import Exact, Lost, Overlay, made_overlay
 from engine.types import OPEN
 
 MAX_ROUNDS: Final = 12
@@ -40,12 +39,12 @@ Again = Callable[[Found, Budget], Found]
 
 
 def settle_rings(
-    first: Found, exact: Exact, again: Again, may_snap: bool, budget: Budget, is_on_grid: bool = False
+    first: Found, exact: Exact, again: Again, may_snap: bool, budget: Budget, snap: Again | None = None
 ) -> Overlay | None:
     """Arrange a pair until it is valid; None where ``again`` cannot, or snapping is needed and not possible.
 
     exact: the exact rings that ``first`` is rounded from. again: arranges rounded rings, and gives evidence. may_snap:
-    the rings are those of ``exact``, not scaled. is_on_grid: once valid, they are snapped to whole numbers (grid.py).
+    the rings are those of ``exact``, not scaled. snap: what puts them on whole numbers once they are valid (grid.py).
     """
     rings, displacement = first, float(first.displacement[0])
     rounds = int(displacement > 0.0)
@@ -69,8 +68,8 @@ def settle_rings(
                 rings, displacement = _snapped(first, exact, budget)
                 edges = own_edges[edges_along(rings.sources)]
                 origins, snapped, has_crossings = own, True, True
-    if is_on_grid:
-        rings = snapped_to_units(rings, budget)
+    if snap is not None:
+        rings = snap(rings, budget)
         edges, moved = edges[edges_along(rings.sources)], float(rings.displacement[0])
         if moved:
             rounds, displacement, snapped, has_crossings = rounds + 1, nextafter(displacement + moved, inf), True, True
@@ -83,12 +82,11 @@ def settle_rings(
         rings,
         first,
         exact,
-        "valid",
         _edges=read_only(edges),
         rounds=rounds,
         largest_displacement=displacement,
         snapped=snapped,
-        vertices_moved=n_moved(first.vertices, rings.vertices, is_on_grid) if has_crossings else 0,
+        vertices_moved=n_moved(first.vertices, rings.vertices, snap is not None) if has_crossings else 0,
         **({} if origins is own else _changes(first, rings, origins, exact)),
     )
 
@@ -123,15 +121,13 @@ def _composed(evidence: IntArray, origins: IntArray) -> IntArray:
     return np.unique(np.column_stack([np.repeat(evidence[:, 0], sizes), through]), axis=0)
 
 
-def overlay_of(rings: Found, first: Found, exact: Exact, output: Output, **told: Any) -> Overlay:
+def overlay_of(rings: Found, first: Found, exact: Exact, **told: Any) -> Overlay:
     """Return the `Overlay` of rings that are settled, ``first`` before that; told: what became of its parts."""
     n_pieces, n_rings = first.counts[0, :2].tolist()
-    return Overlay(
+    return made_overlay(
         vertices=read_only(rings.vertices),
         ring_offsets=read_only(rings.ring_offsets),
         piece_offsets=read_only(rings.piece_offsets),
-        output=output,
-        may_be_invalid=output == "nearest" and bool(first.displacement[0]),
         n_pieces_exact=n_pieces,
         n_holes_exact=n_rings - n_pieces,
         exact=exact,

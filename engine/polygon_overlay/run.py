@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import replace
 from typing import Any, Final, Literal
 
@@ -15,10 +16,11 @@ from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.compiled.ring_nesting import AGAIN, Nesting
 from engine.polygon_overlay.compiled.workspace import Outcomes, first_contacts, keep, more_contacts, scratch_for
 from engine.polygon_overlay.found import Found, one_pair, put_together, ring_sizes, summed
+from engine.polygon_overlay.grid import Grid, as_it_stays, from_units, snap_vertices, snapped_to_units
 from engine.polygon_overlay.implicit_rings import NOTHING, ImplicitRings
 from engine.polygon_overlay.nearest import leave_nearest
 from engine.polygon_overlay.polygon_arrays import PolygonArrays
-from engine.polygon_overlay.result import Output, Overlay
+from engine.polygon_overlay.result import Output, Overlay, made_overlay
 from engine.polygon_overlay.rounds import settle_rings
 from engine.polygon_overlay.run_pair import BY_CONTACT, NOT_REDUCED, UNNAMED, run_pair
 from engine.predicates.scaling import exponent_of, scaled_back, shifted
@@ -87,16 +89,17 @@ def overlay_compiled(
     output: Output,
     budget: Budget,
     nesting: Nesting = UNNAMED,
-    is_on_grid: bool = False,
+    grid: Grid | None = None,
 ) -> tuple[Overlay, int] | None:
     """Return the overlay of one pair and the number of pairs of edges beyond the filter; None where it is left open.
 
-    A scene outside of the kernel's range is brought into it by a power of two where that is exact.
+    grid: whose units coordinates are in; those of the overlay are not. A scene outside of the kernel's range is brought
+    into it by a power of two where that is exact.
     """
     found, exponent = run_pair(subject, clip, KEPT_ARRAYS[operation], budget, nesting), 0
     if found.status == OPEN:
         exponent = exponent_of(subject.vertices, clip.vertices)
-        if exponent == 0 or is_on_grid:
+        if exponent == 0 or grid is not None:
             return None
         first, second = shifted(subject.vertices, -exponent), shifted(clip.vertices, -exponent)
         if first is None or second is None:
@@ -105,19 +108,26 @@ def overlay_compiled(
         found = run_pair(*near, KEPT_ARRAYS[operation], budget, nesting)
         if found.status == OPEN:
             return None
+    result: Overlay | None = None
     exact = ImplicitRings(subject, clip, found.sources, found.ring_offsets)
-    if found.status == DONE and not is_on_grid:
+    known = None
+    if found.status == DONE and grid is None:
         result = as_overlay(found.vertices, found.piece_offsets, found.displacement, exact, output)
-    else:
+    elif found.status == DONE and grid is not None:
+        known = snap_vertices(found.vertices, found.ring_offsets, found.piece_offsets, budget)
+        result = as_it_stays(found, known, grid, len(subject.vertices))
+    if result is None:
         rings = found.ring_offsets, found.piece_offsets
         rounded = one_pair(found.vertices, *rings, found.displacement, found.n_exact, found.sources, found.status)
-        if output == "valid":
-            settled = settle_rings(rounded, exact, arranged_again, exponent == 0, budget, is_on_grid)
+        if output == "nearest":
+            result = leave_nearest(rounded, exact, budget)
         else:
-            settled = leave_nearest(rounded, exact, budget)
-        if settled is None:
+            snap = grid and functools.partial(snapped_to_units, known=known)
+            result = settle_rings(rounded, exact, arranged_again, exponent == 0, budget, snap)
+        if result is None:
             return None
-        result = settled
+        if grid is not None:
+            result = from_units(result, grid, len(subject.vertices), arranged_again, budget)
     if exponent:
         vertices, doubtful = scaled_back(result.vertices, exponent)
         if doubtful.any() or not np.isfinite(vertices).all():
@@ -143,20 +153,16 @@ def as_overlay(
     vertices: FloatArray, piece_offsets: IntArray, displacement: float, exact: ImplicitRings, output: Output
 ) -> Overlay:
     """Return an `Overlay` whose rounded rings have the structure of the exact ones; all arrays are read-only."""
-    offsets = exact.offsets
     n_pieces = len(piece_offsets) - 1
-    result = object.__new__(Overlay)
-    told = {  # all at once: Overlay(...) sets one by one, which takes 2 us
-        "vertices": vertices,
-        "ring_offsets": offsets,
-        "piece_offsets": piece_offsets,
-        "output": output,
-        "may_be_invalid": output == "nearest" and displacement > 0.0,
-        "n_pieces_exact": n_pieces,
-        "n_holes_exact": len(offsets) - 1 - n_pieces,
-        "exact": exact,
-        "largest_displacement": displacement,
-        "rounds": int(displacement > 0.0),
-    }
-    object.__setattr__(result, "__dict__", told)
-    return result
+    return made_overlay(
+        vertices=vertices,
+        ring_offsets=exact.offsets,
+        piece_offsets=piece_offsets,
+        n_pieces_exact=n_pieces,
+        n_holes_exact=len(exact.offsets) - 1 - n_pieces,
+        exact=exact,
+        output=output,
+        may_be_invalid=output == "nearest" and displacement > 0.0,
+        largest_displacement=displacement,
+        rounds=int(displacement > 0.0),
+    )

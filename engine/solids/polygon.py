@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import accumulate
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
 from engine.errors import InvalidArrayError, RingTooShortError
 from engine.solids.base import Solid, T
-from engine.solids.checks import as_points, check_not_empty, frozen
+from engine.solids.checks import as_points, check_finite, check_not_empty, frozen, is_ready
 
 _NO_VERTICES = np.zeros((0, 2))
 
@@ -94,7 +94,11 @@ class Polygon(Solid):
 
 def _as_ring(ring: object, where: tuple[str | int, ...]) -> FloatArray:
     """Return the vertices of one ring without a repeated last one."""
-    points = as_points(ring, 2, where)
+    if is_ready(ring, 2):
+        points = cast("FloatArray", ring)
+        check_finite(points, where)
+    else:
+        points = as_points(ring, 2, where)
     if len(points) < 2:
         raise RingTooShortError(f"rings[{where[-1]}] has {len(points)} vertices; a ring needs at least 2", where)
     if len(points) > 2 and points[0].tolist() == points[-1].tolist():

@@ -108,6 +108,9 @@ def polygons(coordinates: object, ring_offsets: object, polygon_offsets: object)
             if offsets is None:
                 offsets = sizes[end - start] = read_only(np.array([0, end - start]))
             found.append(Polygon.of_arrays(vertices[start:end], offsets))
+        elif not has_short[k] and last_vertices[first : last - 1] == first_vertices[first + 1 : last] != []:
+            start, end = first_vertices[first], last_vertices[last - 1]
+            found.append(Polygon.of_arrays(vertices[start:end], read_only(np.append(starts[first:last], end) - start)))
         else:
             found.append(_of_rings(vertices, first_vertices[first:last], last_vertices[first:last], ring=first))
     return found

@@ -8,21 +8,21 @@ moves by more than half a diagonal.
     |  .  |_.--   above and below it, as it rises or falls. Sides are exact signs, of doubles and halves of whole
     '--.--'       numbers.
 
-Where no edge passes a pixel but those of its ends, no two vertices share one, and no ring gets a straight vertex, rings
-stay what they are.
+Where no edge passes a pixel but those of its ends, and vertices share one only where they are one point, rings stay
+what they are, but for vertices that get straight: a point of ab and the one that parts the moved edge alike differ by
+less than a pixel, all the way there, so that c can come to lie on the edge only if ab passes the pixel of c.
 
 Source: J. D. Hobby, Practical segment intersection with finite precision output, 1999.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from engine.jit import bare_kernel, called, inline, merged
 from engine.polygon_overlay.compiled.clearance import certify
-from engine.polygon_overlay.compiled.crossing_signs import Edges
 from engine.polygon_overlay.compiled.edge_tree import (
     DOUBTFUL,
     FEW,
@@ -34,8 +34,10 @@ from engine.polygon_overlay.compiled.edge_tree import (
 )
 from engine.polygon_overlay.compiled.loading import EVERYTHING, RingArrays, fill_boxes, load_rings
 from engine.polygon_overlay.compiled.workspace import Buffers, rows_of
-from engine.predicates.orientation import orient2d
+from engine.predicates.orientation import BOUND_2D, orient2d
 from engine.types import Point2
+
+FOLDS: Final = -1
 
 
 @merged
@@ -61,52 +63,122 @@ def _passes(ax: float, ay: float, bx: float, by: float, x: float, y: float) -> b
     return orient2d(a, b, Point2(left, low)) <= 0 and orient2d(a, b, Point2(right, high)) > 0
 
 
+@bare_kernel
+def scale(
+    values: Any, divisor: float, factor: float, more: float, near_by: float, least: float, limit: float, scaled: Any
+) -> bool:
+    """Fill ``scaled``, (n, 2), with values by ``divisor``, times ``factor``, times ``more``; tell whether all of that
+    is below ``limit``, without its sign.
+
+    What lies within the part ``near_by`` of it of a whole number is that number then, and less than ``least`` is zero.
+    """
+    are_below = True
+    for k in range(values.shape[0]):
+        for axis in range(2):
+            value = values[k, axis] / divisor * factor * more
+            are_below &= abs(value) < limit
+            near = np.rint(value)
+            value = near if abs(value - near) <= near_by * abs(value) else value
+            scaled[k, axis] = 0.0 if abs(value) < least else value + 0.0
+    return are_below
+
+
 @inline
-def _is_simple(edges: Edges, n: int, stop: Any) -> bool:
-    """Tell whether every ring, of the pixels of its vertices, turns everywhere and begins where it did."""
-    x, y = edges.x, edges.y
-    first = 0
-    for k in range(n):
+def _find_pixels(vertices: Any, pixels: Any, stop: Any) -> int:
+    """Fill ``pixels`` with the whole points in whose pixels vertices lie; return how many are not there already."""
+    n_moved = 0
+    for k in range(vertices.shape[0]):
         if k & POLL == 0 and stop[0]:
-            return False
-        i, j = edges.before[k], edges.after[k]
-        before, here, after = (
-            Point2(_pixel(x[i]), _pixel(y[i])),
-            Point2(_pixel(x[k]), _pixel(y[k])),
-            Point2(_pixel(x[j]), _pixel(y[j])),
-        )
-        if orient2d(before, here, after) == 0:
-            return False
-        if edges.ring[k] != edges.ring[first]:
-            first = k
-        px, py = _pixel(x[first]), _pixel(y[first])
-        if here.x < px or (here.x == px and here.y < py):
-            return False
-    return True
+            return 0
+        pixels[k, 0], pixels[k, 1] = _pixel(vertices[k, 0]) + 0.0, _pixel(vertices[k, 1]) + 0.0
+        n_moved += (pixels[k, 0] != vertices[k, 0]) | (pixels[k, 1] != vertices[k, 1])
+    return n_moved
+
+
+@merged
+def _is_before(pixels: Any, i: int, j: int) -> bool:
+    return pixels[i, 0] < pixels[j, 0] or (pixels[i, 0] == pixels[j, 0] and pixels[i, 1] < pixels[j, 1])
+
+
+@inline
+def _find_corners(pixels: Any, offsets: Any, pieces: Any, corners: Any, starts: Any, stop: Any) -> int:
+    """Fill ``corners`` with the vertices where rings turn, ``starts`` with where those of each ring begin there.
+
+    Returns how many, or FOLDS where a ring turns back, begins elsewhere than before, or is not in its order.
+    """
+    piece = n = 0
+    for ring in range(offsets.shape[0] - 1):
+        first, last = offsets[ring], offsets[ring + 1]
+        before = ring - 1  # of the same kind, or none
+        if piece < pieces.shape[0] - 1 and ring == pieces[piece]:
+            before = pieces[piece - 1] if piece > 0 else -1
+            piece += 1
+        elif before == pieces[piece - 1]:
+            before = -1
+        if before >= 0 and not _is_before(pixels, offsets[before], first):
+            return FOLDS
+        i, starts[ring] = last - 1, n
+        for j in range(first, last):
+            if j & POLL == 0 and stop[0]:
+                return FOLDS
+            k = j + 1 if j + 1 < last else first
+            ux, uy = pixels[j, 0] - pixels[i, 0], pixels[j, 1] - pixels[i, 1]
+            vx, vy = pixels[k, 0] - pixels[j, 0], pixels[k, 1] - pixels[j, 1]
+            left, right = ux * vy, uy * vx
+            corners[n] = j
+            n += 1
+            size = abs(left) + abs(right)  # of whole numbers, so that nothing underflows, and up to 2^53 all is exact
+            if left == right if size < 2.0**53 else not abs(left - right) > BOUND_2D * size:
+                a, b = Point2(pixels[i, 0], pixels[i, 1]), Point2(pixels[j, 0], pixels[j, 1])
+                if size < 2.0**53 or orient2d(a, b, Point2(pixels[k, 0], pixels[k, 1])) == 0:
+                    if not ux * vx + uy * vy > 0.0:
+                        return FOLDS
+                    n -= 1
+            if _is_before(pixels, j, first):
+                return FOLDS
+            i = j
+    starts[offsets.shape[0] - 1] = n
+    return n
+
+
+class Snapped(NamedTuple):
+    """What becomes of rings. pixels: (n, 2) float64, the whole points in whose pixels vertices lie; corners, starts: as
+    `_find_corners` fills them; passages: (m, 2) int32, an edge, by its first vertex, and a vertex of another pixel that
+    it passes."""
+
+    pixels: Any
+    corners: Any
+    starts: Any
+    passages: Any
 
 
 @bare_kernel
-def find_passages(
-    vertices: Any, offsets: Any, stop: Any, buffers: Buffers, passages: Any
-) -> tuple[int, bool]:  # fmt: skip
-    """Fill ``passages``, (m, 2) int32, with an edge, by its first vertex, and a vertex of another pixel that it passes.
+def snap(
+    vertices: Any, offsets: Any, pieces: Any, stop: Any, buffers: Buffers, made: Snapped
+) -> tuple[int, int, int]:  # fmt: skip
+    """Fill ``made`` for valid rings, coordinates below 2^51.
 
-    vertices, offsets: valid rings, coordinates below 2^51. Returns how many passages there are, which may be more than
-    there is room for, and whether rings stay what they are.
+    Returns how many vertices are no whole points, where all are nothing but the pixels is filled; how many passages
+    there are, which may be more than there is room for; how many corners, or FOLDS where rings do not stay what they
+    are, without vertices that get straight.
     """
+    n_moved = _find_pixels(vertices, made.pixels, stop)
+    if n_moved == 0:
+        return 0, 0, vertices.shape[0]
     w = rows_of(buffers)
-    edges, tree = w.given.edges, w.tree
+    edges, tree, pixels, passages = w.given.edges, w.tree, made.pixels, made.passages
     rings, n_rings = RingArrays(vertices, offsets), offsets.shape[0] - 1
     n, _, _ = load_rings(rings, 0, n_rings, 0, True, 0, EVERYTHING, w.given, tree, 0, 0, stop)
     fill_boxes(edges, n, 0.5, tree, stop)
-    stays = _is_simple(edges, n, stop)
+    n_corners = _find_corners(pixels, offsets, pieces, made.corners, made.starts, stop)
     x, y, after = edges.x, edges.y, edges.after
     for e in range(n):
         b = after[e]
-        if (_pixel(x[e]) == _pixel(x[b])) & (_pixel(y[e]) == _pixel(y[b])):  # it shrinks to a point
+        if (pixels[e, 0] == pixels[b, 0]) & (pixels[e, 1] == pixels[b, 1]):  # it shrinks to a point
             tree.boxes[e, 3] = -np.inf
     if n > FEW:
         build_tree(tree, n, stop)
+    meets, shares = False, False
     m, depth = 0, begin_pairs(tree, n, stop)
     while depth > 0 and not stop[0]:  # bound: the walk through the tree
         found, depth = next_pairs(tree, n, depth)
@@ -115,18 +187,21 @@ def find_passages(
             if not boxes_meet(tree.boxes, e, tree.boxes, f):
                 continue
             for _ in range(2):
-                px, py, b = _pixel(x[f]), _pixel(y[f]), after[e]
-                at_begin = (px == _pixel(x[e])) & (py == _pixel(y[e]))
-                at_end = (px == _pixel(x[b])) & (py == _pixel(y[b]))
+                px, py, b = pixels[f, 0], pixels[f, 1], after[e]
+                at_begin = (px == pixels[e, 0]) & (py == pixels[e, 1])
+                at_end = (px == pixels[b, 0]) & (py == pixels[b, 1])
                 if at_begin or at_end:
                     end = e if at_begin else b
-                    stays = stays and x[f] == x[end] and y[f] == y[end]
+                    meets |= end != f
+                    shares |= (x[f] != x[end]) | (y[f] != y[end])
                 elif _passes(x[e], y[e], x[b], y[b], px, py):
                     if m < passages.shape[0]:
                         passages[m, 0], passages[m, 1] = e, f
                     m += 1
                 e, f = f, e
-    return m, stays and m == 0
+    if m > 0 or shares or (meets and n_corners < n):  # a straight vertex stays where rings meet in it
+        n_corners = FOLDS
+    return n_moved, m, n_corners
 
 
 @bare_kernel

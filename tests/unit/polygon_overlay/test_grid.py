@@ -11,6 +11,8 @@ import pytest
 
 import engine
 from engine.arrangement.snap_rounding import snap_rings
+from engine.arrays import read_only
+from engine.parallel import Budget
 from engine.polygon_overlay import grid as grids
 from tests.reference import fast_overlay
 from tests.reference.exact import Q
@@ -125,8 +127,36 @@ def test_edge_goes_through_the_pixels_it_passes() -> None:
 
 
 def test_pixels_are_half_open() -> None:
-    passes = grids._pixels_of(np.array([[0.5, -0.5], [1.5, 2.5], [-1.5, 0.49999999999999994]]))
-    assert passes.tolist() == [[1, 0], [2, 3], [-1, 0]]
+    triangle = np.array([[0.5, -0.5], [1.5, 2.5], [-1.5, 0.49999999999999994]])
+    one = read_only(np.array([0, 3])), read_only(np.array([0, 1]))
+    assert grids.snap_vertices(read_only(triangle), *one, Budget()).vertices.tolist() == [[1, 0], [2, 3], [-1, 0]]
+
+
+@pytest.mark.parametrize("family", ["fine", "touching"])
+@pytest.mark.parametrize("size", [2.0**-3, 2.0**-5, 2.0**-7])
+def test_rings_that_stay_are_as_arranged_again(family: str, size: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fine rings get straight vertices, which are left out; not where rings meet in them."""
+    angles = np.linspace(0, 2 * np.pi, 60, endpoint=False)
+    disc = np.round(np.column_stack([np.cos(angles), np.sin(angles)]) * 2.0**8) / 2.0**7
+    subject = engine.Polygon([disc * 1.01])
+    clip = engine.Polygon([disc * 1.01 + (0.7, 0.3)])
+    if family == "touching":  # in (0, -2) or nearly
+        subject, clip = engine.Polygon([disc]), engine.Polygon([[(-4, -2), (4, -2), (4, -4.3), (-4.1, -4)]])
+    snapped = grids.snap_vertices
+
+    def bent(vertices: Any, offsets: Any, *rest: Any) -> Any:
+        found = snapped(vertices, offsets, *rest)
+        return found._replace(stays=False, vertices=np.floor(vertices + 0.5), offsets=offsets, edges=None)
+
+    for operation in OPERATIONS:
+        told = []
+        for known in (snapped, bent):
+            monkeypatch.setattr("engine.polygon_overlay.run.snap_vertices", known)
+            result = engine.overlay(subject, clip, operation, grid=size)
+            assert_valid(result)
+            told.append([result.vertices.tobytes(), result.ring_offsets.tolist(), result.sources.tolist()])
+            told[-1] += [result.rounds, result.vertices_moved, result.largest_displacement, result.area_exact]
+        assert told[0] == told[1]
 
 
 def test_doubles_that_do_not_tell_multiples_apart() -> None:
