@@ -39,7 +39,8 @@ def test_points_and_who_is_wrong_about_which(tmp_path: Path, capsys: pytest.Capt
     found = audited(tmp_path, SQUARE, points)
     assert found["ours"] == {"judged": 4, "wrong": 0, "refused": 0, "outside": 0, "where": []}
     assert found["textbook: half-line"]["where"] == [1]
-    assert "textbook: half-line is wrong on items 1" in capsys.readouterr().out
+    line = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("textbook: half-line  "))
+    assert line.split()[-5:] == ["1", "(4.6%", "to", "70%)", "1"]
     assert {"textbook: signed angles", "textbook: same side, float32"} <= set(found)
 
 
@@ -50,7 +51,7 @@ def test_segments_bodies_and_layers(tmp_path: Path) -> None:
     moved = {**TETRAHEDRON, "vertices": [[x + 1, y, z] for x, y, z in TETRAHEDRON["vertices"]]}
     found = audited(tmp_path, TETRAHEDRON, moved)
     assert found["ours"]["wrong"] == 0
-    assert "textbook: volumes first" in found
+    assert found["textbook: volumes first, float32"] == found["textbook: volumes first"]
     assert audited(tmp_path, SQUARE, SQUARE)["ours"]["wrong"] == 0
 
 
@@ -64,6 +65,13 @@ def test_a_page_is_written_that_needs_no_other_file(tmp_path: Path) -> None:
     assert "square.geojson and points.csv" in text
     assert '"where":[1]' in text
     assert "http" not in text.replace("http://127.0.0.1:8000", "").replace("http://www.w3.org", "")
+
+
+def test_a_mesh_alone_is_asked_about_the_middles_of_its_faces(tmp_path: Path) -> None:
+    (tmp_path / "body.json").write_text(json.dumps(TETRAHEDRON))
+    assert audit.main([str(tmp_path / "body.json"), "--seconds", "0.01", "-o", str(tmp_path / "found.json")]) == 0
+    rows = json.loads((tmp_path / "found.json").read_text())["rows"]
+    assert {row["errors"]["judged"] for row in rows if not row["absent"]} == {4}
 
 
 def test_layers_of_different_lengths_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
