@@ -393,4 +393,7 @@ def _run_threaded(
         with _pool_lock:
             _n_calls -= 1
     if failures:
-        raise min(failures, key=lambda failure: failure[0])[1]
+        try:
+            raise min(failures, key=lambda failure: failure[0])[1]
+        finally:
+            failures.clear()  # each leads to frames that lead here: only a search for cycles would free what they hold

@@ -46,7 +46,7 @@ from service.routes import (
 from service.settings import Settings
 from service.store import Store
 from service.tools import add_tools, running
-from service.work import Memory, Pool
+from service.work import Memory, Pool, give_back_freed
 
 log = logging.getLogger("service")
 
@@ -76,6 +76,7 @@ object and the header `Server-Timing` (decode, prepare, compute, encode). Errors
 def create_app(settings: Settings | None = None) -> FastAPI:
     """Return the service as an ASGI application."""
     gc.enable()  # all is imported (__main__.py)
+    give_back_freed()
     settings = settings or Settings()
     app = FastAPI(
         title="exact-geometry",

@@ -97,6 +97,8 @@ _PYDANTIC_CODES: Final = {
     "union_tag_not_found": "unknown_type",
     "recursion_loop": "too_deep",
 }
+_MOST_MISTAKES: Final = 5000
+"""Of one body that are looked at: pydantic lets no other thread run while it lists them, 2 us each."""
 _MOST_PROBLEM: Final = 1000
 _MOST_PART: Final = 100
 """Characters of a sentence, and of a field's name in a pointer."""
@@ -182,6 +184,9 @@ def http_fault(status: int, path: str, method: str) -> Fault:
 def faults_of_validation(error: ValidationError, document: Any) -> list[Fault]:
     """Return what is wrong with `document`, the request as decoded, and where; at most `MAX_ERRORS` entries."""
     faults: list[Fault] = []
+    if error.error_count() > _MOST_MISTAKES:
+        detail = f"{error.error_count()} things are wrong, most are fields not known here; /docs has an example"
+        return [Fault((), "invalid_request", detail)]
     for item in error.errors(include_url=False, include_input=False):
         path = _path_in(document, item["loc"])
         parent = document

@@ -151,7 +151,7 @@ class _Job:
             document = wire.decode_fast(text)
             if document is not None:
                 try:
-                    self.question = self.adapter.validate_python(document, context=self.call.settings)
+                    self.question = self.adapter.validate_python(document, context=self.call)
                     return
                 except ValidationError:  # the other decoder keeps what pointers need
                     del document
@@ -159,7 +159,7 @@ class _Job:
             self.call.take(wire.cost_of(text))
             document = wire.decode(text)
             try:
-                self.question = self.adapter.validate_python(document, context=self.call.settings)
+                self.question = self.adapter.validate_python(document, context=self.call)
             except ValidationError as error:
                 raise _InvalidBody(error, document) from None
 

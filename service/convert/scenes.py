@@ -59,7 +59,7 @@ def to_moved(scene: Scene, moved: list[scenes.MovedBody] | None, call: Call) -> 
 def read_moved(text: str, call: Call) -> list[scenes.MovedBody]:
     """Return what moved, from the query of the binary lane."""
     try:
-        return _MOVED.validate_json(text, context=call.settings)
+        return _MOVED.validate_json(text, context=call)
     except ValidationError as error:
         reason = str(error.errors()[0]["msg"])
         raise ServiceError("invalid_request", f"query parameter 'moved': {reason:.200}, got {text!r:.100}") from None

@@ -89,19 +89,22 @@ class Numbers:
         return item
 
     def _validate(self, value: Any, info: core_schema.ValidationInfo) -> Any:
-        array = self._decode(value, info.context)
+        call = info.context
+        if call is not None:  # a body of many short arrays takes long
+            call.remaining()
+        array = self._decode(value, call)
         if array is not None:
             return array
-        faults = list(islice(self._faults(value, (), {}, info.context), MAX_ERRORS))
+        faults = list(islice(self._faults(value, (), {}, call), MAX_ERRORS))
         faults = faults or [Fault((), "invalid_array", self._shape())]
         raise PydanticCustomError("numbers", "{detail}", {"detail": faults[0].detail, "faults": faults})
 
-    def _decode(self, value: Any, settings: Any) -> Any:
+    def _decode(self, value: Any, call: Any) -> Any:
         """Return `value` as an array, or None if anything about it is wrong; at C speed."""
         if not self.axes and type(value) is float and isfinite(value) and self.kind == "number":
             return value
         if isinstance(value, np.ndarray):
-            return self._taken(value, settings)
+            return self._taken(value, call)
         dtype, types, _ = _KINDS[self.kind]
         level = [value]
         shape: list[int] = []
@@ -110,7 +113,7 @@ class Numbers:
             if not set(map(type, level)) <= {list}:
                 return None
             lengths = set(map(len, level))
-            low, high = axis.low, _limit(axis, settings)
+            low, high = axis.low, _limit(axis, call)
             if any(length < low or (high is not None and length > high) for length in lengths):
                 return None
             is_ragged_axis = self.ragged and len(shape) == 1
@@ -131,12 +134,12 @@ class Numbers:
             return value
         return flat.reshape(shape) if shape else flat.item()
 
-    def _taken(self, array: Array, settings: Any) -> Any:
+    def _taken(self, array: Array, call: Any) -> Any:
         """Return `array`, which the fast decoder made of a list without a fault in it, if this field takes it."""
         if array.ndim != len(self.axes):
             return None
         for axis, length in zip(self.axes, array.shape):
-            high = _limit(axis, settings)
+            high = _limit(axis, call)
             if length < axis.low or (high is not None and length > high):
                 return None
         if self.kind == "number":
@@ -159,7 +162,7 @@ class Numbers:
         is_short = len(level) <= SHORT and int not in found
         return (is_short and isfinite(sum(level))) or bool(np.isfinite(flat).all())
 
-    def _faults(self, value: Any, path: Path, seen: dict[int, int], settings: Any) -> Iterator[Fault]:
+    def _faults(self, value: Any, path: Path, seen: dict[int, int], call: Any) -> Iterator[Fault]:
         """Walk a list that failed and name each element at fault; `seen`: length of the first list by depth."""
         depth = len(path)
         if depth == len(self.axes):
@@ -167,7 +170,9 @@ class Numbers:
         elif type(value) is not list:
             yield Fault(path, "invalid_array", f"expected a list, got {_show(value)}; {self._shape()}")
         else:
-            axis, high = self.axes[depth], _limit(self.axes[depth], settings)
+            if call is not None:
+                call.remaining()
+            axis, high = self.axes[depth], _limit(self.axes[depth], call)
             if len(value) < axis.low or (high is not None and len(value) > high):
                 yield self._fault_of_length(path, axis, high, len(value))
             elif len(value) != seen.setdefault(depth, len(value)) and not (self.ragged and depth == 1):
@@ -175,7 +180,7 @@ class Numbers:
                 yield Fault(path, "invalid_array", detail)
             else:
                 for i_item, item in enumerate(value):
-                    yield from self._faults(item, (*path, i_item), seen, settings)
+                    yield from self._faults(item, (*path, i_item), seen, call)
 
     def _fault_of_length(self, path: Path, axis: Axis, high: int | None, length: int) -> Fault:
         if isinstance(axis.high, str) and high is not None and length > high:
@@ -220,9 +225,9 @@ def limit_sentence(name: str, limit: int, length: int) -> str:
     return f"got {length} items, at most {limit} are taken; send fewer, or raise the setting GEOMETRY_{name.upper()}"
 
 
-def _limit(axis: Axis, settings: Any) -> int | None:
+def _limit(axis: Axis, call: Any) -> int | None:
     if isinstance(axis.high, str):
-        return None if settings is None else cast(int, getattr(settings, axis.high))
+        return None if call is None else cast(int, getattr(call.settings, axis.high))
     return axis.high
 
 

@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
-from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationError
 from pydantic_core import PydanticCustomError, core_schema
 
 from service.schemas.arrays import LIMIT, Fault, limit_sentence
 
+_STEP: Final = 256
+"""Items checked at once: pydantic lets no other thread run while it lists what is wrong with them."""
+
 
 class AtMost:
-    """Annotation of a list of models: no longer than the setting of this name, counted before any item is looked at."""
+    """Annotation of a list of models: no longer than the setting of this name, counted before any item is looked at.
+
+    Nothing is said of items long after the first that is wrong.
+    """
 
     def __init__(self, name: str, low: int = 0) -> None:
         self.name = name
         self.low = low
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
-        return core_schema.with_info_before_validator_function(self._validate, handler(source))
+        return core_schema.with_info_wrap_validator_function(self._validate, handler(source))
 
     def __get_pydantic_json_schema__(
         self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
@@ -30,19 +36,31 @@ class AtMost:
         document[LIMIT] = self.name
         return document
 
-    def _validate(self, value: Any, info: core_schema.ValidationInfo) -> Any:
+    def _validate(
+        self, value: Any, handler: core_schema.ValidatorFunctionWrapHandler, info: core_schema.ValidationInfo
+    ) -> Any:
         if isinstance(value, np.ndarray):
             value = list(value)
         if not isinstance(value, list):
-            return value
-        limit = None if info.context is None else getattr(info.context, self.name)
+            return handler(value)
+        limit = None if info.context is None else getattr(info.context.settings, self.name)
         if limit is not None and len(value) > limit:
             fault = Fault((), "limit_exceeded", limit_sentence(self.name, limit, len(value)))
         elif len(value) < self.low:
             fault = Fault((), "empty_geometry", f"the list holds {len(value)} items; at least {self.low} are needed")
         else:
-            return value
+            return self._checked(value, handler)
         raise PydanticCustomError("numbers", "{detail}", {"detail": fault.detail, "faults": [fault]})
+
+    def _checked(self, items: list[Any], handler: core_schema.ValidatorFunctionWrapHandler) -> list[Any]:
+        found: list[Any] = []
+        for start in range(0, max(1, len(items)), _STEP):
+            try:
+                found += handler(items[start : start + _STEP])
+            except ValidationError:
+                handler(items[: start + _STEP])  # raises too, with their places in the whole list
+                raise
+        return found
 
 
 def _without_default(schema: dict[str, Any]) -> None:

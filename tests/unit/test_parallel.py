@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 import multiprocessing
 import threading
 import time
+import weakref
 
 import numpy as np
 import pytest
@@ -231,3 +233,26 @@ def test_the_error_that_raised_the_flag_reaches_the_caller() -> None:
 
     with Budget() as budget, pytest.raises(KeyError):
         run_chunks(task, 3, budget=budget, first_chunk=1, workers=2)
+
+
+def test_an_error_leaves_nothing_that_only_a_search_for_cycles_finds() -> None:
+    held = np.zeros(1)
+    gone = weakref.ref(held)
+
+    def work(held: np.ndarray) -> None:
+        def task(start: int, stop: int) -> None:
+            time.sleep(0.003)
+            if start > 0:  # the first is done by the calling thread
+                raise ValueError(held)
+
+        with Budget() as budget:
+            run_chunks(task, 10, budget=budget, first_chunk=1, workers=2)
+
+    gc.disable()
+    try:
+        with pytest.raises(ValueError, match="0"):
+            work(held)
+        del held
+        assert gone() is None
+    finally:
+        gc.enable()

@@ -8,7 +8,6 @@ import httpx
 import pytest
 
 from service.schemas.collision import CollideResponse, CollideSceneResponse
-from service.settings import Settings
 from tests.unit.service.asking import SPHERE, check_problem
 
 pytestmark = pytest.mark.anyio
@@ -28,7 +27,7 @@ def moved(*translation: float) -> dict[str, Any]:
 async def collide(client: httpx.AsyncClient, **body: Any) -> dict[str, Any]:
     answer = await client.post("/v1/collide", json=body)
     assert answer.status_code == 200, answer.text
-    CollideResponse.model_validate_json(answer.content, context=Settings())
+    CollideResponse.model_validate_json(answer.content)
     found: dict[str, Any] = answer.json()
     return found
 
@@ -66,7 +65,7 @@ async def test_scene_lists_colliding_pairs(client: httpx.AsyncClient) -> None:
         {"first": 0, "second": 2, "relation": "overlapping"},
         {"first": 1, "second": 2, "relation": "touching"},
     ]
-    CollideSceneResponse.model_validate_json(answer.content, context=Settings())
+    CollideSceneResponse.model_validate_json(answer.content)
     answer = await client.post("/v1/collide/scene", json={"bodies": bodies, "skip": [[0, 1]]})
     assert [(pair["first"], pair["second"]) for pair in answer.json()["pairs"]] == [(0, 2), (1, 2)]
     answer = await client.post("/v1/collide/scene", json={"bodies": bodies, "only": [[2, 0]]})
@@ -93,7 +92,7 @@ async def test_the_eight_relations_are_told_when_asked_for(client: httpx.AsyncCl
     bodies = [{"solid": CUBE}, {"solid": CUBE}, {"solid": half}, {"solid": flat}]
     answer = await client.post("/v1/collide/scene", json={"bodies": bodies, "detail": True})
     assert answer.status_code == 200, answer.text
-    CollideSceneResponse.model_validate_json(answer.content, context=Settings())
+    CollideSceneResponse.model_validate_json(answer.content)
     details = {(pair["first"], pair["second"]): pair.get("detail") for pair in answer.json()["pairs"]}
     assert details == {(0, 1): "EQ", (0, 2): "TPPi", (1, 2): "TPPi", (0, 3): None, (1, 3): None, (2, 3): None}
 

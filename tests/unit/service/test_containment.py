@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from service.schemas.containment import ContainsResponse, ContainsSceneResponse
-from service.settings import Settings
 from tests.unit.service.asking import SPHERE, check_problem
 
 pytestmark = pytest.mark.anyio
@@ -25,7 +24,7 @@ async def test_points_are_in_on_the_boundary_or_out(client: httpx.AsyncClient) -
     assert answer.json()["boundary"] == [1, 3]
     assert answer.json()["accuracy"]["decisions"] == "exact"
     assert answer.json()["accuracy"]["items"] == 4
-    ContainsResponse.model_validate_json(answer.content, context=Settings())
+    ContainsResponse.model_validate_json(answer.content)
 
 
 async def test_large_and_small_requests_agree(client: httpx.AsyncClient) -> None:
@@ -57,7 +56,7 @@ async def test_scene_lists_the_bodies_of_each_point(client: httpx.AsyncClient) -
     assert answer.status_code == 200, answer.text
     assert answer.json()["bodies"] == [[0], [0, 1], []]
     assert answer.json()["boundary"] == [[], [0, 1], []]
-    ContainsSceneResponse.model_validate_json(answer.content, context=Settings())
+    ContainsSceneResponse.model_validate_json(answer.content)
     answer = await client.post("/v1/contains/scene", json={"bodies": [{"solid": BOX}], "points": []})
     assert answer.json()["bodies"] == []
 

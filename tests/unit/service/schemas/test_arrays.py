@@ -8,34 +8,35 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
+from engine import DeadlineExceededError
 from service.schemas.arrays import DIMENSION, POINTS, Array, Axis, Numbers
 from service.schemas.solids import Faces
 from service.settings import Settings
+from service.store import Store
+from service.work import Call, Memory
 
 POSITIONS: TypeAdapter[Any] = TypeAdapter(Annotated[Array, Numbers(POINTS, DIMENSION)])
 NUMBER: TypeAdapter[Any] = TypeAdapter(Annotated[float, Numbers()])
 FACES: TypeAdapter[Any] = TypeAdapter(Faces)
-SETTINGS = Settings(max_points=5, max_faces=5)
+CALL = Call(Settings(max_points=5, max_faces=5), Store(1), Memory(1))
 
 
 def faults(adapter: TypeAdapter[Any], value: object) -> list[tuple[tuple[int, ...], str]]:
     with pytest.raises(ValidationError) as caught:
-        adapter.validate_python(value, context=SETTINGS)
+        adapter.validate_python(value, context=CALL)
     (error,) = caught.value.errors()
     return [(fault.path, fault.code) for fault in error["ctx"]["faults"]]
 
 
 def test_lists_become_one_contiguous_array() -> None:
-    array = POSITIONS.validate_python([[1, 2.5, -0.0], [2**53, 1e300, 5e-324]], context=SETTINGS)
+    array = POSITIONS.validate_python([[1, 2.5, -0.0], [2**53, 1e300, 5e-324]], context=CALL)
     assert array.dtype == np.float64
     assert array.flags.c_contiguous
     assert array.tolist() == [[1.0, 2.5, 0.0], [2.0**53, 1e300, 5e-324]]
-    assert POSITIONS.validate_python([], context=SETTINGS).shape == (0, 2)
-    assert NUMBER.validate_python(3, context=SETTINGS) == 3.0
+    assert POSITIONS.validate_python([], context=CALL).shape == (0, 2)
+    assert NUMBER.validate_python(3, context=CALL) == 3.0
     huge = int(1.7e308)
-    assert (
-        POSITIONS.validate_python([[huge, huge], [1.7e308, 1.7e308]], context=SETTINGS).tolist() == [[1.7e308] * 2] * 2
-    )
+    assert POSITIONS.validate_python([[huge, huge], [1.7e308, 1.7e308]], context=CALL).tolist() == [[1.7e308] * 2] * 2
 
 
 @pytest.mark.parametrize(
@@ -73,9 +74,9 @@ def test_a_number_is_a_number(value: object) -> None:
 
 
 def test_faces_are_triangles_or_lists() -> None:
-    triangles = FACES.validate_python([[0, 1, 2], [2, 1, 3]], context=SETTINGS)
+    triangles = FACES.validate_python([[0, 1, 2], [2, 1, 3]], context=CALL)
     assert (triangles.dtype, triangles.shape) == (np.int64, (2, 3))
-    assert FACES.validate_python([[0, 1, 2], [2, 1, 3, 4]], context=SETTINGS) == [[0, 1, 2], [2, 1, 3, 4]]
+    assert FACES.validate_python([[0, 1, 2], [2, 1, 3, 4]], context=CALL) == [[0, 1, 2], [2, 1, 3, 4]]
     assert faults(FACES, [[0, 1, 2.0]]) == [((0, 2), "invalid_array")]
     assert faults(FACES, [[0, 1, 2], [0, -1, 2]]) == [((1, 1), "index_out_of_range")]
     assert faults(FACES, [[0, 1, 2**63]]) == [((0, 2), "index_out_of_range")]
@@ -90,3 +91,22 @@ def test_schema_is_an_array_of_arrays_of_doubles() -> None:
         "x-limit": "max_points",
         "items": {"type": "array", "minItems": 2, "maxItems": 3, "items": {"type": "number", "format": "double"}},
     }
+
+
+def test_many_short_arrays_end_at_the_deadline() -> None:
+    late = Call(Settings(deadline_seconds=1e-9), Store(1), Memory(1))
+    with pytest.raises(DeadlineExceededError):
+        POSITIONS.validate_python([[0, 0]], context=late)
+
+
+def test_the_search_for_what_is_wrong_ends_at_the_deadline() -> None:
+    class Ending:
+        settings, left = Settings(), 100
+
+        def remaining(self) -> None:
+            self.left -= 1
+            if not self.left:
+                raise DeadlineExceededError("late")
+
+    with pytest.raises(DeadlineExceededError):
+        POSITIONS.validate_python([[0, 0]] * 200 + [[0, None]], context=Ending())
