@@ -33,6 +33,8 @@ LARGEST = 20_000
 """Characters of a request that is kept."""
 QUESTIONS = 200
 """At most, for each of these sizes."""
+NAMED: list[str] = []
+"""Contenders that no contest knows and the command names."""
 Goals = tuple[float | None, float | None]
 """What the ratio against a peer must be, and what it aims at."""
 
@@ -62,21 +64,21 @@ def contender(
     knob = (float(setting),) if setting else ()
     return Contender(
         contenders.shown(module, own or kind), partial(build, module, own or kind, subject, threads, *knob),
-        contenders.PACKAGES.get(module, ""), goals=goals or (None, None), setting=knob[0] if knob else None,
+        contenders.stated(module).get("PACKAGE", ""), goals=goals or (None, None), setting=knob[0] if knob else None,
     )  # fmt: skip
 
 
 def field_of(
     kind: str, subject: Any, peers: Sequence[str] | Mapping[str, Goals | None] = (), threads: int = 2, **more: Any
 ) -> list[Contender]:
-    """Return ours and peers, with their goals where they have any."""
-    goals = peers if isinstance(peers, Mapping) else dict.fromkeys(peers)
+    """Return ours and peers, with their goals where they have any; also whom the command names."""
+    goals = dict.fromkeys(NAMED) | (dict(peers) if isinstance(peers, Mapping) else dict.fromkeys(peers))
     return [contender(spec, kind, subject, threads, goal, **more) for spec, goal in ({"ours": None} | goals).items()]
 
 
 def two_threads(kind: str, subject: Any, goals: Goals = (1.7, 1.9)) -> list[Contender]:
     """Return ours with two threads, and with one as its contender."""
-    (two,), (one,) = field_of(kind, subject, (), 2), field_of(kind, subject, (), 1)
+    two, one = field_of(kind, subject, (), 2)[0], field_of(kind, subject, (), 1)[0]
     return [two, replace(one, name="ours, one thread", goals=goals)]
 
 

@@ -10,7 +10,7 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
-from benchmarks.contenders import PACKAGES
+from benchmarks.contenders import packages
 
 ROOT = Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "benchmarks" / "results"
@@ -64,7 +64,7 @@ def load() -> float | None:
 
 def facts(seed: int, threads: int) -> dict[str, Any]:
     """Return everything a table of figures names."""
-    packages = ("numba", "llvmlite", "embreex", *PACKAGES.values())
+    named = dict.fromkeys(("numba", "llvmlite", "embreex", *packages()))
     return {
         "processor": processor(),
         "cores": cores(),
@@ -72,5 +72,5 @@ def facts(seed: int, threads: int) -> dict[str, Any]:
         "seed": seed,
         "commit": commit(),
         "load_before": load(),
-        "versions": {"python": platform.python_version()} | {name: version_of(name) for name in packages},
+        "versions": {"python": platform.python_version()} | {name: version_of(name) for name in named},
     }

@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks import machine
-from benchmarks.contest import Contest, Row, Size, Task, hold
+from benchmarks import contenders, machine
+from benchmarks.contest import NAMED, Contest, Row, Size, Task, hold
 from benchmarks.fields import FIELDS, Figure, tasks
 from benchmarks.measure import Spread, spread
 from benchmarks.workloads import MissingDataError
@@ -37,7 +37,12 @@ def options(words: list[str] | None, description: str, **more: str) -> argparse.
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", default="", metavar="WORD", help="only rows whose name contains WORD")
     parser.add_argument("--contest", dest="only", metavar="WORD", help="the same as --only")
-    parser.add_argument("--contender", default="", metavar="WORD", help="ours and contenders whose name contains WORD")
+    parser.add_argument(
+        "--contender",
+        default="",
+        metavar="WORD",
+        help="ours and contenders whose name contains WORD, or the file contenders/with_WORD.py",
+    )
     parser.add_argument("--dry", action="store_true", help="write no results file")
     for name, about in more.items():
         parser.add_argument(f"--{name}", action="store_true", help=about)
@@ -45,6 +50,7 @@ def options(words: list[str] | None, description: str, **more: str) -> argparse.
     given.rounds = given.rounds or (3 if given.quick else 7 if "pages" in more else 15)
     given.seconds = given.seconds or (0.3 if given.quick else 2.0 if "pages" in more else 3.0)
     given.writes = not (given.dry or given.quick or given.only or given.contender)
+    NAMED[:] = [given.contender] if contenders.is_there(given.contender) else []
     given.size = Size(given.seed, QUICK if given.quick else 1.0)
     return given
 
@@ -118,6 +124,7 @@ def measured(name: str, chosen: Iterable[Task], given: argparse.Namespace, has_l
     """Hold the contests and take the figures; print them; return what is stored, and how many are below their must."""
     found: dict[str, Any] = machine.facts(given.seed, machine.cores()) | {"quick": given.quick}
     print(head(name, found))
+    names = {"ours", *contenders.names_of(given.contender)}
     started, rows, figures, missed = time.perf_counter(), [], [], 0
     for task in chosen:
         if given.only not in task.name:
@@ -127,7 +134,7 @@ def measured(name: str, chosen: Iterable[Task], given: argparse.Namespace, has_l
         try:
             made = task.make()
             if isinstance(made, Contest) and given.contender:
-                asked = [each for each in made.contenders if each.name == "ours" or given.contender in each.name]
+                asked = [each for each in made.contenders if each.name in names or given.contender in each.name]
                 made = replace(made, contenders=asked)
             held = hold(made, given.rounds, given.seconds, has_latency) if isinstance(made, Contest) else made
         except MissingDataError as error:

@@ -1,8 +1,9 @@
 """Contenders: ours and one file per package, all with the same calls.
 
-A contender is a module with `MAKERS`: for each kind of question a function ``(subject, threads) -> Prepared``, called
-once; that is its build. It imports its package when it is imported itself, so one that is not installed is found by
-`make`. The kinds, what they are about, the items they are asked about and the answers:
+A contender is one file, with_NAME.py, with `MAKERS`: for each kind of question a function ``(subject, threads[, knob])
+-> Prepared``, called once; that is its build. `PACKAGE` is the distribution that it needs, `NAMES` what it is called in
+tables, by kind ("" for all others). It imports its package when it is imported itself, so one that is not installed is
+found by `make`. The kinds, what they are about, the items they are asked about and the answers:
 
     points            Mesh, Rings, Convex     points                      bool: contained, the boundary too
     scene             Bodies                  points                      point * n_bodies + body, sorted
@@ -24,11 +25,14 @@ once; that is its build. It imports its package when it is imported itself, so o
 
 from __future__ import annotations
 
+import ast
 import importlib
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -36,37 +40,41 @@ import numpy as np
 import engine
 from benchmarks.workloads import Bodies, Mesh, Rings
 
-PACKAGES = {
-    "open3d": "open3d", "shapely": "shapely", "trimesh": "trimesh", "igl": "libigl", "vtk": "vtk", "cgal": "cgal",
-    "matplotlib": "matplotlib", "coal": "coal", "fcl": "python-fcl", "manifold3d": "manifold3d", "numpy": "numpy",
-    "geopandas": "geopandas", "pyclipper": "pyclipper", "celltree": "numba-celltree",
-}  # fmt: skip
-"""The distribution of each module; those of our own code have none."""
-SHOWN = {
-    "open3d": "Open3D", "open3d points": "Open3D occupancy", "open3d scene": "Open3D occupancy", "igl": "libigl",
-    "igl points": "libigl winding number", "trimesh": "trimesh + embreex", "vtk": "VTK", "cgal": "CGAL",
-    "vtk points": "VTK enclosed points", "cgal points": "CGAL side of mesh", "celltree": "numba_celltree",
-    "matplotlib": "matplotlib Path", "shapely": "shapely (GEOS)", "shapely points": "shapely, prepared",
-    "shapely scene": "shapely STRtree", "shapely segments": "shapely clip_by_rect",
-    "shapely polygon areas": "shapely clip_by_rect", "shapely kept polygons": "shapely clip_by_rect",
-    "numpy determinant": "numpy determinant", "numpy linalg": "numpy.linalg.det", "fcl crowd": "fcl's manager",
-    "manifold3d overlay": "Clipper2 by manifold3d", "manifold3d overlay of made": "Clipper2 by manifold3d",
-    "plain_signs": "ours, plain signs",
-    "textbook points": "textbook: half-line", "textbook recast": "textbook: another half-line",
-    "textbook planes": "textbook: half-spaces", "textbook signed angles": "textbook: signed angles",
-    "textbook unsigned angles": "textbook: unsigned angles, 1e-6", "textbook same side": "textbook: same side",
-    "textbook cross and dot": "textbook: cross and dot", "textbook projection": "textbook: projection",
-    "textbook segments": "textbook: Cohen-Sutherland", "textbook by planes": "textbook: Cohen-Sutherland by planes",
-    "textbook quadratic": "textbook: quadratic", "textbook naive segments": "naive", "textbook kept polygons": "naive",
-    "textbook polygon areas": "textbook: Sutherland-Hodgman", "textbook overlay": "textbook: Greiner-Hormann",
-    "textbook pair by vertices": "textbook: vertices in the other", "ours relation": "ours",
-    "textbook pair by edges": "textbook: edges through faces", "textbook pair by volumes": "textbook: volumes first",
-}  # fmt: skip
+
+def files() -> dict[str, Path]:
+    """Return the file of every contender."""
+    found = (path for folder in __path__ for path in Path(folder).glob("with_*.py"))
+    return {path.stem.removeprefix("with_"): path for path in found}
+
+
+@cache
+def stated(module: str) -> dict[str, Any]:
+    """Return what a contender's file says of itself, read and not imported: its package may not be there."""
+    told = [node for node in ast.parse(files()[module].read_text("utf-8")).body if isinstance(node, ast.Assign)]
+    names = {getattr(node.targets[0], "id", ""): node.value for node in told}
+    return {name: ast.literal_eval(names[name]) for name in ("PACKAGE", "NAMES") if name in names}
+
+
+def packages() -> list[str]:
+    """Return the distributions that contenders need; our own code needs none."""
+    return [stated(module)["PACKAGE"] for module in sorted(files()) if "PACKAGE" in stated(module)]
+
+
+def is_there(spec: str) -> bool:
+    """Return whether there is a file for a contender."""
+    return re.split("[:@]", spec)[0] in files()
+
+
+def names_of(spec: str) -> Sequence[str]:
+    """Return what a contender is called, of whatever kind."""
+    module = re.split("[:@]", spec)[0]
+    return [module, *stated(module).get("NAMES", {}).values()] if is_there(spec) else []
 
 
 def shown(module: str, kind: str) -> str:
     """Return the name of a contender in tables."""
-    return SHOWN.get(f"{module} {kind}") or SHOWN.get(module, module)
+    names = stated(module).get("NAMES", {})
+    return names.get(kind) or names.get("", module)
 
 
 class NotApplicable(Exception):

@@ -12,6 +12,9 @@ from numba_celltree.constants import Box, Point
 import engine
 from benchmarks.contenders import NotApplicable, Prepared, rows_of
 
+PACKAGE = "numba-celltree"
+NAMES = {"": "numba_celltree"}
+
 
 @numba.njit(nogil=True)
 def _clip(segments: Any, low: Any, high: Any) -> tuple[Any, Any]:

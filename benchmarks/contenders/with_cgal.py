@@ -12,6 +12,9 @@ from CGAL.CGAL_Polyhedron_3 import Polyhedron_3, Polyhedron_modifier
 from benchmarks.contenders import NotApplicable, Prepared
 from benchmarks.workloads import Mesh
 
+PACKAGE = "cgal"
+NAMES = {"": "CGAL", "points": "CGAL side of mesh"}
+
 
 def _points(mesh: Mesh, threads: int) -> Prepared:
     modifier = Polyhedron_modifier()

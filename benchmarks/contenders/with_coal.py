@@ -14,6 +14,8 @@ import numpy as np
 from benchmarks.contenders import Couple, Library, Placed, Prepared, box_of, makers_of
 from benchmarks.workloads import Mesh
 
+PACKAGE = "coal"
+
 Body = tuple[Any, coal.Transform3s]
 _MEET, _FOUND = coal.CollisionRequest(), coal.CollisionResult()
 _MEET.enable_contact = False

@@ -14,6 +14,9 @@ from benchmarks.bodies import Crowd
 from benchmarks.contenders import Library, Placed, Prepared, box_of, makers_of
 from benchmarks.workloads import Mesh
 
+PACKAGE = "python-fcl"
+NAMES = {"crowd": "fcl's manager"}
+
 _MEET = fcl.CollisionRequest(num_max_contacts=1, enable_contact=False)
 
 

@@ -10,6 +10,8 @@ import shapely
 
 from benchmarks.contenders import Prepared
 
+PACKAGE = "geopandas"
+
 
 def frames_of(layers: tuple[np.ndarray, np.ndarray]) -> list[Any]:
     """Return two layers of polygons of (n, size, 2) corners as GeoDataFrames with two columns."""

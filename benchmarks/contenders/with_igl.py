@@ -7,6 +7,9 @@ import igl
 from benchmarks.contenders import Couple, Prepared, meshes_of
 from benchmarks.workloads import Mesh
 
+PACKAGE = "libigl"
+NAMES = {"": "libigl", "points": "libigl winding number"}
+
 
 def _points(mesh: Mesh, threads: int) -> Prepared:
     return Prepared(lambda points: igl.fast_winding_number(mesh.vertices, mesh.faces, points) > 0.5)

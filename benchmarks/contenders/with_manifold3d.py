@@ -19,6 +19,9 @@ from benchmarks.contenders import (
     rings_of,
 )
 
+PACKAGE = "manifold3d"
+NAMES = {"overlay": "Clipper2 by manifold3d", "overlay of made": "Clipper2 by manifold3d"}
+
 
 def _combined(pair: Any, operation: str) -> Any:
     first, second = pair

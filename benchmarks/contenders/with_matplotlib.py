@@ -8,6 +8,9 @@ from matplotlib.path import Path
 from benchmarks.contenders import Prepared
 from benchmarks.workloads import Rings
 
+PACKAGE = "matplotlib"
+NAMES = {"": "matplotlib Path"}
+
 
 def _points(subject: Rings, threads: int) -> Prepared:
     paths = [Path(np.concatenate([ring, ring[:1]]), closed=True) for ring in subject.rings]

@@ -10,6 +10,9 @@ import numpy as np
 import engine
 from benchmarks.contenders import Prepared, in_threads
 
+PACKAGE = "numpy"
+NAMES = {"determinant": "numpy determinant", "linalg": "numpy.linalg.det"}
+
 BLOCK = 1 << 15
 """Signed distances held at once: 256 KB, and products too small for the BLAS to start threads of its own."""
 

@@ -16,6 +16,9 @@ from open3d.t.geometry import RaycastingScene
 from benchmarks.contenders import Couple, Prepared, merged, meshes_of
 from benchmarks.workloads import Bodies, Mesh
 
+PACKAGE = "open3d"
+NAMES = {"": "Open3D", "points": "Open3D occupancy", "scene": "Open3D occupancy"}
+
 open3d.utility.set_verbosity_level(open3d.utility.VerbosityLevel.Error)
 
 

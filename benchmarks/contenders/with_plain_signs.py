@@ -20,6 +20,8 @@ from engine.lanes.cells import planes_of
 from engine.lanes.lanes import bits_of, count_bits
 from engine.lanes.tracing import Number, Rows, traced
 
+NAMES = {"": "ours, plain signs"}
+
 _AS_ENGINE: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 """Options of `engine.jit`, without a cache."""
 

@@ -11,6 +11,8 @@ import engine
 from benchmarks.contenders import Prepared, each_or_nan, overlays, rings_of
 from benchmarks.workloads import Rings
 
+PACKAGE = "pyclipper"
+
 OPERATIONS = {
     "intersection": pyclipper.CT_INTERSECTION, "union": pyclipper.CT_UNION, "difference": pyclipper.CT_DIFFERENCE,
     "symmetric_difference": pyclipper.CT_XOR,

@@ -14,6 +14,12 @@ import engine
 from benchmarks.contenders import Couple, NotApplicable, Prepared, each_alone, in_threads, overlays, without_poses
 from benchmarks.workloads import Bodies, Rings
 
+PACKAGE = "shapely"
+NAMES = {
+    "": "shapely (GEOS)", "kept polygons": "shapely clip_by_rect", "points": "shapely, prepared",
+    "polygon areas": "shapely clip_by_rect", "scene": "shapely STRtree", "segments": "shapely clip_by_rect",
+}  # fmt: skip
+
 
 def _made(rings: list[np.ndarray]) -> shapely.Polygon:
     return shapely.Polygon(rings[0], rings[1:])

@@ -32,6 +32,17 @@ from engine.textbook import (
     triangles,
 )
 
+NAMES = {
+    "by planes": "textbook: Cohen-Sutherland by planes", "cross and dot": "textbook: cross and dot",
+    "kept polygons": "naive", "naive segments": "naive", "overlay": "textbook: Greiner-Hormann",
+    "pair by edges": "textbook: edges through faces", "pair by vertices": "textbook: vertices in the other",
+    "pair by volumes": "textbook: volumes first", "planes": "textbook: half-spaces", "points": "textbook: half-line",
+    "polygon areas": "textbook: Sutherland-Hodgman", "projection": "textbook: projection",
+    "quadratic": "textbook: quadratic", "recast": "textbook: another half-line", "same side": "textbook: same side",
+    "segments": "textbook: Cohen-Sutherland", "signed angles": "textbook: signed angles",
+    "unsigned angles": "textbook: unsigned angles, 1e-6",
+}  # fmt: skip
+
 OBLIQUE = np.array([0.5773, 0.2113, 0.7886])
 """A direction without zero components for the textbook's half-line."""
 Ask = Callable[[np.ndarray], Any]

@@ -14,6 +14,9 @@ import engine
 from benchmarks.contenders import Prepared, merged
 from benchmarks.workloads import Bodies, Mesh
 
+PACKAGE = "trimesh"
+NAMES = {"": "trimesh + embreex"}
+
 
 def _points(mesh: Mesh, threads: int) -> Prepared:
     return Prepared(trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).contains)

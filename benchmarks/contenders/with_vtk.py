@@ -10,6 +10,9 @@ import engine
 from benchmarks.contenders import Couple, Prepared, meshes_of
 from benchmarks.workloads import Mesh
 
+PACKAGE = "vtk"
+NAMES = {"": "VTK", "points": "VTK enclosed points"}
+
 
 def _polydata(vertices: np.ndarray, faces: np.ndarray | None = None) -> vtk.vtkPolyData:
     corners, data, cells = vtk.vtkPoints(), vtk.vtkPolyData(), vtk.vtkCellArray()

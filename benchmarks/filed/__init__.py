@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import engine
-from benchmarks.contenders import PACKAGES, NotApplicable, Placed, answers
+from benchmarks.contenders import NotApplicable, Placed, answers, stated
 from benchmarks.filed import museum
 from benchmarks.machine import version_of
 from benchmarks.workloads import Mesh, Rings
@@ -216,7 +216,7 @@ def replay(names: Sequence[str] = (), limit: float = LIMIT, cases: list[Case] | 
 def _replay_one(peer: Peer, cases: list[Case], limit: float) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = []
     process, pipe = None, None
-    package = PACKAGES.get(peer.module)
+    package = stated(peer.module).get("PACKAGE") if peer.module else ""
     about = {"contender": peer.name, "version": version_of(package) if package else ""}
     for case in cases:
         kind, outcome, note, where = kind_of(case), "not applicable", "", list[int]()

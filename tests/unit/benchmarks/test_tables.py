@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benchmarks import errors, machine, measure, table, workloads
+from benchmarks import contenders, contest, errors, machine, measure, table, workloads
 from benchmarks.contenders import Prepared, in_threads
 from benchmarks.contest import Contender, Contest, Row, Size, contender, hold
 from benchmarks.fields import Figure, tasks
@@ -34,6 +35,26 @@ def test_answers_that_differ_are_settled() -> None:
     exact = partial(lambda rows: errors.locations(points[rows], square))
     ours, peer = hold(Contest("o", "c", False, points, exact, errors.same, contenders), 2, 0.01)
     assert (ours.errors["differ"], ours.errors["wrong"], peer.errors["wrong"]) == (2, 0, 2)
+
+
+def test_a_contender_is_one_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It takes part by being there and named; a package that is not installed is told, not raised."""
+    for name, line in (("mine", ""), ("absent", "import a_package_of_nobody\n")):
+        text = f"{line}from benchmarks.contenders import Prepared\n"
+        text += f'PACKAGE = "nobodys"\nNAMES = {{"points": "my {name}"}}\n'
+        text += 'MAKERS = {"points": lambda subject, threads: Prepared(lambda points: points[:, 0] < 0)}\n'
+        (tmp_path / f"with_{name}.py").write_text(text)
+    monkeypatch.setattr(contenders, "__path__", [*contenders.__path__, str(tmp_path)])
+    for name in ("mine", "absent"):
+        given = table.options(["--contest", "triangle 2D, boundary", "--contender", name, "--quick"], "")
+        given.seconds, chosen = 0.01, tasks(given.size, ("containment",))
+        rows = table.measured("containment", chosen, given)["rows"]
+        assert [row["contender"] for row in rows] == ["ours", f"my {name}"]
+        assert rows[1]["absent"] == ("ModuleNotFoundError: No module named 'a_package_of_nobody'" * (name == "absent"))
+    assert "my mine" in capsys.readouterr().out
+    contest.NAMED.clear()
 
 
 def test_a_median_has_quartiles() -> None:
