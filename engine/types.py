@@ -26,14 +26,6 @@ class Point3(NamedTuple):
     z: float
 
 
-class HalfSpace2(NamedTuple):
-    """The half-plane a x + b y + c >= 0; (a, b) points inward."""
-
-    a: float
-    b: float
-    c: float
-
-
 class HalfSpace3(NamedTuple):
     """The half-space a x + b y + c z + d >= 0; (a, b, c) points inward."""
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 from engine.jit import inline
-from engine.types import HalfSpace2, HalfSpace3, Point2, Point3
+from engine.types import Point2, Point3
 
 
 @inline
@@ -21,15 +21,3 @@ def as_point2(points: Any, row: int) -> Point2:
 def as_point3(points: Any, row: int) -> Point3:
     """Return row `row` of points (n, 3) float64."""
     return Point3(float(points[row, 0]), float(points[row, 1]), float(points[row, 2]))
-
-
-@inline
-def as_half_space2(rows: Any, row: int) -> HalfSpace2:
-    """Return row `row` of rows (n, 3) float64."""
-    return HalfSpace2(float(rows[row, 0]), float(rows[row, 1]), float(rows[row, 2]))
-
-
-@inline
-def as_half_space3(rows: Any, row: int) -> HalfSpace3:
-    """Return row `row` of rows (n, 4) float64."""
-    return HalfSpace3(float(rows[row, 0]), float(rows[row, 1]), float(rows[row, 2]), float(rows[row, 3]))

@@ -14,7 +14,7 @@ more than the largest bound of these, are settled and leave the block.
 A row may also be the rounded image of a rational one (a posed plane, a wall of a prism): each coefficient then carries
 another u, which the slack has room for (5 u of 8 u), but what the filter leaves open stays UNDECIDED.
 
-The plane and space have a kernel each: one for both, its steps merged, takes a fifth longer on few planes.
+The plane and space have a kernel each, of one function: told only when it runs, it takes a fifth longer on few planes.
 
 Source: Shewchuk 1997, "Adaptive precision floating-point arithmetic and fast robust geometric predicates", for the form
 of the filter; the exact sign is `side.py`'s.
@@ -27,8 +27,7 @@ from typing import Any, Final
 import numpy as np
 
 from engine.containment.posed.filters import NOT_FINITE, has_not_finite, in_space
-from engine.jit import inline, kernel
-from engine.predicates.loading import as_half_space2, as_half_space3, as_point2, as_point3
+from engine.jit import inline, kernel, merged
 from engine.predicates.side import side_of_plane, side_of_plane_filter
 from engine.types import UNDECIDED, HalfSpace3, Point3
 
@@ -44,11 +43,11 @@ _LARGE: Final = 1e300
 """Terms of a row whose sizes add up to less than this cannot overflow, in any order; NaN is not less."""
 
 
-@inline
-def _row(planes: Any, row: int) -> HalfSpace3:
+@merged
+def _row(planes: Any, row: int, is_flat: bool) -> HalfSpace3:
     """Return row `row` of planes (m, 3 or 4); those of the plane have 0 in the third place, as points have."""
-    a, b, d = float(planes[row, 0]), float(planes[row, 1]), float(planes[row, planes.shape[1] - 1])
-    return HalfSpace3(a, b, 0.0 if planes.shape[1] == 3 else float(planes[row, 2]), d)
+    a, b, d = float(planes[row, 0]), float(planes[row, 1]), float(planes[row, 2 if is_flat else 3])
+    return HalfSpace3(a, b, 0.0 if is_flat else float(planes[row, 2]), d)
 
 
 @inline
@@ -57,12 +56,13 @@ def _locate_one(points: Any, item: int, planes: Any, is_exact: Any) -> tuple[int
     x, y, z = in_space(points, item)
     p, location, is_unsure = Point3(x, y, z), 1, False
     for row in range(len(planes)):
-        side = side_of_plane_filter(_row(planes, row), p)
+        h = _row(planes, row, planes.shape[1] == 3)
+        side = side_of_plane_filter(h, p)
         if side == 1:
             continue
         if side == UNDECIDED:
             is_unsure = True
-            side = side_of_plane(_row(planes, row), p) if is_exact[row] else UNDECIDED
+            side = side_of_plane(h, p) if is_exact[row] else UNDECIDED
         if side == -1:
             return -1, is_unsure
         if side == UNDECIDED:
@@ -103,72 +103,14 @@ def _pays(row: int, n_rows: int) -> bool:
     return row >= 8 and row & (row - 1) == 0 and n_rows - row >= 24
 
 
-@kernel
-def locate_in_half_planes(points: Any, planes: Any, is_exact: Any, locations: Any, flag: Any) -> int:
-    """Fill `locations` (n,) int8 for points (n, 2) and planes (m, 3); UNDECIDED where the exponents are out of range.
-
-    is_exact: (m,) bool, False for a row that is correctly rounded from a rational one, without underflow.
-    Returns how many points needed more than the filter, or NOT_FINITE. Stops early once flag[0] is set.
-    """
-    if has_not_finite(points):
-        return NOT_FINITE
-    if len(points) < _FEW:
-        return _locate_few(points, planes, is_exact, locations, flag)
-    xs, ys, least, folded = np.empty(_BLOCK), np.empty(_BLOCK), np.empty(_BLOCK), np.empty(_BLOCK)
-    places, found = np.empty(_BLOCK, np.uint32), np.empty(_BLOCK, np.int8)
-    n_beyond, last = 0, len(planes) - 1
-    for start in range(0, len(points), _BLOCK):
-        stop, is_thinned = min(start + _BLOCK, len(points)), False
-        count = stop - start
-        for k in range(count):
-            p = as_point2(points, start + k)
-            xs[k], ys[k] = p.x, p.y
-        xs[count:], ys[count:], least[:] = 0.0, 0.0, _LARGE
-        x_size, y_size, largest = _largest(xs, folded), _largest(ys, folded), 0.0
-        for row in range(0, len(planes), _ROWS):
-            if flag[0]:
-                return n_beyond
-            if _pays(row, len(planes)):
-                if not is_thinned:
-                    is_thinned = True
-                    for k in range(count):
-                        places[k], locations[start + k] = k, -1
-                bound, n_left = _SLACK * largest + _TINY, 0
-                for k in range(count):
-                    left = np.uint32(n_left)
-                    xs[left], ys[left], least[left], places[left] = xs[k], ys[k], least[k], places[k]
-                    n_left += not least[k] < -bound
-                count = n_left
-            e, f = as_half_space2(planes, row), as_half_space2(planes, min(row + 1, last))
-            g, h = as_half_space2(planes, min(row + 2, last)), as_half_space2(planes, min(row + 3, last))
-            for each in (e, f, g, h):
-                size = abs(each.a) * x_size + abs(each.b) * y_size + abs(each.c)
-                largest = max(largest, size) if size < _LARGE else np.inf  # also for a row of NaN
-            if not largest < _LARGE:
-                break
-            for k in range(count):
-                x, y = xs[k], ys[k]
-                first = min(e.a * x + e.b * y + e.c, f.a * x + f.b * y + f.c)
-                second = min(g.a * x + g.b * y + g.c, h.a * x + h.b * y + h.c)
-                least[k] = min(least[k], min(first, second))
-        bound = _SLACK * largest + _TINY if largest < _LARGE else np.inf
-        n_open = 0
-        for k in range(count):
-            is_in, is_out = least[k] > bound, least[k] < -bound
-            found[k] = UNDECIDED - is_in - 3 * is_out  # no branch: 1, -1 or 2
-            n_open += not (is_in | is_out)
-        for k in range(count):
-            locations[start + (places[k] if is_thinned else k)] = found[k]
-        for item in range(start, stop if n_open > 0 else start):
-            if locations[item] == UNDECIDED:
-                locations[item], is_unsure = _locate_one(points, item, planes, is_exact)
-                n_beyond += is_unsure
-    return n_beyond
+@merged
+def _value(h: Any, x: Any, y: Any, z: Any, is_flat: bool) -> Any:
+    return h.a * x + h.b * y + h.d if is_flat else h.a * x + h.b * y + h.c * z + h.d
 
 
-@kernel
-def locate_in_half_spaces(points: Any, planes: Any, is_exact: Any, locations: Any, flag: Any) -> int:
-    """Fill `locations` (n,) int8 for points (n, 3) and planes (m, 4); the rest as in the plane."""
+@merged
+def _locate(points: Any, planes: Any, is_exact: Any, locations: Any, flag: Any, is_flat: bool) -> int:
+    """Do what both kernels do; is_flat is known when they are compiled."""
     if has_not_finite(points):
         return NOT_FINITE
     if len(points) < _FEW:
@@ -181,10 +123,12 @@ def locate_in_half_spaces(points: Any, planes: Any, is_exact: Any, locations: An
         stop, is_thinned = min(start + _BLOCK, len(points)), False
         count = stop - start
         for k in range(count):
-            p = as_point3(points, start + k)
-            xs[k], ys[k], zs[k] = p.x, p.y, p.z
+            xs[k], ys[k] = points[start + k, 0], points[start + k, 1]
+            if not is_flat:
+                zs[k] = points[start + k, 2]
         xs[count:], ys[count:], zs[count:], least[:] = 0.0, 0.0, 0.0, _LARGE
-        x_size, y_size, z_size, largest = _largest(xs, folded), _largest(ys, folded), _largest(zs, folded), 0.0
+        x_size, y_size, largest = _largest(xs, folded), _largest(ys, folded), 0.0
+        z_size = 0.0 if is_flat else _largest(zs, folded)
         for row in range(0, len(planes), _ROWS):
             if flag[0]:
                 return n_beyond
@@ -196,21 +140,22 @@ def locate_in_half_spaces(points: Any, planes: Any, is_exact: Any, locations: An
                 bound, n_left = _SLACK * largest + _TINY, 0
                 for k in range(count):
                     left = np.uint32(n_left)
-                    xs[left], ys[left], zs[left] = xs[k], ys[k], zs[k]
-                    least[left], places[left] = least[k], places[k]
+                    xs[left], ys[left], least[left], places[left] = xs[k], ys[k], least[k], places[k]
+                    if not is_flat:
+                        zs[left] = zs[k]
                     n_left += not least[k] < -bound
                 count = n_left
-            e, f = as_half_space3(planes, row), as_half_space3(planes, min(row + 1, last))
-            g, h = as_half_space3(planes, min(row + 2, last)), as_half_space3(planes, min(row + 3, last))
+            e, f = _row(planes, row, is_flat), _row(planes, min(row + 1, last), is_flat)
+            g, h = _row(planes, min(row + 2, last), is_flat), _row(planes, min(row + 3, last), is_flat)
             for each in (e, f, g, h):
                 size = abs(each.a) * x_size + abs(each.b) * y_size + abs(each.c) * z_size + abs(each.d)
                 largest = max(largest, size) if size < _LARGE else np.inf  # also for a row of NaN
             if not largest < _LARGE:
                 break
             for k in range(count):
-                x, y, z = xs[k], ys[k], zs[k]
-                first = min(e.a * x + e.b * y + e.c * z + e.d, f.a * x + f.b * y + f.c * z + f.d)
-                second = min(g.a * x + g.b * y + g.c * z + g.d, h.a * x + h.b * y + h.c * z + h.d)
+                x, y, z = xs[k], ys[k], 0.0 if is_flat else zs[k]
+                first = min(_value(e, x, y, z, is_flat), _value(f, x, y, z, is_flat))
+                second = min(_value(g, x, y, z, is_flat), _value(h, x, y, z, is_flat))
                 least[k] = min(least[k], min(first, second))
         bound = _SLACK * largest + _TINY if largest < _LARGE else np.inf
         n_open = 0
@@ -225,3 +170,19 @@ def locate_in_half_spaces(points: Any, planes: Any, is_exact: Any, locations: An
                 locations[item], is_unsure = _locate_one(points, item, planes, is_exact)
                 n_beyond += is_unsure
     return n_beyond
+
+
+@kernel
+def locate_in_half_planes(points: Any, planes: Any, is_exact: Any, locations: Any, flag: Any) -> int:
+    """Fill `locations` (n,) int8 for points (n, 2) and planes (m, 3); UNDECIDED where the exponents are out of range.
+
+    is_exact: (m,) bool, False for a row that is correctly rounded from a rational one, without underflow.
+    Returns how many points needed more than the filter, or NOT_FINITE. Stops early once flag[0] is set.
+    """
+    return int(_locate(points, planes, is_exact, locations, flag, True))
+
+
+@kernel
+def locate_in_half_spaces(points: Any, planes: Any, is_exact: Any, locations: Any, flag: Any) -> int:
+    """Fill `locations` (n,) int8 for points (n, 3) and planes (m, 4); the rest as in the plane."""
+    return int(_locate(points, planes, is_exact, locations, flag, False))

@@ -7,11 +7,11 @@ from typing import Any
 import numba
 
 from engine.jit import _OPTIONS
-from engine.predicates.loading import as_half_space3, as_point2, as_point3
+from engine.predicates.loading import as_point2, as_point3
 from engine.predicates.orientation import orient2d, orient2d_filter, orient3d_filter
 from engine.predicates.polynomial import sign_of_polynomial_exact, sign_of_polynomial_filter
 from engine.predicates.side import side_of_plane
-from engine.types import UNDECIDED
+from engine.types import UNDECIDED, HalfSpace3
 
 kernel = numba.njit(**_OPTIONS)
 
@@ -50,4 +50,6 @@ def sign_of_polynomial_batch(powers: Any, coefficients: Any, degree: int, points
 def side_of_plane_batch(rows: Any, points: Any, sides: Any) -> None:
     """Fill sides (n,) int8 with side_of_plane of the rows (n, 4) and the points (n, 3) float64."""
     for item in range(sides.shape[0]):
-        sides[item] = side_of_plane(as_half_space3(rows, item), as_point3(points, item))
+        sides[item] = side_of_plane(
+            HalfSpace3(rows[item, 0], rows[item, 1], rows[item, 2], rows[item, 3]), as_point3(points, item)
+        )
