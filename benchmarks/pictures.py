@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import io
+import math
 from typing import Any
 
-from benchmarks.web_page import error_share
+from benchmarks.web_page import SAME, faults, questions
 
 TONE = "#8a9099"
 OURS = "#d9480f"
@@ -15,12 +16,14 @@ PEERS = {
     "pyclipper": "#e64980", "Clipper2": "#1098ad", "numba_celltree": "#94d82d", "numpy": "#4263eb",
     "fractions": "#a0522d", "ours, plain": "#ffa94d",
 }  # fmt: skip
-"""One colour a package in every picture; the textbook's methods are grey, told apart by their markers."""
-MARKERS = ("s", "D", "^", "v", "P")
+"""One colour a package in every picture; the textbook's methods are grey."""
+GOOD, SLOW, BAD = "#2b8a3e", "#d9730d", "#e03131"
 ZERO_LANE = 1e-6
 """Where an error rate of 0 stands on the logarithmic axis."""
 SHARES: dict[str, Any] = {"ylim": (ZERO_LANE / 2, 1.5), "yticks": [ZERO_LANE, 1e-4, 1e-2, 1],
                           "yticklabels": ["0", "0.01%", "1%", "100%"]}  # fmt: skip
+LEFT, WIDE, LINE = 170, 240, 24
+"""Of the first picture: where its axis begins, how wide it is, how high a line."""
 
 
 def draw(found: dict[str, Any]) -> dict[str, str]:
@@ -34,10 +37,9 @@ def draw(found: dict[str, Any]) -> dict[str, str]:
         "grid.color": TONE, "grid.alpha": 0.25, "font.family": "sans-serif",
     }  # fmt: skip
     return {
-        "speed_against_error.svg": _scatter(found["rows"]),
+        "speed_against_error.svg": _glance(questions(found["rows"])),
         "error_by_distance.svg": _distance(found["curves"]["distance"]),
         "speed_by_size.svg": _size(found["curves"]["size"]),
-        "coordinate_errors.svg": _histograms(found["rows"]),
     }
 
 
@@ -51,103 +53,82 @@ def _svg(figure: Any) -> str:
     return "\n".join(line.rstrip() for line in text.getvalue().splitlines()) + "\n"
 
 
-def _looks(names: list[str]) -> dict[str, dict[str, Any]]:
-    """Return colour and marker of each contender."""
-    looks: dict[str, dict[str, Any]] = {}
-    grey = iter(MARKERS * 9)
-    for name in names:
-        color = next((tone for word, tone in PEERS.items() if name.startswith(word)), None)
-        looks[name] = {"color": color, "marker": "o"} if color else {"color": TONE, "marker": next(grey)}
-    return looks | {"ours": {"color": OURS, "marker": "*"}}
+def _glance(asked: list[dict[str, Any]]) -> str:
+    """All questions: a ring for easy and a disc for hard input on an axis of speed, then who is wrong."""
+    axis, beside = LEFT + WIDE / 2, LEFT + WIDE + 20
+    heads = ((LEFT, "100x slower", "start"), (axis, "same", "middle"), (LEFT + WIDE, "100x faster", "end"),
+             (beside, "wrong on hard input, the fastest first", "start"))  # fmt: skip
+    parts = [_text(x, 14, words, anchor) for x, words, anchor in heads]
+    for number, each in enumerate(sorted(asked, key=lambda each: each["is_alone"])):
+        y, words = 36 + LINE * number, []
+        parts.append(_text(0, y + 4, each["title"]))
+        parts.append(f'<path d="M{LEFT} {y}h{WIDE}M{axis} {y - 8}v16" stroke="{TONE}" stroke-opacity=".6"/>')
+        for side, one in each["sides"].items():
+            if one["ratio"] is not None:
+                x = axis + WIDE / 2 * max(-1.0, min(1.0, math.log10(one["ratio"]) / 2))
+                tone = GOOD if one["ratio"] >= SAME else SLOW
+                fill = f'fill="{tone}"' if side == "hard" else 'fill="none"'
+                parts.append(f'<circle cx="{x:.1f}" cy="{y}" r="5" stroke="{tone}" stroke-width="2" {fill}/>')
+        for one in each["seen"]:
+            tone = BAD if one["wrong"] else SLOW if one["refused"] + one["outside"] else GOOD
+            words.append(f'<tspan fill="{tone}">{faults(one)}</tspan>')
+        parts.append(_text(beside, y + 4, "&#160; ".join(words)))
+    size = f'viewBox="0 0 1000 {40 + LINE * len(asked)}" font-family="sans-serif" font-size="13"'
+    return f'<svg xmlns="http://www.w3.org/2000/svg" {size}>\n' + "\n".join(parts) + "\n</svg>\n"
 
 
-def _log_axes(axis: Any) -> None:
-    from matplotlib.ticker import NullFormatter
-
-    axis.set(xscale="log", yscale="log")
-    axis.xaxis.set_minor_formatter(NullFormatter())
-    axis.yaxis.set_minor_formatter(NullFormatter())
-
-
-def _scatter(rows: list[dict[str, Any]]) -> str:
-    """Speed against the share of wrong or refused answers, one panel an operation, its hard contests."""
-    import matplotlib.pyplot as plt
-
-    operations = list(dict.fromkeys(row["operation"] for row in rows if row["is_hard"]))
-    n_lines = -(-len(operations) // 3)
-    figure, axes = plt.subplots(n_lines, 3, figsize=(11, 3.1 * n_lines), squeeze=False)
-    for axis in axes.flat[len(operations) :]:
-        axis.set_visible(False)
-    for axis, operation in zip(axes.flat, operations):
-        chosen = [row for row in rows if row["operation"] == operation and row["is_hard"] and row["seconds"]]
-        chosen = [row for row in chosen if row.get("setting") is None and "judged" in row["errors"]]
-        for name, look in _looks([row["contender"] for row in chosen]).items():
-            mine = [row for row in chosen if row["contender"] == name]
-            shares = [error_share(row) or ZERO_LANE for row in mine]
-            rates = [row["rate"] for row in mine]
-            axis.scatter(rates, shares, label=name, s=110 if name == "ours" else 30, zorder=3, **look)
-        _log_axes(axis)
-        axis.set(title=operation, **SHARES)
-        low, high = axis.get_xlim()
-        axis.set_xlim(min(low, high / 200), high)  # two decades at least: a tick to read each by
-        axis.legend(fontsize=6.5, framealpha=0.0, loc="center left")
-    for axis in axes[:, 0]:
-        axis.set_ylabel("wrong or refused")
-    for axis in axes[-1]:
-        axis.set_xlabel("items a second")
-    return _svg(figure)
+def _text(x: float, y: float, text: str, anchor: str = "start") -> str:
+    return f'<text x="{x:g}" y="{y}" fill="{TONE}" text-anchor="{anchor}">{text}</text>'
 
 
 def _curves(axis: Any, curves: dict[str, tuple[Any, Any]]) -> None:
-    """Draw the places of each contender, both ways logarithmic."""
-    looks = _looks(list(curves))
+    """Draw the places of each contender, both ways logarithmic, each name beside the end of its curve."""
+    from matplotlib.ticker import NullFormatter
+
+    axis.set(xscale="log", yscale="log")
     for name, (x, y) in curves.items():
-        axis.plot(x, y, label=name, ms=4, lw=2.5 if name == "ours" else 1.2, **looks[name])
-    _log_axes(axis)
-    axis.legend(fontsize=7, framealpha=0.0)
+        axis.plot(x, y, "o-", ms=4, lw=2.5 if name == "ours" else 1.2, color=_color(name))
+    for each in (axis.xaxis, axis.yaxis):
+        each.set_minor_formatter(NullFormatter())
+
+
+def _name(axis: Any, curves: dict[str, tuple[Any, Any]]) -> None:
+    """Put each name beside the end of its curve, moved up until it covers no other."""
+    axis.get_xlim(), axis.get_ylim()  # which settles them
+    to_axes = axis.transData + axis.transAxes.inverted()
+    ends = sorted((to_axes.transform((x[-1], y[-1]))[1], name) for name, (x, y) in curves.items())
+    free = -1.0
+    for height, name in ends:
+        free = max(height, free + 0.062)
+        axis.text(1.01, free, name, transform=axis.transAxes, va="center", fontsize=8, color=_color(name))
+
+
+def _color(name: str) -> str:
+    return OURS if name == "ours" else next((tone for word, tone in PEERS.items() if name.startswith(word)), TONE)
 
 
 def _distance(found: dict[str, Any]) -> str:
     import matplotlib.pyplot as plt
 
-    figure, axes = plt.subplots(1, 2, figsize=(11, 3.6), sharey=True)
+    figure, axes = plt.subplots(1, 2, figsize=(12, 3.6))
     places = [max(ulps, 0.5) for ulps in found["ulps"]]
     for axis, operation in zip(axes, ("containment 2D", "containment 3D")):
         drawn = {name: (places, [share or ZERO_LANE for share in shares]) for name, shares in found[operation].items()}
         _curves(axis, drawn)
         axis.set(title=operation, xlabel="ulps of a coordinate off (leftmost: rounded onto it)", **SHARES)
-    axes[0].set_ylabel("wrong answers")
+        _name(axis, {name: ((x[0],), (y[0],)) for name, (x, y) in drawn.items()})
+    axes[0].set_ylabel("wrong answers; names: from the left end")
     return _svg(figure)
 
 
 def _size(found: dict[str, Any]) -> str:
     import matplotlib.pyplot as plt
 
-    figure, axes = plt.subplots(1, 2, figsize=(11, 3.6), sharey=True)
+    figure, axes = plt.subplots(1, 2, figsize=(12, 3.6))
     for axis, (kind, label) in zip(axes, (("faces", "faces of the mesh"), ("batch", "points in one call"))):
-        _curves(axis, {name: tuple(zip(*places)) for name, places in found[kind].items()})
+        drawn = {name: tuple(zip(*places)) for name, places in found[kind].items()}
+        _curves(axis, drawn)
+        _name(axis, drawn)
         axis.set_xlabel(label)
     axes[0].set_ylabel("points a second, containment 3D")
-    return _svg(figure)
-
-
-def _histograms(rows: list[dict[str, Any]]) -> str:
-    """Errors of clipped coordinates in ulps, by powers of two."""
-    import matplotlib.pyplot as plt
-
-    chosen = [row for row in rows if row["is_hard"] and "ulp_histogram" in row["errors"]]
-    contests = list(dict.fromkeys(row["contest"] for row in chosen))
-    figure, axes = plt.subplots(1, len(contests), figsize=(11, 3.1), sharey=True, squeeze=False)
-    for axis, contest in zip(axes[0], contests):
-        mine = [row for row in chosen if row["contest"] == contest]
-        looks = _looks([row["contender"] for row in mine])
-        for i_row, row in enumerate(mine):
-            counts = row["errors"]["ulp_histogram"]
-            total, width = max(1, sum(counts)), 0.8 / len(mine)
-            axis.bar([x + width * i_row for x in range(len(counts))], [count / total for count in counts],
-                     width, color=looks[row["contender"]]["color"], label=row["contender"])  # fmt: skip
-        axis.set(title=contest, yscale="log", ylim=(1e-4, 1.2), xlabel="ulps off")
-        axis.set_xticks([0, 1, 3, 8, 14, 20], ["0", "1", "7", "255", "2$^{14}$", "more"])
-        axis.legend(fontsize=6.5, framealpha=0.0)
-    axes[0, 0].set_ylabel("share of coordinates")
     return _svg(figure)
