@@ -31,6 +31,8 @@ SIZES = (1, 10, 100)
 """Items of a question whose latency is measured by itself."""
 LARGEST = 20_000
 """Characters of a request that is kept."""
+DRAWN = 300
+"""Faces or vertices of a body that is too large to be kept."""
 QUESTIONS = 200
 """At most, for each of these sizes."""
 NAMED: list[str] = []
@@ -332,7 +334,30 @@ def _note(contest: Contest, entry: _Entry, answers: Any, exact: Any, rows: np.nd
         is_small = len(json.dumps(body)) <= LARGEST
         entry.row.worst["request"] = (path, body if is_small else None)
         if is_small:
+            entry.row.worst.pop("sketch", None)
             break
+        entry.row.worst["sketch"] = sketch(body)
+
+
+def sketch(value: Any) -> Any:
+    """Return a body that is too large to be shown as one that can be drawn: some of its faces and vertices."""
+    if isinstance(value, list):
+        return [sketch(each) for each in value[:DRAWN]]
+    if not isinstance(value, dict):
+        return value
+    if "faces" in value:
+        faces = value["faces"][:: 1 + len(value["faces"]) // DRAWN]
+        used = sorted({vertex for face in faces for vertex in face})
+        numbers = {vertex: number for number, vertex in enumerate(used)}
+        corners = [[float(f"{x:.6g}") for x in value["vertices"][vertex]] for vertex in used]
+        return {
+            "type": value["type"],
+            "vertices": corners,
+            "faces": [[numbers[each] for each in face] for face in faces],
+        }
+    if "rings" in value:
+        return value | {"rings": [ring[:: 1 + len(ring) // DRAWN] for ring in value["rings"]]}
+    return {key: sketch(each) for key, each in value.items()}
 
 
 def _judge_differing(contest: Contest, entries: list[_Entry]) -> None:

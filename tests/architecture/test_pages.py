@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.__main__ import NAMES
+
 ROOT = Path(__file__).resolve().parents[2]
 NAMED = re.compile(r"`([\w./]+(?:\.py|/|\.md|\.json))`")
 PLACES = ("", "engine", "tests", "service", "tests/contract", "engine/collision/meshes", "engine/collision/scenes")
@@ -37,3 +39,30 @@ def test_the_glossary_names_constants_that_exist() -> None:
     sources = "\n".join(path.read_text("utf-8") for path in (ROOT / "engine").rglob("*.py"))
     assert len(words) == 4
     assert all(re.search(rf"^{word}(: Final)? = ", sources, re.MULTILINE) for word in words)
+
+
+COMMAND = re.compile(r'(?:command|add_parser)\(\s*"([a-z-]+)"')
+COMMANDS = set(COMMAND.findall((ROOT / "engine" / "__main__.py").read_text("utf-8")))
+PAGES = sorted(
+    path
+    for folder in (".", "docs", "benchmarks", "benchmarks/filed", "tests/hard")
+    for path in (ROOT / folder).glob("*.md")
+)
+
+
+def anchors(text: str) -> set[str]:
+    """Return the names that a page's headings have in links."""
+    heads = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", head.lower()).replace(" ", "-") for head in heads}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_links_lead_somewhere_and_commands_exist(page: Path) -> None:
+    text = page.read_text("utf-8")
+    for link, anchor in re.findall(r"\]\(((?!http)[^)#\s]*)(?:#([^)]*))?\)", text):
+        place = page.parent / link if link else page
+        assert place.exists() or page.name == "page.md", link
+        assert not anchor or anchor in anchors(place.read_text("utf-8")), f"{link}#{anchor}"
+    for kind, names in (("benchmarks", set(NAMES)), ("engine", COMMANDS)):
+        named = set(re.findall(rf"python3? -m {kind} ([a-z_]+)", text))
+        assert named <= names, named - names

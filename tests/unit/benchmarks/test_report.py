@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import compare, errors, page
+from benchmarks import compare, errors, page, workloads
 from benchmarks.contenders import Prepared
 from benchmarks.contenders.with_ours import ring_areas
-from benchmarks.contest import Contender, Contest, Row, Size, hold
+from benchmarks.contest import Contender, Contest, Row, Size, hold, sketch
 from benchmarks.fields import tasks
 
 pytest.importorskip("gmpy2", reason="exact answers need gmpy2")
@@ -71,6 +71,19 @@ def test_ours_has_no_wrong_answer(field: str) -> None:
         row = hold(only, 1, 0.01, has_latency=True)[0]
         assert row.errors["judged"] > 0
         assert row.errors["wrong"] + row.errors["refused"] + row.errors.get("off", 0) == 0
+
+
+def test_a_body_too_large_to_be_shown_is_drawn_by_some_of_its_faces() -> None:
+    mesh = workloads.bumpy_sphere("sketch", 0, 4)
+    rings = [[[k, k * k] for k in range(2000)]]
+    body = {"first": workloads.document(mesh), "second": {"type": "polygon", "rings": rings}}
+    found = sketch(body)
+    assert len(json.dumps(found)) < 60_000 < len(json.dumps(body))
+    assert 200 < len(found["first"]["faces"]) <= 300
+    assert {vertex for face in found["first"]["faces"] for vertex in face} == set(
+        range(len(found["first"]["vertices"]))
+    )
+    assert 200 < len(found["second"]["rings"][0]) <= 300
 
 
 def test_ring_areas() -> None:
