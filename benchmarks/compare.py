@@ -11,6 +11,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+from benchmarks.table import named
+
 
 def main(words: list[str] | None = None) -> int:
     """Print the comparison."""
@@ -37,4 +39,6 @@ def main(words: list[str] | None = None) -> int:
 
 
 def _by_key(found: dict[str, Any]) -> dict[tuple[str, str, str], dict[str, Any]]:
-    return {(row["operation"], row["contest"], row["contender"]): row for row in found["rows"]}
+    return {
+        (row["operation"], row["contest"], named(row["contender"], row.get("setting"))): row for row in found["rows"]
+    }

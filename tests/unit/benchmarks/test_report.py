@@ -93,14 +93,17 @@ def test_ring_areas() -> None:
 
 def stored(path: Path, rate: float, wrong: int) -> str:
     row = {"operation": "o", "contest": "c", "contender": "ours", "rate": rate, "errors": {"wrong": wrong}}
-    path.write_text(json.dumps({"commit": "x", "processor": "p", "cores": 2, "seed": 0, "rows": [row]}))
+    rows = [row, row | {"setting": 3.0, "rate": 7.0}]
+    path.write_text(json.dumps({"commit": "x", "processor": "p", "cores": 2, "seed": 0, "rows": rows}))
     return str(path)
 
 
 def test_two_results_are_compared(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     old, new = stored(tmp_path / "a.json", 100.0, 0), stored(tmp_path / "b.json", 250.0, 1)
     assert compare.main([old, new]) == 1
-    assert "2.50x" in capsys.readouterr().out
+    shown = capsys.readouterr().out
+    assert "2.50x" in shown
+    assert "ours @3" in shown
     assert compare.main([new, old]) == 0
 
 
