@@ -5,7 +5,7 @@ The table of methods is locators.py. Here the arguments are checked, the batch i
 
 from __future__ import annotations
 
-from typing import Literal, Unpack, overload
+from typing import Any, Literal, Unpack, overload
 
 import numpy as np
 
@@ -133,10 +133,6 @@ def contains(
     >>> contains([[3.0, 4.0], [3.1, 4.0]], Sphere([0, 0], 5)).tolist()
     [True, False]
     """
-    if report is False:
-        return locate(points, solid, workers=workers, deadline=deadline, cancel=cancel, progress=progress) >= 0
-    check_options(workers, progress, report=report)
-    locations, accuracy = locate(
-        points, solid, workers=workers, deadline=deadline, cancel=cancel, progress=progress, report=True
-    )
-    return (locations >= 0, accuracy) if report else locations >= 0
+    options = {"workers": workers, "deadline": deadline, "cancel": cancel, "progress": progress, "report": report}
+    found: Any = locate(points, solid, **options)  # type: ignore[call-overload]
+    return (found[0] >= 0, found[1]) if report else found >= 0

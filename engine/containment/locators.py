@@ -138,14 +138,6 @@ def _in_rows(solid: HalfSpace | Convex) -> Locator:
     return _by_kernel("half_spaces", kernel, solid, rows, np.ones(len(rows), np.bool_))
 
 
-def _in_sphere(solid: Sphere) -> Locator:
-    return _by_kernel("squared_distance", locate_in_ball, solid, solid.center, 0.0, solid.radius)
-
-
-def _in_aabb(solid: Aabb) -> Locator:
-    return _by_kernel("comparison", locate_in_box, solid, solid.min, solid.max)
-
-
 def _in_triangle(solid: Triangle) -> Locator:
     if solid.dimension == 2:
         return by_ring_pass("same_side", solid)
@@ -271,8 +263,8 @@ def csg_locator(solid: Csg, leaf_locator: Callable[[Solid], Locator]) -> Locator
 _MAKERS: dict[type[Solid], Callable[..., Locator]] = {
     HalfSpace: _in_rows,
     Convex: _in_rows,
-    Sphere: _in_sphere,
-    Aabb: _in_aabb,
+    Sphere: lambda solid: _by_kernel("squared_distance", locate_in_ball, solid, solid.center, 0.0, solid.radius),
+    Aabb: lambda solid: _by_kernel("comparison", locate_in_box, solid, solid.min, solid.max),
     Triangle: _in_triangle,
     Polygon: _in_polygon,
     Polyhedron: _in_polyhedron,

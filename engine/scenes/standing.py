@@ -8,7 +8,6 @@ from typing import Any, Final, Literal, NamedTuple
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray
-from engine.collision.scenes.bodies import SceneBodies
 from engine.containment.scene.locate_scene import SceneLocations
 from engine.direct import entry_of
 from engine.parallel import Budget
@@ -33,10 +32,6 @@ class Layer(NamedTuple):
     """What they are called in the scene, None for their places."""
     is_away: BoolArray
     """(n,) of each whether it moved since, or (0,) where none did."""
-
-
-def _where(bodies: SceneBodies) -> Placed:
-    return Placed(bodies.kinds, bodies.rotations, bodies.translations)
 
 
 class Standing:
@@ -124,7 +119,8 @@ class Standing:
         """
         batches, tree, room = self.base.batches(budget), self.base.tree(budget), 16 + 6 * len(named)
         bodies, few = batches.bodies, self.base if self.few is None else self.few
-        still, moved = (_where(each.arrays(budget)) for each in (self.base, few))
+        arrays_of = (each.arrays(budget) for each in (self.base, few))
+        still, moved = (Placed(each.kinds, each.rotations, each.translations) for each in arrays_of)
         while True:  # bound: the second turn has room
             d, n_rows = bodies.dimension, 2 * room + 1
             arrays = np.empty((n_rows, d, d)), np.empty((n_rows, d))

@@ -73,17 +73,6 @@ def dot_sign(a: Triple, b: Triple, c: Triple, d: Triple, radius: float) -> int:
 
 
 @inline
-def cross_of(p: Triple, q: Triple, c: Triple, k: int) -> tuple[float, float, float, float, float, float, float, float]:
-    """Return the four differences whose products, first two less last two, are component k of (q - p) x (p - c)."""
-    i, j = (k + 1) % 3, (k + 2) % 3
-    dh, dl = two_diff(q[i], p[i])
-    gh, gl = two_diff(p[j], c[j])
-    eh, el = two_diff(q[j], p[j])
-    fh, fl = two_diff(p[i], c[i])
-    return dh, dl, gh, gl, eh, el, fh, fl
-
-
-@inline
 def discriminant(p: Triple, q: Triple, c: Triple, radius: float) -> Triple:
     """Return A r^2 - |d x f|^2 as a double-double, and its bound; that is 0 where it is exact."""
     ah, al, _ = dd_dot(p, q, p, q)
@@ -91,7 +80,11 @@ def discriminant(p: Triple, q: Triple, c: Triple, radius: float) -> Triple:
     h, low = dd_mul(ah, al, rh, rl)
     size, lost = h, 0.0
     for k in range(3):
-        dh, dl, gh, gl, eh, el, fh, fl = cross_of(p, q, c, k)
+        i, j = (k + 1) % 3, (k + 2) % 3
+        dh, dl = two_diff(q[i], p[i])
+        gh, gl = two_diff(p[j], c[j])
+        eh, el = two_diff(q[j], p[j])
+        fh, fl = two_diff(p[i], c[i])
         uh, ul = dd_mul(dh, dl, gh, gl)
         vh, vl = dd_mul(eh, el, fh, fl)
         ch, cl = dd_sub(uh, ul, vh, vl)
@@ -113,9 +106,8 @@ def short_sign(p: Triple, q: Triple, c: Triple, radius: float) -> int:
     n_square = grow_product(part, 0, radius, radius)
     n = add_product(e, 0, square, expand_dot(p, q, p, q, square, 0), part, n_square)
     for k in range(3):
-        d, _, g, _, b, _, f, _ = cross_of(p, q, c, k)
-        n_part = grow_product(part, 0, d, g)
-        n_part = grow_product(part, n_part, -b, f)
+        i, j = (k + 1) % 3, (k + 2) % 3
+        n_part = grow_product(part, grow_product(part, 0, q[i] - p[i], p[j] - c[j]), p[j] - q[j], p[i] - c[i])
         for i in range(n_part):
             n = add_scaled(e, n, part, n_part, -part[i])
     return sign(e, n)

@@ -73,18 +73,6 @@ def _locate_one(points: Any, item: int, planes: Any, is_exact: Any) -> tuple[int
 
 
 @inline
-def _locate_few(points: Any, planes: Any, is_exact: Any, locations: Any, flag: Any) -> int:
-    """Do what the kernels do, point by point."""
-    n_beyond = 0
-    for item in range(len(points)):
-        if flag[0]:
-            break
-        locations[item], is_unsure = _locate_one(points, item, planes, is_exact)
-        n_beyond += is_unsure
-    return n_beyond
-
-
-@inline
 def _largest(values: Any, folded: Any) -> float:
     """Return the largest size of values (_BLOCK,), by halves: short loops that the compiler turns into vectors."""
     half = _BLOCK // 2
@@ -113,12 +101,15 @@ def _locate(points: Any, planes: Any, is_exact: Any, locations: Any, flag: Any, 
     """Do what both kernels do; is_flat is known when they are compiled."""
     if has_not_finite(points):
         return NOT_FINITE
+    n_beyond, last = 0, len(planes) - 1
     if len(points) < _FEW:
-        return _locate_few(points, planes, is_exact, locations, flag)
+        for item in range(len(points)):
+            locations[item], is_unsure = _locate_one(points, item, planes, is_exact)
+            n_beyond += is_unsure
+        return n_beyond
     xs, ys, zs = np.empty(_BLOCK), np.empty(_BLOCK), np.empty(_BLOCK)
     least, folded = np.empty(_BLOCK), np.empty(_BLOCK)
     places, found = np.empty(_BLOCK, np.uint32), np.empty(_BLOCK, np.int8)
-    n_beyond, last = 0, len(planes) - 1
     for start in range(0, len(points), _BLOCK):
         stop, is_thinned = min(start + _BLOCK, len(points)), False
         count = stop - start

@@ -58,7 +58,8 @@ def posed_locator(solid: Solid, pose: Pose | None) -> Locator:
     unposed = locator_of(solid)
     frames = frames_of([pose], solid.dimension)
     if isinstance(solid, Implicit) and solid.function is not None:
-        return Locator(unposed.method, _through_frame(unposed.fill, frames), unposed.decisions)
+        by_preimage: Fill = lambda points, *rest: unposed.fill(_moved(points, frames)[0], *rest)  # noqa: E731
+        return Locator(unposed.method, by_preimage, unposed.decisions)  # rounded: a callable decides in floats anyway
     return Locator(unposed.method, _filtered(solid, pose, unposed, frames), unposed.decisions)
 
 
@@ -67,11 +68,6 @@ def _moved(points: FloatArray, frames: Frames) -> tuple[FloatArray, FloatArray]:
     with np.errstate(all="ignore"):
         move_to_body_frame(points, frames, moved, blurs)
     return read_only(moved), blurs
-
-
-def _through_frame(fill: Fill, frames: Frames) -> Fill:
-    """Return the fill that rounds each point's preimage: for callables, whose decisions are float64 anyway."""
-    return lambda points, locations, budget: fill(_moved(points, frames)[0], locations, budget)
 
 
 def _filtered(solid: Solid, pose: Pose, unposed: Locator, frames: Frames) -> Fill:

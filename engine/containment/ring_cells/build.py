@@ -40,13 +40,10 @@ _WORDS: Final = 1 << 24
 
 def ring_cells_of(solid: Polygon, budget: Budget) -> RingCells | None:
     """Return the cells of `solid`, prepared once; None where its coordinates are out of their range."""
-    if len(solid.vertices) > _MOST or not solid.prepared("is_in_range", lambda: [_is_in_range(solid)])[0]:
+    is_in_range = solid.prepared("is_in_range", lambda: [bool(np.abs(solid.vertices).max() <= _RANGE)])[0]
+    if len(solid.vertices) > _MOST or not is_in_range:
         return None
     return solid.prepared("ring_cells", lambda: build_ring_cells(solid, budget), budget.check)
-
-
-def _is_in_range(solid: Polygon) -> bool:
-    return bool(np.abs(solid.vertices).max() <= _RANGE)
 
 
 def build_ring_cells(solid: Polygon, budget: Budget) -> RingCells:
