@@ -15,6 +15,7 @@ import numpy as np
 
 from engine.arrays import Int8Array, IntArray
 from engine.bounding.bvh import STACK
+from engine.collision.meshes.faces_near import SLACK, box_between, next_face
 from engine.collision.meshes.mesh_arrays import (
     STATE_CLEAN,
     STATE_CROSSED,
@@ -35,13 +36,8 @@ from engine.collision.meshes.triangle_triangle import (
     with_pose,
 )
 from engine.jit import allocating, inline, kernel
-from engine.lanes.boxes import inside_box
-from engine.lanes.lanes import lowest_bit
 from engine.predicates.orientation import orient2d, orient3d
 from engine.types import UNDECIDED, Point3
-
-SLACK = 2.0**-20
-"""By how much a box in the tree's coordinates is widened for its rounding to float32."""
 
 
 @inline
@@ -127,31 +123,15 @@ def state_among(mesh: MeshArrays, face: int, poses: Any) -> int:
     """Return what the other faces of the body make of the state of a face with area."""
     t = triangle_of(mesh, face)
     p, q, r = in_tree(mesh, t.p), in_tree(mesh, t.q), in_tree(mesh, t.r)
-    low = (
-        np.float32(min(p.x, q.x, r.x) - SLACK),
-        np.float32(min(p.y, q.y, r.y) - SLACK),
-        np.float32(min(p.z, q.z, r.z) - SLACK),
-    )
-    high = (
-        np.float32(max(p.x, q.x, r.x) + SLACK),
-        np.float32(max(p.y, q.y, r.y) + SLACK),
-        np.float32(max(p.z, q.z, r.z) + SLACK),
-    )
-    stack = np.empty(STACK, np.int32)
+    low = Point3(min(p.x, q.x, r.x), min(p.y, q.y, r.y), min(p.z, q.z, r.z))
+    high = Point3(max(p.x, q.x, r.x), max(p.y, q.y, r.y), max(p.z, q.z, r.z))
+    box, stack, state = box_between(low, high, SLACK), np.empty(STACK, np.int32), STATE_CLEAN
     stack[0] = 0
-    n_stack, state = 1, STATE_CLEAN
-    while n_stack > 0 and state != STATE_STACKED:  # bound: each node enters once
-        n_stack -= 1
-        node = int(stack[n_stack])
-        lanes = inside_box(mesh.boxes, node, low, high)
-        while lanes != 0:
-            child = int(mesh.child[node, lowest_bit(lanes)])
-            lanes &= lanes - 1
-            if child >= 0:
-                stack[n_stack] = child
-                n_stack += 1
-            elif -1 - child != face:
-                state = max(state, state_by(mesh, face, -1 - child, poses))
+    other, n = next_face(mesh, stack, 1, box)
+    while other >= 0 and state != STATE_STACKED:  # bound: the faces of the body
+        if other != face:
+            state = max(state, state_by(mesh, face, other, poses))
+        other, n = next_face(mesh, stack, n, box)
     return state
 
 

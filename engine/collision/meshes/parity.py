@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from engine.bounding.bvh import STACK
-from engine.collision.meshes.face_state import SLACK
+from engine.collision.meshes.faces_near import ABOVE_ALL, SLACK, box_between, next_face
 from engine.collision.meshes.mesh_arrays import MeshArrays, in_tree, triangle_of
 from engine.collision.meshes.placement import (
     Placement,
@@ -28,16 +28,12 @@ from engine.collision.meshes.placement import (
 )
 from engine.collision.meshes.triangle_triangle import Triangle3
 from engine.jit import allocating, inline, kernel
-from engine.lanes.boxes import inside_box
-from engine.lanes.lanes import lowest_bit
 from engine.predicates.loading import as_point3
 from engine.predicates.vectors import largest_of
 from engine.types import UNDECIDED, Point2, Point3
 
 OUTSIDE = -1
 INSIDE = 1
-ABOVE_ALL = 1e6
-"""In the coordinates of a tree, which are at most 2."""
 MISSED = 3
 """`half_line_crosses` beside 0 (on the face), 1 (above), -1 (below) and UNDECIDED: the moved line passes by."""
 
@@ -114,30 +110,16 @@ def locate_point(own: OwnPoint, mesh: MeshArrays) -> int:
         return UNDECIDED
     if largest_of(local) > 4.0 + slack:
         return OUTSIDE
-    low = (np.float32(local.x - slack), np.float32(local.y - slack), np.float32(local.z - slack))
-    high = (np.float32(local.x + slack), np.float32(local.y + slack), np.float32(ABOVE_ALL))
-    stack = np.empty(STACK, np.int32)
+    box, stack = box_between(local, Point3(local.x, local.y, ABOVE_ALL), slack), np.empty(STACK, np.int32)
     stack[0] = 0
-    n_stack, n_above = 1, 0
-    unsure, on_face = False, False
-    while n_stack > 0:  # bound: each node enters once
-        n_stack -= 1
-        node = int(stack[n_stack])
-        lanes = inside_box(mesh.boxes, node, low, high)
-        while lanes != 0:
-            child = int(mesh.child[node, lowest_bit(lanes)])
-            lanes &= lanes - 1
-            if child >= 0:
-                stack[n_stack] = child
-                n_stack += 1
-                continue
-            how = half_line_crosses(triangle_of(mesh, -1 - child), q, error)
-            if how == UNDECIDED:
-                unsure = True
-            elif how == 0:
-                on_face = True
-            elif how == 1:
-                n_above += 1
+    n_above, unsure, on_face = 0, False, False
+    face, n = next_face(mesh, stack, 1, box)
+    while face >= 0:  # bound: the faces of the body
+        how = half_line_crosses(triangle_of(mesh, face), q, error)
+        unsure |= how == UNDECIDED
+        on_face |= how == 0
+        n_above += how == 1
+        face, n = next_face(mesh, stack, n, box)
     if on_face:
         return 0
     if unsure:

@@ -18,11 +18,16 @@ from fractions import Fraction
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
+from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING
 from engine.collision.exact_images import HalfSpaceImage, Vector, image_half_space, image_point, rounded, value_at
 from engine.collision.meshes.live_faces import simplex_distance
-from engine.collision.result import FIRST_WITHIN, NO_CONTACT, SECOND_WITHIN, Collision, Parts, Witness, Work
+from engine.collision.meshes.mesh_arrays import mesh_body_of
+from engine.collision.meshes.mesh_pair import SPACE
+from engine.collision.result import FIRST_WITHIN, NO_CONTACT, RELATIONS, SECOND_WITHIN, Collision, Parts, Witness, Work
+from engine.collision.simple.ball_on_mesh import relate_ball
 from engine.collision.simple.boundary import Boundary, boundary_of, signs_of
 from engine.containment.rational_locate import rational_location
+from engine.direct import entry_of
 from engine.predicates.exact_vectors import minus, squared_length
 from engine.solids.base import Solid
 from engine.solids.bounds import own_box
@@ -36,21 +41,43 @@ def collide_body_sphere(
     body: Solid, sphere: Sphere, body_pose: Pose | None, sphere_pose: Pose | None, work: Work
 ) -> Collision:
     """Return the relation of a body with a boundary of faces or edges (first) and a ball or disc (second), exact."""
-    if body_pose is None and _is_ball_beside(body, sphere, sphere_pose):
-        return NO_CONTACT
+    if body_pose is None:
+        center = sphere.center.tolist() if sphere_pose is None else [
+            rounded(c) for c in image_point(sphere.center, sphere_pose)]  # fmt: skip
+        if _is_ball_beside(body, center, sphere.radius):
+            return NO_CONTACT
+        if body.dimension == 3:
+            answer = _by_floats(body, center, sphere_pose is not None, sphere.radius, work)
+            if answer is not None:
+                return answer
     with np.errstate(over="ignore", invalid="ignore"):  # an infinite bound only sends a face to the exact test
         return _by_distances(body, sphere, body_pose, sphere_pose, work)
 
 
-def _is_ball_beside(body: Solid, sphere: Sphere, pose: Pose | None) -> bool:
+def _is_ball_beside(body: Solid, center: list[float], radius: float) -> bool:
     """Tell whether a ball surely keeps clear of the box around a body; three roundings of 2^-53 are below 2^-50."""
-    center = sphere.center.tolist() if pose is None else [rounded(c) for c in image_point(sphere.center, pose)]
-    reach = sphere.radius * (1.0 + 2.0**-50)
+    reach = radius * (1.0 + 2.0**-50)
     low, high, _ = own_box(body)
     for c, a, b in zip(center, low.tolist(), high.tolist()):
         if max(a - c, c - b) - 2.0**-50 * (abs(c) + max(abs(a), abs(b))) > reach:
             return True
     return False
+
+
+def _by_floats(body: Solid, center: list[float], is_rounded: bool, radius: float, work: Work) -> Collision | None:
+    """Return the relation of a mesh and a ball about a point, rounded maybe, where floats prove it."""
+    mesh = mesh_body_of(body)
+    error = 2.0**-52 * max(map(abs, center)) + 2.0**-1074 if is_rounded else 0.0
+    relation, face = entry_of(relate_ball)(
+        mesh.arrays, *center, error, float(radius), SPACE.descent.poses, work.budget.flag
+    )
+    work.budget.check()
+    if relation in (OVERLAPPING, TOUCHING):
+        return Collision(RELATIONS[relation], Witness("surface", face, piercing=relation == TOUCHING))
+    return _WITHIN.get(relation)
+
+
+_WITHIN = {DISJOINT: NO_CONTACT, FIRST_INSIDE_SECOND: FIRST_WITHIN, SECOND_INSIDE_FIRST: SECOND_WITHIN}
 
 
 def _by_distances(

@@ -1,0 +1,126 @@
+"""A ball and a mesh without a pose: the relation and its witness from floats, where those prove it.
+
+The faces near the ball are found by the tree. Of each in question nearly nearest points and the slab between them and
+the centre (`near_triangles.py`) prove that it enters the open ball, or keeps clear of the closed one; the witness is
+the one that enters of which the box is nearest. A centre that no face comes near to lies where a half-line tells, and
+a face that no other one covers has the open interior beside it. Whatever is not proven is UNSETTLED.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from engine.bounding.bvh import STACK
+from engine.collision.clearance.near_triangles import nearest_points, rounding_of, seen_from
+from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
+from engine.collision.meshes.face_state import state_of
+from engine.collision.meshes.faces_near import SLACK, box_between, next_face
+from engine.collision.meshes.mesh_arrays import STATE_STACKED, MeshArrays, in_tree, triangle_of
+from engine.collision.meshes.parity import INSIDE, OUTSIDE, OwnPoint, locate_point
+from engine.collision.meshes.triangle_triangle import Triangle3
+from engine.jit import allocating, inline, kernel
+from engine.predicates.loading import as_point3
+from engine.predicates.vectors import dot, largest_of, minus
+from engine.types import Point3
+
+_MANY = 4096
+
+
+@inline
+def _box_distance(t: Triangle3, center: Point3, slack: float) -> float:
+    """Return a lower bound on the square of the distance of a triangle's box, as `box_distance_bounds` does."""
+    square = 0.0
+    for c, p, q, r in (
+        (center.x, t.p.x, t.q.x, t.r.x), (center.y, t.p.y, t.q.y, t.r.y), (center.z, t.p.z, t.q.z, t.r.z),
+    ):  # fmt: skip
+        gap = max(max((min(p, q, r) - slack) - c, c - (max(p, q, r) + slack)), 0.0)
+        square += gap * gap
+    square = square * (1.0 - 2.0**-48) - 2.0**-1000
+    return square if np.isfinite(square) else 0.0
+
+
+@inline
+def _enters(t: Triangle3, own: OwnPoint, radius: float) -> int:
+    """Tell whether a triangle surely enters the open ball: 1, surely keeps clear of the closed one: 0; else UNSETTLED.
+
+    The corners as seen from the centre are off by its error and a rounding, the distances by less than twice that.
+    """
+    t, none = seen_from(own.point, t), Point3(0.0, 0.0, 0.0)
+    center = Triangle3(none, none, none)
+    slack = 4.0 * rounding_of(t, center) + 2.0 * own.error + 2.0**-50 * radius
+    inner = radius - slack
+    if inner > 2.0**-500 and min(dot(t.p, t.p), dot(t.q, t.q), dot(t.r, t.r)) < inner * inner * (1.0 - 2.0**-49):
+        return 1
+    _, across = nearest_points(center, t, radius + 2.0 * slack)  # order: edges are measured from the ends of the first
+    if across.size < inner:
+        return 1
+    return 0 if across.low > radius + slack else UNSETTLED
+
+
+@allocating
+def _first_to_enter(own: OwnPoint, radius: float, mesh: MeshArrays, flag: Any) -> tuple[int, int]:
+    """Return the relation of the surface of a mesh and a ball as far as it is proven, DISJOINT or TOUCHING (a face
+    enters the ball), and of the faces that enter the one of the nearest box, of equal ones the first."""
+    center, error = own
+    reach = largest_of(Point3(mesh.origin[0], mesh.origin[1], mesh.origin[2])) + largest_of(center) + radius
+    local, slack = in_tree(mesh, center), SLACK + (error + 2.0**-48 * reach) / mesh.scale
+    if not (slack < 1.0 and np.isfinite(local.x + local.y + local.z)):  # case: the ends of the exponent range
+        return UNSETTLED, -1
+    box, stack = box_between(local, local, radius / mesh.scale + slack), np.empty(STACK, np.int32)
+    stack[0] = 0
+    best, found, unsure, box_slack = np.inf, -1, np.inf, 2.0**-50 * largest_of(center) + 2.0**-1070
+    face, n = next_face(mesh, stack, 1, box)
+    while face >= 0:  # bound: the faces of the body
+        t = triangle_of(mesh, face)
+        square = _box_distance(t, center, box_slack)
+        if square < best or (square == best and face < found):
+            how = _enters(t, own, radius)
+            if how == 1:
+                best, found = square, face
+            elif how == UNSETTLED:
+                unsure = min(unsure, square)
+        if flag[0] != 0:
+            return UNSETTLED, -1
+        face, n = next_face(mesh, stack, n, box)
+    if unsure <= best and unsure < np.inf:
+        return UNSETTLED, -1
+    return (DISJOINT if found < 0 else TOUCHING), found
+
+
+@inline
+def _holds_all(own: OwnPoint, radius: float, mesh: MeshArrays, flag: Any) -> int:
+    """Tell whether all vertices of a mesh surely lie in the open ball: 1, one surely does not: 0; else UNSETTLED."""
+    result = 1
+    for vertex in range(mesh.vertices.shape[0]):
+        v = minus(as_point3(mesh.vertices, vertex), own.point)
+        size = np.sqrt(dot(v, v))
+        slack = 2.0**-49 * (size + radius) + 2.0 * own.error + 2.0**-500
+        if size > radius + slack:
+            return 0
+        if not size < radius - slack or (vertex % _MANY == 0 and flag[0] != 0):
+            result = UNSETTLED
+    return result
+
+
+@kernel
+def relate_ball(
+    mesh: MeshArrays, x: float, y: float, z: float, error: float, radius: float, poses: Any, flag: Any
+) -> tuple[int, int]:
+    """Return the relation of a mesh (first) and a ball about a point off by `error` in each coordinate, or UNSETTLED;
+    and the face that enters it, the caller's, where the relation is overlapping or touching. poses: any (n, 12)."""
+    own = OwnPoint(Point3(x, y, z), error)
+    relation, face = _first_to_enter(own, radius, mesh, flag)
+    if relation == DISJOINT:
+        where = locate_point(own, mesh) if mesh.has_inside else OUTSIDE
+        return (SECOND_INSIDE_FIRST if where == INSIDE else (DISJOINT if where == OUTSIDE else UNSETTLED)), -1
+    if relation == TOUCHING:
+        is_within = _holds_all(own, radius, mesh, flag)
+        if is_within != 0:
+            return (FIRST_INSIDE_SECOND if is_within == 1 else UNSETTLED), -1
+        if mesh.has_inside:
+            is_covered = mesh.axis[face] < 0 or state_of(mesh, face, poses) == STATE_STACKED
+            relation = UNSETTLED if is_covered else OVERLAPPING
+        return relation, mesh.faces[face]
+    return UNSETTLED, -1
