@@ -69,8 +69,13 @@ def feature_of(solid: Solid, mesh: MeshBody, triangle: int, code: int) -> Featur
     face = int(mesh.faces[triangle])
     if code == FACE:
         return Feature("face", (face,))
-    numbers, points = _ring(solid, face)
     corners, vertices = mesh.arrays.triangles[triangle].tolist(), mesh.arrays.vertices
+    if isinstance(solid, Mesh) and len(set(corners)) == 3:
+        numbers = solid.face_indices[solid.face_offsets[face] : solid.face_offsets[face + 1]].tolist()
+        if len(numbers) == 3:  # case: a triangle, its corners in the caller's order
+            i, j = numbers[code % 3], numbers[(code + 1) % 3]
+            return Feature("vertex", (i,)) if code < 3 else Feature("edge", (min(i, j), max(i, j)))
+    numbers, points = _ring(solid, face)
     places = [points.index(vertices[corners[k]].tolist()[: solid.dimension]) for k in (code % 3, (code + 1) % 3)]
     if code < 3 or places[0] == places[1]:
         return Feature("vertex", (named(solid, numbers[places[0]]),))

@@ -17,8 +17,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 from engine.collision.clearance.boxes import Search, View
-from engine.collision.clearance.near_triangles import FACE
-from engine.collision.clearance.refined import Triangle, corners_of, ends_of, height_above, shift_of, vertex_of
+from engine.collision.clearance.refined import Triangle, corners_of, ends_of, height_above, named, shift_of, vertex_of
 from engine.collision.clearance.wide import Wide, Wide3, dot_wide, minus_wide, over, plus, root, times
 from engine.jit import called, inline
 from engine.predicates.double_double import surely_rounded
@@ -27,21 +26,11 @@ _SLACK: Final = 2.0**-86
 
 
 @inline
-def _named(view: View, triangle: int, feature: int) -> tuple[int, int, int]:
-    """Return the vertices of a feature, of an edge the smaller first, -1 for none."""
-    t, k = view.mesh.triangles, feature % 3
-    i, j = t[triangle, k], t[triangle, (k + 1) % 3]
-    if feature < 3:
-        return i, -1, -1
-    return (min(i, j), max(i, j), -1) if feature < FACE else (i, j, t[triangle, 2])
-
-
-@inline
-def _is_beyond(view: View, triangle: int, named: tuple[int, int, int], t: Triangle, n: Wide3, base: Wide3,
+def _is_beyond(view: View, triangle: int, known: tuple[int, int, int], t: Triangle, n: Wide3, base: Wide3,
                slack: float) -> bool:  # fmt: skip
     """Tell whether the corners of a triangle that are none of a feature lie strictly beyond the plane across n."""
     for k in range(3):
-        if view.mesh.triangles[triangle, k] in named:
+        if view.mesh.triangles[triangle, k] in known:
             continue
         if not height_above(n, vertex_of(t, k), base).h < -slack:
             return False
@@ -49,7 +38,7 @@ def _is_beyond(view: View, triangle: int, named: tuple[int, int, int], t: Triang
 
 
 @inline
-def _write(view: View, named: tuple[int, int, int], p: Wide3, n: Wide3, radius: float, start: Any, error: float,
+def _write(view: View, known: tuple[int, int, int], p: Wide3, n: Wide3, radius: float, start: Any, error: float,
            point: Any) -> bool:  # fmt: skip
     """Write the point (d,) at a radius from p along n, from the origin of space; tell whether it is sure."""
     size, is_sure, v = root(dot_wide(n, n)), True, view.mesh.vertices
@@ -59,9 +48,9 @@ def _write(view: View, named: tuple[int, int, int], p: Wide3, n: Wide3, radius: 
         if k >= point.shape[0]:
             continue
         first, second, third = (
-            named[0],
-            (named[1] if named[1] >= 0 else named[0]),
-            (named[2] if named[2] >= 0 else named[0]),
+            known[0],
+            (known[1] if known[1] >= 0 else known[0]),
+            (known[2] if known[2] >= 0 else known[0]),
         )
         if is_given and v[first, k] == v[second, k] and v[first, k] == v[third, k]:
             point[k] = v[first, k]  # of the whole feature
@@ -79,9 +68,9 @@ def certify(s: Search, start: Any, other: Any, radii: Any, n: int, points: Any) 
     """
     pairs, best = s.room.found.pairs, 0
     faces, their_faces = s.a.mesh.faces, s.b.mesh.faces
-    here, there = _named(s.a, pairs[0, 0], pairs[0, 2]), _named(s.b, pairs[0, 1], pairs[0, 3])
+    here, there = named(s.a, pairs[0, 0], pairs[0, 2]), named(s.b, pairs[0, 1], pairs[0, 3])
     for k in range(n):
-        if _named(s.a, pairs[k, 0], pairs[k, 2]) != here or _named(s.b, pairs[k, 1], pairs[k, 3]) != there:
+        if named(s.a, pairs[k, 0], pairs[k, 2]) != here or named(s.b, pairs[k, 1], pairs[k, 3]) != there:
             return False
         own, least = faces[pairs[k, 0]], faces[pairs[best, 0]]
         if own < least or (own == least and their_faces[pairs[k, 1]] < their_faces[pairs[best, 1]]):

@@ -7,6 +7,8 @@ between them from below, whatever the points are.
 **Bound.** Coordinates are products of two doubles, exact, and sums of seven such, each sum off by 4 u^2 of all terms; a
 point takes six operations more, a slab eight, each on numbers below twice `size`, which bounds all coordinates. All
 together is below 2^-98 size; 2^-94 size is allowed.
+
+Most candidates name the two features of the first, of which all that they add are corners: floats tell those apart.
 """
 
 from __future__ import annotations
@@ -32,13 +34,17 @@ from engine.collision.clearance.wide import (
     times,
 )
 from engine.collision.meshes.mesh_arrays import triangle_of
-from engine.collision.meshes.placement import Placement
+from engine.collision.meshes.placement import Placement, turned
 from engine.jit import called, inline
 from engine.predicates.double_double import surely_rounded
 from engine.predicates.error_free import two_diff
+from engine.predicates.loading import as_point3
+from engine.predicates.vectors import dot, minus
 from engine.types import Point3
 
 ROUNDING: Final = 2.0**-94
+_ROUGHLY: Final = 2.0**-40
+"""More than a scalar product of differences of rounded points, none above 2, may be off."""
 
 
 class Triangle(NamedTuple):
@@ -150,19 +156,43 @@ def height_above(n: Wide3, p: Wide3, base: Wide3) -> Wide:
 
 
 @called
-def _bounds(s: Triangle, t: Triangle, first: int, second: int) -> tuple[Wide, float]:
-    """Return the distance of two points of the triangles, and by how much the triangles may be nearer at most but for
-    rounding."""
+def _bounds(s: Triangle, t: Triangle, first: int, second: int) -> tuple[Wide, float, Point3, Point3]:
+    """Return the distance of two points of the triangles, by how much the triangles may be nearer at most but for
+    rounding, and the points, rounded."""
     p, q, _, _ = ends_of(s, t, first, second)
-    n = minus_wide(q, p)
+    n, ends = minus_wide(q, p), (Point3(p.x.h, p.y.h, p.z.h), Point3(q.x.h, q.y.h, q.z.h))
     square = dot_wide(n, n)
     if not square.h > 2.0**-300:
-        return Wide(0.0, 0.0), 0.0
+        return Wide(0.0, 0.0), 0.0, *ends
     beyond = 0.0
     for k in range(3):
         beyond = max(beyond, height_above(n, vertex_of(s, k), p).h, -height_above(n, vertex_of(t, k), q).h)
     size = root(square)
-    return size, 2.0 * beyond / size.h
+    return size, 2.0 * beyond / size.h, *ends
+
+
+@inline
+def named(view: View, triangle: int, feature: int) -> tuple[int, int, int]:
+    """Return the vertices of a feature, of an edge the smaller first, -1 for none."""
+    t, k = view.mesh.triangles, feature % 3
+    i, j = t[triangle, k], t[triangle, (k + 1) % 3]
+    if feature < 3:
+        return i, -1, -1
+    return (min(i, j), max(i, j), -1) if feature < FACE else (i, j, t[triangle, 2])
+
+
+@inline
+def _is_beyond(
+    view: View, triangle: int, known: tuple[int, int, int], shift: Point3, way: Point3, base: Point3
+) -> bool:
+    """Tell whether the corners of a triangle that are none of a feature surely lie beyond the plane across a way."""
+    for k in range(3):
+        vertex = view.mesh.triangles[triangle, k]
+        if vertex not in known:
+            v = turned(view.place, scaled(as_point3(view.mesh.vertices, vertex), view.unit))
+            if not dot(way, minus(Point3(v.x + shift.x, v.y + shift.y, v.z + shift.z), base)) < -_ROUGHLY:
+                return False
+    return True
 
 
 @inline
@@ -184,9 +214,24 @@ def refine(s: Search, start: Any, other: Any, radii: Any, n: int) -> tuple[float
     found, unit = s.room.found, s.a.unit
     least, lowest, origin = Wide(np.inf, 0.0), Wide(np.inf, 0.0), Wide(0.0, 0.0)
     shift = shift_of(s, start, other)
+    here, there = named(s.a, found.pairs[0, 0], found.pairs[0, 2]), named(s.b, found.pairs[0, 1], found.pairs[0, 3])
+    none, rough = Point3(0.0, 0.0, 0.0), Point3(shift.x.h, shift.y.h, shift.z.h)
+    p = q = none
     for k in range(n):
-        t = corners_of(s.a, found.pairs[k, 0], Wide3(origin, origin, origin))
-        size, beyond = _bounds(t, corners_of(s.b, found.pairs[k, 1], shift), found.pairs[k, 2], found.pairs[k, 3])
+        i, j, first, second = found.pairs[k]
+        if (
+            k > 0
+            and named(s.a, i, first) == here
+            and named(s.b, j, second) == there
+            and _is_beyond(s.a, i, here, none, minus(q, p), p)
+            and _is_beyond(s.b, j, there, rough, minus(p, q), q)
+        ):
+            found.bounds[k] = found.bounds[0]  # the same two points, and no corner more that may be nearer
+            continue
+        t, u = corners_of(s.a, i, Wide3(origin, origin, origin)), corners_of(s.b, j, shift)
+        size, beyond, here_p, there_q = _bounds(t, u, first, second)
+        if k == 0:
+            p, q = here_p, there_q
         low = less(size, Wide(beyond, 0.0))
         found.bounds[k] = low.h * (1.0 - 2.0**-50) - ROUNDING
         least = size if less(size, least).h < 0.0 or k == 0 else least

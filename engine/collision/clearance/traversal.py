@@ -119,7 +119,7 @@ def _search(s: Search, limits: Any, flag: Any) -> tuple[int, int]:
     how, n_found = approach(s, limits)
     if how != DONE:
         return how, 0
-    n, n_turns, next_try = 1, 0, 1
+    n, n_turns, next_try = 1, 0, 16
     s.room.heap.bounds[0], s.room.heap.lanes[0, 0], s.room.heap.lanes[0, 1] = 0.0, ROOT, ROOT
     while n > 0 and s.room.heap.bounds[0] <= limits[0]:  # bound: each pair of boxes enters once
         i, j = int(s.room.heap.lanes[0, 0]), int(s.room.heap.lanes[0, 1])
