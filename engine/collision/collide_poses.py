@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -18,13 +19,13 @@ from engine.collision.meshes.mesh_mesh import answer_of
 from engine.collision.meshes.mesh_pair import SPACE, what_to_seek
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.meshes.pose_batch import N_COLUMNS, RELATION, relate_poses
-from engine.collision.result import MESHES, Work
+from engine.collision.result import MESHES, UNLIMITED, Work
 from engine.collision.scenes.batches import convex_poses
 from engine.direct import entry_of
 from engine.errors import InvalidArrayError, WrongDimensionError
 from engine.parallel import Budget, Cancel, Progress, check_options, run_chunks
 from engine.solids.base import Solid
-from engine.solids.checks import as_floats
+from engine.solids.checks import as_floats, is_ready
 from engine.solids.pose import Pose, check_rotations
 from engine.types import Accuracy
 
@@ -75,10 +76,10 @@ def collide_poses(
     poses = PoseArrays(*as_poses(rotations, translations, first.dimension), True)
     n_poses = len(poses.rotations)
     if n_poses == 1 and progress is None and not (detail or report):
-        with Budget(deadline, cancel) as budget:
+        with UNLIMITED if deadline is None and cancel is None else Budget(deadline, cancel) as budget:
             budget.check()
-            work = Work(budget, witness=bool(witnesses), boolean=bool(boolean))
-            one = collide_pair(first, second, None, Pose.of_checked(poses.rotations[0], poses.translations[0]), work)
+            pose = Pose.of_checked(poses.rotations[0], poses.translations[0])
+            one = collide_pair(first, second, None, pose, Work(budget, bool(witnesses), bool(boolean)))
         relations = np.array([one.relation], np.int8)
         return (relations, [one.witness]) if witnesses else relations
     with Budget(deadline, cancel) as budget:
@@ -110,8 +111,13 @@ def collide_poses(
 
 def as_poses(rotations: object, translations: object, dimension: int) -> tuple[FloatArray, FloatArray]:
     """Return checked rotations (n, d, d) and translations (n, d)."""
-    turns = np.ascontiguousarray(as_floats(rotations, 3, ("rotations",)))
-    moves = np.ascontiguousarray(as_floats(translations, 2, ("translations",)))
+    given: Any = (rotations, translations)
+    if is_ready(rotations, dimension, dimension) and is_ready(translations, dimension) and [*map(len, given)] == [1, 1]:
+        turn, move = map(read_only, given)
+        if isfinite(sum(turn.ravel().tolist()) + sum(move.ravel().tolist())):
+            check_rotations(turn)
+            return turn, move
+    turns, moves = as_floats(rotations, 3, ("rotations",)), as_floats(translations, 2, ("translations",))
     if len(turns) and turns.shape[1:] != (dimension, dimension):
         raise WrongDimensionError(
             f"rotations must have shape (n, {dimension}, {dimension}), got {turns.shape}", ("rotations",)

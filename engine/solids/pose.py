@@ -170,7 +170,7 @@ _IDENTITIES: Final = tuple(np.eye(d).tobytes() + np.zeros(d).tobytes() for d in 
 def _restored(rotation: FloatArray, translation: FloatArray) -> Pose:
     """Return the pose that was pickled, its arrays read-only again."""
     pose = object.__new__(Pose)
-    pose._set(frozen(rotation), frozen(translation))
+    pose._set(read_only(rotation + 0.0), read_only(translation + 0.0))  # of -0.0: 0.0
     return pose
 
 
