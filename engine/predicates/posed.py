@@ -22,7 +22,7 @@ from __future__ import annotations
 from math import frexp, ldexp
 from typing import Any, NamedTuple
 
-from engine.jit import inline
+from engine.jit import called, inline
 from engine.predicates.error_free import workspace
 from engine.predicates.expansion import Components, add_scaled, compress, grow_product, sign
 from engine.predicates.orientation import (
@@ -147,6 +147,18 @@ def orient3d_posed_exact(poses: Any, a: PosedPoint3, b: PosedPoint3, c: PosedPoi
         for i in range(int(lengths[slot])):
             n = add_scaled(e, n, m, n_m, w[slot * N_DIFFERENCE + i])
     return sign(e, n)
+
+
+@called
+def surely_same(poses: Any, a: PosedPoint3, b: PosedPoint3) -> bool:
+    """Tell whether two posed points are one, exactly; False where exponents leave the range."""
+    shift, w = _common_shift(poses, a, a, b, b), workspace(N_DIFFERENCE)
+    if shift == OUT_OF_RANGE:
+        return False
+    n_other = 0
+    for axis in range(3):
+        n_other += sign(w, _set_difference(w, 0, poses, a, b, axis, shift)) != 0
+    return n_other == 0
 
 
 @inline

@@ -3,7 +3,8 @@
 Two trees are descended together: a pair of nodes is replaced by those pairs of their children whose boxes
 (`box_lanes.meeting`) and discs (`lanes/discs.py`) may meet, two blocks of faces by the pairs of faces that neither
 boxes nor planes part (`lanes/faces.py`); those are classified by signs. All of these are conservative under a pose, so
-no contact is missed. Pairs beyond the room for them are counted: who wants them makes that much room and asks again.
+no contact is missed. Pairs beyond the room for them are counted: who wants them makes that much room and asks again,
+and of the faces that meet in a common corner only (`common_corners.py`) gets no more than say all.
 """
 
 from __future__ import annotations
@@ -12,8 +13,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FlagArray, Float32Array, FloatArray, Int8Array, Int32Array, IntArray
+from engine.arrays import BoolArray, FlagArray, Float32Array, FloatArray, Int8Array, Int32Array, IntArray
 from engine.bounding.bvh import MAX_DEPTH
+from engine.collision.meshes.common_corners import common_corner, keep_first
+from engine.collision.meshes.contact_kinds import N_NAMED
 from engine.collision.meshes.face_state import proves_overlap, state_of
 from engine.collision.meshes.mesh_arrays import STATE_CLEAN, MeshArrays, triangle_of
 from engine.collision.meshes.placement import (
@@ -27,7 +30,9 @@ from engine.collision.meshes.placement import (
 )
 from engine.collision.meshes.triangle_triangle import (
     APART,
+    CORNER,
     CROSSING,
+    PosedTriangle,
     Triangle3,
     classify_exactly,
     classify_near,
@@ -75,10 +80,15 @@ class Descent(NamedTuple):
 
 
 class Found(NamedTuple):
-    """Room for pairs of faces that are not apart: pairs (room, 2) and their classes kinds (room,), room >= 1."""
+    """Room for pairs of faces that are not apart: pairs (room, 2) and their classes kinds (room,), room >= 1.
+
+    met: empty, or of all faces of the first, then of the second, whether a listed pair has them. Then
+    `common_corners.py` chooses, and there are N_NAMED rows more.
+    """
 
     pairs: IntArray
     kinds: Int8Array
+    met: BoolArray
 
 
 class Place(NamedTuple):
@@ -113,9 +123,16 @@ def new_descent() -> Descent:
     )
 
 
-def new_found(room: int) -> Found:
-    """Return room for pairs."""
-    return Found(np.empty((room, 2), np.int64), np.empty(room, np.int8))
+def new_found(room: int, n_faces: int = 0) -> Found:
+    """Return room for pairs; n_faces: of both bodies, where of common corners those are listed that say all."""
+    n = room + (N_NAMED if n_faces else 0)
+    return Found(np.full((n, 2), -1), np.empty(n, np.int8), np.zeros(n_faces, np.bool_))
+
+
+@inline
+def room_of(found: Found) -> int:
+    """Return how many pairs there is room for."""
+    return len(found.kinds) - (N_NAMED if len(found.met) > 0 else 0)
 
 
 @inline
@@ -159,19 +176,33 @@ def placed_triangle(t: Triangle3, place: Placement) -> Triangle3:
     return Triangle3(placed(t.p, place), placed(t.q, place), placed(t.r, place))
 
 
+@inline
+def before_poses(s: Search, i: int, j: int) -> tuple[PosedTriangle, PosedTriangle]:
+    """Return a face of either body before its pose."""
+    own = with_pose(triangle_of(s.first, i), 0 if s.place.a.is_posed else UNPOSED)
+    return own, with_pose(triangle_of(s.second, j), 1 if s.place.b.is_posed else UNPOSED)
+
+
 @merged
-def settle_class(s: Search, i: int, j: int) -> int:
-    """Return the class of two faces that `classify_near` leaves open; UNDECIDED without area, or out of range."""
+def class_of_corner(s: Search, i: int, j: int, t: Triangle3, u: Triangle3) -> int:
+    """Return the class of two faces, placed t and u, that surely meet in a common corner only; else UNDECIDED."""
+    if s.first.axis[i] < 0 or s.second.axis[j] < 0:
+        return UNDECIDED
+    own, their = before_poses(s, i, j)
+    common = common_corner(s.descent.poses, t, u, own, their, s.place.error)
+    return CORNER + common if common >= 0 else UNDECIDED
+
+
+@merged
+def settle_class(s: Search, i: int, j: int, t: Triangle3, u: Triangle3) -> int:
+    """Return the class of two faces that is left open; UNDECIDED without area, or out of range."""
     place, poses = s.place, s.descent.poses
     if s.first.axis[i] < 0 or s.second.axis[j] < 0:
         return UNDECIDED
-    t, u = triangle_of(s.first, i), triangle_of(s.second, j)
     if place.error == 0.0:  # the rounded points are the points
-        t, u = placed_triangle(t, place.a), placed_triangle(u, place.b)
         return classify_exactly(poses, with_pose(t), with_pose(u), placed_axis(int(s.first.axis[i]), place.a), 0.0)
-    t_posed = with_pose(t, 0 if place.a.is_posed else UNPOSED)
-    u_posed = with_pose(u, 1 if place.b.is_posed else UNPOSED)
-    return classify_exactly(poses, t_posed, u_posed, int(s.first.axis[i]), place.posed_error)
+    own, their = before_poses(s, i, j)
+    return classify_exactly(poses, own, their, int(s.first.axis[i]), place.posed_error)
 
 
 @merged
@@ -202,24 +233,35 @@ def classify_faces(s: Search, i: int, j: int, low: int, high: int, n_pairs: int)
 
     Returns DONE, or what ended it early; the number of pairs found.
     """
-    pairs, kinds = s.found
+    pairs, kinds, met = s.found
+    room = room_of(s.found)
     while low != 0 or high != 0:  # bound: each turn takes a bit
         bit, low, high = take_bit(low, high)
         i_face, j_face = -1 - int(s.first.child[i, bit >> 3]), -1 - int(s.second.child[j, bit & 7])
         t = placed_triangle(triangle_of(s.first, i_face), s.place.a)
         u = placed_triangle(triangle_of(s.second, j_face), s.place.b)
-        kind = classify_near(t, u, s.place.error)
+        kind = class_of_corner(s, i_face, j_face, t, u) if len(met) > 0 else UNDECIDED
         if kind == UNDECIDED:
-            kind = settle_class(s, i_face, j_face)
+            kind = classify_near(t, u, s.place.error)
+        if kind == UNDECIDED and len(met) == 0:
+            kind = class_of_corner(s, i_face, j_face, t, u)
+        if kind == UNDECIDED:
+            kind = settle_class(s, i_face, j_face, t, u)
+        if kind >= CORNER and len(met) > 0:
+            i_face, j_face, kind = keep_first(s.first.faces, s.second.faces, pairs, kinds, i_face, j_face, kind)
+            n_first = len(s.first.faces)
+            if i_face < 0 or (met[i_face] and met[n_first + j_face]):
+                continue
+            met[i_face] = met[n_first + j_face] = True
         if kind == APART:
             continue
         if kind != UNDECIDED and settles(s, kind, i_face, j_face):
             pairs[0, 0], pairs[0, 1], kinds[0] = i_face, j_face, kind
             return SETTLED, 1
-        if n_pairs < kinds.shape[0]:
+        if n_pairs < room:
             pairs[n_pairs, 0], pairs[n_pairs, 1], kinds[n_pairs] = i_face, j_face, kind
         n_pairs += 1
-        if n_pairs > max(LEAST_LOOK, kinds.shape[0]):
+        if n_pairs > max(LEAST_LOOK, room):
             return FULL, n_pairs
         if s.flag[0] != 0:
             return INTERRUPTED, n_pairs
@@ -283,4 +325,11 @@ def search(s: Search) -> tuple[int, int]:
             how, n_pairs = classify_faces(s, i, j, low, high, n_pairs)
             if how != DONE:
                 return how, n_pairs
+    pairs, kinds, _ = s.found
+    room = room_of(s.found)
+    for kept in range(room, kinds.shape[0]):  # what `common_corners.py` keeps
+        if pairs[kept, 0] >= 0:
+            if n_pairs < room:
+                pairs[n_pairs, 0], pairs[n_pairs, 1], kinds[n_pairs] = pairs[kept, 0], pairs[kept, 1], kinds[kept]
+            n_pairs += 1
     return DONE, n_pairs

@@ -81,17 +81,19 @@ def relate(
     """Return what `relate_poses` says of a pair, and where its contacts are, all of them, until the next call; known:
     all contacts, their classes too, where they are found already."""
     found, n_known = (SPACE.found, 0) if known is None else (known, len(known.kinds))
+    room = len(found.kinds)
     while True:  # bound: each turn has more room
         entry_of(relate_poses)(
             first.arrays, second.arrays, first.posed(first_pose), second.posed(second_pose), seek,
             N_NAMED if work.witness else 0, SPACE.descent, found, n_known, SPACE.rows, work.budget.flag,
         )  # fmt: skip
         row: list[int] = SPACE.rows[0].tolist()
-        if row[N_CONTACTS] <= len(found.kinds):
+        n = row[N_CONTACTS]
+        if n <= room:
             return row, found
         work.budget.check()
-        n = row[N_CONTACTS]
-        found = new_found(n if n <= LEAST_LOOK else 16 * n)
+        room = n if n <= LEAST_LOOK else 16 * n
+        found = new_found(room, len(first.faces) + len(second.faces))
 
 
 def what_to_seek(first: MeshBody, second: MeshBody, work: Work) -> int:
@@ -161,7 +163,8 @@ class MeshPair:
                 return
         self.contacts, kinds = self.contacts[kinds != APART], kinds[kinds != APART]
         if len(kinds):
-            (first, second), (a_pose, b_pose), found = self.meshes, self.poses, Found(self.contacts, kinds)
+            (first, second), (a_pose, b_pose) = self.meshes, self.poses
+            found = Found(self.contacts, kinds, np.empty(0, np.bool_))
             self.row, _ = relate(first, a_pose, second, b_pose, self.seek, self.work, found)
             self.work.budget.check()
 

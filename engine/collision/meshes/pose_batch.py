@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
-from engine.collision.meshes.contact_kinds import FACE_FACE, FLUSH, N_NAMED, VERTEX_VERTEX, kind_of
+from engine.collision.meshes.contact_kinds import EDGE_FACE, FACE_FACE, FLUSH, N_NAMED, VERTEX_VERTEX, kind_of
 from engine.collision.meshes.dual_traversal import (
     DONE,
     INTERRUPTED,
@@ -15,17 +15,18 @@ from engine.collision.meshes.dual_traversal import (
     Found,
     Place,
     Search,
+    before_poses,
     place_bodies,
+    room_of,
     search,
 )
-from engine.collision.meshes.mesh_arrays import MeshArrays, triangle_of
+from engine.collision.meshes.mesh_arrays import MeshArrays
 from engine.collision.meshes.parity import INSIDE, OUTSIDE, brought_back, locate_point
 from engine.collision.meshes.placement import Placement, PoseArrays, defect_of
 from engine.collision.meshes.touching import only_touch
-from engine.collision.meshes.triangle_triangle import COPLANAR, with_pose
+from engine.collision.meshes.triangle_triangle import COPLANAR, CORNER
 from engine.jit import bare_kernel, called, inline, merged
 from engine.predicates.loading import as_point3
-from engine.predicates.posed import UNPOSED
 from engine.types import UNDECIDED
 
 RELATION, KIND, FIRST_FACE, SECOND_FACE, N_CONTACTS = range(5)
@@ -73,7 +74,7 @@ def in_contact(s: Search, n: int, n_named: int, row: Any) -> None:
     The first are put in order, and of those looked at the class becomes JUDGED with the corners in the plane of the
     other face; nothing of that where a class is open.
     """
-    pairs, kinds = s.found
+    pairs, kinds, _ = s.found
     first, second = s.first, s.second
     for item in range(n):
         if kinds[item] == UNDECIDED:
@@ -82,7 +83,11 @@ def in_contact(s: Search, n: int, n_named: int, row: Any) -> None:
     is_free, is_named, best, face, their_face = True, n_named > 0, VERTEX_VERTEX + 1, 0, 0
     for item in range(n):
         i, j = pairs[item, 0], pairs[item, 1]
-        kind, may_cut = kind_of_pair(s, i, j)
+        if kinds[item] >= CORNER:
+            kind, may_cut, common = VERTEX_VERTEX, False, kinds[item] - CORNER
+            s.descent.signs[FLUSH] = 1 << common // 3 | 8 << common % 3
+        else:
+            kind, may_cut = kind_of_pair(s, i, j)
         kinds[item] = JUDGED | s.descent.signs[FLUSH]
         f, g = first.faces[i], second.faces[j]
         if item < n_named and (kind < best or (kind == best and (f < face or (f == face and g < their_face)))):
@@ -90,7 +95,7 @@ def in_contact(s: Search, n: int, n_named: int, row: Any) -> None:
         is_free, is_named = is_free and not may_cut, is_named and best != UNSETTLED
         if s.flag[0] != 0:
             return
-        if kind == FACE_FACE or not (is_free or item + 1 < n_named):
+        if kind == FACE_FACE or not (is_free or (item + 1 < n_named and best > EDGE_FACE)):  # none later is stronger
             break
     if is_named:
         row[KIND], row[FIRST_FACE], row[SECOND_FACE] = best, face, their_face
@@ -105,8 +110,7 @@ def kind_of_pair(s: Search, i: int, j: int) -> tuple[int, bool]:
     if axis < 0 or their_axis < 0:
         s.descent.signs[FLUSH] = 0
         return UNSETTLED, True
-    t = with_pose(triangle_of(s.first, i), 0 if s.place.a.is_posed else UNPOSED)
-    u = with_pose(triangle_of(s.second, j), 1 if s.place.b.is_posed else UNPOSED)
+    t, u = before_poses(s, i, j)
     return kind_of(s.descent.poses, t, axis, u, their_axis, s.place.posed_error, s.descent.signs)
 
 
@@ -171,5 +175,5 @@ def relate_poses(
             settled_by(s, n_named > 0, row)
         elif n_pairs == 0:
             row[RELATION] = relation_apart(first, second, place)
-        elif n_pairs <= found.kinds.shape[0]:
+        elif n_known > 0 or n_pairs <= room_of(found):
             in_contact(s, n_pairs, n_named, row)

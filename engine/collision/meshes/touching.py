@@ -20,11 +20,11 @@ from typing import Any
 
 import numpy as np
 
-from engine.collision.meshes.dual_traversal import Search
-from engine.collision.meshes.mesh_arrays import MeshArrays, triangle_of
+from engine.collision.meshes.dual_traversal import Search, before_poses
+from engine.collision.meshes.mesh_arrays import MeshArrays
 from engine.collision.meshes.parity import OUTSIDE, brought_back, locate_point
 from engine.collision.meshes.placement import Placement, defect_of
-from engine.collision.meshes.triangle_triangle import corner, sign_of_four, with_pose
+from engine.collision.meshes.triangle_triangle import corner, sign_of_four
 from engine.jit import allocating, called, inline
 from engine.predicates.loading import as_point3
 from engine.predicates.posed import UNPOSED, PosedPoint3
@@ -83,8 +83,7 @@ def are_separated(s: Search, contacts: Any) -> bool:
     own, their = 0 if s.place.a.is_posed else UNPOSED, 1 if s.place.b.is_posed else UNPOSED
     u, v = first.vertices, second.vertices
     for item in range(min(N_FACES, contacts.shape[0])):
-        t = with_pose(triangle_of(first, contacts[item, 0]), own)
-        w = with_pose(triangle_of(second, contacts[item, 1]), their)
+        t, w = before_poses(s, contacts[item, 0], contacts[item, 1])
         if separates(poses, t.p, t.q, t.r, u, own, v, their, error):
             return True
         if separates(poses, w.p, w.q, w.r, u, own, v, their, error):
@@ -92,8 +91,7 @@ def are_separated(s: Search, contacts: Any) -> bool:
         if s.flag[0] != 0:
             return False
     for item in range(min(N_EDGES, contacts.shape[0])):  # order: a plane of a face is likelier, and tried with all
-        t = with_pose(triangle_of(first, contacts[item, 0]), own)
-        w = with_pose(triangle_of(second, contacts[item, 1]), their)
+        t, w = before_poses(s, contacts[item, 0], contacts[item, 1])
         for edge in range(6):
             one, other = (t, w) if edge < 3 else (w, t)
             for end in range(3):

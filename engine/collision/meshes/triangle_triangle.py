@@ -29,8 +29,9 @@ APART = 0
 CROSSING = 1
 CONTACT = 3
 COPLANAR = 4
+CORNER = 8
 """Classes of a pair beside UNDECIDED (2): no common point; crossing strictly; a weaker contact; a contact in one
-plane."""
+plane; from CORNER on 3 k + m more, corner k of the first is corner m of the second, and nothing else is common."""
 
 
 class Triangle3(NamedTuple):
@@ -208,6 +209,22 @@ def sides_of(poses: Any, t: PosedTriangle, u: PosedTriangle, error: float) -> tu
     )
 
 
+@inline
+def lone_first(
+    t1: PosedTriangle, t2: PosedTriangle, sides: tuple[int, int, int], their_sides: tuple[int, int, int]
+) -> tuple[PosedTriangle, PosedTriangle]:
+    """Return two triangles with the lone vertices first, each above the plane of the other; sides: of the corners of
+    t1 of the plane of t2, and the other way."""
+    lone1, side1 = lone_vertex(sides[0], sides[1], sides[2])
+    lone2, side2 = lone_vertex(their_sides[0], their_sides[1], their_sides[2])
+    a, b = turned(t1, lone1), turned(t2, lone2)
+    if side1 < 0:  # turn b over: now a.p is above b
+        b = PosedTriangle(b.p, b.r, b.q)
+    if side2 < 0:
+        a = PosedTriangle(a.p, a.r, a.q)
+    return a, b
+
+
 @called
 def classify_exactly(poses: Any, t1: PosedTriangle, t2: PosedTriangle, axis: int, error: float) -> int:
     """Return the class of two triangles that both have an area; UNDECIDED only where exponents leave the range.
@@ -230,13 +247,7 @@ def classify_exactly(poses: Any, t1: PosedTriangle, t2: PosedTriangle, axis: int
         if how == UNDECIDED:
             return UNDECIDED
         return APART if how == 1 else COPLANAR
-    lone1, side1 = lone_vertex(p1, q1, r1)
-    lone2, side2 = lone_vertex(p2, q2, r2)
-    a, b = turned(t1, lone1), turned(t2, lone2)
-    if side1 < 0:  # turn b over: now a.p is above b
-        b = PosedTriangle(b.p, b.r, b.q)
-    if side2 < 0:
-        a = PosedTriangle(a.p, a.r, a.q)
+    a, b = lone_first(t1, t2, (p1, q1, r1), (p2, q2, r2))
     first = sign_of_four(poses, a.q, b.p, a.p, b.q, error)
     if first == 1:
         return APART

@@ -33,7 +33,7 @@ def test_agrees_with_exact_integers(size: int, pose: Pose | None) -> None:
         faces = a.corners(0), b.corners(0)
         if classify_exact(*faces) == APART:
             continue
-        found = Found(np.zeros((1, 2), np.int64), np.full(1, CONTACT, np.int8))
+        found = Found(np.zeros((1, 2), np.int64), np.full(1, CONTACT, np.int8), np.empty(0, np.bool_))
         with np.errstate(all="ignore"):
             row, _ = relate(first, pose, second, pose, SEEK_CONTACT, Work(), found)
         if min(first.arrays.axis[0], second.arrays.axis[0]) < 0:

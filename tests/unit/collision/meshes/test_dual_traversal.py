@@ -1,4 +1,5 @@
-"""The search finds every pair of faces with a common point, however little room it has; and ends where it may."""
+"""The search finds every pair of faces with a common point, however little room it has, but for common corners of which
+others say as much; and ends where it may."""
 
 from __future__ import annotations
 
@@ -9,7 +10,7 @@ import pytest
 from engine import Pose
 from engine.collision.meshes.dual_traversal import SEEK_CONTACT, SEEK_OVERLAP, new_found
 from engine.collision.meshes.exact_body import exact_pair
-from engine.collision.meshes.exact_triangles import classify_exact
+from engine.collision.meshes.exact_triangles import classify_exact, kind_of_contact
 from engine.collision.meshes.mesh_pair import SPACE, relate
 from engine.collision.meshes.pose_batch import N_CONTACTS, ONE_SETTLES
 from engine.collision.meshes.triangle_triangle import APART, CROSSING
@@ -32,8 +33,12 @@ def test_finds_what_looking_at_all_pairs_finds(
     x, y = exact_pair(a, pose, b, pose)
     every = itertools.product(range(len(a.faces)), range(len(b.faces)))
     touching = {(i, j) for i, j in every if classify_exact(x.corners(i), y.corners(j)) != APART}
-    assert touching <= pairs
-    assert pairs == touching or UNDECIDED in found.kinds[: len(pairs)]
+    for i, j in touching - pairs:
+        assert len(found.met) > 0
+        assert kind_of_contact(x.corners(i), y.corners(j)) == "vertex_vertex"
+        assert i in {p for p, _ in pairs}
+        assert j in {q for _, q in pairs}
+    assert pairs <= touching or UNDECIDED in found.kinds[: len(pairs)]
     assert CROSSING not in found.kinds[: len(pairs)]
 
 

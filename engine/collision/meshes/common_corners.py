@@ -1,0 +1,71 @@
+"""Pairs of faces that meet in a common corner and nowhere else: told quickly, and few of them kept.
+
+Where many faces of either body share one point, each meets each of the other's there: the square of their number says
+no more than that they are in contact. Such a pair names no other witness than a vertex on a vertex, cuts no face and
+proves nothing, so a search kept for many contacts lists it only while one of its faces is not known to be in contact,
+and keeps aside those that stand first among all, which name the witness.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from engine.collision.meshes.contact_kinds import N_NAMED
+from engine.collision.meshes.triangle_triangle import PosedTriangle, Triangle3, bound_near, corner
+from engine.jit import inline, merged
+from engine.predicates.posed import surely_same
+from engine.predicates.vectors import cross, dot, largest_of, minus
+from engine.types import Point3
+
+
+@inline
+def _is_beside(a: Point3, b: Point3, c: Point3, d: Point3, error: float) -> bool:
+    """Tell whether c and d surely lie strictly on one side of the plane of the origin, a and b."""
+    n, bound = cross(a, b), bound_near(a, b, c, d, d, error)
+    one, other = dot(n, c), dot(n, d)
+    return (one > bound and other > bound) or (one < -bound and other < -bound)
+
+
+@merged
+def common_corner(
+    poses: Any, t: Triangle3, u: Triangle3, given: PosedTriangle, other: PosedTriangle, error: float
+) -> int:
+    """Return 3 k + m where corner k of a face surely is corner m of another, and they have no other common point, else
+    -1; t, u: the rounded posed triangles, each coordinate off by at most `error`; given, other: before their poses.
+
+    The other corners of one lie strictly on one side of the plane of the other: it meets that plane in the corner.
+    """
+    for k in range(3):
+        p = t.p if k == 0 else (t.q if k == 1 else t.r)
+        for m in range(3):
+            q = u.p if m == 0 else (u.q if m == 1 else u.r)
+            if not largest_of(minus(p, q)) <= 2.0 * error:
+                continue
+            v, w = (minus(t.q if k == 0 else t.p, p), minus(t.q if k == 2 else t.r, p))
+            x, y = (minus(u.q if m == 0 else u.p, q), minus(u.q if m == 2 else u.r, q))
+            if not (_is_beside(v, w, x, y, error) or _is_beside(x, y, v, w, error)):
+                return -1
+            return 3 * k + m if error == 0.0 or surely_same(poses, corner(given, k), corner(other, m)) else -1
+    return -1
+
+
+@merged
+def keep_first(faces: Any, their_faces: Any, pairs: Any, kinds: Any, i: int, j: int, kind: int) -> tuple[int, int, int]:
+    """Put a pair among the last N_NAMED rows, in order, those not used -1; return the one that then has no place there,
+    -1 where all have."""
+    n = kinds.shape[0]
+    for place in range(n - N_NAMED if _stands_before(faces, their_faces, i, j, pairs, n - 1) else n, n):
+        if _stands_before(faces, their_faces, i, j, pairs, place):
+            p, q, other = pairs[place, 0], pairs[place, 1], kinds[place]
+            pairs[place, 0], pairs[place, 1], kinds[place] = i, j, kind
+            i, j, kind = p, q, int(other)
+            if i < 0:
+                break
+    return i, j, kind
+
+
+@inline
+def _stands_before(faces: Any, their_faces: Any, i: int, j: int, pairs: Any, place: int) -> bool:
+    """Tell whether a pair is named before that of a row: by the callers' faces, then by the numbers."""
+    p, q = pairs[place, 0], pairs[place, 1]
+    return p < 0 or (faces[i], their_faces[j], i, j) < (faces[p], their_faces[q], p, q)
