@@ -210,14 +210,9 @@ def _meet(
 
 
 def _split(
-    nodes: NodeTable,
-    ends: list[tuple[int, int]],
-    lines: list[Line],
-    merged: list[list[Any]],
-    on_segment: dict[int, set[int]],
-    n_exact: int,
-    budget: Budget,
-) -> Arrangement:
+    nodes: NodeTable, ends: list[tuple[int, int]], lines: list[Line], merged: list[list[Any]],
+    on_segment: dict[int, set[int]], n_exact: int, budget: Budget,
+) -> Arrangement:  # fmt: skip
     """Cut every segment at its nodes and unite the edges that several segments share."""
     by_place = cmp_to_key(nodes.compare)
     edges: dict[tuple[int, int], list[Any]] = {}

@@ -21,14 +21,14 @@ from engine.containment.scene.locate_scene import locate_scene
 from engine.errors import InvalidOperationError, NotRepresentableError
 from engine.parallel import Budget, Cancel
 from engine.polygon_overlay.batch import OverlayBatch, overlay_batch
-from engine.polygon_overlay.found import chained, places_of, summed
+from engine.polygon_overlay.found import chained, places_of
 from engine.polygon_overlay.polygon_arrays import Chosen, PolygonArrays, joined_arrays
 from engine.polygon_overlay.result import Output, Overlay
 from engine.polygon_overlay.run import Operation
 from engine.polygon_overlay.union_all import less_all, union_all
 from engine.solids.checks import shown
 from engine.solids.polygon import Polygon
-from engine.solids.ragged import closed_rings
+from engine.solids.ragged import closed_rings, summed
 from engine.types import Accuracy
 
 How = Literal["intersection", "union", "identity", "difference", "symmetric_difference"]

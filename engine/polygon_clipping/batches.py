@@ -21,7 +21,7 @@ from engine.predicates.scaling import exponent_above, scaled_back, shifted
 from engine.solids.base import Solid
 from engine.types import OPEN
 
-_AXES: Final = {2: (0, 1), 3: (0, 1, 2)}
+AXES: Final = {2: (0, 1), 3: (0, 1, 2)}  # the `names` of `clip_rings`
 _DEEPEST: Final = -900
 """Scenes below 2^-900 have subnormal results, which the kernel would round twice."""
 
@@ -97,16 +97,9 @@ def _double_double_quotient(top: int, bottom: int) -> tuple[float, float]:
 
 
 def clip_chunk(
-    scene: KernelScene,
-    ring_offsets: IntArray,
-    polygon_offsets: IntArray,
-    first: int,
-    last: int,
-    budget: Budget,
-    sizes: IntArray,
-    state: FlagArray,
-    may_have_bridges: BoolArray,
-) -> FloatArray:
+    scene: KernelScene, ring_offsets: IntArray, polygon_offsets: IntArray, first: int, last: int, budget: Budget,
+    sizes: IntArray, state: FlagArray, may_have_bridges: BoolArray,
+) -> FloatArray:  # fmt: skip
     """Clip polygons first .. last - 1 as far as the kernel can; return the vertices of those it settled, in order.
 
     Fills sizes (of rings), state and may_have_bridges (of polygons); see `clip_rings`.
@@ -119,7 +112,7 @@ def clip_chunk(
     while done < last:
         out = np.empty(room)
         reached, written = clip(
-            flat, ring_offsets, polygon_offsets, tables, done, last, budget.flag, out, *found, _AXES[d]
+            flat, ring_offsets, polygon_offsets, tables, done, last, budget.flag, out, *found, AXES[d]
         )
         budget.check()
         parts.append(out[: written * d].reshape(-1, d))

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from itertools import pairwise
+from itertools import accumulate
 from typing import Any, Final, Literal, NamedTuple, Unpack, cast, overload
 
 import numpy as np
 import numpy.typing as npt
 
-from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray
+from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray, read_only
+from engine.direct import entry_of
 from engine.errors import EmptyGeometryError, InvalidArrayError, TooComplexError, UnsupportedSolidError
 from engine.parallel import UNLIMITED, Budget, Cancel, Options, Progress, check_options, run_chunks
-from engine.polygon_clipping.batches import KernelScene, clip_chunk, kernel_scene
+from engine.polygon_clipping.batches import AXES, clip_chunk, kernel_scene
 from engine.polygon_clipping.convex_planes import convex_planes
 from engine.polygon_clipping.in_integers import Row, clip_polygon, integer_row, reduced
-from engine.polygon_clipping.rings import CLIPPED
+from engine.polygon_clipping.rings import CLIPPED, PlaneTables
+from engine.polygon_clipping.sutherland_hodgman import clip_rings
 from engine.predicates.scaling import largest_of
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
@@ -26,6 +29,7 @@ from engine.solids.convex import Convex, rows_of
 from engine.solids.half_space import HalfSpace
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
+from engine.solids.ragged import summed
 from engine.types import OPEN, Accuracy
 
 
@@ -75,14 +79,10 @@ Polygons = Sequence[Polygon] | Sequence[Sequence[npt.ArrayLike]] | npt.NDArray[A
 def clip_polygons(
     polygons: Polygons, region: Solid, *, report: Literal[False] = False, **options: Unpack[Options]
 ) -> ClippedPolygons: ...
-
-
 @overload
 def clip_polygons(
     polygons: Polygons, region: Solid, *, report: Literal[True], **options: Unpack[Options]
 ) -> tuple[ClippedPolygons, Accuracy]: ...
-
-
 def clip_polygons(
     polygons: Polygons,
     region: Solid,
@@ -156,30 +156,50 @@ def _clip_array(polygons: npt.NDArray[Any], region: Solid) -> ClippedPolygons | 
     # the largest coordinate lies between the root of this sum, and that over the root of how many there are
     if not (0 < n * size <= _FEW and 2.0**-100 < flat.dot(flat) < 2.0**120):
         return None
-    scene = KernelScene(polygons.reshape(-1, region.dimension), 0, tables)
-    found = _clip_few(scene, size * (numbers := np.arange(n + 1)), numbers, UNLIMITED)
+    ring_offsets, numbers = _one_ring(size) if n == 1 else (size * (numbers := np.arange(n + 1)), numbers)
+    found = _clip_few(flat, tables, ring_offsets, numbers, UNLIMITED)
     return None if found is None else found[0]
 
 
+@functools.lru_cache(64)
+def _one_ring(size: int) -> tuple[IntArray, IntArray]:
+    """Return the offsets of the ring of one polygon, and of that polygon."""
+    return read_only(np.array([0, size])), read_only(np.array([0, 1]))
+
+
 def _clip_few(
-    scene: KernelScene, ring_offsets: IntArray, polygon_offsets: IntArray, budget: Budget
+    vertices: FloatArray, tables: PlaneTables, ring_offsets: IntArray, polygon_offsets: IntArray, budget: Budget
 ) -> tuple[ClippedPolygons, int] | None:
-    """Clip few polygons; return the result, and how many needed more than the filter, None where one is left open."""
-    n = len(polygon_offsets) - 1
-    ring_sizes, status = np.empty(len(ring_offsets) - 1, np.int64), np.zeros(n, np.int8)
+    """Clip few polygons, vertices as one row; return the result, and how many needed more than the filter.
+
+    None where one is left open, or there is no room.
+    """
+    n, n_rings, d = len(polygon_offsets) - 1, len(ring_offsets) - 1, tables.high.shape[1] - 1
+    out = np.empty(len(vertices) + d * (4 * len(tables.high) + 64))
+    ring_sizes, status = np.empty(n_rings, np.int64), np.zeros(n, np.int8)
     state, bridges = np.empty(n, np.uint8), np.empty(n, np.bool_)
-    vertices = clip_chunk(scene, ring_offsets, polygon_offsets, 0, n, budget, ring_sizes, state, bridges)
-    if OPEN in (states := state.tolist()):
+    reached, written = entry_of(clip_rings, d)(
+        vertices, ring_offsets, polygon_offsets, tables, 0, n, budget.flag, out, ring_sizes, state, bridges, AXES[d]
+    )
+    budget.check()
+    if reached < n or OPEN in (states := state.tolist()):
         return None
-    rings, polygons, contours, sizes = [0], [0], list[int](), ring_sizes.tolist()
-    for begin, end in pairwise(polygon_offsets.tolist()):
-        for ring in range(begin, end):
-            if sizes[ring]:
-                rings.append(rings[-1] + sizes[ring])
-                contours.append(ring - begin)
-        polygons.append(len(contours))
-    first, second, third = (np.array(numbers, np.int64) for numbers in (rings, polygons, contours))
-    return ClippedPolygons(vertices, first, second, third, status, bridges), n - states.count(CLIPPED)
+    left, sizes = out[: written * d].reshape(-1, d), ring_sizes.tolist()
+    n_beyond = n - states.count(CLIPPED)
+    if n == n_rings and all(sizes):
+        offsets = np.array([0, *accumulate(sizes)], np.int64)
+        return ClippedPolygons(left, offsets, polygon_offsets, np.zeros(n, np.int64), status, bridges), n_beyond
+    return _gathered(left, ring_sizes, polygon_offsets, status, bridges), n_beyond
+
+
+def _gathered(
+    vertices: FloatArray, sizes: IntArray, polygon_offsets: IntArray, status: Int8Array, may_have_bridges: BoolArray
+) -> ClippedPolygons:
+    """Return what is left of polygons; sizes: the vertices of each ring, those that vanished with none."""
+    left = np.flatnonzero(sizes)
+    owners = np.repeat(polygon_offsets[:-1], np.diff(polygon_offsets))
+    contours, ends = (np.arange(len(sizes)) - owners)[left], summed(sizes > 0)[polygon_offsets]
+    return ClippedPolygons(vertices, summed(sizes[left]), ends, contours, status, may_have_bridges)
 
 
 def _planes(region: Solid, budget: Budget) -> list[Row]:
@@ -261,29 +281,19 @@ def as_contours(polygons: Any, dimension: int) -> Contours:
         counts.append(len(found))
     vertices = np.concatenate(rings) if rings else np.zeros((0, dimension))
     vertices.setflags(write=False)
-    return Contours(vertices, _offsets([len(ring) for ring in rings]), _offsets(counts), largest_of(vertices))
-
-
-def _offsets(counts: Sequence[int] | IntArray) -> IntArray:
-    offsets = np.zeros(len(counts) + 1, np.int64)
-    np.cumsum(counts, out=offsets[1:])
-    return offsets
+    return Contours(vertices, summed([len(ring) for ring in rings]), summed(counts), largest_of(vertices))
 
 
 def _clip(
-    contours: Contours,
-    region: Solid,
-    planes: list[Row],
-    budget: Budget,
-    workers: int | None,
+    contours: Contours, region: Solid, planes: list[Row], budget: Budget, workers: int | None,
     progress: Progress | None,
-) -> tuple[ClippedPolygons, int, int]:
+) -> tuple[ClippedPolygons, int, int]:  # fmt: skip
     """Clip every polygon; return the result, how many polygons needed more than the filter, and rational arithmetic."""
     vertices, ring_offsets, polygon_offsets, largest = contours
     n, dimension = len(polygon_offsets) - 1, vertices.shape[1]
     scene = kernel_scene(region, vertices, largest, planes, budget)
-    if scene is not None and len(vertices) <= _FEW:
-        few = _clip_few(scene, ring_offsets, polygon_offsets, budget)
+    if scene is not None and scene.exponent == 0 and len(vertices) <= _FEW:
+        few = _clip_few(vertices.reshape(-1), scene.tables, ring_offsets, polygon_offsets, budget)
         if few is not None:
             if progress is not None and n:
                 progress(n)
@@ -313,7 +323,7 @@ def _clip(
         open_ones = first + np.flatnonzero(state[first:last] == OPEN)
         if len(open_ones):
             rings = polygon_offsets[first : last + 1]
-            before = _offsets(sizes[rings[0] : rings[-1]])[rings - rings[0]]  # vertices that the kernel left
+            before = summed(sizes[rings[0] : rings[-1]])[rings - rings[0]]  # vertices that the kernel left
             found, taken = [], 0
             for i in open_ones:
                 budget.check()
@@ -323,15 +333,6 @@ def _clip(
         parts[first] = settled
 
     run_chunks(task, n, budget=budget, workers=workers, progress=progress, first_chunk=64)
-    left = np.flatnonzero(sizes)
-    counted = np.concatenate([[0], np.cumsum(sizes > 0)])
-    owners = np.repeat(polygon_offsets[:-1], np.diff(polygon_offsets))
-    clipped = ClippedPolygons(
-        np.concatenate([parts[first] for first in sorted(parts)]) if parts else np.zeros((0, dimension)),
-        _offsets(sizes[left]),
-        counted[polygon_offsets],
-        (np.arange(len(sizes)) - owners)[left],
-        status,
-        may_have_bridges,
-    )
+    vertices = np.concatenate([parts[first] for first in sorted(parts)]) if parts else np.zeros((0, dimension))
+    clipped = _gathered(vertices, sizes, polygon_offsets, status, may_have_bridges)
     return clipped, int(np.count_nonzero(state)), int(np.count_nonzero(state == OPEN))

@@ -333,16 +333,9 @@ def cut_by_planes(s: Any, planes: Any, cutting: Cutting, n_cutting: int, n_ring:
 
 @bare
 def clip_exactly(
-    s: Any,
-    polygons: Polygons,
-    polygon: int,
-    planes: Any,
-    cutting: Cutting,
-    n_cutting: int,
-    stop: Any,
-    clipped: Clipped,
-    written: int,
-) -> int:
+    s: Any, polygons: Polygons, polygon: int, planes: Any, cutting: Cutting, n_cutting: int, stop: Any,
+    clipped: Clipped, written: int,
+) -> int:  # fmt: skip
     """Clip a polygon by the planes of `cutting`, whose contacts begin anew; `written` vertices are there already.
 
     Returns the vertices written then, or NO_ROOM. What is too long is left OPEN.

@@ -39,19 +39,9 @@ def room_for(ring_offsets: Any, first: int, last: int, n_planes: int) -> int:
 
 @kernel
 def clip_rings(
-    vertices: Any,
-    ring_offsets: Any,
-    polygon_offsets: Any,
-    planes: PlaneTables,
-    first: int,
-    last: int,
-    stop: Any,
-    out: Any,
-    sizes: Any,
-    state: Any,
-    may_have_bridges: Any,
-    names: Any,
-) -> tuple[int, int]:
+    vertices: Any, ring_offsets: Any, polygon_offsets: Any, planes: PlaneTables, first: int, last: int, stop: Any,
+    out: Any, sizes: Any, state: Any, may_have_bridges: Any, names: Any,
+) -> tuple[int, int]:  # fmt: skip
     """Clip polygons first .. last - 1 by all planes; returns the polygon reached and the vertices written.
 
     vertices .. polygon_offsets: see `Polygons`; out .. may_have_bridges: see `Clipped`. stop: one uint8, polled.

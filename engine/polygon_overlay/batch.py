@@ -13,7 +13,7 @@ from engine.errors import InvalidArrayError, NotRepresentableError
 from engine.parallel import Budget, Cancel, Progress, check_options, run_chunks
 from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
 from engine.polygon_overlay.compiled.loading import RingArrays
-from engine.polygon_overlay.found import NO_PAIRS, Found, chained, joined, one_pair, summed, taken
+from engine.polygon_overlay.found import NO_PAIRS, Found, chained, joined, one_pair, taken
 from engine.polygon_overlay.implicit_rings import ImplicitRings, areas_of
 from engine.polygon_overlay.nearest import nearest_pairs
 from engine.polygon_overlay.overlay import accuracy_of, check_words, overlay_rings, rings_of, ulps_moved
@@ -23,7 +23,7 @@ from engine.polygon_overlay.rounds import SettledPairs, settle_pairs
 from engine.polygon_overlay.run import Operation, arranged_again, as_overlay, run_kernel
 from engine.solids.base import Solid
 from engine.solids.polygon import Polygon
-from engine.solids.ragged import closed_rings
+from engine.solids.ragged import closed_rings, summed
 from engine.types import OPEN, Accuracy
 
 NOT_REPRESENTABLE: Final = 1
@@ -214,15 +214,9 @@ class _Rest(NamedTuple):
 
 
 def _settled(
-    found: Found,
-    rest: _Rest,
-    subjects: Sequence[Solid],
-    clips: Sequence[Solid],
-    operation: Operation,
-    output: Output,
-    workers: int | None,
-    budget: Budget,
-) -> tuple[Found, float, int]:
+    found: Found, rest: _Rest, subjects: Sequence[Solid], clips: Sequence[Solid], operation: Operation, output: Output,
+    workers: int | None, budget: Budget,
+) -> tuple[Found, float, int]:  # fmt: skip
     """Fill ``rest``; return all pairs settled, `Accuracy.coordinates_ulp`, and how many decisions took rationals."""
     settled: dict[int, SettledPairs] = {}
     alone: dict[int, tuple[Overlay, int, int]] = {}

@@ -7,8 +7,9 @@ from typing import Any, Final, NamedTuple, cast
 
 import numpy as np
 
-from engine.arrays import FloatArray, Int8Array, Int32Array, IntArray, read_only
+from engine.arrays import FloatArray, Int8Array, Int32Array, IntArray
 from engine.polygon_overlay.compiled.kernel import DONE
+from engine.solids.ragged import summed
 
 NO_EVIDENCE: Final = np.zeros((0, 2), np.int64)
 
@@ -45,14 +46,9 @@ NO_PAIRS: Final = Found(
 
 
 def one_pair(
-    vertices: FloatArray,
-    ring_offsets: IntArray,
-    piece_offsets: IntArray,
-    displacement: float,
-    n_exact: int,
-    sources: Int32Array | None = None,
-    status: int = DONE,
-) -> Found:
+    vertices: FloatArray, ring_offsets: IntArray, piece_offsets: IntArray, displacement: float, n_exact: int,
+    sources: Int32Array | None = None, status: int = DONE,
+) -> Found:  # fmt: skip
     """Return what was found for one pair; sources left out: vertices that may be any."""
     counts = np.array([[len(piece_offsets) - 1, len(ring_offsets) - 1, len(vertices), n_exact]])
     sources = np.zeros((len(vertices), 2), np.int32) if sources is None else sources
@@ -95,13 +91,6 @@ def put_together(parts: Sequence[Sequence[Any]]) -> list[Any]:
     vertices, sources, ring_offsets, piece_offsets, evidence = zip(*parts, strict=True)
     offsets = chained(ring_offsets), chained(piece_offsets)
     return [np.concatenate(vertices), np.concatenate(sources), *offsets, np.concatenate(evidence)]
-
-
-def summed(sizes: IntArray) -> IntArray:
-    """Return where each of some parts put one after another begins, and the end of the last; read-only."""
-    offsets = np.zeros(len(sizes) + 1, np.int64)
-    np.cumsum(sizes, out=offsets[1:])
-    return read_only(offsets)
 
 
 def chained(offsets: Sequence[IntArray]) -> IntArray:

@@ -22,14 +22,14 @@ from engine.direct import entry_of
 from engine.errors import InvalidInputError, NotRepresentableError
 from engine.parallel import Budget
 from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
-from engine.polygon_overlay.compiled.snapping import FOLDS, Snapped, scale, snap, stay_apart
+from engine.polygon_overlay.compiled.snapping import FOLDS, scale, snap
 from engine.polygon_overlay.compiled.workspace import keep, scratch_for
-from engine.polygon_overlay.found import Found, one_pair, ring_numbers, summed
+from engine.polygon_overlay.found import Found, one_pair, ring_numbers
 from engine.polygon_overlay.implicit_rings import ImplicitRings, edges_along, rings_alone
 from engine.polygon_overlay.result import Overlay, made_overlay
 from engine.polygon_overlay.run_pair import FoundPair
 from engine.solids.checks import shown
-from engine.solids.ragged import next_in_rings
+from engine.solids.ragged import next_in_rings, summed
 
 _MOST: Final = 2.0**51
 """Cells from zero up to which halves of cells are doubles, with room for sums."""
@@ -39,8 +39,8 @@ _LEAST: Final = 2.0**-60
 """Part of a cell that counts as none: exponents stay in the range of expansions."""
 _ROUNDED: Final = 2.0**-51
 _SURELY_VALID: Final = 2.0**24
-"""Cells from zero up to which the doubles nearest to tenths, hundredths, ... lie to each other as whole numbers do: a
-turn of these is no less than 1, rounding them changes it by a half at most."""
+_FINEST: Final = 2.0**49
+"""Cells from zero, and these times the longest edge, up to which rings surely stay valid; see `_are_told_apart`."""
 HALF_DIAGONAL: Final = nextafter(0.5**0.5, 1.0)
 
 
@@ -119,24 +119,25 @@ def snap_vertices(vertices: FloatArray, offsets: IntArray, piece_offsets: IntArr
     """Return what becomes of valid rings, read-only arrays. Raises as `Budget.check`."""
     n = len(vertices)
     n_most, n_rings = max(64, n), len(offsets) - 1
-    made = Snapped(np.empty((n, 2)), np.empty(n, np.int32), np.empty(n_rings + 1, np.int64), np.empty(0))
+    pixels, corners, starts = np.empty((n, 2)), np.empty(n, np.int32), np.empty(n_rings + 1, np.int64)
     while True:  # bound: the second turn has room
-        made = made._replace(passages=np.empty((n_most, 2), np.int32))
+        passages = np.empty((n_most, 2), np.int32)
         budget.take(8 * n_most)
         scratch = scratch_for(n, n_rings, 256, 0, 0)
-        n_moved, m, n_corners = entry_of(snap)(vertices, offsets, piece_offsets, budget.flag, scratch.buffers, made)
+        n_moved, m, n_corners = entry_of(snap)(
+            vertices, offsets, piece_offsets, budget.flag, scratch.buffers, pixels, corners, starts, passages
+        )
         budget.check()
         keep(scratch)
         if m <= n_most:
             break
         n_most = m
-    passages = made.passages[:m]
     if n_corners in (n, FOLDS):
-        return _OnGrid(n_moved, n_corners == n, read_only(made.pixels), offsets, None, passages)
-    corners = made.corners[:n_corners]
-    pixels = made.pixels[corners]
+        return _OnGrid(n_moved, n_corners == n, read_only(pixels), offsets, None, passages[:m])
+    corners = corners[:n_corners]
+    pixels = pixels[corners]
     n_moved = int((pixels != vertices[corners]).any(axis=1).sum())
-    return _OnGrid(n_moved, True, read_only(pixels), read_only(made.starts), corners, passages)
+    return _OnGrid(n_moved, True, read_only(pixels), read_only(starts), corners, passages[:m])
 
 
 def snapped_to_units(rings: Found, budget: Budget, known: _OnGrid | None = None) -> Found:
@@ -163,19 +164,16 @@ def as_it_stays(found: FoundPair, snapped: _OnGrid, grid: Grid, start: int) -> O
     start: of the vertices of the clip among all. The same as `settle_rings` and `from_units`; None where they do not,
     or doubles may not tell its multiples apart.
     """
-    if not snapped.stays or (grid.base == 10 and not _are_told_apart(snapped.vertices)):
+    if not snapped.stays or (grid.base == 10 and not _are_told_apart(snapped.vertices, snapped.offsets)):
         return None
     places, edges = grid.places_of(snapped.vertices), edges_along(found.sources)
     has_moved = snapped.n_moved > 0 or snapped.edges is not None
     displacement = nextafter(found.displacement + HALF_DIAGONAL, inf) if has_moved else found.displacement
-    n_pieces = len(found.piece_offsets) - 1
     return made_overlay(
-        vertices=places,
-        ring_offsets=snapped.offsets,
-        piece_offsets=found.piece_offsets,
-        n_pieces_exact=n_pieces,
-        n_holes_exact=len(snapped.offsets) - 1 - n_pieces,
-        exact=rings_alone(places, snapped.offsets),
+        places,
+        snapped.offsets,
+        found.piece_offsets,
+        rings_alone(places, snapped.offsets),
         largest_displacement=_displacement(displacement, grid, places),
         rounds=int(found.displacement > 0.0) + int(has_moved),
         snapped=has_moved,
@@ -208,23 +206,18 @@ def _along(edges: IntArray) -> Any:
     return np.repeat(edges.astype(np.int32), 2).reshape(-1, 2)
 
 
-def _stay_apart(result: Overlay, budget: Budget) -> bool:
-    """Tell whether the doubles nearest to multiples of the grid surely leave rings valid: none is off by more than half
-    a unit in the last place of its own, which is a thirtieth of what `stay_apart` has room for."""
-    vertices, offsets = result.vertices, result.ring_offsets
-    _, points = np.unique(np.ascontiguousarray(vertices).view(np.complex128).ravel(), return_inverse=True)
-    scratch = scratch_for(len(vertices), len(offsets) - 1, max(256, len(offsets)), 0, 0)
-    are_apart = entry_of(stay_apart)(
-        read_only(vertices), read_only(points.astype(np.int32)), read_only(offsets), budget.flag, scratch.buffers
-    )
-    budget.check()
-    keep(scratch)
-    return bool(are_apart)
+def _are_told_apart(units: FloatArray, offsets: IntArray) -> bool:
+    """Tell whether valid rings surely stay so where each of these multiples is rounded to a double.
 
-
-def _are_told_apart(units: FloatArray) -> bool:
-    """Tell whether the doubles nearest to these multiples of a power of ten surely lie to each other as they do."""
-    return not len(units) or max(-float(units.min()), float(units.max())) <= _SURELY_VALID
+    With C the largest, that moves a coordinate by no more than d = 2^-53 C cells. Let no edge be longer than L along an
+    axis, which is 1 at least. Before rings become invalid on the way there, a vertex c comes to lie on an edge ab,
+    within its box. Either abc turned before, by 1 at least, since these are whole numbers, and a turn of points so near
+    changes by 8 d L + 24 d^2 at most; or c was on the line beyond an end, by 1 at least along an axis, which 2 d make
+    up for. Neither can be where C L is no more than 2^49.
+    """
+    largest = max(-float(units.min()), float(units.max())) if len(units) else 0.0
+    is_near = largest <= _SURELY_VALID
+    return is_near or bool(largest * np.abs(units[next_in_rings(offsets)] - units).max() <= _FINEST)
 
 
 def _displacement(displacement: float, grid: Grid, places: FloatArray) -> float:
@@ -241,11 +234,9 @@ def from_units(result: Overlay, grid: Grid, start: int, again: Any, budget: Budg
     start: of the vertices of the clip among all. again: arranges rings.
     """
     vertices = grid.places_of(read_only(result.vertices))
-    is_valid = grid.base == 2 or _are_told_apart(result.vertices)
-    if not is_valid and not _stay_apart(result, budget):
+    if grid.base == 10 and not _are_told_apart(result.vertices, result.ring_offsets):
         rings = one_pair(vertices, result.ring_offsets, result.piece_offsets, 0.0, 0, status=MAY_CROSS)
-        is_valid = np.array_equal(again(rings, budget).vertices, vertices)
-        if not is_valid:
+        if not np.array_equal(again(rings, budget).vertices, vertices):
             raise NotRepresentableError(
                 f"multiples of {grid.spacing!r} are not told apart well enough by float64 here; take a power of two"
             )

@@ -35,14 +35,9 @@ _Sources = frozenset[int]
 
 
 def overlay_exactly(
-    subject: RingArrays,
-    clip: RingArrays,
-    operation: Operation,
-    output: Output,
-    budget: Budget,
-    nesting: Nesting = UNNAMED,
-    is_on_grid: bool = False,
-) -> tuple[Overlay, int]:
+    subject: RingArrays, clip: RingArrays, operation: Operation, output: Output, budget: Budget,
+    nesting: Nesting = UNNAMED, is_on_grid: bool = False,
+) -> tuple[Overlay, int]:  # fmt: skip
     """Return the overlay of checked rings (either may be empty), and how many pairs of edges the filter left open."""
     vertices = np.concatenate([subject.vertices, clip.vertices])
     offsets = [*subject.offsets.tolist(), *(clip.offsets[1:] + len(subject.vertices)).tolist()]

@@ -19,12 +19,12 @@ from typing import Final, Literal, Unpack, overload
 import numpy as np
 
 from engine.errors import InvalidOperationError, UnsupportedSolidError
-from engine.parallel import UNLIMITED, Budget, Cancel, Options, Progress, check_options
+from engine.parallel import UNLIMITED, Budget, Cancel, Progress, check_options
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.compiled.ring_nesting import Nesting
 from engine.polygon_overlay.grid import from_units, grid_of
 from engine.polygon_overlay.in_integers import overlay_exactly
-from engine.polygon_overlay.result import Output, Overlay
+from engine.polygon_overlay.result import Output, Overlay, OverlayOptions
 from engine.polygon_overlay.run import KEPT, Operation, arranged_again, overlay_compiled
 from engine.polygon_overlay.run_pair import UNNAMED
 from engine.solids.base import Solid
@@ -39,23 +39,14 @@ _OUTPUTS: Final = ("valid", "nearest")
 def overlay(
     subject: Solid,
     clip: Solid,
-    operation: Operation = "intersection",
+    operation: Operation = ...,
     *,
-    output: Output = "valid",
-    grid: float | None = None,
     report: Literal[False] = False,
-    **options: Unpack[Options],
+    **options: Unpack[OverlayOptions],
 ) -> Overlay: ...
 @overload
 def overlay(
-    subject: Solid,
-    clip: Solid,
-    operation: Operation = "intersection",
-    *,
-    output: Output = "valid",
-    grid: float | None = None,
-    report: Literal[True],
-    **options: Unpack[Options],
+    subject: Solid, clip: Solid, operation: Operation = ..., *, report: Literal[True], **options: Unpack[OverlayOptions]
 ) -> tuple[Overlay, Accuracy]: ...
 def overlay(
     subject: Solid,
@@ -136,14 +127,9 @@ def rings_of(solid: object, *where: str | int) -> RingArrays:
 
 
 def overlay_rings(
-    subject: RingArrays,
-    clip: RingArrays,
-    operation: Operation,
-    output: Output,
-    budget: Budget,
-    nesting: Nesting = UNNAMED,
-    grid: float | None = None,
-) -> tuple[Overlay, int, int]:
+    subject: RingArrays, clip: RingArrays, operation: Operation, output: Output, budget: Budget,
+    nesting: Nesting = UNNAMED, grid: float | None = None,
+) -> tuple[Overlay, int, int]:  # fmt: skip
     """Return the overlay of checked rings (either may be empty), pairs of edges beyond the filter, and in rationals.
 
     nesting: of the rings of the subject, for another rule than even-odd in either; no clip then, and "union".

@@ -9,10 +9,10 @@ import numpy as np
 
 from engine.arrays import FloatArray, IntArray, read_only
 from engine.errors import RingTooShortError
-from engine.polygon_overlay.found import chained, places_of, summed
+from engine.polygon_overlay.found import chained, places_of
 from engine.polygon_overlay.implicit_rings import one_polygon
 from engine.solids.polygon import Polygon
-from engine.solids.ragged import parted
+from engine.solids.ragged import parted, summed
 
 _LEAST: Final = 3
 """Positions of a ring that has area."""

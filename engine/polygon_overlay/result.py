@@ -14,11 +14,18 @@ import numpy as np
 from engine.arrangement.exact_area import ExactRings
 from engine.arrangement.nodes import nearest_quotient
 from engine.arrays import FloatArray, IntArray
-from engine.parallel import Budget
+from engine.parallel import Budget, Options
 from engine.polygon_overlay.implicit_rings import ImplicitRings, edges_along
 from engine.solids.ragged import as_geojson
 
 Output = Literal["valid", "nearest"]
+
+
+class OverlayOptions(Options, total=False):
+    """What overlays take by keyword beside."""
+
+    output: Output
+    grid: float | None
 
 
 @functools.lru_cache(64)
@@ -215,8 +222,13 @@ class Overlay:
         return self.exact.nearest_areas(np.append(np.flatnonzero(self.exact.are_shells()), self.exact.n_rings))
 
 
-def made_overlay(**fields: Any) -> Overlay:
-    """Return an `Overlay` of these fields, which are all that have no default; arrays are read-only."""
+def made_overlay(
+    vertices: FloatArray, ring_offsets: IntArray, piece_offsets: IntArray, exact: Exact, **told: Any
+) -> Overlay:
+    """Return an `Overlay` of read-only arrays, with the counts of its exact result unless told otherwise."""
+    told.update(vertices=vertices, ring_offsets=ring_offsets, piece_offsets=piece_offsets, exact=exact)
+    if "n_pieces_exact" not in told:
+        told["n_pieces_exact"], told["n_holes_exact"] = len(piece_offsets) - 1, len(ring_offsets) - len(piece_offsets)
     result = object.__new__(Overlay)
-    object.__setattr__(result, "__dict__", fields)  # all at once: Overlay(...) sets one by one, which takes 2 us
+    object.__setattr__(result, "__dict__", told)  # all at once: Overlay(...) sets one by one, which takes 2 us
     return result

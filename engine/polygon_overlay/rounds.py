@@ -124,15 +124,8 @@ def _composed(evidence: IntArray, origins: IntArray) -> IntArray:
 def overlay_of(rings: Found, first: Found, exact: Exact, **told: Any) -> Overlay:
     """Return the `Overlay` of rings that are settled, ``first`` before that; told: what became of its parts."""
     n_pieces, n_rings = first.counts[0, :2].tolist()
-    return made_overlay(
-        vertices=read_only(rings.vertices),
-        ring_offsets=read_only(rings.ring_offsets),
-        piece_offsets=read_only(rings.piece_offsets),
-        n_pieces_exact=n_pieces,
-        n_holes_exact=n_rings - n_pieces,
-        exact=exact,
-        **told,
-    )
+    arrays = read_only(rings.vertices), read_only(rings.ring_offsets), read_only(rings.piece_offsets)
+    return made_overlay(*arrays, exact, n_pieces_exact=n_pieces, n_holes_exact=n_rings - n_pieces, **told)
 
 
 def _snapped(first: Found, exact: Exact, budget: Budget) -> tuple[Found, float]:

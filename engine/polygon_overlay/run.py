@@ -15,7 +15,7 @@ from engine.polygon_overlay.compiled.kernel import DONE, NEEDS_CONTACTS, NEEDS_O
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.compiled.ring_nesting import AGAIN, Nesting
 from engine.polygon_overlay.compiled.workspace import Outcomes, first_contacts, keep, more_contacts, scratch_for
-from engine.polygon_overlay.found import Found, one_pair, put_together, ring_sizes, summed
+from engine.polygon_overlay.found import Found, one_pair, put_together, ring_sizes
 from engine.polygon_overlay.grid import Grid, as_it_stays, from_units, snap_vertices, snapped_to_units
 from engine.polygon_overlay.implicit_rings import NOTHING, ImplicitRings
 from engine.polygon_overlay.nearest import leave_nearest
@@ -24,6 +24,7 @@ from engine.polygon_overlay.result import Output, Overlay, made_overlay
 from engine.polygon_overlay.rounds import settle_rings
 from engine.polygon_overlay.run_pair import BY_CONTACT, NOT_REDUCED, UNNAMED, run_pair
 from engine.predicates.scaling import exponent_of, scaled_back, shifted
+from engine.solids.ragged import summed
 from engine.types import OPEN
 
 Operation = Literal["intersection", "union", "difference", "symmetric_difference"]
@@ -46,7 +47,8 @@ def run_kernel(
     """
     n = len(subjects.polygon_offsets) - 1
     n_vertices, n_rings = map(sum, zip(subjects.most(), clips.most(), strict=True))
-    first, second = RingArrays(*subjects[:2]), RingArrays(*clips[:2])
+    sides = RingArrays(*subjects[:2]), subjects.polygon_offsets, RingArrays(*clips[:2]), clips.polygon_offsets
+    kept = KEPT_ARRAYS[operation]
     outcomes = Outcomes(np.empty(n, np.int8), np.empty((n, 4), np.int64), np.empty(n))
     reached = 0
     parts: list[list[Any]] = []
@@ -56,18 +58,7 @@ def run_kernel(
         scratch = scratch_for(n_vertices, n_rings, n_contacts, n_out, n_out_rings)
         n_known = sum(len(part[2]) - 1 for part in parts)
         reached, needs, filled, n_filled, n_pieces, n_evidence, _ = entry_of(overlay_pairs)(
-            first,
-            subjects.polygon_offsets,
-            second,
-            clips.polygon_offsets,
-            reached,
-            NOT_REDUCED,
-            KEPT_ARRAYS[operation],
-            nesting,
-            budget.flag,
-            scratch.buffers,
-            outcomes,
-            scratch.output,
+            *sides, reached, NOT_REDUCED, kept, nesting, budget.flag, scratch.buffers, outcomes, scratch.output
         )
         budget.check()
         sizes = filled, filled, n_filled + 1, n_pieces + 1, n_evidence
@@ -83,14 +74,9 @@ def run_kernel(
 
 
 def overlay_compiled(
-    subject: RingArrays,
-    clip: RingArrays,
-    operation: Operation,
-    output: Output,
-    budget: Budget,
-    nesting: Nesting = UNNAMED,
-    grid: Grid | None = None,
-) -> tuple[Overlay, int] | None:
+    subject: RingArrays, clip: RingArrays, operation: Operation, output: Output, budget: Budget,
+    nesting: Nesting = UNNAMED, grid: Grid | None = None,
+) -> tuple[Overlay, int] | None:  # fmt: skip
     """Return the overlay of one pair and the number of pairs of edges beyond the filter; None where it is left open.
 
     grid: whose units coordinates are in; those of the overlay are not. A scene outside of the kernel's range is brought
@@ -153,16 +139,6 @@ def as_overlay(
     vertices: FloatArray, piece_offsets: IntArray, displacement: float, exact: ImplicitRings, output: Output
 ) -> Overlay:
     """Return an `Overlay` whose rounded rings have the structure of the exact ones; all arrays are read-only."""
-    n_pieces = len(piece_offsets) - 1
-    return made_overlay(
-        vertices=vertices,
-        ring_offsets=exact.offsets,
-        piece_offsets=piece_offsets,
-        n_pieces_exact=n_pieces,
-        n_holes_exact=len(exact.offsets) - 1 - n_pieces,
-        exact=exact,
-        output=output,
-        may_be_invalid=output == "nearest" and displacement > 0.0,
-        largest_displacement=displacement,
-        rounds=int(displacement > 0.0),
-    )
+    has_moved = displacement > 0.0
+    told = {"output": output, "may_be_invalid": output == "nearest" and has_moved, "rounds": int(has_moved)}
+    return made_overlay(vertices, exact.offsets, piece_offsets, exact, largest_displacement=displacement, **told)

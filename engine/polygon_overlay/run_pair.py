@@ -82,14 +82,9 @@ def run_pair(
 
 
 def run_blocks(
-    subject: RingArrays,
-    clip: RingArrays,
-    size: int,
-    n_most: int,
-    kept: FlagArray,
-    budget: Budget,
+    subject: RingArrays, clip: RingArrays, size: int, n_most: int, kept: FlagArray, budget: Budget,
     nesting: Nesting = UNNAMED,
-) -> FoundPair | None:
+) -> FoundPair | None:  # fmt: skip
     """Overlay two polygons in blocks of ``size`` edges, of which fewer than n_most may be looked at one by one.
 
     None where more edges are near others, or where the pair is not DONE: rounded rings that nothing vouches for are to
@@ -97,7 +92,7 @@ def run_blocks(
     when the call must end.
     """
     n_vertices, n_rings = len(subject.vertices) + len(clip.vertices), len(subject.offsets) + len(clip.offsets) - 2
-    subject_item, clip_item = one_polygon(len(subject.offsets) - 1), one_polygon(len(clip.offsets) - 1)
+    sides = subject, one_polygon(len(subject.offsets) - 1), clip, one_polygon(len(clip.offsets) - 1)
     if size:
         reduced, n_contacts, n_out, n_out_rings = NOT_REDUCED, _FEW_CONTACTS, 0, 0
     else:
@@ -114,18 +109,7 @@ def run_blocks(
                 return None
         (status, counts, displacement), output = scratch.outcome, scratch.output
         _, needs, n, n_found, n_pieces, _, n_left_out = entry_of(overlay_pairs)(
-            subject,
-            subject_item,
-            clip,
-            clip_item,
-            0,
-            reduced,
-            kept,
-            nesting,
-            budget.flag,
-            scratch.buffers,
-            scratch.outcome,
-            output,
+            *sides, 0, reduced, kept, nesting, budget.flag, scratch.buffers, scratch.outcome, output
         )
         budget.check()
         if needs == FINISHED:

@@ -14,13 +14,13 @@ import numpy as np
 
 from engine.arrays import IntArray
 from engine.errors import InvalidArrayError, InvalidOperationError
-from engine.parallel import Budget, Cancel, Options, Progress, check_options
+from engine.parallel import Budget, Cancel, Progress, check_options
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.compiled.ring_nesting import ANY, FIRST_ALONE, NEGATIVE, NON_ZERO, POSITIVE, Nesting
 from engine.polygon_overlay.implicit_rings import NOTHING
 from engine.polygon_overlay.overlay import accuracy_of, check_words, overlay_rings, rings_of, ulps_moved
 from engine.polygon_overlay.polygon_arrays import gathered
-from engine.polygon_overlay.result import Output, Overlay
+from engine.polygon_overlay.result import Output, Overlay, OverlayOptions
 from engine.solids.base import Solid
 from engine.solids.checks import shown
 from engine.solids.polygon import Polygon
@@ -32,21 +32,11 @@ _RULES: Final = {"non_zero": NON_ZERO, "positive": POSITIVE, "negative": NEGATIV
 
 @overload
 def union_all(
-    polygons: Sequence[Solid],
-    *,
-    output: Output = "valid",
-    grid: float | None = None,
-    report: Literal[False] = False,
-    **options: Unpack[Options],
+    polygons: Sequence[Solid], *, report: Literal[False] = False, **options: Unpack[OverlayOptions]
 ) -> Overlay: ...
 @overload
 def union_all(
-    polygons: Sequence[Solid],
-    *,
-    output: Output = "valid",
-    grid: float | None = None,
-    report: Literal[True],
-    **options: Unpack[Options],
+    polygons: Sequence[Solid], *, report: Literal[True], **options: Unpack[OverlayOptions]
 ) -> tuple[Overlay, Accuracy]: ...
 def union_all(
     polygons: Sequence[Solid],

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import chain, pairwise
 from typing import Any
 
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray, read_only
+from engine.arrays import BoolArray, FloatArray, IntArray, read_only
 from engine.errors import EngineError, InvalidArrayError
 from engine.solids.checks import Where, as_point_groups, as_points, frozen, shown, spell
 from engine.solids.polygon import Polygon
@@ -67,6 +68,13 @@ def _joined(lines: list[Any] | tuple[Any, ...], dimension: int, where: Where) ->
     except (EngineError, TypeError, ValueError):
         parts = [as_points(line, dimension, (*where, i_line)) for i_line, line in enumerate(lines)]
     return np.concatenate([np.zeros((0, dimension)), *parts]), np.cumsum([0, *map(len, parts)])
+
+
+def summed(sizes: Sequence[int] | IntArray | BoolArray) -> IntArray:
+    """Return where each of some parts put one after another begins, and the end of the last; read-only."""
+    offsets = np.zeros(len(sizes) + 1, np.int64)
+    np.cumsum(sizes, out=offsets[1:])
+    return read_only(offsets)
 
 
 def within(offsets: IntArray, items: IntArray) -> IntArray:

@@ -17,14 +17,12 @@ Source: J. D. Hobby, Practical segment intersection with finite precision output
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 
 from engine.jit import bare_kernel, called, inline, merged
-from engine.polygon_overlay.compiled.clearance import certify
 from engine.polygon_overlay.compiled.edge_tree import (
-    DOUBTFUL,
     FEW,
     POLL,
     begin_pairs,
@@ -141,36 +139,28 @@ def _find_corners(pixels: Any, offsets: Any, pieces: Any, corners: Any, starts: 
     return n
 
 
-class Snapped(NamedTuple):
-    """What becomes of rings. pixels: (n, 2) float64, the whole points in whose pixels vertices lie; corners, starts: as
-    `_find_corners` fills them; passages: (m, 2) int32, an edge, by its first vertex, and a vertex of another pixel that
-    it passes."""
-
-    pixels: Any
-    corners: Any
-    starts: Any
-    passages: Any
-
-
 @bare_kernel
 def snap(
-    vertices: Any, offsets: Any, pieces: Any, stop: Any, buffers: Buffers, made: Snapped
+    vertices: Any, offsets: Any, pieces: Any, stop: Any, buffers: Buffers, pixels: Any, corners: Any, starts: Any,
+    passages: Any,
 ) -> tuple[int, int, int]:  # fmt: skip
-    """Fill ``made`` for valid rings, coordinates below 2^51.
+    """Fill what tells what becomes of valid rings, coordinates below 2^51.
 
-    Returns how many vertices are no whole points, where all are nothing but the pixels is filled; how many passages
-    there are, which may be more than there is room for; how many corners, or FOLDS where rings do not stay what they
-    are, without vertices that get straight.
+    pixels: (n, 2) float64, the whole points in whose pixels vertices lie; where all lie there nothing else is filled.
+    corners, starts: see `_find_corners`. passages: (m, 2) int32, an edge, by its first vertex, and a vertex of another
+    pixel that it passes. Returns how many vertices are no whole points; how many passages there are, which may be more
+    than there is room for; how many corners, or FOLDS where rings do not stay what they are, without vertices that get
+    straight.
     """
-    n_moved = _find_pixels(vertices, made.pixels, stop)
+    n_moved = _find_pixels(vertices, pixels, stop)
     if n_moved == 0:
         return 0, 0, vertices.shape[0]
     w = rows_of(buffers)
-    edges, tree, pixels, passages = w.given.edges, w.tree, made.pixels, made.passages
+    edges, tree = w.given.edges, w.tree
     rings, n_rings = RingArrays(vertices, offsets), offsets.shape[0] - 1
     n, _, _ = load_rings(rings, 0, n_rings, 0, True, 0, EVERYTHING, w.given, tree, 0, 0, stop)
     fill_boxes(edges, n, 0.5, tree, stop)
-    n_corners = _find_corners(pixels, offsets, pieces, made.corners, made.starts, stop)
+    n_corners = _find_corners(pixels, offsets, pieces, corners, starts, stop)
     x, y, after = edges.x, edges.y, edges.after
     for e in range(n):
         b = after[e]
@@ -202,20 +192,3 @@ def snap(
     if m > 0 or shares or (meets and n_corners < n):  # a straight vertex stays where rings meet in it
         n_corners = FOLDS
     return n_moved, m, n_corners
-
-
-@bare_kernel
-def stay_apart(vertices: Any, points: Any, offsets: Any, stop: Any, buffers: Buffers) -> bool:
-    """Tell whether valid rings surely stay so when vertices move by no more than clearance.py has room for.
-
-    That is a unit in the last place of the largest coordinate. points: (n,) int32, equal for vertices at one place.
-    There is scratch for as many contacts as rings.
-    """
-    w = rows_of(buffers)
-    found, rounded, n = w.found, w.rounded, vertices.shape[0]
-    for k in range(n):
-        rounded.x[k], rounded.y[k], rounded.moved[k] = vertices[k, 0], vertices[k, 1], 1
-        found.point[k], found.meets[k] = points[k], DOUBTFUL
-    for ring in range(offsets.shape[0]):
-        found.offset[ring] = offsets[ring]
-    return certify(found, offsets.shape[0] - 1, n, rounded, w.tree, w.chains.at, w.stars.node_of, stop)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from engine.polygon_overlay.found import NO_PAIRS, Found, chained, joined, one_pair, ring_sizes, summed, taken
+from engine.polygon_overlay.found import NO_PAIRS, Found, chained, joined, one_pair, ring_sizes, taken
+from engine.solids.ragged import summed
 
 
 def pair_of(random: np.random.Generator) -> Found:
