@@ -355,17 +355,14 @@ def _run_threaded(
             before = time.perf_counter()
             try:
                 task(first, stop)
+                ranges.took(stop - first, time.perf_counter() - before)
+                n_done += stop - first
+                budget.check()
             except BaseException as error:  # the caller's, who gets it, and not what follows from a raised flag
-                failures.append((n_items if budget.flag[0] else first, error))
+                is_late = budget.flag[0] or isinstance(error, (CancelledError, DeadlineExceededError))
+                failures.append((n_items if is_late else first, error))
                 budget.flag[0] = 1
                 break
-            ranges.took(stop - first, time.perf_counter() - before)
-            n_done += stop - first
-            try:
-                budget.check()
-            except (CancelledError, DeadlineExceededError) as error:
-                failures.append((n_items, error))
-                budget.flag[0] = 1
             if progress is not None or _n_calls > 1:
                 break
         return n_done
