@@ -175,7 +175,7 @@ def _clip_few(
     None where one is left open, or there is no room.
     """
     n, n_rings, d = len(polygon_offsets) - 1, len(ring_offsets) - 1, tables.high.shape[1] - 1
-    out = np.empty(len(vertices) + d * (4 * len(tables.high) + 64))
+    out = np.empty(4 * len(vertices) + d * (4 * len(tables.high) + 64))  # spikes are cut many times
     ring_sizes, status = np.empty(n_rings, np.int64), np.zeros(n, np.int8)
     state, bridges = np.empty(n, np.uint8), np.empty(n, np.bool_)
     reached, written = entry_of(clip_rings, d)(
