@@ -144,7 +144,8 @@ def _illustrate(made: dict[str, Any]) -> None:
                 part.setdefault("description", schemas[_name(part)]["description"])
     for item in made["paths"].values():
         for operation in item.values():
-            operation["summary"] = re.split("[.,:;]", operation["description"])[0]  # FastAPI's is the function's name
+            if operation.get("summary") == operation["operationId"].replace("_", " ").title():  # FastAPI's, of ours
+                operation["summary"] = re.split("[.,:;]", operation["description"])[0]
             found = [answer for status, answer in operation["responses"].items() if status < "300"]
             for body in (operation.get("requestBody", {}), *found):
                 for media_type, content in body.get("content", {}).items():

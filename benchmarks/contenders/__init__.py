@@ -50,7 +50,8 @@ def files() -> dict[str, Path]:
 @cache
 def stated(module: str) -> dict[str, Any]:
     """Return what a contender's file says of itself, read and not imported: its package may not be there."""
-    told = [node for node in ast.parse(files()[module].read_text("utf-8")).body if isinstance(node, ast.Assign)]
+    text = files()[module].read_text("utf-8") if is_there(module) else ""
+    told = [node for node in ast.parse(text).body if isinstance(node, ast.Assign)]
     names = {getattr(node.targets[0], "id", ""): node.value for node in told}
     return {name: ast.literal_eval(names[name]) for name in ("PACKAGE", "NAMES") if name in names}
 

@@ -18,7 +18,7 @@ from service.work import Call, Memory
 POSITIONS: TypeAdapter[Any] = TypeAdapter(Annotated[Array, Numbers(POINTS, DIMENSION)])
 NUMBER: TypeAdapter[Any] = TypeAdapter(Annotated[float, Numbers()])
 FACES: TypeAdapter[Any] = TypeAdapter(Faces)
-CALL = Call(Settings(max_points=5, max_faces=5), Store(1), Memory(1))
+CALL = Call(Settings(max_points=5, max_faces=5, deadline_seconds=86_400), Store(1), Memory(1))
 
 
 def faults(adapter: TypeAdapter[Any], value: object) -> list[tuple[tuple[int, ...], str]]:
