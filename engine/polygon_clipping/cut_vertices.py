@@ -15,7 +15,8 @@ Range: coordinates below 2^64. Numbers that t or a quotient divides by are above
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from collections import namedtuple
+from typing import Final, NamedTuple
 
 from engine.jit import inline, merged
 from engine.polygon_clipping.rings import Plane
@@ -130,19 +131,14 @@ def between(x: Triple, y: Triple, s: Share) -> Triple:
     return h, rest, 1.01 * (POINT_BOUND * (abs(x_h) + abs(mh)) + s.r * abs(dh)) + TINY
 
 
-class Vertices(NamedTuple):
-    """The vertices of a ring, those that it came with first, then the cut ones.
+Vertices = namedtuple("Vertices", "pool rests edges names")
+"""The vertices of a ring, those that it came with first, then the cut ones.
 
-    pool: (room * dim,) float64, their doubles. rests: (room * dim * 2,) float64, for each coordinate of a cut what its
-    double leaves over, and the bound of its error. edges: (room,) int32, the original edge that goes on from a vertex,
-    by its first vertex, -1 for one along a plane. names: as many numbers as there are axes, so that their count is
-    known when this is compiled.
-    """
-
-    pool: Any
-    rests: Any
-    edges: Any
-    names: Any
+pool: (room * dim,) float64, their doubles. rests: (room * dim * 2,) float64, for each coordinate of a cut what its
+double leaves over, and the bound of its error. edges: (room,) int32, the original edge that goes on from a vertex, by
+its first vertex, -1 for one along a plane. names: as many numbers as there are axes, so that their count is known when
+this is compiled.
+"""
 
 
 @merged

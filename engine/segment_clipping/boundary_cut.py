@@ -8,7 +8,8 @@ exact_pieces.py.
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from collections import namedtuple
+from typing import Any, Final
 
 import numpy as np
 
@@ -22,14 +23,8 @@ from engine.types import OPEN
 SETTLED: Final = 0
 """State of a segment, beside OPEN."""
 
-
-class Crossings(NamedTuple):
-    """The crossings of a group of segments, those of each in a row; as many of each array as there is room for."""
-
-    t: Any
-    points: Any
-    faces: Any
-    order: Any
+Crossings = namedtuple("Crossings", "t points faces order")
+"""The crossings of a group of segments, those of each in a row; as many of each array as there is room for."""
 
 
 @inline

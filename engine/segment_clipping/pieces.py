@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import namedtuple
 from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
 
@@ -28,13 +29,8 @@ class Piece(NamedTuple):
     faces: tuple[int, int]
 
 
-class Pieces(NamedTuple):
-    """Pieces in order, see `SegmentPieces`: source (m,), ends (2, m, dim), t and faces (m, 2)."""
-
-    source: Any
-    ends: Any
-    t: Any
-    faces: Any
+Pieces = namedtuple("Pieces", "source ends t faces")
+"""Pieces in order, see `SegmentPieces`: source (m,), ends (2, m, dim), t and faces (m, 2)."""
 
 
 def room_for(m: int, dimension: int) -> Pieces:

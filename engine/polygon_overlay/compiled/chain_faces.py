@@ -8,7 +8,8 @@ doubles.
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from collections import namedtuple
+from typing import Any, Final
 
 from engine.jit import inline, merged
 from engine.polygon_overlay.compiled.chains import Chains, Stars, is_live, place_before, standing
@@ -22,20 +23,11 @@ from engine.predicates.orientation import BOUND_2D, GUARD_2D
 
 NOTHING: Final = -1
 
-
-class Faces(NamedTuple):
-    """By half-chain: cycle, or -1 where another half-chain stands for it; following: the one that goes on around its
-    face. By cycle, of which entry n_cycles is the unbounded face: joined, a forest of those of one face; regions, of
-    those of one region of the result; inside: whether it is in the result. bounds: by chain, whether it bounds the
-    result; fan: by node, how many that do."""
-
-    cycle: Any
-    following: Any
-    joined: Any
-    regions: Any
-    inside: Any
-    bounds: Any
-    fan: Any
+Faces = namedtuple("Faces", "cycle following joined regions inside bounds fan")
+"""By half-chain: cycle, or -1 where another half-chain stands for it; following: the one that goes on around its face.
+By cycle, of which entry n_cycles is the unbounded face: joined, a forest of those of one face; regions, of those of one
+region of the result; inside: whether it is in the result. bounds: by chain, whether it bounds the result; fan: by node,
+how many that do."""
 
 
 @inline

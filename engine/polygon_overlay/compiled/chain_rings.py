@@ -6,7 +6,8 @@ and lists the points where the boundary turns or rings meet.
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from collections import namedtuple
+from typing import Any, Final
 
 from engine.arrangement.union_find import root_of, unite
 from engine.jit import inline, merged
@@ -18,25 +19,13 @@ from engine.polygon_overlay.compiled.ring_nesting import Holders, enter_beyond
 
 MEETS: Final = 1
 
+Rings = namedtuple("Rings", "point edge meets offset region")
+"""point: united points, ring after ring; edge: along which the ring goes on from there; meets: MEETS where rings meet,
+RUN where those up to the next point are left out, DOUBTFUL where an edge up to there has that mark; offset: where each
+ring begins; region: a number of the region it bounds."""
 
-class Rings(NamedTuple):
-    """point: united points, ring after ring; edge: along which the ring goes on from there; meets: MEETS where rings
-    meet, RUN where those up to the next point are left out, DOUBTFUL where an edge up to there has that mark; offset:
-    where each ring begins; region: a number of the region it bounds."""
-
-    point: Any
-    edge: Any
-    meets: Any
-    offset: Any
-    region: Any
-
-
-class Walk(NamedTuple):
-    """Scratch. seen: by half-chain, uint8; path: the half-chains of a walk; place: by node its place on the path."""
-
-    seen: Any
-    path: Any
-    place: Any
+Walk = namedtuple("Walk", "seen path place")
+"""Scratch. seen: by half-chain, uint8; path: the half-chains of a walk; place: by node its place on the path."""
 
 
 @inline

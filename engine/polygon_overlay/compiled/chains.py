@@ -10,7 +10,8 @@ for all, its source mask the exclusive or of theirs.
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from collections import namedtuple
+from typing import Any, Final
 
 from engine.arrangement.union_find import root_of
 from engine.jit import called, inline, merged
@@ -24,42 +25,18 @@ from engine.predicates.orientation import BOUND_2D, GUARD_2D
 NOT_YET: Final = -1
 """In a star, in the place of a half-chain that is not known yet."""
 
+Chains = namedtuple("Chains", "tail head first last mask stands twin at")
+"""By chain: node at its tail and head, its first and last edge, the mask of its sources, and the half-chain that stands
+for its half-chain 2 c (itself, unless chains coincide). twin: the next of the chains that one stands for, or -1. at:
+for each edge the chain at its beginning; the chains after the nodes inside it follow one by one."""
 
-class Chains(NamedTuple):
-    """By chain: node at its tail and head, its first and last edge, the mask of its sources, and the half-chain that
-    stands for its half-chain 2 c (itself, unless chains coincide). twin: the next of the chains that one stands for, or
-    -1. at: for each edge the chain at its beginning; the chains after the nodes inside it follow one by one."""
+Stars = namedtuple("Stars", "node_of point starts ends half place")
+"""Half-chains around nodes. node_of: by point its node, or -1; by node its point, and where its half-chains begin and
+end in ``half``; place: by half-chain its index there. Simple nodes have the first places, four each."""
 
-    tail: Any
-    head: Any
-    first: Any
-    last: Any
-    mask: Any
-    stands: Any
-    twin: Any
-    at: Any
-
-
-class Stars(NamedTuple):
-    """Half-chains around nodes. node_of: by point its node, or -1; by node its point, and where its half-chains begin
-    and end in ``half``; place: by half-chain its index there. Simple nodes have the first places, four each."""
-
-    node_of: Any
-    point: Any
-    starts: Any
-    ends: Any
-    half: Any
-    place: Any
-
-
-class Loose(NamedTuple):
-    """Half-chains that leave nodes that are not simple, ascending, to be sorted into stars. Scratch: masks, by chain
-    those from before chains are united; dx, dy: directions of a star's half-chains, float64."""
-
-    half: Any
-    masks: Any
-    dx: Any
-    dy: Any
+Loose = namedtuple("Loose", "half masks dx dy")
+"""Half-chains that leave nodes that are not simple, ascending, to be sorted into stars. Scratch: masks, by chain those
+from before chains are united; dx, dy: directions of a star's half-chains, float64."""
 
 
 @merged

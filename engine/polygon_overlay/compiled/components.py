@@ -16,7 +16,8 @@ Few edges are looked at one by one, those of large components by a tree over the
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from collections import namedtuple
+from typing import Any, Final
 
 import numpy as np
 
@@ -49,16 +50,9 @@ _HOLDS: Final = 1
 _IS_OPEN: Final = 2
 """States of a component: its box holds another's; the edge above it is not known yet."""
 
-
-class Components(NamedTuple):
-    """By ring: highest: of the one that stands for a component its last vertex (rightmost, then highest), of others -1;
-    following: the next ring of the component, or -1; first: its first vertex. By number of component: ring, state."""
-
-    highest: Any
-    following: Any
-    first: Any
-    ring: Any
-    state: Any
+Components = namedtuple("Components", "highest following first ring state")
+"""By ring: highest: of the one that stands for a component its last vertex (rightmost, then highest), of others -1;
+following: the next ring of the component, or -1; first: its first vertex. By number of component: ring, state."""
 
 
 @inline

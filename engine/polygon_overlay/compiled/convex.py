@@ -16,7 +16,8 @@ Source: M. I. Shamos and D. Hoey, Geometric intersection problems, 1976, section
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from collections import namedtuple
+from typing import Any, Final
 
 import numpy as np
 
@@ -33,22 +34,12 @@ GENERAL: Final = -1
 """In the place of a result: the pair goes the general way."""
 _NONE: Final = -1
 
+Passages = namedtuple("Passages", "enters leaves")
+"""By edge: the edge of the other polygon at which it enters that, and leaves it, or none."""
 
-class Passages(NamedTuple):
-    """By edge: the edge of the other polygon at which it enters that, and leaves it, or none."""
-
-    enters: Any
-    leaves: Any
-
-
-class Points(NamedTuple):
-    """Points of the result: doubles, and where they come from: a vertex of the input and -1, or two edges of it, the
-    one along which the result goes on first."""
-
-    x: Any
-    y: Any
-    firsts: Any
-    seconds: Any
+Points = namedtuple("Points", "x y firsts seconds")
+"""Points of the result: doubles, and where they come from: a vertex of the input and -1, or two edges of it, the one
+along which the result goes on first."""
 
 
 @merged

@@ -17,7 +17,8 @@ Source: J. R. Shewchuk, Adaptive precision floating-point arithmetic and fast ro
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from collections import namedtuple
+from typing import Final
 
 from engine.jit import called, inline, merged
 from engine.predicates.double_double import U2, dd_mul, dd_sub
@@ -32,18 +33,11 @@ PRODUCT_BOUND: Final = 16.0 * U2
 WEIGHT_ROOM: Final = 16
 """Components of a weight: the product of two differences of two components each, twice."""
 
+Edges = namedtuple("Edges", "x y after before ring")
+"""Closed rings as vertices; edge i runs from vertex i to vertex ``after[i]``.
 
-class Edges(NamedTuple):
-    """Closed rings as vertices; edge i runs from vertex i to vertex ``after[i]``.
-
-    x, y: float64; after, before, ring: int64; one entry a vertex.
-    """
-
-    x: Any
-    y: Any
-    after: Any
-    before: Any
-    ring: Any
+x, y: float64; after, before, ring: int64; one entry a vertex.
+"""
 
 
 @merged

@@ -14,6 +14,7 @@ all, so a vertex where there is one), crossings through one point later, when th
 
 from __future__ import annotations
 
+from collections import namedtuple
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -33,30 +34,14 @@ RIGHT: Final = 2
 """How the second edge of a crossing leaves, seen along the first; NOT_SIMPLE where floating point is not sure of that,
 or the crossing is not alone."""
 
+Events = namedtuple("Events", "edge point other t slack reach first second turn")
+"""Points inside edges. edge: the edge; point: its number; other: the edge that crosses there, -1 for a vertex; t,
+slack: parameter along the edge and bound of its error; reach: how far along the edge the other one is nearer than the
+margin of clearance.py, where that is not in doubt already, and the slack. By crossing: first and second, its edges;
+turn: LEFT or RIGHT as the second leaves to that side of the first, or NOT_SIMPLE."""
 
-class Events(NamedTuple):
-    """Points inside edges. edge: the edge; point: its number; other: the edge that crosses there, -1 for a vertex;
-    t, slack: parameter along the edge and bound of its error; reach: how far along the edge the other one is nearer
-    than the margin of clearance.py, where that is not in doubt already, and the slack. By crossing: first and second,
-    its edges; turn: LEFT or RIGHT as the second leaves to that side of the first, or NOT_SIMPLE."""
-
-    edge: Any
-    point: Any
-    other: Any
-    t: Any
-    slack: Any
-    reach: Any
-    first: Any
-    second: Any
-    turn: Any
-
-
-class Unions(NamedTuple):
-    """points: forest of points that are one; is_node: by vertex, uint8; rings: forest of rings that hang together."""
-
-    points: Any
-    is_node: Any
-    rings: Any
+Unions = namedtuple("Unions", "points is_node rings")
+"""points: forest of points that are one; is_node: by vertex, uint8; rings: forest of rings that hang together."""
 
 
 @merged

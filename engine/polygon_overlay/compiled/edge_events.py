@@ -5,7 +5,8 @@ Events that turn out to be one point are united, so that lines through one point
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from collections import namedtuple
+from typing import Any, Final
 
 from engine.arrangement.union_find import unite
 from engine.jit import called, inline
@@ -16,16 +17,9 @@ from engine.polygon_overlay.compiled.edge_tree import DOUBTFUL, POLL
 _RUN: Final = 16
 """Events that are sorted by insertion; more are merged."""
 
-
-class Along(NamedTuple):
-    """The events along each edge in their order: ``order[starts[e]:starts[e + 1]]``; keys: their parameters, float64
-    in that order. spare_keys, spare: scratch of the same sizes."""
-
-    starts: Any
-    order: Any
-    keys: Any
-    spare_keys: Any
-    spare: Any
+Along = namedtuple("Along", "starts order keys spare_keys spare")
+"""The events along each edge in their order: ``order[starts[e]:starts[e + 1]]``; keys: their parameters, float64 in
+that order. spare_keys, spare: scratch of the same sizes."""
 
 
 @called

@@ -21,7 +21,8 @@ G. M. Morton, A computer oriented geodetic data base, 1966.
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from collections import namedtuple
+from typing import Any, Final
 
 import numpy as np
 
@@ -55,23 +56,12 @@ _BORROWS: Final = sum(1 << (_BITS * side + _BITS - 1) for side in range(4))
 DEEPEST: Final = 256
 """Places on the stack: a walk through 60 levels holds at most three pairs a level."""
 
+BoxTree = namedtuple("BoxTree", "boxes marks nodes node_marks places lows highs stack pairs")
+"""Boxes by number (n, 4) float64, with the mark of each; the tree over them: by node its box and its mark.
 
-class BoxTree(NamedTuple):
-    """Boxes by number (n, 4) float64, with the mark of each; the tree over them: by node its box and its mark.
-
-    places: the boxes in the order of the leaves; lows, highs: their codes in that order, int64: what must not be above
-    the other box's, and what must not be below. stack: (DEEPEST, 2) int64; pairs: (PORTION, 2), those found last.
-    """
-
-    boxes: Any
-    marks: Any
-    nodes: Any
-    node_marks: Any
-    places: Any
-    lows: Any
-    highs: Any
-    stack: Any
-    pairs: Any
+places: the boxes in the order of the leaves; lows, highs: their codes in that order, int64: what must not be above the
+other box's, and what must not be below. stack: (DEEPEST, 2) int64; pairs: (PORTION, 2), those found last.
+"""
 
 
 @inline

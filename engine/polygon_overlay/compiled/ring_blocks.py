@@ -12,7 +12,8 @@ Every step is one that the compiler does four at a time, over vertices that are 
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from collections import namedtuple
+from typing import Any, Final
 
 import numpy as np
 
@@ -32,19 +33,10 @@ _AT_ONCE: Final = 512
 _TURN_BOUND: Final = 4.0 * BOUND_2D
 """Bound of a turn by the larger half of its two products: |r| <= |l| + |l - r|, so BOUND_2D (|l| + |r|) is less."""
 
-
-class Blocks(NamedTuple):
-    """By block: its first vertex, the number after its last edge's first vertex, the block that follows in the ring;
-    boxes: x_min, x_max, y_min, y_max; marks: uint8, which way it does not head; is_active: uint8, whether its edges
-    have to be looked at one by one; firsts: the first block of each ring, and the end of the last one's."""
-
-    first: Any
-    last: Any
-    following: Any
-    boxes: Any
-    marks: Any
-    is_active: Any
-    firsts: Any
+Blocks = namedtuple("Blocks", "first last following boxes marks is_active firsts")
+"""By block: its first vertex, the number after its last edge's first vertex, the block that follows in the ring; boxes:
+x_min, x_max, y_min, y_max; marks: uint8, which way it does not head; is_active: uint8, whether its edges have to be
+looked at one by one; firsts: the first block of each ring, and the end of the last one's."""
 
 
 @inline

@@ -21,6 +21,7 @@ Only the few rings that a face lies in are looked at.
 
 from __future__ import annotations
 
+from collections import namedtuple
 from typing import Any, Final, NamedTuple
 
 from engine.arrangement.union_find import root_of
@@ -55,26 +56,13 @@ class Nesting(NamedTuple):
     rule: int
 
 
-class Holders(NamedTuple):
-    """Scratch. held: the rings that a face lies in; place: by ring its place there, or -1; stamp: by ring.
+Holders = namedtuple("Holders", "held place stamp link first entered ring after region beyond offset")
+"""Scratch. held: the rings that a face lies in; place: by ring its place there, or -1; stamp: by ring.
 
-    link: by half-chain the next one of its face; first: by face its first; entered: by face the half-chain through
-    which it was, from the other side. ring, after: by entry of evidence its ring, and the next of its region; region:
-    by region its first entry. beyond: regions on the other side of the rings of the result, those of ring k from
-    offset[k] on.
-    """
-
-    held: Any
-    place: Any
-    stamp: Any
-    link: Any
-    first: Any
-    entered: Any
-    ring: Any
-    after: Any
-    region: Any
-    beyond: Any
-    offset: Any
+link: by half-chain the next one of its face; first: by face its first; entered: by face the half-chain through which it
+was, from the other side. ring, after: by entry of evidence its ring, and the next of its region; region: by region its
+first entry. beyond: regions on the other side of the rings of the result, those of ring k from offset[k] on.
+"""
 
 
 @merged

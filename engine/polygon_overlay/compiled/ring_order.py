@@ -5,7 +5,8 @@ The first vertex of a ring is its leftmost, then lowest; rings are compared vert
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections import namedtuple
+from typing import Any
 
 import numpy as np
 
@@ -16,16 +17,8 @@ from engine.polygon_overlay.compiled.rounded_crossings import Rounded
 from engine.predicates.orientation import orient2d
 from engine.types import Point2
 
-
-class Ranking(NamedTuple):
-    """By ring: index of its first vertex, its x, whether it is a hole, rank of its piece; order: the rings in order."""
-
-    start: Any
-    x: Any
-    is_hole: Any
-    piece: Any
-    order: Any
-    spare: Any
+Ranking = namedtuple("Ranking", "start x is_hole piece order spare")
+"""By ring: index of its first vertex, its x, whether it is a hole, rank of its piece; order: the rings in order."""
 
 
 @inline

@@ -11,6 +11,7 @@ nothing: quotients of their two leading components are within 2^-100 of it.
 
 from __future__ import annotations
 
+from collections import namedtuple
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -29,16 +30,8 @@ LOST: Final = -1.0
 _NOT_YET: Final = -2.0
 """Error of a crossing that is not rounded yet."""
 
-
-class Rounded(NamedTuple):
-    """Doubles of the points of rings, and whether rounding moved each, uint8; by crossing its doubles and its error."""
-
-    x: Any
-    y: Any
-    moved: Any
-    crossing_x: Any
-    crossing_y: Any
-    error: Any
+Rounded = namedtuple("Rounded", "x y moved crossing_x crossing_y error")
+"""Doubles of the points of rings, and whether rounding moved each, uint8; by crossing its doubles and its error."""
 
 
 class _Cut(NamedTuple):

@@ -5,8 +5,9 @@ The kernel is handed the few arrays and takes their rows itself: handing over ei
 
 from __future__ import annotations
 
+from collections import namedtuple
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -31,27 +32,12 @@ _MOST_KEPT: Final = 256_000_000
 _MORE_CONTACTS: Final = 2**15
 _MANY_CONTACTS: Final = 2**15
 
-
-class Buffers(NamedTuple):
-    """Scratch by size: a row for each purpose, by vertex, ring, contact, half-chain and point of a boundary ring."""
-
-    vertex_floats: Any
-    vertex_integers: Any
-    ring_integers: Any
-    contact_floats: Any
-    contact_integers: Any
-    half_integers: Any
-    half_labels: Any
-    half_octets: Any
-    point_floats: Any
-    point_integers: Any
-    point_codes: Any
-    point_octets: Any
-    boxes: Any
-    tree: Any
-    tree_marks: Any
-    stack: Any
-    pairs: Any
+Buffers = namedtuple(
+    "Buffers",
+    "vertex_floats vertex_integers ring_integers contact_floats contact_integers half_integers half_labels "
+    "half_octets point_floats point_integers point_codes point_octets boxes tree tree_marks stack pairs",
+)
+"""Scratch by size: a row for each purpose, by vertex, ring, contact, half-chain and point of a boundary ring."""
 
 
 class Workspace(NamedTuple):
@@ -74,24 +60,13 @@ class Workspace(NamedTuple):
     ranking: Ranking
 
 
-class Output(NamedTuple):
-    """Pair after pair: vertices (m, 2) float64, their sources (m, 2) int32, ends of rings and of pieces (n + 1,) int64,
-    that begin with 0, evidence (m, 2) int64: a ring, and one that it comes from."""
+Output = namedtuple("Output", "vertices sources rings pieces evidence")
+"""Pair after pair: vertices (m, 2) float64, their sources (m, 2) int32, ends of rings and of pieces (n + 1,) int64,
+that begin with 0, evidence (m, 2) int64: a ring, and one that it comes from."""
 
-    vertices: Any
-    sources: Any
-    rings: Any
-    pieces: Any
-    evidence: Any
-
-
-class Outcomes(NamedTuple):
-    """By pair: status (n,) int8; counts (n, 4) int64: pieces, rings, vertices, pairs of edges beyond the filter;
-    displacement (n,) float64: how far rounding moved a vertex at most."""
-
-    status: Any
-    counts: Any
-    displacement: Any
+Outcomes = namedtuple("Outcomes", "status counts displacement")
+"""By pair: status (n,) int8; counts (n, 4) int64: pieces, rings, vertices, pairs of edges beyond the filter;
+displacement (n,) float64: how far rounding moved a vertex at most."""
 
 
 @dataclass(frozen=True, slots=True)
