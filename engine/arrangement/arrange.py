@@ -232,14 +232,9 @@ def _split(
                 known[0] ^= mask
                 known[1] |= cover
     return Arrangement(
-        nodes=nodes,
-        tails=[tail for tail, _ in edges],
-        heads=[head for _, head in edges],
-        lines=carriers,
-        masks=[mask for mask, _ in edges.values()],
-        cover=[cover for _, cover in edges.values()],
-        n_exact=n_exact,
-    )
+        nodes=nodes, tails=[tail for tail, _ in edges], heads=[head for _, head in edges], lines=carriers,
+        masks=[mask for mask, _ in edges.values()], cover=[cover for _, cover in edges.values()], n_exact=n_exact,
+    )  # fmt: skip
 
 
 def arrange_rings(

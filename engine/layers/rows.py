@@ -292,14 +292,11 @@ def _rows(batch: OverlayBatch, left: IntArray, right: IntArray) -> LayerRows:
 def _together(parts: Sequence[LayerRows]) -> LayerRows:
     """Return the rows of some parts one after another."""
     return LayerRows(
-        np.concatenate([part.left for part in parts]),
-        np.concatenate([part.right for part in parts]),
-        np.concatenate([part.vertices for part in parts]),
-        chained([part.ring_offsets for part in parts]),
-        chained([part.piece_offsets for part in parts]),
-        chained([part.row_offsets for part in parts]),
+        np.concatenate([part.left for part in parts]), np.concatenate([part.right for part in parts]),
+        np.concatenate([part.vertices for part in parts]), chained([part.ring_offsets for part in parts]),
+        chained([part.piece_offsets for part in parts]), chained([part.row_offsets for part in parts]),
         sum(part.n_collapsed for part in parts),
-    )
+    )  # fmt: skip
 
 
 def dissolved(layer: Layer, groups: IntArray, n_groups: int, limits: Limits) -> LayerRows:
@@ -314,14 +311,11 @@ def dissolved(layer: Layer, groups: IntArray, n_groups: int, limits: Limits) -> 
 def _rows_of(found: Sequence[Overlay], left: IntArray) -> LayerRows:
     """Return overlays as rows, also those without pieces."""
     return LayerRows(
-        left,
-        np.full(len(left), NONE),
-        np.concatenate([np.zeros((0, 2)), *(each.vertices for each in found)]),
-        chained([each.ring_offsets for each in found]),
-        chained([each.piece_offsets for each in found]),
+        left, np.full(len(left), NONE), np.concatenate([np.zeros((0, 2)), *(each.vertices for each in found)]),
+        chained([each.ring_offsets for each in found]), chained([each.piece_offsets for each in found]),
         summed(np.array([each.n_pieces for each in found], np.int64)),
         sum(each.n_pieces == 0 < each.n_pieces_exact for each in found),
-    )
+    )  # fmt: skip
 
 
 def held(points: object, layer: Layer, limits: Limits) -> tuple[IntArray, IntArray, BoolArray]:

@@ -19,15 +19,7 @@ import numpy as np
 from engine.jit import bare, inline
 from engine.polygon_clipping.cut_vertices import VALUE_BOUND
 from engine.polygon_clipping.rings import EXACT, NO_ROOM, Clipped, Cutting, Plane, Polygons, has_bridges, plane_of
-from engine.predicates.digits import (
-    MOST,
-    SLOT,
-    nearest_quotient,
-    negate,
-    put_double,
-    sign_of,
-    sum_products,
-)
+from engine.predicates.digits import MOST, SLOT, nearest_quotient, negate, put_double, sign_of, sum_products
 from engine.types import OPEN
 
 TOO_LONG = -1
@@ -76,20 +68,11 @@ def exact_scratch(room: int, dimension: int, row_heap: Any, row_places: Any) -> 
     for i in range(row_heap.size):
         heap[_ROWS + i] = row_heap[i]
     return ExactScratch(
-        heap,
-        row_heap.size,
-        np.empty((4, 3), np.int64),
-        np.empty((2, dimension + 1), np.int64),
-        row_places + _ROWS,
-        np.empty((room, dimension)),
-        np.empty((room, dimension + 1), np.int64),
-        np.empty((2, room), np.int64),
-        np.empty(room, np.int64),
-        np.empty(room, np.int64),
-        np.empty(room, np.int64),
-        np.empty(room, np.bool_),
+        heap, row_heap.size, np.empty((4, 3), np.int64), np.empty((2, dimension + 1), np.int64), row_places + _ROWS,
+        np.empty((room, dimension)), np.empty((room, dimension + 1), np.int64), np.empty((2, room), np.int64),
+        np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room, np.bool_),
         np.empty(2, np.int64),
-    )
+    )  # fmt: skip
 
 
 @inline

@@ -184,20 +184,12 @@ def overlay_batch(
     for array in (rest.status, *found, *(first_found if first_found is not found else ())):
         array.setflags(write=False)
     batch = OverlayBatch(
-        status=rest.status,
-        vertices=found.vertices,
-        ring_offsets=found.ring_offsets,
-        piece_offsets=found.piece_offsets,
-        pair_offsets=summed(found.counts[:, 0]),
-        displacement=found.displacement,
+        status=rest.status, vertices=found.vertices, ring_offsets=found.ring_offsets, piece_offsets=found.piece_offsets,
+        pair_offsets=summed(found.counts[:, 0]), displacement=found.displacement,
         _subjects=subjects if isinstance(subjects, Chosen) else tuple(subjects),
-        _clips=clips if isinstance(clips, Chosen) else tuple(clips),
-        _operation=operation,
-        _output=output,
-        _exact=first_found,
-        _is_rounded_again=rest.is_rounded_again,
-        _apart=rest.apart,
-    )
+        _clips=clips if isinstance(clips, Chosen) else tuple(clips), _operation=operation, _output=output,
+        _exact=first_found, _is_rounded_again=rest.is_rounded_again, _apart=rest.apart,
+    )  # fmt: skip
     if not report:
         return batch
     n_edges = _n_vertices(subjects) + _n_vertices(clips)
@@ -273,10 +265,7 @@ def join_batches(batches: Sequence[OverlayBatch]) -> OverlayBatch:
         pair_offsets=chained([part.pair_offsets for part in batches]),
         displacement=read_only(np.concatenate([part.displacement for part in batches])),
         _subjects=tuple(solid for part in batches for solid in part._subjects),
-        _clips=tuple(solid for part in batches for solid in part._clips),
-        _operation=batches[0]._operation,
-        _output=batches[0]._output,
-        _exact=joined([part._exact for part in batches]),
-        _is_rounded_again=np.concatenate([part._is_rounded_again for part in batches]),
-        _apart=apart,
-    )
+        _clips=tuple(solid for part in batches for solid in part._clips), _operation=batches[0]._operation,
+        _output=batches[0]._output, _exact=joined([part._exact for part in batches]),
+        _is_rounded_again=np.concatenate([part._is_rounded_again for part in batches]), _apart=apart,
+    )  # fmt: skip

@@ -34,15 +34,9 @@ class Found(NamedTuple):
 
 
 NO_PAIRS: Final = Found(
-    np.zeros(0, np.int8),
-    np.zeros((0, 4), np.int64),
-    np.zeros(0),
-    np.zeros((0, 2)),
-    np.zeros((0, 2), np.int32),
-    np.zeros(1, np.int64),
-    np.zeros(1, np.int64),
-    NO_EVIDENCE,
-)
+    np.zeros(0, np.int8), np.zeros((0, 4), np.int64), np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2), np.int32),
+    np.zeros(1, np.int64), np.zeros(1, np.int64), NO_EVIDENCE,
+)  # fmt: skip
 
 
 def one_pair(
@@ -60,15 +54,10 @@ def taken(found: Found, items: IntArray) -> Found:
     """Return some of the pairs found, in the order of ``items``; no evidence."""
     of_pieces, of_rings, of_vertices = (places_of(summed(found.counts[:, k]), items) for k in range(3))
     return Found(
-        found.status[items],
-        found.counts[items],
-        found.displacement[items],
-        found.vertices[of_vertices],
-        found.sources[of_vertices],
-        summed(np.diff(found.ring_offsets)[of_rings]),
-        summed(np.diff(found.piece_offsets)[of_pieces]),
-        NO_EVIDENCE,
-    )
+        found.status[items], found.counts[items], found.displacement[items], found.vertices[of_vertices],
+        found.sources[of_vertices], summed(np.diff(found.ring_offsets)[of_rings]),
+        summed(np.diff(found.piece_offsets)[of_pieces]), NO_EVIDENCE,
+    )  # fmt: skip
 
 
 def places_of(offsets: IntArray, items: IntArray) -> IntArray:

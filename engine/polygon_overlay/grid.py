@@ -170,17 +170,11 @@ def as_it_stays(found: FoundPair, snapped: _OnGrid, grid: Grid, start: int) -> O
     has_moved = snapped.n_moved > 0 or snapped.edges is not None
     displacement = nextafter(found.displacement + HALF_DIAGONAL, inf) if has_moved else found.displacement
     return made_overlay(
-        places,
-        snapped.offsets,
-        found.piece_offsets,
-        rings_alone(places, snapped.offsets),
+        places, snapped.offsets, found.piece_offsets, rings_alone(places, snapped.offsets),
         largest_displacement=_displacement(displacement, grid, places),
-        rounds=int(found.displacement > 0.0) + int(has_moved),
-        snapped=has_moved,
-        vertices_moved=snapped.n_moved,
-        _edges=edges if snapped.edges is None else edges[snapped.edges],
-        _starts=np.array([start]),
-    )
+        rounds=int(found.displacement > 0.0) + int(has_moved), snapped=has_moved, vertices_moved=snapped.n_moved,
+        _edges=edges if snapped.edges is None else edges[snapped.edges], _starts=np.array([start]),
+    )  # fmt: skip
 
 
 def _bent(
@@ -245,11 +239,8 @@ def from_units(result: Overlay, grid: Grid, start: int, again: Any, budget: Budg
         assert isinstance(result.exact, ImplicitRings)
         edges = edges_along(result.exact.sources)
     return replace(
-        result,
-        vertices=vertices,
-        exact=rings_alone(vertices, result.ring_offsets),
+        result, vertices=vertices, exact=rings_alone(vertices, result.ring_offsets),
         largest_displacement=_displacement(result.largest_displacement, grid, vertices),
-        _lost=result._lost and result._lost._replace(unit=Fraction(grid.base) ** grid.power),
-        _edges=edges,
+        _lost=result._lost and result._lost._replace(unit=Fraction(grid.base) ** grid.power), _edges=edges,
         _starts=np.array([start]),
-    )
+    )  # fmt: skip

@@ -109,14 +109,10 @@ def rounded(arrangement: Arrangement, pieces: Sequence[Piece]) -> Found:
     edges = [min(arrangement.cover[half_edge >> 1]) for half_edge in half_edges]
     displacement = max(map(nodes.displacement, set(used)), default=0.0)
     return one_pair(
-        np.array([(nodes.xs[node], nodes.ys[node]) for node in used]).reshape(-1, 2),
-        np.cumsum([0, *map(len, rings)]),
-        np.cumsum([0, *(1 + len(piece.holes) for piece in pieces)]),
-        displacement,
-        0,
-        np.array([edges, edges], np.int32).T,
-        MAY_CROSS if displacement else DONE,
-    )
+        np.array([(nodes.xs[node], nodes.ys[node]) for node in used]).reshape(-1, 2), np.cumsum([0, *map(len, rings)]),
+        np.cumsum([0, *(1 + len(piece.holes) for piece in pieces)]), displacement, 0,
+        np.array([edges, edges], np.int32).T, MAY_CROSS if displacement else DONE,
+    )  # fmt: skip
 
 
 def arranged_again(rings: Found, budget: Budget) -> Found:

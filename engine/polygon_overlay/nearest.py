@@ -56,13 +56,9 @@ def nearest_rings(
     ordered = [ring for piece in sorted(pieces) for ring in piece]
     numbers = np.array([number for _, own in ordered for number in own], np.int64)
     return NearestRings(
-        vertices[numbers],
-        np.cumsum([0, *(len(own) for _, own in ordered)]),
-        np.cumsum([0, *map(len, pieces)]),
-        numbers,
-        np.flatnonzero(~have_area & ~is_hole).tolist(),
-        np.flatnonzero(~stays & is_hole).tolist(),
-    )
+        vertices[numbers], np.cumsum([0, *(len(own) for _, own in ordered)]), np.cumsum([0, *map(len, pieces)]),
+        numbers, np.flatnonzero(~have_area & ~is_hole).tolist(), np.flatnonzero(~stays & is_hole).tolist(),
+    )  # fmt: skip
 
 
 def _from_first(vertices: FloatArray, numbers: IntArray) -> _Ring:
@@ -87,16 +83,10 @@ def leave_nearest(first: Found, exact: Exact, budget: Budget) -> Overlay:
     found = nearest_rings(first.vertices, first.ring_offsets, first.piece_offsets, budget)
     displacement = float(first.displacement[0])
     return overlay_of(
-        one_pair(*found[:3], displacement, 0),
-        first,
-        exact,
-        output="nearest",
-        may_be_invalid=displacement > 0.0,
-        _edges=read_only(edges_along(first.sources)[found.numbers]),
-        rounds=int(displacement > 0.0),
-        largest_displacement=displacement,
-        _lost=Lost(exact, first.piece_offsets, found.lost_pieces, found.lost_holes),
-    )
+        one_pair(*found[:3], displacement, 0), first, exact, output="nearest", may_be_invalid=displacement > 0.0,
+        _edges=read_only(edges_along(first.sources)[found.numbers]), rounds=int(displacement > 0.0),
+        largest_displacement=displacement, _lost=Lost(exact, first.piece_offsets, found.lost_pieces, found.lost_holes),
+    )  # fmt: skip
 
 
 def nearest_pairs(first: Found, budget: Budget) -> SettledPairs:

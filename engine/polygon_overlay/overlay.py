@@ -164,10 +164,6 @@ def ulps_moved(result: Overlay) -> float:
 def accuracy_of(ulps: float, n_edges: int, n_exact: int, n_rational: int) -> Accuracy:
     """Return the report of one or many overlays; ulps: of the worst of them."""
     return Accuracy(
-        decisions="exact",
-        coordinates_ulp=ulps,
-        n_items=n_edges,
-        n_beyond_filter=n_exact,
-        n_rational=n_rational,
+        decisions="exact", coordinates_ulp=ulps, n_items=n_edges, n_beyond_filter=n_exact, n_rational=n_rational,
         method="arrangement",
-    )
+    )  # fmt: skip

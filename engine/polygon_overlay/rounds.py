@@ -79,16 +79,10 @@ def settle_rings(
                 return None
             origins, edges = _composed(rings.evidence, origins), edges[edges_along(rings.sources)]
     return overlay_of(
-        rings,
-        first,
-        exact,
-        _edges=read_only(edges),
-        rounds=rounds,
-        largest_displacement=displacement,
-        snapped=snapped,
+        rings, first, exact, _edges=read_only(edges), rounds=rounds, largest_displacement=displacement, snapped=snapped,
         vertices_moved=n_moved(first.vertices, rings.vertices, snap is not None) if has_crossings else 0,
         **({} if origins is own else _changes(first, rings, origins, exact)),
-    )
+    )  # fmt: skip
 
 
 def _changes(first: Found, rings: Found, origins: IntArray, exact: Exact) -> dict[str, Any]:

@@ -144,18 +144,9 @@ def cut_by_root(p: Triple, q: Triple, c: Triple, radius: float, side: int) -> tu
 
 @bare_kernel
 def fill_on_sphere(
-    segments: Any,
-    center: Any,
-    radius: float,
-    items: Any,
-    planes: Any,
-    begin: int,
-    size: int,
-    stop: Any,
-    pieces: Pieces,
-    still: Any,
-    n: Any,
-) -> None:
+    segments: Any, center: Any, radius: float, items: Any, planes: Any, begin: int, size: int, stop: Any,
+    pieces: Pieces, still: Any, n: Any,
+) -> None:  # fmt: skip
     """Fill the pieces of ``segments`` ((n, 2, dim) float64): see `fill_on_boxes`."""
     is_flat = center.size == 2
     n_open, c = 0, center_of(center, is_flat)

@@ -174,17 +174,9 @@ def decide_roughly(
 
 @bare_kernel
 def decide_on_sphere(
-    segments: Any,
-    center: Any,
-    radius: float,
-    first: int,
-    last: int,
-    stop: Any,
-    items: Any,
-    planes: Any,
-    still: Any,
+    segments: Any, center: Any, radius: float, first: int, last: int, stop: Any, items: Any, planes: Any, still: Any,
     n: Any,
-) -> None:
+) -> None:  # fmt: skip
     """Decide on ``segments[first:last]`` ((n, 2, dim) float64) and the closed ball: see `decide_on_boxes`."""
     is_flat = center.size == 2
     kept, n_open, beyond = 0, 0, 0
@@ -200,17 +192,11 @@ def decide_on_sphere(
         y, y_size = dz * fx - dx * fz, abs(dz * fx) + abs(dx * fz)
         z, z_size = dx * fy - dy * fx, abs(dx * fy) + abs(dy * fx)
         state, entered, left = decide_roughly(
-            fx * fx + fy * fy + fz * fz,
-            gx * gx + gy * gy + gz * gz,
-            dx * dx + dy * dy + dz * dz,
-            dx * fx + dy * fy + dz * fz,
-            abs(dx * fx) + abs(dy * fy) + abs(dz * fz),
-            dx * gx + dy * gy + dz * gz,
-            abs(dx * gx) + abs(dy * gy) + abs(dz * gz),
-            x * x + y * y + z * z,
-            x_size * x_size + y_size * y_size + z_size * z_size,
-            rr,
-        )
+            fx * fx + fy * fy + fz * fz, gx * gx + gy * gy + gz * gz, dx * dx + dy * dy + dz * dz,
+            dx * fx + dy * fy + dz * fz, abs(dx * fx) + abs(dy * fy) + abs(dz * fz), dx * gx + dy * gy + dz * gz,
+            abs(dx * gx) + abs(dy * gy) + abs(dz * gz), x * x + y * y + z * z,
+            x_size * x_size + y_size * y_size + z_size * z_size, rr,
+        )  # fmt: skip
         if state == OPEN:
             beyond += 1
             state, entered, left = decide_exactly(p, q, c, radius)

@@ -114,17 +114,9 @@ def cut_segment(segments: Any, item: int, boundary: Any, contacts: Any, cuts: Cr
 
 @bare
 def cut_group(
-    segments: Any,
-    locations: Any,
-    first: int,
-    boundary: Any,
-    contacts: Any,
-    cuts: Crossings,
-    stop: Any,
-    out: Pieces,
-    row: int,
-    state: Any,
-) -> tuple[int, int]:
+    segments: Any, locations: Any, first: int, boundary: Any, contacts: Any, cuts: Crossings, stop: Any, out: Pieces,
+    row: int, state: Any,
+) -> tuple[int, int]:  # fmt: skip
     """Cut the segments of a group, those from `first` on, at their contacts; return the place reached, and the row.
 
     Stops short where there is no room in `out`, or `stop` is set. See `cut_on_outline`.

@@ -64,19 +64,9 @@ def cut_again(
 
 @bare_kernel
 def fill_on_boxes(
-    segments: Any,
-    low: Any,
-    high: Any,
-    columns: Any,
-    items: Any,
-    planes: Any,
-    begin: int,
-    size: int,
-    stop: Any,
-    pieces: Pieces,
-    still: Any,
-    n: Any,
-) -> None:
+    segments: Any, low: Any, high: Any, columns: Any, items: Any, planes: Any, begin: int, size: int, stop: Any,
+    pieces: Pieces, still: Any, n: Any,
+) -> None:  # fmt: skip
     """Fill the pieces, from row `begin` on, of the first `size` items, ``segments`` ((n, 2, dim) float64) on a box.
 
     items: (m,) int32, planes: (m, 2) int32, as decided on the box `low`, `high`; columns: of its rows.

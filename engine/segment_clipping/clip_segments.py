@@ -185,13 +185,7 @@ def _on_rows(rows: FloatArray) -> Method:
         balanced = None if found is None else balanced_rows(rows, found.exponent)
         return None if found is None or balanced is None else replace(found, region=(as_columns(balanced),))
 
-    return Method(
-        "cyrus_beck",
-        decide_on_rows,
-        fill_on_rows,
-        (as_columns(rows if plain is None else plain),),
-        scale,
-    )
+    return Method("cyrus_beck", decide_on_rows, fill_on_rows, (as_columns(rows if plain is None else plain),), scale)
 
 
 def _on_ball(center: FloatArray, radius: float) -> Method:
@@ -199,10 +193,4 @@ def _on_ball(center: FloatArray, radius: float) -> Method:
         found = scaled(segments, center, np.array([radius]))
         return found and replace(found, region=(found.region[0], float(found.region[1][0])))
 
-    return Method(
-        "sphere_interval",
-        decide_on_sphere,
-        fill_on_sphere,
-        (center, radius),
-        scale,
-    )
+    return Method("sphere_interval", decide_on_sphere, fill_on_sphere, (center, radius), scale)

@@ -51,11 +51,9 @@ class EdgeContacts(NamedTuple):
 def edge_contacts_for(n_segments: int, n_contacts: int) -> EdgeContacts:
     """Return room for groups of so many segments at most, and so many contacts of a group."""
     return EdgeContacts(
-        np.empty(n_contacts, np.int64),
-        np.empty(n_contacts, np.uint8),
-        np.empty(n_segments + 1, np.int64),
+        np.empty(n_contacts, np.int64), np.empty(n_contacts, np.uint8), np.empty(n_segments + 1, np.int64),
         np.empty(DEEPEST, np.int64),
-    )
+    )  # fmt: skip
 
 
 @inline

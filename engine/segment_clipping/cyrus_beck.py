@@ -183,11 +183,9 @@ def later(t: float, slack: float, plane: float, is_crossed: bool, best: Latest) 
     is_later = is_crossed & (t > best.t)
     other = best.t + best.slack if is_later else (t + slack if is_crossed else best.rival)
     return Latest(
-        t if is_later else best.t,
-        slack if is_later else best.slack,
-        plane if is_later else best.plane,
+        t if is_later else best.t, slack if is_later else best.slack, plane if is_later else best.plane,
         other if other > best.rival else best.rival,
-    )
+    )  # fmt: skip
 
 
 @merged

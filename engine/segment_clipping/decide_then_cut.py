@@ -118,15 +118,9 @@ def clip_few(segments: FloatArray, method: Method) -> Clipped | None:
 
 
 def _clip(
-    segments: FloatArray,
-    region: Solid,
-    method: Method,
-    scene: Scaled,
-    most_open: int,
-    budget: Budget,
-    workers: int | None,
-    progress: Progress | None,
-) -> Clipped | None:
+    segments: FloatArray, region: Solid, method: Method, scene: Scaled, most_open: int, budget: Budget,
+    workers: int | None, progress: Progress | None,
+) -> Clipped | None:  # fmt: skip
     """Return the pieces; None where more than `most_open` items are left to rational arithmetic."""
     batch = _Batch(method, scene, budget)
     run_chunks(batch.clip, len(segments), budget=budget, workers=workers, progress=progress)

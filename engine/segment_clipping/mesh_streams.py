@@ -75,20 +75,12 @@ def streams_for(mesh: Any, n_segments: int, n_contacts: int) -> Streams:
     """Return room for groups of so many segments at most, and so many contacts of a group."""
     n_pairs = _PAIRS * n_segments
     return Streams(
-        np.empty((n_segments, 16), np.float32),
-        np.empty(n_segments, np.int64),
-        np.empty(n_segments * (1 + LANES * mesh.n_levels), np.int32),
-        np.empty(n_segments, np.int64),
-        np.empty((LANES * mesh.n_levels + 1, 3), np.int64),
-        np.empty(n_pairs, np.int64),
-        np.empty(_TRIANGLES, np.int64),
-        np.empty(n_contacts, np.int32),
-        np.empty(n_contacts, np.int64),
-        np.empty(n_contacts, np.uint8),
-        np.empty(n_contacts, np.int64),
-        np.empty(n_contacts, np.uint8),
-        np.empty(n_segments + 1, np.int64),
-    )
+        np.empty((n_segments, 16), np.float32), np.empty(n_segments, np.int64),
+        np.empty(n_segments * (1 + LANES * mesh.n_levels), np.int32), np.empty(n_segments, np.int64),
+        np.empty((LANES * mesh.n_levels + 1, 3), np.int64), np.empty(n_pairs, np.int64), np.empty(_TRIANGLES, np.int64),
+        np.empty(n_contacts, np.int32), np.empty(n_contacts, np.int64), np.empty(n_contacts, np.uint8),
+        np.empty(n_contacts, np.int64), np.empty(n_contacts, np.uint8), np.empty(n_segments + 1, np.int64),
+    )  # fmt: skip
 
 
 @inline
@@ -128,17 +120,9 @@ def _settle_pairs(streams: Any, mesh: Any, segments: Any, n_pairs: int, n_contac
         item, block = pair & _SEGMENT, pair >> 16
         row, k = streams.numbers[item], streams.axes[item]
         bits = near_triangles(
-            corners,
-            block,
-            AXES_BEFORE[k],
-            AXES_BEFORE[k + 1],
-            k,
-            (row[8], row[9], row[10]),
-            row[11],
-            row[12],
-            row[13],
+            corners, block, AXES_BEFORE[k], AXES_BEFORE[k + 1], k, (row[8], row[9], row[10]), row[11], row[12], row[13],
             row[14],
-        )
+        )  # fmt: skip
         pairs[n_kept] = (pair << LANES) | bits
         n_kept += bits != 0
     place = 0

@@ -73,17 +73,9 @@ def cut_by_values(p: Triple, q: Triple, sp: Triple, sq: Triple) -> tuple[float, 
 
 @bare_kernel
 def fill_on_rows(
-    segments: Any,
-    columns: Any,
-    items: Any,
-    planes: Any,
-    begin: int,
-    size: int,
-    stop: Any,
-    pieces: Pieces,
-    still: Any,
+    segments: Any, columns: Any, items: Any, planes: Any, begin: int, size: int, stop: Any, pieces: Pieces, still: Any,
     n: Any,
-) -> None:
+) -> None:  # fmt: skip
     """Fill the pieces of ``segments`` ((n, 2, dim) float64): see `fill_on_boxes`."""
     is_flat = segments.shape[2] == 2
     a, b, c, d = columns_of(columns)

@@ -88,17 +88,9 @@ def mesh_of(elements: FloatArray, faces: IntArray) -> Mesh:
     low, high = elements.min(axis=1), elements.max(axis=1)
     tree, n_inner = _inner_first(build_bvh(np.concatenate([low, high], axis=1)))
     return Mesh(
-        on_lines(elements),
-        _are_safe(elements),
-        read_only(faces),
-        tree.boxes,
-        tree.child,
-        tree.origin,
-        1.0 / tree.scale,
-        n_inner,
-        _levels_of(tree.child[:n_inner]),
-        corners_of(tree, n_inner, elements),
-    )
+        on_lines(elements), _are_safe(elements), read_only(faces), tree.boxes, tree.child, tree.origin,
+        1.0 / tree.scale, n_inner, _levels_of(tree.child[:n_inner]), corners_of(tree, n_inner, elements),
+    )  # fmt: skip
 
 
 def _inner_first(tree: Bvh) -> tuple[Bvh, int]:

@@ -106,12 +106,9 @@ def build_cells(solid: Polyhedron, budget: Budget) -> Cells:
         fill_leaves(mesh, *of_level, groups, budget.flag)
         budget.check()
     return Cells(
-        lattice,
-        np.append(np.minimum(codes[0], MIXED_CELL) + CODE_SHIFT, -1).astype(np.int8),
-        np.concatenate(codes),
-        len(codes),
-        groups,
-    )
+        lattice, np.append(np.minimum(codes[0], MIXED_CELL) + CODE_SHIFT, -1).astype(np.int8), np.concatenate(codes),
+        len(codes), groups,
+    )  # fmt: skip
 
 
 def _listed(

@@ -41,9 +41,7 @@ def _set_normal(row: Any, place: int, u: Any, v: Any) -> float:
     """Write u x v, scaled to a largest component of 1, to row[place : place + 3]; return a bound on its error."""
     x, y, z = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
     size = max(
-        abs(u[1] * v[2]) + abs(u[2] * v[1]),
-        abs(u[2] * v[0]) + abs(u[0] * v[2]),
-        abs(u[0] * v[1]) + abs(u[1] * v[0]),
+        abs(u[1] * v[2]) + abs(u[2] * v[1]), abs(u[2] * v[0]) + abs(u[0] * v[2]), abs(u[0] * v[1]) + abs(u[1] * v[0])
     )
     largest = max(abs(x), abs(y), abs(z))
     if not (largest > 1e-280 and largest < 1e280):  # underflow, off by 2^-1074, is far below what is still sure

@@ -114,11 +114,7 @@ def corners(vertices: Any, triangles: Any, triangle: int) -> Any:
 @inline
 def scaled_difference(a: Any, b: Any, scale: Any, parts: float) -> Any:
     """Return a - b in units of the cells of a level: one rounding each."""
-    return (
-        (a[0] - b[0]) * (scale[0] * parts),
-        (a[1] - b[1]) * (scale[1] * parts),
-        (a[2] - b[2]) * (scale[2] * parts),
-    )
+    return ((a[0] - b[0]) * (scale[0] * parts), (a[1] - b[1]) * (scale[1] * parts), (a[2] - b[2]) * (scale[2] * parts))
 
 
 @inline

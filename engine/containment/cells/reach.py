@@ -54,12 +54,9 @@ def walls_of(u: Any, v: Any) -> Any:
     su, sv = abs(u[0]) + abs(u[1]) + abs(u[2]), abs(v[0]) + abs(v[1]) + abs(v[2])
     reach = _MARGIN * (abs(nx) + abs(ny) + abs(nz)) + _ROUNDING * su * sv * (su + sv + 6.0)
     return Walls(
-        _edges(u[0], u[1], v[0], v[1]),
-        _edges(u[1], u[2], v[1], v[2]),
-        _edges(u[2], u[0], v[2], v[0]),
-        (nx, ny, nz),
+        _edges(u[0], u[1], v[0], v[1]), _edges(u[1], u[2], v[1], v[2]), _edges(u[2], u[0], v[2], v[0]), (nx, ny, nz),
         reach,
-    )
+    )  # fmt: skip
 
 
 @inline

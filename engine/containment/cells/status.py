@@ -103,13 +103,10 @@ def _fill_groups(groups: Any, first_group: int, mesh: Any, level: Any, cell: int
         row = groups[first_group + place // LANES, :, place % LANES]
         a, b, c = corners(mesh.vertices, mesh.triangles, level.lists[first + place])
         set_entry(
-            row,
-            scaled_difference(a, reference, scale, parts),
-            scaled_difference(b, reference, scale, parts),
-            scaled_difference(c, reference, scale, parts),
-            scaled_difference(b, a, scale, parts),
+            row, scaled_difference(a, reference, scale, parts), scaled_difference(b, reference, scale, parts),
+            scaled_difference(c, reference, scale, parts), scaled_difference(b, a, scale, parts),
             scaled_difference(c, a, scale, parts),
-        )
+        )  # fmt: skip
     return n_groups
 
 

@@ -101,11 +101,9 @@ def make_lattice(tree: TriangleTree, wanted: float, most: float) -> Lattice:
     lows = tuple(low[k] - sizes[k] * (95.0 / 256.0) for k in range(3))
     n = tuple(int((high[k] - lows[k]) / sizes[k]) + 1 for k in range(3))
     return Lattice(
-        (lows[0], lows[1], lows[2]),
-        (1.0 / sizes[0], 1.0 / sizes[1], 1.0 / sizes[2]),
-        (sizes[0], sizes[1], sizes[2]),
+        (lows[0], lows[1], lows[2]), (1.0 / sizes[0], 1.0 / sizes[1], 1.0 / sizes[2]), (sizes[0], sizes[1], sizes[2]),
         (n[0], n[1], n[2]),
-    )
+    )  # fmt: skip
 
 
 def lattice_of(solid: Polyhedron, budget: Budget) -> tuple[Lattice, float]:

@@ -109,22 +109,13 @@ def _cut(
         above, owners = words, np.flatnonzero(is_crowded)
         nodes = _crowded_nodes(nodes, cuts, bases, owners, sides, firsts, stops)
         edges_of, most, cells = next_edges, np.full(2, _CUT_BITS), _CUT_CELLS
-    return (
-        np.concatenate(levels).astype(np.int32),
-        np.concatenate(lists),
-        (int(top[0]), int(top[1])),
-    )
+    return (np.concatenate(levels).astype(np.int32), np.concatenate(lists), (int(top[0]), int(top[1])))
 
 
 def _crowded_nodes(
-    nodes: IntArray,
-    cuts: IntArray,
-    bases: IntArray,
-    owners: IntArray,
-    sides: Int8Array,
-    firsts: IntArray,
+    nodes: IntArray, cuts: IntArray, bases: IntArray, owners: IntArray, sides: Int8Array, firsts: IntArray,
     stops: IntArray,
-) -> IntArray:
+) -> IntArray:  # fmt: skip
     """Return the nodes of the next level, which are the cells `owners` of this one."""
     parent = np.searchsorted(bases, owners, side="right") - 1
     a, b = cuts[parent].T

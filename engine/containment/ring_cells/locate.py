@@ -111,11 +111,9 @@ def as_edge(edges: Any, row: int) -> Edge:
     """Return edge `row` of edges (4 m,) float64. An unsigned row saves the compiler the care for negative ones."""
     first = np.uint32(4 * row)
     return Edge(
-        float(edges[first]),
-        float(edges[first + np.uint32(1)]),
-        float(edges[first + np.uint32(2)]),
+        float(edges[first]), float(edges[first + np.uint32(1)]), float(edges[first + np.uint32(2)]),
         float(edges[first + np.uint32(3)]),
-    )
+    )  # fmt: skip
 
 
 @merged

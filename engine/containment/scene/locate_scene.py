@@ -132,14 +132,9 @@ def locate_in(
     while todo:  # bound: each turn does a piece of work
         pieces, todo = _scan(array, todo, scene, budget, workers)
         counts = settle_rest(
-            array,
-            scene,
-            [piece.owners for piece in pieces],
-            [piece.bodies[piece.places] for piece in pieces],
-            [partial(piece.located.__setitem__, piece.places) for piece in pieces],
-            budget,
-            workers,
-        )
+            array, scene, [piece.owners for piece in pieces], [piece.bodies[piece.places] for piece in pieces],
+            [partial(piece.located.__setitem__, piece.places) for piece in pieces], budget, workers,
+        )  # fmt: skip
         n_beyond += counts.beyond + sum(piece.n_beyond for piece in pieces)
         n_rational += counts.rational
         held = [_held(piece) for piece in pieces]

@@ -29,14 +29,9 @@ _FEWEST_FOR_TREES: Final = 64
 
 
 def settle_rest(
-    points: FloatArray,
-    scene: Scene,
-    owners_of: list[IntArray],
-    bodies_of: list[IntArray],
-    take: list[Callable[[Int8Array], object]],
-    budget: Budget,
-    workers: int | None,
-) -> Counts:
+    points: FloatArray, scene: Scene, owners_of: list[IntArray], bodies_of: list[IntArray],
+    take: list[Callable[[Int8Array], object]], budget: Budget, workers: int | None,
+) -> Counts:  # fmt: skip
     """Locate pairs of a point (owners) and a body, given piece by piece, and hand each piece its locations.
 
     Returns how many took more than the filter, and how many rational arithmetic.
@@ -57,15 +52,9 @@ def settle_rest(
         def by_trees(start: int, stop: int) -> None:
             with np.errstate(all="ignore"):
                 locate_groups(
-                    points,
-                    owners,
-                    order,
-                    *(each[start:stop] for each in groups),
-                    scene.tables,
-                    tables,
-                    found,
+                    points, owners, order, *(each[start:stop] for each in groups), scene.tables, tables, found,
                     budget.flag,
-                )
+                )  # fmt: skip
 
         run_chunks(by_trees, len(groups[0]), budget=budget, first_chunk=4, workers=workers)
         order = order[found[order] == UNDECIDED]
@@ -122,10 +111,7 @@ def _tree_tables(scene: Scene, sizes: IntArray, budget: Budget, workers: int | N
     cells = [solid.kept("top_cells") for _, solid in chosen]
     addresses, sizes_of, places = (np.array(each) for each in zip(*lines))
     return TreeTables(
-        rows[scene.owners],
-        addresses,
-        sizes_of,
-        places,
+        rows[scene.owners], addresses, sizes_of, places,
         np.array([(0, 0, 0, 0) if each is None else each.place for each in cells], np.int64),
         np.array([np.zeros(6) if each is None else each.frame for each in cells]),
-    )
+    )  # fmt: skip

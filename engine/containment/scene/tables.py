@@ -92,27 +92,10 @@ def scene_of(solids: Sequence[Solid], poses: Sequence[Pose | None] | None, dimen
     is_bounded = np.isfinite(lows).all(axis=1) & np.isfinite(highs).all(axis=1)
     is_empty = (lows > highs).any(axis=1)
     tables = SceneTables(
-        kinds.kinds[owners],
-        slots,
-        lows,
-        highs,
-        frames.rows,
-        frames.inverses,
-        frames.translations,
-        frames.is_turn,
-        kinds.boxes[0],
-        kinds.boxes[1],
-        centers,
-        radii,
-        kinds.row_offsets,
-        kinds.rows,
-        kinds.polygon_offsets,
-        kinds.ring_offsets,
-        kinds.xs,
-        kinds.ys,
-        kinds.cell_frames,
-        kinds.cell_places,
-    )
+        kinds.kinds[owners], slots, lows, highs, frames.rows, frames.inverses, frames.translations, frames.is_turn,
+        kinds.boxes[0], kinds.boxes[1], centers, radii, kinds.row_offsets, kinds.rows, kinds.polygon_offsets,
+        kinds.ring_offsets, kinds.xs, kinds.ys, kinds.cell_frames, kinds.cell_places,
+    )  # fmt: skip
     grid = build_scene_grid(np.flatnonzero(is_bounded & ~is_empty), lows, highs)
     unbounded = np.flatnonzero(~is_bounded & ~is_empty)
     most = max(1, int(np.diff(grid.offsets).max()) + len(unbounded))

@@ -58,26 +58,16 @@ def tree_at(tables: Any, row: int) -> TriangleTree:
         array_at(addresses[row, 2], (sizes[row, 2], BOX_ROWS, WIDTH), np.float32),
         array_at(addresses[row, 3], (sizes[row, 2], WIDTH), np.int32),
         array_at(addresses[row, 4], (sizes[row, 2], OVERHEAD_ROWS, WIDTH), np.float32),
-        (places[row, 0], places[row, 1], places[row, 2]),
-        places[row, 3],
-        (places[row, 4], places[row, 5], places[row, 6]),
-        (places[row, 7], places[row, 8], places[row, 9]),
-    )
+        (places[row, 0], places[row, 1], places[row, 2]), places[row, 3],
+        (places[row, 4], places[row, 5], places[row, 6]), (places[row, 7], places[row, 8], places[row, 9]),
+    )  # fmt: skip
 
 
 @kernel
 def locate_groups(
-    points: Any,
-    owners: Any,
-    order: Any,
-    begins: Any,
-    ends: Any,
-    bodies: Any,
-    scene: Any,
-    tables: Any,
-    located: Any,
+    points: Any, owners: Any, order: Any, begins: Any, ends: Any, bodies: Any, scene: Any, tables: Any, located: Any,
     flag: Any,
-) -> None:
+) -> None:  # fmt: skip
     """Fill located (n_pairs,) int8 for groups of pairs of a body each: those at order[begins[group] : ends[group]].
 
     owners: (n_pairs,) the point of each pair; bodies: that of each group; scene: the `SceneTables`, for its poses.

@@ -28,16 +28,7 @@ from engine.polygon_overlay.compiled.chains import Chains, Stars
 from engine.polygon_overlay.compiled.crossing_signs import Edges
 from engine.polygon_overlay.compiled.edge_contacts import Events, Unions
 from engine.polygon_overlay.compiled.edge_events import Along
-from engine.polygon_overlay.compiled.edge_tree import (
-    LEAF,
-    OFTEN,
-    POLL,
-    RUN,
-    BoxTree,
-    box_holds,
-    build_tree,
-    leaves_of,
-)
+from engine.polygon_overlay.compiled.edge_tree import LEAF, OFTEN, POLL, RUN, BoxTree, box_holds, build_tree, leaves_of
 from engine.polygon_overlay.compiled.loading import Given
 from engine.predicates.error_free import workspace
 

@@ -22,14 +22,7 @@ from typing import Any, Final
 import numpy as np
 
 from engine.jit import bare_kernel, called, inline, merged
-from engine.polygon_overlay.compiled.edge_tree import (
-    FEW,
-    POLL,
-    begin_pairs,
-    boxes_meet,
-    build_tree,
-    next_pairs,
-)
+from engine.polygon_overlay.compiled.edge_tree import FEW, POLL, begin_pairs, boxes_meet, build_tree, next_pairs
 from engine.polygon_overlay.compiled.loading import EVERYTHING, RingArrays, fill_boxes, load_rings
 from engine.polygon_overlay.compiled.workspace import Buffers, rows_of
 from engine.predicates.orientation import BOUND_2D, orient2d

@@ -160,24 +160,15 @@ def buffers_for(n_vertices: int, n_rings: int, n_contacts: int) -> Buffers:
     while n_leaves * LEAF < m:  # bound: 60 doublings
         n_leaves *= 2
     return Buffers(
-        vertex_floats=np.empty((2, n + 1)),
-        vertex_integers=np.empty((5, n + 1), np.int32),
-        ring_integers=np.empty((8, n_rings + 1), np.int64),
-        contact_floats=np.empty((5, k)),
-        contact_integers=np.empty((20, k + 1), np.int32),
-        half_integers=np.empty((11, 2 * k + 1), np.int32),
-        half_labels=np.empty((2, 2 * k + 1), np.int64),
-        half_octets=np.empty((4, 2 * k + 1), np.uint8),
-        point_floats=np.empty((2, m)),
-        point_integers=np.empty((6, m), np.int32),
-        point_codes=np.empty((2, m), np.int64),
-        point_octets=np.empty((4, m), np.uint8),
-        boxes=np.empty((m, 4)),
-        tree=np.empty((2 * n_leaves, 4)),
-        tree_marks=np.empty(2 * n_leaves, np.uint8),
-        stack=np.empty((DEEPEST, 2), np.int64),
-        pairs=np.empty((PORTION, 2), np.int32),
-    )
+        vertex_floats=np.empty((2, n + 1)), vertex_integers=np.empty((5, n + 1), np.int32),
+        ring_integers=np.empty((8, n_rings + 1), np.int64), contact_floats=np.empty((5, k)),
+        contact_integers=np.empty((20, k + 1), np.int32), half_integers=np.empty((11, 2 * k + 1), np.int32),
+        half_labels=np.empty((2, 2 * k + 1), np.int64), half_octets=np.empty((4, 2 * k + 1), np.uint8),
+        point_floats=np.empty((2, m)), point_integers=np.empty((6, m), np.int32),
+        point_codes=np.empty((2, m), np.int64), point_octets=np.empty((4, m), np.uint8), boxes=np.empty((m, 4)),
+        tree=np.empty((2 * n_leaves, 4)), tree_marks=np.empty(2 * n_leaves, np.uint8),
+        stack=np.empty((DEEPEST, 2), np.int64), pairs=np.empty((PORTION, 2), np.int32),
+    )  # fmt: skip
 
 
 @merged
