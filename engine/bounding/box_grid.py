@@ -87,9 +87,7 @@ def _grid_of(low: FloatArray, high: FloatArray) -> CornerGrid | None:
     boxes, numbers, cells = np.zeros((n_boxes, 6)), np.empty(n_boxes, np.int64), np.empty(n_boxes, np.int64)
     starts = np.zeros(layer * int(counts[2]) + 1, np.int32)
     grid = CornerGrid(boxes, numbers, cells, starts, row, layer)
-    if _sort_into_cells(low, high, extent, widest, least, width, grid) > _CROWD * n_boxes:
-        return None
-    return grid
+    return None if _sort_into_cells(low, high, extent, widest, least, width, grid) > _CROWD * n_boxes else grid
 
 
 @kernel

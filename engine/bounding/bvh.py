@@ -114,13 +114,9 @@ def build_bvh(boxes: FloatArray) -> Bvh:
     """
     n_items, origin = len(boxes), np.empty(3)
     n_halves = 2 * n_items - 1
-    items = Items(np.empty((n_items, WIDTH), np.float32), np.empty((n_items, WIDTH), np.float32), np.arange(n_items))
-    halves = Halves(
-        np.empty((n_halves, WIDTH), np.float32),
-        np.empty((n_halves, WIDTH), np.float32),
-        np.empty(n_halves, np.int64),
-        np.empty((n_halves, 2), np.int64),
-    )
+    own, around = np.empty((2, n_items, WIDTH), np.float32), np.empty((2, n_halves, WIDTH), np.float32)
+    items = Items(own[0], own[1], np.arange(n_items))
+    halves = Halves(around[0], around[1], np.empty(n_halves, np.int64), np.empty((n_halves, 2), np.int64))
     stack, state = np.zeros((STACK, 2), np.int64), np.array([int(n_items > WIDTH), 1])
     with np.errstate(all="ignore"):  # what underflows here is far below the enlargement of the boxes
         scale = _normalise(read_only(boxes), origin, items, halves)
@@ -209,12 +205,8 @@ def _halve(items: Any, halves: Any, stack: Any, state: Any) -> None:
     wait there, and how many nodes there are.
     """
     n_stack, n_nodes, n_seen = state[0], state[1], 0
-    bins = Bins(
-        np.empty((N_BINS, WIDTH), np.float32),
-        np.empty((N_BINS, WIDTH), np.float32),
-        np.empty(N_BINS, np.int64),
-        np.empty(N_BINS, np.float32),
-    )
+    boxes, centres = np.empty((N_BINS, WIDTH), np.float32), np.empty((N_BINS, WIDTH), np.float32)
+    bins = Bins(boxes, centres, np.empty(N_BINS, np.int64), np.empty(N_BINS, np.float32))
     while n_stack > 0 and n_seen < _WORK:  # bound: each turn ends one of the 2 n - 1 nodes
         n_stack -= 1
         node, depth = stack[n_stack, 0], stack[n_stack, 1]
@@ -226,10 +218,10 @@ def _halve(items: Any, halves: Any, stack: Any, state: Any) -> None:
         middle = _split(items, halves, node, bins, n_nodes) if depth < HEURISTIC_DEPTH else start
         if middle == start:
             middle = (start + end) // 2
-            for side, (first, last) in enumerate(((start, middle), (middle, end))):
-                _clear(halves, n_nodes + side)
-                for item in range(first, last):
-                    _include(halves, n_nodes + side, items, item)
+            _clear(halves, n_nodes)
+            _clear(halves, n_nodes + 1)
+            for item in range(start, end):
+                _include(halves, n_nodes + (item >= middle), items, item)
         halves.left[node] = n_nodes
         halves.runs[n_nodes, 0], halves.runs[n_nodes, 1] = start, middle
         halves.runs[n_nodes + 1, 0], halves.runs[n_nodes + 1, 1] = middle, end

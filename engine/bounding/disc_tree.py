@@ -13,6 +13,9 @@ import numpy as np
 from engine.jit import inline, kernel
 from engine.lanes.boxes import EMPTY
 from engine.lanes.tracing import LANES
+from engine.predicates.loading import as_point3
+from engine.predicates.vectors import cross, dot, length, minus
+from engine.types import Point3
 
 _ENLARGED: Final = 2.0**-20
 
@@ -49,6 +52,13 @@ def fill_discs(blocks: Any, child: Any, boxes: Any, discs: Any) -> None:
 
 
 @inline
+def _corner(rows: Any, node: int, lane: int, corner: int) -> Point3:
+    """Return a corner of a triangle of a block; of boxes the first is the centre."""
+    x, y, z = rows[node, 3 * corner, lane], rows[node, 3 * corner + 1, lane], rows[node, 3 * corner + 2, lane]
+    return Point3(float(x), float(y), float(z))
+
+
+@inline
 def _set_normals(blocks: Any, child: Any, parents: Any, normals: Any) -> None:
     """Set normals (n_nodes, 3), zeros, to the direction of the sum of the normals of all faces below a node."""
     for node in range(len(child)):
@@ -58,18 +68,17 @@ def _set_normals(blocks: Any, child: Any, parents: Any, normals: Any) -> None:
         for lane in range(LANES):
             if child[node, lane] == EMPTY:
                 continue
-            b = blocks[node, :, lane]
-            ux, uy, uz = float(b[3]) - b[0], float(b[4]) - b[1], float(b[5]) - b[2]
-            vx, vy, vz = float(b[6]) - b[0], float(b[7]) - b[1], float(b[8]) - b[2]
-            x, y, z = x + (uy * vz - uz * vy), y + (uz * vx - ux * vz), z + (ux * vy - uy * vx)
+            p = _corner(blocks, node, lane, 0)
+            n = cross(minus(_corner(blocks, node, lane, 1), p), minus(_corner(blocks, node, lane, 2), p))
+            x, y, z = x + n.x, y + n.y, z + n.z
         above = node
         while above >= 0:  # bound: the depth of the tree
             normals[above, 0] += x
             normals[above, 1] += y
             normals[above, 2] += z
-            above = parents[above] >> 3 if parents[above] >= 0 else -1
+            above = parents[above] >> 3  # of the root -1
     for node in range(len(child)):
-        size = np.sqrt(normals[node, 0] ** 2 + normals[node, 1] ** 2 + normals[node, 2] ** 2)
+        size = length(as_point3(normals, node))
         for k in range(3):
             normals[node, k] = normals[node, k] / size if size > 1e-100 else (1.0 if k == 2 else 0.0)
 
@@ -84,17 +93,12 @@ def _set_reached(blocks: Any, child: Any, boxes: Any, parents: Any, normals: Any
         for lane in range(LANES):
             if child[node, lane] == EMPTY:
                 continue
-            b = blocks[node, :, lane]
             for corner in range(3):
-                px, py, pz = b[3 * corner], b[3 * corner + 1], b[3 * corner + 2]
-                below, up = node, parents[node]
+                p, below, up = _corner(blocks, node, lane, corner), node, parents[node]
                 while up >= 0:  # bound: the depth of the tree
-                    at, lane_above = up >> 3, up & 7
-                    x = float(px) - boxes[at, 0, lane_above]
-                    y = float(py) - boxes[at, 1, lane_above]
-                    z = float(pz) - boxes[at, 2, lane_above]
-                    along = x * normals[below, 0] + y * normals[below, 1] + z * normals[below, 2]
+                    v = minus(p, _corner(boxes, up >> 3, up & 7, 0))
+                    along = dot(v, as_point3(normals, below))
                     reached[below, 0] = min(reached[below, 0], along)
                     reached[below, 1] = max(reached[below, 1], along)
-                    reached[below, 2] = max(reached[below, 2], x * x + y * y + z * z - along * along)
-                    below, up = at, parents[at]
+                    reached[below, 2] = max(reached[below, 2], dot(v, v) - along * along)
+                    below, up = up >> 3, parents[up >> 3]

@@ -49,9 +49,7 @@ def cell_of(value: float, low: float, cells_per_unit: float, n_cells: int) -> in
 def make_axis(low: float, high: float, n_cells: int) -> Axis:
     """Return `n_cells` cells from low to high, one where there is no extent."""
     extent = high * 0.5 - low * 0.5
-    if extent <= 0.0:
-        return Axis(low, high, 0.0, 1)
-    return Axis(low, high, min(n_cells / extent, _FASTEST), n_cells)
+    return Axis(low, high, 0.0, 1) if extent <= 0.0 else Axis(low, high, min(n_cells / extent, _FASTEST), n_cells)
 
 
 @inline

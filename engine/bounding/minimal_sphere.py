@@ -132,10 +132,10 @@ class _Walk:
         radius = math.sqrt(square / unit**2)
         gap = _up(sum(map(abs, shift), Fraction(self.slack) / unit))  # what may lie between |vector| and the distance
         farthest = int(sizes.argmax())
-        if sizes[farthest] > _above((radius * (1.0 + 4.0 * _UNIT) + gap) ** 2):
+        if sizes[farthest] > (radius * (1.0 + 4.0 * _UNIT) + gap) ** 2 * (1.0 + 16.0 * _UNIT) + _TINY:
             return farthest
         inner = radius * (1.0 - 4.0 * _UNIT) - gap
-        candidates = np.flatnonzero(sizes > (_below(inner * inner) if inner > 0.0 else -1.0))
+        candidates = np.flatnonzero(sizes > (inner * inner * (1.0 - 16.0 * _UNIT) - _TINY if inner > 0.0 else -1.0))
         self.n_candidates = max(self.n_candidates, len(candidates))
         if len(candidates) > _FEW and self.slack == 0.0:
             excess, bound = excess_double_double(self.points[candidates], rounded, shift, square / unit**2, unit)
@@ -180,16 +180,6 @@ class _Walk:
 def _up(value: Fraction) -> float:
     """Return a double not below `value`, capped where anything larger means the same."""
     return float(min(value, Fraction(10) ** 100)) * (1.0 + 4.0 * _UNIT) + _TINY
-
-
-def _above(size: float) -> float:
-    """Return what a computed squared distance must exceed to be certainly above `size`."""
-    return size * (1.0 + 16.0 * _UNIT) + _TINY
-
-
-def _below(size: float) -> float:
-    """Return what a computed squared distance must not exceed to be certainly below `size`."""
-    return size * (1.0 - 16.0 * _UNIT) - _TINY
 
 
 def excess_double_double(

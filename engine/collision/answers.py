@@ -11,14 +11,13 @@ from engine.arrays import Int8Array, IntArray
 from engine.collision.codes import DISJOINT, UNSETTLED
 from engine.collision.collide import collide_pair
 from engine.collision.detail import NO_DETAIL, code_of, detail_of
-from engine.collision.result import Witness, Work
+from engine.collision.result import Poses, Witness, Work
 from engine.parallel import Budget
 from engine.solids.base import Solid
-from engine.solids.pose import Pose
 from engine.types import Accuracy
 
 Witnesses = list[Witness | None]
-PlacedPair = tuple[Solid, Solid, Pose | None, Pose | None]
+PlacedPair = tuple[Solid, Solid, Poses]
 
 
 @dataclass(slots=True, eq=False)

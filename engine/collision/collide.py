@@ -18,14 +18,15 @@ from engine.collision.result import (
     UNNAMED,
     Collision,
     PairFunction,
+    Poses,
     Work,
 )
 from engine.collision.simple.against_boundary import collide_body_sphere, collide_half_space_body
 from engine.collision.simple.closed_forms import (
     collide_aabb_sphere,
-    collide_half_space_half_space,
     collide_half_space_sphere,
-    collide_sphere_sphere,
+    collide_half_spaces,
+    collide_spheres,
     relate_boxes,
     touching_boxes,
 )
@@ -39,9 +40,9 @@ from engine.types import Accuracy, Relation
 TAKEN = {2: "polygon, triangle, aabb, sphere, half_space", 3: "polyhedron, surface, aabb, sphere, half_space"}
 
 
-def _aabb_aabb(first: Aabb, second: Aabb, first_pose: Pose | None, second_pose: Pose | None, work: Work) -> Collision:
+def _aabb_aabb(first: Aabb, second: Aabb, poses: Poses, work: Work) -> Collision:
     """Decide by comparisons where neither box has a pose; a witness of a contact is named as for other bodies."""
-    if first_pose is None and second_pose is None:
+    if poses[0] is None and poses[1] is None:
         bounds = first.min.tolist(), first.max.tolist(), second.min.tolist(), second.max.tolist()
         relation = relate_boxes(*bounds)
         if relation == DISJOINT or not work.witness:
@@ -51,7 +52,7 @@ def _aabb_aabb(first: Aabb, second: Aabb, first_pose: Pose | None, second_pose: 
         if relation == TOUCHING and first.dimension == 3 and (witness := touching_boxes(*bounds)) is not None:
             return Collision(Relation.TOUCHING, witness)
     bodies = mesh_mesh if first.dimension == 3 else collide_outlines
-    return bodies(first, second, first_pose, second_pose, work)
+    return bodies(first, second, poses, work)
 
 
 PAIRS: dict[tuple[int, str, str], PairFunction] = {
@@ -63,9 +64,9 @@ PAIRS: dict[tuple[int, str, str], PairFunction] = {
 for _dimension in (2, 3):
     PAIRS[_dimension, "aabb", "aabb"] = _aabb_aabb
     PAIRS[_dimension, "aabb", "sphere"] = collide_aabb_sphere
-    PAIRS[_dimension, "half_space", "half_space"] = collide_half_space_half_space
+    PAIRS[_dimension, "half_space", "half_space"] = collide_half_spaces
     PAIRS[_dimension, "half_space", "sphere"] = collide_half_space_sphere
-    PAIRS[_dimension, "sphere", "sphere"] = collide_sphere_sphere
+    PAIRS[_dimension, "sphere", "sphere"] = collide_spheres
 """Dimension and the two types to the function of that pair; a pair may stand in one order only."""
 
 _BOTH_ORDERS = {
@@ -111,20 +112,16 @@ def check_pose(pose: object, solid: Solid, name: str) -> None:
         )
 
 
-def collide_pair(
-    first: Solid, second: Solid, first_pose: Pose | None, second_pose: Pose | None, work: Work
-) -> Collision:
+def collide_pair(first: Solid, second: Solid, poses: Poses, work: Work) -> Collision:
     """Return the relation of two checked solids under checked poses, within the budget of `work`.
 
     Two equal poses are left out: what moves together keeps its relation, although a rotation of floats is not quite
     orthogonal and a ball's radius is kept under it.
     """
-    if first_pose is not None and first_pose == second_pose:
-        first_pose = second_pose = None
+    if poses[0] is not None and poses[0] == poses[1]:
+        poses = None, None
     function, is_swapped = pair_function(first, second)
-    if is_swapped:
-        return function(second, first, second_pose, first_pose, work).swapped()
-    return function(first, second, first_pose, second_pose, work)
+    return function(second, first, poses[::-1], work).swapped() if is_swapped else function(first, second, poses, work)
 
 
 class CollideOptions(Options, total=False):
@@ -199,17 +196,17 @@ def collide(
     are_plain = type(report) is type(boolean) is type(witness) is type(detail) is bool
     if workers is not None or progress is not None or not are_plain:
         check_options(workers, progress, report=report, boolean=boolean, witness=witness, detail=detail)
-    is_named = witness and not boolean
+    is_named, poses = witness and not boolean, (first_pose, second_pose)
     if deadline is None and cancel is None and progress is None and not (detail or report):
-        return collide_pair(first, second, first_pose, second_pose, Work(UNLIMITED, is_named, boolean))
+        return collide_pair(first, second, poses, Work(UNLIMITED, is_named, boolean))
     if detail:
         check_has_detail(((("first",), first), (("second",), second)), boolean)
     with Budget(deadline, cancel) as budget:
         budget.check()
         work = Work(budget, witness=is_named, boolean=boolean)
-        result = collide_pair(first, second, first_pose, second_pose, work)
+        result = collide_pair(first, second, poses, work)
         if detail:
-            named = detail_of(first, second, first_pose, second_pose, result.relation, work)
+            named = detail_of(first, second, poses, result.relation, work)
             result = Collision(result.relation, result.witness, named)
     if progress is not None:
         progress(1)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from engine.arrays import FloatArray, Int8Array, IntArray, read_only
-from engine.collision.answers import Answers, Witnesses, accuracy_of
+from engine.collision.answers import Answers, PlacedPair, Witnesses, accuracy_of
 from engine.collision.codes import DISJOINT, UNSETTLED
 from engine.collision.collide import collide_pair, pair_function
 from engine.collision.detail import NO_DETAIL, check_has_detail, details_where_proven, has_interior
@@ -79,7 +79,7 @@ def collide_poses(
         with UNLIMITED if deadline is None and cancel is None else Budget(deadline, cancel) as budget:
             budget.check()
             pose = Pose.of_checked(poses.rotations[0], poses.translations[0])
-            one = collide_pair(first, second, None, pose, Work(budget, bool(witnesses), bool(boolean)))
+            one = collide_pair(first, second, (None, pose), Work(budget, bool(witnesses), bool(boolean)))
         relations = np.array([one.relation], np.int8)
         return (relations, [one.witness]) if witnesses else relations
     with Budget(deadline, cancel) as budget:
@@ -91,15 +91,15 @@ def collide_poses(
         answers = Answers(budget, bool(boolean), relations, found, details if has_detail else None)
         fill = batch_of(first, second, poses, answers)
 
+        def pair_of(item: int) -> PlacedPair:
+            return first, second, (None, Pose.of_checked(poses.rotations[item], poses.translations[item]))
+
         def task(start: int, stop: int) -> None:
             if fill is not None:
                 fill(start, stop)
             if has_detail:
                 details[start:stop] = details_where_proven(relations[start:stop])
-            answers.settle(
-                answers.left(start, stop),
-                lambda item: (first, second, None, Pose.of_checked(poses.rotations[item], poses.translations[item])),
-            )
+            answers.settle(answers.left(start, stop), pair_of)
 
         run_chunks(task, n_poses, budget=budget, first_chunk=8, workers=workers, progress=progress)
     parts = (relations, *([] if found is None else [found]), *([details] if detail else []))
@@ -155,18 +155,9 @@ def batch_of(first: Solid, second: Solid, poses: PoseArrays, answers: Answers) -
         if not len(rows):
             return
         entry_of(relate_poses)(
-            a.arrays,
-            b.arrays,
-            STILL,
-            some,
-            seek,
-            N_NAMED if is_named else 0,
-            SPACE.descent,
-            SPACE.found,
-            0,
-            rows,
+            a.arrays, b.arrays, STILL, some, seek, N_NAMED if is_named else 0, SPACE.descent, SPACE.found, 0, rows,
             budget.flag,
-        )
+        )  # fmt: skip
         budget.check()
         relations[items] = rows[:, RELATION]
         if witnesses is not None:

@@ -28,7 +28,7 @@ from engine.collision.planar.outline import (
     outline_of,
     single_points,
 )
-from engine.collision.result import BODIES, MESHES, OUTLINES, Parts, Work
+from engine.collision.result import BODIES, MESHES, OUTLINES, Parts, Poses, Work
 from engine.collision.simple.against_boundary import body_sphere_parts, half_space_body_parts
 from engine.containment.rational_locate import rational_location
 from engine.errors import InvalidInputError, UnsupportedSolidError
@@ -38,12 +38,11 @@ from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.checks import spell
 from engine.solids.half_space import HalfSpace
-from engine.solids.pose import Pose
 from engine.solids.sphere import Sphere
 from engine.solids.surface import Surface
 from engine.types import Location, Rcc8, Relation
 
-PartsFunction = Callable[[Any, Any, Pose | None, Pose | None, Work], Parts]
+PartsFunction = Callable[[Any, Any, Poses, Work], Parts]
 
 NO_DETAIL = -1
 """In place of a code of `Rcc8`: a body without interior."""
@@ -90,29 +89,23 @@ def code_of(detail: Rcc8 | None) -> int:
     return NO_DETAIL if detail is None else int(detail)
 
 
-def detail_of(
-    first: Solid, second: Solid, first_pose: Pose | None, second_pose: Pose | None, relation: Relation, work: Work
-) -> Rcc8 | None:
+def detail_of(first: Solid, second: Solid, poses: Poses, relation: Relation, work: Work) -> Rcc8 | None:
     """Return the relation of RCC-8 of a checked pair whose relation is known; None where a body has no interior."""
     if relation != Relation.OVERLAPPING:
         if not (has_interior(first, work.budget) and has_interior(second, work.budget)):
             return None
         return UNLESS_OVERLAPPING[relation]
-    if first_pose is not None and first_pose == second_pose:
-        first_pose = second_pose = None
+    if poses[0] is not None and poses[0] == poses[1]:
+        poses = None, None
     function = PARTS.get((first.dimension, first.type, second.type))
     if function is not None:
-        parts = function(first, second, first_pose, second_pose, work)
+        parts = function(first, second, poses, work)
     else:
         function = PARTS[first.dimension, second.type, first.type]
-        parts = function(second, first, second_pose, first_pose, work).swapped()
-    if parts.first and parts.second:
-        return Rcc8.PO
+        parts = function(second, first, poses[::-1], work).swapped()
     if parts.first:
-        return Rcc8.TPPI if parts.meet else Rcc8.NTPPI
-    if parts.second:
-        return Rcc8.TPP if parts.meet else Rcc8.NTPP
-    return Rcc8.EQ
+        return Rcc8.PO if parts.second else (Rcc8.TPPI if parts.meet else Rcc8.NTPPI)
+    return (Rcc8.TPP if parts.meet else Rcc8.NTPP) if parts.second else Rcc8.EQ
 
 
 def has_interior(solid: Solid, budget: Budget) -> bool:
@@ -133,45 +126,36 @@ def _has_interior(solid: Solid, budget: Budget) -> bool:
     return mesh.has_inside and any(live_piece(mesh, face, budget) is not None for face in range(len(mesh.faces)))
 
 
-def _sphere_sphere(
-    first: Sphere, second: Sphere, first_pose: Pose | None, second_pose: Pose | None, work: Work
-) -> Parts:
-    between = squared_length(minus(image_point(first.center, first_pose), image_point(second.center, second_pose)))
+def _sphere_sphere(first: Sphere, second: Sphere, poses: Poses, work: Work) -> Parts:
+    between = squared_length(minus(image_point(first.center, poses[0]), image_point(second.center, poses[1])))
     r, s = Fraction(first.radius), Fraction(second.radius)
     return Parts(r > s or between > (s - r) ** 2, s > r or between > (s - r) ** 2, True)
 
 
-def _half_spaces(
-    first: HalfSpace, second: HalfSpace, first_pose: Pose | None, second_pose: Pose | None, work: Work
-) -> Parts:
+def _half_spaces(first: HalfSpace, second: HalfSpace, poses: Poses, work: Work) -> Parts:
     """Overlapping half-spaces are equal, or their planes cross, or each holds the plane of the other."""
-    n, d = image_half_space(first.normal, first.offset, first_pose)
-    m, e = image_half_space(second.normal, second.offset, second_pose)
+    (n, d), (m, e) = image_half_space(first, poses[0]), image_half_space(second, poses[1])
     axis = largest_axis(n)
     factor = m[axis] / n[axis]
     is_equal = factor > 0 and all(q == factor * p for p, q in zip((*n, d), (*m, e)))
     return Parts(not is_equal, not is_equal, True)
 
 
-def _half_space_sphere(
-    half_space: HalfSpace, sphere: Sphere, half_space_pose: Pose | None, sphere_pose: Pose | None, work: Work
-) -> Parts:
+def _half_space_sphere(space: HalfSpace, ball: Sphere, poses: Poses, work: Work) -> Parts:
     """A ball that overlaps a half-space reaches its plane."""
-    plane = image_half_space(half_space.normal, half_space.offset, half_space_pose)
-    height = value_at(plane, image_point(sphere.center, sphere_pose))
-    reach = Fraction(sphere.radius) ** 2 * squared_length(plane[0])
-    return Parts(True, height < 0 or height**2 < reach, True)
+    plane = image_half_space(space, poses[0])
+    height, reach = value_at(plane, image_point(ball.center, poses[1])), squared_length(plane[0])
+    return Parts(True, height < 0 or height**2 < Fraction(ball.radius) ** 2 * reach, True)
 
 
-def _outlines(first: Solid, second: Solid, first_pose: Pose | None, second_pose: Pose | None, work: Work) -> Parts:
-    outlines = [outline_of(first, first_pose, work.budget), outline_of(second, second_pose, work.budget)]
+def _outlines(first: Solid, second: Solid, poses: Poses, work: Work) -> Parts:
+    outlines = [outline_of(first, poses[0], work.budget), outline_of(second, poses[1], work.budget)]
     arrangement, _ = arrange_outlines(outlines, work.budget)
     labels = label_faces(subdivide(arrangement, work.budget))
     meet = boundaries_meet(arrangement)
-    for outline, other, pose in ((outlines[0], second, second_pose), (outlines[1], first, first_pose)):
+    for outline, other, pose in ((outlines[0], second, poses[1]), (outlines[1], first, poses[0])):
         for vertex in single_points(outline):
-            at = rational_location(outline.points[vertex], other, pose, work.budget.check)
-            meet = meet or at == Location.BOUNDARY
+            meet |= rational_location(outline.points[vertex], other, pose, work.budget.check) == Location.BOUNDARY
     return Parts(FIRST in labels, SECOND in labels, meet)
 
 

@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from fractions import Fraction
 
-from engine.arrays import FloatArray
 from engine.containment.rational_locate import adjugate
 from engine.predicates.exact_vectors import dot
+from engine.solids.half_space import HalfSpace
 from engine.solids.pose import Pose
 
 Vector = tuple[Fraction, ...]
@@ -44,9 +44,9 @@ def image_point(point: Point, pose: Pose | None) -> Vector:
     return image_map(pose)(point)
 
 
-def image_half_space(normal: FloatArray, offset: float, pose: Pose | None) -> HalfSpaceImage:
+def image_half_space(half_space: HalfSpace, pose: Pose | None) -> HalfSpaceImage:
     """Return normal and offset of the exact image of a half-space, up to a positive factor."""
-    n, d = as_vector(normal), Fraction(offset)
+    n, d = as_vector(half_space.normal), Fraction(half_space.offset)
     if pose is None:
         return n, d
     adjugated, determinant = adjugate([as_vector(row) for row in pose.rotation.tolist()])

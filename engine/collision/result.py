@@ -1,6 +1,6 @@
 """What a collision call answers, and what one pair of solids is asked with.
 
-Every pair of types has one function ``(first, second, first_pose, second_pose, work) -> Collision``; the table in
+Every pair of types has one function ``(first, second, poses, work) -> Collision``; the table in
 `collide.py` finds it. `Work` carries what such a function may spend and what it should report.
 """
 
@@ -22,6 +22,8 @@ contact. Edges are those of the triangles that a face was cut into; `surface` wh
 half-space) takes part in the contact."""
 
 
+Poses = tuple[Pose | None, Pose | None]
+"""Of two bodies, None for one that stands where it is."""
 Containing = Literal["", "first", "second"]
 
 _SWAPPED: dict[Containing, Containing] = {"": "", "first": "second", "second": "first"}
@@ -121,5 +123,5 @@ class Work:
     n_rational: int = 0
 
 
-PairFunction = Callable[[Any, Any, Pose | None, Pose | None, Work], Collision]
+PairFunction = Callable[[Any, Any, Poses, Work], Collision]
 """The two solids are of the types that the table in `pairs.py` names."""

@@ -12,7 +12,7 @@ Source: the textbook's exercise 22.4-5; separating axes after S. Gottschalk et a
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -20,13 +20,20 @@ from engine.arrays import FloatArray, Int8Array
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
 from engine.collision.meshes.exact_triangles import classify_exact
 from engine.collision.meshes.mesh_arrays import NO_AREA, UNKNOWN_AXIS, axis_of
-from engine.collision.meshes.triangle_triangle import APART, Triangle3, classify_exactly, classify_near, with_pose
+from engine.collision.meshes.triangle_triangle import (
+    APART,
+    Facet,
+    classify_exactly,
+    classify_near,
+    triangle_at,
+    with_pose,
+)
 from engine.collision.planar.outline import collide_outline_outline
 from engine.collision.result import Work
 from engine.errors import InvalidArrayError, WrongDimensionError
 from engine.jit import inline, kernel
 from engine.parallel import Budget, Cancel, Progress, check_options, run_chunks
-from engine.predicates.loading import as_point3
+from engine.predicates.loading import as_point2
 from engine.predicates.orientation import orient2d
 from engine.predicates.rational import scaled_integers
 from engine.solids.checks import as_point_groups
@@ -34,19 +41,10 @@ from engine.solids.triangle import Triangle
 from engine.types import UNDECIDED, Accuracy, Point2, Relation
 
 
-class Triangle2(NamedTuple):
-    """Three points of the plane."""
-
-    p: Point2
-    q: Point2
-    r: Point2
-
-
 @inline
-def as_triangle2(triangles: Any, item: int) -> Triangle2:
-    """Load row `item` of (n, 3, 2) triangles."""
-    t = triangles[item]
-    return Triangle2(Point2(t[0, 0], t[0, 1]), Point2(t[1, 0], t[1, 1]), Point2(t[2, 0], t[2, 1]))
+def as_facet2(t: Any) -> Facet:
+    """Load a triangle (3, 2)."""
+    return Facet(as_point2(t, 0), as_point2(t, 1), as_point2(t, 2))
 
 
 @inline
@@ -64,7 +62,7 @@ def are_boxes_apart(t: Any, u: Any) -> bool:
 
 
 @inline
-def side_range(a: Point2, b: Point2, u: Triangle2) -> tuple[int, int]:
+def side_range(a: Point2, b: Point2, u: Facet) -> tuple[int, int]:
     """Return the least and the largest side of the line a b that a corner of u lies on; UNDECIDED twice if unsure."""
     p, q, r = orient2d(a, b, u.p), orient2d(a, b, u.q), orient2d(a, b, u.r)
     if p == UNDECIDED or q == UNDECIDED or r == UNDECIDED:
@@ -73,7 +71,7 @@ def side_range(a: Point2, b: Point2, u: Triangle2) -> tuple[int, int]:
 
 
 @inline
-def against_edges(t: Triangle2, u: Triangle2) -> int:
+def against_edges(t: Facet, u: Facet) -> int:
     """Return how u lies to the edges of t; DISJOINT and SECOND_INSIDE_FIRST are final, TOUCHING: interiors apart."""
     p, q, r = t
     inside, apart = True, False
@@ -85,13 +83,11 @@ def against_edges(t: Triangle2, u: Triangle2) -> int:
             return DISJOINT
         inside, apart = inside and low > 0, apart or high == 0
         p, q, r = q, r, p
-    if inside:
-        return SECOND_INSIDE_FIRST
-    return TOUCHING if apart else OVERLAPPING
+    return SECOND_INSIDE_FIRST if inside else (TOUCHING if apart else OVERLAPPING)
 
 
 @inline
-def relation_of_triangles(t: Triangle2, u: Triangle2) -> int:
+def relation_of_triangles(t: Facet, u: Facet) -> int:
     """Return the relation of two closed triangles of the plane, degenerate ones included, or UNSETTLED."""
     if are_boxes_apart(t, u):
         return DISJOINT
@@ -99,9 +95,9 @@ def relation_of_triangles(t: Triangle2, u: Triangle2) -> int:
     if t_turn == UNDECIDED or u_turn == UNDECIDED:
         return UNSETTLED
     if t_turn < 0:
-        t = Triangle2(t.p, t.r, t.q)
+        t = Facet(t.p, t.r, t.q)
     if u_turn < 0:
-        u = Triangle2(u.p, u.r, u.q)
+        u = Facet(u.p, u.r, u.q)
     first = against_edges(t, u)
     if first in (UNSETTLED, DISJOINT, SECOND_INSIDE_FIRST):
         return first
@@ -118,13 +114,7 @@ def relation_of_triangles(t: Triangle2, u: Triangle2) -> int:
 def relate_triangles_2d(first: Any, second: Any, relations: Any) -> None:
     """Fill relations (n,) int8 for the pairs of rows of two (n, 3, 2) float64 arrays."""
     for item in range(relations.shape[0]):
-        relations[item] = relation_of_triangles(as_triangle2(first, item), as_triangle2(second, item))
-
-
-@inline
-def as_triangle3(triangles: Any, item: int) -> Triangle3:
-    """Load row `item` of (n, 3, 3) triangles."""
-    return Triangle3(as_point3(triangles[item], 0), as_point3(triangles[item], 1), as_point3(triangles[item], 2))
+        relations[item] = relation_of_triangles(as_facet2(first[item]), as_facet2(second[item]))
 
 
 @kernel
@@ -132,12 +122,12 @@ def relate_triangles_3d(first: Any, second: Any, relations: Any) -> None:
     """Fill relations (n,) int8 for the pairs of rows of two (n, 3, 3) float64 arrays, degenerate ones UNSETTLED."""
     poses = np.zeros((1, 12))  # nothing here has one
     for item in range(relations.shape[0]):
-        t, u = as_triangle3(first, item), as_triangle3(second, item)
+        t, u = triangle_at(first[item], 0, 1, 2), triangle_at(second[item], 0, 1, 2)
         relations[item] = UNSETTLED
         if are_boxes_apart(t, u) or are_apart_on_axis(t.p.z, t.q.z, t.r.z, u.p.z, u.q.z, u.r.z):
             relations[item] = DISJOINT
             continue
-        axis, other_axis = axis_of(t.p, t.q, t.r), axis_of(u.p, u.q, u.r)
+        axis, other_axis = axis_of(t), axis_of(u)
         if axis in (NO_AREA, UNKNOWN_AXIS) or other_axis in (NO_AREA, UNKNOWN_AXIS):
             continue
         how = classify_near(t, u, 0.0)
@@ -206,7 +196,7 @@ def collide_triangles(
 def _settled(t: FloatArray, u: FloatArray, budget: Budget) -> Relation:
     """Return the relation of one pair by integer or rational arithmetic."""
     if t.shape[1] == 2:
-        return collide_outline_outline(Triangle(t), Triangle(u), None, None, Work(budget, witness=False)).relation
+        return collide_outline_outline(Triangle(t), Triangle(u), (None, None), Work(budget, witness=False)).relation
     numbers = scaled_integers([*t.ravel().tolist(), *u.ravel().tolist()])
     a, b, c, d, e, f = (tuple(numbers[k : k + 3]) for k in range(0, 18, 3))
     return Relation.DISJOINT if classify_exact((a, b, c), (d, e, f)) == APART else Relation.TOUCHING

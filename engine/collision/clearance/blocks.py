@@ -19,7 +19,7 @@ from engine.collision.clearance.boxes import (
 from engine.collision.clearance.near_triangles import nearest_points, rounding_of, seen_from
 from engine.collision.meshes.mesh_arrays import triangle_of
 from engine.collision.meshes.placement import placed
-from engine.collision.meshes.triangle_triangle import Triangle3
+from engine.collision.meshes.triangle_triangle import Facet
 from engine.jit import inline
 from engine.lanes.boxes import EMPTY
 from engine.lanes.tracing import LANES
@@ -36,16 +36,14 @@ asked; by the flag."""
 
 
 @inline
-def _triangle(view: View, item: int) -> Triangle3:
+def _triangle(view: View, item: int) -> Facet:
     """Return a placed triangle, rounded, times the unit."""
     t, place, unit = triangle_of(view.mesh, item), view.place, view.unit
-    return Triangle3(
-        scaled(placed(t.p, place), unit), scaled(placed(t.q, place), unit), scaled(placed(t.r, place), unit)
-    )
+    return Facet(scaled(placed(t.p, place), unit), scaled(placed(t.q, place), unit), scaled(placed(t.r, place), unit))
 
 
 @inline
-def _measure(s: Triangle3, t: Triangle3, error: float, most: float) -> tuple[float, float, Point3, tuple[int, int]]:
+def _measure(s: Facet, t: Facet, error: float, most: float) -> tuple[float, float, Point3, tuple[int, int]]:
     """Return bounds on the distance of two triangles, from below and above, and direction and features of nearly
     nearest points; of any where the lower bound is above `most`.
 

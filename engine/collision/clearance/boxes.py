@@ -14,10 +14,10 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.collision.meshes.mesh_arrays import MeshArrays
-from engine.collision.meshes.placement import Placement, defect_of, turned, turned_back
+from engine.collision.meshes.placement import Placement, column, defect_of, turned, turned_back
 from engine.jit import inline, merged
 from engine.lanes.tracing import LANES
-from engine.predicates.vectors import dot, largest_of
+from engine.predicates.vectors import dot, largest_of, minus
 from engine.types import Point3
 
 MOST_LISTED: Final = 64
@@ -88,17 +88,12 @@ class Room(NamedTuple):
 
 def new_room(room: int, n_nodes: int) -> Room:
     """Return work space for so many pairs, and trees of so many nodes."""
+    heap, found = Heap(np.empty(room), np.empty((room, 2), np.int64)), np.empty((room, 4), np.int64)
     return Room(
-        Heap(np.empty(room), np.empty((room, 2), np.int64)),
-        Candidates(np.empty((room, 4), np.int64), np.empty(room)),
-        np.empty(2),
-        np.zeros(12),
-        np.zeros((n_nodes, 4)),
-        np.empty(n_nodes + LANES, np.int32),
-        np.empty(n_nodes + LANES),
-        np.empty((2, MOST_LISTED), np.int32),
+        heap, Candidates(found, np.empty(room)), np.empty(2), np.zeros(12), np.zeros((n_nodes, 4)),
+        np.empty(n_nodes + LANES, np.int32), np.empty(n_nodes + LANES), np.empty((2, MOST_LISTED), np.int32),
         np.empty((2, 3)),
-    )
+    )  # fmt: skip
 
 
 class Search(NamedTuple):
@@ -116,13 +111,12 @@ class Search(NamedTuple):
 def frame_of(a: View, b: View) -> Frame:
     """Return the map between two trees."""
     p, q = a.place, b.place
-    x, y, z = Point3(1.0, 0.0, 0.0), Point3(0.0, 1.0, 0.0), Point3(0.0, 0.0, 1.0)
-    u, v, w = turned_back(p, turned(q, x)), turned_back(p, turned(q, y)), turned_back(p, turned(q, z))
+    u, v, w = turned_back(p, column(q, 0)), turned_back(p, column(q, 1)), turned_back(p, column(q, 2))
     origin, other = a.mesh.origin, b.mesh.origin
     there = turned(q, scaled(Point3(other[0], other[1], other[2]), b.unit))
-    moved = scaled(Point3(q.x - p.x, q.y - p.y, q.z - p.z), a.unit)
+    moved = scaled(minus(q.shift, p.shift), a.unit)
     t = turned_back(p, Point3(there.x + moved.x, there.y + moved.y, there.z + moved.z))
-    shift = Point3(t.x - origin[0] * a.unit, t.y - origin[1] * a.unit, t.z - origin[2] * a.unit)
+    shift = minus(t, scaled(Point3(origin[0], origin[1], origin[2]), a.unit))
     size = 4.0 * (a.mesh.extent.reach * a.unit + b.mesh.extent.reach * b.unit) + 2.0 * largest_of(moved)
     defect = defect_of(p) + defect_of(q)
     return Frame(
@@ -162,11 +156,8 @@ def box_bound(s: Search, most: float, c: Point3, h: Point3, other: Point3, half:
     mx, my, mz = magnitudes(f.x), magnitudes(f.y), magnitudes(f.z)
     x, y, z = _gap(v.x, h.x + dot(mx, half)), _gap(v.y, h.y + dot(my, half)), _gap(v.z, h.z + dot(mz, half))
     square = x * x + y * y + z * z
-    w = Point3(
-        f.x.x * v.x + f.y.x * v.y + f.z.x * v.z,
-        f.x.y * v.x + f.y.y * v.y + f.z.y * v.z,
-        f.x.z * v.x + f.y.z * v.y + f.z.z * v.z,
-    )
+    p, q, r = Point3(f.x.x, f.y.x, f.z.x), Point3(f.x.y, f.y.y, f.z.y), Point3(f.x.z, f.y.z, f.z.z)
+    w = Point3(dot(p, v), dot(q, v), dot(r, v))
     x = _gap(w.x, half.x + mx.x * h.x + my.x * h.y + mz.x * h.z)
     y = _gap(w.y, half.y + mx.y * h.x + my.y * h.y + mz.y * h.z)
     z = _gap(w.z, half.z + mx.z * h.x + my.z * h.y + mz.z * h.z)
@@ -178,26 +169,23 @@ def box_bound(s: Search, most: float, c: Point3, h: Point3, other: Point3, half:
 
 
 @merged
+def _in_lane(view: View, at: int, row: int) -> Point3:
+    node, lane, b = at >> 3, at & 7, view.mesh.boxes
+    p = Point3(float(b[node, row, lane]), float(b[node, row + 1, lane]), float(b[node, row + 2, lane]))
+    return scaled(p, view.mesh.scale * view.unit)
+
+
+@merged
 def lane_centre(view: View, at: int) -> Point3:
     """Return the centre of a box in the axes of its body, from the origin of its tree; ROOT is all of the tree."""
-    if at == ROOT:
-        return Point3(0.0, 0.0, 0.0)
-    node, lane, boxes, scale = at >> 3, at & 7, view.mesh.boxes, view.mesh.scale * view.unit
-    return Point3(
-        scale * float(boxes[node, 0, lane]), scale * float(boxes[node, 1, lane]), scale * float(boxes[node, 2, lane])
-    )
+    return Point3(0.0, 0.0, 0.0) if at == ROOT else _in_lane(view, at, 0)
 
 
 @merged
 def lane_half(view: View, at: int) -> Point3:
     """Return the half widths of a box."""
-    scale = view.mesh.scale * view.unit
-    if at == ROOT:
-        return Point3(2.0 * scale, 2.0 * scale, 2.0 * scale)
-    node, lane, boxes = at >> 3, at & 7, view.mesh.boxes
-    return Point3(
-        scale * float(boxes[node, 3, lane]), scale * float(boxes[node, 4, lane]), scale * float(boxes[node, 5, lane])
-    )
+    whole = 2.0 * (view.mesh.scale * view.unit)
+    return Point3(whole, whole, whole) if at == ROOT else _in_lane(view, at, 3)
 
 
 @inline
@@ -208,6 +196,6 @@ def set_line(line: Any, a: View, b: View, d: Point3) -> None:
     line[0], line[1], line[2] = e.x, e.y, e.z
     line[3], line[4], line[5] = f.x, f.y, f.z
     line[6], line[7], line[8] = d.x, d.y, d.z
-    line[9] = dot(d, scaled(Point3(a.place.x, a.place.y, a.place.z), a.unit))
-    line[10] = dot(d, scaled(Point3(b.place.x, b.place.y, b.place.z), b.unit))
+    line[9] = dot(d, scaled(a.place.shift, a.unit))
+    line[10] = dot(d, scaled(b.place.shift, b.unit))
     line[11] += 1.0

@@ -17,8 +17,9 @@ from __future__ import annotations
 from typing import Any, Final
 
 from engine.collision.clearance.boxes import Search, View
-from engine.collision.clearance.refined import Triangle, corners_of, ends_of, height_above, named, shift_of, vertex_of
+from engine.collision.clearance.refined import corners_of, ends_of, height_above, named, shift_of
 from engine.collision.clearance.wide import Wide, Wide3, dot_wide, minus_wide, over, plus, root, times
+from engine.collision.meshes.triangle_triangle import Facet, corner
 from engine.jit import called, inline
 from engine.predicates.double_double import surely_rounded
 
@@ -26,13 +27,13 @@ _SLACK: Final = 2.0**-86
 
 
 @inline
-def _is_beyond(view: View, triangle: int, known: tuple[int, int, int], t: Triangle, n: Wide3, base: Wide3,
+def _is_beyond(view: View, triangle: int, known: tuple[int, int, int], t: Facet, n: Wide3, base: Wide3,
                slack: float) -> bool:  # fmt: skip
     """Tell whether the corners of a triangle that are none of a feature lie strictly beyond the plane across n."""
     for k in range(3):
         if view.mesh.triangles[triangle, k] in known:
             continue
-        if not height_above(n, vertex_of(t, k), base).h < -slack:
+        if not height_above(n, corner(t, k), base).h < -slack:
             return False
     return True
 
@@ -47,17 +48,13 @@ def _write(view: View, known: tuple[int, int, int], p: Wide3, n: Wide3, radius: 
     for k, at, way in ((0, p.x, n.x), (1, p.y, n.y), (2, p.z, n.z)):
         if k >= point.shape[0]:
             continue
-        first, second, third = (
-            known[0],
-            (known[1] if known[1] >= 0 else known[0]),
-            (known[2] if known[2] >= 0 else known[0]),
-        )
-        if is_given and v[first, k] == v[second, k] and v[first, k] == v[third, k]:
-            point[k] = v[first, k]  # of the whole feature
+        x, y, z = v[known[0], k], v[max(known[1], 0), k], v[max(known[2], 0), k]
+        if is_given and (known[1] < 0 or x == y) and (known[2] < 0 or x == z):
+            point[k] = x  # of the whole feature
             continue
-        x = plus(plus(at, times(over(way, size), Wide(radius, 0.0))), Wide(start[k] * view.unit, 0.0))
-        point[k] = x.h / view.unit
-        is_sure = is_sure and surely_rounded(x.h, x.low, bound) and 2.0**-1000 < abs(point[k]) < 2.0**1000
+        end = plus(plus(at, times(over(way, size), Wide(radius, 0.0))), Wide(start[k] * view.unit, 0.0))
+        point[k] = end.h / view.unit
+        is_sure = is_sure and surely_rounded(end.h, end.low, bound) and 2.0**-1000 < abs(point[k]) < 2.0**1000
     return is_sure
 
 
@@ -78,10 +75,8 @@ def certify(s: Search, start: Any, other: Any, radii: Any, n: int, points: Any) 
     for column in range(4):
         pairs[0, column] = pairs[best, column]
     none = Wide(0.0, 0.0)
-    t, u = (
-        corners_of(s.a, pairs[0, 0], Wide3(none, none, none)),
-        corners_of(s.b, pairs[0, 1], shift_of(s, start, other)),
-    )
+    t = corners_of(s.a, pairs[0, 0], Wide3(none, none, none))
+    u = corners_of(s.b, pairs[0, 1], shift_of(s, start, other))
     p, q, inside, steepness = ends_of(t, u, pairs[0, 2], pairs[0, 3])
     error = _SLACK * steepness + 2.0**-92
     slack, way, back = _SLACK + 16.0 * error, minus_wide(q, p), minus_wide(p, q)

@@ -12,7 +12,7 @@ from engine.collision.clearance.half_spaces import gap_of_planes
 from engine.collision.clearance.result import Clearance
 from engine.collision.clearance.spreads import spread_pair
 from engine.collision.collide import check_pose, collide_pair, pair_function
-from engine.collision.result import UNLIMITED, Work
+from engine.collision.result import UNLIMITED, Poses, Work
 from engine.errors import InvalidInputError
 from engine.parallel import Budget, Cancel, Options, Progress, check_options
 from engine.solids.base import Solid
@@ -85,13 +85,14 @@ def clearance(
     check_pose(second_pose, second, "second_pose")
     check_options(workers, progress, report=report)
     least = None if at_least is None else checked_distance(at_least)
+    poses = first_pose, second_pose
     if first_pose is not None and first_pose == second_pose:
-        first_pose = second_pose = None  # as `collide_pair` does, so that the two agree
+        poses = None, None  # as `collide_pair` does, so that the two agree
     if deadline is None and cancel is None and progress is None and not report:
-        return _answer(first, second, first_pose, second_pose, least, UNLIMITED)
+        return _answer(first, second, poses, least, UNLIMITED)
     with Budget(deadline, cancel) as budget:
         budget.check()
-        answer = _answer(first, second, first_pose, second_pose, least, budget)
+        answer = _answer(first, second, poses, least, budget)
     if progress is not None:
         progress(1)
     if not report:
@@ -111,33 +112,31 @@ def checked_distance(value: Any, name: str = "at_least") -> float:
     return number
 
 
-def do_meet(first: Solid, second: Solid, first_pose: Pose | None, second_pose: Pose | None, budget: Budget) -> bool:
+def do_meet(first: Solid, second: Solid, poses: Poses, budget: Budget) -> bool:
     """Tell whether two bodies have a common point."""
     work = Work(budget, witness=False, boolean=True)
-    return collide_pair(first, second, first_pose, second_pose, work).relation != Relation.DISJOINT
+    return collide_pair(first, second, poses, work).relation != Relation.DISJOINT
 
 
-def _answer(
-    first: Solid, second: Solid, first_pose: Pose | None, second_pose: Pose | None, least: float | None, budget: Budget
-) -> Clearance | bool:
+def _answer(first: Solid, second: Solid, poses: Poses, least: float | None, budget: Budget) -> Clearance | bool:
     """Return how far apart two bodies are, or whether at least so far: by closed forms, by planes, by a search."""
     if least == 0.0:
         return True
     planes = has_plane(first, second)
-    closed = (between_form_and_plane if planes else between_forms)(first, second, first_pose, second_pose, least)
+    closed = (between_form_and_plane if planes else between_forms)(first, second, poses, least)
     if closed is None and first.dimension == 2 and not planes:
-        closed = between_outlines(first, second, first_pose, second_pose, least)
+        closed = between_outlines(first, second, poses, least)
     if closed is not None:
         return closed
     if least is not None and not planes:
         answers = np.full(1, np.nan)
-        spread_pair(first, second, first_pose, second_pose, budget).fill(0, 1, answers, Fraction(least))
-        return bool(answers[0] > 0.0) and not do_meet(first, second, first_pose, second_pose, budget)
-    if do_meet(first, second, first_pose, second_pose, budget):
+        spread_pair(first, second, poses, budget).fill(0, 1, answers, Fraction(least))
+        return bool(answers[0] > 0.0) and not do_meet(first, second, poses, budget)
+    if do_meet(first, second, poses, budget):
         return MEETING if least is None else False
     if not planes:
-        return spread_pair(first, second, first_pose, second_pose, budget).clearance(0)
-    gap, features = gap_of_planes(first, second, first_pose, second_pose, budget)
+        return spread_pair(first, second, poses, budget).clearance(0)
+    gap, features = gap_of_planes(first, second, poses, budget)
     return gap.clearance(features, first.dimension) if least is None else gap.is_at_least(Fraction(least))
 
 

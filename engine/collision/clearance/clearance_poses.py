@@ -12,11 +12,12 @@ from engine.collision.clearance.bodies import in_space
 from engine.collision.clearance.clearance import checked_distance, do_meet, has_plane
 from engine.collision.clearance.half_spaces import gap_of_planes
 from engine.collision.clearance.spreads import SpreadPair
-from engine.collision.codes import DISJOINT, UNSETTLED
+from engine.collision.codes import DISJOINT, TOUCHING, UNSETTLED
 from engine.collision.collide import pair_function
 from engine.collision.collide_poses import as_poses, batch_of
 from engine.collision.meshes.mesh_arrays import STILL
 from engine.collision.meshes.placement import PoseArrays
+from engine.collision.result import Poses
 from engine.parallel import Budget, Cancel, Progress, check_options, run_chunks
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
@@ -89,10 +90,13 @@ class _Batch:
             self.relate(start, stop)
         for item in range(start, stop):
             self.budget.check()
-            if self._do_meet(item):
+            if self.relations[item] == UNSETTLED:
+                meets = do_meet(self.first, self.second, self._poses(item), self.budget)
+                self.relations[item] = TOUCHING if meets else DISJOINT
+            if self.relations[item] != DISJOINT:
                 answers[item] = 0.0
             elif self.spread is None:
-                gap, _ = gap_of_planes(self.first, self.second, None, self._pose(item), self.budget)
+                gap, _ = gap_of_planes(self.first, self.second, self._poses(item), self.budget)
                 answers[item] = gap.distance() if least is None else (np.inf if gap.is_at_least(least) else 0.0)
         if self.spread is None:
             self.n_exact += stop - start
@@ -101,10 +105,5 @@ class _Batch:
             pair.fill(start, stop, answers, least)
             self.n_exact += pair.n_exact
 
-    def _do_meet(self, item: int) -> bool:
-        if self.relations[item] != UNSETTLED:
-            return bool(self.relations[item] != DISJOINT)
-        return do_meet(self.first, self.second, None, self._pose(item), self.budget)
-
-    def _pose(self, item: int) -> Pose:
-        return Pose(self.poses.rotations[item], self.poses.translations[item])
+    def _poses(self, item: int) -> Poses:
+        return None, Pose.of_checked(self.poses.rotations[item], self.poses.translations[item])

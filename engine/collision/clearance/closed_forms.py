@@ -99,8 +99,7 @@ def _place(form: Any, turn: Any, move: Any, w: Any, first: int) -> float:
             is_turned = is_turned or turn[k, m] != (1.0 if k == m else 0.0)
     for k in range(d):
         for side in range(2):
-            h, low = two_sum(form[3 * side + k], move[k])
-            x = Wide(h, low)
+            x = Wide(*two_sum(form[3 * side + k], move[k]))
             if is_turned:
                 x, terms = Wide(move[k], 0.0), abs(move[k])
                 for m in range(d):
@@ -110,9 +109,7 @@ def _place(form: Any, turn: Any, move: Any, w: Any, first: int) -> float:
             w[first + 4 * k + 2 * side], w[first + 4 * k + 2 * side + 1] = x.h, x.low
             if not abs(x.h) < _LARGEST:
                 return float("inf")
-    if not is_turned:
-        return 0.0
-    return 16.0 * U2 * size + _TINY if form[IS_BALL] > 0.0 else float("inf")
+    return 0.0 if not is_turned else (16.0 * U2 * size + _TINY if form[IS_BALL] > 0.0 else float("inf"))
 
 
 @inline
@@ -129,18 +126,15 @@ def gap_of_forms(
     square, rest = Wide(0.0, 0.0), Wide(0.0, 0.0)
     is_sure, bound = error < float("inf"), 0.0
     for k in range(d):
-        low, high, their_low, their_high = (
-            _wide(w, 4 * k), _wide(w, 4 * k + 2), _wide(w, 4 * k + 12), _wide(w, 4 * k + 14),
-        )  # fmt: skip
+        low, high = _wide(w, 4 * k), _wide(w, 4 * k + 2)
+        their_low, their_high = _wide(w, 4 * k + 12), _wide(w, 4 * k + 14)
         up, down = less(their_low, high), less(low, their_high)
-        signs = (
-            _sign(up, error), _sign(down, error),
-            _sign(less(low, their_low), error), _sign(less(high, their_high), error),
-        )  # fmt: skip
-        is_sure = is_sure and max(signs) < 2
-        here, there = _touched(signs[0], signs[1], signs[2], signs[3])
+        above, below = _sign(up, error), _sign(down, error)
+        lows, highs = _sign(less(low, their_low), error), _sign(less(high, their_high), error)
+        is_sure = is_sure and max(above, below, lows, highs) < 2
+        here, there = _touched(above, below, lows, highs)
         faces, theirs = faces | here << 2 * k, theirs | there << 2 * k
-        gap = up if signs[0] > 0 else (Wide(-down.h, -down.low) if signs[1] > 0 else Wide(0.0, 0.0))
+        gap = up if above > 0 else (Wide(-down.h, -down.low) if below > 0 else Wide(0.0, 0.0))
         w[_GAPS + 2 * k], w[_GAPS + 2 * k + 1] = gap.h, gap.low
         if gap.h != 0.0:
             n_apart += 1
@@ -148,16 +142,16 @@ def gap_of_forms(
             rest = Wide(abs(gap.h), gap.low if gap.h > 0.0 else -gap.low)
             is_exact = low.low == 0.0 and high.low == 0.0 and their_low.low == 0.0 and their_high.low == 0.0
             bound = 0.0 if is_exact else 4.0 * U2 * rest.h
-        elif signs[0] < 0 and signs[1] < 0 and form[IS_BALL] + other[IS_BALL] == 0.0:
+        elif above < 0 and below < 0 and form[IS_BALL] + other[IS_BALL] == 0.0:
             free |= 1 << k
     faces, theirs = _ends_of_shared(faces, theirs, free, d)
     if n_apart > 1:
         is_sure = is_sure and 2.0**-900 < square.h < 2.0**1000
         rest = root(square)
         bound = 32.0 * U2 * rest.h
-    h, low = two_sum(form[RADIUS], other[RADIUS])
-    distance = less(rest, Wide(h, low))
-    bound += 2.0 * error + (4.0 * U2 * abs(distance.h) if h > 0.0 else 0.0)
+    radii = Wide(*two_sum(form[RADIUS], other[RADIUS]))
+    distance = less(rest, radii)
+    bound += 2.0 * error + (4.0 * U2 * abs(distance.h) if radii.h > 0.0 else 0.0)
     if not is_sure:
         return UNSURE, faces, theirs, rest, error
     if distance.h < -bound or (distance.h == 0.0 and bound == 0.0):
@@ -233,11 +227,10 @@ def nearest_of_plane(row: Any, form: Any, turn: Any, move: Any, points: Any) -> 
         step, outward = over(times(n, value), square), over(times(n, Wide(form[RADIUS], 0.0)), norm)
         foot, p = less(x, step), (plus(x, outward) if row[k] != 0.0 and form[RADIUS] > 0.0 else x)
         points[0, k], points[1, k] = foot.h + 0.0, p.h + 0.0
+        bound = 0.0
         if row[k] != 0.0:
             bound = 128.0 * U2 * abs(step.h) + 2.0 * slack * abs(row[k]) / square.h + 4.0 * U2 * abs(foot.h)
             is_sure = is_sure and surely_rounded(foot.h, foot.low, bound + error + _PLANE_TINY)
             bound = 128.0 * U2 * abs(outward.h) + 4.0 * U2 * abs(p.h) + _PLANE_TINY if form[RADIUS] > 0.0 else 0.0
-        else:
-            bound = 0.0
         is_sure = is_sure and surely_rounded(p.h, p.low, bound + error)
     return distance.h, 0 if is_sure else -1, faces

@@ -20,12 +20,13 @@ import numpy as np
 
 from engine.collision.clearance.closed_forms import gap_of_forms
 from engine.collision.clearance.near_triangles import FACE
-from engine.collision.clearance.refined import ROUNDING, Triangle, corner_of, ends_of, height_above
+from engine.collision.clearance.refined import ROUNDING, corner_of, ends_of, height_above
 from engine.collision.clearance.wide import Wide, Wide3, dot_wide, less, minus_wide, root
-from engine.collision.convex.body import ASIDE, CENTER, REACH, ConvexArrays
+from engine.collision.convex.body import ASIDE, CENTER, REACH, ConvexArrays, point_of
 from engine.collision.convex.pair import inner_point
-from engine.collision.convex.xenocollide import PlacedBody, farthest, largest, placed_body, point_of
+from engine.collision.convex.xenocollide import PlacedBody, farthest, largest, placed_body
 from engine.collision.meshes.placement import PoseArrays, placed, turned_back
+from engine.collision.meshes.triangle_triangle import Facet
 from engine.jit import bare_kernel, called, inline, merged
 from engine.predicates.double_double import surely_rounded
 from engine.predicates.error_free import two_diff, two_sum, workspace
@@ -89,11 +90,8 @@ def _with(s: Simplex, new: Corner) -> tuple[Simplex, Point3]:
     for turn in range(3):
         p, q = (s.b if turn == 2 else s.a), (s.b if turn == 0 else s.c)
         x, y, z = _weights(new.at, p.at, q.at)
-        v = Point3(
-            x * new.at.x + y * p.at.x + z * q.at.x,
-            x * new.at.y + y * p.at.y + z * q.at.y,
-            x * new.at.z + y * p.at.z + z * q.at.z,
-        )
+        w, a, b, c = Point3(x, y, z), new.at, p.at, q.at
+        v = Point3(dot(w, Point3(a.x, b.x, c.x)), dot(w, Point3(a.y, b.y, c.y)), dot(w, Point3(a.z, b.z, c.z)))
         if dot(v, v) < best:
             best, nearest = dot(v, v), v
             first = new if x > 0.0 else (p if y > 0.0 else q)
@@ -165,25 +163,24 @@ def _dual(pool: ConvexArrays, f: PlacedBody, vertex: int, shift: Wide3) -> Wide3
 @called
 def _proven(pool: ConvexArrays, s: Simplex, a: PlacedBody, b: PlacedBody, reach: float) -> float:
     """Return the double nearest to the distance, NaN where the features of a simplex do not prove it."""
-    origin, p, q = Wide(0.0, 0.0), a.place, b.place
-    x, y, z = two_diff(q.x, p.x), two_diff(q.y, p.y), two_diff(q.z, p.z)
-    here, there = Wide3(origin, origin, origin), Wide3(Wide(x[0], x[1]), Wide(y[0], y[1]), Wide(z[0], z[1]))
+    origin, p, q = Wide(0.0, 0.0), a.place.shift, b.place.shift
+    here = Wide3(origin, origin, origin)
+    there = Wide3(Wide(*two_diff(q.x, p.x)), Wide(*two_diff(q.y, p.y)), Wide(*two_diff(q.z, p.z)))
     i, j = _kinds(s.a.i, s.b.i, s.c.i), _kinds(s.a.j, s.b.j, s.c.j)
-    t = Triangle(_dual(pool, a, i[0], here), _dual(pool, a, i[1], here), _dual(pool, a, i[2], here))
-    u = Triangle(_dual(pool, b, j[0], there), _dual(pool, b, j[1], there), _dual(pool, b, j[2], there))
+    t = Facet(_dual(pool, a, i[0], here), _dual(pool, a, i[1], here), _dual(pool, a, i[2], here))
+    u = Facet(_dual(pool, b, j[0], there), _dual(pool, b, j[1], there), _dual(pool, b, j[2], there))
     p_end, q_end, _, _ = ends_of(t, u, i[3], j[3])
     n = minus_wide(q_end, p_end)
     square = dot_wide(n, n)
-    size_of_all = reach + max(abs(x[0]), abs(y[0]), abs(z[0]))
+    size_of_all = reach + max(abs(there.x.h), abs(there.y.h), abs(there.z.h))
     if not (square.h > _SMALLEST and square.h > 2.0**-80 * size_of_all * size_of_all):
         return np.nan
     beyond = max(
         _beyond(pool, a, n, p_end, here, size_of_all), _beyond(pool, b, minus_wide(here, n), q_end, there, size_of_all)
     )
-    size = root(square)
-    h, low = two_sum(a.round, b.round)
-    distance = less(size, Wide(h, low))
-    bound = 2.0 * beyond / size.h + ROUNDING * (size_of_all + h)
+    size, radii = root(square), Wide(*two_sum(a.round, b.round))
+    distance = less(size, radii)
+    bound = 2.0 * beyond / size.h + ROUNDING * (size_of_all + radii.h)
     is_sure = distance.h > bound and surely_rounded(distance.h, distance.low, bound)
     return distance.h if is_sure else np.nan
 

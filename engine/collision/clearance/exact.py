@@ -8,7 +8,6 @@ that fails, all pairs of features are tried.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from fractions import Fraction
 from typing import Final, NamedTuple
 
@@ -99,23 +98,22 @@ class ScaledGap(NamedTuple):
 def nearest_of_triangles(s: Corners, t: Corners, first: int, second: int) -> Gap:
     """Return the gap between two triangles that are apart; first, second: the features that are probably nearest."""
     suggested = _gap(s, t, first, second)
-    if suggested is not None and _is_least(s, t, suggested):
-        return suggested
-    best: Gap | None = None
-    for found in _all_gaps(s, t):
-        if best is None or found.is_less(best):
+    if suggested is not None:
+        wall, other = walls(suggested)
+        if all(is_beyond(wall, corner) for corner in s) and all(is_beyond(other, corner) for corner in t):
+            return suggested
+    best = None
+    for i, j in _PAIRS:
+        found = _gap(s, t, i, j)
+        if found is not None and (best is None or found.is_less(best)):
             best = found
     assert best is not None
     return best
 
 
-def _all_gaps(s: Corners, t: Corners) -> Iterator[Gap]:
-    """Yield the gaps of all pairs of features, those of vertices first."""
-    pairs = [(i, j) for i in range(7) for j in range(7) if (i < 6 and j < 6) or i < 3 or j < 3]
-    for i, j in sorted(pairs, key=lambda pair: max(pair[0] // 3, pair[1] // 3)):
-        found = _gap(s, t, i, j)
-        if found is not None:
-            yield found
+_ALL: Final = [(i, j) for i in range(7) for j in range(7) if (i < 6 and j < 6) or i < 3 or j < 3]
+_PAIRS: Final = sorted(_ALL, key=lambda pair: max(pair[0] // 3, pair[1] // 3))
+"""Of features, those of vertices first."""
 
 
 def walls(gap: Gap) -> tuple[Wall, Wall]:
@@ -131,34 +129,28 @@ def is_beyond(wall: Wall, point: Vector) -> bool:
     return dot(n, point) * size <= at
 
 
-def _is_least(s: Corners, t: Corners, gap: Gap) -> bool:
-    """Tell whether the triangles lie beyond the planes across the gap through its ends."""
-    first, second = walls(gap)
-    return all(is_beyond(first, corner) for corner in s) and all(is_beyond(second, corner) for corner in t)
-
-
 def _gap(s: Corners, t: Corners, first: int, second: int) -> Gap | None:
     """Return the gap of two features, None where the nearest points of their lines or planes lie off them."""
-    if first < 3 and second < 3:
-        return _between(Rational(s[first], 1), Rational(t[second], 1), first, second)
     if first < 3:
         foot = _foot(s[first], t, second)
         return None if foot is None else _between(Rational(s[first], 1), foot[0], first, foot[1])
     if second < 3:
         foot = _foot(t[second], s, first)
         return None if foot is None else _between(foot[0], Rational(t[second], 1), foot[1], second)
-    if first == FACE or second == FACE:
-        return None
-    return _edges(s, first - 3, t, second - 3)
+    return None if FACE in (first, second) else _edges(s, first - 3, t, second - 3)
 
 
 def _between(p: Rational, q: Rational, first: int, second: int) -> Gap:
+    """Return the gap of two points on some features."""
     n = tuple(y * p.denominator - x * q.denominator for x, y in zip(p.numerators, q.numerators))
     return Gap(p, q, first, second, squared_length(n), (p.denominator * q.denominator) ** 2)
 
 
 def _foot(point: Vector, t: Corners, feature: int) -> tuple[Rational, int] | None:
-    """Return the foot of a point on an edge or on all of a triangle, and the feature it lies on; None if it is off."""
+    """Return the foot of a point on a vertex, an edge or all of a triangle, and the feature it lies on; None if it is
+    off. Numbers may be fractions."""
+    if feature < 3:
+        return Rational(t[feature], 1), feature
     if feature < FACE:
         k = feature - 3
         a, u = t[k], minus(t[(k + 1) % 3], t[k])
@@ -181,10 +173,8 @@ def _foot(point: Vector, t: Corners, feature: int) -> tuple[Rational, int] | Non
 def _on_edge(t: Corners, k: int, part: int, whole: int) -> tuple[Rational, int] | None:
     """Return the point at part / whole of an edge, and the feature it lies on; None where it is beyond the ends."""
     a, b = t[k], t[(k + 1) % 3]
-    if part == 0:
-        return Rational(a, 1), k
-    if part == whole:
-        return Rational(b, 1), (k + 1) % 3
+    if part == 0 or part == whole:
+        return Rational(b if part else a, 1), ((k + 1) % 3 if part else k)
     if not 0 < part < whole:
         return None
     return Rational(tuple(x * (whole - part) + y * part for x, y in zip(a, b)), whole), 3 + k

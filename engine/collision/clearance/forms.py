@@ -23,6 +23,7 @@ from engine.collision.clearance.exact import Gap, Rational, ScaledGap
 from engine.collision.clearance.outlines import nearest_of_outlines
 from engine.collision.clearance.result import Clearance, Feature
 from engine.collision.exact_images import Vector, as_vector, image_point
+from engine.collision.result import Poses
 from engine.direct import entry_of
 from engine.predicates.exact_vectors import minus, squared_length
 from engine.predicates.rational import sign_of
@@ -72,76 +73,61 @@ def _form(solid: Solid) -> FloatArray | None:
     return None
 
 
-def between_forms(
-    first: Solid, second: Solid, first_pose: Pose | None, second_pose: Pose | None, least: float | None
-) -> Clearance | bool | None:
+def _told(distance: float, least: float | None) -> Clearance | bool | None:
+    """Return what a distance tells by itself, as the distance rounded to nearest does; None for no answer yet."""
+    if least is not None and distance not in (UNSURE, least):
+        return bool(distance > least)
+    return MEETING if distance == 0.0 else None
+
+
+def between_forms(first: Solid, second: Solid, poses: Poses, least: float | None) -> Clearance | bool | None:
     """Return the clearance of two boxes or balls, or whether it is at least so much; None for other bodies, and boxes
     that are turned."""
     form, other = form_of(first), form_of(second)
     if form is None or other is None:
         return None
     d = first.dimension
-    points = np.empty((2, d))
-    (turn, move), (their_turn, their_move) = motion_of(first_pose, d), motion_of(second_pose, d)
-    distance, faces, theirs = entry_of(nearest_of_forms)(form, turn, move, other, their_turn, their_move, points)
-    if least is not None and distance not in (UNSURE, least):
-        return bool(distance > least)  # as the distance rounded to nearest is
-    if distance == 0.0:
-        return MEETING
+    points, own, their = np.empty((2, d)), motion_of(poses[0], d), motion_of(poses[1], d)
+    distance, faces, theirs = entry_of(nearest_of_forms)(form, *own, other, *their, points)
+    told = _told(distance, least)
+    if told is not None:
+        return told
     if distance > 0.0 and faces >= 0 and least is None:
         return _answer(distance, points, _named(first, faces), _named(second, theirs))
-    placed = _placed_exactly(first, first_pose), _placed_exactly(second, second_pose)
-    if placed[0] is None or placed[1] is None:
-        return None
-    return _settled((first, second), placed[0], placed[1], least)
+    placed = _placed_exactly(first, poses[0]), _placed_exactly(second, poses[1])
+    return None if placed[0] is None or placed[1] is None else _settled((first, second), placed[0], placed[1], least)
 
 
-def between_form_and_plane(
-    first: Solid, second: Solid, first_pose: Pose | None, second_pose: Pose | None, least: float | None
-) -> Clearance | bool | None:
+def between_form_and_plane(first: Solid, second: Solid, poses: Poses, least: float | None) -> Clearance | bool | None:
     """Return what `between_forms` does, one of the two a half-space without a pose; None where that is not sure."""
     is_second = isinstance(second, HalfSpace)
-    plane, body, pose = (second, first, first_pose) if is_second else (first, second, second_pose)
+    plane, body = (second, first) if is_second else (first, second)
     form = form_of(body)
-    if form is None or not isinstance(plane, HalfSpace) or (second_pose if is_second else first_pose) is not None:
+    if form is None or not isinstance(plane, HalfSpace) or poses[is_second] is not None:
         return None
-    d = body.dimension
-    points = np.empty((2, d))
-    turn, move = motion_of(pose, d)
-    distance, told, faces = entry_of(nearest_of_plane)(plane.row, form, turn, move, points)
-    if least is not None and distance not in (UNSURE, least):
-        return bool(distance > least)
-    if distance == 0.0:
-        return MEETING
-    if not distance > 0.0 or told < 0 or least is not None:
-        return None
-    feature = _named(body, faces)
-    return (
-        _answer(distance, points[::-1].copy(), feature, PLANE)
-        if is_second
-        else _answer(distance, points, PLANE, feature)
-    )
+    points = np.empty((2, body.dimension))
+    motion = motion_of(poses[not is_second], body.dimension)
+    distance, told, faces = entry_of(nearest_of_plane)(plane.row, form, *motion, points)
+    answer = _told(distance, least)
+    if answer is not None or not distance > 0.0 or told < 0 or least is not None:
+        return answer
+    if is_second:
+        return _answer(distance, points[::-1].copy(), _named(body, faces), PLANE)
+    return _answer(distance, points, PLANE, _named(body, faces))
 
 
-def between_outlines(
-    first: Solid, second: Solid, first_pose: Pose | None, second_pose: Pose | None, least: float | None
-) -> Clearance | bool | None:
+def between_outlines(first: Solid, second: Solid, poses: Poses, least: float | None) -> Clearance | bool | None:
     """Return what `between_forms` does, of two bodies of the plane; None where that is not sure, or they are large."""
     (vertices, following), (other, their_following) = outline_of(first), outline_of(second)
     if len(vertices) * len(other) > _MOST_PAIRS:
         return None
-    points = np.empty((2, 2))
-    (turn, move), (their_turn, their_move) = motion_of(first_pose, 2), motion_of(second_pose, 2)
+    points, motion, their = np.empty((2, 2)), motion_of(poses[0], 2), motion_of(poses[1], 2)
     distance, own, theirs = entry_of(nearest_of_outlines)(
-        vertices, following, turn, move, other, their_following, their_turn, their_move,
-        (radius_of(first), radius_of(second)), points,
-    )  # fmt: skip
-    if distance == 0.0:
-        return MEETING if least is None else False
-    if least is not None and distance not in (UNSURE, least):
-        return bool(distance > least)
-    if own < 0 or least is not None:
-        return None
+        vertices, following, *motion, other, their_following, *their, (radius_of(first), radius_of(second)), points
+    )
+    told = _told(distance, least)
+    if told is not None or own < 0 or least is not None:
+        return told
     return _answer(distance, points, _of_outline(first, following, own), _of_outline(second, their_following, theirs))
 
 

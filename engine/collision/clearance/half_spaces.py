@@ -16,44 +16,39 @@ from engine.collision.clearance.forms import PLANE, scaled_gap
 from engine.collision.clearance.result import Feature
 from engine.collision.exact_images import HalfSpaceImage, Vector, image_half_space, image_map, value_at
 from engine.collision.meshes.mesh_arrays import MeshBody
+from engine.collision.result import Poses
 from engine.collision.simple.boundary import pulled_back
 from engine.parallel import Budget
 from engine.predicates.exact_vectors import squared_length
 from engine.solids.base import Solid
 from engine.solids.half_space import HalfSpace
-from engine.solids.pose import Pose
 
 
 def gap_of_planes(
-    solid: Solid, other: Solid, pose: Pose | None, other_pose: Pose | None, budget: Budget
+    solid: Solid, other: Solid, poses: Poses, budget: Budget
 ) -> tuple[ScaledGap, tuple[Feature, Feature]]:
     """Return the gap of two bodies without a common point, one of them a half-space or both, and what it ends on."""
     if isinstance(solid, HalfSpace) and isinstance(other, HalfSpace):
-        return _of_planes(image_half_space(solid.normal, solid.offset, pose),
-                          image_half_space(other.normal, other.offset, other_pose)), (PLANE, PLANE)  # fmt: skip
+        # their planes are parallel; of all lines across, that through the origin
+        planes = image_half_space(solid, poses[0]), image_half_space(other, poses[1])
+        p, q = (tuple(-offset * x / squared_length(normal) for x in normal) for normal, offset in planes)
+        return scaled_gap(p, q, (0.0, 0.0)), (PLANE, PLANE)
     if isinstance(solid, HalfSpace):
-        foot, point, feature = _foot_and_vertex(solid, pose, other, other_pose, budget)
+        foot, point, feature = _foot_and_vertex(solid, other, poses, budget)
         return scaled_gap(foot, point, (0.0, radius_of(other))), (PLANE, feature)
     assert isinstance(other, HalfSpace)
-    foot, point, feature = _foot_and_vertex(other, other_pose, solid, pose, budget)
+    foot, point, feature = _foot_and_vertex(other, solid, poses[::-1], budget)
     return scaled_gap(point, foot, (radius_of(solid), 0.0)), (feature, PLANE)
 
 
-def _of_planes(first: HalfSpaceImage, second: HalfSpaceImage) -> ScaledGap:
-    """Return the gap of two half-spaces: their planes are parallel. Of all lines across, that through the origin."""
-    p, q = (tuple(-offset * x / squared_length(normal) for x in normal) for normal, offset in (first, second))
-    return scaled_gap(p, q, (0.0, 0.0))
-
-
 def _foot_and_vertex(
-    half_space: HalfSpace, half_space_pose: Pose | None, body: Solid, body_pose: Pose | None, budget: Budget
+    half_space: HalfSpace, body: Solid, poses: Poses, budget: Budget
 ) -> tuple[Vector, Vector, Feature]:
     """Return the point of a plane and the point of a body that are nearest, and the vertex the latter is."""
     mesh, d = spread_of(body), body.dimension
-    plane = image_half_space(half_space.normal, half_space.offset, half_space_pose)
-    image = image_map(body_pose)
+    plane, image = image_half_space(half_space, poses[0]), image_map(poses[1])
     best: tuple[Fraction, Vector, Feature] | None = None
-    for vertex in _highest(pulled_back(plane, body_pose), mesh, d).tolist():
+    for vertex in _highest(pulled_back(plane, poses[1]), mesh, d).tolist():
         budget.check()
         point = image(mesh.arrays.vertices[vertex, :d].tolist())
         value = value_at(plane, point)

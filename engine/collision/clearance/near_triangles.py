@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from engine.collision.meshes.triangle_triangle import Triangle3
+from engine.collision.meshes.triangle_triangle import Facet, corner
 from engine.jit import inline, merged
 from engine.predicates.vectors import cross, dot, largest_of, minus
 from engine.types import Point3
@@ -46,11 +46,6 @@ def _along(a: Point3, u: Point3, t: float) -> Point3:
 
 
 @merged
-def _corner(t: Triangle3, k: int) -> Point3:
-    return t.p if k == 0 else (t.q if k == 1 else t.r)
-
-
-@merged
 def _clamped(value: float) -> float:
     return min(max(value, 0.0), 1.0)
 
@@ -62,10 +57,10 @@ def _end_or_edge(t: float, k: int) -> int:
 
 
 @inline
-def _edges(best: Nearest, s: Triangle3, i: int, t: Triangle3, j: int) -> Nearest:
+def _edges(best: Nearest, s: Facet, i: int, t: Facet, j: int) -> Nearest:
     """Return the nearer of `best` and the nearest points of edge i of s and edge j of t."""
-    a, c = _corner(s, i), _corner(t, j)
-    u, v = minus(_corner(s, (i + 1) % 3), a), minus(_corner(t, (j + 1) % 3), c)
+    a, c = corner(s, i), corner(t, j)
+    u, v = minus(corner(s, i + 1), a), minus(corner(t, j + 1), c)
     w = minus(a, c)
     uu, uv, vv, uw, vw = dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w)
     size = uu * vv - uv * uv
@@ -77,13 +72,11 @@ def _edges(best: Nearest, s: Triangle3, i: int, t: Triangle3, j: int) -> Nearest
     p, q = _along(a, u, x), _along(c, v, y)
     gap = minus(q, p)
     square = dot(gap, gap)
-    if square < best.square:
-        return Nearest(p, q, _end_or_edge(x, i), _end_or_edge(y, j), square)
-    return best
+    return Nearest(p, q, _end_or_edge(x, i), _end_or_edge(y, j), square) if square < best.square else best
 
 
 @inline
-def _foot(p: Point3, t: Triangle3) -> tuple[bool, Point3]:
+def _foot(p: Point3, t: Facet) -> tuple[bool, Point3]:
     """Return whether the foot of p on the plane of t lies over the triangle, and the foot."""
     normal = cross(minus(t.q, t.p), minus(t.r, t.p))
     size = dot(normal, normal)
@@ -91,8 +84,8 @@ def _foot(p: Point3, t: Triangle3) -> tuple[bool, Point3]:
         return False, p
     foot = _along(p, normal, -dot(minus(p, t.p), normal) / size)
     for k in range(3):
-        corner = _corner(t, k)
-        if dot(cross(minus(_corner(t, (k + 1) % 3), corner), minus(p, corner)), normal) < 0.0:
+        start = corner(t, k)
+        if dot(cross(minus(corner(t, k + 1), start), minus(p, start)), normal) < 0.0:
             return False, foot
     return True, foot
 
@@ -108,7 +101,7 @@ class Across(NamedTuple):
 
 
 @inline
-def _across(s: Triangle3, t: Triangle3, found: Nearest, before: Across, most: float) -> Across:
+def _across(s: Facet, t: Facet, found: Nearest, before: Across, most: float) -> Across:
     """Return what is known once nearer points are found: the slab between the triangles across their line."""
     gap = minus(found.q, found.p)
     largest = largest_of(gap)
@@ -123,7 +116,7 @@ def _across(s: Triangle3, t: Triangle3, found: Nearest, before: Across, most: fl
 
 
 @inline
-def nearest_points(s: Triangle3, t: Triangle3, most: float) -> tuple[Nearest, Across]:
+def nearest_points(s: Facet, t: Facet, most: float) -> tuple[Nearest, Across]:
     """Return nearly nearest points of two triangles that are apart, and bounds; any points of them where they prove to
     be further apart than `most`."""
     best, across = Nearest(s.p, t.p, 0, 0, np.inf), Across(-np.inf, np.inf, Point3(0.0, 0.0, 0.0), False)
@@ -136,12 +129,12 @@ def nearest_points(s: Triangle3, t: Triangle3, most: float) -> tuple[Nearest, Ac
                     return best, across
     for turn in range(6):
         k, is_first = turn % 3, turn < 3
-        corner = _corner(s, k) if is_first else _corner(t, k)
-        is_over, foot = _foot(corner, t if is_first else s)
-        gap = minus(foot, corner)
+        end = corner(s if is_first else t, k)
+        is_over, foot = _foot(end, t if is_first else s)
+        gap = minus(foot, end)
         if is_over and dot(gap, gap) < best.square:
-            best = Nearest(corner, foot, k, FACE, dot(gap, gap)) if is_first else Nearest(
-                foot, corner, FACE, k, dot(gap, gap))  # fmt: skip
+            best = Nearest(end, foot, k, FACE, dot(gap, gap)) if is_first else Nearest(
+                foot, end, FACE, k, dot(gap, gap))  # fmt: skip
             across = _across(s, t, best, across, most)
             if across.is_done:
                 break
@@ -149,13 +142,13 @@ def nearest_points(s: Triangle3, t: Triangle3, most: float) -> tuple[Nearest, Ac
 
 
 @inline
-def seen_from(origin: Point3, s: Triangle3) -> Triangle3:
+def seen_from(origin: Point3, s: Facet) -> Facet:
     """Return the triangle with its coordinates counted from a point."""
-    return Triangle3(minus(s.p, origin), minus(s.q, origin), minus(s.r, origin))
+    return Facet(minus(s.p, origin), minus(s.q, origin), minus(s.r, origin))
 
 
 @inline
-def rounding_of(s: Triangle3, t: Triangle3) -> float:
+def rounding_of(s: Facet, t: Facet) -> float:
     """Return what rounding may add to a bound of two triangles seen from near them."""
     largest = max(largest_of(s.p), largest_of(s.q), largest_of(s.r))
     return _ROUNDING * max(largest, largest_of(t.p), largest_of(t.q), largest_of(t.r)) + _TINY

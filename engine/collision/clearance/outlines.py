@@ -320,9 +320,9 @@ def nearest_of_outlines(
     best, nearer, is_sure = _search(a, b)
     if not _SMALLEST < best.distance.h < _LARGEST:
         return UNSURE, -1, -1
-    h, low = two_sum(radii[0], radii[1])
-    distance, bound = less(best.distance, Wide(h, low)), best.bound + nearer
-    bound += 4.0 * U2 * abs(distance.h) if h > 0.0 else 0.0
+    both = Wide(*two_sum(radii[0], radii[1]))
+    distance, bound = less(best.distance, both), best.bound + nearer
+    bound += 4.0 * U2 * abs(distance.h) if both.h > 0.0 else 0.0
     if distance.h < -bound:
         return 0.0, -1, -1
     if not (distance.h > bound and surely_rounded(distance.h, distance.low, bound)):

@@ -13,7 +13,7 @@ Most candidates name the two features of the first, of which all that they add a
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 
@@ -35,6 +35,7 @@ from engine.collision.clearance.wide import (
 )
 from engine.collision.meshes.mesh_arrays import triangle_of
 from engine.collision.meshes.placement import Placement, turned
+from engine.collision.meshes.triangle_triangle import Facet, corner
 from engine.jit import called, inline
 from engine.predicates.double_double import surely_rounded
 from engine.predicates.error_free import two_diff
@@ -45,14 +46,6 @@ from engine.types import Point3
 ROUNDING: Final = 2.0**-94
 _ROUGHLY: Final = 2.0**-40
 """More than a scalar product of differences of rounded points, none above 2, may be off."""
-
-
-class Triangle(NamedTuple):
-    """Three corners."""
-
-    p: Wide3
-    q: Wide3
-    r: Wide3
 
 
 @inline
@@ -73,28 +66,21 @@ def _row(a: Point3, p: Point3, shift: Wide) -> Wide:
 @called
 def corner_of(place: Placement, p: Point3, shift: Wide3) -> Wide3:
     """Return a placed point, with `shift` in place of the translation."""
-    x = _row(Point3(place.xx, place.xy, place.xz), p, shift.x)
-    y = _row(Point3(place.yx, place.yy, place.yz), p, shift.y)
-    return Wide3(x, y, _row(Point3(place.zx, place.zy, place.zz), p, shift.z))
+    return Wide3(_row(place.x, p, shift.x), _row(place.y, p, shift.y), _row(place.z, p, shift.z))
 
 
 @inline
-def corners_of(view: View, triangle: int, shift: Wide3) -> Triangle:
+def corners_of(view: View, triangle: int, shift: Wide3) -> Facet:
     t = triangle_of(view.mesh, triangle)
     p, q = corner_of(view.place, scaled(t.p, view.unit), shift), corner_of(view.place, scaled(t.q, view.unit), shift)
-    return Triangle(p, q, corner_of(view.place, scaled(t.r, view.unit), shift))
+    return Facet(p, q, corner_of(view.place, scaled(t.r, view.unit), shift))
 
 
 @inline
-def vertex_of(t: Triangle, k: int) -> Wide3:
-    return t.p if k == 0 else (t.q if k == 1 else t.r)
-
-
-@inline
-def _edge(t: Triangle, k: int) -> tuple[Wide3, Wide3]:
+def _edge(t: Facet, k: int) -> tuple[Wide3, Wide3]:
     """Return the start of an edge, and the vector to its end."""
-    a = vertex_of(t, k)
-    return a, minus_wide(vertex_of(t, (k + 1) % 3), a)
+    a = corner(t, k)
+    return a, minus_wide(corner(t, k + 1), a)
 
 
 @inline
@@ -103,12 +89,12 @@ def _reach(u: Wide3) -> float:
 
 
 @called
-def _foot(point: Wide3, t: Triangle, feature: int) -> tuple[Wide3, float, float]:
+def _foot(point: Wide3, t: Facet, feature: int) -> tuple[Wide3, float, float]:
     """Return the point of a vertex, edge or triangle that is nearest to a point, or some other of it; by how much its
     weights times their denominator are above 0, and the lengths of the edges over the denominator: the former over,
     the latter times what errors of the weights are to be counted in (`certified.py`)."""
     if feature < 3:
-        return vertex_of(t, feature), np.inf, 0.0
+        return corner(t, feature), np.inf, 0.0
     a, u = _edge(t, feature % 3)
     w, uu = minus_wide(point, a), dot_wide(u, u)
     uw = dot_wide(u, w)
@@ -129,13 +115,13 @@ def _foot(point: Wide3, t: Triangle, feature: int) -> tuple[Wide3, float, float]
 
 
 @called
-def ends_of(s: Triangle, t: Triangle, first: int, second: int) -> tuple[Wide3, Wide3, float, float]:
+def ends_of(s: Facet, t: Facet, first: int, second: int) -> tuple[Wide3, Wide3, float, float]:
     """Return the nearest points of two features, or some others of them, and of both together what `_foot` tells."""
     if second < 3:
-        q = vertex_of(t, second)
+        q = corner(t, second)
         p, inside, steepness = _foot(q, s, first)
         return p, q, inside, steepness
-    p, inside, steepness = vertex_of(s, first % 3), np.inf, 0.0
+    p, inside, steepness = corner(s, first % 3), np.inf, 0.0
     if 3 <= first < FACE and second < FACE:
         (a, u), (b, v) = _edge(s, first - 3), _edge(t, second - 3)
         w = minus_wide(a, b)
@@ -156,7 +142,7 @@ def height_above(n: Wide3, p: Wide3, base: Wide3) -> Wide:
 
 
 @called
-def _bounds(s: Triangle, t: Triangle, first: int, second: int) -> tuple[Wide, float, Point3, Point3]:
+def _bounds(s: Facet, t: Facet, first: int, second: int) -> tuple[Wide, float, Point3, Point3]:
     """Return the distance of two points of the triangles, by how much the triangles may be nearer at most but for
     rounding, and the points, rounded."""
     p, q, _, _ = ends_of(s, t, first, second)
@@ -166,7 +152,7 @@ def _bounds(s: Triangle, t: Triangle, first: int, second: int) -> tuple[Wide, fl
         return Wide(0.0, 0.0), 0.0, *ends
     beyond = 0.0
     for k in range(3):
-        beyond = max(beyond, height_above(n, vertex_of(s, k), p).h, -height_above(n, vertex_of(t, k), q).h)
+        beyond = max(beyond, height_above(n, corner(s, k), p).h, -height_above(n, corner(t, k), q).h)
     size = root(square)
     return size, 2.0 * beyond / size.h, *ends
 
@@ -199,9 +185,8 @@ def _is_beyond(
 def shift_of(s: Search, start: Any, other: Any) -> Wide3:
     """Return the translation of the second body less that of the first, times the unit."""
     unit = s.a.unit
-    x, y = two_diff(other[0] * unit, start[0] * unit), two_diff(other[1] * unit, start[1] * unit)
-    z = two_diff(other[2] * unit, start[2] * unit)
-    return Wide3(Wide(x[0], x[1]), Wide(y[0], y[1]), Wide(z[0], z[1]))
+    x, y = Wide(*two_diff(other[0] * unit, start[0] * unit)), Wide(*two_diff(other[1] * unit, start[1] * unit))
+    return Wide3(x, y, Wide(*two_diff(other[2] * unit, start[2] * unit)))
 
 
 @called

@@ -21,6 +21,7 @@ from engine.collision.clearance.traversal import BEYOND, TOLD, Asked, find_neare
 from engine.collision.meshes.exact_body import exact_pair, on_lattice
 from engine.collision.meshes.mesh_arrays import STILL, MeshBody, lattice_shift
 from engine.collision.meshes.placement import PoseArrays
+from engine.collision.result import Poses
 from engine.direct import entry_of
 from engine.parallel import Budget
 from engine.solids.base import Solid
@@ -75,15 +76,10 @@ class SpreadPair:
     def fill(self, start: int, stop: int, answers: FloatArray, least: Fraction | None = None) -> None:
         """Answer for the poses of a range whose answers are NaN: how far apart the triangles are, those of bodies that
         have no common point; where a distance is given 0.0 if they are nearer than that, else infinity."""
-        if least is None:
-            for _, item, pairs in self._left(
-                start, stop, answers, Asked(np.inf, -1.0, *self._radii, self._reach, False)
-            ):
-                answers[item] = self._least(item, pairs)[0].distance()
-            return
-        limits = _around(least + Fraction(self._radii[0]) + Fraction(self._radii[1]))
+        limits = (np.inf, -1.0) if least is None else _around(least + sum(map(Fraction, self._radii)))
         for _, item, pairs in self._left(start, stop, answers, Asked(*limits, *self._radii, self._reach, False)):
-            answers[item] = np.inf if self._least(item, pairs)[0].is_at_least(least) else 0.0
+            gap, _ = self._least(item, pairs)
+            answers[item] = gap.distance() if least is None else (np.inf if gap.is_at_least(least) else 0.0)
 
     def _left(
         self, start: int, stop: int, answers: FloatArray, asked: Asked
@@ -103,28 +99,17 @@ class SpreadPair:
             if how in (DONE, TOLD):
                 yield how, start, self._room.found.pairs[:n].tolist()
             elif how == BEYOND:
-                yield (
-                    how,
-                    start,
-                    product(range(len(a.faces)), range(len(b.faces)), (0,), (0,)),
-                )  # never held all at once
+                every = product(range(len(a.faces)), range(len(b.faces)), (0,), (0,))  # never held all at once
+                yield how, start, every
             else:
                 self._room = new_room(2 * len(self._room.found.bounds), len(self._room.kept))
 
-    def _polled(self, pairs: Iterable[Sequence[int]]) -> Iterator[Sequence[int]]:
-        for count, row in enumerate(pairs):
-            if count % 16 == 0:
-                self.budget.check()
-            yield row
-
-    def _exact(self, item: int) -> _ExactPair:
-        self.n_exact += 1
-        (a, b), (own, poses) = self.meshes, self.poses
-        return _ExactPair(a, _pose_at(own, min(item, len(own.rotations) - 1)), b, _pose_at(poses, item), self._radii)
-
     def _least(self, item: int, pairs: Iterable[Sequence[int]]) -> tuple[ScaledGap, tuple[int, int]]:
         """Return the least gap of the candidates, of equal ones that of the smallest faces, and its triangles."""
-        exact, (a, b) = self._exact(item), self.meshes
+        self.n_exact += 1
+        (a, b), (own, poses) = self.meshes, self.poses
+        placed = _pose_at(own, min(item, len(own.rotations) - 1)), _pose_at(poses, item)
+        exact = _ExactPair(a, b, placed, self._radii)
 
         def rank(i: int, j: int) -> tuple[int, int, list[float], list[float]]:
             """Order by faces, of one face by corners: the order of the tree is nobody's."""
@@ -134,7 +119,9 @@ class SpreadPair:
         kept = (-1, -1)
         if isinstance(pairs, list) and len(pairs) > 1:
             pairs.sort(key=lambda row: rank(row[0], row[1]))  # ties fall to the first
-        for i, j, first, second in self._polled(pairs):
+        for count, (i, j, first, second) in enumerate(pairs):
+            if count % 16 == 0:
+                self.budget.check()
             is_later = best is not None and rank(i, j) >= rank(*kept)
             if is_later and exact.are_beyond(i, j):
                 continue
@@ -155,10 +142,8 @@ def _corners(body: MeshBody, triangle: int) -> list[float]:
 class _ExactPair:
     """Both bodies on one lattice, their radii too."""
 
-    def __init__(
-        self, a: MeshBody, a_pose: Pose | None, b: MeshBody, b_pose: Pose | None, radii: tuple[float, float]
-    ) -> None:
-        self._bodies = exact_pair(a, a_pose, b, b_pose, lattice_shift(np.array(radii)))
+    def __init__(self, a: MeshBody, b: MeshBody, poses: Poses, radii: tuple[float, float]) -> None:
+        self._bodies = exact_pair(a, b, poses, lattice_shift(np.array(radii)))
         shift = self._bodies[0].shift
         self._scale = 1 << shift
         self._radii = on_lattice(radii[0], shift), on_lattice(radii[1], shift)
@@ -198,12 +183,7 @@ def _around(target: Fraction) -> tuple[float, float]:
     return (nextafter(value, np.inf) * (1.0 + 2.0**-50) if isfinite(value) else np.inf), value * (1.0 - 2.0**-50)
 
 
-def spread_pair(
-    first: Solid, second: Solid, first_pose: Pose | None, second_pose: Pose | None, budget: Budget
-) -> SpreadPair:
+def spread_pair(first: Solid, second: Solid, poses: Poses, budget: Budget) -> SpreadPair:
     """Return two bodies, each under one pose or none."""
-    poses = [
-        STILL if pose is None else in_space(pose.rotation[None], pose.translation[None])
-        for pose in (first_pose, second_pose)
-    ]
-    return SpreadPair(first, second, poses[0], poses[1], budget)
+    own, their = (STILL if at is None else in_space(at.rotation[None], at.translation[None]) for at in poses)
+    return SpreadPair(first, second, own, their, budget)

@@ -29,36 +29,31 @@ class Wide3(NamedTuple):
 @inline
 def plus(a: Wide, b: Wide) -> Wide:
     """Return a + b."""
-    h, low = dd_add(a.h, a.low, b.h, b.low)
-    return Wide(h, low)
+    return Wide(*dd_add(a.h, a.low, b.h, b.low))
 
 
 @inline
 def less(a: Wide, b: Wide) -> Wide:
     """Return a - b."""
-    h, low = dd_sub(a.h, a.low, b.h, b.low)
-    return Wide(h, low)
+    return Wide(*dd_sub(a.h, a.low, b.h, b.low))
 
 
 @inline
 def times(a: Wide, b: Wide) -> Wide:
     """Return a b."""
-    h, low = dd_mul(a.h, a.low, b.h, b.low)
-    return Wide(h, low)
+    return Wide(*dd_mul(a.h, a.low, b.h, b.low))
 
 
 @inline
 def over(a: Wide, b: Wide) -> Wide:
     """Return a / b; b is not zero."""
-    h, low = dd_div(a.h, a.low, b.h, b.low)
-    return Wide(h, low)
+    return Wide(*dd_div(a.h, a.low, b.h, b.low))
 
 
 @inline
 def product(a: float, b: float) -> Wide:
     """Return a b of two doubles, exactly."""
-    h, low = two_prod(a, b)
-    return Wide(h, low)
+    return Wide(*two_prod(a, b))
 
 
 @inline
@@ -70,8 +65,7 @@ def root(a: Wide) -> Wide:
     """
     h = np.sqrt(a.h)
     p, e = two_prod(h, h)
-    r, low = fast_two_sum(h, ((a.h - p) - e + a.low) / (2.0 * h))
-    return Wide(r, low)
+    return Wide(*fast_two_sum(h, ((a.h - p) - e + a.low) / (2.0 * h)))
 
 
 @inline

@@ -15,12 +15,14 @@ import numpy as np
 from engine.arrays import FloatArray, IntArray
 from engine.bounding.aabb import corners_of_box
 from engine.collision.meshes.mesh_arrays import BOX_TRIANGLES
-from engine.jit import kernel
+from engine.jit import kernel, merged
+from engine.predicates.vectors import cross, length, minus
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.convexity import convexity
 from engine.solids.polyhedron import Polyhedron
 from engine.solids.sphere import Sphere
+from engine.types import Point3
 
 MOST_FACES = 1 << 16
 """Beyond this many triangles the question whether a polyhedron is convex is not asked: milliseconds, mostly for no."""
@@ -118,6 +120,12 @@ def _hull(vertices: FloatArray, triangles: IntArray, center: FloatArray) -> Conv
     return ConvexBody(points, first_neighbor, neighbors, outermost, normals, triangles[:, 0].copy(), numbers)
 
 
+@merged
+def point_of(points: Any, point: int) -> Point3:
+    """Load a vertex of points (3, n)."""
+    return Point3(points[0, point], points[1, point], points[2, point])
+
+
 @kernel
 def _describe(
     points: Any, triangles: Any, first_neighbor: Any, neighbors: Any, outermost: Any, normals: Any, numbers: Any
@@ -140,16 +148,12 @@ def _describe(
             start = triangles[item, k]
             neighbors[filled[start]] = triangles[item, (k + 1) % 3]
             filled[start] += 1
-        vx, vy, vz = points[0, b] - points[0, a], points[1, b] - points[1, a], points[2, b] - points[2, a]
-        wx, wy, wz = points[0, c] - points[0, a], points[1, c] - points[1, a], points[2, c] - points[2, a]
-        nx, ny, nz = vy * wz - vz * wy, vz * wx - vx * wz, vx * wy - vy * wx
-        length = np.sqrt(nx * nx + ny * ny + nz * nz)
-        sides = np.sqrt(vx * vx + vy * vy + vz * vz) * np.sqrt(wx * wx + wy * wy + wz * wz)
-        normals[0, item] = normals[1, item] = normals[2, item] = 0.0
-        normals[3, item] = _NO_CLAIM
-        if length > 2.0**-30 * sides and length > 2.0**-900 and length < 2.0**900:
-            normals[0, item], normals[1, item], normals[2, item] = nx / length, ny / length, nz / length
-            normals[3, item] = 2.0**-48 * sides / length
+        v, w = minus(point_of(points, b), point_of(points, a)), minus(point_of(points, c), point_of(points, a))
+        n, sides = cross(v, w), length(v) * length(w)
+        normals[:3, item], normals[3, item] = 0.0, _NO_CLAIM
+        if length(n) > 2.0**-30 * sides and 2.0**-900 < length(n) < 2.0**900:
+            normals[0, item], normals[1, item], normals[2, item] = n.x / length(n), n.y / length(n), n.z / length(n)
+            normals[3, item] = 2.0**-48 * sides / length(n)
     for octant in range(8):
         best = -np.inf
         outermost[octant] = 0

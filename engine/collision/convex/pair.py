@@ -17,16 +17,8 @@ from typing import Any
 import numpy as np
 
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, UNSETTLED
-from engine.collision.convex.body import ASIDE, CENTER, RADIUS, ConvexArrays
-from engine.collision.convex.xenocollide import (
-    APART,
-    MEETING,
-    PlacedBody,
-    largest,
-    meet_or_apart,
-    placed_body,
-    point_of,
-)
+from engine.collision.convex.body import ASIDE, CENTER, RADIUS, ConvexArrays, point_of
+from engine.collision.convex.xenocollide import APART, MEETING, PlacedBody, largest, meet_or_apart, placed_body
 from engine.collision.meshes.placement import PoseArrays, placed, turned
 from engine.jit import inline, kernel, merged
 from engine.predicates.vectors import dot, minus
@@ -90,9 +82,7 @@ def _relate_balls(distance: float, first_radius: float, second_radius: float, er
         return SECOND_INSIDE_FIRST
     if may_be_equal and first_radius == second_radius and distance < both - slack:
         return OVERLAPPING  # neither lies within the other
-    if abs(first_radius - second_radius) + slack < distance < both - slack:
-        return OVERLAPPING
-    return UNSETTLED
+    return OVERLAPPING if abs(first_radius - second_radius) + slack < distance < both - slack else UNSETTLED
 
 
 @merged
@@ -138,35 +128,24 @@ def _lies_in_ball(points: Any, a: PlacedBody, center: Point3, radius: float, err
         most = max(most, dot(v, v))
     reach = np.sqrt(most) + a.round
     slack = 2.0**-40 * (reach + radius) + error + 2.0**-400
-    if reach > radius + slack:
-        return _OUT
-    return _WITHIN if reach < radius - slack else UNDECIDED
+    return _OUT if reach > radius + slack else (_WITHIN if reach < radius - slack else UNDECIDED)
 
 
 @merged
 def _has_equal_pose(rotations: Any, translations: Any, i: int, j: int) -> bool:
     """Tell whether rows i and j hold one pose: then the two bodies count as unposed."""
     for k in range(3):
-        if translations[i, k] != translations[j, k]:
-            return False
-    for k in range(3):
         for m in range(3):
-            if rotations[i, k, m] != rotations[j, k, m]:
+            if translations[i, k] != translations[j, k] or rotations[i, k, m] != rotations[j, k, m]:
                 return False
     return True
 
 
 @kernel
 def relate_convex_pairs(
-    pool: ConvexArrays,
-    bodies: Any,
-    poses: PoseArrays,
-    pairs: Any,
-    is_boolean: bool,
-    may_be_equal: bool,
-    relations: Any,
-    flag: Any,
-) -> None:
+    pool: ConvexArrays, bodies: Any, poses: PoseArrays, pairs: Any, is_boolean: bool, may_be_equal: bool,
+    relations: Any, flag: Any,
+) -> None:  # fmt: skip
     """Fill what is UNSETTLED in relations (n,) int8 for pairs (n, 2) of rows; bodies: of each row its body, or -1.
 
     poses: n_rows; row 0 holds the identity, which also stands for no pose.

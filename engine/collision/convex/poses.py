@@ -135,11 +135,8 @@ def step(first: Any, second: Any, state: Any) -> tuple[int, int, int]:
 @merged
 def start_lane(state: Any, lane: int, f: Placement, v0: Point3, margin: float) -> None:
     """Begin the search of a pose in a lane; v0 and margin in units of the pair."""
-    state[TURN, lane], state[TURN + 1, lane], state[TURN + 2, lane] = f.xx, f.xy, f.xz
-    state[TURN + 3, lane], state[TURN + 4, lane], state[TURN + 5, lane] = f.yx, f.yy, f.yz
-    state[TURN + 6, lane], state[TURN + 7, lane], state[TURN + 8, lane] = f.zx, f.zy, f.zz
-    state[V0, lane], state[V0 + 1, lane], state[V0 + 2, lane] = v0.x, v0.y, v0.z
-    state[D, lane], state[D + 1, lane], state[D + 2, lane] = -v0.x, -v0.y, -v0.z
+    for row, p in ((TURN, f.x), (TURN + 3, f.y), (TURN + 6, f.z), (V0, v0), (D, negative(v0))):
+        state[row, lane], state[row + 1, lane], state[row + 2, lane] = p
     state[STAGE, lane], state[MARGIN, lane], state[TURNS, lane] = 0.0, margin, 0.0
 
 
@@ -200,31 +197,16 @@ def _start(
 @inline
 def _meets(state: Any, lane: int) -> bool:
     """Tell whether the four points of a lane prove that the open interiors meet."""
-    points = lane_point(state, V0, lane), lane_point(state, V1, lane), lane_point(state, V2, lane)
-    return is_around_origin(
-        points[0], points[1], points[2], lane_point(state, V3, lane), np.float64(state[MARGIN, lane])
-    )
-
-
-@inline
-def _relate_met(pool: ConvexArrays, a: PlacedBody, b: PlacedBody, is_boolean: bool) -> int:
-    """Return the relation of the two bodies, whose open interiors meet."""
-    if is_boolean:
-        return OVERLAPPING
-    start = minus(inner_point(pool.numbers, 0, a, CENTER), inner_point(pool.numbers, 1, b, ASIDE))
-    return relate_meeting(pool, 0, 1, a, b, dot(start, start))
+    p, q = lane_point(state, V0, lane), lane_point(state, V1, lane)
+    r, s = lane_point(state, V2, lane), lane_point(state, V3, lane)
+    return is_around_origin(p, q, r, s, np.float64(state[MARGIN, lane]))
 
 
 @kernel
 def relate_in_lanes(
-    pool: ConvexArrays,
-    lanes: LaneArrays,
-    still: PoseArrays,
-    poses: PoseArrays,
-    is_boolean: bool,
-    relations: Any,
+    pool: ConvexArrays, lanes: LaneArrays, still: PoseArrays, poses: PoseArrays, is_boolean: bool, relations: Any,
     flag: Any,
-) -> None:
+) -> None:  # fmt: skip
     """Fill relations (n,) int8 of the two bodies of a pool for n poses of the second, UNSETTLED where open.
 
     still: the identity. A lane whose search has ended takes the next pose. Returns early when the flag is raised.
@@ -254,5 +236,8 @@ def relate_in_lanes(
             if is_apart >> lane & 1:
                 relations[item] = DISJOINT
             elif meets >> lane & 1 and _meets(state, lane):
-                b = placed_body(pool, 1, poses, item)
-                relations[item] = _relate_met(pool, a, b, is_boolean)
+                relations[item] = OVERLAPPING
+                if not is_boolean:
+                    b = placed_body(pool, 1, poses, item)
+                    start = minus(inner_point(pool.numbers, 0, a, CENTER), inner_point(pool.numbers, 1, b, ASIDE))
+                    relations[item] = relate_meeting(pool, 0, 1, a, b, dot(start, start))

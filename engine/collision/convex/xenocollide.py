@@ -29,9 +29,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from engine.collision.codes import UNSETTLED
-from engine.collision.convex.body import REACH, ROUND, ConvexArrays
+from engine.collision.convex.body import REACH, ROUND, ConvexArrays, point_of
 from engine.collision.meshes.placement import Placement, PoseArrays, as_placement, placed, turned_back
 from engine.jit import inline, merged
+from engine.predicates.loading import as_point3
 from engine.predicates.vectors import cross, dot, largest_of, length, minus, negative
 from engine.types import Point3
 
@@ -60,17 +61,10 @@ class PlacedBody(NamedTuple):
 @merged
 def placed_body(pool: ConvexArrays, body: int, poses: PoseArrays, item: int) -> PlacedBody:
     """Return body `body` of the pool under pose `item`."""
-    x, y, z = poses.translations[item, 0], poses.translations[item, 1], poses.translations[item, 2]
-    error = 2.0**-49 * (3.0 * pool.numbers[body, REACH] + max(abs(x), abs(y), abs(z))) + 2.0**-1060
-    place = as_placement(poses, item, x, y, z, error)
-    numbers, firsts = pool.numbers, pool.firsts
+    numbers, firsts, shift = pool.numbers, pool.firsts, as_point3(poses.translations, item)
+    error = 2.0**-49 * (3.0 * numbers[body, REACH] + largest_of(shift)) + 2.0**-1060
+    place = as_placement(poses, item, shift, error)
     return PlacedBody(place, numbers[body, ROUND], firsts[0, body], firsts[0, body + 1], firsts[2, body])
-
-
-@merged
-def point_of(points: Any, point: int) -> Point3:
-    """Load a vertex of points (3, n)."""
-    return Point3(points[0, point], points[1, point], points[2, point])
 
 
 @merged
@@ -79,7 +73,7 @@ def farthest(points: Any, graph: Any, f: PlacedBody, local: Point3, hint: int) -
     if f.stop - f.first <= _FEW:
         best, found = -np.inf, f.first
         for point in range(f.first, f.stop):
-            value = points[0, point] * local.x + points[1, point] * local.y + points[2, point] * local.z
+            value = dot(point_of(points, point), local)
             if value > best:
                 best, found = value, point
         return found
@@ -87,14 +81,13 @@ def farthest(points: Any, graph: Any, f: PlacedBody, local: Point3, hint: int) -
     if found < 0:
         octant = (1 if local.x > 0.0 else 0) + (2 if local.y > 0.0 else 0) + (4 if local.z > 0.0 else 0)
         found = graph[f.outermost + octant]
-    best = points[0, found] * local.x + points[1, found] * local.y + points[2, found] * local.z
+    best = dot(point_of(points, found), local)
     for _ in range(f.stop - f.first):  # bound: the value grows, so no vertex comes twice
         start = found
         for place in range(graph[start], graph[start + 1]):
-            point = graph[place]
-            value = points[0, point] * local.x + points[1, point] * local.y + points[2, point] * local.z
+            value = dot(point_of(points, graph[place]), local)
             if value > best:
-                best, found = value, point
+                best, found = value, graph[place]
         if found == start:
             break
     return found
@@ -106,16 +99,12 @@ def largest(points: Any, f: PlacedBody, d: Point3) -> float:
     local = turned_back(f.place, d)
     best, other = -np.inf, -np.inf
     for point in range(f.first, f.stop - 1, 2):  # two chains: a maximum waits for the one before
-        value = points[0, point] * local.x + points[1, point] * local.y + points[2, point] * local.z
-        best = value if value > best else best
-        value = points[0, point + 1] * local.x + points[1, point + 1] * local.y + points[2, point + 1] * local.z
-        other = value if value > other else other
-    last = f.stop - 1
-    value = points[0, last] * local.x + points[1, last] * local.y + points[2, last] * local.z
-    best = max(value, best, other)
+        value, second = dot(point_of(points, point), local), dot(point_of(points, point + 1), local)
+        best, other = value if value > best else best, second if second > other else other
+    best = max(dot(point_of(points, f.stop - 1), local), best, other)
     if f.round > 0.0:
         best += f.round * length(d)
-    return best + (d.x * f.place.x + d.y * f.place.y + d.z * f.place.z)
+    return best + dot(d, f.place.shift)
 
 
 @inline

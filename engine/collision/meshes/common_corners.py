@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import Any
 
 from engine.collision.meshes.contact_kinds import N_NAMED
-from engine.collision.meshes.triangle_triangle import PosedTriangle, Triangle3, bound_near, corner
+from engine.collision.meshes.triangle_triangle import Facet, bound_near, corner
 from engine.jit import inline, merged
 from engine.predicates.posed import surely_same
 from engine.predicates.vectors import cross, dot, largest_of, minus
@@ -27,25 +27,22 @@ def _is_beside(a: Point3, b: Point3, c: Point3, d: Point3, error: float) -> bool
 
 
 @merged
-def common_corner(
-    poses: Any, t: Triangle3, u: Triangle3, given: PosedTriangle, other: PosedTriangle, error: float
-) -> int:
-    """Return 3 k + m where corner k of a face surely is corner m of another, and they have no other common point, else
-    -1; t, u: the rounded posed triangles, each coordinate off by at most `error`; given, other: before their poses.
+def common_corner(poses: Any, t: Facet, u: Facet, own: Facet, their: Facet, error: float) -> int:
+    """Return 3 k + m where corner k of a face surely is corner m of another, and they have no their common point, else
+    -1; t, u: the rounded posed triangles, each coordinate off by at most `error`; own, their: before their poses.
 
-    The other corners of one lie strictly on one side of the plane of the other: it meets that plane in the corner.
+    The their corners of one lie strictly on one side of the plane of the their: it meets that plane in the corner.
     """
     for k in range(3):
-        p = t.p if k == 0 else (t.q if k == 1 else t.r)
         for m in range(3):
-            q = u.p if m == 0 else (u.q if m == 1 else u.r)
+            p, q = corner(t, k), corner(u, m)
             if not largest_of(minus(p, q)) <= 2.0 * error:
                 continue
-            v, w = (minus(t.q if k == 0 else t.p, p), minus(t.q if k == 2 else t.r, p))
-            x, y = (minus(u.q if m == 0 else u.p, q), minus(u.q if m == 2 else u.r, q))
+            v, w = minus(corner(t, k + 1), p), minus(corner(t, k + 2), p)
+            x, y = minus(corner(u, m + 1), q), minus(corner(u, m + 2), q)
             if not (_is_beside(v, w, x, y, error) or _is_beside(x, y, v, w, error)):
                 return -1
-            return 3 * k + m if error == 0.0 or surely_same(poses, corner(given, k), corner(other, m)) else -1
+            return 3 * k + m if error == 0.0 or surely_same(poses, corner(own, k), corner(their, m)) else -1
     return -1
 
 

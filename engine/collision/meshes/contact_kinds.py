@@ -13,7 +13,7 @@ import numpy as np
 
 from engine.collision.codes import UNSETTLED
 from engine.collision.meshes.triangle_triangle import (
-    PosedTriangle,
+    Facet,
     beside,
     corner,
     is_same,
@@ -43,10 +43,9 @@ face, three bits for each face."""
 def _side(poses: Any, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d: PosedPoint3, error: float, work: Any) -> int:
     """Return orient3d; 0, and note it, where it is open."""
     side = sign_of_four(poses, a, b, c, d, error)
-    if side != UNDECIDED:
-        return side
-    work[_BAD] = 1
-    return 0
+    if side == UNDECIDED:
+        work[_BAD], side = 1, 0
+    return side
 
 
 @called
@@ -55,15 +54,14 @@ def _turn(
 ) -> int:
     """Return how three points of one plane turn; 0, and note it, where that is open."""
     turn = turn_in_plane(poses, a, b, c, off, axis, error)
-    if turn != UNDECIDED:
-        return turn
-    work[_BAD] = 1
-    return 0
+    if turn == UNDECIDED:
+        work[_BAD], turn = 1, 0
+    return turn
 
 
 @called
 def _against_face(
-    poses: Any, t: PosedTriangle, sides: tuple[int, int, int], u: PosedTriangle, axis: int, error: float, work: Any
+    poses: Any, t: Facet, sides: tuple[int, int, int], u: Facet, axis: int, error: float, work: Any
 ) -> int:
     """Return how t, at these sides of u's plane, meets the open face u: EDGE_FACE, VERTEX_FACE; or by corners."""
     off, flat = beside(u, axis), axis if (t.p.pose == UNPOSED and u.p.pose == UNPOSED) else -1
@@ -108,7 +106,7 @@ def _against_face(
 
 @called
 def _overlap_on_line(
-    poses: Any, t: PosedTriangle, k: int, c: PosedPoint3, d: PosedPoint3, axis: int, error: float, work: Any
+    poses: Any, t: Facet, k: int, c: PosedPoint3, d: PosedPoint3, axis: int, error: float, work: Any
 ) -> bool:
     """Tell whether edge k of t and c d, on one line, share a length, by planes through either end and off the line."""
     a, b, apex, off = corner(t, k), corner(t, k + 1), corner(t, k + 2), beside(t, axis)
@@ -123,15 +121,9 @@ def _overlap_on_line(
 
 @called
 def _open_edges_meet(
-    poses: Any,
-    t: PosedTriangle,
-    sides: tuple[int, int, int],
-    u: PosedTriangle,
-    their_sides: tuple[int, int, int],
-    axis: int,
-    error: float,
-    work: Any,
-) -> bool:
+    poses: Any, t: Facet, sides: tuple[int, int, int], u: Facet, their_sides: tuple[int, int, int], axis: int,
+    error: float, work: Any,
+) -> bool:  # fmt: skip
     """Tell whether two open edges of the faces have a common point."""
     is_flat = sides[0] == 0 and sides[1] == 0 and sides[2] == 0
     off, flat = beside(t, axis), axis if (t.p.pose == UNPOSED and u.p.pose == UNPOSED) else -1
@@ -157,13 +149,9 @@ def _open_edges_meet(
                 if _overlap_on_line(poses, t, k, c, d, axis, error, work):
                     return True
             elif _side(poses, a, b, c, d, error, work) == 0:
-                if their_across != 0:
-                    apex = corner(t, k + 2)
-                    one, other = _side(poses, c, d, apex, a, error, work), _side(poses, c, d, apex, b, error, work)
-                else:
-                    apex = corner(u, m + 2)
-                    one, other = _side(poses, a, b, apex, c, error, work), _side(poses, a, b, apex, d, error, work)
-                if one * other < 0:
+                p, q, x, y = (c, d, a, b) if their_across != 0 else (a, b, c, d)
+                apex = corner(t, k + 2) if their_across != 0 else corner(u, m + 2)
+                if _side(poses, p, q, apex, x, error, work) * _side(poses, p, q, apex, y, error, work) < 0:
                     return True
     return False
 
@@ -179,7 +167,7 @@ def lone_zero(sides: tuple[int, int, int]) -> int:
 
 @inline
 def _is_edge_across(
-    poses: Any, t: PosedTriangle, u: PosedTriangle, sides: tuple[int, int, int], their_sides: tuple[int, int, int],
+    poses: Any, t: Facet, u: Facet, sides: tuple[int, int, int], their_sides: tuple[int, int, int],
     error: float,
 ) -> bool:  # fmt: skip
     """Tell whether an edge of one of two faces that straddle surely passes through the other, strictly within it.
@@ -197,9 +185,7 @@ def _is_edge_across(
 
 
 @called
-def kind_of(
-    poses: Any, t: PosedTriangle, axis: int, u: PosedTriangle, their_axis: int, error: float, work: Any
-) -> tuple[int, bool]:
+def kind_of(poses: Any, t: Facet, axis: int, u: Facet, their_axis: int, error: float, work: Any) -> tuple[int, bool]:
     """Return the kind of the contact of two faces with area, UNSETTLED where a sign is open, and whether it may cut an
     open face: False where all that they share is one point, or on the borders of both. Sets FLUSH."""
     work[_BAD] = work[FLUSH] = 0

@@ -32,8 +32,7 @@ from engine.collision.meshes.triangle_triangle import (
     APART,
     CORNER,
     CROSSING,
-    PosedTriangle,
-    Triangle3,
+    Facet,
     classify_exactly,
     classify_near,
     with_pose,
@@ -146,14 +145,9 @@ def store_pose(poses: Any, row: int, pose: PoseArrays, item: int) -> None:
 
 @inline
 def place_bodies(
-    first: MeshArrays,
-    first_pose: PoseArrays,
-    first_item: int,
-    second: MeshArrays,
-    second_pose: PoseArrays,
-    second_item: int,
-    descent: Descent,
-) -> tuple[Place, bool]:
+    first: MeshArrays, first_pose: PoseArrays, first_item: int, second: MeshArrays, second_pose: PoseArrays,
+    second_item: int, descent: Descent,
+) -> tuple[Place, bool]:  # fmt: skip
     """Place two bodies and fill the frames and poses of a search; tell whether they are surely apart."""
     a, b = place_pair(first.extent, first_pose, first_item, second.extent, second_pose, second_item)
     defect = defect_of(a) + defect_of(b)
@@ -171,20 +165,20 @@ def place_bodies(
 
 
 @inline
-def placed_triangle(t: Triangle3, place: Placement) -> Triangle3:
+def placed_triangle(t: Facet, place: Placement) -> Facet:
     """Return the rounded posed triangle."""
-    return Triangle3(placed(t.p, place), placed(t.q, place), placed(t.r, place))
+    return Facet(placed(t.p, place), placed(t.q, place), placed(t.r, place))
 
 
 @inline
-def before_poses(s: Search, i: int, j: int) -> tuple[PosedTriangle, PosedTriangle]:
+def before_poses(s: Search, i: int, j: int) -> tuple[Facet, Facet]:
     """Return a face of either body before its pose."""
     own = with_pose(triangle_of(s.first, i), 0 if s.place.a.is_posed else UNPOSED)
     return own, with_pose(triangle_of(s.second, j), 1 if s.place.b.is_posed else UNPOSED)
 
 
 @merged
-def class_of_corner(s: Search, i: int, j: int, t: Triangle3, u: Triangle3) -> int:
+def class_of_corner(s: Search, i: int, j: int, t: Facet, u: Facet) -> int:
     """Return the class of two faces, placed t and u, that surely meet in a common corner only; else UNDECIDED."""
     if s.first.axis[i] < 0 or s.second.axis[j] < 0:
         return UNDECIDED
@@ -194,7 +188,7 @@ def class_of_corner(s: Search, i: int, j: int, t: Triangle3, u: Triangle3) -> in
 
 
 @merged
-def settle_class(s: Search, i: int, j: int, t: Triangle3, u: Triangle3) -> int:
+def settle_class(s: Search, i: int, j: int, t: Facet, u: Facet) -> int:
     """Return the class of two faces that is left open; UNDECIDED without area, or out of range."""
     place, poses = s.place, s.descent.poses
     if s.first.axis[i] < 0 or s.second.axis[j] < 0:
@@ -274,13 +268,8 @@ def replace_pair(s: Search, i: int, j: int, n_stack: int) -> tuple[int, int, int
 
     Returns the height of the stack, and of two blocks the bits of their pairs of faces that may meet.
     """
-    stack, child, their_child, frames, work = (
-        s.descent.stack,
-        s.first.child,
-        s.second.child,
-        s.descent.frames,
-        s.descent.work,
-    )
+    stack, frames, work, _, _ = s.descent
+    child, their_child = s.first.child, s.second.child
     i_block, j_block = child[i, 0] < 0, their_child[j, 0] < 0
     if i_block and j_block:
         low, high = faces_meeting(s.first.blocks, i, s.second.blocks, j, frames, work)

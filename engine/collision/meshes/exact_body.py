@@ -19,6 +19,7 @@ from engine.collision.exact_images import rounded_quotient
 from engine.collision.meshes.face_state import states_of
 from engine.collision.meshes.mesh_arrays import STATE_CLEAN, MeshArrays, MeshBody, lattice_shift
 from engine.collision.meshes.placement import PoseArrays
+from engine.collision.result import Poses
 from engine.jit import inline, kernel
 from engine.lanes.boxes import EMPTY
 from engine.predicates.exact_vectors import cross, dot, largest_axis, minus
@@ -115,16 +116,14 @@ def faces_in(arrays: MeshArrays, pose: PoseArrays, low: list[float], high: list[
     return np.asarray(np.sort(found[:n_found]), np.int64)
 
 
-def exact_pair(
-    first: MeshBody, first_pose: Pose | None, second: MeshBody, second_pose: Pose | None, shift: int = 0
-) -> tuple[ExactBody, ExactBody]:
+def exact_pair(first: MeshBody, second: MeshBody, poses: Poses, shift: int = 0) -> tuple[ExactBody, ExactBody]:
     """Return both bodies on one lattice, of spacing 2^-shift at most."""
-    for mesh, pose in ((first, first_pose), (second, second_pose)):
+    for mesh, pose in zip((first, second), poses):
         own = mesh.shift
         if pose is not None:
             own = max(own + lattice_shift(pose.rotation), lattice_shift(pose.translation))
         shift = max(shift, own)
-    return ExactBody(first, first_pose, shift), ExactBody(second, second_pose, shift)
+    return ExactBody(first, poses[0], shift), ExactBody(second, poses[1], shift)
 
 
 def rounded_outward(numerator: int, denominator: int) -> tuple[float, float]:

@@ -22,7 +22,7 @@ from engine.arrays import IntArray
 from engine.collision.meshes.exact_body import Corners, ExactBody, Plane, Vector, rounded_outward
 from engine.collision.meshes.exact_triangles import meets_open_face, open_face, share_area, value_at, without_axis
 from engine.parallel import Budget
-from engine.predicates.exact_vectors import cross, dot, largest_axis, minus
+from engine.predicates.exact_vectors import cross, dot, minus
 from engine.predicates.rational import sign_of
 
 Rational = int | Fraction  # integers where they suffice: they are ten times faster
@@ -180,50 +180,39 @@ def _moved_line_meets(corners: Corners, j: int, k: int, x: int, y: int, w: int) 
 
 def regions_of(body: ExactBody, face: int, cutters: list[ExactBody], budget: Budget) -> Iterator[Homogeneous]:
     """Yield a point in each region that the faces of `cutters` cut from a face with area; none lies on a trace."""
-    corners, plane = body.corners(face), body.plane(face)
-    axis = largest_axis(plane[:3])
-    segments = _traces(body, face, corners, plane, axis, cutters, budget)
+    corners, plane, axis = body.corners(face), body.plane(face), body.axis(face)
     own = [_segment(without_axis(corners[i], axis), without_axis(corners[i - 2], axis)) for i in range(3)]
-    for x, y in _samples(own, segments, budget):
+    for x, y in _samples(own, _traces(body, face, cutters, budget), budget):
         yield _lifted(x, y, plane, axis)
 
 
 def _lifted(x: Rational, y: Rational, plane: Plane, axis: int) -> Homogeneous:
     """Return the point of the plane over (x, y)."""
-    j, k = (axis + 1) % 3, (axis + 2) % 3
-    w = x.denominator * y.denominator
+    j, k, n = (axis + 1) % 3, (axis + 2) % 3, abs(plane[axis])
+    w, sign = x.denominator * y.denominator, sign_of(plane[axis])
     xw, yw = x.numerator * y.denominator, y.numerator * x.denominator
-    n = plane[axis]
-    point = [0, 0, 0]
-    point[axis] = -(plane[j] * xw + plane[k] * yw + plane[3] * w)
-    point[j], point[k], w = xw * n, yw * n, w * n
-    if w < 0:
-        return -point[0], -point[1], -point[2], -w
-    return point[0], point[1], point[2], w
+    point = [0, 0, 0, w * n]
+    point[axis] = -sign * (plane[j] * xw + plane[k] * yw + plane[3] * w)
+    point[j], point[k] = xw * n, yw * n
+    return tuple(point)
 
 
 def _segment(p: Rational2, q: Rational2) -> tuple[Rational2, Rational2]:
     return (p, q) if p <= q else (q, p)
 
 
-def _traces(
-    body: ExactBody, face: int, corners: Corners, plane: Plane, axis: int, cutters: list[ExactBody], budget: Budget
-) -> list[tuple[Rational2, Rational2]]:
-    """Return the segments in which other faces meet the plane of a face, near the face, projected along `axis`."""
-    low, high = _around(body, [(*p, 1) for p in corners])
+def _traces(body: ExactBody, face: int, cutters: list[ExactBody], budget: Budget) -> list[tuple[Rational2, Rational2]]:
+    """Return the segments in which other faces meet the plane of a face, near the face, projected along its axis."""
+    low, high = _around(body, [(*p, 1) for p in body.corners(face)])
     found = set()
     for cutter in cutters:
         for other in cutter.faces_in(low, high):
             budget.check()
-            if cutter is body and other == face:
-                continue
-            if not any(cutter.plane(other)[:3]):
+            if (cutter is body and other == face) or not any(cutter.plane(other)[:3]):
                 continue
             points = cutter.corners(other)
-            values = [value_at(plane, p) for p in points]
-            for p, q in _trace(points, values, axis):
-                if p != q:
-                    found.add(_segment(p, q))
+            values = [value_at(body.plane(face), p) for p in points]
+            found |= {_segment(p, q) for p, q in _trace(points, values, body.axis(face)) if p != q}
     return sorted(found)
 
 
@@ -252,8 +241,7 @@ def _samples(
             if x is not None and left < x < right:
                 stops.add(x)
     edges = [_on_line(s) for s in own]
-    ordered = sorted(stops)
-    for x0, x1 in pairwise(ordered):
+    for x0, x1 in pairwise(sorted(stops)):
         budget.check()
         x = Fraction(x0 + x1, 2)
         ends = [_height(s, x) for s in edges if s.ends[0][0] < x < s.ends[1][0]]
@@ -286,33 +274,29 @@ def _height(s: _Segment, x: Fraction) -> Fraction:
 
 def _crossing_abscissa(s: _Segment, t: _Segment) -> Fraction | None:
     """Return where two segments cross in a point that is an end of neither; None otherwise (ends are stops already)."""
-    f, g = dot(s.line, t.left), dot(s.line, t.right)
-    if f >= 0 <= g or f <= 0 >= g:
-        return None
-    f, g = dot(t.line, s.left), dot(t.line, s.right)
-    if f >= 0 <= g or f <= 0 >= g:
-        return None
+    for one, other in ((s, t), (t, s)):
+        if sign_of(dot(one.line, other.left)) * sign_of(dot(one.line, other.right)) >= 0:
+            return None
     x, _, w = cross(s.line, t.line)
     return Fraction(x, w)
 
 
 def pieces_of_segment(
-    body: ExactBody, ends: tuple[Vector, Vector], cutter: ExactBody, budget: Budget
+    body: ExactBody, ends: tuple[Vector, Vector], by: ExactBody, budget: Budget
 ) -> Iterator[Homogeneous]:
-    """Yield a point in each piece that the faces of `cutter` cut from a segment; points of a face may be among them."""
+    """Yield a point in each piece that the faces of `by` cut from a segment; points of a face may be among them."""
     p, q = ends
     low, high = _around(body, [(*p, 1), (*q, 1)])
     stops = {Fraction(0), Fraction(1)}
-    for face in cutter.faces_in(low, high):
+    for face in by.faces_in(low, high):
         budget.check()
-        for plane in _planes_that_cut(cutter, face):
+        for plane in _planes_that_cut(by, face):
             f, g = value_at(plane, p), value_at(plane, q)
             if f != g:
                 t = Fraction(f, f - g)
                 if 0 < t < 1:
                     stops.add(t)
-    ordered = sorted(stops)
-    for t0, t1 in pairwise(ordered):
+    for t0, t1 in pairwise(sorted(stops)):
         t = (t0 + t1) / 2
         n, w = t.numerator, t.denominator
         yield (p[0] * (w - n) + q[0] * n, p[1] * (w - n) + q[1] * n, p[2] * (w - n) + q[2] * n, w)
@@ -321,11 +305,9 @@ def pieces_of_segment(
 def _planes_that_cut(cutter: ExactBody, face: int) -> Iterator[Plane]:
     """Yield a face's plane and those through its edges across it: a segment's status changes on one of them."""
     plane = cutter.plane(face)
-    if not any(plane[:3]):
-        return
-    yield plane
-    corners = cutter.corners(face)
-    for i in range(3):
-        a, b = corners[i], corners[i - 2]
-        m = cross(plane[:3], minus(b, a))
-        yield (*m, -dot(m, a))
+    if any(plane[:3]):
+        yield plane
+        corners = cutter.corners(face)
+        for i in range(3):
+            m = cross(plane[:3], minus(corners[i - 2], corners[i]))
+            yield (*m, -dot(m, corners[i]))

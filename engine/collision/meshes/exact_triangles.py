@@ -106,9 +106,7 @@ def kind_of_contact(t1: Corners, t2: Corners) -> Kind:
         return "edge_face"
     if meet(0, 2) or meet(2, 0):
         return "vertex_face"
-    if meet(1, 1):
-        return "edge_edge"
-    return "vertex_vertex" if meet(0, 0) else "vertex_edge"
+    return "edge_edge" if meet(1, 1) else ("vertex_vertex" if meet(0, 0) else "vertex_edge")
 
 
 def _features(s: tuple[Vector, ...]) -> tuple[list[tuple[Vector, ...]], ...]:

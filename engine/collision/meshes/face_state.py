@@ -27,7 +27,7 @@ from engine.collision.meshes.mesh_arrays import (
 )
 from engine.collision.meshes.triangle_triangle import (
     CROSSING,
-    Triangle3,
+    Facet,
     classify_exactly,
     classify_near,
     is_straddling,
@@ -41,7 +41,7 @@ from engine.types import UNDECIDED, Point3
 
 
 @inline
-def edge_meets_inside(t: Triangle3, axis: int, a: Point3, b: Point3) -> bool:
+def edge_meets_inside(t: Facet, axis: int, a: Point3, b: Point3) -> bool:
     """Tell whether the segment a b in the plane of t may meet its relative interior (True where unsure)."""
     p, q, r = projected(t.p, axis), projected(t.q, axis), projected(t.r, axis)
     s, e = projected(a, axis), projected(b, axis)
@@ -61,7 +61,7 @@ def edge_meets_inside(t: Triangle3, axis: int, a: Point3, b: Point3) -> bool:
 
 
 @inline
-def side_of_vertex(mesh: MeshArrays, face: int, t: Triangle3, vertex: int, p: Point3) -> int:
+def side_of_vertex(mesh: MeshArrays, face: int, t: Facet, vertex: int, p: Point3) -> int:
     """Return the side of the plane of a face on which a vertex lies, 0 at once for one of its own."""
     corners = mesh.triangles
     if vertex == corners[face, 0] or vertex == corners[face, 1] or vertex == corners[face, 2]:
@@ -90,9 +90,7 @@ def state_by(mesh: MeshArrays, face: int, other: int, poses: Any) -> int:
         how = classify_near(t, o, 0.0)
         if how == UNDECIDED:
             how = classify_exactly(poses, with_pose(t), with_pose(o), axis, 0.0)
-        if how == UNDECIDED:
-            return STATE_STACKED
-        return STATE_CROSSED if how == CROSSING else STATE_CLEAN
+        return STATE_STACKED if how == UNDECIDED else (STATE_CROSSED if how == CROSSING else STATE_CLEAN)
     sides, corners = (p, q, r), (o.p, o.q, o.r)
     for k in range(3):
         end = (k + 1) % 3

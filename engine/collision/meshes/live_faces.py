@@ -15,7 +15,7 @@ import numpy as np
 from engine.arrangement.arrange import arrange
 from engine.arrangement.nodes import float_nodes
 from engine.arrangement.subdivision import label_faces, subdivide
-from engine.collision.exact_images import Vector
+from engine.collision.exact_images import Vector, as_vector
 from engine.collision.meshes.face_state import states_of
 from engine.collision.meshes.mesh_arrays import NO_AREA, STATE_STACKED, MeshBody
 from engine.parallel import Budget
@@ -29,37 +29,24 @@ IN_FACE, IN_ODD, LIVE = 1, 2, 3
 def segment_distance(point: Vector, a: Vector, b: Vector) -> Fraction:
     """Return the squared distance from `point` to the closed segment a b, which may be a point."""
     along, to_point = minus(b, a), minus(point, a)
-    length = squared_length(along)
-    if length == 0:
-        return squared_length(to_point)
-    t = dot(to_point, along)
-    if t <= 0:
-        return squared_length(to_point)
-    if t >= length:
-        return squared_length(minus(point, b))
+    length, t = squared_length(along), dot(to_point, along)
+    if t <= 0 or t >= length:
+        return squared_length(minus(point, b) if t > 0 else to_point)
     return squared_length(to_point) - t * t / length
 
 
 def simplex_distance(point: Vector, corners: Sequence[Vector]) -> Fraction:
-    """Return the squared distance from `point` to the closed segment or triangle of these corners."""
-    return segment_distance(point, *corners) if len(corners) == 2 else triangle_distance(point, *corners)
+    """Return the squared distance from `point` to the closed segment or triangle of these corners, degenerate or not.
 
-
-def triangle_distance(point: Vector, a: Vector, b: Vector, c: Vector) -> Fraction:
-    """Return the squared distance from `point` of space to the closed triangle a b c, which may be degenerate.
-
-    Over the open triangle it is the distance to the plane, elsewhere that to the nearest edge.
+    Over an open triangle it is the distance to the plane, elsewhere that to the nearest edge.
     """
-    normal = cross(minus(b, a), minus(c, a))
-    size = squared_length(normal)
-    if size != 0:
-        corners = (a, b, c)
-        inner = (
-            dot(cross(minus(corners[(k + 1) % 3], corners[k]), minus(point, corners[k])), normal) >= 0 for k in range(3)
-        )
-        if all(inner):
-            return dot(normal, minus(point, a)) ** 2 / size
-    return min(segment_distance(point, a, b), segment_distance(point, b, c), segment_distance(point, c, a))
+    if len(corners) == 2:
+        return segment_distance(point, *corners)
+    edges = list(zip(corners, (*corners[1:], corners[0])))
+    normal = cross(minus(corners[1], corners[0]), minus(corners[2], corners[0]))
+    if any(normal) and all(dot(cross(minus(b, a), minus(point, a)), normal) >= 0 for a, b in edges):
+        return dot(normal, minus(point, corners[0])) ** 2 / squared_length(normal)
+    return min(segment_distance(point, a, b) for a, b in edges)
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,9 +61,7 @@ class LivePiece:
 
     def vertices(self) -> list[Vector]:
         """Return points whose convex hull is that of the live part."""
-        if self.edges is None:
-            return list(self.corners)
-        return [end for edge in self.edges for end in edge]
+        return list(self.corners) if self.edges is None else [end for edge in self.edges for end in edge]
 
     def moved(self, image: Callable[[Vector], Vector]) -> LivePiece:
         """Return the piece with every point replaced by its image."""
@@ -98,7 +83,7 @@ class LivePiece:
         axis = largest_axis(normal)
         if _is_within(_flat(foot, axis), [(_flat(start, axis), _flat(end, axis)) for start, end in self.edges]):
             return squared_length(minus(point, foot))
-        return min(segment_distance(point, start, end) for start, end in self.edges)
+        return min(segment_distance(point, *edge) for edge in self.edges)
 
 
 def live_piece(mesh: MeshBody, face: int, budget: Budget) -> LivePiece | None:
@@ -106,18 +91,12 @@ def live_piece(mesh: MeshBody, face: int, budget: Budget) -> LivePiece | None:
     arrays = mesh.arrays
     if arrays.axis[face] == NO_AREA:
         return None
-    corners = _corners(mesh, face)
+    a, b, c = arrays.vertices[arrays.triangles[face]].tolist()
+    corners = as_vector(a), as_vector(b), as_vector(c)
     if states_of(arrays, np.array([face]))[0] != STATE_STACKED:
         return LivePiece(corners, None)
     edges = _live_edges(mesh, face, corners, budget)
     return LivePiece(corners, edges) if edges else None
-
-
-def _corners(mesh: MeshBody, face: int) -> tuple[Vector, Vector, Vector]:
-    a, b, c = (
-        tuple(map(Fraction, mesh.arrays.vertices[vertex].tolist())) for vertex in mesh.arrays.triangles[face].tolist()
-    )
-    return a, b, c
 
 
 def _live_edges(
@@ -146,8 +125,7 @@ def _live_edges(
     for edge, (tail, head) in enumerate(zip(subdivision.arrangement.tails, subdivision.arrangement.heads)):
         left, right = labels[subdivision.faces[2 * edge]], labels[subdivision.faces[2 * edge + 1]]
         if (left == LIVE) != (right == LIVE):
-            ends = (_lifted(nodes.exact(tail), a, normal, axis), _lifted(nodes.exact(head), a, normal, axis))
-            found.append(ends)
+            found.append((_lifted(nodes.exact(tail), a, normal, axis), _lifted(nodes.exact(head), a, normal, axis)))
     return found
 
 

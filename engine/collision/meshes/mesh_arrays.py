@@ -17,7 +17,7 @@ from engine.bounding.aabb import corners_of_box
 from engine.bounding.bvh import WIDTH, build_bvh
 from engine.bounding.disc_tree import fill_discs
 from engine.collision.meshes.placement import Extent, PoseArrays
-from engine.collision.meshes.triangle_triangle import Triangle3, projected
+from engine.collision.meshes.triangle_triangle import Facet, projected, triangle_at
 from engine.containment.methods.polyhedron_ray_parity import fill_triangle_boxes
 from engine.jit import inline, kernel
 from engine.lanes.boxes import EMPTY
@@ -26,6 +26,7 @@ from engine.lanes.faces import NOWHERE
 from engine.lanes.triangles import CORNER_ROWS
 from engine.predicates.loading import as_point3
 from engine.predicates.orientation import orient2d
+from engine.predicates.vectors import cross, minus
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.mesh import Mesh
@@ -144,38 +145,20 @@ def mesh_body_of_triangles(vertices: FloatArray, triangles: IntArray, faces: Int
     _fill_blocks(used, ordered, child, tree.origin, tree.scale, blocks)
     discs = np.empty((len(child), DISC_ROWS, WIDTH), np.float32)
     fill_discs(blocks, child, tree.boxes, discs)
+    used = used[:n_used].copy() if n_used < len(used) else used
     arrays = MeshArrays(
-        read_only(used[:n_used].copy() if n_used < len(used) else used),
-        read_only(ordered),
-        read_only(axis),
-        np.full(n_triangles, STATE_UNKNOWN, np.int8),
-        tree.boxes,
-        read_only(child),
-        read_only(blocks),
-        read_only(discs),
-        tree.origin,
-        tree.scale,
-        Extent(reach, ldexp(1.0, lowest_bit)),
-        components[:n_components].copy(),
-        faces[order],
-        first_face,
-        has_inside,
-    )
+        read_only(used), read_only(ordered), read_only(axis), np.full(n_triangles, STATE_UNKNOWN, np.int8), tree.boxes,
+        read_only(child), read_only(blocks), read_only(discs), tree.origin, tree.scale,
+        Extent(reach, ldexp(1.0, lowest_bit)), components[:n_components].copy(), faces[order], first_face, has_inside,
+    )  # fmt: skip
     return MeshBody(arrays, shift)
 
 
 @kernel
 def _lay_out(
-    vertices: Any,
-    triangles: Any,
-    faces: Any,
-    child: Any,
-    order: Any,
-    ordered: Any,
-    used: Any,
-    axis: Any,
+    vertices: Any, triangles: Any, faces: Any, child: Any, order: Any, ordered: Any, used: Any, axis: Any,
     components: Any,
-) -> tuple[int, int, int]:
+) -> tuple[int, int, int]:  # fmt: skip
     """Renumber triangles and vertices in the order of the tree; return the numbers of vertices and components, and the
     least face connected with the first triangle.
 
@@ -199,9 +182,7 @@ def _lay_out(
                     used[n_used, 0], used[n_used, 1], used[n_used, 2] = as_point3(vertices, vertex)
                     n_used += 1
                 ordered[item, corner] = number[vertex]
-            axis[item] = axis_of(
-                as_point3(used, ordered[item, 0]), as_point3(used, ordered[item, 1]), as_point3(used, ordered[item, 2])
-            )
+            axis[item] = axis_of(triangle_at(used, ordered[item, 0], ordered[item, 1], ordered[item, 2]))
     parent = np.empty(n_used, np.int64)
     _join(ordered, np.zeros(n_triangles, np.bool_), parent)
     number[:n_used] = 0
@@ -271,16 +252,15 @@ def _box_triangles(box: Aabb) -> tuple[FloatArray, IntArray, IntArray]:
 
 
 @inline
-def axis_of(p: Point3, q: Point3, r: Point3) -> int:
+def axis_of(t: Facet) -> int:
     """Return an axis along which the projection of a triangle has an area, NO_AREA or UNKNOWN_AXIS."""
-    ux, uy, uz = q.x - p.x, q.y - p.y, q.z - p.z
-    vx, vy, vz = r.x - p.x, r.y - p.y, r.z - p.z
-    nx, ny, nz = abs(uy * vz - uz * vy), abs(uz * vx - ux * vz), abs(ux * vy - uy * vx)
-    best = 0 if (nx >= ny and nx >= nz) else (1 if ny >= nz else 2)
+    n = cross(minus(t.q, t.p), minus(t.r, t.p))
+    x, y, z = abs(n.x), abs(n.y), abs(n.z)
+    best = 0 if (x >= y and x >= z) else (1 if y >= z else 2)
     found = NO_AREA
     for turn in range(3):
         axis = (best + turn) % 3
-        side = orient2d(projected(p, axis), projected(q, axis), projected(r, axis))
+        side = orient2d(projected(t.p, axis), projected(t.q, axis), projected(t.r, axis))
         if side == 1 or side == -1:
             return axis
         if side != 0:
@@ -289,21 +269,17 @@ def axis_of(p: Point3, q: Point3, r: Point3) -> int:
 
 
 @inline
-def triangle_of(mesh: MeshArrays, item: int) -> Triangle3:
+def triangle_of(mesh: MeshArrays, item: int) -> Facet:
     """Load a triangle in the body's own coordinates."""
-    return Triangle3(
-        as_point3(mesh.vertices, mesh.triangles[item, 0]),
-        as_point3(mesh.vertices, mesh.triangles[item, 1]),
-        as_point3(mesh.vertices, mesh.triangles[item, 2]),
-    )
+    t = mesh.triangles
+    return triangle_at(mesh.vertices, t[item, 0], t[item, 1], t[item, 2])
 
 
 @inline
 def in_tree(mesh: MeshArrays, p: Point3) -> Point3:
     """Return a point in the coordinates of the body's tree, rounded."""
-    return Point3(
-        (p.x - mesh.origin[0]) / mesh.scale, (p.y - mesh.origin[1]) / mesh.scale, (p.z - mesh.origin[2]) / mesh.scale
-    )
+    o, scale = mesh.origin, mesh.scale
+    return Point3((p.x - o[0]) / scale, (p.y - o[1]) / scale, (p.z - o[2]) / scale)
 
 
 @inline

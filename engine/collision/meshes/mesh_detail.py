@@ -20,21 +20,19 @@ from engine.collision.meshes.exact_regions import Sides, even_sides, regions_of,
 from engine.collision.meshes.mesh_arrays import STATE_CLEAN, MeshBody, mesh_body_of
 from engine.collision.meshes.mesh_pair import MeshPair, met_by_face, unless_identity
 from engine.collision.meshes.parity import INSIDE, OUTSIDE
-from engine.collision.result import Parts, Work
+from engine.collision.result import Parts, Poses, Work
 from engine.solids.base import Solid
-from engine.solids.pose import Pose
 
 _BOTH, _NEITHER = Sides(True, True, True), Sides(False, False, False)
 
 
-def mesh_parts(first: Solid, second: Solid, first_pose: Pose | None, second_pose: Pose | None, work: Work) -> Parts:
+def mesh_parts(first: Solid, second: Solid, poses: Poses, work: Work) -> Parts:
     """Return what of two overlapping polyhedra or boxes lies outside the other."""
     with np.errstate(all="ignore"):  # kernels, where they run uncompiled
-        a, b = mesh_body_of(first), mesh_body_of(second)
-        first_pose, second_pose = unless_identity(first_pose), unless_identity(second_pose)
-        if first_pose is None and second_pose is None and _have_equal_faces(a, b):
+        a, b, poses = mesh_body_of(first), mesh_body_of(second), unless_identity(poses)
+        if poses == (None, None) and _have_equal_faces(a, b):
             return Parts(False, False, True)
-        return _OverlappingPair(a, first_pose, b, second_pose, Work(work.budget, witness=False)).parts()
+        return _OverlappingPair(a, b, poses, Work(work.budget, witness=False)).parts()
 
 
 def _have_equal_faces(first: MeshBody, second: MeshBody) -> bool:

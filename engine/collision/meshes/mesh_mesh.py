@@ -20,7 +20,7 @@ from functools import lru_cache
 import numpy as np
 
 from engine.arrays import IntArray
-from engine.collision.codes import DISJOINT, TOUCHING, UNSETTLED
+from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
 from engine.collision.meshes.contact_kinds import STRENGTH
 from engine.collision.meshes.dual_traversal import SEEK_OVERLAP, SEEK_PIERCING_BY_FIRST, SEEK_PIERCING_BY_SECOND
 from engine.collision.meshes.exact_regions import even_sides, pieces_of_segment, regions_of, sides_at, sides_within
@@ -29,9 +29,8 @@ from engine.collision.meshes.mesh_arrays import STATE_CLEAN, MeshBody, mesh_body
 from engine.collision.meshes.mesh_pair import MeshPair, met_by_face, relate, unless_identity, what_to_seek
 from engine.collision.meshes.parity import INSIDE
 from engine.collision.meshes.pose_batch import N_CONTACTS, ONE_SETTLES, RELATION
-from engine.collision.result import NO_CONTACT, RELATIONS, UNNAMED, Collision, Containing, Witness, Work
+from engine.collision.result import NO_CONTACT, RELATIONS, UNNAMED, Collision, Poses, Witness, Work
 from engine.solids.base import Solid
-from engine.solids.pose import Pose
 from engine.types import Relation
 
 
@@ -91,13 +90,13 @@ def pierces_without_area(pair: MeshPair, own: int, face: int) -> bool:
     return any(all(sides_at(other, q, axis).at for axis in range(3)) for q in pieces)
 
 
-def mesh_mesh(first: Solid, second: Solid, first_pose: Pose | None, second_pose: Pose | None, work: Work) -> Collision:
+def mesh_mesh(first: Solid, second: Solid, poses: Poses, work: Work) -> Collision:
     """Return the relation of two polyhedra, surfaces or 3D boxes."""
     a, b = mesh_body_of(first), mesh_body_of(second)
-    if first_pose is not None or second_pose is not None:
-        first_pose, second_pose = unless_identity(first_pose), unless_identity(second_pose)
+    if poses[0] is not None or poses[1] is not None:
+        poses = unless_identity(poses)
     seek = what_to_seek(a, b, work)
-    row, found = relate(a, first_pose, b, second_pose, seek, work)
+    row, found = relate(a, b, poses, seek, work)
     relation = row[RELATION]
     is_unnamed = relation == DISJOINT or not (work.witness or relation == UNSETTLED)
     answer = UNNAMED[relation] if is_unnamed else answer_of(row, a, b, seek)
@@ -106,7 +105,7 @@ def mesh_mesh(first: Solid, second: Solid, first_pose: Pose | None, second_pose:
         return answer
     work.budget.check()
     with np.errstate(all="ignore"):  # kernels, where they run uncompiled
-        pair = MeshPair(a, first_pose, b, second_pose, work)
+        pair = MeshPair(a, b, poses, work)
         pair.find_contacts((row, found))
         return _relation(pair)
 
@@ -114,11 +113,10 @@ def mesh_mesh(first: Solid, second: Solid, first_pose: Pose | None, second_pose:
 def answer_of(row: list[int], first: MeshBody, second: MeshBody, seek: int) -> Collision | None:
     """Return what a row of `relate_poses` says of bodies that are not disjoint; None where it does not say all."""
     relation, kind, first_face, second_face, n_contacts = row
-    if relation == Relation.FIRST_INSIDE_SECOND:
-        return _contained(relation, first.arrays.first_face, -1, "second")
-    if relation == Relation.SECOND_INSIDE_FIRST:
-        return _contained(relation, -1, second.arrays.first_face, "first")
-    if relation == UNSETTLED or kind == UNSETTLED:
+    if relation in (FIRST_INSIDE_SECOND, SECOND_INSIDE_FIRST):
+        own = int(relation == SECOND_INSIDE_FIRST)
+        return _contained(relation, own, (first, second)[own].arrays.first_face)
+    if UNSETTLED in (relation, kind):
         return None
     pierces = n_contacts == ONE_SETTLES and seek in (SEEK_PIERCING_BY_FIRST, SEEK_PIERCING_BY_SECOND)
     return _in_contact(relation, kind, first_face, second_face, pierces)
@@ -131,8 +129,11 @@ def _in_contact(relation: int, kind: int, first_face: int, second_face: int, pie
 
 
 @lru_cache(256)
-def _contained(relation: int, first_face: int, second_face: int, containing: Containing) -> Collision:
-    return Collision(RELATIONS[relation], Witness("containment", first_face, second_face, containing))
+def _contained(relation: int, own: int, face: int, piercing: bool = False) -> Collision:
+    """Return a relation with a part of body `own` inside the other one as its witness."""
+    if own == 0:
+        return Collision(RELATIONS[relation], Witness("containment", face, -1, "second", piercing))
+    return Collision(RELATIONS[relation], Witness("containment", -1, face, "first", piercing))
 
 
 def _relation(pair: MeshPair) -> Collision:
@@ -166,9 +167,8 @@ def _overlap_or_touch(pair: MeshPair, patches: list[list[IntArray]]) -> Collisio
                     return Collision(Relation.OVERLAPPING, pair.named())
                 return _contain(pair, Relation.OVERLAPPING, own, patch)
     for own in (0, 1):
-        if not both and (piercing or not pair.work.witness or not pair.meshes[1 - own].has_inside):
-            continue
-        for face, met in met_by_face(contacts, own):
+        is_told = not both and (piercing or not pair.work.witness or not pair.meshes[1 - own].has_inside)
+        for face, met in () if is_told else met_by_face(contacts, own):
             pair.work.budget.check()
             overlaps, pierces = look_at_regions(pair, own, face, met)
             if overlaps:
@@ -185,11 +185,7 @@ def _overlap_or_touch(pair: MeshPair, patches: list[list[IntArray]]) -> Collisio
 
 
 def _contain(pair: MeshPair, relation: Relation, own: int, patch: IntArray, *, piercing: bool = False) -> Collision:
-    """Return a relation with a part of body `own` inside the other one as its witness."""
+    """Return a relation with a patch of body `own` inside the other one as its witness."""
     if not pair.work.witness:
-        return Collision(relation)
-    face = int(pair.meshes[own].faces[patch].min())
-    containing: Containing = "second" if own == 0 else "first"
-    return Collision(
-        relation, Witness("containment", face if own == 0 else -1, face if own == 1 else -1, containing, piercing)
-    )
+        return UNNAMED[relation]
+    return _contained(relation, own, int(pair.meshes[own].faces[patch].min()), piercing)

@@ -37,17 +37,10 @@ from engine.collision.meshes.mesh_arrays import (
     join_vertices,
 )
 from engine.collision.meshes.parity import INSIDE, OUTSIDE, locate_vertices
-from engine.collision.meshes.pose_batch import (
-    KIND,
-    N_COLUMNS,
-    N_CONTACTS,
-    ONE_SETTLES,
-    relate_poses,
-)
+from engine.collision.meshes.pose_batch import KIND, N_COLUMNS, N_CONTACTS, ONE_SETTLES, relate_poses
 from engine.collision.meshes.triangle_triangle import APART, CROSSING
-from engine.collision.result import Witness, Work
+from engine.collision.result import Poses, Witness, Work
 from engine.direct import entry_of
-from engine.solids.pose import Pose
 from engine.types import UNDECIDED
 
 _BLOCK = 64
@@ -64,19 +57,14 @@ ROOM_AT_ONCE = 256
 SPACE = _WorkSpace()
 
 
-def unless_identity(pose: Pose | None) -> Pose | None:
+def unless_identity(poses: Poses) -> Poses:
     """Return None for the identity."""
-    return None if pose is None or pose.is_identity else pose
+    a, b = poses
+    return None if a is None or a.is_identity else a, None if b is None or b.is_identity else b
 
 
 def relate(
-    first: MeshBody,
-    first_pose: Pose | None,
-    second: MeshBody,
-    second_pose: Pose | None,
-    seek: int,
-    work: Work,
-    known: Found | None = None,
+    first: MeshBody, second: MeshBody, poses: Poses, seek: int, work: Work, known: Found | None = None
 ) -> tuple[list[int], Found]:
     """Return what `relate_poses` says of a pair, and where its contacts are, all of them, until the next call; known:
     all contacts, their classes too, where they are found already."""
@@ -84,7 +72,7 @@ def relate(
     room = len(found.kinds)
     while True:  # bound: each turn has more room
         entry_of(relate_poses)(
-            first.arrays, second.arrays, first.posed(first_pose), second.posed(second_pose), seek,
+            first.arrays, second.arrays, first.posed(poses[0]), second.posed(poses[1]), seek,
             N_NAMED if work.witness else 0, SPACE.descent, found, n_known, SPACE.rows, work.budget.flag,
         )  # fmt: skip
         row: list[int] = SPACE.rows[0].tolist()
@@ -121,12 +109,10 @@ class MeshPair:
     all, as is_settled tells; filled by `find_contacts`.
     """
 
-    def __init__(
-        self, first: MeshBody, first_pose: Pose | None, second: MeshBody, second_pose: Pose | None, work: Work
-    ) -> None:
+    def __init__(self, first: MeshBody, second: MeshBody, poses: Poses, work: Work) -> None:
         self.meshes = (first, second)
-        self.poses = (first_pose, second_pose)
-        self.posed = (first.posed(first_pose), second.posed(second_pose))
+        self.poses = poses
+        self.posed = (first.posed(poses[0]), second.posed(poses[1]))
         self.work = work
         self.seek = what_to_seek(first, second, work)
         self._exact: tuple[ExactBody, ExactBody] | None = None
@@ -135,13 +121,12 @@ class MeshPair:
     def exact(self) -> tuple[ExactBody, ExactBody]:
         """Both bodies in exact coordinates."""
         if self._exact is None:
-            self._exact = exact_pair(self.meshes[0], self.poses[0], self.meshes[1], self.poses[1])
+            self._exact = exact_pair(*self.meshes, self.poses)
         return self._exact
 
     def find_contacts(self, seen: tuple[list[int], Found] | None = None) -> None:
         """Find all contacts; seen: what `relate` said of the pair, where it was asked already."""
-        (first, second), (first_pose, second_pose) = self.meshes, self.poses
-        self.row, found = seen or relate(first, first_pose, second, second_pose, self.seek, self.work)
+        self.row, found = seen or relate(*self.meshes, self.poses, self.seek, self.work)
         self.work.budget.check()
         n, self.is_settled = abs(self.row[N_CONTACTS]), self.row[N_CONTACTS] == ONE_SETTLES
         self.contacts, kinds = found.pairs[:n].copy(), found.kinds[:n].copy()
@@ -163,9 +148,8 @@ class MeshPair:
                 return
         self.contacts, kinds = self.contacts[kinds != APART], kinds[kinds != APART]
         if len(kinds):
-            (first, second), (a_pose, b_pose) = self.meshes, self.poses
             found = Found(self.contacts, kinds, np.empty(0, np.bool_))
-            self.row, _ = relate(first, a_pose, second, b_pose, self.seek, self.work, found)
+            self.row, _ = relate(*self.meshes, self.poses, self.seek, self.work, found)
             self.work.budget.check()
 
     def _is_settled_by(self, kind: int, i: int, j: int) -> bool:

@@ -21,15 +21,16 @@ from engine.collision.meshes.placement import (
     PoseArrays,
     defect_of,
     orient2d_near,
-    orient3d_near,
     place_pair,
     placed,
     turned_back,
 )
-from engine.collision.meshes.triangle_triangle import Triangle3
+from engine.collision.meshes.triangle_triangle import Facet
 from engine.jit import allocating, inline, kernel
 from engine.predicates.loading import as_point3
-from engine.predicates.vectors import largest_of
+from engine.predicates.orientation import orient3d
+from engine.predicates.posed import orient3d_rounded
+from engine.predicates.vectors import largest_of, minus
 from engine.types import UNDECIDED, Point2, Point3
 
 OUTSIDE = -1
@@ -50,13 +51,11 @@ def moved_side(a: Point3, b: Point3, q: Point3, error: float) -> int:
         return side
     if a.y != b.y:
         return 1 if a.y > b.y else -1
-    if a.x != b.x:
-        return 1 if b.x > a.x else -1
-    return 0
+    return int(b.x > a.x) - int(b.x < a.x)
 
 
 @inline
-def half_line_crosses(t: Triangle3, q: Point3, error: float) -> int:
+def half_line_crosses(t: Facet, q: Point3, error: float) -> int:
     """Return where the moved vertical line through q meets t: above q 1, below -1, at q 0; MISSED or UNDECIDED."""
     p_side = moved_side(t.p, t.q, q, error)
     q_side = moved_side(t.q, t.r, q, error)
@@ -69,10 +68,9 @@ def half_line_crosses(t: Triangle3, q: Point3, error: float) -> int:
         return UNDECIDED
     if p_side == 0 or q_side == 0 or r_side == 0:  # case: two corners above one another, an upright face
         return MISSED
-    side = orient3d_near(t.p, t.q, t.r, q, error)  # counter-clockwise from above: 1 if q is above the face
-    if side == UNDECIDED or side == 0:
-        return side
-    return -side if has_left else side
+    # counter-clockwise from above: 1 if q is above the face
+    side = orient3d(t.p, t.q, t.r, q) if error == 0.0 else orient3d_rounded(t.p, t.q, t.r, q, error)
+    return side if side == UNDECIDED or side == 0 else (-side if has_left else side)
 
 
 class OwnPoint(NamedTuple):
@@ -92,7 +90,7 @@ def brought_back(p: Point3, source: Placement, target: Placement, defect: float)
     q = placed(p, source)
     if not target.is_posed:
         return OwnPoint(q, source.error)
-    w = Point3(q.x - target.x, q.y - target.y, q.z - target.z)
+    w = minus(q, target.shift)
     own = turned_back(target, w)
     if source.error == 0.0 and target.error == 0.0:  # nothing is rounded on a lattice
         return OwnPoint(own, 0.0)
@@ -122,21 +120,14 @@ def locate_point(own: OwnPoint, mesh: MeshArrays) -> int:
         face, n = next_face(mesh, stack, n, box)
     if on_face:
         return 0
-    if unsure:
-        return UNDECIDED
-    return INSIDE if n_above % 2 == 1 else OUTSIDE
+    return UNDECIDED if unsure else (INSIDE if n_above % 2 == 1 else OUTSIDE)
 
 
 @kernel
 def locate_vertices(
-    source: MeshArrays,
-    source_pose: PoseArrays,
-    vertices: Any,
-    mesh: MeshArrays,
-    pose: PoseArrays,
-    found: Any,
+    source: MeshArrays, source_pose: PoseArrays, vertices: Any, mesh: MeshArrays, pose: PoseArrays, found: Any,
     flag: Any,
-) -> None:
+) -> None:  # fmt: skip
     """Fill found (n,) int8 for the vertices (n,) of `source` against `mesh`, each under its one pose."""
     a, b = place_pair(source.extent, source_pose, 0, mesh.extent, pose, 0)
     defect = defect_of(b)

@@ -31,9 +31,9 @@ import numpy as np
 
 from engine.arrays import FloatArray
 from engine.jit import inline, merged
-from engine.predicates.orientation import orient2d, orient3d
-from engine.predicates.posed import orient3d_rounded
-from engine.predicates.vectors import largest_of
+from engine.predicates.loading import as_point3
+from engine.predicates.orientation import orient2d
+from engine.predicates.vectors import dot, largest_of, minus
 from engine.types import UNDECIDED, Point2, Point3
 
 
@@ -46,20 +46,12 @@ class PoseArrays(NamedTuple):
 
 
 class Placement(NamedTuple):
-    """Rotation (rows), translation, and the error of a rounded posed coordinate (0.0: exact)."""
+    """Rows of the rotation, translation, and the error of a rounded posed coordinate (0.0: exact)."""
 
-    xx: float
-    xy: float
-    xz: float
-    yx: float
-    yy: float
-    yz: float
-    zx: float
-    zy: float
-    zz: float
-    x: float
-    y: float
-    z: float
+    x: Point3
+    y: Point3
+    z: Point3
+    shift: Point3
     is_posed: bool
     error: float
 
@@ -72,13 +64,11 @@ class Extent(NamedTuple):
 
 
 @merged
-def as_placement(pose: PoseArrays, item: int, x: float, y: float, z: float, error: float) -> Placement:
+def as_placement(pose: PoseArrays, item: int, shift: Point3, error: float) -> Placement:
     """Load the rotation of pose `item`, with a translation of the caller's."""
     r, i = pose.rotations, item
-    return Placement(
-        r[i, 0, 0], r[i, 0, 1], r[i, 0, 2], r[i, 1, 0], r[i, 1, 1], r[i, 1, 2], r[i, 2, 0], r[i, 2, 1], r[i, 2, 2],
-        x, y, z, pose.is_posed, error,
-    )  # fmt: skip
+    x, y = Point3(r[i, 0, 0], r[i, 0, 1], r[i, 0, 2]), Point3(r[i, 1, 0], r[i, 1, 1], r[i, 1, 2])
+    return Placement(x, y, Point3(r[i, 2, 0], r[i, 2, 1], r[i, 2, 2]), shift, pose.is_posed, error)
 
 
 @inline
@@ -103,63 +93,50 @@ def place_pair(
     a: Extent, a_pose: PoseArrays, a_item: int, b: Extent, b_pose: PoseArrays, b_item: int
 ) -> tuple[Placement, Placement]:
     """Return the placements of two bodies, moved together so that a posed first body has no translation if both are."""
-    s, t = a_pose.translations[a_item], b_pose.translations[b_item]
-    x, y, z = t[0] - s[0], t[1] - s[1], t[2] - s[2]
-    shift = max(abs(x), abs(y), abs(z))
+    s, t = as_point3(a_pose.translations, a_item), as_point3(b_pose.translations, b_item)
+    none, apart = Point3(0.0, 0.0, 0.0), minus(t, s)
+    shift = largest_of(apart)
     grain = min(a.grain, b.grain)
     is_exact = not (a_pose.is_posed or b_pose.is_posed)
     if not is_exact and is_lattice_rotation(a_pose.rotations[a_item]) and is_lattice_rotation(b_pose.rotations[b_item]):
         is_exact = a.reach + b.reach + shift < 2.0**53 * grain and a.reach + b.reach + shift < 1e300
-        for k in range(3):
-            is_exact = is_exact and is_multiple(s[k], grain) and is_multiple(t[k], grain)
+        for value in (s.x, s.y, s.z, t.x, t.y, t.z):
+            is_exact = is_exact and is_multiple(value, grain)
     a_error = b_error = 0.0
     if a_pose.is_posed and not is_exact:
         a_error = 2.0**-50 * (3.0 * a.reach + (0.0 if b_pose.is_posed else shift)) + 2.0**-1060
     if b_pose.is_posed and not is_exact:
         b_error = 2.0**-50 * (3.0 * b.reach + shift) + 2.0**-1060
     if b_pose.is_posed:  # an unposed body's translation is 0
-        a_place = as_placement(a_pose, a_item, 0.0, 0.0, 0.0, a_error)
-        return a_place, as_placement(b_pose, b_item, x, y, z, b_error)
-    return as_placement(a_pose, a_item, s[0], s[1], s[2], a_error), as_placement(b_pose, b_item, 0.0, 0.0, 0.0, 0.0)
+        return as_placement(a_pose, a_item, none, a_error), as_placement(b_pose, b_item, apart, b_error)
+    return as_placement(a_pose, a_item, s, a_error), as_placement(b_pose, b_item, none, 0.0)
 
 
 @merged
 def placed(p: Point3, place: Placement) -> Point3:
     """Return the rounded posed point, the point itself where there is no pose."""
-    x, y, z = p
-    if not place.is_posed:
-        return p
-    return Point3(
-        place.xx * x + place.xy * y + place.xz * z + place.x,
-        place.yx * x + place.yy * y + place.yz * z + place.y,
-        place.zx * x + place.zy * y + place.zz * z + place.z,
-    )
+    t = place.shift
+    return Point3(dot(place.x, p) + t.x, dot(place.y, p) + t.y, dot(place.z, p) + t.z) if place.is_posed else p
 
 
 @merged
 def turned(place: Placement, v: Point3) -> Point3:
     """Return R v."""
-    return Point3(
-        place.xx * v.x + place.xy * v.y + place.xz * v.z,
-        place.yx * v.x + place.yy * v.y + place.yz * v.z,
-        place.zx * v.x + place.zy * v.y + place.zz * v.z,
-    )
+    return Point3(dot(place.x, v), dot(place.y, v), dot(place.z, v))
 
 
 @merged
 def turned_back(place: Placement, v: Point3) -> Point3:
     """Return the product of the transpose of R with v."""
-    return Point3(
-        place.xx * v.x + place.yx * v.y + place.zx * v.z,
-        place.xy * v.x + place.yy * v.y + place.zy * v.z,
-        place.xz * v.x + place.yz * v.y + place.zz * v.z,
-    )
+    x, y, z = column(place, 0), column(place, 1), column(place, 2)
+    return Point3(dot(x, v), dot(y, v), dot(z, v))
 
 
-@inline
-def orient3d_near(a: Point3, b: Point3, c: Point3, d: Point3, error: float) -> int:
-    """Return orient3d of the points behind rounded ones; UNDECIDED where `error` a coordinate could change it."""
-    return orient3d(a, b, c, d) if error == 0.0 else orient3d_rounded(a, b, c, d, error)
+@merged
+def column(place: Placement, axis: int) -> Point3:
+    """Return where the pose turns an axis to."""
+    x, y, z = place.x, place.y, place.z
+    return Point3(x.x, y.x, z.x) if axis == 0 else (Point3(x.y, y.y, z.y) if axis == 1 else Point3(x.z, y.z, z.z))
 
 
 @inline
@@ -177,11 +154,7 @@ def orient2d_near(a: Point2, b: Point2, c: Point2, error: float) -> int:
     m = max(max(abs(ux), abs(uy)), max(abs(vx), abs(vy)))
     e = 2.0 * error
     threshold = 2.0**-51 * (abs(left) + abs(right)) + 4.5 * e * (m + e) + 2.0**-1070
-    if det > threshold:
-        return 1
-    if -det > threshold:
-        return -1
-    return UNDECIDED
+    return 1 if det > threshold else (-1 if -det > threshold else UNDECIDED)
 
 
 @inline
@@ -189,12 +162,8 @@ def placed_axis(axis: int, place: Placement) -> int:
     """Return where the pose turns a coordinate axis to; caller guarantees a pose that permutes axes, or none."""
     if not place.is_posed or axis < 0:
         return axis
-    x, y = place.xx, place.yx
-    if axis == 1:
-        x, y = place.xy, place.yy
-    elif axis == 2:
-        x, y = place.xz, place.yz
-    return 0 if x != 0.0 else (1 if y != 0.0 else 2)
+    there = column(place, axis)
+    return 0 if there.x != 0.0 else (1 if there.y != 0.0 else 2)
 
 
 WIDEST_RATIO = 2.0**60
@@ -208,9 +177,8 @@ def defect_of(place: Placement) -> float:
     """Return a bound on the entries of |R' R - I|."""
     if not place.is_posed:
         return 0.0
-    x = turned_back(place, Point3(place.xx, place.yx, place.zx))
-    y = turned_back(place, Point3(place.xy, place.yy, place.zy))
-    z = turned_back(place, Point3(place.xz, place.yz, place.zz))
+    x, y = turned_back(place, column(place, 0)), turned_back(place, column(place, 1))
+    z = turned_back(place, column(place, 2))
     off = max(abs(x.y), abs(x.z), abs(y.z))
     return max(off, abs(x.x - 1.0), abs(y.y - 1.0), abs(z.z - 1.0)) + 2.0**-50
 
@@ -220,10 +188,8 @@ def set_frame(
     frame: Any, a: Placement, a_origin: Any, a_scale: float, b: Placement, b_origin: Any, b_scale: float, defect: float
 ) -> bool:
     """Fill frame (22, 8) float32 with the map from tree b to tree a; tell whether the two trees are surely apart."""
-    ratio = b_scale / a_scale
-    origin = Point3(b_origin[0], b_origin[1], b_origin[2])
+    ratio, origin, shift = b_scale / a_scale, Point3(b_origin[0], b_origin[1], b_origin[2]), minus(b.shift, a.shift)
     there = turned(b, origin)
-    shift = Point3(b.x - a.x, b.y - a.y, b.z - a.z)
     v = turned_back(a, Point3(there.x + shift.x, there.y + shift.y, there.z + shift.z))
     t = Point3((v.x - a_origin[0]) / a_scale, (v.y - a_origin[1]) / a_scale, (v.z - a_origin[2]) / a_scale)
     a_reach = max(abs(a_origin[0]), abs(a_origin[1]), abs(a_origin[2]))
@@ -235,7 +201,7 @@ def set_frame(
         frame[21, :] = NEVER_APART
         return False
     for k in range(3):
-        m = turned_back(a, turned(b, Point3(1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0)))
+        m = turned_back(a, column(b, k))
         frame[k, :], frame[3 + k, :], frame[6 + k, :] = ratio * m.x, ratio * m.y, ratio * m.z
         frame[9 + k, :], frame[12 + k, :], frame[15 + k, :] = ratio * abs(m.x), ratio * abs(m.y), ratio * abs(m.z)
     frame[18, :], frame[19, :], frame[20, :] = t.x, t.y, t.z

@@ -62,9 +62,7 @@ def relation_apart(first: MeshArrays, second: MeshArrays, place: Place) -> int:
         return DISJOINT
     if in_second == first.components.shape[0] and in_first == 0:
         return FIRST_INSIDE_SECOND
-    if in_second == 0 and in_first == second.components.shape[0]:
-        return SECOND_INSIDE_FIRST
-    return UNSETTLED
+    return SECOND_INSIDE_FIRST if in_second == 0 and in_first == second.components.shape[0] else UNSETTLED
 
 
 @called
@@ -143,18 +141,9 @@ def settled_by(s: Search, is_named: bool, row: Any) -> None:
 
 @bare_kernel
 def relate_poses(
-    first: MeshArrays,
-    second: MeshArrays,
-    still: PoseArrays,
-    poses: PoseArrays,
-    seek: int,
-    n_named: int,
-    descent: Descent,
-    found: Found,
-    n_known: int,
-    rows: Any,
-    flag: Any,
-) -> None:
+    first: MeshArrays, second: MeshArrays, still: PoseArrays, poses: PoseArrays, seek: int, n_named: int,
+    descent: Descent, found: Found, n_known: int, rows: Any, flag: Any,
+) -> None:  # fmt: skip
     """Fill rows (n, N_COLUMNS) int64 for the poses (n) of the second body; still: the one of the first.
 
     n_named: how many contacts name the witness; without any, relations are all that is told. `descent` and `found` are

@@ -24,7 +24,7 @@ from engine.collision.meshes.dual_traversal import Search, before_poses
 from engine.collision.meshes.mesh_arrays import MeshArrays
 from engine.collision.meshes.parity import OUTSIDE, brought_back, locate_point
 from engine.collision.meshes.placement import Placement, defect_of
-from engine.collision.meshes.triangle_triangle import corner, sign_of_four
+from engine.collision.meshes.triangle_triangle import Facet, corner, sign_of_four
 from engine.jit import allocating, called, inline
 from engine.predicates.loading import as_point3
 from engine.predicates.posed import UNPOSED, PosedPoint3
@@ -37,40 +37,28 @@ _SAMPLED = 16
 
 
 @called
-def side_of_all(
-    poses: Any, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, vertices: Any, pose: int, error: float, n_samples: int
-) -> int:
-    """Return the closed side (1, -1) of the plane of a, b, c on which about so many of vertices (n, 3) lie, 0 if they
-    lie on it; UNDECIDED if they lie on both sides, or where a sign is open."""
+def side_of_all(poses: Any, plane: Facet, vertices: Any, pose: int, error: float, n_samples: int) -> int:
+    """Return the closed side (1, -1) of a plane on which about so many of vertices (n, 3) lie, 0 if they lie on it;
+    UNDECIDED if they lie on both sides, or where a sign is open."""
     found = 0
     for vertex in range(0, vertices.shape[0], max(1, vertices.shape[0] // n_samples)):
         p = PosedPoint3(vertices[vertex, 0], vertices[vertex, 1], vertices[vertex, 2], pose)
-        side = sign_of_four(poses, a, b, c, p, error)
+        side = sign_of_four(poses, plane.p, plane.q, plane.r, p, error)
         if side == UNDECIDED or side * found < 0:
             return UNDECIDED
-        if found == 0:
-            found = side
+        found = side if found == 0 else found
     return found
 
 
 @called
-def separates(
-    poses: Any,
-    a: PosedPoint3,
-    b: PosedPoint3,
-    c: PosedPoint3,
-    vertices: Any,
-    pose: int,
-    their_vertices: Any,
-    their_pose: int,
-    error: float,
-) -> bool:
-    """Tell whether the plane of a, b, c has the two bodies on different closed sides, not both of them in it."""
-    for n_samples in (_SAMPLED, max(len(vertices), len(their_vertices))):  # most planes cut the bodies in the middle
-        side = side_of_all(poses, a, b, c, vertices, pose, error, n_samples)
+def separates(poses: Any, plane: Facet, u: Any, own: int, v: Any, their: int, error: float) -> bool:
+    """Tell whether a plane has two bodies, of vertices u and v under poses `own` and `their`, on different closed
+    sides, not both of them in it."""
+    for n_samples in (_SAMPLED, max(len(u), len(v))):  # most planes cut the bodies in the middle
+        side = side_of_all(poses, plane, u, own, error, n_samples)
         if side == UNDECIDED:
             return False
-        their_side = side_of_all(poses, a, b, c, their_vertices, their_pose, error, n_samples)
+        their_side = side_of_all(poses, plane, v, their, error, n_samples)
         if their_side == UNDECIDED or side * their_side > 0:
             return False
     return side != their_side
@@ -84,9 +72,7 @@ def are_separated(s: Search, contacts: Any) -> bool:
     u, v = first.vertices, second.vertices
     for item in range(min(N_FACES, contacts.shape[0])):
         t, w = before_poses(s, contacts[item, 0], contacts[item, 1])
-        if separates(poses, t.p, t.q, t.r, u, own, v, their, error):
-            return True
-        if separates(poses, w.p, w.q, w.r, u, own, v, their, error):
+        if separates(poses, t, u, own, v, their, error) or separates(poses, w, u, own, v, their, error):
             return True
         if s.flag[0] != 0:
             return False
@@ -95,8 +81,8 @@ def are_separated(s: Search, contacts: Any) -> bool:
         for edge in range(6):
             one, other = (t, w) if edge < 3 else (w, t)
             for end in range(3):
-                a, b, c = corner(one, edge), corner(one, edge + 1), corner(other, end)
-                if separates(poses, a, b, c, u, own, v, their, error):
+                plane = Facet(corner(one, edge), corner(one, edge + 1), corner(other, end))
+                if separates(poses, plane, u, own, v, their, error):
                     return True
         if s.flag[0] != 0:
             return False

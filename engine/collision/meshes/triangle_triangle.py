@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from engine.jit import called, inline, merged
+from engine.predicates.loading import as_point3
 from engine.predicates.orientation import orient2d
 from engine.predicates.posed import UNPOSED, PosedPoint3, orient3d_posed, posed_point
 from engine.predicates.vectors import cross, dot, largest_of, minus
@@ -34,26 +35,24 @@ CORNER = 8
 plane; from CORNER on 3 k + m more, corner k of the first is corner m of the second, and nothing else is common."""
 
 
-class Triangle3(NamedTuple):
-    """Three points; compiled code passes triangles by value."""
+class Facet(NamedTuple):
+    """Three points of one kind; compiled code passes triangles by value."""
 
-    p: Point3
-    q: Point3
-    r: Point3
-
-
-class PosedTriangle(NamedTuple):
-    """Three points before their poses."""
-
-    p: PosedPoint3
-    q: PosedPoint3
-    r: PosedPoint3
+    p: Any
+    q: Any
+    r: Any
 
 
 @inline
-def with_pose(t: Triangle3, pose: int = UNPOSED) -> PosedTriangle:
+def triangle_at(points: Any, i: int, j: int, k: int) -> Facet:
+    """Load three of points (n, 3)."""
+    return Facet(as_point3(points, i), as_point3(points, j), as_point3(points, k))
+
+
+@inline
+def with_pose(t: Facet, pose: int = UNPOSED) -> Facet:
     """Return the triangle before pose number `pose`, or UNPOSED."""
-    return PosedTriangle(
+    return Facet(
         PosedPoint3(t.p.x, t.p.y, t.p.z, pose),
         PosedPoint3(t.q.x, t.q.y, t.q.z, pose),
         PosedPoint3(t.r.x, t.r.y, t.r.z, pose),
@@ -94,18 +93,26 @@ def is_straddling(p: int, q: int, r: int) -> bool:
     return (p == 1 or q == 1 or r == 1) and (p == -1 or q == -1 or r == -1)
 
 
+@inline
+def turned(t: Facet, lone: int) -> Facet:
+    """Return the triangle with vertex `lone` first, orientation kept."""
+    return t if lone == 0 else (Facet(t.q, t.r, t.p) if lone == 1 else Facet(t.r, t.p, t.q))
+
+
+@merged
+def corner(t: Facet, index: int) -> Any:
+    """Return a corner by its number, at most 6, modulo 3."""
+    return t.q if index == 1 or index == 4 else (t.r if index == 2 or index == 5 else t.p)
+
+
 # ---- near: one bound for all signs ----------------------------------------------------------------------------------
 
 
 @inline
-def with_lone_first(t: Triangle3, p: float, q: float, r: float) -> Triangle3:
+def with_lone_first(t: Facet, p: float, q: float, r: float) -> Facet:
     """Return a triangle with the vertex first that is alone on its side of a plane; p, q, r: values, none near 0."""
     above = int(p > 0.0) + int(q > 0.0) + int(r > 0.0) == 1
-    if (p > 0.0) == above:
-        return t
-    if (q > 0.0) == above:
-        return Triangle3(t.q, t.r, t.p)
-    return Triangle3(t.r, t.p, t.q)
+    return turned(t, 0 if (p > 0.0) == above else (1 if (q > 0.0) == above else 2))
 
 
 @merged
@@ -122,7 +129,7 @@ def bound_near(u: Point3, v: Point3, p: Point3, q: Point3, r: Point3, error: flo
 
 
 @inline
-def classify_near(t1: Triangle3, t2: Triangle3, error: float) -> int:
+def classify_near(t1: Facet, t2: Facet, error: float) -> int:
     """Return APART, CROSSING or UNDECIDED for two triangles of points rounded by at most `error` a coordinate."""
     u, v = minus(t1.q, t1.p), minus(t1.r, t1.p)
     p2, q2, r2 = minus(t2.p, t1.p), minus(t2.q, t1.p), minus(t2.r, t1.p)
@@ -142,37 +149,16 @@ def classify_near(t1: Triangle3, t2: Triangle3, error: float) -> int:
     # the lone vertices first, each above the plane of the other triangle
     s, t = with_lone_first(t1, d, f, g), with_lone_first(t2, a, b, c)
     if int(d > 0.0) + int(f > 0.0) + int(g > 0.0) == 2:  # the lone one is below: turn the other triangle over
-        t = Triangle3(t.p, t.r, t.q)
+        t = Facet(t.p, t.r, t.q)
     if int(a > 0.0) + int(b > 0.0) + int(c > 0.0) == 2:
-        s = Triangle3(s.p, s.r, s.q)
+        s = Facet(s.p, s.r, s.q)
     from_p = minus(t.p, s.p)
     first = dot(cross(minus(s.q, s.p), from_p), minus(t.q, s.p))  # orient3d(s.q, t.p, s.p, t.q)
     second = dot(cross(from_p, minus(s.r, s.p)), minus(t.r, s.p))  # orient3d(s.p, t.p, s.r, t.r)
-    if first > bound or second > bound:
-        return APART
-    if first < -bound and second < -bound:
-        return CROSSING
-    return UNDECIDED
+    return APART if first > bound or second > bound else (CROSSING if first < -bound and second < -bound else UNDECIDED)
 
 
 # ---- exact ----------------------------------------------------------------------------------------------------------
-
-
-@inline
-def turned(t: PosedTriangle, lone: int) -> PosedTriangle:
-    """Return the triangle with vertex `lone` first, orientation kept."""
-    if lone == 0:
-        return t
-    if lone == 1:
-        return PosedTriangle(t.q, t.r, t.p)
-    return PosedTriangle(t.r, t.p, t.q)
-
-
-@inline
-def corner(t: PosedTriangle, index: int) -> PosedPoint3:
-    """Return a corner by its number modulo 3."""
-    index = index % 3
-    return t.p if index == 0 else (t.q if index == 1 else t.r)
 
 
 @inline
@@ -195,7 +181,7 @@ def sign_of_four(poses: Any, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d: 
 
 
 @called
-def sides_of(poses: Any, t: PosedTriangle, u: PosedTriangle, error: float) -> tuple[int, int, int]:
+def sides_of(poses: Any, t: Facet, u: Facet, error: float) -> tuple[int, int, int]:
     """Return the sides of the plane of t on which the corners of u lie, each as `sign_of_four`."""
     a = posed_point(poses, t.p)
     v, w = minus(posed_point(poses, t.q), a), minus(posed_point(poses, t.r), a)
@@ -211,22 +197,22 @@ def sides_of(poses: Any, t: PosedTriangle, u: PosedTriangle, error: float) -> tu
 
 @inline
 def lone_first(
-    t1: PosedTriangle, t2: PosedTriangle, sides: tuple[int, int, int], their_sides: tuple[int, int, int]
-) -> tuple[PosedTriangle, PosedTriangle]:
+    t1: Facet, t2: Facet, sides: tuple[int, int, int], their_sides: tuple[int, int, int]
+) -> tuple[Facet, Facet]:
     """Return two triangles with the lone vertices first, each above the plane of the other; sides: of the corners of
     t1 of the plane of t2, and the other way."""
     lone1, side1 = lone_vertex(sides[0], sides[1], sides[2])
     lone2, side2 = lone_vertex(their_sides[0], their_sides[1], their_sides[2])
     a, b = turned(t1, lone1), turned(t2, lone2)
     if side1 < 0:  # turn b over: now a.p is above b
-        b = PosedTriangle(b.p, b.r, b.q)
+        b = Facet(b.p, b.r, b.q)
     if side2 < 0:
-        a = PosedTriangle(a.p, a.r, a.q)
+        a = Facet(a.p, a.r, a.q)
     return a, b
 
 
 @called
-def classify_exactly(poses: Any, t1: PosedTriangle, t2: PosedTriangle, axis: int, error: float) -> int:
+def classify_exactly(poses: Any, t1: Facet, t2: Facet, axis: int, error: float) -> int:
     """Return the class of two triangles that both have an area; UNDECIDED only where exponents leave the range.
 
     poses (n, 12), error: as for `orient3d_posed`. axis: a coordinate axis, before its pose, along which the projection
@@ -244,9 +230,7 @@ def classify_exactly(poses: Any, t1: PosedTriangle, t2: PosedTriangle, axis: int
         return UNDECIDED
     if p2 == 0 and q2 == 0 and r2 == 0:
         how = separation(poses, t1, t2, axis, error)
-        if how == UNDECIDED:
-            return UNDECIDED
-        return APART if how == 1 else COPLANAR
+        return UNDECIDED if how == UNDECIDED else (APART if how == 1 else COPLANAR)
     a, b = lone_first(t1, t2, (p1, q1, r1), (p2, q2, r2))
     first = sign_of_four(poses, a.q, b.p, a.p, b.q, error)
     if first == 1:
@@ -256,23 +240,17 @@ def classify_exactly(poses: Any, t1: PosedTriangle, t2: PosedTriangle, axis: int
         return APART
     if first == UNDECIDED or second == UNDECIDED:
         return UNDECIDED
-    if first < 0 and second < 0 and is_straddling(p1, q1, r1) and is_straddling(p2, q2, r2):
-        return CROSSING
-    return CONTACT
+    return CROSSING if first < 0 and second < 0 and is_straddling(p1, q1, r1) and is_straddling(p2, q2, r2) else CONTACT
 
 
 @inline
 def projected(p: Any, axis: int) -> Point2:
     """Return the point without one coordinate, the two others in cyclic order."""
-    if axis == 0:
-        return Point2(p.y, p.z)
-    if axis == 1:
-        return Point2(p.z, p.x)
-    return Point2(p.x, p.y)
+    return Point2(p.y, p.z) if axis == 0 else (Point2(p.z, p.x) if axis == 1 else Point2(p.x, p.y))
 
 
 @inline
-def beside(t: PosedTriangle, axis: int) -> PosedPoint3:
+def beside(t: Facet, axis: int) -> PosedPoint3:
     """Return a point off the plane of t: its first corner moved along `axis`, before its pose; maybe not finite."""
     p, size = t.p, max(largest_of(minus(t.q, t.p)), largest_of(minus(t.r, t.p)))
     value = p.x if axis == 0 else (p.y if axis == 1 else p.z)
@@ -291,7 +269,7 @@ def turn_in_plane(
 
 
 @inline
-def outside_an_edge(poses: Any, t: PosedTriangle, u: PosedTriangle, off: PosedPoint3, axis: int, error: float) -> int:
+def outside_an_edge(poses: Any, t: Facet, u: Facet, off: PosedPoint3, axis: int, error: float) -> int:
     """Return how an edge of t separates it from u, both in one plane.
 
     1: some edge has all of u strictly outside; 0: outside or on it; -1: no edge separates; UNDECIDED.
@@ -321,7 +299,7 @@ def outside_an_edge(poses: Any, t: PosedTriangle, u: PosedTriangle, off: PosedPo
 
 
 @inline
-def separation(poses: Any, t1: PosedTriangle, t2: PosedTriangle, axis: int, error: float) -> int:
+def separation(poses: Any, t1: Facet, t2: Facet, axis: int, error: float) -> int:
     """Return how two coplanar triangles with area lie: 1 apart, 0 only their borders meet, -1 interiors meet."""
     off = beside(t1, axis)
     if not np.isfinite(off.x + off.y + off.z):
@@ -331,8 +309,4 @@ def separation(poses: Any, t1: PosedTriangle, t2: PosedTriangle, axis: int, erro
     if first == 1:
         return 1
     second = outside_an_edge(poses, t2, t1, off, flat, error)
-    if second == 1:
-        return 1
-    if first == UNDECIDED or second == UNDECIDED:
-        return UNDECIDED
-    return max(first, second)
+    return 1 if second == 1 else (UNDECIDED if first == UNDECIDED or second == UNDECIDED else max(first, second))

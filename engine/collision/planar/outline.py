@@ -21,7 +21,7 @@ from engine.arrangement.nodes import NodeTable, float_nodes, rational_nodes
 from engine.arrangement.subdivision import label_faces, subdivide
 from engine.arrays import FloatArray, IntArray
 from engine.collision.exact_images import image_map, rounded
-from engine.collision.result import FIRST_WITHIN, NO_CONTACT, SECOND_WITHIN, Collision, Kind, Witness, Work
+from engine.collision.result import FIRST_WITHIN, NO_CONTACT, SECOND_WITHIN, Collision, Kind, Poses, Witness, Work
 from engine.containment.rational_locate import rational_location
 from engine.parallel import Budget
 from engine.predicates.rational import orient2d_rational
@@ -154,23 +154,21 @@ def single_points(outline: Outline) -> list[int]:
 FIRST, SECOND, BOTH = 1, 2, 3
 
 
-def collide_outline_outline(
-    first: Solid, second: Solid, first_pose: Pose | None, second_pose: Pose | None, work: Work
-) -> Collision:
+def collide_outline_outline(first: Solid, second: Solid, poses: Poses, work: Work) -> Collision:
     """Return the relation of two bodies of the plane, each a polygon, a triangle or a box; exact.
 
     Bodies are closed sets under even-odd; an edge that cancels is boundary still, but no interior lies beside it. Where
     nothing is left of the interior (zero area, doubled rings) a body never overlaps.
     """
-    a, b = outline_of(first, first_pose, work.budget), outline_of(second, second_pose, work.budget)
+    a, b = outline_of(first, poses[0], work.budget), outline_of(second, poses[1], work.budget)
     if (a.low.min(0) > b.high.max(0)).any() or (b.low.min(0) > a.high.max(0)).any():
         return NO_CONTACT
     arrangement, _ = arrange_outlines([a, b], work.budget)
     subdivision = subdivide(arrangement, work.budget)
     labels = label_faces(subdivision)
     beside = [(labels[f], labels[g]) for f, g in zip(subdivision.faces[0::2], subdivision.faces[1::2])]
-    first_points = [rational_location(a.points[k], second, second_pose, work.budget.check) for k in single_points(a)]
-    second_points = [rational_location(b.points[k], first, first_pose, work.budget.check) for k in single_points(b)]
+    first_points = [rational_location(a.points[k], second, poses[1], work.budget.check) for k in single_points(a)]
+    second_points = [rational_location(b.points[k], first, poses[0], work.budget.check) for k in single_points(b)]
     meets = boundaries_meet(arrangement) or Location.BOUNDARY in (*first_points, *second_points)
     # Edges of one body, not of the other, with the other's open interior on both sides.
     first_parts = [bool(left & right & SECOND) for c, (left, right) in zip(arrangement.cover, beside) if c == FIRST]
@@ -222,9 +220,7 @@ def _meeting(p: Point, q: Point, r: Point, s: Point) -> Kind | None:
     if _is_on(r, p, q) or _is_on(s, p, q) or _is_on(p, r, s) or _is_on(q, r, s):
         return "vertex_edge"
     apart = orient2d_rational(p, q, r) * orient2d_rational(p, q, s) >= 0
-    if apart or orient2d_rational(r, s, p) * orient2d_rational(r, s, q) >= 0:
-        return None
-    return "edge_edge"
+    return None if apart or orient2d_rational(r, s, p) * orient2d_rational(r, s, q) >= 0 else "edge_edge"
 
 
 def _is_on(point: Point, a: Point, b: Point) -> bool:

@@ -17,20 +17,20 @@ from engine.arrays import FloatArray, IntArray, read_only
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, UNSETTLED
 from engine.collision.meshes.placement import PoseArrays, orient2d_near
 from engine.collision.planar.outline import collide_outline_outline, rings_of
-from engine.collision.result import FIRST_WITHIN, SECOND_WITHIN, UNNAMED, Collision, Witness, Work
+from engine.collision.result import FIRST_WITHIN, OUTLINES, SECOND_WITHIN, UNNAMED, Collision, Poses, Witness, Work
 from engine.direct import entry_of
 from engine.jit import inline, kernel
 from engine.predicates.loading import as_point2
 from engine.predicates.orientation import orient2d
 from engine.solids.base import Solid
-from engine.solids.pose import Pose, motion_of
+from engine.solids.pose import motion_of
 from engine.solids.ragged import next_in_rings
 from engine.types import UNDECIDED, Point2, Relation
 
 MOST_EDGES = 1024
 """Beyond, pairs of edges are too many to look at all of them."""
 
-_NO_RINGS = np.empty((0, 2)), np.zeros(1, np.int64)
+_NONE = np.empty((0, 2)), np.empty(0, np.int64)
 UNSURE = 2
 _POLL_EVERY = 64
 
@@ -46,13 +46,14 @@ class OutlineArrays(NamedTuple):
 
 def outline_pool(bodies: Sequence[Solid]) -> tuple[OutlineArrays, IntArray]:
     """Return the bodies as arrays, and for each its number there, -1 for one that the batches do not take."""
-    rings = [rings_of(body) if body.type in ("polygon", "triangle", "aabb") else _NO_RINGS for body in bodies]
-    firsts = np.append(np.int64(0), np.cumsum([len(vertices) for vertices, _ in rings]))
-    following = np.concatenate([np.empty(0, np.int64), *(next_in_rings(offsets) for _, offsets in rings)])
-    vertices = np.concatenate([np.empty((0, 2)), *(vertices for vertices, _ in rings)])
-    pool, numbers = OutlineArrays(vertices, following, firsts), np.full(len(bodies), -1, np.int64)
-    _find_simple(pool, numbers)
-    return pool, numbers
+    outlines = [outline_arrays(body) if body.type in OUTLINES else _NONE for body in bodies]
+    firsts = np.append(np.int64(0), np.cumsum([len(vertices) for vertices, _ in outlines]))
+    vertices, following = map(np.concatenate, zip(_NONE, *outlines))
+    numbers = [
+        number if 0 < len(points) <= MOST_EDGES and _is_simple(body) else -1
+        for number, (body, (points, _)) in enumerate(zip(bodies, outlines))
+    ]
+    return OutlineArrays(vertices, following, firsts), np.array(numbers, np.int64)
 
 
 def outline_arrays(solid: Solid) -> tuple[FloatArray, IntArray]:
@@ -93,15 +94,12 @@ def _crossing(a: Point2, b: Point2, c: Point2, d: Point2, error: float) -> int:
     return UNSURE if is_met else 0
 
 
-@inline
+@kernel
 def is_simple(vertices: Any, following: Any) -> bool:
     """Tell whether no two edges of these rings meet but in the vertex between them, and none has length 0."""
     for i in range(len(vertices)):
-        a, b, c = (
-            as_point2(vertices, i),
-            as_point2(vertices, following[i]),
-            as_point2(vertices, following[following[i]]),
-        )
+        a, b = as_point2(vertices, i), as_point2(vertices, following[i])
+        c = as_point2(vertices, following[following[i]])
         if (a.x == b.x and a.y == b.y) or following[following[i]] == i:
             return False
         is_ahead = (b.x - a.x) * (c.x - b.x) + (b.y - a.y) * (c.y - b.y) > 0.0
@@ -113,15 +111,6 @@ def is_simple(vertices: Any, following: Any) -> bool:
             if _crossing(a, b, as_point2(vertices, j), as_point2(vertices, following[j]), 0.0) != 0:
                 return False
     return True
-
-
-@kernel
-def _find_simple(pool: OutlineArrays, numbers: Any) -> None:
-    """Fill the number of each body whose edges meet only where they follow each other."""
-    for body in range(numbers.shape[0]):
-        first, stop = pool.firsts[body], pool.firsts[body + 1]
-        if 0 < stop - first <= MOST_EDGES and is_simple(pool.vertices[first:stop], pool.following[first:stop]):
-            numbers[body] = body
 
 
 @inline
@@ -174,9 +163,7 @@ def _rings_inside(points: Any, following: Any, vertices: Any, their_following: A
 
 
 @inline
-def relate_placed(
-    points: Any, following: Any, vertices: Any, their_following: Any, error: float
-) -> tuple[int, int, int]:
+def relate_placed(points: Any, following: Any, vertices: Any, theirs: Any, error: float) -> tuple[int, int, int]:
     """Return the relation of two placed bodies, or UNSETTLED, and the edges that cross, -1 for none or not the first.
 
     Of bodies that are not simple OVERLAPPING says no more than that they meet. error: of each coordinate.
@@ -184,16 +171,16 @@ def relate_placed(
     is_unsure = False
     for edge in range(len(following)):
         a, b = as_point2(points, edge), as_point2(points, following[edge])
-        for other in range(len(their_following)):
-            c, d = as_point2(vertices, other), as_point2(vertices, their_following[other])
+        for other in range(len(theirs)):
+            c, d = as_point2(vertices, other), as_point2(vertices, theirs[other])
             how = _crossing(a, b, c, d, error)
             if how == 1:
                 return OVERLAPPING, (-1 if is_unsure else edge), other
             is_unsure |= how != 0
     if is_unsure:
         return UNSETTLED, -1, -1
-    in_second = _rings_inside(points, following, vertices, their_following, error)
-    in_first = _rings_inside(vertices, their_following, points, following, error)
+    in_second = _rings_inside(points, following, vertices, theirs, error)
+    in_first = _rings_inside(vertices, theirs, points, following, error)
     if in_second == 0 and in_first == 0:
         return DISJOINT, -1, -1
     if in_second + in_first == 1:
@@ -238,26 +225,18 @@ def _relate_two(
     return relate_placed(placed[:n], following, placed[n:], their_following, error)
 
 
-@kernel
-def _is_outline_simple(vertices: Any, following: Any) -> bool:
-    return is_simple(vertices, following)
-
-
-def collide_outlines(
-    first: Solid, second: Solid, first_pose: Pose | None, second_pose: Pose | None, work: Work
-) -> Collision:
+def collide_outlines(first: Solid, second: Solid, poses: Poses, work: Work) -> Collision:
     """Return what `collide_outline_outline` does, which decides what is not sure here."""
     (vertices, following), (other, their_following) = outline_arrays(first), outline_arrays(second)
     if max(len(following), len(their_following)) > MOST_EDGES:
-        return collide_outline_outline(first, second, first_pose, second_pose, work)
-    (turn, move), (their_turn, their_move) = motion_of(first_pose, 2), motion_of(second_pose, 2)
+        return collide_outline_outline(first, second, poses, work)
+    own, their = motion_of(poses[0], 2), motion_of(poses[1], 2)
     relation, i, j = entry_of(_relate_two)(
-        vertices, following, turn, move, other, their_following, their_turn, their_move,
-        (first_pose is not None, second_pose is not None),
-    )  # fmt: skip
+        vertices, following, *own, other, their_following, *their, (poses[0] is not None, poses[1] is not None)
+    )
     is_sure = relation != UNSETTLED and (relation == DISJOINT or (_is_simple(first) and _is_simple(second)))
     if not is_sure or (relation == OVERLAPPING and work.witness and i < 0):
-        return collide_outline_outline(first, second, first_pose, second_pose, work)
+        return collide_outline_outline(first, second, poses, work)
     if relation == DISJOINT or not work.witness:
         return UNNAMED[relation]
     if relation == OVERLAPPING:
@@ -266,4 +245,4 @@ def collide_outlines(
 
 
 def _is_simple(solid: Solid) -> bool:
-    return solid.prepared("is_simple", lambda: bool(_is_outline_simple(*outline_arrays(solid))))
+    return solid.prepared("is_simple", lambda: bool(is_simple(*outline_arrays(solid))))

@@ -74,12 +74,9 @@ def scene_bodies(solids: Sequence[Solid], poses: Sequence[Pose | None] | None) -
 
 
 def bodies_of(
-    solids: Sequence[Solid],
-    poses: Sequence[Pose | None],
-    distinct: list[Solid],
-    kinds: IntArray,
+    solids: Sequence[Solid], poses: Sequence[Pose | None], distinct: list[Solid], kinds: IntArray,
     check: Callable[[], object] | None = None,
-) -> SceneBodies:
+) -> SceneBodies:  # fmt: skip
     """Return bodies of any type as arrays; check: as for `Solid.prepared`."""
     own = [own_box(solid, check) for solid in distinct]
     boxes = np.array([box[:2] for box in own]).reshape(-1, 2, distinct[0].dimension if distinct else 3)
@@ -107,17 +104,15 @@ def _placed(
     return SceneBodies(solids, poses, distinct, kinds, is_posed, rotations, translations, low, high, own)
 
 
-def _pose_numbers(
-    placed: Sequence[Pose | None], dimension: int, bodies: Sequence[Solid]
-) -> tuple[BoolArray, FloatArray]:
+def _pose_numbers(placed: Sequence[Pose | None], d: int, bodies: Sequence[Solid]) -> tuple[BoolArray, FloatArray]:
     """Return which bodies have a pose, and rows of rotation and translation; raise on the first that is none."""
     types, moving, is_posed = set(map(type, placed)), placed, np.ones(len(placed), np.bool_)
     if type(None) in types:
         moving, is_posed = [pose for pose in placed if pose is not None], np.array([p is not None for p in placed])
     if types <= {Pose, type(None)}:
         numbers = np.frombuffer(b"".join([pose.numbers for pose in moving]))  # type: ignore[union-attr]
-        if len(numbers) == len(moving) * (dimension**2 + dimension):  # none of 2 rows makes up for one of 3
-            return is_posed, numbers.reshape(-1, dimension**2 + dimension)
+        if len(numbers) == len(moving) * (d**2 + d):  # none of 2 rows makes up for one of 3
+            return is_posed, numbers.reshape(-1, d**2 + d)
     for index, pose in enumerate(placed):
         check_pose(pose, bodies[index], f"poses[{index}]")
     raise AssertionError("unreachable")

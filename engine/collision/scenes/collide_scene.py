@@ -167,7 +167,7 @@ def _settle(
 
     def pair_of(item: int) -> PlacedPair:
         i, j = pairs[item].tolist()
-        return bodies.solids[i], bodies.solids[j], bodies.poses[i], bodies.poses[j]
+        return bodies.solids[i], bodies.solids[j], (bodies.poses[i], bodies.poses[j])
 
     def task(start: int, stop: int) -> None:
         answers.settle(left[start:stop], pair_of)

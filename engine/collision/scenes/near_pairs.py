@@ -97,7 +97,7 @@ def _forms(bodies: SceneBodies, kinds: IntArray) -> FloatArray:
 
 
 def _asked(
-    bodies: SceneBodies, pairs: IntArray, places: IntArray, gap: float, is_measured: bool, budget: Budget
+    bodies: SceneBodies, pairs: IntArray, places: IntArray, gap: float, measured: bool, budget: Budget
 ) -> FloatArray:
     """Return the distances of pairs of the same two solids under the poses of some rows, as `distances_below` does."""
     first, second = (bodies.solids[number] for number in pairs[0].tolist())
@@ -105,14 +105,14 @@ def _asked(
     if has_plane(first, second):
         for item, ((i, j), place) in enumerate(zip(pairs.tolist(), places[:, 0].tolist())):
             budget.check()
-            p, q = (bodies.poses[i], bodies.poses[j]) if place else (None, None)
-            apart, _ = gap_of_planes(first, second, p, q, budget)
-            found[item] = np.inf if apart.is_at_least(Fraction(gap)) else apart.distance() if is_measured else 0.0
+            placed = (bodies.poses[i], bodies.poses[j]) if place else (None, None)
+            apart, _ = gap_of_planes(first, second, placed, budget)
+            found[item] = np.inf if apart.is_at_least(Fraction(gap)) else apart.distance() if measured else 0.0
         return found
     own, others = (in_space(bodies.rotations[rows], bodies.translations[rows]) for rows in places.T)
     pair = SpreadPair(first, second, own, others, budget)
     pair.fill(0, len(pairs), found, Fraction(gap))
-    if is_measured:
+    if measured:
         found[found == 0.0] = np.nan
         pair.fill(0, len(pairs), found)
     return found

@@ -23,7 +23,17 @@ from engine.collision.exact_images import HalfSpaceImage, Vector, image_half_spa
 from engine.collision.meshes.live_faces import simplex_distance
 from engine.collision.meshes.mesh_arrays import mesh_body_of
 from engine.collision.meshes.mesh_pair import SPACE
-from engine.collision.result import FIRST_WITHIN, NO_CONTACT, RELATIONS, SECOND_WITHIN, Collision, Parts, Witness, Work
+from engine.collision.result import (
+    FIRST_WITHIN,
+    NO_CONTACT,
+    RELATIONS,
+    SECOND_WITHIN,
+    Collision,
+    Parts,
+    Poses,
+    Witness,
+    Work,
+)
 from engine.collision.simple.ball_on_mesh import relate_ball
 from engine.collision.simple.boundary import Boundary, boundary_of, signs_of
 from engine.containment.rational_locate import rational_location
@@ -37,21 +47,19 @@ from engine.solids.sphere import Sphere
 from engine.types import Location, Relation
 
 
-def collide_body_sphere(
-    body: Solid, sphere: Sphere, body_pose: Pose | None, sphere_pose: Pose | None, work: Work
-) -> Collision:
+def collide_body_sphere(body: Solid, ball: Sphere, poses: Poses, work: Work) -> Collision:
     """Return the relation of a body with a boundary of faces or edges (first) and a ball or disc (second), exact."""
-    if body_pose is None:
-        center = sphere.center.tolist() if sphere_pose is None else [
-            rounded(c) for c in image_point(sphere.center, sphere_pose)]  # fmt: skip
-        if _is_ball_beside(body, center, sphere.radius):
+    pose, ball_pose = poses
+    if pose is None:
+        center = [rounded(c) for c in image_point(ball.center, ball_pose)]
+        if _is_ball_beside(body, center, ball.radius):
             return NO_CONTACT
         if body.dimension == 3:
-            answer = _by_floats(body, center, sphere_pose is not None, sphere.radius, work)
+            answer = _by_floats(body, center, ball_pose is not None, ball.radius, work)
             if answer is not None:
                 return answer
     with np.errstate(over="ignore", invalid="ignore"):  # an infinite bound only sends a face to the exact test
-        return _by_distances(body, sphere, body_pose, sphere_pose, work)
+        return _by_distances(body, ball, poses, work)
 
 
 def _is_ball_beside(body: Solid, center: list[float], radius: float) -> bool:
@@ -80,12 +88,11 @@ def _by_floats(body: Solid, center: list[float], is_rounded: bool, radius: float
 _WITHIN = {DISJOINT: NO_CONTACT, FIRST_INSIDE_SECOND: FIRST_WITHIN, SECOND_INSIDE_FIRST: SECOND_WITHIN}
 
 
-def _by_distances(
-    body: Solid, sphere: Sphere, body_pose: Pose | None, sphere_pose: Pose | None, work: Work
-) -> Collision:
-    center, limit = image_point(sphere.center, sphere_pose), Fraction(sphere.radius) ** 2
-    boundary = boundary_of(body, body_pose, work)
-    near = boundary.near(center, sphere.radius)
+def _by_distances(body: Solid, ball: Sphere, poses: Poses, work: Work) -> Collision:
+    pose, ball_pose = poses
+    center, limit = image_point(ball.center, ball_pose), Fraction(ball.radius) ** 2
+    boundary = boundary_of(body, pose, work)
+    near = boundary.near(center, ball.radius)
     candidates = near[_candidates(boundary.face_bounds(center, near)[0], limit)]
     touched, entered = -1, candidates[:0]
     for count, face in enumerate(candidates.tolist()):
@@ -101,16 +108,14 @@ def _by_distances(
     work.n_rational += len(candidates) > 0
     enters = len(entered) > 0
     if touched < 0 and not enters:
-        if not boundary.is_inside(center):
-            return NO_CONTACT
-        return SECOND_WITHIN
+        return NO_CONTACT if not boundary.is_inside(center) else SECOND_WITHIN
     if enters and _all_vertices_within(boundary, center, limit, work):
         return FIRST_WITHIN
     face = boundary.number(int(entered[0]) if enters else touched)
-    if sphere.radius > 0.0 and boundary.has_inside:
+    if ball.radius > 0.0 and boundary.has_inside:
         if enters:
             overlaps = _enters(boundary, entered, center, limit)
-            overlaps = overlaps or _is_within_walls(body, body_pose, center, sphere.radius, work)
+            overlaps = overlaps or _is_within_walls(body, pose, center, ball.radius, work)
         else:
             overlaps = boundary.is_inside(center)
         if overlaps:
@@ -171,16 +176,14 @@ def _all_vertices_within(boundary: Boundary, center: Vector, limit: Fraction, wo
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def body_sphere_parts(
-    body: Solid, sphere: Sphere, body_pose: Pose | None, sphere_pose: Pose | None, work: Work
-) -> Parts:
+def body_sphere_parts(body: Solid, ball: Sphere, poses: Poses, work: Work) -> Parts:
     """Return what of a body (first) and a ball or disc (second) that overlap lies outside the other.
 
     The ball sticks out of the body exactly if a live part of the body's boundary enters the open ball: else the ball is
     all inside. The body sticks out of the ball exactly if some point of its live boundary does, and then a vertex.
     """
-    center, limit = image_point(sphere.center, sphere_pose), Fraction(sphere.radius) ** 2
-    boundary = boundary_of(body, body_pose, work)
+    center, limit = image_point(ball.center, poses[1]), Fraction(ball.radius) ** 2
+    boundary = boundary_of(body, poses[0], work)
     nearest, farthest = boundary.face_bounds(center)
     candidates = _candidates(nearest, limit)
     ball_sticks_out = _enters(boundary, candidates, center, limit)
@@ -202,18 +205,16 @@ def _meets_sphere(boundary: Boundary, face: int, center: Vector, limit: Fraction
     )
 
 
-def collide_half_space_body(
-    half_space: HalfSpace, body: Solid, half_space_pose: Pose | None, body_pose: Pose | None, work: Work
-) -> Collision:
+def collide_half_space_body(space: HalfSpace, body: Solid, poses: Poses, work: Work) -> Collision:
     """Return the relation of a half-space (first) and a body with vertices (second), exact."""
-    if half_space_pose is None and body_pose is None and (side := _side_of_box(half_space, body)) != 0:
+    if poses[0] is None and poses[1] is None and (side := _side_of_box(space, body)) != 0:
         return SECOND_WITHIN if side > 0 else NO_CONTACT
-    plane = image_half_space(half_space.normal, half_space.offset, half_space_pose)
+    plane = image_half_space(space, poses[0])
     low, high, _ = own_box(body)
     corners = np.array(list(itertools.product(*zip(low.tolist(), high.tolist()))))
-    signs = signs_of(plane, corners, body_pose, work)  # of a linear function: one side with these is one with the body
+    signs = signs_of(plane, corners, poses[1], work)  # of a linear function: one side with these is one with the body
     if not ((signs < 0).all() or (signs > 0).all()):
-        boundary = boundary_of(body, body_pose, work)
+        boundary = boundary_of(body, poses[1], work)
         signs = boundary.signs(plane)
     if (signs < 0).all():
         return NO_CONTACT
@@ -248,12 +249,9 @@ def _reaches(boundary: Boundary, faces: IntArray, plane: HalfSpaceImage, side: i
     return boundary.has_live(faces, lambda piece: any(side * value_at(plane, p) > 0 for p in piece.vertices()))
 
 
-def half_space_body_parts(
-    half_space: HalfSpace, body: Solid, half_space_pose: Pose | None, body_pose: Pose | None, work: Work
-) -> Parts:
+def half_space_body_parts(space: HalfSpace, body: Solid, poses: Poses, work: Work) -> Parts:
     """Return what of a half-space and a body with vertices (second) that overlap lies outside the other."""
-    boundary = boundary_of(body, body_pose, work)
-    plane = image_half_space(half_space.normal, half_space.offset, half_space_pose)
+    boundary, plane = boundary_of(body, poses[1], work), image_half_space(space, poses[0])
     signs = boundary.signs(plane)
     sticks_out = _reaches(boundary, boundary.faces_at(signs < 0), plane, -1)
     meet = np.intersect1d(boundary.faces_at(signs <= 0), boundary.faces_at(signs >= 0), assume_unique=True)

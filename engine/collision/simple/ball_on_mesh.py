@@ -19,7 +19,7 @@ from engine.collision.meshes.face_state import state_of
 from engine.collision.meshes.faces_near import SLACK, box_between, next_face
 from engine.collision.meshes.mesh_arrays import STATE_STACKED, MeshArrays, in_tree, triangle_of
 from engine.collision.meshes.parity import INSIDE, OUTSIDE, OwnPoint, locate_point
-from engine.collision.meshes.triangle_triangle import Triangle3
+from engine.collision.meshes.triangle_triangle import Facet
 from engine.jit import allocating, inline, kernel
 from engine.predicates.loading import as_point3
 from engine.predicates.vectors import dot, largest_of, minus
@@ -29,7 +29,7 @@ _MANY = 4096
 
 
 @inline
-def _box_distance(t: Triangle3, center: Point3, slack: float) -> float:
+def _box_distance(t: Facet, center: Point3, slack: float) -> float:
     """Return a lower bound on the square of the distance of a triangle's box, as `box_distance_bounds` does."""
     square = 0.0
     for c, p, q, r in (
@@ -42,21 +42,19 @@ def _box_distance(t: Triangle3, center: Point3, slack: float) -> float:
 
 
 @inline
-def _enters(t: Triangle3, own: OwnPoint, radius: float) -> int:
+def _enters(t: Facet, own: OwnPoint, radius: float) -> int:
     """Tell whether a triangle surely enters the open ball: 1, surely keeps clear of the closed one: 0; else UNSETTLED.
 
     The corners as seen from the centre are off by its error and a rounding, the distances by less than twice that.
     """
     t, none = seen_from(own.point, t), Point3(0.0, 0.0, 0.0)
-    center = Triangle3(none, none, none)
+    center = Facet(none, none, none)
     slack = 4.0 * rounding_of(t, center) + 2.0 * own.error + 2.0**-50 * radius
     inner = radius - slack
     if inner > 2.0**-500 and min(dot(t.p, t.p), dot(t.q, t.q), dot(t.r, t.r)) < inner * inner * (1.0 - 2.0**-49):
         return 1
     _, across = nearest_points(center, t, radius + 2.0 * slack)  # order: edges are measured from the ends of the first
-    if across.size < inner:
-        return 1
-    return 0 if across.low > radius + slack else UNSETTLED
+    return 1 if across.size < inner else (0 if across.low > radius + slack else UNSETTLED)
 
 
 @allocating

@@ -115,7 +115,7 @@ def _mesh_boundary(body: Solid, pose: Pose | None, work: Work) -> Boundary:
         return faces_in(mesh.arrays, mesh.posed(pose), (around - reach).tolist(), (around + reach).tolist())
 
     def is_inside(center: Vector) -> bool:
-        exact, _ = exact_pair(mesh, pose, mesh, pose)
+        exact, _ = exact_pair(mesh, mesh, (pose, pose))
         return mesh.has_inside and sides_at(exact, exact.at(center), 2).at
 
     def live(faces: list[int]) -> Iterator[LivePiece]:

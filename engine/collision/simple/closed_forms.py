@@ -21,6 +21,7 @@ from engine.collision.result import (
     TOUCH,
     Collision,
     Kind,
+    Poses,
     Witness,
     Work,
 )
@@ -30,7 +31,6 @@ from engine.predicates.exact_vectors import largest_axis, minus, squared_length
 from engine.predicates.rational import scaled_integers
 from engine.solids.aabb import Aabb
 from engine.solids.half_space import HalfSpace
-from engine.solids.pose import Pose
 from engine.solids.sphere import Sphere
 from engine.types import Relation
 
@@ -47,10 +47,8 @@ def relate_boxes(low: Any, high: Any, their_low: Any, their_high: Any) -> int:
         interiors &= a0 < b1 and b0 < a1
     if not meet:
         return DISJOINT
-    if i_within:
-        return FIRST_INSIDE_SECOND
-    if j_within:
-        return SECOND_INSIDE_FIRST
+    if i_within or j_within:
+        return FIRST_INSIDE_SECOND if i_within else SECOND_INSIDE_FIRST
     return OVERLAPPING if solid and interiors else TOUCHING
 
 
@@ -66,16 +64,14 @@ def relate_box_pairs(low: Any, high: Any, is_box: Any, pairs: Any, relations: An
             relations[item] = _relate(low[i], high[i], low[j], high[j])
 
 
-def touching_boxes(
-    low: list[float], high: list[float], their_low: list[float], their_high: list[float]
-) -> Witness | None:
-    """Return the witness of two touching boxes of space, None where one is flat.
+def touching_boxes(*bounds: list[float]) -> Witness | None:
+    """Return the witness of two touching boxes of space, each low and high; None where one is flat.
 
     They share a part of a face, an edge or a vertex, by on how many axes they only touch; of the faces that meet there
     the first is on the first of these axes.
     """
     n, first_face, second_face = -1, 0, 0
-    for axis, (a0, a1, b0, b1) in enumerate(zip(low, high, their_low, their_high)):
+    for axis, (a0, a1, b0, b1) in enumerate(zip(*bounds)):
         if a0 == a1 or b0 == b1:
             return None
         if a1 == b0 or b1 == a0:
@@ -88,21 +84,19 @@ def touching_boxes(
 _SHARED: tuple[Kind, ...] = ("face_face", "edge_edge", "vertex_vertex")
 
 
-def collide_aabb_sphere(
-    box: Aabb, sphere: Sphere, box_pose: Pose | None, sphere_pose: Pose | None, work: Work
-) -> Collision:
+def collide_aabb_sphere(box: Aabb, ball: Sphere, poses: Poses, work: Work) -> Collision:
     """Return the relation of a box (first) and a ball (second), exact, in 2D or 3D; a posed box is any body.
 
     Flat boxes and balls of radius 0 have no interior and never overlap.
     """
-    if box_pose is not None:
-        return collide_body_sphere(box, sphere, box_pose, sphere_pose, work)
+    if poses[0] is not None:
+        return collide_body_sphere(box, ball, poses, work)
     d, numbers = box.dimension, list[Any]()
-    if sphere_pose is None:
-        numbers = scaled_integers([*box.min.tolist(), *box.max.tolist(), *sphere.center.tolist(), sphere.radius])
+    if poses[1] is None:
+        numbers = scaled_integers([*box.min.tolist(), *box.max.tolist(), *ball.center.tolist(), ball.radius])
     else:
-        numbers = [*as_vector(box.min), *as_vector(box.max), *image_point(sphere.center, sphere_pose)]
-        numbers.append(Fraction(sphere.radius))
+        there, r = image_point(ball.center, poses[1]), Fraction(ball.radius)
+        numbers = [*as_vector(box.min), *as_vector(box.max), *there, r]
     low, high, center, radius = numbers[:d], numbers[d : 2 * d], numbers[2 * d : -1], numbers[-1]
     near = squared_length([max(a - c, c - b, 0) for c, a, b in zip(center, low, high)])
     if near > radius * radius:
@@ -117,58 +111,42 @@ def collide_aabb_sphere(
     return Collision(Relation.TOUCHING, Witness("surface", piercing=True)) if enters else TOUCH
 
 
-def collide_half_space_half_space(
-    first: HalfSpace, second: HalfSpace, first_pose: Pose | None, second_pose: Pose | None, work: Work
-) -> Collision:
+def collide_half_spaces(first: HalfSpace, second: HalfSpace, poses: Poses, work: Work) -> Collision:
     """Return the relation of two half-spaces (half-planes in 2D), exact.
 
     Equal ones overlap; opposite ones that share only their plane touch. Neither holds the other unless its plane lies
     strictly inside.
     """
-    n, d = image_half_space(first.normal, first.offset, first_pose)
-    m, e = image_half_space(second.normal, second.offset, second_pose)
+    (n, d), (m, e) = image_half_space(first, poses[0]), image_half_space(second, poses[1])
     axis = largest_axis(n)
     factor = m[axis] / n[axis]  # m = factor n if parallel
     if any(m[k] != factor * n[k] for k in range(len(n))):
         return OVERLAP
     low, bound = -d, -e / factor if factor != 0 else -d  # first: n . x >= low; factor = 0 only if not parallel
     if factor > 0:
-        if low > bound:
-            return FIRST_WITHIN
-        if low < bound:
-            return SECOND_WITHIN
-        return OVERLAP
-    if low > bound:
-        return NO_CONTACT
-    return TOUCH if low == bound else OVERLAP
+        return FIRST_WITHIN if low > bound else (SECOND_WITHIN if low < bound else OVERLAP)
+    return NO_CONTACT if low > bound else (TOUCH if low == bound else OVERLAP)
 
 
-def collide_half_space_sphere(
-    half_space: HalfSpace, sphere: Sphere, half_space_pose: Pose | None, sphere_pose: Pose | None, work: Work
-) -> Collision:
+def collide_half_space_sphere(space: HalfSpace, ball: Sphere, poses: Poses, work: Work) -> Collision:
     """Return the relation of a half-space (first) and a ball (second), exact; a half-space is never inside."""
-    normal, offset = image_half_space(half_space.normal, half_space.offset, half_space_pose)
-    value = value_at((normal, offset), image_point(sphere.center, sphere_pose))
-    reach = Fraction(sphere.radius) ** 2 * squared_length(normal)
+    plane = image_half_space(space, poses[0])
+    value = value_at(plane, image_point(ball.center, poses[1]))
+    reach = Fraction(ball.radius) ** 2 * squared_length(plane[0])
     if value**2 > reach:
-        if value < 0:
-            return NO_CONTACT
-        return SECOND_WITHIN
+        return NO_CONTACT if value < 0 else SECOND_WITHIN
     # case: the ball touches the plane from outside, or is a point on it
-    only_touches = value**2 == reach and value <= 0
-    return TOUCH if only_touches else OVERLAP
+    return TOUCH if value**2 == reach and value <= 0 else OVERLAP
 
 
-def collide_sphere_sphere(
-    first: Sphere, second: Sphere, first_pose: Pose | None, second_pose: Pose | None, work: Work
-) -> Collision:
+def collide_spheres(a: Sphere, b: Sphere, poses: Poses, work: Work) -> Collision:
     """Return the relation of two balls (discs in 2D), exact. A ball of radius 0 is a point: it never overlaps."""
-    d, numbers = first.dimension, list[Any]()
-    if first_pose is None and second_pose is None:
-        numbers = scaled_integers([*first.center.tolist(), *second.center.tolist(), first.radius, second.radius])
+    d, numbers = a.dimension, list[Any]()
+    if poses[0] is None and poses[1] is None:
+        numbers = scaled_integers([*a.center.tolist(), *b.center.tolist(), a.radius, b.radius])
     else:
-        numbers = [*image_point(first.center, first_pose), *image_point(second.center, second_pose)]
-        numbers += [Fraction(first.radius), Fraction(second.radius)]
+        numbers = [*image_point(a.center, poses[0]), *image_point(b.center, poses[1])]
+        numbers += map(Fraction, (a.radius, b.radius))
     r, s = numbers[-2:]
     between, sum_of_both = squared_length(minus(numbers[:d], numbers[d : 2 * d])), (r + s) * (r + s)
     if between > sum_of_both:

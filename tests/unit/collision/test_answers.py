@@ -16,7 +16,7 @@ OTHERS: list[Solid] = [BOX, Aabb([1, 0, 0], [2, 1, 1]), Aabb([5, 0, 0], [6, 1, 1
 
 
 def pair_of(item: int) -> PlacedPair:
-    return BOX, OTHERS[item], None, None
+    return BOX, OTHERS[item], (None, None)
 
 
 def test_open_pairs_are_settled_and_witnesses_added() -> None:

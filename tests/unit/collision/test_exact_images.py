@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from engine import Pose
+from engine import HalfSpace, Pose
 from engine.collision.exact_images import as_vector, image_half_space, image_point, value_at
 from engine.predicates.exact_vectors import dot
 
@@ -24,7 +24,8 @@ def test_the_image_of_a_half_space_holds_the_images_of_its_points(d: int) -> Non
         rows = [as_vector(row) for row in pose.rotation]
         assert images[0][0] == dot(rows[0], as_vector(points[0])) + Fraction(float(pose.translation[0]))
         ratios = {
-            value_at(image_half_space(normal, offset, pose), image) / value_at((as_vector(normal), Fraction(offset)), p)
+            value_at(image_half_space(HalfSpace(normal, offset), pose), image)
+            / value_at((as_vector(normal), Fraction(offset)), p)
             for p, image in zip(map(as_vector, points), images)
         }
         assert len(ratios) == 1  # the determinant
@@ -33,4 +34,4 @@ def test_the_image_of_a_half_space_holds_the_images_of_its_points(d: int) -> Non
 
 def test_no_pose_changes_nothing() -> None:
     assert image_point([0.1, 0.2], None) == (Fraction(0.1), Fraction(0.2))
-    assert image_half_space(np.array([1.0, 2.0]), 3.0, None) == ((1, 2), 3)
+    assert image_half_space(HalfSpace([1.0, 2.0], 3.0), None) == ((1, 2), 3)

@@ -60,9 +60,9 @@ def test_boxes_and_balls_are_what_rationals_say(size: float, monkeypatch: pytest
             return call
 
         monkeypatch.setattr(forms, "entry_of", told)
-        found: Any = between_forms(first, second, *poses, None)
+        found: Any = between_forms(first, second, poses, None)
         monkeypatch.setattr(forms, "entry_of", lambda _: lambda *_: (UNSURE, -1, -1))
-        exact = between_forms(first, second, *poses, None)
+        exact = between_forms(first, second, poses, None)
         n_sure += sum(sure)
         assert said(found) == said(exact), (first, second, poses)
         if exact is None:
@@ -70,9 +70,9 @@ def test_boxes_and_balls_are_what_rationals_say(size: float, monkeypatch: pytest
         for least in (nextafter(found.distance, 0.0), found.distance, nextafter(found.distance, 1e308)):
             if least > 0.0:
                 monkeypatch.setattr(forms, "entry_of", lambda _: lambda *_: (UNSURE, -1, -1))
-                settled = between_forms(first, second, *poses, least)
+                settled = between_forms(first, second, poses, least)
                 monkeypatch.setattr(forms, "entry_of", real)
-                assert between_forms(first, second, *poses, least) is settled, (first, second, poses, least)
+                assert between_forms(first, second, poses, least) is settled, (first, second, poses, least)
     assert n_sure > 50 or not 1e-140 < size < 1e140
 
 
@@ -84,18 +84,18 @@ def test_half_spaces_are_what_rationals_say(size: float) -> None:
         normal = [rng.choice([0.0, 0.0, 1.0, -1.0, rng.uniform(-1.0, 1.0)]) for _ in range(d)]
         plane = HalfSpace(normal if any(normal) else [1.0, *normal[1:]], number(rng, size) - 8.0 * size)
         other, other_pose = body(rng, d, size), pose(rng, d, size)
-        found: Any = between_form_and_plane(plane, other, None, other_pose, None)
-        mirrored: Any = between_form_and_plane(other, plane, other_pose, None, None)
+        found: Any = between_form_and_plane(plane, other, (None, other_pose), None)
+        mirrored: Any = between_form_and_plane(other, plane, (other_pose, None), None)
         if found is None or found is MEETING:
             continue
         n_sure += 1
         with Budget() as budget:
-            gap, features = gap_of_planes(plane, other, None, other_pose, budget)
+            gap, features = gap_of_planes(plane, other, (None, other_pose), budget)
         assert said(found) == said(gap.clearance(features, d)), (plane, other, other_pose)
         assert (mirrored.distance, mirrored.features) == (found.distance, found.features[::-1])
         assert mirrored.points.tolist() == found.points.tolist()[::-1]
-        assert between_form_and_plane(plane, other, None, other_pose, nextafter(found.distance, 0.0)) is True
-        assert between_form_and_plane(plane, other, None, other_pose, nextafter(found.distance, 1e308)) is False
+        assert between_form_and_plane(plane, other, (None, other_pose), nextafter(found.distance, 0.0)) is True
+        assert between_form_and_plane(plane, other, (None, other_pose), nextafter(found.distance, 1e308)) is False
     assert n_sure > 50 or size > 1e150
 
 

@@ -7,7 +7,7 @@ import random
 import numpy as np
 
 from engine.collision.clearance.near_triangles import nearest_points, rounding_of, seen_from
-from engine.collision.meshes.triangle_triangle import Triangle3
+from engine.collision.meshes.triangle_triangle import Facet
 from engine.jit import kernel
 from engine.types import Point3
 from tests.reference.distance import squared_distance
@@ -15,7 +15,7 @@ from tests.reference.exact import q, vector
 
 
 @kernel
-def bounds(s: Triangle3, t: Triangle3) -> tuple[float, float]:
+def bounds(s: Facet, t: Facet) -> tuple[float, float]:
     origin = s.p
     s, t = seen_from(origin, s), seen_from(origin, t)
     _, across = nearest_points(s, t, np.inf)
@@ -33,7 +33,7 @@ def test_bounds_enclose_the_exact_distance_closely() -> None:
             for _ in range(2)
         )
         t = [[x + offset, y, z] for x, y, z in t]
-        low, high = bounds(*(Triangle3(*(Point3(*p) for p in hull)) for hull in (s, t)))
+        low, high = bounds(*(Facet(*(Point3(*p) for p in hull)) for hull in (s, t)))
         exact = squared_distance(*[tuple(dict.fromkeys(map(vector, hull))) for hull in (s, t)])
         assert q(max(low, 0.0)) ** 2 <= exact <= q(high) ** 2, (s, t)
         assert high - low <= 1e-12 * (1.0 + high) or np.sqrt(float(exact)) < 1e-6, (s, t)

@@ -37,7 +37,7 @@ def test_squares_that_nearly_touch_are_told_as_rationals_do(is_posed: bool, n: i
         pose = {"rotation": [[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]],
                 "translation": [3.0, 0.1]} if is_posed else None  # fmt: skip
         placed = None if pose is None else Pose(pose["rotation"], pose["translation"])
-        found = between_outlines(solid(a), solid(b), placed, None, None)
+        found = between_outlines(solid(a), solid(b), (placed, None), None)
         if found is None:
             continue
         n_told += 1
@@ -53,7 +53,7 @@ def test_squares_that_nearly_touch_are_told_as_rationals_do(is_posed: bool, n: i
 def test_ties_along_the_axes_fall_to_the_least_edges_and_other_ties_are_left_open() -> None:
     square = Polygon([[(0, 0), (2, 0), (2, 2), (0, 2)]])
     beside = Polygon([[(3, -1), (5, -1), (5, 3), (3, 3)]])
-    told = between_outlines(square, beside, None, None, None)
+    told = between_outlines(square, beside, (None, None), None)
     assert isinstance(told, Clearance)
     assert told.features is not None
     assert told.points is not None
@@ -64,20 +64,20 @@ def test_ties_along_the_axes_fall_to_the_least_edges_and_other_ties_are_left_ope
     )
     turned = Polygon([[(0, 0), (1, -1), (2, 0), (1, 1)]])
     opposite = Polygon([[(2, 2), (3, 1), (4, 2), (3, 3)]])  # a side each, all along 45 degrees
-    assert between_outlines(turned, opposite, None, None, None) is None
-    assert between_outlines(turned, opposite, None, None, 1.0) is True
+    assert between_outlines(turned, opposite, (None, None), None) is None
+    assert between_outlines(turned, opposite, (None, None), 1.0) is True
     assert clearance(turned, opposite).distance == math.sqrt(2)  # type: ignore[union-attr]
 
 
 def test_a_ball_within_a_ring_is_as_far_as_its_sides_and_one_inside_meets() -> None:
     frame = Polygon([[(0, 0), (10, 0), (10, 10), (0, 10)], [(2, 2), (8, 2), (8, 8), (2, 8)]])
-    within = between_outlines(frame, Sphere([5, 4], 1), None, None, None)
+    within = between_outlines(frame, Sphere([5, 4], 1), (None, None), None)
     assert isinstance(within, Clearance)
     assert within.points is not None
     assert (within.distance, within.points.tolist()) == (1.0, [[5.0, 2.0], [5.0, 3.0]])
     for center, radius in [((1, 1), 0.25), ((5, 4), 2.5)]:
-        met = between_outlines(frame, Sphere(center, radius), None, None, None)
+        met = between_outlines(frame, Sphere(center, radius), (None, None), None)
         assert isinstance(met, Clearance)
         assert met.distance == 0.0
-    touching = between_outlines(frame, Sphere([5, 4], 2), None, None, None)
+    touching = between_outlines(frame, Sphere([5, 4], 2), (None, None), None)
     assert touching is None  # a contact is for rationals

@@ -10,7 +10,7 @@ import pytest
 
 import engine.collision.clearance.spreads as spreads
 from engine import DeadlineExceededError, Polyhedron, Pose, clearance
-from engine.collision.clearance.spreads import SpreadPair, spread_pair
+from engine.collision.clearance.spreads import SpreadPair, _ExactPair, spread_pair
 from engine.parallel import Budget
 
 
@@ -40,10 +40,10 @@ def one(pair: SpreadPair, least: Fraction | None = None) -> float:
 
 def least(first: Polyhedron, second: Polyhedron, pose: Pose | None, every_pair: bool) -> float:
     with Budget() as budget:
-        pair = spread_pair(first, second, None, pose, budget)
+        pair = spread_pair(first, second, (None, pose), budget)
         if every_pair:
             a, b = (range(len(mesh.faces)) for mesh in pair.meshes)
-            exact = pair._exact(0)
+            exact = _ExactPair(*pair.meshes, (None, pose), (0.0, 0.0))
             gaps = [exact.gap(i, j, 0, 0) for i in a for j in b]
             best = gaps[0]
             for gap in gaps:
@@ -71,9 +71,9 @@ def test_bodies_that_enclose_each_other_and_little_room(monkeypatch: pytest.Monk
         np.concatenate([outer.triangles, outer.triangles[:, ::-1] + len(outer.vertices)]),
     )
     with Budget() as budget:
-        expected = one(spread_pair(shell, inner, None, None, budget))
+        expected = one(spread_pair(shell, inner, (None, None), budget))
         monkeypatch.setattr(spreads, "_ROOM", 32)
-        pair = spread_pair(shell, inner, None, None, budget)
+        pair = spread_pair(shell, inner, (None, None), budget)
         assert one(pair) == expected
         assert one(pair, Fraction(expected) / 2)
         assert not one(pair, Fraction(expected) * 2)

@@ -88,7 +88,7 @@ def test_answers_are_those_of_the_exact_path(first: str, second: str) -> None:
     placed: list[Pose | None] = [*poses(3 if slow else 12, 0.5, 1), *poses(3 if slow else 12, 0.05, 2), None]
     found = short_answers(one, other, placed)
     for pose, relation in zip(placed, found):
-        exact = collide_pair(one, other, None, pose, Work(witness=False)).relation
+        exact = collide_pair(one, other, (None, pose), Work(witness=False)).relation
         assert relation in (exact, UNSETTLED), pose
     assert found.count(UNSETTLED) <= 3
 

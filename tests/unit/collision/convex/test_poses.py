@@ -48,7 +48,7 @@ def test_answers_are_those_of_the_exact_path(first: str, second: str) -> None:
     placed = [*poses(11, 0.5, 1), *poses(10, 0.05, 2)]
     found = in_lanes(one, other, placed)
     assert found is not None
-    exact = [collide_pair(one, other, None, pose, Work(witness=False)).relation for pose in placed]
+    exact = [collide_pair(one, other, (None, pose), Work(witness=False)).relation for pose in placed]
     assert all(answer in (right, UNSETTLED) for answer, right in zip(found, exact))
     assert found.count(UNSETTLED) <= 5
     booleans = in_lanes(one, other, placed, boolean=True)
@@ -84,7 +84,7 @@ def test_bodies_far_from_the_origin(shift: float) -> None:
     found = in_lanes(one, other, placed)
     if found is None:  # rounded to so few places that they are not convex any more
         return
-    exact = [collide_pair(one, other, None, pose, Work(witness=False)).relation for pose in placed]
+    exact = [collide_pair(one, other, (None, pose), Work(witness=False)).relation for pose in placed]
     assert all(answer in (right, UNSETTLED) for answer, right in zip(found, exact))
     assert shift > 1e6 or found.count(UNSETTLED) <= 1
 

@@ -11,7 +11,7 @@ from engine.collision.meshes.dual_traversal import SEEK_OVERLAP, new_found
 from engine.collision.meshes.exact_triangles import kind_of_contact
 from engine.collision.meshes.mesh_arrays import mesh_body_of
 from engine.collision.meshes.mesh_pair import N_CONTACTS, SPACE, relate
-from engine.collision.meshes.triangle_triangle import Triangle3, with_pose
+from engine.collision.meshes.triangle_triangle import Facet, with_pose
 from engine.collision.result import Work
 from engine.types import Point3
 
@@ -21,7 +21,7 @@ def test_a_common_corner_is_all() -> None:
     n_told, poses = 0, np.zeros((1, 12))
     for _ in range(1500):
         first, second = draw.integers(0, 4, (2, 3, 3)).tolist()
-        t, u = (Triangle3(*(Point3(*map(float, p)) for p in corners)) for corners in (first, second))
+        t, u = (Facet(*(Point3(*map(float, p)) for p in corners)) for corners in (first, second))
         common = common_corner(poses, t, u, with_pose(t), with_pose(u), 0.0)
         if common >= 0:
             n_told += 1
@@ -55,7 +55,7 @@ def test_many_faces_at_one_point(pose: Pose | None) -> None:
 
 def test_few_pairs_say_all() -> None:
     a, b = mesh_body_of(fan(30, 1, 0.5)), mesh_body_of(fan(25, -1, 0.75))
-    row, found = relate(a, None, b, None, SEEK_OVERLAP, Work(witness=False))
+    row, found = relate(a, b, (None, None), SEEK_OVERLAP, Work(witness=False))
     assert row[N_CONTACTS] <= 32 + 30 + 25
     assert len(np.unique(found.pairs[: row[N_CONTACTS], 0])) == 30
     assert len(np.unique(found.pairs[: row[N_CONTACTS], 1])) == 25

@@ -29,13 +29,13 @@ def test_agrees_with_exact_integers(size: int, pose: Pose | None) -> None:
         if rng.random() < 0.5:
             t[:, 2] = u[:, 2] = 0.0
         first, second = (mesh_body_of(Surface(corners, [[0, 1, 2]])) for corners in (t, u))
-        a, b = exact_pair(first, pose, second, pose)
+        a, b = exact_pair(first, second, (pose, pose))
         faces = a.corners(0), b.corners(0)
         if classify_exact(*faces) == APART:
             continue
         found = Found(np.zeros((1, 2), np.int64), np.full(1, CONTACT, np.int8), np.empty(0, np.bool_))
         with np.errstate(all="ignore"):
-            row, _ = relate(first, pose, second, pose, SEEK_CONTACT, Work(), found)
+            row, _ = relate(first, second, (pose, pose), SEEK_CONTACT, Work(), found)
         if min(first.arrays.axis[0], second.arrays.axis[0]) < 0:
             assert row[KIND] == UNSETTLED
         else:

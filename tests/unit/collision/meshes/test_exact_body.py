@@ -15,7 +15,7 @@ from tests.unit.collision.meshes.bodies import TURN, mesh
 
 @pytest.mark.parametrize("pose", [None, TURN, Pose(np.eye(3), [2.0**-1074, 1e300, 0.1])])
 def test_vertices_are_exact_images(pose: Pose | None) -> None:
-    body, _ = exact_pair(mesh(2, (0.1, 0, 2.0**-60)), pose, mesh(1), TURN)
+    body, _ = exact_pair(mesh(2, (0.1, 0, 2.0**-60)), mesh(1), (pose, TURN))
     for vertex, p in enumerate(body.mesh.arrays.vertices.tolist()):
         assert tuple(Fraction(x, 1 << body.shift) for x in body.vertex(vertex)) == image_point(p, pose)
     a, b, c, d = body.plane(0)
@@ -24,7 +24,7 @@ def test_vertices_are_exact_images(pose: Pose | None) -> None:
 
 @pytest.mark.parametrize("pose", [None, TURN])
 def test_no_face_that_meets_a_box_is_missed(pose: Pose | None) -> None:
-    body, _ = exact_pair(mesh(3), pose, mesh(1), None)
+    body, _ = exact_pair(mesh(3), mesh(1), (pose, None))
     low, high = [0.5, 0.5, -1.0], [1.5, 1.25, float("inf")]
     found = body.faces_in(low, high)
     assert found == sorted(found)

@@ -48,7 +48,7 @@ def test_a_point_in_every_region() -> None:
 
 @pytest.mark.parametrize("pose", [None, TURN])
 def test_sides_of_the_faces_of_a_box(pose: Pose | None) -> None:
-    body, other = exact_pair(mesh(2), pose, mesh(1, (0.5, 0.5, 2)), pose)
+    body, other = exact_pair(mesh(2), mesh(1, (0.5, 0.5, 2)), (pose, pose))
     for face in range(len(body.mesh.faces)):
         sides = sides_within(body, face, other, np.empty(0, np.int64))
         assert sides is not None

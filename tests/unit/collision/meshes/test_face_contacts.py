@@ -19,7 +19,7 @@ from tests.unit.collision.meshes.bodies import TURN, mesh
 @pytest.mark.parametrize("pose", [None, TURN])
 @pytest.mark.parametrize("at", [(2, 0.5, 0), (2, 2, 1), (9, 0, 0)])
 def test_contacts_are_those_of_all_pairs_in_order(pose: Pose | None, at: tuple[float, float, float]) -> None:
-    pair = MeshPair(mesh(2), pose, mesh(1, at), pose, Work())
+    pair = MeshPair(mesh(2), mesh(1, at), (pose, pose), Work())
     with np.errstate(all="ignore"):
         pair.find_contacts()
     assert not pair.is_settled
@@ -33,7 +33,7 @@ def test_contacts_are_those_of_all_pairs_in_order(pose: Pose | None, at: tuple[f
 
 
 def test_a_crossing_settles() -> None:
-    pair = MeshPair(mesh(2), None, mesh(2, (1, 0.5, 0.25)), None, Work())
+    pair = MeshPair(mesh(2), mesh(2, (1, 0.5, 0.25)), (None, None), Work())
     pair.find_contacts()
     assert pair.is_settled
     assert len(pair.contacts) == 1

@@ -15,7 +15,7 @@ from tests.unit.collision.meshes.bodies import TURN, mesh
 @pytest.mark.parametrize("pose", [None, TURN])
 @pytest.mark.parametrize(("at", "overlaps"), [((1, 0, 0), True), ((2, 0, 0), False), ((0, 0, 0), True)])
 def test_flush_boxes(at: tuple[float, float, float], overlaps: bool, pose: Pose | None) -> None:
-    pair = MeshPair(mesh(2), pose, mesh(2, at), pose, Work())
+    pair = MeshPair(mesh(2), mesh(2, at), (pose, pose), Work())
     with np.errstate(all="ignore"):
         pair.find_contacts()
         found = False

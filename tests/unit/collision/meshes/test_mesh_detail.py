@@ -29,4 +29,4 @@ def test_known_parts(
     expected: Parts,
     pose: Pose | None,
 ) -> None:
-    assert mesh_parts(brick(*first), brick(*second), pose, pose, Work()) == expected
+    assert mesh_parts(brick(*first), brick(*second), (pose, pose), Work()) == expected

@@ -13,14 +13,13 @@ from tests.unit.collision.meshes.bodies import TURN, mesh
 
 
 def test_the_identity_is_no_pose() -> None:
-    assert unless_identity(None) is None
-    assert unless_identity(Pose.identity()) is None
-    assert unless_identity(TURN) is TURN
+    assert unless_identity((None, Pose.identity())) == (None, None)
+    assert unless_identity((TURN, None)) == (TURN, None)
 
 
 @pytest.mark.parametrize("pose", [None, TURN])
 def test_patches_inside_and_outside(pose: Pose | None) -> None:
-    pair = MeshPair(mesh(1, (1, 1, 1)), pose, mesh(3), pose, Work())
+    pair = MeshPair(mesh(1, (1, 1, 1)), mesh(3), (pose, pose), Work())
     none = np.empty(0, np.int64)
     assert [len(patch) for patch in pair.patches(0, none, INSIDE)] == [12]
     assert [len(patch) for patch in pair.patches(1, none, OUTSIDE)] == [108]

@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 
 from engine.collision.meshes.exact_triangles import classify_exact, kind_of_contact
-from engine.collision.meshes.placement import orient3d_near
 from engine.collision.meshes.triangle_triangle import (
     APART,
     CONTACT,
     COPLANAR,
     CROSSING,
-    Triangle3,
+    Facet,
     classify_exactly,
     with_pose,
 )
 from engine.jit import kernel
 from engine.predicates.loading import as_point3
+from engine.predicates.posed import orient3d_rounded
 from engine.types import UNDECIDED
 from tests.reference.contact import triangles_meet
 from tests.reference.exact import Vector, vector
@@ -33,8 +33,8 @@ def classify_batch(first: Any, second: Any, axes: Any, kinds: Any) -> None:
     poses = np.zeros((1, 12))
     for item in range(kinds.shape[0]):
         a, b = first[item], second[item]
-        t1 = Triangle3(as_point3(a, 0), as_point3(a, 1), as_point3(a, 2))
-        t2 = Triangle3(as_point3(b, 0), as_point3(b, 1), as_point3(b, 2))
+        t1 = Facet(as_point3(a, 0), as_point3(a, 1), as_point3(a, 2))
+        t2 = Facet(as_point3(b, 0), as_point3(b, 1), as_point3(b, 2))
         kinds[item] = classify_exactly(poses, with_pose(t1), with_pose(t2), axes[item], 0.0)
 
 
@@ -42,7 +42,7 @@ def classify_batch(first: Any, second: Any, axes: Any, kinds: Any) -> None:
 def near_batch(points: Any, error: float, sides: Any) -> None:
     for item in range(sides.shape[0]):
         p = points[item]
-        sides[item] = orient3d_near(as_point3(p, 0), as_point3(p, 1), as_point3(p, 2), as_point3(p, 3), error)
+        sides[item] = orient3d_rounded(as_point3(p, 0), as_point3(p, 1), as_point3(p, 2), as_point3(p, 3), error)
 
 
 def axes_of(triangles: np.ndarray) -> np.ndarray:

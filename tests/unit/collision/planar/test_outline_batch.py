@@ -75,8 +75,8 @@ def test_single_pairs_are_what_the_arrangement_says_witnesses_too() -> None:
         pose = Pose([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]], rng.uniform(-1, 1, 2))
         for placed in (None, pose):
             work = Work(Budget(None, None))
-            assert collide_outlines(first, second, None, placed, work) == collide_outline_outline(
-                first, second, None, placed, work
+            assert collide_outlines(first, second, (None, placed), work) == collide_outline_outline(
+                first, second, (None, placed), work
             )
 
 

@@ -27,7 +27,7 @@ def test_agrees_with_rationals(is_solid: bool, scale: float) -> None:
             found = _by_floats(body, ball.center.tolist(), False, ball.radius, Work())
             if found is not None:
                 n_told += 1
-                assert found == _by_distances(body, ball, None, None, Work())
+                assert found == _by_distances(body, ball, (None, None), Work())
     assert n_told > 100 or scale != 1.0
 
 
@@ -37,4 +37,4 @@ def test_a_rounded_centre_is_told_where_it_does_not_matter() -> None:
     for x in range(-3, 9):
         ball = Sphere([x, 0.5, 0.5], 1)
         found = _by_floats(body, (turn.rotation @ ball.center + turn.translation).tolist(), True, 1.0, Work())
-        assert found == _by_distances(body, ball, None, turn, Work())
+        assert found == _by_distances(body, ball, (None, turn), Work())

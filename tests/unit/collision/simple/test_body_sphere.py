@@ -63,4 +63,4 @@ SLAB, SQUARE = Aabb([-3, -4, -1], [3, 4, 1]), Polygon([[[-3, -4], [3, -4], [3, 4
     ],
 )
 def test_known_parts(body: Solid, ball: Sphere, expected: Parts) -> None:
-    assert body_sphere_parts(body, ball, None, None, Work()) == expected
+    assert body_sphere_parts(body, ball, (None, None), Work()) == expected

@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from engine import Aabb, Polygon, Pose, Solid
+from engine import Aabb, HalfSpace, Polygon, Pose, Solid
 from engine.collision.exact_images import image_half_space, value_at
 from engine.collision.meshes.live_faces import simplex_distance
 from engine.collision.result import Work
@@ -24,7 +24,7 @@ TURNED2 = Pose([[0.6, -0.8], [0.8, 0.6]], [0.1, 0.2])
 def test_rounded_vertices_bounds_and_signs_hold_the_exact_ones(body: Solid, pose: Pose | None) -> None:
     boundary = boundary_of(body, pose, Work())
     center = tuple(map(Fraction, [5, 6, 7][: body.dimension]))
-    plane = image_half_space(np.array([3.0, 1.0, -2.0][: body.dimension]), -2.5, None)
+    plane = image_half_space(HalfSpace([3.0, 1.0, -2.0][: body.dimension], -2.5), None)
     floats = boundary.floats(slice(None))
     lower, upper = boundary.bounds(center, floats, floats)
     signs = boundary.signs(plane)

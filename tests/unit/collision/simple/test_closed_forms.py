@@ -37,7 +37,7 @@ def test_witnesses_of_touching_boxes_are_those_of_their_meshes() -> None:
         other = Aabb(*zip(*spots))
         found = collide(box, other)
         if found.relation.label == "touching":
-            assert found == mesh_mesh(box, other, None, None, Work())
+            assert found == mesh_mesh(box, other, (None, None), Work())
             kinds.add(found.witness and found.witness.kind)
     assert kinds == {"face_face", "edge_edge", "vertex_vertex"}
 

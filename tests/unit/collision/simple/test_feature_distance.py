@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from engine.collision.meshes.live_faces import segment_distance, triangle_distance
+from engine.collision.meshes.live_faces import segment_distance, simplex_distance
 from engine.collision.simple.boundary import box_distance_bounds
 from tests.reference.contact import squared_distance_to_segment, squared_distance_to_triangle
 from tests.reference.exact import vector
@@ -24,9 +24,9 @@ def test_agrees_with_the_reference_and_the_bounds_hold() -> None:
             np.array([rows[1:]]).min(1).astype(float),
             np.array([rows[1:]]).max(1).astype(float),
         )
-        assert near[0] <= triangle_distance(p, a, b, c) <= far[0]
+        assert near[0] <= simplex_distance(p, (a, b, c)) <= far[0]
         if np.cross(np.subtract(rows[2], rows[1]), np.subtract(rows[3], rows[1])).any():
-            assert triangle_distance(p, a, b, c) == squared_distance_to_triangle(q[0], (q[1], q[2], q[3]))
+            assert simplex_distance(p, (a, b, c)) == squared_distance_to_triangle(q[0], (q[1], q[2], q[3]))
 
 
 def test_bounds_survive_overflow() -> None:

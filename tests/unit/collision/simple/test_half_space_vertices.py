@@ -42,10 +42,10 @@ SQUARE = [[0, 0], [2, 0], [2, 2], [0, 2]]
 @pytest.mark.parametrize(("offset", "expected"), [(1, (False, False)), (0, (False, True)), (-1, (True, True))])
 def test_known_parts(offset: float, expected: tuple[bool, bool]) -> None:
     space, plane = HalfSpace([1, 0, 0], offset), HalfSpace([1, 0], offset)
-    assert half_space_body_parts(space, Aabb([0, 0, 0], [2, 2, 2]), None, None, Work()) == Parts(True, *expected)
-    assert half_space_body_parts(plane, Polygon([SQUARE]), None, None, Work()) == Parts(True, *expected)
+    assert half_space_body_parts(space, Aabb([0, 0, 0], [2, 2, 2]), (None, None), Work()) == Parts(True, *expected)
+    assert half_space_body_parts(plane, Polygon([SQUARE]), (None, None), Work()) == Parts(True, *expected)
 
 
 def test_walls_that_cancel_do_not_stick_out() -> None:
     walled = Polygon([SQUARE, [[-3, 1], [-1, 1], [-2, 1]]])
-    assert half_space_body_parts(HalfSpace([1, 0], 0), walled, None, None, Work()) == Parts(True, False, True)
+    assert half_space_body_parts(HalfSpace([1, 0], 0), walled, (None, None), Work()) == Parts(True, False, True)
