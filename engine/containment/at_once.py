@@ -50,7 +50,9 @@ def located_at_once(points: object, solid: Solid) -> Located | None:
         or array.shape[1] != solid.dimension
         or not array.flags.carray
     ):
-        if not isinstance(points, (np.ndarray, list, tuple)) or not 0 < _length(points) <= MOST:
+        if not isinstance(points, (np.ndarray, list, tuple)) or getattr(points, "ndim", 1) == 0:
+            return None
+        if not 0 < len(points) <= MOST:
             return None
         if solid.type == "surface":
             return None
@@ -75,10 +77,6 @@ def located_at_once(points: object, solid: Solid) -> Located | None:
     locations = np.empty(n_points, np.int8)
     n_beyond = entry(array, *prepared, locations, _NO_FLAG)
     return (locations, 0, 0, method) if n_beyond == 0 else _settled(array, solid, locations, n_beyond, method)
-
-
-def _length(points: Any) -> int:
-    return 0 if isinstance(points, np.ndarray) and points.ndim == 0 else len(points)
 
 
 def _settled(array: Any, solid: Solid, locations: Int8Array, n_beyond: int, method: str) -> Located:

@@ -25,7 +25,7 @@ from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
 from engine.containment.methods.polynomial import locate_by_polynomial
 from engine.containment.policy import CELLS, PASS, choose_for_mesh, choose_for_rings
 from engine.containment.posed.filters import NOT_FINITE
-from engine.containment.prepared import EXACT, prism_rows, ring_offsets_of, rings_of, tree_of
+from engine.containment.prepared import EXACT, prism_rows, rings_of, tree_of
 from engine.containment.rational_locate import Check, combine, over_tree, rational_location, unsupported
 from engine.containment.ring_cells.build import ring_cells_of
 from engine.containment.ring_cells.locate import locate_by_ring_cells
@@ -146,7 +146,7 @@ def _in_triangle(solid: Triangle) -> Locator:
 
 def by_ring_pass(method: str, solid: Polygon | Triangle) -> Locator:
     """Return the locator that passes over all edges."""
-    return _by_kernel(method, locate_by_ring_pass, solid, EXACT, solid.vertices, ring_offsets_of(solid))
+    return _by_kernel(method, locate_by_ring_pass, solid, EXACT, solid.vertices, solid.ring_offsets)
 
 
 def _in_polygon(solid: Polygon) -> Locator:

@@ -20,7 +20,6 @@ from engine.solids.triangle import Triangle
 
 EXACT: Final = np.zeros(0)
 """In place of blurs: the points are what they are."""
-_TRIANGLE: Final = read_only(np.array([0, 3], np.int64))
 
 
 class TriangleTree(NamedTuple):
@@ -95,17 +94,9 @@ def _build_rings(vertices: FloatArray, following: IntArray, check: Check) -> Rin
     low, high = np.minimum(starts, ends), np.maximum(starts, ends)
     flat = np.zeros(1)
     slabs = build_box_grid([low[:, 1], flat], [high[:, 1], flat], [max(1, min(1 << 20, len(order))), 1], check)
-    return Rings(starts, ends, np.ascontiguousarray(high[:, 0]), slabs, _box_of(vertices))
-
-
-def _box_of(vertices: FloatArray) -> tuple[float, float, float, float]:
     xs, ys = vertices[:, 0], vertices[:, 1]  # one by one: some 40 times as fast as min(axis=0)
-    return float(xs.min()), float(xs.max()), float(ys.min()), float(ys.max())
-
-
-def ring_offsets_of(solid: Polygon | Triangle) -> IntArray:
-    """Return where the rings of a polygon begin, of a plane triangle its one."""
-    return solid.ring_offsets if isinstance(solid, Polygon) else _TRIANGLE
+    box = float(xs.min()), float(xs.max()), float(ys.min()), float(ys.max())
+    return Rings(starts, ends, np.ascontiguousarray(high[:, 0]), slabs, box)
 
 
 def prism_rows(solid: Triangle) -> tuple[FloatArray, BoolArray]:

@@ -158,10 +158,7 @@ def _in_polyhedron(point: Sequence[Number], solid: Polyhedron, check: Check) -> 
 
 def next_in_ring(solid: Polygon | Triangle) -> IntArray:
     """Return for each vertex the index of the one after it in its ring, prepared once."""
-
-    return solid.prepared(
-        "next_in_ring", lambda: next_in_rings(solid.ring_offsets if isinstance(solid, Polygon) else np.array([0, 3]))
-    )
+    return solid.prepared("next_in_ring", lambda: next_in_rings(solid.ring_offsets))
 
 
 def _in_polygon(point: Sequence[Number], solid: Polygon | Triangle, check: Check) -> int:

@@ -243,7 +243,9 @@ def _collection(value: Any, where: Where, kinds: tuple[str, ...] = AREAS) -> _Co
         if geometry is not None and (kind := _type_of(geometry)) not in kinds:
             got = kind or shown(geometry)
             raise _refused(UnsupportedSolidError, feature, number, where, f"is {got:.60}, not {' or '.join(kinds)}")
-        if properties is not None and not (isinstance(properties, dict) and all(map(_is_text, properties))):
+        if properties is not None and not (
+            isinstance(properties, dict) and all(isinstance(name, str) for name in properties)
+        ):
             what = "has properties that are no object whose names are text"
             raise _refused(InvalidInputError, feature, number, where, what)
     properties_of = [feature.get("properties") or {} for feature in features]
@@ -266,10 +268,6 @@ def _type_of(value: Any) -> str:
     """Return the member `type` of a GeoJSON object; nothing if it has none."""
     kind = value.get("type") if isinstance(value, dict) else None
     return kind if isinstance(kind, str) else ""
-
-
-def _is_text(name: object) -> bool:
-    return isinstance(name, str)
 
 
 def _key(value: Any, name: str) -> str:

@@ -138,7 +138,10 @@ def overlay_rows(left: Layer, right: Layer, how: str, limits: Limits) -> LayerRo
     check_how(how)
     of_pairs, of_left, of_right = HOWS[how]
     pairs, rivals = meeting(left, right, limits, with_rivals=of_left or of_right)
-    parts = [_intersections(left, right, pairs, limits)] if of_pairs else []
+    parts = []
+    if of_pairs:
+        sides = Chosen(left.arrays, pairs[:, 0]), Chosen(right.arrays, pairs[:, 1])
+        parts.append(_rows(_overlaid(*sides, "intersection", limits), *pairs.T))
     if of_left:
         parts.append(_differences(left, right, pairs, rivals[1], limits))
     if of_right:
@@ -179,11 +182,6 @@ def meeting(
     pairs = np.concatenate(found) - np.array([0, len(left)])
     order = np.lexsort((pairs[:, 1], pairs[:, 0])) if len(found) > 2 else slice(None)
     return pairs[order], (np.concatenate(rivals[0]), np.concatenate(rivals[1]))
-
-
-def _intersections(left: Layer, right: Layer, pairs: IntArray, limits: Limits) -> LayerRows:
-    sides = Chosen(left.arrays, pairs[:, 0]), Chosen(right.arrays, pairs[:, 1])
-    return _rows(_overlaid(*sides, "intersection", limits), pairs[:, 0], pairs[:, 1])
 
 
 def _differences(layer: Layer, others: Layer, pairs: IntArray, rivals: IntArray, limits: Limits) -> LayerRows:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Final, NamedTuple, cast
+from typing import Final, cast
 
 import numpy as np
 
@@ -177,18 +177,19 @@ def overlay_batch(
 
         run_chunks(task, len(subjects), budget=budget, first_chunk=_FIRST_CHUNK, workers=workers, progress=progress)
         found = first_found = joined([parts[start] for start in sorted(parts)] or [NO_PAIRS])
-        rest = _Rest(np.zeros(len(subjects), np.int8), np.zeros(len(subjects), np.bool_), {})
+        rest = np.zeros(len(subjects), np.int8), np.zeros(len(subjects), np.bool_), dict[int, Overlay]()
+        status, is_rounded_again, apart = rest
         ulps, n_rational = 0.5, 0
         if found.status.any():
             found, ulps, n_rational = _settled(found, rest, subjects, clips, operation, output, workers, budget)
-    for array in (rest.status, *found, *(first_found if first_found is not found else ())):
+    for array in (status, *found, *(first_found if first_found is not found else ())):
         array.setflags(write=False)
     batch = OverlayBatch(
-        status=rest.status, vertices=found.vertices, ring_offsets=found.ring_offsets, piece_offsets=found.piece_offsets,
+        status=status, vertices=found.vertices, ring_offsets=found.ring_offsets, piece_offsets=found.piece_offsets,
         pair_offsets=summed(found.counts[:, 0]), displacement=found.displacement,
         _subjects=subjects if isinstance(subjects, Chosen) else tuple(subjects),
         _clips=clips if isinstance(clips, Chosen) else tuple(clips), _operation=operation, _output=output,
-        _exact=first_found, _is_rounded_again=rest.is_rounded_again, _apart=rest.apart,
+        _exact=first_found, _is_rounded_again=is_rounded_again, _apart=apart,
     )  # fmt: skip
     if not report:
         return batch
@@ -196,20 +197,15 @@ def overlay_batch(
     return batch, accuracy_of(ulps, n_edges, int(found.counts[:, 3].sum()), n_rational)
 
 
-class _Rest(NamedTuple):
-    """What becomes of pairs that the first call of the kernel does not settle; the names are those of `OverlayBatch`,
-    without underscores."""
-
-    status: Int8Array
-    is_rounded_again: BoolArray
-    apart: dict[int, Overlay]
-
-
 def _settled(
-    found: Found, rest: _Rest, subjects: Sequence[Solid], clips: Sequence[Solid], operation: Operation, output: Output,
-    workers: int | None, budget: Budget,
+    found: Found, rest: tuple[Int8Array, BoolArray, dict[int, Overlay]], subjects: Sequence[Solid],
+    clips: Sequence[Solid], operation: Operation, output: Output, workers: int | None, budget: Budget,
 ) -> tuple[Found, float, int]:  # fmt: skip
-    """Fill ``rest``; return all pairs settled, `Accuracy.coordinates_ulp`, and how many decisions took rationals."""
+    """Return all pairs settled, `Accuracy.coordinates_ulp`, and how many decisions took rationals.
+
+    rest: filled with `OverlayBatch.status`, `_is_rounded_again` and `_apart`.
+    """
+    status, is_rounded_again, apart = rest
     settled: dict[int, SettledPairs] = {}
     alone: dict[int, tuple[Overlay, int, int]] = {}
     doubtful = np.flatnonzero(found.status == MAY_CROSS)
@@ -227,15 +223,15 @@ def _settled(
             try:
                 alone[pair] = overlay_rings(*both, operation, output, budget)
             except NotRepresentableError:
-                rest.status[pair] = NOT_REPRESENTABLE
+                status[pair] = NOT_REPRESENTABLE
 
     run_chunks(settle, -(-len(doubtful) // _DOUBTFUL), budget=budget, first_chunk=1, workers=workers)
     together = [settled[start] for start in sorted(settled)]
     for each in together:
-        rest.is_rounded_again[each.pairs] = True
-    left = np.flatnonzero((found.status != DONE) & ~rest.is_rounded_again)
+        is_rounded_again[each.pairs] = True
+    left = np.flatnonzero((found.status != DONE) & ~is_rounded_again)
     run_chunks(overlay_alone, len(left), budget=budget, first_chunk=1, workers=workers)
-    rest.apart.update((pair, result) for pair, (result, _, _) in alone.items())
+    apart.update((pair, result) for pair, (result, _, _) in alone.items())
     more = [*(each.found for each in together), *(_found_of(*each) for each in alone.values())]
     pairs = np.concatenate([*(each.pairs for each in together), np.array([*alone], np.int64)])
     rows = np.arange(len(found.status))

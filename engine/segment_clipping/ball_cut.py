@@ -86,12 +86,9 @@ def newton_step(p: Triple, q: Triple, c: Triple, radius: float, t: float, side: 
     z, zl, z_size, dz = place_on(p[2], q[2], c[2], t)
     h, low = two_prod(-radius, radius)
     size = -h
-    sh, sl = dd_mul(x, xl, x, xl)
-    h, low = dd_add(h, low, sh, sl)
-    sh, sl = dd_mul(y, yl, y, yl)
-    h, low = dd_add(h, low, sh, sl)
-    sh, sl = dd_mul(z, zl, z, zl)
-    h, low = dd_add(h, low, sh, sl)
+    for place, tail in ((x, xl), (y, yl), (z, zl)):
+        sh, sl = dd_mul(place, tail, place, tail)
+        h, low = dd_add(h, low, sh, sl)
     size += x_size * x_size + y_size * y_size + z_size * z_size
     slope = 2.0 * (dx * x + dy * y + dz * z)
     slope_bound = SLOPE_BOUND * (abs(dx) * x_size + abs(dy) * y_size + abs(dz) * z_size) + TINY

@@ -15,9 +15,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from itertools import groupby
-from operator import mul, sub
 from typing import Final, NamedTuple
 
+from engine.predicates.exact_vectors import cross, dot, minus
 from engine.predicates.rational import nearest
 
 Integers = Sequence[int]
@@ -36,35 +36,25 @@ class Contact(NamedTuple):
     turns: bool
 
 
-def _minus(a: Integers, b: Integers) -> list[int]:
-    return list(map(sub, a, b))
-
-
-def _dot(a: Integers, b: Integers) -> int:
-    return sum(map(mul, a, b))
-
-
-def _cross(u: Integers, v: Integers) -> list[int]:
-    """Return u x v in space; in the plane the list of its one component."""
-    if len(u) == 2:
-        return [u[0] * v[1] - u[1] * v[0]]
-    return [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
+def _cross(u: Integers, v: Integers) -> Integers:
+    """Return u x v in space; in the plane its one component, and 0."""
+    return cross(u, v) if len(u) == 3 else (u[0] * v[1] - u[1] * v[0], 0)
 
 
 def edge_stretch(p: Integers, q: Integers, a: Integers, b: Integers) -> tuple[Fraction, Fraction, bool] | None:
     """Return where p q meets the edge a b, and whether it runs along it (so it does where a = b)."""
-    u, v, w = _minus(q, p), _minus(b, a), _minus(a, p)
+    u, v, w = minus(q, p), minus(b, a), minus(a, p)
     normal = _cross(u, v)
-    size = _dot(normal, normal)
+    size = dot(normal, normal)
     if size:
-        if len(u) == 3 and _dot(w, normal):
+        if len(u) == 3 and dot(w, normal):
             return None  # the lines pass each other
-        t, s = Fraction(_dot(_cross(w, v), normal), size), Fraction(_dot(_cross(w, u), normal), size)
+        t, s = Fraction(dot(_cross(w, v), normal), size), Fraction(dot(_cross(w, u), normal), size)
         return (t, t, False) if 0 <= t <= 1 and 0 <= s <= 1 else None
     if any(_cross(u, w)):
         return None  # parallel, not on one line
-    length = _dot(u, u)
-    ends = sorted(Fraction(_dot(_minus(end, p), u), length) for end in (a, b))
+    length = dot(u, u)
+    ends = sorted(Fraction(dot(minus(end, p), u), length) for end in (a, b))
     first, last = max(ends[0], ZERO), min(ends[1], ONE)
     return (first, last, True) if first <= last else None
 
@@ -77,8 +67,8 @@ def triangle_stretch(
     With corners seen from p and u = q - p, the normal is B x C + C x A + A x B; the line meets the triangle unless
     signs of the volumes u . (B x C), ... differ, and their sum is n . u.
     """
-    u, *seen = (_minus(x, p) for x in (q, a, b, c))
-    around = [_cross(seen[k - 2], seen[k - 1]) for k in range(3)]
+    u, *seen = (minus(x, p) for x in (q, a, b, c))
+    around = [cross(seen[k - 2], seen[k - 1]) for k in range(3)]
     normal = [sum(each) for each in zip(*around)]
     if not any(normal):  # case: no area; the triangle is its edges
         found = [edge_stretch(p, q, *edge) for edge in ((a, b), (b, c), (c, a))]
@@ -86,7 +76,7 @@ def triangle_stretch(
         if not met:
             return None
         return min(s[0] for s in met), max(s[1] for s in met), True
-    volumes, from_p = [_dot(u, each) for each in around], _dot(seen[0], around[0])
+    volumes, from_p = [dot(u, each) for each in around], dot(seen[0], around[0])
     if along := sum(volumes):
         if min(volumes) < 0 < max(volumes) or not 0 <= from_p * (1 if along > 0 else -1) <= abs(along):
             return None
@@ -96,8 +86,8 @@ def triangle_stretch(
         return None
     first, last = ZERO, ONE
     for corner, following in ((a, b), (b, c), (c, a)):
-        inward = _cross(normal, _minus(following, corner))
-        v_p, v_q = _dot(inward, _minus(p, corner)), _dot(inward, _minus(q, corner))
+        inward = cross(normal, minus(following, corner))
+        v_p, v_q = dot(inward, minus(p, corner)), dot(inward, minus(q, corner))
         if v_p == v_q:
             if v_p < 0:
                 return None
@@ -113,12 +103,12 @@ def is_crossed(p: Integers, q: Integers, corners: Sequence[Integers]) -> bool:
 
     Seen along the line, an element parallel to it has no length or no area: it holds no point that is moved so.
     """
-    u = _minus(q, p)
+    u = minus(q, p)
     if len(u) == 2:
-        return len({_cross(u, _minus(corner, p))[0] > 0 for corner in corners}) == 2
+        return len({_cross(u, minus(corner, p))[0] > 0 for corner in corners}) == 2
     k = max(range(3), key=lambda axis: abs(u[axis]))
     i, j = (k + 1) % 3, (k + 2) % 3
-    seen = [(w[i] * u[k] - w[k] * u[i], w[j] * u[k] - w[k] * u[j]) for w in (_minus(corner, p) for corner in corners)]
+    seen = [(w[i] * u[k] - w[k] * u[i], w[j] * u[k] - w[k] * u[j]) for w in (minus(corner, p) for corner in corners)]
     sides = [a[0] * b[1] - a[1] * b[0] or a[1] - b[1] or b[0] - a[0] for a, b in zip(seen, [*seen[1:], seen[0]])]
     return min(sides) > 0 or max(sides) < 0
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from engine.arrays import Float32Array, FloatArray, Int32Array, IntArray, read_only
 from engine.bounding.bvh import UNUSED, Bvh, build_bvh, on_lines
+from engine.containment.rational_locate import next_in_ring
 from engine.lanes.boxes import EMPTY
 from engine.lanes.tracing import LANES
 from engine.lanes.triangles import CORNER_ROWS
@@ -15,7 +16,6 @@ from engine.predicates.expansion import LARGEST, SMALLEST
 from engine.segment_clipping.box_tree import build_box_tree
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
-from engine.solids.ragged import next_in_rings
 from engine.solids.surface import Surface
 from engine.solids.triangle import Triangle
 
@@ -62,8 +62,7 @@ def boundary_of(region: Polygon | Triangle | Polyhedron | Surface) -> Outline | 
     def build() -> Outline | Mesh:
         if isinstance(region, Polyhedron | Surface):
             return mesh_of(region.vertices[region.triangles], region.triangle_faces)
-        offsets = region.ring_offsets if isinstance(region, Polygon) else np.array([0, 3])
-        following = next_in_rings(offsets)
+        following = next_in_ring(region)
         first = np.arange(len(following), dtype=np.int64)  # an edge is named by its first vertex
         return outline_of(region.vertices[np.stack([first, following], axis=1)], first)
 

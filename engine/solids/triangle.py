@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from engine.arrays import FloatArray
+import numpy as np
+
+from engine.arrays import FloatArray, IntArray, read_only
 from engine.errors import InvalidArrayError
 from engine.solids.base import Solid
 from engine.solids.checks import as_floats, check_dimension, digits, frozen
@@ -25,6 +27,8 @@ class Triangle(Solid):
 
     type: ClassVar[str] = "triangle"
     vertices: FloatArray
+    ring_offsets: ClassVar[IntArray] = read_only(np.array([0, 3], np.int64))
+    """Of the plane's: those of its one ring."""
 
     def __init__(self, vertices: object) -> None:
         points = as_floats(vertices, 2, ("vertices",))

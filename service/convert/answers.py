@@ -58,7 +58,7 @@ def from_accuracy(accuracy: engine.Accuracy) -> Accuracy:
 def from_stored(name: str, solid: Solid) -> solids.StoredSolidSummary:
     """Return what the store says of a solid."""
     counts = {field: len(getattr(solid, field)) for field in ("planes", "powers", "operands") if hasattr(solid, field)}
-    if hasattr(solid, "ring_offsets"):
+    if isinstance(solid, engine.Polygon):
         counts["rings"] = len(solid.ring_offsets) - 1
     if hasattr(solid, "face_offsets"):
         counts["faces"] = len(solid.face_offsets) - 1

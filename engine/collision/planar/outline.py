@@ -84,9 +84,8 @@ def outline_of(body: Solid, pose: Pose | None, budget: Budget) -> Outline:
 def rings_of(body: Solid) -> tuple[FloatArray, IntArray]:
     if isinstance(body, Polygon):
         body.check_not_empty()
+    if isinstance(body, (Polygon, Triangle)):
         return body.vertices, body.ring_offsets
-    if isinstance(body, Triangle):
-        return body.vertices, np.array([0, 3])
     assert isinstance(body, Aabb)
     (x0, y0), (x1, y1) = body.min, body.max
     return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]]), np.array([0, 4])

@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 
 from engine.containment.cells.lattice import LEVELS, PARTS, PLACE, finest, parts_of, reference_coordinate, share_of
-from engine.containment.posed.filters import NOT_FINITE
+from engine.containment.posed.filters import NOT_FINITE, has_not_finite
 from engine.jit import called, inline, kernel, merged
 from engine.lanes.cells import ROWS, group_parity, prefetch_group
 from engine.types import UNDECIDED
@@ -59,15 +59,6 @@ def _first_status(points: Any, start: Any, end: Any, cells: Any, locations: Any,
         n_kept += np.uint64(status == UNDECIDED)
         n_beyond += np.uint64(not is_within)
     return n_kept, n_beyond
-
-
-@inline
-def _has_not_finite(points: Any, start: Any, end: Any) -> bool:
-    for item in range(start, end):
-        px, py, pz = points[item, 0], points[item, 1], points[item, 2]
-        if (px - px) + (py - py) + (pz - pz) != 0.0:
-            return True
-    return False
 
 
 @merged
@@ -170,7 +161,7 @@ def locate_by_cells(points: Any, cells: Any, locations: Any, flag: Any) -> int:
             break
         first, end = np.uint64(start), np.uint64(min(start + _BLOCK, len(points)))
         n_kept, n_beyond = _first_status(points, first, end, cells, locations, item_of, n_kept)
-        if n_beyond > 0 and _has_not_finite(points, first, end):
+        if n_beyond > 0 and has_not_finite(points[first:end]):
             return NOT_FINITE
         if n_kept < _FEWEST and end < len(points):
             continue

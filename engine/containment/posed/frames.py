@@ -38,13 +38,8 @@ def frames_of(poses: Sequence[Pose | None], dimension: int) -> Frames:
     is_moved = translations.any(axis=1) | (rotations != np.eye(3)).any(axis=(1, 2))
     rotations, translations = rotations[is_moved], np.ascontiguousarray(translations[is_moved])
     rows[np.array([body for body, _ in given])[is_moved]] = np.arange(len(rotations))
-    return Frames(rows, rotations, _inverses(rotations), translations, _is_turn(rotations))
-
-
-def _is_turn(rotations: FloatArray) -> BoolArray:
-    is_unit = np.isin(rotations, (-1.0, 0.0, 1.0)).all(axis=(1, 2))
-    found: BoolArray = is_unit & (np.abs(rotations).sum(axis=1) == 1.0).all(axis=1)
-    return found
+    is_turn = np.isin(rotations, (-1.0, 0.0, 1.0)).all(axis=(1, 2)) & (np.abs(rotations).sum(axis=1) == 1.0).all(axis=1)
+    return Frames(rows, rotations, _inverses(rotations), translations, is_turn)
 
 
 def _inverses(rotations: FloatArray) -> FloatArray:

@@ -24,7 +24,7 @@ from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
 from engine.containment.posed.body_frame import move_to_body_frame
 from engine.containment.posed.filters import locate_by_polynomial_blurred, locate_in_box_blurred, locate_in_rows_blurred
 from engine.containment.posed.frames import Frames, frames_of
-from engine.containment.prepared import prism_rows, ring_offsets_of, rings_of, tree_of
+from engine.containment.prepared import prism_rows, rings_of, tree_of
 from engine.containment.rational_locate import Check, to_world_frame
 from engine.parallel import Budget
 from engine.solids.aabb import Aabb
@@ -100,7 +100,7 @@ def _blurred_kernel(solid: Solid) -> Blurred:
         rows = rows_in_space(prism_rows(solid)[0] if isinstance(solid, Triangle) else rows_of(solid))
         kernel, prepared = locate_in_rows_blurred, lambda _: (rows,)
     elif isinstance(solid, Triangle):
-        kernel, prepared = locate_by_ring_pass, lambda _: (solid.vertices, ring_offsets_of(solid))
+        kernel, prepared = locate_by_ring_pass, lambda _: (solid.vertices, solid.ring_offsets)
     elif isinstance(solid, Polygon):
         kernel, prepared = locate_in_rings, lambda check: rings_of(solid, check)
     elif isinstance(solid, Polyhedron):

@@ -86,21 +86,6 @@ def as_ends(places: Any, row: int) -> Ends:
     return Ends(float(places[row, 0]), float(places[row, 1]), float(places[row, 2]), float(places[row, 3]))
 
 
-@inline
-def _columns_in_row(ends: Any, row: int, u_shift: int, v_shift: int, is_tight: bool) -> tuple[int, int]:
-    """Return the first and last column that the edge may touch in a row that it reaches into."""
-    left, right = min(ends.lower_u, ends.upper_u), max(ends.lower_u, ends.upper_u)
-    first, last = int(left) >> u_shift, int(right) >> u_shift
-    if first == last or not is_tight or int(ends.lower_v) >> v_shift == int(ends.upper_v) >> v_shift:
-        return first, last
-    width, rise = ends.upper_u - ends.lower_u, ends.upper_v - ends.lower_v
-    bottom, top = float(row << v_shift), float((row + 1) << v_shift)
-    enters = ends.lower_u + max(0.0, (bottom - ends.lower_v) / rise) * width
-    leaves = ends.lower_u + min(1.0, (top - ends.lower_v) / rise) * width
-    least, most = max(0.0, min(enters, leaves) - 1.0), max(enters, leaves) + 1.0
-    return max(first, int(least) >> u_shift), min(last, int(most) >> u_shift)
-
-
 @kernel
 def place_edges(starts: Any, ends: Any, low: Any, scales: Any, edges: Any, places: Any) -> None:
     """Fill edges (4 (m + 1),), as locate.py reads them, and places (m + 1, 4) of `Ends`, numbers from 1 on.
@@ -183,8 +168,17 @@ def _rows_of(ends: Any, cut: Any) -> tuple[int, int]:
 
 @inline
 def _columns_of(ends: Any, cut: Any, row: int, is_tight: bool) -> tuple[int, int]:
-    """Return the first and last column of a row of the cut that an edge may touch, beyond the node's own if it does."""
-    first, last = _columns_in_row(ends, cut.bottom + row, cut.u_shift, cut.v_shift, is_tight)
+    """Return the first and last column that an edge may touch in a row of the cut that it reaches into, beyond the
+    node's own if it does."""
+    left, right = min(ends.lower_u, ends.upper_u), max(ends.lower_u, ends.upper_u)
+    first, last = int(left) >> cut.u_shift, int(right) >> cut.u_shift
+    if first != last and is_tight and int(ends.lower_v) >> cut.v_shift != int(ends.upper_v) >> cut.v_shift:
+        width, rise = ends.upper_u - ends.lower_u, ends.upper_v - ends.lower_v
+        bottom, top = float((cut.bottom + row) << cut.v_shift), float((cut.bottom + row + 1) << cut.v_shift)
+        enters = ends.lower_u + max(0.0, (bottom - ends.lower_v) / rise) * width
+        leaves = ends.lower_u + min(1.0, (top - ends.lower_v) / rise) * width
+        least, most = max(0.0, min(enters, leaves) - 1.0), max(enters, leaves) + 1.0
+        first, last = max(first, int(least) >> cut.u_shift), min(last, int(most) >> cut.u_shift)
     return first - cut.left, last - cut.left
 
 

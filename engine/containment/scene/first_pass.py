@@ -18,7 +18,7 @@ from engine.containment.methods.polygon_one_pass import locate_in_small_rings
 from engine.containment.posed.body_frame import to_frame
 from engine.containment.posed.filters import in_space, side_of_box, side_of_rows
 from engine.containment.scene.grid import cell_at
-from engine.jit import bare_kernel, inline, kernel, merged
+from engine.jit import bare_kernel, kernel, merged
 from engine.types import UNDECIDED
 
 SECOND_PASS: Final = 0
@@ -66,13 +66,6 @@ class SceneTables(NamedTuple):
     """``(n, 6)`` and ``(n, 4)``: what `TopCells` has of a polyhedron."""
 
 
-@inline
-def _in_ball(centers: Any, balls: Any, slot: int, p: Any) -> int:
-    dx, dy, dz = p[0] - centers[slot, 0], p[1] - centers[slot, 1], p[2] - centers[slot, 2]
-    radius, blur = balls[slot, 0], balls[slot, 1]
-    return int(located(dx, dy, dz, radius * radius, radius + 2.0 * blur, blur))
-
-
 @merged
 def _is_in_bounds(tables: Any, body: int, p: Any) -> bool:
     lows, highs = tables.lows, tables.highs
@@ -89,15 +82,16 @@ def _locate_in_body(tables: Any, body: int, is_flat: bool, p: Any) -> tuple[int,
     q, blur = to_frame(tables, tables.frames[body], p)
     if kind == RINGS:
         rings = tables.polygon_offsets[slot], tables.polygon_offsets[slot + 1]
-        location, is_beyond = locate_in_small_rings(tables.xs, tables.ys, tables.ring_offsets, rings, q, blur)
-        return location, is_beyond
+        return locate_in_small_rings(tables.xs, tables.ys, tables.ring_offsets, rings, q, blur)
     location = UNDECIDED
     if kind == CELLS:
         location = side_in_cell(tables.cell_frames, tables.cell_places, slot, q, blur)
     elif kind == BOX:
         location = side_of_box(in_space(tables.box_lows, slot), in_space(tables.box_highs, slot), is_flat, q, blur)
     elif kind == BALL:
-        location = _in_ball(tables.centers, tables.balls, slot, p)
+        c, radius, blur = in_space(tables.centers, slot), tables.balls[slot, 0], tables.balls[slot, 1]
+        square, reach = radius * radius, radius + 2.0 * blur
+        location = int(located(p[0] - c[0], p[1] - c[1], p[2] - c[2], square, reach, blur))
     elif kind == ROWS:
         location = side_of_rows(tables.rows, tables.row_offsets[slot], tables.row_offsets[slot + 1], q, blur)
     return location, False
@@ -110,11 +104,8 @@ def sort_by_cell(points: Any, grid: Any, shift: int, keys: Any, ends: Any, order
     shift: cells that share all higher bits of their number count as one. keys, order: (n,) int32, order is filled with
     the points' places; ends: (number of cells + 1 >> shift, and two more) int64, zero.
     """
-    is_flat = points.shape[1] == 2
-    u, v, w = grid.u, grid.v, grid.w
     for item in range(len(points)):
-        x, y, z = float(points[item, 0]), float(points[item, 1]), 0.0 if is_flat else float(points[item, 2])
-        key = (cell_at(x, y, z, u, v, w) + 1) >> shift
+        key = (cell_at(in_space(points, item), grid) + 1) >> shift
         keys[item] = key
         ends[key + 1] += 1
     for key in range(1, len(ends)):
@@ -144,7 +135,7 @@ def scan_points(
             break
         p = in_space(points, item)
         entry = last = waiting = 0
-        cell = cell_at(p[0], p[1], p[2], grid.u, grid.v, grid.w)
+        cell = cell_at(p, grid)
         if cell >= 0:
             entry, last = grid.offsets[cell], grid.offsets[cell + 1]
         if n_bodies + (last - entry) + n_unbounded > len(bodies):

@@ -36,8 +36,9 @@ def _place(value: float, axis: Any) -> int:
 
 
 @inline
-def cell_at(x: float, y: float, z: float, u: Any, v: Any, w: Any) -> int:
-    """Return the cell of a point, -1 beside the grid."""
+def cell_at(p: Any, grid: Any) -> int:
+    """Return the cell of a point (x, y, z), -1 beside the grid."""
+    (x, y, z), u, v, w = p, grid.u, grid.v, grid.w
     if (x < u.low) | (x > u.high) | (y < v.low) | (y > v.high) | (z < w.low) | (z > w.high):
         return -1
     return (_place(z, w) * v.n_cells + _place(y, v)) * u.n_cells + _place(x, u)

@@ -30,13 +30,13 @@ from engine.solids.half_space import HalfSpace
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
 from engine.solids.pose import Pose
+from engine.solids.ragged import summed
 from engine.solids.sphere import Sphere
 from engine.solids.triangle import Triangle
 
 _MOST_EDGES: Final = 128
 """Of a polygon whose edges are all looked at: above it the lists of single solids are better."""
 _CHECK_EVERY: Final = 256
-_TRIANGLE: Final = np.array([0, 3], np.int64)
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,12 +154,12 @@ class _Kinds:
 
     def _set_rings(self, indices: list[int]) -> None:
         solids = self._chosen(indices, RINGS)
-        offsets = [_TRIANGLE if isinstance(solid, Triangle) else solid.ring_offsets for solid in solids]
-        polygon_offsets = _offsets(np.array([len(each) - 1 for each in offsets], np.int64))
+        offsets = [solid.ring_offsets for solid in solids]
+        polygon_offsets = summed([len(each) - 1 for each in offsets])
         ends = np.concatenate([np.zeros(0, np.int64), *offsets])  # each begins with 0
         sizes = np.delete(np.diff(ends, prepend=0), polygon_offsets[:-1] + np.arange(len(offsets)))
         vertices = np.concatenate([np.empty((0, 2)), *(solid.vertices for solid in solids)])
-        xs, ys, ring_offsets = close_rings(vertices, _offsets(sizes))
+        xs, ys, ring_offsets = close_rings(vertices, summed(sizes))
         firsts = ring_offsets[polygon_offsets[:-1]]
         for axis, values in enumerate((xs, ys) if solids else ()):
             self.lows[indices, axis] = np.minimum.reduceat(values, firsts)
@@ -181,7 +181,7 @@ class _Kinds:
     def _set_rows(self, indices: list[int]) -> None:
         solids = self._chosen(indices, ROWS)
         planes = [rows_of(solid) for solid in solids]
-        self.row_offsets = _offsets(np.array([len(each) for each in planes], np.int64))
+        self.row_offsets = summed([len(each) for each in planes])
         self.rows = rows_in_space(np.concatenate([np.zeros((0, self._dimension + 1)), *planes]))
 
     def _set_cells(self, indices: list[int], budget: Budget) -> None:
@@ -198,9 +198,3 @@ class _Kinds:
         self._chosen([index for index, _ in found], CELLS)
         self.cell_frames = np.array([cells.frame for _, cells in found]).reshape(-1, 6)
         self.cell_places = np.array([cells.place for _, cells in found], np.int64).reshape(-1, 4)
-
-
-def _offsets(sizes: IntArray) -> IntArray:
-    offsets = np.zeros(len(sizes) + 1, np.int64)
-    np.cumsum(sizes, out=offsets[1:])
-    return offsets

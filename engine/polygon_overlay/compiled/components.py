@@ -23,11 +23,8 @@ import numpy as np
 
 from engine.arrangement.union_find import root_of, unite
 from engine.jit import inline, merged
-from engine.polygon_overlay.compiled.chain_faces import NOTHING, Faces, edge_above, half_below, test_edge
-from engine.polygon_overlay.compiled.chains import Chains, Stars
+from engine.polygon_overlay.compiled.chain_faces import NOTHING, edge_above, half_below, test_edge
 from engine.polygon_overlay.compiled.crossing_signs import Edges
-from engine.polygon_overlay.compiled.edge_contacts import Events, Unions
-from engine.polygon_overlay.compiled.edge_events import Along
 from engine.polygon_overlay.compiled.edge_tree import LEAF, OFTEN, POLL, RUN, BoxTree, box_holds, build_tree, leaves_of
 from engine.polygon_overlay.compiled.loading import Given
 from engine.predicates.error_free import workspace
@@ -164,22 +161,21 @@ def _gather_edges(edges: Edges, components: Components, n: int, tree: BoxTree, n
 
 
 @inline
-def join_faces(
-    given: Given, events: Events, along: Along, unions: Unions, tree: BoxTree, chains: Chains, stars: Stars,
-    faces: Faces, components: Components, names: Any, sizes: tuple[int, int, int, int], stop: Any,
-) -> None:  # fmt: skip
+def join_faces(w: Any, names: Any, sizes: tuple[int, int, int, int], stop: Any) -> None:
     """Join the outer cycle of each component of rings to the face it lies in.
 
-    names: scratch by point. sizes: the numbers of vertices, rings, cycles and runs. tree: scratch, but for its marks:
-    RUN of the edges that stand for many; caller guarantees that none of these is next above another component.
+    w: the `Workspace`, whose tree is scratch, but for its marks: RUN of the edges that stand for many; caller
+    guarantees that none of these is next above another component. names: scratch by point. sizes: the numbers of
+    vertices, rings, cycles and runs.
     """
     n, n_rings, n_cycles, n_runs = sizes
+    given, tree, faces, components = w.given, w.tree, w.faces, w.components
     for i in range(n_cycles + 1):
         if i & POLL == 0 and stop[0]:
             return
         faces.joined[i] = faces.regions[i] = i
     edges, boxes, endless = given.edges, tree.boxes, float("inf")
-    n_components = _find_components(given, unions.rings, n, n_rings, components)
+    n_components = _find_components(given, w.unions.rings, n, n_rings, components)
     for k in range(n_components if n_components > 1 else 0):
         boxes[k, 0], boxes[k, 1], boxes[k, 2], boxes[k, 3] = _box_of(edges, components, k)
         if n_runs > 0:  # what is left out may be anywhere
@@ -200,7 +196,7 @@ def join_faces(
             n_open += 1
             continue
         top = components.highest[components.ring[k]]
-        _join_one(given, events, along, unions, chains, stars, faces, top, int(above[j]), n_cycles)
+        _join_one(w, top, int(above[j]), n_cycles)
     if n_open == 0:
         return
     m = _gather_edges(edges, components, n_components, tree, names)
@@ -211,18 +207,16 @@ def join_faces(
         if components.state[k] & _IS_OPEN:
             top = components.highest[components.ring[k]]
             above = edge_above(edges, tree, names, top, m)
-            _join_one(given, events, along, unions, chains, stars, faces, top, above, n_cycles)
+            _join_one(w, top, above, n_cycles)
 
 
 @inline
-def _join_one(
-    given: Given, events: Events, along: Along, unions: Unions, chains: Chains, stars: Stars, faces: Faces, top: int,
-    above: int, n_cycles: int,
-) -> None:  # fmt: skip
+def _join_one(w: Any, top: int, above: int, n_cycles: int) -> None:
     """Join the outer cycle at the last vertex of a component to the face below the edge above it."""
-    node = stars.node_of[root_of(unions.points, top)]
+    faces, stars, points = w.faces, w.stars, w.unions.points
+    node = stars.node_of[root_of(points, top)]
     outer, beyond = faces.cycle[stars.half[stars.ends[node] - 1]], n_cycles
     if above != NOTHING:
-        beyond = faces.cycle[half_below(given.edges, events, along, unions.points, chains, above, top)]
+        beyond = faces.cycle[half_below(w.given.edges, w.events, w.along, points, w.chains, above, top)]
     unite(faces.joined, outer, beyond)
     unite(faces.regions, outer, beyond)

@@ -244,7 +244,5 @@ def _add_crossing(events: Events, at: int, crossing: int, edge: int, other: int,
     t = A / (A + B), with A and B off by r at most, is off by r / (A + B), and by three roundings.
     """
     total = abs(ends.first) + abs(ends.second)
-    slack = ends.bound / total + 2.0**-50
-    events.edge[at], events.point[at], events.other[at] = edge, crossing, other
-    events.t[at], events.slack[at] = abs(ends.first) / total, slack
-    events.reach[at] = slack + margin * ends.length / total
+    _add_event(events, at, edge, crossing, other, abs(ends.first) / total, ends.bound / total + 2.0**-50)
+    events.reach[at] += margin * ends.length / total

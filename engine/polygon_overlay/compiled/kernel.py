@@ -190,10 +190,7 @@ def _arrange(w: Workspace, loaded: Loaded, kept: Any, nesting: Nesting, stop: An
     n_cycles = number_cycles(w.chains, w.stars, w.faces, n_chains, n_simple, stop)
     if stop[0]:
         return _NONE
-    join_faces(
-        w.given, w.events, w.along, w.unions, w.tree, w.chains, w.stars, w.faces, w.components, w.found.point,
-        (n, n_rings, n_cycles, loaded.n_runs), stop,
-    )  # fmt: skip
+    join_faces(w, w.found.point, (n, n_rings, n_cycles, loaded.n_runs), stop)
     tells = nesting.rule == AGAIN
     n_entries = spread_sources(w.given, w.chains, w.faces, nesting, kept, w.holders, (n_chains, n_cycles), stop)
     if n_entries == NO_ROOM:

@@ -15,7 +15,7 @@ Everything that the overlay asks of a vertex, it asks where both of its edges ar
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -82,14 +82,6 @@ def _low_of(vertices: Any, blocks: Blocks, begin: int, end: int) -> int:
                 if _is_lower(vertices, k, low):
                     low = k
     return low
-
-
-class _Reduced(NamedTuple):
-    """What stays of rings: how many vertices, rings and runs (edges that stand for more than one)."""
-
-    n: int
-    n_rings: int
-    n_runs: int
 
 
 @inline
@@ -160,13 +152,13 @@ def _load_ring(
 
 @inline
 def _load_polygon(
-    vertices: Any, n_polygon_rings: int, blocks: Blocks, ring: int, mask: int, base: int, given: Given, highest: Any,
-    runs: Any, reduced: _Reduced, stop: Any,
-) -> tuple[_Reduced, bool]:  # fmt: skip
+    rings: RingArrays, blocks: Blocks, ring: int, mask: int, base: int, given: Given, highest: Any, runs: Any,
+    reduced: Loaded, stop: Any,
+) -> tuple[Loaded, bool]:  # fmt: skip
     """Append what stays of a polygon; return how much there is then, and whether all is in range."""
-    n, n_rings, n_runs = reduced
-    safe = True
-    for i_ring in range(ring, ring + n_polygon_rings):
+    n, n_rings, n_runs, largest = reduced
+    vertices, safe = rings.vertices, True
+    for i_ring in range(ring, ring + rings.offsets.shape[0] - 1):
         start = n
         begin, end = blocks.firsts[i_ring], blocks.firsts[i_ring + 1]
         n, n_runs, is_ring_safe = _load_ring(
@@ -174,7 +166,7 @@ def _load_polygon(
         )  # fmt: skip
         safe &= is_ring_safe
         n, n_rings = end_ring(given, start, n, n_rings, mask)
-    return _Reduced(n, n_rings, n_runs), safe
+    return Loaded(n, n_rings, n_runs, largest), safe
 
 
 @inline
@@ -214,12 +206,12 @@ def reduce_pair(
     There is scratch for a thousand contacts at least. Returns no vertices if it is not worth while.
     """
     w = rows_of(buffers)
-    n_subject, n_clip = subjects.offsets.shape[0] - 1, clips.offsets.shape[0] - 1
+    n_subject = subjects.offsets.shape[0] - 1
     blocks = Blocks(
         w.unions.points, w.stars.node_of, w.chains.at, w.tree.boxes, w.rounded.moved, w.found.meets, w.along.starts
     )
-    end_subject = load_blocks(subjects.vertices, subjects.offsets, n_subject, size, blocks, 0, 0, stop)
-    end = load_blocks(clips.vertices, clips.offsets, n_clip, size, blocks, end_subject, n_subject, stop)
+    end_subject = load_blocks(subjects, size, blocks, 0, 0, stop)
+    end = load_blocks(clips, size, blocks, end_subject, n_subject, stop)
     if stop[0]:
         return Loaded(0, 0, 0, 0.0)
     subject_box, clip_box = box_of_blocks(blocks.boxes, 0, end_subject), box_of_blocks(blocks.boxes, end_subject, end)
@@ -228,31 +220,21 @@ def reduce_pair(
     if largest > LARGEST or is_empty(common):
         return Loaded(0, 0, 0, largest)
     begin = end_subject
-    end_subject = cut_beyond(
-        subjects.vertices, subjects.offsets, n_subject, EVERYTHING if kept[1] else common, blocks, 0, 0, 0
-    )
-    end = cut_beyond(
-        clips.vertices, clips.offsets, n_clip, EVERYTHING if kept[2] else common, blocks, n_subject, begin, end_subject
-    )
+    end_subject = cut_beyond(subjects, EVERYTHING if kept[1] else common, blocks, 0, 0, 0)
+    end = cut_beyond(clips, EVERYTHING if kept[2] else common, blocks, n_subject, begin, end_subject)
     margin = CLEARANCE * largest
     x, y = w.rounded.x, w.rounded.y
-    mark_blocks(subjects.vertices, subjects.offsets, n_subject, margin, blocks, 0, x, y, stop)
-    mark_blocks(clips.vertices, clips.offsets, n_clip, margin, blocks, n_subject, x, y, stop)
+    mark_blocks(subjects, margin, blocks, 0, x, y, stop)
+    mark_blocks(clips, margin, blocks, n_subject, x, y, stop)
     if stop[0] or count_active(blocks, end) >= n_most:
         return Loaded(0, 0, 0, largest)
     if not _wake(subjects, clips, blocks, end, margin, n_most, w.tree, w.components.highest, stop):
         return Loaded(0, 0, 0, largest)
-    runs = w.tree.places  # order: the tree is not asked any more
-    reduced, safe = _load_polygon(
-        subjects.vertices, n_subject, blocks, 0, 1, 0, w.given, w.components.highest, runs, _Reduced(0, 0, 0), stop
-    )
-    reduced, also_safe = _load_polygon(
-        clips.vertices, n_clip, blocks, n_subject, 2, subjects.vertices.shape[0], w.given, w.components.highest, runs,
-        reduced, stop,
-    )  # fmt: skip
-    if stop[0] or not (safe and also_safe):
-        return Loaded(0, 0, 0, largest)
-    return Loaded(reduced.n, reduced.n_rings, reduced.n_runs, largest)
+    runs, highest = w.tree.places, w.components.highest  # order: the tree is not asked any more
+    reduced, safe = _load_polygon(subjects, blocks, 0, 1, 0, w.given, highest, runs, Loaded(0, 0, 0, largest), stop)
+    n = subjects.vertices.shape[0]
+    reduced, also_safe = _load_polygon(clips, blocks, n_subject, 2, n, w.given, highest, runs, reduced, stop)
+    return reduced if safe and also_safe and not stop[0] else Loaded(0, 0, 0, largest)
 
 
 @inline

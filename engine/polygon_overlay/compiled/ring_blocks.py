@@ -18,6 +18,7 @@ from typing import Any, Final
 import numpy as np
 
 from engine.jit import inline
+from engine.polygon_overlay.compiled.loading import Box, RingArrays
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
 
 NOT_RIGHT: Final = 2
@@ -40,10 +41,9 @@ looked at one by one; firsts: the first block of each ring, and the end of the l
 
 
 @inline
-def load_blocks(
-    vertices: Any, offsets: Any, n_rings: int, size: int, blocks: Blocks, n: int, ring: int, stop: Any
-) -> int:
+def load_blocks(rings: RingArrays, size: int, blocks: Blocks, n: int, ring: int, stop: Any) -> int:
     """Append the blocks of rings, of up to ``size`` edges, from number n and ``ring`` on; return their end."""
+    vertices, offsets, n_rings = rings.vertices, rings.offsets, rings.offsets.shape[0] - 1
     first, last, boxes = blocks.first, blocks.last, blocks.boxes
     for i_ring in range(n_rings):
         start, end = offsets[i_ring], offsets[i_ring + 1]
@@ -68,7 +68,7 @@ def load_blocks(
 
 
 @inline
-def box_of_blocks(boxes: Any, first: int, last: int) -> tuple[float, float, float, float]:
+def box_of_blocks(boxes: Any, first: int, last: int) -> Box:
     """Return x_min, x_max, y_min, y_max of some blocks; inverted where there is none."""
     x_min = y_min = np.inf
     x_max = y_max = -np.inf
@@ -79,14 +79,12 @@ def box_of_blocks(boxes: Any, first: int, last: int) -> tuple[float, float, floa
 
 
 @inline
-def cut_beyond(
-    vertices: Any, offsets: Any, n_rings: int, box: tuple[float, float, float, float], blocks: Blocks, ring: int,
-    begin: int, at: int,
-) -> int:  # fmt: skip
+def cut_beyond(rings: RingArrays, box: Box, blocks: Blocks, ring: int, begin: int, at: int) -> int:
     """Put chords in the place of blocks beyond one side of a box, of rings from ``ring`` and blocks from ``begin`` on.
 
     Moves all down to ``at`` and on; returns their end.
     """
+    vertices, offsets, n_rings = rings.vertices, rings.offsets, rings.offsets.shape[0] - 1
     x_min, x_max, y_min, y_max = box
     first, last, boxes, marks = blocks.first, blocks.last, blocks.boxes, blocks.marks
     i = begin
@@ -109,26 +107,22 @@ def cut_beyond(
                 at += 1
             if sides:
                 a, b = first[at - 1], last[at - 1] if last[at - 1] < end else start
-                boxes[at - 1, 0], boxes[at - 1, 1] = (
-                    min(vertices[a, 0], vertices[b, 0]), max(vertices[a, 0], vertices[b, 0]),
-                )  # fmt: skip
-                boxes[at - 1, 2], boxes[at - 1, 3] = (
-                    min(vertices[a, 1], vertices[b, 1]), max(vertices[a, 1], vertices[b, 1]),
-                )  # fmt: skip
+                for k in range(2):
+                    p, q = vertices[a, k], vertices[b, k]
+                    boxes[at - 1, 2 * k], boxes[at - 1, 2 * k + 1] = min(p, q), max(p, q)
             i += 1
     blocks.firsts[ring + n_rings] = at
     return at
 
 
 @inline
-def mark_blocks(
-    vertices: Any, offsets: Any, n_rings: int, margin: float, blocks: Blocks, ring: int, dx: Any, dy: Any, stop: Any
-) -> None:
+def mark_blocks(rings: RingArrays, margin: float, blocks: Blocks, ring: int, dx: Any, dy: Any, stop: Any) -> None:
     """Fill the marks of all blocks of rings, the block that follows each, and make those active that must be.
 
     Active are chords, blocks that head no way, and those that may have a vertex where their ring does not turn, or one
     that the vertex before repeats. dx, dy: float64, scratch for `_AT_ONCE` edges and one.
     """
+    vertices, offsets, n_rings = rings.vertices, rings.offsets, rings.offsets.shape[0] - 1
     first, last, marks = blocks.first, blocks.last, blocks.marks
     ex, ey = dx[1:], dy[1:]
     for i_ring in range(n_rings):

@@ -16,14 +16,14 @@ def test_lists_are_conservative(depth: float) -> None:
     bodies = np.arange(3, 200, 2)
     grid = build_scene_grid(bodies, lows, highs)
     for point in np.concatenate([lows[bodies], highs[bodies]]):
-        cell = cell_at(*point.tolist(), grid.u, grid.v, grid.w)
+        cell = cell_at(tuple(point.tolist()), grid)
         listed = grid.items[grid.offsets[cell] : grid.offsets[cell + 1]].tolist()
         held = bodies[((lows <= point) & (point <= highs)).all(axis=1)[bodies]].tolist()
         assert set(held) <= set(listed)
         assert listed == sorted(listed)
-    assert cell_at(-1.0, 0.0, 0.0, grid.u, grid.v, grid.w) == -1
+    assert cell_at((-1.0, 0.0, 0.0), grid) == -1
 
 
 def test_no_bodies_are_in_no_cell() -> None:
     grid = build_scene_grid(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)))
-    assert cell_at(0.0, 0.0, 0.0, grid.u, grid.v, grid.w) == -1
+    assert cell_at((0.0, 0.0, 0.0), grid) == -1
