@@ -56,10 +56,8 @@ class Rings(NamedTuple):
 
 
 def tree_of(solid: Polyhedron, check: Check = no_check) -> TriangleTree:
-    """Return the tree over the triangles of `solid`, prepared once.
-
-    check: called between the steps, a second's work for a million triangles; what it raises ends the building.
-    """
+    """Return the tree over the triangles of `solid`, prepared once. check: called between the steps, a second's work
+    for a million triangles; what it raises ends the building."""
     return solid.prepared("tree", lambda: _build_tree(solid, check), check)
 
 
@@ -106,10 +104,8 @@ def prism_rows(solid: Triangle) -> tuple[FloatArray, BoolArray]:
 
 def rounded_rows(rows: Sequence[Sequence[int | Fraction]]) -> tuple[FloatArray, BoolArray]:
     """Return rational rows, each scaled to a largest coefficient near 1 and correctly rounded, and whether exactly so.
-
     A coefficient that is smaller than 2^-900 of the largest, and not zero, could underflow: such a row becomes NaN,
-    which no filter accepts.
-    """
+    which no filter accepts."""
     rounded, is_exact = np.empty((len(rows), len(rows[0]))), np.empty(len(rows), np.bool_)
     for i_row, row in enumerate(rows):
         largest = max(abs(Fraction(value)) for value in row)

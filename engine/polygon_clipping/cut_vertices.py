@@ -132,13 +132,10 @@ def between(x: Triple, y: Triple, s: Share) -> Triple:
 
 
 Vertices = namedtuple("Vertices", "pool rests edges names")
-"""The vertices of a ring, those that it came with first, then the cut ones.
-
-pool: (room * dim,) float64, their doubles. rests: (room * dim * 2,) float64, for each coordinate of a cut what its
-double leaves over, and the bound of its error. edges: (room,) int32, the original edge that goes on from a vertex, by
-its first vertex, -1 for one along a plane. names: as many numbers as there are axes, so that their count is known when
-this is compiled.
-"""
+"""The vertices of a ring, those that it came with first, then the cut ones. pool: (room * dim,) float64, their doubles.
+rests: (room * dim * 2,) float64, for each coordinate of a cut what its double leaves over, and the bound of its error.
+edges: (room,) int32, the original edge that goes on from a vertex, by its first vertex, -1 for one along a plane.
+names: as many numbers as there are axes, so that their count is known when this is compiled."""
 
 
 @merged
@@ -241,10 +238,8 @@ def cut_anew(s: Vertices, plane: Plane, p: int, q: int, n_ring: int, j: int) -> 
 
 @merged
 def cut_edge(s: Vertices, plane: Plane, v: int, w: int, n_ring: int, j: int) -> bool:
-    """Set vertex j to where the edge v w crosses a plane; return whether its doubles are sure.
-
-    A part of an original edge is cut as the whole of it is.
-    """
+    """Set vertex j to where the edge v w crosses a plane; return whether its doubles are sure. A part of an original
+    edge is cut as the whole of it is."""
     edge, p, q = s.edges[v], v, w
     if edge >= 0:
         p, q = edge, edge + 1 if edge + 1 < n_ring else 0

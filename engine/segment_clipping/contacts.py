@@ -109,10 +109,8 @@ def is_point(segment: Any) -> bool:
 
 @bare
 def gather_edges(contacts: EdgeContacts, outline: Any, segments: Any, n: int, stop: Any) -> int:
-    """Fill met, kinds and offsets with the contacts of the first n of some segments (m, 2, 2); return how many.
-
-    Those of no length have none. NO_ROOM where they have no room, STOPPED where `stop` (one uint8) is set.
-    """
+    """Fill met, kinds and offsets with the contacts of the first n of some segments (m, 2, 2); return how many. Those
+    of no length have none. NO_ROOM where they have no room, STOPPED where `stop` (one uint8) is set."""
     found = 0
     contacts.offsets[0] = 0
     for i in range(n):
@@ -128,11 +126,9 @@ def gather_edges(contacts: EdgeContacts, outline: Any, segments: Any, n: int, st
 
 @kernel
 def find_contacts_2d(segments: Any, outline: Any, stop: Any, room: int) -> tuple[int, Any, Any, Any]:
-    """Return how many contacts segments (n, 2, 2) float64 have with the edges of a polygon, and these.
-
-    elements met and kinds, int64 and uint8, one segment after another; offsets (n + 1,) int64, where those of each
-    begin. NO_ROOM where there are more than `room`. stop: one uint8, polled.
-    """
+    """Return how many contacts segments (n, 2, 2) float64 have with the edges of a polygon, and these. elements met and
+    kinds, int64 and uint8, one segment after another; offsets (n + 1,) int64, where those of each begin. NO_ROOM where
+    there are more than `room`. stop: one uint8, polled."""
     contacts = edge_contacts_for(segments.shape[0], room)
     found = gather_edges(contacts, outline, segments, segments.shape[0], stop)
     return found, contacts.met, contacts.kinds, contacts.offsets

@@ -62,11 +62,8 @@ def scaled(points: FloatArray, *region: FloatArray) -> Scaled | None:
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """How segments are clipped on one region.
-
-    decide, fill: kernels; see cohen_sutherland.py, box_cut.py. region: their arguments. scale: returns the batch
-    scaled, None where it is well as it is or cannot be scaled exactly.
-    """
+    """How segments are clipped on one region. decide, fill: kernels; see cohen_sutherland.py, box_cut.py. region: their
+    arguments. scale: returns the batch scaled, None where it is well as it is or cannot be scaled exactly."""
 
     name: str
     decide: Any
@@ -78,10 +75,8 @@ class Method:
 def clip_on_convex(
     segments: FloatArray, region: Solid, method: Method, budget: Budget, workers: int | None, progress: Progress | None
 ) -> Clipped:
-    """Return the piece of each segment that has one. segments: (n, 2, dim) float64, not yet looked at for NaN.
-
-    Raises: NotFiniteError.
-    """
+    """Return the piece of each segment that has one. segments: (n, 2, dim) float64, not yet looked at for NaN. Raises:
+    NotFiniteError."""
     found = clip_few(segments, method) if len(segments) <= FEW else None
     if found is not None:
         budget.check()
@@ -138,12 +133,10 @@ def _clip(
 
 
 class _Batch:
-    """Clips chunks of a batch; each piece is written where it stays, behind those of all chunks before.
-
-    Rows are given in the order of the chunks: what is decided before its turn waits, and is filled by whoever decides
-    the chunk that it waits for. There are rows for a piece of every segment; memory that none is written to is no more
-    than addresses.
-    """
+    """Clips chunks of a batch; each piece is written where it stays, behind those of all chunks before. Rows are given
+    in the order of the chunks: what is decided before its turn waits, and is filled by whoever decides the chunk that
+    it waits for. There are rows for a piece of every segment; memory that none is written to is no more than
+    addresses."""
 
     def __init__(self, method: Method, scene: Scaled, budget: Budget) -> None:
         n, _, dimension = scene.points.shape

@@ -187,10 +187,8 @@ def _by_segment(streams: Any, n: int, n_contacts: int) -> None:
 
 @bare
 def gather_contacts(streams: Any, mesh: Any, segments: Any, n: int, stop: Any) -> int:
-    """Fill met, kinds and offsets with the contacts of the first n of some segments (m, 2, 3); return how many.
-
-    Those of no length have none. NO_ROOM where they have no room, STOPPED where `stop` (one uint8) is set.
-    """
+    """Fill met, kinds and offsets with the contacts of the first n of some segments (m, 2, 3); return how many. Those
+    of no length have none. NO_ROOM where they have no room, STOPPED where `stop` (one uint8) is set."""
     members, found, stack, pairs = streams.members, streams.found, streams.stack, streams.pairs
     n_near = _load(streams, mesh, segments, n)
     n_pairs, n_contacts, depth = 0, 0, 0

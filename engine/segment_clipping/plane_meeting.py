@@ -29,11 +29,9 @@ parts loses nothing where they are within a factor of two, and elsewhere does no
 
 
 class Meeting(NamedTuple):
-    """A place where a segment enters or leaves a slab.
-
-    t, t_low: parameter, a double-double. n, d: as above, rounded. is_exact: they lost nothing. plane: 0.0 .. 5.0, or
-    -1.0 for none, with a t outside of [0, 1] that is like no other.
-    """
+    """A place where a segment enters or leaves a slab. t, t_low: parameter, a double-double. n, d: as above, rounded.
+    is_exact: they lost nothing. plane: 0.0 .. 5.0, or -1.0 for none, with a t outside of [0, 1] that is like no
+    other."""
 
     t: float
     t_low: float
@@ -68,10 +66,8 @@ def meetings(p: float, q: float, low: float, high: float, axis: float) -> tuple[
 
 @merged
 def gap_between(a: Meeting, b: Meeting) -> tuple[float, bool]:
-    """Return the parameter of a less that of b, and whether its sign is sure: exactly zero where both are equal.
-
-    Of exact differences equality shows as n_a d_b = n_b d_a (lattices: diagonals through corners).
-    """
+    """Return the parameter of a less that of b, and whether its sign is sure: exactly zero where both are equal. Of
+    exact differences equality shows as n_a d_b = n_b d_a (lattices: diagonals through corners)."""
     gap = (a.t - b.t) + (a.t_low - b.t_low)
     left, left_tail = two_prod(a.n, b.d)
     right, right_tail = two_prod(b.n, a.d)

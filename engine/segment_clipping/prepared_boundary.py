@@ -115,10 +115,8 @@ def _levels_of(child: Int32Array) -> int:
 
 
 def corners_of(tree: Bvh, n_inner: int, elements: FloatArray) -> Float32Array:
-    """Return the corners (n_blocks, 9, 8) float32 of the triangles in each block of a tree, in its coordinates.
-
-    Lanes without a triangle lie far from everything.
-    """
+    """Return the corners (n_blocks, 9, 8) float32 of the triangles in each block of a tree, in its coordinates. Lanes
+    without a triangle lie far from everything."""
     child = tree.child[n_inner:]
     is_item = child != EMPTY
     block, lane = np.nonzero(is_item)

@@ -115,9 +115,7 @@ def _listed(
     lister: Callable[[IntArray, Int32Array, bool], object], n: int, budget: Budget
 ) -> tuple[IntArray, IntArray, IntArray, Int32Array]:
     """Return the lengths of n lists, which of them are not empty, where those begin and the last ends, and the lists.
-
-    lister: counts, then fills, as `list_top` does.
-    """
+    lister: counts, then fills, as `list_top` does."""
     counts = np.zeros(n, np.int64)
     lister(counts, np.empty(0, np.int32), False)
     budget.check()

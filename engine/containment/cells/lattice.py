@@ -166,10 +166,8 @@ def list_top(mesh: Any, ends: Any, items: Any, is_fill: bool, flag: Any) -> None
 
 @kernel
 def list_parts(mesh: Any, level: Any, parents: Any, ends: Any, items: Any, is_fill: bool, flag: Any) -> None:
-    """Count or list, as `list_top` does, the triangles that reach into the 64 parts of each parent cell.
-
-    level: that of the parents; parents: (p,) some of its cells; ends: (p * 64,).
-    """
+    """Count or list, as `list_top` does, the triangles that reach into the 64 parts of each parent cell. level: that of
+    the parents; parents: (p,) some of its cells; ends: (p * 64,)."""
     for parent in range(len(parents)):
         if flag[0]:
             break

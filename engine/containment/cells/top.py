@@ -59,11 +59,9 @@ def can_have_cells(solid: Polyhedron) -> bool:
 
 
 def top_cells_if_they_pay(solid: Polyhedron, n_points: int, budget: Budget) -> TopCells | None:
-    """Return level 0 of `solid` if it is there, or if the points asked in scenes so far pay for building it.
-
-    Building takes about 0.5 us a face and 10 ns a cell, some 0.5 ms for 1,000 faces; a ray takes 0.2 us. The answers
-    are the same either way.
-    """
+    """Return level 0 of `solid` if it is there, or if the points asked in scenes so far pay for building it. Building
+    takes about 0.5 us a face and 10 ns a cell, some 0.5 ms for 1,000 faces; a ray takes 0.2 us. The answers are the
+    same either way."""
     seen = solid.prepared("scene_points_seen", lambda: [0], budget.check)
     seen[0] += n_points
     n_faces = len(solid.triangles)
@@ -89,10 +87,8 @@ def build_top_cells(solid: Polyhedron, budget: Budget) -> TopCells:
 
 
 def make_lattice(tree: TriangleTree, wanted: float, most: float) -> Lattice:
-    """Return level 0: some cells to each triangle of a cube, by powers of two, flat axes in one cell.
-
-    wanted: cells along the longest axis for each triangle along an edge of a cube; most: cells along it.
-    """
+    """Return level 0: some cells to each triangle of a cube, by powers of two, flat axes in one cell. wanted: cells
+    along the longest axis for each triangle along an edge of a cube; most: cells along it."""
     low, high = tree.low, tree.high
     extent = np.subtract(high, low)
     largest = float(extent.max())
@@ -108,10 +104,8 @@ def make_lattice(tree: TriangleTree, wanted: float, most: float) -> Lattice:
 
 def lattice_of(solid: Polyhedron, budget: Budget) -> tuple[Lattice, float]:
     """Return level 0 of all levels, and how long its lists are in all, as a sample of the triangles says; found once.
-
     It is finer than that of scenes, as far as it fits the cache, but that long needles and large faces are not listed
-    in more than some cells each.
-    """
+    in more than some cells each."""
     return solid.prepared("lattice", lambda: _find_lattice(tree_of(solid, budget.check), budget), budget.check)
 
 
@@ -142,10 +136,8 @@ def top_places(lattice: Lattice, cells: IntArray) -> Int32Array:
 
 
 def top_statuses(tree: TriangleTree, lattice: Lattice, counts: IntArray, only_empty: bool, budget: Budget) -> Int8Array:
-    """Return the sides of the cells of level 0: of all of an empty one, of the reference point of another one.
-
-    counts: lengths of the cells' lists. only_empty: the other ones are left UNKNOWN.
-    """
+    """Return the sides of the cells of level 0: of all of an empty one, of the reference point of another one. counts:
+    lengths of the cells' lists. only_empty: the other ones are left UNKNOWN."""
     labels = np.empty(len(counts), np.int64)
     label_empty(counts, lattice.n[0], lattice.n[1], labels)
     is_asked = labels == np.arange(len(labels))
@@ -158,10 +150,8 @@ def top_statuses(tree: TriangleTree, lattice: Lattice, counts: IntArray, only_em
 
 
 def ask_cells(tree: TriangleTree, lattice: Lattice, places: Int32Array, depth: int, budget: Budget) -> Int8Array:
-    """Return the sides of the reference points of cells of a level, by vertical rays.
-
-    UNKNOWN where such a point is not in its cell, on the boundary, or not decided by the compiled ray.
-    """
+    """Return the sides of the reference points of cells of a level, by vertical rays. UNKNOWN where such a point is not
+    in its cell, on the boundary, or not decided by the compiled ray."""
     points, is_valid = np.empty((len(places), 3)), np.empty(len(places), np.bool_)
     reference_points(lattice, places, depth, points, is_valid)
     found, blurs = np.empty(len(points), np.int8), np.zeros(len(points))

@@ -88,10 +88,8 @@ def as_ends(places: Any, row: int) -> Ends:
 
 @kernel
 def place_edges(starts: Any, ends: Any, low: Any, scales: Any, edges: Any, places: Any) -> None:
-    """Fill edges (4 (m + 1),), as locate.py reads them, and places (m + 1, 4) of `Ends`, numbers from 1 on.
-
-    starts, ends: (m, 2). low: (2,), half the box's lower corner. scales: (2,).
-    """
+    """Fill edges (4 (m + 1),), as locate.py reads them, and places (m + 1, 4) of `Ends`, numbers from 1 on. starts,
+    ends: (m, 2). low: (2,), half the box's lower corner. scales: (2,)."""
     for i_edge in range(len(starts)):
         a, b = as_point2(starts, i_edge), as_point2(ends, i_edge)
         if b.y < a.y or (b.y == a.y and b.x < a.x):
@@ -127,9 +125,7 @@ def choose_cuts(
     nodes: Any, edges_of: Any, places: Any, most: Any, cells: Any, is_tight: bool, cuts: Any, flag: Any
 ) -> None:
     """Fill cuts (n, 2) with a, b of each node: halves where that lengthens the lists least, as long as it pays.
-
-    edges_of: the level's list. most: (2,) largest a and b. cells: (3,) cells of a node: least, most, for each edge.
-    """
+    edges_of: the level's list. most: (2,) largest a and b. cells: (3,) cells of a node: least, most, for each edge."""
     for i_node in range(len(nodes)):
         if flag[0]:
             break
@@ -195,11 +191,9 @@ def _note_beyond(turns: Any, node: Any, cut: Any, e: Any, ends: Any) -> None:
 
 @inline
 def _note_in_row(sides: Any, head: int, cut: Any, columns: Any, goes_on: int, is_passed: bool) -> None:
-    """Note what an edge changes in the cells of a row, at the last cell of those that it changes.
-
-    columns: the first and last in which the edge is listed. goes_on: those before it lie left of where it goes on down.
-    is_passed: it passes the lowest height of the row, so it is right of all columns before the first.
-    """
+    """Note what an edge changes in the cells of a row, at the last cell of those that it changes. columns: the first
+    and last in which the edge is listed. goes_on: those before it lie left of where it goes on down. is_passed: it
+    passes the lowest height of the row, so it is right of all columns before the first."""
     first, last = columns
     if is_passed:
         if first > 0:

@@ -99,11 +99,9 @@ def _locate_in_body(tables: Any, body: int, is_flat: bool, p: Any) -> tuple[int,
 
 @kernel
 def sort_by_cell(points: Any, grid: Any, shift: int, keys: Any, ends: Any, order: Any, gathered: Any) -> None:
-    """Gather points (n, dim) in the order of their cells, so that those that meet the same bodies come together.
-
-    shift: cells that share all higher bits of their number count as one. keys, order: (n,) int32, order is filled with
-    the points' places; ends: (number of cells + 1 >> shift, and two more) int64, zero.
-    """
+    """Gather points (n, dim) in the order of their cells, so that those that meet the same bodies come together. shift:
+    cells that share all higher bits of their number count as one. keys, order: (n,) int32, order is filled with the
+    points' places; ends: (number of cells + 1 >> shift, and two more) int64, zero."""
     for item in range(len(points)):
         key = (cell_at(in_space(points, item), grid) + 1) >> shift
         keys[item] = key
@@ -122,12 +120,10 @@ def sort_by_cell(points: Any, grid: Any, shift: int, keys: Any, ends: Any, order
 def scan_points(
     points: Any, tables: Any, grid: Any, unbounded: Any, counts: Any, bodies: Any, located: Any, flag: Any
 ) -> Any:
-    """List the bodies that hold the points (n, 2 or 3), as far as the room goes.
-
-    counts: (n,) int64, bodies of each point; bodies int32, located int8: (room,) the bodies of all points, ascending
-    for each, where they are not surely outside. unbounded: bodies that are asked about every point, ascending.
-    Returns the numbers of points done, bodies listed, and those that took more than a filter.
-    """
+    """List the bodies that hold the points (n, 2 or 3), as far as the room goes. counts: (n,) int64, bodies of each
+    point; bodies int32, located int8: (room,) the bodies of all points, ascending for each, where they are not surely
+    outside. unbounded: bodies that are asked about every point, ascending. Returns the numbers of points done, bodies
+    listed, and those that took more than a filter."""
     is_flat, n_unbounded, items = points.shape[1] == 2, len(unbounded), grid.items
     n_bodies = n_beyond = done = 0
     for item in range(len(points)):
@@ -161,12 +157,9 @@ def scan_points(
 def put_in_order(
     order: Any, sorted_counts: Any, sorted_bodies: Any, sorted_located: Any, counts: Any, starts: Any, lists: Any
 ) -> int:
-    """Bring what `scan_points` listed for gathered points into the order of the points.
-
-    order: (n,) each one's place; counts: (n,) and starts: (n,) int64 are filled; lists: bodies int64 and located int8,
-    of the pairs' number, then places and owners int64: the pairs that are UNDECIDED, and their points.
-    Returns how many those are.
-    """
+    """Bring what `scan_points` listed for gathered points into the order of the points. order: (n,) each one's place;
+    counts: (n,) and starts: (n,) int64 are filled; lists: bodies int64 and located int8, of the pairs' number, then
+    places and owners int64: the pairs that are UNDECIDED, and their points. Returns how many those are."""
     bodies, located, places, owners = lists
     for place in range(len(order)):
         counts[order[place]] = sorted_counts[place]

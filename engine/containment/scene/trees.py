@@ -69,9 +69,7 @@ def locate_groups(
     flag: Any,
 ) -> None:  # fmt: skip
     """Fill located (n_pairs,) int8 for groups of pairs of a body each: those at order[begins[group] : ends[group]].
-
-    owners: (n_pairs,) the point of each pair; bodies: that of each group; scene: the `SceneTables`, for its poses.
-    """
+    owners: (n_pairs,) the point of each pair; bodies: that of each group; scene: the `SceneTables`, for its poses."""
     stack = np.empty(STACK, np.int32)
     for group in range(len(begins)):
         body = bodies[group]

@@ -78,10 +78,8 @@ def _put_vertex(edges: Edges, events: Events, unions: Unions, at: int, e: int, v
 def _enter_contact(
     edges: Edges, events: Events, unions: Unions, n: int, n_events: int, n_crossings: int, e: int, f: int
 ) -> tuple[int, int]:
-    """Enter what the edges e and f have in common, decided exactly; return the numbers of events and crossings.
-
-    n: number of vertices. There is room for four events more.
-    """
+    """Enter what the edges e and f have in common, decided exactly; return the numbers of events and crossings. n:
+    number of vertices. There is room for four events more."""
     parent, rings = unions.points, unions.rings
     a, b, c, d = e, edges.after[e], f, edges.after[f]
     if b == c or d == a:  # consecutive edges: their common vertex is all, unless they fold
@@ -176,10 +174,8 @@ def agree(found: Turns) -> bool:
 def find_contacts(
     edges: Edges, n: int, n_rings: int, margin: float, events: Events, unions: Unions, tree: BoxTree, stop: Any
 ) -> Contacts:
-    """Enter all contacts; the edges of pairs of which `Contacts.are_far` does not hold get the mark DOUBTFUL.
-
-    tree: over the boxes of the edges, with the margin around them. unions: filled.
-    """
+    """Enter all contacts; the edges of pairs of which `Contacts.are_far` does not hold get the mark DOUBTFUL. tree:
+    over the boxes of the edges, with the margin around them. unions: filled."""
     for i in range(n):
         unions.points[i] = i
     unions.is_node[:n] = 0
@@ -240,9 +236,7 @@ def _put_in_doubt(marks: Any, e: int, f: int) -> None:
 @merged
 def _add_crossing(events: Events, at: int, crossing: int, edge: int, other: int, ends: Turns, margin: float) -> None:
     """Enter the event at ``at`` of a proper crossing whose signs are sure; ends: the turns from ``other`` to both ends.
-
-    t = A / (A + B), with A and B off by r at most, is off by r / (A + B), and by three roundings.
-    """
+    t = A / (A + B), with A and B off by r at most, is off by r / (A + B), and by three roundings."""
     total = abs(ends.first) + abs(ends.second)
     _add_event(events, at, edge, crossing, other, abs(ends.first) / total, ends.bound / total + 2.0**-50)
     events.reach[at] += margin * ends.length / total

@@ -280,18 +280,16 @@ def overlay_pairs(
     subjects: RingArrays, subject_items: Any, clips: RingArrays, clip_items: Any, begin: int, reduced: Loaded,
     kept: Any, nesting: Nesting, stop: Any, buffers: Buffers, outcomes: Outcomes, output: Output,
 ) -> tuple[int, int, int, int, int, int, int]:  # fmt: skip
-    """Overlay the pairs from ``begin`` on; fill outcomes, by pair, and output from its beginning.
-
-    subject_items, clip_items: the first ring of each polygon, and the end of the last one's. kept: (4,) uint8 by label.
-    nesting: of the rule PAIR; or, without clips, and kept all but the first, that of the rings of subjects
-    (ring_nesting.py), numbers counted from the pair's first ring; by the rule AGAIN evidence is filled too, with
-    numbers of rings. A source is an input vertex and -1, where the ring goes on along an edge of that vertex, or -3 -
-    e, along edge e; or two edges that cross, the one that it goes on along first. Edges by their first vertices;
-    vertices are counted from the pair's first, those of its clip after those of its subject. The input vertex and
-    LEFT_OUT where the vertices up to the next source are left out. reduced: what reduce_pair returned for the only
-    pair; no vertices, no such pair. Returns the pair reached, FINISHED or what is needed to go on with it, numbers of
-    vertices, rings, pieces, rows of evidence, and how many vertices are left out.
-    """
+    """Overlay the pairs from ``begin`` on; fill outcomes, by pair, and output from its beginning. subject_items,
+    clip_items: the first ring of each polygon, and the end of the last one's. kept: (4,) uint8 by label. nesting: of
+    the rule PAIR; or, without clips, and kept all but the first, that of the rings of subjects (ring_nesting.py),
+    numbers counted from the pair's first ring; by the rule AGAIN evidence is filled too, with numbers of rings. A
+    source is an input vertex and -1, where the ring goes on along an edge of that vertex, or -3 - e, along edge e; or
+    two edges that cross, the one that it goes on along first. Edges by their first vertices; vertices are counted from
+    the pair's first, those of its clip after those of its subject. The input vertex and LEFT_OUT where the vertices up
+    to the next source are left out. reduced: what reduce_pair returned for the only pair; no vertices, no such pair.
+    Returns the pair reached, FINISHED or what is needed to go on with it, numbers of vertices, rings, pieces, rows of
+    evidence, and how many vertices are left out."""
     w = rows_of(buffers)
     is_intersection = not (kept[0] or kept[1] or kept[2])
     filled = _Filled(0, 0, 0, 0)

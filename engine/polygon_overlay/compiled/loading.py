@@ -79,12 +79,10 @@ def load_rings(
     tree: BoxTree, n: int, n_rings: int, stop: Any,
 ) -> tuple[int, int, bool]:  # fmt: skip
     """Append rings without repeated points; return the numbers of vertices and rings, and whether none is too small.
-
     is_named: the mask of each ring is its number instead, from ``first_ring`` on. base: what is added to the number of
     a vertex in ``origins``. box: of vertices beyond one of its sides, one after another, the first and the last count.
     tree: scratch. Many rings that are not named are taken in the order of a space-filling curve: whatever looks at
-    neighbours then finds them in the cache.
-    """
+    neighbours then finds them in the cache."""
     vertices, offsets, order = rings.vertices, rings.offsets, tree.places
     if is_named or last_ring - first_ring < _MANY_RINGS:
         for k in range(last_ring - first_ring):
@@ -157,10 +155,8 @@ def is_empty(box: Box) -> bool:
 
 @inline
 def fill_boxes(edges: Edges, n: int, margin: float, tree: BoxTree, stop: Any) -> float:
-    """Fill the box of every edge, with a margin around it, and its mark; return the least length of an edge.
-
-    Its length is the larger of both coordinates'.
-    """
+    """Fill the box of every edge, with a margin around it, and its mark; return the least length of an edge. Its length
+    is the larger of both coordinates'."""
     x, y, boxes, marks = edges.x, edges.y, tree.boxes, tree.marks
     shortest = np.inf
     first = 0

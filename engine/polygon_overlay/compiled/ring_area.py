@@ -181,10 +181,9 @@ def sum_areas(
     areas: Any,
 ) -> int:  # fmt: skip
     """Fill ``areas``, (n,) float64, with the doubles nearest to the areas of some rings each, NaN where that is unsure.
-
     subjects, subject_items, clips, clip_items: as of overlay_pairs, a pair for each area, or one for all. sources,
-    offsets: of rings, as overlay_pairs fills them. groups: (n + 1,) int64 into the rings. Returns how many are unsure.
-    """
+    offsets: of rings, as overlay_pairs fills them. groups: (n + 1,) int64 into the rings. Returns how many are
+    unsure."""
     n_unsure = 0
     known = workspace(2)
     known[0] = known[1] = 0.0

@@ -56,11 +56,8 @@ def _abs2(h: float, low: float) -> tuple[float, float]:
 
 @called
 def round_crossing(edges: Edges, e: int, f: int) -> tuple[float, float, float, float]:
-    """Return the doubles nearest to the crossing of edges e and f, and a bound of the error of each.
-
-    An error of 0 says that the coordinate is that double exactly; LOST that it could not be found (the caller settles
-    it in rationals).
-    """
+    """Return the doubles nearest to the crossing of edges e and f, and a bound of the error of each. An error of 0 says
+    that the coordinate is that double exactly; LOST that it could not be found (the caller settles it in rationals)."""
     a, b, fb = e, edges.after[e], edges.after[f]
     x, knows_x = common_place(edges.x[a], edges.x[b], edges.x[f], edges.x[fb])
     y, knows_y = common_place(edges.y[a], edges.y[b], edges.y[f], edges.y[fb])
