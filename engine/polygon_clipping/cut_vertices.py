@@ -16,7 +16,7 @@ Range: coordinates below 2^64. Numbers that t or a quotient divides by are above
 from __future__ import annotations
 
 from collections import namedtuple
-from typing import Final, NamedTuple
+from typing import Final
 
 from engine.jit import inline, merged
 from engine.polygon_clipping.rings import Plane
@@ -96,18 +96,8 @@ def value_bound(size: float, moved: float) -> float:
     return DD_VALUE_BOUND * size + 1.01 * moved + TINY
 
 
-class Share(NamedTuple):
-    """Where an edge is cut: weights |p|, |q|, their sum, t = |p| / sum as double-doubles, t known to a relative r."""
-
-    ph: float
-    pl: float
-    qh: float
-    ql: float
-    sum_h: float
-    sum_l: float
-    th: float
-    tl: float
-    r: float
+Share = namedtuple("Share", "ph pl qh ql sum_h sum_l th tl r")
+"""Where an edge is cut: weights |p|, |q|, their sum, t = |p| / sum as double-doubles, t known to a relative r."""
 
 
 @inline

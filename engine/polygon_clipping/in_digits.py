@@ -12,7 +12,8 @@ What does not fit digits.py (edges of space cut anew several times, sizes far ap
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections import namedtuple
+from typing import Any
 
 import numpy as np
 
@@ -33,28 +34,16 @@ _ROWS = 16 * SLOT
 _TINY = 2.0**-1000
 """Products that underflow."""
 
-
-class ExactScratch(NamedTuple):
-    """heap: int64, see digits.py; n_rows: how much of it the planes take. terms: (4, 3) int64, for sums. loaded: (2,
-    dim + 1) int64, places of two vertices. rows: (planes, dim + 1) int64, places of the planes' numbers. points: (room,
-    dim) float64, the doubles nearest to vertices; places: (room, dim + 1) int64, numbers of cut ones. rings: (2, room)
-    int64, a ring as numbers of vertices. edges, along: (room,) int64, the original edge that goes on from a vertex, by
-    its first vertex, and the plane that it runs along, else -1. signs: (room,) int64. on_plane: (room,) bool, for
-    places of the ring made. used: (2,) int64, how many vertices there are, and numbers of the heap."""
-
-    heap: Any
-    n_rows: int
-    terms: Any
-    loaded: Any
-    rows: Any
-    points: Any
-    places: Any
-    rings: Any
-    edges: Any
-    along: Any
-    signs: Any
-    on_plane: Any
-    used: Any
+ExactScratch = namedtuple(
+    "ExactScratch",
+    "heap n_rows terms loaded rows points places rings edges along signs on_plane used",
+)
+"""heap: int64, see digits.py; n_rows: how much of it the planes take. terms: (4, 3) int64, for sums. loaded: (2, dim +
+1) int64, places of two vertices. rows: (planes, dim + 1) int64, places of the planes' numbers. points: (room, dim)
+float64, the doubles nearest to vertices; places: (room, dim + 1) int64, numbers of cut ones. rings: (2, room) int64, a
+ring as numbers of vertices. edges, along: (room,) int64, the original edge that goes on from a vertex, by its first
+vertex, and the plane that it runs along, else -1. signs: (room,) int64. on_plane: (room,) bool, for places of the ring
+made. used: (2,) int64, how many vertices there are, and numbers of the heap."""
 
 
 @inline

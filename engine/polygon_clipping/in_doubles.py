@@ -17,7 +17,8 @@ Slack of planes across no axis: every vertex lies in the box of its polygon, so 
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from collections import namedtuple
+from typing import Any, Final
 
 import numpy as np
 
@@ -35,20 +36,10 @@ MOST_BITS: Final = 30
 ALONE: Final = 1 << MOST_BITS
 """Mark of a vertex on a plane (or near it): a run of its own."""
 
-
-class Scratch(NamedTuple):
-    """What rings are clipped in. rings: (2, room) int32, a ring as numbers of vertices, and the one that is made of it.
-    signs: (room,) int8, of its vertices. ends, codes: (room,) int32, of original vertices the last one of the run, and
-    the planes that it is outside of. lows, highs: (3,) float64, the box of a polygon."""
-
-    vertices: Vertices
-    cutting: Cutting
-    rings: Any
-    signs: Any
-    ends: Any
-    codes: Any
-    lows: Any
-    highs: Any
+Scratch = namedtuple("Scratch", "vertices cutting rings signs ends codes lows highs")
+"""What rings are clipped in. rings: (2, room) int32, a ring as numbers of vertices, and the one that is made of it.
+signs: (room,) int8, of its vertices. ends, codes: (room,) int32, of original vertices the last one of the run, and the
+planes that it is outside of. lows, highs: (3,) float64, the box of a polygon."""
 
 
 @inline

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import namedtuple
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 from engine.jit import merged
 
@@ -21,16 +21,8 @@ PlaneTables = namedtuple("PlaneTables", "high low axes at row_heap row_places")
 float64, rows as double-doubles, every number zero or in the safe range. axes: (planes,) int64, the axis that a plane
 cuts across in one known double `at`, else -1. row_heap, row_places: the rows in whole numbers, see digits.py."""
 
-
-class Plane(NamedTuple):
-    """One of the planes: its number, and the axis that it cuts across at `place`, else -1."""
-
-    high: Any
-    low: Any
-    number: int
-    axis: int
-    place: float
-
+Plane = namedtuple("Plane", "high low number axis place")
+"""One of the planes: its number, and the axis that it cuts across at `place`, else -1."""
 
 Clipped = namedtuple("Clipped", "vertices sizes state may_have_bridges")
 """What is left of polygons. vertices: (room * dim,) float64, rings one after another. sizes: (n_rings,) int64, vertices

@@ -24,7 +24,6 @@ from engine.polygon_overlay.compiled.ring_area import sum_areas
 
 _NEVER: Final = np.zeros(1, np.uint8)
 
-
 NOTHING: Final = RingArrays(read_only(np.zeros((0, 2))), read_only(np.zeros(1, np.int64)))
 
 

@@ -34,7 +34,6 @@ from engine.types import OPEN
 MAX_ROUNDS: Final = 12
 """Rounds before snapping: on 4,296 results of public test pairs all but 14 had ended by then."""
 
-
 Again = Callable[[Found, Budget], Found]
 
 

@@ -44,7 +44,6 @@ _INT32: Final = np.dtype(np.int32)
 _INT64: Final = np.dtype(np.int64)
 """Types that numpy need not look up."""
 
-
 _Rings = tuple[FloatArray, Int32Array, IntArray]
 
 

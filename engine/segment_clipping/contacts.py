@@ -15,7 +15,8 @@ location of its first end.
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from collections import namedtuple
+from typing import Any, Final
 
 import numpy as np
 
@@ -35,16 +36,9 @@ NO_ROOM: Final = -1
 STOPPED: Final = -2
 """Instead of a number of contacts."""
 
-
-class EdgeContacts(NamedTuple):
-    """Room for the contacts of a group of segments: elements and kinds one segment after another, and offsets."""
-
-    met: Any
-    kinds: Any
-    offsets: Any
-    """(m + 1,) where those of each segment begin."""
-    stack: Any
-    """(DEEPEST,) int64, nodes that wait."""
+EdgeContacts = namedtuple("EdgeContacts", "met kinds offsets stack")
+"""Room for the contacts of a group of segments: elements and kinds one segment after another; offsets: (m + 1,) where
+those of each segment begin; stack: (DEEPEST,) int64, nodes that wait."""
 
 
 @inline

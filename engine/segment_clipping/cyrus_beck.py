@@ -17,7 +17,8 @@ original ends.
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from collections import namedtuple
+from typing import Any, Final
 
 import numpy as np
 
@@ -41,14 +42,8 @@ WIDEST: Final = 2.0**900
 NARROWEST: Final = 2.0**-960
 """Where values of two signs are beyond it, the inverse of their difference does not overflow."""
 
-
-class Latest(NamedTuple):
-    """The last plane of some that a segment crosses: at t, within `slack`; rival: the latest that another may be."""
-
-    t: float
-    slack: float
-    plane: float
-    rival: float
+Latest = namedtuple("Latest", "t slack plane rival")
+"""The last plane of some that a segment crosses: at t, within `slack`; rival: the latest that another may be."""
 
 
 def as_columns(rows: FloatArray) -> FloatArray:

@@ -34,7 +34,6 @@ FEW: Final = 32
 """Open items that rational arithmetic settles in the time in which a batch is looked through for its exponent; segments
 that are clipped in the time that it takes to plan more."""
 
-
 _spare: list[tuple[Int32Array, Int32Array, Int32Array, IntArray]] = []
 """Scratch for so few segments that no call works in now."""
 _AT_ONCE: Final = 1 << 12

@@ -17,7 +17,8 @@ multi-BVH ray stream tracing, 2009.
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from collections import namedtuple
+from typing import Any, Final
 
 import numpy as np
 
@@ -39,35 +40,16 @@ _TRIANGLES: Final = 4096
 _SEGMENT: Final = (1 << 16) - 1
 _BITS: Final = (1 << LANES) - 1
 
-
-class Streams(NamedTuple):
-    """Room for a group of segments."""
-
-    numbers: Any
-    """(m, 16) float32: middle, half, slack and tiny of `local_segment`; then middle, r, s, reach and slack of
-    `near_triangles`."""
-    axes: Any
-    """(m,) the longest axis."""
-    members: Any
-    """The lists, one after another: segments."""
-    found: Any
-    """(m,) the answers of a node to its list."""
-    stack: Any
-    """(n, 3) nodes that wait, begin and end of their lists."""
-    pairs: Any
-    """Blocks and segments that wait, later with the bits of the block's triangles."""
-    waiting: Any
-    """Triangles and segments that wait."""
-    owners: Any
-    """Of each contact its segment."""
-    found_met: Any
-    found_kinds: Any
-    """Contacts in the order in which they are found."""
-    met: Any
-    kinds: Any
-    """The same by segment."""
-    offsets: Any
-    """(m + 1,) where those of each segment begin."""
+Streams = namedtuple(
+    "Streams",
+    "numbers axes members found stack pairs waiting owners found_met found_kinds met kinds offsets",
+)
+"""Room for a group of segments. numbers: (m, 16) float32, middle, half, slack and tiny of `local_segment`, then middle,
+r, s, reach and slack of `near_triangles`; axes: (m,) the longest axis. members: the lists, one after another, of
+segments; found: (m,) the answers of a node to its list; stack: (n, 3) nodes that wait, begin and end of their lists.
+pairs: blocks and segments that wait, later with the bits of the block's triangles; waiting: triangles and segments that
+wait. owners: of each contact its segment; found_met, found_kinds: contacts in the order in which they are found; met,
+kinds: the same by segment; offsets: (m + 1,) where those of each segment begin."""
 
 
 @inline

@@ -11,7 +11,8 @@ Everything here is written without branches and takes and gives numbers only: lo
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from collections import namedtuple
+from typing import Final
 
 from engine.jit import merged
 from engine.predicates.double_double import U2
@@ -27,18 +28,9 @@ _CLOSE: Final = 48.0 * U2
 """Two parameters are within 26 u^2 of the larger one, the difference of their low parts loses 6 u^2; that of their high
 parts loses nothing where they are within a factor of two, and elsewhere does not matter."""
 
-
-class Meeting(NamedTuple):
-    """A place where a segment enters or leaves a slab. t, t_low: parameter, a double-double. n, d: as above, rounded.
-    is_exact: they lost nothing. plane: 0.0 .. 5.0, or -1.0 for none, with a t outside of [0, 1] that is like no
-    other."""
-
-    t: float
-    t_low: float
-    n: float
-    d: float
-    is_exact: bool
-    plane: float
+Meeting = namedtuple("Meeting", "t t_low n d is_exact plane")
+"""A place where a segment enters or leaves a slab. t, t_low: parameter, a double-double. n, d: as above, rounded.
+is_exact: they lost nothing. plane: 0.0 .. 5.0, or -1.0 for none, with a t outside of [0, 1] that is like no other."""
 
 
 @merged

@@ -5,12 +5,13 @@ By itself it serves scenes: cheap to build, and small, it tells the location of 
 
 from __future__ import annotations
 
+from collections import namedtuple
 from math import frexp, ldexp
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
-from engine.arrays import FloatArray, Int8Array, Int32Array, IntArray, read_only
+from engine.arrays import Int8Array, Int32Array, IntArray, read_only
 from engine.containment.cells.lattice import UNKNOWN, Lattice, Mesh, list_top
 from engine.containment.cells.status import label_empty, reference_points
 from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
@@ -38,16 +39,10 @@ _RANGE: Final = 2.0**400
 """Largest extent, and 1 / smallest, of a solid that gets cells: products of three stay far from its ends."""
 _AT_ONCE: Final = 4096
 
-
-class TopCells(NamedTuple):
-    """What `side_in_cell` reads."""
-
-    frame: FloatArray
-    """``(6,)``: the low corner of the lattice, and cells to a unit."""
-    place: tuple[int, int, int, int]
-    """Address of `sides`, and cells along each axis."""
-    sides: Int8Array
-    """The location of all points of a cell, UNDECIDED where a triangle may reach into it."""
+TopCells = namedtuple("TopCells", "frame place sides")
+"""What `side_in_cell` reads. frame: (6,), the low corner of the lattice, and cells to a unit; place: address of
+`sides`, and cells along each axis; sides: the location of all points of a cell, UNDECIDED where a triangle may reach
+into it."""
 
 
 def can_have_cells(solid: Polyhedron) -> bool:

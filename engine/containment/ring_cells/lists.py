@@ -13,64 +13,27 @@ that are not: the side of the node tells their number, once what the node's own 
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections import namedtuple
+from typing import Any
 
 import numpy as np
 
-from engine.arrays import FloatArray, Int32Array, IntArray
 from engine.containment.ring_cells.locate import EDGE_SHIFT, GOES_ON_DOWN, GOES_ON_UP, as_edge
 from engine.jit import inline, kernel
 from engine.predicates.loading import as_point2
 
+Node = namedtuple("Node", "column row u_shift v_shift side first stop")
+"""A cell to cut: column and row where fine places are shifted so, side, and its part of the level's list."""
 
-class Node(NamedTuple):
-    """A cell to cut: column and row where fine places are shifted so, side, and its part of the level's list."""
+LevelOfNodes = namedtuple("LevelOfNodes", "nodes cuts bases edges_of edges places is_tight")
+"""The nodes of one level, (n, 7) of `Node`, and how they are cut. cuts: (n, 2), a node becomes 2^a by 2^b cells; bases:
+first word of each node; edges_of: the level's list; is_tight: whether places are off by no more than rounding."""
 
-    column: int
-    row: int
-    u_shift: int
-    v_shift: int
-    side: int
-    first: int
-    stop: int
+Cut = namedtuple("Cut", "left bottom u_shift v_shift n_columns n_rows base")
+"""The cells of one node: column and row of the first, and where fine places are shifted so, numbers, first word."""
 
-
-class LevelOfNodes(NamedTuple):
-    """The nodes of one level and how they are cut."""
-
-    nodes: IntArray
-    """``(n, 7)`` of `Node`."""
-    cuts: IntArray
-    """``(n, 2)``: a node becomes 2^a by 2^b cells."""
-    bases: IntArray
-    """First word of each node."""
-    edges_of: Int32Array
-    """The level's list."""
-    edges: FloatArray
-    places: FloatArray
-    is_tight: bool
-    """Whether places are off by no more than rounding."""
-
-
-class Cut(NamedTuple):
-    """The cells of one node: column and row of the first, and where fine places are shifted so, numbers, first word."""
-
-    left: int
-    bottom: int
-    u_shift: int
-    v_shift: int
-    n_columns: int
-    n_rows: int
-    base: int
-
-
-class Ends(NamedTuple):
-    """Places of an edge's ends in the fine grid, not cut to integers."""
-
-    lower_u: float
-    lower_v: float
-    upper_u: float
-    upper_v: float
+Ends = namedtuple("Ends", "lower_u lower_v upper_u upper_v")
+"""Places of an edge's ends in the fine grid, not cut to integers."""
 
 
 @inline

@@ -9,9 +9,9 @@ posed/filters.py), what they leave is UNDECIDED and listed for the methods of si
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from collections import namedtuple
+from typing import Any, Final
 
-from engine.arrays import BoolArray, FloatArray, Int8Array, Int32Array, IntArray
 from engine.containment.cells.side import side_in_cell
 from engine.containment.methods.ball import located
 from engine.containment.methods.polygon_one_pass import locate_in_small_rings
@@ -29,41 +29,18 @@ RINGS: Final = 4
 CELLS: Final = 5
 """Kinds of bodies: how a candidate is decided in the first pass."""
 
-
-class SceneTables(NamedTuple):
-    """What the first pass reads of the bodies; a body's row in the tables of its kind is its slot."""
-
-    kinds: Int8Array
-    slots: Int32Array
-    lows: FloatArray
-    """``(n_bodies, 3)``: boxes, rounded outward; the third axis of a scene of the plane is 0."""
-    highs: FloatArray
-    frames: Int32Array
-    """Row of a body's pose in the next three, -1 for none."""
-    inverses: FloatArray
-    """``(n_poses, 3, 3)``: R^-1 rounded (posed/body_frame.py); the plane's in the upper left."""
-    translations: FloatArray
-    is_turn: BoolArray
-    box_lows: FloatArray
-    """``(n, 3)``: of boxes in their own frame."""
-    box_highs: FloatArray
-    centers: FloatArray
-    """``(n, 3)``: of balls, in the world."""
-    balls: FloatArray
-    """``(n, 2)``: radius, and a bound on the error of each coordinate of the centre."""
-    row_offsets: IntArray
-    """Where the rows of a half-space or convex begin."""
-    rows: FloatArray
-    """``(n, 4)``: normal and offset; the plane's have 0 in the third place."""
-    polygon_offsets: IntArray
-    """Where the rings of a polygon begin."""
-    ring_offsets: IntArray
-    xs: FloatArray
-    """The vertices of all rings, each ended by its first one."""
-    ys: FloatArray
-    cell_frames: FloatArray
-    cell_places: IntArray
-    """``(n, 6)`` and ``(n, 4)``: what `TopCells` has of a polyhedron."""
+SceneTables = namedtuple(
+    "SceneTables",
+    "kinds slots lows highs frames inverses translations is_turn box_lows box_highs centers balls row_offsets rows "
+    "polygon_offsets ring_offsets xs ys cell_frames cell_places",
+)
+"""What the first pass reads of the bodies; a body's row in the tables of its kind is its slot. Arrays of three columns
+are (n, 3), with 0 in the third place in the plane. lows, highs: boxes, rounded outward. frames: row of a body's pose in
+inverses (R^-1 rounded, posed/body_frame.py), translations and is_turn, -1 for none. box_lows, box_highs: of boxes in
+their own frame. centers: of balls, in the world; balls: (n, 2), radius, and a bound on the error of each coordinate of
+the centre. row_offsets: where the rows (n, 4) of a half-space or convex begin. polygon_offsets: where the rings of a
+polygon begin; xs, ys: the vertices of all rings, each ended by its first one. cell_frames, cell_places: (n, 6) and (n,
+4), what `TopCells` has of a polyhedron."""
 
 
 @merged

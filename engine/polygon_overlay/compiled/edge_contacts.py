@@ -15,7 +15,7 @@ all, so a vertex where there is one), crossings through one point later, when th
 from __future__ import annotations
 
 from collections import namedtuple
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 
@@ -127,24 +127,13 @@ def _enter_contact(
     return n_events, n_crossings
 
 
-class Contacts(NamedTuple):
-    """How many events (-1: no room), crossings, and pairs that floating point left to exact signs; are_far: all edges
-    that do not meet are further apart than the margin, and all contacts are crossings."""
+Contacts = namedtuple("Contacts", "n_events n_crossings n_exact are_far")
+"""How many events (-1: no room), crossings, and pairs that floating point left to exact signs; are_far: all edges that
+do not meet are further apart than the margin, and all contacts are crossings."""
 
-    n_events: int
-    n_crossings: int
-    n_exact: int
-    are_far: bool
-
-
-class Turns(NamedTuple):
-    """Of a segment ab and the points c and d: orient(a, b, c) and orient(a, b, d) in floating point, a bound for the
-    errors of both, and ab's length, which is the sum of both coordinates'."""
-
-    first: float
-    second: float
-    bound: float
-    length: float
+Turns = namedtuple("Turns", "first second bound length")
+"""Of a segment ab and the points c and d: orient(a, b, c) and orient(a, b, d) in floating point, a bound for the errors
+of both, and ab's length, which is the sum of both coordinates'."""
 
 
 @merged

@@ -21,7 +21,8 @@ so nothing counts references to arrays.
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from collections import namedtuple
+from typing import Any, Final
 
 from engine.jit import bare_kernel, merged
 from engine.polygon_overlay.compiled.chain_faces import number_cycles
@@ -73,36 +74,15 @@ NEEDS_CONTACTS: Final = 1
 NEEDS_OUTPUT: Final = 2
 """The pair reached has more vertices or rings than the output has room for."""
 
+_Span = namedtuple("_Span", "first first_end second second_end")
+"""The rings of a pair: of its subject first .. first_end - 1, of its clip second .. second_end - 1."""
 
-class _Span(NamedTuple):
-    """The rings of a pair: of its subject first .. first_end - 1, of its clip second .. second_end - 1."""
+_Filled = namedtuple("_Filled", "n_vertices n_rings n_pieces n_evidence")
+"""How much output there is."""
 
-    first: int
-    first_end: int
-    second: int
-    second_end: int
-
-
-class _Filled(NamedTuple):
-    """How much output there is."""
-
-    n_vertices: int
-    n_rings: int
-    n_pieces: int
-    n_evidence: int
-
-
-class _Arranged(NamedTuple):
-    """What was found of a pair: boundary rings and their points, crossings, pairs of edges left to exact signs, whether
-    clearance.py vouches for all; n_contacts: those that there must be scratch for, more than there is if it failed."""
-
-    n_found: int
-    n_points: int
-    n_crossings: int
-    n_exact: int
-    is_clear: bool
-    n_contacts: int
-
+_Arranged = namedtuple("_Arranged", "n_found n_points n_crossings n_exact is_clear n_contacts")
+"""What was found of a pair: boundary rings and their points, crossings, pairs of edges left to exact signs, whether
+clearance.py vouches for all; n_contacts: those that there must be scratch for, more than there is if it failed."""
 
 _NONE: Final = _Arranged(0, 0, 0, 0, False, 0)
 

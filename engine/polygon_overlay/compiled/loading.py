@@ -6,6 +6,7 @@ other beyond one side of the common box give way to the first and the last of th
 
 from __future__ import annotations
 
+from collections import namedtuple
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -21,7 +22,6 @@ Box = tuple[float, float, float, float]
 """x_min, x_max, y_min, y_max."""
 EVERYTHING: Final = (-np.inf, np.inf, -np.inf, np.inf)
 
-
 _MANY_RINGS: Final = 256
 LEFT_OUT: Final = -2
 """Second source of a vertex after which those up to the next one are left out."""
@@ -34,23 +34,12 @@ class RingArrays(NamedTuple):
     offsets: IntArray
 
 
-class Given(NamedTuple):
-    """The rings of both polygons: their edges, by vertex its number in the input, by ring its top vertex (rightmost,
-    then highest) and the mask of its source."""
+Given = namedtuple("Given", "edges origins tops masks")
+"""The rings of both polygons: their edges, by vertex its number in the input, by ring its top vertex (rightmost, then
+highest) and the mask of its source."""
 
-    edges: Edges
-    origins: Any
-    tops: Any
-    masks: Any
-
-
-class Loaded(NamedTuple):
-    """How many vertices, rings, and edges that stand for many (runs); the largest coordinate, without its sign."""
-
-    n: int
-    n_rings: int
-    n_runs: int
-    largest: float
+Loaded = namedtuple("Loaded", "n n_rings n_runs largest")
+"""How many vertices, rings, and edges that stand for many (runs); the largest coordinate, without its sign."""
 
 
 @inline

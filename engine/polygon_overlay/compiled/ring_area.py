@@ -12,7 +12,8 @@ What the bound leaves open (a tie, a sum that nearly cancels, exponents near the
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections import namedtuple
+from typing import Any
 
 from engine.jit import bare_kernel, called, inline, merged
 from engine.polygon_overlay.compiled.crossing_signs import weight_of
@@ -25,27 +26,12 @@ from engine.predicates.parameters import minor
 _TINY = 2.0**-1040
 """More than what an underflow may lose in a term."""
 
+_Place = namedtuple("_Place", "xh xl yh yl error")
+"""A point, as double-doubles counted from another, and a bound of the error of each coordinate."""
 
-class _Place(NamedTuple):
-    """A point, as double-doubles counted from another, and a bound of the error of each coordinate."""
-
-    xh: float
-    xl: float
-    yh: float
-    yl: float
-    error: float
-
-
-class _Pair(NamedTuple):
-    """Polygons, and of a pair of them: first vertex of its subject, number of its vertices, first vertex of its clip;
-    known: the ring that was found last, of either polygon."""
-
-    subjects: Any
-    clips: Any
-    first: int
-    n: int
-    second: int
-    known: Any
+_Pair = namedtuple("_Pair", "subjects clips first n second known")
+"""Polygons, and of a pair of them: first vertex of its subject, number of its vertices, first vertex of its clip;
+known: the ring that was found last, of either polygon."""
 
 
 @merged

@@ -12,7 +12,7 @@ nothing: quotients of their two leading components are within 2^-100 of it.
 from __future__ import annotations
 
 from collections import namedtuple
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 
@@ -33,20 +33,9 @@ _NOT_YET: Final = -2.0
 Rounded = namedtuple("Rounded", "x y moved crossing_x crossing_y error")
 """Doubles of the points of rings, and whether rounding moved each, uint8; by crossing its doubles and its error."""
 
-
-class _Cut(NamedTuple):
-    """Two edges that cross, the weights of the ends of the first as positive double-doubles, their sum, and a bound of
-    the relative error of a coordinate."""
-
-    e: int
-    f: int
-    ah: float
-    al: float
-    bh: float
-    bl: float
-    sum_h: float
-    sum_l: float
-    relative: float
+_Cut = namedtuple("_Cut", "e f ah al bh bl sum_h sum_l relative")
+"""Two edges that cross, the weights of the ends of the first as positive double-doubles, their sum, and a bound of the
+relative error of a coordinate."""
 
 
 @merged
