@@ -16,12 +16,13 @@ Source: C. Ericson, Real-Time Collision Detection, 2005, section 7.1 (uniform gr
 
 from __future__ import annotations
 
+from collections import namedtuple
 from collections.abc import Iterator
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 
-from engine.arrays import FloatArray, Int32Array, IntArray
+from engine.arrays import FloatArray, IntArray
 from engine.bounding.sweep import BLOCK, meeting_boxes
 from engine.jit import inline, kernel
 
@@ -32,19 +33,12 @@ _CROWD: Final = 48
 """Boxes that share a cell with one box, on average, beyond which a sweep is no worse."""
 
 
-class CornerGrid(NamedTuple):
-    """Boxes by cell, the large ones last.
+CornerGrid = namedtuple("CornerGrid", "boxes numbers cells starts row layer")
+"""Boxes by cell, the large ones last.
 
-    boxes (n, 6): low, then high. numbers (n,): which box each is. cells (n,): its cell, -1 where it is large. starts
-    (n_cells + 1,) int32: where each cell begins among them. row, layer: how far the next cell on y and on z is.
-    """
-
-    boxes: FloatArray
-    numbers: IntArray
-    cells: IntArray
-    starts: Int32Array
-    row: int
-    layer: int
+boxes (n, 6): low, then high. numbers (n,): which box each is. cells (n,): its cell, -1 where it is large. starts
+(n_cells + 1,) int32: where each cell begins among them. row, layer: how far the next cell on y and on z is.
+"""
 
 
 def pairs_of_boxes(low: FloatArray, high: FloatArray, flag: Any, block: int = BLOCK) -> Iterator[IntArray]:

@@ -21,12 +21,13 @@ S. Boulos, Getting rid of packets: efficient SIMD single-ray traversal using mul
 
 from __future__ import annotations
 
+from collections import namedtuple
 from math import frexp, ldexp
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from engine.arrays import Float32Array, FloatArray, Int32Array, IntArray, read_only
+from engine.arrays import Float32Array, FloatArray, Int32Array, read_only
 from engine.jit import inline, kernel
 from engine.lanes.boxes import EMPTY
 from engine.lanes.lanes import aligned
@@ -70,40 +71,18 @@ class Bvh(NamedTuple):
     scale: float
 
 
-class Items(NamedTuple):
-    """The items, in the order of the tree."""
+Items = namedtuple("Items", "boxes centres order")
+"""The items, in the order of the tree: boxes (n, 8), as lanes/rows.py has them; centres (n, 8), boxes without extent;
+order (n,), which item it is."""
 
-    boxes: Float32Array
-    """(n, 8), as lanes/rows.py has them."""
-    centres: Float32Array
-    """(n, 8): boxes without extent."""
-    order: IntArray
-    """(n,): which item it is."""
+Halves = namedtuple("Halves", "boxes centres left runs")
+"""A binary tree whose leaves are runs of at most eight items: boxes and centres (2 n - 1, 8), around the items of a
+node and around their centres; left, the left child, the right one follows, or -1; runs (2 n - 1, 2), first item and
+end."""
 
-
-class Halves(NamedTuple):
-    """A binary tree whose leaves are runs of at most eight items."""
-
-    boxes: Float32Array
-    """(2 n - 1, 8): around the items of a node."""
-    centres: Float32Array
-    """(2 n - 1, 8): around their centres."""
-    left: IntArray
-    """The left child, the right one follows; or -1."""
-    runs: IntArray
-    """(2 n - 1, 2): first item and end."""
-
-
-class Bins(NamedTuple):
-    """Items of a run by where their centres lie along an axis."""
-
-    boxes: Float32Array
-    """(16, 8)"""
-    centres: Float32Array
-    numbers: IntArray
-    """(16,): how many items."""
-    costs: Float32Array
-    """(16,): of what lies from a bin on, to the right."""
+Bins = namedtuple("Bins", "boxes centres numbers costs")
+"""Items of a run by where their centres lie along an axis: boxes, centres (16, 8); numbers (16,), how many items;
+costs (16,), of what lies from a bin on, to the right."""
 
 
 def build_bvh(boxes: FloatArray) -> Bvh:

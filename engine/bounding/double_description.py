@@ -76,8 +76,7 @@ def _add(
     constraint: Vector, number: int, lines: list[Vector], rays: list[_Ray], budget: Budget
 ) -> tuple[list[Vector], list[_Ray]]:
     """Return the generators of the part of their cone where the constraint is not negative."""
-    bit = 1 << number
-    slopes = [_dot(constraint, line) for line in lines]
+    bit, slopes = 1 << number, [_dot(constraint, line) for line in lines]
     i_line = next((i for i, slope in enumerate(slopes) if slope != 0), None)
     if i_line is None:
         return lines, _cut(constraint, bit, rays, len(constraint) - len(lines) - 2, budget)

@@ -97,7 +97,8 @@ def list_in_cells(
     ends = [(float(low.min()), float(high.max())) for low, high in zip(lows, highs)]
     while True:  # bound: every turn halves a number of cells, and one cell lists each box once
         axes = [make_axis(*ends[k], n_cells[k]) for k in range(3)]
-        if max(n_cells) == 1 or _estimate(lows, highs, axes) <= limit:
+        along = [(high * 0.5 - low * 0.5) * axis.cells_per_unit + 1.0 for low, high, axis in zip(lows, highs, axes)]
+        if max(n_cells) == 1 or float((along[0] * along[1] * along[2]).sum()) <= limit:  # about how many entries
             break
         check()
         longest = n_cells.index(max(n_cells))
@@ -110,12 +111,6 @@ def list_in_cells(
     items = np.empty(offsets[-1], np.int32)
     list_boxes(tuple(lows), tuple(highs), tuple(axes), offsets[:-1].copy(), items, True)
     return axes, offsets, items
-
-
-def _estimate(lows: list[FloatArray], highs: list[FloatArray], axes: list[Axis]) -> float:
-    """Return about how many entries the lists would have."""
-    along = [(high * 0.5 - low * 0.5) * axis.cells_per_unit + 1.0 for low, high, axis in zip(lows, highs, axes)]
-    return float((along[0] * along[1] * along[2]).sum())
 
 
 def build_box_grid(

@@ -53,8 +53,7 @@ def _ball_through(points: Sequence[IntPoint], support: tuple[int, ...]) -> IntBa
     first, *others = (points[index] for index in support)
     steps = [tuple(x - x0 for x, x0 in zip(point, first)) for point in others]
     gram = [[sum(a * b for a, b in zip(u, v)) for v in steps] for u in steps]
-    squares = [gram[i][i] for i in range(len(steps))]
-    volume = determinant(gram)
+    squares, volume = [gram[i][i] for i in range(len(steps))], determinant(gram)
     if volume == 0:
         return None  # affinely dependent: a smaller set has the same ball
     scale = 2 * volume  # > 0: a Gram determinant

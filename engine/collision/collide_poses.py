@@ -85,8 +85,7 @@ def collide_poses(
     with Budget(deadline, cancel) as budget:
         budget.check()
         has_detail = detail and has_interior(first, budget) and has_interior(second, budget)
-        details = np.full(n_poses, NO_DETAIL, np.int8)
-        relations = np.full(n_poses, UNSETTLED, np.int8)
+        details, relations = np.full(n_poses, NO_DETAIL, np.int8), np.full(n_poses, UNSETTLED, np.int8)
         found: Witnesses | None = [None] * n_poses if witnesses else None
         answers = Answers(budget, bool(boolean), relations, found, details if has_detail else None)
         fill = batch_of(first, second, poses, answers)

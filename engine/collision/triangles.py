@@ -38,7 +38,7 @@ from engine.predicates.orientation import orient2d
 from engine.predicates.rational import scaled_integers
 from engine.solids.checks import as_point_groups
 from engine.solids.triangle import Triangle
-from engine.types import UNDECIDED, Accuracy, Point2, Relation
+from engine.types import UNDECIDED, Accuracy, Relation
 
 
 @inline
@@ -62,26 +62,17 @@ def are_boxes_apart(t: Any, u: Any) -> bool:
 
 
 @inline
-def side_range(a: Point2, b: Point2, u: Facet) -> tuple[int, int]:
-    """Return the least and the largest side of the line a b that a corner of u lies on; UNDECIDED twice if unsure."""
-    p, q, r = orient2d(a, b, u.p), orient2d(a, b, u.q), orient2d(a, b, u.r)
-    if p == UNDECIDED or q == UNDECIDED or r == UNDECIDED:
-        return UNDECIDED, UNDECIDED
-    return min(p, q, r), max(p, q, r)
-
-
-@inline
 def against_edges(t: Facet, u: Facet) -> int:
     """Return how u lies to the edges of t; DISJOINT and SECOND_INSIDE_FIRST are final, TOUCHING: interiors apart."""
     p, q, r = t
     inside, apart = True, False
     for _ in range(3):
-        low, high = side_range(p, q, u)
-        if low == UNDECIDED:
+        a, b, c = orient2d(p, q, u.p), orient2d(p, q, u.q), orient2d(p, q, u.r)
+        if max(a, b, c) == UNDECIDED:
             return UNSETTLED
-        if high < 0:
+        if max(a, b, c) < 0:
             return DISJOINT
-        inside, apart = inside and low > 0, apart or high == 0
+        inside, apart = inside and min(a, b, c) > 0, apart or max(a, b, c) == 0
         p, q, r = q, r, p
     return SECOND_INSIDE_FIRST if inside else (TOUCHING if apart else OVERLAPPING)
 
@@ -165,14 +156,12 @@ def collide_triangles(
     [2]
     """
     check_options(workers, progress, report=report)
-    a = as_point_groups(first, 3, None, ("first",))
-    b = as_point_groups(second, 3, None, ("second",))
+    a, b = as_point_groups(first, 3, None, ("first",)), as_point_groups(second, 3, None, ("second",))
     if len(a) != len(b):
         raise InvalidArrayError(f"first and second must be equally many, got {len(a)} and {len(b)}", ("second",))
     if len(a) and a.shape[2] != b.shape[2]:
         raise WrongDimensionError(f"first is {a.shape[2]}D, second {b.shape[2]}D; both need one dimension", ("second",))
-    is_planar = a.shape[2] == 2
-    relations = np.empty(len(a), np.int8)
+    is_planar, relations = a.shape[2] == 2, np.empty(len(a), np.int8)
     n_open: list[int] = []
     with Budget(deadline, cancel) as budget:
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 from typing import Final
 
 from engine.lanes.lanes import any_above, bits_of, bytes_of, dot, lane_of, load
-from engine.lanes.tracing import LANES, Lanes, Number, Rows, Triple, traced
+from engine.lanes.tracing import LANES, Lanes, Mask, Number, Rows, Triple, traced
 
 FRAME_ROWS: Final = 22
 SHIFT_ROW: Final = 18
@@ -32,20 +32,18 @@ def meeting(first: Rows, i: int, second: Rows, j: int, frames: Rows) -> tuple[in
     others apart, each in 32 bits."""
     a = [load(first, BOX_ROWS * i + row) for row in range(BOX_ROWS)]
     b = [load(second, BOX_ROWS * j + row) for row in range(BOX_ROWS)]
-    image_low, image_high = _image(b, frames, 0)
-    their_image_low, their_image_high = _image(a, frames, FRAME_ROWS)
-    (low, high), (their_low, their_high) = _ends(a), _ends(b)
-    masks = []
-    for lane in range(LANES):
-        pairs = []
+    image, own, their_image, theirs = _image(b, frames, 0), _ends(a), _image(a, frames, FRAME_ROWS), _ends(b)
+    return bytes_of([~are_parted(lane, own, image, their_image, theirs) for lane in range(LANES)])
+
+
+def are_parted(lane: int, own: Bounds, image: Bounds, their_image: Bounds, theirs: Bounds) -> Mask:
+    """Tell which boxes of the second body an axis of either tree parts from the one in a lane of the first."""
+    pairs = []
+    for (low, high), (their_low, their_high) in ((own, image), (their_image, theirs)):
         for k in range(3):
-            pairs.append((image_low[k], lane_of(high[k], lane)))
-            pairs.append((lane_of(low[k], lane), image_high[k]))
-        for k in range(3):
-            pairs.append((their_low[k], lane_of(their_image_high[k], lane)))
-            pairs.append((lane_of(their_image_low[k], lane), their_high[k]))
-        masks.append(~any_above(pairs))
-    return bytes_of(masks)
+            pairs.append((their_low[k], lane_of(high[k], lane)))
+            pairs.append((lane_of(low[k], lane), their_high[k]))
+    return any_above(pairs)
 
 
 def _ends(box: list[Lanes]) -> Bounds:

@@ -18,7 +18,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 from engine.jit import inline
-from engine.lanes.boxes import FRAME_ROWS, MARGIN_ROW, SHIFT_ROW
+from engine.lanes.boxes import FRAME_ROWS, MARGIN_ROW, SHIFT_ROW, Bounds, are_parted
 from engine.lanes.lanes import any_above, bits_of, bytes_of, dot, greater, lane_of, lesser, load, load_lane, sift, store
 from engine.lanes.tracing import LANES, Lanes, Rows, traced
 from engine.lanes.triangles import CORNER_ROWS
@@ -60,26 +60,18 @@ def _greatest(a: Lanes, b: Lanes, c: Lanes) -> Lanes:
 @traced
 def meet_boxes(first: Rows, i: int, second: Rows, j: int, frames: Rows, work: Rows) -> tuple[int, int]:
     """Return as `faces_meeting` does the pairs that the axes of the trees leave; write the images to `work`."""
-    low, high, image_low, image_high = _bounds(first, i, second, j, frames, 0, work, _SECOND_IMAGE)
-    their_low, their_high, their_image_low, their_image_high = _bounds(
-        second, j, first, i, frames, FRAME_ROWS, work, _FIRST_IMAGE
-    )
+    own, image = _bounds(first, i, second, j, frames, 0, work, _SECOND_IMAGE)
+    theirs, their_image = _bounds(second, j, first, i, frames, FRAME_ROWS, work, _FIRST_IMAGE)
     masks = []
     for lane in range(LANES):
-        apart = lane_of(low[0], lane) > _BEYOND  # case: neither lane is used
-        pairs = []
-        for k in range(3):
-            pairs.append((image_low[k], lane_of(high[k], lane)))
-            pairs.append((lane_of(low[k], lane), image_high[k]))
-            pairs.append((their_low[k], lane_of(their_image_high[k], lane)))
-            pairs.append((lane_of(their_image_low[k], lane), their_high[k]))
-        masks.append(~(apart | any_above(pairs)))
+        apart = lane_of(own[0][0], lane) > _BEYOND  # case: neither lane is used
+        masks.append(~(apart | are_parted(lane, own, image, their_image, theirs)))
     return bytes_of(masks)
 
 
 def _bounds(
     own_rows: Rows, own_block: int, rows: Rows, block: int, frames: Rows, frame_row: int, work: Rows, image_row: int
-) -> tuple[list[Lanes], list[Lanes], list[Lanes], list[Lanes]]:
+) -> tuple[Bounds, Bounds]:
     """Return low and high of a block, by its margin, and of the image of another block; write that to `work`."""
     own, other = _block(own_rows, own_block), _block(rows, block)
     frame = [load(frames, frame_row + row) for row in range(FRAME_ROWS)]
@@ -89,12 +81,8 @@ def _bounds(
             turned = dot(frame[3 * k : 3 * k + 3], other[3 * corner : 3 * corner + 3])
             image.append(turned + frame[SHIFT_ROW + k])
             store(work, image_row + 3 * corner + k, image[-1])
-    return (
-        [_least(*own[k::3]) - margin for k in range(3)],
-        [_greatest(*own[k::3]) + margin for k in range(3)],
-        [_least(*image[k::3]) for k in range(3)],
-        [_greatest(*image[k::3]) for k in range(3)],
-    )
+    low, high = [_least(*own[k::3]) - margin for k in range(3)], [_greatest(*own[k::3]) + margin for k in range(3)]
+    return (low, high), ([_least(*image[k::3]) for k in range(3)], [_greatest(*image[k::3]) for k in range(3)])
 
 
 @traced

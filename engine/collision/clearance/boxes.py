@@ -9,6 +9,7 @@ by less than twice it. Everything else is rounding: `margin`.
 
 from __future__ import annotations
 
+from collections import namedtuple
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -52,38 +53,20 @@ class Frame(NamedTuple):
     margin: float
 
 
-class Heap(NamedTuple):
-    """Pairs of boxes that wait, the least bound first: bounds (room,), lanes (room, 2) int64, eight a node, or ROOT."""
+Heap = namedtuple("Heap", "bounds lanes")
+"""Pairs of boxes that wait, the least bound first: bounds (room,), lanes (room, 2) int64, eight a node, or ROOT."""
 
-    bounds: Any
-    lanes: Any
+Candidates = namedtuple("Candidates", "pairs bounds")
+"""Pairs of triangles: pairs (room, 4) int64, two triangles and two features; bounds (room,) float64 from below."""
 
+Room = namedtuple("Room", "heap found limits line kept waiting waiting_bounds listed points")
+"""Work space of searches, one at a time.
 
-class Candidates(NamedTuple):
-    """Pairs of triangles: pairs (room, 4) int64, two triangles and two features; bounds (room,) float64 from below."""
-
-    pairs: Any
-    bounds: Any
-
-
-class Room(NamedTuple):
-    """Work space of searches, one at a time.
-
-    limits (2,): of a search (traversal.py). line (12,): the direction of the nearest pair so far, not longer than 1, in
-    the axes of both bodies and in space; where the two origins are along it; how often it turned. kept (n_nodes, 4): of
-    either body the turn at which `block_reach` was found, and it. waiting, waiting_bounds (n_nodes,), listed (2,
-    MOST_LISTED): nodes of one body. points (2, 3): the nearest.
-    """
-
-    heap: Heap
-    found: Candidates
-    limits: Any
-    line: Any
-    kept: Any
-    waiting: Any
-    waiting_bounds: Any
-    listed: Any
-    points: Any
+limits (2,): of a search (traversal.py). line (12,): the direction of the nearest pair so far, not longer than 1, in
+the axes of both bodies and in space; where the two origins are along it; how often it turned. kept (n_nodes, 4): of
+either body the turn at which `block_reach` was found, and it. waiting, waiting_bounds (n_nodes,), listed (2,
+MOST_LISTED): nodes of one body. points (2, 3): the nearest.
+"""
 
 
 def new_room(room: int, n_nodes: int) -> Room:
@@ -161,8 +144,7 @@ def box_bound(s: Search, most: float, c: Point3, h: Point3, other: Point3, half:
     x = _gap(w.x, half.x + mx.x * h.x + my.x * h.y + mz.x * h.z)
     y = _gap(w.y, half.y + mx.y * h.x + my.y * h.y + mz.y * h.z)
     z = _gap(w.z, half.z + mx.z * h.x + my.z * h.y + mz.z * h.z)
-    bound = np.sqrt(max(square, x * x + y * y + z * z))
-    size = np.sqrt(dot(v, v))
+    bound, size = np.sqrt(max(square, x * x + y * y + z * z)), np.sqrt(dot(v, v))
     if size > 0.0:
         bound = max(bound, size - (dot(magnitudes(v), h) + dot(magnitudes(w), half)) / size)
     return max(max(bound, along) * f.shrink - f.margin, 0.0)

@@ -207,8 +207,7 @@ def nearest_of_plane(row: Any, form: Any, turn: Any, move: Any, points: Any) -> 
         side = 1 if row[k] > 0.0 else 0
         x = _wide(w, 4 * k + 2 * side)
         faces |= 1 << (2 * k + side)
-        value = plus(value, times(product(row[k], 1.0), x))
-        square = plus(square, product(row[k], row[k]))
+        value, square = plus(value, times(product(row[k], 1.0), x)), plus(square, product(row[k], row[k]))
         terms, size = terms + abs(row[k] * x.h), size + abs(row[k])
     slack = 32.0 * U2 * terms + size * error + _PLANE_TINY
     if not (2.0**-400 < square.h < 2.0**400 and terms < 2.0**500 and error < float("inf")):

@@ -179,8 +179,7 @@ def _proven(pool: ConvexArrays, s: Simplex, a: PlacedBody, b: PlacedBody, reach:
         _beyond(pool, a, n, p_end, here, size_of_all), _beyond(pool, b, minus_wide(here, n), q_end, there, size_of_all)
     )
     size, radii = root(square), Wide(*two_sum(a.round, b.round))
-    distance = less(size, radii)
-    bound = 2.0 * beyond / size.h + ROUNDING * (size_of_all + radii.h)
+    distance, bound = less(size, radii), 2.0 * beyond / size.h + ROUNDING * (size_of_all + radii.h)
     is_sure = distance.h > bound and surely_rounded(distance.h, distance.low, bound)
     return distance.h if is_sure else np.nan
 

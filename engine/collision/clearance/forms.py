@@ -105,8 +105,7 @@ def between_form_and_plane(first: Solid, second: Solid, poses: Poses, least: flo
     form = form_of(body)
     if form is None or not isinstance(plane, HalfSpace) or poses[is_second] is not None:
         return None
-    points = np.empty((2, body.dimension))
-    motion = motion_of(poses[not is_second], body.dimension)
+    points, motion = np.empty((2, body.dimension)), motion_of(poses[not is_second], body.dimension)
     distance, told, faces = entry_of(nearest_of_plane)(plane.row, form, *motion, points)
     answer = _told(distance, least)
     if answer is not None or not distance > 0.0 or told < 0 or least is not None:

@@ -9,13 +9,11 @@ from fractions import Fraction
 
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray
 from engine.collision.clearance.bodies import feature_of, radius_of, spread_of
 from engine.collision.clearance.exact import ScaledGap
 from engine.collision.clearance.forms import PLANE, scaled_gap
 from engine.collision.clearance.result import Feature
-from engine.collision.exact_images import HalfSpaceImage, Vector, image_half_space, image_map, value_at
-from engine.collision.meshes.mesh_arrays import MeshBody
+from engine.collision.exact_images import Vector, image_half_space, image_map, value_at
 from engine.collision.result import Poses
 from engine.collision.simple.boundary import pulled_back
 from engine.parallel import Budget
@@ -48,7 +46,12 @@ def _foot_and_vertex(
     mesh, d = spread_of(body), body.dimension
     plane, image = image_half_space(half_space, poses[0]), image_map(poses[1])
     best: tuple[Fraction, Vector, Feature] | None = None
-    for vertex in _highest(pulled_back(plane, poses[1]), mesh, d).tolist():
+    (_, weights, _), points = pulled_back(plane, poses[1]), mesh.arrays.vertices[:, :d]
+    with np.errstate(all="ignore"):  # the rounding is that of `signs_of`
+        values = points @ weights
+        bounds = 2.0**-49 * (np.abs(points) @ np.abs(weights)) + 2.0**-1000 + 2.0**-1073 * np.abs(points).sum(axis=1)
+        is_below = values + bounds < np.max(values - bounds)
+    for vertex in np.flatnonzero(~is_below).tolist():
         budget.check()
         point = image(mesh.arrays.vertices[vertex, :d].tolist())
         value = value_at(plane, point)
@@ -60,16 +63,3 @@ def _foot_and_vertex(
     assert best is not None
     value, point, feature = best
     return tuple(x - value * n / squared_length(plane[0]) for x, n in zip(point, plane[0])), point, feature
-
-
-def _highest(pulled: HalfSpaceImage, mesh: MeshBody, dimension: int) -> IntArray:
-    """Return the vertices at which a linear function may be largest; the rounding is that of `signs_of`."""
-    normal, offset = pulled
-    largest = max(abs(value) for value in (*normal, offset))
-    weights = np.array([float(value / largest) for value in normal])
-    points: FloatArray = mesh.arrays.vertices[:, :dimension]
-    with np.errstate(all="ignore"):
-        values = points @ weights
-        bounds = 2.0**-49 * (np.abs(points) @ np.abs(weights)) + 2.0**-1000 + 2.0**-1073 * np.abs(points).sum(axis=1)
-        is_below = values + bounds < np.max(values - bounds)
-    return np.flatnonzero(~is_below)

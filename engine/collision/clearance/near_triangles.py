@@ -108,8 +108,7 @@ def _across(s: Facet, t: Facet, found: Nearest, before: Across, most: float) -> 
     if not largest > 0.0:
         return Across(0.0, 0.0, Point3(0.0, 0.0, 0.0), True)
     d = Point3(gap.x / largest, gap.y / largest, gap.z / largest)  # order: squares of small numbers are none
-    size = np.sqrt(dot(d, d))
-    furthest = max(dot(d, s.p), dot(d, s.q), dot(d, s.r))
+    size, furthest = np.sqrt(dot(d, d)), max(dot(d, s.p), dot(d, s.q), dot(d, s.r))
     low = max(before.low, (min(dot(d, t.p), dot(d, t.q), dot(d, t.r)) - furthest) / size)
     way = Point3(d.x / size, d.y / size, d.z / size)
     return Across(low, largest * size, way, low > most or low >= _AS_GOOD * largest * size)

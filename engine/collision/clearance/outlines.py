@@ -13,6 +13,7 @@ A foot moves by what moves the corners, times the distance of the vertex over th
 
 from __future__ import annotations
 
+from collections import namedtuple
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -40,30 +41,14 @@ class Wide2(NamedTuple):
     y: Wide
 
 
-class Placed(NamedTuple):
-    """An outline under a pose: points (n, 4), both coordinates rounded, then what they lack; the vertex at the end of
-    each edge; a bound on the error of coordinates; the largest of them, infinite beyond what bounds hold for."""
+Placed = namedtuple("Placed", "points following error reach")
+"""An outline under a pose: points (n, 4), both coordinates rounded, then what they lack; the vertex at the end of
+each edge; a bound on the error of coordinates; the largest of them, infinite beyond what bounds hold for."""
 
-    points: Any
-    following: Any
-    error: float
-    reach: float
-
-
-class Found(NamedTuple):
-    """How far a vertex is from an edge, and a bound on the error of that; the point of the edge that is nearest and the
-    error of that; whether the vertex is the first body's; of both bodies the vertex, or the number of vertices + the
-    edge, and the least edge that this lies on."""
-
-    distance: Wide
-    bound: float
-    foot: Wide2
-    error: float
-    is_first: bool
-    first: int
-    second: int
-    face: int
-    their_face: int
+Found = namedtuple("Found", "distance bound foot error is_first first second face their_face")
+"""How far a vertex is from an edge, and a bound on the error of that; the point of the edge that is nearest and the
+error of that; whether the vertex is the first body's; of both bodies the vertex, or the number of vertices + the
+edge, and the least edge that this lies on."""
 
 
 @inline
@@ -220,9 +205,8 @@ def _found(a: Placed, b: Placed, vertex: int, edge: int, is_first: bool) -> tupl
         feature = edge if where == 0 else end
         face = _least_face(b.following, feature)
     own = _least_face(a.following, vertex)
-    if is_first:
-        return Found(distance, bound, foot, error, True, vertex, feature, own, face), where >= 0
-    return Found(distance, bound, foot, error, False, feature, vertex, face, own), where >= 0
+    first, second, face, theirs = (vertex, feature, own, face) if is_first else (feature, vertex, face, own)
+    return Found(distance, bound, foot, error, is_first, first, second, face, theirs), where >= 0
 
 
 @inline

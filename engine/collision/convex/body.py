@@ -6,9 +6,10 @@ with a radius around it. Bodies without interior (flat boxes, balls of radius 0)
 
 from __future__ import annotations
 
+from collections import namedtuple
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -40,22 +41,15 @@ WEIGHTS = tuple(weight / 1024 for weight in (16, 25, 31, 38, 4, 11, 13, 22))
 _NO_CLAIM = np.inf
 
 
-class ConvexArrays(NamedTuple):
-    """Several convex bodies, one after another; few arrays, because kernels count references to each.
+ConvexArrays = namedtuple("ConvexArrays", "points graph normals anchors firsts numbers")
+"""Several convex bodies, one after another; few arrays, because kernels count references to each.
 
-    points: (3, n) their vertices. graph: (n + 1,) places in itself where the neighbours of each vertex begin, the
-    vertices at the other end of its edges; then these; then for each body the vertex farthest along each of 8
-    diagonals. normals: (4, n_faces) about unit, outward; last how far off, relative to lengths. anchors: (n_faces,) a
-    vertex of each face. firsts: (3, n_bodies + 1) first vertex and face of each body; where its 8 vertices stand.
-    numbers: (n_bodies, N_NUMBERS).
-    """
-
-    points: FloatArray
-    graph: IntArray
-    normals: FloatArray
-    anchors: IntArray
-    firsts: IntArray
-    numbers: FloatArray
+points: (3, n) their vertices. graph: (n + 1,) places in itself where the neighbours of each vertex begin, the
+vertices at the other end of its edges; then these; then for each body the vertex farthest along each of 8
+diagonals. normals: (4, n_faces) about unit, outward; last how far off, relative to lengths. anchors: (n_faces,) a
+vertex of each face. firsts: (3, n_bodies + 1) first vertex and face of each body; where its 8 vertices stand.
+numbers: (n_bodies, N_NUMBERS).
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,8 +96,7 @@ def _ball(ball: Sphere) -> ConvexBody:
     with np.errstate(over="ignore"):
         numbers[RADIUS], numbers[ROUND] = ball.radius * (1.0 + 2.0**-40), ball.radius
         numbers[REACH] = np.abs(ball.center).max() + ball.radius
-    none = np.empty(0, np.int64)
-    points = np.ascontiguousarray(ball.center[:, None])
+    none, points = np.empty(0, np.int64), np.ascontiguousarray(ball.center[:, None])
     return ConvexBody(points, np.zeros(2, np.int64), none, np.zeros(8, np.int64), np.empty((4, 0)), none, numbers)
 
 

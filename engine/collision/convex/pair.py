@@ -105,13 +105,11 @@ def _lies(pool: ConvexArrays, inner: int, outer: int, a: PlacedBody, b: PlacedBo
     first, stop = pool.firsts[1, outer], pool.firsts[1, outer + 1]
     if first == stop:
         return _lies_in_ball(pool.points, a, inner_point(pool.numbers, outer, b, CENTER), b.round, error)
-    extent = np.sqrt(square) + pool.numbers[inner, RADIUS] + pool.numbers[outer, RADIUS]
-    result = _WITHIN
+    extent, result = np.sqrt(square) + pool.numbers[inner, RADIUS] + pool.numbers[outer, RADIUS], _WITHIN
     for face in range(first, stop):
         n = turned(b.place, point_of(pool.normals, face))
         level = dot(n, placed(point_of(pool.points, pool.anchors[face]), b.place))
-        height = largest(pool.points, a, n) - level
-        slack = extent * (1e-11 + pool.normals[3, face]) + error
+        height, slack = largest(pool.points, a, n) - level, extent * (1e-11 + pool.normals[3, face]) + error
         if height > slack:
             return _OUT
         if not height < -slack:
@@ -163,6 +161,5 @@ def relate_convex_pairs(
             if first == second and may_be_equal:
                 relations[item] = OVERLAPPING
                 continue
-        a = placed_body(pool, first, poses, i)
-        b = placed_body(pool, second, poses, j)
+        a, b = placed_body(pool, first, poses, i), placed_body(pool, second, poses, j)
         relations[item] = relate_convex(pool, first, second, a, b, is_boolean, may_be_equal)

@@ -17,20 +17,20 @@ below `margin` again.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections import namedtuple
+from typing import Any
 
 import numpy as np
 
-from engine.arrays import Float32Array
 from engine.collision.codes import DISJOINT, OVERLAPPING, UNSETTLED
 from engine.collision.convex.body import ASIDE, CENTER, RADIUS, ConvexArrays, ConvexBody
 from engine.collision.convex.pair import LARGEST_ERROR, inner_point, is_farther, relate_meeting
 from engine.collision.convex.xenocollide import PlacedBody, is_around_origin, placed_body
-from engine.collision.meshes.placement import Placement, PoseArrays
+from engine.collision.meshes.placement import PoseArrays
 from engine.jit import inline, kernel, merged
 from engine.lanes.lanes import bits_of, load, lowest_bit, select, spread, store
 from engine.lanes.tracing import LANES
-from engine.predicates.vectors import cross, dot, minus, negative
+from engine.predicates.vectors import cross, dot, largest_of, minus, negative
 from engine.types import Point3
 
 MOST_VERTICES = 512
@@ -95,10 +95,8 @@ def step(first: Any, second: Any, state: Any) -> tuple[int, int, int]:
     )
     zero, stage = spread(0.0), load(state, STAGE)
     size = abs(d.x) + abs(d.y) + abs(d.z)
-    slack = load(state, MARGIN) * size
-    height = reach + their_reach + dot(d, v0)
-    is_below = ~(height > zero)
-    is_apart = (height < -slack) & (size > spread(_GUARD))
+    slack, height = load(state, MARGIN) * size, reach + their_reach + dot(d, v0)
+    is_below, is_apart = ~(height > zero), (height < -slack) & (size > spread(_GUARD))
 
     is_first, is_second = stage < spread(0.5), (stage > spread(0.5)) & (stage < spread(1.5))
     is_third, is_last = (stage > spread(1.5)) & (stage < spread(2.5)), stage > spread(2.5)
@@ -133,14 +131,6 @@ def step(first: Any, second: Any, state: Any) -> tuple[int, int, int]:
 
 
 @merged
-def start_lane(state: Any, lane: int, f: Placement, v0: Point3, margin: float) -> None:
-    """Begin the search of a pose in a lane; v0 and margin in units of the pair."""
-    for row, p in ((TURN, f.x), (TURN + 3, f.y), (TURN + 6, f.z), (V0, v0), (D, negative(v0))):
-        state[row, lane], state[row + 1, lane], state[row + 2, lane] = p
-    state[STAGE, lane], state[MARGIN, lane], state[TURNS, lane] = 0.0, margin, 0.0
-
-
-@merged
 def lane_point(state: Any, row: int, lane: int) -> Point3:
     """Return a point of one lane, in float64."""
     return Point3(np.float64(state[row, lane]), np.float64(state[row + 1, lane]), np.float64(state[row + 2, lane]))
@@ -152,12 +142,8 @@ LEAST_POSES = 32
 _ALL_LANES = (1 << LANES) - 1
 
 
-class LaneArrays(NamedTuple):
-    """What the lanes see of a pair: vertices (3, n) float32 of either body, in units of scale."""
-
-    first: Float32Array
-    second: Float32Array
-    scale: float
+LaneArrays = namedtuple("LaneArrays", "first second scale")
+"""What the lanes see of a pair: vertices (3, n) float32 of either body, in units of scale."""
 
 
 def lane_arrays(first: ConvexBody, second: ConvexBody) -> LaneArrays | None:
@@ -188,9 +174,11 @@ def _start(
     error, square = a.place.error + b.place.error, dot(start, start)
     if error < LARGEST_ERROR and is_farther(square, pool.numbers[0, RADIUS] + pool.numbers[1, RADIUS], error):
         return DISJOINT
-    v0 = Point3(start.x * per_unit, start.y * per_unit, start.z * per_unit)
-    shift = max(abs(v0.x), abs(v0.y), abs(v0.z))
-    start_lane(state, lane, b.place, v0, 2.0**-19 * (1.0 + 0.25 * shift) + error * per_unit)
+    f, v0 = b.place, Point3(start.x * per_unit, start.y * per_unit, start.z * per_unit)
+    for row, p in ((TURN, f.x), (TURN + 3, f.y), (TURN + 6, f.z), (V0, v0), (D, negative(v0))):
+        state[row, lane], state[row + 1, lane], state[row + 2, lane] = p
+    state[STAGE, lane], state[TURNS, lane] = 0.0, 0.0
+    state[MARGIN, lane] = 2.0**-19 * (1.0 + 0.25 * largest_of(v0)) + error * per_unit
     return UNSETTLED
 
 

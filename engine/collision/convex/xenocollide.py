@@ -110,8 +110,7 @@ def largest(points: Any, f: PlacedBody, d: Point3) -> float:
 @inline
 def is_apart_along(points: Any, a: PlacedBody, b: PlacedBody, d: Point3) -> bool:
     """Tell whether all of the first body surely lies below all of the second one along d."""
-    size = abs(d.x) + abs(d.y) + abs(d.z)
-    gap = -(largest(points, a, d) + largest(points, b, negative(d)))
+    size, gap = abs(d.x) + abs(d.y) + abs(d.z), -(largest(points, a, d) + largest(points, b, negative(d)))
     return size > _GUARD and gap > 2.25 * (a.place.error + b.place.error) * size + _GUARD
 
 
@@ -144,8 +143,7 @@ def meet_or_apart(points: Any, graph: Any, a: PlacedBody, b: PlacedBody, v0: Poi
     Stages: 0 and 1 find the first two corners, 2 the third, until the half-line from v0 to the origin passes between
     all three; 3 moves the corners outward.
     """
-    error = a.place.error + b.place.error
-    rounding = a.round + b.round
+    error, rounding = a.place.error + b.place.error, a.round + b.round
     d, v1, v2, v3 = negative(v0), v0, v0, v0
     i = j = -1
     stage = 0

@@ -9,14 +9,15 @@ and of the faces that meet in a common corner only (`common_corners.py`) gets no
 
 from __future__ import annotations
 
+from collections import namedtuple
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from engine.arrays import BoolArray, FlagArray, Float32Array, FloatArray, Int8Array, Int32Array, IntArray
+from engine.arrays import FlagArray
 from engine.bounding.bvh import MAX_DEPTH
 from engine.collision.meshes.common_corners import common_corner, keep_first
-from engine.collision.meshes.contact_kinds import N_NAMED
+from engine.collision.meshes.contact_kinds import N_NAMED, N_SIGNS
 from engine.collision.meshes.face_state import proves_overlap, state_of
 from engine.collision.meshes.mesh_arrays import STATE_CLEAN, MeshArrays, triangle_of
 from engine.collision.meshes.placement import (
@@ -63,31 +64,20 @@ STACK_ROWS = LANES * LANES * 2 * MAX_DEPTH
 """A pair of nodes is replaced by at most 64, one of the two nodes a level deeper: bound of what is waiting."""
 
 
-class Descent(NamedTuple):
-    """Work space of a search.
+Descent = namedtuple("Descent", "stack frames work poses signs")
+"""Work space of a search.
 
-    stack (STACK_ROWS, 2) int32: pairs of nodes waiting. frames (2, 22, 8) float32: see `lanes/boxes.py`. work (28, 8)
-    float32: of `lanes/discs.py` and `lanes/faces.py`, for one pair of nodes. poses (2, 12) float64: rotation and
-    translation of either body, for exact signs. signs (11,) int8: of `contact_kinds.py`.
-    """
+stack (STACK_ROWS, 2) int32: pairs of nodes waiting. frames (2, 22, 8) float32: see `lanes/boxes.py`. work (28, 8)
+float32: of `lanes/discs.py` and `lanes/faces.py`, for one pair of nodes. poses (2, 12) float64: rotation and
+translation of either body, for exact signs. signs (11,) int8: of `contact_kinds.py`.
+"""
 
-    stack: Int32Array
-    frames: Float32Array
-    work: Float32Array
-    poses: FloatArray
-    signs: Int8Array
+Found = namedtuple("Found", "pairs kinds met")
+"""Room for pairs of faces that are not apart: pairs (room, 2) and their classes kinds (room,), room >= 1.
 
-
-class Found(NamedTuple):
-    """Room for pairs of faces that are not apart: pairs (room, 2) and their classes kinds (room,), room >= 1.
-
-    met: empty, or of all faces of the first, then of the second, whether a listed pair has them. Then
-    `common_corners.py` chooses, and there are N_NAMED rows more.
-    """
-
-    pairs: IntArray
-    kinds: Int8Array
-    met: BoolArray
+met: empty, or of all faces of the first, then of the second, whether a listed pair has them. Then
+`common_corners.py` chooses, and there are N_NAMED rows more.
+"""
 
 
 class Place(NamedTuple):
@@ -113,13 +103,8 @@ class Search(NamedTuple):
 
 def new_descent() -> Descent:
     """Return work space for one search at a time."""
-    return Descent(
-        np.empty((STACK_ROWS, 2), np.int32),
-        np.empty((2, FRAME_ROWS, LANES), np.float32),
-        np.empty((WORK_ROWS, LANES), np.float32),
-        np.zeros((2, 12)),
-        np.zeros(11, np.int8),
-    )
+    frames, work = np.empty((2, FRAME_ROWS, LANES), np.float32), np.empty((WORK_ROWS, LANES), np.float32)
+    return Descent(np.empty((STACK_ROWS, 2), np.int32), frames, work, np.zeros((2, 12)), np.zeros(N_SIGNS, np.int8))
 
 
 def new_found(room: int, n_faces: int = 0) -> Found:

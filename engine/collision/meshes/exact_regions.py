@@ -157,8 +157,7 @@ def _flat_trace(points: Corners, values: list[int], axis: int) -> Sequence[Vecto
 
 def _around(body: ExactBody, points: Sequence[Homogeneous]) -> tuple[list[float], list[float]]:
     """Return the ends of a box of doubles around points on one denominator."""
-    scale = points[0][3] << body.shift
-    sides = list(zip(*points))[:3]
+    scale, sides = points[0][3] << body.shift, list(zip(*points))[:3]
     return [rounded_outward(min(x), scale)[0] for x in sides], [rounded_outward(max(x), scale)[1] for x in sides]
 
 

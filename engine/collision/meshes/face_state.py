@@ -61,12 +61,9 @@ def edge_meets_inside(t: Facet, axis: int, a: Point3, b: Point3) -> bool:
 
 
 @inline
-def side_of_vertex(mesh: MeshArrays, face: int, t: Facet, vertex: int, p: Point3) -> int:
-    """Return the side of the plane of a face on which a vertex lies, 0 at once for one of its own."""
-    corners = mesh.triangles
-    if vertex == corners[face, 0] or vertex == corners[face, 1] or vertex == corners[face, 2]:
-        return 0
-    return orient3d(t.p, t.q, t.r, p)
+def side_of_corner(mesh: MeshArrays, face: int, t: Facet, other: int, k: int, p: Point3) -> int:
+    """Return the side of the plane of a face on which a corner of another one lies, 0 at once for one of its own."""
+    return 0 if is_corner(mesh, face, other, k) else orient3d(t.p, t.q, t.r, p)
 
 
 @inline
@@ -78,9 +75,8 @@ def state_by(mesh: MeshArrays, face: int, other: int, poses: Any) -> int:
         return STATE_STACKED
     t, o = triangle_of(mesh, face), triangle_of(mesh, other)
     axis = int(mesh.axis[face])
-    p = side_of_vertex(mesh, face, t, mesh.triangles[other, 0], o.p)
-    q = side_of_vertex(mesh, face, t, mesh.triangles[other, 1], o.q)
-    r = side_of_vertex(mesh, face, t, mesh.triangles[other, 2], o.r)
+    p, q = side_of_corner(mesh, face, t, other, 0, o.p), side_of_corner(mesh, face, t, other, 1, o.q)
+    r = side_of_corner(mesh, face, t, other, 2, o.r)
     if p == UNDECIDED or q == UNDECIDED or r == UNDECIDED:
         return STATE_STACKED
     if p == 0 and q == 0 and r == 0:

@@ -21,12 +21,9 @@ ABOVE_ALL = 1e6
 @inline
 def box_between(a: Point3, b: Point3, slack: float) -> tuple[Any, Any]:
     """Return the ends of the box from a to b, widened, as far as it matters, as triples of float32."""
-    low = (max(a.x - slack, -ABOVE_ALL), max(a.y - slack, -ABOVE_ALL), max(a.z - slack, -ABOVE_ALL))
-    high = (min(b.x + slack, ABOVE_ALL), min(b.y + slack, ABOVE_ALL), min(b.z + slack, ABOVE_ALL))
-    return (
-        (np.float32(low[0]), np.float32(low[1]), np.float32(low[2])),
-        (np.float32(high[0]), np.float32(high[1]), np.float32(high[2])),
-    )
+    x, y, z = max(a.x - slack, -ABOVE_ALL), max(a.y - slack, -ABOVE_ALL), max(a.z - slack, -ABOVE_ALL)
+    p, q, r = min(b.x + slack, ABOVE_ALL), min(b.y + slack, ABOVE_ALL), min(b.z + slack, ABOVE_ALL)
+    return (np.float32(x), np.float32(y), np.float32(z)), (np.float32(p), np.float32(q), np.float32(r))
 
 
 @inline

@@ -79,8 +79,7 @@ class LivePiece:
         a, b, c = self.corners
         normal = cross(minus(b, a), minus(c, a))
         height = dot(normal, minus(point, a)) / squared_length(normal)
-        foot = tuple(p - height * n for p, n in zip(point, normal))
-        axis = largest_axis(normal)
+        foot, axis = tuple(p - height * n for p, n in zip(point, normal)), largest_axis(normal)
         if _is_within(_flat(foot, axis), [(_flat(start, axis), _flat(end, axis)) for start, end in self.edges]):
             return squared_length(minus(point, foot))
         return min(segment_distance(point, *edge) for edge in self.edges)
@@ -120,8 +119,7 @@ def _live_edges(
     segments = [(numbers[3 * i + k], numbers[3 * i + (k + 1) % 3]) for i in range(len(covering)) for k in range(3)]
     masks = [IN_ODD | (IN_FACE if i < 3 else 0) for i in range(len(segments))]
     subdivision = subdivide(arrange(nodes, segments, masks, budget), budget)
-    labels = label_faces(subdivision)
-    found = []
+    labels, found = label_faces(subdivision), []
     for edge, (tail, head) in enumerate(zip(subdivision.arrangement.tails, subdivision.arrangement.heads)):
         left, right = labels[subdivision.faces[2 * edge]], labels[subdivision.faces[2 * edge + 1]]
         if (left == LIVE) != (right == LIVE):

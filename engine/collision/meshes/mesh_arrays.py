@@ -6,13 +6,14 @@ inside. All arrays are in the body's own coordinates: poses are applied where a 
 
 from __future__ import annotations
 
+from collections import namedtuple
 from dataclasses import dataclass, field
 from math import frexp, ldexp
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from engine.arrays import Float32Array, FloatArray, Int8Array, Int32Array, IntArray, read_only
+from engine.arrays import FloatArray, IntArray, read_only
 from engine.bounding.aabb import corners_of_box
 from engine.bounding.bvh import WIDTH, build_bvh
 from engine.bounding.disc_tree import fill_discs
@@ -55,28 +56,15 @@ BOX_TRIANGLES = np.array([[(a, b, c), (a, c, d)] for a, b, c, d in
 """Of each face of a box (6, 2, 3), counter-clockwise from outside; numbers of corners as in `corners_of_box`."""
 
 
-class MeshArrays(NamedTuple):
-    """What kernels take; boxes to scale: the tree (`bvh.py`); blocks, discs: what its blocks (`lanes/faces.py`) and its
-    inner nodes (`lanes/discs.py`) hold beside boxes, the rows of the other kind not set. `state` is filled by kernels
-    as needed: any thread writes the same values. components: of the triangles connected through vertices, one triangle
-    each, ascending. faces: the caller's face of each triangle; first_face: the least in the first component.
-    has_inside: False for surfaces and flat boxes."""
-
-    vertices: FloatArray
-    triangles: IntArray
-    axis: Int8Array
-    state: Int8Array
-    boxes: Float32Array
-    child: Int32Array
-    blocks: Float32Array
-    discs: Float32Array
-    origin: FloatArray
-    scale: float
-    extent: Extent
-    components: IntArray
-    faces: IntArray
-    first_face: int
-    has_inside: bool
+MeshArrays = namedtuple(
+    "MeshArrays",
+    "vertices triangles axis state boxes child blocks discs origin scale extent components faces first_face has_inside",
+)
+"""What kernels take; boxes to scale: the tree (`bvh.py`); blocks, discs: what its blocks (`lanes/faces.py`) and its
+inner nodes (`lanes/discs.py`) hold beside boxes, the rows of the other kind not set. `state` is filled by kernels
+as needed: any thread writes the same values. components: of the triangles connected through vertices, one triangle
+each, ascending. faces: the caller's face of each triangle; first_face: the least in the first component.
+has_inside: False for surfaces and flat boxes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -242,8 +230,7 @@ def lattice_shift(values: FloatArray) -> int:
 
 def _box_triangles(box: Aabb) -> tuple[FloatArray, IntArray, IntArray]:
     """Return the triangles of a box by face (xmin, xmax, ymin, ymax, zmin, zmax); of a flat one each place once."""
-    flat = box.min == box.max
-    corners = corners_of_box(box.min, box.max)
+    flat, corners = box.min == box.max, corners_of_box(box.min, box.max)
     faces = np.arange(6)
     if flat.any():  # the two faces across a flat axis are one: keep that; a segment or point: any face will do
         faces = faces[2 * int(np.argmax(flat)) :][:1]

@@ -201,7 +201,10 @@ class MeshPair:
         kept = np.flatnonzero(~left_out)
         roots = parent[triangles[kept, 0]]
         vertices = np.unique(roots)
-        found = self.located(own, vertices)
+        found = np.empty(len(vertices), np.int8)
+        posed, theirs = self.posed[own], self.posed[1 - own]
+        locate_vertices(mesh.arrays, posed, vertices, other.arrays, theirs, found, self.work.budget.flag)
+        self.work.budget.check()
         for index in np.flatnonzero(found == UNDECIDED):
             self.work.budget.check()
             self.work.n_beyond_filter += 1
@@ -222,12 +225,3 @@ class MeshPair:
         for face in with_area.tolist():
             for q in regions_of(body, face, [body], self.work.budget):
                 yield sides_at(body, q, body.axis(face))
-
-    def located(self, own: int, vertices: IntArray) -> Int8Array:
-        """Return where vertices that are on no face of the other body lie: INSIDE, OUTSIDE or UNDECIDED."""
-        mesh, other = self.meshes[own], self.meshes[1 - own]
-        found = np.empty(len(vertices), np.int8)
-        posed, theirs = self.posed[own], self.posed[1 - own]
-        locate_vertices(mesh.arrays, posed, vertices, other.arrays, theirs, found, self.work.budget.flag)
-        self.work.budget.check()
-        return found

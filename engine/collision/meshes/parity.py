@@ -57,8 +57,7 @@ def moved_side(a: Point3, b: Point3, q: Point3, error: float) -> int:
 @inline
 def half_line_crosses(t: Facet, q: Point3, error: float) -> int:
     """Return where the moved vertical line through q meets t: above q 1, below -1, at q 0; MISSED or UNDECIDED."""
-    p_side = moved_side(t.p, t.q, q, error)
-    q_side = moved_side(t.q, t.r, q, error)
+    p_side, q_side = moved_side(t.p, t.q, q, error), moved_side(t.q, t.r, q, error)
     r_side = moved_side(t.r, t.p, q, error)
     has_left = p_side == 1 or q_side == 1 or r_side == 1
     has_right = p_side == -1 or q_side == -1 or r_side == -1
@@ -102,8 +101,7 @@ def brought_back(p: Point3, source: Placement, target: Placement, defect: float)
 def locate_point(own: OwnPoint, mesh: MeshArrays) -> int:
     """Return INSIDE, OUTSIDE, 0 (on a face) or UNDECIDED for one point."""
     q, error = own.point, own.error
-    local = in_tree(mesh, q)
-    slack = SLACK + error / mesh.scale
+    local, slack = in_tree(mesh, q), SLACK + error / mesh.scale
     if not (slack < 1.0 and np.isfinite(local.x + local.y + local.z)):  # case: the ends of the exponent range
         return UNDECIDED
     if largest_of(local) > 4.0 + slack:

@@ -82,26 +82,18 @@ def is_lattice_rotation(rotation: Any) -> bool:
 
 
 @inline
-def is_multiple(value: float, grain: float) -> bool:
-    """Tell whether value / grain is an integer (False where the quotient overflows)."""
-    quotient = value / grain
-    return np.floor(quotient) == quotient and abs(quotient) < 2.0**53
-
-
-@inline
 def place_pair(
     a: Extent, a_pose: PoseArrays, a_item: int, b: Extent, b_pose: PoseArrays, b_item: int
 ) -> tuple[Placement, Placement]:
     """Return the placements of two bodies, moved together so that a posed first body has no translation if both are."""
     s, t = as_point3(a_pose.translations, a_item), as_point3(b_pose.translations, b_item)
     none, apart = Point3(0.0, 0.0, 0.0), minus(t, s)
-    shift = largest_of(apart)
-    grain = min(a.grain, b.grain)
+    shift, grain = largest_of(apart), min(a.grain, b.grain)
     is_exact = not (a_pose.is_posed or b_pose.is_posed)
     if not is_exact and is_lattice_rotation(a_pose.rotations[a_item]) and is_lattice_rotation(b_pose.rotations[b_item]):
         is_exact = a.reach + b.reach + shift < 2.0**53 * grain and a.reach + b.reach + shift < 1e300
         for value in (s.x, s.y, s.z, t.x, t.y, t.z):
-            is_exact = is_exact and is_multiple(value, grain)
+            is_exact = is_exact and np.floor(value / grain) == value / grain and abs(value / grain) < 2.0**53
     a_error = b_error = 0.0
     if a_pose.is_posed and not is_exact:
         a_error = 2.0**-50 * (3.0 * a.reach + (0.0 if b_pose.is_posed else shift)) + 2.0**-1060

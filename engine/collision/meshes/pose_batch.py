@@ -129,16 +129,6 @@ def put_in_order(faces: Any, their_faces: Any, pairs: Any, kinds: Any, n: int) -
         pairs[place, 0], pairs[place, 1], kinds[place] = i, j, kind
 
 
-@inline
-def settled_by(s: Search, is_named: bool, row: Any) -> None:
-    """Fill the row of a pair by the one contact that settles it."""
-    i, j = s.found.pairs[0, 0], s.found.pairs[0, 1]
-    if is_named:
-        row[KIND], _ = kind_of_pair(s, i, j)
-        row[FIRST_FACE], row[SECOND_FACE] = s.first.faces[i], s.second.faces[j]
-    row[RELATION], row[N_CONTACTS] = OVERLAPPING if s.seek == SEEK_OVERLAP else TOUCHING, ONE_SETTLES
-
-
 @bare_kernel
 def relate_poses(
     first: MeshArrays, second: MeshArrays, still: PoseArrays, poses: PoseArrays, seek: int, n_named: int,
@@ -161,7 +151,11 @@ def relate_poses(
         if how == INTERRUPTED:
             return
         if how == SETTLED:
-            settled_by(s, n_named > 0, row)
+            row[RELATION], row[N_CONTACTS] = OVERLAPPING if seek == SEEK_OVERLAP else TOUCHING, ONE_SETTLES
+            i, j = found.pairs[0, 0], found.pairs[0, 1]
+            if n_named > 0:
+                row[KIND], _ = kind_of_pair(s, i, j)
+                row[FIRST_FACE], row[SECOND_FACE] = first.faces[i], second.faces[j]
         elif n_pairs == 0:
             row[RELATION] = relation_apart(first, second, place)
         elif n_known > 0 or n_pairs <= room_of(found):

@@ -15,7 +15,8 @@ Changed: the permutations are replaced by a rule that names the lone vertex; str
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections import namedtuple
+from typing import Any
 
 import numpy as np
 
@@ -35,12 +36,8 @@ CORNER = 8
 plane; from CORNER on 3 k + m more, corner k of the first is corner m of the second, and nothing else is common."""
 
 
-class Facet(NamedTuple):
-    """Three points of one kind; compiled code passes triangles by value."""
-
-    p: Any
-    q: Any
-    r: Any
+Facet = namedtuple("Facet", "p q r")
+"""Three points of one kind; compiled code passes triangles by value."""
 
 
 @inline
@@ -66,8 +63,7 @@ def lone_vertex(p: int, q: int, r: int) -> tuple[int, int]:
     p, q, r: sides of the vertices, not all zero, not all on one strict side. The other two lie on the opposite closed
     side, and not both of them on the plane unless the lone one is off it.
     """
-    n_above = (p > 0) + (q > 0) + (r > 0)
-    n_below = (p < 0) + (q < 0) + (r < 0)
+    n_above, n_below = (p > 0) + (q > 0) + (r > 0), (p < 0) + (q < 0) + (r < 0)
     if n_above == 1:
         side, wanted = 1, 1
     elif n_below == 1:

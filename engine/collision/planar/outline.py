@@ -117,8 +117,7 @@ def _nodes_of(outlines: list[Outline], budget: Budget) -> tuple[NodeTable, list[
 def live_edges(outline: Outline, budget: Budget) -> list[tuple[Point, Point]]:
     """Return the pieces of edges that even-odd does not cancel: exactly these have the open interior on one side."""
     arrangement, _ = arrange_outlines([outline], budget)
-    kept = [edge for edge, mask in enumerate(arrangement.masks) if mask]
-    exact = arrangement.nodes.exact
+    kept, exact = [edge for edge, mask in enumerate(arrangement.masks) if mask], arrangement.nodes.exact
     return [(exact(arrangement.tails[edge]), exact(arrangement.heads[edge])) for edge in kept]
 
 

@@ -8,8 +8,9 @@ the other body. Contacts, and what rounded poses leave open, stay UNSETTLED for 
 
 from __future__ import annotations
 
+from collections import namedtuple
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -35,13 +36,9 @@ UNSURE = 2
 _POLL_EVERY = 64
 
 
-class OutlineArrays(NamedTuple):
-    """Several bodies, one after another. vertices (n, 2); following (n,): the vertex at the end of each edge, counted
-    within its body; firsts (n_bodies + 1,): of each body."""
-
-    vertices: FloatArray
-    following: IntArray
-    firsts: IntArray
+OutlineArrays = namedtuple("OutlineArrays", "vertices following firsts")
+"""Several bodies, one after another. vertices (n, 2); following (n,): the vertex at the end of each edge, counted
+within its body; firsts (n_bodies + 1,): of each body."""
 
 
 def outline_pool(bodies: Sequence[Solid]) -> tuple[OutlineArrays, IntArray]:

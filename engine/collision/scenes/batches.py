@@ -64,10 +64,8 @@ class SceneBatches:
         if not (found == UNSETTLED).any():
             return found
         pool, convex = self.pool(budget)
-        rows, poses = (
-            np.append(np.int64(-1), convex[bodies.kinds]),
-            PoseArrays(bodies.rotations, bodies.translations, True),
-        )
+        rows = np.append(np.int64(-1), convex[bodies.kinds])
+        poses = PoseArrays(bodies.rotations, bodies.translations, True)
 
         def task(start: int, stop: int) -> None:
             of_some = pairs[start:stop] + 1
@@ -81,8 +79,7 @@ class SceneBatches:
     ) -> Int8Array:
         """Return the relations of n pairs of bodies of some kinds, UNSETTLED where the batch of convex ones does not
         decide; pair i: rows 2 i + 1 and 2 i + 2; row 0: the identity, of any kind."""
-        found = np.full(n, UNSETTLED, np.int8)
-        pools = self._pools
+        found, pools = np.full(n, UNSETTLED, np.int8), self._pools
         if n and self.bodies.dimension == 3 and (pools.convex is not None or len(self.bodies.distinct) <= _FEW):
             pool, convex = self.pool(budget)
             pairs, poses = np.arange(1, 2 * n + 1).reshape(n, 2), PoseArrays(rotations, translations, True)

@@ -11,7 +11,7 @@ import numpy as np
 from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray
 from engine.bounding.box_grid import pairs_of_boxes
 from engine.bounding.sweep import BLOCK
-from engine.collision.answers import Answers, PlacedPair, Witnesses, accuracy_of
+from engine.collision.answers import Answers, PlacedPair, accuracy_of
 from engine.collision.clearance.clearance import checked_distance
 from engine.collision.codes import UNSETTLED
 from engine.collision.detail import NO_DETAIL, check_has_detail, has_interior
@@ -126,7 +126,7 @@ def collide_bodies(
     budget.check()
     skipped = None if skip is None else pair_keys(skip, len(bodies.solids), "skip")
     wanted = None if only is None else pair_keys(only, len(bodies.solids), "only")
-    parts: list[_Part] = []
+    parts: list[ScenePairs] = []
     works: list[Work] = []
     n_candidates = n_open = 0
     for pairs in _candidates(bodies, enlarged(bodies, gap), wanted, skipped, budget):
@@ -140,21 +140,15 @@ def collide_bodies(
         works += answers.works
         near = None if gap is None else _near(batches, pairs, answers, gap, workers)
         parts.append(_found(bodies, pairs, answers, near))
-        budget.take((_BYTES + _BYTES_OF_WITNESS * witnesses) * len(parts[-1].pairs))
+        budget.take((_BYTES + _BYTES_OF_WITNESS * witnesses) * len(parts[-1].first))
     budget.check()
-    method = "boxes" if only is None else "named pairs"
-    result = _joined(parts, witnesses, detail, gap is not None and not boolean)
-    return result, accuracy_of(n_candidates, n_open, works, method)
-
-
-class _Part(NamedTuple):
-    """Of a block of candidates those that are found; witnesses, details and distances where asked for."""
-
-    pairs: IntArray
-    relations: Int8Array
-    witnesses: Witnesses
-    details: Int8Array
-    distances: FloatArray
+    if not parts:
+        none, codes, distances = np.empty(0, np.int64), np.empty(0, np.int8), np.empty(0)
+        is_near = gap is not None and not boolean
+        parts = [ScenePairs(none, none, codes, () if witnesses else None, codes if detail else None,
+                            distances if is_near else None)]  # fmt: skip
+    accuracy = accuracy_of(n_candidates, n_open, works, "boxes" if only is None else "named pairs")
+    return parts[0] if len(parts) == 1 else _joined(parts), accuracy
 
 
 def _settle(
@@ -183,35 +177,30 @@ def _near(batches: SceneBatches, pairs: IntArray, answers: Answers, gap: float, 
     return distances
 
 
-def _found(bodies: SceneBodies, pairs: IntArray, answers: Answers, near: FloatArray | None) -> _Part:
+def _found(bodies: SceneBodies, pairs: IntArray, answers: Answers, near: FloatArray | None) -> ScenePairs:
     """Return the pairs of a block that collide or are near."""
     meet = answers.relations != Relation.DISJOINT
     if answers.boolean:
         answers.relations[meet] = Relation.TOUCHING
     kept = np.flatnonzero(meet if near is None else near != np.inf)
-    named = [] if answers.witnesses is None else [answers.witnesses[item] for item in kept.tolist()]
-    details = np.empty(0, np.int8)
-    if answers.details is not None:
-        details = answers.details[kept]
+    named = None if answers.witnesses is None else tuple(answers.witnesses[item] for item in kept.tolist())
+    details = None if answers.details is None else answers.details[kept]
+    if details is not None:
         details[~_have_interiors(bodies, pairs[kept], answers.budget)] = NO_DETAIL
-    return _Part(pairs[kept], answers.relations[kept], named, details, np.empty(0) if near is None else near[kept])
+    distances = None if near is None or answers.boolean else near[kept]
+    return ScenePairs(pairs[kept, 0], pairs[kept, 1], answers.relations[kept], named, details, distances)
 
 
-def _joined(parts: list[_Part], witnesses: bool, detail: bool, distance: bool) -> ScenePairs:
+def _joined(parts: list[ScenePairs]) -> ScenePairs:
     """Return the pairs found of all blocks as one, sorted; each block is."""
-    none = np.empty(0, np.int8)
-    pairs = np.concatenate([np.empty((0, 2), np.int64), *(part.pairs for part in parts)])
-    relations = np.concatenate([none, *(part.relations for part in parts)])
-    named = tuple(witness for part in parts for witness in part.witnesses) if witnesses else None
-    details = np.concatenate([none, *(part.details for part in parts)]) if detail else None
-    distances = np.concatenate([np.empty(0), *(part.distances for part in parts)]) if distance else None
-    if len(parts) > 1:
-        order = np.lexsort((pairs[:, 1], pairs[:, 0]))
-        pairs, relations = pairs[order], relations[order]
-        named = None if named is None else tuple(named[item] for item in order.tolist())
-        details = None if details is None else details[order]
-        distances = None if distances is None else distances[order]
-    return ScenePairs(pairs[:, 0].copy(), pairs[:, 1].copy(), relations, named, details, distances)
+    columns = zip(*((part.first, part.second, part.relation, part.detail, part.distance) for part in parts))
+    joined: list[Any] = [None if column[0] is None else np.concatenate(column) for column in columns]
+    order = np.lexsort((joined[1], joined[0]))
+    found: list[Any] = [None if column is None else column[order] for column in joined]
+    named = [witness for part in parts for witness in part.witnesses or ()]
+    witnesses = None if parts[0].witnesses is None else tuple(named[item] for item in order.tolist())
+    first, second, relation, detail, distance = found
+    return ScenePairs(first, second, relation, witnesses, detail, distance)
 
 
 def _have_interiors(bodies: SceneBodies, pairs: IntArray, budget: Budget) -> BoolArray:

@@ -59,7 +59,10 @@ def distances_below(
     turns, moves = bodies.rotations, bodies.translations
     is_equal = (turns[i] == turns[j]).all(axis=(1, 2)) & (moves[i] == moves[j]).all(axis=1)  # left out, as by `collide`
     places = np.where(is_equal, 0, (i, j)).T.copy()
-    forms = _forms(bodies, kinds)
+    forms = np.full((len(bodies.distinct), N_NUMBERS), np.nan)  # of solids that have none
+    for kind in np.unique(kinds).tolist():
+        form = form_of(bodies.distinct[kind])
+        forms[kind] = forms[kind] if form is None else form
     pool, convex = _NONE, np.full(len(forms), -1, np.int64)
     if bodies.is_posed[pairs[left]].any() or np.isnan(forms[kinds, 0]).any():
         pool, convex = batches.pool(budget)
@@ -84,16 +87,6 @@ def distances_below(
     run_chunks(by_search, len(still), budget=budget, first_chunk=4, workers=workers)
     result[left] = found
     return result
-
-
-def _forms(bodies: SceneBodies, kinds: IntArray) -> FloatArray:
-    """Return the form of each solid that some kinds name, NaN for those that have none."""
-    forms = np.full((len(bodies.distinct), N_NUMBERS), np.nan)
-    for kind in np.unique(kinds).tolist():
-        form = form_of(bodies.distinct[kind])
-        if form is not None:
-            forms[kind] = form
-    return forms
 
 
 def _asked(

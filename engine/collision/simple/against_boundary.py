@@ -192,17 +192,11 @@ def body_sphere_parts(body: Solid, ball: Sphere, poses: Poses, work: Work) -> Pa
     body_sticks_out = boundary.has_live(beyond, lambda piece: piece.farthest(center) > limit)
     meet = ball_sticks_out and body_sticks_out
     if not meet:
-        both = np.intersect1d(candidates, beyond).tolist()
-        meet = any(_meets_sphere(boundary, face, center, limit) for face in both)
+        meet = any(  # of a face, some part is as near as the sphere, and some corner as far
+            simplex_distance(center, corners) <= limit <= max(squared_length(minus(p, center)) for p in corners)
+            for corners in map(boundary.corners, np.intersect1d(candidates, beyond).tolist())
+        )
     return Parts(body_sticks_out, ball_sticks_out, meet)
-
-
-def _meets_sphere(boundary: Boundary, face: int, center: Vector, limit: Fraction) -> bool:
-    """Tell whether a face has a point at the given squared distance from a centre."""
-    corners = boundary.corners(face)
-    return simplex_distance(center, corners) <= limit and any(
-        squared_length(minus(p, center)) >= limit for p in corners
-    )
 
 
 def collide_half_space_body(space: HalfSpace, body: Solid, poses: Poses, work: Work) -> Collision:

@@ -126,18 +126,11 @@ def _mesh_boundary(body: Solid, pose: Pose | None, work: Work) -> Boundary:
                 yield piece if pose is None else piece.moved(image)
 
     return Boundary(
-        triangles,
-        floats,
-        error,
-        near,
-        lambda vertex: image(vertices[vertex].tolist()),
+        triangles, floats, error, near, lambda vertex: image(vertices[vertex].tolist()),
         lambda face: int(mesh.faces[face]),
         lambda vertex: int(mesh.faces[np.argmax((triangles == vertex).any(axis=1))]),
-        lambda plane: signs_of(plane, vertices, pose, work),
-        live,
-        is_inside,
-        mesh.has_inside,
-    )
+        lambda plane: signs_of(plane, vertices, pose, work), live, is_inside, mesh.has_inside,
+    )  # fmt: skip
 
 
 def _outline_boundary(body: Solid, pose: Pose | None, work: Work) -> Boundary:
@@ -150,19 +143,13 @@ def _outline_boundary(body: Solid, pose: Pose | None, work: Work) -> Boundary:
                 yield LivePiece(outline.edge(edge), None)
         yield from (LivePiece(ends, None) for ends in live_edges(outline, work.budget))
 
+    error = 2.0**-52 * float(np.abs(outline.floats).max()) + 2.0**-1074
     return Boundary(
-        outline.ends,
-        lambda where: outline.floats[where],
-        2.0**-52 * float(np.abs(outline.floats).max()) + 2.0**-1074,
-        lambda center, radius: np.arange(outline.n_edges),
-        lambda vertex: outline.points[vertex],
-        lambda edge: edge,
-        lambda vertex: vertex,
-        lambda plane: np.array([sign_of(value_at(plane, point)) for point in outline.points], np.int8),
-        live,
-        lambda center: rational_location(center, body, pose, work.budget.check) == Location.INSIDE,
-        True,
-    )
+        outline.ends, lambda where: outline.floats[where], error, lambda center, radius: np.arange(outline.n_edges),
+        lambda vertex: outline.points[vertex], lambda edge: edge, lambda vertex: vertex,
+        lambda plane: np.array([sign_of(value_at(plane, point)) for point in outline.points], np.int8), live,
+        lambda center: rational_location(center, body, pose, work.budget.check) == Location.INSIDE, True,
+    )  # fmt: skip
 
 
 def signs_of(plane: HalfSpaceImage, points: FloatArray, pose: Pose | None, work: Work) -> Int8Array:
@@ -173,10 +160,7 @@ def signs_of(plane: HalfSpaceImage, points: FloatArray, pose: Pose | None, work:
     and the sum of k products one of (k + 2) u of the sum of magnitudes: 2^-49 of it, 2^-1073 of the sum of coordinates
     (for the denormal weights) and 2^-1000 more are not exceeded.
     """
-    normal, offset = pulled_back(plane, pose)
-    largest = max(abs(value) for value in (*normal, offset))
-    weights = np.array([float(value / largest) for value in normal])
-    shift = float(offset / largest)
+    (normal, offset), weights, shift = pulled_back(plane, pose)
     with np.errstate(all="ignore"):
         values = points @ weights + shift
         bounds = np.abs(points) @ (2.0**-49 * np.abs(weights) + 2.0**-1073) + (2.0**-49 * abs(shift) + 2.0**-1000)
@@ -191,10 +175,12 @@ def signs_of(plane: HalfSpaceImage, points: FloatArray, pose: Pose | None, work:
     return signs
 
 
-def pulled_back(plane: HalfSpaceImage, pose: Pose | None) -> HalfSpaceImage:
-    """Return the function of points before the pose whose value is that of a plane at their images."""
-    if pose is None:
-        return plane
+def pulled_back(plane: HalfSpaceImage, pose: Pose | None) -> tuple[HalfSpaceImage, FloatArray, float]:
+    """Return the function of points before the pose whose value is that of a plane at their images; and rounded, times
+    a number that makes the largest magnitude about 1."""
     normal, offset = plane
-    pulled = tuple(dot(normal, as_vector(column)) for column in pose.rotation.T.tolist())
-    return pulled, offset + dot(normal, as_vector(pose.translation.tolist()))
+    if pose is not None:
+        offset += dot(normal, as_vector(pose.translation.tolist()))
+        normal = tuple(dot(normal, as_vector(column)) for column in pose.rotation.T.tolist())
+    largest = max(abs(value) for value in (*normal, offset))
+    return (normal, offset), np.array([float(value / largest) for value in normal]), float(offset / largest)
