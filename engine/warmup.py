@@ -147,6 +147,7 @@ def _warm_collision() -> None:
 def _warm_scenes() -> None:
     collide_scene(_bodies())
     Scene(_bodies()).collide(moved=[0])
+    Scene([Sphere([0, 0, 0], 1)]).locate([[0.25, 0, 0]])
     segments = [[[-1.0, 0.3, 0.2], [2.0, 0.4, 0.1]]]
     turned = Pose.from_quaternion([3, 1, 0, 0], [0.25, 0, 0])
     for dimension in (2, 3):

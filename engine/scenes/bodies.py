@@ -3,42 +3,45 @@
 from __future__ import annotations
 
 import threading
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, Final
 
 import numpy as np
 
-from engine.arrays import IntArray
+from engine.arrays import FloatArray, IntArray
+from engine.bounding.posed_boxes import place_boxes
 from engine.collision.scenes.batches import SceneBatches
 from engine.collision.scenes.bodies import SceneBodies, bodies_of, check_collidable, distinct_of
 from engine.containment.locators import Locator
 from engine.containment.posed.locators import posed_locator
+from engine.containment.scene.bodies import body_box
 from engine.containment.scene.first_pass import SECOND_PASS
 from engine.containment.scene.tables import Scene as LocateTables
 from engine.containment.scene.tables import scene_of
+from engine.direct import entry_of
 from engine.parallel import Budget
 from engine.scenes.broad_phase import BodyTree, body_tree
 from engine.scenes.table import Table
 from engine.segment_clipping.profiles import check_cut
 from engine.solids.base import Preparing, Solid
+from engine.solids.csg import Csg
 from engine.solids.polyhedron import Polyhedron
-from engine.solids.pose import Pose
+from engine.solids.pose import Pose, motion_of
+from engine.solids.triangle import Triangle
+
+_LISTED: Final = 4
+"""Bodies that have no tree: their boxes are looked at sooner than one is built."""
+_STILL: Final = {d: b"".join(each.tobytes() for each in motion_of(None, d)) for d in (2, 3)}
 
 
 class Bodies(Preparing):
     """Checked solids with a pose or None each; safe to share between threads.
 
-    whole, names: bodies that these are some of, which share what does not depend on poses.
+    whole: bodies that these are some of, which share what does not depend on poses.
     """
 
-    def __init__(
-        self,
-        solids: tuple[Solid, ...],
-        poses: tuple[Pose | None, ...],
-        whole: Bodies | None = None,
-        names: IntArray | None = None,
-    ) -> None:
-        self.solids, self.poses = solids, poses
-        self._whole, self._names = whole, names
+    def __init__(self, solids: tuple[Solid, ...], poses: tuple[Pose | None, ...], whole: Bodies | None = None) -> None:
+        self.solids, self.poses, self._whole = solids, poses, whole
         self._prepared: dict[str, Any] = {}
         self._lock = threading.RLock()
 
@@ -47,14 +50,40 @@ class Bodies(Preparing):
         return self.prepared("arrays", lambda: self._as_arrays(budget), budget.check)
 
     def _as_arrays(self, budget: Budget) -> SceneBodies:
-        if self._whole is not None and self._names is not None:
-            return self._whole.arrays(budget).under(self._names, self.poses)
         distinct, kinds, _ = distinct_of(self.solids)
         return bodies_of(self.solids, self.poses, distinct, kinds, budget.check)
 
     def tree(self, budget: Budget) -> BodyTree:
         """Return the tree over the boxes of the bodies, at least one."""
-        return self.prepared("tree", lambda: body_tree(self.arrays(budget), budget), budget.check)
+        return self.prepared("tree", lambda: self._as_tree(budget), budget.check)
+
+    def _as_tree(self, budget: Budget) -> BodyTree:
+        arrays = self.arrays(budget)
+        boxes = arrays.low.copy(), arrays.high.copy()
+        self._place_odd(np.arange(len(arrays.kinds)), self.poses, *boxes, budget)
+        return body_tree(*boxes, _LISTED)
+
+    def _place_odd(self, names: IntArray, poses: Sequence[Pose | None], low: Any, high: Any, budget: Budget) -> None:
+        """Set the boxes of each csg and prism among some, whose own are no boxes of theirs."""
+        arrays, kinds = self.arrays(budget), (Csg, Triangle) if self.solids[0].dimension == 3 else Csg
+        odd = self.prepared("odd", lambda: [k for k, solid in enumerate(arrays.distinct) if isinstance(solid, kinds)])
+        for place in np.flatnonzero(np.isin(arrays.kinds[names], odd)).tolist() if odd else ():
+            low[place], high[place] = body_box(self.solids[names[place]], poses[place], budget.check)
+
+    def under(
+        self, names: IntArray, poses: Sequence[Pose | None], budget: Budget
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return rotations (m, d, d) and translations of some bodies under other poses, and boxes, low and high."""
+        arrays, m, d = self.arrays(budget), len(names), self.solids[0].dimension
+        joined = b"".join([_STILL[d] if pose is None else pose.numbers for pose in poses])
+        numbers = np.frombuffer(joined).reshape(m, -1)
+        turns, moves = numbers[:, : d * d].copy().reshape(m, d, d), numbers[:, d * d :].copy()
+        low, high, rows = np.empty((m, d)), np.empty((m, d)), np.arange(m)
+        if type(None) in map(type, poses):
+            rows[[pose is None for pose in poses]] = -1
+        entry_of(place_boxes)(*arrays.own, arrays.kinds[names], rows, turns, moves, low, high)
+        self._place_odd(names, poses, low, high, budget)
+        return turns, moves, low, high
 
     def locator(self, body: int) -> Locator:
         """Return how points are located in a body."""
@@ -69,11 +98,12 @@ class Bodies(Preparing):
 
     def batches(self, budget: Budget) -> SceneBatches:
         """Return what pairs are related by. Raises: as `collide_scene` where it does not take a body."""
-        return self.prepared("batches", lambda: self._as_batches(budget), budget.check)
 
-    def _as_batches(self, budget: Budget) -> SceneBatches:
-        check_collidable(self.solids)
-        return SceneBatches(self.arrays(budget))
+        def build() -> SceneBatches:
+            check_collidable(self.solids)
+            return SceneBatches(self.arrays(budget))
+
+        return self.prepared("batches", build, budget.check)
 
     def table(self, budget: Budget) -> Table:
         """Return what kernels for segments read of the bodies."""
@@ -85,11 +115,6 @@ class Bodies(Preparing):
         table = self.table(budget)
         with self._lock:
             table.prepare(body, wanted)
-
-    def placed(self, body: int) -> tuple[Solid, Pose | None]:
-        """Return a body's solid, and its pose unless that leaves it where it is."""
-        pose = self.poses[body]
-        return self.solids[body], None if pose is None or pose.is_identity else pose
 
     def check_cut(self, budget: Budget) -> None:
         """Raise unless segments are cut on every body."""

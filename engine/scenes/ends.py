@@ -14,6 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
+from engine.direct import entry_of
+from engine.jit import bare_kernel, inline
 from engine.segment_clipping.parameters import ONE, ZERO, Parameter, compare
 
 
@@ -57,16 +59,15 @@ Exact = Callable[[int, int, int], tuple[Parameter, Parameter]]
 
 
 def joined(parts: list[Found], dimension: int) -> Found:
-    """Return all pieces, by source and body."""
-    none = np.empty(0, np.int64)
-    found = Found(none, none, np.empty((2, 0, dimension)), np.empty((0, 2)), np.empty((0, 2), np.int64))
+    """Return all pieces, in no order."""
     if len(parts) == 1:
-        found = parts[0]
-    elif parts:
-        source, body, ends, t, faces = (list(each) for each in zip(*parts))
-        whole = (np.concatenate(each) for each in (t, faces))
-        found = Found(np.concatenate(source), np.concatenate(body), np.concatenate(ends, axis=1), *whole)
-    return taken(found, np.lexsort((found.body, found.source)))
+        return parts[0]
+    none = np.empty(0, np.int64)
+    nothing = Found(none, none, np.empty((2, 0, dimension)), np.empty((0, 2)), np.empty((0, 2), np.int64))
+    if not parts:
+        return nothing
+    each = list(zip(nothing, *parts))
+    return Found(*(np.concatenate(each[k], axis=int(k == 2)) for k in range(5)))
 
 
 def taken(found: Found, rows: Any) -> Found:
@@ -74,23 +75,86 @@ def taken(found: Found, rows: Any) -> Found:
     return Found(found.source[rows], found.body[rows], found.ends[:, rows], found.t[rows], found.faces[rows])
 
 
-def in_order(found: Found, exact: Exact) -> ScenePieces:
-    """Return pieces, given by source and body, in the exact order of their starts."""
-    m, starts_source = len(found.source), found.source[1:] != found.source[:-1]
-    if starts_source.all() and (found.t[:, 0] < found.t[:, 1]).all():
-        ranks = np.array([[0, 1]]).repeat(m, axis=0)
-        return ScenePieces(found.source, found.body, found.ends[0], found.ends[1], found.t, found.faces, ranks)
-    number = np.arange(m)  # of a piece among those of its source and body
-    is_new = np.append(True, starts_source | (found.body[1:] != found.body[:-1]))
-    number -= np.maximum.accumulate(np.where(is_new, number, 0))
+def in_order(found: Found, n_sources: int, exact: Exact) -> ScenePieces:
+    """Return pieces, those of one source and body in order, in the exact order of their starts."""
+    m = len(found.source)
+    numbers, ends = np.empty((2, m), np.int64), np.empty((2, m, found.ends.shape[2]))
+    out = *numbers, *ends, np.empty((m, 2)), *np.empty((2, m, 2), np.int64)
+    order, ranks, offsets = np.empty(4 * m, np.int64), np.empty((m, 2), np.int64), np.zeros(n_sources + 2, np.int64)
+    given = found.source, found.body, found.ends[0], found.ends[1], found.t, found.faces
+    if entry_of(put_in_order)(tuple(map(np.ascontiguousarray, given)), offsets, order, ranks, out):
+        return ScenePieces(*out)
+    found = taken(found, np.lexsort((found.body, found.source)))
+    number, is_new = np.arange(m), np.append(True, found.source[1:] != found.source[:-1])
+    is_new[1:] |= found.body[1:] != found.body[:-1]
+    number -= np.maximum.accumulate(np.where(is_new, number, 0))  # of a piece among those of its source and body
     source = np.concatenate([found.source, found.source])
     order = np.lexsort((found.t.T.ravel(), source))  # all starts, then all ends
-    ranks = np.empty(2 * m, np.int64)
-    ranks[order] = _ranks(found, number, order, source[order], exact)
-    by_start = np.lexsort((found.body, ranks[:m], found.source))
-    found = taken(found, by_start)
-    ranks = ranks.reshape(2, m).T[by_start]
+    of_ends = np.empty(2 * m, np.int64)
+    of_ends[order] = _ranks(found, number, order, source[order], exact)
+    by_start = np.lexsort((found.body, of_ends[:m], found.source))
+    found, ranks = taken(found, by_start), of_ends.reshape(2, m).T[by_start]
     return ScenePieces(found.source, found.body, found.ends[0], found.ends[1], found.t, found.faces, ranks)
+
+
+@bare_kernel
+def put_in_order(given: Any, offsets: Any, order: Any, ranks: Any, out: Any) -> bool:
+    """Fill `out`, the arrays of `ScenePieces`, with pieces given by those before the last; tell whether their order is
+    exact: of ends that round alike only the segment's own are known to be one.
+
+    Room to work in: offsets (n + 2,) zeros, for n sources; order (4 m,), ranks (m, 2).
+    """
+    source, body, start, end, t, faces = given
+    for piece in range(source.size):
+        offsets[source[piece] + 2] += 1
+    for item in range(2, offsets.size):
+        offsets[item] += offsets[item - 1]
+    for piece in range(source.size):
+        place = offsets[source[piece] + 1]
+        offsets[source[piece] + 1] += 1
+        order[2 * place], order[2 * place + 1] = 2 * piece, 2 * piece + 1
+    for item in range(offsets.size - 2):
+        first, last = 2 * offsets[item], 2 * offsets[item + 1]
+        _sort_ends(order, first, last, body, t)
+        rank, n_starts = -1, offsets[item]
+        for place in range(first, last):
+            piece, side = order[place] // 2, order[place] % 2
+            before, other = order[max(first, place - 1)] // 2, order[max(first, place - 1)] % 2
+            if place == first or t[before, other] != t[piece, side]:
+                rank += 1
+            elif faces[before, other] >= 0 or faces[piece, side] >= 0:
+                return False
+            ranks[piece, side] = rank
+            if side == 0:
+                order[2 * source.size + n_starts] = piece
+                n_starts += 1
+    for place in range(source.size):
+        piece = order[2 * source.size + place]
+        out[0][place], out[1][place] = source[piece], body[piece]
+        for k in range(start.shape[1]):
+            out[2][place, k], out[3][place, k] = start[piece, k], end[piece, k]
+        for k in range(2):
+            out[4][place, k], out[5][place, k], out[6][place, k] = t[piece, k], faces[piece, k], ranks[piece, k]
+    return True
+
+
+@inline
+def _sort_ends(order: Any, first: int, last: int, body: Any, t: Any) -> None:
+    """Sort ends, 2 * piece + side, by parameter and body."""
+    gap = (last - first) // 2
+    while gap > 0:  # bound: gap is halved; Shell's sort, n^1.5 steps
+        for i in range(first + gap, last):
+            moved, j = order[i], i
+            at, name = t[moved // 2, moved % 2], body[moved // 2]
+            while j >= first + gap:
+                other = order[j - gap]
+                value = t[other // 2, other % 2]
+                if value < at or (value == at and body[other // 2] <= name):
+                    break
+                order[j] = other
+                j -= gap
+            order[j] = moved
+        gap //= 2
 
 
 def _ranks(found: Found, number: IntArray, order: IntArray, source: IntArray, exact: Exact) -> IntArray:
@@ -113,15 +177,9 @@ def _ranks(found: Found, number: IntArray, order: IntArray, source: IntArray, ex
 
 
 def _look_closer(
-    found: Found,
-    number: IntArray,
-    ends: tuple[IntArray, IntArray],
-    order: IntArray,
-    is_tie: Any,
-    places: IntArray,
-    steps: IntArray,
-    exact: Exact,
-) -> None:
+    found: Found, number: IntArray, ends: tuple[IntArray, IntArray], order: IntArray, is_tie: Any, places: IntArray,
+    steps: IntArray, exact: Exact,
+) -> None:  # fmt: skip
     """Put runs of ends that round alike, some of which may differ, in exact order, and note where one begins."""
     row, side = ends
     starts = np.flatnonzero(~is_tie)
@@ -132,13 +190,9 @@ def _look_closer(
         keyed: list[tuple[Parameter, int]] = []
         for place in range(begin, stop):
             i, end = int(row[place]), int(side[place])
-            if found.faces[i, end] < 0:
-                at = ONE if end else ZERO
-            else:
-                if i not in known:
-                    known[i] = exact(int(found.source[i]), int(found.body[i]), int(number[i]))
-                at = known[i][end]
-            keyed.append((at, int(order[place])))
+            if found.faces[i, end] >= 0 and i not in known:
+                known[i] = exact(int(found.source[i]), int(found.body[i]), int(number[i]))
+            keyed.append((known[i][end] if found.faces[i, end] >= 0 else (ZERO, ONE)[end], int(order[place])))
         keyed.sort(key=_BY_PARAMETER)
         for place, (at, item) in zip(range(begin, stop), keyed):
             order[place] = item

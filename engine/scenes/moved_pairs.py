@@ -2,108 +2,67 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections import namedtuple
+from typing import Any
 
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray
-from engine.bounding.bvh import STACK
-from engine.jit import inline, kernel
-from engine.scenes.near_boxes import bodies_in
+from engine.jit import bare_kernel, inline
+from engine.scenes.near_boxes import bodies_in, name_of, place_in
 
-
-class Placed(NamedTuple):
-    """What `SceneBodies` says of where bodies stand: kinds (n,), rotations (n + 1, d, d), translations (n + 1, d)."""
-
-    kinds: IntArray
-    rotations: FloatArray
-    translations: FloatArray
-
-
-class PairRows(NamedTuple):
-    """Pairs by the keys first * n + second, and their bodies: those of pair i are rows 2 i + 1 and 2 i + 2, row 0 is
-    the identity."""
-
-    keys: IntArray
-    """(room,)."""
-    kinds: IntArray
-    """(2 room + 1,)."""
-    rotations: FloatArray
-    translations: FloatArray
+Placed = namedtuple("Placed", "kinds rotations translations")
+"""What `SceneBodies` says of where bodies stand: kinds (n,), rotations (n + 1, d, d), translations (n + 1, d)."""
+PairRows = namedtuple("PairRows", "keys kinds rotations translations")
+"""Pairs by the keys first * n + second (room,), and their bodies (2 room + 1, ...): those of pair i are rows 2 i + 1
+and 2 i + 2, row 0 is the identity."""
 
 
 @inline
-def _place_in(names: Any, body: int) -> int:
-    """Return where a body stands among names, which ascend; -1 where it does not."""
-    low, high = 0, names.size
-    while low < high:  # bound: halved each turn
-        middle = (low + high) // 2
-        if names[middle] < body:
-            low = middle + 1
-        else:
-            high = middle
-    return low if low < names.size and names[low] == body else -1
-
-
-@inline
-def _put_row(rows: Any, row: int, still: Placed, moved: Placed, names: Any, body: int) -> None:
+def _put_row(rows: Any, row: int, still: Placed, moved: Placed, body: int, name: int) -> None:
     """Fill a row with a body where it stands."""
-    place = _place_in(names, body)
-    rows.kinds[row] = still.kinds[body]
+    n = still.kinds.size
+    rows.kinds[row] = still.kinds[name]
     for i in range(rows.translations.shape[1]):
-        translations = still.translations[body + 1, i] if place < 0 else moved.translations[place + 1, i]
-        rows.translations[row, i] = translations
+        step = still.translations[body + 1, i] if body < n else moved.translations[body - n, i]
+        rows.translations[row, i] = step
         for j in range(rows.translations.shape[1]):
-            turn = still.rotations[body + 1, i, j] if place < 0 else moved.rotations[place + 1, i, j]
+            turn = still.rotations[body + 1, i, j] if body < n else moved.rotations[body - n, i, j]
             rows.rotations[row, i, j] = turn
 
 
-@kernel
+@bare_kernel
 def list_pairs(
-    named: Any,
-    reach: float,
-    tree: Any,
-    is_away: Any,
-    few: Any,
-    names: Any,
-    still: Any,
-    moved: Any,
-    rows: Any,
-    flag: Any,
+    named: Any, reach: float, where: Any, still: Any, moved: Any, rows: Any, stack: Any, found: Any, box: Any, flag: Any
 ) -> int:
     """Fill `rows` with the pairs of a named body and another whose boxes, grown by `reach`, meet, each once, in no
     order; return how many there are, more than there is room for where that is less.
 
-    named, names: ascending. tree: the `BodyTree` of all, of whom some are away (is_away (n,), or (0,) for none); few:
-    that of those, called `names`. still, moved: `Placed` of both.
+    named: ascending. where: a `Where` of n bodies and m that moved; still, moved: `Placed` of both, moved without its
+    row 0. Room to work in: stack (STACK,), found (n + m + 1,), box (2, dim).
     """
-    n, dimension, n_pairs = tree.boxes.shape[0], tree.boxes.shape[2], 0
-    stack, found, box = np.empty(STACK, np.int32), np.empty(n + 1, np.int64), np.empty((1, 2, dimension))
+    n, n_pairs = still.kinds.size, 0
     rows.kinds[0] = 0
-    for i in range(dimension):
+    for i in range(box.shape[1]):
         rows.translations[0, i] = 0.0
-        for j in range(dimension):
+        for j in range(box.shape[1]):
             rows.rotations[0, i, j] = still.rotations[0, i, j]
-    for body in named:
-        place = _place_in(names, body)
-        for i in range(dimension):
-            for side in range(2):
-                value = tree.boxes[body, side, i] if place < 0 else few.boxes[place, side, i]
-                box[0, side, i] = value if reach == 0.0 else _outward(value, reach, side)
-        n_still = bodies_in(box, 0, tree, stack, found)
-        n_found = n_still
-        if names.size > 0:
-            n_found += bodies_in(box, 0, few, stack, found[n_still:])
-        for i in range(n_found):
-            other = found[i] if i < n_still else names[found[i]]
-            is_gone = i < n_still and is_away.size > 0 and is_away[other]
-            if is_gone or other == body or (other < body and _place_in(named, other) >= 0):
+    for name in named:
+        place = place_in(where.names, name)
+        body = name if place < 0 else n + place
+        for i in range(box.shape[1]):
+            box[0, i] = where.together.low[name, i] if place < 0 else where.moved.low[place, i]
+            box[1, i] = where.together.high[name, i] if place < 0 else where.moved.high[place, i]
+            if reach != 0.0:
+                box[0, i], box[1, i] = _outward(box[0, i], reach, 0), _outward(box[1, i], reach, 1)
+        for i in range(bodies_in(box[0], box[1], where, stack, found)):
+            other = name_of(where, found[i])
+            if other == name or (other < name and place_in(named, other) >= 0):
                 continue
             if n_pairs < rows.keys.size:
-                first, second = min(body, other), max(body, other)
-                rows.keys[n_pairs] = first * n + second
-                _put_row(rows, 2 * n_pairs + 1, still, moved, names, first)
-                _put_row(rows, 2 * n_pairs + 2, still, moved, names, second)
+                rows.keys[n_pairs] = min(name, other) * n + max(name, other)
+                row = 2 * n_pairs + 1
+                _put_row(rows, row + (other < name), still, moved, body, name)
+                _put_row(rows, row + (name < other), still, moved, found[i], other)
             n_pairs += 1
         if flag[0]:
             break

@@ -7,7 +7,9 @@ first end, by a vertical ray in the same frame, is all that is wanted beside the
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+import threading
+from collections import namedtuple
+from typing import Any, Final
 
 import numpy as np
 
@@ -37,45 +39,31 @@ WANTS_TREE: Final = -3
 """In place of a number of pieces: UNDECIDED, or the body, or the tree that points are located by, is not prepared."""
 
 
-class Lines(NamedTuple):
-    """Prepared arrays of solids, by row: their addresses (n, k), 0 where they are not prepared, sizes and numbers."""
-
-    addresses: Any
-    sizes: Any
-    places: Any
+_here: Final = threading.local()
+_MOST_KEPT: Final = 1 << 14
+"""Bodies of a scene whose room is kept: some 800 kB a thread."""
 
 
-class PlacedMesh(NamedTuple):
-    """What of `Mesh` is read here."""
-
-    elements: Any
-    faces: Any
-    boxes: Any
-    child: Any
-    origin: Any
-    inverse: float
-    are_safe: bool
-    n_inner: int
-    corners: Any
-
-
-class Scratch(NamedTuple):
-    """Room for the work on one segment."""
-
-    stack: Any
-    met: Any
-    cuts: Crossings
-    near: Crossings
-    """The bodies near it, by where it enters their boxes."""
+Lines = namedtuple("Lines", "addresses sizes places")
+"""Prepared arrays of solids, by row: their addresses (n, k), 0 where they are not prepared, sizes and numbers."""
+PlacedMesh = namedtuple("PlacedMesh", "elements faces boxes child origin inverse are_safe n_inner corners")
+"""What of `Mesh` is read here."""
+Scratch = namedtuple("Scratch", "stack met cuts near")
+"""Room for the work on one segment; cuts, near: `Crossings`, of the bodies near it by where it enters their boxes."""
 
 
 def scratch_for(n_bodies: int) -> Scratch:
-    """Return room for the work on one segment at a time."""
-    cuts, near = (
-        Crossings(np.empty(n), np.empty((n, 3)), np.empty(n, np.int64), np.empty(n, np.int64))
-        for n in (MOST_MET, n_bodies + 1)
-    )
-    return Scratch(np.empty(STACK, np.int32), np.empty(MOST_MET, np.int64), cuts, near)
+    """Return room for the work on one segment at a time; each thread keeps its own."""
+    found: Scratch | None = getattr(_here, "scratch", None)
+    if found is None or len(found.near.t) <= n_bodies:
+        cuts, near = (
+            Crossings(np.empty(n), np.empty((n, 3)), np.empty(n, np.int64), np.empty(n, np.int64))
+            for n in (MOST_MET, n_bodies + 1)
+        )
+        found = Scratch(np.empty(STACK, np.int32), np.empty(MOST_MET, np.int64), cuts, near)
+        if n_bodies <= _MOST_KEPT:
+            _here.scratch = found
+    return found
 
 
 @inline

@@ -96,7 +96,7 @@ class Scene(Immutable):
     def memory(self) -> int:
         """Bytes of all arrays held, of the solids and of what is prepared too, shared ones once."""
         found: dict[int, int] = {}
-        _collect_arrays((self.solids, *self._standing.kept), found, set())
+        _collect_arrays((self.solids, *self._standing.all_kept), found, set())
         return sum(found.values()) + _BYTES_OF_POSE * sum(pose is not None for pose in self.poses)
 
     def moved(self, poses: Mapping[int, Pose | None]) -> Scene:
@@ -111,10 +111,12 @@ class Scene(Immutable):
             raise InvalidArrayError(f"poses must be a dict of poses by body, got {type(poses).__name__}", ("poses",))
         solids = self.solids
         bodies = self._named(list(poses), "poses")
-        for body in bodies:
-            check_pose(poses[body], solids[body], f"poses[{body}]")
+        given = {body: poses[body] for body in bodies}
+        for body, pose in given.items():
+            if type(pose) is not Pose or len(pose.translation) != solids[0].dimension:
+                check_pose(pose, solids[body], f"poses[{body}]")
         scene = object.__new__(Scene)
-        object.__setattr__(scene, "_standing", self._standing.moved({body: poses[body] for body in bodies}))
+        object.__setattr__(scene, "_standing", self._standing.after(given))
         return scene
 
     def locate(
@@ -129,11 +131,11 @@ class Scene(Immutable):
     ) -> SceneLocations | tuple[SceneLocations, Accuracy]:
         """Find for each point the bodies that hold it; all is as in `locate_scene`, which prepares anew each time."""
         check_options(workers, progress, report=report)
-        array = as_points(points, self.solids[0].dimension if len(self) else None)
+        standing, solids = self._standing, self.solids
+        array = as_points(points, solids[0].dimension if solids else None)
         with Budget(deadline, cancel) as budget:
-            standing = self._standing
             tables = standing.base.tables(array.shape[1], budget)
-            if 0 < len(array) <= _FEW and len(self):
+            if 0 < len(array) <= _FEW and solids:
                 found, accuracy = standing.located(array, budget)
                 if progress is not None:
                     progress(len(array))
@@ -141,8 +143,8 @@ class Scene(Immutable):
                 found, accuracy = locate_in(array, tables, budget, workers, progress)
                 if len(array) >= _MANY:
                     standing.base.prepared("asked_often", lambda: True)
-                if standing.few is not None:
-                    tables = standing.few.tables(array.shape[1], budget)
+                if standing.moved:
+                    tables = standing.few().tables(array.shape[1], budget)
                     more, besides = locate_in(array, tables, budget, workers, None)
                     found, accuracy = standing.merged(found, more), _both(accuracy, besides)
         return (found, accuracy) if report else found
@@ -279,7 +281,7 @@ class Scene(Immutable):
             self._standing.base.check_cut(budget)
             result: ScenePieces | BoolArray
             if not len(self):
-                result = in_order(joined([], array.shape[2]), lambda *_: (ZERO, ONE))
+                result = in_order(joined([], array.shape[2]), n, lambda *_: (ZERO, ONE))
                 result = np.zeros(n, np.bool_) if keep == "any" else result
             else:
                 cut: Any = {"all": clip_all, "first": clip_first, "any": meets_any}[keep]
@@ -296,6 +298,10 @@ class Scene(Immutable):
         """Return indices of bodies, each once, ascending. Raises: IndexOutOfRangeError, InvalidArrayError."""
         if not isinstance(bodies, (list, tuple, set, frozenset, np.ndarray)) or getattr(bodies, "ndim", 1) != 1:
             raise InvalidArrayError(f"{name} must be a list of bodies, got {type(bodies).__name__}", (name,))
+        if type(bodies) is list and set(map(type, bodies)) == {int}:
+            ascending = sorted(set(bodies))
+            if ascending[0] >= 0 and ascending[-1] < len(self):
+                return ascending
         found, n = set(), len(self)
         for place, body in enumerate(bodies):
             if isinstance(body, (bool, np.bool_)) or not isinstance(body, (int, np.integer)):

@@ -1,77 +1,68 @@
-"""Where the bodies of a scene stand: as they were when they were last prepared together, but for a few that moved."""
+"""Where the bodies of a scene stand: as they were when they were last prepared together, but for a few that moved.
+
+Kernels take both: of n bodies those that stay go by their index, those that moved count from n on.
+"""
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Mapping
-from typing import Any, Final, Literal, NamedTuple
+from typing import Any, Final, Literal
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray
+from engine.arrays import FloatArray, Int8Array, IntArray
+from engine.bounding.bvh import STACK
 from engine.containment.scene.locate_scene import SceneLocations
 from engine.direct import entry_of
 from engine.parallel import Budget
 from engine.scenes.bodies import Bodies
-from engine.scenes.broad_phase import candidates
+from engine.scenes.broad_phase import NO_BODIES, Where, body_tree, candidates
 from engine.scenes.moved_pairs import PairRows, Placed, list_pairs
-from engine.solids.base import Solid
+from engine.scenes.table import unready
+from engine.scenes.through import Cut
+from engine.solids.base import Preparing, Solid
 from engine.solids.pose import Pose
 from engine.types import Accuracy
 
 _FEW: Final = 64
 _PART: Final = 4
 """Bodies up to `_FEW`, or the scene's size divided by `_PART`, that moved are kept beside the others."""
-_NONE: Final = np.zeros(0, np.bool_)
+_LISTED: Final = 128
+"""Bodies that moved whose boxes are looked at one by one: as soon done as a tree over them built."""
+_NOBODY: Final = np.zeros(0, np.int64)
 
 
-class Layer(NamedTuple):
-    """Bodies that were prepared together."""
-
-    bodies: Bodies
-    names: IntArray | None
-    """What they are called in the scene, None for their places."""
-    is_away: BoolArray
-    """(n,) of each whether it moved since, or (0,) where none did."""
-
-
-class Standing:
+class Standing(Preparing):
     """Bodies, and those that moved since: safe to share between threads, as `Bodies` are."""
 
-    __slots__ = ("_whole", "base", "few", "layers", "names", "places")
+    __slots__ = ("_cut", "_lock", "_placed", "_prepared", "base", "moved", "names")
 
-    def __init__(self, base: Bodies, moved: Mapping[int, Pose | None]) -> None:
-        self.base = base
-        self.places = {body: place for place, body in enumerate(sorted(moved))}
-        """Which of `few` a body is, ascending."""
-        self.names = np.array(list(self.places), np.int64)
-        self.few: Bodies | None = None
-        self._whole: Bodies | None = base
-        self.layers = [Layer(base, None, _NONE)]
-        if moved:
-            solids, poses = zip(*((base.solids[body], moved[body]) for body in self.places))
-            self.few = Bodies(solids, poses, base, self.names)
-            self._whole = None
-            is_away = np.zeros(len(base.solids), np.bool_)
-            is_away[self.names] = True
-            self.layers = [Layer(base, None, is_away), Layer(self.few, self.names, _NONE)]
+    def __init__(self, base: Bodies, moved: dict[int, Pose | None]) -> None:
+        self.base, self.moved = base, moved
+        self.names = np.array(list(moved), np.int64) if moved else _NOBODY
+        """Those that moved, ascending."""
+        self._lock, self._prepared = threading.RLock(), dict[str, Any]()
+        self._placed: tuple[Where, FloatArray, FloatArray] | None = None
+        self._cut: Cut | None = None
 
     @property
     def poses(self) -> tuple[Pose | None, ...]:
         """The pose of each body."""
         poses = list(self.base.poses)
-        for body in self.places:
-            poses[body] = self.pose(body)
+        for body, pose in self.moved.items():
+            poses[body] = pose
         return tuple(poses)
 
     @property
-    def kept(self) -> list[Any]:
+    def all_kept(self) -> list[Any]:
         """What is prepared."""
-        all_of = {id(each): each for each in (self.base, self.few, self._whole) if each is not None}
-        return [each._prepared for each in all_of.values()]
+        others = (self.kept("few"), self.kept("whole"))
+        return [self.base._prepared, self._placed, *(each._prepared for each in others if each is not None)]
 
-    def moved(self, poses: Mapping[int, Pose | None]) -> Standing:
-        """Return where bodies stand after some, which are there, moved."""
-        given = {body: self.pose(body) for body in self.places} | dict(poses)
+    def after(self, poses: Mapping[int, Pose | None]) -> Standing:
+        """Return where bodies stand after some, which are there and ascend, moved."""
+        given = dict(sorted({**self.moved, **poses}.items())) if self.moved else dict(poses)
         if len(given) <= max(_FEW, len(self.base.solids) // _PART):
             return Standing(self.base, given)
         everywhere = list(self.base.poses)
@@ -81,35 +72,70 @@ class Standing:
 
     def whole(self) -> Bodies:
         """Return all bodies where they are."""
-        if self._whole is None:
-            self._whole = Bodies(self.base.solids, self.poses)
-        return self._whole
+        return self.prepared("whole", lambda: Bodies(self.base.solids, self.poses)) if self.moved else self.base
+
+    def few(self) -> Bodies:
+        """Return those that moved, where they are; at least one."""
+        return self.prepared("few", self._as_bodies)
+
+    def _as_bodies(self) -> Bodies:
+        solids = tuple(self.base.solids[body] for body in self.moved)
+        return Bodies(solids, tuple(self.moved.values()), self.base)
 
     def pose(self, body: int) -> Pose | None:
         """Return the pose of a body."""
-        place = self.places.get(body)
-        return self.base.poses[body] if place is None or self.few is None else self.few.poses[place]
+        return self.moved[body] if body in self.moved else self.base.poses[body]
 
     def placed(self, body: int) -> tuple[Solid, Pose | None]:
         """Return a body's solid, and its pose unless that leaves it where it is."""
-        place = self.places.get(body)
-        return self.base.placed(body) if place is None or self.few is None else self.few.placed(place)
+        pose = self.pose(body)
+        return self.base.solids[body], None if pose is None or pose.is_identity else pose
+
+    def names_of(self, bodies: IntArray) -> IntArray:
+        """Return what bodies are called in the scene of which those that moved count from n on."""
+        n = len(self.base.solids)
+        if not self.moved or not len(bodies):
+            return bodies
+        return np.where(bodies < n, bodies, self.names.take(bodies - n, mode="clip"))
+
+    def where(self, budget: Budget) -> Where:
+        """Return where all bodies are, for kernels."""
+        return (self._placed or self.placed_numbers(budget))[0]
+
+    def placed_numbers(self, budget: Budget) -> tuple[Where, FloatArray, FloatArray]:
+        """Return also the rotations and translations of those that moved, the identity for None."""
+        if self._placed is None:  # who comes second makes the same
+            tree, names = self.base.tree(budget), self.names
+            if self.moved:
+                turns, moves, low, high = self.base.under(names, list(self.moved.values()), budget)
+                self._placed = Where(tree, body_tree(low, high, _LISTED), names), turns, moves
+            else:
+                d = tree.low.shape[1]
+                self._placed = Where(tree, NO_BODIES[d], names), np.empty((0, d, d)), np.empty((0, d))
+        return self._placed
+
+    def cut(self, budget: Budget) -> Cut:
+        """Return what kernels for segments read of all bodies."""
+        if self._cut is None:
+            self._cut = Cut(self.base.table(budget).of_kernels, unready(len(self.names)))
+        return self._cut
+
+    def prepare(self, body: int, wanted: int, budget: Budget) -> None:
+        """Make ready what kernels want of a body."""
+        n = len(self.base.solids)
+        if body < n:
+            self.base.prepare(body, wanted, budget)
+        else:
+            few = self.few()
+            few.prepare(body - n, wanted, budget)
+            self._cut = self.cut(budget)._replace(moved=few.table(budget).of_kernels)
 
     def boxes(self, budget: Budget) -> FloatArray:
         """Return the boxes of all bodies where they are."""
-        boxes = self.base.tree(budget).boxes
-        if self.few is not None:
-            boxes = boxes.copy()
-            boxes[self.names] = self.few.tree(budget).boxes
+        where = self.where(budget)
+        boxes = np.stack([where.together.low, where.together.high], axis=1)
+        boxes[self.names, 0], boxes[self.names, 1] = where.moved.low, where.moved.high
         return boxes
-
-    def layers_near(self, segments: FloatArray, budget: Budget) -> list[Layer]:
-        """Return the layers that segments (n, 2, dim) may meet: where few, and away from what moved, the first."""
-        if self.few is None or not 0 < len(segments) <= _FEW:
-            return self.layers
-        boxes = self.few.tree(budget).boxes
-        meet = (boxes[:, 0] <= segments.max(axis=(0, 1))) & (boxes[:, 1] >= segments.min(axis=(0, 1)))
-        return self.layers[: 1 + bool(meet.all(axis=1).any())]
 
     def pairs_with(self, named: IntArray, reach: float, boolean: bool, budget: Budget) -> tuple[IntArray, Int8Array]:
         """Return the pairs of a body named and another whose boxes, grown by `reach`, meet, by first * n + second and
@@ -117,66 +143,44 @@ class Standing:
 
         Raises: as `collide_scene` where it does not take a body.
         """
-        batches, tree, room = self.base.batches(budget), self.base.tree(budget), 16 + 6 * len(named)
-        bodies, few = batches.bodies, self.base if self.few is None else self.few
-        arrays_of = (each.arrays(budget) for each in (self.base, few))
-        still, moved = (Placed(each.kinds, each.rotations, each.translations) for each in arrays_of)
+        batches, (where, *moves), room = self.base.batches(budget), self.placed_numbers(budget), 16 + 6 * len(named)
+        arrays, d = batches.bodies, batches.bodies.dimension
+        still, moved = Placed(arrays.kinds, arrays.rotations, arrays.translations), Placed(arrays.kinds, *moves)
+        stack, box = np.empty(STACK, np.int32), np.empty((2, d))
+        found = np.empty(len(arrays.kinds) + len(self.names) + 1, np.int64)
         while True:  # bound: the second turn has room
-            d, n_rows = bodies.dimension, 2 * room + 1
-            arrays = np.empty((n_rows, d, d)), np.empty((n_rows, d))
-            rows = PairRows(np.empty(room, np.int64), np.empty(n_rows, np.int64), *arrays)
-            n = int(
-                entry_of(list_pairs)(
-                    named,
-                    reach,
-                    tree,
-                    self.layers[0].is_away,
-                    few.tree(budget),
-                    self.names,
-                    still,
-                    moved,
-                    rows,
-                    budget.flag,
-                )
-            )
+            n_rows = 2 * room + 1
+            placed = np.empty((n_rows, d, d)), np.empty((n_rows, d))
+            rows = PairRows(np.empty(room, np.int64), np.empty(n_rows, np.int64), *placed)
+            n = entry_of(list_pairs)(named, reach, where, still, moved, rows, stack, found, box, budget.flag)
             budget.check()
             if n <= room:
-                return rows.keys[:n], batches.related(rows.kinds, rows.rotations, rows.translations, n, boolean, budget)
+                return rows.keys[:n], batches.related(*rows[1:], n, boolean, budget)
             room = n
-
-    def near(self, points: FloatArray, budget: Budget) -> tuple[IntArray, IntArray]:
-        """Return pairs of one of some points and a body that it may meet."""
-        ends = np.stack([points, points], axis=1)
-        owners, bodies = candidates(self.base.tree(budget), ends, budget, 1)
-        if self.few is None:
-            return owners, bodies
-        stays = ~self.layers[0].is_away[bodies]
-        more, places = candidates(self.few.tree(budget), ends, budget, 1)
-        return np.concatenate([owners[stays], more]), np.concatenate([bodies[stays], self.names[places]])
 
     def located(self, points: FloatArray, budget: Budget) -> tuple[SceneLocations, Accuracy]:
         """Return where a few points lie, body by body: for many `locate_in` is faster."""
-        n, beyond, rational, is_exact = len(points), 0, 0, True
+        n, n_bodies, beyond, rational, is_exact = len(points), len(self.base.solids), 0, 0, True
         budget.check()
-        owners, bodies = self.near(points, budget)
-        order = np.lexsort((bodies, owners))
-        owners, bodies, at = owners[order], bodies[order], np.empty(len(order), np.int8)
-        for pair, (item, body) in enumerate(zip(owners.tolist(), bodies.tolist())):
-            place = self.places.get(body)
-            locator = self.base.locator(body) if place is None or self.few is None else self.few.locator(place)
-            counts = locator.chosen(1, budget).fill(points[item : item + 1], at[pair : pair + 1], budget)
+        owners, bodies = candidates(self.where(budget), points.repeat(2, axis=0).reshape(n, 2, -1), budget, 1)
+        names, at = self.names_of(bodies), np.empty(1, np.int8)
+        held, on_boundary, offsets = list[int](), list[bool](), np.zeros(n + 1, np.int64)
+        for item, name, body in sorted(zip(owners.tolist(), names.tolist(), bodies.tolist())):
+            locator = self.base.locator(body) if body < n_bodies else self.few().locator(body - n_bodies)
+            counts = locator.chosen(1, budget).fill(points[item : item + 1], at, budget)
             beyond, rational = beyond + counts.beyond, rational + counts.rational
             is_exact &= locator.decisions == "exact"
-        held = at >= 0
-        offsets = np.zeros(n + 1, np.int64)
-        np.cumsum(np.bincount(owners[held], minlength=n), out=offsets[1:])
+            if at[0] >= 0:
+                held.append(name)
+                on_boundary.append(at[0] == 0)
+                offsets[item + 1 :] += 1
         decisions: Literal["exact", "float64"] = "exact" if is_exact else "float64"
         accuracy = Accuracy(decisions, None, n, min(n, beyond), min(n, rational), "box_grid")
-        return SceneLocations(offsets, bodies[held], at[held] == 0), accuracy
+        return SceneLocations(offsets, np.array(held, np.int64), np.array(on_boundary, np.bool_)), accuracy
 
     def merged(self, found: SceneLocations, more: SceneLocations) -> SceneLocations:
         """Return where points lie among all bodies, from where they lie among those of `base` and of `few`."""
-        stay, n = ~self.layers[0].is_away[found.indices], len(found.offsets) - 1
+        stay, n = np.isin(found.indices, self.names, invert=True), len(found.offsets) - 1
         owners = np.repeat(np.arange(n), np.diff(found.offsets))[stay]
         owners = np.concatenate([owners, np.repeat(np.arange(n), np.diff(more.offsets))])
         bodies = np.concatenate([found.indices[stay], self.names[more.indices]])

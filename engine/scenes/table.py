@@ -64,18 +64,9 @@ class Table:
         rows, meshes, trees = of_solids if like is None else like.of_solids
         self.of_solids: tuple[FloatArray, Lines, Lines] = rows, meshes, trees
         self.of_kernels = BodyTable(
-            np.full(n, UNREADY, np.int8),
-            begins,
-            begins.copy(),
-            frames,
-            np.zeros((n_posed, 3, 3, 2)),
-            np.zeros((n_posed, 3)),
-            rows,
-            np.zeros((n_balls, 3, 2)),
-            np.zeros(n_balls),
-            meshes,
-            trees,
-        )
+            np.full(n, UNREADY, np.int8), begins, begins.copy(), frames, np.zeros((n_posed, 3, 3, 2)),
+            np.zeros((n_posed, 3)), rows, np.zeros((n_balls, 3, 2)), np.zeros(n_balls), meshes, trees,
+        )  # fmt: skip
 
     def prepare(self, body: int, wanted: int) -> None:
         """Make ready what kernels want of a body. Caller holds the lock of the bodies."""
@@ -120,6 +111,11 @@ class Table:
         return OTHER
 
 
+def unready(n: int) -> BodyTable:
+    """Return what says of n bodies that none is prepared."""
+    return _NOTHING._replace(kinds=np.full(n, UNREADY, np.int8)) if n else _NOTHING
+
+
 def _lines(n: int, n_addresses: int, n_sizes: int, n_places: int) -> Lines:
     return Lines(np.zeros((n, n_addresses), np.int64), np.zeros((n, n_sizes), np.int64), np.zeros((n, n_places)))
 
@@ -148,3 +144,6 @@ def _double(above: int, below: int) -> tuple[float, float]:
 
 def _are_safe(numbers: Iterable[float]) -> bool:
     return all(x == 0.0 or SMALLEST <= abs(x) <= LARGEST for x in numbers)
+
+
+_NOTHING: Final = Table((), ()).of_kernels

@@ -76,6 +76,8 @@ def _filtered(solid: Solid, pose: Pose, unposed: Locator, frames: Frames) -> Fil
         with np.errstate(all="ignore"):
             n_beyond = int(blurred(moved, blurs, locations, budget))
         budget.check()
+        if not n_beyond:
+            return Counts(0, 0)
         n_rational = 0
         if frames.is_turn[0]:
             exact = np.flatnonzero((blurs == 0.0) & (locations == UNDECIDED))

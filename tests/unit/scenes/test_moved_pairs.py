@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from engine import Aabb, Pose, Scene
+from engine.bounding.bvh import STACK
 from engine.parallel import Budget
 from engine.scenes.moved_pairs import PairRows, Placed, list_pairs
 
@@ -28,13 +29,11 @@ def test_pairs_are_those_whose_boxes_meet(dimension: int, reach: float) -> None:
             np.empty((2 * room + 1, dimension)),
         )
         with Budget() as budget:
-            few = standing.base if standing.few is None else standing.few
-            arrays = [each.arrays(budget) for each in (standing.base, few)]
-            where = [Placed(each.kinds, each.rotations, each.translations) for each in arrays]
-            trees = standing.base.tree(budget), few.tree(budget)
-            n_pairs = list_pairs(
-                named, reach, trees[0], standing.layers[0].is_away, trees[1], standing.names, *where, rows, budget.flag
-            )
+            arrays = standing.base.arrays(budget)
+            still = Placed(arrays.kinds, arrays.rotations, arrays.translations)
+            moves = Placed(arrays.kinds, *standing.placed_numbers(budget)[1:])
+            scratch = np.empty(STACK, np.int32), np.empty(2 * n + 1, np.int64), np.empty((2, dimension))
+            n_pairs = list_pairs(named, reach, standing.where(budget), still, moves, rows, *scratch, budget.flag)
             low, high = standing.boxes(budget).transpose(1, 0, 2)
         meet = ((low[:, None] <= high + reach) & (low <= high[:, None] + reach)).all(axis=2)
         expected = {(min(i, j), max(i, j)) for i in named.tolist() for j in range(n) if i != j and meet[i, j]}

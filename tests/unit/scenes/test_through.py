@@ -11,6 +11,7 @@ from engine import Aabb, Convex, HalfSpace, Polyhedron, Pose, Solid, Sphere, Sur
 from engine.parallel import Budget
 from engine.scenes.bodies import Bodies
 from engine.scenes.posed_mesh import MOST_MET, WANTS_BODY, scratch_for
+from engine.scenes.standing import Standing
 from engine.scenes.through import OTHER, cut_pairs
 from engine.segment_clipping.boundary_cut import SETTLED
 from engine.segment_clipping.pieces import Pieces, first_of, joined, room_for
@@ -31,16 +32,17 @@ BODIES: list[Solid] = [
 
 def cut_on(segments: Any, solid: Solid, pose: Pose | None) -> tuple[Pieces, Any]:
     """Return the pieces of segments within a placed solid that are settled, and the state of each segment."""
-    bodies, n = Bodies((solid,), (pose,)), np.zeros(3, np.int64)
-    out, state = room_for(MOST_MET + 2 * len(segments), solid.dimension), np.empty(len(segments), np.uint8)
+    standing, n = Standing(Bodies((solid,), (pose,)), {}), np.array([0, 0, 0, len(segments), 0])
+    room = MOST_MET + 2 * len(segments)
+    out, names, state = room_for(room, solid.dimension), np.empty(room, np.int64), np.empty(len(segments), np.uint8)
     places, parts = np.arange(len(segments)), []
     with Budget() as budget:
         while n[0] < len(segments):
-            table = bodies.table(budget).of_kernels
-            cut_pairs(segments, places, places * 0, table, scratch_for(1), budget.flag, out, state, n)
+            where, cut = standing.where(budget), standing.cut(budget)
+            cut_pairs(segments, places, places * 0, where, cut, scratch_for(1), budget.flag, out, names, state, n)
             parts.append(Pieces(*(each.copy() for each in first_of(out, int(n[1])))))
             if n[2] < 0:
-                bodies.prepare(0, int(n[2]), budget)
+                standing.prepare(0, int(n[2]), budget)
     return joined(parts), state
 
 
