@@ -175,6 +175,11 @@ SCENE = {
                      for solid in (polygon([[-HUGE, -HUGE], [HUGE, -HUGE], [HUGE, HUGE], [-HUGE, HUGE]]),
                                    {"type": "triangle", "vertices": [[-HUGE, -HUGE], [HUGE, -HUGE], [HUGE, HUGE]]})],
              points=[[HUGE, -HUGE / 2], [HUGE, HUGE / 2], [0, 0], [-HUGE, HUGE / 2]]),
+        case("preimage that overflows", "a coordinate in the body's frame is the largest double, and rounds to infinity",
+             bodies=[{"solid": {"type": "aabb", "min": [0, 0], "max": [HUGE, HUGE]},
+                      "pose": {"rotation": [[turn, 0], [0, turn]], "translation": [0, 0]}}
+                     for turn in (1 - 2.0**-53, 1 - 3 * 2.0**-53)],
+             points=[[HUGE * (1 - 2.0**-53), 1], [HUGE * (1 - 3 * 2.0**-53), 1], [1, 1]]),
     ],
 }  # fmt: skip
 

@@ -4,7 +4,7 @@ The exact preimage of q is R^-1 (q - t). Floating point gives adj(R) (q - t) / d
 and its determinant 1, up to 1e-11, so an entry of the inverse is off by less than 32 u (u = 2^-53), and with the
 roundings of the difference, the products and the sums a coordinate is off by less than 48 u sum |q - t|. The `blur`
 of a point is more than twice that: adding it to a coordinate, or taking it off, in floating point leaves a true
-bound.
+bound. From 2^1021 on, where a coordinate may overflow that should not, the blur is infinite, and nothing is sure.
 
 Where R only turns the axes onto each other and every difference is exact, so is the preimage, and the blur is 0.
 """
@@ -17,7 +17,8 @@ from engine.containment.posed.filters import in_space
 from engine.jit import inline, kernel
 from engine.predicates.error_free import two_diff
 
-_BLUR: Final = 128.0 * 2.0**-53
+_BLUR: Final = 16.0 * 2.0**-53
+"""Of eight times the differences: these overflow before a coordinate does."""
 _TINY: Final = 1e-320
 
 
@@ -37,7 +38,7 @@ def to_frame(frames: Any, frame: int, p: Any) -> Any:
     z = inverses[frame, 2, 0] * dx + inverses[frame, 2, 1] * dy + inverses[frame, 2, 2] * dz
     if frames.is_turn[frame] and x_tail == 0.0 and y_tail == 0.0 and z_tail == 0.0:
         return (x, y, z), 0.0
-    return (x, y, z), _BLUR * (abs(dx) + abs(dy) + abs(dz)) + _TINY
+    return (x, y, z), _BLUR * (8.0 * abs(dx) + 8.0 * abs(dy) + 8.0 * abs(dz)) + _TINY
 
 
 @kernel
