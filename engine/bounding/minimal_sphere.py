@@ -92,11 +92,9 @@ class _Walk:
             if outside is None:
                 break
             support, center, square = self._ball_of((outside, *support))
-        rounded = np.array([nearest_float(x) for x in center])
-        radius = self._radius_about(rounded)
-        return MinimalSphere(
-            rounded, radius, center, square, tuple(sorted(support)), self.n_candidates, self.n_rational
-        )
+        near = np.array([nearest_float(x) for x in center])
+        radius = self._radius_about(near)
+        return MinimalSphere(near, radius, center, square, tuple(sorted(support)), self.n_candidates, self.n_rational)
 
     def _ball_of(self, indices: tuple[int, ...]) -> tuple[tuple[int, ...], Rational, Fraction]:
         """Return support, centre and squared radius of the smallest ball of a few points, the first on its surface."""

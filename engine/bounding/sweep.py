@@ -76,9 +76,7 @@ def _meet(low: Any, high: Any, box: int, other: int) -> bool:
 
 
 @kernel
-def _sweep(
-    low: Any, high: Any, order: Any, axis: int, counts: Any, start: int, stop: int, keys: Any, flag: Any
-) -> None:
+def _sweep(low: Any, high: Any, ids: Any, axis: int, counts: Any, start: int, stop: int, keys: Any, flag: Any) -> None:
     """Count into counts (n,) the pairs of which each box is the first by number; boxes sorted by low on `axis`. Where
     `keys` has room: write first * n + second of the pairs with start <= first < stop instead, which just fit."""
     n_boxes, n_keys, n_found = low.shape[0], keys.shape[0], 0
@@ -91,7 +89,7 @@ def _sweep(
                 break
             if not _meet(low, high, box, other):
                 continue
-            first, second = min(order[box], order[other]), max(order[box], order[other])
+            first, second = min(ids[box], ids[other]), max(ids[box], ids[other])
             if n_keys == 0:
                 counts[first] += 1
             elif start <= first < stop and n_found < n_keys:

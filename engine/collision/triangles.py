@@ -20,14 +20,7 @@ from engine.arrays import FloatArray, Int8Array
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
 from engine.collision.meshes.exact_triangles import classify_exact
 from engine.collision.meshes.mesh_arrays import NO_AREA, UNKNOWN_AXIS, axis_of
-from engine.collision.meshes.triangle_triangle import (
-    APART,
-    Facet,
-    classify_exactly,
-    classify_near,
-    triangle_at,
-    with_pose,
-)
+from engine.collision.meshes.triangle_triangle import APART, Facet, classify, classify_near, facet_at, with_pose
 from engine.collision.planar.outline import collide_outline_outline
 from engine.collision.result import Work
 from engine.errors import InvalidArrayError, WrongDimensionError
@@ -113,7 +106,7 @@ def relate_triangles_3d(first: Any, second: Any, relations: Any) -> None:
     """Fill relations (n,) int8 for the pairs of rows of two (n, 3, 3) float64 arrays, degenerate ones UNSETTLED."""
     poses = np.zeros((1, 12))  # nothing here has one
     for item in range(relations.shape[0]):
-        t, u = triangle_at(first[item], 0, 1, 2), triangle_at(second[item], 0, 1, 2)
+        t, u = facet_at(first[item], 0, 1, 2), facet_at(second[item], 0, 1, 2)
         relations[item] = UNSETTLED
         if are_boxes_apart(t, u) or are_apart_on_axis(t.p.z, t.q.z, t.r.z, u.p.z, u.q.z, u.r.z):
             relations[item] = DISJOINT
@@ -123,7 +116,7 @@ def relate_triangles_3d(first: Any, second: Any, relations: Any) -> None:
             continue
         how = classify_near(t, u, 0.0)
         if how == UNDECIDED:
-            how = classify_exactly(poses, with_pose(t), with_pose(u), axis, 0.0)
+            how = classify(poses, with_pose(t), with_pose(u), axis, 0.0)
         if how != UNDECIDED:
             relations[item] = DISJOINT if how == APART else TOUCHING
 

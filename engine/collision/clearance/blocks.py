@@ -6,16 +6,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.collision.clearance.boxes import (
-    Candidates,
-    Search,
-    View,
-    box_bound,
-    lane_centre,
-    lane_half,
-    scaled,
-    set_line,
-)
+from engine.collision.clearance.boxes import Search, View, box_bound, lane_centre, lane_half, scaled, set_line
 from engine.collision.clearance.near_triangles import nearest_points, rounding_of, seen_from
 from engine.collision.meshes.mesh_arrays import triangle_of
 from engine.collision.meshes.placement import placed
@@ -57,7 +48,7 @@ def _measure(s: Facet, t: Facet, error: float, most: float) -> tuple[float, floa
 
 
 @inline
-def keep_below(found: Candidates, n: int, most: float) -> int:
+def keep_below(found: Any, n: int, most: float) -> int:
     """Leave out the candidates above the bound; return how many there are."""
     n_kept = 0
     for item in range(n):

@@ -18,7 +18,7 @@ from typing import Any, Final
 
 from engine.collision.clearance.boxes import Search, View
 from engine.collision.clearance.refined import corners_of, ends_of, height_above, named, shift_of
-from engine.collision.clearance.wide import Wide, Wide3, dot_wide, minus_wide, over, plus, root, times
+from engine.collision.clearance.wide import Wide, Wide3, dot3, less3, over, plus, root, times
 from engine.collision.meshes.triangle_triangle import Facet, corner
 from engine.jit import called, inline
 from engine.predicates.double_double import surely_rounded
@@ -42,7 +42,7 @@ def _is_beyond(view: View, triangle: int, known: tuple[int, int, int], t: Facet,
 def _write(view: View, known: tuple[int, int, int], p: Wide3, n: Wide3, radius: float, start: Any, error: float,
            point: Any) -> bool:  # fmt: skip
     """Write the point (d,) at a radius from p along n, from the origin of space; tell whether it is sure."""
-    size, is_sure, v = root(dot_wide(n, n)), True, view.mesh.vertices
+    size, is_sure, v = root(dot3(n, n)), True, view.mesh.vertices
     bound = error + 4.0 * radius * (error / size.h + 2.0**-98)
     is_given = radius == 0.0 and not view.place.is_posed
     for k, at, way in ((0, p.x, n.x), (1, p.y, n.y), (2, p.z, n.z)):
@@ -79,7 +79,7 @@ def certify(s: Search, start: Any, other: Any, radii: Any, n: int, points: Any) 
     u = corners_of(s.b, pairs[0, 1], shift_of(s, start, other))
     p, q, inside, steepness = ends_of(t, u, pairs[0, 2], pairs[0, 3])
     error = _SLACK * steepness + 2.0**-92
-    slack, way, back = _SLACK + 16.0 * error, minus_wide(q, p), minus_wide(p, q)
+    slack, way, back = _SLACK + 16.0 * error, less3(q, p), less3(p, q)
     if not (inside > _SLACK and way.x.h * way.x.h + way.y.h * way.y.h + way.z.h * way.z.h > 2.0**-300):
         return False
     if not (

@@ -21,7 +21,7 @@ import numpy as np
 from engine.collision.clearance.closed_forms import gap_of_forms
 from engine.collision.clearance.near_triangles import FACE
 from engine.collision.clearance.refined import ROUNDING, corner_of, ends_of, height_above
-from engine.collision.clearance.wide import Wide, Wide3, dot_wide, less, minus_wide, root
+from engine.collision.clearance.wide import Wide, Wide3, dot3, less, less3, root
 from engine.collision.convex.body import ASIDE, CENTER, REACH, ConvexArrays, point_of
 from engine.collision.convex.pair import inner_point
 from engine.collision.convex.xenocollide import PlacedBody, farthest, largest, placed_body
@@ -170,16 +170,14 @@ def _proven(pool: ConvexArrays, s: Simplex, a: PlacedBody, b: PlacedBody, reach:
     t = Facet(_dual(pool, a, i[0], here), _dual(pool, a, i[1], here), _dual(pool, a, i[2], here))
     u = Facet(_dual(pool, b, j[0], there), _dual(pool, b, j[1], there), _dual(pool, b, j[2], there))
     p_end, q_end, _, _ = ends_of(t, u, i[3], j[3])
-    n = minus_wide(q_end, p_end)
-    square = dot_wide(n, n)
-    size_of_all = reach + max(abs(there.x.h), abs(there.y.h), abs(there.z.h))
-    if not (square.h > _SMALLEST and square.h > 2.0**-80 * size_of_all * size_of_all):
+    n = less3(q_end, p_end)
+    square = dot3(n, n)
+    whole = reach + max(abs(there.x.h), abs(there.y.h), abs(there.z.h))
+    if not (square.h > _SMALLEST and square.h > 2.0**-80 * whole * whole):
         return np.nan
-    beyond = max(
-        _beyond(pool, a, n, p_end, here, size_of_all), _beyond(pool, b, minus_wide(here, n), q_end, there, size_of_all)
-    )
+    beyond = max(_beyond(pool, a, n, p_end, here, whole), _beyond(pool, b, less3(here, n), q_end, there, whole))
     size, radii = root(square), Wide(*two_sum(a.round, b.round))
-    distance, bound = less(size, radii), 2.0 * beyond / size.h + ROUNDING * (size_of_all + radii.h)
+    distance, bound = less(size, radii), 2.0 * beyond / size.h + ROUNDING * (whole + radii.h)
     is_sure = distance.h > bound and surely_rounded(distance.h, distance.low, bound)
     return distance.h if is_sure else np.nan
 

@@ -147,8 +147,7 @@ def _between(p: Rational, q: Rational, first: int, second: int) -> Gap:
 
 
 def _foot(point: Vector, t: Corners, feature: int) -> tuple[Rational, int] | None:
-    """Return the foot of a point on a vertex, an edge or all of a triangle, and the feature it lies on; None if it is
-    off. Numbers may be fractions."""
+    """Return the foot of a point on a feature of a triangle, and the feature it lies on; None if it is off."""
     if feature < 3:
         return Rational(t[feature], 1), feature
     if feature < FACE:

@@ -22,29 +22,25 @@ from engine.solids.base import Solid
 from engine.solids.half_space import HalfSpace
 
 
-def gap_of_planes(
-    solid: Solid, other: Solid, poses: Poses, budget: Budget
-) -> tuple[ScaledGap, tuple[Feature, Feature]]:
+def gap_of_planes(one: Solid, other: Solid, poses: Poses, budget: Budget) -> tuple[ScaledGap, tuple[Feature, Feature]]:
     """Return the gap of two bodies without a common point, one of them a half-space or both, and what it ends on."""
-    if isinstance(solid, HalfSpace) and isinstance(other, HalfSpace):
+    if isinstance(one, HalfSpace) and isinstance(other, HalfSpace):
         # their planes are parallel; of all lines across, that through the origin
-        planes = image_half_space(solid, poses[0]), image_half_space(other, poses[1])
+        planes = image_half_space(one, poses[0]), image_half_space(other, poses[1])
         p, q = (tuple(-offset * x / squared_length(normal) for x in normal) for normal, offset in planes)
         return scaled_gap(p, q, (0.0, 0.0)), (PLANE, PLANE)
-    if isinstance(solid, HalfSpace):
-        foot, point, feature = _foot_and_vertex(solid, other, poses, budget)
+    if isinstance(one, HalfSpace):
+        foot, point, feature = _foot_and_vertex(one, other, poses, budget)
         return scaled_gap(foot, point, (0.0, radius_of(other))), (PLANE, feature)
     assert isinstance(other, HalfSpace)
-    foot, point, feature = _foot_and_vertex(other, solid, poses[::-1], budget)
-    return scaled_gap(point, foot, (radius_of(solid), 0.0)), (feature, PLANE)
+    foot, point, feature = _foot_and_vertex(other, one, poses[::-1], budget)
+    return scaled_gap(point, foot, (radius_of(one), 0.0)), (feature, PLANE)
 
 
-def _foot_and_vertex(
-    half_space: HalfSpace, body: Solid, poses: Poses, budget: Budget
-) -> tuple[Vector, Vector, Feature]:
+def _foot_and_vertex(space: HalfSpace, body: Solid, poses: Poses, budget: Budget) -> tuple[Vector, Vector, Feature]:
     """Return the point of a plane and the point of a body that are nearest, and the vertex the latter is."""
     mesh, d = spread_of(body), body.dimension
-    plane, image = image_half_space(half_space, poses[0]), image_map(poses[1])
+    plane, image = image_half_space(space, poses[0]), image_map(poses[1])
     best: tuple[Fraction, Vector, Feature] | None = None
     (_, weights, _), points = pulled_back(plane, poses[1]), mesh.arrays.vertices[:, :d]
     with np.errstate(all="ignore"):  # the rounding is that of `signs_of`

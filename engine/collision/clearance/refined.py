@@ -20,19 +20,7 @@ import numpy as np
 from engine.collision.clearance.blocks import keep_below
 from engine.collision.clearance.boxes import Search, View, scaled
 from engine.collision.clearance.near_triangles import FACE
-from engine.collision.clearance.wide import (
-    Wide,
-    Wide3,
-    along_wide,
-    dot_wide,
-    less,
-    minus_wide,
-    over,
-    plus,
-    product,
-    root,
-    times,
-)
+from engine.collision.clearance.wide import Wide, Wide3, along3, dot3, less, less3, over, plus, product, root, times
 from engine.collision.meshes.mesh_arrays import triangle_of
 from engine.collision.meshes.placement import Placement, turned
 from engine.collision.meshes.triangle_triangle import Facet, corner
@@ -80,7 +68,7 @@ def corners_of(view: View, triangle: int, shift: Wide3) -> Facet:
 def _edge(t: Facet, k: int) -> tuple[Wide3, Wide3]:
     """Return the start of an edge, and the vector to its end."""
     a = corner(t, k)
-    return a, minus_wide(corner(t, k + 1), a)
+    return a, less3(corner(t, k + 1), a)
 
 
 @inline
@@ -96,20 +84,20 @@ def _foot(point: Wide3, t: Facet, feature: int) -> tuple[Wide3, float, float]:
     if feature < 3:
         return corner(t, feature), np.inf, 0.0
     a, u = _edge(t, feature % 3)
-    w, uu = minus_wide(point, a), dot_wide(u, u)
-    uw = dot_wide(u, w)
+    w, uu = less3(point, a), dot3(u, u)
+    uw = dot3(u, w)
     if feature < FACE:
         scale = _reach(u) + _reach(w)
-        return along_wide(a, _share(uw, uu), u), min(uw.h, uu.h - uw.h) / scale, np.sqrt(uu.h) / uu.h * scale
-    v = minus_wide(t.r, a)
+        return along3(a, _share(uw, uu), u), min(uw.h, uu.h - uw.h) / scale, np.sqrt(uu.h) / uu.h * scale
+    v = less3(t.r, a)
     length = max(_reach(u), _reach(v))
     scale = length * length * (length + _reach(w))
-    uv, vv, vw = dot_wide(u, v), dot_wide(v, v), dot_wide(v, w)
+    uv, vv, vw = dot3(u, v), dot3(v, v), dot3(v, w)
     size = less(times(uu, vv), times(uv, uv))
     top, their_top = less(times(vv, uw), times(uv, vw)), less(times(uu, vw), times(uv, uw))
     x, y = _share(top, size), _share(their_top, size)
     rest = less(Wide(1.0, 0.0), x)
-    foot = along_wide(along_wide(a, x, u), y if less(y, rest).h <= 0.0 else rest, v)
+    foot = along3(along3(a, x, u), y if less(y, rest).h <= 0.0 else rest, v)
     inside = min(top.h, their_top.h, size.h - top.h - their_top.h) / scale
     return foot, inside, (np.sqrt(uu.h) + np.sqrt(vv.h)) / size.h * scale
 
@@ -124,12 +112,12 @@ def ends_of(s: Facet, t: Facet, first: int, second: int) -> tuple[Wide3, Wide3, 
     p, inside, steepness = corner(s, first % 3), np.inf, 0.0
     if 3 <= first < FACE and second < FACE:
         (a, u), (b, v) = _edge(s, first - 3), _edge(t, second - 3)
-        w = minus_wide(a, b)
-        uu, uv, vv, uw, vw = dot_wide(u, u), dot_wide(u, v), dot_wide(v, v), dot_wide(u, w), dot_wide(v, w)
+        w = less3(a, b)
+        uu, uv, vv, uw, vw = dot3(u, u), dot3(u, v), dot3(v, v), dot3(u, w), dot3(v, w)
         size, top = less(times(uu, vv), times(uv, uv)), less(times(uv, vw), times(vv, uw))
         length = max(_reach(u), _reach(v))
         scale = length * length * (length + _reach(w))
-        p, inside = along_wide(a, _share(top, size), u), min(top.h, size.h - top.h) / scale
+        p, inside = along3(a, _share(top, size), u), min(top.h, size.h - top.h) / scale
         steepness = np.sqrt(uu.h) / size.h * scale
     q, their_inside, their_steepness = _foot(p, t, second)
     return p, q, min(inside, their_inside), steepness + their_steepness
@@ -138,7 +126,7 @@ def ends_of(s: Facet, t: Facet, first: int, second: int) -> tuple[Wide3, Wide3, 
 @inline
 def height_above(n: Wide3, p: Wide3, base: Wide3) -> Wide:
     """Return n . (p - base)."""
-    return dot_wide(n, minus_wide(p, base))
+    return dot3(n, less3(p, base))
 
 
 @called
@@ -146,8 +134,8 @@ def _bounds(s: Facet, t: Facet, first: int, second: int) -> tuple[Wide, float, P
     """Return the distance of two points of the triangles, by how much the triangles may be nearer at most but for
     rounding, and the points, rounded."""
     p, q, _, _ = ends_of(s, t, first, second)
-    n, ends = minus_wide(q, p), (Point3(p.x.h, p.y.h, p.z.h), Point3(q.x.h, q.y.h, q.z.h))
-    square = dot_wide(n, n)
+    n, ends = less3(q, p), (Point3(p.x.h, p.y.h, p.z.h), Point3(q.x.h, q.y.h, q.z.h))
+    square = dot3(n, n)
     if not square.h > 2.0**-300:
         return Wide(0.0, 0.0), 0.0, *ends
     beyond = 0.0
@@ -168,12 +156,10 @@ def named(view: View, triangle: int, feature: int) -> tuple[int, int, int]:
 
 
 @inline
-def _is_beyond(
-    view: View, triangle: int, known: tuple[int, int, int], shift: Point3, way: Point3, base: Point3
-) -> bool:
+def _is_beyond(view: View, item: int, known: tuple[int, int, int], shift: Point3, way: Point3, base: Point3) -> bool:
     """Tell whether the corners of a triangle that are none of a feature surely lie beyond the plane across a way."""
     for k in range(3):
-        vertex = view.mesh.triangles[triangle, k]
+        vertex = view.mesh.triangles[item, k]
         if vertex not in known:
             v = turned(view.place, scaled(as_point3(view.mesh.vertices, vertex), view.unit))
             if not dot(way, minus(Point3(v.x + shift.x, v.y + shift.y, v.z + shift.z), base)) < -_ROUGHLY:

@@ -43,12 +43,10 @@ def _room(n_nodes: int) -> Room:
 class SpreadPair:
     """Two bodies, the second under one of many poses, the first under one or as many; one thread at a time."""
 
-    def __init__(
-        self, first: Solid, second: Solid, first_poses: PoseArrays, second_poses: PoseArrays, budget: Budget
-    ) -> None:
+    def __init__(self, first: Solid, second: Solid, own: PoseArrays, second_poses: PoseArrays, budget: Budget) -> None:
         self.solids = first, second
         self.meshes = spread_of(first), spread_of(second)
-        self.poses = first_poses, second_poses
+        self.poses = own, second_poses
         self.budget = budget
         self.n_exact = 0  # poses that the exact stage was asked about
         self._radii = radius_of(first), radius_of(second)

@@ -23,18 +23,7 @@ import numpy as np
 
 from engine.collision.clearance.along_line import approach, finish_along_line
 from engine.collision.clearance.blocks import CLOSER, DONE, FULL, INTERRUPTED, block_reach, keep_below, measure_blocks
-from engine.collision.clearance.boxes import (
-    ROOT,
-    Heap,
-    Room,
-    Search,
-    View,
-    box_bound,
-    frame_of,
-    lane_centre,
-    lane_half,
-    set_line,
-)
+from engine.collision.clearance.boxes import ROOT, Search, View, box_bound, frame_of, lane_centre, lane_half, set_line
 from engine.collision.clearance.certified import certify
 from engine.collision.clearance.refined import refine
 from engine.collision.meshes.mesh_arrays import MeshArrays
@@ -66,7 +55,7 @@ class Asked(NamedTuple):
 
 
 @inline
-def push(heap: Heap, n: int, bound: float, i: int, j: int) -> None:
+def push(heap: Any, n: int, bound: float, i: int, j: int) -> None:
     bounds, lanes = heap.bounds, heap.lanes
     while n > 0 and bounds[(n - 1) >> 1] > bound:  # bound: the height of the heap
         bounds[n], lanes[n, 0], lanes[n, 1] = bounds[(n - 1) >> 1], lanes[(n - 1) >> 1, 0], lanes[(n - 1) >> 1, 1]
@@ -75,7 +64,7 @@ def push(heap: Heap, n: int, bound: float, i: int, j: int) -> None:
 
 
 @inline
-def drop_first(heap: Heap, n: int) -> None:
+def drop_first(heap: Any, n: int) -> None:
     """Take the first of n entries out, the last one takes a place of its own."""
     bounds, lanes = heap.bounds, heap.lanes
     last, i, j = bounds[n - 1], lanes[n - 1, 0], lanes[n - 1, 1]
@@ -170,7 +159,7 @@ def _start_line(s: Search) -> None:
 @bare_kernel
 def find_nearest(
     first: MeshArrays, first_poses: PoseArrays, second: MeshArrays, second_poses: PoseArrays, span: tuple[int, int],
-    asked: Asked, answers: Any, room: Room, flag: Any,
+    asked: Asked, answers: Any, room: Any, flag: Any,
 ) -> tuple[int, int, int]:  # fmt: skip
     """Answer for the poses of both bodies from span[0] to span[1] whose answers (n,) are NaN; the first may have but
     one.

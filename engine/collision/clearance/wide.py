@@ -69,18 +69,18 @@ def root(a: Wide) -> Wide:
 
 
 @inline
-def minus_wide(a: Wide3, b: Wide3) -> Wide3:
+def less3(a: Wide3, b: Wide3) -> Wide3:
     """Return a - b."""
     return Wide3(less(a.x, b.x), less(a.y, b.y), less(a.z, b.z))
 
 
 @called
-def dot_wide(a: Wide3, b: Wide3) -> Wide:
+def dot3(a: Wide3, b: Wide3) -> Wide:
     """Return a . b."""
     return plus(plus(times(a.x, b.x), times(a.y, b.y)), times(a.z, b.z))
 
 
 @inline
-def along_wide(a: Wide3, t: Wide, u: Wide3) -> Wide3:
+def along3(a: Wide3, t: Wide, u: Wide3) -> Wide3:
     """Return a + t u."""
     return Wide3(plus(a.x, times(t, u.x)), plus(a.y, times(t, u.y)), plus(a.z, times(t, u.z)))

@@ -28,10 +28,10 @@ def _is_beside(a: Point3, b: Point3, c: Point3, d: Point3, error: float) -> bool
 
 @merged
 def common_corner(poses: Any, t: Facet, u: Facet, own: Facet, their: Facet, error: float) -> int:
-    """Return 3 k + m where corner k of a face surely is corner m of another, and they have no their common point, else
+    """Return 3 k + m where corner k of a face surely is corner m of another, and they have no other common point, else
     -1; t, u: the rounded posed triangles, each coordinate off by at most `error`; own, their: before their poses.
 
-    The their corners of one lie strictly on one side of the plane of the their: it meets that plane in the corner.
+    The other corners of one lie strictly on one side of the plane of the other: it meets that plane in the corner.
     """
     for k in range(3):
         for m in range(3):

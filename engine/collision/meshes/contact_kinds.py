@@ -14,6 +14,7 @@ import numpy as np
 from engine.collision.codes import UNSETTLED
 from engine.collision.meshes.triangle_triangle import (
     Facet,
+    Signs,
     beside,
     corner,
     is_same,
@@ -60,9 +61,7 @@ def _turn(
 
 
 @called
-def _against_face(
-    poses: Any, t: Facet, sides: tuple[int, int, int], u: Facet, axis: int, error: float, work: Any
-) -> int:
+def _against_face(poses: Any, t: Facet, sides: Signs, u: Facet, axis: int, error: float, work: Any) -> int:
     """Return how t, at these sides of u's plane, meets the open face u: EDGE_FACE, VERTEX_FACE; or by corners."""
     off, flat = beside(u, axis), axis if (t.p.pose == UNPOSED and u.p.pose == UNPOSED) else -1
     if not np.isfinite(off.x + off.y + off.z):
@@ -121,9 +120,8 @@ def _overlap_on_line(
 
 @called
 def _open_edges_meet(
-    poses: Any, t: Facet, sides: tuple[int, int, int], u: Facet, their_sides: tuple[int, int, int], axis: int,
-    error: float, work: Any,
-) -> bool:  # fmt: skip
+    poses: Any, t: Facet, sides: Signs, u: Facet, their_sides: Signs, axis: int, error: float, work: Any
+) -> bool:
     """Tell whether two open edges of the faces have a common point."""
     is_flat = sides[0] == 0 and sides[1] == 0 and sides[2] == 0
     off, flat = beside(t, axis), axis if (t.p.pose == UNPOSED and u.p.pose == UNPOSED) else -1
@@ -157,7 +155,7 @@ def _open_edges_meet(
 
 
 @inline
-def lone_zero(sides: tuple[int, int, int]) -> int:
+def lone_zero(sides: Signs) -> int:
     """Return the corner of a face that alone lies on a plane, the others strictly on one side of it; -1 for none."""
     for k in range(3):
         if sides[k] == 0 and sides[(k + 1) % 3] * sides[(k + 2) % 3] == 1:
@@ -166,10 +164,7 @@ def lone_zero(sides: tuple[int, int, int]) -> int:
 
 
 @inline
-def _is_edge_across(
-    poses: Any, t: Facet, u: Facet, sides: tuple[int, int, int], their_sides: tuple[int, int, int],
-    error: float,
-) -> bool:  # fmt: skip
+def _is_edge_across(poses: Any, t: Facet, u: Facet, sides: Signs, their_sides: Signs, error: float) -> bool:
     """Tell whether an edge of one of two faces that straddle surely passes through the other, strictly within it.
 
     Each cuts the line of the two planes in an interval. Where these share a length and two ends differ, one of them

@@ -20,24 +20,8 @@ from engine.collision.meshes.common_corners import common_corner, keep_first
 from engine.collision.meshes.contact_kinds import N_NAMED, N_SIGNS
 from engine.collision.meshes.face_state import proves_overlap, state_of
 from engine.collision.meshes.mesh_arrays import STATE_CLEAN, MeshArrays, triangle_of
-from engine.collision.meshes.placement import (
-    Placement,
-    PoseArrays,
-    defect_of,
-    place_pair,
-    placed,
-    placed_axis,
-    set_frame,
-)
-from engine.collision.meshes.triangle_triangle import (
-    APART,
-    CORNER,
-    CROSSING,
-    Facet,
-    classify_exactly,
-    classify_near,
-    with_pose,
-)
+from engine.collision.meshes.placement import Placement, PoseArrays, axis_at, defect_of, place_pair, placed, set_frame
+from engine.collision.meshes.triangle_triangle import APART, CORNER, CROSSING, Facet, classify, classify_near, with_pose
 from engine.jit import inline, merged
 from engine.lanes.boxes import FRAME_ROWS, meeting
 from engine.lanes.discs import discs_meeting
@@ -179,9 +163,9 @@ def settle_class(s: Search, i: int, j: int, t: Facet, u: Facet) -> int:
     if s.first.axis[i] < 0 or s.second.axis[j] < 0:
         return UNDECIDED
     if place.error == 0.0:  # the rounded points are the points
-        return classify_exactly(poses, with_pose(t), with_pose(u), placed_axis(int(s.first.axis[i]), place.a), 0.0)
+        return classify(poses, with_pose(t), with_pose(u), axis_at(int(s.first.axis[i]), place.a), 0.0)
     own, their = before_poses(s, i, j)
-    return classify_exactly(poses, own, their, int(s.first.axis[i]), place.posed_error)
+    return classify(poses, own, their, int(s.first.axis[i]), place.posed_error)
 
 
 @merged

@@ -281,15 +281,15 @@ def _crossing_abscissa(s: _Segment, t: _Segment) -> Fraction | None:
 
 
 def pieces_of_segment(
-    body: ExactBody, ends: tuple[Vector, Vector], by: ExactBody, budget: Budget
+    body: ExactBody, ends: tuple[Vector, Vector], cutter: ExactBody, budget: Budget
 ) -> Iterator[Homogeneous]:
-    """Yield a point in each piece that the faces of `by` cut from a segment; points of a face may be among them."""
+    """Yield a point in each piece that the faces of `cutter` cut from a segment; points of a face may be among them."""
     p, q = ends
     low, high = _around(body, [(*p, 1), (*q, 1)])
     stops = {Fraction(0), Fraction(1)}
-    for face in by.faces_in(low, high):
+    for face in cutter.faces_in(low, high):
         budget.check()
-        for plane in _planes_that_cut(by, face):
+        for plane in _planes_that_cut(cutter, face):
             f, g = value_at(plane, p), value_at(plane, q)
             if f != g:
                 t = Fraction(f, f - g)

@@ -28,7 +28,7 @@ from engine.collision.meshes.mesh_arrays import (
 from engine.collision.meshes.triangle_triangle import (
     CROSSING,
     Facet,
-    classify_exactly,
+    classify,
     classify_near,
     is_straddling,
     projected,
@@ -85,7 +85,7 @@ def state_by(mesh: MeshArrays, face: int, other: int, poses: Any) -> int:
     if is_straddling(p, q, r):
         how = classify_near(t, o, 0.0)
         if how == UNDECIDED:
-            how = classify_exactly(poses, with_pose(t), with_pose(o), axis, 0.0)
+            how = classify(poses, with_pose(t), with_pose(o), axis, 0.0)
         return STATE_STACKED if how == UNDECIDED else (STATE_CROSSED if how == CROSSING else STATE_CLEAN)
     sides, corners = (p, q, r), (o.p, o.q, o.r)
     for k in range(3):

@@ -18,7 +18,7 @@ from engine.bounding.aabb import corners_of_box
 from engine.bounding.bvh import WIDTH, build_bvh
 from engine.bounding.disc_tree import fill_discs
 from engine.collision.meshes.placement import Extent, PoseArrays
-from engine.collision.meshes.triangle_triangle import Facet, projected, triangle_at
+from engine.collision.meshes.triangle_triangle import Facet, facet_at, projected
 from engine.containment.methods.polyhedron_ray_parity import fill_triangle_boxes
 from engine.jit import inline, kernel
 from engine.lanes.boxes import EMPTY
@@ -170,7 +170,7 @@ def _lay_out(
                     used[n_used, 0], used[n_used, 1], used[n_used, 2] = as_point3(vertices, vertex)
                     n_used += 1
                 ordered[item, corner] = number[vertex]
-            axis[item] = axis_of(triangle_at(used, ordered[item, 0], ordered[item, 1], ordered[item, 2]))
+            axis[item] = axis_of(facet_at(used, ordered[item, 0], ordered[item, 1], ordered[item, 2]))
     parent = np.empty(n_used, np.int64)
     _join(ordered, np.zeros(n_triangles, np.bool_), parent)
     number[:n_used] = 0
@@ -259,7 +259,7 @@ def axis_of(t: Facet) -> int:
 def triangle_of(mesh: MeshArrays, item: int) -> Facet:
     """Load a triangle in the body's own coordinates."""
     t = mesh.triangles
-    return triangle_at(mesh.vertices, t[item, 0], t[item, 1], t[item, 2])
+    return facet_at(mesh.vertices, t[item, 0], t[item, 1], t[item, 2])
 
 
 @inline

@@ -28,14 +28,7 @@ from engine.collision.meshes.exact_body import ExactBody, exact_pair
 from engine.collision.meshes.exact_regions import Sides, regions_of, sides_at
 from engine.collision.meshes.exact_triangles import classify_exact, kind_of_contact
 from engine.collision.meshes.face_state import states_of
-from engine.collision.meshes.mesh_arrays import (
-    NO_AREA,
-    STATE_CLEAN,
-    STATE_CROSSED,
-    STATE_STACKED,
-    MeshBody,
-    join_vertices,
-)
+from engine.collision.meshes.mesh_arrays import NO_AREA, STATE_CLEAN, STATE_STACKED, MeshBody, join_vertices
 from engine.collision.meshes.parity import INSIDE, OUTSIDE, locate_vertices
 from engine.collision.meshes.pose_batch import KIND, N_COLUMNS, N_CONTACTS, ONE_SETTLES, relate_poses
 from engine.collision.meshes.triangle_triangle import APART, CROSSING
@@ -163,7 +156,7 @@ class MeshPair:
             return second == STATE_CLEAN
         if self.seek == SEEK_PIERCING_BY_SECOND:
             return first == STATE_CLEAN
-        return max(first, second) <= STATE_CROSSED and min(first, second) == STATE_CLEAN
+        return STATE_CLEAN in (first, second) and STATE_STACKED not in (first, second)
 
     def named(self, *, piercing: bool = False) -> Witness | None:
         """Return the strongest of the first contacts, of equal ones that of the first faces; None if none is asked."""

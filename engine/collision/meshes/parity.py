@@ -16,15 +16,7 @@ import numpy as np
 from engine.bounding.bvh import STACK
 from engine.collision.meshes.faces_near import ABOVE_ALL, SLACK, box_between, next_face
 from engine.collision.meshes.mesh_arrays import MeshArrays, in_tree, triangle_of
-from engine.collision.meshes.placement import (
-    Placement,
-    PoseArrays,
-    defect_of,
-    orient2d_near,
-    place_pair,
-    placed,
-    turned_back,
-)
+from engine.collision.meshes.placement import Placement, defect_of, orient2d_near, place_pair, placed, turned_back
 from engine.collision.meshes.triangle_triangle import Facet
 from engine.jit import allocating, inline, kernel
 from engine.predicates.loading import as_point3
@@ -123,7 +115,7 @@ def locate_point(own: OwnPoint, mesh: MeshArrays) -> int:
 
 @kernel
 def locate_vertices(
-    source: MeshArrays, source_pose: PoseArrays, vertices: Any, mesh: MeshArrays, pose: PoseArrays, found: Any,
+    source: MeshArrays, source_pose: Any, vertices: Any, mesh: MeshArrays, pose: Any, found: Any,
     flag: Any,
 ) -> None:  # fmt: skip
     """Fill found (n,) int8 for the vertices (n,) of `source` against `mesh`, each under its one pose."""

@@ -150,7 +150,7 @@ def orient2d_near(a: Point2, b: Point2, c: Point2, error: float) -> int:
 
 
 @inline
-def placed_axis(axis: int, place: Placement) -> int:
+def axis_at(axis: int, place: Placement) -> int:
     """Return where the pose turns a coordinate axis to; caller guarantees a pose that permutes axes, or none."""
     if not place.is_posed or axis < 0:
         return axis

@@ -5,7 +5,7 @@ interval of the common line, and two more signs tell whether the intervals have 
 plane, the edges are separating axes. Two stages:
 
 - `classify_near`: float64 with one bound for all signs; answers APART or CROSSING, UNDECIDED where any sign is near 0.
-- `classify_exactly`: every sign exact, of points under their poses; answers always but out of exponent range.
+- `classify`: every sign exact, of points under their poses; answers always but out of exponent range.
 
 Caller guarantees that both triangles have an area (`exact_triangles.py` takes those without).
 
@@ -36,12 +36,13 @@ CORNER = 8
 plane; from CORNER on 3 k + m more, corner k of the first is corner m of the second, and nothing else is common."""
 
 
+Signs = tuple[int, int, int]
 Facet = namedtuple("Facet", "p q r")
 """Three points of one kind; compiled code passes triangles by value."""
 
 
 @inline
-def triangle_at(points: Any, i: int, j: int, k: int) -> Facet:
+def facet_at(points: Any, i: int, j: int, k: int) -> Facet:
     """Load three of points (n, 3)."""
     return Facet(as_point3(points, i), as_point3(points, j), as_point3(points, k))
 
@@ -177,7 +178,7 @@ def sign_of_four(poses: Any, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d: 
 
 
 @called
-def sides_of(poses: Any, t: Facet, u: Facet, error: float) -> tuple[int, int, int]:
+def sides_of(poses: Any, t: Facet, u: Facet, error: float) -> Signs:
     """Return the sides of the plane of t on which the corners of u lie, each as `sign_of_four`."""
     a = posed_point(poses, t.p)
     v, w = minus(posed_point(poses, t.q), a), minus(posed_point(poses, t.r), a)
@@ -192,9 +193,7 @@ def sides_of(poses: Any, t: Facet, u: Facet, error: float) -> tuple[int, int, in
 
 
 @inline
-def lone_first(
-    t1: Facet, t2: Facet, sides: tuple[int, int, int], their_sides: tuple[int, int, int]
-) -> tuple[Facet, Facet]:
+def lone_first(t1: Facet, t2: Facet, sides: Signs, their_sides: Signs) -> tuple[Facet, Facet]:
     """Return two triangles with the lone vertices first, each above the plane of the other; sides: of the corners of
     t1 of the plane of t2, and the other way."""
     lone1, side1 = lone_vertex(sides[0], sides[1], sides[2])
@@ -208,7 +207,7 @@ def lone_first(
 
 
 @called
-def classify_exactly(poses: Any, t1: Facet, t2: Facet, axis: int, error: float) -> int:
+def classify(poses: Any, t1: Facet, t2: Facet, axis: int, error: float) -> int:
     """Return the class of two triangles that both have an area; UNDECIDED only where exponents leave the range.
 
     poses (n, 12), error: as for `orient3d_posed`. axis: a coordinate axis, before its pose, along which the projection

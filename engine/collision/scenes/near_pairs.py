@@ -90,7 +90,7 @@ def distances_below(
 
 
 def _asked(
-    bodies: SceneBodies, pairs: IntArray, places: IntArray, gap: float, measured: bool, budget: Budget
+    bodies: SceneBodies, pairs: IntArray, places: IntArray, gap: float, is_measured: bool, budget: Budget
 ) -> FloatArray:
     """Return the distances of pairs of the same two solids under the poses of some rows, as `distances_below` does."""
     first, second = (bodies.solids[number] for number in pairs[0].tolist())
@@ -100,12 +100,12 @@ def _asked(
             budget.check()
             placed = (bodies.poses[i], bodies.poses[j]) if place else (None, None)
             apart, _ = gap_of_planes(first, second, placed, budget)
-            found[item] = np.inf if apart.is_at_least(Fraction(gap)) else apart.distance() if measured else 0.0
+            found[item] = np.inf if apart.is_at_least(Fraction(gap)) else apart.distance() if is_measured else 0.0
         return found
     own, others = (in_space(bodies.rotations[rows], bodies.translations[rows]) for rows in places.T)
     pair = SpreadPair(first, second, own, others, budget)
     pair.fill(0, len(pairs), found, Fraction(gap))
-    if measured:
+    if is_measured:
         found[found == 0.0] = np.nan
         pair.fill(0, len(pairs), found)
     return found

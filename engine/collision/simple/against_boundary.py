@@ -23,17 +23,7 @@ from engine.collision.exact_images import HalfSpaceImage, Vector, image_half_spa
 from engine.collision.meshes.live_faces import simplex_distance
 from engine.collision.meshes.mesh_arrays import mesh_body_of
 from engine.collision.meshes.mesh_pair import SPACE
-from engine.collision.result import (
-    FIRST_WITHIN,
-    NO_CONTACT,
-    RELATIONS,
-    SECOND_WITHIN,
-    Collision,
-    Parts,
-    Poses,
-    Witness,
-    Work,
-)
+from engine.collision.result import FIRST_WITHIN, NO_CONTACT, SECOND_WITHIN, Collision, Parts, Poses, Witness, Work
 from engine.collision.simple.ball_on_mesh import relate_ball
 from engine.collision.simple.boundary import Boundary, boundary_of, signs_of
 from engine.containment.rational_locate import rational_location
@@ -81,7 +71,7 @@ def _by_floats(body: Solid, center: list[float], is_rounded: bool, radius: float
     )
     work.budget.check()
     if relation in (OVERLAPPING, TOUCHING):
-        return Collision(RELATIONS[relation], Witness("surface", face, piercing=relation == TOUCHING))
+        return Collision(Relation(relation), Witness("surface", face, piercing=relation == TOUCHING))
     return _WITHIN.get(relation)
 
 

@@ -15,7 +15,7 @@ from engine.collision.meshes.triangle_triangle import (
     COPLANAR,
     CROSSING,
     Facet,
-    classify_exactly,
+    classify,
     with_pose,
 )
 from engine.jit import kernel
@@ -35,7 +35,7 @@ def classify_batch(first: Any, second: Any, axes: Any, kinds: Any) -> None:
         a, b = first[item], second[item]
         t1 = Facet(as_point3(a, 0), as_point3(a, 1), as_point3(a, 2))
         t2 = Facet(as_point3(b, 0), as_point3(b, 1), as_point3(b, 2))
-        kinds[item] = classify_exactly(poses, with_pose(t1), with_pose(t2), axes[item], 0.0)
+        kinds[item] = classify(poses, with_pose(t1), with_pose(t2), axes[item], 0.0)
 
 
 @kernel
