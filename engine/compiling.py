@@ -27,6 +27,7 @@ from numba.core.lowering import Lower
 from numba.core.registry import CPUDispatcher
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
+from numba.core.targetconfig import ConfigStack
 from numba.core.typed_passes import NativeLowering, NopythonRewrites
 from numba.core.types import Dispatcher
 from numba.core.types.misc import unliteral
@@ -42,6 +43,7 @@ _ASKED_FOR = {
     NullCache: ("load_overload", "save_overload"),
     CompileResult: ("_reduce",),
     CompilerBase: ("compile_extra",),
+    ConfigStack: ("top_or_none",),
     Context: ("resolve_function_type", "resolve_getattr"),
     CPUDispatcher: ("get_call_template",),
     Lower: ("setup_function",),
@@ -121,7 +123,10 @@ class _InnerLibrary(_Library):
 
 
 class _CalledLibrary(_InnerLibrary):
-    """Code that is never copied into its callers."""
+    """Code that is never copied into its callers: it is optimised once, with the kernel."""
+
+    def _optimize_final_module(self) -> None:
+        pass
 
 
 class _InnerCodegen(JITCPUCodegen):  # type: ignore[misc]
@@ -265,11 +270,30 @@ class CalledCompiler(KernelCompiler):
 
 
 class InnerDispatcher(CPUDispatcher):  # type: ignore[misc]
-    """Compiles a function once for ``int``, not again for each number that a caller spells out."""
+    """Compiles a function once for ``int``, not again for each number that a caller spells out.
+
+    Nor again for callers that count references to arrays and callers that do not. What it does to those it is handed
+    comes out even either way; those that it returned would be counted by one side alone, and be freed while in use,
+    or never.
+
+    Raises: TypeError where a function that returns arrays is called by both.
+    """
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         plain = {name: unliteral(kind) for name, kind in kws.items()}
-        return super().get_call_template(tuple(map(unliteral, args)), plain)
+        found = super().get_call_template(tuple(map(unliteral, args)), plain)
+        counts = bool(ConfigStack.top_or_none().nrt)
+        for types, made in self.overloads.items():
+            first = self._counted.setdefault(types, self.targetoptions.get("_nrt", counts))
+            result = made.signature.return_type
+            if first != counts and self.targetctx.data_model_manager[result].contains_nrt_meminfo():
+                raise TypeError(f"{self.py_func.__qualname__} returns {result} to bare and to counting callers")
+        return found
+
+    @functools.cached_property
+    def _counted(self) -> dict[Any, bool]:
+        """Whether each overload counts references."""
+        return {}
 
 
 class KernelCache(NullCache):  # type: ignore[misc]

@@ -76,7 +76,8 @@ def kernel(function: Callable[..., Any]) -> Any:
 def bare_kernel(function: Callable[..., Any]) -> Any:
     """Compile as `kernel` does, without counting references to arrays, there and in all that it calls.
 
-    Nothing below may make an array, or assign a part of one to another, unless it is `allocating`.
+    Nothing below may make an array, or assign a part of one to another, unless it is `allocating`; nor may it return an
+    array where a `kernel` calls it too (who compiles that is told).
     """
     return _kernel(function, _nrt=False)
 

@@ -189,13 +189,6 @@ def state_of(entered: Latest, left: Latest, is_out: bool, is_open: bool) -> floa
 
 
 @inline
-def columns_of(columns: Any) -> tuple[Any, Any, Any, Any]:
-    """Return the columns of a, b, c and d; in the plane any for c, since z is 0."""
-    d = columns.shape[0] - 3
-    return columns[0], columns[1], columns[d - 1], columns[d]
-
-
-@inline
 def coordinate_limit(columns: Any) -> float:
     """Return what coordinates have to stay below, so that bounds of plane values stay below `WIDEST`."""
     limit = np.inf
@@ -210,7 +203,8 @@ def decide_alone(
 ) -> tuple[int, int, int, int]:
     """Decide on one segment as `decide_by_rows` does; limit: of coordinates. numbers, chosen: (3, m), (m,), scratch."""
     is_flat = segments.shape[2] == 2
-    a, b, c, d = columns_of(columns)
+    k = columns.shape[0] - 3  # in the plane any column is that of c, since z is 0
+    a, b, c, d = columns[0], columns[1], columns[k - 1], columns[k]
     p, q = point_of(segments, item, 0, is_flat), point_of(segments, item, 1, is_flat)
     most = max(abs(p[0]), abs(p[1]), abs(p[2]), abs(q[0]), abs(q[1]), abs(q[2]))
     if not (is_plain(p, q) and most < limit):
@@ -232,7 +226,8 @@ def decide_on_rows(
     """Decide on ``segments[first:last]`` ((n, 2, dim) float64) where all planes (`as_columns`) are >= 0. Plane by plane
     over a block of segments, without branches. Outputs: see `decide_on_boxes`."""
     is_flat = segments.shape[2] == 2
-    a, b, c, d = columns_of(columns)
+    k = columns.shape[0] - 3  # in the plane any column is that of c, since z is 0
+    a, b, c, d = columns[0], columns[1], columns[k - 1], columns[k]
     m, limit = d.size, coordinate_limit(columns)
     numbers, chosen = np.empty((3, m + 1)), np.empty(m + 1, np.int64)
     px, py, pz, qx, qy, qz, most = (

@@ -14,7 +14,7 @@ from engine.predicates.double_double import dd_add, dd_div
 from engine.predicates.error_free import two_diff, workspace
 from engine.predicates.expansion import Components, grow, is_safe, sign
 from engine.predicates.side import dd_value
-from engine.segment_clipping.cyrus_beck import columns_of, expand_value, is_row_safe, is_segment_safe
+from engine.segment_clipping.cyrus_beck import expand_value, is_row_safe, is_segment_safe
 from engine.segment_clipping.pieces import Pieces, Triple, point_of, put_end, put_own_end
 from engine.segment_clipping.plane_meeting import T_BOUND
 
@@ -76,7 +76,8 @@ def fill_on_rows(
 ) -> None:  # fmt: skip
     """Fill the pieces of ``segments`` ((n, 2, dim) float64): see `fill_on_boxes`."""
     is_flat = segments.shape[2] == 2
-    a, b, c, d = columns_of(columns)
+    k = columns.shape[0] - 3  # in the plane any column is that of c, since z is 0
+    a, b, c, d = columns[0], columns[1], columns[k - 1], columns[k]
     n_open = beyond = 0
     for place in range(size):
         if stop[0]:

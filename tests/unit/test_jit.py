@@ -13,8 +13,10 @@ import sys
 import tarfile
 from pathlib import Path
 
+import numpy as np
 import pytest
 from numba import config as numba_config
+from numba.core.errors import TypingError
 
 import engine
 from engine import jit, kernel_cache
@@ -301,3 +303,29 @@ def test_no_compiled_function_calls_a_kernel() -> None:
                 known = function.__globals__
                 called = [name for name in function.__code__.co_names if id(known.get(name)) in kernels]
                 assert not called, (function, called)
+
+
+def test_what_returns_arrays_is_not_shared_with_callers_that_do_not_count_them() -> None:
+    """Counted by one side alone they were freed while in use: `Scene.clip_segments` as the first question crashed."""
+
+    @jit.inline
+    def part(values):  # type: ignore[no-untyped-def]
+        return values[1]
+
+    @jit.kernel
+    def counting(values, out):  # type: ignore[no-untyped-def]
+        out[:] = part(values)
+
+    @jit.bare_kernel
+    def bare(values, out):  # type: ignore[no-untyped-def]
+        out[0] = np.sum(part(values))
+
+    out = np.zeros(2)
+    counting(np.array([1.0, 2.0]), out)
+    assert out.tolist() == [2.0, 2.0]
+    bare(np.array([3.0, 4.0]), out)  # numbers are not counted
+    assert out.tolist() == [4.0, 2.0]
+    counting(np.array([[1.0, 2.0], [3.0, 4.0]]), out)
+    assert out.tolist() == [3.0, 4.0]
+    with pytest.raises((TypeError, TypingError), match="part returns array.* to bare and to counting callers"):
+        bare(np.array([[1.0, 2.0], [3.0, 4.0]]), out)

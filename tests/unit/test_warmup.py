@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from engine.warmup import STEPS
+
 PROBE = """
 import importlib, pkgutil
 import numpy as np
@@ -103,3 +105,13 @@ def test_first_answers_take_no_more_compilations_than_known(tmp_path: Path) -> N
     assert found.returncode == 0, found.stderr[-3000:]
     counts = [int(word) for word in found.stdout.split()]
     assert all(count <= known for count, known in zip(counts, COMPILATIONS, strict=True)), counts
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("step", [step.__name__ for step in STEPS])
+def test_any_step_may_be_the_first(tmp_path: Path, step: str) -> None:
+    """What is compiled for one kernel depends on those before it: who asks about scenes first gets other code."""
+    code = f"from engine import warmup; warmup.{step}()"
+    empty = {**os.environ, "ENGINE_CACHE_DIR": str(tmp_path / "cache"), "ENGINE_CACHE_SEED": ""}
+    found = subprocess.run([sys.executable, "-c", code], env=empty, capture_output=True, text=True, timeout=600)
+    assert found.returncode == 0, found.stderr[-3000:]
