@@ -85,9 +85,11 @@ def crossing(first: Line, second: Line) -> Homogeneous:
 def arrange(
     nodes: NodeTable, segments: Sequence[tuple[int, int]], masks: Sequence[Any], budget: Budget | None = None
 ) -> Arrangement:
-    """Return the arrangement of `segments`, pairs of numbers in `nodes`, which gains the crossings. masks: for each
-    segment the sources it bounds: the bits of an integer, or a frozenset. Segments of zero length bound nothing and are
-    left out. Cost: the box sweep, 5 us per crossing, 10 us per pair that the filter leaves."""
+    """Return the arrangement of `segments`, pairs of numbers in `nodes`, which gains the crossings.
+
+    masks: for each segment the sources it bounds: the bits of an integer, or a frozenset. Segments of zero length bound
+    nothing and are left out. Cost: the box sweep, 5 us per crossing, 10 us per pair that the filter leaves.
+    """
     budget = budget or Budget()
     merged: dict[tuple[int, int], list[Any]] = {}
     for count, ((start, end), mask) in enumerate(zip(segments, masks)):
@@ -153,9 +155,10 @@ def _orientation(a: FloatArray, b: FloatArray, c: FloatArray) -> Int8Array:
 
 def classify_pairs(coordinates: FloatArray, segments: IntArray, pairs: IntArray, budget: Budget) -> Int8Array:
     """Return for each of `pairs` whether its segments MISS, CROSS in a point inside both, or are UNDECIDED.
+
     coordinates: (n_nodes, 2) float64, exact. segments: (n_segments, 2) int64 nodes. pairs: (n_pairs, 2) int64 segments.
-    Segments that share an end and are surely not collinear count as MISS: no point besides that end is common to
-    them."""
+    Segments that share an end and are surely not collinear count as MISS: no point besides that end is common to them.
+    """
     result = np.full(len(pairs), UNDECIDED, np.int8)
     for start in range(0, len(pairs), _CHUNK):
         budget.check()

@@ -26,9 +26,11 @@ _POLL = 1024  # points, a microsecond each, between two looks at the clock
 
 
 def nearest_quotient(numerator: int, denominator: int) -> float:
-    """Return the double nearest to ``numerator / denominator``, ties to even, zero as +0.0. CPython divides integers
-    with one correct rounding, subnormal results included. Raises: `NotRepresentableError` where the quotient rounds
-    beyond the largest double."""
+    """Return the double nearest to ``numerator / denominator``, ties to even, zero as +0.0.
+
+    CPython divides integers with one correct rounding, subnormal results included.
+    Raises: `NotRepresentableError` where the quotient rounds beyond the largest double.
+    """
     try:
         return numerator / denominator + 0.0
     except OverflowError:
@@ -47,8 +49,11 @@ def reduced(x: int, y: int, w: int) -> Homogeneous:
 
 
 class NodeTable:
-    """Exact points without repetition, numbered in order of arrival. points[i]: the point as integers. xs[i], ys[i]:
-    the doubles nearest to its coordinates. exponent: a coordinate is ``x / w * 2**exponent``."""
+    """Exact points without repetition, numbered in order of arrival.
+
+    points[i]: the point as integers. xs[i], ys[i]: the doubles nearest to its coordinates.
+    exponent: a coordinate is ``x / w * 2**exponent``.
+    """
 
     __slots__ = ("_down", "_index", "_n_floats", "_up", "exponent", "points", "xs", "ys")
 

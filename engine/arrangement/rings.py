@@ -44,9 +44,11 @@ class Piece:
 def trace_pieces(
     subdivision: Subdivision, inside: Sequence[bool], evidence: Sequence[frozenset[int]], budget: Budget | None = None
 ) -> list[Piece]:
-    """Return the regions that the faces marked `inside` make, in the order of their shells. inside, evidence: one for
-    each face; face 0 must be outside. Shells run counter-clockwise, holes clockwise; pieces are in lexicographic order
-    of their shells' nodes, holes likewise: the order does not depend on that of the input."""
+    """Return the regions that the faces marked `inside` make, in the order of their shells.
+
+    inside, evidence: one for each face; face 0 must be outside. Shells run counter-clockwise, holes clockwise; pieces
+    are in lexicographic order of their shells' nodes, holes likewise: the order does not depend on that of the input.
+    """
     budget = budget or Budget()
     arrangement, faces = subdivision.arrangement, subdivision.faces
     bounds = [inside[left] != inside[right] for left, right in zip(faces[0::2], faces[1::2])]

@@ -91,7 +91,9 @@ def snap_rings(
 
 def _candidates(hot: Sequence[Pixel], centres: np.ndarray, start: Point, end: Point) -> list[int]:
     """Return the pixels that the segment may pass: those near its box, and of many those near its line, generously.
-    hot: sorted; centres: the same as floats."""
+
+    hot: sorted; centres: the same as floats.
+    """
     (x0, x1), (y0, y1) = (sorted((floor(a), floor(b))) for a, b in zip(start, end))
     first, last = bisect_left(hot, (x0 - 1, y0 - 1)), bisect_left(hot, (x1 + 2, y1 + 3))
     a, b = np.array(start, np.float64), np.array(end, np.float64)

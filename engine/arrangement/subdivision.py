@@ -132,10 +132,12 @@ def _first_nodes(arrangement: Arrangement) -> list[int]:
 
 
 def label_faces(subdivision: Subdivision, masks: Sequence[Any] | None = None, winds: bool = False) -> list[Any]:
-    """Return for each face the exclusive or of the masks of the edges between it and infinity. masks: one for each
-    edge; left out, those of the arrangement. Bit k of a label tells whether the face lies in source k under the
-    even-odd rule. The labels are well defined where each source is a set of closed rings. winds: masks are how often
-    rings run along each edge, less how often against it, and labels are winding numbers."""
+    """Return for each face the exclusive or of the masks of the edges between it and infinity.
+
+    masks: one for each edge; left out, those of the arrangement. Bit k of a label tells whether the face lies in source
+    k under the even-odd rule. The labels are well defined where each source is a set of closed rings. winds: masks are
+    how often rings run along each edge, less how often against it, and labels are winding numbers.
+    """
     masks = subdivision.arrangement.masks if masks is None else masks
     faces = subdivision.faces
     neighbours: list[list[tuple[int, Any]]] = [[] for _ in range(subdivision.n_faces)]
@@ -159,8 +161,10 @@ def label_faces(subdivision: Subdivision, masks: Sequence[Any] | None = None, wi
 
 class EdgesBelow:
     """The edges of an arrangement, ready for stabs straight down from a node, an infinitesimal step to its right.
+
     Arrays of rounded coordinates prune (rounding is monotone), integers decide. A stab counts edges that begin at the
-    node's x and leaves out those that end there, and vertical ones."""
+    node's x and leaves out those that end there, and vertical ones.
+    """
 
     __slots__ = ("_arrangement", "_high", "_low", "_x_max", "_x_min")
 

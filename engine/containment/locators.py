@@ -77,9 +77,11 @@ class Locator(NamedTuple):
 def settled(
     kernel: Callable[[FloatArray, Int8Array, Budget], int], settle: Callable[[Sequence[float], Check], int]
 ) -> Fill:
-    """Return the fill that runs `kernel` over a chunk and settles what it leaves UNDECIDED one by one. kernel: returns
-    how many points needed more than its filter, those left UNDECIDED among them, or NOT_FINITE. Raises NotFiniteError,
-    which names no point, and what `Budget.check` raises, also when the kernel stopped early."""
+    """Return the fill that runs `kernel` over a chunk and settles what it leaves UNDECIDED one by one.
+
+    kernel: returns how many points needed more than its filter, those left UNDECIDED among them, or NOT_FINITE.
+    Raises NotFiniteError, which names no point, and what `Budget.check` raises, also when the kernel stopped early.
+    """
 
     def fill(points: FloatArray, locations: Int8Array, budget: Budget) -> Counts:
         if len(points) == 0:
@@ -100,7 +102,10 @@ def settled(
 
 
 def locator_of(solid: Solid) -> Locator:
-    """Return how points are located in `solid`; prepares nothing yet. Raises: UnsupportedSolidError."""
+    """Return how points are located in `solid`; prepares nothing yet.
+
+    Raises: UnsupportedSolidError.
+    """
     maker = _MAKERS.get(type(solid))
     if maker is None:
         raise unsupported(solid)

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections import namedtuple
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray, IntArray, read_only
+from engine.arrays import BoolArray, Float32Array, FloatArray, Int32Array, IntArray, read_only
 from engine.bounding.bvh import WIDTH, build_bvh, on_lines
-from engine.bounding.grid import build_box_grid
+from engine.bounding.grid import BoxGrid, build_box_grid
 from engine.containment.methods.polyhedron_ray_parity import fill_triangle_boxes, lay_out
 from engine.containment.rational_locate import Check, next_in_ring, no_check, prism_walls
 from engine.lanes.overhead import OVERHEAD_ROWS
@@ -22,19 +21,45 @@ from engine.solids.triangle import Triangle
 EXACT: Final = np.zeros(0)
 """In place of blurs: the points are what they are."""
 
-TriangleTree = namedtuple("TriangleTree", "vertices triangles boxes child blocks origin scale low high")
-"""Triangles in a tree of boxes, for vertical rays. vertices: the solid's; triangles: (m, 3), in the order of the tree;
-boxes, child, origin, scale: as `Bvh` has them; blocks: (n_nodes, 8, 8), what `overhead` reads of the triangles of a
-node; low, high: the box of all triangles."""
 
-Rings = namedtuple("Rings", "starts ends x_highs slabs box")
-"""Edges of a polygon by horizontal slabs, for rays to the right. starts, ends: (m, 2), by falling larger x, which is
-x_highs; slabs: over y, the second axis has one cell; box: xmin, xmax, ymin, ymax."""
+class TriangleTree(NamedTuple):
+    """Triangles in a tree of boxes, for vertical rays."""
+
+    vertices: FloatArray
+    """``(n, 3)``: the solid's."""
+    triangles: Int32Array
+    """``(m, 3)``, in the order of the tree."""
+    boxes: Float32Array
+    child: Int32Array
+    """As `Bvh` has them."""
+    blocks: Float32Array
+    """``(n_nodes, 8, 8)``: what `overhead` reads of the triangles of a node."""
+    origin: tuple[float, float, float]
+    scale: float
+    low: tuple[float, float, float]
+    """The box of all triangles."""
+    high: tuple[float, float, float]
+
+
+class Rings(NamedTuple):
+    """Edges of a polygon by horizontal slabs, for rays to the right."""
+
+    starts: FloatArray
+    """``(m, 2)``, by falling larger x."""
+    ends: FloatArray
+    x_highs: FloatArray
+    """``(m,)``: the larger x of each edge."""
+    slabs: BoxGrid
+    """Over y; its second axis has one cell."""
+    box: tuple[float, float, float, float]
+    """xmin, xmax, ymin, ymax."""
 
 
 def tree_of(solid: Polyhedron, check: Check = no_check) -> TriangleTree:
-    """Return the tree over the triangles of `solid`, prepared once. check: called between the steps, a second's work
-    for a million triangles; what it raises ends the building."""
+    """Return the tree over the triangles of `solid`, prepared once.
+
+    check: called between the steps, a second's work for a million triangles; what it raises ends the building.
+    """
     return solid.prepared("tree", lambda: _build_tree(solid, check), check)
 
 
@@ -81,8 +106,10 @@ def prism_rows(solid: Triangle) -> tuple[FloatArray, BoolArray]:
 
 def rounded_rows(rows: Sequence[Sequence[int | Fraction]]) -> tuple[FloatArray, BoolArray]:
     """Return rational rows, each scaled to a largest coefficient near 1 and correctly rounded, and whether exactly so.
+
     A coefficient that is smaller than 2^-900 of the largest, and not zero, could underflow: such a row becomes NaN,
-    which no filter accepts."""
+    which no filter accepts.
+    """
     rounded, is_exact = np.empty((len(rows), len(rows[0]))), np.empty(len(rows), np.bool_)
     for i_row, row in enumerate(rows):
         largest = max(abs(Fraction(value)) for value in row)

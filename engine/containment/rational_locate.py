@@ -67,9 +67,11 @@ def _orient3d(a: Sequence[int], b: Sequence[int], c: Sequence[int], d: Sequence[
 
 
 def _is_on_closed_triangle(a: Integers, b: Integers, c: Integers, q: Integers) -> bool:
-    """Tell whether q lies on the closed triangle a, b, c of space, which may be a segment or a point. In the plane of a
-    proper triangle q is inside when no projection sees it on both sides of the three edges; beside the line of a
-    degenerate one some projection does, because the three signed areas add up to zero."""
+    """Tell whether q lies on the closed triangle a, b, c of space, which may be a segment or a point.
+
+    In the plane of a proper triangle q is inside when no projection sees it on both sides of the three edges; beside
+    the line of a degenerate one some projection does, because the three signed areas add up to zero.
+    """
     if any(not min(a[k], b[k], c[k]) <= q[k] <= max(a[k], b[k], c[k]) for k in range(3)):
         return False
     if _orient3d(a, b, c, q) != 0:
@@ -124,7 +126,9 @@ def triangle_boxes(solid: Polyhedron) -> FloatArray:
 
 def _unsure_triangles(point: Sequence[Number], solid: Polyhedron) -> tuple[IntArray, bool]:
     """Return the triangles (n, 3) that the ray up from a point may meet, and whether it meets an odd number of others.
-    By the tree where there is one, else by a look at all boxes."""
+
+    By the tree where there is one, else by a look at all boxes.
+    """
     near = [_around(value) for value in point]
     tree, found = solid.kept("tree"), np.empty(_MOST_UNSURE, np.int64)
     if tree is not None:
@@ -178,8 +182,10 @@ def _in_polygon(point: Sequence[Number], solid: Polygon | Triangle, check: Check
 
 def prism_walls(solid: Triangle) -> list[list[int]]:
     """Return the three rows of the prism over a triangle of space, as integers; all zero for a triangle without area.
+
     Wall e of the edge from p to r is {x : dot((n x (r - p)), x - p) >= 0} with n = (b - a) x (c - a), which is the
-    textbook's comparison of cross products by their dot product."""
+    textbook's comparison of cross products by their dot product.
+    """
 
     def build() -> list[list[int]]:
         flat = scaled_integers((*solid.vertices.ravel().tolist(), 1))
@@ -282,8 +288,10 @@ def rational_location(point: Sequence[Number], solid: Solid, pose: Pose | None =
 
 
 def combine(operation: str, located: Sequence[Any]) -> Any:
-    """Return the three-valued union (max), intersection (min) or difference min(A, -B) of locations. located: numbers,
-    or int8 arrays of one shape."""
+    """Return the three-valued union (max), intersection (min) or difference min(A, -B) of locations.
+
+    located: numbers, or int8 arrays of one shape.
+    """
     if operation == "difference":
         first, second = located
         return np.minimum(first, -second)

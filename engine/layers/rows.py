@@ -49,8 +49,10 @@ _HELD_BYTES: Final = 40
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Layer:
-    """The polygons of a layer's features, empty ones welcome, and which features have no geometry at all. parts,
-    owners: of features whose parts overlap the parts as given, and of each the feature; arrays: their union."""
+    """The polygons of a layer's features, empty ones welcome, and which features have no geometry at all.
+
+    parts, owners: of features whose parts overlap the parts as given, and of each the feature; arrays: their union.
+    """
 
     arrays: PolygonArrays
     is_missing: BoolArray
@@ -183,8 +185,10 @@ def meeting(
 
 
 def _differences(layer: Layer, others: Layer, pairs: IntArray, rivals: IntArray, limits: Limits) -> LayerRows:
-    """Return what is left of each feature of `layer` without those of `others` that it is paired with. pairs: by the
-    first, then the second; rivals: of others whose boxes meet."""
+    """Return what is left of each feature of `layer` without those of `others` that it is paired with.
+
+    pairs: by the first, then the second; rivals: of others whose boxes meet.
+    """
     seconds, groups = pairs[:, 1], summed(np.bincount(pairs[:, 0], minlength=len(layer)))
     overlap = _overlapping(others, rivals, groups, seconds, limits)
     clips, is_there = others.arrays.taken(seconds).merged(groups), layer.arrays.sizes() > 0
@@ -314,8 +318,10 @@ def _rows_of(found: Sequence[Overlay], left: IntArray) -> LayerRows:
 
 def held(points: object, layer: Layer, limits: Limits) -> tuple[IntArray, IntArray, BoolArray]:
     """Return points and the features that hold them, boundary included, by point, then feature; whether they are on it.
+
     Where parts of a feature overlap it holds what one of them does, boundary, spikes and all; a point on the boundary
-    of some, in the interior of none, is on the feature's unless it is in the interior of their union."""
+    of some, in the interior of none, is on the feature's unless it is in the interior of their union.
+    """
     there = np.flatnonzero(layer.arrays.sizes())
     solids = [*Chosen(layer.arrays, there), *Chosen(layer.parts, np.arange(len(layer.owners)))]
     found = limits.noted(locate_scene(points, solids, **limits.options()))

@@ -38,8 +38,10 @@ class KernelScene:
 def kernel_scene(
     region: Solid, vertices: FloatArray, largest: float, planes: list[Row], budget: Budget
 ) -> KernelScene | None:
-    """Return the scene as the kernel takes it, None where numbers lie too far apart for it. largest: magnitude of any
-    coordinate. planes: those of the region."""
+    """Return the scene as the kernel takes it, None where numbers lie too far apart for it.
+
+    largest: magnitude of any coordinate. planes: those of the region.
+    """
     exponent = exponent_above(largest)
     points = shifted(vertices, -exponent) if exponent else vertices
     if points is None or exponent < _DEEPEST or not planes:
@@ -99,7 +101,9 @@ def clip_chunk(
     sizes: IntArray, state: FlagArray, may_have_bridges: BoolArray,
 ) -> FloatArray:  # fmt: skip
     """Clip polygons first .. last - 1 as far as the kernel can; return the vertices of those it settled, in order.
-    Fills sizes (of rings), state and may_have_bridges (of polygons); see `clip_rings`."""
+
+    Fills sizes (of rings), state and may_have_bridges (of polygons); see `clip_rings`.
+    """
     n_vertices = int(ring_offsets[polygon_offsets[last]] - ring_offsets[polygon_offsets[first]])
     vertices, tables, done, parts = scene.vertices, scene.tables, first, list[FloatArray]()
     d = vertices.shape[1]

@@ -170,8 +170,10 @@ def _one_ring(size: int) -> tuple[IntArray, IntArray]:
 def _clip_few(
     vertices: FloatArray, tables: PlaneTables, ring_offsets: IntArray, polygon_offsets: IntArray, budget: Budget
 ) -> tuple[ClippedPolygons, int] | None:
-    """Clip few polygons, vertices as one row; return the result, and how many needed more than the filter. None where
-    one is left open, or there is no room."""
+    """Clip few polygons, vertices as one row; return the result, and how many needed more than the filter.
+
+    None where one is left open, or there is no room.
+    """
     n, n_rings, d = len(polygon_offsets) - 1, len(ring_offsets) - 1, tables.high.shape[1] - 1
     out = np.empty(4 * len(vertices) + d * (4 * len(tables.high) + 64))  # spikes are cut many times
     ring_sizes, status = np.empty(n_rings, np.int64), np.zeros(n, np.int8)
@@ -240,8 +242,10 @@ class Contours(NamedTuple):
 
 
 def as_contours(polygons: Any, dimension: int) -> Contours:
-    """Return all rings; none at all are welcome, an array is borrowed. Raises: InvalidArrayError, WrongDimensionError,
-    NotFiniteError, EmptyGeometryError, each naming the element."""
+    """Return all rings; none at all are welcome, an array is borrowed.
+
+    Raises: InvalidArrayError, WrongDimensionError, NotFiniteError, EmptyGeometryError, each naming the element.
+    """
     if isinstance(polygons, np.ndarray):
         array = as_point_groups(polygons, None, dimension, ("polygons",), must_be_finite=False)
         n, size = array.shape[:2]

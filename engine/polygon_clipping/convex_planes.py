@@ -43,8 +43,10 @@ def orientations(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> 
 
 
 def convex_planes(region: Polyhedron, check: Check) -> list[Row]:
-    """Return the planes of a convex polyhedron as integer rows, in the order of its faces, each plane once. Raises:
-    UnsupportedSolidError where the polyhedron is not convex, naming a face and a vertex beyond it."""
+    """Return the planes of a convex polyhedron as integer rows, in the order of its faces, each plane once.
+
+    Raises: UnsupportedSolidError where the polyhedron is not convex, naming a face and a vertex beyond it.
+    """
 
     def build() -> list[Row]:
         found: dict[Row, None] = {}

@@ -16,7 +16,7 @@ Range: coordinates below 2^64. Numbers that t or a quotient divides by are above
 from __future__ import annotations
 
 from collections import namedtuple
-from typing import Final
+from typing import Final, NamedTuple
 
 from engine.jit import inline, merged
 from engine.polygon_clipping.rings import Plane
@@ -96,8 +96,18 @@ def value_bound(size: float, moved: float) -> float:
     return DD_VALUE_BOUND * size + 1.01 * moved + TINY
 
 
-Share = namedtuple("Share", "ph pl qh ql sum_h sum_l th tl r")
-"""Where an edge is cut: weights |p|, |q|, their sum, t = |p| / sum as double-doubles, t known to a relative r."""
+class Share(NamedTuple):
+    """Where an edge is cut: weights |p|, |q|, their sum, t = |p| / sum as double-doubles, t known to a relative r."""
+
+    ph: float
+    pl: float
+    qh: float
+    ql: float
+    sum_h: float
+    sum_l: float
+    th: float
+    tl: float
+    r: float
 
 
 @inline
@@ -122,10 +132,13 @@ def between(x: Triple, y: Triple, s: Share) -> Triple:
 
 
 Vertices = namedtuple("Vertices", "pool rests edges names")
-"""The vertices of a ring, those that it came with first, then the cut ones. pool: (room * dim,) float64, their doubles.
-rests: (room * dim * 2,) float64, for each coordinate of a cut what its double leaves over, and the bound of its error.
-edges: (room,) int32, the original edge that goes on from a vertex, by its first vertex, -1 for one along a plane.
-names: as many numbers as there are axes, so that their count is known when this is compiled."""
+"""The vertices of a ring, those that it came with first, then the cut ones.
+
+pool: (room * dim,) float64, their doubles. rests: (room * dim * 2,) float64, for each coordinate of a cut what its
+double leaves over, and the bound of its error. edges: (room,) int32, the original edge that goes on from a vertex, by
+its first vertex, -1 for one along a plane. names: as many numbers as there are axes, so that their count is known when
+this is compiled.
+"""
 
 
 @merged
@@ -228,8 +241,10 @@ def cut_anew(s: Vertices, plane: Plane, p: int, q: int, n_ring: int, j: int) -> 
 
 @merged
 def cut_edge(s: Vertices, plane: Plane, v: int, w: int, n_ring: int, j: int) -> bool:
-    """Set vertex j to where the edge v w crosses a plane; return whether its doubles are sure. A part of an original
-    edge is cut as the whole of it is."""
+    """Set vertex j to where the edge v w crosses a plane; return whether its doubles are sure.
+
+    A part of an original edge is cut as the whole of it is.
+    """
     edge, p, q = s.edges[v], v, w
     if edge >= 0:
         p, q = edge, edge + 1 if edge + 1 < n_ring else 0

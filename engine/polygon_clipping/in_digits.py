@@ -12,8 +12,7 @@ What does not fit digits.py (edges of space cut anew several times, sizes far ap
 
 from __future__ import annotations
 
-from collections import namedtuple
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -34,16 +33,30 @@ _ROWS = 16 * SLOT
 _TINY = 2.0**-1000
 """Products that underflow."""
 
-ExactScratch = namedtuple(
-    "ExactScratch",
-    "heap n_rows terms loaded rows points places rings edges along signs on_plane used",
-)
-"""heap: int64, see digits.py; n_rows: how much of it the planes take. terms: (4, 3) int64, for sums. loaded: (2, dim +
-1) int64, places of two vertices. rows: (planes, dim + 1) int64, places of the planes' numbers. points: (room, dim)
-float64, the doubles nearest to vertices; places: (room, dim + 1) int64, numbers of cut ones. rings: (2, room) int64, a
-ring as numbers of vertices. edges, along: (room,) int64, the original edge that goes on from a vertex, by its first
-vertex, and the plane that it runs along, else -1. signs: (room,) int64. on_plane: (room,) bool, for places of the ring
-made. used: (2,) int64, how many vertices there are, and numbers of the heap."""
+
+class ExactScratch(NamedTuple):
+    """heap: int64, see digits.py; n_rows: how much of it the planes take. terms: (4, 3) int64, for sums. loaded:
+    (2, dim + 1) int64, places of two vertices. rows: (planes, dim + 1) int64, places of the planes' numbers.
+
+    points: (room, dim) float64, the doubles nearest to vertices; places: (room, dim + 1) int64, numbers of cut ones.
+    rings: (2, room) int64, a ring as numbers of vertices. edges, along: (room,) int64, the original edge that goes on
+    from a vertex, by its first vertex, and the plane that it runs along, else -1. signs: (room,) int64. on_plane:
+    (room,) bool, for places of the ring made. used: (2,) int64, how many vertices there are, and numbers of the heap.
+    """
+
+    heap: Any
+    n_rows: int
+    terms: Any
+    loaded: Any
+    rows: Any
+    points: Any
+    places: Any
+    rings: Any
+    edges: Any
+    along: Any
+    signs: Any
+    on_plane: Any
+    used: Any
 
 
 @inline
@@ -194,7 +207,9 @@ def cut(s: Any, plane: int, v: int, w: int, is_left: bool, n_ring: int) -> int:
 @inline
 def push(s: Any, made: Any, kept: int, v: int, is_on: bool, n_ring: int) -> int:
     """Append a vertex, on the plane or not, to the `kept` ones of a ring; return how many there are then, or TOO_LONG.
-    One that is the same point as the vertex before hands its edge on to that one."""
+
+    One that is the same point as the vertex before hands its edge on to that one.
+    """
     s.on_plane[kept] = is_on
     if kept > 0 and is_on and s.on_plane[kept - 1]:
         before = made[kept - 1]
@@ -279,7 +294,9 @@ def load_ring(s: Any, vertices: Any, first: int, last: int) -> int:
 @inline
 def cut_by_planes(s: Any, planes: Any, cutting: Cutting, n_cutting: int, n_ring: int, stop: Any) -> tuple[int, int]:
     """Cut the ring that is loaded by one plane after another; return how many vertices are left, in which of `rings`.
-    TOO_LONG or NO_ROOM instead. Adds to the contacts of the planes, and to which dropped a vertex."""
+
+    TOO_LONG or NO_ROOM instead. Adds to the contacts of the planes, and to which dropped a vertex.
+    """
     n, now = n_ring, 0
     for i_plane in range(n_cutting):
         if n <= 0:
@@ -303,7 +320,9 @@ def clip_exactly(
     clipped: Clipped, written: int,
 ) -> int:  # fmt: skip
     """Clip a polygon by the planes of `cutting`, whose contacts begin anew; `written` vertices are there already.
-    Returns the vertices written then, or NO_ROOM. What is too long is left OPEN."""
+
+    Returns the vertices written then, or NO_ROOM. What is too long is left OPEN.
+    """
     begun, d = written, s.points.shape[1]
     first_ring, last_ring = polygons.polygon_offsets[polygon], polygons.polygon_offsets[polygon + 1]
     for i in range(n_cutting):

@@ -17,8 +17,7 @@ Slack of planes across no axis: every vertex lies in the box of its polygon, so 
 
 from __future__ import annotations
 
-from collections import namedtuple
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -36,10 +35,23 @@ MOST_BITS: Final = 30
 ALONE: Final = 1 << MOST_BITS
 """Mark of a vertex on a plane (or near it): a run of its own."""
 
-Scratch = namedtuple("Scratch", "vertices cutting rings signs ends codes lows highs")
-"""What rings are clipped in. rings: (2, room) int32, a ring as numbers of vertices, and the one that is made of it.
-signs: (room,) int8, of its vertices. ends, codes: (room,) int32, of original vertices the last one of the run, and the
-planes that it is outside of. lows, highs: (3,) float64, the box of a polygon."""
+
+class Scratch(NamedTuple):
+    """What rings are clipped in.
+
+    rings: (2, room) int32, a ring as numbers of vertices, and the one that is made of it. signs: (room,) int8, of its
+    vertices. ends, codes: (room,) int32, of original vertices the last one of the run, and the planes that it is
+    outside of. lows, highs: (3,) float64, the box of a polygon.
+    """
+
+    vertices: Vertices
+    cutting: Cutting
+    rings: Any
+    signs: Any
+    ends: Any
+    codes: Any
+    lows: Any
+    highs: Any
 
 
 @inline
@@ -62,8 +74,10 @@ def scratch_for(room: int, n_planes: int, names: Any) -> Scratch:
 
 @merged
 def load_ring(s: Scratch, vertices: Any, begin: int, end: int) -> tuple[int, float, float, float, float, float, float]:
-    """Load a ring without vertices equal to the one before; return how many, and the bounds of each axis. Zeros become
-    +0.0. The first vertex may still be repeated at the end."""
+    """Load a ring without vertices equal to the one before; return how many, and the bounds of each axis.
+
+    Zeros become +0.0. The first vertex may still be repeated at the end.
+    """
     pool, d = s.vertices.pool, len(s.vertices.names)
     x, y, z = vertices[begin * d], vertices[begin * d + 1], 0.0 if d == 2 else vertices[begin * d + 2]
     pool[0], pool[1] = x + 0.0, y + 0.0
@@ -100,8 +114,10 @@ def load_box(s: Scratch, polygons: Polygons, first: int, last: int) -> int:
 
 @merged
 def choose_planes(s: Scratch, planes: Any) -> tuple[int, bool]:
-    """List the planes that may cut a polygon; return how many, and whether one has all of it outside. A plane that has
-    all vertices inside cuts nothing: what later planes see are points between the vertices."""
+    """List the planes that may cut a polygon; return how many, and whether one has all of it outside.
+
+    A plane that has all vertices inside cuts nothing: what later planes see are points between the vertices.
+    """
     cutting, lows, highs, d = s.cutting, s.lows, s.highs, len(s.vertices.names)
     n, is_outside = 0, False
     for number in range(planes.high.shape[0]):
@@ -215,8 +231,9 @@ def classify_by_value(s: Scratch, plane: Plane, near: float, ring: Any, n: int) 
 @merged
 def cut_ring(s: Scratch, plane: Plane, ring: Any, n: int, made: Any, n_ring: int, n_made: int) -> tuple[int, int]:
     """Cut a ring of n vertices by a plane at which they have their signs, into `made`: keep, cross or drop each edge.
-    n_made: how many vertices there are, cut ones included. Returns how many are left (DOUBT), and how many there
-    are."""
+
+    n_made: how many vertices there are, cut ones included. Returns how many are left (DOUBT), and how many there are.
+    """
     signs, edges = s.signs, s.vertices.edges
     kept, was_on, first_on = 0, False, False
     signs[n] = signs[0]
@@ -290,8 +307,11 @@ def emit(s: Scratch, ring: Any, n: int, n_ring: int, out: Any, place: int) -> in
 def clip_plainly(
     polygons: Polygons, planes: Any, first: int, last: int, stop: Any, clipped: Clipped, written: int, s: Scratch
 ) -> tuple[int, int, int, int]:
-    """Clip polygons from `first` on, up to one that needs care; `written` vertices are there already. Returns the
-    polygon reached, the vertices written, 0, DOUBT or NO_ROOM, and how many planes may cut the polygon reached."""
+    """Clip polygons from `first` on, up to one that needs care; `written` vertices are there already.
+
+    Returns the polygon reached, the vertices written, 0, DOUBT or NO_ROOM, and how many planes may cut the polygon
+    reached.
+    """
     d, offsets = len(s.vertices.names), polygons.ring_offsets
     for polygon in range(first, last):
         if stop[0]:

@@ -78,8 +78,11 @@ def clip_polygon(
     rings: Sequence[Sequence[Sequence[float]]], planes: Sequence[Row], check: Callable[[], object]
 ) -> tuple[list[list[list[float]]], bool]:
     """Return the contours of one polygon after all planes, correctly rounded, and whether it may hold bridge edges.
+
     rings: contours of at least one vertex each. planes: integer rows, applied in order. check: called for each plane.
-    An empty list stands for a contour of which nothing is left. Raises: TooComplexError."""
+    An empty list stands for a contour of which nothing is left.
+    Raises: TooComplexError.
+    """
     contours = []
     for ring in rings:
         dimension = len(ring[0])

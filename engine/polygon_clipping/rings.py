@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import namedtuple
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from engine.jit import merged
 
@@ -17,21 +17,37 @@ Polygons = namedtuple("Polygons", "vertices ring_offsets polygon_offsets")
 """vertices: (m * dim,) float64, as one row of numbers; offsets of rings and of polygons: see `ClippedPolygons`."""
 
 PlaneTables = namedtuple("PlaneTables", "high low axes at row_heap row_places")
-"""Planes as the kernel takes them; prepared once a region where nothing is scaled. high, low: (planes, dim + 1)
-float64, rows as double-doubles, every number zero or in the safe range. axes: (planes,) int64, the axis that a plane
-cuts across in one known double `at`, else -1. row_heap, row_places: the rows in whole numbers, see digits.py."""
+"""Planes as the kernel takes them; prepared once a region where nothing is scaled.
 
-Plane = namedtuple("Plane", "high low number axis place")
-"""One of the planes: its number, and the axis that it cuts across at `place`, else -1."""
+high, low: (planes, dim + 1) float64, rows as double-doubles, every number zero or in the safe range. axes: (planes,)
+int64, the axis that a plane cuts across in one known double `at`, else -1. row_heap, row_places: the rows in whole
+numbers, see digits.py.
+"""
+
+
+class Plane(NamedTuple):
+    """One of the planes: its number, and the axis that it cuts across at `place`, else -1."""
+
+    high: Any
+    low: Any
+    number: int
+    axis: int
+    place: float
+
 
 Clipped = namedtuple("Clipped", "vertices sizes state may_have_bridges")
-"""What is left of polygons. vertices: (room * dim,) float64, rings one after another. sizes: (n_rings,) int64, vertices
-left of each. state: (n,) uint8, CLIPPED, EXACT or OPEN; an open polygon has sizes 0 and no vertices. may_have_bridges:
-(n,) bool."""
+"""What is left of polygons.
+
+vertices: (room * dim,) float64, rings one after another. sizes: (n_rings,) int64, vertices left of each. state: (n,)
+uint8, CLIPPED, EXACT or OPEN; an open polygon has sizes 0 and no vertices. may_have_bridges: (n,) bool.
+"""
 
 Cutting = namedtuple("Cutting", "planes slack contacts dropped")
-"""The planes that may cut a polygon, in order. planes: their numbers. slack: how far values in doubles may be wrong.
-contacts: in how many points all rings together met a plane. dropped: whether one lost a vertex to it."""
+"""The planes that may cut a polygon, in order.
+
+planes: their numbers. slack: how far values in doubles may be wrong. contacts: in how many points all rings together
+met a plane. dropped: whether one lost a vertex to it.
+"""
 
 
 @merged

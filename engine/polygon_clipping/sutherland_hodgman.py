@@ -27,8 +27,10 @@ from engine.polygon_clipping.rings import NO_ROOM, Clipped, PlaneTables, Polygon
 
 @inline
 def room_for(ring_offsets: Any, first: int, last: int, n_planes: int) -> int:
-    """Return to how many vertices, dropped ones included, one of some rings may grow; what outgrows it is left open. A
-    convex ring gains one vertex a plane."""
+    """Return to how many vertices, dropped ones included, one of some rings may grow; what outgrows it is left open.
+
+    A convex ring gains one vertex a plane.
+    """
     largest = 0
     for ring in range(first, last):
         largest = max(largest, ring_offsets[ring + 1] - ring_offsets[ring])
@@ -40,9 +42,11 @@ def clip_rings(
     vertices: Any, ring_offsets: Any, polygon_offsets: Any, planes: PlaneTables, first: int, last: int, stop: Any,
     out: Any, sizes: Any, state: Any, may_have_bridges: Any, names: Any,
 ) -> tuple[int, int]:  # fmt: skip
-    """Clip polygons first .. last - 1 by all planes; returns the polygon reached and the vertices written. vertices ..
-    polygon_offsets: see `Polygons`; out .. may_have_bridges: see `Clipped`. stop: one uint8, polled. names: see
-    `Vertices`. Stops before a polygon that has no room in `out`."""
+    """Clip polygons first .. last - 1 by all planes; returns the polygon reached and the vertices written.
+
+    vertices .. polygon_offsets: see `Polygons`; out .. may_have_bridges: see `Clipped`. stop: one uint8, polled.
+    names: see `Vertices`. Stops before a polygon that has no room in `out`.
+    """
     polygons, clipped = Polygons(vertices, ring_offsets, polygon_offsets), Clipped(out, sizes, state, may_have_bridges)
     n_planes = planes.high.shape[0]
     room = room_for(ring_offsets, polygon_offsets[first], polygon_offsets[last], n_planes)

@@ -201,8 +201,10 @@ def _settled(
     found: Found, rest: tuple[Int8Array, BoolArray, dict[int, Overlay]], subjects: Sequence[Solid],
     clips: Sequence[Solid], operation: Operation, output: Output, workers: int | None, budget: Budget,
 ) -> tuple[Found, float, int]:  # fmt: skip
-    """Return all pairs settled, `Accuracy.coordinates_ulp`, and how many decisions took rationals. rest: filled with
-    `OverlayBatch.status`, `_is_rounded_again` and `_apart`."""
+    """Return all pairs settled, `Accuracy.coordinates_ulp`, and how many decisions took rationals.
+
+    rest: filled with `OverlayBatch.status`, `_is_rounded_again` and `_apart`.
+    """
     status, is_rounded_again, apart = rest
     settled: dict[int, SettledPairs] = {}
     alone: dict[int, tuple[Overlay, int, int]] = {}

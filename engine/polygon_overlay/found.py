@@ -15,10 +15,13 @@ NO_EVIDENCE: Final = np.zeros((0, 2), np.int64)
 
 
 class Found(NamedTuple):
-    """What the kernel found for some pairs, one after another. status: (pairs,) int8, DONE, OPEN or MAY_CROSS; counts:
-    (pairs, 4) int64, pieces, rings, vertices and pairs of edges beyond the filter; displacement: (pairs,) float64.
-    vertices, sources: of all pairs that are not OPEN; ring_offsets into them; piece_offsets: into the rings. evidence:
-    (m, 2) int64, of pairs whose rings are sources of their own: a ring, and one that it comes from."""
+    """What the kernel found for some pairs, one after another.
+
+    status: (pairs,) int8, DONE, OPEN or MAY_CROSS; counts: (pairs, 4) int64, pieces, rings, vertices and pairs of edges
+    beyond the filter; displacement: (pairs,) float64. vertices, sources: of all pairs that are not OPEN; ring_offsets
+    into them; piece_offsets: into the rings. evidence: (m, 2) int64, of pairs whose rings are sources of their own: a
+    ring, and one that it comes from.
+    """
 
     status: Int8Array
     counts: IntArray

@@ -45,9 +45,11 @@ HALF_DIAGONAL: Final = nextafter(0.5**0.5, 1.0)
 
 
 class Grid(NamedTuple):
-    """Multiples of ``base ** power``; base: 2 or 10. spacing: their distance, the nearest double. into, back: by what
-    coordinates are divided, and twice multiplied, to be counted in units, and these to be coordinates. Of two factors
-    of a power of two, which no double may be, the first loses nothing."""
+    """Multiples of ``base ** power``; base: 2 or 10. spacing: their distance, the nearest double.
+
+    into, back: by what coordinates are divided, and twice multiplied, to be counted in units, and these to be
+    coordinates. Of two factors of a power of two, which no double may be, the first loses nothing.
+    """
 
     base: int
     power: int
@@ -140,8 +142,10 @@ def snap_vertices(vertices: FloatArray, offsets: IntArray, piece_offsets: IntArr
 
 def snapped_to_units(rings: Found, budget: Budget, known: _OnGrid | None = None) -> Found:
     """Return valid rings of one pair snapped to whole numbers: DONE, or MAY_CROSS if they are to be arranged again.
+
     Displacement is 0 where no vertex moved. sources: twice the vertex whose edge goes on from there. known: what
-    `snap_vertices` returned for these rings."""
+    `snap_vertices` returned for these rings.
+    """
     vertices, offsets = rings.vertices, rings.ring_offsets
     found = known or snap_vertices(read_only(vertices), read_only(offsets), read_only(rings.piece_offsets), budget)
     edges = np.arange(len(vertices)) if found.edges is None else found.edges.astype(np.int64)
@@ -155,9 +159,11 @@ def snapped_to_units(rings: Found, budget: Budget, known: _OnGrid | None = None)
 
 
 def as_it_stays(found: FoundPair, snapped: _OnGrid, grid: Grid, start: int) -> Overlay | None:
-    """Return the overlay of a pair whose rings stay what they are on the grid, in the units of its input. start: of the
-    vertices of the clip among all. The same as `settle_rings` and `from_units`; None where they do not, or doubles may
-    not tell its multiples apart."""
+    """Return the overlay of a pair whose rings stay what they are on the grid, in the units of its input.
+
+    start: of the vertices of the clip among all. The same as `settle_rings` and `from_units`; None where they do not,
+    or doubles may not tell its multiples apart.
+    """
     if not snapped.stays or (grid.base == 10 and not _are_told_apart(snapped.vertices, snapped.offsets)):
         return None
     places, edges = grid.places_of(snapped.vertices), edges_along(found.sources)
@@ -195,12 +201,14 @@ def _along(edges: IntArray) -> Any:
 
 
 def _are_told_apart(units: FloatArray, offsets: IntArray) -> bool:
-    """Tell whether valid rings surely stay so where each of these multiples is rounded to a double. With C the largest,
-    that moves a coordinate by no more than d = 2^-53 C cells. Let no edge be longer than L along an axis, which is 1 at
-    least. Before rings become invalid on the way there, a vertex c comes to lie on an edge ab, within its box. Either
-    abc turned before, by 1 at least, since these are whole numbers, and a turn of points so near changes by 8 d L + 24
-    d^2 at most; or c was on the line beyond an end, by 1 at least along an axis, which 2 d make up for. Neither can be
-    where C L is no more than 2^49."""
+    """Tell whether valid rings surely stay so where each of these multiples is rounded to a double.
+
+    With C the largest, that moves a coordinate by no more than d = 2^-53 C cells. Let no edge be longer than L along an
+    axis, which is 1 at least. Before rings become invalid on the way there, a vertex c comes to lie on an edge ab,
+    within its box. Either abc turned before, by 1 at least, since these are whole numbers, and a turn of points so near
+    changes by 8 d L + 24 d^2 at most; or c was on the line beyond an end, by 1 at least along an axis, which 2 d make
+    up for. Neither can be where C L is no more than 2^49.
+    """
     largest = max(-float(units.min()), float(units.max())) if len(units) else 0.0
     is_near = largest <= _SURELY_VALID
     return is_near or bool(largest * np.abs(units[next_in_rings(offsets)] - units).max() <= _FINEST)
@@ -215,8 +223,10 @@ def _displacement(displacement: float, grid: Grid, places: FloatArray) -> float:
 
 
 def from_units(result: Overlay, grid: Grid, start: int, again: Any, budget: Budget) -> Overlay:
-    """Return an overlay in units of the grid as one in the units of its input; its exact rings are its own then. start:
-    of the vertices of the clip among all. again: arranges rings."""
+    """Return an overlay in units of the grid as one in the units of its input; its exact rings are its own then.
+
+    start: of the vertices of the clip among all. again: arranges rings.
+    """
     vertices = grid.places_of(read_only(result.vertices))
     if grid.base == 10 and not _are_told_apart(result.vertices, result.ring_offsets):
         rings = one_pair(vertices, result.ring_offsets, result.piece_offsets, 0.0, 0, status=MAY_CROSS)

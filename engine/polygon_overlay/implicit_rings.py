@@ -24,6 +24,7 @@ from engine.polygon_overlay.compiled.ring_area import sum_areas
 
 _NEVER: Final = np.zeros(1, np.uint8)
 
+
 NOTHING: Final = RingArrays(read_only(np.zeros((0, 2))), read_only(np.zeros(1, np.int64)))
 
 
@@ -49,9 +50,12 @@ def areas_of(
 
 
 class ImplicitRings(NamedTuple):
-    """Exact rings over two polygons, made when asked for. sources: (n, 2) integers: an input vertex and a negative
-    number, or the first vertices of two edges that cross, as `overlay_pairs` tells them; those of `clip` are counted
-    after those of `subject`. offsets: (n_rings + 1,) int64, where each ring begins."""
+    """Exact rings over two polygons, made when asked for.
+
+    sources: (n, 2) integers: an input vertex and a negative number, or the first vertices of two edges that cross, as
+    `overlay_pairs` tells them; those of `clip` are counted after those of `subject`. offsets: (n_rings + 1,) int64,
+    where each ring begins.
+    """
 
     subject: RingArrays
     clip: RingArrays
@@ -64,13 +68,17 @@ class ImplicitRings(NamedTuple):
 
     def sure_areas(self, groups: IntArray) -> tuple[FloatArray, int]:
         """Return (n,) float64, the doubles nearest to the areas of the rings groups[k] .. groups[k + 1] - 1, or NaN.
-        And how many are NaN."""
+
+        And how many are NaN.
+        """
         items = one_polygon(len(self.subject.offsets) - 1), one_polygon(len(self.clip.offsets) - 1)
         return areas_of(self.subject, items[0], self.clip, items[1], self.sources, self.offsets, groups)
 
     def nearest_areas(self, groups: IntArray) -> FloatArray:
-        """Return those areas, the exact sums where a bound is not enough. Raises `NotRepresentableError` where one is
-        beyond the largest double."""
+        """Return those areas, the exact sums where a bound is not enough.
+
+        Raises `NotRepresentableError` where one is beyond the largest double.
+        """
         areas, n_unsure = self.sure_areas(groups)
         for k in np.flatnonzero(np.isnan(areas)).tolist() if n_unsure else ():
             areas[k] = self.some(range(groups[k], groups[k + 1])).nearest_area()

@@ -99,8 +99,10 @@ def rings_of(pieces: Iterable[Piece]) -> list[list[int]]:
 
 
 def rounded(arrangement: Arrangement, pieces: Sequence[Piece]) -> Found:
-    """Return the nearest doubles of the nodes of all rings; done where nothing moves. sources: twice the first of the
-    edges along which the ring goes on, since no vertex is told from a crossing."""
+    """Return the nearest doubles of the nodes of all rings; done where nothing moves.
+
+    sources: twice the first of the edges along which the ring goes on, since no vertex is told from a crossing.
+    """
     rings, nodes = rings_of(pieces), arrangement.nodes
     half_edges = [half_edge for ring in rings for half_edge in ring]
     used = [arrangement.origin(half_edge) for half_edge in half_edges]

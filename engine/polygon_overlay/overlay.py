@@ -131,7 +131,9 @@ def overlay_rings(
     nesting: Nesting = UNNAMED, grid: float | None = None,
 ) -> tuple[Overlay, int, int]:  # fmt: skip
     """Return the overlay of checked rings (either may be empty), pairs of edges beyond the filter, and in rationals.
-    nesting: of the rings of the subject, for another rule than even-odd in either; no clip then, and "union"."""
+
+    nesting: of the rings of the subject, for another rule than even-odd in either; no clip then, and "union".
+    """
     units = None if grid is None else grid_of(grid)
     first, second = subject, clip
     if units is not None:

@@ -62,8 +62,10 @@ class PolygonArrays(NamedTuple):
 
 
 def arrays_of(coordinates: object, ring_offsets: object, polygon_offsets: object) -> PolygonArrays:
-    """Return what `polygons` takes as arrays; a ring of two positions, which has no area, is left out. Raises: as
-    `polygons`."""
+    """Return what `polygons` takes as arrays; a ring of two positions, which has no area, is left out.
+
+    Raises: as `polygons`.
+    """
     vertices, starts, ends, groups = parted(coordinates, ring_offsets, polygon_offsets)
     sizes = ends - starts
     if len(single := np.flatnonzero(sizes == 1)):
@@ -85,8 +87,10 @@ def joined_arrays(parts: Sequence[PolygonArrays]) -> PolygonArrays:
 
 
 def gathered(polygons: Sequence[Polygon]) -> PolygonArrays:
-    """Return polygons as arrays. Joined as bytes: numpy takes three times as long to put small arrays one after
-    another."""
+    """Return polygons as arrays.
+
+    Joined as bytes: numpy takes three times as long to put small arrays one after another.
+    """
     if len(polygons) == 1:
         return PolygonArrays(polygons[0].vertices, polygons[0].ring_offsets, one_polygon(polygons[0].n_rings))
     vertices = np.frombuffer(b"".join(cast("list[bytes]", [each.vertices for each in polygons])))

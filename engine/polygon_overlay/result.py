@@ -59,7 +59,9 @@ _Place = tuple[Fraction, Fraction]
 
 class Lost(NamedTuple):
     """Parts of an exact result that rounding lost: shells of pieces, and holes, by their numbers among all rings.
-    piece_offsets: of the exact result. unit: what coordinates are multiples of."""
+
+    piece_offsets: of the exact result. unit: what coordinates are multiples of.
+    """
 
     exact: Exact
     piece_offsets: IntArray

@@ -34,15 +34,18 @@ from engine.types import OPEN
 MAX_ROUNDS: Final = 12
 """Rounds before snapping: on 4,296 results of public test pairs all but 14 had ended by then."""
 
+
 Again = Callable[[Found, Budget], Found]
 
 
 def settle_rings(
     first: Found, exact: Exact, again: Again, may_snap: bool, budget: Budget, snap: Again | None = None
 ) -> Overlay | None:
-    """Arrange a pair until it is valid; None where ``again`` cannot, or snapping is needed and not possible. exact: the
-    exact rings that ``first`` is rounded from. again: arranges rounded rings, and gives evidence. may_snap: the rings
-    are those of ``exact``, not scaled. snap: what puts them on whole numbers once they are valid (grid.py)."""
+    """Arrange a pair until it is valid; None where ``again`` cannot, or snapping is needed and not possible.
+
+    exact: the exact rings that ``first`` is rounded from. again: arranges rounded rings, and gives evidence. may_snap:
+    the rings are those of ``exact``, not scaled. snap: what puts them on whole numbers once they are valid (grid.py).
+    """
     rings, displacement = first, float(first.displacement[0])
     rounds = int(displacement > 0.0)
     edges = own_edges = edges_along(first.sources)
@@ -140,10 +143,11 @@ def n_moved(images: FloatArray, vertices: FloatArray, are_whole: bool = False) -
 
 def count_changes(is_exact: BoolArray, origins: IntArray, n_found: int) -> tuple[list[int], int, int]:
     """Return which exact parts are lost, by how many the rest fell by joining, and by how many it rose by parting.
+
     is_exact: of the rings of the exact result those that are such parts. origins: rows of an output part and an exact
     one that it comes from. n_found: output parts. Parts are linked where one comes from the other. Of each linked group
-    of e exact and o output parts, e - 1 were joined and o - 1 parted; an output part without origin counts as
-    parted."""
+    of e exact and o output parts, e - 1 were joined and o - 1 parted; an output part without origin counts as parted.
+    """
     survivors = np.unique(origins[:, 1])
     is_lost = is_exact.copy()
     is_lost[survivors] = False
@@ -172,10 +176,12 @@ class SettledPairs(NamedTuple):
 
 
 def settle_pairs(first: Found, again: Again, budget: Budget) -> SettledPairs:
-    """Arrange the pairs of ``first`` that are MAY_CROSS until they are valid, all in one call of ``again`` a round. A
-    pair leaves when it is valid, with no more than its rings: what became of the parts of the exact result is found for
-    a single pair, when asked for. Left out are those that the kernel leaves open, or that are not valid after the last
-    round. Raises as `Budget.check` when the call must end."""
+    """Arrange the pairs of ``first`` that are MAY_CROSS until they are valid, all in one call of ``again`` a round.
+
+    A pair leaves when it is valid, with no more than its rings: what became of the parts of the exact result is found
+    for a single pair, when asked for. Left out are those that the kernel leaves open, or that are not valid after the
+    last round. Raises as `Budget.check` when the call must end.
+    """
     pairs = np.flatnonzero(first.status == MAY_CROSS)
     rings = taken(first, pairs)
     displacement = rings.displacement

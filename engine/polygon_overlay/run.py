@@ -41,8 +41,10 @@ KEPT_ARRAYS: Final = {name: np.array(kept, np.uint8) for name, kept in KEPT.item
 def run_kernel(
     subjects: PolygonArrays, clips: PolygonArrays, operation: Operation, budget: Budget, nesting: Nesting = UNNAMED
 ) -> Found:
-    """Overlay polygons pair by pair. Raises as `Budget.check` when the call must end. nesting: of the rings of
-    subjects, to be arranged each as a source of its own, as `overlay_pairs` takes it."""
+    """Overlay polygons pair by pair. Raises as `Budget.check` when the call must end.
+
+    nesting: of the rings of subjects, to be arranged each as a source of its own, as `overlay_pairs` takes it.
+    """
     n = len(subjects.polygon_offsets) - 1
     n_vertices, n_rings = map(sum, zip(subjects.most(), clips.most(), strict=True))
     sides = RingArrays(*subjects[:2]), subjects.polygon_offsets, RingArrays(*clips[:2]), clips.polygon_offsets
@@ -76,8 +78,10 @@ def overlay_compiled(
     nesting: Nesting = UNNAMED, grid: Grid | None = None,
 ) -> tuple[Overlay, int] | None:  # fmt: skip
     """Return the overlay of one pair and the number of pairs of edges beyond the filter; None where it is left open.
+
     grid: whose units coordinates are in; those of the overlay are not. A scene outside of the kernel's range is brought
-    into it by a power of two where that is exact."""
+    into it by a power of two where that is exact.
+    """
     found, exponent = run_pair(subject, clip, KEPT_ARRAYS[operation], budget, nesting), 0
     if found.status == OPEN:
         exponent = exponent_of(subject.vertices, clip.vertices)

@@ -44,13 +44,16 @@ _INT32: Final = np.dtype(np.int32)
 _INT64: Final = np.dtype(np.int64)
 """Types that numpy need not look up."""
 
+
 _Rings = tuple[FloatArray, Int32Array, IntArray]
 
 
 class FoundPair(NamedTuple):
-    """What the kernel found for one pair; arrays are read-only, and no rings if it is OPEN. status: DONE, OPEN or
-    MAY_CROSS. n_exact: pairs of edges beyond the filter. displacement: how far rounding moved a vertex at most.
-    vertices, sources, ring_offsets, piece_offsets: those of `Found`."""
+    """What the kernel found for one pair; arrays are read-only, and no rings if it is OPEN.
+
+    status: DONE, OPEN or MAY_CROSS. n_exact: pairs of edges beyond the filter. displacement: how far rounding moved a
+    vertex at most. vertices, sources, ring_offsets, piece_offsets: those of `Found`.
+    """
 
     status: int
     n_exact: int
@@ -82,10 +85,12 @@ def run_blocks(
     subject: RingArrays, clip: RingArrays, size: int, n_most: int, kept: FlagArray, budget: Budget,
     nesting: Nesting = UNNAMED,
 ) -> FoundPair | None:  # fmt: skip
-    """Overlay two polygons in blocks of ``size`` edges, of which fewer than n_most may be looked at one by one. None
-    where more edges are near others, or where the pair is not DONE: rounded rings that nothing vouches for are to be
-    arranged again, with all their vertices. Size 0: all edges one by one, and never None. Raises as `Budget.check` when
-    the call must end."""
+    """Overlay two polygons in blocks of ``size`` edges, of which fewer than n_most may be looked at one by one.
+
+    None where more edges are near others, or where the pair is not DONE: rounded rings that nothing vouches for are to
+    be arranged again, with all their vertices. Size 0: all edges one by one, and never None. Raises as `Budget.check`
+    when the call must end.
+    """
     n_vertices, n_rings = len(subject.vertices) + len(clip.vertices), len(subject.offsets) + len(clip.offsets) - 2
     sides = subject, one_polygon(len(subject.offsets) - 1), clip, one_polygon(len(clip.offsets) - 1)
     if size:

@@ -117,7 +117,9 @@ def _arranged(
 
 def _together(polygons: Sequence[Solid]) -> tuple[RingArrays, IntArray, IntArray]:
     """Return the rings of all polygons, by ring the number of its polygon, and the first vertex of all but the first.
-    Polygons without rings have no number, so that of a ring is no less than that of its polygon."""
+
+    Polygons without rings have no number, so that of a ring is no less than that of its polygon.
+    """
     if set(map(type, polygons)) - {Polygon}:
         for k, polygon in enumerate(polygons):
             rings_of(polygon, "polygons", k)

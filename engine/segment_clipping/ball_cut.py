@@ -78,7 +78,9 @@ def coordinate_at(p: float, q: float, t: float, step: float, slack: float) -> tu
 @inline
 def newton_step(p: Triple, q: Triple, c: Triple, radius: float, t: float, side: int) -> tuple[float, float, bool]:
     """Return the step from `t` to the root where the ball is entered (side 0) or left, its bound, and if that holds.
-    Caller guarantees that there are roots. With the sign of F' that the root has, it is at most 2 |F / F'| away."""
+
+    Caller guarantees that there are roots. With the sign of F' that the root has, it is at most 2 |F / F'| away.
+    """
     x, xl, x_size, dx = place_on(p[0], q[0], c[0], t)
     y, yl, y_size, dy = place_on(p[1], q[1], c[1], t)
     z, zl, z_size, dz = place_on(p[2], q[2], c[2], t)
@@ -113,9 +115,11 @@ def cut_by_ball(p: Triple, q: Triple, c: Triple, radius: float, side: int) -> tu
 
 @inline
 def cut_by_root(p: Triple, q: Triple, c: Triple, radius: float, side: int) -> tuple[float, float, float, float, bool]:
-    """Return what `cut_by_ball` does, by t = (-B -+ sqrt(D)) / A in double-doubles: a line that is nearly tangent. A
-    and B are within `DOT_BOUND`, the root within half the bound of D over itself and the 8 u^2 that it is rounded by;
-    their sum has 4 u^2, the quotient 16 u^2 of t and what A has."""
+    """Return what `cut_by_ball` does, by t = (-B -+ sqrt(D)) / A in double-doubles: a line that is nearly tangent.
+
+    A and B are within `DOT_BOUND`, the root within half the bound of D over itself and the 8 u^2 that it is rounded by;
+    their sum has 4 u^2, the quotient 16 u^2 of t and what A has.
+    """
     h, low, bound = discriminant(p, q, c, radius)
     ah, al, _ = dd_dot(p, q, p, q)
     bh, bl, size = dd_dot(p, q, c, p)

@@ -42,7 +42,10 @@ _CONTACT_BYTES: Final = 60
 def clip_on_boundary(
     segments: FloatArray, region: Polygon | Polyhedron, budget: Budget, workers: int | None, progress: Progress | None
 ) -> Clipped:
-    """Return the pieces of segments (n, 2, dim) float64, not yet looked at for NaN. Raises: NotFiniteError."""
+    """Return the pieces of segments (n, 2, dim) float64, not yet looked at for NaN.
+
+    Raises: NotFiniteError.
+    """
     check_finite(segments, ("segments",))
     chunks: dict[int, tuple[Pieces, IntArray]] = {}
     locator = locator_of(region).chosen(len(segments), budget)

@@ -118,7 +118,9 @@ def cut_group(
     row: int, state: Any,
 ) -> tuple[int, int]:  # fmt: skip
     """Cut the segments of a group, those from `first` on, at their contacts; return the place reached, and the row.
-    Stops short where there is no room in `out`, or `stop` is set. See `cut_on_outline`."""
+
+    Stops short where there is no room in `out`, or `stop` is set. See `cut_on_outline`.
+    """
     for item in range(segments.shape[0]):
         begin, end, place = contacts.offsets[item], contacts.offsets[item + 1], first + item
         state[place] = OPEN
@@ -134,10 +136,12 @@ def cut_group(
 
 @kernel
 def cut_on_outline(segments: Any, locations: Any, outline: Any, stop: Any, out: Pieces, state: Any, n: Any) -> None:
-    """Cut segments (m, 2, 2) float64 on a polygon, as far as double-doubles and filters go. locations: (m,) int8 of
-    their first ends. outline: see `Outline`. stop: one uint8, polled. out: their source is their place. state: (m,)
-    uint8, SETTLED or OPEN. n: the place to begin with, afterwards where to go on, short of the end where there is no
-    room; how many rows are filled; and for how many contacts of a group there is to be room."""
+    """Cut segments (m, 2, 2) float64 on a polygon, as far as double-doubles and filters go.
+
+    locations: (m,) int8 of their first ends. outline: see `Outline`. stop: one uint8, polled. out: their source is
+    their place. state: (m,) uint8, SETTLED or OPEN. n: the place to begin with, afterwards where to go on, short of the
+    end where there is no room; how many rows are filled; and for how many contacts of a group there is to be room.
+    """
     size = group_size(locations.size - n[0])
     contacts, cuts, last = edge_contacts_for(size, n[2]), crossings_for(n[2], 2), n[0]
     n[1], found = 0, 0

@@ -30,8 +30,10 @@ TOO_LARGE: Final = 2.0**500
 
 
 def build_box_tree(low: FloatArray, high: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Return the tree over elements with the boxes `low`, `high`, (n, dim) float64 each. (n,) int64, elements by leaf;
-    (2 n_leaves, 2, dim) float64, low and high of node i at row i."""
+    """Return the tree over elements with the boxes `low`, `high`, (n, dim) float64 each.
+
+    (n,) int64, elements by leaf; (2 n_leaves, 2, dim) float64, low and high of node i at row i.
+    """
     n, dimension = low.shape
     order = np.argsort(_curve(low, high), kind="stable")
     n_leaves = 1

@@ -104,10 +104,12 @@ def decide_on_boxes(
     segments: Any, low: Any, high: Any, columns: Any, first: int, last: int, stop: Any, items: Any, planes: Any,
     still: Any, n: Any,
 ) -> None:  # fmt: skip
-    """Decide on ``segments[first:last]`` ((n, 2, dim) float64) and the box `low`, `high`; columns: of its rows. items:
-    (m,) the segments that are kept, in order, in planes (m, 2) the planes entered and left, -1 for an end of the
+    """Decide on ``segments[first:last]`` ((n, 2, dim) float64) and the box `low`, `high`; columns: of its rows.
+
+    items: (m,) the segments that are kept, in order, in planes (m, 2) the planes entered and left, -1 for an end of the
     segment; there is room for all. still: likewise the segments left open. n: how many are kept, open, and went beyond
-    the filter. stop: one uint8, polled."""
+    the filter. stop: one uint8, polled.
+    """
     is_flat = low.size == 2
     lowest, highest = corners_of(low, high)
     px, py, pz, qx, qy, qz = (

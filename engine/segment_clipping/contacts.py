@@ -15,8 +15,7 @@ location of its first end.
 
 from __future__ import annotations
 
-from collections import namedtuple
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -36,9 +35,16 @@ NO_ROOM: Final = -1
 STOPPED: Final = -2
 """Instead of a number of contacts."""
 
-EdgeContacts = namedtuple("EdgeContacts", "met kinds offsets stack")
-"""Room for the contacts of a group of segments: elements and kinds one segment after another; offsets: (m + 1,) where
-those of each segment begin; stack: (DEEPEST,) int64, nodes that wait."""
+
+class EdgeContacts(NamedTuple):
+    """Room for the contacts of a group of segments: elements and kinds one segment after another, and offsets."""
+
+    met: Any
+    kinds: Any
+    offsets: Any
+    """(m + 1,) where those of each segment begin."""
+    stack: Any
+    """(DEEPEST,) int64, nodes that wait."""
 
 
 @inline
@@ -103,8 +109,10 @@ def is_point(segment: Any) -> bool:
 
 @bare
 def gather_edges(contacts: EdgeContacts, outline: Any, segments: Any, n: int, stop: Any) -> int:
-    """Fill met, kinds and offsets with the contacts of the first n of some segments (m, 2, 2); return how many. Those
-    of no length have none. NO_ROOM where they have no room, STOPPED where `stop` (one uint8) is set."""
+    """Fill met, kinds and offsets with the contacts of the first n of some segments (m, 2, 2); return how many.
+
+    Those of no length have none. NO_ROOM where they have no room, STOPPED where `stop` (one uint8) is set.
+    """
     found = 0
     contacts.offsets[0] = 0
     for i in range(n):
@@ -120,9 +128,11 @@ def gather_edges(contacts: EdgeContacts, outline: Any, segments: Any, n: int, st
 
 @kernel
 def find_contacts_2d(segments: Any, outline: Any, stop: Any, room: int) -> tuple[int, Any, Any, Any]:
-    """Return how many contacts segments (n, 2, 2) float64 have with the edges of a polygon, and these. elements met and
-    kinds, int64 and uint8, one segment after another; offsets (n + 1,) int64, where those of each begin. NO_ROOM where
-    there are more than `room`. stop: one uint8, polled."""
+    """Return how many contacts segments (n, 2, 2) float64 have with the edges of a polygon, and these.
+
+    elements met and kinds, int64 and uint8, one segment after another; offsets (n + 1,) int64, where those of each
+    begin. NO_ROOM where there are more than `room`. stop: one uint8, polled.
+    """
     contacts = edge_contacts_for(segments.shape[0], room)
     found = gather_edges(contacts, outline, segments, segments.shape[0], stop)
     return found, contacts.met, contacts.kinds, contacts.offsets

@@ -17,8 +17,7 @@ original ends.
 
 from __future__ import annotations
 
-from collections import namedtuple
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -31,8 +30,10 @@ from engine.segment_clipping.pieces import BLOCK, DROPPED, KEPT, is_plain, point
 from engine.types import OPEN, UNDECIDED
 
 VALUE_BOUND: Final = 8.0 * 2.0**-53
-"""Bound of a plane value a x + b y + c z + d in doubles, relative to the sum of absolute terms. Each term carries at
-most (1 + u)^4, the sum of absolute terms the same; 8 u covers both and its own rounding."""
+"""Bound of a plane value a x + b y + c z + d in doubles, relative to the sum of absolute terms.
+
+Each term carries at most (1 + u)^4, the sum of absolute terms the same; 8 u covers both and its own rounding.
+"""
 VALUE_TINY: Final = 2.0**-1070
 """Products that underflow lose at most 2^-1074 each."""
 T_ROUNDINGS: Final = 8.0 * 2.0**-53
@@ -42,14 +43,23 @@ WIDEST: Final = 2.0**900
 NARROWEST: Final = 2.0**-960
 """Where values of two signs are beyond it, the inverse of their difference does not overflow."""
 
-Latest = namedtuple("Latest", "t slack plane rival")
-"""The last plane of some that a segment crosses: at t, within `slack`; rival: the latest that another may be."""
+
+class Latest(NamedTuple):
+    """The last plane of some that a segment crosses: at t, within `slack`; rival: the latest that another may be."""
+
+    t: float
+    slack: float
+    plane: float
+    rival: float
 
 
 def as_columns(rows: FloatArray) -> FloatArray:
-    """Return plane rows (m, dim + 1) as columns (dim + 3, m). The last two bound the error of a value in doubles: times
-    the largest coordinate, and by themselves. They are zero where a value is a coordinate and a number, rounded once:
-    its sign is exact, and what compares values has room for a rounding of each."""
+    """Return plane rows (m, dim + 1) as columns (dim + 3, m).
+
+    The last two bound the error of a value in doubles: times the largest coordinate, and by themselves. They are zero
+    where a value is a coordinate and a number, rounded once: its sign is exact, and what compares values has room for
+    a rounding of each.
+    """
     with np.errstate(all="ignore"):  # what overflows bounds nothing, and is left to exact arithmetic
         slope = VALUE_BOUND * np.abs(rows[:, :-1]).sum(axis=1)
         floor = VALUE_BOUND * np.abs(rows[:, -1]) + VALUE_TINY
@@ -109,8 +119,10 @@ def decide_by_rows(
     segment: Any, columns: Any, s_p: Any, s_q: Any, bounds: Any, chosen: Any, n: int
 ) -> tuple[int, int, int, int]:
     """Decide on one segment by the n `chosen` planes: state, plane entered, plane left, 1 where filters did not do.
-    s_p, s_q, bounds: of each of them the values at both ends and their bound. An item with an open sign or order
-    outside of the safe range is left open."""
+
+    s_p, s_q, bounds: of each of them the values at both ends and their bound. An item with an
+    open sign or order outside of the safe range is left open.
+    """
     entered = left = -1
     beyond, checked = 0, False
     for i in range(n):
@@ -178,8 +190,10 @@ def later(t: float, slack: float, plane: float, is_crossed: bool, best: Latest) 
 
 @merged
 def state_of(entered: Latest, left: Latest, is_out: bool, is_open: bool) -> float:
-    """Return the state of a segment from the latest plane entered and, by -t, the first one left; OPEN: unsure. t = s_p
-    / (s_p - s_q) moves by at most bound / (|s_p| + |s_q|) when both values move by a bound."""
+    """Return the state of a segment from the latest plane entered and, by -t, the first one left; OPEN: unsure.
+
+    t = s_p / (s_p - s_q) moves by at most bound / (|s_p| + |s_q|) when both values move by a bound.
+    """
     start, end = entered.t, -left.t
     is_sure = max(start + entered.slack, entered.rival) < min(end - left.slack, -left.rival)
     is_sure = is_sure & ((entered.plane < 0.0) | (entered.rival < start - entered.slack))
@@ -223,8 +237,10 @@ def decide_alone(
 def decide_on_rows(
     segments: Any, columns: Any, first: int, last: int, stop: Any, items: Any, planes: Any, still: Any, n: Any
 ) -> None:
-    """Decide on ``segments[first:last]`` ((n, 2, dim) float64) where all planes (`as_columns`) are >= 0. Plane by plane
-    over a block of segments, without branches. Outputs: see `decide_on_boxes`."""
+    """Decide on ``segments[first:last]`` ((n, 2, dim) float64) where all planes (`as_columns`) are >= 0.
+
+    Plane by plane over a block of segments, without branches. Outputs: see `decide_on_boxes`.
+    """
     is_flat = segments.shape[2] == 2
     k = columns.shape[0] - 3  # in the plane any column is that of c, since z is 0
     a, b, c, d = columns[0], columns[1], columns[k - 1], columns[k]

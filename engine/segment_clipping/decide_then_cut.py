@@ -34,6 +34,7 @@ FEW: Final = 32
 """Open items that rational arithmetic settles in the time in which a batch is looked through for its exponent; segments
 that are clipped in the time that it takes to plan more."""
 
+
 _spare: list[tuple[Int32Array, Int32Array, Int32Array, IntArray]] = []
 """Scratch for so few segments that no call works in now."""
 _AT_ONCE: Final = 1 << 12
@@ -61,8 +62,11 @@ def scaled(points: FloatArray, *region: FloatArray) -> Scaled | None:
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """How segments are clipped on one region. decide, fill: kernels; see cohen_sutherland.py, box_cut.py. region: their
-    arguments. scale: returns the batch scaled, None where it is well as it is or cannot be scaled exactly."""
+    """How segments are clipped on one region.
+
+    decide, fill: kernels; see cohen_sutherland.py, box_cut.py. region: their arguments. scale: returns the batch
+    scaled, None where it is well as it is or cannot be scaled exactly.
+    """
 
     name: str
     decide: Any
@@ -74,8 +78,10 @@ class Method:
 def clip_on_convex(
     segments: FloatArray, region: Solid, method: Method, budget: Budget, workers: int | None, progress: Progress | None
 ) -> Clipped:
-    """Return the piece of each segment that has one. segments: (n, 2, dim) float64, not yet looked at for NaN. Raises:
-    NotFiniteError."""
+    """Return the piece of each segment that has one. segments: (n, 2, dim) float64, not yet looked at for NaN.
+
+    Raises: NotFiniteError.
+    """
     found = clip_few(segments, method) if len(segments) <= FEW else None
     if found is not None:
         budget.check()
@@ -132,10 +138,12 @@ def _clip(
 
 
 class _Batch:
-    """Clips chunks of a batch; each piece is written where it stays, behind those of all chunks before. Rows are given
-    in the order of the chunks: what is decided before its turn waits, and is filled by whoever decides the chunk that
-    it waits for. There are rows for a piece of every segment; memory that none is written to is no more than
-    addresses."""
+    """Clips chunks of a batch; each piece is written where it stays, behind those of all chunks before.
+
+    Rows are given in the order of the chunks: what is decided before its turn waits, and is filled by whoever decides
+    the chunk that it waits for. There are rows for a piece of every segment; memory that none is written to is no more
+    than addresses.
+    """
 
     def __init__(self, method: Method, scene: Scaled, budget: Budget) -> None:
         n, _, dimension = scene.points.shape

@@ -63,8 +63,10 @@ def triangle_stretch(
     p: Integers, q: Integers, a: Integers, b: Integers, c: Integers
 ) -> tuple[Fraction, Fraction, bool] | None:
     """Return where the segment p q meets the closed triangle a b c, and whether it runs in its plane (no area: yes).
+
     With corners seen from p and u = q - p, the normal is B x C + C x A + A x B; the line meets the triangle unless
-    signs of the volumes u . (B x C), ... differ, and their sum is n . u."""
+    signs of the volumes u . (B x C), ... differ, and their sum is n . u.
+    """
     u, *seen = (minus(x, p) for x in (q, a, b, c))
     around = [cross(seen[k - 2], seen[k - 1]) for k in range(3)]
     normal = [sum(each) for each in zip(*around)]
@@ -97,8 +99,10 @@ def triangle_stretch(
 
 
 def is_crossed(p: Integers, q: Integers, corners: Sequence[Integers]) -> bool:
-    """Tell whether the line through p and q, moved by infinitesimals, crosses an edge or a triangle. Seen along the
-    line, an element parallel to it has no length or no area: it holds no point that is moved so."""
+    """Tell whether the line through p and q, moved by infinitesimals, crosses an edge or a triangle.
+
+    Seen along the line, an element parallel to it has no length or no area: it holds no point that is moved so.
+    """
     u = minus(q, p)
     if len(u) == 2:
         return len({_cross(u, minus(corner, p))[0] > 0 for corner in corners}) == 2
@@ -136,8 +140,11 @@ def nodes_with_locations(
     contacts: Sequence[Contact], locations: tuple[int, int], locate: Callable[[Fraction], int]
 ) -> Iterator[tuple[Fraction, list[Contact], bool, bool]]:
     """Yield the parameters of `nodes_of` with their contacts, and of the span after each whether the segment lies in an
-    element there, and else whether it is inside. locations: of the ends of the segment. locate: tells the location at a
-    parameter; asked once at most, where both ends are on the boundary."""
+    element there, and else whether it is inside.
+
+    locations: of the ends of the segment. locate: tells the location at a parameter; asked once at most, where both
+    ends are on the boundary.
+    """
     nodes = nodes_of(contacts)
     n_along, has_turned = 0, False
     are_along, have_turned = [], []  # of the span after each node; turned: against the first span

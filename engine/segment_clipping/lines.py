@@ -153,8 +153,10 @@ def _joined(pieces: SegmentPieces, at: IntArray, vertices: FloatArray, offsets: 
 def _closed(
     line: IntArray, at: IntArray, reaches: BoolArray, goes_on: BoolArray, vertices: FloatArray, offsets: IntArray
 ) -> Any:
-    """Return the parts in an order in which those from the start of a closed line follow those up to its end. None
-    where there are none to be moved: lines whose two ends differ, or not both within, or in one piece."""
+    """Return the parts in an order in which those from the start of a closed line follow those up to its end.
+
+    None where there are none to be moved: lines whose two ends differ, or not both within, or in one piece.
+    """
     sizes = np.diff(offsets)
     lines = np.flatnonzero(sizes > 0)
     first, last = offsets[lines], offsets[lines + 1] - 1

@@ -17,8 +17,7 @@ multi-BVH ray stream tracing, 2009.
 
 from __future__ import annotations
 
-from collections import namedtuple
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -40,16 +39,35 @@ _TRIANGLES: Final = 4096
 _SEGMENT: Final = (1 << 16) - 1
 _BITS: Final = (1 << LANES) - 1
 
-Streams = namedtuple(
-    "Streams",
-    "numbers axes members found stack pairs waiting owners found_met found_kinds met kinds offsets",
-)
-"""Room for a group of segments. numbers: (m, 16) float32, middle, half, slack and tiny of `local_segment`, then middle,
-r, s, reach and slack of `near_triangles`; axes: (m,) the longest axis. members: the lists, one after another, of
-segments; found: (m,) the answers of a node to its list; stack: (n, 3) nodes that wait, begin and end of their lists.
-pairs: blocks and segments that wait, later with the bits of the block's triangles; waiting: triangles and segments that
-wait. owners: of each contact its segment; found_met, found_kinds: contacts in the order in which they are found; met,
-kinds: the same by segment; offsets: (m + 1,) where those of each segment begin."""
+
+class Streams(NamedTuple):
+    """Room for a group of segments."""
+
+    numbers: Any
+    """(m, 16) float32: middle, half, slack and tiny of `local_segment`; then middle, r, s, reach and slack of
+    `near_triangles`."""
+    axes: Any
+    """(m,) the longest axis."""
+    members: Any
+    """The lists, one after another: segments."""
+    found: Any
+    """(m,) the answers of a node to its list."""
+    stack: Any
+    """(n, 3) nodes that wait, begin and end of their lists."""
+    pairs: Any
+    """Blocks and segments that wait, later with the bits of the block's triangles."""
+    waiting: Any
+    """Triangles and segments that wait."""
+    owners: Any
+    """Of each contact its segment."""
+    found_met: Any
+    found_kinds: Any
+    """Contacts in the order in which they are found."""
+    met: Any
+    kinds: Any
+    """The same by segment."""
+    offsets: Any
+    """(m + 1,) where those of each segment begin."""
 
 
 @inline
@@ -169,8 +187,10 @@ def _by_segment(streams: Any, n: int, n_contacts: int) -> None:
 
 @bare
 def gather_contacts(streams: Any, mesh: Any, segments: Any, n: int, stop: Any) -> int:
-    """Fill met, kinds and offsets with the contacts of the first n of some segments (m, 2, 3); return how many. Those
-    of no length have none. NO_ROOM where they have no room, STOPPED where `stop` (one uint8) is set."""
+    """Fill met, kinds and offsets with the contacts of the first n of some segments (m, 2, 3); return how many.
+
+    Those of no length have none. NO_ROOM where they have no room, STOPPED where `stop` (one uint8) is set.
+    """
     members, found, stack, pairs = streams.members, streams.found, streams.stack, streams.pairs
     n_near = _load(streams, mesh, segments, n)
     n_pairs, n_contacts, depth = 0, 0, 0

@@ -11,8 +11,7 @@ Everything here is written without branches and takes and gives numbers only: lo
 
 from __future__ import annotations
 
-from collections import namedtuple
-from typing import Final
+from typing import Final, NamedTuple
 
 from engine.jit import merged
 from engine.predicates.double_double import U2
@@ -28,9 +27,20 @@ _CLOSE: Final = 48.0 * U2
 """Two parameters are within 26 u^2 of the larger one, the difference of their low parts loses 6 u^2; that of their high
 parts loses nothing where they are within a factor of two, and elsewhere does not matter."""
 
-Meeting = namedtuple("Meeting", "t t_low n d is_exact plane")
-"""A place where a segment enters or leaves a slab. t, t_low: parameter, a double-double. n, d: as above, rounded.
-is_exact: they lost nothing. plane: 0.0 .. 5.0, or -1.0 for none, with a t outside of [0, 1] that is like no other."""
+
+class Meeting(NamedTuple):
+    """A place where a segment enters or leaves a slab.
+
+    t, t_low: parameter, a double-double. n, d: as above, rounded. is_exact: they lost nothing. plane: 0.0 .. 5.0, or
+    -1.0 for none, with a t outside of [0, 1] that is like no other.
+    """
+
+    t: float
+    t_low: float
+    n: float
+    d: float
+    is_exact: bool
+    plane: float
 
 
 @merged
@@ -58,8 +68,10 @@ def meetings(p: float, q: float, low: float, high: float, axis: float) -> tuple[
 
 @merged
 def gap_between(a: Meeting, b: Meeting) -> tuple[float, bool]:
-    """Return the parameter of a less that of b, and whether its sign is sure: exactly zero where both are equal. Of
-    exact differences equality shows as n_a d_b = n_b d_a (lattices: diagonals through corners)."""
+    """Return the parameter of a less that of b, and whether its sign is sure: exactly zero where both are equal.
+
+    Of exact differences equality shows as n_a d_b = n_b d_a (lattices: diagonals through corners).
+    """
     gap = (a.t - b.t) + (a.t_low - b.t_low)
     left, left_tail = two_prod(a.n, b.d)
     right, right_tail = two_prod(b.n, a.d)

@@ -40,7 +40,9 @@ def expand_difference(x: float, y: float, e: Components) -> int:
 @inline
 def cut_by_signs(row: Any, segment: Any, point: Any, axis: int, at: float) -> tuple[float, bool]:
     """Set `point` to where `segment` crosses the plane of `row`, by exact signs; return t and whether all is sure.
-    axis, at: across an axis, where, so that values are differences; else -1 and anything."""
+
+    axis, at: across an axis, where, so that values are differences; else -1 and anything.
+    """
     wp, wq, e = workspace(8), workspace(8), workspace(96)
     if axis >= 0:
         p, q = segment[0, axis], segment[1, axis]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import namedtuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,16 +19,41 @@ from engine.solids.polyhedron import Polyhedron
 from engine.solids.surface import Surface
 from engine.solids.triangle import Triangle
 
-Outline = namedtuple("Outline", "elements are_safe faces order boxes")
-"""The edges of all rings of a polygon. elements: (k, 2, 2) the corners of each edge: where one is read, all are;
-are_safe: whether every coordinate is zero or of a size for which kernels keep their bounds; faces: (k,) what each edge
-is reported as; order, boxes: see `build_box_tree`."""
 
-Mesh = namedtuple("Mesh", "elements are_safe faces boxes child origin inverse n_inner n_levels corners")
-"""The triangles of a polyhedron. elements: (k, 3, 3) the corners of each; are_safe: see `Outline`; faces: (k,) the face
-of the caller that each is reported as. boxes, child, origin, inverse (1 / scale): see `Bvh`, but inner nodes, n_inner
-of them, stand before all blocks, close to each other; unless there is but one block, they begin with the root.
-n_levels: how many inner nodes stand above one another at most. corners: (n_blocks, 9, 8), see `corners_of`."""
+class Outline(NamedTuple):
+    """The edges of all rings of a polygon."""
+
+    elements: FloatArray
+    """(k, 2, 2) the corners of each edge: where one is read, all are."""
+    are_safe: bool
+    """Whether every coordinate is zero or of a size for which kernels keep their bounds."""
+    faces: IntArray
+    """(k,) what each edge is reported as."""
+    order: IntArray
+    boxes: FloatArray
+    """order, boxes: see `build_box_tree`."""
+
+
+class Mesh(NamedTuple):
+    """The triangles of a polyhedron."""
+
+    elements: FloatArray
+    """(k, 3, 3) the corners of each triangle."""
+    are_safe: bool
+    """See `Outline`."""
+    faces: IntArray
+    """(k,) the face of the caller that each triangle is reported as."""
+    boxes: Float32Array
+    child: Int32Array
+    origin: FloatArray
+    inverse: float
+    """boxes, child, origin, 1 / scale: see `Bvh`, but inner nodes stand before all blocks, close to each other."""
+    n_inner: int
+    """How many they are; unless there is but one block, they begin with the root."""
+    n_levels: int
+    """How many inner nodes stand above one another at most."""
+    corners: Float32Array
+    """(n_blocks, 9, 8), see `corners_of`."""
 
 
 def boundary_of(region: Polygon | Triangle | Polyhedron | Surface) -> Outline | Mesh:
@@ -90,8 +115,10 @@ def _levels_of(child: Int32Array) -> int:
 
 
 def corners_of(tree: Bvh, n_inner: int, elements: FloatArray) -> Float32Array:
-    """Return the corners (n_blocks, 9, 8) float32 of the triangles in each block of a tree, in its coordinates. Lanes
-    without a triangle lie far from everything."""
+    """Return the corners (n_blocks, 9, 8) float32 of the triangles in each block of a tree, in its coordinates.
+
+    Lanes without a triangle lie far from everything.
+    """
     child = tree.child[n_inner:]
     is_item = child != EMPTY
     block, lane = np.nonzero(is_item)

@@ -70,7 +70,9 @@ def settled(
     segments: FloatArray, items: IntArray, solid: Solid, pose: Pose | None, budget: Budget, locations: Any = None
 ) -> Pieces:
     """Return the pieces of some of segments (n, 2, dim) by exact arithmetic; locations: of both ends of each, if known.
-    Raises: UnsupportedSolidError, what `Budget.check` raises."""
+
+    Raises: UnsupportedSolidError, what `Budget.check` raises.
+    """
     sources: list[int] = []
     pieces: list[Piece] = []
     for place, item in enumerate(items.tolist()):

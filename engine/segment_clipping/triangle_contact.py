@@ -31,9 +31,11 @@ UNDERFLOW: Final = 2.0**-700
 
 @called
 def exact_contact(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3) -> int:
-    """Return how a segment p q and a triangle a b c meet, by exact signs. TOUCHING: where an end is off the plane, the
-    triangle has an area, and the line meets the plane in one point, within the segment unless both ends are on one
-    side. That point is outside of the triangle only where two edges tell so."""
+    """Return how a segment p q and a triangle a b c meet, by exact signs.
+
+    TOUCHING: where an end is off the plane, the triangle has an area, and the line meets the plane in one point, within
+    the segment unless both ends are on one side. That point is outside of the triangle only where two edges tell so.
+    """
     of_p, of_q = orient3d(a, b, c, p), orient3d(a, b, c, q)
     if of_p == of_q and (of_p == 1 or of_p == -1):
         return APART

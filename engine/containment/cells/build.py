@@ -6,18 +6,18 @@ Cost: linear in the faces and the entries, 0.6 to 1.5 us a face on one thread an
 
 from __future__ import annotations
 
-from collections import namedtuple
 from collections.abc import Callable
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import Int8Array, Int32Array, IntArray
+from engine.arrays import Float32Array, Int8Array, Int32Array, IntArray
 from engine.containment.cells.lattice import (
     LEVELS,
     PARTS,
     SPLIT,
     UNKNOWN,
+    Lattice,
     Level,
     Mesh,
     keep_of_details,
@@ -47,10 +47,19 @@ _COARSE: Final = 2
 """Cuts that every long list gets: deeper ones are for detail, where most triangles are smaller than the cell. What
 meets in a vertex or runs side by side is not told apart by finer cells."""
 
-Cells = namedtuple("Cells", "lattice statuses codes n_levels groups")
-"""What `locate_by_cells` reads. statuses: (n + 1,) int8 of level 0, the location of all points of a cell, UNDECIDED
-where its code says more, and last that of points beyond the lattice; small enough to stay in the cache. codes: level 0,
-then 64 a brick. groups: (n, 14, 8), what leaves keep of their triangles (lanes/cells.py)."""
+
+class Cells(NamedTuple):
+    """What `locate_by_cells` reads."""
+
+    lattice: Lattice
+    statuses: Int8Array
+    """(n + 1,) of level 0: the location of all points of a cell, UNDECIDED where its code says more, and last that of
+    points beyond the lattice; small enough to stay in the cache."""
+    codes: Int32Array
+    """Level 0, then 64 a brick."""
+    n_levels: int
+    groups: Float32Array
+    """(n, 14, 8): what leaves keep of their triangles (lanes/cells.py)."""
 
 
 def cells_of(solid: Polyhedron, budget: Budget) -> Cells:
@@ -106,7 +115,9 @@ def _listed(
     lister: Callable[[IntArray, Int32Array, bool], object], n: int, budget: Budget
 ) -> tuple[IntArray, IntArray, IntArray, Int32Array]:
     """Return the lengths of n lists, which of them are not empty, where those begin and the last ends, and the lists.
-    lister: counts, then fills, as `list_top` does."""
+
+    lister: counts, then fills, as `list_top` does.
+    """
     counts = np.zeros(n, np.int64)
     lister(counts, np.empty(0, np.int32), False)
     budget.check()

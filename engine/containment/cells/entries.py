@@ -61,8 +61,11 @@ def set_nothing(row: Any) -> None:
 
 @inline
 def set_entry(row: Any, a: Any, b: Any, c: Any, u: Any, v: Any) -> None:
-    """Write the entry of a triangle to row (13,) or longer. a, b, c: corners less R; u, v: b - a and c - a; all of them
-    differences of the given numbers, each rounded once, in units of the cell."""
+    """Write the entry of a triangle to row (13,) or longer.
+
+    a, b, c: corners less R; u, v: b - a and c - a; all of them differences of the given numbers, each rounded once, in
+    units of the cell.
+    """
     normal_error = _set_normal(row, 0, u, v)
     distance = row[0] * a[0] + row[1] * a[1] + row[2] * a[2]
     reach = max(abs(a[0]), abs(a[1]), abs(a[2]))

@@ -9,9 +9,9 @@ index of its least to that of its largest coordinate, but where a separating axi
 
 from __future__ import annotations
 
-from collections import namedtuple
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
+from engine.arrays import FloatArray, Int8Array, Int32Array, IntArray
 from engine.containment.cells.reach import layer_reached, row_reached, walls_of
 from engine.jit import inline, kernel
 
@@ -26,18 +26,49 @@ UNKNOWN: Final = 0
 PLACE: Final = (0.5 + 287.0 / 4096.0, 0.5 - 413.0 / 4096.0, 0.5 + 101.0 / 4096.0)
 """Where the reference point lies in its cell: no symmetry that faces of a lattice might share."""
 
-Lattice = namedtuple("Lattice", "low scale size n")
-"""The cells of level 0, along each axis: the low corner, cells a unit, sizes, which are powers of two, and how many."""
 
-Mesh = namedtuple("Mesh", "vertices triangles lattice")
-"""A polyhedron and its lattice."""
+class Lattice(NamedTuple):
+    """The cells of level 0; sizes are powers of two."""
 
-Level = namedtuple("Level", "depth places statuses firsts lists")
-"""The cells of one level that have lists. places: (m, 3) int32 indices on the level; statuses: (m,) int8, side of the
-reference point, -1, 1, or UNKNOWN; firsts: (m + 1,), where each cell's triangles begin in `lists`."""
+    low: tuple[float, float, float]
+    scale: tuple[float, float, float]
+    """1 / size."""
+    size: tuple[float, float, float]
+    n: tuple[int, int, int]
 
-Block = namedtuple("Block", "depth x y z nx ny nz first")
-"""Cells of a level side by side: from which index on, how many along the axes, the number of the first."""
+
+class Mesh(NamedTuple):
+    """A polyhedron and its lattice."""
+
+    vertices: FloatArray
+    triangles: Int32Array
+    lattice: Lattice
+
+
+class Level(NamedTuple):
+    """The cells of one level that have lists."""
+
+    depth: int
+    places: Int32Array
+    """``(m, 3)`` indices on the level."""
+    statuses: Int8Array
+    """``(m,)`` side of the reference point: -1, 1, or UNKNOWN."""
+    firsts: IntArray
+    """``(m + 1,)``: where each cell's triangles begin in `lists`."""
+    lists: Int32Array
+
+
+class Block(NamedTuple):
+    """Cells of a level side by side: from which index on, how many along the axes, the number of the first."""
+
+    depth: int
+    x: int
+    y: int
+    z: int
+    nx: int
+    ny: int
+    nz: int
+    first: int
 
 
 @inline
@@ -135,8 +166,10 @@ def list_top(mesh: Any, ends: Any, items: Any, is_fill: bool, flag: Any) -> None
 
 @kernel
 def list_parts(mesh: Any, level: Any, parents: Any, ends: Any, items: Any, is_fill: bool, flag: Any) -> None:
-    """Count or list, as `list_top` does, the triangles that reach into the 64 parts of each parent cell. level: that of
-    the parents; parents: (p,) some of its cells; ends: (p * 64,)."""
+    """Count or list, as `list_top` does, the triangles that reach into the 64 parts of each parent cell.
+
+    level: that of the parents; parents: (p,) some of its cells; ends: (p * 64,).
+    """
     for parent in range(len(parents)):
         if flag[0]:
             break

@@ -37,9 +37,11 @@ _AHEAD: Final = 6
 
 @inline
 def _first_status(points: Any, start: Any, end: Any, cells: Any, locations: Any, item_of: Any, n_kept: Any) -> Any:
-    """Write the status of level 0 for points start .. end, and append those that are UNDECIDED to item_of. Returns how
-    many that makes, and how many lie beyond the lattice. One pass without a branch: a point beyond, or not finite, gets
-    the status behind the last one."""
+    """Write the status of level 0 for points start .. end, and append those that are UNDECIDED to item_of.
+
+    Returns how many that makes, and how many lie beyond the lattice. One pass without a branch: a point beyond, or not
+    finite, gets the status behind the last one.
+    """
     low, scale, n, statuses = cells.lattice.low, cells.lattice.scale, cells.lattice.n, cells.statuses
     nx, ny, beyond = np.int32(n[0]), np.int32(n[1]), np.uint32(n[0] * n[1] * n[2])
     x_end, y_end, z_end = float(n[0]), float(n[1]), float(n[2])
@@ -143,10 +145,12 @@ def _count_open(locations: Any, item_of: Any, n_kept: Any) -> int:
 
 @kernel
 def locate_by_cells(points: Any, cells: Any, locations: Any, flag: Any) -> int:
-    """Fill `locations` (n,) int8 for points (n, 3) from a `Cells`; returns how many are left UNDECIDED. Points go
-    through one stage after another, many at a time, so that the loads of a stage do not wait for each other: status on
-    level 0, where most points end; codes there and in bricks; first group of the leaf, parity. Returns NOT_FINITE, with
-    the rest undone, where a point is not: it is in no cell, so it costs little to look."""
+    """Fill `locations` (n,) int8 for points (n, 3) from a `Cells`; returns how many are left UNDECIDED.
+
+    Points go through one stage after another, many at a time, so that the loads of a stage do not wait for each other:
+    status on level 0, where most points end; codes there and in bricks; first group of the leaf, parity.
+    Returns NOT_FINITE, with the rest undone, where a point is not: it is in no cell, so it costs little to look.
+    """
     room = _FEWEST + _BLOCK + 1
     item_of, code_of, level_of = np.empty(room, np.uint64), np.empty(room, np.int32), np.empty(room, np.int32)
     places, waiting = np.empty((room, 3), np.int32), np.empty(room, np.uint64)

@@ -25,8 +25,10 @@ _SHARE: Final = 0.4
 
 @kernel
 def top_cells(points: Any, cells: Any, keys: Any, flag: Any) -> int:
-    """Fill keys (n,) int32 with each point's cell of level 0, the last one for points beyond. Returns how many of the
-    cells have lists."""
+    """Fill keys (n,) int32 with each point's cell of level 0, the last one for points beyond.
+
+    Returns how many of the cells have lists.
+    """
     low, scale, n = cells.lattice.low, cells.lattice.scale, cells.lattice.n
     x_end, y_end, z_end, n_listed = float(n[0]), float(n[1]), float(n[2]), 0
     for item in range(len(points)):

@@ -21,9 +21,8 @@ Source: the separating axes of a triangle and a box after Akenine-Moeller 2001; 
 
 from __future__ import annotations
 
-from collections import namedtuple
 from math import ceil, floor
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from engine.jit import inline
 
@@ -33,9 +32,19 @@ _SLACK: Final = 2.0**-16
 _FLAT: Final = 2.0**-300
 """A slope below this cuts nothing: the quotient could overflow."""
 
-Walls = namedtuple("Walls", "seen_along_z seen_along_x seen_along_y normal reach")
-"""Functions that are not negative where a cell may meet the triangle, two slopes and a constant each: three over (x,
-y), over (y, z), over (z, x); and the plane, where |normal . w| is at most `reach`."""
+
+class Walls(NamedTuple):
+    """Functions that are not negative where a cell may meet the triangle: two slopes and a constant each."""
+
+    seen_along_z: Any
+    """Three over (x, y)."""
+    seen_along_x: Any
+    """Three over (y, z)."""
+    seen_along_y: Any
+    """Three over (z, x)."""
+    normal: Any
+    """The plane: |normal . w| is at most `reach` where they may meet."""
+    reach: float
 
 
 @inline

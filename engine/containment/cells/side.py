@@ -21,8 +21,10 @@ def _index(value: float, low: float, scale: float) -> int:
 
 @inline
 def side_in_cell(frames: Any, places: Any, row: int, p: Any, blur: float) -> int:
-    """Return the location of a blurred point (x, y, z) if its cell tells it, else UNDECIDED. frames: (n, 6), places:
-    (n, 4), what `TopCells` has of each polyhedron, of which `row` counts."""
+    """Return the location of a blurred point (x, y, z) if its cell tells it, else UNDECIDED.
+
+    frames: (n, 6), places: (n, 4), what `TopCells` has of each polyhedron, of which `row` counts.
+    """
     x, y, z = p
     x_low, y_low, z_low = frames[row, 0], frames[row, 1], frames[row, 2]
     x_scale, y_scale, z_scale = frames[row, 3], frames[row, 4], frames[row, 5]

@@ -46,7 +46,9 @@ def _empty_before(counts: Any, first: int, place: int, nx: int, ny: int) -> int:
 @kernel
 def label_empty(counts: Any, nx: int, ny: int, labels: Any) -> None:
     """Fill labels (nz * ny * nx,) int64 with the cell that each empty cell copies from, itself for one that is asked.
-    Cells with a list label themselves."""
+
+    Cells with a list label themselves.
+    """
     for cell in range(len(counts)):
         before = _empty_before(counts, 0, cell, nx, ny) if counts[cell] == 0 else -1
         labels[cell] = labels[before] if before >= 0 else cell
@@ -85,8 +87,10 @@ def reference_points(lattice: Any, places: Any, level: int, points: Any, is_vali
 
 @inline
 def _fill_groups(groups: Any, first_group: int, mesh: Any, level: Any, cell: int, reference: Any) -> int:
-    """Write the groups of a cell's triangles about its reference point, in units of the cells of its level. Returns how
-    many they are."""
+    """Write the groups of a cell's triangles about its reference point, in units of the cells of its level.
+
+    Returns how many they are.
+    """
     scale, parts = mesh.lattice.scale, parts_of(level.depth)
     first, last = level.firsts[cell], level.firsts[cell + 1]
     n_groups = (last - first + LANES - 1) // LANES
@@ -121,8 +125,10 @@ def _across(groups: Any, n_groups: int, w: Any, status: int) -> int:
 @kernel
 def locate_parts(mesh: Any, level: Any, parents: Any, counts: Any, groups: Any, found: Any, flag: Any) -> None:
     """Fill found (p * 64,) int8 with the status of each part: of its reference point, or of all of it if it is empty.
+
     level, parents: as for `list_parts`; counts: (p * 64,) lengths of the parts' lists; groups: workspace for the
-    longest list of a parent."""
+    longest list of a parent.
+    """
     lattice, below = mesh.lattice, level.depth + 1
     parts, shift = parts_of(level.depth), 2 * (LEVELS - 1 - below)
     for parent in range(len(parents)):

@@ -5,13 +5,12 @@ By itself it serves scenes: cheap to build, and small, it tells the location of 
 
 from __future__ import annotations
 
-from collections import namedtuple
 from math import frexp, ldexp
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import Int8Array, Int32Array, IntArray, read_only
+from engine.arrays import FloatArray, Int8Array, Int32Array, IntArray, read_only
 from engine.containment.cells.lattice import UNKNOWN, Lattice, Mesh, list_top
 from engine.containment.cells.status import label_empty, reference_points
 from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
@@ -39,10 +38,16 @@ _RANGE: Final = 2.0**400
 """Largest extent, and 1 / smallest, of a solid that gets cells: products of three stay far from its ends."""
 _AT_ONCE: Final = 4096
 
-TopCells = namedtuple("TopCells", "frame place sides")
-"""What `side_in_cell` reads. frame: (6,), the low corner of the lattice, and cells to a unit; place: address of
-`sides`, and cells along each axis; sides: the location of all points of a cell, UNDECIDED where a triangle may reach
-into it."""
+
+class TopCells(NamedTuple):
+    """What `side_in_cell` reads."""
+
+    frame: FloatArray
+    """``(6,)``: the low corner of the lattice, and cells to a unit."""
+    place: tuple[int, int, int, int]
+    """Address of `sides`, and cells along each axis."""
+    sides: Int8Array
+    """The location of all points of a cell, UNDECIDED where a triangle may reach into it."""
 
 
 def can_have_cells(solid: Polyhedron) -> bool:
@@ -54,9 +59,11 @@ def can_have_cells(solid: Polyhedron) -> bool:
 
 
 def top_cells_if_they_pay(solid: Polyhedron, n_points: int, budget: Budget) -> TopCells | None:
-    """Return level 0 of `solid` if it is there, or if the points asked in scenes so far pay for building it. Building
-    takes about 0.5 us a face and 10 ns a cell, some 0.5 ms for 1,000 faces; a ray takes 0.2 us. The answers are the
-    same either way."""
+    """Return level 0 of `solid` if it is there, or if the points asked in scenes so far pay for building it.
+
+    Building takes about 0.5 us a face and 10 ns a cell, some 0.5 ms for 1,000 faces; a ray takes 0.2 us. The answers
+    are the same either way.
+    """
     seen = solid.prepared("scene_points_seen", lambda: [0], budget.check)
     seen[0] += n_points
     n_faces = len(solid.triangles)
@@ -82,8 +89,10 @@ def build_top_cells(solid: Polyhedron, budget: Budget) -> TopCells:
 
 
 def make_lattice(tree: TriangleTree, wanted: float, most: float) -> Lattice:
-    """Return level 0: some cells to each triangle of a cube, by powers of two, flat axes in one cell. wanted: cells
-    along the longest axis for each triangle along an edge of a cube; most: cells along it."""
+    """Return level 0: some cells to each triangle of a cube, by powers of two, flat axes in one cell.
+
+    wanted: cells along the longest axis for each triangle along an edge of a cube; most: cells along it.
+    """
     low, high = tree.low, tree.high
     extent = np.subtract(high, low)
     largest = float(extent.max())
@@ -99,8 +108,10 @@ def make_lattice(tree: TriangleTree, wanted: float, most: float) -> Lattice:
 
 def lattice_of(solid: Polyhedron, budget: Budget) -> tuple[Lattice, float]:
     """Return level 0 of all levels, and how long its lists are in all, as a sample of the triangles says; found once.
+
     It is finer than that of scenes, as far as it fits the cache, but that long needles and large faces are not listed
-    in more than some cells each."""
+    in more than some cells each.
+    """
     return solid.prepared("lattice", lambda: _find_lattice(tree_of(solid, budget.check), budget), budget.check)
 
 
@@ -131,8 +142,10 @@ def top_places(lattice: Lattice, cells: IntArray) -> Int32Array:
 
 
 def top_statuses(tree: TriangleTree, lattice: Lattice, counts: IntArray, only_empty: bool, budget: Budget) -> Int8Array:
-    """Return the sides of the cells of level 0: of all of an empty one, of the reference point of another one. counts:
-    lengths of the cells' lists. only_empty: the other ones are left UNKNOWN."""
+    """Return the sides of the cells of level 0: of all of an empty one, of the reference point of another one.
+
+    counts: lengths of the cells' lists. only_empty: the other ones are left UNKNOWN.
+    """
     labels = np.empty(len(counts), np.int64)
     label_empty(counts, lattice.n[0], lattice.n[1], labels)
     is_asked = labels == np.arange(len(labels))
@@ -145,8 +158,10 @@ def top_statuses(tree: TriangleTree, lattice: Lattice, counts: IntArray, only_em
 
 
 def ask_cells(tree: TriangleTree, lattice: Lattice, places: Int32Array, depth: int, budget: Budget) -> Int8Array:
-    """Return the sides of the reference points of cells of a level, by vertical rays. UNKNOWN where such a point is not
-    in its cell, on the boundary, or not decided by the compiled ray."""
+    """Return the sides of the reference points of cells of a level, by vertical rays.
+
+    UNKNOWN where such a point is not in its cell, on the boundary, or not decided by the compiled ray.
+    """
     points, is_valid = np.empty((len(places), 3)), np.empty(len(places), np.bool_)
     reference_points(lattice, places, depth, points, is_valid)
     found, blurs = np.empty(len(points), np.int8), np.zeros(len(points))

@@ -80,8 +80,9 @@ def _settle(points: Any, item: int, center: Any, radius: float, expansion: Any) 
 @kernel
 def locate_in_ball(points: Any, center: Any, blur: float, radius: float, locations: Any, flag: Any) -> int:
     """Fill `locations` (n,) int8 for points (n, dim); returns how many needed more than the filter, or NOT_FINITE.
-    blur: bound on the error of each coordinate of `center`; 0.0 where it is exact, else what stays open is
-    UNDECIDED."""
+
+    blur: bound on the error of each coordinate of `center`; 0.0 where it is exact, else what stays open is UNDECIDED.
+    """
     if has_not_finite(points):
         return NOT_FINITE
     is_flat, n_beyond = len(center) == 2, 0

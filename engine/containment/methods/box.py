@@ -10,8 +10,10 @@ from engine.jit import kernel
 
 @kernel
 def locate_in_box(points: Any, low: Any, high: Any, locations: Any, flag: Any) -> int:
-    """Fill `locations` (n,) int8 for points (n, dim) and the corners low, high (dim,); returns 0, or NOT_FINITE. Where
-    low = high on an axis every point of the box lies on its boundary: the comparisons say so by themselves."""
+    """Fill `locations` (n,) int8 for points (n, dim) and the corners low, high (dim,); returns 0, or NOT_FINITE.
+
+    Where low = high on an axis every point of the box lies on its boundary: the comparisons say so by themselves.
+    """
     if has_not_finite(points):
         return NOT_FINITE
     n_axes = len(low)

@@ -166,8 +166,10 @@ def _locate(points: Any, planes: Any, is_exact: Any, locations: Any, flag: Any, 
 @kernel
 def locate_in_half_planes(points: Any, planes: Any, is_exact: Any, locations: Any, flag: Any) -> int:
     """Fill `locations` (n,) int8 for points (n, 2) and planes (m, 3); UNDECIDED where the exponents are out of range.
-    is_exact: (m,) bool, False for a row that is correctly rounded from a rational one, without underflow. Returns how
-    many points needed more than the filter, or NOT_FINITE. Stops early once flag[0] is set."""
+
+    is_exact: (m,) bool, False for a row that is correctly rounded from a rational one, without underflow.
+    Returns how many points needed more than the filter, or NOT_FINITE. Stops early once flag[0] is set.
+    """
     return int(_locate(points, planes, is_exact, locations, flag, True))
 
 

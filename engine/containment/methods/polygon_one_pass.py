@@ -66,7 +66,9 @@ def _count_crossings(xs: Any, ys: Any, first: int, last: int, x: float, y: float
 @bare
 def _one_by_one(xs: Any, ys: Any, ring_offsets: Any, rings: tuple[int, int], q: Any) -> int:
     """Return the location of q in the rings rings[0] up to rings[1], which may end with their first vertex or not.
-    UNDECIDED where a sign is out of the compiled range."""
+
+    UNDECIDED where a sign is out of the compiled range.
+    """
     is_odd, is_open = False, False
     for ring in range(rings[0], rings[1]):
         first, last = ring_offsets[ring], ring_offsets[ring + 1]
@@ -88,7 +90,9 @@ def locate_in_small_rings(
     xs: Any, ys: Any, ring_offsets: Any, rings: tuple[int, int], q: Any, blur: float
 ) -> tuple[int, bool]:
     """Return the location of q = (x, y, ...) in closed rings from rings[0] on, and whether it took more than a filter.
-    xs, ys, ring_offsets: as `close_rings` leaves them."""
+
+    xs, ys, ring_offsets: as `close_rings` leaves them.
+    """
     n_crossed = n_unsure = 0
     for ring in range(rings[0], rings[1]):
         crossed, unsure = _count_crossings(xs, ys, ring_offsets[ring], ring_offsets[ring + 1], q[0], q[1], blur)
@@ -149,9 +153,11 @@ def _by_points(points: Any, blurs: Any, vertices: Any, ring_offsets: Any, crosse
 
 @kernel
 def locate_by_ring_pass(points: Any, blurs: Any, vertices: Any, ring_offsets: Any, locations: Any, flag: Any) -> int:
-    """Fill `locations` (n,) int8 for points (n, 2); returns how many needed more than the filter. blurs: (n,), or (0,)
-    for points that are exact; then NOT_FINITE is returned where one is not finite. vertices, ring_offsets: a
-    polygon's."""
+    """Fill `locations` (n,) int8 for points (n, 2); returns how many needed more than the filter.
+
+    blurs: (n,), or (0,) for points that are exact; then NOT_FINITE is returned where one is not finite. vertices,
+    ring_offsets: a polygon's.
+    """
     if len(blurs) == 0 and has_not_finite(points):
         return NOT_FINITE
     crossed, unsure = np.zeros(len(points), np.int64), np.zeros(len(points), np.int64)

@@ -85,8 +85,10 @@ def _locate_in_slab(q: Any, blur: float, edges: Any, slabs: Any, slab: int, flag
 
 @inline
 def meet_edge(a: Any, b: Any, q: Any) -> int:
-    """Return CROSSED if the ray to the right from q passes the edge, MISSED, ON_EDGE or UNDECIDED. BEYOND is added
-    where it took more than the filter."""
+    """Return CROSSED if the ray to the right from q passes the edge, MISSED, ON_EDGE or UNDECIDED.
+
+    BEYOND is added where it took more than the filter.
+    """
     if (a.y < q.y and b.y < q.y) or (a.y > q.y and b.y > q.y) or (a.x < q.x and b.x < q.x):
         return MISSED
     is_passed = (a.y <= q.y) != (b.y <= q.y)

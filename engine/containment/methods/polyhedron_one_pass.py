@@ -25,7 +25,9 @@ _ODD, _ON_FACE, _OPEN, _BEYOND = 1, 2, 4, 8
 @inline
 def _sort_into_cells(points: Any, u: Any, v: Any, firsts: Any, order: Any) -> None:
     """Fill order (n,) int32 with the points (n, 3) by their cell, and firsts (u_cells * v_cells + 1,) with the places.
-    u, v: each an `Axis` over x and y of all points. firsts: int64, zero."""
+
+    u, v: each an `Axis` over x and y of all points. firsts: int64, zero.
+    """
     for item in range(len(points)):
         firsts[_cell_at(points, item, u, v) + 1] += 1
     for cell in range(1, len(firsts)):
@@ -77,8 +79,10 @@ def _conclude(states: Any, locations: Any) -> int:
 
 @inline
 def _pass_over(points: Any, cells: Any, vertices: Any, triangles: Any, z_min: float, states: Any, flag: Any) -> None:
-    """Enter in states (n,) uint8 how the rays of points (n, 3) meet the triangles (m, 3). cells: u, v, firsts, order as
-    `_sort_into_cells` leaves them. z_min: least of the points."""
+    """Enter in states (n,) uint8 how the rays of points (n, 3) meet the triangles (m, 3).
+
+    cells: u, v, firsts, order as `_sort_into_cells` leaves them. z_min: least of the points.
+    """
     u, v, firsts, order = cells
     for triangle in range(len(triangles)):
         if flag[0]:
@@ -118,7 +122,9 @@ def _axis_over(points: Any, axis: int, n_cells: int) -> Axis:
 @kernel
 def locate_by_pass(points: Any, vertices: Any, triangles: Any, locations: Any, flag: Any) -> int:
     """Fill `locations` (n,) int8 for points (n, 3), n > 0; returns how many needed more than the filter, or NOT_FINITE.
-    triangles: (m, 3) int64. Caller guarantees a surface that is even at each edge."""
+
+    triangles: (m, 3) int64. Caller guarantees a surface that is even at each edge.
+    """
     if has_not_finite(points):
         return NOT_FINITE
     side = max(1, int(len(points) ** 0.5))

@@ -91,7 +91,9 @@ def touch_in_plane(a: Any, b: Any, c: Any, q: Any) -> int:
 @inline
 def touch_triangle(a: Any, b: Any, c: Any, q: Any) -> int:
     """Return ON_FACE if q lies on the closed triangle a, b, c, which may be degenerate; else MISSED, or UNDECIDED.
-    Caller guarantees that q lies in the triangle's box."""
+
+    Caller guarantees that q lies in the triangle's box.
+    """
     side = orient3d_filter(a, b, c, q)
     if side != UNDECIDED:
         return MISSED
@@ -115,7 +117,9 @@ def touch_triangle(a: Any, b: Any, c: Any, q: Any) -> int:
 @inline
 def meet_upwards(a: Any, b: Any, c: Any, q: Any) -> int:
     """Return CROSSED if the ray up from the moved q meets the triangle, ON_FACE if q is on it, MISSED or UNDECIDED.
-    BEYOND is added where it took more than the filter."""
+
+    BEYOND is added where it took more than the filter.
+    """
     if q.z > max(a.z, b.z, c.z):
         return MISSED
     a2, b2, c2, q2 = Point2(a.x, a.y), Point2(b.x, b.y), Point2(c.x, c.y), Point2(q.x, q.y)
@@ -183,8 +187,10 @@ def _in_tree(tree: Any, q: Any, blur: float) -> tuple[Any, Any, Any, float, bool
 @kernel
 def list_unsure(tree: Any, x: float, y: float, z: float, blur: float, found: Any) -> tuple[int, bool]:
     """Fill found (n,) int64 with the rows of `tree.triangles` of which it is not sure how the rays up from all of the
-    blurred (x, y, z) meet them; return how many, and whether they meet an odd number of the others. The number is -1
-    where there is no room, or the point is too far from the tree."""
+    blurred (x, y, z) meet them; return how many, and whether they meet an odd number of the others.
+
+    The number is -1 where there is no room, or the point is too far from the tree.
+    """
     q, stack, n_found, is_odd, n_stack = Point3(x, y, z), np.empty(STACK, np.int32), 0, False, 1
     _, least, most, _, is_near = _in_tree(tree, q, blur)
     if not is_near:
@@ -216,8 +222,10 @@ def list_unsure(tree: Any, x: float, y: float, z: float, blur: float, found: Any
 
 @inline
 def locate_in_tree(tree: Any, q: Any, blur: float, stack: Any, flag: Any) -> tuple[int, bool]:
-    """Return the location of a blurred q in a `TriangleTree`, and whether it took more than a filter. stack: (STACK,)
-    int32. Coordinates of the tree are at most 2, and so is q in it, or it is outside."""
+    """Return the location of a blurred q in a `TriangleTree`, and whether it took more than a filter.
+
+    stack: (STACK,) int32. Coordinates of the tree are at most 2, and so is q in it, or it is outside.
+    """
     low, high = tree.low, tree.high
     is_out = (q.x + blur < low[0]) | (q.x - blur > high[0]) | (q.y + blur < low[1]) | (q.y - blur > high[1])
     if is_out | (q.z + blur < low[2]) | (q.z - blur > high[2]):
@@ -257,9 +265,11 @@ def locate_in_tree(tree: Any, q: Any, blur: float, stack: Any, flag: Any) -> tup
 
 @kernel
 def locate_by_tree(points: Any, blurs: Any, tree: Any, locations: Any, flag: Any) -> int:
-    """Fill `locations` (n,) int8 for points (n, 3); returns how many needed more than the filter. blurs: (n,), or (0,)
-    for points that are exact; then NOT_FINITE is returned where one is not finite. tree: a `TriangleTree`. Caller
-    guarantees a surface that is even at each edge."""
+    """Fill `locations` (n,) int8 for points (n, 3); returns how many needed more than the filter.
+
+    blurs: (n,), or (0,) for points that are exact; then NOT_FINITE is returned where one is not finite. tree: a
+    `TriangleTree`. Caller guarantees a surface that is even at each edge.
+    """
     if len(blurs) == 0 and has_not_finite(points):
         return NOT_FINITE
     return int(_locate_each(points, blurs, tree, locations, np.empty(STACK, np.int32), flag))
@@ -292,7 +302,9 @@ def fill_triangle_boxes(vertices: Any, triangles: Any, boxes: Any) -> None:
 @kernel
 def lay_out(vertices: Any, triangles: Any, tree: Any, child: Any, ordered: Any, blocks: Any) -> None:
     """Fill ordered (m, 3) int32 with the triangles in the order of a `Bvh`, child with its children numbered so.
-    blocks: (n_nodes, 8, 8) float32, zero; filled as `overhead` reads them."""
+
+    blocks: (n_nodes, 8, 8) float32, zero; filled as `overhead` reads them.
+    """
     place, origin, scale = 0, tree.origin, tree.scale
     for node in range(len(child)):
         centre_x, centre_y = float(tree.boxes[node, 0, 0]), float(tree.boxes[node, 1, 0])

@@ -12,8 +12,11 @@ from engine.types import UNDECIDED
 
 @kernel
 def locate_by_polynomial(points: Any, powers: Any, coefficients: Any, degree: int, locations: Any, flag: Any) -> int:
-    """Fill `locations` (n,) int8 for points (n, dim) with the sign of the polynomial, or UNDECIDED. powers: (t, dim)
-    int64; coefficients: (t,); degree: the largest total power. Returns the count beyond the filter, or NOT_FINITE."""
+    """Fill `locations` (n,) int8 for points (n, dim) with the sign of the polynomial, or UNDECIDED.
+
+    powers: (t, dim) int64; coefficients: (t,); degree: the largest total power. Returns the count beyond the
+    filter, or NOT_FINITE.
+    """
     if has_not_finite(points):
         return NOT_FINITE
     n_beyond = 0

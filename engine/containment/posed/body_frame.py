@@ -24,9 +24,11 @@ _TINY: Final = 1e-320
 
 @inline
 def to_frame(frames: Any, frame: int, p: Any) -> Any:
-    """Return a point (x, y, z) in the frame of a pose, and its blur: 0.0 where it is exact. frames: has inverses (n, 3,
-    3) of R^-1 rounded, translations (n, 3) and is_turn (n,): whether the entries are exactly -1, 0 and 1. frame: which
-    of them, -1 for none."""
+    """Return a point (x, y, z) in the frame of a pose, and its blur: 0.0 where it is exact.
+
+    frames: has inverses (n, 3, 3) of R^-1 rounded, translations (n, 3) and is_turn (n,): whether the entries are
+    exactly -1, 0 and 1. frame: which of them, -1 for none.
+    """
     if frame < 0:
         return p, 0.0
     inverses, translations = frames.inverses, frames.translations

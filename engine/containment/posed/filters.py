@@ -41,8 +41,10 @@ def orient2d_blurred(a: Any, b: Any, q: Any, blur: float) -> int:
 
 @inline
 def orient3d_blurred(a: Any, b: Any, c: Any, q: Any, blur: float) -> int:
-    """Return the sign of orient3d(a, b, c, .) on all of the blurred q, or UNDECIDED. Taken from a: dot((b - a) x (c -
-    a), q - a), whose change with q is at most the sum of the normal's parts."""
+    """Return the sign of orient3d(a, b, c, .) on all of the blurred q, or UNDECIDED.
+
+    Taken from a: dot((b - a) x (c - a), q - a), whose change with q is at most the sum of the normal's parts.
+    """
     ux, uy, uz = b.x - a.x, b.y - a.y, b.z - a.z
     vx, vy, vz = c.x - a.x, c.y - a.y, c.z - a.z
     wx, wy, wz = q.x - a.x, q.y - a.y, q.z - a.z
@@ -111,8 +113,10 @@ def locate_in_box_blurred(points: Any, blurs: Any, low: Any, high: Any, location
 
 @kernel
 def locate_in_rows_blurred(points: Any, blurs: Any, rows: Any, locations: Any, flag: Any) -> int:
-    """Fill `locations` (n,) int8 for rows (m, 4), each given or correctly rounded; returns how many stay open. Those of
-    the plane have 0 in the third place."""
+    """Fill `locations` (n,) int8 for rows (m, 4), each given or correctly rounded; returns how many stay open.
+
+    Those of the plane have 0 in the third place.
+    """
     n_open = 0
     for item in range(len(points)):
         if flag[0]:
@@ -126,10 +130,12 @@ def locate_in_rows_blurred(points: Any, blurs: Any, rows: Any, locations: Any, f
 def locate_by_polynomial_blurred(
     points: Any, blurs: Any, powers: Any, coefficients: Any, degree: int, locations: Any, flag: Any
 ) -> int:
-    """Fill `locations` (n,) int8 with the sign of the polynomial; returns how many stay open. A term changes by at most
-    degree times blur times the same term with one factor left out, all factors grown by the blur; each factor is at
-    most the largest grown coordinate or 1, m: the change is below degree |c| m^degree blur. A product that underflows
-    is off by 2^-1075 m^degree; there are at most 16,000."""
+    """Fill `locations` (n,) int8 with the sign of the polynomial; returns how many stay open.
+
+    A term changes by at most degree times blur times the same term with one factor left out, all factors grown by the
+    blur; each factor is at most the largest grown coordinate or 1, m: the change is below degree |c| m^degree blur. A
+    product that underflows is off by 2^-1075 m^degree; there are at most 16,000.
+    """
     n_axes, n_open = points.shape[1], 0
     for item in range(len(points)):
         if flag[0]:

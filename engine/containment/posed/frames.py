@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
-from collections import namedtuple
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from engine.arrays import FloatArray
+from engine.arrays import BoolArray, FloatArray, Int32Array
 from engine.solids.pose import Pose
 
-Frames = namedtuple("Frames", "rows rotations inverses translations is_turn")
-"""The poses of many bodies, those of the plane in the upper left. rows: of each body's pose in what follows, -1 for one
-that stays where it is. rotations, inverses: (n, 3, 3), each entry of these off by less than 32 units of rounding
-(body_frame.py). is_turn: whether a rotation only turns the axes onto each other."""
+
+class Frames(NamedTuple):
+    """The poses of many bodies; those of the plane in the upper left."""
+
+    rows: Int32Array
+    """Row of each body's pose in what follows, -1 for a body that stays where it is."""
+    rotations: FloatArray
+    """``(n, 3, 3)``."""
+    inverses: FloatArray
+    """``(n, 3, 3)``: each entry off by less than 32 units of rounding (body_frame.py)."""
+    translations: FloatArray
+    is_turn: BoolArray
+    """Whether a rotation only turns the axes onto each other."""
 
 
 def frames_of(poses: Sequence[Pose | None], dimension: int) -> Frames:

@@ -13,27 +13,64 @@ that are not: the side of the node tells their number, once what the node's own 
 
 from __future__ import annotations
 
-from collections import namedtuple
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from engine.arrays import FloatArray, Int32Array, IntArray
 from engine.containment.ring_cells.locate import EDGE_SHIFT, GOES_ON_DOWN, GOES_ON_UP, as_edge
 from engine.jit import inline, kernel
 from engine.predicates.loading import as_point2
 
-Node = namedtuple("Node", "column row u_shift v_shift side first stop")
-"""A cell to cut: column and row where fine places are shifted so, side, and its part of the level's list."""
 
-LevelOfNodes = namedtuple("LevelOfNodes", "nodes cuts bases edges_of edges places is_tight")
-"""The nodes of one level, (n, 7) of `Node`, and how they are cut. cuts: (n, 2), a node becomes 2^a by 2^b cells; bases:
-first word of each node; edges_of: the level's list; is_tight: whether places are off by no more than rounding."""
+class Node(NamedTuple):
+    """A cell to cut: column and row where fine places are shifted so, side, and its part of the level's list."""
 
-Cut = namedtuple("Cut", "left bottom u_shift v_shift n_columns n_rows base")
-"""The cells of one node: column and row of the first, and where fine places are shifted so, numbers, first word."""
+    column: int
+    row: int
+    u_shift: int
+    v_shift: int
+    side: int
+    first: int
+    stop: int
 
-Ends = namedtuple("Ends", "lower_u lower_v upper_u upper_v")
-"""Places of an edge's ends in the fine grid, not cut to integers."""
+
+class LevelOfNodes(NamedTuple):
+    """The nodes of one level and how they are cut."""
+
+    nodes: IntArray
+    """``(n, 7)`` of `Node`."""
+    cuts: IntArray
+    """``(n, 2)``: a node becomes 2^a by 2^b cells."""
+    bases: IntArray
+    """First word of each node."""
+    edges_of: Int32Array
+    """The level's list."""
+    edges: FloatArray
+    places: FloatArray
+    is_tight: bool
+    """Whether places are off by no more than rounding."""
+
+
+class Cut(NamedTuple):
+    """The cells of one node: column and row of the first, and where fine places are shifted so, numbers, first word."""
+
+    left: int
+    bottom: int
+    u_shift: int
+    v_shift: int
+    n_columns: int
+    n_rows: int
+    base: int
+
+
+class Ends(NamedTuple):
+    """Places of an edge's ends in the fine grid, not cut to integers."""
+
+    lower_u: float
+    lower_v: float
+    upper_u: float
+    upper_v: float
 
 
 @inline
@@ -51,8 +88,10 @@ def as_ends(places: Any, row: int) -> Ends:
 
 @kernel
 def place_edges(starts: Any, ends: Any, low: Any, scales: Any, edges: Any, places: Any) -> None:
-    """Fill edges (4 (m + 1),), as locate.py reads them, and places (m + 1, 4) of `Ends`, numbers from 1 on. starts,
-    ends: (m, 2). low: (2,), half the box's lower corner. scales: (2,)."""
+    """Fill edges (4 (m + 1),), as locate.py reads them, and places (m + 1, 4) of `Ends`, numbers from 1 on.
+
+    starts, ends: (m, 2). low: (2,), half the box's lower corner. scales: (2,).
+    """
     for i_edge in range(len(starts)):
         a, b = as_point2(starts, i_edge), as_point2(ends, i_edge)
         if b.y < a.y or (b.y == a.y and b.x < a.x):
@@ -88,7 +127,9 @@ def choose_cuts(
     nodes: Any, edges_of: Any, places: Any, most: Any, cells: Any, is_tight: bool, cuts: Any, flag: Any
 ) -> None:
     """Fill cuts (n, 2) with a, b of each node: halves where that lengthens the lists least, as long as it pays.
-    edges_of: the level's list. most: (2,) largest a and b. cells: (3,) cells of a node: least, most, for each edge."""
+
+    edges_of: the level's list. most: (2,) largest a and b. cells: (3,) cells of a node: least, most, for each edge.
+    """
     for i_node in range(len(nodes)):
         if flag[0]:
             break
@@ -154,9 +195,11 @@ def _note_beyond(turns: Any, node: Any, cut: Any, e: Any, ends: Any) -> None:
 
 @inline
 def _note_in_row(sides: Any, head: int, cut: Any, columns: Any, goes_on: int, is_passed: bool) -> None:
-    """Note what an edge changes in the cells of a row, at the last cell of those that it changes. columns: the first
-    and last in which the edge is listed. goes_on: those before it lie left of where it goes on down. is_passed: it
-    passes the lowest height of the row, so it is right of all columns before the first."""
+    """Note what an edge changes in the cells of a row, at the last cell of those that it changes.
+
+    columns: the first and last in which the edge is listed. goes_on: those before it lie left of where it goes on down.
+    is_passed: it passes the lowest height of the row, so it is right of all columns before the first.
+    """
     first, last = columns
     if is_passed:
         if first > 0:

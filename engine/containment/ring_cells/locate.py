@@ -38,11 +38,11 @@ Source: the parity is Shimrat's, 1962; new here are the lengthened edges.
 
 from __future__ import annotations
 
-from collections import namedtuple
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from engine.arrays import FlagArray, FloatArray, Int32Array
 from engine.containment.posed.filters import NOT_FINITE, has_not_finite
 from engine.jit import inline, kernel, merged
 from engine.predicates.loading import as_point2
@@ -61,19 +61,49 @@ GOES_ON_DOWN: Final = 4
 EDGE_SHIFT: Final = 3
 _BLOCK: Final = 256
 
-RingCells = namedtuple("RingCells", "edges words items box u_scale v_scale u_bits v_bits band")
-"""What `locate_by_ring_cells` reads. edges: (4 m,) x, low, high, slope of each; edge 0 is one that is never sure.
-words: those of the topmost cells, row by row, one for the points out of the box, then those below. items: listed edges,
-each list ended by LAST; list 0 is not read, list 1 is never sure. box: xmin, xmax, ymin, ymax. u_scale, v_scale: fine
-cells a halved unit of x, of y. Topmost columns are 2^u_bits, rows 2^v_bits."""
 
-Edge = namedtuple("Edge", "x low high slope")
-"""An edge that goes up from (x, low) to height high."""
+class RingCells(NamedTuple):
+    """What `locate_by_ring_cells` reads."""
 
-_Block = namedtuple("_Block", "xs ys us vs found states waiting places")
-"""Points that go together, (256,) each: their coordinates, fine places, words found and states (side, and one bit above
-for a point that is not sure). waiting: uint32, the points that wait for the next step; places: the place in `items` of
-each."""
+    edges: FloatArray
+    """``(4 m,)``: x, low, high, slope of each; edge 0 is one that is never sure."""
+    words: Int32Array
+    """Those of the topmost cells, row by row, one for the points out of the box, then those below."""
+    items: Int32Array
+    """Listed edges, each list ended by LAST; list 0 is not read, list 1 is never sure."""
+    box: tuple[float, float, float, float]
+    """xmin, xmax, ymin, ymax."""
+    u_scale: float
+    """Fine cells a halved unit of x."""
+    v_scale: float
+    u_bits: int
+    """Topmost columns are 2^u_bits."""
+    v_bits: int
+    band: float
+
+
+class Edge(NamedTuple):
+    """An edge that goes up from (x, low) to height high."""
+
+    x: float
+    low: float
+    high: float
+    slope: float
+
+
+class _Block(NamedTuple):
+    """Points that go together, (256,) each: their coordinates, fine places, words found and states."""
+
+    xs: FloatArray
+    ys: FloatArray
+    us: Int32Array
+    vs: Int32Array
+    found: Int32Array
+    states: FlagArray
+    """Side, and one bit above for a point that is not sure."""
+    waiting: Any
+    """uint32: the points that wait for the next step, and the place in `items` of each."""
+    places: Any
 
 
 @inline

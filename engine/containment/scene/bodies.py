@@ -36,7 +36,9 @@ def grown_boxes(centers: FloatArray, reach: FloatArray) -> Box:
 
 def body_box(solid: Solid, pose: Pose | None, check: Check) -> Box:
     """Return low, high (dim,) around a body; infinite for one that may have no bounds (half-spaces and the like).
-    check: as for `Solid.prepared`."""
+
+    check: as for `Solid.prepared`.
+    """
     if isinstance(solid, Csg):
         found: Box = over_tree(solid, lambda leaf: body_box(leaf, pose, check), _csg_box)
         return found

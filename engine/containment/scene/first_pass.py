@@ -9,9 +9,9 @@ posed/filters.py), what they leave is UNDECIDED and listed for the methods of si
 
 from __future__ import annotations
 
-from collections import namedtuple
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
+from engine.arrays import BoolArray, FloatArray, Int8Array, Int32Array, IntArray
 from engine.containment.cells.side import side_in_cell
 from engine.containment.methods.ball import located
 from engine.containment.methods.polygon_one_pass import locate_in_small_rings
@@ -29,18 +29,41 @@ RINGS: Final = 4
 CELLS: Final = 5
 """Kinds of bodies: how a candidate is decided in the first pass."""
 
-SceneTables = namedtuple(
-    "SceneTables",
-    "kinds slots lows highs frames inverses translations is_turn box_lows box_highs centers balls row_offsets rows "
-    "polygon_offsets ring_offsets xs ys cell_frames cell_places",
-)
-"""What the first pass reads of the bodies; a body's row in the tables of its kind is its slot. Arrays of three columns
-are (n, 3), with 0 in the third place in the plane. lows, highs: boxes, rounded outward. frames: row of a body's pose in
-inverses (R^-1 rounded, posed/body_frame.py), translations and is_turn, -1 for none. box_lows, box_highs: of boxes in
-their own frame. centers: of balls, in the world; balls: (n, 2), radius, and a bound on the error of each coordinate of
-the centre. row_offsets: where the rows (n, 4) of a half-space or convex begin. polygon_offsets: where the rings of a
-polygon begin; xs, ys: the vertices of all rings, each ended by its first one. cell_frames, cell_places: (n, 6) and (n,
-4), what `TopCells` has of a polyhedron."""
+
+class SceneTables(NamedTuple):
+    """What the first pass reads of the bodies; a body's row in the tables of its kind is its slot."""
+
+    kinds: Int8Array
+    slots: Int32Array
+    lows: FloatArray
+    """``(n_bodies, 3)``: boxes, rounded outward; the third axis of a scene of the plane is 0."""
+    highs: FloatArray
+    frames: Int32Array
+    """Row of a body's pose in the next three, -1 for none."""
+    inverses: FloatArray
+    """``(n_poses, 3, 3)``: R^-1 rounded (posed/body_frame.py); the plane's in the upper left."""
+    translations: FloatArray
+    is_turn: BoolArray
+    box_lows: FloatArray
+    """``(n, 3)``: of boxes in their own frame."""
+    box_highs: FloatArray
+    centers: FloatArray
+    """``(n, 3)``: of balls, in the world."""
+    balls: FloatArray
+    """``(n, 2)``: radius, and a bound on the error of each coordinate of the centre."""
+    row_offsets: IntArray
+    """Where the rows of a half-space or convex begin."""
+    rows: FloatArray
+    """``(n, 4)``: normal and offset; the plane's have 0 in the third place."""
+    polygon_offsets: IntArray
+    """Where the rings of a polygon begin."""
+    ring_offsets: IntArray
+    xs: FloatArray
+    """The vertices of all rings, each ended by its first one."""
+    ys: FloatArray
+    cell_frames: FloatArray
+    cell_places: IntArray
+    """``(n, 6)`` and ``(n, 4)``: what `TopCells` has of a polyhedron."""
 
 
 @merged
@@ -76,9 +99,11 @@ def _locate_in_body(tables: Any, body: int, is_flat: bool, p: Any) -> tuple[int,
 
 @kernel
 def sort_by_cell(points: Any, grid: Any, shift: int, keys: Any, ends: Any, order: Any, gathered: Any) -> None:
-    """Gather points (n, dim) in the order of their cells, so that those that meet the same bodies come together. shift:
-    cells that share all higher bits of their number count as one. keys, order: (n,) int32, order is filled with the
-    points' places; ends: (number of cells + 1 >> shift, and two more) int64, zero."""
+    """Gather points (n, dim) in the order of their cells, so that those that meet the same bodies come together.
+
+    shift: cells that share all higher bits of their number count as one. keys, order: (n,) int32, order is filled with
+    the points' places; ends: (number of cells + 1 >> shift, and two more) int64, zero.
+    """
     for item in range(len(points)):
         key = (cell_at(in_space(points, item), grid) + 1) >> shift
         keys[item] = key
@@ -97,10 +122,12 @@ def sort_by_cell(points: Any, grid: Any, shift: int, keys: Any, ends: Any, order
 def scan_points(
     points: Any, tables: Any, grid: Any, unbounded: Any, counts: Any, bodies: Any, located: Any, flag: Any
 ) -> Any:
-    """List the bodies that hold the points (n, 2 or 3), as far as the room goes. counts: (n,) int64, bodies of each
-    point; bodies int32, located int8: (room,) the bodies of all points, ascending for each, where they are not surely
-    outside. unbounded: bodies that are asked about every point, ascending. Returns the numbers of points done, bodies
-    listed, and those that took more than a filter."""
+    """List the bodies that hold the points (n, 2 or 3), as far as the room goes.
+
+    counts: (n,) int64, bodies of each point; bodies int32, located int8: (room,) the bodies of all points, ascending
+    for each, where they are not surely outside. unbounded: bodies that are asked about every point, ascending.
+    Returns the numbers of points done, bodies listed, and those that took more than a filter.
+    """
     is_flat, n_unbounded, items = points.shape[1] == 2, len(unbounded), grid.items
     n_bodies = n_beyond = done = 0
     for item in range(len(points)):
@@ -134,9 +161,12 @@ def scan_points(
 def put_in_order(
     order: Any, sorted_counts: Any, sorted_bodies: Any, sorted_located: Any, counts: Any, starts: Any, lists: Any
 ) -> int:
-    """Bring what `scan_points` listed for gathered points into the order of the points. order: (n,) each one's place;
-    counts: (n,) and starts: (n,) int64 are filled; lists: bodies int64 and located int8, of the pairs' number, then
-    places and owners int64: the pairs that are UNDECIDED, and their points. Returns how many those are."""
+    """Bring what `scan_points` listed for gathered points into the order of the points.
+
+    order: (n,) each one's place; counts: (n,) and starts: (n,) int64 are filled; lists: bodies int64 and located int8,
+    of the pairs' number, then places and owners int64: the pairs that are UNDECIDED, and their points.
+    Returns how many those are.
+    """
     bodies, located, places, owners = lists
     for place in range(len(order)):
         counts[order[place]] = sorted_counts[place]

@@ -6,12 +6,11 @@ are listed in ascending order.
 
 from __future__ import annotations
 
-from collections import namedtuple
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray
+from engine.arrays import FloatArray, Int32Array, IntArray
 from engine.bounding.grid import Axis, cell_of, list_in_cells
 from engine.jit import inline
 
@@ -20,8 +19,15 @@ _ENTRIES_A_BOX: Final = 48
 """Entries a box (and 64 more) above which the cells are made larger."""
 _MOST_ALONG: Final = 1024
 
-SceneGrid = namedtuple("SceneGrid", "u v w offsets items")
-"""Bodies by cell: those of cell (u, v, w) are ``items[offsets[k]:offsets[k + 1]]``, k = (w * nv + v) * nu + u."""
+
+class SceneGrid(NamedTuple):
+    """Bodies by cell: those of cell (u, v, w) are ``items[offsets[k]:offsets[k + 1]]``, k = (w * nv + v) * nu + u."""
+
+    u: Axis
+    v: Axis
+    w: Axis
+    offsets: IntArray
+    items: Int32Array
 
 
 @inline

@@ -32,8 +32,10 @@ def settle_rest(
     points: FloatArray, scene: Scene, owners_of: list[IntArray], bodies_of: list[IntArray],
     take: list[Callable[[Int8Array], object]], budget: Budget, workers: int | None,
 ) -> Counts:  # fmt: skip
-    """Locate pairs of a point (owners) and a body, given piece by piece, and hand each piece its locations. Returns how
-    many took more than the filter, and how many rational arithmetic."""
+    """Locate pairs of a point (owners) and a body, given piece by piece, and hand each piece its locations.
+
+    Returns how many took more than the filter, and how many rational arithmetic.
+    """
     owners = np.concatenate([np.zeros(0, np.int64), *owners_of])
     bodies = np.concatenate([np.zeros(0, np.int64), *bodies_of])
     if not len(owners):

@@ -114,9 +114,11 @@ def _placed_balls(balls: IntArray, radii: FloatArray, lows: FloatArray, highs: F
 
 
 class _Kinds:
-    """The tables of the distinct solids, by kind, each in its own frame, named as in `SceneTables`. lows, highs: (n,
-    3), infinite where there may be no bounds; of spheres the centre. is_other: solids of other kinds, whose bodies are
-    looked at one by one."""
+    """The tables of the distinct solids, by kind, each in its own frame, named as in `SceneTables`.
+
+    lows, highs: (n, 3), infinite where there may be no bounds; of spheres the centre. is_other: solids of other kinds,
+    whose bodies are looked at one by one.
+    """
 
     def __init__(self, solids: list[Solid], dimension: int, budget: Budget) -> None:
         n = len(solids)

@@ -6,11 +6,11 @@ UNDECIDED.
 
 from __future__ import annotations
 
-from collections import namedtuple
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from engine.arrays import FloatArray, Int32Array, IntArray
 from engine.bounding.bvh import STACK, WIDTH
 from engine.containment.cells.side import side_in_cell
 from engine.containment.methods.polyhedron_ray_parity import locate_in_tree
@@ -24,11 +24,21 @@ from engine.lanes.boxes import BOX_ROWS
 from engine.lanes.overhead import OVERHEAD_ROWS
 from engine.types import UNDECIDED, Point3
 
-TreeTables = namedtuple("TreeTables", "rows addresses sizes places cell_places cell_frames")
-"""The prepared structures of the polyhedra of a scene, a row for each solid. rows: row of each body's solid, -1 for
-bodies that are not asked here. addresses: (n, 5), of vertices, triangles, boxes, children and blocks; sizes: (n, 3),
-numbers of vertices, triangles and nodes; places: (n, 10), origin, scale, low and high of the tree; cell_places: (n, 4),
-address and numbers of the cells of level 0, 0 where there are none; cell_frames: (n, 6)."""
+
+class TreeTables(NamedTuple):
+    """The prepared structures of the polyhedra of a scene, a row for each solid."""
+
+    rows: Int32Array
+    """Row of each body's solid, -1 for bodies that are not asked here."""
+    addresses: IntArray
+    """``(n, 5)``: of vertices, triangles, boxes, children and blocks."""
+    sizes: IntArray
+    """``(n, 3)``: numbers of vertices, triangles and nodes."""
+    places: FloatArray
+    """``(n, 10)``: origin, scale, low and high of the tree."""
+    cell_places: IntArray
+    """``(n, 4)``: address and numbers of the cells of level 0, 0 where there are none."""
+    cell_frames: FloatArray
 
 
 def tree_line(tree: TriangleTree) -> tuple[tuple[int, ...], tuple[int, ...], tuple[float, ...]]:
@@ -59,7 +69,9 @@ def locate_groups(
     flag: Any,
 ) -> None:  # fmt: skip
     """Fill located (n_pairs,) int8 for groups of pairs of a body each: those at order[begins[group] : ends[group]].
-    owners: (n_pairs,) the point of each pair; bodies: that of each group; scene: the `SceneTables`, for its poses."""
+
+    owners: (n_pairs,) the point of each pair; bodies: that of each group; scene: the `SceneTables`, for its poses.
+    """
     stack = np.empty(STACK, np.int32)
     for group in range(len(begins)):
         body = bodies[group]

@@ -42,8 +42,11 @@ def count_active(blocks: Blocks, n: int) -> int:
 
 @inline
 def wake_near(blocks: Blocks, n: int, gap: float, tree: BoxTree, n_most: int, stop: Any) -> bool:
-    """Make blocks active whose boxes may be no further apart than ``gap``; tell whether few enough are. tree: built,
-    with marks of which the last of each ring has all bits. n_most: edges of active blocks that are too many."""
+    """Make blocks active whose boxes may be no further apart than ``gap``; tell whether few enough are.
+
+    tree: built, with marks of which the last of each ring has all bits. n_most: edges of active blocks that are too
+    many.
+    """
     nodes, stack = tree.nodes, tree.stack
     n_active = count_active(blocks, n)
     n_leaves, visits = leaves_of(n), _VISITS * n

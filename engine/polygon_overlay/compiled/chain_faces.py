@@ -114,9 +114,11 @@ def test_edge(edges: Edges, v: int, e: int, nearest: int) -> int:
 
 @inline
 def edge_above(edges: Edges, tree: BoxTree, names: Any, v: int, n: int) -> int:
-    """Return the edge next above vertex v, a step to its right, or NOTHING; no edge of its component is there. tree: of
-    n edges, ``names`` their numbers. Edges that begin or pass through v are not above it: caller guarantees that none
-    does to the right."""
+    """Return the edge next above vertex v, a step to its right, or NOTHING; no edge of its component is there.
+
+    tree: of n edges, ``names`` their numbers. Edges that begin or pass through v are not above it: caller guarantees
+    that none does to the right.
+    """
     nearest = NOTHING
     n_leaves = leaves_of(n)
     nodes, stack, x, y = tree.nodes, tree.stack, edges.x[v], edges.y[v]

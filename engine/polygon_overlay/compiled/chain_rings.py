@@ -110,9 +110,11 @@ def walk_rings(
     edges: Edges, chains: Chains, stars: Stars, faces: Faces, marks: Any, walk: Walk, rings: Rings, holders: Holders,
     is_named: bool, sizes: tuple[int, int, int], stop: Any,
 ) -> tuple[int, int]:  # fmt: skip
-    """Write all boundary rings, and what is beyond them if rings are named; return how many rings and points. marks: of
-    the edges, BENT where the boundary surely turns at the first vertex, RUN where one stands for many, DOUBTFUL as
-    clearance.py says. sizes: the numbers of chains, nodes and simple nodes."""
+    """Write all boundary rings, and what is beyond them if rings are named; return how many rings and points.
+
+    marks: of the edges, BENT where the boundary surely turns at the first vertex, RUN where one stands for many,
+    DOUBTFUL as clearance.py says. sizes: the numbers of chains, nodes and simple nodes.
+    """
     n_chains, n_nodes, n_simple = sizes
     seen, path, place, fan = walk.seen, walk.path, walk.place, faces.fan
     seen[: 2 * n_chains] = 0

@@ -125,9 +125,11 @@ def build_chains(
     given: Given, events: Events, along: Along, unions: Unions, chains: Chains, stars: Stars, loose: Any, n: int,
     n_rings: int, stop: Any,
 ) -> tuple[int, int, int, int]:  # fmt: skip
-    """Walk every ring from its top vertex and cut it at its nodes, and fill the stars of simple nodes. unions.is_node:
-    the tops among them. stars.node_of: -1 on entry. ``loose`` gets the half-chains that leave other nodes, whose stars
-    begin NOT_YET. Returns the numbers of nodes, simple nodes, chains and loose half-chains."""
+    """Walk every ring from its top vertex and cut it at its nodes, and fill the stars of simple nodes.
+
+    unions.is_node: the tops among them. stars.node_of: -1 on entry. ``loose`` gets the half-chains that leave other
+    nodes, whose stars begin NOT_YET. Returns the numbers of nodes, simple nodes, chains and loose half-chains.
+    """
     edges = given.edges
     n_nodes = n_simple = n_chains = n_loose = 0
     for ring in range(n_rings):
@@ -198,8 +200,10 @@ def _compare_directions(edges: Edges, chains: Chains, g: int, h: int) -> int:
 
 @called
 def _unite_twins(edges: Edges, chains: Chains, star: Any, first: int, last: int, masks: Any) -> int:
-    """Let the lowest chain of each direction stand for all, and close the gaps; return where the star then ends. The
-    other end of coinciding chains finds the same chains together, so it chooses the same one."""
+    """Let the lowest chain of each direction stand for all, and close the gaps; return where the star then ends.
+
+    The other end of coinciding chains finds the same chains together, so it chooses the same one.
+    """
     kept = at = first
     while at < last:  # bound: each turn passes one group
         stop = at + 1

@@ -68,8 +68,10 @@ MARGIN: Final = 16.0 * 2.0**-52
 
 @inline
 def _corner_is_clear(edges: Edges, v: int, share_before: float, share_after: float, margin: float) -> bool:
-    """Tell whether the nodes next to vertex v are away from the other edge there. share_before, share_after: which part
-    of the edge before v, and of that after it, lies between v and the next node."""
+    """Tell whether the nodes next to vertex v are away from the other edge there.
+
+    share_before, share_after: which part of the edge before v, and of that after it, lies between v and the next node.
+    """
     x, y = edges.x, edges.y
     p, q = edges.before[v], edges.after[v]
     ux, uy, wx, wy = x[p] - x[v], y[p] - y[v], x[q] - x[v], y[q] - y[v]
@@ -82,7 +84,9 @@ def _corner_is_clear(edges: Edges, v: int, share_before: float, share_after: flo
 @inline
 def corners_are_clear(edges: Edges, n: int, along: Along, margin: float, marks: Any, stop: Any) -> bool:
     """Tell whether the first and the last event of every edge are far enough from the edge that begins or ends there.
-    along: by sort_events. Edges of corners where that is not so get the mark DOUBTFUL."""
+
+    along: by sort_events. Edges of corners where that is not so get the mark DOUBTFUL.
+    """
     starts, keys = along.starts, along.keys
     are_clear = True
     for e in range(n):
@@ -143,9 +147,11 @@ def has_straight_point(rings: Rings, n_rings: int, rounded: Rounded, stop: Any) 
 def certify(
     rings: Rings, n_rings: int, n: int, rounded: Rounded, tree: BoxTree, tails: Any, heads: Any, stop: Any
 ) -> bool:
-    """Tell whether the rings are certainly valid after rounding, no edges near each other that do not meet. n: points
-    of ``rings``. tree, tails, heads: scratch for as many. Only edges with the mark DOUBTFUL are looked at. What is left
-    out (RUN) is away from all that moves."""
+    """Tell whether the rings are certainly valid after rounding, no edges near each other that do not meet.
+
+    n: points of ``rings``. tree, tails, heads: scratch for as many. Only edges with the mark DOUBTFUL are looked at.
+    What is left out (RUN) is away from all that moves.
+    """
     x, y, moved, boxes, pairs = rounded.x, rounded.y, rounded.moved, tree.boxes, tree.pairs
     largest = 0.0
     for k in range(n):

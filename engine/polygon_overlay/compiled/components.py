@@ -162,9 +162,12 @@ def _gather_edges(edges: Edges, components: Components, n: int, tree: BoxTree, n
 
 @inline
 def join_faces(w: Any, names: Any, sizes: tuple[int, int, int, int], stop: Any) -> None:
-    """Join the outer cycle of each component of rings to the face it lies in. w: the `Workspace`, whose tree is
-    scratch, but for its marks: RUN of the edges that stand for many; caller guarantees that none of these is next above
-    another component. names: scratch by point. sizes: the numbers of vertices, rings, cycles and runs."""
+    """Join the outer cycle of each component of rings to the face it lies in.
+
+    w: the `Workspace`, whose tree is scratch, but for its marks: RUN of the edges that stand for many; caller
+    guarantees that none of these is next above another component. names: scratch by point. sizes: the numbers of
+    vertices, rings, cycles and runs.
+    """
     n, n_rings, n_cycles, n_runs = sizes
     given, tree, faces, components = w.given, w.tree, w.faces, w.components
     for i in range(n_cycles + 1):

@@ -57,9 +57,11 @@ def _is_after(ax: float, ay: float, bx: float, by: float) -> bool:
 
 @inline
 def _rise_of(x: Any, y: Any, size: int) -> int:
-    """Return how many edges of a ring go up in the order of x, then y; GENERAL unless it is surely strictly convex. It
-    is if all its turns are to the left, and it turns once: its edges go up once, and down once. x, y: its vertices,
-    counter-clockwise, and the first one again. No branches: the compiler makes vectors of this loop."""
+    """Return how many edges of a ring go up in the order of x, then y; GENERAL unless it is surely strictly convex.
+
+    It is if all its turns are to the left, and it turns once: its edges go up once, and down once. x, y: its vertices,
+    counter-clockwise, and the first one again. No branches: the compiler makes vectors of this loop.
+    """
     n_left = n_rising = n_changes = 0
     for i in range(size - 1):
         ax, ay, bx, by, cx, cy = x[i], y[i], x[i + 1], y[i + 1], x[i + 2], y[i + 2]
@@ -91,9 +93,11 @@ def _first_of(vertices: Any) -> int:
 def load_convex(
     vertices: Any, base: int, edges: Edges, origins: Any, start: int, stop: Any
 ) -> tuple[int, int]:  # fmt: skip
-    """Load a ring to where ``start`` is, counter-clockwise from its first vertex, with that again at its end. Returns
-    its last vertex in the order of x, then y, or GENERAL if it is not strictly convex, and 1 or -1, along or against
-    the ring as given."""
+    """Load a ring to where ``start`` is, counter-clockwise from its first vertex, with that again at its end.
+
+    Returns its last vertex in the order of x, then y, or GENERAL if it is not strictly convex, and 1 or -1, along or
+    against the ring as given.
+    """
     size = vertices.shape[0]
     low = _first_of(vertices)
     after, before = (low + 1 if low + 1 < size else 0), (low if low > 0 else size) - 1
@@ -117,9 +121,11 @@ def load_convex(
 
 @inline
 def _are_apart(edges: Edges, i: int, i_end: int, i_step: int, j: int, j_end: int) -> bool:
-    """Tell whether a lower chain is surely under an upper one: it is all along, if it is where both begin and end. For
-    the one is convex, the other concave. Edges i and j are the first that have an x in common. Vertical edges are the
-    first of an upper chain and the last of a lower one, so that there too the ends are what counts."""
+    """Tell whether a lower chain is surely under an upper one: it is all along, if it is where both begin and end.
+
+    For the one is convex, the other concave. Edges i and j are the first that have an x in common. Vertical edges are
+    the first of an upper chain and the last of a lower one, so that there too the ends are what counts.
+    """
     x, y = edges.x, edges.y
     if i_step < 0:
         i, i_end, j, j_end = j, j_end, i, i_end
@@ -165,8 +171,10 @@ def _enter_passage(edges: Edges, e: int, f: int, passages: Passages) -> int:
 def _find_passages(
     edges: Edges, i: int, i_end: int, i_step: int, j: int, j_end: int, j_step: int, passages: Passages, stop: Any
 ) -> int:  # fmt: skip
-    """Enter the crossings of two chains, walked from left to right; return how many, or GENERAL. i, j: the leftmost
-    vertex of each; a lower chain goes up by steps of 1, an upper one down by -1."""
+    """Enter the crossings of two chains, walked from left to right; return how many, or GENERAL.
+
+    i, j: the leftmost vertex of each; a lower chain goes up by steps of 1, an upper one down by -1.
+    """
     x, y = edges.x, edges.y
     while i != i_end and x[i + i_step] < x[j]:
         i += i_step
@@ -247,10 +255,12 @@ def _walk(
     edges: Edges, origins: Any, n: int, second: int, end: int, turned: int, turned_second: int, passages: Passages,
     points: Points, stop: Any,
 ) -> tuple[int, float]:  # fmt: skip
-    """Write the points of the result; return how many, or GENERAL, and how far one moved. The first polygon is followed
-    where it is inside the other, and the other from where the first leaves to where it enters again. Edges 0 .. n - 1
-    and second .. end - 1; at least one crossing. turned, turned_second: 1 if the ring was given clockwise: its edges
-    began with their ends."""
+    """Write the points of the result; return how many, or GENERAL, and how far one moved.
+
+    The first polygon is followed where it is inside the other, and the other from where the first leaves to where it
+    enters again. Edges 0 .. n - 1 and second .. end - 1; at least one crossing. turned, turned_second: 1 if the ring
+    was given clockwise: its edges began with their ends.
+    """
     enters, leaves = passages.enters, passages.leaves
     start = 0
     while start < n and enters[start] == _NONE:  # bound: n
@@ -290,8 +300,10 @@ def intersect_convex(
     subject: Any, clip: Any, given: Given, passages: Passages, points: Points, stop: Any
 ) -> tuple[int, int, float]:  # fmt: skip
     """Intersect two rings: return the number of points, which of them is first, and how far one moved; or GENERAL.
-    points: filled, counter-clockwise; vertices by their numbers, those of clip after those of subject. The arrays of
-    given and passages need room for two more than all vertices, those of points for four times as many."""
+
+    points: filled, counter-clockwise; vertices by their numbers, those of clip after those of subject.
+    The arrays of given and passages need room for two more than all vertices, those of points for four times as many.
+    """
     edges, origins, x, y = given.edges, given.origins, points.x, points.y
     n = subject.shape[0]
     top, step = load_convex(subject, 0, edges, origins, 0, stop)

@@ -34,8 +34,10 @@ WEIGHT_ROOM: Final = 16
 """Components of a weight: the product of two differences of two components each, twice."""
 
 Edges = namedtuple("Edges", "x y after before ring")
-"""Closed rings as vertices; edge i runs from vertex i to vertex ``after[i]``. x, y: float64; after, before, ring:
-int64; one entry a vertex."""
+"""Closed rings as vertices; edge i runs from vertex i to vertex ``after[i]``.
+
+x, y: float64; after, before, ring: int64; one entry a vertex.
+"""
 
 
 @merged
@@ -143,8 +145,10 @@ def difference_of_products(
 
 @called
 def order_of_crossings(edges: Edges, e: int, f: int, g: int) -> int:
-    """Return -1, 0 or 1 as the crossing of edge e with f comes before, with or after that with g, along e. Caller
-    guarantees that f and g each cross e in a point inside both."""
+    """Return -1, 0 or 1 as the crossing of edge e with f comes before, with or after that with g, along e.
+
+    Caller guarantees that f and g each cross e in a point inside both.
+    """
     a, b = e, edges.after[e]
     fb, gb = edges.after[f], edges.after[g]
     # With t_f = w_a / (w_a - w_b) the difference t_f - t_g has the sign of w_a(g) w_b(f) - w_a(f) w_b(g), times the
@@ -174,8 +178,10 @@ def _exact_order(edges: Edges, a: int, b: int, f: int, fb: int, g: int, gb: int)
 
 @called
 def crossing_against(edges: Edges, e: int, f: int, axis: int, value: float, tail: float) -> int:
-    """Return the sign of a coordinate of the crossing of the edges e and f less ``value + tail``, exactly. Caller
-    guarantees that they cross in a point inside both; value and tail as two_sum gives them."""
+    """Return the sign of a coordinate of the crossing of the edges e and f less ``value + tail``, exactly.
+
+    Caller guarantees that they cross in a point inside both; value and tail as two_sum gives them.
+    """
     z = edges.x if axis == 0 else edges.y
     a, b, fb = e, edges.after[e], edges.after[f]
     wa, wb, p, q = workspace(16), workspace(16), workspace(4), workspace(4)

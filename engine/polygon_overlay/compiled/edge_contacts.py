@@ -15,7 +15,7 @@ all, so a vertex where there is one), crossings through one point later, when th
 from __future__ import annotations
 
 from collections import namedtuple
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -78,8 +78,10 @@ def _put_vertex(edges: Edges, events: Events, unions: Unions, at: int, e: int, v
 def _enter_contact(
     edges: Edges, events: Events, unions: Unions, n: int, n_events: int, n_crossings: int, e: int, f: int
 ) -> tuple[int, int]:
-    """Enter what the edges e and f have in common, decided exactly; return the numbers of events and crossings. n:
-    number of vertices. There is room for four events more."""
+    """Enter what the edges e and f have in common, decided exactly; return the numbers of events and crossings.
+
+    n: number of vertices. There is room for four events more.
+    """
     parent, rings = unions.points, unions.rings
     a, b, c, d = e, edges.after[e], f, edges.after[f]
     if b == c or d == a:  # consecutive edges: their common vertex is all, unless they fold
@@ -127,13 +129,24 @@ def _enter_contact(
     return n_events, n_crossings
 
 
-Contacts = namedtuple("Contacts", "n_events n_crossings n_exact are_far")
-"""How many events (-1: no room), crossings, and pairs that floating point left to exact signs; are_far: all edges that
-do not meet are further apart than the margin, and all contacts are crossings."""
+class Contacts(NamedTuple):
+    """How many events (-1: no room), crossings, and pairs that floating point left to exact signs; are_far: all edges
+    that do not meet are further apart than the margin, and all contacts are crossings."""
 
-Turns = namedtuple("Turns", "first second bound length")
-"""Of a segment ab and the points c and d: orient(a, b, c) and orient(a, b, d) in floating point, a bound for the errors
-of both, and ab's length, which is the sum of both coordinates'."""
+    n_events: int
+    n_crossings: int
+    n_exact: int
+    are_far: bool
+
+
+class Turns(NamedTuple):
+    """Of a segment ab and the points c and d: orient(a, b, c) and orient(a, b, d) in floating point, a bound for the
+    errors of both, and ab's length, which is the sum of both coordinates'."""
+
+    first: float
+    second: float
+    bound: float
+    length: float
 
 
 @merged
@@ -163,8 +176,10 @@ def agree(found: Turns) -> bool:
 def find_contacts(
     edges: Edges, n: int, n_rings: int, margin: float, events: Events, unions: Unions, tree: BoxTree, stop: Any
 ) -> Contacts:
-    """Enter all contacts; the edges of pairs of which `Contacts.are_far` does not hold get the mark DOUBTFUL. tree:
-    over the boxes of the edges, with the margin around them. unions: filled."""
+    """Enter all contacts; the edges of pairs of which `Contacts.are_far` does not hold get the mark DOUBTFUL.
+
+    tree: over the boxes of the edges, with the margin around them. unions: filled.
+    """
     for i in range(n):
         unions.points[i] = i
     unions.is_node[:n] = 0
@@ -225,7 +240,9 @@ def _put_in_doubt(marks: Any, e: int, f: int) -> None:
 @merged
 def _add_crossing(events: Events, at: int, crossing: int, edge: int, other: int, ends: Turns, margin: float) -> None:
     """Enter the event at ``at`` of a proper crossing whose signs are sure; ends: the turns from ``other`` to both ends.
-    t = A / (A + B), with A and B off by r at most, is off by r / (A + B), and by three roundings."""
+
+    t = A / (A + B), with A and B off by r at most, is off by r / (A + B), and by three roundings.
+    """
     total = abs(ends.first) + abs(ends.second)
     _add_event(events, at, edge, crossing, other, abs(ends.first) / total, ends.bound / total + 2.0**-50)
     events.reach[at] += margin * ends.length / total

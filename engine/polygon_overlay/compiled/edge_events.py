@@ -91,8 +91,10 @@ def _sort_by_key(along: Along, first: int, last: int) -> None:
 
 @called
 def _mark_near(edges: Edges, events: Events, along: Along, marks: Any, e: int) -> None:
-    """Put in doubt edge e, and those whose crossings with it are within reach of another event, or of an end of e. Then
-    also the edge that begins or ends there."""
+    """Put in doubt edge e, and those whose crossings with it are within reach of another event, or of an end of e.
+
+    Then also the edge that begins or ends there.
+    """
     order, keys, first, last = along.order, along.keys, along.starts[e], along.starts[e + 1]
     marks[e] |= DOUBTFUL
     reached = 0.0
@@ -166,9 +168,11 @@ def _sort_exactly(edges: Edges, events: Events, along: Along, unions: Unions, n:
 def sort_events(
     edges: Edges, events: Events, along: Along, unions: Unions, marks: Any, n: int, n_events: int, stop: Any
 ) -> bool:
-    """Fill ``along``, unite events at one point, and make crossings there NOT_SIMPLE. Returns whether the events of
-    every edge are further apart than their reaches, and each is further from the ends than its own; other edges, and
-    those that cross there, get the mark DOUBTFUL."""
+    """Fill ``along``, unite events at one point, and make crossings there NOT_SIMPLE.
+
+    Returns whether the events of every edge are further apart than their reaches, and each is further from the ends
+    than its own; other edges, and those that cross there, get the mark DOUBTFUL.
+    """
     if not _group_events(events, along, n, n_events, stop):
         return False
     starts, order, keys = along.starts, along.order, along.keys

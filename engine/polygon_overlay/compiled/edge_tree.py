@@ -57,9 +57,11 @@ DEEPEST: Final = 256
 """Places on the stack: a walk through 60 levels holds at most three pairs a level."""
 
 BoxTree = namedtuple("BoxTree", "boxes marks nodes node_marks places lows highs stack pairs")
-"""Boxes by number (n, 4) float64, with the mark of each; the tree over them: by node its box and its mark. places: the
-boxes in the order of the leaves; lows, highs: their codes in that order, int64: what must not be above the other box's,
-and what must not be below. stack: (DEEPEST, 2) int64; pairs: (PORTION, 2), those found last."""
+"""Boxes by number (n, 4) float64, with the mark of each; the tree over them: by node its box and its mark.
+
+places: the boxes in the order of the leaves; lows, highs: their codes in that order, int64: what must not be above the
+other box's, and what must not be below. stack: (DEEPEST, 2) int64; pairs: (PORTION, 2), those found last.
+"""
 
 
 @inline
@@ -116,8 +118,10 @@ def _spread(bits: int) -> int:
 
 @allocating
 def order_boxes(boxes: Any, n: int, places: Any, stop: Any) -> bool:
-    """Fill ``places`` with the boxes in the order in which the leaves take them; tell whether it is another order. Only
-    the lower left corners are looked at."""
+    """Fill ``places`` with the boxes in the order in which the leaves take them; tell whether it is another order.
+
+    Only the lower left corners are looked at.
+    """
     x_min = y_min = float("inf")
     x_max = y_max = float("-inf")
     way, x_last, y_last = 0.0, boxes[0, 0], boxes[0, 2]
@@ -187,8 +191,10 @@ def build_tree(tree: BoxTree, n: int, stop: Any) -> None:
 
 @merged
 def push_children(tree: BoxTree, node: int, depth: int) -> int:
-    """Put the children of a node on the stack of a search upwards; return the depth. The lower one is last, so first
-    off: what is found there spares the other."""
+    """Put the children of a node on the stack of a search upwards; return the depth.
+
+    The lower one is last, so first off: what is found there spares the other.
+    """
     low, high = 2 * node, 2 * node + 1
     if tree.nodes[low, 2] > tree.nodes[high, 2]:
         low, high = high, low
@@ -272,7 +278,9 @@ def begin_pairs(tree: BoxTree, n: int, stop: Any) -> int:
 @inline
 def next_pairs(tree: BoxTree, n: int, depth: int) -> tuple[int, int]:
     """Write the next portion of pairs, each once, of boxes that may meet; return how many, and the depth, 0 at the end.
-    Caller guarantees a built tree, unless boxes are few."""
+
+    Caller guarantees a built tree, unless boxes are few.
+    """
     if n <= FEW:
         return _all_pairs(tree, n), 0
     return _next_pairs(tree, n, depth)

@@ -21,8 +21,7 @@ so nothing counts references to arrays.
 
 from __future__ import annotations
 
-from collections import namedtuple
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from engine.jit import bare_kernel, merged
 from engine.polygon_overlay.compiled.chain_faces import number_cycles
@@ -74,15 +73,36 @@ NEEDS_CONTACTS: Final = 1
 NEEDS_OUTPUT: Final = 2
 """The pair reached has more vertices or rings than the output has room for."""
 
-_Span = namedtuple("_Span", "first first_end second second_end")
-"""The rings of a pair: of its subject first .. first_end - 1, of its clip second .. second_end - 1."""
 
-_Filled = namedtuple("_Filled", "n_vertices n_rings n_pieces n_evidence")
-"""How much output there is."""
+class _Span(NamedTuple):
+    """The rings of a pair: of its subject first .. first_end - 1, of its clip second .. second_end - 1."""
 
-_Arranged = namedtuple("_Arranged", "n_found n_points n_crossings n_exact is_clear n_contacts")
-"""What was found of a pair: boundary rings and their points, crossings, pairs of edges left to exact signs, whether
-clearance.py vouches for all; n_contacts: those that there must be scratch for, more than there is if it failed."""
+    first: int
+    first_end: int
+    second: int
+    second_end: int
+
+
+class _Filled(NamedTuple):
+    """How much output there is."""
+
+    n_vertices: int
+    n_rings: int
+    n_pieces: int
+    n_evidence: int
+
+
+class _Arranged(NamedTuple):
+    """What was found of a pair: boundary rings and their points, crossings, pairs of edges left to exact signs, whether
+    clearance.py vouches for all; n_contacts: those that there must be scratch for, more than there is if it failed."""
+
+    n_found: int
+    n_points: int
+    n_crossings: int
+    n_exact: int
+    is_clear: bool
+    n_contacts: int
+
 
 _NONE: Final = _Arranged(0, 0, 0, 0, False, 0)
 
@@ -260,16 +280,18 @@ def overlay_pairs(
     subjects: RingArrays, subject_items: Any, clips: RingArrays, clip_items: Any, begin: int, reduced: Loaded,
     kept: Any, nesting: Nesting, stop: Any, buffers: Buffers, outcomes: Outcomes, output: Output,
 ) -> tuple[int, int, int, int, int, int, int]:  # fmt: skip
-    """Overlay the pairs from ``begin`` on; fill outcomes, by pair, and output from its beginning. subject_items,
-    clip_items: the first ring of each polygon, and the end of the last one's. kept: (4,) uint8 by label. nesting: of
-    the rule PAIR; or, without clips, and kept all but the first, that of the rings of subjects (ring_nesting.py),
-    numbers counted from the pair's first ring; by the rule AGAIN evidence is filled too, with numbers of rings. A
-    source is an input vertex and -1, where the ring goes on along an edge of that vertex, or -3 - e, along edge e; or
-    two edges that cross, the one that it goes on along first. Edges by their first vertices; vertices are counted from
-    the pair's first, those of its clip after those of its subject. The input vertex and LEFT_OUT where the vertices up
-    to the next source are left out. reduced: what reduce_pair returned for the only pair; no vertices, no such pair.
-    Returns the pair reached, FINISHED or what is needed to go on with it, numbers of vertices, rings, pieces, rows of
-    evidence, and how many vertices are left out."""
+    """Overlay the pairs from ``begin`` on; fill outcomes, by pair, and output from its beginning.
+
+    subject_items, clip_items: the first ring of each polygon, and the end of the last one's. kept: (4,) uint8 by label.
+    nesting: of the rule PAIR; or, without clips, and kept all but the first, that of the rings of subjects
+    (ring_nesting.py), numbers counted from the pair's first ring; by the rule AGAIN evidence is filled too, with
+    numbers of rings. A source is an input vertex and -1, where the ring goes on along an edge of that vertex, or -3 -
+    e, along edge e; or two edges that cross, the one that it goes on along first. Edges by their first vertices;
+    vertices are counted from the pair's first, those of its clip after those of its subject. The input vertex and
+    LEFT_OUT where the vertices up to the next source are left out. reduced: what reduce_pair returned for the only
+    pair; no vertices, no such pair. Returns the pair reached, FINISHED or what is needed to go on with it, numbers of
+    vertices, rings, pieces, rows of evidence, and how many vertices are left out.
+    """
     w = rows_of(buffers)
     is_intersection = not (kept[0] or kept[1] or kept[2])
     filled = _Filled(0, 0, 0, 0)

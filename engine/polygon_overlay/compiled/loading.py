@@ -6,7 +6,6 @@ other beyond one side of the common box give way to the first and the last of th
 
 from __future__ import annotations
 
-from collections import namedtuple
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -22,6 +21,7 @@ Box = tuple[float, float, float, float]
 """x_min, x_max, y_min, y_max."""
 EVERYTHING: Final = (-np.inf, np.inf, -np.inf, np.inf)
 
+
 _MANY_RINGS: Final = 256
 LEFT_OUT: Final = -2
 """Second source of a vertex after which those up to the next one are left out."""
@@ -34,12 +34,23 @@ class RingArrays(NamedTuple):
     offsets: IntArray
 
 
-Given = namedtuple("Given", "edges origins tops masks")
-"""The rings of both polygons: their edges, by vertex its number in the input, by ring its top vertex (rightmost, then
-highest) and the mask of its source."""
+class Given(NamedTuple):
+    """The rings of both polygons: their edges, by vertex its number in the input, by ring its top vertex (rightmost,
+    then highest) and the mask of its source."""
 
-Loaded = namedtuple("Loaded", "n n_rings n_runs largest")
-"""How many vertices, rings, and edges that stand for many (runs); the largest coordinate, without its sign."""
+    edges: Edges
+    origins: Any
+    tops: Any
+    masks: Any
+
+
+class Loaded(NamedTuple):
+    """How many vertices, rings, and edges that stand for many (runs); the largest coordinate, without its sign."""
+
+    n: int
+    n_rings: int
+    n_runs: int
+    largest: float
 
 
 @inline
@@ -68,10 +79,12 @@ def load_rings(
     tree: BoxTree, n: int, n_rings: int, stop: Any,
 ) -> tuple[int, int, bool]:  # fmt: skip
     """Append rings without repeated points; return the numbers of vertices and rings, and whether none is too small.
+
     is_named: the mask of each ring is its number instead, from ``first_ring`` on. base: what is added to the number of
     a vertex in ``origins``. box: of vertices beyond one of its sides, one after another, the first and the last count.
     tree: scratch. Many rings that are not named are taken in the order of a space-filling curve: whatever looks at
-    neighbours then finds them in the cache."""
+    neighbours then finds them in the cache.
+    """
     vertices, offsets, order = rings.vertices, rings.offsets, tree.places
     if is_named or last_ring - first_ring < _MANY_RINGS:
         for k in range(last_ring - first_ring):
@@ -144,8 +157,10 @@ def is_empty(box: Box) -> bool:
 
 @inline
 def fill_boxes(edges: Edges, n: int, margin: float, tree: BoxTree, stop: Any) -> float:
-    """Fill the box of every edge, with a margin around it, and its mark; return the least length of an edge. Its length
-    is the larger of both coordinates'."""
+    """Fill the box of every edge, with a margin around it, and its mark; return the least length of an edge.
+
+    Its length is the larger of both coordinates'.
+    """
     x, y, boxes, marks = edges.x, edges.y, tree.boxes, tree.marks
     shortest = np.inf
     first = 0

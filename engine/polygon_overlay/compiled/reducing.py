@@ -115,7 +115,9 @@ def _load_ring(
     n_runs: int, stop: Any,
 ) -> tuple[int, int, bool]:  # fmt: skip
     """Append what stays of the blocks of a ring; return the numbers of vertices and runs, and whether all are in range.
-    runs: filled with the edges that stand for more than one."""
+
+    runs: filled with the edges that stand for more than one.
+    """
     x, y, origins = given.edges.x, given.edges.y, given.origins
     start = n
     safe = True
@@ -198,9 +200,11 @@ def _wake(
 def reduce_pair(
     subjects: RingArrays, clips: RingArrays, size: int, n_most: int, kept: Any, stop: Any, buffers: Buffers
 ) -> Loaded:
-    """Load the edges of two polygons into the scratch of overlay_pairs, those that meet nothing as runs. size: edges of
-    a block. n_most: edges that are too many to be looked at one by one. kept: as of overlay_pairs. There is scratch for
-    a thousand contacts at least. Returns no vertices if it is not worth while."""
+    """Load the edges of two polygons into the scratch of overlay_pairs, those that meet nothing as runs.
+
+    size: edges of a block. n_most: edges that are too many to be looked at one by one. kept: as of overlay_pairs.
+    There is scratch for a thousand contacts at least. Returns no vertices if it is not worth while.
+    """
     w = rows_of(buffers)
     n_subject = subjects.offsets.shape[0] - 1
     blocks = Blocks(
@@ -265,9 +269,11 @@ def expand_rings(
     made_offsets: Any,
 ) -> None:  # fmt: skip
     """Fill ``made``, (m, 2) float64, and ``made_sources``, (m, 2) int32, with rings and all that was left out of them.
+
     vertices, sources, offsets: as overlay_pairs fills them. subjects, clips: (n, 2) float64 vertices. made_offsets:
-    (rings + 1,) int64, filled with where each ring begins in ``made``, and the end of the last. A run is made of
-    vertices one after another in the input, there or back."""
+    (rings + 1,) int64, filled with where each ring begins in ``made``, and the end of the last.
+    A run is made of vertices one after another in the input, there or back.
+    """
     n_subject = subjects.shape[0]
     at = made_offsets[0] = 0
     for ring in range(made_offsets.shape[0] - 1):

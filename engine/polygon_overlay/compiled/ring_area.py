@@ -12,8 +12,7 @@ What the bound leaves open (a tie, a sum that nearly cancels, exponents near the
 
 from __future__ import annotations
 
-from collections import namedtuple
-from typing import Any
+from typing import Any, NamedTuple
 
 from engine.jit import bare_kernel, called, inline, merged
 from engine.polygon_overlay.compiled.crossing_signs import weight_of
@@ -26,12 +25,27 @@ from engine.predicates.parameters import minor
 _TINY = 2.0**-1040
 """More than what an underflow may lose in a term."""
 
-_Place = namedtuple("_Place", "xh xl yh yl error")
-"""A point, as double-doubles counted from another, and a bound of the error of each coordinate."""
 
-_Pair = namedtuple("_Pair", "subjects clips first n second known")
-"""Polygons, and of a pair of them: first vertex of its subject, number of its vertices, first vertex of its clip;
-known: the ring that was found last, of either polygon."""
+class _Place(NamedTuple):
+    """A point, as double-doubles counted from another, and a bound of the error of each coordinate."""
+
+    xh: float
+    xl: float
+    yh: float
+    yl: float
+    error: float
+
+
+class _Pair(NamedTuple):
+    """Polygons, and of a pair of them: first vertex of its subject, number of its vertices, first vertex of its clip;
+    known: the ring that was found last, of either polygon."""
+
+    subjects: Any
+    clips: Any
+    first: int
+    n: int
+    second: int
+    known: Any
 
 
 @merged
@@ -167,9 +181,10 @@ def sum_areas(
     areas: Any,
 ) -> int:  # fmt: skip
     """Fill ``areas``, (n,) float64, with the doubles nearest to the areas of some rings each, NaN where that is unsure.
+
     subjects, subject_items, clips, clip_items: as of overlay_pairs, a pair for each area, or one for all. sources,
-    offsets: of rings, as overlay_pairs fills them. groups: (n + 1,) int64 into the rings. Returns how many are
-    unsure."""
+    offsets: of rings, as overlay_pairs fills them. groups: (n + 1,) int64 into the rings. Returns how many are unsure.
+    """
     n_unsure = 0
     known = workspace(2)
     known[0] = known[1] = 0.0

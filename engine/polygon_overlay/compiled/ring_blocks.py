@@ -81,7 +81,9 @@ def box_of_blocks(boxes: Any, first: int, last: int) -> Box:
 @inline
 def cut_beyond(rings: RingArrays, box: Box, blocks: Blocks, ring: int, begin: int, at: int) -> int:
     """Put chords in the place of blocks beyond one side of a box, of rings from ``ring`` and blocks from ``begin`` on.
-    Moves all down to ``at`` and on; returns their end."""
+
+    Moves all down to ``at`` and on; returns their end.
+    """
     vertices, offsets, n_rings = rings.vertices, rings.offsets, rings.offsets.shape[0] - 1
     x_min, x_max, y_min, y_max = box
     first, last, boxes, marks = blocks.first, blocks.last, blocks.boxes, blocks.marks
@@ -115,9 +117,11 @@ def cut_beyond(rings: RingArrays, box: Box, blocks: Blocks, ring: int, begin: in
 
 @inline
 def mark_blocks(rings: RingArrays, margin: float, blocks: Blocks, ring: int, dx: Any, dy: Any, stop: Any) -> None:
-    """Fill the marks of all blocks of rings, the block that follows each, and make those active that must be. Active
-    are chords, blocks that head no way, and those that may have a vertex where their ring does not turn, or one that
-    the vertex before repeats. dx, dy: float64, scratch for `_AT_ONCE` edges and one."""
+    """Fill the marks of all blocks of rings, the block that follows each, and make those active that must be.
+
+    Active are chords, blocks that head no way, and those that may have a vertex where their ring does not turn, or one
+    that the vertex before repeats. dx, dy: float64, scratch for `_AT_ONCE` edges and one.
+    """
     vertices, offsets, n_rings = rings.vertices, rings.offsets, rings.offsets.shape[0] - 1
     first, last, marks = blocks.first, blocks.last, blocks.marks
     ex, ey = dx[1:], dy[1:]

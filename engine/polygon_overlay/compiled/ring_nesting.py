@@ -46,8 +46,10 @@ and no other."""
 
 class Nesting(NamedTuple):
     """AGAIN: by ring the number of its shell, its own where it is one, int64, and how large that shell is, float64.
+
     ANY, FIRST_ALONE: by ring the number of its source, no larger than that of the ring. Winding numbers: by ring any
-    number. PAIR: no rings."""
+    number. PAIR: no rings.
+    """
 
     shells: Any
     sizes: Any
@@ -55,16 +57,20 @@ class Nesting(NamedTuple):
 
 
 Holders = namedtuple("Holders", "held place stamp link first entered ring after region beyond offset")
-"""Scratch. held: the rings that a face lies in; place: by ring its place there, or -1; stamp: by ring. link: by
-half-chain the next one of its face; first: by face its first; entered: by face the half-chain through which it was,
-from the other side. ring, after: by entry of evidence its ring, and the next of its region; region: by region its first
-entry. beyond: regions on the other side of the rings of the result, those of ring k from offset[k] on."""
+"""Scratch. held: the rings that a face lies in; place: by ring its place there, or -1; stamp: by ring.
+
+link: by half-chain the next one of its face; first: by face its first; entered: by face the half-chain through which it
+was, from the other side. ring, after: by entry of evidence its ring, and the next of its region; region: by region its
+first entry. beyond: regions on the other side of the rings of the result, those of ring k from offset[k] on.
+"""
 
 
 @merged
 def _cross(given: Given, chains: Chains, nesting: Nesting, h: Holders, half: int, n_held: int) -> int:
-    """Go over a half-chain, from its left, and take up or lay down all that it stands for; return how many are held. Of
-    winding numbers, and labels of two polygons: return the one beyond, ``n_held`` being the one here."""
+    """Go over a half-chain, from its left, and take up or lay down all that it stands for; return how many are held.
+
+    Of winding numbers, and labels of two polygons: return the one beyond, ``n_held`` being the one here.
+    """
     chain = half >> 1
     if nesting.rule == PAIR:
         return n_held ^ chains.mask[chain]
@@ -126,9 +132,11 @@ def spread_sources(
     given: Given, chains: Chains, faces: Faces, nesting: Nesting, kept: Any, h: Holders, sizes: tuple[int, int],
     stop: Any,
 ) -> int:  # fmt: skip
-    """Fill ``faces.inside`` and the entries of evidence, ``after`` with their faces; return how many, or NO_ROOM. kept:
-    (4,) uint8, by the label of two polygons whether a face of it is inside. sizes: the numbers of chains and cycles.
-    ``faces.joined`` joins the cycles of one face."""
+    """Fill ``faces.inside`` and the entries of evidence, ``after`` with their faces; return how many, or NO_ROOM.
+
+    kept: (4,) uint8, by the label of two polygons whether a face of it is inside. sizes: the numbers of chains and
+    cycles. ``faces.joined`` joins the cycles of one face.
+    """
     n_chains, n_cycles = sizes
     cycle, joined, inside = faces.cycle, faces.joined, faces.inside
     for ring in range(nesting.shells.shape[0]):
@@ -211,8 +219,10 @@ def enter_beyond(faces: Faces, h: Holders, path: Any, first: int, last: int, n_r
 def write_evidence(
     h: Holders, ring: int, region: int, is_hole: bool, name: int, base: int, evidence: Any, n: int
 ) -> int:  # fmt: skip
-    """Append rows ``name``, number of a ring that a ring of the result comes from; return how many, or NO_ROOM. A shell
-    comes from what its own region says, a hole from what those beyond say. base: number of the first ring."""
+    """Append rows ``name``, number of a ring that a ring of the result comes from; return how many, or NO_ROOM.
+
+    A shell comes from what its own region says, a hole from what those beyond say. base: number of the first ring.
+    """
     for at in range(h.offset[ring] if is_hole else 0, h.offset[ring + 1] if is_hole else 1):
         k = h.region[h.beyond[at] if is_hole else region]
         while k >= 0:  # bound: the entries of the region

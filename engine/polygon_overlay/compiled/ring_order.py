@@ -44,7 +44,9 @@ def _is_before(rings: Rings, ranking: Ranking, rounded: Rounded, i: int, j: int)
 @inline
 def _sort(rings: Rings, ranking: Ranking, rounded: Rounded, n: int, is_by_piece: bool, stop: Any) -> None:
     """Sort the first n entries of ``ranking.order``: merging runs of doubling length that are not in order.
-    is_by_piece: pieces differ."""
+
+    is_by_piece: pieces differ.
+    """
     order, spare, first_x = ranking.order, ranking.spare, ranking.x
     width = 1
     while width < n:  # bound: log n turns
@@ -75,9 +77,11 @@ def _sort(rings: Rings, ranking: Ranking, rounded: Rounded, n: int, is_by_piece:
 
 @inline
 def find_shells(rings: Rings, n_rings: int, rounded: Rounded, ranking: Ranking, widest: Any, boxes: Any) -> bool:
-    """Fill ``ranking.is_hole`` of rings whose rounded points may turn either way; tell whether it is sure. Rounding
-    keeps order, so the rounded box of a shell holds those of its holes: the one ring of a region whose box holds all
-    others, and is no other's, is its shell. widest: scratch by region; boxes: by ring."""
+    """Fill ``ranking.is_hole`` of rings whose rounded points may turn either way; tell whether it is sure.
+
+    Rounding keeps order, so the rounded box of a shell holds those of its holes: the one ring of a region whose box
+    holds all others, and is no other's, is its shell. widest: scratch by region; boxes: by ring.
+    """
     x, y = rounded.x, rounded.y
     for ring in range(n_rings):
         x_min = y_min = np.inf
@@ -103,7 +107,9 @@ def rank_rings(
     rings: Rings, n_rings: int, rounded: Rounded, ranking: Ranking, is_valid: bool, piece_of: Any, boxes: Any, stop: Any
 ) -> int:
     """Fill ``ranking``; return the number of pieces, -1 if a region has not exactly one shell, or none that is sure.
-    is_valid: whether rounding left the rings what they were. piece_of: scratch by region; boxes: by ring."""
+
+    is_valid: whether rounding left the rings what they were. piece_of: scratch by region; boxes: by ring.
+    """
     if not is_valid and not find_shells(rings, n_rings, rounded, ranking, piece_of, boxes):
         return -1
     n_pieces = 0

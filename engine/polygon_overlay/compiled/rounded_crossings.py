@@ -12,7 +12,7 @@ nothing: quotients of their two leading components are within 2^-100 of it.
 from __future__ import annotations
 
 from collections import namedtuple
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -33,9 +33,20 @@ _NOT_YET: Final = -2.0
 Rounded = namedtuple("Rounded", "x y moved crossing_x crossing_y error")
 """Doubles of the points of rings, and whether rounding moved each, uint8; by crossing its doubles and its error."""
 
-_Cut = namedtuple("_Cut", "e f ah al bh bl sum_h sum_l relative")
-"""Two edges that cross, the weights of the ends of the first as positive double-doubles, their sum, and a bound of the
-relative error of a coordinate."""
+
+class _Cut(NamedTuple):
+    """Two edges that cross, the weights of the ends of the first as positive double-doubles, their sum, and a bound of
+    the relative error of a coordinate."""
+
+    e: int
+    f: int
+    ah: float
+    al: float
+    bh: float
+    bl: float
+    sum_h: float
+    sum_l: float
+    relative: float
 
 
 @merged
@@ -45,8 +56,11 @@ def _abs2(h: float, low: float) -> tuple[float, float]:
 
 @called
 def round_crossing(edges: Edges, e: int, f: int) -> tuple[float, float, float, float]:
-    """Return the doubles nearest to the crossing of edges e and f, and a bound of the error of each. An error of 0 says
-    that the coordinate is that double exactly; LOST that it could not be found (the caller settles it in rationals)."""
+    """Return the doubles nearest to the crossing of edges e and f, and a bound of the error of each.
+
+    An error of 0 says that the coordinate is that double exactly; LOST that it could not be found (the caller settles
+    it in rationals).
+    """
     a, b, fb = e, edges.after[e], edges.after[f]
     x, knows_x = common_place(edges.x[a], edges.x[b], edges.x[f], edges.x[fb])
     y, knows_y = common_place(edges.y[a], edges.y[b], edges.y[f], edges.y[fb])

@@ -59,8 +59,10 @@ def scale(
     values: Any, divisor: float, factor: float, more: float, near_by: float, least: float, limit: float, scaled: Any
 ) -> bool:
     """Fill ``scaled``, (n, 2), with values by ``divisor``, times ``factor``, times ``more``; tell whether all of that
-    is below ``limit``, without its sign. What lies within the part ``near_by`` of it of a whole number is that number
-    then, and less than ``least`` is zero."""
+    is below ``limit``, without its sign.
+
+    What lies within the part ``near_by`` of it of a whole number is that number then, and less than ``least`` is zero.
+    """
     are_below = True
     for k in range(values.shape[0]):
         for axis in range(2):
@@ -92,7 +94,9 @@ def _is_before(pixels: Any, i: int, j: int) -> bool:
 @inline
 def _find_corners(pixels: Any, offsets: Any, pieces: Any, corners: Any, starts: Any, stop: Any) -> int:
     """Fill ``corners`` with the vertices where rings turn, ``starts`` with where those of each ring begin there.
-    Returns how many, or FOLDS where a ring turns back, begins elsewhere than before, or is not in its order."""
+
+    Returns how many, or FOLDS where a ring turns back, begins elsewhere than before, or is not in its order.
+    """
     piece = n = 0
     for ring in range(offsets.shape[0] - 1):
         first, last = offsets[ring], offsets[ring + 1]
@@ -133,11 +137,14 @@ def snap(
     vertices: Any, offsets: Any, pieces: Any, stop: Any, buffers: Buffers, pixels: Any, corners: Any, starts: Any,
     passages: Any,
 ) -> tuple[int, int, int]:  # fmt: skip
-    """Fill what tells what becomes of valid rings, coordinates below 2^51. pixels: (n, 2) float64, the whole points in
-    whose pixels vertices lie; where all lie there nothing else is filled. corners, starts: see `_find_corners`.
-    passages: (m, 2) int32, an edge, by its first vertex, and a vertex of another pixel that it passes. Returns how many
-    vertices are no whole points; how many passages there are, which may be more than there is room for; how many
-    corners, or FOLDS where rings do not stay what they are, without vertices that get straight."""
+    """Fill what tells what becomes of valid rings, coordinates below 2^51.
+
+    pixels: (n, 2) float64, the whole points in whose pixels vertices lie; where all lie there nothing else is filled.
+    corners, starts: see `_find_corners`. passages: (m, 2) int32, an edge, by its first vertex, and a vertex of another
+    pixel that it passes. Returns how many vertices are no whole points; how many passages there are, which may be more
+    than there is room for; how many corners, or FOLDS where rings do not stay what they are, without vertices that get
+    straight.
+    """
     n_moved = _find_pixels(vertices, pixels, stop)
     if n_moved == 0:
         return 0, 0, vertices.shape[0]

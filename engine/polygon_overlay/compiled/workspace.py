@@ -83,10 +83,12 @@ class Scratch:
 
 
 def scratch_for(n_vertices: int, n_rings: int, n_contacts: int, n_out: int, n_out_rings: int) -> Scratch:
-    """Return scratch of that size at least: what was kept if that suffices, or else new. It is the caller's until
-    `keep`: a signal handler may overlay while what the kernel left is not copied yet. One pair of that size always
-    finds room in the output: every contact adds a vertex and a ring at most. What is not written to costs nothing;
-    pages that are for the first time cost more than the kernel does."""
+    """Return scratch of that size at least: what was kept if that suffices, or else new.
+
+    It is the caller's until `keep`: a signal handler may overlay while what the kernel left is not copied yet.
+    One pair of that size always finds room in the output: every contact adds a vertex and a ring at most. What is not
+    written to costs nothing; pages that are for the first time cost more than the kernel does.
+    """
     try:
         kept: Scratch | None = _kept.pop()
     except IndexError:  # whether there is any, only taking it tells: another thread may be quicker
@@ -116,9 +118,11 @@ def first_contacts(n_vertices: int) -> int:
 
 
 def more_contacts(n: int) -> int:
-    """Return for how many contacts to try next where there was scratch for ``n``. Few are multiplied at once, since
-    every try begins anew and pages that are not written to cost nothing; many are doubled, since a system may refuse to
-    promise more memory than it has."""
+    """Return for how many contacts to try next where there was scratch for ``n``.
+
+    Few are multiplied at once, since every try begins anew and pages that are not written to cost nothing; many are
+    doubled, since a system may refuse to promise more memory than it has.
+    """
     return 8 * n if n < _MANY_CONTACTS else 2 * n
 
 
@@ -140,9 +144,11 @@ def release() -> None:
 
 
 def _spread(length: int) -> int:
-    """Return a length of rows, no smaller, whose beginnings do not fall together in the cache. A cache finds lines by
-    the last bits of their address: rows a whole number of pages apart, or nearly, would share few places, and small
-    pairs, which use the beginnings only, wait for memory. Rows of a page or less stay close."""
+    """Return a length of rows, no smaller, whose beginnings do not fall together in the cache.
+
+    A cache finds lines by the last bits of their address: rows a whole number of pages apart, or nearly, would share
+    few places, and small pairs, which use the beginnings only, wait for memory. Rows of a page or less stay close.
+    """
     return length if length <= 1024 else length + (56 - length) % 1024
 
 
