@@ -126,9 +126,8 @@ def _run(module: str, shares: Sequence[int], processes: int, progress: Callable[
         try:
             command = [sys.executable, "-c", _COMPILE, str(os.getpid()), module]
             for number in range(processes):
-                more = [*command, str(number), *sys.path]
-                process = subprocess.Popen(more, bufsize=0, stdin=subprocess.PIPE, stdout=said, stderr=subprocess.DEVNULL)
-                running.append(process)
+                pipes = {"stdin": subprocess.PIPE, "stdout": said, "stderr": subprocess.DEVNULL}
+                running.append(subprocess.Popen([*command, str(number), *sys.path], bufsize=0, **pipes))
                 hand_step(number, number * n // processes - 1)
         finally:
             os.close(said)

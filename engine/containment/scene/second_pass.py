@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 
 from engine.arrays import FloatArray, Int8Array, IntArray
+from engine.bounding.bvh import STACK
 from engine.containment.cells.order import counting_sort
 from engine.containment.cells.top import MOST_FACES, top_cells_if_they_pay
 from engine.containment.locators import Counts
@@ -53,7 +54,7 @@ def settle_rest(
             with np.errstate(all="ignore"):
                 locate_groups(
                     points, owners, order, *(each[start:stop] for each in groups), scene.tables, tables, found,
-                    budget.flag,
+                    np.empty(STACK, np.int32), budget.flag,
                 )  # fmt: skip
 
         run_chunks(by_trees, len(groups[0]), budget=budget, first_chunk=4, workers=workers)

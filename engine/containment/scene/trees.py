@@ -11,14 +11,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from engine.arrays import FloatArray, Int32Array, IntArray
-from engine.bounding.bvh import STACK, WIDTH
+from engine.bounding.bvh import WIDTH
 from engine.containment.cells.side import side_in_cell
 from engine.containment.methods.polyhedron_ray_parity import locate_in_tree
 from engine.containment.posed.body_frame import to_frame
 from engine.containment.posed.filters import in_space
 from engine.containment.prepared import TriangleTree
 from engine.containment.scene.first_pass import SECOND_PASS
-from engine.jit import inline, kernel
+from engine.jit import bare_kernel, inline
 from engine.lanes.addresses import array_at
 from engine.lanes.boxes import BOX_ROWS
 from engine.lanes.overhead import OVERHEAD_ROWS
@@ -63,16 +63,16 @@ def tree_at(tables: Any, row: int) -> TriangleTree:
     )  # fmt: skip
 
 
-@kernel
+@bare_kernel
 def locate_groups(
     points: Any, owners: Any, order: Any, begins: Any, ends: Any, bodies: Any, scene: Any, tables: Any, located: Any,
-    flag: Any,
+    stack: Any, flag: Any,
 ) -> None:  # fmt: skip
     """Fill located (n_pairs,) int8 for groups of pairs of a body each: those at order[begins[group] : ends[group]].
 
-    owners: (n_pairs,) the point of each pair; bodies: that of each group; scene: the `SceneTables`, for its poses.
+    owners: (n_pairs,) the point of each pair; bodies: that of each group; scene: the `SceneTables`, for its poses;
+    stack: (STACK,) int32, scratch.
     """
-    stack = np.empty(STACK, np.int32)
     for group in range(len(begins)):
         body = bodies[group]
         row, frame = tables.rows[body], scene.frames[body]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from engine.arrays import read_only
+from engine.bounding.bvh import STACK
 from engine.containment.prepared import tree_of
 from engine.containment.rational_locate import rational_location
 from engine.containment.scene.tables import scene_of
@@ -23,8 +24,9 @@ def test_groups_of_bodies() -> None:
     begins, order = np.arange(0, 160, 40), np.arange(160)
     with Budget() as budget:
         scene = scene_of(solids, None, 3, budget)
+        stack, flag = np.empty(STACK, np.int32), budget.flag
         locate_groups(
-            points, owners, order, begins, begins + 40, np.arange(4), scene.tables, tables, located, budget.flag
+            points, owners, order, begins, begins + 40, np.arange(4), scene.tables, tables, located, stack, flag
         )
     for body, found in enumerate(located.reshape(4, 40).tolist()):
         asked = [rational_location(point, solids[body]) for point in points.tolist()]
