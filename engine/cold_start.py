@@ -32,14 +32,12 @@ def end_with_parent(process):
     os._exit(1)
 
 threading.Thread(target=end_with_parent, args=[int(sys.argv[1])], daemon=True).start()
-sys.path[:] = sys.argv[4:]
+sys.path[:] = sys.argv[3:]
 work = importlib.import_module(sys.argv[2]).STEPS
 while step := os.read(0, 1):
-    is_done = 0
     with contextlib.suppress(Exception):
         work[step[0]]()
-        is_done = 1
-    os.write(1, bytes([int(sys.argv[3]), step[0], is_done]))
+        os.write(1, step)
 """
 
 
@@ -100,48 +98,28 @@ def _alone(path: Path) -> Iterator[None]:
 
 
 def _run(module: str, shares: Sequence[int], processes: int, progress: Callable[[int], object] | None) -> Sequence[int]:
-    """Return the steps that ended well.
-
-    Steps side by side have much in common, which a process compiles once: each begins at another place of the circle of
-    them, and is handed the next one left there.
-    """
-    n, processes = len(shares), min(processes, len(shares))
-    log.info("compiling all kernels, once for these sources: %d parts, %d processes", n, processes)
+    """Return the steps that ended well; processes take them from one pipe, and say in another what is done."""
+    log.info("compiling all kernels, once for these sources: %d parts, %d processes", len(shares), processes)
     done: list[int] = []
-    left, begin, running = list(range(n)), time.perf_counter(), list[subprocess.Popen[bytes]]()
-    ended, said = os.pipe()
-
-    def hand_step(number: int, last: int) -> None:
-        pipe = running[number].stdin
-        assert pipe is not None
-        with contextlib.suppress(OSError):  # it was killed
-            if left:
-                step = min(left, key=lambda step: (step - last - 1) % n)
-                left.remove(step)
-                pipe.write(bytes([step]))
-            else:
-                pipe.close()
-
+    begin, running = time.perf_counter(), []
+    (steps, left), (ended, said) = os.pipe(), os.pipe()
+    os.write(left, bytes(range(len(shares))))
+    os.close(left)
     try:
         try:
-            command = [sys.executable, "-c", _COMPILE, str(os.getpid()), module]
-            for number in range(processes):
-                pipes = {"stdin": subprocess.PIPE, "stdout": said, "stderr": subprocess.DEVNULL}
-                running.append(subprocess.Popen([*command, str(number), *sys.path], bufsize=0, **pipes))
-                hand_step(number, number * n // processes - 1)
+            command = [sys.executable, "-c", _COMPILE, str(os.getpid()), module, *sys.path]
+            for _ in range(min(processes, len(shares))):
+                running.append(subprocess.Popen(command, stdin=steps, stdout=said, stderr=subprocess.DEVNULL))
         finally:
+            os.close(steps)
             os.close(said)
-        while told := os.read(ended, 3):
-            number, step, is_done = told
-            hand_step(number, step)
-            if not is_done:
-                continue
-            done.append(step)
+        while step := os.read(ended, 1):
+            done.append(step[0])
             seconds, part = time.perf_counter() - begin, sum(shares[each] for each in done) / sum(shares)
             rest = seconds * (1 - part) / part
             log.info("compiled %.0f %% of all kernels in %.0f s; some %.0f s are left", 100 * part, seconds, rest)
             if progress is not None:
-                progress(shares[step])
+                progress(shares[step[0]])
     except BaseException:
         for process in running:
             process.kill()
@@ -149,7 +127,5 @@ def _run(module: str, shares: Sequence[int], processes: int, progress: Callable[
     finally:
         os.close(ended)
         for process in running:
-            if process.stdin is not None:
-                process.stdin.close()
             process.wait()
     return done

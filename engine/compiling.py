@@ -123,10 +123,7 @@ class _InnerLibrary(_Library):
 
 
 class _CalledLibrary(_InnerLibrary):
-    """Code that is never copied into its callers: it is optimised once, with the kernel."""
-
-    def _optimize_final_module(self) -> None:
-        pass
+    """Code that is never copied into its callers."""
 
 
 class _InnerCodegen(JITCPUCodegen):  # type: ignore[misc]
