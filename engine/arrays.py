@@ -20,9 +20,9 @@ Scalar = TypeVar("Scalar", bound=np.generic)
 
 def read_only(array: npt.NDArray[Scalar]) -> npt.NDArray[Scalar]:
     """Return an array of the one kind that kernels are compiled for: itself, a read-only view, or a copy."""
-    if not array.flags.c_contiguous:
-        array = np.ascontiguousarray(array)
-    if array.flags.writeable:
-        array = array.view()
-        array.setflags(write=False)
+    flags = array.flags
+    if flags.c_contiguous and not flags.writeable:
+        return array
+    array = array.view() if flags.c_contiguous else np.ascontiguousarray(array)
+    array.setflags(write=False)
     return array

@@ -15,18 +15,18 @@ from engine.collision.collide import collide_pair, pair_function
 from engine.collision.detail import NO_DETAIL, check_has_detail, details_where_proven, has_interior
 from engine.collision.meshes.contact_kinds import N_NAMED
 from engine.collision.meshes.mesh_arrays import STILL, mesh_body_of
-from engine.collision.meshes.mesh_mesh import answer_of
+from engine.collision.meshes.mesh_mesh import answer_of, told_by_kernel
 from engine.collision.meshes.mesh_pair import SPACE, what_to_seek
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.meshes.pose_batch import N_COLUMNS, RELATION, relate_poses
-from engine.collision.result import MESHES, UNLIMITED, Work
+from engine.collision.result import MESHES, RELATIONS, UNLIMITED, Collision, Work
 from engine.collision.scenes.batches import convex_poses
 from engine.direct import entry_of
 from engine.errors import InvalidArrayError, WrongDimensionError
 from engine.parallel import Budget, Cancel, Progress, check_options, run_chunks
 from engine.solids.base import Solid
 from engine.solids.checks import as_floats, is_ready
-from engine.solids.pose import Pose, check_rotations
+from engine.solids.pose import Pose, check_rotations, is_surely_rotation
 from engine.types import Accuracy
 
 PoseCollisions = (
@@ -69,7 +69,9 @@ def collide_poses(
     >>> collide_poses(box, box, turns, [[0.5, 0, 0], [1, 0, 0], [2, 0, 0]]).tolist()
     [3, 4, 0]
     """
-    check_options(workers, progress, report=report, witnesses=witnesses, boolean=boolean, detail=detail)
+    are_plain = type(report) is type(witnesses) is type(boolean) is type(detail) is bool
+    if workers is not None or progress is not None or not are_plain:
+        check_options(workers, progress, report=report, witnesses=witnesses, boolean=boolean, detail=detail)
     pair_function(first, second)
     if detail:
         check_has_detail(((("first",), first), (("second",), second)), boolean)
@@ -78,9 +80,8 @@ def collide_poses(
     if n_poses == 1 and progress is None and not (detail or report):
         with UNLIMITED if deadline is None and cancel is None else Budget(deadline, cancel) as budget:
             budget.check()
-            pose = Pose.of_checked(poses.rotations[0], poses.translations[0])
-            one = collide_pair(first, second, (None, pose), Work(budget, bool(witnesses), bool(boolean)))
-        relations = np.array([one.relation], np.int8)
+            one = _collide_pose(first, second, poses, Work(budget, bool(witnesses), bool(boolean)))
+        relations = _ALONE[one.relation].copy()
         return (relations, [one.witness]) if witnesses else relations
     with Budget(deadline, cancel) as budget:
         budget.check()
@@ -108,13 +109,26 @@ def collide_poses(
     return result, accuracy_of(n_poses, 0, answers.works, "+".join(sorted({first.type, second.type})))
 
 
+_ALONE = [np.array([relation], np.int8) for relation in RELATIONS]
+
+
+def _collide_pose(first: Solid, second: Solid, poses: PoseArrays, work: Work) -> Collision:
+    """Return the answer to one pose; of two meshes without a `Pose`, which takes as long to make as to decide."""
+    if first.dimension == 3 and first.type in MESHES and second.type in MESHES:
+        told = told_by_kernel(mesh_body_of(first), mesh_body_of(second), (STILL, poses), work)
+        if isinstance(told, Collision):
+            return told
+    pose = Pose.of_checked(poses.rotations[0], poses.translations[0])
+    return collide_pair(first, second, (None, pose), work)
+
+
 def as_poses(rotations: object, translations: object, dimension: int) -> tuple[FloatArray, FloatArray]:
     """Return checked rotations (n, d, d) and translations (n, d)."""
-    given: Any = (rotations, translations)
-    if is_ready(rotations, dimension, dimension) and is_ready(translations, dimension) and [*map(len, given)] == [1, 1]:
-        turn, move = map(read_only, given)
-        if isfinite(sum(turn.ravel().tolist()) + sum(move.ravel().tolist())):
-            check_rotations(turn)
+    turn: Any = rotations
+    move: Any = translations
+    if is_ready(turn, dimension, dimension) and is_ready(move, dimension) and len(turn) == 1 == len(move):
+        turn, move = read_only(turn), read_only(move)
+        if isfinite(sum(move[0].tolist())) and is_surely_rotation(turn):
             return turn, move
     turns, moves = as_floats(rotations, 3, ("rotations",)), as_floats(translations, 2, ("translations",))
     if len(turns) and turns.shape[1:] != (dimension, dimension):

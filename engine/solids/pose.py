@@ -192,9 +192,9 @@ def check_rotations(
     if rotations.ndim != 3 or rotations.shape[1] != rotations.shape[2]:
         raise InvalidArrayError(f"{spell(where)} must have shape (n, d, d), got {rotations.shape}", where)
     sure = (_TOLERANCE if limit is TOLERANCE else float(limit)) - _UNSURE
-    is_suspect = np.zeros(len(rotations), np.bool_)
-    entry_of(find_suspects)(read_only(rotations), sure, is_suspect)  # huge entries overflow, far from orthogonal
-    for index in np.flatnonzero(is_suspect) if is_suspect.any() else ():
+    is_suspect = np.empty(len(rotations), np.bool_)
+    n_suspects = entry_of(find_suspects)(read_only(rotations), sure, is_suspect)
+    for index in np.flatnonzero(is_suspect) if n_suspects else ():
         matrix = rotations[index]
         path = where if one else (*where, int(index))
         defect = _exact_defect(matrix)
@@ -213,13 +213,20 @@ def check_rotations(
             )
 
 
-@kernel
-def find_suspects(matrices: Any, limit: float, is_suspect: Any) -> None:
-    """Fill is_suspect (n,) for matrices (n, d, d): whether max|R^T R - I| > limit as computed, or det is not positive.
+def is_surely_rotation(matrix: FloatArray) -> bool:
+    """Tell whether a read-only ``(1, d, d)`` float64 is finite and a rotation; what is not sure `check_rotations` tells."""
+    return not entry_of(find_suspects)(matrix, _TOLERANCE - _UNSURE, np.empty(1, np.bool_))
 
-    An entry of the product is a sum of d products, det a sum of d! of d; numbers that overflow are suspect.
+
+@kernel
+def find_suspects(matrices: Any, limit: float, is_suspect: Any) -> int:
+    """Fill is_suspect (n,) for matrices (n, d, d): whether max|R^T R - I| > limit as computed, or det is not positive;
+    return how many there are.
+
+    An entry of the product is a sum of d products, det a sum of d! of d; numbers that overflow, far from orthogonal,
+    are suspect.
     """
-    dimension = matrices.shape[1]
+    dimension, n_suspects = matrices.shape[1], 0
     for item in range(matrices.shape[0]):
         suspect = False
         for j in range(dimension):
@@ -237,6 +244,8 @@ def find_suspects(matrices: Any, limit: float, is_suspect: Any) -> None:
                 minor = matrices[item, 1, j] * matrices[item, 2, k] - matrices[item, 1, k] * matrices[item, 2, j]
                 det += matrices[item, 0, i] * minor
         is_suspect[item] = suspect or not det > 0.0
+        n_suspects += is_suspect[item]
+    return n_suspects
 
 
 def _exact_defect(matrix: FloatArray) -> Fraction:

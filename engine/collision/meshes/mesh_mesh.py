@@ -22,11 +22,23 @@ import numpy as np
 from engine.arrays import IntArray
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
 from engine.collision.meshes.contact_kinds import STRENGTH
-from engine.collision.meshes.dual_traversal import SEEK_OVERLAP, SEEK_PIERCING_BY_FIRST, SEEK_PIERCING_BY_SECOND
+from engine.collision.meshes.dual_traversal import (
+    SEEK_OVERLAP,
+    SEEK_PIERCING_BY_FIRST,
+    SEEK_PIERCING_BY_SECOND,
+    Found,
+)
 from engine.collision.meshes.exact_regions import even_sides, pieces_of_segment, regions_of, sides_at, sides_within
 from engine.collision.meshes.exact_triangles import as_simplex
 from engine.collision.meshes.mesh_arrays import STATE_CLEAN, MeshBody, mesh_body_of
-from engine.collision.meshes.mesh_pair import MeshPair, met_by_face, relate, unless_identity, what_to_seek
+from engine.collision.meshes.mesh_pair import (
+    MeshPair,
+    PosedPair,
+    met_by_face,
+    relate,
+    unless_identity,
+    what_to_seek,
+)
 from engine.collision.meshes.parity import INSIDE
 from engine.collision.meshes.pose_batch import N_CONTACTS, ONE_SETTLES, RELATION
 from engine.collision.result import NO_CONTACT, RELATIONS, UNNAMED, Collision, Poses, Witness, Work
@@ -95,19 +107,29 @@ def mesh_mesh(first: Solid, second: Solid, poses: Poses, work: Work) -> Collisio
     a, b = mesh_body_of(first), mesh_body_of(second)
     if poses[0] is not None or poses[1] is not None:
         poses = unless_identity(poses)
-    seek = what_to_seek(a, b, work)
-    row, found = relate(a, b, poses, seek, work)
-    relation = row[RELATION]
-    is_unnamed = relation == DISJOINT or not (work.witness or relation == UNSETTLED)
-    answer = UNNAMED[relation] if is_unnamed else answer_of(row, a, b, seek)
-    if answer is not None:
-        work.n_beyond_filter += max(0, row[N_CONTACTS])
-        return answer
+    told = told_by_kernel(a, b, (a.posed(poses[0]), b.posed(poses[1])), work)
+    if isinstance(told, Collision):
+        return told
     work.budget.check()
     with np.errstate(all="ignore"):  # kernels, where they run uncompiled
         pair = MeshPair(a, b, poses, work)
-        pair.find_contacts((row, found))
+        pair.find_contacts(told)
         return _relation(pair)
+
+
+def told_by_kernel(
+    first: MeshBody, second: MeshBody, posed: PosedPair, work: Work
+) -> Collision | tuple[list[int], Found]:
+    """Return the answer where `relate_poses` tells it, else what `relate` says."""
+    seek = what_to_seek(first, second, work)
+    row, found = relate(first, second, posed, seek, work)
+    relation = row[RELATION]
+    is_unnamed = relation == DISJOINT or not (work.witness or relation == UNSETTLED)
+    answer = UNNAMED[relation] if is_unnamed else answer_of(row, first, second, seek)
+    if answer is None:
+        return row, found
+    work.n_beyond_filter += max(0, row[N_CONTACTS])
+    return answer
 
 
 def answer_of(row: list[int], first: MeshBody, second: MeshBody, seek: int) -> Collision | None:

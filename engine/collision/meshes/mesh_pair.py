@@ -30,6 +30,7 @@ from engine.collision.meshes.exact_triangles import classify_exact, kind_of_cont
 from engine.collision.meshes.face_state import states_of
 from engine.collision.meshes.mesh_arrays import NO_AREA, STATE_CLEAN, STATE_STACKED, MeshBody, join_vertices
 from engine.collision.meshes.parity import INSIDE, OUTSIDE, locate_vertices
+from engine.collision.meshes.placement import PoseArrays
 from engine.collision.meshes.pose_batch import KIND, N_COLUMNS, N_CONTACTS, ONE_SETTLES, relate_poses
 from engine.collision.meshes.triangle_triangle import APART, CROSSING
 from engine.collision.result import Poses, Witness, Work
@@ -46,6 +47,8 @@ class _WorkSpace(threading.local):
         self.descent, self.found, self.rows = new_descent(), new_found(ROOM_AT_ONCE), np.empty((1, N_COLUMNS), np.int64)
 
 
+PosedPair = tuple[PoseArrays, PoseArrays]
+"""The one pose of either body, as kernels take it."""
 ROOM_AT_ONCE = 256
 SPACE = _WorkSpace()
 
@@ -57,7 +60,7 @@ def unless_identity(poses: Poses) -> Poses:
 
 
 def relate(
-    first: MeshBody, second: MeshBody, poses: Poses, seek: int, work: Work, known: Found | None = None
+    first: MeshBody, second: MeshBody, posed: PosedPair, seek: int, work: Work, known: Found | None = None
 ) -> tuple[list[int], Found]:
     """Return what `relate_poses` says of a pair, and where its contacts are, all of them, until the next call; known:
     all contacts, their classes too, where they are found already."""
@@ -65,8 +68,8 @@ def relate(
     room = len(found.kinds)
     while True:  # bound: each turn has more room
         entry_of(relate_poses)(
-            first.arrays, second.arrays, first.posed(poses[0]), second.posed(poses[1]), seek,
-            N_NAMED if work.witness else 0, SPACE.descent, found, n_known, SPACE.rows, work.budget.flag,
+            first.arrays, second.arrays, *posed, seek, N_NAMED if work.witness else 0, SPACE.descent, found, n_known,
+            SPACE.rows, work.budget.flag,
         )  # fmt: skip
         row: list[int] = SPACE.rows[0].tolist()
         n = row[N_CONTACTS]
@@ -119,7 +122,7 @@ class MeshPair:
 
     def find_contacts(self, seen: tuple[list[int], Found] | None = None) -> None:
         """Find all contacts; seen: what `relate` said of the pair, where it was asked already."""
-        self.row, found = seen or relate(*self.meshes, self.poses, self.seek, self.work)
+        self.row, found = seen or relate(*self.meshes, self.posed, self.seek, self.work)
         self.work.budget.check()
         n, self.is_settled = abs(self.row[N_CONTACTS]), self.row[N_CONTACTS] == ONE_SETTLES
         self.contacts, kinds = found.pairs[:n].copy(), found.kinds[:n].copy()
@@ -142,7 +145,7 @@ class MeshPair:
         self.contacts, kinds = self.contacts[kinds != APART], kinds[kinds != APART]
         if len(kinds):
             found = Found(self.contacts, kinds, np.empty(0, np.bool_))
-            self.row, _ = relate(*self.meshes, self.poses, self.seek, self.work, found)
+            self.row, _ = relate(*self.meshes, self.posed, self.seek, self.work, found)
             self.work.budget.check()
 
     def _is_settled_by(self, kind: int, i: int, j: int) -> bool:

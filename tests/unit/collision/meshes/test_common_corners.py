@@ -9,7 +9,7 @@ from engine import Polyhedron, Pose, Relation, Surface, collide
 from engine.collision.meshes.common_corners import common_corner
 from engine.collision.meshes.dual_traversal import SEEK_OVERLAP, new_found
 from engine.collision.meshes.exact_triangles import kind_of_contact
-from engine.collision.meshes.mesh_arrays import mesh_body_of
+from engine.collision.meshes.mesh_arrays import STILL, mesh_body_of
 from engine.collision.meshes.mesh_pair import N_CONTACTS, SPACE, relate
 from engine.collision.meshes.triangle_triangle import Facet, with_pose
 from engine.collision.result import Work
@@ -55,7 +55,7 @@ def test_many_faces_at_one_point(pose: Pose | None) -> None:
 
 def test_few_pairs_say_all() -> None:
     a, b = mesh_body_of(fan(30, 1, 0.5)), mesh_body_of(fan(25, -1, 0.75))
-    row, found = relate(a, b, (None, None), SEEK_OVERLAP, Work(witness=False))
+    row, found = relate(a, b, (STILL, STILL), SEEK_OVERLAP, Work(witness=False))
     assert row[N_CONTACTS] <= 32 + 30 + 25
     assert len(np.unique(found.pairs[: row[N_CONTACTS], 0])) == 30
     assert len(np.unique(found.pairs[: row[N_CONTACTS], 1])) == 25

@@ -35,7 +35,7 @@ def test_agrees_with_exact_integers(size: int, pose: Pose | None) -> None:
             continue
         found = Found(np.zeros((1, 2), np.int64), np.full(1, CONTACT, np.int8), np.empty(0, np.bool_))
         with np.errstate(all="ignore"):
-            row, _ = relate(first, second, (pose, pose), SEEK_CONTACT, Work(), found)
+            row, _ = relate(first, second, (first.posed(pose), second.posed(pose)), SEEK_CONTACT, Work(), found)
         if min(first.arrays.axis[0], second.arrays.axis[0]) < 0:
             assert row[KIND] == UNSETTLED
         else:

@@ -27,7 +27,7 @@ def test_finds_what_looking_at_all_pairs_finds(
 ) -> None:
     monkeypatch.setattr(SPACE, "found", new_found(room))
     a, b = mesh(2), mesh(1, at)
-    row, found = relate(a, b, (pose, pose), SEEK_OVERLAP, Work())
+    row, found = relate(a, b, (a.posed(pose), b.posed(pose)), SEEK_OVERLAP, Work())
     pairs = set(map(tuple, found.pairs[: row[N_CONTACTS]].tolist()))
     assert len(pairs) == row[N_CONTACTS]
     x, y = exact_pair(a, b, (pose, pose))
@@ -46,7 +46,7 @@ def test_finds_what_looking_at_all_pairs_finds(
 def test_a_crossing_or_any_contact_may_settle_the_question(pose: Pose | None) -> None:
     a, b = mesh(2), mesh(2, (1, 0.5, 0.25))
     for seek in (SEEK_OVERLAP, SEEK_CONTACT):
-        row, found = relate(a, b, (pose, pose), seek, Work())
+        row, found = relate(a, b, (a.posed(pose), b.posed(pose)), seek, Work())
         assert row[N_CONTACTS] == ONE_SETTLES
         i, j = found.pairs[0].tolist()
         x, y = exact_pair(a, b, (pose, pose))

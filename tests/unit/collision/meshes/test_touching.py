@@ -22,7 +22,7 @@ def compiled(first: Solid, second: Solid, pose: Pose | None) -> int:
     """Return the relation that compiled proofs find."""
     a, b, work = mesh_body_of(first), mesh_body_of(second), Work()
     with np.errstate(all="ignore"):
-        return relate(a, b, (pose, pose), what_to_seek(a, b, work), work)[0][RELATION]
+        return relate(a, b, (a.posed(pose), b.posed(pose)), what_to_seek(a, b, work), work)[0][RELATION]
 
 
 @pytest.mark.parametrize("pose", [None, TURN])
