@@ -14,7 +14,7 @@ Near contact this leaves a fraction of what boxes leave, and the more so the fin
 **margin.** Numbers are below 5 in the own tree. In units of 2^-24, with the other scale `ratio` times the own and the
 shift T of `frames`: n . (c_b - c_a) is off by less than 80 ratio + 16 |T| + 30 (corners, products and sums), the right
 side by less than 70 ratio + 40 (g is off by 13, either n by 10); twice the margin of a frame is 128 + 224 ratio + 64
-|T| (frames.py). Under the root g^2 is off by less than 30: `_ROUND` is 64. `fill_discs` enlarges by 16, which is more
+|T| (frames.py). Under the root g^2 is off by less than 30: `ROUND` is 64. `fill_discs` enlarges by 16, which is more
 than what its own rounding and that of the corners come to. What is no number separates nothing.
 """
 
@@ -30,7 +30,7 @@ from engine.lanes.lanes import any_above, bits_of, dot, greater, load, load_lane
 from engine.lanes.tracing import LANES, Lanes, Number, Rows, traced
 
 DISC_ROWS: Final = 8
-_ROUND: Final = 2.0**-18
+ROUND: Final = 2.0**-18
 
 
 @inline
@@ -43,8 +43,15 @@ def discs_meeting(
     """
     if low | high == 0:
         return low, high
-    place_discs(second, j, frames, np.float32(scales[1] / scales[0]), np.float32(scales[0] / scales[1]), work)
+    place_discs(second, j, frames, np.float32(scales[1] / scales[0]), inverse_ratio(scales[1], scales[0]), work)
     return sift(low, 0, beside_disc, (first, i, work)), sift(high, LANES // 2, beside_disc, (first, i, work))
+
+
+@inline
+def inverse_ratio(their: float, own: float) -> Any:
+    """Return what makes normals in the units of another tree unit vectors; infinity, which separates nothing, where
+    those are so small that float32 has lost bits of them."""
+    return np.float32(own / their if own / their <= 2.0**60 else np.inf)
 
 
 @traced
@@ -69,7 +76,7 @@ def beside_disc(lane: int, first: Rows, i: int, work: Rows) -> int:
     gap = [b[k] - a[k] for k in range(3)]
     g = dot(a[3:6], b[3:6])
     along_a, along_b = abs(dot(a[3:6], gap)), abs(dot(b[3:6], gap))
-    s, g = root(greater((1.0 + _ROUND) - g * g, _ROUND)), abs(g)
+    s, g = root(greater((1.0 + ROUND) - g * g, ROUND)), abs(g)
 
     def reach(theirs: list[Lanes], ours: list[Lanes]) -> Lanes:
         return (g * theirs[7] + s * theirs[6]) + (b[8] + ours[7])

@@ -112,7 +112,8 @@ class EmittedMask(Emitted):
 class EmittedLanes(Emitted):
     """Eight float32."""
 
-    __add__, __sub__, __mul__ = _writes("fadd"), _writes("fsub"), _writes("fmul")
+    __add__, __sub__ = _writes("fadd"), _writes("fsub")
+    __mul__, __truediv__ = _writes("fmul"), _writes("fdiv")
     __gt__, __lt__, __ge__, __le__ = _compares(">"), _compares("<"), _compares(">="), _compares("<=")
 
     @staticmethod

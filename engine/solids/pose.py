@@ -214,7 +214,7 @@ def check_rotations(
 
 
 def is_surely_rotation(matrix: FloatArray) -> bool:
-    """Tell whether a read-only ``(1, d, d)`` float64 is finite and a rotation; what is not sure `check_rotations` tells."""
+    """Tell whether a read-only ``(1, d, d)`` float64 is surely a finite rotation; `check_rotations` tells others."""
     return not entry_of(find_suspects)(matrix, _TOLERANCE - _UNSURE, np.empty(1, np.bool_))
 
 

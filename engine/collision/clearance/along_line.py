@@ -6,29 +6,26 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.collision.clearance.blocks import DONE, FULL, block_reach, keep_below, measure_blocks
-from engine.collision.clearance.boxes import MOST_LISTED, Search, View, lane_centre, lane_half, magnitudes
-from engine.jit import inline
+from engine.collision.clearance.blocks import DONE, FULL, block_reach, keep_below, measure_blocks, reach_from
+from engine.collision.clearance.boxes import MOST_LISTED, Search, View, size_of, way_of
+from engine.jit import inline, merged
 from engine.lanes.boxes import EMPTY
+from engine.lanes.gaps import box_reaches
 from engine.lanes.tracing import LANES
-from engine.predicates.vectors import dot
-from engine.types import Point3
 
 MOST_STEPS: Final = 8
 """Of the first approach."""
 
 
-@inline
-def _reach_of_lane(s: Search, view: View, row: int, at: int) -> float:
-    """Return a bound on how far a box reaches along the line toward the other body."""
-    d = Point3(s.room.line[3 * row], s.room.line[3 * row + 1], s.room.line[3 * row + 2])
-    o, unit, sign = view.mesh.origin, view.unit, (1.0 if row == 0 else -1.0)
-    c, h = lane_centre(view, at), lane_half(view, at)
-    middle = d.x * (o[0] * unit + c.x) + d.y * (o[1] * unit + c.y) + d.z * (o[2] * unit + c.z) + s.room.line[9 + row]
-    return sign * middle + dot(magnitudes(d), h) + s.frame.margin
+@merged
+def _set_reaches(s: Search, view: View, row: int, node: int) -> tuple[float, float]:
+    """Write how far the boxes of a node reach along the line toward the other body to the first row of work: times the
+    second number, plus the first."""
+    box_reaches(view.mesh.boxes, node, way_of(s.room.line, row, 1.0 - 2.0 * row), s.room.work)
+    return reach_from(s, view, row) + s.margin, size_of(view)
 
 
-@inline
+@merged
 def _furthest(s: Search, view: View, row: int) -> tuple[float, int]:
     """Return how far a body reaches along the line toward the other, and the block that does."""
     child, waiting, bounds, sign = view.mesh.child, s.room.waiting, s.room.waiting_bounds, (1.0 if row == 0 else -1.0)
@@ -43,10 +40,11 @@ def _furthest(s: Search, view: View, row: int) -> tuple[float, int]:
             if reach > best:
                 best, found = reach, node
             continue
+        start, size = _set_reaches(s, view, row, node)
         for lane in range(LANES):
             if child[node, lane] == EMPTY:
                 continue
-            bound, place = _reach_of_lane(s, view, row, node * LANES + lane), n
+            bound, place = start + size * float(s.room.work[0, lane]), n
             while place > 0 and n - place < lane and bounds[place - 1] > bound:  # order: of a node, the furthest last
                 waiting[place], bounds[place] = waiting[place - 1], bounds[place - 1]
                 place -= 1
@@ -64,7 +62,7 @@ def approach(s: Search, limits: Any) -> tuple[int, int]:
     for _ in range(MOST_STEPS):
         before = limits[0]
         (reach, i), (their_reach, j) = _furthest(s, s.a, 0), _furthest(s, s.b, 1)
-        if -their_reach - reach - s.frame.margin > limits[0]:
+        if -their_reach - reach - s.margin > limits[0]:
             return DONE, 0
         how, _ = measure_blocks(s, i, j, 0, limits)
         if how != DONE or not limits[0] < before:
@@ -72,7 +70,7 @@ def approach(s: Search, limits: Any) -> tuple[int, int]:
     return DONE, 0
 
 
-@inline
+@merged
 def _list_blocks(s: Search, view: View, row: int, least: float) -> int:
     """List the blocks that reach so far toward the other body; return their number, above MOST_LISTED for too many."""
     child, waiting, sign = view.mesh.child, s.room.waiting, (1.0 if row == 0 else -1.0)
@@ -86,8 +84,9 @@ def _list_blocks(s: Search, view: View, row: int, least: float) -> int:
                     s.room.listed[row, n_listed] = node
                 n_listed += 1
             continue
+        start, size = _set_reaches(s, view, row, node)
         for lane in range(LANES):
-            if child[node, lane] != EMPTY and _reach_of_lane(s, view, row, node * LANES + lane) >= least:
+            if child[node, lane] != EMPTY and start + size * float(s.room.work[0, lane]) >= least:
                 waiting[n] = child[node, lane]
                 n += 1
     return n_listed
@@ -100,7 +99,7 @@ def finish_along_line(s: Search, limits: Any) -> tuple[int, int]:
     Bodies that bulge toward each other have few: this looks at each body alone, not at pairs of boxes. Returns FULL
     where they are many, and there is nothing gained.
     """
-    margin = s.frame.margin
+    margin = s.margin
     (furthest, _), (theirs, _) = _furthest(s, s.a, 0), _furthest(s, s.b, 1)
     n_first = _list_blocks(s, s.a, 0, -theirs - limits[0] - 2.0 * margin)
     if n_first > MOST_LISTED:

@@ -6,16 +6,17 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.collision.clearance.boxes import Search, View, box_bound, lane_centre, lane_half, scaled, set_line
+from engine.collision.clearance.boxes import Search, View, scaled, set_line, size_of, way_of
 from engine.collision.clearance.near_triangles import nearest_points, rounding_of, seen_from
 from engine.collision.meshes.mesh_arrays import triangle_of
 from engine.collision.meshes.placement import placed
 from engine.collision.meshes.triangle_triangle import Facet
-from engine.jit import inline
+from engine.jit import inline, merged
 from engine.lanes.boxes import EMPTY
+from engine.lanes.gaps import near_triangle, place_triangles, triangle_reaches
+from engine.lanes.lanes import lowest_bit
 from engine.lanes.tracing import LANES
-from engine.predicates.loading import as_point3
-from engine.predicates.vectors import dot, minus
+from engine.predicates.vectors import dot
 from engine.types import Point3
 
 DONE: Final = 0
@@ -24,9 +25,12 @@ CLOSER: Final = 2
 INTERRUPTED: Final = 3
 """How a search ended: with all pairs; without room for more pairs of boxes or triangles; with two points nearer than
 asked; by the flag."""
+_REACH: Final = 2.0**-18
+"""More than what a product of a direction with two vectors of float32, none of them above 2, is off by."""
+_ABOVE_ONE: Final = 1.0 + 2.0**-22
 
 
-@inline
+@merged
 def _triangle(view: View, item: int) -> Facet:
     """Return a placed triangle, rounded, times the unit."""
     t, place, unit = triangle_of(view.mesh, item), view.place, view.unit
@@ -60,88 +64,71 @@ def keep_below(found: Any, n: int, most: float) -> int:
     return n_kept
 
 
-@inline
-def _reach(s: Search, view: View, row: int, item: int) -> float:
-    """Return how far a triangle reaches along the line, toward the other body."""
-    d = Point3(s.room.line[3 * row], s.room.line[3 * row + 1], s.room.line[3 * row + 2])
-    sign, reach = 1.0 - 2.0 * row, -np.inf
-    for corner in range(3):
-        p = scaled(as_point3(view.mesh.vertices, view.mesh.triangles[item, corner]), view.unit)
-        reach = max(reach, sign * dot(d, p))
-    return sign * reach + s.room.line[9 + row]
+@merged
+def reach_from(s: Search, view: View, row: int) -> float:
+    """Return how far the origin of a body's tree reaches along the line toward the other body, rounding left out."""
+    line, o, unit = s.room.line, view.mesh.origin, view.unit
+    d = Point3(line[3 * row], line[3 * row + 1], line[3 * row + 2])
+    return (1.0 - 2.0 * row) * (dot(d, scaled(Point3(o[0], o[1], o[2]), unit)) + line[9 + row]) + _REACH * size_of(view)
 
 
-@inline
+@merged
 def block_reach(s: Search, view: View, row: int, node: int) -> float:
     """Return how far the triangles of a block reach along the line, toward the other body; kept until that turns."""
-    turn, sign, reach = s.room.line[11], 1.0 - 2.0 * row, -np.inf
-    if s.room.kept[node, 2 * row] == turn:
-        return float(s.room.kept[node, 2 * row + 1])
-    for lane in range(LANES):
-        if view.mesh.child[node, lane] == EMPTY:
-            break
-        reach = max(reach, sign * _reach(s, view, row, -1 - int(view.mesh.child[node, lane])))
-    s.room.kept[node, 2 * row], s.room.kept[node, 2 * row + 1] = turn, sign * reach
-    return sign * reach
+    kept, sign = s.room.kept[node], 1.0 - 2.0 * row
+    if kept[2 * row] != s.room.line[11]:
+        triangle_reaches(view.mesh.blocks, node, way_of(s.room.line, row, sign), s.room.work)
+        kept[2 * row] = s.room.line[11]
+        most = _most_of_block(view.mesh.child, node, s.room.work)
+        kept[2 * row + 1] = sign * (reach_from(s, view, row) + most * size_of(view))
+    return float(kept[2 * row + 1])
 
 
 @inline
-def _box_of_block(view: View, node: int) -> tuple[Point3, Point3]:
-    """Return centre and half widths of a box around the boxes of a block."""
-    c, h = lane_centre(view, node * LANES), lane_half(view, node * LANES)
-    low, high = minus(c, h), minus(c, minus(Point3(0.0, 0.0, 0.0), h))
+def _most_of_block(child: Any, node: int, work: Any) -> float:
+    """Return the largest number in the first row of work in a lane with a triangle."""
+    most = np.float64(work[0, 0])
     for lane in range(1, LANES):
-        if view.mesh.child[node, lane] == EMPTY:
+        if child[node, lane] == EMPTY:
             break
-        c, h = lane_centre(view, node * LANES + lane), lane_half(view, node * LANES + lane)
-        low = Point3(min(low.x, c.x - h.x), min(low.y, c.y - h.y), min(low.z, c.z - h.z))
-        high = Point3(max(high.x, c.x + h.x), max(high.y, c.y + h.y), max(high.z, c.z + h.z))
-    middle = Point3(0.5 * (low.x + high.x), 0.5 * (low.y + high.y), 0.5 * (low.z + high.z))
-    return middle, minus(high, middle)
+        most = max(most, np.float64(work[0, lane]))
+    return most
 
 
-@inline
+@merged
 def measure_blocks(s: Search, i: int, j: int, n_found: int, limits: Any) -> tuple[int, int]:
     """Add the pairs of triangles of two blocks that may be the nearest; return how that ended, and their number.
 
     limits: as in `find_nearest`; the first falls.
     """
-    (c, h), (other, half) = _box_of_block(s.a, i), _box_of_block(s.b, j)
-    if box_bound(s, limits[0], c, h, other, half) > limits[0]:
-        return DONE, n_found
+    line, frames, work, found = s.room.line, s.room.frames, s.room.work, s.room.found
+    way, per_size = way_of(line, 0, 1.0), _ABOVE_ONE / size_of(s.a)
+    place_triangles(s.b.mesh.blocks, j, frames, way, work)
     for k in range(LANES):
         own = int(s.a.mesh.child[i, k])
         if own == EMPTY:
             break
-        c, h = lane_centre(s.a, i * LANES + k), lane_half(s.a, i * LANES + k)
-        if box_bound(s, limits[0], c, h, other, half) > limits[0]:
-            continue
+        bits = near_triangle(s.a.mesh.blocks, i, k, frames, way, limits[0] * per_size, work)
         t = _triangle(s.a, -1 - own)
-        for m in range(LANES):
-            their = int(s.b.mesh.child[j, m])
+        while bits != 0:  # bound: each turn takes a bit
+            their = int(s.b.mesh.child[j, lowest_bit(bits)])
+            bits &= bits - 1
             if their == EMPTY:
                 break
-            # order: both by one line, which turns below
-            if _reach(s, s.b, 1, -1 - their) - _reach(s, s.a, 0, -1 - own) - s.frame.margin > limits[0]:
-                continue
-            at = j * LANES + m
-            if box_bound(s, limits[0], c, h, lane_centre(s.b, at), lane_half(s.b, at)) > limits[0]:
-                continue
             low, high, d, features = _measure(t, _triangle(s.b, -1 - their), s.error, limits[0])
             if high < limits[1]:
                 return CLOSER, 0
             if high < limits[0]:
                 limits[0] = high
-                set_line(s.room.line, s.a, s.b, d)
+                set_line(line, s.a, s.b, d)
             if low > limits[0]:
                 continue
-            if n_found == len(s.room.found.bounds):
-                n_found = keep_below(s.room.found, n_found, limits[0])
-                if 2 * n_found > len(s.room.found.bounds):
+            if n_found == len(found.bounds):
+                n_found = keep_below(found, n_found, limits[0])
+                if 2 * n_found > len(found.bounds):
                     return FULL, 0
-            pairs = s.room.found.pairs
-            s.room.found.bounds[n_found] = low
-            pairs[n_found, 0], pairs[n_found, 1] = -1 - own, -1 - their
-            pairs[n_found, 2], pairs[n_found, 3] = features
+            found.bounds[n_found] = low
+            found.pairs[n_found, 0], found.pairs[n_found, 1] = -1 - own, -1 - their
+            found.pairs[n_found, 2], found.pairs[n_found, 3] = features
             n_found += 1
     return DONE, n_found

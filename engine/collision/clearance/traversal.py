@@ -1,11 +1,12 @@
 """The pairs of triangles of two placed bodies that may be the nearest, by a best-first descent of both trees.
 
-A pair of boxes is bounded from below along eight axes: those of either box, whose gaps are also put together, the line
-of the two centres, and that of the nearest pair so far. Pairs wait in a heap, the least bound first; the larger box of
-a pair is opened. Triangles are bounded from both sides (near_triangles.py); the least upper bound so far ends the
-search once no pair that waits is below it. Now and then each body alone is asked what of it reaches far enough along
-that line to be nearer: where that is little, it is measured and nothing is left. What is returned are all pairs of
-triangles whose lower bound does not exceed the least upper bound: the distance of the bodies is that of one of them.
+A pair of boxes, each with the disc of what it holds, is bounded from below by `lanes/gaps.py`, along the line of the
+nearest pair so far too. Pairs wait in a heap, the least bound first; the larger box of a pair is opened, its eight
+children are bounded at once. Of two blocks the pairs of triangles that may be near are told eight at once and bounded
+from both sides (near_triangles.py); the least upper bound so far ends the search once no pair that waits is below it.
+Now and then each body alone is asked what of it reaches far enough along that line to be nearer: where that is little,
+it is measured and nothing is left. What is returned are all pairs of triangles whose lower bound does not exceed the
+least upper bound: the distance of the bodies is that of one of them.
 
 limits (2,) of a search: pairs above the first are not looked for (it falls to the least upper bound found); a pair
 below the second ends it as CLOSER.
@@ -23,15 +24,28 @@ import numpy as np
 
 from engine.collision.clearance.along_line import approach, finish_along_line
 from engine.collision.clearance.blocks import CLOSER, DONE, FULL, INTERRUPTED, block_reach, keep_below, measure_blocks
-from engine.collision.clearance.boxes import ROOT, Search, View, box_bound, frame_of, lane_centre, lane_half, set_line
+from engine.collision.clearance.boxes import (
+    ROOT,
+    Search,
+    View,
+    fix,
+    half_of,
+    margin_of,
+    scaled,
+    set_line,
+    size_of,
+    way_of,
+)
 from engine.collision.clearance.certified import certify
 from engine.collision.clearance.refined import refine
 from engine.collision.meshes.mesh_arrays import MeshArrays
-from engine.collision.meshes.placement import PoseArrays, place_pair, turned
-from engine.jit import bare_kernel, inline
-from engine.lanes.boxes import EMPTY
+from engine.collision.meshes.placement import PoseArrays, defect_of, place_pair, placed, set_frame
+from engine.jit import bare_kernel, inline, merged
+from engine.lanes.boxes import EMPTY, FRAME_ROWS
+from engine.lanes.discs import inverse_ratio
+from engine.lanes.gaps import child_bounds
 from engine.lanes.tracing import LANES
-from engine.predicates.vectors import largest_of, length
+from engine.predicates.vectors import length, minus
 from engine.types import Point3
 
 BEYOND: Final = 4
@@ -80,22 +94,23 @@ def drop_first(heap: Any, n: int) -> None:
     bounds[place], lanes[place, 0], lanes[place, 1] = last, i, j
 
 
-@inline
+@merged
 def _open(s: Search, n: int, pair: tuple[int, int, bool], most: float) -> int:
     """Put the pairs of one box with the children of a node of the other body on the heap; return its height.
 
     pair: the node, the lane of the other body, and whether the node is the first body's.
     """
     node, other, is_first = pair
-    view, fixed = (s.a, s.b) if is_first else (s.b, s.a)
-    centre, half = lane_centre(fixed, other), lane_half(fixed, other)
+    view, fixed, own = (s.a, s.b, 0) if is_first else (s.b, s.a, 1)
+    unit, their_unit = size_of(view), size_of(fixed)
+    fix(fixed, other, s.room.fixed)
+    child_bounds(
+        view.mesh.boxes, view.mesh.discs, node, s.room.fixed, s.room.frames, own * FRAME_ROWS, (1 - own) * FRAME_ROWS,
+        their_unit / unit, inverse_ratio(their_unit, unit), way_of(s.room.line, own, 1.0 - 2.0 * own), s.room.work,
+    )  # fmt: skip
     for lane in range(LANES):
-        if view.mesh.child[node, lane] == EMPTY:
-            continue
-        at = node * LANES + lane
-        c, h = lane_centre(view, at), lane_half(view, at)
-        bound = box_bound(s, most, c, h, centre, half) if is_first else box_bound(s, most, centre, half, c, h)
-        if bound <= most:
+        bound, at = unit * float(s.room.work[0, lane]), node * LANES + lane
+        if bound <= most and view.mesh.child[node, lane] != EMPTY:
             push(s.room.heap, n, bound, at if is_first else other, other if is_first else at)
             n += 1
     return n
@@ -104,7 +119,7 @@ def _open(s: Search, n: int, pair: tuple[int, int, bool], most: float) -> int:
 @inline
 def _search(s: Search, limits: Any, flag: Any) -> tuple[int, int]:
     """Fill the candidates; return how the search ended, and their number. See `find_nearest`."""
-    first, second = s.a.mesh.child, s.b.mesh.child
+    first, second, sizes = s.a.mesh.child, s.b.mesh.child, (size_of(s.a), size_of(s.b))
     how, n_found = approach(s, limits)
     if how != DONE:
         return how, 0
@@ -124,24 +139,27 @@ def _search(s: Search, limits: Any, flag: Any) -> tuple[int, int]:
             return INTERRUPTED, 0
         if n + LANES > len(s.room.heap.bounds):
             return FULL, 0
-        half, other = lane_half(s.a, i), lane_half(s.b, j)
-        if box_bound(s, limits[0], lane_centre(s.a, i), half, lane_centre(s.b, j), other) > limits[0]:
-            continue
         node = 0 if i == ROOT else int(first[i >> 3, i & 7])
         their_node = 0 if j == ROOT else int(second[j >> 3, j & 7])
         i_block, j_block = first[node, 0] < 0, second[their_node, 0] < 0
         if i_block and j_block:
             reach, their_reach = block_reach(s, s.a, 0, node), block_reach(s, s.b, 1, their_node)
-            if their_reach - reach - s.frame.margin > limits[0]:
+            if their_reach - reach - s.margin > limits[0]:
                 continue
             how, n_found = measure_blocks(s, node, their_node, n_found, limits)
             if how != DONE:
                 return how, 0
-        elif not i_block and (j_block or largest_of(half) >= largest_of(other)):
-            n = _open(s, n, (node, j, True), limits[0])
-        else:
-            n = _open(s, n, (their_node, i, False), limits[0])
+            continue
+        is_first = not i_block and (j_block or half_of(s.a, i) * sizes[0] >= half_of(s.b, j) * sizes[1])
+        n = _open(s, n, (node if is_first else their_node, j if is_first else i, is_first), limits[0])
     return DONE, keep_below(s.room.found, n_found, limits[0])
+
+
+@inline
+def _middle(view: View) -> Point3:
+    """Return the middle of a body's tree in space."""
+    o = view.mesh.origin
+    return scaled(placed(Point3(o[0], o[1], o[2]), view.place), view.unit)
 
 
 @inline
@@ -150,7 +168,8 @@ def _start_line(s: Search) -> None:
     for k in range(11):
         s.room.line[k] = 0.0
     s.room.line[11] += 1.0
-    middle = turned(s.a.place, s.frame.shift)
+    start, their_start = _middle(s.a), _middle(s.b)
+    middle = minus(their_start, start)
     size = length(middle)
     if 0.0 < size < np.inf:
         set_line(s.room.line, s.a, s.b, Point3(middle.x / size, middle.y / size, middle.z / size))
@@ -183,7 +202,10 @@ def find_nearest(
         place, other = place_pair(first.extent, first_poses, own, second.extent, second_poses, item)
         radii = asked.radius * unit, asked.other_radius * unit
         a, b = View(first, place, unit), View(second, other, unit)
-        s = Search(a, b, frame_of(a, b), 2.0 * unit * (place.error + other.error), room)
+        s = Search(a, b, margin_of(a, b), 2.0 * unit * (place.error + other.error), room)
+        defect = defect_of(place) + defect_of(other)
+        set_frame(room.frames[0], place, first.origin, first.scale, other, second.origin, second.scale, defect)
+        set_frame(room.frames[1], other, second.origin, second.scale, place, first.origin, first.scale, defect)
         _start_line(s)
         how, n = _search(s, limits, flag)
         if how == CLOSER or (how == DONE and n == 0):
