@@ -147,6 +147,12 @@ def states_of(mesh: MeshArrays, faces: IntArray) -> Int8Array:
     return states
 
 
+def state_at(mesh: MeshArrays, face: int) -> int:
+    """Return the state of one face, at once where it is known."""
+    state = mesh.state[face]
+    return int(states_of(mesh, np.array([face]))[0] if state == STATE_UNKNOWN else state)
+
+
 @kernel
 def _find_states(mesh: MeshArrays, faces: Any, states: Any) -> None:
     """Fill states (n,) with the state of each of `faces` (n,)."""

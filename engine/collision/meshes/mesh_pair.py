@@ -27,7 +27,7 @@ from engine.collision.meshes.dual_traversal import (
 from engine.collision.meshes.exact_body import ExactBody, exact_pair
 from engine.collision.meshes.exact_regions import Sides, regions_of, sides_at
 from engine.collision.meshes.exact_triangles import classify_exact, kind_of_contact
-from engine.collision.meshes.face_state import states_of
+from engine.collision.meshes.face_state import state_at, states_of
 from engine.collision.meshes.mesh_arrays import NO_AREA, STATE_CLEAN, STATE_STACKED, MeshBody, join_vertices
 from engine.collision.meshes.parity import INSIDE, OUTSIDE, locate_vertices
 from engine.collision.meshes.placement import PoseArrays
@@ -182,7 +182,7 @@ class MeshPair:
         return states_of(self.meshes[own].arrays, faces)
 
     def state(self, own: int, face: int) -> int:
-        return int(self.states(own, np.array([face]))[0])
+        return state_at(self.meshes[own].arrays, face)
 
     def patches(self, own: int, in_contact: IntArray, place: int) -> list[IntArray]:
         """Return the patches (connected faces without contact) of one body that lie INSIDE or OUTSIDE the other."""

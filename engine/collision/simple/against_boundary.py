@@ -20,9 +20,9 @@ import numpy as np
 from engine.arrays import FloatArray, IntArray
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING
 from engine.collision.exact_images import HalfSpaceImage, Vector, image_half_space, image_point, rounded, value_at
+from engine.collision.meshes.face_state import state_at
 from engine.collision.meshes.live_faces import simplex_distance
-from engine.collision.meshes.mesh_arrays import mesh_body_of
-from engine.collision.meshes.mesh_pair import SPACE
+from engine.collision.meshes.mesh_arrays import STATE_STACKED, mesh_body_of
 from engine.collision.result import FIRST_WITHIN, NO_CONTACT, SECOND_WITHIN, Collision, Parts, Poses, Witness, Work
 from engine.collision.simple.ball_on_mesh import relate_ball
 from engine.collision.simple.boundary import Boundary, boundary_of, signs_of
@@ -66,11 +66,12 @@ def _by_floats(body: Solid, center: list[float], is_rounded: bool, radius: float
     """Return the relation of a mesh and a ball about a point, rounded maybe, where floats prove it."""
     mesh = mesh_body_of(body)
     error = 2.0**-52 * max(map(abs, center)) + 2.0**-1074 if is_rounded else 0.0
-    relation, face = entry_of(relate_ball)(
-        mesh.arrays, *center, error, float(radius), SPACE.descent.poses, work.budget.flag
-    )
+    relation, triangle = entry_of(relate_ball)(mesh.arrays, *center, error, float(radius), work.budget.flag)
     work.budget.check()
+    if relation == OVERLAPPING and state_at(mesh.arrays, triangle) == STATE_STACKED:
+        return None
     if relation in (OVERLAPPING, TOUCHING):
+        face = int(mesh.faces[triangle])
         return Collision(Relation(relation), Witness("surface", face, piercing=relation == TOUCHING))
     return _WITHIN.get(relation)
 

@@ -3,7 +3,7 @@
 The faces near the ball are found by the tree. Of each in question nearly nearest points and the slab between them and
 the centre (`near_triangles.py`) prove that it enters the open ball, or keeps clear of the closed one; the witness is
 the one that enters of which the box is nearest. A centre that no face comes near to lies where a half-line tells, and
-a face that no other one covers has the open interior beside it. Whatever is not proven is UNSETTLED.
+a face that no other one covers has the open interior beside it, which the caller asks. Whatever is not proven is UNSETTLED.
 """
 
 from __future__ import annotations
@@ -15,9 +15,8 @@ import numpy as np
 from engine.bounding.bvh import STACK
 from engine.collision.clearance.near_triangles import nearest_points, rounding_of, seen_from
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
-from engine.collision.meshes.face_state import state_of
 from engine.collision.meshes.faces_near import SLACK, box_between, next_face
-from engine.collision.meshes.mesh_arrays import STATE_STACKED, MeshArrays, in_tree, triangle_of
+from engine.collision.meshes.mesh_arrays import MeshArrays, in_tree, triangle_of
 from engine.collision.meshes.parity import INSIDE, OUTSIDE, OwnPoint, locate_point
 from engine.collision.meshes.triangle_triangle import Facet
 from engine.jit import allocating, inline, kernel
@@ -104,12 +103,13 @@ def _holds_all(own: OwnPoint, radius: float, mesh: MeshArrays, flag: Any) -> int
 
 @kernel
 def relate_ball(
-    mesh: MeshArrays, x: float, y: float, z: float, error: float, radius: float, poses: Any, flag: Any
+    mesh: MeshArrays, x: float, y: float, z: float, error: float, radius: float, flag: Any
 ) -> tuple[int, int]:
     """Return the relation of a mesh (first) and a ball about a point off by `error` in each coordinate, or UNSETTLED;
-    and the face that enters it, the caller's, where the relation is overlapping or touching. poses: any (n, 12)."""
+    and the triangle that enters it, where the relation is overlapping, unless even-odd cancels that one, or touching.
+    """
     own = OwnPoint(Point3(x, y, z), error)
-    relation, face = _first_to_enter(own, radius, mesh, flag)
+    relation, triangle = _first_to_enter(own, radius, mesh, flag)
     if relation == DISJOINT:
         where = locate_point(own, mesh) if mesh.has_inside else OUTSIDE
         return (SECOND_INSIDE_FIRST if where == INSIDE else (DISJOINT if where == OUTSIDE else UNSETTLED)), -1
@@ -117,8 +117,5 @@ def relate_ball(
         is_within = _holds_all(own, radius, mesh, flag)
         if is_within != 0:
             return (FIRST_INSIDE_SECOND if is_within == 1 else UNSETTLED), -1
-        if mesh.has_inside:
-            is_covered = mesh.axis[face] < 0 or state_of(mesh, face, poses) == STATE_STACKED
-            relation = UNSETTLED if is_covered else OVERLAPPING
-        return relation, mesh.faces[face]
+        return (OVERLAPPING if mesh.has_inside else TOUCHING), triangle
     return UNSETTLED, -1
