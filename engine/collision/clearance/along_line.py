@@ -8,7 +8,7 @@ import numpy as np
 
 from engine.collision.clearance.blocks import DONE, FULL, block_reach, keep_below, measure_blocks, reach_from
 from engine.collision.clearance.boxes import MOST_LISTED, Search, View, size_of, way_of
-from engine.jit import inline, merged
+from engine.jit import inline
 from engine.lanes.boxes import EMPTY
 from engine.lanes.gaps import box_reaches
 from engine.lanes.tracing import LANES
@@ -17,40 +17,43 @@ MOST_STEPS: Final = 8
 """Of the first approach."""
 
 
-@merged
-def _set_reaches(s: Search, view: View, row: int, node: int) -> tuple[float, float]:
-    """Write how far the boxes of a node reach along the line toward the other body to the first row of work: times the
-    second number, plus the first."""
-    box_reaches(view.mesh.boxes, node, way_of(s.room.line, row, 1.0 - 2.0 * row), s.room.work)
-    return reach_from(s, view, row) + s.margin, size_of(view)
-
-
-@merged
-def _furthest(s: Search, view: View, row: int) -> tuple[float, int]:
-    """Return how far a body reaches along the line toward the other, and the block that does."""
-    child, waiting, bounds, sign = view.mesh.child, s.room.waiting, s.room.waiting_bounds, (1.0 if row == 0 else -1.0)
-    waiting[0], bounds[0], n, best, found = 0, np.inf, 1, -np.inf, 0
-    while n > 0:  # bound: each node enters once
+@inline
+def _blocks_along(s: Search, view: View, row: int, least: float, is_listed: bool) -> tuple[float, int]:
+    """List the blocks of a body that reach so far along the line toward the other body, and return `least` and their
+    number, above MOST_LISTED for too many; or return how far the body reaches, and the block that does."""
+    child, waiting, bounds, sign = view.mesh.child, s.room.waiting, s.room.waiting_bounds, 1.0 - 2.0 * row
+    start, size, work = reach_from(s, view, row) + s.margin, size_of(view), s.room.work
+    waiting[0], bounds[0], n, found = 0, np.inf, 1, 0
+    while n > 0 and found <= MOST_LISTED:  # bound: each node enters once
         n -= 1
         node = int(waiting[n])
-        if bounds[n] <= best:
+        if bounds[n] < least:
             continue
         if child[node, 0] < 0:
             reach = sign * block_reach(s, view, row, node)
-            if reach > best:
-                best, found = reach, node
+            if reach >= least and is_listed:
+                s.room.listed[row, min(found, MOST_LISTED - 1)] = node
+                found += 1
+            elif reach > least:
+                least, s.room.listed[row, 0] = reach, node
             continue
-        start, size = _set_reaches(s, view, row, node)
+        box_reaches(view.mesh.boxes, node, way_of(s.room.line, row, sign), work)
         for lane in range(LANES):
             if child[node, lane] == EMPTY:
                 continue
-            bound, place = start + size * float(s.room.work[0, lane]), n
+            bound, place = start + size * np.float64(work[0, lane]), n
             while place > 0 and n - place < lane and bounds[place - 1] > bound:  # order: of a node, the furthest last
                 waiting[place], bounds[place] = waiting[place - 1], bounds[place - 1]
                 place -= 1
             waiting[place], bounds[place] = child[node, lane], bound
             n += 1
-    return best, found
+    return least, found
+
+
+@inline
+def _reach(s: Search, view: View, row: int) -> float:
+    """Return how far a body reaches along the line toward the other; the block that does is listed first."""
+    return _blocks_along(s, view, row, -np.inf, False)[0]
 
 
 @inline
@@ -61,35 +64,14 @@ def approach(s: Search, limits: Any) -> tuple[int, int]:
     """
     for _ in range(MOST_STEPS):
         before = limits[0]
-        (reach, i), (their_reach, j) = _furthest(s, s.a, 0), _furthest(s, s.b, 1)
+        reach, their_reach = _reach(s, s.a, 0), _reach(s, s.b, 1)
         if -their_reach - reach - s.margin > limits[0]:
             return DONE, 0
+        i, j = int(s.room.listed[0, 0]), int(s.room.listed[1, 0])
         how, _ = measure_blocks(s, i, j, 0, limits)
         if how != DONE or not limits[0] < before:
             return how, 0
     return DONE, 0
-
-
-@merged
-def _list_blocks(s: Search, view: View, row: int, least: float) -> int:
-    """List the blocks that reach so far toward the other body; return their number, above MOST_LISTED for too many."""
-    child, waiting, sign = view.mesh.child, s.room.waiting, (1.0 if row == 0 else -1.0)
-    waiting[0], n, n_listed = 0, 1, 0
-    while n > 0 and n_listed <= MOST_LISTED:  # bound: each node enters once
-        n -= 1
-        node = int(waiting[n])
-        if child[node, 0] < 0:
-            if sign * block_reach(s, view, row, node) >= least:
-                if n_listed < MOST_LISTED:
-                    s.room.listed[row, n_listed] = node
-                n_listed += 1
-            continue
-        start, size = _set_reaches(s, view, row, node)
-        for lane in range(LANES):
-            if child[node, lane] != EMPTY and start + size * float(s.room.work[0, lane]) >= least:
-                waiting[n] = child[node, lane]
-                n += 1
-    return n_listed
 
 
 @inline
@@ -100,11 +82,11 @@ def finish_along_line(s: Search, limits: Any) -> tuple[int, int]:
     where they are many, and there is nothing gained.
     """
     margin = s.margin
-    (furthest, _), (theirs, _) = _furthest(s, s.a, 0), _furthest(s, s.b, 1)
-    n_first = _list_blocks(s, s.a, 0, -theirs - limits[0] - 2.0 * margin)
+    furthest, theirs = _reach(s, s.a, 0), _reach(s, s.b, 1)
+    _, n_first = _blocks_along(s, s.a, 0, -theirs - limits[0] - 2.0 * margin, True)
     if n_first > MOST_LISTED:
         return FULL, 0
-    n_second = _list_blocks(s, s.b, 1, -furthest - limits[0] - 2.0 * margin)
+    _, n_second = _blocks_along(s, s.b, 1, -furthest - limits[0] - 2.0 * margin, True)
     if n_second > MOST_LISTED:
         return FULL, 0
     n_found = 0

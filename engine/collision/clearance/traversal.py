@@ -131,7 +131,7 @@ def _search(s: Search, limits: Any, flag: Any) -> tuple[int, int]:
         n -= 1
         n_turns += 1
         if n_turns == next_try:
-            next_try *= 4
+            next_try *= 16
             how, n_all = finish_along_line(s, limits)
             if how != FULL:
                 return how, n_all

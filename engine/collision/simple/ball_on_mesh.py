@@ -3,7 +3,8 @@
 The faces near the ball are found by the tree. Of each in question nearly nearest points and the slab between them and
 the centre (`near_triangles.py`) prove that it enters the open ball, or keeps clear of the closed one; the witness is
 the one that enters of which the box is nearest. A centre that no face comes near to lies where a half-line tells, and
-a face that no other one covers has the open interior beside it, which the caller asks. Whatever is not proven is UNSETTLED.
+a face that no other one covers, as the caller asks, has the open interior beside it. Whatever is not proven is
+UNSETTLED.
 """
 
 from __future__ import annotations
