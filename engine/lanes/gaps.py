@@ -37,11 +37,11 @@ _MOST: Final = 2.0**60
 """A bound beyond is told as this: squares of more overflow."""
 
 
-def _sizes(v: list[Lanes]) -> list[Lanes]:
+def _sizes(v: Sequence[Lanes]) -> list[Lanes]:
     return [abs(x) for x in v]
 
 
-def _gaps(v: list[Lanes], reach: list[Lanes]) -> Lanes:
+def _gaps(v: Sequence[Lanes], reach: Sequence[Lanes]) -> Lanes:
     """Return the square of the vector of gaps between two boxes along three axes."""
     gaps = [greater(abs(x) - r, 0.0) for x, r in zip(v, reach)]
     return dot(gaps, gaps)
@@ -111,7 +111,7 @@ def triangle_reaches(blocks: Rows, node: int, way: Triple, work: Rows) -> None:
     store(work, 0, _ends(way, [load(blocks, CORNER_ROWS * node + row) for row in range(CORNER_ROWS)])[1])
 
 
-def _ends(way: list[Lanes], corners: list[Lanes]) -> tuple[Lanes, Lanes]:
+def _ends(way: Sequence[Lanes], corners: Sequence[Lanes]) -> tuple[Lanes, Lanes]:
     """Return the least and the greatest product of a direction with three corners."""
     p, q, r = (dot(way, corners[3 * k : 3 * k + 3]) for k in range(3))
     return lesser(p, lesser(q, r)), greater(p, greater(q, r))
