@@ -68,7 +68,7 @@ def clearance(
     Accuracy: the distance and each coordinate are the doubles nearest to the exact values, each on its own, so the
     points given may be a little nearer or further. Poses are exact images, equal ones are left out, as by `collide`.
     Cost: boxes along the axes, balls and half-spaces some 4 us, small bodies of the plane 8. Others both trees, built
-    once per solid; a search of 30 to 400 us for 1,000 to 10,000 faces, then integers for ties. Where sums of
+    once per solid; a search of 30 to 220 us for 1,000 to 20,000 faces, then integers for ties. Where sums of
     coordinates may exceed 1e300 every pair of faces is measured: right, and slow.
     Raises: as `collide`; InvalidInputError (at_least negative or not finite); NotRepresentableError (the distance is
     beyond the largest double).

@@ -102,7 +102,7 @@ def _with(s: Simplex, new: Corner) -> tuple[Simplex, Point3]:
     return kept, nearest
 
 
-@inline
+@merged
 def _start(pool: ConvexArrays, a: PlacedBody, b: PlacedBody, v: Point3) -> tuple[Corner, float]:
     """Return the corner of M furthest against v, and its v . at."""
     i = farthest(pool.points, pool.graph, a, turned_back(a.place, negative(v)), -1)
@@ -111,7 +111,7 @@ def _start(pool: ConvexArrays, a: PlacedBody, b: PlacedBody, v: Point3) -> tuple
     return Corner(at, i, j), dot(v, at)
 
 
-@inline
+@merged
 def _slab(pool: ConvexArrays, a: PlacedBody, b: PlacedBody, v: Point3, error: float) -> float:
     """Return a lower bound on the distance of two bodies: the slab between them across v."""
     d = negative(v)
@@ -121,7 +121,7 @@ def _slab(pool: ConvexArrays, a: PlacedBody, b: PlacedBody, v: Point3, error: fl
     )
 
 
-@inline
+@merged
 def gap_of_convex(pool: ConvexArrays, first: int, second: int, a: PlacedBody, b: PlacedBody, gap: float,
                   is_measured: bool) -> float:  # fmt: skip
     """Return the distance of two bodies without a common point, infinity where it is surely at least the gap, NaN where
@@ -193,7 +193,7 @@ def _kinds(i: int, j: int, k: int) -> tuple[int, int, int, int]:
     return (i, j, j, 3) if k in (i, j) else (i, j, k, FACE)
 
 
-@inline
+@merged
 def _beyond(pool: ConvexArrays, f: PlacedBody, n: Wide3, base: Wide3, shift: Wide3, reach: float) -> float:
     """Return how far the vertices of a body reach beyond the plane through `base` across n, times |n|.
 
