@@ -9,10 +9,9 @@ import pytest
 
 from engine.collision.meshes.mesh_arrays import MeshArrays, mesh_body_of
 from engine.collision.meshes.placement import Placement, PoseArrays, defect_of, place_pair, set_frame
-from engine.lanes.boxes import EMPTY, FRAME_ROWS
+from engine.lanes.boxes import BOX_ROWS, EMPTY, FRAME_ROWS
 from engine.lanes.discs import DISC_ROWS, inverse_ratio
 from engine.lanes.gaps import (
-    BOX_ROWS,
     FIXED_ROWS,
     GAP_ROWS,
     box_reaches,
