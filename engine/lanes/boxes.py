@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from engine.lanes.lanes import any_above, bits_of, bytes_of, dot, lane_of, load
+from engine.lanes.lanes import any_above, bits_of, bytes_of, dot, lane_of, load, select, store
 from engine.lanes.tracing import LANES, Lanes, Mask, Number, Rows, Triple, traced
 
 FRAME_ROWS: Final = 22
@@ -80,3 +80,28 @@ def near_segment(boxes: Rows, node: int, middle: Triple, half: Triple, slack: Nu
     for i, j in ((0, 1), (1, 2), (2, 0)):
         apart |= abs(half[i] * w[j] - half[j] * w[i]) > h[i] * e[j] + h[j] * e[i] + tiny
     return bits_of(~apart)
+
+
+@traced
+def enter_boxes(
+    boxes: Rows, node: int, middle: Triple, inverse: Triple, slack: Number, last: Number, entered: Rows
+) -> int:
+    """Return the lanes of a node (`bvh.py`), a bit each, in whose boxes the segment middle + t half may be at a t of
+    -1 to `last`; set entered (1, 8) to parameters before which it is in none of them. All numbers are float32.
+
+    inverse: 1 / half. With u = 2^-24 and S + 2 above all coordinates (`local_segment`), at a point of the box
+
+        |w - t e| <= h + 3 u (S + 2),    w = c - m as it is computed here, e the half in float32,
+
+    so t >= w / e - (h + 3 u (S + 2)) / |e|. Both quotients are off by 3.1 u of themselves, their difference by 1 u of
+    its parts, all of which are below S + 4.1 over |e|: 11 u (S + 2) / |e| in all, and a slack is 16 u (S + 2).
+    """
+    first, end = -1.0, last
+    for k in range(3):
+        centre = (load(boxes, BOX_ROWS * node + k) - middle[k]) * inverse[k]
+        reach = (load(boxes, BOX_ROWS * node + 3 + k) + slack) * abs(inverse[k])
+        near, far = centre - reach, centre + reach
+        first = select(near > first, near, first)
+        end = select(far < end, far, end)
+    store(entered, 0, first)
+    return bits_of(~(first > end))

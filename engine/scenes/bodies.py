@@ -20,7 +20,8 @@ from engine.containment.scene.tables import Scene as LocateTables
 from engine.containment.scene.tables import scene_of
 from engine.direct import entry_of
 from engine.parallel import Budget
-from engine.scenes.broad_phase import BodyTree, body_tree
+from engine.scenes.broad_phase import body_tree, words_of
+from engine.scenes.near_boxes import BodyTree
 from engine.scenes.table import Table
 from engine.segment_clipping.profiles import check_cut
 from engine.solids.base import Preparing, Solid
@@ -31,6 +32,7 @@ from engine.solids.triangle import Triangle
 
 _LISTED: Final = 4
 """Bodies that have no tree: their boxes are looked at sooner than one is built."""
+_NOBODY: Final = np.empty(0, np.int64)
 _STILL: Final = {d: b"".join(each.tobytes() for each in motion_of(None, d)) for d in (2, 3)}
 
 
@@ -109,6 +111,12 @@ class Bodies(Preparing):
         """Return what kernels for segments read of the bodies."""
         like = None if self._whole is None else self._whole.table(budget)
         return self.prepared("table", lambda: Table(self.solids, self.poses, like), budget.check)
+
+    def words(self, budget: Budget) -> tuple[list[int], Any]:
+        """Return what kernels for segments read of all bodies (`words_of`)."""
+        return self.prepared(
+            "words", lambda: words_of(self.tree(budget), _NOBODY, self.table(budget).rows), budget.check
+        )
 
     def prepare(self, body: int, wanted: int, budget: Budget) -> None:
         """Make ready what these kernels want of a body."""

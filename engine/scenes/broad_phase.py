@@ -6,7 +6,7 @@ Boxes are rounded outward (posed_boxes.py), so no body is missed; those without 
 from __future__ import annotations
 
 from collections import namedtuple
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -14,16 +14,12 @@ from engine.arrays import FloatArray, IntArray, read_only
 from engine.bounding.bvh import UNUSED, WIDTH, Bvh, build_bvh
 from engine.direct import entry_of
 from engine.lanes.boxes import BOX_ROWS, EMPTY
-from engine.parallel import Budget, run_chunks
-from engine.scenes.near_boxes import list_near
+from engine.parallel import Budget
+from engine.scenes.near_boxes import BodyTree, list_near, put_keys
+from engine.scenes.posed_mesh import scratch_for
 
-_FEW: Final = 64
-"""Items that are asked about in one piece of work."""
-
-
-BodyTree = namedtuple("BodyTree", "low high tree inverse bounded listed")
-"""The boxes of bodies, low and high (n, dimension), infinite where they may have no bounds; a `Bvh` over those that are
-bounded, where they are not few, 1 / its scale, and which body is where in it; the others, looked at one by one."""
+_MANY: Final = 4096
+_AS_GIVEN: Final = read_only(np.arange(_MANY))
 Where = namedtuple("Where", "together moved names")
 """Where the bodies of a scene are: the `BodyTree` of n of them together, and of those that moved since, which count
 from n on; what these are called in the scene, ascending."""
@@ -52,30 +48,31 @@ _NO_TREE: Final = Bvh(
 NO_BODIES: Final = {d: BodyTree(np.empty((0, d)), np.empty((0, d)), _NO_TREE, 1.0, _NOBODY, _NOBODY) for d in (2, 3)}
 
 
-def candidates(where: Where, items: FloatArray, budget: Budget, workers: int | None) -> tuple[IntArray, IntArray]:
-    """Return pairs of a segment (n, 2, dimension) and a body that it may meet, by item; bodies of one in no order."""
-    n, items, chunks = len(items), read_only(items), dict[int, tuple[IntArray, IntArray]]()
-    if n <= _FEW:
-        return _of_some(where, items, budget, 0)
-
-    def task(first: int, last: int) -> None:
-        chunks[first] = _of_some(where, items[first:last], budget, first)
-
-    run_chunks(task, n, budget=budget, workers=workers)
-    owners, bodies = zip(*(chunks[first] for first in sorted(chunks)))
-    return np.concatenate(owners), np.concatenate(bodies)
+def words_of(bodies: BodyTree, names: IntArray, placed: IntArray) -> tuple[list[int], Any]:
+    """Return the row that stands for a `BodyTree`, with a `Table`'s rows, and what it gives addresses of."""
+    tree, numbers = bodies.tree, np.array([bodies.inverse, *bodies.tree.origin.tolist()])
+    kept = bodies.low, bodies.high, tree.boxes, tree.child, bodies.bounded, bodies.listed, numbers, names, placed
+    low, high, boxes, child, bounded, listed, *more = (array.__array_interface__["data"][0] for array in kept)
+    return [len(bodies.low), low, high, len(tree.child), boxes, child, bounded, len(bodies.listed), listed, *more], kept
 
 
-def _of_some(where: Where, items: FloatArray, budget: Budget, first: int) -> tuple[IntArray, IntArray]:
-    n, start, room = len(items), 0, 4 * len(items) + 64
-    parts: list[IntArray] = []
-    while start < n:  # bound: the room doubles until the bodies of an item find it
-        pairs = np.empty((2, room), np.int64)
-        stop, m = entry_of(list_near)(items, start, where, pairs, budget.flag)
+def order_of(segments: FloatArray, t: float, where: Where) -> IntArray:
+    """Return an order of segments in which those follow each other that are near each other at t, where they are many:
+    these find in the cache what others were asked about."""
+    n = len(segments)
+    if n < _MANY:
+        return _AS_GIVEN[:n]
+    entry_of(put_keys)(segments, t, where.together, keys := np.empty(n, np.uint16))
+    return np.argsort(keys, kind="stable")
+
+
+def candidates(where: Where, points: FloatArray, budget: Budget) -> IntArray:
+    """Return pairs (m, 2) of a point (n, dimension) and a body that it may lie in, by point; bodies in no order."""
+    room, scratch = 16 * len(points), scratch_for(len(where.together.low) + len(where.names))
+    while True:  # bound: the second turn has room
+        pairs = np.empty((room, 2), np.int64)
+        n = entry_of(list_near)(points, where, scratch, pairs, budget.flag)
         budget.check()
-        budget.take(2 * pairs.itemsize * m)
-        parts.append(pairs[:, :m])
-        room *= 2
-        start = stop
-    owners, bodies = parts[0] if len(parts) == 1 else np.concatenate([np.empty((2, 0), np.int64), *parts], axis=1)
-    return (owners + first if first else owners), bodies
+        if n <= room:
+            return pairs[:n]
+        room = n

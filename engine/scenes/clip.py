@@ -16,11 +16,11 @@ from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.containment.locators import locator_of
 from engine.direct import entry_of
 from engine.parallel import Budget, run_chunks
-from engine.scenes.broad_phase import candidates
+from engine.scenes.broad_phase import order_of
 from engine.scenes.ends import Exact, Found, ScenePieces, in_order, joined
 from engine.scenes.posed_mesh import MOST_MET, scratch_for
 from engine.scenes.standing import Standing
-from engine.scenes.through import MET, cut_pairs, find_first
+from engine.scenes.through import MET, cut_near, find_first
 from engine.segment_clipping.boundary import clip_chunk, cut_exactly
 from engine.segment_clipping.clip_segments import method_for
 from engine.segment_clipping.decide_then_cut import clip_on_convex
@@ -28,14 +28,15 @@ from engine.segment_clipping.pieces import Pieces, first_of, room_for
 from engine.segment_clipping.profiles import ExactPiece, exact_pieces, settled
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
-from engine.types import OPEN
+from engine.types import OPEN, UNDECIDED
 
 _BYTES: Final = 400
 """Of a piece, in its part, joined and in order."""
-_PAIRS: Final = 64
-"""Bodies near a segment in the mean of few, for which there is room at once."""
-_CROWD: Final = 48
-"""Segments that go down the tree of a mesh together (mesh_streams.py) faster than one by one."""
+_FEW: Final = 64
+"""Segments that are one piece of work."""
+_BODIES_KEPT: Final = 16
+_LEFT: Final = 16
+"""Pairs left for which there is room at once, beside one for each segment."""
 _MOST_IN_GROUP: Final = 1 << 13
 """Segments that are cut on one body in one piece of work."""
 
@@ -56,13 +57,14 @@ def clip_all(
 ) -> ScenePieces:
     """Return all pieces of segments (n, 2, dim)."""
     parts = _parts(segments, standing, counts, budget, workers)
-    return in_order(joined(parts, segments.shape[2]), len(segments), _exact_ends(segments, standing, budget))
+    found = joined(parts, segments.shape[2])
+    return in_order(found, len(segments), lambda: _exact_ends(segments, standing, budget))
 
 
 def _exact_ends(segments: FloatArray, standing: Standing, budget: Budget) -> Exact:
-    """Return what tells the exact parameters of a piece; those of the pieces asked about last are kept."""
+    """Return what tells the exact parameters of a piece; those of the bodies asked about last are kept."""
 
-    @lru_cache(1)
+    @lru_cache(_BODIES_KEPT)
     def pieces(source: int, body: int) -> list[ExactPiece]:
         budget.check()
         p, q = segments[source].tolist()
@@ -77,10 +79,9 @@ def clip_first(
     """Return the first piece of each segment that meets a body, of those that begin at one point that of the first."""
     state, bodies, out = _searched(segments, standing, False, budget, workers)
     left, met = np.flatnonzero(state == OPEN), np.flatnonzero(state == MET)
-    ranks = np.stack([np.zeros(len(met), np.int64), np.ones(len(met), np.int64)], axis=1)
-    for place in np.flatnonzero(out.t[met, 0] == out.t[met, 1]).tolist():  # what was settled of others has a length
-        ranks[place, 1] = standing.base.solids[bodies[met[place]]].type != "surface"
-    sure = ScenePieces(met, bodies[met], out.ends[0, met], out.ends[1, met], out.t[met], out.faces[met], ranks)
+    sure = ScenePieces(met, *(each.take(met, axis=0) for each in (bodies, *out.ends, out.t, out.faces, out.faces)))
+    sure.ranks[:, 0], sure.ranks[:, 1] = 0, sure.faces[:, 1] >= -1
+    sure.faces[:, 1] = np.where(sure.ranks[:, 1], sure.faces[:, 1], sure.faces[:, 0])
     if not len(left):
         return sure
     more = Counts(len(left))
@@ -114,20 +115,20 @@ def _searched(
     """Return of each segment the state, and where it is MET a body and, unless `is_any`, in its row the first piece."""
     n, dimension = len(segments), segments.shape[2]
     found = np.empty(n, np.uint8), np.empty(n, np.int64), room_for(0 if is_any else n, dimension)
-    where = standing.where(budget)
+    words, order = standing.words(budget), order_of(segments, 0.0, standing.where(budget))
 
     def task(first: int, last: int) -> None:
-        reached = np.array([first, 0, 0])
-        room = room_for(0 if is_any else MOST_MET, dimension)
-        scratch = scratch_for(len(where.together.low) + len(where.names))
+        reached, room = np.array([first, 0, 0]), scratch_for(standing.n_rows)
         while reached[0] < last:  # bound: each turn reaches the end, or prepares what a body wants
-            cut = standing.cut(budget)
-            entry_of(find_first)(segments, last, where, cut, scratch, is_any, budget.flag, *found, room, reached)
+            entry_of(find_first)(segments, order, last, words, room, is_any, budget.flag, *found, reached)
             budget.check()
             if reached[1] < 0:
                 standing.prepare(int(reached[2]), int(reached[1]), budget)
 
-    run_chunks(task, n, budget=budget, workers=workers)
+    if n < _FEW:
+        task(0, n)
+    else:
+        run_chunks(task, n, budget=budget, workers=workers)
     return found
 
 
@@ -135,65 +136,54 @@ def _parts(
     segments: FloatArray, standing: Standing, counts: Counts, budget: Budget, workers: int | None
 ) -> list[Found]:
     """Return the pieces of segments within all bodies, in no order."""
-    n, rest, parts = len(segments), list[Found](), dict[int, list[Found]]()
-    if n < _CROWD:
-        room = _PAIRS * n
-        owners, bodies, state = np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room, np.uint8)
-        parts[0], n_pairs, n_open = _cut_pairs(segments, owners, bodies, -1, state, standing, budget)
-    if n >= _CROWD or n_pairs < 0:
-        owners, bodies = candidates(standing.where(budget), segments, budget, workers)
-        are_streamed = standing.base.table(budget).are_streamed
-        if n >= _CROWD:
-            are_streamed = np.append(are_streamed, np.zeros(len(standing.names), np.bool_))
-            is_crowded = (np.bincount(bodies, minlength=len(are_streamed)) >= _CROWD) & are_streamed
-            together = np.flatnonzero(is_crowded[bodies])
-            rest = _cut(segments, owners[together], bodies[together], False, standing, counts, budget, workers)
-            owners, bodies = (np.delete(each, together) for each in (owners, bodies))
-        n_pairs = n_open = len(owners)
-        state = np.empty(n_pairs, np.uint8)
+    n, parts, left = len(segments), dict[int, list[Found]](), dict[int, list[IntArray]]()
+    order = order_of(segments, 0.5, standing.where(budget))
 
-        def task(first: int, last: int) -> None:
-            some = owners[first:last], bodies[first:last], last - first, state[first:last]
-            parts[first] = _cut_pairs(segments, *some, standing, budget)[0]
+    def task(first: int, last: int) -> None:
+        parts[first], left[first] = _cut_near(segments, order, first, last, standing, budget)
 
-        run_chunks(task, n_pairs, budget=budget, workers=workers)
-    if n_open:
-        left = np.flatnonzero(state[:n_pairs] == OPEN)
-        counts.is_beyond[owners[left]] = True
-        rest += _cut(segments, owners[left], bodies[left], True, standing, counts, budget, workers)
-    return [part for first in sorted(parts) for part in parts[first]] + rest
+    if n < _FEW:
+        task(0, n)
+    else:
+        run_chunks(task, n, budget=budget, workers=workers)
+    found = [part for first in sorted(parts) for part in parts[first]]
+    pairs = [part for first in sorted(left) for part in left[first]]
+    if pairs:
+        owners, bodies = np.concatenate(pairs).T
+        counts.is_beyond[owners] = True
+        found += _cut(segments, owners, bodies, standing, counts, budget, workers)
+    return found
 
 
-def _cut_pairs(
-    segments: FloatArray, owners: IntArray, bodies: IntArray, n_pairs: int, state: Any, standing: Standing,
-    budget: Budget,
-) -> tuple[list[Found], int, int]:  # fmt: skip
-    """Return the pieces of pairs of a segment and a body, how many these are, -1 for pairs that are to be listed, and
-    where they find no room, and how many of them are left; fill their state."""
-    parts, n = list[Found](), np.array([0, 0, 0, n_pairs, 0])
-    where = standing.where(budget)
-    scratch, m = scratch_for(len(where.together.low) + len(where.names)), MOST_MET + 2 * len(owners)
-    while True:  # bound: each turn has room for a pair, or prepares what a body wants
-        out, names = room_for(m, segments.shape[2]), np.empty(m, np.int64)
-        cut = standing.cut(budget)
-        entry_of(cut_pairs)(segments, owners, bodies, where, cut, scratch, budget.flag, out, names, state, n)
+def _cut_near(
+    segments: FloatArray, order: IntArray, first: int, last: int, standing: Standing, budget: Budget
+) -> tuple[list[Found], list[IntArray]]:
+    """Return the pieces of some segments within the bodies near them, and which of these pairs are left (k, 2)."""
+    parts, left, n = list[Found](), list[IntArray](), np.array([first, 0, 0, 0, 0, 0])
+    words, n_rows = standing.words(budget), 4 * (last - first) + MOST_MET
+    scratch = scratch_for(standing.n_rows)
+    while n[0] < last:  # bound: each turn has room for a body, or prepares what one wants
+        out, names = room_for(n_rows, segments.shape[2]), np.empty((n_rows, 2), np.int64)
+        pairs = np.empty((_LEFT + last - first, 2), np.int64)
+        entry_of(cut_near)(segments, order, last, words, scratch, budget.flag, out, names, pairs, n)
         budget.check()
-        reached, m_found, wanted, n_pairs, n_open = n.tolist()
-        if m_found:
-            budget.take(_BYTES * m_found)
-            found = first_of(out, m_found)
-            parts.append(Found(found.source, names[:m_found], *found[1:]))
+        _, _, m, m_left, wanted, body = n.tolist()
+        if m:
+            budget.take(_BYTES * m)
+            found = first_of(out, m)
+            parts.append(Found(found.source, names[:m, 0], names[:m, 1], *found[1:]))
+        if m_left:
+            left.append(pairs[:m_left])
         if wanted:
-            standing.prepare(int(bodies[reached]), wanted, budget)
-        elif reached >= n_pairs:
-            return parts, n_pairs, n_open
+            standing.prepare(body, wanted, budget)
+    return parts, left
 
 
 def _cut(
-    segments: FloatArray, owners: IntArray, bodies: IntArray, are_left: bool, standing: Standing, counts: Counts,
-    budget: Budget, workers: int | None,
+    segments: FloatArray, owners: IntArray, bodies: IntArray, standing: Standing, counts: Counts, budget: Budget,
+    workers: int | None,
 ) -> list[Found]:  # fmt: skip
-    """Return the pieces of pairs of a segment and a body that the kernels left or were not asked, body by body."""
+    """Return the pieces of pairs of a segment and a body that the kernels left, body by body."""
     bodies = standing.names_of(bodies)
     order = np.argsort(bodies, kind="stable")
     owners, bodies = owners[order], bodies[order]
@@ -209,20 +199,18 @@ def _cut(
         for group in range(first, last):
             begin, end = groups[group]
             body, items = int(bodies[begin]), owners[begin:end]
-            pieces, rational = _on_body(segments[items], *standing.placed(body), are_left, budget)
+            pieces, rational = _on_body(segments[items], *standing.placed(body), budget)
             counts.is_beyond[items[rational]] = counts.is_rational[items[rational]] = True
             m = len(pieces.source)
             if m:
                 budget.take(_BYTES * m)
-                found[group] = Found(items[pieces.source], np.full(m, body), *pieces[1:])
+                found[group] = Found(items[pieces.source], np.full(m, body), np.full(m, UNDECIDED), *pieces[1:])
 
     run_chunks(task, len(groups), budget=budget, first_chunk=1, workers=workers)
     return [found[group] for group in sorted(found)]
 
 
-def _on_body(
-    segments: FloatArray, solid: Solid, pose: Pose | None, are_left: bool, budget: Budget
-) -> tuple[Pieces, Any]:
+def _on_body(segments: FloatArray, solid: Solid, pose: Pose | None, budget: Budget) -> tuple[Pieces, Any]:
     """Return the pieces of segments (n, 2, dim) within a placed solid, by source and t, and which of them took rational
     arithmetic: all where some did and it is not told which."""
     n, every, shape = len(segments), np.arange(len(segments)), cast(Any, solid)
@@ -231,7 +219,7 @@ def _on_body(
         return pieces, every[: n * bool(n_rational)]
     if pose is None and solid.type in (("polygon", "triangle") if solid.dimension == 2 else ("polyhedron",)):
         locator = locator_of(solid).chosen(n, budget)
-        if not are_left or solid.dimension == 2:
+        if solid.dimension == 2:
             return clip_chunk(segments, 0, n, shape, locator, budget)
         locator.fill(segments[:, 0].copy(), locations := np.empty(n, np.int8), budget)
         return cut_exactly(segments, every, locations, shape, budget), every

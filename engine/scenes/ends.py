@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cmp_to_key
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,6 +18,7 @@ from engine.arrays import FloatArray, IntArray
 from engine.direct import entry_of
 from engine.jit import bare_kernel, inline
 from engine.segment_clipping.parameters import ONE, ZERO, Parameter, compare
+from engine.types import UNDECIDED
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,16 +46,17 @@ class ScenePieces:
 
 
 class Found(NamedTuple):
-    """Pieces, those of one segment in one body in order: source, body (m,), ends (2, m, dim), t and faces (m, 2)."""
+    """Pieces, those of one segment in one body in order: source, body, (m,) whether each is longer than a point, 1 or
+    0, or where its ends round alike perhaps UNDECIDED; ends (2, m, dim), t and faces (m, 2)."""
 
     source: Any
     body: Any
+    are_long: Any
     ends: Any
     t: Any
     faces: Any
 
 
-_BY_PARAMETER: Any = cmp_to_key(lambda a, b: compare(a[0], b[0]))
 Exact = Callable[[int, int, int], tuple[Parameter, Parameter]]
 """Tells the exact parameters of a piece: its source, its body, and which of their pieces it is."""
 
@@ -63,48 +66,75 @@ def joined(parts: list[Found], dimension: int) -> Found:
     if len(parts) == 1:
         return parts[0]
     none = np.empty(0, np.int64)
-    nothing = Found(none, none, np.empty((2, 0, dimension)), np.empty((0, 2)), np.empty((0, 2), np.int64))
+    nothing = Found(none, none, none, np.empty((2, 0, dimension)), np.empty((0, 2)), np.empty((0, 2), np.int64))
     if not parts:
         return nothing
     each = list(zip(nothing, *parts))
-    return Found(*(np.concatenate(each[k], axis=int(k == 2)) for k in range(5)))
+    return Found(*(np.concatenate(each[k], axis=int(k == 3)) for k in range(6)))
 
 
 def taken(found: Found, rows: Any) -> Found:
     """Return some pieces."""
-    return Found(found.source[rows], found.body[rows], found.ends[:, rows], found.t[rows], found.faces[rows])
+    source, body, are_long, ends, t, faces = found
+    return Found(source[rows], body[rows], are_long[rows], ends[:, rows], t[rows], faces[rows])
 
 
-def in_order(found: Found, n_sources: int, exact: Exact) -> ScenePieces:
+def in_order(found: Found, n_sources: int, exact: Callable[[], Exact]) -> ScenePieces:
     """Return pieces, those of one source and body in order, in the exact order of their starts."""
     m = len(found.source)
     numbers, ends = np.empty((2, m), np.int64), np.empty((2, m, found.ends.shape[2]))
     out = *numbers, *ends, np.empty((m, 2)), *np.empty((2, m, 2), np.int64)
     order, ranks, offsets = np.empty(4 * m, np.int64), np.empty((m, 2), np.int64), np.zeros(n_sources + 2, np.int64)
-    given = found.source, found.body, found.ends[0], found.ends[1], found.t, found.faces
-    if entry_of(put_in_order)(tuple(map(np.ascontiguousarray, given)), offsets, order, ranks, out):
-        return ScenePieces(*out)
-    found = taken(found, np.lexsort((found.body, found.source)))
-    number, is_new = np.arange(m), np.append(True, found.source[1:] != found.source[:-1])
-    is_new[1:] |= found.body[1:] != found.body[:-1]
-    number -= np.maximum.accumulate(np.where(is_new, number, 0))  # of a piece among those of its source and body
-    source = np.concatenate([found.source, found.source])
-    order = np.lexsort((found.t.T.ravel(), source))  # all starts, then all ends
-    of_ends = np.empty(2 * m, np.int64)
-    of_ends[order] = _ranks(found, number, order, source[order], exact)
-    by_start = np.lexsort((found.body, of_ends[:m], found.source))
-    found, ranks = taken(found, by_start), of_ends.reshape(2, m).T[by_start]
-    return ScenePieces(found.source, found.body, found.ends[0], found.ends[1], found.t, found.faces, ranks)
+    given = found.source, found.body, found.are_long, found.ends[0], found.ends[1], found.t, found.faces
+    is_tied = np.zeros(n_sources, np.bool_)
+    if not entry_of(put_in_order)(tuple(map(np.ascontiguousarray, given)), offsets, order, ranks, is_tied, out):
+        rows, some = np.flatnonzero(is_tied[out[0]]), taken(found, np.flatnonzero(is_tied[found.source]))
+        for array, looked_at in zip(out, _in_exact_order(some, exact())):
+            array[rows] = looked_at
+    return ScenePieces(*out)
+
+
+def _in_exact_order(found: Found, exact: Exact) -> tuple[Any, ...]:
+    """Return the arrays of `ScenePieces` for pieces of segments some of whose ends, 2 * piece + side, round alike."""
+    found, ranks = taken(found, np.lexsort((found.body, found.source))), np.empty((len(found.source), 2), np.int64)
+    sources, bodies, are_long, t, faces = (each.tolist() for each in (*found[:3], *found[4:]))
+    numbers = [0] * len(sources)  # of a piece among those of its source and body
+
+    def value(end: int) -> Parameter:
+        piece, side = divmod(end, 2)
+        is_own = faces[piece][side] < 0
+        return (ZERO, ONE)[side] if is_own else exact(sources[piece], bodies[piece], numbers[piece])[side]
+
+    def difference(first: int, second: int) -> int:
+        (i, side), (j, other) = divmod(first, 2), divmod(second, 2)
+        if t[i][side] != t[j][other]:
+            return -1 if t[i][side] < t[j][other] else 1
+        is_known = i == j and are_long[i] != UNDECIDED
+        return (side - other) * are_long[i] if is_known else compare(value(first), value(second))
+
+    begin = 0
+    for piece in range(1, len(sources) + 1):
+        if piece < len(sources) and sources[piece] == sources[begin]:
+            numbers[piece] = numbers[piece - 1] + 1 if bodies[piece] == bodies[piece - 1] else 0
+            continue
+        ends = sorted(range(2 * begin, 2 * piece), key=cmp_to_key(difference))
+        steps = [0, *(difference(*pair) != 0 for pair in pairwise(ends))]
+        ranks.reshape(-1)[ends], begin = np.cumsum(steps), piece
+    by_start = np.lexsort((found.body, ranks[:, 0], found.source))
+    found = taken(found, by_start)
+    return found.source, found.body, found.ends[0], found.ends[1], found.t, found.faces, ranks[by_start]
 
 
 @bare_kernel
-def put_in_order(given: Any, offsets: Any, order: Any, ranks: Any, out: Any) -> bool:
-    """Fill `out`, the arrays of `ScenePieces`, with pieces given by those before the last; tell whether their order is
-    exact: of ends that round alike only the segment's own are known to be one.
+def put_in_order(given: Any, offsets: Any, order: Any, ranks: Any, is_tied: Any, out: Any) -> bool:
+    """Fill `out`, the arrays of `ScenePieces`, with pieces given by those before the last, and `are_long`; tell whether
+    their order is exact, and of which sources it is not: of ends that round alike those of one piece may be known to
+    differ, or to be one, and the segment's own are one.
 
-    Room to work in: offsets (n + 2,) zeros, for n sources; order (4 m,), ranks (m, 2).
+    Room to work in: offsets (n + 2,) zeros, for n sources; order (4 m,), ranks (m, 2). is_tied: (n,) zeros.
     """
-    source, body, start, end, t, faces = given
+    source, body, are_long, start, end, t, faces = given
+    are_exact = True
     for piece in range(source.size):
         offsets[source[piece] + 2] += 1
     for item in range(2, offsets.size):
@@ -122,8 +152,10 @@ def put_in_order(given: Any, offsets: Any, order: Any, ranks: Any, out: Any) -> 
             before, other = order[max(first, place - 1)] // 2, order[max(first, place - 1)] % 2
             if place == first or t[before, other] != t[piece, side]:
                 rank += 1
+            elif piece == before and are_long[piece] != UNDECIDED:
+                rank += are_long[piece]
             elif faces[before, other] >= 0 or faces[piece, side] >= 0:
-                return False
+                is_tied[item], are_exact = True, False
             ranks[piece, side] = rank
             if side == 0:
                 order[2 * source.size + n_starts] = piece
@@ -135,12 +167,12 @@ def put_in_order(given: Any, offsets: Any, order: Any, ranks: Any, out: Any) -> 
             out[2][place, k], out[3][place, k] = start[piece, k], end[piece, k]
         for k in range(2):
             out[4][place, k], out[5][place, k], out[6][place, k] = t[piece, k], faces[piece, k], ranks[piece, k]
-    return True
+    return are_exact
 
 
 @inline
 def _sort_ends(order: Any, first: int, last: int, body: Any, t: Any) -> None:
-    """Sort ends, 2 * piece + side, by parameter and body."""
+    """Sort ends, 2 * piece + side, by parameter, body and piece."""
     gap = (last - first) // 2
     while gap > 0:  # bound: gap is halved; Shell's sort, n^1.5 steps
         for i in range(first + gap, last):
@@ -148,52 +180,10 @@ def _sort_ends(order: Any, first: int, last: int, body: Any, t: Any) -> None:
             at, name = t[moved // 2, moved % 2], body[moved // 2]
             while j >= first + gap:
                 other = order[j - gap]
-                value = t[other // 2, other % 2]
-                if value < at or (value == at and body[other // 2] <= name):
+                value, its = t[other // 2, other % 2], body[other // 2]
+                if value < at or (value == at and (its < name or (its == name and other < moved))):
                     break
                 order[j] = other
                 j -= gap
             order[j] = moved
         gap //= 2
-
-
-def _ranks(found: Found, number: IntArray, order: IntArray, source: IntArray, exact: Exact) -> IntArray:
-    """Return the rank of each end, given in the order of source and rounded parameter; a piece's two ends are known to
-    be one only where that is known of numbers that round alike."""
-    m = len(found.source)
-    side, row = np.divmod(order, max(1, m))
-    t, is_own = found.t[row, side], found.faces[row, side] < 0
-    is_first = np.append(True, source[1:] != source[:-1])[: len(order)]
-    is_tie = ~is_first
-    is_tie[1:] &= t[1:] == t[:-1]
-    is_sure = np.append(False, is_own[1:] & is_own[:-1])[: len(order)]
-    steps = (~is_tie).astype(np.int64)
-    places = np.flatnonzero(is_tie & ~is_sure)
-    if len(places):
-        _look_closer(found, number, (row, side), order, is_tie, places, steps, exact)
-    counts = np.cumsum(steps)
-    ranks: IntArray = counts - np.maximum.accumulate(np.where(is_first, counts, 0))
-    return ranks
-
-
-def _look_closer(
-    found: Found, number: IntArray, ends: tuple[IntArray, IntArray], order: IntArray, is_tie: Any, places: IntArray,
-    steps: IntArray, exact: Exact,
-) -> None:  # fmt: skip
-    """Put runs of ends that round alike, some of which may differ, in exact order, and note where one begins."""
-    row, side = ends
-    starts = np.flatnonzero(~is_tie)
-    runs = np.unique(np.searchsorted(starts, places, "right") - 1)
-    stops = np.append(starts[1:], len(order))
-    for begin, stop in zip(starts[runs].tolist(), stops[runs].tolist()):
-        known: dict[int, tuple[Parameter, Parameter]] = {}
-        keyed: list[tuple[Parameter, int]] = []
-        for place in range(begin, stop):
-            i, end = int(row[place]), int(side[place])
-            if found.faces[i, end] >= 0 and i not in known:
-                known[i] = exact(int(found.source[i]), int(found.body[i]), int(number[i]))
-            keyed.append((known[i][end] if found.faces[i, end] >= 0 else (ZERO, ONE)[end], int(order[place])))
-        keyed.sort(key=_BY_PARAMETER)
-        for place, (at, item) in zip(range(begin, stop), keyed):
-            order[place] = item
-            steps[place] = place == begin or compare(keyed[place - begin - 1][0], at) != 0

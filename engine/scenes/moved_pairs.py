@@ -9,6 +9,7 @@ import numpy as np
 
 from engine.jit import bare_kernel, inline
 from engine.scenes.near_boxes import bodies_in, name_of, place_in
+from engine.scenes.posed_mesh import scratch_at
 
 Placed = namedtuple("Placed", "kinds rotations translations")
 """What `SceneBodies` says of where bodies stand: kinds (n,), rotations (n + 1, d, d), translations (n + 1, d)."""
@@ -32,15 +33,15 @@ def _put_row(rows: Any, row: int, still: Placed, moved: Placed, body: int, name:
 
 @bare_kernel
 def list_pairs(
-    named: Any, reach: float, where: Any, still: Any, moved: Any, rows: Any, stack: Any, found: Any, box: Any, flag: Any
+    named: Any, reach: float, where: Any, still: Any, moved: Any, rows: Any, room: Any, box: Any, flag: Any
 ) -> int:
     """Fill `rows` with the pairs of a named body and another whose boxes, grown by `reach`, meet, each once, in no
     order; return how many there are, more than there is room for where that is less.
 
     named: ascending. where: a `Where` of n bodies and m that moved; still, moved: `Placed` of both, moved without its
-    row 0. Room to work in: stack (STACK,), found (n + m + 1,), box (2, dim).
+    row 0. Room to work in: that of `scratch_for`, box (2, dim).
     """
-    n, n_pairs = still.kinds.size, 0
+    n, n_pairs, scratch = still.kinds.size, 0, scratch_at(room)
     rows.kinds[0] = 0
     for i in range(box.shape[1]):
         rows.translations[0, i] = 0.0
@@ -54,15 +55,15 @@ def list_pairs(
             box[1, i] = where.together.high[name, i] if place < 0 else where.moved.high[place, i]
             if reach != 0.0:
                 box[0, i], box[1, i] = _outward(box[0, i], reach, 0), _outward(box[1, i], reach, 1)
-        for i in range(bodies_in(box[0], box[1], where, stack, found)):
-            other = name_of(where, found[i])
+        for i in range(bodies_in(box[0], box[1], where, scratch.stack, scratch.near)):
+            other = name_of(where, scratch.near[i])
             if other == name or (other < name and place_in(named, other) >= 0):
                 continue
             if n_pairs < rows.keys.size:
                 rows.keys[n_pairs] = min(name, other) * n + max(name, other)
                 row = 2 * n_pairs + 1
                 _put_row(rows, row + (other < name), still, moved, body, name)
-                _put_row(rows, row + (name < other), still, moved, found[i], other)
+                _put_row(rows, row + (name < other), still, moved, scratch.near[i], other)
             n_pairs += 1
         if flag[0]:
             break

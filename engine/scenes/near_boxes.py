@@ -2,18 +2,30 @@
 
 from __future__ import annotations
 
+from collections import namedtuple
 from typing import Any, Final
 
 import numpy as np
 
-from engine.bounding.bvh import STACK
-from engine.jit import inline, kernel
-from engine.lanes.boxes import EMPTY, inside_box, near_segment
+from engine.bounding.bvh import WIDTH, Bvh
+from engine.jit import bare_kernel, inline, merged
+from engine.lanes.addresses import array_at
+from engine.lanes.boxes import BOX_ROWS, EMPTY, enter_boxes, inside_box
 from engine.lanes.lanes import lowest_bit
-from engine.segment_clipping.mesh_contacts import local_segment
+from engine.scenes.posed_mesh import scratch_at
+from engine.segment_clipping.mesh_contacts import inverse_of, local_segment
 from engine.segment_clipping.pieces import point_of
 from engine.types import Point3
 
+Way = namedtuple("Way", "middle half inverse slack is_near")
+"""What `local_segment` tells of a segment, and 1 / half."""
+BodyTree = namedtuple("BodyTree", "low high tree inverse bounded listed")
+"""The boxes of bodies, low and high (n, dimension), infinite where they may have no bounds; a `Bvh` over those that are
+bounded, where they are not few, 1 / its scale, and which body is where in it; the others, looked at one by one."""
+N_BODIES, LOW, HIGH, N_NODES, BOXES, CHILD, BOUNDED, N_LISTED, LISTED, NUMBERS, NAMES, PLACED = range(12)
+"""What stands of a `BodyTree` in a row of whole numbers, sizes and addresses: one is handed on where it would be a
+hundred numbers. NUMBERS: of (4,), inverse and origin. NAMES: of (n,), what moved bodies are called. PLACED: of the
+rows of their `Table`."""
 _SLACK: Final = 2.0**-20
 """By how much a box in the tree's coordinates, at most 2 where it matters, is widened for its rounding to float32."""
 
@@ -54,45 +66,100 @@ def _join_moved(where: Any, found: Any, n_found: int, n_all: int) -> int:
     return n_left
 
 
-@inline
-def near_bodies(segments: Any, item: int, where: Any, stack: Any, found: Any) -> int:
-    """Fill `found` with the bodies of a `Where` that a segment may meet; return how many. stack: (STACK,)."""
-    n_found = _near_of(segments, item, where.together, stack, found, 0)
-    if where.names.size > 0:
-        n_found = _join_moved(where, found, n_found, _near_of(segments, item, where.moved, stack, found, n_found))
-    return n_found
+@merged
+def tree_in(row: Any, dimension: int) -> BodyTree:
+    """Return the `BodyTree` of a row."""
+    n, numbers = row[N_BODIES], array_at(row[NUMBERS], (4,), np.float64)
+    boxes = array_at(row[BOXES], (row[N_NODES], BOX_ROWS, WIDTH), np.float32)
+    child = array_at(row[CHILD], (row[N_NODES], WIDTH), np.int32)
+    low, high = array_at(row[LOW], (n, dimension), np.float64), array_at(row[HIGH], (n, dimension), np.float64)
+    bounded, listed = array_at(row[BOUNDED], (n,), np.int64), array_at(row[LISTED], (row[N_LISTED],), np.int64)
+    origin: Any = numbers[1], numbers[2], numbers[3]
+    return BodyTree(low, high, Bvh(boxes, child, origin, 1.0), numbers[0], bounded, listed)
 
 
 @inline
-def _near_of(segments: Any, item: int, bodies: Any, stack: Any, found: Any, n_found: int) -> int:
-    """Fill `found` from n_found on with the bodies of a `BodyTree` that a segment may meet; return where they end."""
-    tree, is_flat = bodies.tree, segments.shape[2] == 2
+def called(words: Any, body: int) -> int:
+    """Return what a body is called in the scene."""
+    n, m = words[0, N_BODIES], words[1, N_BODIES]
+    return body if body < n else array_at(words[1, NAMES], (m,), np.int64)[body - n]
+
+
+@inline
+def has_moved(words: Any, body: int) -> bool:
+    """Tell whether one of all bodies stands elsewhere by now."""
+    m = words[1, N_BODIES]
+    return m > 0 and place_in(array_at(words[1, NAMES], (m,), np.int64), body) >= 0
+
+
+@inline
+def way_of(segments: Any, item: int, bodies: BodyTree) -> Way:
+    """Return a segment in the coordinates of a tree."""
+    is_flat = segments.shape[2] == 2
     px, py, pz = point_of(segments, item, 0, is_flat)
     qx, qy, qz = point_of(segments, item, 1, is_flat)
     p, q = Point3(px, py, pz), Point3(qx, qy, qz)
-    middle, half, slack, tiny, is_near = local_segment(p, q, tree.origin, bodies.inverse)
-    depth, stack[0] = int(is_near), 0
-    while depth > 0:  # bound: each node enters the stack once
-        depth -= 1
-        node = stack[depth]
-        bits = near_segment(tree.boxes, node, middle, half, np.float32(slack), np.float32(tiny))
-        while bits != 0:
-            below = tree.child[node, lowest_bit(bits)]
-            bits &= bits - 1
-            if below >= 0:
-                stack[depth] = below
-                depth += 1
-            elif below != EMPTY:
-                found[n_found] = bodies.bounded[-1 - below]
-                n_found += 1
-    for place in range(bodies.listed.size):
-        found[n_found] = body = bodies.listed[place]
-        meet = True
-        for k in range(segments.shape[2]):
-            start, end = segments[item, 0, k], segments[item, 1, k]
-            meet &= (min(start, end) <= bodies.high[body, k]) & (max(start, end) >= bodies.low[body, k])
-        n_found += meet
+    middle, half, slack, _, is_near = local_segment(p, q, bodies.tree.origin, bodies.inverse)
+    return Way(middle, half, inverse_of(half), np.float32(slack), is_near)
+
+
+@inline
+def near_bodies(segments: Any, item: int, words: Any, room: Any) -> int:
+    """Fill scratch.near with the bodies that a segment may meet; return how many."""
+    scratch, last = scratch_at(room), np.float32(1.0)
+    stack, found, n_found = scratch.stack, scratch.near, 0
+    for side in range(1 + (words[1, N_BODIES] > 0)):
+        bodies, n_before = tree_in(words[side], segments.shape[2]), side * words[0, N_BODIES]
+        way = way_of(segments, item, bodies)
+        depth, stack[0] = int(way.is_near), 0
+        while depth > 0:  # bound: each node enters the stack once
+            depth -= 1
+            node = stack[depth]
+            bits = enter_boxes(bodies.tree.boxes, node, way.middle, way.inverse, way.slack, last, scratch.entered)
+            while bits != 0:
+                below = bodies.tree.child[node, lowest_bit(bits)]
+                bits &= bits - 1
+                if below >= 0:
+                    stack[depth] = below
+                    depth += 1
+                elif below != EMPTY:
+                    found[n_found] = n_before + bodies.bounded[-1 - below]
+                    n_found += side == 1 or not has_moved(words, found[n_found])
+        for body in bodies.listed:
+            found[n_found] = n_before + body
+            is_there = side == 1 or not has_moved(words, body)
+            n_found += is_there and in_its_box(segments, item, bodies, body)
     return n_found
+
+
+@inline
+def in_its_box(segments: Any, item: int, bodies: Any, body: int) -> bool:
+    """Tell whether the box of a segment meets that of a body."""
+    meet = True
+    for k in range(segments.shape[2]):
+        start, end = segments[item, 0, k], segments[item, 1, k]
+        meet &= (min(start, end) <= bodies.high[body, k]) & (max(start, end) >= bodies.low[body, k])
+    return meet
+
+
+@inline
+def open_node(tree: Any, node: int, way: Way, last: Any, scratch: Any, depth: int) -> int:
+    """Put what a node of a tree names, and a segment enters before `last`, on scratch.waiting from `depth` on, the
+    nearest last; return where it ends."""
+    waiting, keys, first = scratch.waiting, scratch.keys, depth
+    bits = enter_boxes(tree.boxes, node, way.middle, way.inverse, way.slack, last, scratch.entered)
+    while bits != 0:
+        lane = lowest_bit(bits)
+        bits &= bits - 1
+        below, key, place = tree.child[node, lane], scratch.entered[0, lane], depth
+        if below == EMPTY:
+            continue
+        while place > first and keys[place - 1] < key:
+            waiting[place], keys[place] = waiting[place - 1], keys[place - 1]
+            place -= 1
+        waiting[place], keys[place] = below, key
+        depth += 1
+    return depth
 
 
 @inline
@@ -146,19 +213,31 @@ def _of_box(low: Any, high: Any, bodies: Any, stack: Any, found: Any, n_found: i
     return n_found
 
 
-@kernel
-def list_near(items: Any, start: int, where: Any, pairs: Any, flag: Any) -> tuple[int, int]:
-    """List in pairs (2, room) the segments (n, 2, dim) from `start` on and the bodies of a `Where` that they may meet;
-    return the item reached, and how many pairs there are. An item whose bodies find no room is not begun."""
-    n_bodies = where.together.low.shape[0] + where.names.size
-    stack, found, n_pairs = np.empty(STACK, np.int32), np.empty(n_bodies + 1, np.int64), 0
-    for item in range(start, items.shape[0]):
+@bare_kernel
+def list_near(points: Any, where: Any, room: Any, pairs: Any, flag: Any) -> int:
+    """List in pairs (room, 2) points (n, dim) and the bodies of a `Where` in whose boxes they lie; return how many,
+    more than there is room for where that is less."""
+    n_pairs, scratch = 0, scratch_at(room)
+    for item in range(points.shape[0]):
+        for place in range(bodies_in(points[item], points[item], where, scratch.stack, scratch.near)):
+            if n_pairs < pairs.shape[0]:
+                pairs[n_pairs, 0], pairs[n_pairs, 1] = item, scratch.near[place]
+            n_pairs += 1
         if flag[0]:
-            return item, n_pairs
-        n_found = near_bodies(items, item, where, stack, found)
-        if n_pairs + n_found > pairs.shape[1]:
-            return item, n_pairs
-        for place in range(n_found):
-            pairs[0, n_pairs + place], pairs[1, n_pairs + place] = item, found[place]
-        n_pairs += n_found
-    return items.shape[0], n_pairs
+            break
+    return n_pairs
+
+
+@bare_kernel
+def put_keys(segments: Any, t: float, bodies: Any, keys: Any) -> None:
+    """Set keys (n,) to the cells of a tree, 32 along each axis, in which segments are at t, in the order of G. M.
+    Morton, 1966."""
+    origin, inverse = bodies.tree.origin, bodies.inverse
+    for item in range(segments.shape[0]):
+        key = 0
+        for k in range(segments.shape[2]):
+            x = segments[item, 0, k] * (1.0 - t) + segments[item, 1, k] * t
+            cell = int(min(max(8.0 * (x - origin[k]) * inverse + 16.0, 0.0), 31.0))
+            for bit in range(5):
+                key |= ((cell >> bit) & 1) << (3 * bit + k)
+        keys[item] = key

@@ -20,6 +20,7 @@ from typing import Any, Final
 import numpy as np
 
 from engine.jit import inline
+from engine.lanes.addresses import array_at
 from engine.predicates.cut_point import point_at
 from engine.predicates.double_double import U2, dd_add, dd_div, dd_mul, dd_scale, dd_sub
 from engine.predicates.error_free import fma, two_diff, two_prod
@@ -31,35 +32,36 @@ from engine.types import UNDECIDED
 _FRAME_BOUND: Final = 32.0 * U2
 
 Pair = tuple[float, float]
+Frame = tuple[Vector, float, Vector, float]
 
 
 @inline
-def _row(m: Any, frame: int, i: int, v: Vector) -> Pair:
-    ah, al = dd_mul(m[frame, i, 0, 0], m[frame, i, 0, 1], v[0][0], v[0][1])
-    bh, bl = dd_mul(m[frame, i, 1, 0], m[frame, i, 1, 1], v[1][0], v[1][1])
-    ch, cl = dd_mul(m[frame, i, 2, 0], m[frame, i, 2, 1], v[2][0], v[2][1])
+def _row(m: Any, i: int, v: Vector) -> Pair:
+    ah, al = dd_mul(m[i, 0], m[i, 1], v[0][0], v[0][1])
+    bh, bl = dd_mul(m[i, 2], m[i, 3], v[1][0], v[1][1])
+    ch, cl = dd_mul(m[i, 4], m[i, 5], v[2][0], v[2][1])
     ah, al = dd_add(ah, al, bh, bl)
     return dd_add(ah, al, ch, cl)
 
 
 @inline
-def _turned(m: Any, frame: int, v: Vector) -> tuple[Vector, float]:
+def _turned(m: Any, v: Vector) -> tuple[Vector, float]:
     """Return M v for a vector of pairs without error, and the bound of each coordinate."""
     bound = _FRAME_BOUND * (abs(v[0][0]) + abs(v[1][0]) + abs(v[2][0]))
-    return (_row(m, frame, 0, v), _row(m, frame, 1, v), _row(m, frame, 2, v)), bound
+    return (_row(m, 0, v), _row(m, 1, v), _row(m, 2, v)), bound
 
 
 @inline
-def in_frame(table: Any, body: int, segments: Any, item: int) -> tuple[Vector, float, Vector, float]:
-    """Return p' and e' of a segment with their bounds, 0 for a body without a pose."""
-    frame, is_flat = table.frames[body], segments.shape[2] == 2
+def in_frame(body: Any, segments: Any, item: int) -> Frame:
+    """Return p' and e' of a segment in the frame of a body (4,) with their bounds, 0 for one without a pose."""
+    is_flat = segments.shape[2] == 2
     p, q = point_of(segments, item, 0, is_flat), point_of(segments, item, 1, is_flat)
     way = (two_diff(q[0], p[0]), two_diff(q[1], p[1]), two_diff(q[2], p[2]))
-    if frame < 0:
+    if body[3] == 0:
         return ((p[0], 0.0), (p[1], 0.0), (p[2], 0.0)), 0.0, way, 0.0
-    x, y, z = table.shifts[frame, 0], table.shifts[frame, 1], table.shifts[frame, 2]
-    own, blur = _turned(table.inverses, frame, (two_diff(p[0], x), two_diff(p[1], y), two_diff(p[2], z)))
-    along, along_blur = _turned(table.inverses, frame, way)
+    m = array_at(body[3], (3, 7), np.float64)
+    own, blur = _turned(m, (two_diff(p[0], m[0, 6]), two_diff(p[1], m[1, 6]), two_diff(p[2], m[2, 6])))
+    along, along_blur = _turned(m, way)
     return own, blur, along, along_blur
 
 
@@ -127,13 +129,65 @@ def put_piece(out: Pieces, row: int, source: int, segments: Any, item: int, firs
 
 
 @inline
-def between_planes(table: Any, body: int, segments: Any, item: int) -> tuple[int, Any, Any]:
+def _value(row: Any, v: Vector, offset: float, blur: float) -> tuple[float, float]:
+    """Return n . v + offset by doubles, and its bound: three sums, a product and the tail of v lose 5 u of the size."""
+    x, y, z = row[0] * v[0][0], row[1] * v[1][0], row[2] * v[2][0]
+    size = abs(x) + abs(y) + abs(z) + abs(offset)
+    return x + y + z + offset, 2.0**-50 * size + 1.01 * blur * (abs(row[0]) + abs(row[1]) + abs(row[2]))
+
+
+@inline
+def _planes_cut(rows: Any, frame: Frame) -> tuple[int, int, int]:
+    """Return 1, -1 or UNDECIDED for a segment that surely meets all half-spaces, or not, and where it does the planes
+    that cut it first and last, -1 for none; by doubles.
+
+    Each parameter t = -s / d is known within r = 1.01 (s' + t d') / |d| + 2^-51 t for bounds s' and d' < |d| / 1000.
+    """
+    own, blur, along, along_blur = frame
+    enters, leaves, first, last, is_sure = (-1.0, -1.0), (2.0, 2.0), -1, -1, True
+    for face in range(rows.shape[0]):
+        s, s_bound = _value(rows[face], own, rows[face, 3], blur)
+        d, d_bound = _value(rows[face], along, 0.0, along_blur)
+        of_p = _sign(s, s_bound)
+        of_q = _sign(s + d, 1.01 * (s_bound + d_bound) + 2.0**-51 * (abs(s) + abs(d)))
+        if of_p == -1 and of_q == -1:
+            return -1, -1, -1
+        if of_p == 1 and of_q == 1:
+            continue
+        if of_p == UNDECIDED or of_q == UNDECIDED or d_bound > 2.0**-10 * abs(d):
+            is_sure = False
+            continue
+        t = -s / d
+        r = 1.01 * (s_bound + t * d_bound) / abs(d) + 2.0**-51 * t
+        if of_p < 0:
+            is_sure &= t - r > enters[1] or t + r < enters[0]
+            if t > enters[1]:
+                first = face
+            enters = (max(enters[0], t - r), max(enters[1], t + r))
+        else:
+            is_sure &= t + r < leaves[0] or t - r > leaves[1]
+            if t < leaves[0]:
+                last = face
+            leaves = (min(leaves[0], t - r), min(leaves[1], t + r))
+    if enters[0] > leaves[1]:
+        return -1, -1, -1
+    return (1 if is_sure and enters[1] < leaves[0] else UNDECIDED), first, last
+
+
+@inline
+def between_planes(body: Any, segments: Any, item: int, is_any: bool) -> tuple[int, Any, Any]:
     """Return 1, -1 or UNDECIDED for a segment that meets all half-spaces of a body, or not, or may, and the ends of its
-    piece as `put_piece` takes them."""
-    own, blur, along, along_blur = in_frame(table, body, segments, item)
+    piece as `put_piece` takes them, unless `is_any`."""
+    frame, rows = in_frame(body, segments, item), array_at(body[2], (body[1], 4), np.float64)
+    own, blur, along, along_blur = frame
     first, last = (-1.0, 0.0, 0.0, -1), (2.0, 0.0, 0.0, -1)
-    for face in range(table.ends[body] - table.begins[body]):
-        row = table.rows[table.begins[body] + face]
+    meets, entered, left = _planes_cut(rows, frame)
+    if meets == -1 or (meets == 1 and is_any):
+        return meets, first, last
+    for face in range(rows.shape[0]):
+        if meets == 1 and face != entered and face != left:
+            continue
+        row = rows[face]
         s, s_low, s_bound = _plane_at(row, own, row[3], blur)
         d, d_low, d_bound = _plane_at(row, along, 0.0, along_blur)
         at_q, _ = dd_add(s, s_low, d, d_low)
@@ -168,15 +222,37 @@ def _dot(a: Vector, b: Vector) -> Pair:
 
 
 @inline
-def in_ball(table: Any, body: int, segments: Any, item: int) -> tuple[int, Any, Any]:
+def in_ball(body: Any, segments: Any, item: int, is_any: bool) -> tuple[int, Any, Any]:
     """Return what `between_planes` does for a ball: d = q - p, and f = p - c off by the rounding of the image c."""
-    place, is_flat = table.begins[body], segments.shape[2] == 2
+    c, is_flat = array_at(body[2], (7,), np.float64), segments.shape[2] == 2
     p, q = point_of(segments, item, 0, is_flat), point_of(segments, item, 1, is_flat)
-    x, y, z = table.centers[place, 0], table.centers[place, 1], table.centers[place, 2]
     along = (two_diff(q[0], p[0]), two_diff(q[1], p[1]), two_diff(q[2], p[2]))
-    own = (dd_sub(p[0], 0.0, x[0], x[1]), dd_sub(p[1], 0.0, y[0], y[1]), dd_sub(p[2], 0.0, z[0], z[1]))
-    size = max(abs(p[0]), abs(p[1]), abs(p[2]), abs(x[0]), abs(y[0]), abs(z[0]))
-    return _between_roots(along, own, 8.0 * U2 * size, table.radii[place])
+    own = (dd_sub(p[0], 0.0, c[0], c[1]), dd_sub(p[1], 0.0, c[2], c[3]), dd_sub(p[2], 0.0, c[4], c[5]))
+    size = max(abs(p[0]), abs(p[1]), abs(p[2]), abs(c[0]), abs(c[2]), abs(c[4]))
+    meets = _meets_ball(along, own, 8.0 * U2 * size, c[6])
+    if meets == -1 or (meets == 1 and is_any):
+        return meets, (-1.0, 0.0, 0.0, -1), (2.0, 0.0, 0.0, -1)
+    return _between_roots(along, own, 8.0 * U2 * size, c[6])
+
+
+@inline
+def _meets_ball(d: Vector, f: Vector, blur: float, radius: float) -> int:
+    """Return what `_between_roots` does, by the heads of the pairs: sums of three products lose 6 u of their size."""
+    d_size, f_size = abs(d[0][0]) + abs(d[1][0]) + abs(d[2][0]), abs(f[0][0]) + abs(f[1][0]) + abs(f[2][0])
+    a = d[0][0] * d[0][0] + d[1][0] * d[1][0] + d[2][0] * d[2][0]
+    b = d[0][0] * f[0][0] + d[1][0] * f[1][0] + d[2][0] * f[2][0]
+    c = f[0][0] * f[0][0] + f[1][0] * f[1][0] + f[2][0] * f[2][0] - radius * radius
+    at_q = a + 2.0 * b + c
+    a_bound, b_bound = 2.0**-50 * a, (2.0**-50 * f_size + 1.01 * blur) * d_size
+    c_bound = 2.0**-50 * (f_size * f_size + radius * radius) + 2.02 * blur * (f_size + 2.0 * blur)
+    q_bound = 1.01 * (a_bound + 2.0 * b_bound + c_bound) + 2.0**-50 * (a + 2.0 * abs(b) + abs(c))
+    d_bound = 1.01 * ((2.0 * abs(b) + b_bound) * b_bound + a * c_bound + (abs(c) + c_bound) * a_bound)
+    d_bound += 2.0**-50 * (b * b + a * abs(c))
+    gap, past = b * b - a * c, a_bound + b_bound + 2.0**-50 * (a + abs(b))
+    if c < -c_bound or at_q < -q_bound or (gap > d_bound and b < -b_bound and a + b > past):
+        return 1
+    is_out = c > c_bound and at_q > q_bound and (b > b_bound or a + b < -past or gap < -d_bound)
+    return -1 if is_out else UNDECIDED
 
 
 @inline

@@ -13,27 +13,33 @@ from typing import Any, Final
 
 import numpy as np
 
+from engine.arrays import IntArray
 from engine.bounding.bvh import STACK, WIDTH
 from engine.containment.methods.polyhedron_ray_parity import locate_in_tree
 from engine.containment.scene.trees import tree_at
-from engine.jit import inline
+from engine.jit import inline, merged
 from engine.lanes.addresses import array_at
-from engine.lanes.boxes import BOX_ROWS, EMPTY, near_segment
-from engine.lanes.lanes import lowest_bit
+from engine.lanes.boxes import BOX_ROWS, EMPTY, enter_boxes
+from engine.lanes.lanes import lowest_bit, prefetch
 from engine.lanes.tracing import LANES
 from engine.lanes.triangles import AXES_BEFORE, CORNER_ROWS, longest_axis, near_triangles
 from engine.predicates.double_double import dd_div, dd_sub
+from engine.predicates.orientation import orient3d
 from engine.scenes.posed_cut import in_frame, put_point, slack_of
 from engine.segment_clipping.boundary_cut import Crossings, sort_crossings
 from engine.segment_clipping.contacts import APART, PROPER, TOUCHING
 from engine.segment_clipping.crossing_values import Vector, dot, is_item_safe, normal_of
-from engine.segment_clipping.mesh_contacts import local_segment
-from engine.segment_clipping.triangle_contact import contact_filter, corner, exact_contact
+from engine.segment_clipping.mesh_contacts import inverse_of, local_segment
+from engine.segment_clipping.pieces import Pieces
+from engine.segment_clipping.plane_meeting import T_BOUND
+from engine.segment_clipping.triangle_contact import UNDERFLOW, contact_filter, corner, exact_contact
 from engine.types import UNDECIDED, Point3
 
 MOST_MET: Final = 512
 """Triangles that a segment crosses; with more it is UNDECIDED."""
 UNSURE: Final = -1
+CROSSED: Final = -3
+"""How a triangle is met, where it is not touched: an odd number, as of a touched one that the line crosses."""
 WANTS_BODY: Final = -2
 WANTS_TREE: Final = -3
 """In place of a number of pieces: UNDECIDED, or the body, or the tree that points are located by, is not prepared."""
@@ -44,42 +50,90 @@ _MOST_KEPT: Final = 1 << 14
 """Bodies of a scene whose room is kept: some 800 kB a thread."""
 
 
-Lines = namedtuple("Lines", "addresses sizes places")
-"""Prepared arrays of solids, by row: their addresses (n, k), 0 where they are not prepared, sizes and numbers."""
 PlacedMesh = namedtuple("PlacedMesh", "elements faces boxes child origin inverse are_safe n_inner corners")
 """What of `Mesh` is read here."""
-Scratch = namedtuple("Scratch", "stack met cuts near")
-"""Room for the work on one segment; cuts, near: `Crossings`, of the bodies near it by where it enters their boxes."""
+MESH_WORDS: Final = 37
+"""Of a solid: addresses (5,) of its arrays, numbers (3,) of elements, nodes and inner nodes; `tree_line`'s addresses,
+0 where there is no tree, and sizes (8,); then as doubles origin, inverse, whether all is safe, low and high of its box
+(11,), and `tree_line`'s places (10,)."""
+TREE, PLACES, TREE_PLACES = 8, 16, 27
+"""Where these begin."""
+_Lines = namedtuple("_Lines", "addresses sizes places")
+Scratch = namedtuple("Scratch", "stack met kinds cuts room waiting keys entered best found near")
+"""Room for the work on one segment. stack: of one body, met: its triangles, kinds: CROSSED or `_touched`, cuts:
+`Crossings`, room: its pieces, the last row for the first of them all. waiting, keys: nodes and bodies to be asked, and
+where they are entered; entered (1, 8), of one node. best: where the first piece begins; found: the body it lies in, and
+whether another may begin there too. near: bodies."""
+_SIZES: Final = (
+    STACK // 2, MOST_MET, MOST_MET, 3 * MOST_MET, MOST_MET, MOST_MET, MOST_MET + 1, 6 * MOST_MET + 6, 2 * MOST_MET + 2,
+    2 * MOST_MET + 2, STACK // 2, STACK // 2, WIDTH // 2, 1, 2, MOST_MET,
+)  # fmt: skip
+"""Words of the arrays of a `Scratch`, in order, but for `near`."""
+_AT: Final = tuple(8 * (2 + sum(_SIZES[:k])) for k in range(len(_SIZES) + 1))
+"""Where these begin, in bytes."""
 
 
-def scratch_for(n_bodies: int) -> Scratch:
-    """Return room for the work on one segment at a time; each thread keeps its own."""
-    found: Scratch | None = getattr(_here, "scratch", None)
-    if found is None or len(found.near.t) <= n_bodies:
-        cuts, near = (
-            Crossings(np.empty(n), np.empty((n, 3)), np.empty(n, np.int64), np.empty(n, np.int64))
-            for n in (MOST_MET, n_bodies + 1)
-        )
-        found = Scratch(np.empty(STACK, np.int32), np.empty(MOST_MET, np.int64), cuts, near)
+def scratch_for(n_bodies: int) -> IntArray:
+    """Return room for the work on one segment at a time (`scratch_at`); each thread keeps its own."""
+    found: IntArray | None = getattr(_here, "scratch", None)
+    if found is None or found[1] <= n_bodies:
+        found = np.empty(_AT[-1] // 8 + n_bodies + 1, np.int64)
+        found[:2] = found.ctypes.data, n_bodies + 1
         if n_bodies <= _MOST_KEPT:
             _here.scratch = found
     return found
 
 
+@merged
+def scratch_at(words: Any) -> Scratch:
+    """Return the arrays that `scratch_for` has room for."""
+    at, m = words[0], MOST_MET
+    cuts = Crossings(
+        array_at(at + _AT[2], (m,), np.float64), array_at(at + _AT[3], (m, 3), np.float64),
+        array_at(at + _AT[4], (m,), np.int64), array_at(at + _AT[5], (m,), np.int64),
+    )  # fmt: skip
+    room = Pieces(
+        array_at(at + _AT[6], (m + 1,), np.int64), array_at(at + _AT[7], (2, m + 1, 3), np.float64),
+        array_at(at + _AT[8], (m + 1, 2), np.float64), array_at(at + _AT[9], (m + 1, 2), np.int64),
+    )  # fmt: skip
+    return Scratch(
+        array_at(at + _AT[0], (STACK,), np.int32), array_at(at + _AT[1], (m,), np.int64),
+        array_at(at + _AT[15], (m,), np.int64), cuts, room,
+        array_at(at + _AT[10], (STACK,), np.int32), array_at(at + _AT[11], (STACK,), np.float32),
+        array_at(at + _AT[12], (1, WIDTH), np.float32), array_at(at + _AT[13], (1,), np.float64),
+        array_at(at + _AT[14], (2,), np.int64), array_at(at + _AT[16], (words[1],), np.int64),
+    )  # fmt: skip
+
+
 @inline
-def _mesh_at(lines: Any, row: int) -> PlacedMesh:
-    addresses, sizes, places = lines.addresses, lines.sizes, lines.places
+def _lines_at(body: Any) -> tuple[Any, Any]:
+    """Return what stands of a body's mesh, as whole numbers and as doubles."""
+    return array_at(body[2], (MESH_WORDS,), np.int64), array_at(body[2], (MESH_WORDS,), np.float64)
+
+
+@inline
+def _mesh_of(lines: Any, numbers: Any) -> PlacedMesh:
     return PlacedMesh(
-        array_at(addresses[row, 0], (sizes[row, 0], 3, 3), np.float64),
-        array_at(addresses[row, 1], (sizes[row, 0],), np.int64),
-        array_at(addresses[row, 2], (sizes[row, 1], BOX_ROWS, WIDTH), np.float32),
-        array_at(addresses[row, 3], (sizes[row, 1], WIDTH), np.int32),
-        (places[row, 0], places[row, 1], places[row, 2]),
-        places[row, 3],
-        places[row, 4] != 0.0,
-        sizes[row, 2],
-        array_at(addresses[row, 4], (sizes[row, 1] - sizes[row, 2], CORNER_ROWS, LANES), np.float32),
+        array_at(lines[0], (lines[5], 3, 3), np.float64),
+        array_at(lines[1], (lines[5],), np.int64),
+        array_at(lines[2], (lines[6], BOX_ROWS, WIDTH), np.float32),
+        array_at(lines[3], (lines[6], WIDTH), np.int32),
+        (numbers[PLACES], numbers[PLACES + 1], numbers[PLACES + 2]),
+        numbers[PLACES + 3],
+        numbers[PLACES + 4] != 0.0,
+        lines[7],
+        array_at(lines[4], (lines[6] - lines[7], CORNER_ROWS, LANES), np.float32),
     )
+
+
+@inline
+def _tree_of(address: int) -> Any:
+    lines = _Lines(
+        array_at(address + 8 * TREE, (1, 5), np.int64),
+        array_at(address + 8 * (TREE + 5), (1, 3), np.int64),
+        array_at(address + 8 * TREE_PLACES, (1, 10), np.float64),
+    )
+    return tree_at(lines, 0)
 
 
 @inline
@@ -91,15 +145,16 @@ def _contact(mesh: PlacedMesh, element: int, p: Point3, q: Point3, blur: float) 
 
 
 @inline
-def _gather(mesh: PlacedMesh, p: Point3, q: Point3, blur: float, is_any: bool, scratch: Scratch) -> int:
+def _gather(mesh: PlacedMesh, p: Point3, q: Point3, blur: float, is_any: bool, words: Any) -> int:
     """Fill met with the triangles that a segment crosses; return how many, UNSURE where one may be met otherwise. Where
     `is_any` one that is surely met is enough."""
+    scratch = scratch_at(words)
     stack, met = scratch.stack, scratch.met
-    middle, half, slack, tiny, is_near = local_segment(p, q, mesh.origin, mesh.inverse)
+    middle, half, slack, _, is_near = local_segment(p, q, mesh.origin, mesh.inverse)
     if not is_near:
         return 0
     room = 64.0 * blur * mesh.inverse
-    slack_32, tiny_32 = np.float32(slack + room), np.float32(tiny + room)
+    slack_32, inverse, last = np.float32(slack + room), inverse_of(half), np.float32(1.0)
     k = longest_axis(half)
     i, j, double = (
         AXES_BEFORE[k],
@@ -115,13 +170,14 @@ def _gather(mesh: PlacedMesh, p: Point3, q: Point3, blur: float, is_any: bool, s
         if node >= mesh.n_inner:
             bits = near_triangles(mesh.corners, node - mesh.n_inner, i, j, k, place, r, s, reach, double)
         else:
-            bits = near_segment(mesh.boxes, node, middle, half, slack_32, tiny_32)
+            bits = enter_boxes(mesh.boxes, node, middle, inverse, slack_32, last, scratch.entered)
         while bits != 0:
             below = mesh.child[node, lowest_bit(bits)]
             bits &= bits - 1
             if below == EMPTY:
                 continue
             if below >= 0:
+                prefetch(mesh.child, below * WIDTH)
                 stack[depth] = below
                 depth += 1
                 continue
@@ -130,14 +186,98 @@ def _gather(mesh: PlacedMesh, p: Point3, q: Point3, blur: float, is_any: bool, s
                 continue
             if is_any and kind in (PROPER, TOUCHING):
                 return 1
-            if kind != PROPER or n_met == met.size:
+            how = CROSSED
+            if kind != PROPER:
+                how = _touched(mesh, -1 - below, p, q) if kind == TOUCHING and not is_any else UNSURE
+            if how == UNSURE or n_met == MOST_MET:
                 if not is_any:
                     return UNSURE
                 is_unsure = True
                 continue
-            met[n_met] = -1 - below
+            met[n_met], scratch.kinds[n_met] = -1 - below, how
             n_met += 1
     return UNSURE if is_unsure else n_met
+
+
+@inline
+def _touched(mesh: PlacedMesh, element: int, p: Point3, q: Point3) -> int:
+    """Return 2 n + 1 or 2 n for a triangle that a segment surely touches, between its ends, in corner n, or n - 3 in
+    side n: whether the line moved by infinitesimals crosses it, as `is_crossed` tells (exact_pieces.py); or UNSURE."""
+    a, b, c = corner(mesh.elements, element, 0), corner(mesh.elements, element, 1), corner(mesh.elements, element, 2)
+    if orient3d(a, b, c, p) * orient3d(a, b, c, q) != -1:
+        return UNSURE
+    ab, bc, ca = orient3d(p, q, a, b), orient3d(p, q, b, c), orient3d(p, q, c, a)
+    u = (q.x - p.x, q.y - p.y, q.z - p.z)
+    k = longest_axis(u)
+    j, way = AXES_BEFORE[k + 1], 1 if u[k] > 0.0 else -1
+    first = way * ab if ab != 0 else _beside(a, b, u, j, k)
+    second = way * bc if bc != 0 else _beside(b, c, u, j, k)
+    third = way * ca if ca != 0 else _beside(c, a, u, j, k)
+    if first == UNDECIDED or second == UNDECIDED or third == UNDECIDED:
+        return UNSURE
+    side = 3 if ab == 0 else 4 if bc == 0 else 5
+    if (ab == 0) + (bc == 0) + (ca == 0) == 2:
+        side = 0 if bc != 0 else 1 if ca != 0 else 2
+    return 2 * side + (first == second and second == third)
+
+
+@inline
+def _beside(a: Point3, b: Point3, u: Any, j: int, k: int) -> int:
+    """Return on which side of a side a b, which the line along u meets, it lies when it is moved, else UNDECIDED: six
+    roundings and a sum, 2^-50 is twice that."""
+    seen = (a.x - b.x, a.y - b.y, a.z - b.z)
+    x, y = seen[j] * u[k], seen[k] * u[j]
+    gap, bound = x - y, 2.0**-50 * (abs(x) + abs(y)) + UNDERFLOW
+    return 1 if gap > bound else -1 if gap < -bound else UNDECIDED
+
+
+@inline
+def _are_one(mesh: PlacedMesh, scratch: Scratch, i: int, j: int) -> bool:
+    """Tell whether two triangles are touched in one corner, or one side, of both."""
+    n, m = scratch.kinds[i] >> 1, scratch.kinds[j] >> 1
+    if n < 0 or m < 0 or (n < 3) != (m < 3):
+        return False
+    first, second = scratch.met[i], scratch.met[j]
+    if n < 3:
+        return corner(mesh.elements, first, n) == corner(mesh.elements, second, m)
+    a, b = corner(mesh.elements, first, n - 3), corner(mesh.elements, first, (n - 2) % 3)
+    c, d = corner(mesh.elements, second, m - 3), corner(mesh.elements, second, (m - 2) % 3)
+    return (a == c and b == d) or (a == d and b == c)
+
+
+@inline
+def _join_touches(mesh: PlacedMesh, scratch: Scratch, n: int, is_in: bool, is_closed: bool) -> int:
+    """Make one of crossings, which are sorted, that lie in one point; return how many are in order then, or UNSURE.
+
+    Where the location does not turn over, a closed mesh is met in a point, or not left: such a point stands there
+    twice, the second time by -2 - face.
+    """
+    cuts, kinds, order, n_out, begin = scratch.cuts, scratch.kinds, scratch.cuts.order, 2 * n, 0
+    if 4 * n > MOST_MET:
+        return UNSURE
+    for place in range(1, n + 1):
+        first, turns = order[begin], False
+        if place < n and cuts.t[order[place]] == cuts.t[first]:
+            if not _are_one(mesh, scratch, first, order[place]):
+                return UNSURE
+            continue
+        for rank in range(begin, place):
+            turns ^= (kinds[order[rank]] & 1) == 1
+            cuts.faces[first] = min(cuts.faces[first], cuts.faces[order[rank]])
+        begin = place
+        if turns or not is_closed or not is_in:
+            order[n_out] = first
+            n_out += 1
+        if is_closed and not turns and not is_in:
+            again = n + n_out
+            order[n_out], cuts.t[again], cuts.faces[again] = again, cuts.t[first], -2 - cuts.faces[first]
+            for k in range(3):
+                cuts.points[again, k] = cuts.points[first, k]
+            n_out += 1
+        is_in ^= turns
+    for place in range(2 * n, n_out):
+        order[place - 2 * n] = order[place]
+    return n_out - 2 * n
 
 
 @inline
@@ -148,9 +288,9 @@ def _values(at_p: Any, blur: float, normal: Any) -> Any:
 
 
 @inline
-def _cut_at(mesh: PlacedMesh, segments: Any, item: int, element: int, frame: Any, cuts: Crossings, place: int) -> bool:
-    """Make a crossing; tell whether all is surely nearest."""
-    own, blur, along, along_blur = frame
+def _cut_at(mesh: PlacedMesh, segments: Any, item: int, place: int, frame: Any, scratch: Scratch) -> bool:
+    """Make a crossing, in a corner where one is touched; tell whether all is surely nearest."""
+    (own, blur, along, along_blur), cuts, element = frame, scratch.cuts, scratch.met[place]
     if not (mesh.are_safe or is_item_safe(mesh.elements, element)):
         return False
     a, b, c = corner(mesh.elements, element, 0), corner(mesh.elements, element, 1), corner(mesh.elements, element, 2)
@@ -165,7 +305,13 @@ def _cut_at(mesh: PlacedMesh, segments: Any, item: int, element: int, frame: Any
     slack = slack_of(s, s_bound, d, d_bound)
     t, low = dd_div(-s, -s_low, d, d_low)
     cuts.t[place], cuts.faces[place] = t + low, mesh.faces[element]
-    return put_point(cuts.points[place], segments, item, t, low, slack)
+    n = scratch.kinds[place] >> 1
+    if n < 0 or n > 2:
+        return put_point(cuts.points[place], segments, item, t, low, slack)
+    touched, bound = corner(mesh.elements, element, n), (T_BOUND + slack) * abs(t)
+    cuts.points[place, 0], cuts.points[place, 1] = touched.x + 0.0, touched.y + 0.0
+    cuts.points[place, 2] = touched.z + 0.0
+    return slack < 0.001 and t + (low - bound) == t + (low + bound)
 
 
 @inline
@@ -178,38 +324,40 @@ def _ends_of(own: Vector, blur: float, along: Vector, along_blur: float, is_plac
 
 
 @inline
-def crossings_in(
-    table: Any, body: int, segments: Any, item: int, is_any: bool, scratch: Scratch, stop: Any
-) -> tuple[int, bool]:
+def crossings_in(body: Any, segments: Any, item: int, is_any: bool, words: Any, stop: Any) -> tuple[int, bool]:
     """Make the crossings of a segment with a placed mesh, in order; return how many, or why not, and whether the first
     end lies in it. Where `is_any` they are not made, and any positive number says that there is one."""
-    slot, is_placed, is_closed = table.begins[body], table.frames[body] >= 0, table.ends[body] != 0
-    frame = in_frame(table, body, segments, item)
+    is_placed, is_closed, scratch, (lines, numbers) = body[3] != 0, body[1] != 0, scratch_at(words), _lines_at(body)
+    frame = in_frame(body, segments, item)
     p, q, blur = _ends_of(frame[0], frame[1], frame[2], frame[3], is_placed)
     if not is_placed:
         q = corner(segments, item, 1)
-    mesh, is_in = _mesh_at(table.meshes, slot), False
-    n_met = _gather(mesh, p, q, blur, is_any, scratch)
+    mesh, is_in = _mesh_of(lines, numbers), False
+    n_met = _gather(mesh, p, q, blur, is_any, words)
     if n_met < 0 or (is_any and n_met > 0):
         return n_met, False
-    if is_closed and _is_near_box(table.meshes.places, slot, p, blur):
-        if table.trees.addresses[slot, 0] == 0:
+    if is_closed and _is_near_box(numbers, p, blur):
+        if lines[TREE] == 0:
             return WANTS_TREE, False
-        at, _ = locate_in_tree(tree_at(table.trees, slot), p, 2.0 * blur, scratch.stack, stop)
+        at, _ = locate_in_tree(_tree_of(body[2]), p, 2.0 * blur, scratch.stack, stop)
         if at == UNDECIDED or (at == 0 and not is_any):
             return UNSURE, False
         is_in = at >= 0
     for i in range(n_met):
-        if not _cut_at(mesh, segments, item, scratch.met[i], frame, scratch.cuts, i):
+        if not _cut_at(mesh, segments, item, i, frame, scratch):
             return UNSURE, False
-    if n_met > 0 and not sort_crossings(scratch.cuts, 0, n_met):
+    touches = False
+    for i in range(n_met):
+        touches |= scratch.kinds[i] != CROSSED
+    if not sort_crossings(scratch.cuts, 0, n_met) and not touches:
         return UNSURE, False
-    return n_met, is_in
+    return (_join_touches(mesh, scratch, n_met, is_in, is_closed) if touches else n_met), is_in
 
 
 @inline
-def _is_near_box(places: Any, slot: int, p: Point3, blur: float) -> bool:
+def _is_near_box(numbers: Any, p: Point3, blur: float) -> bool:
     """Tell whether a point known to `blur` a coordinate may lie in the box of a mesh."""
-    is_out = (p.x + blur < places[slot, 5]) | (p.x - blur > places[slot, 8])
-    is_out |= (p.y + blur < places[slot, 6]) | (p.y - blur > places[slot, 9])
-    return not (is_out | (p.z + blur < places[slot, 7]) | (p.z - blur > places[slot, 10]))
+    low, high = PLACES + 5, PLACES + 8
+    is_out = (p.x + blur < numbers[low]) | (p.x - blur > numbers[high])
+    is_out |= (p.y + blur < numbers[low + 1]) | (p.y - blur > numbers[high + 1])
+    return not (is_out | (p.z + blur < numbers[low + 2]) | (p.z - blur > numbers[high + 2]))

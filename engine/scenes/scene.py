@@ -281,7 +281,7 @@ class Scene(Immutable):
             self._standing.base.check_cut(budget)
             result: ScenePieces | BoolArray
             if not len(self):
-                result = in_order(joined([], array.shape[2]), n, lambda *_: (ZERO, ONE))
+                result = in_order(joined([], array.shape[2]), n, lambda: lambda *_: (ZERO, ONE))
                 result = np.zeros(n, np.bool_) if keep == "any" else result
             else:
                 cut: Any = {"all": clip_all, "first": clip_first, "any": meets_any}[keep]

@@ -7,20 +7,20 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 
 from engine.arrays import FloatArray, Int8Array, IntArray
-from engine.bounding.bvh import STACK
 from engine.containment.scene.locate_scene import SceneLocations
 from engine.direct import entry_of
 from engine.parallel import Budget
 from engine.scenes.bodies import Bodies
-from engine.scenes.broad_phase import NO_BODIES, Where, body_tree, candidates
+from engine.scenes.broad_phase import NO_BODIES, Where, body_tree, candidates, words_of
 from engine.scenes.moved_pairs import PairRows, Placed, list_pairs
+from engine.scenes.near_boxes import PLACED
+from engine.scenes.posed_mesh import scratch_for
 from engine.scenes.table import unready
-from engine.scenes.through import Cut
 from engine.solids.base import Preparing, Solid
 from engine.solids.pose import Pose
 from engine.types import Accuracy
@@ -31,12 +31,20 @@ _PART: Final = 4
 _LISTED: Final = 128
 """Bodies that moved whose boxes are looked at one by one: as soon done as a tree over them built."""
 _NOBODY: Final = np.zeros(0, np.int64)
+_NO_WORDS: Final = [0] * (PLACED + 1)
+
+
+class Words(NamedTuple):
+    """Rows of `words_of`, and what they give addresses of."""
+
+    rows: IntArray
+    kept: Any
 
 
 class Standing(Preparing):
     """Bodies, and those that moved since: safe to share between threads, as `Bodies` are."""
 
-    __slots__ = ("_cut", "_lock", "_placed", "_prepared", "base", "moved", "names")
+    __slots__ = ("_lock", "_placed", "_prepared", "_words", "base", "moved", "names")
 
     def __init__(self, base: Bodies, moved: dict[int, Pose | None]) -> None:
         self.base, self.moved = base, moved
@@ -44,7 +52,7 @@ class Standing(Preparing):
         """Those that moved, ascending."""
         self._lock, self._prepared = threading.RLock(), dict[str, Any]()
         self._placed: tuple[Where, FloatArray, FloatArray] | None = None
-        self._cut: Cut | None = None
+        self._words: Words | None = None
 
     @property
     def poses(self) -> tuple[Pose | None, ...]:
@@ -69,6 +77,11 @@ class Standing(Preparing):
         for body, pose in given.items():
             everywhere[body] = pose
         return Standing(Bodies(self.base.solids, tuple(everywhere)), {})
+
+    @property
+    def n_rows(self) -> int:
+        """How many bodies kernels tell apart."""
+        return len(self.base.solids) + len(self.names)
 
     def whole(self) -> Bodies:
         """Return all bodies where they are."""
@@ -114,11 +127,17 @@ class Standing(Preparing):
                 self._placed = Where(tree, NO_BODIES[d], names), np.empty((0, d, d)), np.empty((0, d))
         return self._placed
 
-    def cut(self, budget: Budget) -> Cut:
-        """Return what kernels for segments read of all bodies."""
-        if self._cut is None:
-            self._cut = Cut(self.base.table(budget).of_kernels, unready(len(self.names)))
-        return self._cut
+    def words(self, budget: Budget) -> IntArray:
+        """Return what kernels for segments read of all bodies, and of those that moved."""
+        found: Words | None = self._words
+        if found is None:
+            together, moved, kept = self.base.words(budget), _NO_WORDS, ()
+            if self.moved:
+                moved, kept = words_of(self.where(budget).moved, self.names, unready(len(self.names)))
+            found = Words(np.array([together[0], moved]), (together[1], kept))
+            with self._lock:
+                self._words = found = self._words or found
+        return found.rows
 
     def prepare(self, body: int, wanted: int, budget: Budget) -> None:
         """Make ready what kernels want of a body."""
@@ -128,7 +147,7 @@ class Standing(Preparing):
         else:
             few = self.few()
             few.prepare(body - n, wanted, budget)
-            self._cut = self.cut(budget)._replace(moved=few.table(budget).of_kernels)
+            self.words(budget)[1, PLACED] = few.table(budget).rows.ctypes.data
 
     def boxes(self, budget: Budget) -> FloatArray:
         """Return the boxes of all bodies where they are."""
@@ -146,13 +165,12 @@ class Standing(Preparing):
         batches, (where, *moves), room = self.base.batches(budget), self.placed_numbers(budget), 16 + 6 * len(named)
         arrays, d = batches.bodies, batches.bodies.dimension
         still, moved = Placed(arrays.kinds, arrays.rotations, arrays.translations), Placed(arrays.kinds, *moves)
-        stack, box = np.empty(STACK, np.int32), np.empty((2, d))
-        found = np.empty(len(arrays.kinds) + len(self.names) + 1, np.int64)
+        scratch, box = scratch_for(self.n_rows), np.empty((2, d))
         while True:  # bound: the second turn has room
             n_rows = 2 * room + 1
             placed = np.empty((n_rows, d, d)), np.empty((n_rows, d))
             rows = PairRows(np.empty(room, np.int64), np.empty(n_rows, np.int64), *placed)
-            n = entry_of(list_pairs)(named, reach, where, still, moved, rows, stack, found, box, budget.flag)
+            n = entry_of(list_pairs)(named, reach, where, still, moved, rows, scratch, box, budget.flag)
             budget.check()
             if n <= room:
                 return rows.keys[:n], batches.related(*rows[1:], n, boolean, budget)
@@ -162,10 +180,11 @@ class Standing(Preparing):
         """Return where a few points lie, body by body: for many `locate_in` is faster."""
         n, n_bodies, beyond, rational, is_exact = len(points), len(self.base.solids), 0, 0, True
         budget.check()
-        owners, bodies = candidates(self.where(budget), points.repeat(2, axis=0).reshape(n, 2, -1), budget, 1)
-        names, at = self.names_of(bodies), np.empty(1, np.int8)
+        pairs, at = candidates(self.where(budget), points, budget), np.empty(1, np.int8)
         held, on_boundary, offsets = list[int](), list[bool](), np.zeros(n + 1, np.int64)
-        for item, name, body in sorted(zip(owners.tolist(), names.tolist(), bodies.tolist())):
+        for item, name, body in sorted(
+            zip(pairs[:, 0].tolist(), self.names_of(pairs[:, 1]).tolist(), pairs[:, 1].tolist())
+        ):
             locator = self.base.locator(body) if body < n_bodies else self.few().locator(body - n_bodies)
             counts = locator.chosen(1, budget).fill(points[item : item + 1], at, budget)
             beyond, rational = beyond + counts.beyond, rational + counts.rational

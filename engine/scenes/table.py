@@ -1,20 +1,20 @@
-"""What the kernels for segments read of the bodies of a scene (`BodyTable`): of each, when it is asked for first."""
+"""What the kernels for segments read of the bodies of a scene (`Cut`): of each, when it is asked for first."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
-from engine.arrays import FloatArray
+from engine.arrays import FloatArray, IntArray
 from engine.containment.prepared import tree_of
 from engine.containment.rational_locate import exact_inverse, to_world_frame
 from engine.containment.scene.trees import tree_line
 from engine.predicates.expansion import LARGEST, SMALLEST
-from engine.scenes.posed_mesh import WANTS_TREE, Lines
-from engine.scenes.through import BALL, MESH, OTHER, ROWS, UNREADY, BodyTable
+from engine.scenes.posed_mesh import MESH_WORDS, PLACES, TREE, TREE_PLACES, WANTS_TREE
+from engine.scenes.through import BALL, MESH, OTHER, ROWS, UNREADY
 from engine.segment_clipping.prepared_boundary import boundary_of
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
@@ -26,113 +26,94 @@ from engine.solids.pose import Pose
 from engine.solids.sphere import Sphere
 from engine.solids.surface import Surface
 
-_MESH_SIZES: Final = 5, 3, 11
-_TREE_SIZES: Final = 5, 3, 10
-"""Addresses, sizes and places in a line."""
-
 
 class Table:
-    """The bodies of a scene for the kernels; `of_kernels` is filled body by body, its kinds last.
+    """The bodies of a scene for the kernels: `rows` (n, 4) are filled body by body, the kind of each last.
+
+    Behind the kind: of planes how many they are, of a mesh whether it is closed; an address, of planes (k, 4), of a
+    ball (7,) its centre in the world, double-doubles, and radius, of a mesh its `MESH_WORDS`; and that of the body's
+    frame (`_frame_of`), 0 for none.
 
     like: the table of bodies that these are some of, which share what stands there of solids.
     """
 
     def __init__(self, solids: Sequence[Solid], poses: Sequence[Pose | None], like: Table | None = None) -> None:
         self._solids, self._poses = solids, poses
-        n = len(solids)
-        self._slots: dict[int, int] = {} if like is None else like._slots
-        self._rows: dict[int, int] = {} if like is None else like._rows
-        self.are_streamed = np.array([isinstance(solid, Polyhedron) for solid in solids], np.bool_)
-        """(n,): polyhedra without a pose."""
-        begins, n_rows, n_balls, n_posed = np.zeros(n, np.int64), 0, 0, 0
-        frames = np.full(n, -1, np.int64)
-        for body, solid in enumerate(solids):
-            if isinstance(solid, Sphere):
-                begins[body], n_balls = n_balls, n_balls + 1
-                continue
-            if poses[body] is not None:
-                self.are_streamed[body] = False
-                frames[body], n_posed = n_posed, n_posed + 1
-            if isinstance(solid, (Polyhedron, Surface)):
-                begins[body] = self._slots.setdefault(id(solid), len(self._slots))
-            elif isinstance(solid, (HalfSpace, Aabb, Convex)):
-                if id(solid) not in self._rows:
-                    self._rows[id(solid)], n_rows = n_rows, n_rows + len(rows_of(solid))
-                begins[body] = self._rows[id(solid)]
-        n_slots = len(self._slots)
-        of_solids = (np.zeros((n_rows, 4)), _lines(n_slots, *_MESH_SIZES), _lines(n_slots, *_TREE_SIZES))
-        rows, meshes, trees = of_solids if like is None else like.of_solids
-        self.of_solids: tuple[FloatArray, Lines, Lines] = rows, meshes, trees
-        self.of_kernels = BodyTable(
-            np.full(n, UNREADY, np.int8), begins, begins.copy(), frames, np.zeros((n_posed, 3, 3, 2)),
-            np.zeros((n_posed, 3)), rows, np.zeros((n_balls, 3, 2)), np.zeros(n_balls), meshes, trees,
-        )  # fmt: skip
+        self.rows: IntArray = unready(len(solids))
+        self._kept: dict[int, Any] = {} if like is None else like._kept
+        """By the id of a solid what rows name by its address."""
+        self._own: list[Any] = []
+        """The same, of one body."""
 
     def prepare(self, body: int, wanted: int) -> None:
         """Make ready what kernels want of a body. Caller holds the lock of the bodies."""
-        solid, table = self._solids[body], self.of_kernels
+        solid = self._solids[body]
         if wanted == WANTS_TREE:
             assert isinstance(solid, Polyhedron)
-            _put_line(table.trees, int(table.begins[body]), *tree_line(tree_of(solid)))
-        elif table.kinds[body] == UNREADY:
-            table.kinds[body] = self._fill(body, solid, self._poses[body])
+            addresses, sizes, places = tree_line(tree_of(solid))
+            words = self._kept[id(solid)]
+            words[TREE + 5 : TREE + 8], words.view(np.float64)[TREE_PLACES:] = sizes, places
+            words[TREE : TREE + 5] = addresses  # order: last, kernels of other threads look at these
+        elif self.rows[body, 0] == UNREADY:
+            self.rows[body, 0] = self._fill(self.rows[body], solid, self._poses[body])
 
-    def _fill(self, body: int, solid: Solid, pose: Pose | None) -> int:
-        """Fill the rows of a body; return its kind, OTHER where no kernel takes its type, or its numbers."""
-        table, place = self.of_kernels, int(self.of_kernels.begins[body])
+    def _fill(self, row: IntArray, solid: Solid, pose: Pose | None) -> int:
+        """Fill the row of a body, but for its kind; return that, OTHER where no kernel takes its type, or numbers."""
         if isinstance(solid, Sphere):
             if not _are_safe([*solid.center, solid.radius, *(() if pose is None else pose.translation)]):
                 return OTHER
             center = solid.center.tolist() if pose is None else to_world_frame(solid.center.tolist(), pose)
             doubles = [_double(*Fraction(x).as_integer_ratio()) for x in center]
-            table.centers[place, : len(center)], table.radii[place] = doubles, solid.radius
+            ball = np.zeros(7)
+            ball[: 2 * len(center)], ball[6] = np.ravel(doubles), solid.radius
+            self._own.append(ball)
+            row[2] = ball.ctypes.data
             return BALL if _are_safe([head for head, _ in doubles]) else OTHER
-        frame = int(table.frames[body])
-        if pose is not None and pose.is_identity:
-            table.frames[body] = -1
-        elif pose is not None and not _put_frame(table, frame, pose):
-            return OTHER
+        if pose is not None and not pose.is_identity:
+            frame = _frame_of(pose)
+            if frame is None:
+                return OTHER
+            self._own.append(frame)
+            row[3] = frame.ctypes.data
         if isinstance(solid, (HalfSpace, Aabb, Convex)):
-            planes = rows_of(solid)
-            table.ends[body] = place + len(planes)
-            table.rows[place : place + len(planes)] = rows_in_space(planes)
+            planes = self._kept.setdefault(id(solid), rows_in_space(rows_of(solid)))
+            row[1], row[2] = len(planes), planes.ctypes.data
             return ROWS if _are_safe(planes.ravel().tolist()) else OTHER
         if isinstance(solid, (Polyhedron, Surface)):
-            table.ends[body] = isinstance(solid, Polyhedron)
-            if table.meshes.addresses[place, 0]:
-                return MESH
-            mesh: Any = boundary_of(solid)
-            low, high, _ = own_box(solid)
-            numbers = *mesh.origin, mesh.inverse, mesh.are_safe, *low, *high
-            arrays = mesh.elements, mesh.faces, mesh.boxes, mesh.child, mesh.corners
-            addresses = tuple(array.ctypes.data for array in arrays)
-            _put_line(table.meshes, place, addresses, (len(mesh.elements), len(mesh.child), mesh.n_inner), numbers)
+            words = self._kept.get(id(solid))
+            words = self._kept.setdefault(id(solid), _words_of(solid)) if words is None else words
+            row[1], row[2] = isinstance(solid, Polyhedron), words.ctypes.data
             return MESH
         return OTHER
 
 
-def unready(n: int) -> BodyTable:
+def unready(n: int) -> IntArray:
     """Return what says of n bodies that none is prepared."""
-    return _NOTHING._replace(kinds=np.full(n, UNREADY, np.int8)) if n else _NOTHING
+    rows = np.zeros((n, 4), np.int64)
+    rows[:, 0] = UNREADY
+    return rows
 
 
-def _lines(n: int, n_addresses: int, n_sizes: int, n_places: int) -> Lines:
-    return Lines(np.zeros((n, n_addresses), np.int64), np.zeros((n, n_sizes), np.int64), np.zeros((n, n_places)))
+def _words_of(solid: Polyhedron | Surface) -> IntArray:
+    """Return what kernels read of a mesh, without the tree that points are located by."""
+    mesh: Any = boundary_of(solid)
+    low, high, _ = own_box(solid)
+    words = np.zeros(MESH_WORDS, np.int64)
+    words[:5] = [array.ctypes.data for array in (mesh.elements, mesh.faces, mesh.boxes, mesh.child, mesh.corners)]
+    words[5:TREE] = len(mesh.elements), len(mesh.child), mesh.n_inner
+    words.view(np.float64)[PLACES:TREE_PLACES] = *mesh.origin, mesh.inverse, mesh.are_safe, *low, *high
+    return words
 
 
-def _put_line(lines: Lines, row: int, addresses: Any, sizes: Any, places: Any) -> None:
-    """Fill a row, its addresses last: kernels of other threads look at these."""
-    lines.sizes[row], lines.places[row] = sizes, places
-    lines.addresses[row] = addresses
-
-
-def _put_frame(table: BodyTable, frame: int, pose: Pose) -> bool:
-    """Fill the frame of a pose; tell whether kernels take its numbers."""
+def _frame_of(pose: Pose) -> FloatArray | None:
+    """Return the frame of a pose, None where kernels do not take its numbers: a row (7,) of each axis, of R^-1 as
+    double-doubles and of the shift; those of the plane with z = z."""
     entries, below = exact_inverse(pose)
-    n, inverse = pose.dimension, [[_double(entry, below) for entry in row] for row in entries]
-    table.inverses[frame, 2, 2, 0] = 1.0
-    table.inverses[frame, :n, :n], table.shifts[frame, :n] = inverse, pose.translation
-    return _are_safe([head for row in inverse for head, _ in row]) and _are_safe(pose.translation.tolist())
+    n, frame = pose.dimension, np.zeros((3, 7))
+    frame[2, 4] = 1.0
+    frame[:n, : 2 * n] = [np.ravel([_double(entry, below) for entry in row]) for row in entries]
+    frame[:n, 6] = pose.translation
+    return frame if _are_safe(frame[:, ::2].ravel().tolist()) else None
 
 
 def _double(above: int, below: int) -> tuple[float, float]:
@@ -144,6 +125,3 @@ def _double(above: int, below: int) -> tuple[float, float]:
 
 def _are_safe(numbers: Iterable[float]) -> bool:
     return all(x == 0.0 or SMALLEST <= abs(x) <= LARGEST for x in numbers)
-
-
-_NOTHING: Final = Table((), ()).of_kernels

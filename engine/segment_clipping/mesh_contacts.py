@@ -24,6 +24,7 @@ CUT_SLACK: Final = 2.0**-45
 LIMIT: Final = 4.0
 """Segments are cut to this cube, in coordinates of the tree, that is: far outside of every box."""
 
+_MOST: Final = np.float32(2.0**100)
 NOWHERE: Final = (np.float32(0.0), np.float32(0.0), np.float32(0.0))
 
 
@@ -55,3 +56,10 @@ def local_segment(p: Point3, q: Point3, origin: Any, inverse: float) -> tuple[An
         tiny,
         True,
     )
+
+
+@merged
+def inverse_of(half: Any) -> Any:
+    """Return 1 / half for `enter_boxes`; halves below 2^-100 are far below every slack."""
+    x, y, z = np.float32(1.0) / half[0], np.float32(1.0) / half[1], np.float32(1.0) / half[2]
+    return min(max(x, -_MOST), _MOST), min(max(y, -_MOST), _MOST), min(max(z, -_MOST), _MOST)

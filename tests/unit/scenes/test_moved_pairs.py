@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from engine import Aabb, Pose, Scene
-from engine.bounding.bvh import STACK
 from engine.parallel import Budget
 from engine.scenes.moved_pairs import PairRows, Placed, list_pairs
+from engine.scenes.posed_mesh import scratch_for
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
@@ -32,8 +32,10 @@ def test_pairs_are_those_whose_boxes_meet(dimension: int, reach: float) -> None:
             arrays = standing.base.arrays(budget)
             still = Placed(arrays.kinds, arrays.rotations, arrays.translations)
             moves = Placed(arrays.kinds, *standing.placed_numbers(budget)[1:])
-            scratch = np.empty(STACK, np.int32), np.empty(2 * n + 1, np.int64), np.empty((2, dimension))
-            n_pairs = list_pairs(named, reach, standing.where(budget), still, moves, rows, *scratch, budget.flag)
+            scratch, where = scratch_for(standing.n_rows), standing.where(budget)
+            n_pairs = list_pairs(
+                named, reach, where, still, moves, rows, scratch, np.empty((2, dimension)), budget.flag
+            )
             low, high = standing.boxes(budget).transpose(1, 0, 2)
         meet = ((low[:, None] <= high + reach) & (low <= high[:, None] + reach)).all(axis=2)
         expected = {(min(i, j), max(i, j)) for i in named.tolist() for j in range(n) if i != j and meet[i, j]}

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine import Aabb, Convex, HalfSpace, Polyhedron, Pose, Solid, Sphere, Surface
+from engine import Aabb, Convex, HalfSpace, Polyhedron, Pose, Scene, Solid, Sphere, Surface
 from engine.parallel import Budget
 from engine.scenes.bodies import Bodies
 from engine.scenes.posed_mesh import MOST_MET, WANTS_BODY, scratch_for
 from engine.scenes.standing import Standing
-from engine.scenes.through import OTHER, cut_pairs
-from engine.segment_clipping.boundary_cut import SETTLED
+from engine.scenes.through import OTHER, cut_near
+from engine.segment_clipping.parameters import compare
 from engine.segment_clipping.pieces import Pieces, first_of, joined, room_for
 from engine.segment_clipping.profiles import exact_pieces
 from tests.unit.scenes.scenes import FACES, OCTAHEDRON
@@ -31,19 +31,20 @@ BODIES: list[Solid] = [
 
 
 def cut_on(segments: Any, solid: Solid, pose: Pose | None) -> tuple[Pieces, Any]:
-    """Return the pieces of segments within a placed solid that are settled, and the state of each segment."""
-    standing, n = Standing(Bodies((solid,), (pose,)), {}), np.array([0, 0, 0, len(segments), 0])
-    room = MOST_MET + 2 * len(segments)
-    out, names, state = room_for(room, solid.dimension), np.empty(room, np.int64), np.empty(len(segments), np.uint8)
-    places, parts = np.arange(len(segments)), []
+    """Return the pieces of segments within a placed solid that are settled, and whether each segment is."""
+    standing, m = Standing(Bodies((solid,), (pose,)), {}), len(segments)
+    n, order, parts, is_settled = np.zeros(6, np.int64), np.arange(m), [], np.ones(m, np.bool_)
+    out, names = room_for(MOST_MET + 2 * m, solid.dimension), np.empty((MOST_MET + 2 * m, 2), np.int64)
+    left = np.empty((m, 2), np.int64)
     with Budget() as budget:
-        while n[0] < len(segments):
-            where, cut = standing.where(budget), standing.cut(budget)
-            cut_pairs(segments, places, places * 0, where, cut, scratch_for(1), budget.flag, out, names, state, n)
-            parts.append(Pieces(*(each.copy() for each in first_of(out, int(n[1])))))
-            if n[2] < 0:
-                standing.prepare(0, int(n[2]), budget)
-    return joined(parts), state
+        while n[0] < m:
+            words = standing.words(budget)
+            cut_near(segments, order, m, words, scratch_for(1), budget.flag, out, names, left, n)
+            parts.append(Pieces(*(each.copy() for each in first_of(out, int(n[2])))))
+            is_settled[left[: n[3], 0]] = False
+            if n[4] < 0:
+                standing.prepare(0, int(n[4]), budget)
+    return joined(parts), is_settled
 
 
 @pytest.mark.parametrize("solid", BODIES, ids=lambda solid: f"{solid.type} {solid.dimension}")
@@ -57,10 +58,10 @@ def test_agrees_with_exact_arithmetic_and_leaves_little(solid: Solid, place: str
     pose = None if place == "unposed" else Pose(turn, shift)
     segments = rng.uniform(-2, 2, (200, 2, dimension)) + (0.0 if pose is None else shift)
     segments[:20, 1] = segments[:20, 0] + rng.normal(size=(20, dimension)) * 1e-9
-    found, state = cut_on(segments, solid, pose)
-    assert (state == SETTLED).mean() > 0.97
+    found, are_settled = cut_on(segments, solid, pose)
+    assert are_settled.mean() > 0.97
     with Budget() as budget:
-        for item, is_settled in enumerate((state == SETTLED).tolist()):
+        for item, is_settled in enumerate(are_settled.tolist()):
             mine = found.source == item
             p, q = segments[item].tolist()
             expected = [piece.rounded(p, q) for piece in exact_pieces(p, q, solid, pose, budget)] if is_settled else []
@@ -78,4 +79,26 @@ def test_what_has_no_range_is_left() -> None:
     with Budget() as budget:
         for body in range(3):
             bodies.prepare(body, WANTS_BODY, budget)
-        assert bodies.table(budget).of_kernels.kinds.tolist() == [OTHER] * 3
+        assert bodies.table(budget).rows[:, 0].tolist() == [OTHER] * 3
+
+
+def test_touched_corners_and_sides_are_settled() -> None:
+    rng, shift = np.random.default_rng(11), np.array([3.0, 5.0, 9.0])  # a point at 0 is never surely rounded
+    corners = np.array(OCTAHEDRON, np.float64) + shift
+    on = np.concatenate([corners, corners[np.array(FACES)[:, :2]].mean(axis=1)]).repeat(8, axis=0)
+    way = np.round(rng.normal(size=on.shape) * 1024) / 1024  # on - way, on and on + way are in one line, exactly
+    segments = np.stack([on - way, on + way], axis=1)
+    for solid in (Polyhedron(corners, FACES), Surface(corners, FACES[:4])):
+        found, are_settled = cut_on(segments, solid, None)
+        assert are_settled.mean() > 0.97
+        pieces = Scene([solid]).clip_segments(segments)
+        with Budget() as budget:
+            for item, (p, q) in enumerate(segments.tolist()):
+                expected = exact_pieces(p, q, solid, None, budget)
+                rounded, mine = [piece.rounded(p, q) for piece in expected], pieces.source == item
+                assert pieces.t[mine].tolist() == [list(piece.t) for piece in rounded]
+                assert pieces.faces[mine].tolist() == [list(piece.faces) for piece in rounded]
+                assert pieces.start[mine].tolist() == [piece.start for piece in rounded]
+                are_points = [compare(piece.first, piece.last) == 0 for piece in expected]
+                assert (pieces.ranks[mine, 0] == pieces.ranks[mine, 1]).tolist() == are_points
+        assert len(found.t) > 0.95 * len(pieces)
