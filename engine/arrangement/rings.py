@@ -42,12 +42,13 @@ class Piece:
 
 
 def trace_pieces(
-    subdivision: Subdivision, inside: Sequence[bool], evidence: Sequence[frozenset[int]], budget: Budget | None = None
+    subdivision: Subdivision, inside: Sequence[int], evidence: Sequence[frozenset[int]], budget: Budget | None = None
 ) -> list[Piece]:
     """Return the regions that the faces marked `inside` make, in the order of their shells.
 
-    inside, evidence: one for each face; face 0 must be outside. Shells run counter-clockwise, holes clockwise; pieces
-    are in lexicographic order of their shells' nodes, holes likewise: the order does not depend on that of the input.
+    inside, evidence: one for each face; face 0 must be outside, marked 0; faces of two marks are two regions. Shells
+    run counter-clockwise, holes clockwise; pieces are in lexicographic order of their shells' nodes, holes likewise:
+    the order does not depend on that of the input.
     """
     budget = budget or Budget()
     arrangement, faces = subdivision.arrangement, subdivision.faces
@@ -61,7 +62,7 @@ def trace_pieces(
     for face, region in enumerate(region_of):
         gathered[region] |= evidence[face]
     fans = [[half_edge for half_edge in fan if bounds[half_edge >> 1]] for fan in subdivision.around]
-    starts = [2 * e if inside[faces[2 * e]] else 2 * e + 1 for e, is_boundary in enumerate(bounds) if is_boundary]
+    starts = [half_edge for half_edge, face in enumerate(faces) if bounds[half_edge >> 1] and inside[face]]
     budget.check()
     rank = _ranks(arrangement, fans)
     pieces: dict[int, Piece] = {}

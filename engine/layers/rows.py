@@ -25,6 +25,7 @@ from engine.polygon_overlay.found import chained, places_of
 from engine.polygon_overlay.polygon_arrays import Chosen, PolygonArrays, joined_arrays
 from engine.polygon_overlay.result import Output, Overlay
 from engine.polygon_overlay.run import Operation
+from engine.polygon_overlay.touching import Touching, touching
 from engine.polygon_overlay.union_all import less_all, union_all
 from engine.solids.checks import shown
 from engine.solids.polygon import Polygon
@@ -70,8 +71,9 @@ class LayerRows:
     left, right: (m,) int64, the feature of either layer that a row comes from, -1 where of none.
     vertices: (n, 2) float64. ring_offsets into them; no ring repeats its first vertex. piece_offsets into the rings, a
     shell counter-clockwise before its holes, clockwise. row_offsets (m + 1,) into the pieces; a row without pieces is
-    that of a feature without geometry.
+    that of a feature without geometry, or of two that meet without common area.
     n_collapsed: rows that are not here because rounding left no piece of them.
+    touching: where pairs meet without common area, by row; None where nobody asked.
     """
 
     left: IntArray
@@ -81,6 +83,7 @@ class LayerRows:
     piece_offsets: IntArray
     row_offsets: IntArray
     n_collapsed: int = 0
+    touching: Touching | None = None
 
     def __len__(self) -> int:
         return len(self.left)
@@ -98,13 +101,13 @@ class Limits:
     def __init__(self, deadline: float | None, cancel: Cancel | None, workers: int | None = None) -> None:
         seconds = Budget(deadline, cancel).deadline  # checks both
         self._end = None if seconds is None else time.monotonic() + seconds
-        self._cancel, self._workers = cancel, workers
+        self._cancel, self.workers = cancel, workers
         self._ulps, self._counts = 0.5, [0, 0, 0]
 
     def options(self) -> dict[str, Any]:
         """Return the options of the next call."""
         left = None if self._end is None else self._end - time.monotonic()
-        return {"deadline": left, "cancel": self._cancel, "workers": self._workers, "report": True}
+        return {"deadline": left, "cancel": self._cancel, "workers": self.workers, "report": True}
 
     def budget(self) -> Budget:
         """Return deadline and cancel switch of what is done here."""
@@ -125,11 +128,12 @@ class Limits:
         return Accuracy("exact", self._ulps, n_items, n_beyond, n_rational, "arrangement")
 
 
-def overlay_rows(left: Layer, right: Layer, how: str, limits: Limits) -> LayerRows:
+def overlay_rows(left: Layer, right: Layer, how: str, limits: Limits, with_touching: bool = False) -> LayerRows:
     """Overlay two layers, every feature with every one that it meets.
 
-    Boundary: features that meet without common area make no row. Degenerate input: polygons without area likewise; one
-    without geometry stands as a row without pieces where what is left of its layer is asked for.
+    Boundary: features that meet without common area make no row, unless it is asked where they do. Degenerate input:
+    polygons without area likewise; one without geometry stands as a row without pieces where what is left of its layer
+    is asked for.
     Accuracy: decisions exact, coordinates rounded once. Of a feature what others leave is its difference with all of
     these at once, in one arrangement.
     Cost: n log n for the boxes of both layers together, then that of `overlay_batch`.
@@ -141,7 +145,8 @@ def overlay_rows(left: Layer, right: Layer, how: str, limits: Limits) -> LayerRo
     parts = []
     if of_pairs:
         sides = Chosen(left.arrays, pairs[:, 0]), Chosen(right.arrays, pairs[:, 1])
-        parts.append(_rows(_overlaid(*sides, "intersection", limits), *pairs.T))
+        batch = _overlaid(*sides, "intersection", limits)
+        parts.append(_rows(batch, pairs[:, 0], pairs[:, 1], _touching(*sides, limits) if with_touching else None))
     if of_left:
         parts.append(_differences(left, right, pairs, rivals[1], limits))
     if of_right:
@@ -271,8 +276,13 @@ def _overlaid(
     return cast(OverlayBatch, limits.noted(found))
 
 
-def _rows(batch: OverlayBatch, left: IntArray, right: IntArray) -> LayerRows:
-    """Return the pairs of a batch that have pieces as rows."""
+def _touching(firsts: Chosen, seconds: Chosen, limits: Limits) -> Touching:
+    with limits.budget() as budget:
+        return touching(firsts, seconds, budget, limits.workers)
+
+
+def _rows(batch: OverlayBatch, left: IntArray, right: IntArray, more: Touching | None = None) -> LayerRows:
+    """Return the pairs of a batch that have pieces, or touch, as rows."""
     if batch.status.any():
         row = int(np.flatnonzero(batch.status)[0])
         raise NotRepresentableError(
@@ -281,19 +291,24 @@ def _rows(batch: OverlayBatch, left: IntArray, right: IntArray) -> LayerRows:
             (),
         )
     n_pieces = np.diff(batch.pair_offsets)
-    kept = np.flatnonzero(n_pieces)
+    is_row = n_pieces > 0
+    if more is not None:
+        is_row[more.lines] = is_row[more.points] = True
+        rows = np.cumsum(is_row) - 1
+        more = more._replace(lines=rows[more.lines], points=rows[more.points])
+    kept = np.flatnonzero(is_row)
     lost = int(((n_pieces == 0) & (batch.n_pieces_exact > 0)).sum())
-    sizes = summed(n_pieces[kept])
-    return LayerRows(left[kept], right[kept], batch.vertices, batch.ring_offsets, batch.piece_offsets, sizes, lost)
+    rings = batch.vertices, batch.ring_offsets, batch.piece_offsets
+    return LayerRows(left[kept], right[kept], *rings, summed(n_pieces[kept]), lost, more)
 
 
 def _together(parts: Sequence[LayerRows]) -> LayerRows:
-    """Return the rows of some parts one after another."""
+    """Return the rows of some parts one after another; pairs that touch are those of the first."""
     return LayerRows(
         np.concatenate([part.left for part in parts]), np.concatenate([part.right for part in parts]),
         np.concatenate([part.vertices for part in parts]), chained([part.ring_offsets for part in parts]),
         chained([part.piece_offsets for part in parts]), chained([part.row_offsets for part in parts]),
-        sum(part.n_collapsed for part in parts),
+        sum(part.n_collapsed for part in parts), parts[0].touching,
     )  # fmt: skip
 
 

@@ -20,7 +20,7 @@ from engine.polygon_overlay.overlay import accuracy_of, check_words, overlay_rin
 from engine.polygon_overlay.polygon_arrays import Chosen, PolygonArrays, gathered
 from engine.polygon_overlay.result import Output, Overlay
 from engine.polygon_overlay.rounds import SettledPairs, settle_pairs
-from engine.polygon_overlay.run import Operation, arranged_again, as_overlay, run_kernel
+from engine.polygon_overlay.run import KEPT_ARRAYS, Operation, arranged_again, as_overlay, run_kernel
 from engine.solids.base import Solid
 from engine.solids.polygon import Polygon
 from engine.solids.ragged import closed_rings, summed
@@ -169,11 +169,12 @@ def overlay_batch(
             for i_pair, solid in enumerate(solids):
                 rings_of(solid, name, i_pair)
     parts: dict[int, Found] = {}
+    kept = KEPT_ARRAYS[operation]
     with Budget(deadline, cancel) as budget:
 
         def task(start: int, stop: int) -> None:
             # Gathered here, chunk by chunk: one thread does while another's kernel runs, and what it wrote is near.
-            parts[start] = run_kernel(_gathered(subjects[start:stop]), _gathered(clips[start:stop]), operation, budget)
+            parts[start] = run_kernel(_gathered(subjects[start:stop]), _gathered(clips[start:stop]), kept, budget)
 
         run_chunks(task, len(subjects), budget=budget, first_chunk=_FIRST_CHUNK, workers=workers, progress=progress)
         found = first_found = joined([parts[start] for start in sorted(parts)] or [NO_PAIRS])

@@ -16,8 +16,8 @@ import numpy as np
 from engine.arrangement.arrange import Arrangement, arrange_rings
 from engine.arrangement.exact_area import ExactRings
 from engine.arrangement.rings import Piece, trace_pieces
-from engine.arrangement.subdivision import label_faces, subdivide
-from engine.arrays import FloatArray
+from engine.arrangement.subdivision import Subdivision, label_faces, subdivide
+from engine.arrays import FloatArray, IntArray
 from engine.errors import TooComplexError
 from engine.parallel import Budget
 from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
@@ -39,25 +39,8 @@ def overlay_exactly(
     nesting: Nesting = UNNAMED, is_on_grid: bool = False,
 ) -> tuple[Overlay, int]:  # fmt: skip
     """Return the overlay of checked rings (either may be empty), and how many pairs of edges the filter left open."""
-    vertices = np.concatenate([subject.vertices, clip.vertices])
-    offsets = [*subject.offsets.tolist(), *(clip.offsets[1:] + len(subject.vertices)).tolist()]
-    arrangement = arrange_rings(vertices, offsets, None, budget)
-    subdivision = subdivide(arrangement, budget)
-    sources = nesting.shells
-    if nesting.rule == PAIR:
-        sources = np.repeat([0, 1], [len(subject.offsets) - 1, len(clip.offsets) - 1])
-    if nesting.rule in (NON_ZERO, POSITIVE, NEGATIVE):
-        labels = label_faces(subdivision, _windings(arrangement, vertices, offsets), winds=True)
-        inside = [{NON_ZERO: label != 0, POSITIVE: label > 0, NEGATIVE: label < 0}[nesting.rule] for label in labels]
-    else:
-        source_of = np.repeat(sources, np.diff(offsets)).tolist()
-        masks = [_odd(source_of[k] for k in edges) for edges in arrangement.cover]
-        labels = [label or frozenset() for label in label_faces(subdivision, masks)]  # 0 where there is no edge
-        if nesting.rule == PAIR:
-            inside = [KEPT[operation][sum(1 << source for source in label)] for label in labels]
-        else:
-            inside = [label == {0} if nesting.rule == FIRST_ALONE else bool(label) for label in labels]
-    budget.check()
+    subdivision, inside = _labelled(subject, clip, KEPT[operation], budget, nesting)
+    arrangement = subdivision.arrangement
     pieces = trace_pieces(subdivision, inside, [frozenset()] * subdivision.n_faces, budget)
     nodes = arrangement.nodes
     corners = [[arrangement.origin(half_edge) for half_edge in ring] for ring in rings_of(pieces)]
@@ -73,6 +56,42 @@ def overlay_exactly(
             raise TooComplexError("snap rounding left a vertex off its lattice; please report this input")
         result = settled
     return replace(result, _starts=np.array([len(subject.vertices)])), arrangement.n_exact
+
+
+def parts_exactly(subject: RingArrays, clip: RingArrays, budget: Budget) -> tuple[Found, IntArray]:
+    """Return what the kernel does that keeps each part, and of each vertex a number of its exact place."""
+    subdivision, inside = _labelled(subject, clip, range(4), budget)
+    pieces = trace_pieces(subdivision, inside, [frozenset((part,)) for part in inside], budget)
+    found = rounded(subdivision.arrangement, pieces)
+    parts = [part for piece in pieces for part in (*piece.evidence,) * (1 + len(piece.holes))]
+    places = [subdivision.arrangement.origin(half_edge) for ring in rings_of(pieces) for half_edge in ring]
+    return found._replace(evidence=np.array([range(len(parts)), parts], np.int64).T), np.array(places, np.int64)
+
+
+def _labelled(
+    subject: RingArrays, clip: RingArrays, kept: Sequence[int], budget: Budget, nesting: Nesting = UNNAMED
+) -> tuple[Subdivision, list[int]]:
+    """Return the faces of an arrangement of checked rings, and of each the part of the result that it is in, or 0."""
+    vertices = np.concatenate([subject.vertices, clip.vertices])
+    offsets = [*subject.offsets.tolist(), *(clip.offsets[1:] + len(subject.vertices)).tolist()]
+    arrangement = arrange_rings(vertices, offsets, None, budget)
+    subdivision = subdivide(arrangement, budget)
+    sources = nesting.shells
+    if nesting.rule == PAIR:
+        sources = np.repeat([0, 1], [len(subject.offsets) - 1, len(clip.offsets) - 1])
+    if nesting.rule in (NON_ZERO, POSITIVE, NEGATIVE):
+        labels = label_faces(subdivision, _windings(arrangement, vertices, offsets), winds=True)
+        inside = [{NON_ZERO: label != 0, POSITIVE: label > 0, NEGATIVE: label < 0}[nesting.rule] for label in labels]
+    else:
+        source_of = np.repeat(sources, np.diff(offsets)).tolist()
+        masks = [_odd(source_of[k] for k in edges) for edges in arrangement.cover]
+        labels = [label or frozenset() for label in label_faces(subdivision, masks)]  # 0 where there is no edge
+        if nesting.rule == PAIR:
+            inside = [kept[sum(1 << source for source in label)] for label in labels]
+        else:
+            inside = [label == {0} if nesting.rule == FIRST_ALONE else bool(label) for label in labels]
+    budget.check()
+    return subdivision, inside
 
 
 def _odd(sources: Iterable[int]) -> _Sources:

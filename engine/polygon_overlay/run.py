@@ -8,7 +8,7 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray, read_only
+from engine.arrays import FlagArray, FloatArray, IntArray, read_only
 from engine.direct import entry_of
 from engine.parallel import Budget
 from engine.polygon_overlay.compiled.kernel import DONE, NEEDS_CONTACTS, NEEDS_OUTPUT, overlay_pairs
@@ -36,19 +36,21 @@ KEPT: Final = {  # by the label of a face: in neither, in the subject, in the cl
     "symmetric_difference": (False, True, True, False),
 }
 KEPT_ARRAYS: Final = {name: np.array(kept, np.uint8) for name, kept in KEPT.items()}
+EACH_PART: Final = np.arange(4, dtype=np.uint8)
+"""Keeps what lies in the subject alone, in the clip alone and in both, as parts 1, 2 and 3 of one result."""
 
 
 def run_kernel(
-    subjects: PolygonArrays, clips: PolygonArrays, operation: Operation, budget: Budget, nesting: Nesting = UNNAMED
+    subjects: PolygonArrays, clips: PolygonArrays, kept: FlagArray, budget: Budget, nesting: Nesting = UNNAMED
 ) -> Found:
     """Overlay polygons pair by pair. Raises as `Budget.check` when the call must end.
 
+    kept: as `overlay_pairs` takes it, one of `KEPT_ARRAYS`, or `EACH_PART`.
     nesting: of the rings of subjects, to be arranged each as a source of its own, as `overlay_pairs` takes it.
     """
     n = len(subjects.polygon_offsets) - 1
     n_vertices, n_rings = map(sum, zip(subjects.most(), clips.most(), strict=True))
     sides = RingArrays(*subjects[:2]), subjects.polygon_offsets, RingArrays(*clips[:2]), clips.polygon_offsets
-    kept = KEPT_ARRAYS[operation]
     outcomes = Outcomes(np.empty(n, np.int8), np.empty((n, 4), np.int64), np.empty(n))
     reached = 0
     parts: list[list[Any]] = []
@@ -132,7 +134,7 @@ def arranged_again(rings: Found, budget: Budget) -> Found:
     subjects = PolygonArrays(read_only(rings.vertices), read_only(rings.ring_offsets), items)
     none = PolygonArrays(*NOTHING, read_only(np.zeros_like(items)))
     nesting = Nesting(shells - np.repeat(items[:-1], n_rings), ring_sizes(rings)[shells], AGAIN)
-    return run_kernel(subjects, none, "union", budget, nesting)
+    return run_kernel(subjects, none, KEPT_ARRAYS["union"], budget, nesting)
 
 
 def as_overlay(

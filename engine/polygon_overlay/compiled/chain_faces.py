@@ -26,8 +26,8 @@ NOTHING: Final = -1
 Faces = namedtuple("Faces", "cycle following joined regions inside bounds fan")
 """By half-chain: cycle, or -1 where another half-chain stands for it; following: the one that goes on around its face.
 By cycle, of which entry n_cycles is the unbounded face: joined, a forest of those of one face; regions, of those of one
-region of the result; inside: whether it is in the result. bounds: by chain, whether it bounds the result; fan: by node,
-how many that do."""
+region of the result; inside: the part of the result that it is in, or 0. bounds: by chain, whether it bounds one; fan:
+by node, how many that do."""
 
 
 @inline

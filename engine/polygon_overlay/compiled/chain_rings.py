@@ -121,11 +121,8 @@ def walk_rings(
     place[:n_nodes] = -1
     rings.offset[0] = 0
     n_rings = n_points = 0
-    for chain in range(n_chains):
-        if not faces.bounds[chain]:
-            continue
-        start = 2 * chain if faces.inside[faces.cycle[2 * chain]] else 2 * chain + 1
-        if seen[start]:
+    for start in range(2 * n_chains):
+        if not faces.bounds[start >> 1] or not faces.inside[faces.cycle[start]] or seen[start]:
             continue
         if stop[0]:
             return n_rings, n_points

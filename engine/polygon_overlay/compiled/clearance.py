@@ -123,6 +123,8 @@ def _is_apart(points: Any, x: Any, y: Any, a: int, b: int, c: int, d: int, squar
         a, b, c, d = b, a, d, c
     elif points[a] != points[c]:
         return segments_are_far(x, y, a, b, c, d, square)
+    if points[b] == points[d]:  # one edge, of two parts
+        return True
     return is_far(x[b], y[b], x[c], y[c], x[d], y[d], square) and is_far(x[d], y[d], x[a], y[a], x[b], y[b], square)
 
 

@@ -270,6 +270,16 @@ def _tell(w: Workspace, n_found: int, first: int, output: Output, filled: _Fille
 
 
 @merged
+def _tell_parts(w: Workspace, n_found: int, output: Output, filled: _Filled) -> int:
+    """Append of each ring the part of the result that it bounds; return how many rings there are then."""
+    for k in range(n_found):
+        ring = w.ranking.order[k] if n_found > 1 else 0
+        at = filled.n_rings + k
+        output.evidence[at, 0], output.evidence[at, 1] = at, w.faces.inside[w.found.region[ring]]
+    return filled.n_rings + n_found
+
+
+@merged
 def _ended(pair: int, needs: int, filled: _Filled, n_left_out: int) -> tuple[int, int, int, int, int, int, int]:
     n_vertices, n_rings, n_pieces, n_evidence = filled
     return pair, needs, n_vertices, n_rings, n_pieces, n_evidence, n_left_out
@@ -282,15 +292,16 @@ def overlay_pairs(
 ) -> tuple[int, int, int, int, int, int, int]:  # fmt: skip
     """Overlay the pairs from ``begin`` on; fill outcomes, by pair, and output from its beginning.
 
-    subject_items, clip_items: the first ring of each polygon, and the end of the last one's. kept: (4,) uint8 by label.
-    nesting: of the rule PAIR; or, without clips, and kept all but the first, that of the rings of subjects
-    (ring_nesting.py), numbers counted from the pair's first ring; by the rule AGAIN evidence is filled too, with
-    numbers of rings. A source is an input vertex and -1, where the ring goes on along an edge of that vertex, or -3 -
-    e, along edge e; or two edges that cross, the one that it goes on along first. Edges by their first vertices;
-    vertices are counted from the pair's first, those of its clip after those of its subject. The input vertex and
-    LEFT_OUT where the vertices up to the next source are left out. reduced: what reduce_pair returned for the only
-    pair; no vertices, no such pair. Returns the pair reached, FINISHED or what is needed to go on with it, numbers of
-    vertices, rings, pieces, rows of evidence, and how many vertices are left out.
+    subject_items, clip_items: the first ring of each polygon, and the end of the last one's. kept: (4,) uint8 by label,
+    of more than one part where some are above 1: then evidence is of each ring its number and its part. nesting: of the
+    rule PAIR; or, without clips, and kept all but the first, that of the rings of subjects (ring_nesting.py), numbers
+    counted from the pair's first ring; by the rule AGAIN evidence is filled too, with numbers of rings. A source is an
+    input vertex and -1, where the ring goes on along an edge of that vertex, or -3 - e, along edge e; or two edges that
+    cross, the one that it goes on along first. Edges by their first vertices; vertices are counted from the pair's
+    first, those of its clip after those of its subject. The input vertex and LEFT_OUT where the vertices up to the next
+    source are left out. reduced: what reduce_pair returned for the only pair; no vertices, no such pair. Returns the
+    pair reached, FINISHED or what is needed to go on with it, numbers of vertices, rings, pieces, rows of evidence, and
+    how many vertices are left out.
     """
     w = rows_of(buffers)
     is_intersection = not (kept[0] or kept[1] or kept[2])
@@ -346,7 +357,11 @@ def overlay_pairs(
         if not _has_room(output, filled, m, n_found):
             counts[pair, 1], counts[pair, 2] = n_found, m
             return _ended(pair, NEEDS_OUTPUT, filled, 0)
-        n_evidence = _tell(w, n_found, span.first, output, filled) if nesting.rule == AGAIN else 0
+        n_evidence = 0
+        if nesting.rule == AGAIN:
+            n_evidence = _tell(w, n_found, span.first, output, filled)
+        elif kept[3] > 1:
+            n_evidence = _tell_parts(w, n_found, output, filled)
         if n_evidence == NO_ROOM:
             counts[pair, 2] = 2 * output.vertices.shape[0]
             return _ended(pair, NEEDS_OUTPUT, filled, 0)

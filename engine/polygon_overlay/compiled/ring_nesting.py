@@ -93,13 +93,13 @@ def _cross(given: Given, chains: Chains, nesting: Nesting, h: Holders, half: int
 
 
 @merged
-def _is_inside(rule: int, kept: Any, h: Holders, n_held: int) -> bool:
-    """Tell whether a face is inside by a rule other than AGAIN."""
+def _is_inside(rule: int, kept: Any, h: Holders, n_held: int) -> int:
+    """Tell whether a face is inside by a rule other than AGAIN; of two polygons return what the table says."""
     if rule == PAIR:
-        return bool(kept[n_held])
+        return int(kept[n_held])
     if rule == FIRST_ALONE:
-        return n_held == 1 and h.place[0] == 0
-    return n_held < 0 if rule == NEGATIVE else n_held > 0 if rule != NON_ZERO else n_held != 0
+        return int(n_held == 1 and h.place[0] == 0)
+    return int(n_held < 0 if rule == NEGATIVE else n_held > 0 if rule != NON_ZERO else n_held != 0)
 
 
 @merged

@@ -18,7 +18,7 @@ from engine.polygon_overlay.nearest import nearest_pairs
 from engine.polygon_overlay.overlay import overlay
 from engine.polygon_overlay.polygon_arrays import gathered
 from engine.polygon_overlay.rounds import settle_pairs
-from engine.polygon_overlay.run import arranged_again, overlay_compiled, run_kernel
+from engine.polygon_overlay.run import KEPT_ARRAYS, arranged_again, overlay_compiled, run_kernel
 from engine.solids.polygon import Polygon
 from tests.unit.polygon_overlay import families as families
 from tests.unit.polygon_overlay.checks import OPERATIONS
@@ -165,7 +165,7 @@ def doubtful() -> Found:
     for family in (families.slivers, families.pencils, families.nearly_coincident):
         for seed in range(8):
             first, second = (gathered([Polygon(list(each))]) for each in families.drawn(family, seed))
-            found.append(run_kernel(first, second, "union", Budget()))
+            found.append(run_kernel(first, second, KEPT_ARRAYS["union"], Budget()))
     return joined(found)
 
 

@@ -1,0 +1,142 @@
+"""Where two polygons meet without common area: the stretches of border that they share, and single points.
+
+A point of both belongs to their common area, or lies on a line that has one polygon on one side and the other on the
+other, or stands alone. All is read from one exact arrangement, whose parts are what lies in the first polygon alone, in
+the second alone, and in both:
+
+    .-------a-------.       From a to b runs an edge of both parts, in either direction: a line.
+    |       |   2   |       c is a vertex of both, on no line, and not of the third part: a point.
+    |   1   b---.   |
+    |      /  .-'   |
+    |     .--c------'
+    '-------'
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from engine.arrays import BoolArray, FloatArray, IntArray
+from engine.parallel import Budget, run_chunks
+from engine.polygon_overlay.compiled.kernel import DONE
+from engine.polygon_overlay.compiled.loading import RingArrays
+from engine.polygon_overlay.found import Found, chained, ring_numbers
+from engine.polygon_overlay.in_integers import parts_exactly
+from engine.polygon_overlay.polygon_arrays import Chosen
+from engine.polygon_overlay.run import EACH_PART, run_kernel
+from engine.solids.ragged import next_in_rings, summed
+
+_FIRST: Final = 1
+_SECOND: Final = 2
+_BOTH: Final = 3
+_FIRST_CHUNK: Final = 64
+
+
+class Touching(NamedTuple):
+    """Lines and points of some pairs. lines, points: the pair of each, ascending. vertices (n, 2) float64 of all lines,
+    one after another; offsets of each into them; places (n_points, 2) float64."""
+
+    lines: IntArray
+    vertices: FloatArray
+    offsets: IntArray
+    points: IntArray
+    places: FloatArray
+
+
+_NOWHERE: Final = Touching(
+    np.zeros(0, np.int64), np.zeros((0, 2)), np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros((0, 2))
+)
+
+
+def touching(firsts: Chosen, seconds: Chosen, budget: Budget, workers: int | None = None) -> Touching:
+    """Return where pairs of polygons, firsts[k] and seconds[k], each even-odd, meet without common area.
+
+    Boundary, degenerate input: polygons are closed sets, the closure of their interior: spikes and rings without area
+    are not there, walls between parts are not seen. A line bends where the border does, and ends where lines meet.
+    Accuracy: decisions exact. Coordinates are those of the input, but for places where a polygon crosses itself: the
+    nearest doubles.
+    Cost: as `overlay_batch`; of pairs whose rounded rings need another look, some 10 us per edge more.
+    """
+    found: dict[int, Touching] = {}
+
+    def task(start: int, stop: int) -> None:
+        some, others = firsts[start:stop], seconds[start:stop]
+        arranged = run_kernel(some.together(), others.together(), EACH_PART, budget)
+        pairs = np.repeat(np.arange(start, stop), arranged.counts[:, 1])
+        parts = np.where(arranged.status[pairs - start] == DONE, arranged.evidence[:, 1], 0)
+        read = [_read(arranged, parts, pairs, _numbered(arranged, pairs))]
+        for pair in np.flatnonzero(arranged.status != DONE).tolist():
+            first, second = (each[pair : pair + 1].together() for each in (some, others))
+            alone, places = parts_exactly(RingArrays(*first[:2]), RingArrays(*second[:2]), budget)
+            parts = alone.evidence[:, 1]
+            read.append(_read(alone, parts, np.full(len(parts), start + pair), places))
+        found[start] = _joined(read)
+
+    run_chunks(task, len(firsts), budget=budget, first_chunk=_FIRST_CHUNK, workers=workers)
+    return _joined([_NOWHERE, *(found[start] for start in sorted(found))])
+
+
+def _numbered(found: Found, pairs: IntArray) -> IntArray:
+    """Return of each vertex the number of its place in its pair; pairs: by ring.
+
+    Rings that are valid once rounded have no two places in one.
+    """
+    keys = *found.vertices.T, np.repeat(pairs, np.diff(found.ring_offsets))
+    order = np.lexsort(keys)
+    is_new = np.zeros(len(order), np.bool_)
+    for key in keys:
+        in_order = key[order]
+        is_new[1:] |= in_order[1:] != in_order[:-1]
+    numbers = np.empty(len(order), np.int64)
+    numbers[order] = np.cumsum(is_new)
+    return numbers
+
+
+def _read(found: Found, parts: IntArray, pairs: IntArray, places: IntArray) -> Touching:
+    """Return the lines and points of rings; parts, pairs: by ring; places: by vertex the number of its place."""
+    rings, after = ring_numbers(found.ring_offsets), next_in_rings(found.ring_offsets)
+    n_places = int(places.max(initial=0)) + 1
+    part = parts[rings]
+    is_in = [np.bincount(places[part == k], minlength=n_places)[places] > 0 for k in (_SECOND, _BOTH)]
+    there, back = n_places * places + places[after], n_places * places[after] + places
+    is_line = (part == _FIRST) & np.isin(there, back[part == _SECOND])
+    n_lines = np.bincount(np.append(places[is_line], places[after[is_line]]), minlength=n_places)[places]
+    alone = np.flatnonzero((part == _FIRST) & is_in[0] & ~is_in[1] & (n_lines == 0))
+    alone = alone[np.unique(places[alone], return_index=True)[1]]
+    edges, starts = _in_line(found.ring_offsets, rings, is_line, n_lines == 2)
+    ends = np.append(starts, len(edges))[1:]
+    along = np.insert(edges, ends, after[edges[ends - 1]])
+    offsets = summed(ends - starts + 1)
+    return Touching(
+        pairs[rings[edges[starts]]], found.vertices[along], offsets, pairs[rings[alone]], found.vertices[alone]
+    )
+
+
+def _in_line(offsets: IntArray, rings: IntArray, is_line: BoolArray, goes_on: BoolArray) -> tuple[IntArray, IntArray]:
+    """Return the edges of lines, by their first vertices, one line after another, and where each line begins.
+
+    goes_on: by vertex whether no more than two edges of lines meet there.
+    """
+    sizes = np.diff(offsets)
+    is_head = is_line & ~(is_line[np.arange(len(rings)) - 1] & goes_on)
+    firsts = offsets[:-1]
+    is_head[firsts] = is_line[firsts] & ~(is_line[offsets[1:] - 1] & goes_on[firsts])
+    heads = np.flatnonzero(is_head)[::-1]
+    begins = firsts.copy()
+    begins[rings[heads]] = heads  # of each ring its first head, written last
+    is_head[begins] |= is_line[begins]  # case: a line all around its ring
+    edges = np.flatnonzero(is_line)
+    turned = (edges - begins[rings[edges]]) % sizes[rings[edges]]
+    edges = edges[np.lexsort((turned, rings[edges]))]
+    return edges, np.flatnonzero(is_head[edges])
+
+
+def _joined(parts: list[Touching]) -> Touching:
+    """Return the lines and points of some pairs, those of one part after another's."""
+    lines, vertices, offsets, points, places = zip(*parts)
+    return Touching(
+        np.concatenate(lines), np.concatenate(vertices), chained(offsets), np.concatenate(points),
+        np.concatenate(places),
+    )  # fmt: skip
