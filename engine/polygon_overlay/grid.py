@@ -25,7 +25,7 @@ from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
 from engine.polygon_overlay.compiled.snapping import FOLDS, scale, snap
 from engine.polygon_overlay.compiled.workspace import keep, scratch_for
 from engine.polygon_overlay.found import Found, one_pair, ring_numbers
-from engine.polygon_overlay.implicit_rings import ImplicitRings, edges_along, rings_alone
+from engine.polygon_overlay.implicit_rings import ImplicitRings, rings_alone
 from engine.polygon_overlay.result import Overlay, made_overlay
 from engine.polygon_overlay.run_pair import FoundPair
 from engine.solids.checks import shown
@@ -61,7 +61,7 @@ class Grid(NamedTuple):
         """Return coordinates in units of the grid; by powers of ten these are rounded to doubles."""
         near_by = _ROUNDED if self.base == 10 else 0.0  # multiples, rounded twice, are whole numbers again
         units = np.empty_like(vertices)
-        if not entry_of(scale)(vertices, *self.into, near_by, _LEAST, _MOST, units):
+        if not entry_of(scale)(vertices, *self.into, near_by, _LEAST, units) < _MOST:
             raise InvalidInputError(
                 f"grid must be no finer than 2^-51 of the largest coordinate, {np.abs(vertices).max().item()!r}; got "
                 f"{self.spacing!r}",
@@ -69,12 +69,13 @@ class Grid(NamedTuple):
             )
         return read_only(units)
 
-    def places_of(self, units: FloatArray) -> FloatArray:
-        """Return the doubles nearest to whole multiples of the grid."""
+    def places_of(self, units: FloatArray) -> tuple[FloatArray, float]:
+        """Return the doubles nearest to whole multiples of the grid, and the largest of them without its sign."""
         places = np.empty_like(units)
-        if not entry_of(scale)(units, *self.back, 0.0, 0.0, inf, places):
+        largest = entry_of(scale)(units, *self.back, 0.0, 0.0, places)
+        if not largest < inf:
             raise NotRepresentableError("a multiple of the grid is beyond the largest float64; scale the input down")
-        return read_only(places)
+        return read_only(places), largest
 
 
 def grid_of(size: object) -> Grid:
@@ -104,11 +105,13 @@ def _grid_of(size: float) -> Grid | None:
 
 class _OnGrid(NamedTuple):
     """What becomes of valid rings on whole numbers. n_moved: vertices that are none; stays: whether rings stay what
-    they are. vertices, offsets, edges: rings then, and by vertex the one whose edge goes on from there; else the whole
-    points of all vertices, and of passages which edge passes the pixel of which vertex."""
+    they are; are_apart: whether no edge is surely nearer to another vertex then than half a cell. vertices, offsets,
+    edges: rings then, and by vertex the one whose edge goes on from there; else the whole points of all vertices, and
+    of passages which edge passes the pixel of which vertex."""
 
     n_moved: int
     stays: bool
+    are_apart: bool
     vertices: FloatArray
     offsets: IntArray
     edges: Int32Array | None
@@ -124,7 +127,7 @@ def snap_vertices(vertices: FloatArray, offsets: IntArray, piece_offsets: IntArr
         passages = np.empty((n_most, 2), np.int32)
         budget.take(8 * n_most)
         scratch = scratch_for(n, n_rings, 256, 0, 0)
-        n_moved, m, n_corners = entry_of(snap)(
+        n_moved, m, n_corners, are_apart = entry_of(snap)(
             vertices, offsets, piece_offsets, budget.flag, scratch.buffers, pixels, corners, starts, passages
         )
         budget.check()
@@ -133,11 +136,11 @@ def snap_vertices(vertices: FloatArray, offsets: IntArray, piece_offsets: IntArr
             break
         n_most = m
     if n_corners in (n, FOLDS):
-        return _OnGrid(n_moved, n_corners == n, read_only(pixels), offsets, None, passages[:m])
+        return _OnGrid(n_moved, n_corners == n, are_apart, read_only(pixels), offsets, None, passages[:m])
     corners = corners[:n_corners]
     pixels = pixels[corners]
     n_moved = int((pixels != vertices[corners]).any(axis=1).sum())
-    return _OnGrid(n_moved, True, read_only(pixels), read_only(starts), corners, passages[:m])
+    return _OnGrid(n_moved, True, are_apart, read_only(pixels), read_only(starts), corners, passages[:m])
 
 
 def snapped_to_units(rings: Found, budget: Budget, known: _OnGrid | None = None) -> Found:
@@ -164,16 +167,19 @@ def as_it_stays(found: FoundPair, snapped: _OnGrid, grid: Grid, start: int) -> O
     start: of the vertices of the clip among all. The same as `settle_rings` and `from_units`; None where they do not,
     or doubles may not tell its multiples apart.
     """
-    if not snapped.stays or (grid.base == 10 and not _are_told_apart(snapped.vertices, snapped.offsets)):
+    if not snapped.stays:
         return None
-    places, edges = grid.places_of(snapped.vertices), edges_along(found.sources)
+    # by powers of ten a vertex and an edge come nearer by less than half a cell, below 2^51 cells
+    if grid.base == 10 and not snapped.are_apart and not _are_told_apart(snapped.vertices, snapped.offsets):
+        return None
+    places, largest = grid.places_of(snapped.vertices)
     has_moved = snapped.n_moved > 0 or snapped.edges is not None
     displacement = nextafter(found.displacement + HALF_DIAGONAL, inf) if has_moved else found.displacement
     return made_overlay(
         places, snapped.offsets, found.piece_offsets, rings_alone(places, snapped.offsets),
-        largest_displacement=_displacement(displacement, grid, places),
+        largest_displacement=_displacement(displacement, grid, largest),
         rounds=int(found.displacement > 0.0) + int(has_moved), snapped=has_moved, vertices_moved=snapped.n_moved,
-        _edges=edges if snapped.edges is None else edges[snapped.edges], _starts=np.array([start]),
+        _edges=found.sources if snapped.edges is None else found.sources[snapped.edges], _starts=np.array([start]),
     )  # fmt: skip
 
 
@@ -214,11 +220,11 @@ def _are_told_apart(units: FloatArray, offsets: IntArray) -> bool:
     return is_near or bool(largest * np.abs(units[next_in_rings(offsets)] - units).max() <= _FINEST)
 
 
-def _displacement(displacement: float, grid: Grid, places: FloatArray) -> float:
-    """Return a bound in units, with what is rounded between these and places, as one between places."""
+def _displacement(displacement: float, grid: Grid, largest: float) -> float:
+    """Return a bound in units as one between places, with what is rounded between these, up to the largest place."""
     moved = grid.spacing * displacement
-    if grid.base == 10 and len(places):  # units are rounded, and what they stand for
-        moved += 2.0 * ulp(max(-float(places.min()), float(places.max())))
+    if grid.base == 10 and largest > 0.0:  # units are rounded, and what they stand for
+        moved += 2.0 * ulp(largest)
     return nextafter(moved, inf) if moved else 0.0
 
 
@@ -227,7 +233,7 @@ def from_units(result: Overlay, grid: Grid, start: int, again: Any, budget: Budg
 
     start: of the vertices of the clip among all. again: arranges rings.
     """
-    vertices = grid.places_of(read_only(result.vertices))
+    vertices, largest = grid.places_of(read_only(result.vertices))
     if grid.base == 10 and not _are_told_apart(result.vertices, result.ring_offsets):
         rings = one_pair(vertices, result.ring_offsets, result.piece_offsets, 0.0, 0, status=MAY_CROSS)
         if not np.array_equal(again(rings, budget).vertices, vertices):
@@ -237,10 +243,10 @@ def from_units(result: Overlay, grid: Grid, start: int, again: Any, budget: Budg
     edges = result._edges
     if edges is None:
         assert isinstance(result.exact, ImplicitRings)
-        edges = edges_along(result.exact.sources)
+        edges = result.exact.sources
     return replace(
         result, vertices=vertices, exact=rings_alone(vertices, result.ring_offsets),
-        largest_displacement=_displacement(result.largest_displacement, grid, vertices),
+        largest_displacement=_displacement(result.largest_displacement, grid, largest),
         _lost=result._lost and result._lost._replace(unit=Fraction(grid.base) ** grid.power), _edges=edges,
         _starts=np.array([start]),
     )  # fmt: skip

@@ -10,6 +10,7 @@ from itertools import pairwise
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from engine.arrangement.exact_area import ExactRings
 from engine.arrangement.nodes import nearest_quotient
@@ -126,7 +127,8 @@ class Overlay:
     snapped: the coarser lattice of snap rounding was needed.
     exact: the rings of the exact result, from which `area_exact` and `area` are computed when asked for.
     _lost: of what `collapsed` is made when asked for; None where rounding lost nothing.
-    _edges: by vertex the input edge along which its ring goes on, by its first vertex; None: that of ``exact``.
+    _edges: by vertex the input edge along which its ring goes on, by its first vertex; or sources, as
+        ``exact`` has them, that tell; None: those.
     _starts: the first vertex of each input but the first, all inputs one after another; None: that of the clip.
     """
 
@@ -139,7 +141,7 @@ class Overlay:
     output: Output = "valid"
     may_be_invalid: bool = False
     _lost: Lost | None = field(default=None, repr=False)
-    _edges: IntArray | None = field(default=None, repr=False)
+    _edges: npt.NDArray[np.signedinteger] | None = field(default=None, repr=False)
     _starts: IntArray | None = field(default=None, repr=False)
     largest_displacement: float = 0.0
     rounds: int = 0
@@ -189,11 +191,11 @@ class Overlay:
         exact = self.exact
         edges, starts = self._edges, self._starts
         if isinstance(exact, ImplicitRings):
-            edges = edges_along(exact.sources) if edges is None else edges
+            edges = exact.sources if edges is None else edges
             starts = np.array([len(exact.subject.vertices)]) if starts is None else starts
         assert edges is not None
         assert starts is not None
-        return np.searchsorted(starts, edges, side="right")
+        return np.searchsorted(starts, edges_along(edges) if edges.ndim == 2 else edges, side="right")
 
     @property
     def __geo_interface__(self) -> dict[str, Any]:

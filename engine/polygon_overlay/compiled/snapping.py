@@ -39,11 +39,11 @@ def _pixel(x: float) -> float:
 
 
 @called
-def _passes(ax: float, ay: float, bx: float, by: float, x: float, y: float) -> bool:
-    """Tell whether the segment ab passes the pixel about (x, y)."""
+def _passes(ax: float, ay: float, bx: float, by: float, x: float, y: float, reach: float) -> bool:
+    """Tell whether the segment ab passes the half-open square of half-side ``reach`` about (x, y)."""
     if bx < ax:
         ax, ay, bx, by = bx, by, ax, ay
-    left, right, low, high = x - 0.5, x + 0.5, y - 0.5, y + 0.5
+    left, right, low, high = x - reach, x + reach, y - reach, y + reach
     if not ((bx >= left) & (ax < right) & (max(ay, by) >= low) & (min(ay, by) < high)):
         return False
     if ax == bx or ay == by:
@@ -55,23 +55,21 @@ def _passes(ax: float, ay: float, bx: float, by: float, x: float, y: float) -> b
 
 
 @bare_kernel
-def scale(
-    values: Any, divisor: float, factor: float, more: float, near_by: float, least: float, limit: float, scaled: Any
-) -> bool:
-    """Fill ``scaled``, (n, 2), with values by ``divisor``, times ``factor``, times ``more``; tell whether all of that
-    is below ``limit``, without its sign.
+def scale(values: Any, divisor: float, factor: float, more: float, near_by: float, least: float, scaled: Any) -> float:
+    """Fill ``scaled``, (n, 2), with values by ``divisor``, times ``factor``, times ``more``; return the largest of
+    these, without its sign.
 
     What lies within the part ``near_by`` of it of a whole number is that number then, and less than ``least`` is zero.
     """
-    are_below = True
+    largest = 0.0
     for k in range(values.shape[0]):
         for axis in range(2):
             value = values[k, axis] / divisor * factor * more
-            are_below &= abs(value) < limit
+            largest = max(largest, abs(value))
             near = np.rint(value)
             value = near if abs(value - near) <= near_by * abs(value) else value
             scaled[k, axis] = 0.0 if abs(value) < least else value + 0.0
-    return are_below
+    return largest
 
 
 @inline
@@ -136,18 +134,18 @@ def _find_corners(pixels: Any, offsets: Any, pieces: Any, corners: Any, starts: 
 def snap(
     vertices: Any, offsets: Any, pieces: Any, stop: Any, buffers: Buffers, pixels: Any, corners: Any, starts: Any,
     passages: Any,
-) -> tuple[int, int, int]:  # fmt: skip
+) -> tuple[int, int, int, bool]:  # fmt: skip
     """Fill what tells what becomes of valid rings, coordinates below 2^51.
 
     pixels: (n, 2) float64, the whole points in whose pixels vertices lie; where all lie there nothing else is filled.
     corners, starts: see `_find_corners`. passages: (m, 2) int32, an edge, by its first vertex, and a vertex of another
     pixel that it passes. Returns how many vertices are no whole points; how many passages there are, which may be more
     than there is room for; how many corners, or FOLDS where rings do not stay what they are, without vertices that get
-    straight.
+    straight; whether no edge passes within a cell of a vertex that is none of its ends.
     """
     n_moved = _find_pixels(vertices, pixels, stop)
     if n_moved == 0:
-        return 0, 0, vertices.shape[0]
+        return 0, 0, vertices.shape[0], False
     w = rows_of(buffers)
     edges, tree = w.given.edges, w.tree
     rings, n_rings = RingArrays(vertices, offsets), offsets.shape[0] - 1
@@ -161,7 +159,7 @@ def snap(
             tree.boxes[e, 3] = -np.inf
     if n > FEW:
         build_tree(tree, n, stop)
-    meets, shares = False, False
+    meets, shares, are_apart = False, False, True
     m, depth = 0, begin_pairs(tree, n, stop)
     while depth > 0 and not stop[0]:  # bound: the walk through the tree
         found, depth = next_pairs(tree, n, depth)
@@ -177,11 +175,13 @@ def snap(
                     end = e if at_begin else b
                     meets |= end != f
                     shares |= (x[f] != x[end]) | (y[f] != y[end])
-                elif _passes(x[e], y[e], x[b], y[b], px, py):
-                    if m < passages.shape[0]:
-                        passages[m, 0], passages[m, 1] = e, f
-                    m += 1
+                elif _passes(x[e], y[e], x[b], y[b], px, py, 1.0):
+                    are_apart = False
+                    if _passes(x[e], y[e], x[b], y[b], px, py, 0.5):
+                        if m < passages.shape[0]:
+                            passages[m, 0], passages[m, 1] = e, f
+                        m += 1
                 e, f = f, e
     if m > 0 or shares or (meets and n_corners < n):  # a straight vertex stays where rings meet in it
         n_corners = FOLDS
-    return n_moved, m, n_corners
+    return n_moved, m, n_corners, are_apart

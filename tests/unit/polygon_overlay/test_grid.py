@@ -20,7 +20,7 @@ from tests.unit.polygon_overlay.checks import OPERATIONS, assert_counts_add_up, 
 from tests.unit.polygon_overlay.families import FAMILIES, drawn, star
 from tests.unit.polygon_overlay.test_union_all import LAYERS, square
 
-GRIDS = [2.0**-3, 0.25, 1.0, 0.1, 0.01, 1e-6, 2.0**-30]
+GRIDS = [2.0**-3, 0.25, 1.0, 0.1, 0.01, 1e-6, 1e-9, 2.0**-30]
 
 
 def assert_on_grid(vertices: np.ndarray, size: float) -> None:
