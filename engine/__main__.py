@@ -1,4 +1,5 @@
-"""The command line ``python -m engine contains | collide | clearance | clip | overlay | bounds``: for files.
+"""The command line ``python -m engine contains | collide | clearance | clip | bounds | overlay | union | join``:
+for files; the last three are for layers.
 
 ``python -m engine warm`` compiles all kernels before they are needed, here or for other machines (``--into``);
 ``python -m engine audit`` says which other packages are wrong on your data.
@@ -32,7 +33,7 @@ from engine.errors import EngineError, InvalidInputError
 from engine.files.solids import read_features, read_solid, read_solids
 from engine.files.tables import read_rows, write_geojson, write_table
 from engine.kernel_cache import cache_folder, seal
-from engine.layers.features import overlay_features
+from engine.layers.features import dissolve_features, locate_features, overlay_features
 from engine.layers.rows import HOWS
 from engine.parallel import Progress
 from engine.polygon_clipping.clip_polygons import PolygonStatus, clip_polygons
@@ -140,7 +141,19 @@ def _clipped(rings: Any, item: int) -> dict[str, Any]:
 
 def _overlay(options: Options) -> None:
     left, right = read_features(options.left), read_features(options.right)
-    rows: Any = overlay_features(left, right, options.operation, deadline=options.deadline)
+    _write_features(overlay_features(left, right, options.operation, deadline=options.deadline), options)
+
+
+def _union(options: Options) -> None:
+    _write_features(dissolve_features(read_features(options.layer), options.by, deadline=options.deadline), options)
+
+
+def _join(options: Options) -> None:
+    points, polygons = read_features(options.points), read_features(options.polygons)
+    _write_features(locate_features(points, polygons, outside=options.outside, deadline=options.deadline), options)
+
+
+def _write_features(rows: Any, options: Options) -> None:
     write_geojson(options.output, rows, rows.crs)
     if rows.collapsed and not options.quiet:
         print(f"rounding left nothing of {rows.collapsed} rows", file=sys.stderr)
@@ -259,6 +272,17 @@ def _parser() -> argparse.ArgumentParser:
     overlay.add_argument("right", help=".geojson file of polygons")
     overlay.add_argument("--operation", choices=HOWS, default="intersection")
     overlay.set_defaults(run=_overlay)
+
+    union = command("union", help="unite the features of a layer, all or those that agree in some properties")
+    union.add_argument("layer", help=".geojson file of polygons")
+    union.add_argument("--by", nargs="+", metavar="NAME", help="properties that are equal in what is united")
+    union.set_defaults(run=_union)
+
+    join = command("join", help="join points to the features that hold them, boundary included")
+    join.add_argument("points", help=".geojson file of points; properties and ids are kept")
+    join.add_argument("polygons", help=".geojson file of polygons")
+    join.add_argument("--outside", action="store_true", help="points that nothing holds too")
+    join.set_defaults(run=_join)
 
     box = command("bounds", help="smallest box and smallest sphere of a solid")
     box.add_argument("solid")

@@ -137,6 +137,25 @@ def test_overlay_of_layers_keeps_attributes(tmp_path: Path, capsys: pytest.Captu
     assert len(json.loads(capsys.readouterr().out)["features"]) == 3
 
 
+def test_layers_are_united_and_points_joined(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    features = [{"type": "Feature", "id": k, "properties": {"a": k % 2}, "geometry": SQUARE} for k in range(3)]
+    layer = written(tmp_path, "layer.geojson", {"type": "FeatureCollection", "features": features})
+    for more, groups in (([], [{"count": 3}]), (["--by", "a"], [{"a": 0, "count": 2}, {"a": 1, "count": 1}])):
+        assert main(["union", layer, *more]) == 0
+        found = json.loads(capsys.readouterr().out)["features"]
+        assert [feature["properties"] for feature in found] == groups
+        square = engine.union_all([engine.Polygon(SQUARE["coordinates"])])
+        assert all(feature["geometry"] == square.__geo_interface__ for feature in found)
+    corner, far = ({"type": "Point", "coordinates": at} for at in (SQUARE["coordinates"][0][0], [99, 99]))
+    points = [{"type": "Feature", "properties": {"p": k}, "geometry": at} for k, at in enumerate((corner, far))]
+    points = written(tmp_path, "points.geojson", {"type": "FeatureCollection", "features": points})
+    for more, expected in (([], [(0, 0), (0, 1), (0, 2)]), (["--outside"], [(0, 0), (0, 1), (0, 2), (1, None)])):
+        assert main(["join", points, layer, *more]) == 0
+        found = json.loads(capsys.readouterr().out)["features"]
+        assert [(f["properties"]["p"], f.get("polygon", {}).get("id")) for f in found] == expected
+        assert all(feature["boundary"] for feature in found[:3])
+
+
 def test_parts_of_a_multipolygon_are_united(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rings = [[[0, 0], [2, 0], [2, 2], [0, 2], [0, 0]], [[1, 1], [3, 1], [3, 3], [1, 3], [1, 1]]]
     path = written(tmp_path, "both.geojson", {"type": "MultiPolygon", "coordinates": [[ring] for ring in rings]})

@@ -130,6 +130,17 @@ def _find_corners(pixels: Any, offsets: Any, pieces: Any, corners: Any, starts: 
     return n
 
 
+@merged
+def _add_passage(passages: Any, m: int, edges: Any, e: int, f: int, px: float, py: float) -> int:
+    """Append that edge e passes the pixel about (px, py), of vertex f, if it does; return how many there are then."""
+    x, y, b = edges.x, edges.y, edges.after[e]
+    if not _passes(x[e], y[e], x[b], y[b], px, py, 0.5):
+        return m
+    if m < passages.shape[0]:
+        passages[m, 0], passages[m, 1] = e, f
+    return m + 1
+
+
 @bare_kernel
 def snap(
     vertices: Any, offsets: Any, pieces: Any, stop: Any, buffers: Buffers, pixels: Any, corners: Any, starts: Any,
@@ -177,10 +188,7 @@ def snap(
                     shares |= (x[f] != x[end]) | (y[f] != y[end])
                 elif _passes(x[e], y[e], x[b], y[b], px, py, 1.0):
                     are_apart = False
-                    if _passes(x[e], y[e], x[b], y[b], px, py, 0.5):
-                        if m < passages.shape[0]:
-                            passages[m, 0], passages[m, 1] = e, f
-                        m += 1
+                    m = _add_passage(passages, m, edges, e, f, px, py)
                 e, f = f, e
     if m > 0 or shares or (meets and n_corners < n):  # a straight vertex stays where rings meet in it
         n_corners = FOLDS
