@@ -22,16 +22,20 @@ from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.parallel import Budget, run_chunks
 from engine.polygon_overlay.compiled.kernel import DONE
 from engine.polygon_overlay.compiled.loading import RingArrays
-from engine.polygon_overlay.found import Found, chained, ring_numbers
+from engine.polygon_overlay.found import Found, chained, places_of, ring_numbers, taken
 from engine.polygon_overlay.in_integers import parts_exactly
 from engine.polygon_overlay.polygon_arrays import Chosen
 from engine.polygon_overlay.run import EACH_PART, run_kernel
 from engine.solids.ragged import next_in_rings, summed
+from engine.types import OPEN
 
 _FIRST: Final = 1
 _SECOND: Final = 2
 _BOTH: Final = 3
-_FIRST_CHUNK: Final = 64
+_OF_A_CROSSING: Final = 3
+"""Parts that meet where two edges cross."""
+_BLOCK: Final = 1024
+"""Pairs that are read together: numpy's calls take as long as some hundred of them."""
 
 
 class Touching(NamedTuple):
@@ -61,21 +65,43 @@ def touching(firsts: Chosen, seconds: Chosen, budget: Budget, workers: int | Non
     """
     found: dict[int, Touching] = {}
 
-    def task(start: int, stop: int) -> None:
+    def task(first_block: int, last_block: int) -> None:
+        start, stop = first_block * _BLOCK, min(last_block * _BLOCK, len(firsts))
         some, others = firsts[start:stop], seconds[start:stop]
         arranged = run_kernel(some.together(), others.together(), EACH_PART, budget)
-        pairs = np.repeat(np.arange(start, stop), arranged.counts[:, 1])
-        parts = np.where(arranged.status[pairs - start] == DONE, arranged.evidence[:, 1], 0)
+        may_touch, is_done = _may_touch(arranged), arranged.status == DONE
+        done = np.flatnonzero(may_touch & is_done)
+        parts = arranged.evidence[places_of(summed(arranged.counts[:, 1]), done), 1]
+        pairs = np.repeat(start + done, arranged.counts[done, 1])
+        arranged = taken(arranged, done)
         read = [_read(arranged, parts, pairs, _numbered(arranged, pairs))]
-        for pair in np.flatnonzero(arranged.status != DONE).tolist():
+        for pair in np.flatnonzero(may_touch & ~is_done).tolist():
             first, second = (each[pair : pair + 1].together() for each in (some, others))
             alone, places = parts_exactly(RingArrays(*first[:2]), RingArrays(*second[:2]), budget)
             parts = alone.evidence[:, 1]
             read.append(_read(alone, parts, np.full(len(parts), start + pair), places))
         found[start] = _joined(read)
 
-    run_chunks(task, len(firsts), budget=budget, first_chunk=_FIRST_CHUNK, workers=workers)
+    run_chunks(task, -(-len(firsts) // _BLOCK), budget=budget, first_chunk=1, workers=workers)
     return _joined([_NOWHERE, *(found[start] for start in sorted(found))])
+
+
+def _may_touch(found: Found) -> BoolArray:
+    """Tell of pairs whether they may meet without common area: surely not where floats tell every sign, and no edges
+    cross but two at a time, one of each polygon.
+
+    Of four wedges round such a crossing three are in parts: two edges are named there three times. Else either a third
+    edge is named, twice at most; or, where as many edges pass that wedges opposite each other are in one part, any two
+    are named an even number of times.
+    """
+    pairs = np.repeat(np.arange(len(found.status)), found.counts[:, 2])
+    is_crossing = found.sources[:, 1] >= 0
+    pairs, edges = pairs[is_crossing], np.sort(found.sources[is_crossing], axis=1).astype(np.int64)
+    n = int(edges.max(initial=0)) + 1
+    _, places, times = np.unique((n * pairs + edges[:, 0]) * n + edges[:, 1], return_inverse=True, return_counts=True)
+    may_touch = (found.status == OPEN) | (found.counts[:, 3] > 0)
+    may_touch[pairs[times[places] != _OF_A_CROSSING]] = True
+    return may_touch
 
 
 def _numbered(found: Found, pairs: IntArray) -> IntArray:

@@ -109,6 +109,21 @@ def test_rings_that_cross_themselves(pytestconfig: pytest.Config) -> None:
     assert n_met > 0
 
 
+@pytest.mark.parametrize("order", range(6))
+def test_where_a_polygon_crosses_itself_on_a_border(order: int) -> None:
+    """Floats tell every sign of two edges; three pass through (0, 0)."""
+    bow = [(-2, -1), (2, 1), (2, -1), (-2, 1)]
+    below = [(-1, -8), (3, -8), (1, 8), (-1, -8)] if order == 0 else [(-1, -8), (1, 8), (-9, 8)]
+    sides = [[np.roll(bow, order, axis=0)], [np.roll(below, order // 2, axis=0)]]
+    for pair in (sides, sides[::-1]):
+        one, other = (gathered([Polygon(rings)]) for rings in pair)
+        with Budget(None, None) as budget:
+            found = touching(Chosen(one, np.arange(1)), Chosen(other, np.arange(1)), budget)
+            exact, places = parts_exactly(RingArrays(*one[:2]), RingArrays(*other[:2]), budget)
+        parts = exact.evidence[:, 1]
+        assert shapes(found) == shapes(_read(exact, parts, np.zeros(len(parts), np.int64), places))
+
+
 def test_far_exponents_and_nothing() -> None:
     near, far = Polygon([[(0, 0), (1, 0), (1, 1)]]), Polygon([[(1, 0), (1e300, 1e-300), (1, 1)]])
     sides = [Chosen(gathered(each), np.arange(3)) for each in ([near, near, near], [far, near, Polygon([])])]
