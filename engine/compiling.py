@@ -19,7 +19,7 @@ import llvmlite.binding
 import numba
 from numba import config as numba_config
 from numba.core.caching import NullCache
-from numba.core.codegen import JITCodeLibrary, JITCPUCodegen, get_host_cpu_features
+from numba.core.codegen import CPUCodeLibrary, JITCodeLibrary, JITCPUCodegen, get_host_cpu_features
 from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder, compile_result
 from numba.core.compiler_machinery import register_pass
 from numba.core.environment import lookup_environment
@@ -37,9 +37,12 @@ from numba.core.untyped_passes import InlineClosureLikes
 from engine.kernel_cache import COMPLETE, cache_folder, keep, kept, source_digest
 
 _ASKED_FOR = {
-    JITCodeLibrary: ("_finalize_final_module", "_finalize_dynamic_globals", "add_linking_library", "finalize"),
-    JITCodeLibrary.__mro__[1]: ("_set_compiled_object", "enable_object_caching"),
-    JITCPUCodegen: ("set_env", "create_library", "_library_class"),
+    JITCodeLibrary: ("_finalize_final_module", "_finalize_dynamic_globals", "add_linking_library"),
+    CPUCodeLibrary: (
+        *("_set_compiled_object", "enable_object_caching", "_optimize_functions", "_optimize_final_module"),
+        *("_get_module_for_linking", "finalize"),
+    ),
+    JITCPUCodegen: ("set_env", "create_library", "_library_class", "_module_pass_manager"),
     NullCache: ("load_overload", "save_overload"),
     CompileResult: ("_reduce",),
     CompilerBase: ("compile_extra",),
@@ -84,21 +87,46 @@ def signs() -> list[str]:
 
 
 class _Library(JITCodeLibrary):  # type: ignore[misc] # numba carries no types
-    """Code that takes in what is `called` below it as late as can be, that is with the kernel.
+    """Code as it was written, that is optimised, with all that is below it, within the kernel.
 
-    Linked into each inner function on the way, it would be optimised again with each: a fifteenth of all compiling.
+    To optimise inner functions beforehand as well, again with each of their callers, was a quarter of all compiling.
     """
 
     def __init__(self, codegen: JITCPUCodegen, name: str) -> None:
         super().__init__(codegen, name)
-        self.below: dict[_CalledLibrary, None] = {}  # what is called, directly or not, before its callers
+        self.below: dict[_InnerLibrary, None] = {}  # what is called, directly or not, before its callers
 
     def add_linking_library(self, library: JITCodeLibrary) -> None:
-        self.below |= getattr(library, "below", {})  # numba's own have none
-        if isinstance(library, _CalledLibrary):
+        if isinstance(library, _InnerLibrary):
+            self.below |= library.below
             self.below[library] = None
         else:
             super().add_linking_library(library)
+
+    def _optimize_functions(self, module: Any) -> None:
+        module.data_layout = self._codegen._data_layout
+
+
+class _InnerLibrary(_Library):
+    """Code of a function that only compiled code calls, without machine code of its own."""
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+    def own_module(self) -> Any:
+        """Return what a kernel links in beside all that is below."""
+        return super()._get_module_for_linking()
+
+    def _get_module_for_linking(self) -> Any:
+        """Return all at once, for numba's own libraries: those of who calls our functions from another compiler."""
+        module = self.own_module().clone()
+        for library in reversed(self.below):
+            module.link_in(library.own_module(), preserve=True)
+        return module
 
 
 class _KernelLibrary(_Library):
@@ -106,24 +134,23 @@ class _KernelLibrary(_Library):
 
     def finalize(self) -> None:
         for library in reversed(self.below):  # callers first: the linker drops what nobody has asked for yet
-            super(_Library, self).add_linking_library(library)
+            self._reload_init.update(library._reload_init)
+            self._final_module.link_in(library.own_module(), preserve=True)
         super().finalize()
 
+    def _optimize_final_module(self) -> None:
+        """Make all passes once: numba makes cheap ones before, for counted references, of which hardly any are here.
 
-class _InnerLibrary(_Library):
-    """Code of a function that only compiled code calls: linked into its callers, without machine code of its own.
-
-    It is optimised before it is linked, and again within each caller. To leave out the first of these spares a tenth of
-    all compiling, and `decide_on_rows` took 35 ns a segment instead of 26.
-    """
-
-    def _finalize_final_module(self) -> None:
-        self._finalize_dynamic_globals()
-        self._finalized = True
-
-
-class _CalledLibrary(_InnerLibrary):
-    """Code that is never copied into its callers."""
+        What is linked in is nobody else's: with one call it is copied there whatever its size, and an argument that it
+        does not use, such as most arrays of a table, is not handed over. It has a name of its own, since the linker
+        would take it for what another compiler made of the same function, and finds no address.
+        """
+        for function in self._final_module.functions:
+            if function.linkage == llvmlite.binding.Linkage.linkonce_odr:
+                function.linkage = "internal"
+                function.name += ".inner"
+        passes, builder = self._codegen._module_pass_manager()
+        passes.run(self._final_module, builder)
 
 
 class _InnerCodegen(JITCPUCodegen):  # type: ignore[misc]
@@ -188,13 +215,7 @@ class _CalledLower(Lower):  # type: ignore[misc]
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _CalledLowering(_InnerLowering):
     _name = "engine_called_lowering"
-
-    def _library(self, name: str, codegen: JITCPUCodegen) -> JITCodeLibrary:
-        return _CalledLibrary(_InnerCodegen(codegen), name)
-
-    @property
-    def lowering_class(self) -> type[Lower]:
-        return _CalledLower
+    lowering_class = _CalledLower
 
 
 class _Typing(Context):  # type: ignore[misc]
@@ -229,6 +250,12 @@ def _typing(shared: Context, counts: bool) -> _Typing:
     return _Typing(shared)
 
 
+def _check_result(context: Any, result: Any, name: str) -> None:
+    """Raise TypeError for a result in which there are arrays, where one side alone would count references to them."""
+    if context.data_model_manager[result].contains_nrt_meminfo():
+        raise TypeError(f"{name} returns {result}: that needs an allocating function below an allocating kernel")
+
+
 class KernelCompiler(CompilerBase):  # type: ignore[misc]
     """numba's own steps, but for how a function is written."""
 
@@ -239,13 +266,19 @@ class KernelCompiler(CompilerBase):  # type: ignore[misc]
         self.state.typingctx = _typing(typing, bool(self.state.flags.nrt))
 
     def compile_extra(self, function: Any) -> Any:
-        """Compile; to look for cycles as often as Python does, among so much that lives long, takes a tenth of it."""
+        """Compile; to look for cycles as often as Python does, among so much that lives long, takes a tenth of it.
+
+        Raises: TypeError where a kernel that does not count references returns arrays: Python would free them.
+        """
         usual = gc.get_threshold()
         gc.set_threshold(50_000, 20, 50)
         try:
-            return super().compile_extra(function)
+            made = super().compile_extra(function)
         finally:
             gc.set_threshold(*usual)
+        if type(self) is KernelCompiler and not self.state.flags.nrt:
+            _check_result(self.state.targetctx, made.signature.return_type, function.__qualname__)
+        return made
 
     def define_pipelines(self) -> list[Any]:
         """Leave out what joins operations on whole arrays, and what looks for functions in a function that has none."""
@@ -269,28 +302,19 @@ class CalledCompiler(KernelCompiler):
 class InnerDispatcher(CPUDispatcher):  # type: ignore[misc]
     """Compiles a function once for ``int``, not again for each number that a caller spells out.
 
-    Nor again for callers that count references to arrays and callers that do not. What it does to those it is handed
-    comes out even either way; those that it returned would be counted by one side alone, and be freed while in use,
-    or never.
+    Nor again for callers that count references to arrays and callers that do not: what it does to those it is handed
+    comes out even either way. Those that it returned, counted by one side alone, would be freed while in use, or never.
 
-    Raises: TypeError where a function that returns arrays is called by both.
+    Raises: TypeError where a function that returns arrays, and its caller, do not both count.
     """
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         plain = {name: unliteral(kind) for name, kind in kws.items()}
         found = super().get_call_template(tuple(map(unliteral, args)), plain)
-        counts = bool(ConfigStack.top_or_none().nrt)
-        for types, made in self.overloads.items():
-            first = self._counted.setdefault(types, self.targetoptions.get("_nrt", counts))
-            result = made.signature.return_type
-            if first != counts and self.targetctx.data_model_manager[result].contains_nrt_meminfo():
-                raise TypeError(f"{self.py_func.__qualname__} returns {result} to bare and to counting callers")
+        if self.targetoptions["_nrt"] != bool(ConfigStack.top_or_none().nrt):
+            for made in self.overloads.values():
+                _check_result(self.targetctx, made.signature.return_type, self.py_func.__qualname__)
         return found
-
-    @functools.cached_property
-    def _counted(self) -> dict[Any, bool]:
-        """Whether each overload counts references."""
-        return {}
 
 
 class KernelCache(NullCache):  # type: ignore[misc]

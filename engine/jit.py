@@ -2,9 +2,9 @@
 
 Decorators. `kernel`: an outer loop over arrays, called from Python, releases the interpreter lock, cached on disk
 (kernel_cache.py). `inline`: a small function that compiled code calls. `merged`: one for which no call is ever left;
-`called`: one for which a call always is. `bare_kernel` and `allocating` are a kernel, and what it calls, without
-counted references. Arithmetic is strict IEEE double: `fastmath` is off everywhere, and nothing is fused unless `fma`
-(error_free.py) is called by name.
+`called`: one for which a call always is. None of them makes arrays, so none counts references to any: what it was
+handed, its caller keeps. `allocating_kernel` and `allocating` (a `called` one) are for what makes arrays. Arithmetic is
+strict IEEE double: `fastmath` is off everywhere, and nothing is fused unless `fma` (error_free.py) is called by name.
 
 What is not in numba's documentation stands in compiling.py. Where this numba lacks any of it, a warning says so, and
 kernels are compiled by what is documented: as right and as fast, but slower to compile, and anew in each process.
@@ -69,17 +69,13 @@ class _Kernel:
 
 
 def kernel(function: Callable[..., Any]) -> Any:
-    """Compile an outer loop: called from Python, releases the interpreter lock, cached on disk."""
-    return _kernel(function)
-
-
-def bare_kernel(function: Callable[..., Any]) -> Any:
-    """Compile as `kernel` does, without counting references to arrays, there and in all that it calls.
-
-    Nothing below may make an array, or assign a part of one to another, unless it is `allocating`; nor may it return an
-    array where a `kernel` calls it too (who compiles that is told).
-    """
+    """Compile an outer loop: called from Python, releases the interpreter lock, cached on disk. It makes no arrays."""
     return _kernel(function, _nrt=False)
+
+
+def allocating_kernel(function: Callable[..., Any]) -> Any:
+    """Compile as `kernel` does, for one that makes arrays: it counts references to them, and returns some maybe."""
+    return _kernel(function)
 
 
 def _kernel(function: Callable[..., Any], **options: Any) -> Any:
@@ -101,7 +97,7 @@ class _Inline:
         functools.update_wrapper(self, function)
         self.py_func = function
         self._compiler = compiler
-        self._options = _OPTIONS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True} | options
+        self._options = _OPTIONS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False} | options
 
     @functools.cached_property
     def _dispatcher(self) -> Any:
@@ -125,14 +121,14 @@ class _Inline:
 
 
 def inline(function: Callable[..., Any]) -> Any:
-    """Compile a small function that kernels call; it lives in the caller's cached code."""
+    """Compile a function that kernels call, and that makes no arrays; it lives in the kernel's cached code."""
     return function if numba_config.DISABLE_JIT else _Inline(function)
 
 
 def merged(function: Callable[..., Any]) -> Any:
-    """Compile as `inline` does, and never leave a call: for work that costs less than counting the arrays it is handed.
+    """Compile as `inline` does, and never leave a call: for work that costs less than handing over its arguments.
 
-    The compiler counts references to arrays at every call that it leaves; merged calls let it drop most of that.
+    An array is seven numbers or more there, and a tuple of arrays all of theirs.
     """
     return function if numba_config.DISABLE_JIT else _Inline(function, forceinline=True)
 
@@ -140,20 +136,12 @@ def merged(function: Callable[..., Any]) -> Any:
 def called(function: Callable[..., Any]) -> Any:
     """Compile as `inline` does, and always leave a call: for long code, the rare exact path of a decision above all.
 
-    The compiler works on everything below a function again with each of its callers, and what it copies there grows
-    from one to the next. `inline` functions below a merged one are merged as well; these are not.
+    What is copied into several callers is worked on in each. `inline` functions below a merged one are merged as well;
+    these are not.
     """
     return function if numba_config.DISABLE_JIT else _Inline(function, "CalledCompiler", forceinline=False)
 
 
 def allocating(function: Callable[..., Any]) -> Any:
-    """Compile as `called` does, for a function below a bare kernel that makes arrays of its own and returns none."""
+    """Compile as `called` does, for a function that makes arrays."""
     return function if numba_config.DISABLE_JIT else _Inline(function, "CalledCompiler", forceinline=False, _nrt=True)
-
-
-def bare(function: Callable[..., Any]) -> Any:
-    """Compile as `called` does, for a function below a counting kernel that, with all that it calls, counts nothing.
-
-    It holds to what `bare_kernel` asks for; the kernel makes the arrays.
-    """
-    return function if numba_config.DISABLE_JIT else _Inline(function, "CalledCompiler", forceinline=False, _nrt=False)

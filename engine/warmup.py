@@ -156,6 +156,7 @@ def _warm_scenes() -> None:
         scene = Scene(some * 2, [None] * len(some) + [pose] * len(some))
         for keep in ("all", "first", "any"):
             scene.clip_segments(np.array(segments)[:, :, :dimension], keep=keep)
+        scene.clip_segments(np.tile(np.array(segments)[:, :, :dimension], (10_000, 1, 1)), keep="any")  # put in order
     many = [Aabb([k, 0, 0], [k + 2, 1, 1]) for k in range(300)]
     collide_scene(many)  # their boxes go into a grid
     flat: list[Solid] = [Polygon([[[0, 0], [4, 0], [1, 1], [0, 4]]]), Triangle([[0, 0], [1, 0], [0, 1]])]

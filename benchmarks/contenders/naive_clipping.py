@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, IntArray
-from engine.jit import inline, kernel
+from engine.jit import allocating_kernel, inline
 from engine.predicates.loading import as_point2, as_point3
 from engine.predicates.vectors import along
 from engine.textbook.clip_segments import ACCEPTED, MAX_TURNS, REJECTED, UNFINISHED
@@ -97,7 +97,7 @@ def clip_one(p: Any, q: Any, low: Any, high: Any, code_word: Any, cut: Any) -> t
     return p, q, UNFINISHED
 
 
-@kernel
+@allocating_kernel
 def clip_on_box_2d(segments: FloatArray, low: FloatArray, high: FloatArray) -> tuple[FloatArray, IntArray]:
     """Return (clipped segments (n, 2, 2), status (n,)) of Cohen-Sutherland."""
     a, b = Point2(low[0], low[1]), Point2(high[0], high[1])
@@ -109,7 +109,7 @@ def clip_on_box_2d(segments: FloatArray, low: FloatArray, high: FloatArray) -> t
     return clipped, status
 
 
-@kernel
+@allocating_kernel
 def clip_on_box_3d(segments: FloatArray, low: FloatArray, high: FloatArray) -> tuple[FloatArray, IntArray]:
     """Return (clipped segments (n, 2, 3), status (n,)) of Cohen-Sutherland."""
     a, b = Point3(low[0], low[1], low[2]), Point3(high[0], high[1], high[2])
@@ -122,7 +122,7 @@ def clip_on_box_3d(segments: FloatArray, low: FloatArray, high: FloatArray) -> t
     return clipped, status
 
 
-@kernel
+@allocating_kernel
 def clip_on_planes_3d(segments: FloatArray, rows: FloatArray) -> tuple[FloatArray, BoolArray]:
     """Return (clipped segments (n, 2, 3), kept (n,)) of one pass over rows (m, 4)."""
     clipped, kept = np.empty_like(segments), np.zeros(len(segments), np.bool_)
@@ -148,7 +148,7 @@ def clip_on_planes_3d(segments: FloatArray, rows: FloatArray) -> tuple[FloatArra
     return clipped, kept
 
 
-@kernel
+@allocating_kernel
 def clip_on_sphere_3d(segments: FloatArray, center: FloatArray, radius: float) -> tuple[FloatArray, BoolArray]:
     """Return (clipped segments (n, 2, 3), kept (n,)) by the two roots of the quadratic."""
     clipped, kept = np.empty_like(segments), np.zeros(len(segments), np.bool_)
@@ -172,7 +172,7 @@ def clip_on_sphere_3d(segments: FloatArray, center: FloatArray, radius: float) -
     return clipped, kept
 
 
-@kernel
+@allocating_kernel
 def clip_rings_on_planes(vertices: FloatArray, offsets: IntArray, rows: FloatArray) -> tuple[FloatArray, IntArray]:
     """Return (vertices, offsets) that Sutherland-Hodgman leaves of rings ``offsets[i]`` .. ``offsets[i + 1]``."""
     n, dimension = len(offsets) - 1, vertices.shape[1]

@@ -24,7 +24,7 @@ import numpy as np
 
 from engine.arrays import FloatArray, IntArray
 from engine.bounding.sweep import BLOCK, meeting_boxes
-from engine.jit import inline, kernel
+from engine.jit import allocating_kernel, inline, kernel
 
 _FEWEST: Final = 256
 _LARGE: Final = 64
@@ -106,7 +106,7 @@ def _spread(low: Any, extent: Any, widest: float, span: Any) -> None:
                 span[1, axis] = max(span[1, axis], low[box, axis])
 
 
-@kernel
+@allocating_kernel
 def _sort_into_cells(low: Any, high: Any, extent: Any, widest: float, least: Any, width: Any, grid: CornerGrid) -> int:
     """Fill the arrays of the grid, boxes and starts zero before; return the sum of the squares of how many share a
     cell."""

@@ -28,7 +28,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from engine.arrays import Float32Array, FloatArray, Int32Array, read_only
-from engine.jit import inline, kernel
+from engine.jit import allocating, allocating_kernel, inline, kernel
 from engine.lanes.boxes import EMPTY
 from engine.lanes.lanes import aligned
 from engine.lanes.rows import exchange, fill, join
@@ -147,7 +147,7 @@ def _normalise(boxes: Any, origin: Any, items: Any, halves: Any) -> float:
     return ldexp(1.0, power)
 
 
-@inline
+@allocating
 def _middle_of(boxes: Any, axis: int) -> float:
     """Return the median of some boxes' centres along an axis."""
     n_seen, step = 0, (len(boxes) - 1) // _SAMPLE + 1
@@ -176,7 +176,7 @@ def _include(halves: Any, node: int, others: Any, other: int) -> None:
     join(halves.centres, node, others.centres, other)
 
 
-@kernel
+@allocating_kernel
 def _halve(items: Any, halves: Any, stack: Any, state: Any) -> None:
     """Go on with the binary tree for `_WORK` items.
 
@@ -211,7 +211,7 @@ def _halve(items: Any, halves: Any, stack: Any, state: Any) -> None:
     state[0], state[1] = n_stack, n_nodes
 
 
-@kernel
+@allocating_kernel
 def _widen(items: Any, halves: Any, boxes: Any, child: Any, stack: Any, state: Any) -> None:
     """Go on to join binary nodes to nodes of eight, the largest boxes opened first, for `_WORK` / 8 nodes.
 

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.jit import inline, kernel
+from engine.jit import allocating_kernel, inline
 from engine.lanes.boxes import EMPTY
 from engine.lanes.tracing import LANES
 from engine.predicates.loading import as_point3
@@ -20,7 +20,7 @@ from engine.types import Point3
 _ENLARGED: Final = 2.0**-20
 
 
-@kernel
+@allocating_kernel
 def fill_discs(blocks: Any, child: Any, boxes: Any, discs: Any) -> None:
     """Fill discs (n_nodes, 8, 8), of inner nodes only, from blocks (`lanes/faces.py`) and boxes of the same tree."""
     n_nodes = child.shape[0]

@@ -24,7 +24,7 @@ from engine.collision.meshes.triangle_triangle import APART, Facet, classify, cl
 from engine.collision.planar.outline import collide_outline_outline
 from engine.collision.result import Work
 from engine.errors import InvalidArrayError, WrongDimensionError
-from engine.jit import inline, kernel
+from engine.jit import allocating_kernel, inline, kernel, merged
 from engine.parallel import Budget, Cancel, Progress, check_options, run_chunks
 from engine.predicates.loading import as_point2
 from engine.predicates.orientation import orient2d
@@ -54,20 +54,34 @@ def are_boxes_apart(t: Any, u: Any) -> bool:
     return are_apart_on_axis(t.p.y, t.q.y, t.r.y, u.p.y, u.q.y, u.r.y)
 
 
+@merged
+def against_edge(p: Any, q: Any, u: Facet) -> int:
+    """Return how u lies to the line p q: apart from its left, within that, touching it from the right, or over it."""
+    a, b, c = orient2d(p, q, u.p), orient2d(p, q, u.q), orient2d(p, q, u.r)
+    if max(a, b, c) == UNDECIDED:
+        return UNSETTLED
+    if max(a, b, c) < 0:
+        return DISJOINT
+    if min(a, b, c) > 0:
+        return SECOND_INSIDE_FIRST
+    return TOUCHING if max(a, b, c) == 0 else OVERLAPPING
+
+
 @inline
 def against_edges(t: Facet, u: Facet) -> int:
     """Return how u lies to the edges of t; DISJOINT and SECOND_INSIDE_FIRST are final, TOUCHING: interiors apart."""
-    p, q, r = t
-    inside, apart = True, False
-    for _ in range(3):
-        a, b, c = orient2d(p, q, u.p), orient2d(p, q, u.q), orient2d(p, q, u.r)
-        if max(a, b, c) == UNDECIDED:
-            return UNSETTLED
-        if max(a, b, c) < 0:
-            return DISJOINT
-        inside, apart = inside and min(a, b, c) > 0, apart or max(a, b, c) == 0
-        p, q, r = q, r, p
-    return SECOND_INSIDE_FIRST if inside else (TOUCHING if apart else OVERLAPPING)
+    first = against_edge(t.p, t.q, u)
+    if first in (UNSETTLED, DISJOINT):
+        return first
+    second = against_edge(t.q, t.r, u)
+    if second in (UNSETTLED, DISJOINT):
+        return second
+    third = against_edge(t.r, t.p, u)
+    if third in (UNSETTLED, DISJOINT):
+        return third
+    if first == SECOND_INSIDE_FIRST and second == SECOND_INSIDE_FIRST and third == SECOND_INSIDE_FIRST:
+        return SECOND_INSIDE_FIRST
+    return TOUCHING if first == TOUCHING or second == TOUCHING or third == TOUCHING else OVERLAPPING
 
 
 @inline
@@ -101,7 +115,7 @@ def relate_triangles_2d(first: Any, second: Any, relations: Any) -> None:
         relations[item] = relation_of_triangles(as_facet2(first[item]), as_facet2(second[item]))
 
 
-@kernel
+@allocating_kernel
 def relate_triangles_3d(first: Any, second: Any, relations: Any) -> None:
     """Fill relations (n,) int8 for the pairs of rows of two (n, 3, 3) float64 arrays, degenerate ones UNSETTLED."""
     poses = np.zeros((1, 12))  # nothing here has one

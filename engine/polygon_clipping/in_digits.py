@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from engine.jit import bare, inline
+from engine.jit import allocating, called, inline
 from engine.polygon_clipping.cut_vertices import VALUE_BOUND
 from engine.polygon_clipping.rings import EXACT, NO_ROOM, Clipped, Cutting, Plane, Polygons, has_bridges, plane_of
 from engine.predicates.digits import MOST, SLOT, nearest_quotient, negate, put_double, sign_of, sum_products
@@ -59,7 +59,7 @@ class ExactScratch(NamedTuple):
     used: Any
 
 
-@inline
+@allocating
 def exact_scratch(room: int, dimension: int, row_heap: Any, row_places: Any) -> Any:
     """Return what `clip_exactly` works in: for rings that grow to `room` vertices, those that were dropped included."""
     first = _ROWS + row_heap.size
@@ -314,7 +314,7 @@ def cut_by_planes(s: Any, planes: Any, cutting: Cutting, n_cutting: int, n_ring:
     return n, now
 
 
-@bare
+@called
 def clip_exactly(
     s: Any, polygons: Polygons, polygon: int, planes: Any, cutting: Cutting, n_cutting: int, stop: Any,
     clipped: Clipped, written: int,

@@ -21,7 +21,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.jit import bare, inline, merged
+from engine.jit import allocating, called, merged
 from engine.lanes.lanes import move
 from engine.polygon_clipping.cut_vertices import TINY, VALUE_BOUND, Vertices, are_same, cut_edge
 from engine.polygon_clipping.rings import CLIPPED, NO_ROOM, Clipped, Cutting, Plane, Polygons, has_bridges, plane_of
@@ -54,7 +54,7 @@ class Scratch(NamedTuple):
     highs: Any
 
 
-@inline
+@allocating
 def scratch_for(room: int, n_planes: int, names: Any) -> Scratch:
     """Return what to clip in, for rings that grow to `room` vertices, those that were dropped included."""
     d = len(names)
@@ -303,7 +303,7 @@ def emit(s: Scratch, ring: Any, n: int, n_ring: int, out: Any, place: int) -> in
     return place
 
 
-@bare
+@called
 def clip_plainly(
     polygons: Polygons, planes: Any, first: int, last: int, stop: Any, clipped: Clipped, written: int, s: Scratch
 ) -> tuple[int, int, int, int]:

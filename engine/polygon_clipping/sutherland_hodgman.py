@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from engine.jit import inline, kernel
+from engine.jit import allocating_kernel, inline
 from engine.polygon_clipping.in_digits import clip_exactly, exact_scratch
 from engine.polygon_clipping.in_doubles import DOUBT, clip_plainly, scratch_for
 from engine.polygon_clipping.rings import NO_ROOM, Clipped, PlaneTables, Polygons
@@ -37,7 +37,7 @@ def room_for(ring_offsets: Any, first: int, last: int, n_planes: int) -> int:
     return 4 * largest + 4 * n_planes + 16
 
 
-@kernel
+@allocating_kernel
 def clip_rings(
     vertices: Any, ring_offsets: Any, polygon_offsets: Any, planes: PlaneTables, first: int, last: int, stop: Any,
     out: Any, sizes: Any, state: Any, may_have_bridges: Any, names: Any,

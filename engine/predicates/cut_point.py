@@ -27,7 +27,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.jit import inline
+from engine.jit import called, inline
 from engine.predicates.double_double import U2, dd_add, dd_div, dd_scale, even_of, surely_rounded
 from engine.predicates.error_free import two_diff, two_prod, two_sum
 from engine.predicates.expansion import LARGEST, Components, grow_product, sign
@@ -57,7 +57,7 @@ def point_at(p: float, q: float, th: float, tl: float, slack: float) -> tuple[fl
     return sh + low, (sh + (low - bound) == sh + (low + bound)) | (p == q)
 
 
-@inline
+@called
 def side_of(
     p: float, q: float, wp: Components, n_wp: int, wq: Components, n_wq: int, x: float, step: float, e: Components
 ) -> int:
@@ -76,7 +76,7 @@ def side_of(
     return sign(e, n)
 
 
-@inline
+@called
 def nearest(
     p: float, q: float, wp: Components, n_wp: int, wq: Components, n_wq: int, sum_h: float, sum_l: float, e: Components
 ) -> tuple[float, bool]:

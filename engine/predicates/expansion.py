@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from engine.jit import inline
+from engine.jit import called, inline
 from engine.predicates.error_free import fast_two_sum, two_prod, two_sum
 
 Components = Any  # a float64 array, or a list of floats when the compiler is disabled
@@ -33,7 +33,7 @@ def is_safe(x: float) -> bool:
     return x == 0.0 or SMALLEST <= abs(x) <= LARGEST
 
 
-@inline
+@called
 def grow(e: Components, n: int, b: float) -> int:
     """Add the double b to e in place."""
     q, kept = b, 0
@@ -102,7 +102,7 @@ def scale(f: Components, m: int, b: float, e: Components) -> int:
     return kept
 
 
-@inline
+@called
 def compress(e: Components, n: int) -> int:
     """Rewrite e in place with as few components as its bits need; its last component is then within an ulp."""
     if n < 2:

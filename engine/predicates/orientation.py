@@ -32,7 +32,7 @@ from __future__ import annotations
 from math import frexp, ldexp
 from typing import Any
 
-from engine.jit import inline, kernel, merged
+from engine.jit import called, inline, kernel, merged
 from engine.predicates.double_double import U2, dd_add, dd_mul, dd_sub
 from engine.predicates.error_free import two_diff, workspace
 from engine.predicates.expansion import Components, add_scaled, sign
@@ -146,7 +146,7 @@ def _shift_of(a: float, b: float, c: float, d: float, bottom: int, top: int) -> 
     return axis_shift(smallest, max(abs(a), abs(b), abs(c), abs(d)), bottom, top)
 
 
-@inline
+@called
 def orient2d_exact(a: Point2, b: Point2, c: Point2) -> int:
     """Return the sign of orient2d from an expansion, or UNDECIDED."""
     # case: on one axis-parallel line, or two equal points; whatever the exponents
@@ -172,7 +172,7 @@ def orient2d_exact(a: Point2, b: Point2, c: Point2) -> int:
     return compare_differences(a.x, c.x, b.y, c.y, a.y, c.y, b.x, c.x, workspace(16))
 
 
-@inline
+@called
 def orient3d_exact(a: Point3, b: Point3, c: Point3, d: Point3) -> int:
     """Return the sign of orient3d from an expansion, or UNDECIDED."""
     # case: all four in one axis-parallel plane (flush boxes, lattices), whatever the exponents

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from engine.jit import inline
+from engine.jit import called, inline
 from engine.predicates.error_free import two_diff, two_prod
 from engine.predicates.expansion import Components, add_scaled, grow_product, sign
 from engine.types import UNDECIDED
@@ -84,7 +84,7 @@ def compare_in_pairs(ah: float, al: float, bh: float, bl: float, ch: float, cl: 
     return UNDECIDED
 
 
-@inline
+@called
 def minor(
     e: Components,
     ax: float,
@@ -121,7 +121,7 @@ def add_absolute_product(e: Components, n: int, a: Components, na: int, b: Compo
     return n
 
 
-@inline
+@called
 def compare_products(
     a: Components, na: int, b: Components, nb: int, c: Components, nc: int, d: Components, nd: int, e: Components
 ) -> int:

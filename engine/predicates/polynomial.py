@@ -16,7 +16,7 @@ from __future__ import annotations
 from math import frexp, ldexp
 from typing import Any
 
-from engine.jit import inline
+from engine.jit import called, inline
 from engine.predicates.error_free import workspace
 from engine.predicates.expansion import Components, compress, grow, scale, sign
 from engine.predicates.side import NO_TERM
@@ -91,7 +91,7 @@ def _term_exponent(powers: Any, coefficients: Any, points: Any, row: int, i_term
     return exponent
 
 
-@inline
+@called
 def sign_of_polynomial_exact(powers: Any, coefficients: Any, points: Any, row: int) -> int:
     """Return the sign from an expansion, or UNDECIDED; arguments as for `sign_of_polynomial_filter`."""
     top = NO_TERM

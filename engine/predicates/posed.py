@@ -123,7 +123,7 @@ def orient3d_posed(poses: Any, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d
     return orient3d_posed_exact(poses, a, b, c, d)
 
 
-@inline
+@called
 def orient3d_posed_exact(poses: Any, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d: PosedPoint3) -> int:
     """Return orient3d of four posed points from an expansion, or UNDECIDED; arguments as for `orient3d_posed`."""
     if a.pose == d.pose and b.pose == d.pose and c.pose == d.pose:

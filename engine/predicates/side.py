@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from math import frexp, ldexp
 
-from engine.jit import inline
+from engine.jit import called, inline
 from engine.predicates.double_double import U2
 from engine.predicates.error_free import two_prod, two_sum, workspace
 from engine.predicates.expansion import Components, grow, grow_product, sign
@@ -77,7 +77,7 @@ def dd_value(a: float, b: float, c: float, d: float, point: tuple[float, float, 
     return h, low, bound
 
 
-@inline
+@called
 def _side_exact(h: HalfSpace3, p: Point3) -> int:
     """Return what `side_of_plane` does, by an expansion; a zero product leaves no component."""
     e = workspace(8)

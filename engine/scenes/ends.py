@@ -16,7 +16,7 @@ import numpy as np
 
 from engine.arrays import FloatArray, IntArray
 from engine.direct import entry_of
-from engine.jit import bare_kernel, inline
+from engine.jit import inline, kernel
 from engine.segment_clipping.parameters import ONE, ZERO, Parameter, compare
 from engine.types import UNDECIDED
 
@@ -125,7 +125,7 @@ def _in_exact_order(found: Found, exact: Exact) -> tuple[Any, ...]:
     return found.source, found.body, found.ends[0], found.ends[1], found.t, found.faces, ranks[by_start]
 
 
-@bare_kernel
+@kernel
 def put_in_order(given: Any, offsets: Any, order: Any, ranks: Any, is_tied: Any, out: Any) -> bool:
     """Fill `out`, the arrays of `ScenePieces`, with pieces given by those before the last, and `are_long`; tell whether
     their order is exact, and of which sources it is not: of ends that round alike those of one piece may be known to

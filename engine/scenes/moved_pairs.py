@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from engine.jit import bare_kernel, inline
+from engine.jit import inline, kernel
 from engine.scenes.near_boxes import bodies_in, name_of, place_in
 from engine.scenes.posed_mesh import scratch_at
 
@@ -31,7 +31,7 @@ def _put_row(rows: Any, row: int, still: Placed, moved: Placed, body: int, name:
             rows.rotations[row, i, j] = turn
 
 
-@bare_kernel
+@kernel
 def list_pairs(
     named: Any, reach: float, where: Any, still: Any, moved: Any, rows: Any, room: Any, box: Any, flag: Any
 ) -> int:

@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from engine.bounding.bvh import WIDTH, Bvh
-from engine.jit import bare_kernel, inline, merged
+from engine.jit import inline, kernel, merged
 from engine.lanes.addresses import array_at
 from engine.lanes.boxes import BOX_ROWS, EMPTY, enter_boxes, inside_box
 from engine.lanes.lanes import lowest_bit
@@ -213,7 +213,7 @@ def _of_box(low: Any, high: Any, bodies: Any, stack: Any, found: Any, n_found: i
     return n_found
 
 
-@bare_kernel
+@kernel
 def list_near(points: Any, where: Any, room: Any, pairs: Any, flag: Any) -> int:
     """List in pairs (room, 2) points (n, dim) and the bodies of a `Where` in whose boxes they lie; return how many,
     more than there is room for where that is less."""
@@ -228,7 +228,7 @@ def list_near(points: Any, where: Any, room: Any, pairs: Any, flag: Any) -> int:
     return n_pairs
 
 
-@bare_kernel
+@kernel
 def put_keys(segments: Any, t: float, bodies: Any, keys: Any) -> None:
     """Set keys (n,) to the cells of a tree, 32 along each axis, in which segments are at t, in the order of G. M.
     Morton, 1966."""

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.jit import bare_kernel, inline
+from engine.jit import inline, kernel
 from engine.lanes.addresses import array_at
 from engine.lanes.lanes import prefetch
 from engine.lanes.triangles import longest_axis
@@ -89,7 +89,7 @@ def _emit_points(cuts: Any, n: int, source: int, out: Pieces, row: int) -> int:
     return n
 
 
-@bare_kernel
+@kernel
 def cut_near(
     segments: Any, order: Any, last: int, words: Any, scratch: Any, stop: Any, out: Pieces, names: Any, left: Any,
     n: Any,
@@ -221,7 +221,7 @@ def _search(words: Any, side: int, segments: Any, item: int, is_any: bool, room:
     return SETTLED
 
 
-@bare_kernel
+@kernel
 def find_first(
     segments: Any, order: Any, last: int, words: Any, room: Any, is_any: bool, stop: Any, state: Any, bodies: Any,
     out: Pieces, n: Any,

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
-from engine.jit import bare_kernel, inline, merged
+from engine.jit import called, inline, kernel, merged
 from engine.predicates.cut_point import TINY as CUT_TINY
 from engine.predicates.double_double import U2, dd_add, dd_div, dd_mul
 from engine.predicates.error_free import fast_two_sum, two_diff, two_prod, two_sum
@@ -113,7 +113,7 @@ def cut_by_ball(p: Triple, q: Triple, c: Triple, radius: float, side: int) -> tu
     return x, y, z, guess + step + 0.0, sure & is_x & is_y & is_z & is_t
 
 
-@inline
+@called
 def cut_by_root(p: Triple, q: Triple, c: Triple, radius: float, side: int) -> tuple[float, float, float, float, bool]:
     """Return what `cut_by_ball` does, by t = (-B -+ sqrt(D)) / A in double-doubles: a line that is nearly tangent.
 
@@ -139,7 +139,7 @@ def cut_by_root(p: Triple, q: Triple, c: Triple, radius: float, side: int) -> tu
     return x, y, z, th + tl + 0.0, sure & is_x & is_y & is_z & is_t
 
 
-@bare_kernel
+@kernel
 def fill_on_sphere(
     segments: Any, center: Any, radius: float, items: Any, planes: Any, begin: int, size: int, stop: Any,
     pieces: Pieces, still: Any, n: Any,

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from engine.jit import bare_kernel, inline, merged
+from engine.jit import called, inline, kernel, merged
 from engine.predicates.double_double import U2, dd_add, dd_mul, dd_sub
 from engine.predicates.error_free import two_diff, two_prod, workspace
 from engine.predicates.expansion import add_product, add_scaled, grow_product, is_safe, sign
@@ -122,7 +122,7 @@ def is_ball_safe(p: Triple, q: Triple, c: Triple, radius: float) -> bool:
     return safe
 
 
-@inline
+@called
 def decide_exactly(p: Triple, q: Triple, c: Triple, radius: float) -> tuple[int, int, int]:
     """Decide on one segment by exact signs: state, and 0 for an end on the sphere, -1 for one of the segment."""
     if not is_ball_safe(p, q, c, radius):
@@ -172,7 +172,7 @@ def decide_roughly(
     return OPEN, -1, -1
 
 
-@bare_kernel
+@kernel
 def decide_on_sphere(
     segments: Any, center: Any, radius: float, first: int, last: int, stop: Any, items: Any, planes: Any, still: Any,
     n: Any,

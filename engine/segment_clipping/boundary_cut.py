@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.jit import bare, inline, kernel
+from engine.jit import allocating, allocating_kernel, called, inline
 from engine.segment_clipping.contacts import GROUP, PROPER, edge_contacts_for, gather_edges
 from engine.segment_clipping.crossing_values import cut_at, is_item_safe, line_values, plane_values
 from engine.segment_clipping.mesh_streams import gather_contacts, streams_for
@@ -34,7 +34,7 @@ def group_size(n: int) -> int:
     return (n + n_groups - 1) // n_groups
 
 
-@inline
+@allocating
 def crossings_for(n: int, dimension: int) -> Crossings:
     """Return room for n contacts."""
     return Crossings(np.empty(n), np.empty((n, dimension)), np.empty(n, np.int64), np.empty(n, np.int64))
@@ -112,7 +112,7 @@ def cut_segment(segments: Any, item: int, boundary: Any, contacts: Any, cuts: Cr
     return sort_crossings(cuts, first, last - first)
 
 
-@bare
+@called
 def cut_group(
     segments: Any, locations: Any, first: int, boundary: Any, contacts: Any, cuts: Crossings, stop: Any, out: Pieces,
     row: int, state: Any,
@@ -134,7 +134,7 @@ def cut_group(
     return first + segments.shape[0], row
 
 
-@kernel
+@allocating_kernel
 def cut_on_outline(segments: Any, locations: Any, outline: Any, stop: Any, out: Pieces, state: Any, n: Any) -> None:
     """Cut segments (m, 2, 2) float64 on a polygon, as far as double-doubles and filters go.
 
@@ -154,7 +154,7 @@ def cut_on_outline(segments: Any, locations: Any, outline: Any, stop: Any, out: 
     n[2] *= 2 if found < 0 else 1
 
 
-@kernel
+@allocating_kernel
 def cut_on_mesh(segments: Any, locations: Any, mesh: Any, stop: Any, out: Pieces, state: Any, n: Any) -> None:
     """Cut segments (m, 2, 3) float64 on a polyhedron, `Mesh`: see `cut_on_outline`."""
     size = group_size(locations.size - n[0])

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from engine.jit import bare_kernel, inline, merged
+from engine.jit import called, kernel, merged
 from engine.predicates.cut_point import point_at
 from engine.predicates.error_free import workspace
 from engine.segment_clipping.cohen_sutherland import corners_of
@@ -47,7 +47,7 @@ def cut_end(
     return x + 0.0, y + 0.0, z + 0.0, (end if is_own else t + 0.0), sure | is_own
 
 
-@inline
+@called
 def cut_again(
     segments: Any, low: Any, high: Any, columns: Any, row: int, unsure: int, pieces: Pieces
 ) -> bool:  # fmt: skip
@@ -62,7 +62,7 @@ def cut_again(
     return all_sure
 
 
-@bare_kernel
+@kernel
 def fill_on_boxes(
     segments: Any, low: Any, high: Any, columns: Any, items: Any, planes: Any, begin: int, size: int, stop: Any,
     pieces: Pieces, still: Any, n: Any,

@@ -29,7 +29,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from engine.jit import bare_kernel, merged
+from engine.jit import kernel, merged
 from engine.predicates.error_free import workspace
 from engine.segment_clipping.cyrus_beck import coordinate_limit, decide_alone
 from engine.segment_clipping.pieces import BLOCK, KEPT, Triple, is_plain, point_of
@@ -99,7 +99,7 @@ def corners_of(low: Any, high: Any) -> tuple[Triple, Triple]:
     return (low[0], low[1], (-1.0 if is_flat else low[2])), (high[0], high[1], (1.0 if is_flat else high[2]))
 
 
-@bare_kernel
+@kernel
 def decide_on_boxes(
     segments: Any, low: Any, high: Any, columns: Any, first: int, last: int, stop: Any, items: Any, planes: Any,
     still: Any, n: Any,

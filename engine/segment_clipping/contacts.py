@@ -19,7 +19,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.jit import bare, inline, kernel
+from engine.jit import allocating, allocating_kernel, called, inline
 from engine.predicates.loading import as_point2
 from engine.predicates.orientation import orient2d
 from engine.segment_clipping.box_tree import DEEPEST, LEAF_SIZE, may_meet
@@ -47,7 +47,7 @@ class EdgeContacts(NamedTuple):
     """(DEEPEST,) int64, nodes that wait."""
 
 
-@inline
+@allocating
 def edge_contacts_for(n_segments: int, n_contacts: int) -> EdgeContacts:
     """Return room for groups of so many segments at most, and so many contacts of a group."""
     return EdgeContacts(
@@ -107,7 +107,7 @@ def is_point(segment: Any) -> bool:
     return are_equal
 
 
-@bare
+@called
 def gather_edges(contacts: EdgeContacts, outline: Any, segments: Any, n: int, stop: Any) -> int:
     """Fill met, kinds and offsets with the contacts of the first n of some segments (m, 2, 2); return how many.
 
@@ -126,7 +126,7 @@ def gather_edges(contacts: EdgeContacts, outline: Any, segments: Any, n: int, st
     return found
 
 
-@kernel
+@allocating_kernel
 def find_contacts_2d(segments: Any, outline: Any, stop: Any, room: int) -> tuple[int, Any, Any, Any]:
     """Return how many contacts segments (n, 2, 2) float64 have with the edges of a polygon, and these.
 

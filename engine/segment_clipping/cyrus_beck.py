@@ -22,7 +22,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.arrays import FloatArray
-from engine.jit import inline, kernel, merged
+from engine.jit import allocating_kernel, called, inline, merged
 from engine.predicates.error_free import workspace
 from engine.predicates.expansion import Components, compress, grow, grow_product, is_safe, sign
 from engine.predicates.parameters import compare_products, compare_ratios_filter
@@ -89,14 +89,14 @@ def expand_value(row: Any, point: Any, e: Components) -> int:
     return compress(e, n)
 
 
-@inline
+@called
 def exact_sign(row: Any, point: Any) -> int:
     """Return the exact sign of `row` at `point`, both within the safe range."""
     e = workspace(8)
     return sign(e, expand_value(row, point, e))
 
 
-@inline
+@called
 def exact_order(row_i: Any, row_j: Any, segment: Any) -> int:
     """Return the exact sign of t_i - t_j for two planes that `segment` crosses, all within the safe range."""
     p_i, q_i, p_j, q_j, e = workspace(8), workspace(8), workspace(8), workspace(8), workspace(200)
@@ -211,7 +211,7 @@ def coordinate_limit(columns: Any) -> float:
     return limit
 
 
-@inline
+@called
 def decide_alone(
     segments: Any, item: int, columns: Any, limit: float, numbers: Any, chosen: Any
 ) -> tuple[int, int, int, int]:
@@ -233,7 +233,7 @@ def decide_alone(
     return state, (int(chosen[entered]) if entered >= 0 else -1), (int(chosen[left]) if left >= 0 else -1), beyond
 
 
-@kernel
+@allocating_kernel
 def decide_on_rows(
     segments: Any, columns: Any, first: int, last: int, stop: Any, items: Any, planes: Any, still: Any, n: Any
 ) -> None:

@@ -21,7 +21,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.jit import bare, inline, kernel
+from engine.jit import allocating, allocating_kernel, called, inline
 from engine.lanes.boxes import EMPTY, near_segment
 from engine.lanes.lanes import lowest_bit, prefetch
 from engine.lanes.tracing import LANES
@@ -70,7 +70,7 @@ class Streams(NamedTuple):
     """(m + 1,) where those of each segment begin."""
 
 
-@inline
+@allocating
 def streams_for(mesh: Any, n_segments: int, n_contacts: int) -> Streams:
     """Return room for groups of so many segments at most, and so many contacts of a group."""
     n_pairs = _PAIRS * n_segments
@@ -185,7 +185,7 @@ def _by_segment(streams: Any, n: int, n_contacts: int) -> None:
     offsets[n] = n_contacts
 
 
-@bare
+@called
 def gather_contacts(streams: Any, mesh: Any, segments: Any, n: int, stop: Any) -> int:
     """Fill met, kinds and offsets with the contacts of the first n of some segments (m, 2, 3); return how many.
 
@@ -244,7 +244,7 @@ def gather_contacts(streams: Any, mesh: Any, segments: Any, n: int, stop: Any) -
     return n_contacts
 
 
-@kernel
+@allocating_kernel
 def find_mesh_contacts(segments: Any, mesh: Any, stop: Any, room: int) -> tuple[int, Any, Any, Any]:
     """Return the contacts of segments (n, 2, 3) float64, GROUP at most, with triangles: see `find_contacts_2d`."""
     streams = streams_for(mesh, segments.shape[0], room)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from engine.jit import bare_kernel, inline, merged
+from engine.jit import called, inline, kernel, merged
 from engine.predicates.cut_point import parameter_and_point, point_at
 from engine.predicates.double_double import dd_add, dd_div
 from engine.predicates.error_free import two_diff, workspace
@@ -37,7 +37,7 @@ def expand_difference(x: float, y: float, e: Components) -> int:
     return grow(e, grow(e, 0, low), h)
 
 
-@inline
+@called
 def cut_by_signs(row: Any, segment: Any, point: Any, axis: int, at: float) -> tuple[float, bool]:
     """Set `point` to where `segment` crosses the plane of `row`, by exact signs; return t and whether all is sure.
 
@@ -71,7 +71,7 @@ def cut_by_values(p: Triple, q: Triple, sp: Triple, sq: Triple) -> tuple[float, 
     return x, y, z, th + tl, sure & is_x & is_y & is_z & (th + (tl - bound) == th + (tl + bound))
 
 
-@bare_kernel
+@kernel
 def fill_on_rows(
     segments: Any, columns: Any, items: Any, planes: Any, begin: int, size: int, stop: Any, pieces: Pieces, still: Any,
     n: Any,

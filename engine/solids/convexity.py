@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from engine.arrays import FloatArray, read_only
-from engine.jit import inline, kernel
+from engine.jit import allocating, inline, kernel
 from engine.predicates.loading import as_point3
 from engine.predicates.orientation import orient3d
 from engine.solids.polyhedron import Polyhedron
@@ -86,7 +86,7 @@ def _certify(vertices: Any, triangles: Any, center: Any) -> int:
     return side
 
 
-@inline
+@allocating
 def _is_locally_convex(vertices: Any, triangles: Any, side: int) -> bool:
     """Tell whether across each edge the next triangle's far corner is on the centre's side of the plane, or on it."""
     n_faces = triangles.shape[0]

@@ -29,7 +29,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
-from engine.jit import bare_kernel, inline
+from engine.jit import inline, kernel
 from engine.solids.simple_ring import Ring, turn
 from engine.types import Point2
 
@@ -81,7 +81,7 @@ def room_for(points: FloatArray, curve: IntArray) -> tuple[Tree, Links]:
     return tree, Links(*np.full((4, n), -1))
 
 
-@bare_kernel
+@kernel
 def cut_ears(ring: Ring, tree: Tree, links: Links, numbers: Any, neighbours: Any, ears: Any, flag: Any) -> int:
     """Fill ears (n - 2, 3): corner before, tip, corner after; return how many were cut, fewer than n - 2 where the flag
     is set or a turn is wanted.

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.jit import called, inline, kernel
+from engine.jit import allocating, allocating_kernel, called, inline
 
 _POLL: Final = 0x3FFF
 """Items between two looks at the flag, one less than a power of two: a fraction of a millisecond."""
@@ -33,7 +33,7 @@ def _mixed(bits: Any, row: int) -> Any:
     return (mixed ^ (mixed >> _HALF)) * _ODD
 
 
-@called
+@allocating
 def _find_equal_rows(bits: Any, first: Any, flag: Any) -> int:
     """Set `first` (n,) to the first row of `bits` (n, 3) uint64 that equals each row; return the number of different
     ones.
@@ -69,7 +69,7 @@ def _find_equal_rows(bits: Any, first: Any, flag: Any) -> int:
     return n_different
 
 
-@inline
+@allocating
 def _find_repeat(offsets: Any, indices: Any, n_vertices: int, flag: Any) -> int:
     """Return the first face that names a vertex twice, -1 if none does."""
     last_face = np.full(n_vertices, -1, np.int64)
@@ -114,7 +114,7 @@ def _group_edges(offsets: Any, indices: Any, starts: Any, ends: Any, flag: Any) 
                 starts[vertex] += starts[vertex - 1]
 
 
-@called
+@allocating
 def _count_unbalanced(starts: Any, ends: Any, marks: Any, flag: Any) -> tuple[int, int]:
     """Return how many edges are used an odd number of times, and how many others more often in one direction.
 
@@ -143,7 +143,7 @@ def _count_unbalanced(starts: Any, ends: Any, marks: Any, flag: Any) -> tuple[in
     return n_odd, n_turned
 
 
-@called
+@allocating
 def _name_unbalanced(
     offsets: Any, corners: Any, starts: Any, ends: Any, marks: Any, wanted: int, named: Any, flag: Any
 ) -> None:
@@ -177,7 +177,7 @@ def _name_unbalanced(
                     return
 
 
-@kernel
+@allocating_kernel
 def look_over(
     bits: Any, offsets: Any, indices: Any, must_close: bool, merged: Any, named: Any, flag: Any
 ) -> tuple[int, int, int, int]:

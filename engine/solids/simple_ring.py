@@ -23,7 +23,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.arrays import IntArray
-from engine.jit import bare_kernel, inline
+from engine.jit import inline, kernel
 from engine.predicates.orientation import orient2d
 from engine.types import UNDECIDED, Point2
 
@@ -74,7 +74,7 @@ def room_for(n: int) -> tuple[IntArray, Blocks]:
     return np.empty((2, n), np.int64), Blocks(sides, np.zeros_like(order), order, np.zeros(2, np.int64))
 
 
-@bare_kernel
+@kernel
 def find_meeting(ring: Ring, sorted_corners: Any, rank: Any, ends: Any, blocks: Blocks, found: Any, flag: Any) -> int:
     """Return whether the ring is SIMPLE, or what was found: TURNS_BACK at corner found[0], or side found[0] MEETS side
     found[1]; ENDED_EARLY where the flag is set or a turn is wanted.

@@ -14,11 +14,11 @@ from __future__ import annotations
 import numpy as np
 
 from engine.arrays import FloatArray
-from engine.jit import kernel
+from engine.jit import allocating_kernel
 from engine.textbook.solids import signed_distance
 
 
-@kernel
+@allocating_kernel
 def clip_contour(contour: FloatArray, normal: FloatArray, offset: float) -> FloatArray:
     """Return what the half-space leaves of a closed contour (n, dim); at most 2 n vertices."""
     n = len(contour)

@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, IntArray
-from engine.jit import inline, kernel, merged
+from engine.jit import allocating, allocating_kernel, inline, merged
 from engine.textbook.solids import signed_distance
 
 REJECTED, ACCEPTED, UNFINISHED = 0, 1, 2
@@ -37,7 +37,7 @@ MAX_TURNS = 64  # six would do in exact arithmetic: each turn settles one plane
 MAX_PLANES = 62
 
 
-@kernel
+@allocating_kernel
 def on_half_space(segments: FloatArray, normal: FloatArray, offset: float) -> tuple[FloatArray, BoolArray]:
     """Return (clipped segments (n, 2, dim), kept (n,)); a removed segment is left as it came."""
     clipped, kept = segments.copy(), np.ones(len(segments), np.bool_)
@@ -66,7 +66,7 @@ def code_word(p: Any, low: Any, high: Any) -> int:
     return code
 
 
-@merged
+@allocating
 def cut(p: Any, q: Any, bit: int, low: Any, high: Any) -> Any:
     """Return the intersection of the segment with the plane of the side `bit`."""
     axis = bit // 2
@@ -74,7 +74,7 @@ def cut(p: Any, q: Any, bit: int, low: Any, high: Any) -> Any:
     return p + (plane - p[axis]) / (q[axis] - p[axis]) * (q - p)
 
 
-@merged
+@allocating
 def clip_one(p: Any, q: Any, n_turns: int, region: Any, code_word: Any, cut: Any) -> int:
     """Cut p q in place by ``code_word(p, *region)`` and ``cut(p, q, bit, *region)``; return its status."""
     code_p, code_q = code_word(p, *region), code_word(q, *region)
@@ -95,7 +95,7 @@ def clip_one(p: Any, q: Any, n_turns: int, region: Any, code_word: Any, cut: Any
     return UNFINISHED
 
 
-@kernel
+@allocating_kernel
 def on_box(segments: FloatArray, low: FloatArray, high: FloatArray) -> tuple[FloatArray, IntArray]:
     """Return (clipped segments (n, 2, dim), status (n,): REJECTED, ACCEPTED or UNFINISHED)."""
     clipped, status = segments.copy(), np.empty(len(segments), np.int64)
@@ -114,7 +114,7 @@ def code_word_of_planes(p: Any, planes: Any) -> int:
     return code
 
 
-@inline
+@allocating
 def cut_on_plane(p: Any, q: Any, bit: int, planes: Any) -> Any:
     """Return the intersection of the segment with the plane of row `bit`."""
     normal, offset = planes[bit, :-1], planes[bit, -1]
@@ -122,7 +122,7 @@ def cut_on_plane(p: Any, q: Any, bit: int, planes: Any) -> Any:
     return p + at_p / (at_p - at_q) * (q - p)
 
 
-@kernel
+@allocating_kernel
 def on_convex(segments: FloatArray, planes: FloatArray) -> tuple[FloatArray, IntArray]:
     """Return (clipped segments (n, 2, dim), status (n,)); planes (m, dim + 1), m <= MAX_PLANES: bits of a code word."""
     clipped, status = segments.copy(), np.empty(len(segments), np.int64)
@@ -132,7 +132,7 @@ def on_convex(segments: FloatArray, planes: FloatArray) -> tuple[FloatArray, Int
     return clipped, status
 
 
-@kernel
+@allocating_kernel
 def on_sphere(segments: FloatArray, center: FloatArray, radius: float) -> tuple[FloatArray, BoolArray]:
     """Return (clipped segments (n, 2, dim), kept (n,)) by the two roots of |p + t (q - p) - c|^2 = r^2, cut to [0, 1].
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.bounding.aabb import box_of_points, corners_of_box
-from engine.jit import inline, kernel
+from engine.jit import allocating_kernel, inline, kernel
 from engine.predicates.loading import as_point3
 from engine.predicates.vectors import along, cross, dot, minus
 from engine.textbook.polyhedra import IN, parity_of
@@ -143,7 +143,7 @@ def farthest(vertices: FloatArray, start: Point3) -> Point3:
     return at
 
 
-@kernel
+@allocating_kernel
 def bounding_sphere(vertices: FloatArray) -> tuple[FloatArray, float]:
     """Return centre (3,) and radius of Ritter's sphere around vertices (n, 3).
 
@@ -193,7 +193,7 @@ def pair_collides(first: Any, second: Any) -> bool:
     return False
 
 
-@kernel
+@allocating_kernel
 def of_triangles(first: FloatArray, second: FloatArray) -> BoolArray:
     """Tell of each pair first[i], second[i], both (n, 3, 2), whether the closed triangles have a common point.
 

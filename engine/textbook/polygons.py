@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, IntArray
-from engine.jit import inline, kernel
+from engine.jit import allocating, allocating_kernel, inline
 
 
-@kernel
+@allocating_kernel
 def by_half_line(points: FloatArray, vertices: FloatArray, ring_offsets: IntArray) -> BoolArray:
     """Tell of each point (n, 2) whether it is in the rings vertices[ring_offsets[r] : ring_offsets[r + 1]].
 
@@ -58,7 +58,7 @@ def unsigned_angle(ux: float, uy: float, vx: float, vy: float) -> float:
     return acos(min(1.0, max(-1.0, (ux * vx + uy * vy) / size)))
 
 
-@inline
+@allocating
 def sum_of_angles(point: Any, vertices: Any, angle: Any) -> float:
     """Return the sum of the angles under which the edges are seen from a point."""
     total = 0.0
@@ -68,7 +68,7 @@ def sum_of_angles(point: Any, vertices: Any, angle: Any) -> float:
     return total
 
 
-@kernel
+@allocating_kernel
 def by_signed_angles(points: FloatArray, vertices: FloatArray) -> BoolArray:
     """Tell of each point (n, 2) whether the signed sum exceeds half a turn in size.
 
@@ -80,7 +80,7 @@ def by_signed_angles(points: FloatArray, vertices: FloatArray) -> BoolArray:
     return contained
 
 
-@kernel
+@allocating_kernel
 def by_unsigned_angles(points: FloatArray, vertices: FloatArray, tolerance: Any) -> BoolArray:
     """Tell of each point (n, 2) whether the unsigned sum is at least a full turn less `tolerance` (radians)."""
     contained = np.zeros(len(points), np.bool_)
@@ -89,7 +89,7 @@ def by_unsigned_angles(points: FloatArray, vertices: FloatArray, tolerance: Any)
     return contained
 
 
-@kernel
+@allocating_kernel
 def by_same_side(points: FloatArray, vertices: FloatArray) -> BoolArray:
     """Tell of each point (n, 2) whether it is on the same side of every edge of the convex ring vertices (m, 2).
 

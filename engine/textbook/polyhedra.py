@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, IntArray
-from engine.jit import inline, kernel
+from engine.jit import allocating_kernel, inline
 from engine.predicates.loading import as_point3
 from engine.predicates.vectors import cross, dot, minus
 from engine.types import Point3
@@ -60,7 +60,7 @@ def parity_of(point: Point3, direction: Point3, vertices: Any, triangles: Any, m
     return parity
 
 
-@kernel
+@allocating_kernel
 def by_half_line(points: FloatArray, vertices: FloatArray, triangles: IntArray, direction: FloatArray) -> BoolArray:
     """Tell of each point (n, 3) whether an odd number of triangles (m, 3) lies ahead in `direction` (3,)."""
     contained = np.zeros(len(points), np.bool_)
@@ -70,7 +70,7 @@ def by_half_line(points: FloatArray, vertices: FloatArray, triangles: IntArray, 
     return contained
 
 
-@kernel
+@allocating_kernel
 def by_other_half_lines(
     points: FloatArray, vertices: FloatArray, triangles: IntArray, directions: FloatArray, margin: float
 ) -> tuple[BoolArray, BoolArray]:

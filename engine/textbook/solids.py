@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, IntArray
-from engine.jit import inline, kernel
+from engine.jit import allocating_kernel, inline
 
 Leaf = Callable[[FloatArray], BoolArray]
 
 
-@kernel
+@allocating_kernel
 def in_implicit(points: FloatArray, powers: IntArray, coefficients: FloatArray) -> BoolArray:
     """Tell of each point whether f >= 0, the sum of coefficient x^i y^j z^k.
 
@@ -45,7 +45,7 @@ def signed_distance(point: Any, normal: Any, offset: float) -> float:
     return total + offset
 
 
-@kernel
+@allocating_kernel
 def in_convex(points: FloatArray, planes: FloatArray) -> BoolArray:
     """Tell of each point (n, dim) whether every row (normal, offset) of planes (m, dim + 1) is >= 0 there.
 

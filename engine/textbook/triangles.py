@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray
-from engine.jit import inline, kernel
+from engine.jit import allocating_kernel, inline
 from engine.predicates.loading import as_point3
 from engine.predicates.vectors import cross, dot, minus
 from engine.types import Point2, Point3
@@ -29,7 +29,7 @@ def is_in_prism(p: Point3, a: Point3, b: Point3, c: Point3) -> bool:
     )
 
 
-@kernel
+@allocating_kernel
 def by_products(points: FloatArray, triangle: FloatArray) -> BoolArray:
     """Tell of each point (n, 3) whether it is in the prism over the triangle (3, 3).
 
@@ -67,7 +67,7 @@ def axis_of_largest_area(a: Point3, b: Point3, c: Point3) -> int:
     return 1 if abs(n.y) >= abs(n.z) else 2
 
 
-@kernel
+@allocating_kernel
 def by_projection(points: FloatArray, triangle: FloatArray) -> BoolArray:
     """Tell of each point (n, 3) whether its projection is in that of the triangle (3, 3): meant for its plane.
 

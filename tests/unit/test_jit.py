@@ -12,14 +12,12 @@ import subprocess
 import sys
 import tarfile
 from pathlib import Path
-from typing import Any, ForwardRef, get_args, get_origin
 
 import pytest
 from numba import config as numba_config
 
 import engine
 from engine import jit, kernel_cache
-from engine.collision.meshes.triangle_triangle import Facet
 
 ROOT = Path(__file__).resolve().parents[2]
 pytestmark = pytest.mark.skipif(bool(numba_config.DISABLE_JIT), reason="the compiler is disabled")
@@ -305,80 +303,84 @@ def test_no_compiled_function_calls_a_kernel() -> None:
                 assert not called, (function, called)
 
 
-MIXED = """
+COUNTING = """
 import numpy as np
-from engine.jit import bare_kernel, inline, kernel
+from engine.jit import allocating, allocating_kernel, inline, kernel
 
 @inline
-def part(values):
-    return values[1]
+def kept(values):
+    return values, 1
+
+@allocating
+def doubled(values):
+    return np.append(values, values)
 
 @kernel
-def counting(values, out):
-    out[:] = part(values)
+def not_counting(values, out):
+    out[0] = kept(values)[0][1]
 
-@bare_kernel
-def bare(values, out):
-    out[0] = np.sum(part(values))
+@allocating_kernel
+def counting(values):
+    return doubled(values)
 
-def ask(values):
-    out = np.zeros(2)
-    counting(values, out)
-    print(*out)
-    bare(values, out)
-    print(*out)
+@allocating_kernel
+def counts_more_than_it_is_given(values):
+    return np.sum(kept(values)[0])
+
+@kernel
+def counts_less_than_it_is_given(values, out):
+    out[0] = doubled(values)[0]
+
+@kernel
+def gives_what_it_does_not_count(values):
+    return values
+
+@kernel
+def makes(values, out):
+    out[0] = np.append(values, values)[0]
 """
 
 
-def test_what_returns_arrays_is_not_shared_with_callers_that_do_not_count_them(project: Path) -> None:
+def test_who_makes_arrays_counts_them_and_nobody_else(project: Path) -> None:
     """Counted by one side alone they were freed while in use: `Scene.clip_segments` as the first question crashed."""
-    (project / "engine" / "mixed.py").write_text(MIXED)
-    code = "import numpy as np; from engine.mixed import ask; ask(np.array([{}]))"
-    assert run(project, code.format("1.0, 2.0")) == ["2.0", "2.0", "2.0", "2.0"]  # numbers are not counted
-    with start(project, code.format("[1.0, 2.0], [3.0, 4.0]")) as process:
-        told, error = process.communicate(timeout=120)
-    assert told.split() == ["3.0", "4.0"]
-    assert "part returns array" in error
+    (project / "engine" / "counts.py").write_text(COUNTING)
+    begin = (
+        "import numpy as np; from engine import counts; values, out = np.array([[1.0, 2.0], [3.0, 4.0]]), np.zeros(2); "
+    )
+    well = "counts.not_counting(values[1], out); print(*out, *counts.counting(values[0]))"
+    assert run(project, begin + well) == ["4.0", "0.0", "1.0", "2.0", "1.0", "2.0"]
+    for call, told in {
+        "counts_more_than_it_is_given(values[0])": "kept returns Tuple",
+        "counts_less_than_it_is_given(values[0], out)": "doubled returns array",
+        "gives_what_it_does_not_count(values[0])": "gives_what_it_does_not_count returns array",
+        "makes(values[0], out)": "Only accept returning of array passed into the function as argument",
+    }.items():
+        with start(project, f"{begin}counts.{call}") as process:
+            assert told in process.communicate(timeout=120)[1]
 
 
-NUMBERS_IN_ANY = {"_in_tree", "corner", "decide2", "in_space", "local_segment", "to_frame"}
-"""Functions said to return Any, or tuples of it, that return numbers of one of two kinds."""
+BESIDE = """
+import numba
+import numpy as np
+from engine.jit import allocating_kernel, called
+
+@called
+def twice(x):
+    return x + x
+
+@allocating_kernel
+def ours(x):
+    return np.full(2, twice(x))
+
+@numba.njit
+def theirs(x):
+    return np.full(3, twice(x))
+"""
 
 
-def leaves_of(kind: Any, names: dict[str, Any]) -> set[Any]:
-    """Return what a returned type is made of in the end: a tuple with names counts as its fields."""
-    if isinstance(kind, (str, ForwardRef)):
-        kind = eval(getattr(kind, "__forward_arg__", kind), names)
-    if get_origin(kind) is tuple:
-        return set().union(*(leaves_of(part, names) for part in get_args(kind)))
-    if isinstance(kind, type) and issubclass(kind, tuple) and kind.__annotations__:
-        known = vars(importlib.import_module(kind.__module__))
-        return set().union(*(leaves_of(part, known) for part in kind.__annotations__.values()))
-    return {kind}
-
-
-def test_functions_below_both_kinds_of_kernels_return_numbers() -> None:
-    """Whichever kernel a process asks for first (the compiler refuses the second one, where they do not)."""
-    for item in pkgutil.walk_packages(engine.__path__, "engine."):
-        importlib.import_module(item.name)
-    callers: dict[int, set[bool]] = {}  # of each function whether what calls it counts references
-    kernels = [
-        kernel for kernel in jit.KERNELS if kernel.py_func.__module__.startswith("engine.")
-    ]  # not of other tests
-    left = [(kernel, kernel._options.get("_nrt", True)) for kernel in kernels]
-    shared = {}
-    while left:
-        function, counts = left.pop()
-        known = function.py_func.__globals__
-        for called in [known.get(name) for name in function.py_func.__code__.co_names]:
-            if isinstance(called, jit._Inline):
-                before, own = callers.setdefault(id(called), set()), called._options.get("_nrt", counts)
-                if not {counts, own} <= before:
-                    before |= {counts, own}
-                    left.append((called, own))
-                if len(before) > 1:
-                    shared[called.py_func.__name__] = called.py_func
-    assert len(shared) > 100
-    for name in shared.keys() - NUMBERS_IN_ANY:
-        returned = shared[name].__annotations__["return"]
-        assert leaves_of(returned, shared[name].__globals__) <= {int, float, bool, None, Facet}, shared[name]
+@pytest.mark.parametrize("order", ["ours, theirs", "theirs, ours"])
+def test_kernels_stand_beside_what_others_compile_of_the_same_functions(project: Path, order: str) -> None:
+    """Ours, and numba's own: the linker once took a function within our kernel for theirs, and found no address."""
+    (project / "engine" / "beside.py").write_text(BESIDE)
+    code = f"from engine.beside import ours, theirs; print(*[value for each in ({order}) for value in each(1.0)])"
+    assert run(project, code) == ["2.0"] * 5

@@ -15,7 +15,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 from engine.collision.clearance.wide import Wide, less, over, plus, product, root, times
-from engine.jit import bare_kernel, inline
+from engine.jit import inline, kernel
 from engine.predicates.double_double import U2, surely_rounded
 from engine.predicates.error_free import two_sum, workspace
 
@@ -160,7 +160,7 @@ def gap_of_forms(
     return distance.h if is_sure else UNSURE, faces, theirs, rest, error
 
 
-@bare_kernel
+@kernel
 def nearest_of_forms(
     form: Any, turn: Any, move: Any, other: Any, their_turn: Any, their_move: Any, points: Any
 ) -> tuple[float, int, int]:
@@ -192,7 +192,7 @@ def nearest_of_forms(
     return distance, faces if is_sure else -1, theirs
 
 
-@bare_kernel
+@kernel
 def nearest_of_plane(row: Any, form: Any, turn: Any, move: Any, points: Any) -> tuple[float, int, int]:
     """Return the distance of a form from the half-space row (d + 1,), 0.0 where they meet, or UNSURE; 0, or -1 where
     the points (2, d) are not sure; and the faces on which the form's nearest point lies, of several the low ones.

@@ -27,7 +27,7 @@ from engine.collision.convex.pair import inner_point
 from engine.collision.convex.xenocollide import PlacedBody, farthest, largest, placed_body
 from engine.collision.meshes.placement import PoseArrays, placed, turned_back
 from engine.collision.meshes.triangle_triangle import Facet
-from engine.jit import bare_kernel, called, inline, merged
+from engine.jit import called, inline, kernel, merged
 from engine.predicates.double_double import surely_rounded
 from engine.predicates.error_free import two_diff, two_sum, workspace
 from engine.predicates.vectors import dot, largest_of, length, minus, negative
@@ -209,7 +209,7 @@ def _beyond(pool: ConvexArrays, f: PlacedBody, n: Wide3, base: Wide3, shift: Wid
     return most
 
 
-@bare_kernel
+@kernel
 def gaps_of_pairs(
     forms: Any, pool: ConvexArrays, bodies: Any, kinds: Any, poses: PoseArrays, places: Any, gap: float,
     is_measured: bool, distances: Any, flag: Any,

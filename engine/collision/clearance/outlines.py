@@ -22,7 +22,7 @@ from engine.collision.clearance.closed_forms import UNSURE
 from engine.collision.clearance.wide import Wide, less, over, plus, product, root, times
 from engine.collision.codes import DISJOINT, UNSETTLED
 from engine.collision.planar.outline_batch import inside, relate_placed
-from engine.jit import called, inline, kernel
+from engine.jit import allocating, allocating_kernel, called, inline
 from engine.predicates.double_double import U2, surely_rounded
 from engine.predicates.error_free import two_sum
 from engine.predicates.loading import as_point2
@@ -51,7 +51,7 @@ error of that; whether the vertex is the first body's; of both bodies the vertex
 edge, and the least edge that this lies on."""
 
 
-@inline
+@allocating
 def _place(vertices: Any, following: Any, turn: Any, move: Any) -> Placed:
     """Return an outline under a pose; each sum of three is off by 12 u^2 of its terms.
 
@@ -209,7 +209,7 @@ def _found(a: Placed, b: Placed, vertex: int, edge: int, is_first: bool) -> tupl
     return Found(distance, bound, foot, error, is_first, first, second, face, theirs), where >= 0
 
 
-@inline
+@allocating
 def _search(a: Placed, b: Placed) -> tuple[Found, float, bool]:
     """Return the nearest pair, of equal ones that of the least faces; by how much another may be nearer; and whether
     this is surely the one."""
@@ -287,7 +287,7 @@ def _write(
     return is_sure
 
 
-@kernel
+@allocating_kernel
 def nearest_of_outlines(
     vertices: Any, following: Any, turn: Any, move: Any, other: Any, their_following: Any, their_turn: Any,
     their_move: Any, radii: tuple[float, float], points: Any,

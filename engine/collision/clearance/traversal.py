@@ -40,7 +40,7 @@ from engine.collision.clearance.certified import certify
 from engine.collision.clearance.refined import refine
 from engine.collision.meshes.mesh_arrays import MeshArrays
 from engine.collision.meshes.placement import PoseArrays, defect_of, place_pair, placed, set_frame
-from engine.jit import bare_kernel, inline, merged
+from engine.jit import inline, kernel, merged
 from engine.lanes.boxes import EMPTY, FRAME_ROWS
 from engine.lanes.discs import inverse_ratio
 from engine.lanes.gaps import child_bounds
@@ -175,7 +175,7 @@ def _start_line(s: Search) -> None:
         set_line(s.room.line, s.a, s.b, Point3(middle.x / size, middle.y / size, middle.z / size))
 
 
-@bare_kernel
+@kernel
 def find_nearest(
     first: MeshArrays, first_poses: PoseArrays, second: MeshArrays, second_poses: PoseArrays, span: tuple[int, int],
     asked: Asked, answers: Any, room: Any, flag: Any,

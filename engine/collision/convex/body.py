@@ -16,7 +16,7 @@ import numpy as np
 from engine.arrays import FloatArray, IntArray
 from engine.bounding.aabb import corners_of_box
 from engine.collision.meshes.mesh_arrays import BOX_TRIANGLES
-from engine.jit import kernel, merged
+from engine.jit import allocating_kernel, merged
 from engine.predicates.vectors import cross, length, minus
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
@@ -119,7 +119,7 @@ def point_of(points: Any, point: int) -> Point3:
     return Point3(points[0, point], points[1, point], points[2, point])
 
 
-@kernel
+@allocating_kernel
 def _describe(
     points: Any, triangles: Any, first_neighbor: Any, neighbors: Any, outermost: Any, normals: Any, numbers: Any
 ) -> None:

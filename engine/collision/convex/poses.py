@@ -27,7 +27,7 @@ from engine.collision.convex.body import ASIDE, CENTER, RADIUS, ConvexArrays, Co
 from engine.collision.convex.pair import LARGEST_ERROR, inner_point, is_farther, relate_meeting
 from engine.collision.convex.xenocollide import PlacedBody, is_around_origin, placed_body
 from engine.collision.meshes.placement import PoseArrays
-from engine.jit import inline, kernel, merged
+from engine.jit import allocating_kernel, inline, merged
 from engine.lanes.lanes import bits_of, load, lowest_bit, select, spread, store
 from engine.lanes.tracing import LANES
 from engine.predicates.vectors import cross, dot, largest_of, minus, negative
@@ -190,7 +190,7 @@ def _meets(state: Any, lane: int) -> bool:
     return is_around_origin(p, q, r, s, np.float64(state[MARGIN, lane]))
 
 
-@kernel
+@allocating_kernel
 def relate_in_lanes(
     pool: ConvexArrays, lanes: LaneArrays, still: PoseArrays, poses: PoseArrays, is_boolean: bool, relations: Any,
     flag: Any,

@@ -20,7 +20,7 @@ from engine.collision.meshes.face_state import states_of
 from engine.collision.meshes.mesh_arrays import STATE_CLEAN, MeshArrays, MeshBody, lattice_shift
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.result import Poses
-from engine.jit import inline, kernel
+from engine.jit import allocating_kernel, inline
 from engine.lanes.boxes import EMPTY
 from engine.predicates.exact_vectors import cross, dot, largest_axis, minus
 from engine.solids.pose import Pose
@@ -146,7 +146,7 @@ def _is_lane_apart(mesh: MeshArrays, node: int, lane: int, pose: PoseArrays, mar
     return False
 
 
-@kernel
+@allocating_kernel
 def _faces_in_box(mesh: MeshArrays, pose: PoseArrays, bounds: Any, found: Any) -> int:
     """Write the triangles whose placed boxes may meet bounds (6,) into found (room,); return their number."""
     t = pose.translations[0]

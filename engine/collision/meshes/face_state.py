@@ -35,7 +35,7 @@ from engine.collision.meshes.triangle_triangle import (
     separation,
     with_pose,
 )
-from engine.jit import allocating, inline, kernel
+from engine.jit import allocating, allocating_kernel, inline
 from engine.predicates.orientation import orient2d, orient3d
 from engine.types import UNDECIDED, Point3
 
@@ -153,7 +153,7 @@ def state_at(mesh: MeshArrays, face: int) -> int:
     return int(states_of(mesh, np.array([face]))[0] if state == STATE_UNKNOWN else state)
 
 
-@kernel
+@allocating_kernel
 def _find_states(mesh: MeshArrays, faces: Any, states: Any) -> None:
     """Fill states (n,) with the state of each of `faces` (n,)."""
     poses = np.zeros((1, 12))

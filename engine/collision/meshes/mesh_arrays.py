@@ -20,7 +20,7 @@ from engine.bounding.disc_tree import fill_discs
 from engine.collision.meshes.placement import Extent, PoseArrays
 from engine.collision.meshes.triangle_triangle import Facet, facet_at, projected
 from engine.containment.methods.polyhedron_ray_parity import fill_triangle_boxes
-from engine.jit import inline, kernel
+from engine.jit import allocating_kernel, inline, kernel
 from engine.lanes.boxes import EMPTY
 from engine.lanes.discs import DISC_ROWS
 from engine.lanes.faces import NOWHERE
@@ -142,7 +142,7 @@ def mesh_body_of_triangles(vertices: FloatArray, triangles: IntArray, faces: Int
     return MeshBody(arrays, shift)
 
 
-@kernel
+@allocating_kernel
 def _lay_out(
     vertices: Any, triangles: Any, faces: Any, child: Any, order: Any, ordered: Any, used: Any, axis: Any,
     components: Any,

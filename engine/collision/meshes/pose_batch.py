@@ -25,7 +25,7 @@ from engine.collision.meshes.parity import INSIDE, OUTSIDE, brought_back, locate
 from engine.collision.meshes.placement import Placement, PoseArrays, defect_of
 from engine.collision.meshes.touching import only_touch
 from engine.collision.meshes.triangle_triangle import COPLANAR, CORNER
-from engine.jit import bare_kernel, called, inline, merged
+from engine.jit import called, inline, kernel, merged
 from engine.predicates.loading import as_point3
 from engine.types import UNDECIDED
 
@@ -129,7 +129,7 @@ def put_in_order(faces: Any, their_faces: Any, pairs: Any, kinds: Any, n: int) -
         pairs[place, 0], pairs[place, 1], kinds[place] = i, j, kind
 
 
-@bare_kernel
+@kernel
 def relate_poses(
     first: MeshArrays, second: MeshArrays, still: PoseArrays, poses: PoseArrays, seek: int, n_named: int,
     descent: Descent, found: Found, n_known: int, rows: Any, flag: Any,

@@ -20,7 +20,7 @@ from engine.collision.meshes.placement import PoseArrays, orient2d_near
 from engine.collision.planar.outline import collide_outline_outline, rings_of
 from engine.collision.result import FIRST_WITHIN, OUTLINES, SECOND_WITHIN, UNNAMED, Collision, Poses, Witness, Work
 from engine.direct import entry_of
-from engine.jit import inline, kernel
+from engine.jit import allocating_kernel, inline, kernel
 from engine.predicates.loading import as_point2
 from engine.predicates.orientation import orient2d
 from engine.solids.base import Solid
@@ -185,7 +185,7 @@ def relate_placed(points: Any, following: Any, vertices: Any, theirs: Any, error
     return UNSETTLED, -1, -1
 
 
-@kernel
+@allocating_kernel
 def relate_outline_pairs(
     pool: OutlineArrays, bodies: Any, rows: Any, poses: PoseArrays, pairs: Any, relations: Any, flag: Any
 ) -> None:
@@ -209,7 +209,7 @@ def relate_outline_pairs(
         relations[item], _, _ = relate_placed(placed[0], pool.following[own], placed[1], pool.following[their], error)
 
 
-@kernel
+@allocating_kernel
 def _relate_two(
     vertices: Any, following: Any, turn: Any, move: Any, other: Any, their_following: Any, their_turn: Any,
     their_move: Any, are_posed: tuple[bool, bool],

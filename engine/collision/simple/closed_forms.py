@@ -26,7 +26,7 @@ from engine.collision.result import (
     Work,
 )
 from engine.collision.simple.against_boundary import collide_body_sphere
-from engine.jit import bare_kernel, inline
+from engine.jit import inline, kernel
 from engine.predicates.exact_vectors import largest_axis, minus, squared_length
 from engine.predicates.rational import scaled_integers
 from engine.solids.aabb import Aabb
@@ -55,7 +55,7 @@ def relate_boxes(low: Any, high: Any, their_low: Any, their_high: Any) -> int:
 _relate = inline(relate_boxes)
 
 
-@bare_kernel
+@kernel
 def relate_box_pairs(low: Any, high: Any, is_box: Any, pairs: Any, relations: Any) -> None:
     """Fill relations (n,) int8 for the pairs (n, 2) of which both are boxes without pose."""
     for item in range(pairs.shape[0]):

@@ -15,7 +15,7 @@ import numpy as np
 
 from engine.containment.cells.lattice import LEVELS, PARTS, PLACE, finest, parts_of, reference_coordinate, share_of
 from engine.containment.posed.filters import NOT_FINITE, has_not_finite
-from engine.jit import called, inline, kernel, merged
+from engine.jit import allocating_kernel, called, inline, merged
 from engine.lanes.cells import ROWS, group_parity, prefetch_group
 from engine.types import UNDECIDED
 
@@ -143,7 +143,7 @@ def _count_open(locations: Any, item_of: Any, n_kept: Any) -> int:
     return n_open
 
 
-@kernel
+@allocating_kernel
 def locate_by_cells(points: Any, cells: Any, locations: Any, flag: Any) -> int:
     """Fill `locations` (n,) int8 for points (n, 3) from a `Cells`; returns how many are left UNDECIDED.
 

@@ -18,7 +18,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 from engine.containment.posed.filters import NOT_FINITE, has_not_finite
-from engine.jit import inline, kernel, merged
+from engine.jit import called, inline, kernel, merged
 from engine.predicates.error_free import two_diff, two_prod, two_sum, workspace
 from engine.types import UNDECIDED
 
@@ -61,7 +61,7 @@ def located(dx: float, dy: float, dz: float, square: float, reach: float, blur: 
     return -1.0 if is_out else (1.0 if excess > bound else 2.0)
 
 
-@inline
+@called
 def _settle(points: Any, item: int, center: Any, radius: float, expansion: Any) -> int:
     """Return the location by exact sums; UNDECIDED where differences or squares are no exact pairs."""
     length = _add_square(expansion, 0, radius, 1.0)

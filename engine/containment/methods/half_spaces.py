@@ -27,7 +27,7 @@ from typing import Any, Final
 import numpy as np
 
 from engine.containment.posed.filters import NOT_FINITE, has_not_finite, in_space
-from engine.jit import inline, kernel, merged
+from engine.jit import allocating, inline, kernel, merged
 from engine.predicates.side import side_of_plane, side_of_plane_filter
 from engine.types import UNDECIDED, HalfSpace3, Point3
 
@@ -96,7 +96,7 @@ def _value(h: Any, x: Any, y: Any, z: Any, is_flat: bool) -> Any:
     return h.a * x + h.b * y + h.d if is_flat else h.a * x + h.b * y + h.c * z + h.d
 
 
-@merged
+@allocating
 def _locate(points: Any, planes: Any, is_exact: Any, locations: Any, flag: Any, is_flat: bool) -> int:
     """Do what both kernels do; is_flat is known when they are compiled."""
     if has_not_finite(points):

@@ -18,7 +18,7 @@ import numpy as np
 from engine.arrays import FloatArray, IntArray
 from engine.containment.methods.polygon_ray_parity import CROSSED, ON_EDGE, meet_edge
 from engine.containment.posed.filters import NOT_FINITE, has_not_finite
-from engine.jit import bare, inline, kernel, merged
+from engine.jit import allocating, allocating_kernel, called, inline, merged
 from engine.predicates.loading import as_point2
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
 from engine.types import UNDECIDED, Point2
@@ -63,7 +63,7 @@ def _count_crossings(xs: Any, ys: Any, first: int, last: int, x: float, y: float
     return n_crossed, n_unsure
 
 
-@bare
+@called
 def _one_by_one(xs: Any, ys: Any, ring_offsets: Any, rings: tuple[int, int], q: Any) -> int:
     """Return the location of q in the rings rings[0] up to rings[1], which may end with their first vertex or not.
 
@@ -105,7 +105,7 @@ def locate_in_small_rings(
     return _one_by_one(xs, ys, ring_offsets, rings, Point2(q[0], q[1])), True
 
 
-@inline
+@allocating
 def _by_edges(points: Any, blurs: Any, vertices: Any, ring_offsets: Any, crossed: Any, unsure: Any, flag: Any) -> None:
     """Count for each point the edges that it meets, and those that are not sure, a block of edges at a time."""
     xs, ys = np.empty(_BLOCK + 1), np.empty(_BLOCK + 1)
@@ -125,7 +125,7 @@ def _by_edges(points: Any, blurs: Any, vertices: Any, ring_offsets: Any, crossed
                 unsure[item] += n_unsure
 
 
-@inline
+@allocating
 def _by_points(points: Any, blurs: Any, vertices: Any, ring_offsets: Any, crossed: Any, unsure: Any, flag: Any) -> None:
     """Do what `_by_edges` does, a block of points at a time."""
     xs, ys, block_blurs = np.empty(_BLOCK), np.empty(_BLOCK), np.zeros(_BLOCK)
@@ -151,7 +151,7 @@ def _by_points(points: Any, blurs: Any, vertices: Any, ring_offsets: Any, crosse
             crossed[start + k], unsure[start + k] = n_crossed[k], n_unsure[k]
 
 
-@kernel
+@allocating_kernel
 def locate_by_ring_pass(points: Any, blurs: Any, vertices: Any, ring_offsets: Any, locations: Any, flag: Any) -> int:
     """Fill `locations` (n,) int8 for points (n, 2); returns how many needed more than the filter.
 

@@ -18,7 +18,7 @@ from typing import Any
 
 from engine.bounding.grid import cell_of
 from engine.containment.posed.filters import NOT_FINITE, has_not_finite, orient2d_blurred
-from engine.jit import bare_kernel, called, inline, merged
+from engine.jit import called, inline, kernel, merged
 from engine.predicates.loading import as_point2
 from engine.predicates.orientation import orient2d_exact, orient2d_filter
 from engine.types import UNDECIDED
@@ -27,7 +27,7 @@ MISSED, CROSSED, ON_EDGE, BEYOND = 0, 1, 3, 4
 """How a ray meets an edge, as `polyhedron_ray_parity.py` has it for faces."""
 
 
-@bare_kernel
+@kernel
 def locate_in_rings(
     points: Any, blurs: Any, starts: Any, ends: Any, x_highs: Any, slabs: Any, box: Any, locations: Any, flag: Any
 ) -> int:

@@ -14,7 +14,7 @@ import numpy as np
 from engine.bounding.grid import Axis, cell_of
 from engine.containment.methods.polyhedron_ray_parity import BEYOND, CROSSED, ON_FACE, meet_upwards
 from engine.containment.posed.filters import NOT_FINITE, has_not_finite
-from engine.jit import inline, kernel
+from engine.jit import allocating_kernel, inline
 from engine.predicates.loading import as_point3
 from engine.types import UNDECIDED
 
@@ -119,7 +119,7 @@ def _axis_over(points: Any, axis: int, n_cells: int) -> Axis:
     return Axis(low, high, min(n_cells / extent, 1e300) if extent > 0.0 else 0.0, n_cells if extent > 0.0 else 1)
 
 
-@kernel
+@allocating_kernel
 def locate_by_pass(points: Any, vertices: Any, triangles: Any, locations: Any, flag: Any) -> int:
     """Fill `locations` (n,) int8 for points (n, 3), n > 0; returns how many needed more than the filter, or NOT_FINITE.
 

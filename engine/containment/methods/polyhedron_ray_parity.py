@@ -30,7 +30,7 @@ import numpy as np
 
 from engine.bounding.bvh import LEAST, STACK, WIDTH
 from engine.containment.posed.filters import NOT_FINITE, has_not_finite, orient2d_blurred, orient3d_blurred
-from engine.jit import bare, inline, kernel, merged
+from engine.jit import allocating_kernel, called, inline, kernel, merged
 from engine.lanes.boxes import EMPTY, inside_box
 from engine.lanes.lanes import count_bits, lowest_bit
 from engine.lanes.overhead import BAND, GROWTH, LEAST_REACH, OVERHEAD_ROWS, overhead
@@ -184,7 +184,7 @@ def _in_tree(tree: Any, q: Any, blur: float) -> tuple[Any, Any, Any, float, bool
     return Point3(x, y, z + w), least, most, wide, is_near
 
 
-@kernel
+@allocating_kernel
 def list_unsure(tree: Any, x: float, y: float, z: float, blur: float, found: Any) -> tuple[int, bool]:
     """Fill found (n,) int64 with the rows of `tree.triangles` of which it is not sure how the rays up from all of the
     blurred (x, y, z) meet them; return how many, and whether they meet an odd number of the others.
@@ -263,7 +263,7 @@ def locate_in_tree(tree: Any, q: Any, blur: float, stack: Any, flag: Any) -> tup
     return UNDECIDED if is_open else 1 if is_odd else -1, beyond != 0
 
 
-@kernel
+@allocating_kernel
 def locate_by_tree(points: Any, blurs: Any, tree: Any, locations: Any, flag: Any) -> int:
     """Fill `locations` (n,) int8 for points (n, 3); returns how many needed more than the filter.
 
@@ -275,7 +275,7 @@ def locate_by_tree(points: Any, blurs: Any, tree: Any, locations: Any, flag: Any
     return int(_locate_each(points, blurs, tree, locations, np.empty(STACK, np.int32), flag))
 
 
-@bare
+@called
 def _locate_each(points: Any, blurs: Any, tree: Any, locations: Any, stack: Any, flag: Any) -> int:
     """Do what `locate_by_tree` does, without counting references to the arrays of the tree for each point."""
     n_beyond = 0

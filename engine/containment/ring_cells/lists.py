@@ -19,7 +19,7 @@ import numpy as np
 
 from engine.arrays import FloatArray, Int32Array, IntArray
 from engine.containment.ring_cells.locate import EDGE_SHIFT, GOES_ON_DOWN, GOES_ON_UP, as_edge
-from engine.jit import inline, kernel
+from engine.jit import allocating_kernel, inline, kernel
 from engine.predicates.loading import as_point2
 
 
@@ -224,7 +224,7 @@ def _add_up(sides: Any, turns: Any, cut: Any) -> None:
             sides[word] = side
 
 
-@kernel
+@allocating_kernel
 def count_level(level: Any, counts: Any, sides: Any, flag: Any) -> None:
     """Fill counts and sides (n_words,) of the cells of all nodes of a `LevelOfNodes`; both zero before."""
     for i_node in range(len(level.nodes)):

@@ -44,7 +44,7 @@ import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, Int32Array
 from engine.containment.posed.filters import NOT_FINITE, has_not_finite
-from engine.jit import inline, kernel, merged
+from engine.jit import allocating_kernel, inline, merged
 from engine.predicates.loading import as_point2
 from engine.types import UNDECIDED
 
@@ -187,7 +187,7 @@ def _take_edges(cells: Any, block: Any, n_waiting: int) -> int:
     return n_listed
 
 
-@kernel
+@allocating_kernel
 def locate_by_ring_cells(points: Any, cells: Any, locations: Any, flag: Any) -> int:
     """Fill `locations` (n,) int8 for points (n, 2) from a `RingCells`; returns how many are open, or NOT_FINITE."""
     if has_not_finite(points):

@@ -18,7 +18,7 @@ from engine.containment.methods.polygon_one_pass import locate_in_small_rings
 from engine.containment.posed.body_frame import to_frame
 from engine.containment.posed.filters import in_space, side_of_box, side_of_rows
 from engine.containment.scene.grid import cell_at
-from engine.jit import bare_kernel, kernel, merged
+from engine.jit import kernel, merged
 from engine.types import UNDECIDED
 
 SECOND_PASS: Final = 0
@@ -118,7 +118,7 @@ def sort_by_cell(points: Any, grid: Any, shift: int, keys: Any, ends: Any, order
             gathered[place, axis] = points[item, axis]
 
 
-@bare_kernel
+@kernel
 def scan_points(
     points: Any, tables: Any, grid: Any, unbounded: Any, counts: Any, bodies: Any, located: Any, flag: Any
 ) -> Any:

@@ -18,7 +18,7 @@ from engine.containment.posed.body_frame import to_frame
 from engine.containment.posed.filters import in_space
 from engine.containment.prepared import TriangleTree
 from engine.containment.scene.first_pass import SECOND_PASS
-from engine.jit import bare_kernel, inline
+from engine.jit import inline, kernel
 from engine.lanes.addresses import array_at
 from engine.lanes.boxes import BOX_ROWS
 from engine.lanes.overhead import OVERHEAD_ROWS
@@ -63,7 +63,7 @@ def tree_at(tables: Any, row: int) -> TriangleTree:
     )  # fmt: skip
 
 
-@bare_kernel
+@kernel
 def locate_groups(
     points: Any, owners: Any, order: Any, begins: Any, ends: Any, bodies: Any, scene: Any, tables: Any, located: Any,
     stack: Any, flag: Any,

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from typing import Any, Final, NamedTuple
 
-from engine.jit import bare_kernel, merged
+from engine.jit import kernel, merged
 from engine.polygon_overlay.compiled.chain_faces import number_cycles
 from engine.polygon_overlay.compiled.chain_rings import choose_boundary, walk_rings
 from engine.polygon_overlay.compiled.chains import build_chains, build_stars
@@ -285,7 +285,7 @@ def _ended(pair: int, needs: int, filled: _Filled, n_left_out: int) -> tuple[int
     return pair, needs, n_vertices, n_rings, n_pieces, n_evidence, n_left_out
 
 
-@bare_kernel
+@kernel
 def overlay_pairs(
     subjects: RingArrays, subject_items: Any, clips: RingArrays, clip_items: Any, begin: int, reduced: Loaded,
     kept: Any, nesting: Nesting, stop: Any, buffers: Buffers, outcomes: Outcomes, output: Output,

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from engine.jit import bare_kernel, inline, merged
+from engine.jit import inline, kernel, merged
 from engine.polygon_overlay.compiled.block_tree import count_active, wake_above, wake_near
 from engine.polygon_overlay.compiled.clearance import CLEARANCE
 from engine.polygon_overlay.compiled.edge_tree import POLL, BoxTree, build_tree
@@ -196,7 +196,7 @@ def _wake(
     return True
 
 
-@bare_kernel
+@kernel
 def reduce_pair(
     subjects: RingArrays, clips: RingArrays, size: int, n_most: int, kept: Any, stop: Any, buffers: Buffers
 ) -> Loaded:
@@ -263,7 +263,7 @@ def _copy(vertices: Any, source: int, base: int, step: int, n: int, made: Any, m
             numbers[k, 0], numbers[k, 1] = source - k, -1
 
 
-@bare_kernel
+@kernel
 def expand_rings(
     vertices: Any, sources: Any, offsets: Any, subjects: Any, clips: Any, stop: Any, made: Any, made_sources: Any,
     made_offsets: Any,

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from engine.jit import bare_kernel, called, inline, merged
+from engine.jit import called, inline, kernel, merged
 from engine.polygon_overlay.compiled.crossing_signs import weight_of
 from engine.polygon_overlay.compiled.rounded_crossings import common_place, leading
 from engine.predicates.double_double import U2, dd_add, dd_div, dd_mul, dd_sub, surely_rounded
@@ -175,7 +175,7 @@ def _twice_area(pair: _Pair, sources: Any, first: int, last: int) -> tuple[float
     return total, rest, error, size
 
 
-@bare_kernel
+@kernel
 def sum_areas(
     subjects: Any, subject_items: Any, clips: Any, clip_items: Any, sources: Any, offsets: Any, groups: Any, stop: Any,
     areas: Any,

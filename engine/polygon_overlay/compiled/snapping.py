@@ -21,7 +21,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.jit import bare_kernel, called, inline, merged
+from engine.jit import called, inline, kernel, merged
 from engine.polygon_overlay.compiled.edge_tree import FEW, POLL, begin_pairs, boxes_meet, build_tree, next_pairs
 from engine.polygon_overlay.compiled.loading import EVERYTHING, RingArrays, fill_boxes, load_rings
 from engine.polygon_overlay.compiled.workspace import Buffers, rows_of
@@ -54,7 +54,7 @@ def _passes(ax: float, ay: float, bx: float, by: float, x: float, y: float, reac
     return orient2d(a, b, Point2(left, low)) <= 0 and orient2d(a, b, Point2(right, high)) > 0
 
 
-@bare_kernel
+@kernel
 def scale(values: Any, divisor: float, factor: float, more: float, near_by: float, least: float, scaled: Any) -> float:
     """Fill ``scaled``, (n, 2), with values by ``divisor``, times ``factor``, times ``more``; return the largest of
     these, without its sign.
@@ -141,7 +141,7 @@ def _add_passage(passages: Any, m: int, edges: Any, e: int, f: int, px: float, p
     return m + 1
 
 
-@bare_kernel
+@kernel
 def snap(
     vertices: Any, offsets: Any, pieces: Any, stop: Any, buffers: Buffers, pixels: Any, corners: Any, starts: Any,
     passages: Any,

@@ -18,7 +18,7 @@ from engine.collision.meshes.triangle_triangle import (
     classify,
     with_pose,
 )
-from engine.jit import kernel
+from engine.jit import allocating_kernel, kernel
 from engine.predicates.loading import as_point3
 from engine.predicates.posed import orient3d_rounded
 from engine.types import UNDECIDED
@@ -28,7 +28,7 @@ from tests.reference.exact import Vector, vector
 Corners = tuple[tuple[int, int, int], ...]
 
 
-@kernel
+@allocating_kernel
 def classify_batch(first: Any, second: Any, axes: Any, kinds: Any) -> None:
     poses = np.zeros((1, 12))
     for item in range(kinds.shape[0]):

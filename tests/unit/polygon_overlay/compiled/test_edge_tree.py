@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from engine.jit import kernel
+from engine.jit import allocating_kernel
 from engine.polygon_overlay.compiled import edge_tree
 
 
-@kernel
+@allocating_kernel
 def pairs_of(tree, found):  # type: ignore[no-untyped-def]
     """Return how many pairs there are, written to `found`."""
     n = len(tree.boxes)
