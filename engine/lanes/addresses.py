@@ -1,6 +1,6 @@
 """Arrays by their address: lets one kernel go through the prepared arrays of thousands of solids.
 
-A table of addresses is made for one call, by the solids that hold the arrays, and is forgotten with it. Compiled code
+A table of addresses is made by what holds the arrays, for no longer than that does. Compiled code
 makes an array of an address in no time; with the compiler disabled a plain twin does the same by ctypes.
 """
 
@@ -26,7 +26,7 @@ def plain_array_at(address: int, shape: Any, dtype: Any) -> Any:
 
 
 def _array_intrinsic(typing_context: Any, address: Any, shape: Any, dtype: Any) -> Any:
-    """Return what `plain_array_at` does; nothing is counted, so that bare kernels may call it."""
+    """Return what `plain_array_at` does; nothing is counted."""
     made = types.Array(dtype.dtype, len(shape), "C")
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -49,7 +49,7 @@ array_at: Any = plain_array_at if numba_config.DISABLE_JIT else intrinsic(_array
 
 
 def plain_int8_at(address: int, place: int) -> int:
-    """Return one number of the int8 array that begins at `address`: also below a bare kernel, which makes no array."""
+    """Return one number of the int8 array that begins at `address`, without an array."""
     return ctypes.c_int8.from_address(int(address) + int(place)).value
 
 

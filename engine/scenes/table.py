@@ -53,7 +53,8 @@ class Table:
             addresses, sizes, places = tree_line(tree_of(solid))
             words = self._kept[id(solid)]
             words[TREE + 5 : TREE + 8], words.view(np.float64)[TREE_PLACES:] = sizes, places
-            words[TREE : TREE + 5] = addresses  # order: last, kernels of other threads look at these
+            words[TREE + 1 : TREE + 5] = addresses[1:]
+            words[TREE] = addresses[0]  # order: last, kernels of other threads look at it
         elif self.rows[body, 0] == UNREADY:
             self.rows[body, 0] = self._fill(self.rows[body], solid, self._poses[body])
 

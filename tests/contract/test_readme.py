@@ -143,6 +143,8 @@ def test_the_files_of_the_command_line_are_asked(tmp_path: Path) -> None:
         feature = {"type": "Feature", "properties": {}, "geometry": {"type": "Polygon", "coordinates": [ring]}}
         collection = {"type": "FeatureCollection", "features": [feature]}
         (tmp_path / f"{name}.geojson").write_text(json.dumps(collection))
+    well = {"type": "Feature", "properties": {}, "geometry": {"type": "Point", "coordinates": [0.25, 0.75]}}
+    (tmp_path / "wells.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": [well]}))
     (block,) = [block for block in blocks("sh") if "pip install '.[formats]'" in block]
     commands = [line for line in block.splitlines() if line.startswith("python -m engine ")]
     assert len(commands) >= 5
