@@ -1,7 +1,7 @@
 """Arrays by their address: lets one kernel go through the prepared arrays of thousands of solids.
 
-A table of addresses is made by what holds the arrays, for no longer than that does. Compiled code
-makes an array of an address in no time; with the compiler disabled a plain twin does the same by ctypes.
+A table of addresses is made by what holds the arrays, and kept no longer than these. Compiled code makes an array of an
+address in no time; with the compiler disabled a plain twin does the same by ctypes.
 """
 
 from __future__ import annotations

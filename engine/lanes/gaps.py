@@ -34,7 +34,7 @@ _MIDDLES, _NEAREST = 9, 12
 _TINY: Final = 2.0**-120
 _BELOW_ONE: Final = 1.0 - 2.0**-18
 _MOST: Final = 2.0**60
-"""A bound beyond is told as this: squares of more overflow."""
+"""A bound beyond, in the units of either tree, is told as this: squares of more overflow."""
 
 
 def _sizes(v: Sequence[Lanes]) -> list[Lanes]:
@@ -85,7 +85,7 @@ def child_bounds(
     flat, their_flat = disc[6:], [number * ratio for number in their_disc[6:]]
     size, g = root(dot(d, d)), dot(disc[3:6], normal)
     on_own, on_their = dot(disc[3:6], d), dot(normal, d)
-    bound = greater(root(_gaps(v, reach)), ratio * root(_gaps(w, their_reach)))
+    bound = greater(root(_gaps(v, reach)), ratio * lesser(root(_gaps(w, their_reach)), _MOST))
     for level, cosine, their_cosine in (
         (size, on_own / greater(size, _TINY), on_their / greater(size, _TINY)),
         (dot(way, d), dot(way, disc[3:6]), dot(way, normal)),

@@ -49,7 +49,9 @@ def _placed(points: np.ndarray, place: Placement) -> np.ndarray:
     return points @ rotation.T + (np.array(place.shift) if place.is_posed else 0.0)
 
 
-@pytest.mark.parametrize(("ratio", "away"), [(1.0, 1.0), (1e-3, 0.7), (1e4, 1e4), (1.0, 1e7), (2.0**-90, 1.0)])
+@pytest.mark.parametrize(
+    ("ratio", "away"), [(1.0, 1.0), (1e-3, 0.7), (1e4, 1e4), (1.0, 1e7), (2.0**-90, 1.0), (2.0**-58, 2.0**8)]
+)
 def test_no_bound_is_above_a_distance(ratio: float, away: float) -> None:
     draw = np.random.default_rng(7)
     a, b = _soup(draw, 1.0), _soup(draw, ratio)
