@@ -20,7 +20,7 @@ from engine.containment.scene.tables import Scene as LocateTables
 from engine.containment.scene.tables import scene_of
 from engine.direct import entry_of
 from engine.parallel import Budget
-from engine.scenes.broad_phase import body_tree, words_of
+from engine.scenes.broad_phase import NOBODY, body_tree, words_of
 from engine.scenes.near_boxes import BodyTree
 from engine.scenes.table import Table
 from engine.segment_clipping.profiles import check_cut
@@ -32,7 +32,6 @@ from engine.solids.triangle import Triangle
 
 _LISTED: Final = 4
 """Bodies that have no tree: their boxes are looked at sooner than one is built."""
-_NOBODY: Final = np.empty(0, np.int64)
 _STILL: Final = {d: b"".join(each.tobytes() for each in motion_of(None, d)) for d in (2, 3)}
 
 
@@ -115,7 +114,7 @@ class Bodies(Preparing):
     def words(self, budget: Budget) -> tuple[list[int], Any]:
         """Return what kernels for segments read of all bodies (`words_of`)."""
         return self.prepared(
-            "words", lambda: words_of(self.tree(budget), _NOBODY, self.table(budget).rows), budget.check
+            "words", lambda: words_of(self.tree(budget), NOBODY, self.table(budget).rows), budget.check
         )
 
     def prepare(self, body: int, wanted: int, budget: Budget) -> None:

@@ -29,7 +29,7 @@ def body_tree(low: FloatArray, high: FloatArray, most_listed: int) -> BodyTree:
     """Return the tree over bodies by their boxes (n, dimension); up to so many have none."""
     n, dimension = low.shape
     if n <= most_listed:
-        return BodyTree(low, high, _NO_TREE, 1.0, _NOBODY, np.arange(n))
+        return BodyTree(low, high, _NO_TREE, 1.0, NOBODY, np.arange(n))
     is_bounded = (np.isfinite(low) & np.isfinite(high)).all(axis=1)
     bounded, listed = np.flatnonzero(is_bounded), np.flatnonzero(~is_bounded & (low <= high).all(axis=1))
     flat = np.zeros((len(bounded), 6))  # in the plane z is 0
@@ -38,14 +38,14 @@ def body_tree(low: FloatArray, high: FloatArray, most_listed: int) -> BodyTree:
     return BodyTree(low, high, tree, 1.0 / tree.scale, bounded, listed)
 
 
-_NOBODY: Final = np.empty(0, np.int64)
+NOBODY: Final = np.empty(0, np.int64)
 _NO_TREE: Final = Bvh(
     read_only(np.full((1, BOX_ROWS, WIDTH), UNUSED)),
     read_only(np.full((1, WIDTH), EMPTY, np.int32)),
     read_only(np.zeros(3)),
     1.0,
 )
-NO_BODIES: Final = {d: BodyTree(np.empty((0, d)), np.empty((0, d)), _NO_TREE, 1.0, _NOBODY, _NOBODY) for d in (2, 3)}
+NO_BODIES: Final = {d: BodyTree(np.empty((0, d)), np.empty((0, d)), _NO_TREE, 1.0, NOBODY, NOBODY) for d in (2, 3)}
 
 
 def words_of(bodies: BodyTree, names: IntArray, placed: IntArray) -> tuple[list[int], Any]:

@@ -79,8 +79,8 @@ def tree_in(row: Any, dimension: int) -> BodyTree:
 
 
 @inline
-def called(words: Any, body: int) -> int:
-    """Return what a body is called in the scene."""
+def name_in(words: Any, body: int) -> int:
+    """Return what `name_of` does, by the rows of two `BodyTree`s."""
     n, m = words[0, N_BODIES], words[1, N_BODIES]
     return body if body < n else array_at(words[1, NAMES], (m,), np.int64)[body - n]
 

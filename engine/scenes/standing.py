@@ -16,7 +16,7 @@ from engine.containment.scene.locate_scene import SceneLocations
 from engine.direct import entry_of
 from engine.parallel import Budget
 from engine.scenes.bodies import Bodies
-from engine.scenes.broad_phase import NO_BODIES, Where, body_tree, candidates, words_of
+from engine.scenes.broad_phase import NO_BODIES, NOBODY, Where, body_tree, candidates, words_of
 from engine.scenes.moved_pairs import PairRows, Placed, list_pairs
 from engine.scenes.near_boxes import PLACED
 from engine.scenes.posed_mesh import scratch_for
@@ -30,7 +30,6 @@ _PART: Final = 4
 """Bodies up to `_FEW`, or the scene's size divided by `_PART`, that moved are kept beside the others."""
 _LISTED: Final = 128
 """Bodies that moved whose boxes are looked at one by one: as soon done as a tree over them built."""
-_NOBODY: Final = np.zeros(0, np.int64)
 _NO_WORDS: Final = [0] * (PLACED + 1)
 
 
@@ -48,7 +47,7 @@ class Standing(Preparing):
 
     def __init__(self, base: Bodies, moved: dict[int, Pose | None]) -> None:
         self.base, self.moved = base, moved
-        self.names = np.array(list(moved), np.int64) if moved else _NOBODY
+        self.names = np.array(list(moved), np.int64) if moved else NOBODY
         """Those that moved, ascending."""
         self._lock, self._prepared = threading.RLock(), dict[str, Any]()
         self._placed: tuple[Where, FloatArray, FloatArray] | None = None

@@ -19,9 +19,9 @@ from engine.lanes.triangles import longest_axis
 from engine.scenes.near_boxes import (
     N_BODIES,
     PLACED,
-    called,
     has_moved,
     in_its_box,
+    name_in,
     near_bodies,
     open_node,
     tree_in,
@@ -120,7 +120,7 @@ def cut_near(
                 n[3] += 1
                 continue
             for row in range(n[2], n[2] + found):
-                names[row, 0] = called(words, body)
+                names[row, 0] = name_in(words, body)
                 names[row, 1] = out.faces[row, 1] >= -1
                 if names[row, 1] == 0:
                     out.faces[row, 1] = out.faces[row, 0]
@@ -168,10 +168,10 @@ def _ask(words: Any, body: int, segments: Any, item: int, is_any: bool, room: An
         scratch.found[1] = 1
         return SETTLED if is_any else OPEN
     if found > 0 and is_any:
-        scratch.found[0] = called(words, body)
+        scratch.found[0] = name_in(words, body)
         return MET
     if found > 0:
-        _keep_first(scratch, called(words, body))
+        _keep_first(scratch, name_in(words, body))
     return SETTLED
 
 
