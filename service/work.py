@@ -77,6 +77,7 @@ class Memory:
         self.limit = limit
         self.taken = self.freed = self.leaving = 0
         self.lock = threading.Lock()
+        self.has_left = threading.Condition(self.lock)
 
     def free(self, taken: int, most: int) -> None:
         """Count the end of a request that holds, or held at most, so much: it is free once the system has it back."""
@@ -106,6 +107,7 @@ class Memory:
         with self.lock:
             self.taken -= taken
             self.leaving -= taken
+            self.has_left.notify_all()
 
     def refusal(self, size: int) -> ServiceError:
         """Return what is said where there is no room for so many bytes more."""
@@ -138,8 +140,8 @@ class Call(Cancel):
     """
 
     __slots__ = (
-        "_answer", "_memory", "_most", "_taken", "coding", "end", "headers", "instead", "is_light", "media_type",
-        "seconds", "settings", "status", "store",
+        "_answer", "_memory", "_most", "_taken", "coding", "end", "headers", "instead", "is_light", "may_wait",
+        "media_type", "seconds", "settings", "status", "store",
     )  # fmt: skip
 
     def __init__(self, settings: Settings, store: Store, memory: Memory) -> None:
@@ -154,6 +156,7 @@ class Call(Cancel):
         self.instead: str | None = None
         """What to ask for where the answer would be too large, once it is asked for."""
         self.is_light = False  # then it ends before a deadline's timer could be started
+        self.may_wait = False  # on the event loop it would hold up everybody
         self.end = time.monotonic() + settings.deadline_seconds
         self.seconds = dict.fromkeys(PHASES, 0.0)
         self.status: int | None = None
@@ -167,13 +170,16 @@ class Call(Cancel):
         """Account for so many bytes more (fewer if negative): of the body, of what is made of it, of the answer.
 
         Raises, with nothing counted: `body_too_large` or `answer_too_large` where this request alone would hold more
-        than all may, `out_of_memory` where others hold what it needs; what takes next to nothing is always given.
+        than all may, `out_of_memory` where others hold what it needs; what takes next to nothing is always given. Off
+        the event loop it waits for others that are about to give theirs back.
         """
         memory = self._memory
         with memory.lock:
             if n_bytes > 0 and self._taken + n_bytes > SMALL:
                 if self._taken + n_bytes > memory.limit:
                     raise self._too_large(memory.limit, "GEOMETRY_REQUEST_BYTES")
+                while self.may_wait and memory.leaving and memory.taken + n_bytes > memory.limit:  # bound: remaining()
+                    memory.has_left.wait(self.remaining())
                 if memory.taken + n_bytes > memory.limit:
                     raise memory.refusal(n_bytes)
             memory.taken += n_bytes
@@ -296,6 +302,7 @@ class Pool:
         def begin() -> T:
             metrics.queued.dec()
             metrics.waited.observe(time.perf_counter() - before)
+            call.may_wait = True
             return job()
 
         try:

@@ -28,6 +28,8 @@ from service.work import Call
 
 _FREE_AREA: Final = 100
 """Vertices of an overlay up to which its area takes no longer than the rest of the answer."""
+_SHORT: Final = 12
+"""Vertices of a ring up to which lists are written faster than an array."""
 _BOUNDARY: Final = int(engine.Location.BOUNDARY)  # numpy compares with an enum's member more slowly
 
 
@@ -206,17 +208,18 @@ def from_overlays(batch: engine.OverlayBatch, accuracy: engine.Accuracy) -> over
 
 
 def _overlay_pieces(result: engine.Overlay | engine.OverlayBatch, start: int, stop: int) -> list[Any]:
-    """Return some pieces of an overlay, or of many, as they are written."""
-    rings, vertices, found = result.ring_offsets, result.vertices, []
-    for first, last in pairwise(result.piece_offsets[start : stop + 1].tolist()):
-        shell, *holes = [_closed(vertices[i:j]) for i, j in pairwise(rings[first : last + 1].tolist())]
-        found.append(overlay.OverlayPiece.made(shell=shell, holes=holes))
-    return found
-
-
-def _closed(ring: Any) -> Any:
-    """Return `ring` as GeoJSON has it: the first position again at its end."""
-    return np.concatenate([ring, ring[:1]])
+    """Return some pieces of an overlay, or of many, as they are written: closed rings, as GeoJSON has them."""
+    pieces = result.piece_offsets[start : stop + 1].tolist()
+    ends = result.ring_offsets[pieces[0] : pieces[-1] + 1].tolist()
+    vertices = result.vertices[ends[0] : ends[-1]]
+    cuts = [(i - ends[0], j - ends[0]) for i, j in pairwise(ends)]
+    if len(vertices) < _SHORT * len(cuts):  # order: an array for each would take longer than its few numbers
+        positions = vertices.tolist()
+        rings: list[Any] = [positions[i:j] + positions[i : i + 1] for i, j in cuts]
+    else:
+        rings = [np.concatenate([vertices[i:j], vertices[i : i + 1]]) for i, j in cuts]
+    cut = [each - pieces[0] for each in pieces]
+    return [{"shell": rings[i], "holes": rings[i + 1 : j]} for i, j in pairwise(cut)]
 
 
 def _area(nearest: Callable[[], float]) -> float | None:

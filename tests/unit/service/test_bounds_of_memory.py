@@ -91,6 +91,19 @@ async def test_who_asks_again_waits_for_what_was_held(app: FastAPI, anyio_backen
             assert app.state.memory.leaving > 0
 
 
+async def test_who_asks_again_waits_for_what_was_computed_with(app: FastAPI, anyio_backend: str) -> None:
+    """The same of a body of a few kB whose answer takes more than half of all."""
+    async with client_of(app) as client:
+        for power in range(16, 31):  # the least of these that suffices is less than two of them need
+            limited(app, request_bytes=2**power)
+            answer = await client.post("/v1/overlay", json=stripes(60))
+            if answer.status_code == 200:
+                break
+        for _ in range(5):
+            answer = await client.post("/v1/overlay", json=stripes(60))
+            assert answer.status_code == 200, answer.text
+
+
 async def test_a_body_may_not_decode_to_far_more_than_its_text(app: FastAPI, anyio_backend: str) -> None:
     async with client_of(limited(app, request_bytes=2**22)) as client:
         answer = await client.post("/v1/contains", content=b"[" + b"[]," * 50_000 + b"[]]", headers=JSON)
