@@ -144,10 +144,10 @@ def from_line_pieces(pieces: engine.LinePieces, accuracy: engine.Accuracy) -> se
     columns = (pieces.source, pieces.segments, pieces.t, pieces.faces)
 
     def some(start: int, stop: int) -> list[Any]:
-        rows = zip(*(column[start:stop].tolist() for column in columns))
+        lines = _rings(pieces.vertices, pieces.offsets[start : stop + 1])
         return [
-            {"line": line, "positions": pieces[k], "segments": on, "t": t, "faces": faces}
-            for k, (line, on, t, faces) in enumerate(rows, start)
+            {"line": line, "positions": positions, "segments": on, "t": t, "faces": faces}
+            for positions, line, on, t, faces in zip(lines, *(column[start:stop].tolist() for column in columns))
         ]
 
     return segments.ClipLinesResponse.made(
@@ -192,13 +192,17 @@ def from_overlays(batch: engine.OverlayBatch, accuracy: engine.Accuracy) -> over
     offsets = batch.pair_offsets
 
     def some(first: int, last: int) -> list[Any]:
+        ends = offsets[first : last + 1].tolist()
+        pieces = _overlay_pieces(batch, ends[0], ends[-1])
         return [
-            overlay.OverlaidPair.made(
-                status="not_representable" if batch.status[pair] else "done",
-                pieces=_overlay_pieces(batch, *offsets[pair : pair + 2].tolist()),
-                largest_displacement=batch.displacement[pair].item(),
+            {
+                "status": "not_representable" if status else "done",
+                "pieces": pieces[start - ends[0] : stop - ends[0]],
+                "largest_displacement": displacement,
+            }
+            for status, displacement, (start, stop) in zip(
+                batch.status[first:last].tolist(), batch.displacement[first:last].tolist(), pairwise(ends)
             )
-            for pair in range(first, last)
         ]
 
     weights = batch.ring_offsets[batch.piece_offsets[offsets]] + np.arange(len(offsets))
@@ -208,18 +212,24 @@ def from_overlays(batch: engine.OverlayBatch, accuracy: engine.Accuracy) -> over
 
 
 def _overlay_pieces(result: engine.Overlay | engine.OverlayBatch, start: int, stop: int) -> list[Any]:
-    """Return some pieces of an overlay, or of many, as they are written: closed rings, as GeoJSON has them."""
-    pieces = result.piece_offsets[start : stop + 1].tolist()
-    ends = result.ring_offsets[pieces[0] : pieces[-1] + 1].tolist()
-    vertices = result.vertices[ends[0] : ends[-1]]
-    cuts = [(i - ends[0], j - ends[0]) for i, j in pairwise(ends)]
-    if len(vertices) < _SHORT * len(cuts):  # order: an array for each would take longer than its few numbers
+    """Return some pieces of an overlay, or of many, as they are written."""
+    ends = result.piece_offsets[start : stop + 1].tolist()
+    rings = _rings(result.vertices, result.ring_offsets[ends[0] : ends[-1] + 1], is_closed=True)
+    return [{"shell": rings[i], "holes": rings[i + 1 : j]} for i, j in pairwise(end - ends[0] for end in ends)]
+
+
+def _rings(vertices: Any, offsets: Any, is_closed: bool = False) -> list[Any]:
+    """Return consecutive rings, or lines, as they are written; closed: as GeoJSON has them, the first position again.
+
+    offsets: where they begin among ``vertices``, and where the last ends.
+    """
+    vertices, ends = vertices[offsets[0] : offsets[-1]], (offsets - offsets[0]).tolist()
+    if len(vertices) < _SHORT * len(ends):  # order: an array for each would take longer than its few numbers
         positions = vertices.tolist()
-        rings: list[Any] = [positions[i:j] + positions[i : i + 1] for i, j in cuts]
-    else:
-        rings = [np.concatenate([vertices[i:j], vertices[i : i + 1]]) for i, j in cuts]
-    cut = [each - pieces[0] for each in pieces]
-    return [{"shell": rings[i], "holes": rings[i + 1 : j]} for i, j in pairwise(cut)]
+        return [positions[i:j] + positions[i : i + is_closed] for i, j in pairwise(ends)]
+    if is_closed:
+        return [np.concatenate([vertices[i:j], vertices[i : i + 1]]) for i, j in pairwise(ends)]
+    return [vertices[i:j] for i, j in pairwise(ends)]
 
 
 def _area(nearest: Callable[[], float]) -> float | None:
@@ -235,14 +245,18 @@ def from_clipped(clipped: engine.ClippedPolygons, accuracy: engine.Accuracy) -> 
     offsets = clipped.polygon_offsets
 
     def some(first: int, last: int) -> list[Any]:
+        ends = offsets[first : last + 1].tolist()
+        rings = _rings(clipped.vertices, clipped.ring_offsets[ends[0] : ends[-1] + 1])
         return [
-            polygons.ClippedPolygon.made(
-                rings=clipped.rings(i_polygon),
-                contours=clipped.contours[start:stop],
-                status=engine.PolygonStatus(clipped.status[i_polygon]).name.lower(),
-                may_have_bridges=bool(clipped.may_have_bridges[i_polygon]),
+            {
+                "rings": rings[start - ends[0] : stop - ends[0]],
+                "contours": clipped.contours[start:stop].tolist(),
+                "status": engine.PolygonStatus(status).name.lower(),
+                "may_have_bridges": may_have_bridges,
+            }
+            for status, may_have_bridges, (start, stop) in zip(
+                clipped.status[first:last].tolist(), clipped.may_have_bridges[first:last].tolist(), pairwise(ends)
             )
-            for i_polygon, (start, stop) in enumerate(pairwise(offsets[first : last + 1].tolist()), first)
         ]
 
     return polygons.ClipPolygonsResponse.made(
@@ -287,22 +301,25 @@ def _details(codes: Any, start: int, stop: int) -> list[engine.Rcc8 | None]:
 
 def _collision_answer(
     relation: engine.Relation, witness: engine.Witness | None, detail: engine.Rcc8 | None
-) -> collision.CollisionAnswer:
-    return collision.CollisionAnswer.made(
-        relation=relation.label,
-        witness=None if witness is None else _witness(witness),
-        detail=None if detail is None else detail.label,
-    )
+) -> dict[str, Any]:
+    answer: dict[str, Any] = {"relation": relation.label}
+    if witness is not None:
+        answer["witness"] = _witness(witness)
+    if detail is not None:
+        answer["detail"] = detail.label
+    return answer
 
 
-def _witness(witness: engine.Witness) -> collision.CollisionWitness:
-    return collision.CollisionWitness.made(
-        kind=witness.kind,
-        first_face=None if witness.first_face < 0 else witness.first_face,
-        second_face=None if witness.second_face < 0 else witness.second_face,
-        containing=witness.containing or None,
-        piercing=witness.piercing,
-    )
+def _witness(witness: engine.Witness) -> dict[str, Any]:
+    answer: dict[str, Any] = {"kind": witness.kind}
+    if witness.first_face >= 0:
+        answer["first_face"] = witness.first_face
+    if witness.second_face >= 0:
+        answer["second_face"] = witness.second_face
+    if witness.containing:
+        answer["containing"] = witness.containing
+    answer["piercing"] = witness.piercing
+    return answer
 
 
 def from_clearances(found: Any, accuracy: engine.Accuracy, are_bools: bool) -> clearance.ClearanceResponse:
