@@ -21,7 +21,7 @@ from engine.scenes.ends import Exact, Found, ScenePieces, in_order, joined
 from engine.scenes.posed_mesh import MOST_MET, scratch_for
 from engine.scenes.standing import Standing
 from engine.scenes.through import MET, cut_near, find_first
-from engine.segment_clipping.boundary import clip_chunk, cut_exactly
+from engine.segment_clipping.boundary import clip_chunk
 from engine.segment_clipping.clip_segments import method_for
 from engine.segment_clipping.decide_then_cut import clip_on_convex
 from engine.segment_clipping.pieces import Pieces, first_of, room_for
@@ -199,28 +199,28 @@ def _cut(
         for group in range(first, last):
             begin, end = groups[group]
             body, items = int(bodies[begin]), owners[begin:end]
-            pieces, rational = _on_body(segments[items], *standing.placed(body), budget)
+            pieces, rational, is_told = _on_body(segments[items], *standing.placed(body), budget)
             counts.is_beyond[items[rational]] = counts.is_rational[items[rational]] = True
             m = len(pieces.source)
             if m:
                 budget.take(_BYTES * m)
-                found[group] = Found(items[pieces.source], np.full(m, body), np.full(m, UNDECIDED), *pieces[1:])
+                are_long = np.full(m, UNDECIDED)
+                if is_told:  # pieces that kernels made have ends that round alike only if they are one
+                    sure = np.flatnonzero(~np.isin(pieces.source, rational))
+                    are_long[sure] = pieces.t[sure, 0] != pieces.t[sure, 1]
+                found[group] = Found(items[pieces.source], np.full(m, body), are_long, *pieces[1:])
 
     run_chunks(task, len(groups), budget=budget, first_chunk=1, workers=workers)
     return [found[group] for group in sorted(found)]
 
 
-def _on_body(segments: FloatArray, solid: Solid, pose: Pose | None, budget: Budget) -> tuple[Pieces, Any]:
+def _on_body(segments: FloatArray, solid: Solid, pose: Pose | None, budget: Budget) -> tuple[Pieces, Any, bool]:
     """Return the pieces of segments (n, 2, dim) within a placed solid, by source and t, and which of them took rational
-    arithmetic: all where some did and it is not told which."""
+    arithmetic, all where some did and it is not told which; and whether the others are of touching_cut.py."""
     n, every, shape = len(segments), np.arange(len(segments)), cast(Any, solid)
     if pose is None and solid.type in ("half_space", "convex", "aabb", "sphere"):
         pieces, _, n_rational = clip_on_convex(segments, shape, cast(Any, method_for(shape)), budget, 1, None)
-        return pieces, every[: n * bool(n_rational)]
+        return pieces, every[: n * bool(n_rational)], False
     if pose is None and solid.type in (("polygon", "triangle") if solid.dimension == 2 else ("polyhedron",)):
-        locator = locator_of(solid).chosen(n, budget)
-        if solid.dimension == 2:
-            return clip_chunk(segments, 0, n, shape, locator, budget)
-        locator.fill(segments[:, 0].copy(), locations := np.empty(n, np.int8), budget)
-        return cut_exactly(segments, every, locations, shape, budget), every
-    return settled(segments, every, solid, pose, budget), every
+        return *clip_chunk(segments, 0, n, shape, locator_of(solid).chosen(n, budget), budget), True
+    return settled(segments, every, solid, pose, budget), every, False

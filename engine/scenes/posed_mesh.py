@@ -24,22 +24,20 @@ from engine.lanes.lanes import lowest_bit, prefetch
 from engine.lanes.tracing import LANES
 from engine.lanes.triangles import AXES_BEFORE, CORNER_ROWS, longest_axis, near_triangles
 from engine.predicates.double_double import dd_div, dd_sub
-from engine.predicates.orientation import orient3d
 from engine.scenes.posed_cut import in_frame, put_point, slack_of
-from engine.segment_clipping.boundary_cut import Crossings, sort_crossings
-from engine.segment_clipping.contacts import APART, PROPER, TOUCHING
+from engine.segment_clipping.contacts import APART, CROSSED, DEGENERATE, PROPER, START, TOUCHING, place_of
 from engine.segment_clipping.crossing_values import Vector, dot, is_item_safe, normal_of
 from engine.segment_clipping.mesh_contacts import inverse_of, local_segment
 from engine.segment_clipping.pieces import Pieces
 from engine.segment_clipping.plane_meeting import T_BOUND
-from engine.segment_clipping.triangle_contact import UNDERFLOW, contact_filter, corner, exact_contact
+from engine.segment_clipping.sorted_crossings import Crossings, sort_crossings
+from engine.segment_clipping.touches import are_one, touched_triangle
+from engine.segment_clipping.triangle_contact import contact_filter, corner, exact_contact
 from engine.types import UNDECIDED, Point3
 
 MOST_MET: Final = 512
 """Triangles that a segment crosses; with more it is UNDECIDED."""
 UNSURE: Final = -1
-CROSSED: Final = -3
-"""How a triangle is met, where it is not touched: an odd number, as of a touched one that the line crosses."""
 WANTS_BODY: Final = -2
 WANTS_TREE: Final = -3
 """In place of a number of pieces: UNDECIDED, or the body, or the tree that points are located by, is not prepared."""
@@ -59,8 +57,8 @@ MESH_WORDS: Final = 37
 TREE, PLACES, TREE_PLACES = 8, 16, 27
 """Where these begin."""
 _Lines = namedtuple("_Lines", "addresses sizes places")
-Scratch = namedtuple("Scratch", "stack met kinds cuts room waiting keys entered best found near")
-"""Room for the work on one segment. stack: of one body, met: its triangles, kinds: CROSSED or `_touched`, cuts:
+Scratch = namedtuple("Scratch", "stack cuts room waiting keys entered best found near")
+"""Room for the work on one segment. stack: of one body, cuts: its
 `Crossings`, room: its pieces, the last row for the first of them all. waiting, keys: nodes and bodies to be asked, and
 where they are entered; entered (1, 8), of one node. best: where the first piece begins; found: the body it lies in, and
 whether another may begin there too. near: bodies."""
@@ -91,14 +89,14 @@ def scratch_at(words: Any) -> Scratch:
     cuts = Crossings(
         array_at(at + _AT[2], (m,), np.float64), array_at(at + _AT[3], (m, 3), np.float64),
         array_at(at + _AT[4], (m,), np.int64), array_at(at + _AT[5], (m,), np.int64),
+        array_at(at + _AT[15], (m,), np.int64), array_at(at + _AT[1], (m,), np.int64),
     )  # fmt: skip
     room = Pieces(
         array_at(at + _AT[6], (m + 1,), np.int64), array_at(at + _AT[7], (2, m + 1, 3), np.float64),
         array_at(at + _AT[8], (m + 1, 2), np.float64), array_at(at + _AT[9], (m + 1, 2), np.int64),
     )  # fmt: skip
     return Scratch(
-        array_at(at + _AT[0], (STACK,), np.int32), array_at(at + _AT[1], (m,), np.int64),
-        array_at(at + _AT[15], (m,), np.int64), cuts, room,
+        array_at(at + _AT[0], (STACK,), np.int32), cuts, room,
         array_at(at + _AT[10], (STACK,), np.int32), array_at(at + _AT[11], (STACK,), np.float32),
         array_at(at + _AT[12], (1, WIDTH), np.float32), array_at(at + _AT[13], (1,), np.float64),
         array_at(at + _AT[14], (2,), np.int64), array_at(at + _AT[16], (words[1],), np.int64),
@@ -149,7 +147,7 @@ def _gather(mesh: PlacedMesh, p: Point3, q: Point3, blur: float, is_any: bool, w
     """Fill met with the triangles that a segment crosses; return how many, UNSURE where one may be met otherwise. Where
     `is_any` one that is surely met is enough."""
     scratch = scratch_at(words)
-    stack, met = scratch.stack, scratch.met
+    stack, cuts = scratch.stack, scratch.cuts
     middle, half, slack, _, is_near = local_segment(p, q, mesh.origin, mesh.inverse)
     if not is_near:
         return 0
@@ -188,61 +186,16 @@ def _gather(mesh: PlacedMesh, p: Point3, q: Point3, blur: float, is_any: bool, w
                 return 1
             how = CROSSED
             if kind != PROPER:
-                how = _touched(mesh, -1 - below, p, q) if kind == TOUCHING and not is_any else UNSURE
+                how = touched_triangle(mesh.elements, -1 - below, p, q) if kind == TOUCHING and not is_any else UNSURE
+                how = UNSURE if how == DEGENERATE or place_of(how) >= START else how
             if how == UNSURE or n_met == MOST_MET:
                 if not is_any:
                     return UNSURE
                 is_unsure = True
                 continue
-            met[n_met], scratch.kinds[n_met] = -1 - below, how
+            cuts.met[n_met], cuts.codes[n_met] = -1 - below, how
             n_met += 1
     return UNSURE if is_unsure else n_met
-
-
-@inline
-def _touched(mesh: PlacedMesh, element: int, p: Point3, q: Point3) -> int:
-    """Return 2 n + 1 or 2 n for a triangle that a segment surely touches, between its ends, in corner n, or n - 3 in
-    side n: whether the line moved by infinitesimals crosses it, as `is_crossed` tells (exact_pieces.py); or UNSURE."""
-    a, b, c = corner(mesh.elements, element, 0), corner(mesh.elements, element, 1), corner(mesh.elements, element, 2)
-    if orient3d(a, b, c, p) * orient3d(a, b, c, q) != -1:
-        return UNSURE
-    ab, bc, ca = orient3d(p, q, a, b), orient3d(p, q, b, c), orient3d(p, q, c, a)
-    u = (q.x - p.x, q.y - p.y, q.z - p.z)
-    k = longest_axis(u)
-    j, way = AXES_BEFORE[k + 1], 1 if u[k] > 0.0 else -1
-    first = way * ab if ab != 0 else _beside(a, b, u, j, k)
-    second = way * bc if bc != 0 else _beside(b, c, u, j, k)
-    third = way * ca if ca != 0 else _beside(c, a, u, j, k)
-    if first == UNDECIDED or second == UNDECIDED or third == UNDECIDED:
-        return UNSURE
-    side = 3 if ab == 0 else 4 if bc == 0 else 5
-    if (ab == 0) + (bc == 0) + (ca == 0) == 2:
-        side = 0 if bc != 0 else 1 if ca != 0 else 2
-    return 2 * side + (first == second and second == third)
-
-
-@inline
-def _beside(a: Point3, b: Point3, u: Any, j: int, k: int) -> int:
-    """Return on which side of a side a b, which the line along u meets, it lies when it is moved, else UNDECIDED: six
-    roundings and a sum, 2^-50 is twice that."""
-    seen = (a.x - b.x, a.y - b.y, a.z - b.z)
-    x, y = seen[j] * u[k], seen[k] * u[j]
-    gap, bound = x - y, 2.0**-50 * (abs(x) + abs(y)) + UNDERFLOW
-    return 1 if gap > bound else -1 if gap < -bound else UNDECIDED
-
-
-@inline
-def _are_one(mesh: PlacedMesh, scratch: Scratch, i: int, j: int) -> bool:
-    """Tell whether two triangles are touched in one corner, or one side, of both."""
-    n, m = scratch.kinds[i] >> 1, scratch.kinds[j] >> 1
-    if n < 0 or m < 0 or (n < 3) != (m < 3):
-        return False
-    first, second = scratch.met[i], scratch.met[j]
-    if n < 3:
-        return corner(mesh.elements, first, n) == corner(mesh.elements, second, m)
-    a, b = corner(mesh.elements, first, n - 3), corner(mesh.elements, first, (n - 2) % 3)
-    c, d = corner(mesh.elements, second, m - 3), corner(mesh.elements, second, (m - 2) % 3)
-    return (a == c and b == d) or (a == d and b == c)
 
 
 @inline
@@ -252,17 +205,18 @@ def _join_touches(mesh: PlacedMesh, scratch: Scratch, n: int, is_in: bool, is_cl
     Where the location does not turn over, a closed mesh is met in a point, or not left: such a point stands there
     twice, the second time by -2 - face.
     """
-    cuts, kinds, order, n_out, begin = scratch.cuts, scratch.kinds, scratch.cuts.order, 2 * n, 0
+    cuts, order, n_out, begin = scratch.cuts, scratch.cuts.order, 2 * n, 0
     if 4 * n > MOST_MET:
         return UNSURE
     for place in range(1, n + 1):
         first, turns = order[begin], False
         if place < n and cuts.t[order[place]] == cuts.t[first]:
-            if not _are_one(mesh, scratch, first, order[place]):
+            other = order[place]
+            if not are_one(mesh.elements, cuts.met[first], cuts.codes[first], cuts.met[other], cuts.codes[other]):
                 return UNSURE
             continue
         for rank in range(begin, place):
-            turns ^= (kinds[order[rank]] & 1) == 1
+            turns ^= (cuts.codes[order[rank]] & 1) == 1
             cuts.faces[first] = min(cuts.faces[first], cuts.faces[order[rank]])
         begin = place
         if turns or not is_closed or not is_in:
@@ -290,7 +244,7 @@ def _values(at_p: Any, blur: float, normal: Any) -> Any:
 @inline
 def _cut_at(mesh: PlacedMesh, segments: Any, item: int, place: int, frame: Any, scratch: Scratch) -> bool:
     """Make a crossing, in a corner where one is touched; tell whether all is surely nearest."""
-    (own, blur, along, along_blur), cuts, element = frame, scratch.cuts, scratch.met[place]
+    (own, blur, along, along_blur), cuts, element = frame, scratch.cuts, scratch.cuts.met[place]
     if not (mesh.are_safe or is_item_safe(mesh.elements, element)):
         return False
     a, b, c = corner(mesh.elements, element, 0), corner(mesh.elements, element, 1), corner(mesh.elements, element, 2)
@@ -305,8 +259,8 @@ def _cut_at(mesh: PlacedMesh, segments: Any, item: int, place: int, frame: Any, 
     slack = slack_of(s, s_bound, d, d_bound)
     t, low = dd_div(-s, -s_low, d, d_low)
     cuts.t[place], cuts.faces[place] = t + low, mesh.faces[element]
-    n = scratch.kinds[place] >> 1
-    if n < 0 or n > 2:
+    n = place_of(cuts.codes[place])
+    if n > 2:
         return put_point(cuts.points[place], segments, item, t, low, slack)
     touched, bound = corner(mesh.elements, element, n), (T_BOUND + slack) * abs(t)
     cuts.points[place, 0], cuts.points[place, 1] = touched.x + 0.0, touched.y + 0.0
@@ -348,7 +302,7 @@ def crossings_in(body: Any, segments: Any, item: int, is_any: bool, words: Any, 
             return UNSURE, False
     touches = False
     for i in range(n_met):
-        touches |= scratch.kinds[i] != CROSSED
+        touches |= scratch.cuts.codes[i] != CROSSED
     if not sort_crossings(scratch.cuts, 0, n_met) and not touches:
         return UNSURE, False
     return (_join_touches(mesh, scratch, n_met, is_in, is_closed) if touches else n_met), is_in

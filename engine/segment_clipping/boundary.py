@@ -16,6 +16,7 @@ from engine.containment.locators import Locator, locator_of
 from engine.direct import entry_of
 from engine.parallel import Budget, Progress, run_chunks
 from engine.segment_clipping.boundary_cut import SETTLED, cut_on_mesh, cut_on_outline
+from engine.segment_clipping.chords import look_before
 from engine.segment_clipping.contacts import GROUP
 from engine.segment_clipping.decide_then_cut import Clipped
 from engine.segment_clipping.pieces import Pieces, completed, first_of, joined, room_for
@@ -66,23 +67,28 @@ def clip_chunk(
     """Return the pieces of ``segments[first:last]``, (n, 2, dim) float64, in order of source and t, and which of them
     were cut in exact arithmetic."""
     boundary, part = boundary_of(region), segments[first:last]
-    locations = np.empty(len(part), np.int8)
-    locator.fill(part[:, 0].copy(), locations, budget)
+    locations = _locations_of(part, boundary, locator, budget)
     parts, state = cut_at_crossings(part, locations, boundary, budget)
     left = np.flatnonzero(state != SETTLED)
     if len(left):
-        parts.append(cut_exactly(part, left, locations[left], region, budget))
+        locations[np.abs(locations) > 1] = 0
+        parts.append(settled(part, left, region, None, budget, locations[left].tolist()))
     pieces = completed(parts) if len(left) else joined(parts) if len(parts) > 1 else parts[0]
     return pieces._replace(source=pieces.source + first), left
 
 
-def cut_exactly(segments: FloatArray, items: IntArray, locations: Int8Array, region: Bounded, budget: Budget) -> Pieces:
-    """Return the pieces of some segments by exact arithmetic; locations: of the first end of each."""
-    both = np.stack([locations, np.zeros(len(items), np.int8)], axis=1)
-    on_boundary = locations == 0
-    locator_of(region).fill(segments[items[on_boundary], 1], found := np.empty(int(on_boundary.sum()), np.int8), budget)
-    both[on_boundary, 1] = found
-    return settled(segments, items, region, None, budget, both.tolist())
+def _locations_of(segments: FloatArray, boundary: Outline | Mesh, locator: Locator, budget: Budget) -> Int8Array:
+    """Return the locations (n, 2) of the ends of segments, of the second where the first is on the boundary; where both
+    are, what `look_before` sets."""
+    locations = np.zeros((len(segments), 2), np.int8)
+    locator.fill(segments[:, 0].copy(), first := np.empty(len(segments), np.int8), budget)
+    locations[:, 0] = first
+    on_boundary = np.flatnonzero(first == 0)
+    if len(on_boundary):
+        locator.fill(segments[on_boundary, 1], second := np.empty(len(on_boundary), np.int8), budget)
+        locations[on_boundary, 1] = second
+        look_before(segments, locations, boundary, locator, budget)
+    return locations
 
 
 def cut_at_crossings(

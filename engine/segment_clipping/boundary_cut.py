@@ -1,30 +1,26 @@
-"""The pieces of segments whose contacts are all proper crossings, compiled: the common case on meshes and polygons.
+"""The pieces of segments on polygons and meshes, compiled; above all of those whose contacts are all proper crossings.
 
 Every crossing turns the location over, so only the first end's location and the order of the crossings along the
 segment matter. Parameters that are surely rounded (crossing_values.py) and differ as doubles are in their exact order.
-A segment with two crossings that round alike, or a coordinate that may round either way, is left open for
-exact_pieces.py.
+A segment that touches, or with a coordinate that may round either way, is cut by touching_cut.py; what that leaves open
+by exact_pieces.py.
 """
 
 from __future__ import annotations
 
-from collections import namedtuple
 from typing import Any, Final
 
-import numpy as np
-
-from engine.jit import allocating, allocating_kernel, called, inline
+from engine.jit import allocating_kernel, called, inline
 from engine.segment_clipping.contacts import GROUP, PROPER, edge_contacts_for, gather_edges
 from engine.segment_clipping.crossing_values import cut_at, is_item_safe, line_values, plane_values
 from engine.segment_clipping.mesh_streams import gather_contacts, streams_for
 from engine.segment_clipping.pieces import Pieces, put_own_end
+from engine.segment_clipping.sorted_crossings import Crossings, crossings_for, sort_crossings
+from engine.segment_clipping.touching_cut import UNSURE, cut_touching, emit_touching
 from engine.types import OPEN
 
 SETTLED: Final = 0
 """State of a segment, beside OPEN."""
-
-Crossings = namedtuple("Crossings", "t points faces order")
-"""The crossings of a group of segments, those of each in a row; as many of each array as there is room for."""
 
 
 @inline
@@ -32,33 +28,6 @@ def group_size(n: int) -> int:
     """Return the size of the groups, all about as large, that n segments are cut in."""
     n_groups = max(1, (n + GROUP - 1) // GROUP)
     return (n + n_groups - 1) // n_groups
-
-
-@allocating
-def crossings_for(n: int, dimension: int) -> Crossings:
-    """Return room for n contacts."""
-    return Crossings(np.empty(n), np.empty((n, dimension)), np.empty(n, np.int64), np.empty(n, np.int64))
-
-
-@inline
-def sort_crossings(cuts: Crossings, first: int, n: int) -> bool:
-    """Set the order of n crossings from `first` on by t; False where two are equal."""
-    t, order = cuts.t, cuts.order
-    for i in range(first, first + n):
-        order[i] = i
-    gap = n // 2
-    while gap > 0:  # bound: gap is halved; Shell's sort, n^1.5 steps
-        for i in range(first + gap, first + n):
-            moved, j = order[i], i
-            while j >= first + gap and t[order[j - gap]] > t[moved]:
-                order[j] = order[j - gap]
-                j -= gap
-            order[j] = moved
-        gap //= 2
-    differ = True
-    for i in range(first + 1, first + n):
-        differ &= t[order[i - 1]] != t[order[i]]
-    return differ
 
 
 @inline
@@ -105,11 +74,12 @@ def cut_segment(segments: Any, item: int, boundary: Any, contacts: Any, cuts: Cr
             at_p, along = line_values(boundary.elements, element, segments, item)
         else:
             at_p, along = plane_values(boundary.elements, element, segments, item)
-        cuts.faces[i] = boundary.faces[element]
-        cuts.t[i], is_sure = cut_at(segments, item, boundary.elements, element, at_p, along, cuts.points, i)
+        place = i - first
+        cuts.faces[place] = boundary.faces[element]
+        cuts.t[place], is_sure = cut_at(segments, item, boundary.elements, element, at_p, along, cuts.points, place)
         if not is_sure:
             return False
-    return sort_crossings(cuts, first, last - first)
+    return sort_crossings(cuts, 0, last - first)
 
 
 @called
@@ -126,11 +96,19 @@ def cut_group(
         state[place] = OPEN
         if stop[0] or row + (end - begin) // 2 + 1 > out.source.size:
             return place, row
-        if not all_proper(contacts.kinds, begin, end) or (end > begin and locations[place] == 0):
-            continue
-        if cut_segment(segments, item, boundary, contacts, cuts):
-            row = emit(segments, item, place, locations[place] >= 0, cuts, begin, end - begin, out, row)
+        is_plain = all_proper(contacts.kinds, begin, end) and (end == begin or locations[place, 0] != 0)
+        if is_plain and cut_segment(segments, item, boundary, contacts, cuts):
+            row = emit(segments, item, place, locations[place, 0] >= 0, cuts, 0, end - begin, out, row)
             state[place] = SETTLED
+            continue
+        n = cut_touching(segments, item, boundary, contacts, cuts)
+        if n >= 0 and row + n + 1 > out.source.size:
+            return place, row
+        reached = UNSURE
+        if n >= 0:
+            reached = emit_touching(segments, item, place, locations[place], boundary.elements, cuts, n, out, row)
+        if reached != UNSURE:
+            row, state[place] = reached, SETTLED
     return first + segments.shape[0], row
 
 
@@ -138,15 +116,16 @@ def cut_group(
 def cut_on_outline(segments: Any, locations: Any, outline: Any, stop: Any, out: Pieces, state: Any, n: Any) -> None:
     """Cut segments (m, 2, 2) float64 on a polygon, as far as double-doubles and filters go.
 
-    locations: (m,) int8 of their first ends. outline: see `Outline`. stop: one uint8, polled. out: their source is
-    their place. state: (m,) uint8, SETTLED or OPEN. n: the place to begin with, afterwards where to go on, short of the
-    end where there is no room; how many rows are filled; and for how many contacts of a group there is to be room.
+    locations: (m, 2) int8 of their ends, the second where the first is 0 at least. outline: see `Outline`. stop: one
+    uint8, polled. out: their source is their place. state: (m,) uint8, SETTLED or OPEN. n: the place to begin with,
+    afterwards where to go on, short of the end where there is no room; how many rows are filled; and for how many
+    contacts of a group there is to be room.
     """
-    size = group_size(locations.size - n[0])
-    contacts, cuts, last = edge_contacts_for(size, n[2]), crossings_for(n[2], 2), n[0]
+    size = group_size(locations.shape[0] - n[0])
+    contacts, cuts, last = edge_contacts_for(size, n[2]), crossings_for(2 * n[2], 2), n[0]
     n[1], found = 0, 0
-    while n[0] == last < locations.size and found >= 0:  # bound: every turn takes a group
-        last = min(n[0] + size, locations.size)
+    while n[0] == last < locations.shape[0] and found >= 0:  # bound: every turn takes a group
+        last = min(n[0] + size, locations.shape[0])
         group = segments[n[0] : last]
         found = gather_edges(contacts, outline, group, group.shape[0], stop)
         if found >= 0:
@@ -157,11 +136,11 @@ def cut_on_outline(segments: Any, locations: Any, outline: Any, stop: Any, out: 
 @allocating_kernel
 def cut_on_mesh(segments: Any, locations: Any, mesh: Any, stop: Any, out: Pieces, state: Any, n: Any) -> None:
     """Cut segments (m, 2, 3) float64 on a polyhedron, `Mesh`: see `cut_on_outline`."""
-    size = group_size(locations.size - n[0])
-    contacts, cuts, last = streams_for(mesh, size, n[2]), crossings_for(n[2], 3), n[0]
+    size = group_size(locations.shape[0] - n[0])
+    contacts, cuts, last = streams_for(mesh, size, n[2]), crossings_for(2 * n[2], 3), n[0]
     n[1], found = 0, 0
-    while n[0] == last < locations.size and found >= 0:
-        last = min(n[0] + size, locations.size)
+    while n[0] == last < locations.shape[0] and found >= 0:
+        last = min(n[0] + size, locations.shape[0])
         group = segments[n[0] : last]
         found = gather_contacts(contacts, mesh, group, group.shape[0], stop)
         if found >= 0:

@@ -8,9 +8,14 @@ them:
     p, q on either side of a b                 on one side of all three edges
         PROPER: crossed in a point inside of both, the location changes there
 
-Signs that exclude a common point drop the element. Everything else, a zero sign or an undecided one, is DEGENERATE:
-exact arithmetic looks at it (exact_pieces.py). A segment whose contacts are all proper needs no other decision than the
-location of its first end.
+Signs that exclude a common point drop the element. A zero sign says that one point is touched, or that both lie on
+one line or plane. An undecided one, and triangles that the segment runs in, are DEGENERATE: exact arithmetic looks at
+them (exact_pieces.py). A segment whose contacts are all proper needs no other decision than the location of its first
+end.
+
+What touches has a code, 2 * place + 5 where the line beside the segment crosses the element, else 2 * place + 4:
+
+    0 .. 2  in that corner        3 .. 5  in the side from corner place - 3 on        START, END  there the segment ends
 """
 
 from __future__ import annotations
@@ -19,16 +24,27 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.jit import allocating, allocating_kernel, called, inline
+from engine.jit import allocating, allocating_kernel, called, inline, merged
 from engine.predicates.loading import as_point2
 from engine.predicates.orientation import orient2d
 from engine.segment_clipping.box_tree import DEEPEST, LEAF_SIZE, may_meet
+from engine.types import UNDECIDED, Point2
 
 APART: Final = 0
 PROPER: Final = 1
 DEGENERATE: Final = 2
 TOUCHING: Final = 3
 """DEGENERATE, and surely one common point."""
+START: Final = 6
+END: Final = 7
+WITHIN: Final = 8
+CROSSED: Final = 2 * WITHIN + 5
+"""The code of what is met in its open interior, no end of the segment."""
+ALONG: Final = 32
+"""Added where the segment runs along an edge of the plane, which is crossed nowhere; others are named before it."""
+BEGINS: Final = 64
+CEASES: Final = 128
+"""Added where it begins to, and where it ends."""
 GROUP: Final = 2048
 """Segments that are looked at together at most."""
 NO_ROOM: Final = -1
@@ -56,9 +72,37 @@ def edge_contacts_for(n_segments: int, n_contacts: int) -> EdgeContacts:
     )  # fmt: skip
 
 
+@merged
+def place_of(code: int) -> int:
+    """Return the place that a code tells."""
+    return ((code & (ALONG - 1)) >> 1) - 2
+
+
+@called
+def touched_edge(of_a: int, of_b: int, of_p: int, of_q: int) -> int:
+    """Return the code of an edge a b of the plane that a segment p q touches, by their signs; ALONG where all are on
+    one line, if they meet at all, DEGENERATE where a sign is UNDECIDED."""
+    if of_a == UNDECIDED or of_b == UNDECIDED or of_p == UNDECIDED or of_q == UNDECIDED:
+        return DEGENERATE
+    if of_a == 0 and of_b == 0:
+        return ALONG
+    place = START if of_p == 0 else END if of_q == 0 else 0 if of_a == 0 else 1
+    return 2 * place + 4 + ((of_a == 1) != (of_b == 1))
+
+
+@called
+def along_edge(a: Point2, b: Point2, p: Point2, q: Point2) -> int:
+    """Return ALONG where a segment p q and an edge a b of one line meet, else APART; DEGENERATE for an edge a = b."""
+    if a.x == b.x and a.y == b.y:
+        return DEGENERATE
+    if max(a.x, b.x) < min(p.x, q.x) or max(p.x, q.x) < min(a.x, b.x):
+        return APART
+    return APART if max(a.y, b.y) < min(p.y, q.y) or max(p.y, q.y) < min(a.y, b.y) else ALONG
+
+
 @inline
 def edge_contact(edge: Any, segment: Any) -> int:
-    """Return how a segment and an edge of the plane meet, (2, 2) float64 both."""
+    """Return how a segment and an edge of the plane meet, (2, 2) float64 both: what touches by its code."""
     a, b = as_point2(edge, 0), as_point2(edge, 1)
     p, q = as_point2(segment, 0), as_point2(segment, 1)
     of_a, of_b = orient2d(p, q, a), orient2d(p, q, b)
@@ -69,7 +113,8 @@ def edge_contact(edge: Any, segment: Any) -> int:
         return APART
     if abs(of_a) == 1 and abs(of_b) == 1 and abs(of_p) == 1 and abs(of_q) == 1:
         return PROPER  # two different signs each
-    return DEGENERATE
+    code = touched_edge(of_a, of_b, of_p, of_q)
+    return code if code != ALONG else along_edge(a, b, p, q)
 
 
 @inline

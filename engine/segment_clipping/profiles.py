@@ -23,16 +23,14 @@ from engine.containment.rational_locate import (
     to_body_frame,
     to_world_frame,
 )
-from engine.direct import entry_of
 from engine.errors import UnsupportedSolidError
 from engine.parallel import Budget
 from engine.predicates.rational import Number, common_integers, nearest_with_root
-from engine.segment_clipping.contacts import NO_ROOM, find_contacts_2d
 from engine.segment_clipping.exact_pieces import Contact, contacts_of, nodes_with_locations
-from engine.segment_clipping.mesh_streams import find_mesh_contacts
+from engine.segment_clipping.found_contacts import contacts_with
 from engine.segment_clipping.parameters import ONE, ZERO, Parameter, compare, parameter
 from engine.segment_clipping.pieces import Piece, Pieces, as_pieces
-from engine.segment_clipping.prepared_boundary import Mesh, Outline, boundary_of
+from engine.segment_clipping.prepared_boundary import boundary_of
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.convex import Convex
@@ -47,8 +45,6 @@ from engine.solids.surface import Surface
 from engine.solids.triangle import Triangle
 
 OUTSIDE, BOUNDARY, INSIDE = -1, 0, 1
-_LEAST_ROOM: Final = 1 << 8
-"""Contacts looked for at once; doubled where a segment has more."""
 _BYTES: Final = 1000
 """Of a piece, as Python holds it."""
 TAKEN: Final = "half_space, aabb, convex, sphere, triangle, polygon, polyhedron, surface and csg of these"
@@ -337,7 +333,7 @@ def _contacts(p: Point, q: Point, solid: Any, pose: Pose | None, budget: Budget)
     """Yield the contacts of p q, in the frame of the solid, with its elements."""
     boundary = boundary_of(solid)
     if pose is None and list(p) != list(q):
-        near = _elements_met(np.array([[p, q]], np.float64), boundary, budget)
+        near, _, _ = contacts_with(np.array([[p, q]], np.float64), boundary, budget)
     else:
         near = _near(boundary.elements, p, q)
     n = len(p)
@@ -349,17 +345,6 @@ def _contacts(p: Point, q: Point, solid: Any, pose: Pose | None, budget: Budget)
         (face, points[2 + size * i : 2 + size * (i + 1)]) for i, face in enumerate(boundary.faces[near].tolist())
     ]
     return contacts_of(points[0], points[1], elements, budget.check)
-
-
-def _elements_met(segment: FloatArray, boundary: Outline | Mesh, budget: Budget) -> IntArray:
-    """Return the elements that a segment (1, 2, dim) may meet."""
-    kernel: Any = find_mesh_contacts if isinstance(boundary, Mesh) else find_contacts_2d
-    room, found, met = _LEAST_ROOM, NO_ROOM, np.zeros(0, np.int64)
-    while found == NO_ROOM:  # bound: room is doubled, and a segment meets an element once
-        found, met, _, _ = entry_of(kernel)(segment, boundary, budget.flag, room)
-        budget.check()
-        room *= 2
-    return met[:found]
 
 
 def _near(elements: Any, p: Point, q: Point) -> Any:

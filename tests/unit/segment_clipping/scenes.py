@@ -101,6 +101,7 @@ def families(rng: np.random.Generator, targets: Floats, n: int) -> dict[str, Flo
         "random": random_segments(rng, n, dimension),
         "lattice": lattice_segments(rng, n, dimension),
         "targets": through(rng, targets, n),
+        "chords": targets[rng.integers(0, len(targets), (n, 2))],
         "tiny": 1e-9 * random_segments(rng, n, dimension) + targets[rng.integers(0, len(targets), n)][:, None, :],
         "long": 1e9 * random_segments(rng, n, dimension),
         "mixed": random_segments(rng, n, dimension) * 10.0 ** rng.integers(-300, 300, (n, 2, dimension)),

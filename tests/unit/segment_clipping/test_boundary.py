@@ -19,7 +19,7 @@ from engine.solids.polyhedron import Polyhedron
 from tests.reference.shapes import box, union_of
 from tests.unit.segment_clipping.scenes import assert_exact, check, families, random_segments, through
 
-FAMILIES = ["random", "lattice", "targets", "tiny", "long", "mixed", "denormal"]
+FAMILIES = ["random", "lattice", "targets", "tiny", "long", "mixed", "denormal", "chords"]
 COMB = [[-2, -1], [2, -1], [2, 2], [1, 2], [1, 0], [0, 0], [0, 2], [-1, 2], [-1, 0], [-2, 0]]
 SQUARE = [[-2, -2], [2, -2], [2, 2], [-2, 2]]
 

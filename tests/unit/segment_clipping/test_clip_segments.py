@@ -32,7 +32,7 @@ from engine.solids.sphere import Sphere
 from engine.solids.triangle import Triangle
 from tests.unit.segment_clipping.scenes import check, families, lattice_segments, random_segments, through
 
-FAMILIES = ["random", "lattice", "targets", "tiny", "long", "mixed", "denormal"]
+FAMILIES = ["random", "lattice", "targets", "tiny", "long", "mixed", "denormal", "chords"]
 CORNERS = {n: np.array(list(itertools.product([-1.0, 2.0], repeat=n))) for n in (2, 3)}
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from engine.predicates.rational import orient2d_rational
-from engine.segment_clipping.contacts import APART, DEGENERATE, NO_ROOM, PROPER, find_contacts_2d
+from engine.segment_clipping.contacts import ALONG, APART, DEGENERATE, END, NO_ROOM, PROPER, START, find_contacts_2d
 from engine.segment_clipping.prepared_boundary import outline_of
 
 
@@ -13,7 +13,13 @@ def contact(edge: list[list[float]], segment: list[list[float]]) -> int:
     signs = [orient2d_rational(*segment, end) for end in edge], [orient2d_rational(*edge, end) for end in segment]
     if any(pair in ([1, 1], [-1, -1]) for pair in signs):
         return APART
-    return PROPER if all(sorted(pair) == [-1, 1] for pair in signs) else DEGENERATE
+    if all(sorted(pair) == [-1, 1] for pair in signs):
+        return PROPER
+    (of_a, of_b), (of_p, of_q) = signs
+    if of_a == of_b == 0:
+        return DEGENERATE if edge[0] == edge[1] else ALONG
+    place = START if of_p == 0 else END if of_q == 0 else 0 if of_a == 0 else 1
+    return 2 * place + 4 + ((of_a > 0) != (of_b > 0))
 
 
 def test_contacts_are_those_of_all_edges() -> None:

@@ -1,0 +1,96 @@
+"""Segments with both ends on the boundary: the location just before the second end, which says where the rest is.
+
+The line from a point m beside the segment, at a known location, to the second end q is another segment of the same
+boundary: from span to span its location turns over where it crosses elements, so it is known up to q. Near q only
+elements that hold q are met. Where p and m, the first end and that point, are strictly on one side of the line or plane
+of each, none lies between the two directions from q: both segments are at one location there.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+
+from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray
+from engine.containment.locators import Locator
+from engine.direct import entry_of
+from engine.jit import kernel
+from engine.parallel import Budget
+from engine.predicates.loading import as_point2
+from engine.predicates.orientation import orient2d, orient3d
+from engine.segment_clipping.contacts import ALONG, DEGENERATE, END, GROUP
+from engine.segment_clipping.found_contacts import contacts_with
+from engine.segment_clipping.prepared_boundary import Mesh, Outline
+from engine.segment_clipping.triangle_contact import corner
+
+INSIDE_BEFORE: Final = 2
+OUTSIDE_BEFORE: Final = -2
+"""Location of the second end that says where the line beside the segment is before its first contact."""
+_PLACES: Final = (0.5, 0.3125, 0.8125)
+"""Where along a segment a point beside it is tried; the next where one is on the boundary, or elements part it."""
+
+
+def look_before(
+    segments: FloatArray, locations: Int8Array, boundary: Outline | Mesh, locator: Locator, budget: Budget
+) -> None:
+    """Set the second of locations (n, 2) where both are 0 and it can be told, see `INSIDE_BEFORE`."""
+    chords = np.flatnonzero((locations == 0).all(axis=1))
+    for begin in range(0, len(chords), GROUP):
+        some = chords[begin : begin + GROUP]
+        locations[some, 1] = _before(segments[some], boundary, locator, budget)
+
+
+def _before(segments: FloatArray, boundary: Outline | Mesh, locator: Locator, budget: Budget) -> Int8Array:
+    """Return what `look_before` sets for chords (n, 2, dim), 0 where it cannot be told."""
+    found = np.zeros(len(segments), np.int8)
+    is_odd, is_left, met, owners = _turns(segments, boundary, budget)
+    for place in _PLACES:
+        if not is_left.any():
+            break
+        inner = segments.copy()
+        inner[:, 0] += place * (segments[:, 1] - segments[:, 0])
+        locator.fill(inner[:, 0].copy(), of_inner := np.empty(len(segments), np.int8), budget)
+        turns_odd, is_told, _, _ = _turns(inner, boundary, budget)
+        entry_of(leave_parted)(boundary.elements, met, owners, segments, inner, is_told)
+        is_told &= is_left & (of_inner != 0)
+        is_in = (of_inner > 0) ^ turns_odd ^ is_odd
+        found[is_told] = np.where(is_in, INSIDE_BEFORE, OUTSIDE_BEFORE)[is_told]
+        is_left &= ~is_told
+    return found
+
+
+def _turns(
+    segments: FloatArray, boundary: Outline | Mesh, budget: Budget
+) -> tuple[BoolArray, BoolArray, IntArray, IntArray]:
+    """Return of each segment whether the location turns over an odd number of times before its end, and whether that is
+    sure and no edge runs there; then the elements that hold its end, and whose they are."""
+    met, kinds, offsets = contacts_with(segments, boundary, budget)
+    owners = np.repeat(np.arange(len(segments)), np.diff(offsets))
+    holds_end = (kinds >= 2 * END + 4) & (kinds <= 2 * END + 5)
+    turning = owners[(kinds & 1 == 1) & ~holds_end]
+    is_sure = np.ones(len(segments), np.bool_)
+    is_sure[owners[kinds == DEGENERATE]] = False
+    along = np.flatnonzero(kinds == ALONG)
+    edges, ends = boundary.elements[met[along]], segments[owners[along], 1]
+    reaches = ((edges.min(axis=1) <= ends) & (ends <= edges.max(axis=1))).all(axis=1)
+    is_sure[owners[along[reaches]]] = False
+    is_odd = np.bincount(turning, minlength=len(segments)) & 1 == 1
+    return is_odd, is_sure, met[holds_end], owners[holds_end]
+
+
+@kernel
+def leave_parted(elements: Any, met: Any, owners: Any, segments: Any, inner: Any, is_told: Any) -> None:
+    """Set is_told (n,) False where an element met does not have the first ends of a segment and of the one beside it
+    strictly on one side."""
+    for place in range(met.size):
+        element, item = met[place], owners[place]
+        if elements.shape[1] == 2:
+            a, b = as_point2(elements[element], 0), as_point2(elements[element], 1)
+            side = orient2d(a, b, as_point2(segments[item], 0))
+            other = orient2d(a, b, as_point2(inner[item], 0))
+        else:
+            c, d, e = corner(elements, element, 0), corner(elements, element, 1), corner(elements, element, 2)
+            side, other = orient3d(c, d, e, corner(segments, item, 0)), orient3d(c, d, e, corner(inner, item, 0))
+        if side != other or abs(side) != 1:
+            is_told[item] = False
