@@ -21,9 +21,10 @@ from engine.scenes.ends import Exact, Found, ScenePieces, in_order, joined
 from engine.scenes.posed_mesh import MOST_MET, scratch_for
 from engine.scenes.standing import Standing
 from engine.scenes.through import MET, cut_near, find_first
-from engine.segment_clipping.boundary import clip_chunk
 from engine.segment_clipping.clip_segments import method_for
-from engine.segment_clipping.decide_then_cut import clip_on_convex
+from engine.segment_clipping.decide_then_cut import FEW, clip_on_convex
+from engine.segment_clipping.on_boundary.boundary import clip_chunk, clip_few
+from engine.segment_clipping.on_boundary.prepared_boundary import boundary_of
 from engine.segment_clipping.pieces import Pieces, first_of, room_for
 from engine.segment_clipping.profiles import ExactPiece, exact_pieces, settled
 from engine.solids.base import Solid
@@ -206,8 +207,8 @@ def _cut(
                 budget.take(_BYTES * m)
                 are_long = np.full(m, UNDECIDED)
                 if is_told:  # pieces that kernels made have ends that round alike only if they are one
-                    sure = np.flatnonzero(~np.isin(pieces.source, rational))
-                    are_long[sure] = pieces.t[sure, 0] != pieces.t[sure, 1]
+                    are_sure = ~np.isin(pieces.source, rational) if len(rational) else True
+                    are_long = np.where(are_sure, pieces.t[:, 0] != pieces.t[:, 1], UNDECIDED)
                 found[group] = Found(items[pieces.source], np.full(m, body), are_long, *pieces[1:])
 
     run_chunks(task, len(groups), budget=budget, first_chunk=1, workers=workers)
@@ -222,5 +223,8 @@ def _on_body(segments: FloatArray, solid: Solid, pose: Pose | None, budget: Budg
         pieces, _, n_rational = clip_on_convex(segments, shape, cast(Any, method_for(shape)), budget, 1, None)
         return pieces, every[: n * bool(n_rational)], False
     if pose is None and solid.type in (("polygon", "triangle") if solid.dimension == 2 else ("polyhedron",)):
+        few = clip_few(segments, shape, boundary_of(shape)) if n <= FEW else None
+        if few is not None:
+            return few, every[:0], True
         return *clip_chunk(segments, 0, n, shape, locator_of(solid).chosen(n, budget), budget), True
     return settled(segments, every, solid, pose, budget), every, False

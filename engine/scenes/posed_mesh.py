@@ -25,14 +25,14 @@ from engine.lanes.tracing import LANES
 from engine.lanes.triangles import AXES_BEFORE, CORNER_ROWS, longest_axis, near_triangles
 from engine.predicates.double_double import dd_div, dd_sub
 from engine.scenes.posed_cut import in_frame, put_point, slack_of
-from engine.segment_clipping.contacts import APART, CROSSED, DEGENERATE, PROPER, START, TOUCHING, place_of
-from engine.segment_clipping.crossing_values import Vector, dot, is_item_safe, normal_of
-from engine.segment_clipping.mesh_contacts import inverse_of, local_segment
+from engine.segment_clipping.on_boundary.contacts import APART, CROSSED, DEGENERATE, PROPER, START, TOUCHING, place_of
+from engine.segment_clipping.on_boundary.crossing_values import Vector, dot, is_item_safe, normal_of
+from engine.segment_clipping.on_boundary.mesh_contacts import inverse_of, local_segment
+from engine.segment_clipping.on_boundary.sorted_crossings import Crossings, sort_crossings
+from engine.segment_clipping.on_boundary.touches import are_one, touched_triangle
+from engine.segment_clipping.on_boundary.triangle_contact import contact_filter, corner, exact_contact
 from engine.segment_clipping.pieces import Pieces
 from engine.segment_clipping.plane_meeting import T_BOUND
-from engine.segment_clipping.sorted_crossings import Crossings, sort_crossings
-from engine.segment_clipping.touches import are_one, touched_triangle
-from engine.segment_clipping.triangle_contact import contact_filter, corner, exact_contact
 from engine.types import UNDECIDED, Point3
 
 MOST_MET: Final = 512

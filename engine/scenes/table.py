@@ -15,7 +15,7 @@ from engine.containment.scene.trees import tree_line
 from engine.predicates.expansion import LARGEST, SMALLEST
 from engine.scenes.posed_mesh import MESH_WORDS, PLACES, TREE, TREE_PLACES, WANTS_TREE
 from engine.scenes.through import BALL, MESH, OTHER, ROWS, UNREADY
-from engine.segment_clipping.prepared_boundary import boundary_of
+from engine.segment_clipping.on_boundary.prepared_boundary import boundary_of
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.bounds import own_box

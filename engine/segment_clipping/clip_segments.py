@@ -14,11 +14,12 @@ from engine.parallel import Budget, Cancel, Options, Progress, check_options
 from engine.predicates.scaling import balanced_rows
 from engine.segment_clipping.ball_cut import fill_on_sphere
 from engine.segment_clipping.ball_interval import decide_on_sphere
-from engine.segment_clipping.boundary import clip_on_boundary
 from engine.segment_clipping.box_cut import fill_on_boxes
 from engine.segment_clipping.cohen_sutherland import decide_on_boxes
 from engine.segment_clipping.cyrus_beck import as_columns, decide_on_rows
 from engine.segment_clipping.decide_then_cut import FEW, Method, Scaled, clip_few, clip_on_convex, scaled
+from engine.segment_clipping.on_boundary.boundary import clip_few as clip_few_on_boundary
+from engine.segment_clipping.on_boundary.boundary import clip_on_boundary
 from engine.segment_clipping.pieces import Pieces
 from engine.segment_clipping.planes_cut import fill_on_rows
 from engine.solids.aabb import Aabb, rows_between
@@ -133,11 +134,16 @@ def clip_segments(
 
 def _clip_array(segments: Any, region: Solid) -> SegmentPieces | None:
     """Clip an array of few segments; None where nothing is kept with the region yet, or a segment is left open."""
-    method = region.kept("segment_method") if isinstance(region, Solid) else None
-    if method is None or not is_ready(segments, 2, region.dimension) or not 0 < len(segments) <= FEW:
+    if not isinstance(region, Solid) or not is_ready(segments, 2, region.dimension) or not 0 < len(segments) <= FEW:
         return None
-    found = clip_few(segments, method)
-    return None if found is None else _as_result(found[0])
+    method = region.kept("segment_method")
+    if method is not None:
+        found = clip_few(segments, method)
+        return None if found is None else _as_result(found[0])
+    if not isinstance(region, Polygon | Polyhedron) or (boundary := region.kept("clipping_boundary")) is None:
+        return None
+    pieces = clip_few_on_boundary(segments, region, boundary)
+    return None if pieces is None else _as_result(pieces)
 
 
 def _as_result(found: Pieces) -> SegmentPieces:

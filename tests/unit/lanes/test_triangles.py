@@ -7,8 +7,8 @@ import pytest
 
 from engine.jit import kernel
 from engine.lanes.triangles import AXES_BEFORE, longest_axis, near_triangles
-from engine.segment_clipping.mesh_contacts import local_segment
-from engine.segment_clipping.prepared_boundary import mesh_of
+from engine.segment_clipping.on_boundary.mesh_contacts import local_segment
+from engine.segment_clipping.on_boundary.prepared_boundary import mesh_of
 from engine.types import Point3
 
 

@@ -16,9 +16,9 @@ from engine.errors import (
     WrongDimensionError,
 )
 from tests.reference.segments import clip_segments as reference_pieces
+from tests.unit.segment_clipping.on_boundary.test_boundary import REGIONS as BOUNDARIES
+from tests.unit.segment_clipping.on_boundary.test_boundary import vertices_of
 from tests.unit.segment_clipping.scenes import as_json, families
-from tests.unit.segment_clipping.test_boundary import REGIONS as BOUNDARIES
-from tests.unit.segment_clipping.test_boundary import vertices_of
 from tests.unit.segment_clipping.test_clip_segments import CORNERS, REGIONS
 
 SQUARE = [[0, 0], [4, 0], [4, 4], [0, 4], [0, 0]]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from engine.segment_clipping.box_tree import LEAF_SIZE, build_box_tree
+from engine.segment_clipping.on_boundary.box_tree import LEAF_SIZE, build_box_tree
 
 
 def test_box_tree_holds_every_element() -> None:

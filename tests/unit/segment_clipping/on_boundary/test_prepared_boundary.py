@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from engine.segment_clipping.prepared_boundary import mesh_of, outline_of
+from engine.segment_clipping.on_boundary.prepared_boundary import mesh_of, outline_of
 
 
 def test_blocks_hold_every_triangle_once_behind_all_inner_nodes() -> None:

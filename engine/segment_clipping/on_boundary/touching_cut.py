@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import Any, Final
 
 from engine.jit import called, inline
-from engine.segment_clipping.chords import INSIDE_BEFORE
-from engine.segment_clipping.contacts import (
+from engine.segment_clipping.on_boundary.chords import INSIDE_BEFORE
+from engine.segment_clipping.on_boundary.contacts import (
     ALONG,
     BEGINS,
     CEASES,
@@ -22,11 +22,11 @@ from engine.segment_clipping.contacts import (
     START,
     place_of,
 )
-from engine.segment_clipping.crossing_values import cut_at, is_item_safe, line_values, plane_values
-from engine.segment_clipping.exact_crossing import cross_exactly, parameter_exactly
+from engine.segment_clipping.on_boundary.crossing_values import cut_at, is_item_safe, line_values, plane_values
+from engine.segment_clipping.on_boundary.exact_crossing import cross_exactly, parameter_exactly
+from engine.segment_clipping.on_boundary.sorted_crossings import Crossings, sort_crossings
+from engine.segment_clipping.on_boundary.touches import are_one, axis_of
 from engine.segment_clipping.pieces import Pieces, put_own_end
-from engine.segment_clipping.sorted_crossings import Crossings, sort_crossings
-from engine.segment_clipping.touches import are_one, axis_of
 
 UNSURE: Final = -1
 

@@ -5,8 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from engine.predicates.rational import orient2d_rational
-from engine.segment_clipping.contacts import ALONG, APART, DEGENERATE, END, NO_ROOM, PROPER, START, find_contacts_2d
-from engine.segment_clipping.prepared_boundary import outline_of
+from engine.segment_clipping.on_boundary.contacts import (
+    ALONG,
+    APART,
+    DEGENERATE,
+    END,
+    NO_ROOM,
+    PROPER,
+    START,
+    find_contacts_2d,
+)
+from engine.segment_clipping.on_boundary.prepared_boundary import outline_of
 
 
 def contact(edge: list[list[float]], segment: list[list[float]]) -> int:

@@ -7,20 +7,22 @@ arithmetic (exact_pieces.py). Zero-length segments are points.
 
 from __future__ import annotations
 
+from math import isfinite
 from typing import Any, Final
 
 import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, Int8Array, IntArray
+from engine.containment.at_once import located_at_once
 from engine.containment.locators import Locator, locator_of
 from engine.direct import entry_of
-from engine.parallel import Budget, Progress, run_chunks
-from engine.segment_clipping.boundary_cut import SETTLED, cut_on_mesh, cut_on_outline
-from engine.segment_clipping.chords import look_before
-from engine.segment_clipping.contacts import GROUP
+from engine.parallel import UNLIMITED, Budget, Progress, run_chunks
 from engine.segment_clipping.decide_then_cut import Clipped
+from engine.segment_clipping.on_boundary.boundary_cut import SETTLED, cut_on_mesh, cut_on_outline
+from engine.segment_clipping.on_boundary.chords import look_before
+from engine.segment_clipping.on_boundary.contacts import GROUP
+from engine.segment_clipping.on_boundary.prepared_boundary import Mesh, Outline, boundary_of
 from engine.segment_clipping.pieces import Pieces, completed, first_of, joined, room_for
-from engine.segment_clipping.prepared_boundary import Mesh, Outline, boundary_of
 from engine.segment_clipping.profiles import settled
 from engine.solids.checks import check_finite
 from engine.solids.polygon import Polygon
@@ -36,6 +38,8 @@ _CONTACTS: Final = 4
 """Of each segment of a group; likewise."""
 _BYTES: Final = 180
 """Of a piece, in its part and joined."""
+_FEW_PIECES: Final = 4
+"""Of each of a few segments, for which there is room at first."""
 _CONTACT_BYTES: Final = 60
 """Of a contact, while a kernel runs."""
 
@@ -59,6 +63,22 @@ def clip_on_boundary(
     pieces, left = zip(*parts)
     n_left = sum(map(len, left))
     return joined(pieces), n_left, n_left
+
+
+def clip_few(segments: FloatArray, region: Bounded, boundary: Outline | Mesh) -> Pieces | None:
+    """Return the pieces of a few segments, (n, 2, dim) float64, not yet looked at for NaN, in a third of the time that
+    the general way takes; None where one is left open or begins on the boundary."""
+    n, _, dimension = segments.shape
+    found = located_at_once(segments[:, 0].copy(), region) if isfinite(segments.sum()) else None
+    if found is None or not found[0].all():
+        return None
+    locations, state = np.zeros((n, 2), np.int8), np.empty(n, np.uint8)
+    locations[:, 0] = found[0]
+    pieces, done = room_for(_FEW_PIECES * n, dimension), np.array([0, 0, _LEAST_ROOM])
+    kernel: Any = cut_on_mesh if isinstance(boundary, Mesh) else cut_on_outline
+    entry_of(kernel)(segments, locations, boundary, UNLIMITED.flag, pieces, state, done)
+    reached, m, _ = done.tolist()
+    return first_of(pieces, m) if reached == n and not state.any() else None
 
 
 def clip_chunk(

@@ -21,7 +21,7 @@ from typing import Any, Final
 
 from engine.jit import called, merged
 from engine.predicates.orientation import orient3d
-from engine.segment_clipping.contacts import APART, DEGENERATE, PROPER, TOUCHING
+from engine.segment_clipping.on_boundary.contacts import APART, DEGENERATE, PROPER, TOUCHING
 from engine.types import UNDECIDED, Point3
 
 EDGE_BOUND: Final = 2.0**-48

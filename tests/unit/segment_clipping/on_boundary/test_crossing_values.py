@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.segment_clipping.crossing_values import cut_at, is_item_safe, line_values, plane_values
+from engine.segment_clipping.on_boundary.crossing_values import cut_at, is_item_safe, line_values, plane_values
 
 
 def exact_value(element: Any, w: Any) -> Fraction:

@@ -170,7 +170,7 @@ def test_large_meshes_agree_with_point_location(data: Path) -> None:
 
 
 def test_uncompiled_is_the_same() -> None:
-    code = "import tests.unit.segment_clipping.test_boundary as t; t.uncompiled_sample()"
+    code = "import tests.unit.segment_clipping.on_boundary.test_boundary as t; t.uncompiled_sample()"
     root = Path(__file__).resolve().parents[3]
     environment = {"NUMBA_DISABLE_JIT": "1", "PATH": "", "PYTHONPATH": str(root)}
     run = subprocess.run(

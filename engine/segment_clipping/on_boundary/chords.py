@@ -19,10 +19,10 @@ from engine.jit import kernel
 from engine.parallel import Budget
 from engine.predicates.loading import as_point2
 from engine.predicates.orientation import orient2d, orient3d
-from engine.segment_clipping.contacts import ALONG, DEGENERATE, END, GROUP
-from engine.segment_clipping.found_contacts import contacts_with
-from engine.segment_clipping.prepared_boundary import Mesh, Outline
-from engine.segment_clipping.triangle_contact import corner
+from engine.segment_clipping.on_boundary.contacts import ALONG, DEGENERATE, END, GROUP
+from engine.segment_clipping.on_boundary.found_contacts import contacts_with
+from engine.segment_clipping.on_boundary.prepared_boundary import Mesh, Outline
+from engine.segment_clipping.on_boundary.triangle_contact import corner
 
 INSIDE_BEFORE: Final = 2
 OUTSIDE_BEFORE: Final = -2
@@ -49,7 +49,7 @@ def _before(segments: FloatArray, boundary: Outline | Mesh, locator: Locator, bu
         if not is_left.any():
             break
         inner = segments.copy()
-        inner[:, 0] += place * (segments[:, 1] - segments[:, 0])
+        inner[:, 0] = (1.0 - place) * segments[:, 0] + place * segments[:, 1]
         locator.fill(inner[:, 0].copy(), of_inner := np.empty(len(segments), np.int8), budget)
         turns_odd, is_told, _, _ = _turns(inner, boundary, budget)
         entry_of(leave_parted)(boundary.elements, met, owners, segments, inner, is_told)

@@ -10,16 +10,16 @@ import pytest
 from engine.arrays import read_only
 from engine.containment.locators import locator_of
 from engine.parallel import Budget
-from engine.segment_clipping.boundary import clip_chunk
 from engine.segment_clipping.clip_segments import clip_segments
-from engine.segment_clipping.contacts import GROUP
+from engine.segment_clipping.on_boundary.boundary import clip_chunk
+from engine.segment_clipping.on_boundary.contacts import GROUP
 from engine.segment_clipping.pieces import Pieces, joined
 from engine.solids.base import Solid
 from engine.solids.polygon import Polygon
 from engine.types import OPEN
 from tests.reference.shapes import box, union_of
+from tests.unit.segment_clipping.on_boundary.test_boundary import REGIONS, solid_of, vertices_of
 from tests.unit.segment_clipping.scenes import assert_exact, random_segments, through
-from tests.unit.segment_clipping.test_boundary import REGIONS, solid_of, vertices_of
 
 
 def nothing_settled(segments: Any, locations: Any, boundary: Any, budget: Any) -> tuple[list[Pieces], np.ndarray]:
@@ -34,7 +34,7 @@ def test_kernel_and_exact_integers_agree(monkeypatch: pytest.MonkeyPatch) -> Non
             segments = np.concatenate([random_segments(rng, 40, dimension), through(rng, vertices_of(region), 40)])
             both = [clip_segments(segments, region)]
             with monkeypatch.context() as patch:
-                patch.setattr("engine.segment_clipping.boundary.cut_at_crossings", nothing_settled)
+                patch.setattr("engine.segment_clipping.on_boundary.boundary.cut_at_crossings", nothing_settled)
                 both.append(clip_segments(segments, region))
             for name in ("source", "start", "end", "t", "faces"):
                 np.testing.assert_array_equal(getattr(both[0], name), getattr(both[1], name))

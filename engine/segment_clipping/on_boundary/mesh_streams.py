@@ -26,10 +26,10 @@ from engine.lanes.boxes import EMPTY, near_segment
 from engine.lanes.lanes import lowest_bit, prefetch
 from engine.lanes.tracing import LANES
 from engine.lanes.triangles import AXES_BEFORE, CORNER_ROWS, longest_axis, near_triangles
-from engine.segment_clipping.contacts import APART, NO_ROOM, STOPPED, TOUCHING, is_point
-from engine.segment_clipping.mesh_contacts import local_segment
-from engine.segment_clipping.touches import touched_triangle
-from engine.segment_clipping.triangle_contact import corner, triangle_contact
+from engine.segment_clipping.on_boundary.contacts import APART, NO_ROOM, STOPPED, TOUCHING, is_point
+from engine.segment_clipping.on_boundary.mesh_contacts import local_segment
+from engine.segment_clipping.on_boundary.touches import touched_triangle
+from engine.segment_clipping.on_boundary.triangle_contact import corner, triangle_contact
 
 AHEAD: Final = 8
 """Items between the one that memory is asked for and the one worked on."""

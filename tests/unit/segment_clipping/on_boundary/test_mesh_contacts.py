@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from engine.segment_clipping.mesh_contacts import LIMIT, local_segment
+from engine.segment_clipping.on_boundary.mesh_contacts import LIMIT, local_segment
 from engine.types import Point3
 
 

@@ -9,9 +9,9 @@ import numpy as np
 from engine.arrays import FlagArray, FloatArray, IntArray
 from engine.direct import entry_of
 from engine.parallel import Budget
-from engine.segment_clipping.contacts import NO_ROOM, find_contacts_2d
-from engine.segment_clipping.mesh_streams import find_mesh_contacts
-from engine.segment_clipping.prepared_boundary import Mesh, Outline
+from engine.segment_clipping.on_boundary.contacts import NO_ROOM, find_contacts_2d
+from engine.segment_clipping.on_boundary.mesh_streams import find_mesh_contacts
+from engine.segment_clipping.on_boundary.prepared_boundary import Mesh, Outline
 
 _LEAST_ROOM: Final = 1 << 8
 """Contacts looked for at once, beside a few for each segment; doubled where there are more."""

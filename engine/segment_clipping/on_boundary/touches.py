@@ -13,9 +13,9 @@ from engine.lanes.triangles import AXES_BEFORE, longest_axis
 from engine.predicates.error_free import workspace
 from engine.predicates.orientation import orient3d
 from engine.predicates.parameters import compare_differences
-from engine.segment_clipping.contacts import DEGENERATE, END, START, place_of
+from engine.segment_clipping.on_boundary.contacts import DEGENERATE, END, START, place_of
+from engine.segment_clipping.on_boundary.triangle_contact import UNDERFLOW, corner
 from engine.segment_clipping.pieces import Triple
-from engine.segment_clipping.triangle_contact import UNDERFLOW, corner
 from engine.types import UNDECIDED, Point3
 
 

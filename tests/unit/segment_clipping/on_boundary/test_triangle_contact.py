@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from engine.segment_clipping.contacts import APART, DEGENERATE, PROPER, TOUCHING
 from engine.segment_clipping.exact_pieces import triangle_stretch
-from engine.segment_clipping.triangle_contact import contact_filter, exact_contact
+from engine.segment_clipping.on_boundary.contacts import APART, DEGENERATE, PROPER, TOUCHING
+from engine.segment_clipping.on_boundary.triangle_contact import contact_filter, exact_contact
 from engine.types import UNDECIDED, Point3
 
 

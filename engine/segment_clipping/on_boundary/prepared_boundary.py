@@ -13,7 +13,7 @@ from engine.lanes.boxes import EMPTY
 from engine.lanes.tracing import LANES
 from engine.lanes.triangles import CORNER_ROWS
 from engine.predicates.expansion import LARGEST, SMALLEST
-from engine.segment_clipping.box_tree import build_box_tree
+from engine.segment_clipping.on_boundary.box_tree import build_box_tree
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
 from engine.solids.surface import Surface

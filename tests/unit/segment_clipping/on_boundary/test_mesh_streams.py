@@ -6,11 +6,11 @@ import numpy as np
 
 from engine.predicates.exact_vectors import cross, minus
 from engine.predicates.rational import common_integers
-from engine.segment_clipping.contacts import APART, END, START, TOUCHING
 from engine.segment_clipping.exact_pieces import is_crossed, triangle_stretch
-from engine.segment_clipping.mesh_streams import find_mesh_contacts
-from engine.segment_clipping.prepared_boundary import Mesh, mesh_of
-from engine.segment_clipping.triangle_contact import exact_contact
+from engine.segment_clipping.on_boundary.contacts import APART, END, START, TOUCHING
+from engine.segment_clipping.on_boundary.mesh_streams import find_mesh_contacts
+from engine.segment_clipping.on_boundary.prepared_boundary import Mesh, mesh_of
+from engine.segment_clipping.on_boundary.triangle_contact import exact_contact
 from engine.types import Point3
 
 Floats = np.ndarray

@@ -27,7 +27,7 @@ import numpy as np
 from engine.jit import allocating, allocating_kernel, called, inline, merged
 from engine.predicates.loading import as_point2
 from engine.predicates.orientation import orient2d
-from engine.segment_clipping.box_tree import DEEPEST, LEAF_SIZE, may_meet
+from engine.segment_clipping.on_boundary.box_tree import DEEPEST, LEAF_SIZE, may_meet
 from engine.types import UNDECIDED, Point2
 
 APART: Final = 0
