@@ -1,9 +1,9 @@
-"""A tree of boxes over the elements of a boundary (edges or triangles), for the elements near a segment.
+"""A tree of boxes over the edges of a boundary, for the elements near a segment.
 
-The elements are put in the order of a space-filling curve through their centres; the tree over them is implicit: node
-i has the children 2 i and 2 i + 1, the second half are leaves of `LEAF_SIZE` elements, and a box that holds nothing
-has low = +inf. Boxes are the exact ones of the doubles given, so a test without rounding errs on neither side;
-where the test rounds, it keeps.
+The rings of elements are put in the order of a space-filling curve through their centres; the tree over them is
+implicit: node i has the children 2 i and 2 i + 1, the second half are leaves of `LEAF_SIZE` elements, and a box that
+holds nothing has low = +inf. Boxes are the exact ones of the doubles given, so a test without rounding errs on neither
+side; where the test rounds, it keeps.
 
 Source: the order is that of G. M. Morton, A computer oriented geodetic data base, 1966; the separating axes of segment
 and box stand in C. Ericson, Real-time collision detection, 2005, section 5.3.3.
@@ -29,13 +29,13 @@ TOO_LARGE: Final = 2.0**500
 """Beyond this products may overflow, and only the boxes are compared."""
 
 
-def build_box_tree(low: FloatArray, high: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Return the tree over elements with the boxes `low`, `high`, (n, dim) float64 each.
+def build_box_tree(low: FloatArray, high: FloatArray, offsets: IntArray) -> tuple[IntArray, FloatArray]:
+    """Return the tree over elements with the boxes `low`, `high`, (n, dim) float64 each; offsets: of their rings.
 
     (n,) int64, elements by leaf; (2 n_leaves, 2, dim) float64, low and high of node i at row i.
     """
     n, dimension = low.shape
-    order = np.argsort(_curve(low, high), kind="stable")
+    order = _order(low, high, offsets)
     n_leaves = 1
     while n_leaves * LEAF_SIZE < n:
         n_leaves *= 2
@@ -48,13 +48,22 @@ def build_box_tree(low: FloatArray, high: FloatArray) -> tuple[IntArray, FloatAr
     while level > 1:
         level //= 2
         children = boxes[2 * level : 4 * level].reshape(level, 2, 2, dimension)
-        boxes[level : 2 * level, 0] = children[:, :, 0].min(axis=1)
-        boxes[level : 2 * level, 1] = children[:, :, 1].max(axis=1)
+        boxes[level : 2 * level, 0] = np.minimum(children[:, 0, 0], children[:, 1, 0])
+        boxes[level : 2 * level, 1] = np.maximum(children[:, 0, 1], children[:, 1, 1])
     return order, boxes
 
 
+def _order(low: FloatArray, high: FloatArray, offsets: IntArray) -> IntArray:
+    """Return elements ring by ring, in the order of the curve; those of a ring follow one another in space too."""
+    if len(offsets) == 2:
+        return np.arange(len(low))
+    starts = offsets[:-1]
+    keys = _curve(np.minimum.reduceat(low, starts), np.maximum.reduceat(high, starts))
+    return np.argsort(np.repeat(keys, np.diff(offsets)), kind="stable")
+
+
 def _curve(low: FloatArray, high: FloatArray) -> npt.NDArray[np.uint64]:
-    """Return the place of each element's centre on the curve; any order is right, a good one is fast."""
+    """Return the place of each box's centre on the curve; any order is right, a good one is fast."""
     centers = low / 2 + high / 2
     smallest = centers.min(axis=0)
     extent = (centers / 2 - smallest / 2).max(axis=0)

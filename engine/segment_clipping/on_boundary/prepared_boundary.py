@@ -64,15 +64,16 @@ def boundary_of(region: Polygon | Triangle | Polyhedron | Surface) -> Outline | 
             return mesh_of(region.vertices[region.triangles], region.triangle_faces)
         following = next_in_ring(region)
         first = np.arange(len(following), dtype=np.int64)  # an edge is named by its first vertex
-        return outline_of(region.vertices[np.stack([first, following], axis=1)], first)
+        offsets = region.ring_offsets if isinstance(region, Polygon) else np.array([0, len(first)])
+        return outline_of(region.vertices[np.stack([first, following], axis=1)], first, offsets)
 
     return region.prepared("clipping_boundary", build)
 
 
-def outline_of(elements: FloatArray, faces: IntArray) -> Outline:
-    """Return what the kernels read of some edges (k, 2, 2)."""
-    low, high = elements.min(axis=1), elements.max(axis=1)
-    order, boxes = build_box_tree(low, high)
+def outline_of(elements: FloatArray, faces: IntArray, offsets: IntArray) -> Outline:
+    """Return what the kernels read of the edges (k, 2, 2) of some rings."""
+    low, high = np.minimum(elements[:, 0], elements[:, 1]), np.maximum(elements[:, 0], elements[:, 1])
+    order, boxes = build_box_tree(low, high, offsets)
     return Outline(read_only(elements), _are_safe(elements), read_only(faces), read_only(order), read_only(boxes))
 
 

@@ -35,7 +35,7 @@ def test_contacts_are_those_of_all_edges() -> None:
     rng = np.random.default_rng(1)
     edges, segments = rng.integers(-3, 4, (30, 2, 2)) * 0.5, rng.integers(-3, 4, (20, 2, 2)) * 0.5
     segments[0, 1] = segments[0, 0]
-    outline, stop = outline_of(edges, np.arange(30)), np.zeros(1, np.uint8)
+    outline, stop = outline_of(edges, np.arange(30), np.array([0, 30])), np.zeros(1, np.uint8)
     n, met, kinds, offsets = find_contacts_2d(segments, outline, stop, 1000)
     assert n == offsets[-1] > 20
     for i, segment in enumerate(segments.tolist()):

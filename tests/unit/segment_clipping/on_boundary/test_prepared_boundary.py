@@ -22,6 +22,6 @@ def test_blocks_hold_every_triangle_once_behind_all_inner_nodes() -> None:
 
 def test_numbers_out_of_range_are_not_safe() -> None:
     edges = np.array([[[0.0, 1.0], [1.0, 2.0]], [[1.0, 2.0], [0.0, 1.0]]])
-    assert outline_of(edges, np.arange(2)).are_safe
+    assert outline_of(edges, np.arange(2), np.array([0, 2])).are_safe
     for number in (1e-40, 1e40):
-        assert not outline_of(np.where(edges == 2.0, number, edges), np.arange(2)).are_safe
+        assert not outline_of(np.where(edges == 2.0, number, edges), np.arange(2), np.array([0, 2])).are_safe
