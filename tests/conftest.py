@@ -18,6 +18,7 @@ WHOLE_SUITE = 4000
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--full", action="store_true", help="run the large samples too (minutes to hours)")
+    parser.addoption("--seed", default="", help="draw other samples where questions are drawn at random")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -41,3 +42,9 @@ def pytest_collection_finish(session: pytest.Session) -> None:
 def data() -> Path:
     """The folder of real meshes and hard sets; tests that use it carry the marker `data`."""
     return DATA
+
+
+@pytest.fixture(scope="session")
+def seed(pytestconfig: pytest.Config) -> str:
+    """What is added to the seeds of generated questions, to draw others."""
+    return str(pytestconfig.getoption("--seed"))

@@ -71,22 +71,43 @@ def _locate(p: Vector, faces: list[Any], is_surface: bool) -> int:
     return locate_by_edges(p, faces) if len(p) == 2 else locate_by_triangles(p, faces)
 
 
+def are_disjoint(
+    first: Solid, second: Solid, first_pose: Solid | None = None, second_pose: Solid | None = None
+) -> bool:
+    """Tell whether two bodies have no common point, without asking whether interiors meet where faces do."""
+    if first_pose == second_pose:
+        first_pose = second_pose = None
+    if {first["type"], second["type"]} & {"half_space", "sphere"}:
+        return relation(first, second, first_pose, second_pose) == DISJOINT
+    return _where_no_faces_meet(first, second, _faces(first, first_pose), _faces(second, second_pose)) == DISJOINT
+
+
+def _is_surface(solid: Solid) -> bool:
+    return solid["type"] == "surface" or (solid["type"] == "triangle" and dimension(solid) == 3)
+
+
+def _where_no_faces_meet(first: Solid, second: Solid, a: list[Any], b: list[Any]) -> int | None:
+    """Return the relation of two bodies with faces, None where these meet, or parts of one are in the other."""
+    meet = segments_meet if dimension(first) == 2 else triangles_meet
+    if any(boxes_meet(one, other) and meet(one, other) for one in a for other in b):
+        return None
+    a_in_b = [_locate(p, b, _is_surface(second)) > 0 for p in _points(a)]
+    b_in_a = [_locate(p, a, _is_surface(first)) > 0 for p in _points(b)]
+    if not any(a_in_b) and not any(b_in_a):
+        return DISJOINT
+    if all(a_in_b) and not any(b_in_a):
+        return FIRST_INSIDE_SECOND
+    return SECOND_INSIDE_FIRST if all(b_in_a) and not any(a_in_b) else None
+
+
 def _bodies(first: Solid, second: Solid, first_pose: Solid | None, second_pose: Solid | None) -> int:
     a, b = _faces(first, first_pose), _faces(second, second_pose)
-    is_surface = [s["type"] == "surface" or (s["type"] == "triangle" and dimension(s) == 3) for s in (first, second)]
-    meet = segments_meet if dimension(first) == 2 else triangles_meet
-    if not any(boxes_meet(one, other) and meet(one, other) for one in a for other in b):
-        a_in_b = [_locate(p, b, is_surface[1]) > 0 for p in _points(a)]
-        b_in_a = [_locate(p, a, is_surface[0]) > 0 for p in _points(b)]
-        if not any(a_in_b) and not any(b_in_a):
-            return DISJOINT
-        if all(a_in_b) and not any(b_in_a):
-            return FIRST_INSIDE_SECOND
-        if all(b_in_a) and not any(a_in_b):
-            return SECOND_INSIDE_FIRST
-    if not any(is_surface) and (interiors_meet_in_plane if dimension(first) == 2 else interiors_meet_in_space)(a, b):
-        return OVERLAPPING
-    return TOUCHING
+    found = _where_no_faces_meet(first, second, a, b)
+    if found is not None:
+        return found
+    interiors_meet = interiors_meet_in_plane if dimension(first) == 2 else interiors_meet_in_space
+    has_interiors = not _is_surface(first) and not _is_surface(second)
+    return OVERLAPPING if has_interiors and interiors_meet(a, b) else TOUCHING
 
 
 def detail(

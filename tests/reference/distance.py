@@ -1,14 +1,15 @@
-"""The distance of two bodies: the least over all pairs of faces, each by every choice of corners that may carry it.
+"""The distance of two bodies: the least over all choices of corners of a face of either that may carry it.
 
 The nearest points of two triangles are combinations of some corners of either. For each choice the stationary point is
 that of a linear system; those whose weights are not negative are points of the triangles, and the least is among them.
+Of bodies that are apart, d + 1 corners do, in d dimensions: the way from one flat to another is across both.
 """
 
 from __future__ import annotations
 
 from itertools import combinations, product
 
-from tests.reference.collision import DISJOINT, relation
+from tests.reference.collision import are_disjoint
 from tests.reference.exact import Q, Vector, add, dot, nearest_double_with_root, q, square, sub, times
 from tests.reference.solids import Solid, dimension, edges, image, rows, triangles, value
 
@@ -59,7 +60,7 @@ def distance(
     first: Solid, second: Solid, first_pose: Solid | None = None, second_pose: Solid | None = None
 ) -> Distance | None:
     """Return the distance of two bodies, None where they have a common point."""
-    if relation(first, second, first_pose, second_pose) != DISJOINT:
+    if not are_disjoint(first, second, first_pose, second_pose):
         return None
     if first_pose == second_pose:
         first_pose = second_pose = None
@@ -68,7 +69,12 @@ def distance(
     if first["type"] == "half_space":
         return _from_half_space(rows(first, first_pose)[0], second, second_pose)
     (s, r), (t, radius) = _hulls(first, first_pose), _hulls(second, second_pose)
-    return min(squared_distance(a, b) for a, b in product(s, t)), r + radius
+    some = [
+        {c for hull in hulls for n in range(1, len(hull) + 1) for c in combinations(sorted(hull), n)}
+        for hulls in (s, t)
+    ]
+    few = (_stationary(a, b) for a, b in product(*some) if len(a) + len(b) <= dimension(first) + 1)
+    return min(found for found in few if found is not None), r + radius
 
 
 def _from_half_space(row: Vector, other: Solid, pose: Solid | None) -> Distance:

@@ -27,7 +27,10 @@ from engine import (
 )
 from engine.collision.clearance.result import Clearance, Feature
 from tests.unit.collision.clearance.makers import (
+    FAMILIES,
     KINDS,
+    Family,
+    Question,
     Scale,
     body,
     distance,
@@ -51,37 +54,54 @@ def lengths_agree(found: Clearance) -> bool:
     return max(Fraction(found.distance) - slack, Fraction(0)) ** 2 <= squared <= (Fraction(found.distance) + slack) ** 2
 
 
+def drawn(rng: random.Random, d: int, first: str, second: str) -> Question:
+    """Return two bodies of named types of any size, anywhere or far away, and their poses."""
+    scale = Scale(rng)
+    offset = [rng.choice([0.0, 0.0, 5.0, *([1e6, 1e9] if scale.size < 1e299 else [])]) * scale.size for _ in range(d)]
+    a, b = body(rng, scale, first, [0.0] * d), body(rng, scale, second, offset)
+    return a, b, pose(rng, scale, d), pose(rng, scale, d)
+
+
+def assert_agrees(question: Question, least: float) -> None:
+    """Hold distance, points, bounds about the distance and another one, and the mirrored pair against rationals."""
+    a, b, p, q = question
+    try:
+        one, other = solid(a), solid(b)
+        exact = distance(a, b, p, q)
+        found: Any = clearance(one, other, first_pose=placed(p), second_pose=placed(q))
+    except (NotRepresentableError, NotImplementedError):
+        return
+    if exact is None:
+        assert (found.distance, found.points, found.features) == (0.0, None, None), question
+    else:
+        assert is_nearest(found.distance, exact), question
+        assert lengths_agree(found), question
+    around = (0.0, math.nextafter(found.distance, 0.0), found.distance, math.nextafter(found.distance, math.inf))
+    for bound in {*around, least}:
+        answer = clearance(one, other, first_pose=placed(p), second_pose=placed(q), at_least=bound)
+        assert answer == is_at_least(bound, exact), (question, bound)
+    mirrored: Any = clearance(other, one, first_pose=placed(q), second_pose=placed(p))
+    assert mirrored.distance == found.distance, question
+
+
 @pytest.mark.parametrize(
     ("d", "first", "second"),
     [(d, *pair) for d in (2, 3) for pair in combinations_with_replacement(KINDS[d], 2)],
 )
 @COUNTS
-def test_agrees_with_the_reference(d: int, first: str, second: str, n: int) -> None:
-    rng = random.Random(f"{d}{first}{second}")
+def test_agrees_with_the_reference(d: int, first: str, second: str, n: int, seed: str) -> None:
+    rng = random.Random(f"{d}{first}{second}{seed}")
     for _ in range(n):
-        scale = Scale(rng)
-        offset = [
-            rng.choice([0.0, 0.0, 5.0, *([1e6, 1e9] if scale.size < 1e299 else [])]) * scale.size for _ in range(d)
-        ]
-        a, b = body(rng, scale, first, [0.0] * d), body(rng, scale, second, offset)
-        p, q = pose(rng, scale, d), pose(rng, scale, d)
-        try:
-            one, other = solid(a), solid(b)
-            exact = distance(a, b, p, q)
-            found: Any = clearance(one, other, first_pose=placed(p), second_pose=placed(q))
-        except (NotRepresentableError, NotImplementedError):
-            continue
-        if exact is None:
-            assert (found.distance, found.points, found.features) == (0.0, None, None), (a, b, p, q)
-        else:
-            assert is_nearest(found.distance, exact), (a, b, p, q)
-            assert lengths_agree(found), (a, b, p, q)
-        around = (0.0, math.nextafter(found.distance, 0.0), found.distance, math.nextafter(found.distance, math.inf))
-        for least in {*around, scale.size / 2}:
-            answer = clearance(one, other, first_pose=placed(p), second_pose=placed(q), at_least=least)
-            assert answer == is_at_least(least, exact), (a, b, p, q, least)
-        mirrored: Any = clearance(other, one, first_pose=placed(q), second_pose=placed(p))
-        assert mirrored.distance == found.distance
+        assert_agrees(drawn(rng, d, first, second), rng.choice([0.5, 1e-310, 1e300]))
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("family", FAMILIES)
+@COUNTS
+def test_agrees_with_the_reference_near_contact(family: Family, d: int, n: int, seed: str) -> None:
+    rng = random.Random(f"{d}{family.__name__}{seed}")
+    for _ in range(n):
+        assert_agrees(family(rng, d), 1e-12)
 
 
 def test_pythagorean_balls_are_at_least_their_distance_apart_and_no_ulp_more() -> None:
