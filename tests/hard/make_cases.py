@@ -31,6 +31,11 @@ BOW = polygon([[0, 0], [4, 4], [4, 0], [0, 4]])
 NEEDLE = tetrahedron((0, 0, 0), (1, EPS, 0), (1, 0, EPS), (1e6, 1, 1))
 STAR = polygon([[0, 3], [2, -3], [-3, 1], [3, 1], [-2, -3]])
 TURN = {"rotation": [[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]], "translation": [0.1, 0.2, 0.3]}
+SKEW = [
+    [0.4216110837159155, -0.8953789340817078, -0.14332012590908527],
+    [-0.1372774677940211, -0.21925840154348986, 0.9659609982751143],
+    [-0.896325270715912, -0.387585239341359, -0.21535712507541674],
+]
 DIAMOND = {
     "type": "polyhedron",
     "vertices": [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]],
@@ -284,6 +289,10 @@ COLLIDE = {
         pair("point disc on a huge needle", "a bound of a box overflows",
              sphere((0, 0), 0), {"type": "triangle", "vertices": [[0, 0], [0, 0], [0, math.nextafter(HUGE, 0)]]}),
         pair("tiny in huge", "", box((TINY,) * 3, (2 * TINY,) * 3), box((-1e300,) * 3, (1e300,) * 3)),
+        pair("turned subnormal triangles", "products of the pose and the smallest numbers round by a part of the bodies",
+             {"type": "surface", "vertices": [[TINY, 2 * TINY, 0], [-TINY, TINY, 0], [-2 * TINY, 0, TINY]], "faces": [[0, 1, 2]]},
+             {"type": "surface", "vertices": [[-TINY, -TINY, TINY], [0, 0, 4 * TINY], [-TINY, 2 * TINY, 2 * TINY]], "faces": [[0, 1, 2]]},
+             first_pose=None, second_pose={"rotation": SKEW, "translation": [0, -TINY, 0]}),
     ],
 }  # fmt: skip
 

@@ -79,16 +79,16 @@ def finish_along_line(s: Search, limits: Any) -> tuple[int, int]:
     """Measure all pairs of blocks that may be nearer than the least upper bound, where few reach so far along the line.
 
     Bodies that bulge toward each other have few: this looks at each body alone, not at pairs of boxes. Returns FULL
-    where they are many, and there is nothing gained.
+    and -1 where they are many, and there is nothing gained; FULL and 0 where what was found before is lost.
     """
     margin = s.margin
     furthest, theirs = _reach(s, s.a, 0), _reach(s, s.b, 1)
     _, n_first = _blocks_along(s, s.a, 0, -theirs - limits[0] - 2.0 * margin, True)
     if n_first > MOST_LISTED:
-        return FULL, 0
+        return FULL, -1
     _, n_second = _blocks_along(s, s.b, 1, -furthest - limits[0] - 2.0 * margin, True)
     if n_second > MOST_LISTED:
-        return FULL, 0
+        return FULL, -1
     n_found = 0
     for k in range(n_first):
         for m in range(n_second):

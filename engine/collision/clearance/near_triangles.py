@@ -77,17 +77,15 @@ def _edges(best: Nearest, s: Facet, i: int, t: Facet, j: int) -> Nearest:
 
 @inline
 def _foot(p: Point3, t: Facet) -> tuple[bool, Point3]:
-    """Return whether the foot of p on the plane of t lies over the triangle, and the foot."""
-    normal = cross(minus(t.q, t.p), minus(t.r, t.p))
+    """Return whether the foot of p on the plane of t lies in the triangle, and it, as a mean of the corners: that is a
+    point of the triangle, however the normal of a needle was rounded."""
+    u, v, w = minus(t.q, t.p), minus(t.r, t.p), minus(p, t.p)
+    normal = cross(u, v)
     size = dot(normal, normal)
     if not size > 0.0:
         return False, p
-    foot = _along(p, normal, -dot(minus(p, t.p), normal) / size)
-    for k in range(3):
-        start = corner(t, k)
-        if dot(cross(minus(corner(t, k + 1), start), minus(p, start)), normal) < 0.0:
-            return False, foot
-    return True, foot
+    x, y = dot(cross(w, v), normal) / size, dot(cross(u, w), normal) / size
+    return x >= 0.0 and y >= 0.0 and x + y <= 1.0, _along(_along(t.p, u, x), v, y)
 
 
 class Across(NamedTuple):

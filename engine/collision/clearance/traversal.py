@@ -133,7 +133,7 @@ def _search(s: Search, limits: Any, flag: Any) -> tuple[int, int]:
         if n_turns == next_try:
             next_try *= 16
             how, n_all = finish_along_line(s, limits)
-            if how != FULL:
+            if n_all >= 0:
                 return how, n_all
         if flag[0] != 0:
             return INTERRUPTED, 0

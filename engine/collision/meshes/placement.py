@@ -19,8 +19,8 @@ two bodies give
 where R_a' stands for the inverse of R_a. **margin.** The transpose is used instead: with `defect` the largest entry of
 |R' R - I|, it is off by 3.1 defect relative to the vector it turns. Float64 rounding is below 2^-46 of the same
 magnitudes, rounding to float32 and the sums of `meeting` below 2^-19 of the numbers there, which are at most 2 + 3.5
-s_b / s_a + |T|. Where scales differ by more than 2^60 the axes of the smaller body are left out: nothing is apart on
-them; so are those of a map that is not finite.
+s_b / s_a + |T|; six products of denormal numbers round to less than 2^-1071 in all. Where scales differ by more than
+2^60 the axes of the smaller body are left out: nothing is apart on them; so are those of a map that is not finite.
 """
 
 from __future__ import annotations
@@ -186,7 +186,7 @@ def set_frame(
     t = Point3((v.x - a_origin[0]) / a_scale, (v.y - a_origin[1]) / a_scale, (v.z - a_origin[2]) / a_scale)
     a_reach = max(abs(a_origin[0]), abs(a_origin[1]), abs(a_origin[2]))
     sizes = (a_reach + largest_of(origin) + largest_of(shift)) / a_scale + 2.0 + 2.0 * ratio
-    margin = 2.0**-19 * (2.0 + 3.5 * ratio + largest_of(t)) + (32.0 * defect + 2.0**-46) * sizes
+    margin = 2.0**-19 * (2.0 + 3.5 * ratio + largest_of(t)) + (32.0 * defect + 2.0**-46) * sizes + 2.0**-1071 / a_scale
     if not (ratio <= WIDEST_RATIO and margin <= WIDEST_MARGIN and np.isfinite(t.x + t.y + t.z)):
         for row in range(21):
             frame[row, :] = 1.0 if 9 <= row < 18 else 0.0

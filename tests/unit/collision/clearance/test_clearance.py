@@ -38,6 +38,7 @@ from tests.unit.collision.clearance.makers import (
     is_nearest,
     placed,
     pose,
+    turn,
 )
 from tests.unit.collision.lattices import solid
 
@@ -170,6 +171,43 @@ def test_denormal_coordinates_are_made_larger_before_they_are_multiplied() -> No
     other = Aabb([1.3234e-319, 1.2142e-319, 1.2142e-319], [1.87024e-319, 2.0237e-319, 2.6068e-319])
     step = Pose(np.eye(3), [5.9e-321, 0.0, 0.0])
     assert clearance(flat, other, first_pose=step).distance == 1.0223e-319  # type: ignore[union-attr]
+
+
+def test_turned_denormal_triangles_are_no_nearer_than_they_are() -> None:
+    """Products of rotations and denormal numbers rounded the map between two trees by a part of the bodies."""
+    rng = random.Random(4)
+    for _ in range(150):
+        size = rng.choice([2, 3, 4])
+        bodies = [
+            {"type": "surface", "faces": [[0, 1, 2]],
+             "vertices": [[5e-324 * rng.randint(-size, size) for _ in range(3)] for _ in range(3)]} for _ in range(2)
+        ]  # fmt: skip
+        poses = [{"rotation": turn(rng, 3), "translation": [5e-324 * rng.randint(-size, size) for _ in range(3)]}
+                 for _ in range(2)]  # fmt: skip
+        assert_agrees((*bodies, *poses), 5e-324)  # type: ignore[arg-type]
+
+
+def test_needles_are_as_far_apart_as_their_points() -> None:
+    """The foot of a corner on a needle lay beside it: no pair was left, or `at_least` said no to the distance."""
+    crossing = [
+        [[510485.3506275446, 33231.7275930698, 859244.0625781787],
+         [-510485.3506275446, -33231.7275930698, -859244.0625781787],
+         [212531.8694631146, 13835.463019897632, 357731.6111428738]],
+        [[510306.35199255316, 33462.93879106929, 859341.4652103785],
+         [-510664.4090051294, -33000.57863215807, -859146.6220452638],
+         [368675.6568592879, 24242.992387942573, 620950.1022030174]],
+    ]  # fmt: skip
+    beside = [
+        [[0.8526763598924814, 0.5055056749863391, -0.13193573373848919],
+         [-0.8526763598924814, -0.5055056749863391, 0.13193573373848919],
+         [0.7344097446193057, 0.4353917982634468, -0.1136361849333536]],
+        [[0.852675692701738, 0.5055068900774163, -0.1319353901040582],
+         [-0.8526768623732406, -0.5055046148483314, 0.13193654816769268],
+         [0.7615792843749679, 0.4515006325576422, -0.1178396749860621]],
+    ]  # fmt: skip
+    for pair in (crossing, beside):
+        first, second = ({"type": "surface", "vertices": corners, "faces": [[0, 1, 2]]} for corners in pair)
+        assert_agrees((first, second, None, None), 1e-12)
 
 
 @pytest.mark.parametrize("wrong", [-1.0, math.nan, math.inf, "1", True, None.__class__])
