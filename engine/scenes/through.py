@@ -179,13 +179,15 @@ def _ask(words: Any, body: int, segments: Any, item: int, is_any: bool, room: An
 def _reached(scratch: Any, bodies: Any, way: Any) -> Any:
     """Return a parameter of `enter_boxes` behind the start of the first piece found.
 
-    Along the longest axis k it is (x - m) / e. The slack is more than the rounding of m and e; it is taken twice.
+    Along the longest axis k it is (x - m) / e. The slack is more than the rounding of m and e; it is taken twice. That
+    of x, the nearest double, is half an ulp where it was made: much, in the tree, of a scene far from the origin.
     """
     k = longest_axis(way.half)
     if scratch.found[0] < 0 or way.half[k] == 0.0:
         return np.float32(1.0)
-    x = scratch.room.ends[0, MOST_MET, k] * bodies.inverse - bodies.tree.origin[k] * bodies.inverse
-    t = (x - way.middle[k]) / way.half[k] + 2.0 * way.slack / abs(way.half[k]) + 2.0**-20
+    place = scratch.room.ends[0, MOST_MET, k] * bodies.inverse
+    x, slack = place - bodies.tree.origin[k] * bodies.inverse, 2.0 * way.slack + 2.0**-52 * abs(place)
+    t = (x - way.middle[k]) / way.half[k] + slack / abs(way.half[k]) + 2.0**-20
     return np.float32(min(1.0, t))
 
 

@@ -102,3 +102,30 @@ def test_touched_corners_and_sides_are_settled() -> None:
                 are_points = [compare(piece.first, piece.last) == 0 for piece in expected]
                 assert (pieces.ranks[mine, 0] == pieces.ranks[mine, 1]).tolist() == are_points
         assert len(found.t) > 0.95 * len(pieces)
+
+
+def far_from_the_origin(rng: np.random.Generator) -> tuple[Scene, Any]:
+    """Boxes far along x, two of which a segment enters between the same two doubles, through sides along x."""
+    size, ulp = 2.0 ** rng.integers(8, 16), 1.0
+    far = ulp * 2.0**52
+    way = np.round(size * np.array([8.0, *rng.uniform(0.5, 2.0, 2)]))
+    cell = far + np.round(rng.uniform(0.2, 0.8) * way[0])
+    first, second = np.array([rng.uniform(0.0, 0.4), 0.45]) + (cell - far)
+    bodies: list[Solid] = [
+        Aabb([far - 2 * size, second / way[0] * way[1], -5 * size], [cell + size, 9 * size, 5 * size]),
+        Aabb([cell - size, -5 * size, first / way[0] * way[2]], [cell + size, 5 * size, 9 * size]),
+    ]
+    for _ in range(60):  # below the segment
+        low = np.array([far, 0.0, 0.0]) + np.round(rng.uniform([-1, -6, -6], [9, 6, -0.1]) * size)
+        bodies.append(Aabb(low, low + np.round(rng.uniform(0.1, 1.0, 3) * [size, size, 0.05 * size])))
+    start = np.array([far, 0.0, 0.0])
+    return Scene([bodies[k] for k in rng.permutation(len(bodies))]), [[start, start + way]]
+
+
+def test_the_first_of_two_that_are_entered_between_the_same_doubles() -> None:
+    """The start of the first piece found was taken for exact: half an ulp is much in the tree of a scene far away."""
+    rng = np.random.default_rng(1)
+    for _ in range(150):
+        scene, segment = far_from_the_origin(rng)
+        every, first = scene.clip_segments(segment), scene.clip_segments(segment, keep="first")
+        assert (first.body[0], first.t[0, 0]) == (every.body[0], every.t[0, 0])
