@@ -134,19 +134,58 @@ def test_ends_that_round_alike_are_put_in_exact_order() -> None:
     assert found.ranks.tolist() == [[0, 1], [0, 1]]
 
 
-def test_pieces_and_gaps_make_up_the_segment() -> None:
-    rng = np.random.default_rng(11)
-    for dimension in (2, 3):
-        solids, poses = scene_of(rng, dimension, 8, 0.5)
-        segments = np.round(rng.uniform(-2, 2, (40, 2, dimension)) * 2) / 2
-        found = Scene(solids, poses).clip_segments(segments)
-        for source in range(40):
-            mine = found.source == source
-            marks = {int(rank): t for rank, t in zip(found.ranks[mine].ravel(), found.t[mine].ravel())}
-            assert sorted(marks) == list(range(len(marks)))
-            assert [marks[rank] for rank in sorted(marks)] == sorted(marks.values())
-            starts = found.ranks[mine, 0].tolist()
-            assert starts == sorted(starts)
+def adversarial(rng: Random, k: int, n: int) -> tuple[Scene, Any]:
+    """Return a scene of all types, and segments of a lattice, an ulp off it, along axes, or hardly longer than none."""
+    dimension, grid = 2 + k % 2, (0.5, 0.25, 0.0, 0.5, 0.125)[k % 5]
+    scene = Scene(*scene_of(rng, dimension, int(rng.choice([1, 2, 3, 6, 12])), grid))
+    segments = rng.uniform(-2.5, 2.5, (n, 2, dimension))
+    segments = np.round(segments / grid) * grid if grid else segments
+    if k % 4 == 1:
+        segments = np.nextafter(segments, rng.choice([-np.inf, np.inf], segments.shape))
+    if k % 4 == 2:
+        segments[:, 1, 1:] = segments[:, 0, 1:]
+    if k % 4 == 3:
+        segments[::2, 1] = np.nextafter(segments[::2, 0], segments[::2, 1])
+    return scene, segments
+
+
+@pytest.mark.parametrize("n", [4, pytest.param(3200, marks=pytest.mark.full)])
+def test_adversarial_segments_are_cut_as_rationals_say(n: int, seed: str) -> None:
+    for k in range(n):
+        rng = np.random.default_rng([k, *seed.encode()])
+        scene, segments = adversarial(rng, k, 32)
+        found = scene.clip_segments(segments)
+        assert_exact(found, segments, expected_pieces(segments, list(scene.solids), list(scene.poses)))
+        assert_first_and_any(scene, segments, found)
+
+
+def assert_partition(found: Any, segments: Any) -> None:
+    """The ends along each segment are ranked without a gap, parameters go up with ranks, pieces of a body are apart."""
+    assert ((found.t >= 0) & (found.t <= 1)).all()
+    assert (found.ranks[:, 0] <= found.ranks[:, 1]).all()
+    sources, ranks, t = np.repeat(found.source, 2), found.ranks.ravel(), found.t.ravel()
+    order = np.lexsort((ranks, sources))
+    goes_on = np.diff(sources[order]) == 0
+    steps, rises = np.diff(ranks[order])[goes_on], np.diff(t[order])[goes_on]
+    assert not ranks[order][np.append(True, ~goes_on)[: len(ranks)]].any()
+    assert ((steps == 0) | (steps == 1)).all()
+    assert ((rises == 0) | ((rises > 0) & (steps == 1))).all()
+    assert (np.lexsort((found.body, found.ranks[:, 0], found.source)) == np.arange(len(found))).all()
+    order = np.lexsort((found.ranks[:, 0], found.body, found.source))
+    is_next = (np.diff(found.source[order]) == 0) & (np.diff(found.body[order]) == 0)
+    assert (found.ranks[order, 0][1:] > found.ranks[order, 1][:-1])[is_next].all()
+    for end, ends in enumerate((found.start, found.end)):
+        is_own = found.faces[:, end] < 0
+        assert (found.t[is_own, end] == end).all()
+        assert (ends[is_own] == segments[found.source[is_own], end]).all()
+
+
+@pytest.mark.parametrize("n", [4, pytest.param(200, marks=pytest.mark.full)])
+def test_pieces_and_gaps_make_up_the_segment(n: int, seed: str) -> None:
+    for k in range(n):
+        rng = np.random.default_rng([k, *seed.encode()])
+        scene, segments = adversarial(rng, k, 40 if n == 4 else 5000)
+        assert_partition(scene.clip_segments(segments), segments)
 
 
 def test_a_surface_is_crossed_in_points() -> None:
