@@ -121,12 +121,12 @@ def test_union_equals_the_reference(draw: Callable[[Random], list[Rings]], seed:
 @pytest.mark.full
 @pytest.mark.parametrize("draw", LAYERS)
 @pytest.mark.parametrize("part", range(10))
-def test_unions_of_twenty_thousand_layers(draw: Callable[[Random], list[Rings]], part: int) -> None:
-    for seed in range(500 * part, 500 * part + 500):
-        assert_union(draw, seed)
+def test_unions_of_twenty_thousand_layers(draw: Callable[[Random], list[Rings]], part: int, seed: str) -> None:
+    for number in range(500 * part, 500 * part + 500):
+        assert_union(draw, [number, *seed.encode()] if seed else number)
 
 
-def assert_union(draw: Callable[[Random], list[Rings]], seed: int) -> None:
+def assert_union(draw: Callable[[Random], list[Rings]], seed: int | list[int]) -> None:
     random = np.random.default_rng(seed)
     layer = listed(draw(random))
     result = engine.union_all([engine.Polygon(rings) for rings in layer])
@@ -188,15 +188,26 @@ def test_integers_agree(draw: Callable[[Random], list[Rings]], seed: int) -> Non
 
 
 @pytest.mark.parametrize("rule", RULES)
-@pytest.mark.parametrize("seed", range(25))
-def test_fill_rules(rule: Any, seed: int) -> None:
+@pytest.mark.parametrize("number", range(25))
+def test_fill_rules(rule: Any, number: int) -> None:
+    assert_filled(rule, number, number)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("rule", RULES)
+def test_fills_of_ten_thousand_drawings(rule: Any, seed: str) -> None:
+    for number in range(3333):
+        assert_filled(rule, number, [number, *seed.encode()])
+
+
+def assert_filled(rule: str, number: int, seed: int | list[int]) -> None:
     random = np.random.default_rng(seed)
     code, is_inside = RULES[rule]
-    if seed % 3:
+    if number % 3:
         rings = [random.integers(0, 5, (n, 2)).astype(float) for n in random.integers(2, 8, 3)]
     else:
         rings = [ring for layer in of_a_family(random) for ring in layer]
-    if seed % 5 == 0:
+    if number % 5 == 0:
         rings = [ring for layer in far([rings]) for ring in layer]
     found, body = engine.filled(rings, rule), [[ring.tolist() for ring in rings]]
     nesting = Nesting(np.zeros(len(rings), np.int64), np.zeros(0), code)
