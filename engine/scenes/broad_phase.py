@@ -6,6 +6,7 @@ Boxes are rounded outward (posed_boxes.py), so no body is missed; those without 
 from __future__ import annotations
 
 from collections import namedtuple
+from math import isfinite
 from typing import Any, Final
 
 import numpy as np
@@ -26,16 +27,19 @@ from n on; what these are called in the scene, ascending."""
 
 
 def body_tree(low: FloatArray, high: FloatArray, most_listed: int) -> BodyTree:
-    """Return the tree over bodies by their boxes (n, dimension); up to so many have none."""
+    """Return the tree over bodies by their boxes (n, dimension); up to so many have none, nor have those so near each
+    other that 1 / its scale is no double."""
     n, dimension = low.shape
+    every = BodyTree(low, high, _NO_TREE, 1.0, NOBODY, np.arange(n))
     if n <= most_listed:
-        return BodyTree(low, high, _NO_TREE, 1.0, NOBODY, np.arange(n))
+        return every
     is_bounded = (np.isfinite(low) & np.isfinite(high)).all(axis=1)
     bounded, listed = np.flatnonzero(is_bounded), np.flatnonzero(~is_bounded & (low <= high).all(axis=1))
     flat = np.zeros((len(bounded), 6))  # in the plane z is 0
     flat[:, :dimension], flat[:, 3 : 3 + dimension] = low[bounded], high[bounded]
     tree = build_bvh(flat) if len(bounded) else _NO_TREE
-    return BodyTree(low, high, tree, 1.0 / tree.scale, bounded, listed)
+    inverse = 1.0 / tree.scale
+    return BodyTree(low, high, tree, inverse, bounded, listed) if isfinite(inverse) else every
 
 
 NOBODY: Final = np.empty(0, np.int64)

@@ -51,3 +51,20 @@ def test_pairs_are_those_whose_boxes_meet(dimension: int, reach: float) -> None:
         for row, body in enumerate(np.array(pairs).ravel().tolist(), 1):
             assert rows.translations[row].tolist() == standing.pose(body).translation.tolist()  # type: ignore[union-attr]
         assert rows.rotations[0].tolist() == np.eye(dimension).tolist()
+
+
+@pytest.mark.parametrize("unit", [5e-324, 2.0**-1040, 2.0**-1020, 1e300])
+def test_new_pairs_of_bodies_so_small_that_the_scale_of_their_tree_has_no_inverse(unit: float) -> None:
+    """A box beside another was told to be infinitely far away."""
+    rng = np.random.default_rng(3)
+    lows = rng.integers(-6, 7, (30, 2)) * unit
+    scene = Scene([Aabb(low, low + rng.integers(1, 4, 2) * unit) for low in lows])
+    moved = scene.moved({4: Pose(np.eye(2), [unit, -unit])})
+    every, new = moved.collide(), moved.collide(moved=[4])
+    rows = (every.first == 4) | (every.second == 4)
+    assert rows.any()
+    for name in ("first", "second", "relation"):
+        assert getattr(new, name).tolist() == getattr(every, name)[rows].tolist()
+    points = np.concatenate([lows, lows + unit])
+    few, many = moved.locate(points[:3]), moved.locate(points)
+    assert few.indices.tolist() == many.indices[: many.offsets[3]].tolist()
