@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from engine.arrangement.union_find import root_of, unite
 from engine.arrays import FloatArray, IntArray, read_only
 from engine.bounding.aabb import corners_of_box
 from engine.bounding.bvh import WIDTH, build_bvh
@@ -269,15 +270,6 @@ def in_tree(mesh: MeshArrays, p: Point3) -> Point3:
     return Point3((p.x - o[0]) / scale, (p.y - o[1]) / scale, (p.z - o[2]) / scale)
 
 
-@inline
-def root_of(parent: Any, vertex: int) -> int:
-    """Return the representative of a vertex's set, halving the path."""
-    while parent[vertex] != vertex:  # bound: parents decrease
-        parent[vertex] = parent[parent[vertex]]
-        vertex = parent[vertex]
-    return vertex
-
-
 @kernel
 def join_vertices(triangles: Any, left_out: Any, parent: Any) -> None:
     """Set parent (n_vertices,) so that vertices connected by triangles not left out have one representative."""
@@ -291,13 +283,7 @@ def _join(triangles: Any, left_out: Any, parent: Any) -> None:
     for item in range(triangles.shape[0]):
         if left_out[item]:
             continue
-        a = root_of(parent, triangles[item, 0])
         for corner in range(1, 3):
-            b = root_of(parent, triangles[item, corner])
-            if a < b:
-                parent[b] = a
-            elif b < a:
-                parent[a] = b
-                a = b
+            unite(parent, triangles[item, 0], triangles[item, corner])
     for vertex in range(parent.shape[0]):
         parent[vertex] = root_of(parent, vertex)
