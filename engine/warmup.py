@@ -163,7 +163,8 @@ def _warm_scenes() -> None:
     collide_scene(flat)
     crossing = Triangle([[0.5, 0.25], [5, 1], [1, 5]])
     collide(flat[0], crossing)
-    clearance(flat[0], crossing)
+    for at in (None, Pose([[0.6, -0.8], [0.8, 0.6]], [5, 5])):
+        clearance(flat[0], crossing, second_pose=at)
     for dimension in (2, 3):
         corners = np.vstack([np.zeros(dimension), np.eye(dimension)])[None, :3]
         collide_triangles(corners, corners + 0.25)

@@ -5,6 +5,9 @@ A ball is its centre and its radius; a body of the plane is its edges, in space 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Final
+
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray, read_only
@@ -19,6 +22,8 @@ from engine.solids.base import Solid
 from engine.solids.mesh import Mesh
 from engine.solids.sphere import Sphere
 
+BALL: Final = Feature("ball")
+
 
 def spread_of(solid: Solid) -> MeshBody:
     """Return the triangles of a body that is no half-space; of a ball its centre."""
@@ -28,18 +33,44 @@ def spread_of(solid: Solid) -> MeshBody:
 
 
 def _built(solid: Solid) -> MeshBody:
-    points, following = outline_of(solid)
+    points, following = outline_of(solid)[:2]
     vertices = np.zeros((len(points), 3))
     vertices[:, : solid.dimension] = points
     triangles = np.column_stack([np.arange(len(points)), following, following])
     return mesh_body_of_triangles(vertices, triangles, np.arange(len(points)), False)
 
 
-def outline_of(solid: Solid) -> tuple[FloatArray, IntArray]:
-    """Return the vertices (n, d) of a ball or a body of the plane, and for each edge the vertex at its end."""
+Outline = tuple[FloatArray, IntArray, float, "_Names"]
+
+
+def outline_of(solid: Solid) -> Outline:
+    """Return the vertices (n, d) of a ball or a body of the plane, for each edge the vertex at its end, the radius, and
+    by number the vertices and then the edges as the caller knows them."""
+    kept: Outline | None = solid.kept("outline and names")
+    return solid.prepared("outline and names", lambda: _outline(solid)) if kept is None else kept
+
+
+def _outline(solid: Solid) -> Outline:
     if isinstance(solid, Sphere):
-        return solid.prepared("centre", lambda: (read_only(solid.center[None]), read_only(np.zeros(1, np.int64))))
-    return outline_arrays(solid)
+        return read_only(solid.center[None]), read_only(np.zeros(1, np.int64)), radius_of(solid), _Names(solid, ())
+    vertices, following = outline_arrays(solid)
+    return vertices, following, 0.0, _Names(solid, following.tolist())
+
+
+class _Names(dict[int, Feature]):
+    """Of the vertices and edges of an outline; each is named when it is asked for first."""
+
+    def __init__(self, solid: Solid, following: Sequence[int]) -> None:
+        self._is_box, self._following = solid.type == "aabb", following
+
+    def __missing__(self, number: int) -> Feature:
+        n = len(self._following)
+        if not n:
+            return BALL
+        ends = [number] if number < n else [number - n, self._following[number - n]]
+        ends = sorted((0, 1, 3, 2)[end] if self._is_box else end for end in ends)
+        self[number] = Feature("vertex" if number < n else "edge", tuple(ends))
+        return self[number]
 
 
 def radius_of(solid: Solid) -> float:
@@ -60,7 +91,7 @@ def in_space(rotations: FloatArray, translations: FloatArray) -> PoseArrays:
 def feature_of(solid: Solid, mesh: MeshBody, triangle: int, code: int) -> Feature:
     """Return the feature `code` of a triangle (near_triangles.py) as the caller knows it."""
     if isinstance(solid, Sphere):
-        return Feature("ball")
+        return BALL
     face = int(mesh.faces[triangle])
     if code == FACE:
         return Feature("face", (face,))
@@ -88,11 +119,11 @@ def _ring(solid: Solid, face: int) -> tuple[list[int], list[list[float]]]:
         (a, b, c), (_, _, d) = BOX_TRIANGLES[face].tolist()
         points, numbers = corners_of_box(solid.min, solid.max), [a, b, c, d]
     else:
-        points, following = outline_of(solid)
+        points, following = outline_of(solid)[:2]
         numbers = [face, int(following[face])]
     return numbers, points[numbers].tolist()
 
 
 def named(solid: Solid, number: int) -> int:
     """Return the vertex's number as the caller knows it: a box of the plane counts its corners as one of space."""
-    return (0, 1, 3, 2)[number] if isinstance(solid, Aabb) and solid.dimension == 2 else number
+    return (0, 1, 3, 2)[number] if solid.type == "aabb" and solid.dimension == 2 else number

@@ -16,7 +16,6 @@ from engine.collision.result import UNLIMITED, Poses, Work
 from engine.errors import InvalidInputError
 from engine.parallel import Budget, Cancel, Options, Progress, check_options
 from engine.solids.base import Solid
-from engine.solids.half_space import HalfSpace
 from engine.solids.pose import Pose
 from engine.types import Accuracy, Relation
 
@@ -81,9 +80,11 @@ def clearance(
     True
     """
     pair_function(first, second)
-    check_pose(first_pose, first, "first_pose")
-    check_pose(second_pose, second, "second_pose")
-    check_options(workers, progress, report=report)
+    if first_pose is not None or second_pose is not None:
+        check_pose(first_pose, first, "first_pose")
+        check_pose(second_pose, second, "second_pose")
+    if workers is not None or progress is not None or type(report) is not bool:
+        check_options(workers, progress, report=report)
     least = None if at_least is None else checked_distance(at_least)
     poses = first_pose, second_pose
     if first_pose is not None and first_pose == second_pose:
@@ -123,9 +124,12 @@ def _answer(first: Solid, second: Solid, poses: Poses, least: float | None, budg
     if least == 0.0:
         return True
     planes = has_plane(first, second)
-    closed = (between_form_and_plane if planes else between_forms)(first, second, poses, least)
-    if closed is None and first.dimension == 2 and not planes:
-        closed = between_outlines(first, second, poses, least)
+    if planes:
+        closed = between_form_and_plane(first, second, poses, least)
+    else:
+        closed = between_forms(first, second, poses, least)
+        if closed is None and first.dimension == 2:
+            closed = between_outlines(first, second, poses, least)
     if closed is not None:
         return closed
     if least is not None and not planes:
@@ -142,4 +146,4 @@ def _answer(first: Solid, second: Solid, poses: Poses, least: float | None, budg
 
 def has_plane(first: Solid, second: Solid) -> bool:
     """Tell whether one of two solids is a half-space."""
-    return isinstance(first, HalfSpace) or isinstance(second, HalfSpace)
+    return first.type == "half_space" or second.type == "half_space"

@@ -6,10 +6,11 @@ from fractions import Fraction
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray
+from engine.arrays import BoolArray, FloatArray, read_only
 from engine.collision.answers import Answers
 from engine.collision.clearance.bodies import in_space
 from engine.collision.clearance.clearance import checked_distance, do_meet, has_plane
+from engine.collision.clearance.forms import STILL2, are_small, told_under_poses
 from engine.collision.clearance.half_spaces import gap_of_planes
 from engine.collision.clearance.spreads import SpreadPair
 from engine.collision.codes import DISJOINT, TOUCHING, UNSETTLED
@@ -82,13 +83,19 @@ class _Batch:
         self.relations = np.full(n_poses, UNSETTLED, np.int8)
         self.relate = batch_of(first, second, poses, Answers(budget, True, self.relations, None, None))
         self.spread = None if has_plane(first, second) or not n_poses else in_space(poses.rotations, poses.translations)
+        self.is_small = self.spread is not None and are_small(first, second)
         self.n_exact = 0
 
     def fill(self, answers: FloatArray, start: int, stop: int, least: Fraction | None) -> None:
         """Answer the poses of a range as `SpreadPair.fill`; threads may answer different ranges."""
         if self.relate is not None:
             self.relate(start, stop)
-        for item in range(start, stop):
+        if self.is_small:
+            turns, moves = read_only(self.poses.rotations[start:stop]), read_only(self.poses.translations[start:stop])
+            motions = *STILL2, turns, moves
+            answers[start:stop] = told_under_poses(self.first, self.second, motions, least, self.budget)
+        left = start + np.flatnonzero(np.isnan(answers[start:stop]))
+        for item in left.tolist():
             self.budget.check()
             if self.relations[item] == UNSETTLED:
                 meets = do_meet(self.first, self.second, self._poses(item), self.budget)
@@ -99,8 +106,8 @@ class _Batch:
                 gap, _ = gap_of_planes(self.first, self.second, self._poses(item), self.budget)
                 answers[item] = gap.distance() if least is None else (np.inf if gap.is_at_least(least) else 0.0)
         if self.spread is None:
-            self.n_exact += stop - start
-        else:
+            self.n_exact += len(left)
+        elif len(left):
             pair = SpreadPair(self.first, self.second, STILL, self.spread, self.budget)
             pair.fill(start, stop, answers, least)
             self.n_exact += pair.n_exact

@@ -3,14 +3,15 @@ sure. Small bodies of the plane by `outlines.py`."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 from math import lcm
 from typing import Final
 
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray, read_only
-from engine.collision.clearance.bodies import named, outline_of, radius_of
+from engine.arrays import FloatArray, read_only
+from engine.collision.clearance.bodies import BALL, outline_of
 from engine.collision.clearance.closed_forms import (
     N_NUMBERS,
     UNSURE,
@@ -20,11 +21,12 @@ from engine.collision.clearance.closed_forms import (
     touched,
 )
 from engine.collision.clearance.exact import Gap, Rational, ScaledGap
-from engine.collision.clearance.outlines import nearest_of_outlines
+from engine.collision.clearance.outlines import nearest_of_outlines, nearest_under_poses
 from engine.collision.clearance.result import Clearance, Feature
 from engine.collision.exact_images import Vector, as_vector, image_point
-from engine.collision.result import Poses
+from engine.collision.result import UNLIMITED, Poses
 from engine.direct import entry_of
+from engine.parallel import Budget
 from engine.predicates.exact_vectors import minus, squared_length
 from engine.predicates.rational import sign_of
 from engine.solids.aabb import Aabb
@@ -33,9 +35,10 @@ from engine.solids.half_space import HalfSpace
 from engine.solids.pose import Pose, motion_of
 from engine.solids.sphere import Sphere
 
-_MOST_PAIRS: Final = 4096
-"""Of edges of two outlines; beyond, trees are faster."""
-BALL, PLANE = Feature("ball"), Feature("plane")
+_MOST_PAIRS: Final = 1 << 18
+"""Of edges of two outlines: to look at all of them takes some milliseconds, where boxes part none."""
+_FORMS: Final = ("aabb", "sphere")
+PLANE: Final = Feature("plane")
 MEETING: Final = Clearance(0.0)
 """The answer for bodies with a common point."""
 
@@ -58,6 +61,8 @@ FEATURES = {d: [_feature(faces, d) for faces in range(1 << 2 * d)] for d in (2, 
 
 def form_of(solid: Solid) -> FloatArray | None:
     """Return a box that is not flat or a ball as kernels take it, None for others."""
+    if solid.type not in _FORMS:
+        return None
     return solid.prepared("form", lambda: _form(solid))
 
 
@@ -83,6 +88,8 @@ def _told(distance: float, least: float | None) -> Clearance | bool | None:
 def between_forms(first: Solid, second: Solid, poses: Poses, least: float | None) -> Clearance | bool | None:
     """Return the clearance of two boxes or balls, or whether it is at least so much; None for other bodies, and boxes
     that are turned."""
+    if first.type not in _FORMS or second.type not in _FORMS:
+        return None
     form, other = form_of(first), form_of(second)
     if form is None or other is None:
         return None
@@ -117,27 +124,61 @@ def between_form_and_plane(first: Solid, second: Solid, poses: Poses, least: flo
 
 def between_outlines(first: Solid, second: Solid, poses: Poses, least: float | None) -> Clearance | bool | None:
     """Return what `between_forms` does, of two bodies of the plane; None where that is not sure, or they are large."""
-    (vertices, following), (other, their_following) = outline_of(first), outline_of(second)
-    if len(vertices) * len(other) > _MOST_PAIRS:
+    vertices, following, radius, names = outline_of(first)
+    others, their_following, their_radius, their_names = outline_of(second)
+    if len(vertices) * len(others) > _MOST_PAIRS:
         return None
-    points, motion, their = np.empty((2, 2)), motion_of(poses[0], 2), motion_of(poses[1], 2)
-    distance, own, theirs = entry_of(nearest_of_outlines)(
-        vertices, following, *motion, other, their_following, *their, (radius_of(first), radius_of(second)), points
-    )
-    told = _told(distance, least)
-    if told is not None or own < 0 or least is not None:
-        return told
-    return _answer(distance, points, _of_outline(first, following, own), _of_outline(second, their_following, theirs))
+    points = np.empty((2, 2))
+    if poses[0] is None and poses[1] is None:
+        distance, own, theirs = entry_of(nearest_of_outlines)(
+            vertices, following, radius, others, their_following, their_radius, points
+        )
+    else:
+        own_pose, their_pose = ([array[None] for array in motion_of(pose, 2)] for pose in poses)
+        (found,) = under_poses(first, second, (*own_pose, *their_pose), UNLIMITED, points).tolist()
+        distance, own, theirs = found[0], int(found[1]), int(found[2])
+    if own < 0 or least is not None:
+        return _told(distance, least)
+    points.setflags(write=False)
+    return Clearance(distance, points, (names[own], their_names[theirs]))
 
 
-def _of_outline(solid: Solid, following: IntArray, code: int) -> Feature:
-    """Return the vertex, or the number of vertices + the edge, as the caller knows it."""
-    if isinstance(solid, Sphere):
-        return BALL
-    if code < len(following):
-        return Feature("vertex", (named(solid, code),))
-    start = code - len(following)
-    return Feature("edge", tuple(sorted((named(solid, start), named(solid, int(following[start]))))))
+def under_poses(
+    first: Solid, second: Solid, motions: Sequence[FloatArray], budget: Budget, points: FloatArray
+) -> FloatArray:
+    """Return what `nearest_under_poses` finds; motions: rotations and translations of each body, read-only."""
+    turns, moves, their_turns, their_moves = motions
+    found = np.empty((len(their_turns), 3))
+    entry_of(nearest_under_poses)(
+        *outline_of(first)[:3], turns, moves, *outline_of(second)[:3], their_turns, their_moves, found, points,
+        budget.flag,
+    )  # fmt: skip
+    budget.check()
+    return found
+
+
+STILL2: Final = tuple(array[None] for array in motion_of(None, 2))
+"""The rotation and translation of a body of the plane without a pose, as one of many."""
+
+
+def told_under_poses(
+    first: Solid, second: Solid, motions: Sequence[FloatArray], least: Fraction | None, budget: Budget
+) -> FloatArray:
+    """Return the distances under poses, NaN where they are not sure; with a distance 0.0 for bodies that are nearer
+    than that, infinity for others."""
+    told = under_poses(first, second, motions, budget, np.empty((2, 2)))[:, 0].copy()
+    told[told == UNSURE] = np.nan
+    if least is not None:
+        bound = float(least)
+        told = np.where(told > bound, np.inf, np.where(told < bound, 0.0, np.nan))
+    return told
+
+
+def are_small(first: Solid, second: Solid) -> bool:
+    """Tell whether two bodies are outlines of the plane that `under_poses` takes."""
+    if first.dimension == 3:
+        return False
+    return len(outline_of(first)[0]) * len(outline_of(second)[0]) <= _MOST_PAIRS
 
 
 def _answer(distance: float, points: FloatArray, first: Feature, second: Feature) -> Clearance:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 from engine.arrays import FloatArray
+from engine.solids.base import setters_of
 
 
 class Feature(NamedTuple):
@@ -21,7 +22,7 @@ class Feature(NamedTuple):
     indices: tuple[int, ...] = ()
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, init=False)
 class Clearance:
     """How far apart two bodies are.
 
@@ -32,3 +33,13 @@ class Clearance:
     distance: float
     points: FloatArray | None = None
     features: tuple[Feature, Feature] | None = None
+
+    def __init__(
+        self, distance: float, points: FloatArray | None = None, features: tuple[Feature, Feature] | None = None
+    ) -> None:
+        _set_distance(self, distance)
+        _set_points(self, points)
+        _set_features(self, features)
+
+
+_set_distance, _set_points, _set_features = setters_of(Clearance)

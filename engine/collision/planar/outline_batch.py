@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import namedtuple
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -33,6 +33,8 @@ MOST_EDGES = 1024
 
 _NONE = np.empty((0, 2)), np.empty(0, np.int64)
 UNSURE = 2
+BLOCK: Final = 8
+"""Edges that follow each other in number, in one box: what that box misses, they miss."""
 _POLL_EVERY = 64
 
 
@@ -126,6 +128,32 @@ def _place(vertices: Any, turn: Any, move: Any, is_posed: bool, placed: Any) -> 
 
 
 @inline
+def n_blocks(n_edges: int) -> int:
+    """Return how many blocks so many edges have."""
+    return (n_edges + BLOCK - 1) // BLOCK
+
+
+@inline
+def box_blocks(points: Any, following: Any, boxes: Any) -> None:
+    """Write the box of each block of edges: low x, low y, high x, high y."""
+    for edge in range(len(following)):
+        a, b, block = as_point2(points, edge), as_point2(points, following[edge]), edge // BLOCK
+        x, y, right, top = min(a.x, b.x), min(a.y, b.y), max(a.x, b.x), max(a.y, b.y)
+        if edge % BLOCK:
+            x, y = min(x, boxes[block, 0]), min(y, boxes[block, 1])
+            right, top = max(right, boxes[block, 2]), max(top, boxes[block, 3])
+        boxes[block, 0], boxes[block, 1], boxes[block, 2], boxes[block, 3] = x, y, right, top
+
+
+@inline
+def _misses(boxes: Any, block: int, a: Point2, b: Point2, slack: float) -> bool:
+    """Tell whether an edge a b is further than a slack from the box of a block."""
+    if max(a.x, b.x) + slack < boxes[block, 0] or boxes[block, 2] + slack < min(a.x, b.x):
+        return True
+    return max(a.y, b.y) + slack < boxes[block, 1] or boxes[block, 3] + slack < min(a.y, b.y)
+
+
+@inline
 def inside(p: Point2, vertices: Any, following: Any, error: float) -> int:
     """Return 1 for a point inside the rings, 0 outside, UNSURE where a bound does not tell."""
     is_inside = 0
@@ -160,20 +188,26 @@ def _rings_inside(points: Any, following: Any, vertices: Any, their_following: A
 
 
 @inline
-def relate_placed(points: Any, following: Any, vertices: Any, theirs: Any, error: float) -> tuple[int, int, int]:
+def relate_placed(
+    points: Any, following: Any, vertices: Any, theirs: Any, boxes: Any, error: float
+) -> tuple[int, int, int]:
     """Return the relation of two placed bodies, or UNSETTLED, and the edges that cross, -1 for none or not the first.
 
-    Of bodies that are not simple OVERLAPPING says no more than that they meet. error: of each coordinate.
+    Of bodies that are not simple OVERLAPPING says no more than that they meet. boxes: of the second's blocks. error: of
+    each coordinate.
     """
     is_unsure = False
     for edge in range(len(following)):
         a, b = as_point2(points, edge), as_point2(points, following[edge])
-        for other in range(len(theirs)):
-            c, d = as_point2(vertices, other), as_point2(vertices, theirs[other])
-            how = _crossing(a, b, c, d, error)
-            if how == 1:
-                return OVERLAPPING, (-1 if is_unsure else edge), other
-            is_unsure |= how != 0
+        for block in range(n_blocks(len(theirs))):
+            if _misses(boxes, block, a, b, 2.0 * error):
+                continue
+            for other in range(BLOCK * block, min(BLOCK * (block + 1), len(theirs))):
+                c, d = as_point2(vertices, other), as_point2(vertices, theirs[other])
+                how = _crossing(a, b, c, d, error)
+                if how == 1:
+                    return OVERLAPPING, (-1 if is_unsure else edge), other
+                is_unsure |= how != 0
     if is_unsure:
         return UNSETTLED, -1, -1
     in_second = _rings_inside(points, following, vertices, theirs, error)
@@ -194,7 +228,7 @@ def relate_outline_pairs(
     bodies: of each its number in the pool, or -1; rows: of each the row of its pose, 0 for none. Returns early when the
     flag is raised.
     """
-    placed = np.empty((2, MOST_EDGES, 2))
+    placed, boxes = np.empty((2, MOST_EDGES, 2)), np.empty((n_blocks(MOST_EDGES), 4))
     for item in range(pairs.shape[0]):
         if item % _POLL_EVERY == 0 and flag[0] != 0:
             return
@@ -206,7 +240,10 @@ def relate_outline_pairs(
         r, t = poses.rotations, poses.translations
         error = _place(pool.vertices[own], r[i_row], t[i_row], i_row != 0, placed[0])
         error = max(error, _place(pool.vertices[their], r[j_row], t[j_row], j_row != 0, placed[1]))
-        relations[item], _, _ = relate_placed(placed[0], pool.following[own], placed[1], pool.following[their], error)
+        box_blocks(placed[1], pool.following[their], boxes)
+        relations[item], _, _ = relate_placed(
+            placed[0], pool.following[own], placed[1], pool.following[their], boxes, error
+        )
 
 
 @allocating_kernel
@@ -216,10 +253,11 @@ def _relate_two(
 ) -> tuple[int, int, int]:  # fmt: skip
     """Return what `relate_placed` does, of two bodies under poses."""
     n = len(vertices)
-    placed = np.empty((n + len(other), 2))
+    placed, boxes = np.empty((n + len(other), 2)), np.empty((n_blocks(len(other)), 4))
     error = _place(vertices, turn, move, are_posed[0], placed[:n])
     error = max(error, _place(other, their_turn, their_move, are_posed[1], placed[n:]))
-    return relate_placed(placed[:n], following, placed[n:], their_following, error)
+    box_blocks(placed[n:], their_following, boxes)
+    return relate_placed(placed[:n], following, placed[n:], their_following, boxes, error)
 
 
 def collide_outlines(first: Solid, second: Solid, poses: Poses, work: Work) -> Collision:

@@ -12,12 +12,12 @@ from typing import Final
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray, IntArray
+from engine.arrays import BoolArray, FloatArray, IntArray, read_only
 from engine.collision.clearance.bodies import in_space
 from engine.collision.clearance.clearance import has_plane
 from engine.collision.clearance.closed_forms import N_NUMBERS
 from engine.collision.clearance.convex_gaps import gaps_of_pairs
-from engine.collision.clearance.forms import form_of
+from engine.collision.clearance.forms import are_small, form_of, told_under_poses
 from engine.collision.clearance.half_spaces import gap_of_planes
 from engine.collision.clearance.spreads import SpreadPair
 from engine.collision.convex.body import pooled
@@ -102,6 +102,12 @@ def _asked(
             apart, _ = gap_of_planes(first, second, placed, budget)
             found[item] = np.inf if apart.is_at_least(Fraction(gap)) else apart.distance() if is_measured else 0.0
         return found
+    if are_small(first, second):
+        motions = [read_only(some[rows]) for rows in places.T for some in (bodies.rotations, bodies.translations)]
+        found = told_under_poses(first, second, motions, None if is_measured else Fraction(gap), budget)
+        found[found > gap], found[found == gap] = np.inf, np.nan
+        if not np.isnan(found).any():
+            return found
     own, others = (in_space(bodies.rotations[rows], bodies.translations[rows]) for rows in places.T)
     pair = SpreadPair(first, second, own, others, budget)
     pair.fill(0, len(pairs), found, Fraction(gap))

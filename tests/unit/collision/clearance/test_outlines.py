@@ -50,7 +50,7 @@ def test_squares_that_nearly_touch_are_told_as_rationals_do(is_posed: bool, n: i
     assert n_told > n // 2
 
 
-def test_ties_along_the_axes_fall_to_the_least_edges_and_other_ties_are_left_open() -> None:
+def test_ties_of_parallel_edges_fall_to_the_least_edges_and_other_ties_are_left_open() -> None:
     square = Polygon([[(0, 0), (2, 0), (2, 2), (0, 2)]])
     beside = Polygon([[(3, -1), (5, -1), (5, 3), (3, 3)]])
     told = between_outlines(square, beside, (None, None), None)
@@ -64,9 +64,15 @@ def test_ties_along_the_axes_fall_to_the_least_edges_and_other_ties_are_left_ope
     )
     turned = Polygon([[(0, 0), (1, -1), (2, 0), (1, 1)]])
     opposite = Polygon([[(2, 2), (3, 1), (4, 2), (3, 3)]])  # a side each, all along 45 degrees
-    assert between_outlines(turned, opposite, (None, None), None) is None
-    assert between_outlines(turned, opposite, (None, None), 1.0) is True
-    assert clearance(turned, opposite).distance == math.sqrt(2)  # type: ignore[union-attr]
+    told = between_outlines(turned, opposite, (None, None), None)
+    assert isinstance(told, Clearance)
+    assert told.points is not None
+    assert (told.distance, told.points.tolist()) == (math.sqrt(2), [[2.0, 0.0], [3.0, 1.0]])
+    assert told.features == (Feature("vertex", (2,)), Feature("vertex", (1,)))
+    arrow, wall = Polygon([[(0, 0), (2, 1), (0, 2)]]), Polygon([[(3, 4), (3, 2), (5, 1), (3, 0), (3, -2), (9, 0)]])
+    assert between_outlines(arrow, wall, (None, None), None) is None  # as far from both sides of a notch
+    assert between_outlines(arrow, wall, (None, None), 0.5) is True
+    assert clearance(arrow, wall).distance == math.sqrt(2)  # type: ignore[union-attr]
 
 
 def test_a_ball_within_a_ring_is_as_far_as_its_sides_and_one_inside_meets() -> None:
