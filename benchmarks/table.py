@@ -160,7 +160,12 @@ def store(name: str, found: dict[str, Any]) -> None:
     """Write results/<machine>/<name>.json."""
     path = machine.results(name)
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(found, indent=1, default=plain) + "\n")
+    path.write_text(written(found))
+
+
+def written(found: dict[str, Any]) -> str:
+    """Return results as they are stored."""
+    return json.dumps(found, indent=1, default=plain) + "\n"
 
 
 def plain(value: Any) -> Any:

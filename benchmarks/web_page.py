@@ -162,31 +162,36 @@ def _beside(how: str, ours: Row, others: list[Row]) -> list[str]:
     return [f"{text}."]
 
 
-def summary(asked: list[dict[str, Any]], rows: list[Row]) -> list[tuple[str, str, str]]:
-    """Return three facts as a figure, its tone and what it counts: ours wrong, easy input, hard input."""
+def summary(asked: list[dict[str, Any]], rows: list[Row]) -> list[tuple[str, str, str, str]]:
+    """Return three facts as a figure, its tone, what it counts, and in brief: ours wrong, easy input, hard input."""
     ours = [row for row in rows if row["contender"] == "ours"]
     wrong, judged = sum(map(failing, ours)), sum(row["errors"].get("judged", 0) for row in ours)
-    facts = [(f"{wrong:,} of {judged:,}", "bad" if wrong else "good", "of our answers are wrong, by exact arithmetic")]
+    words = "of our answers are wrong, by exact arithmetic"
+    facts = [(f"{wrong:,} of {judged:,}", "bad" if wrong else "good", words, "of ours wrong")]
     for side in ("easy", "hard"):
         held = [each["sides"][side] for each in asked if not each["is_alone"] and each["sides"][side]["ratio"]]
         slow = [each for each in held if each["ratio"] < SAME]
         words = f"questions on {side} input: exact is as fast as the fastest peer, or faster"
+        brief = f"{side} inputs: as fast as any peer"
         failed = [each["fails"] for each in slow if each["fails"]]
         if failed:
             words += f"; {len(failed)} of the {len(slow)} faster peers fail, in {percent(min(failed))} to "
             words += percent(max(failed))
+            brief += f"; {len(failed)} of {len(slow)} faster ones fail"
         if held:
-            facts.append((f"{len(held) - len(slow)} of {len(held)}", "good" if not slow else "", words))
+            facts.append((f"{len(held) - len(slow)} of {len(held)}", "good" if not slow else "", words, brief))
     return facts
 
 
-def verdicts(rows: list[Row]) -> list[tuple[str, str, str]]:
+def verdicts(rows: list[Row]) -> list[tuple[str, str, str, str]]:
     """Return what an audit found, ours being the judge: how many are wrong, and the worst."""
     others = [row for row in rows if row["contender"] != "ours" and not row["absent"]]
     wrong = sorted((row for row in others if failing(row)), key=error_share)
-    facts = [(f"{len(wrong)} of {len(others)}", "bad" if wrong else "good", "contenders differ from the exact engine")]
+    words = "contenders differ from the exact engine"
+    facts = [(f"{len(wrong)} of {len(others)}", "bad" if wrong else "good", words, "contenders differ")]
     if wrong:
-        facts.append((percent(error_share(wrong[-1])), "bad", f"of its answers: {wrong[-1]['contender']}, the worst"))
+        worst = wrong[-1]["contender"]
+        facts.append((percent(error_share(wrong[-1])), "bad", f"of its answers: {worst}, the worst", f"worst: {worst}"))
     return facts
 
 

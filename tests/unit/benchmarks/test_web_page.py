@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+import shlex
 import shutil
 from pathlib import Path
 from typing import Any
@@ -115,6 +117,52 @@ def test_in_a_browser(browser: Any, tmp_path: Path, width: int, scheme: str) -> 
     button.click()
     assert page.locator("#panel").is_hidden()
     assert troubles == []
+
+
+def test_a_phone_shows_on_its_first_screen_what_costs_what_and_who_is_wrong(browser: Any) -> None:
+    """Of 390 x 844 a browser leaves 664: every question that has a peer, its speed and the share of a peer's errors."""
+    page = browser.new_page(viewport={"width": 390, "height": 664}, color_scheme="light")
+    page.goto((DOCS / "speed_and_error.html").as_uri())
+    buttons = page.locator("#questions ol").first.locator("button").all()
+    assert len(buttons) >= 13
+    for button in buttons:
+        box, (title, *said) = button.bounding_box(), button.inner_text().split("\n")
+        assert box["y"] + box["height"] <= 664, title
+        assert box["height"] >= 24, title  # that a finger hits
+        assert re.search(r"(faster|slower|same)", " ".join(said)), (title, said)
+        assert re.search(r" [\d.]+%| 0", said[-1]), (title, said)
+        first = button.locator(".who span").first.bounding_box()  # the fastest peer, in full
+        assert first["x"] + first["width"] <= box["x"] + box["width"], title
+    assert all(fact.bounding_box()["y"] < 130 for fact in page.locator("#facts div").all())
+    buttons[0].click()
+    assert page.locator("#questions button .who").first.evaluate(
+        "e => e.scrollWidth <= e.clientWidth"
+    )  # all, once open
+
+
+SHOWN = """kept => kept.map(request => { const made = document.createElement("div"); made.innerHTML = asking(request);
+    return made.querySelector("pre").textContent; })"""
+
+
+@pytest.mark.parametrize("name", ["speed_and_error", "museum"])
+def test_every_command_shown_asks_what_the_page_holds(browser: Any, name: str) -> None:
+    """The same requests are asked of a service in tests/contract/test_pages_answered.py."""
+    page = browser.new_page()
+    page.goto((DOCS / f"{name}.html").as_uri())
+    rows = "Object.values(data.contests).flatMap(one => one.rows).map(row => row.worst.request)"
+    kept = page.evaluate(f"data.cases ? data.cases.map(one => one.request) : {rows}.filter(one => one && one[1])")
+    assert len(kept) >= 40
+    for command, (path, body) in zip(page.evaluate(SHOWN, kept), kept, strict=True):
+        words = shlex.split(command)
+        assert words[:-1] == [
+            "curl",
+            "-s",
+            f"http://127.0.0.1:8000{path}",
+            "-H",
+            "content-type: application/json",
+            "-d",
+        ]
+        assert json.loads(words[-1]) == body
 
 
 @pytest.mark.parametrize("name", ["speed_and_error", "museum"])
