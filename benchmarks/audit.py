@@ -3,13 +3,20 @@
 Asks the textbook's methods, the same on numbers rounded to float32, and every peer that is installed about your points,
 segments, bodies or layers; judges them by the exact engine; prints a table and writes one page that needs no other
 file: who is wrong, how often, on which items, how fast. Of a mesh or polygon alone the points are the middles of its
-own faces or edges, rounded: on its boundary, or beside it by less than a float32 shows.
+own faces or edges, rounded: on its boundary, or beside it by less than a float32 shows. A package that ends the process
+or gives no answer within `LIMIT` is named, and all others are asked again without it.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import math
+import subprocess
+import sys
+import tempfile
+import time
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, replace
 from functools import partial
@@ -21,8 +28,8 @@ import numpy as np
 import engine
 from benchmarks import errors, machine, table, web_page
 from benchmarks.bodies import Pair
-from benchmarks.contenders import Placed, Prepared
-from benchmarks.contest import Contender, Contest, Row, field_of, hold, refusing
+from benchmarks.contenders import NotApplicable, Placed, Prepared, rings_of
+from benchmarks.contest import ASKED, Contender, Contest, Row, field_of, hold, refusing
 from benchmarks.fields import collision as in_collision
 from benchmarks.fields import containment as in_containment
 from benchmarks.fields import overlay as in_overlay
@@ -30,6 +37,7 @@ from benchmarks.fields import segments as in_segments
 from benchmarks.measure import interval
 from benchmarks.web_page import percent
 from benchmarks.workloads import Mesh, Rings, document
+from engine.errors import InvalidArrayError, InvalidInputError
 from engine.files.solids import from_json, read_solid, read_solids
 from engine.files.tables import read_rows
 from engine.textbook import methods
@@ -39,6 +47,8 @@ MOST_STEPS = 2_000_000
 """Of a textbook's method for one item: about a second."""
 MOST_NAMED = 1_000
 """Wrong items that are listed."""
+LIMIT = 120.0
+"""Seconds that a package may work without an answer."""
 MESHES, POLYGONS = ("open3d", "trimesh", "igl", "vtk", "cgal"), ("shapely", "matplotlib")
 BODIES, LAYERS = (
     ("coal", "fcl", "open3d", "vtk", "igl", "manifold3d"),
@@ -74,14 +84,19 @@ def coarse(solid: engine.Solid) -> engine.Solid:
 
 def books(of: Callable[..., methods.Methods], *solids: engine.Solid) -> Iterator[Contender]:
     """Yield the textbook's methods for some solids, and each in float32; none that takes seconds for an item."""
-    for name in (name for name, (_, steps) in of(*solids).items() if steps <= MOST_STEPS):
-        yield Contender(f"textbook: {name}", lambda name=name: Prepared(of(*solids)[name][0]))  # type: ignore[misc]
 
-        def in_float32(name: str = name) -> Prepared:
-            ask = of(*map(coarse, solids))[name][0]
-            return Prepared(lambda *items: ask(*(each.astype(np.float32).astype(np.float64) for each in items)))
+    def plain(name: str, steps: int) -> Prepared:
+        if steps > MOST_STEPS:
+            raise NotApplicable(f"{steps:,} steps for an item")
+        return Prepared(of(*solids)[name][0])
 
-        yield Contender(f"textbook: {name}, float32", in_float32)
+    def in_float32(name: str, steps: int) -> Prepared:
+        ask = of(*map(coarse, solids))[name][0] if steps <= MOST_STEPS else plain(name, steps).ask
+        return Prepared(lambda *items: ask(*(each.astype(np.float32).astype(np.float64) for each in items)))
+
+    for name, (_, steps) in of(*solids).items():
+        yield Contender(f"textbook: {name}", partial(plain, name, steps))
+        yield Contender(f"textbook: {name}, float32", partial(in_float32, name, steps))
 
 
 def telling(judge: Callable[[Any, Any], dict[str, Any]]) -> Callable[[Any, Any], dict[str, Any]]:
@@ -155,12 +170,9 @@ def overlay(subjects: Sequence[engine.Solid], clips: Sequence[engine.Solid]) -> 
     """Return the contest about the areas of intersections, pair by pair; with one polygon on a side, that with all."""
     n = max(len(subjects), len(clips))
     if len({len(subjects), len(clips), 1, n}) > 2:
-        raise ValueError(
-            f"layers are asked pair by pair: {len(subjects)} and {len(clips)} polygons; make one of them 1"
-        )
-    sides = [
-        [subject_of(solid).rings for solid in (side if len(side) == n else side * n)] for side in (subjects, clips)
-    ]
+        counts = f"{len(subjects)} and {len(clips)} polygons"
+        raise InvalidInputError(f"layers are asked pair by pair: {counts}; make one of them 1", ("file",))
+    sides = [[_rings(solid) for solid in (side if len(side) == n else side * n)] for side in (subjects, clips)]
     pairs = list(zip(*sides, strict=True))
     exact = np.array([in_overlay.by_ours(pair) for pair in pairs])
     asked = field_of("overlay", "intersection", LAYERS, 1)
@@ -168,60 +180,128 @@ def overlay(subjects: Sequence[engine.Solid], clips: Sequence[engine.Solid]) -> 
                    request=partial(in_overlay.request, pairs))  # fmt: skip
 
 
+def _rings(solid: engine.Solid) -> list[np.ndarray]:
+    try:
+        return rings_of(subject_of(solid))
+    except NotApplicable:
+        message = f"layers are of polygons or boxes of the plane, not of a {solid.type}"
+        raise InvalidInputError(message, ("file",)) from None
+
+
 def contest_of(question: str | None, files: Sequence[str], poses: str | None) -> Contest:
     """Return the contest that the files are about; without a question the one that the second file tells."""
     first, second = files[0], files[-1]
-    solids = read_solids(first)
     if len(files) == 1:
-        return contains(solids[0], own_points(solids[0]))
-    dimension = solids[0].dimension
+        solid = read_solid(first)
+        return contains(solid, own_points(solid))
     is_table = Path(second).suffix.lower() in (".npy", ".csv")
+    dimension = read_solids(first)[0].dimension
     if question is None and is_table:
         width = read_rows(second, (-1,)).shape[1]
         question = "contains" if width == dimension else "segments"
     elif question is None:
         question = "overlay" if dimension == 2 else "collide"
     if question == "overlay":
-        return overlay(solids, read_solids(second))
+        return overlay(read_solids(first), read_solids(second))
     if question == "contains":
-        return contains(solids[0], read_rows(second, (dimension,)))
+        return contains(read_solid(first), _some(second, (dimension,)))
     if question == "segments":
-        return segments(solids[0], read_rows(second, (2, dimension)))
-    rows = None if poses is None else read_rows(poses, (dimension, dimension + 1))
-    return collide(solids[0], read_solid(second), rows)
+        return segments(read_solid(first), _some(second, (2, dimension)))
+    rows = None if poses is None else _some(poses, (dimension, dimension + 1))
+    return collide(read_solid(first), read_solid(second), rows)
+
+
+def _some(source: str, shape: tuple[int, ...]) -> np.ndarray:
+    rows = read_rows(source, shape)
+    if not len(rows):
+        raise InvalidArrayError(f"{source} holds nothing to ask about", ("file",))
+    return rows
 
 
 def lines_of(rows: Sequence[Row]) -> Iterator[str]:
     """Yield a line a contender: speed, wrong answers with their 95% interval, refusals, the first items."""
     judged = max(row.errors.get("judged", 0) for row in rows)
-    yield f"{'contender':<34}{'a second':>12}  {f'wrong of {judged:,}':<24}  items"
+    wide = max(34, *(len(row.contender) + 2 for row in rows))
+    yield f"{'contender':<{wide}}{'a second':>12}  {f'wrong of {judged:,}':<24}  items"
     for row in rows:
         if row.absent:
-            yield f"{row.contender:<34}{'':>12}  absent: {row.absent}"
+            yield f"{row.contender:<{wide}}{'':>12}  absent: {row.absent}"
             continue
-        wrong, where = row.errors["wrong"], row.errors["where"]
-        between = " to ".join(map(percent, interval(wrong, row.errors["judged"])))
-        silent = ", ".join(f"{row.errors[kind]:,} {kind}" for kind in ("refused", "outside") if row.errors.get(kind))
-        items = ", ".join(map(str, where[:6])) + ", ..." * (wrong > 6)
-        shown = "the judge" if row.contender == "ours" else "; ".join(filter(None, (silent, items)))
-        yield f"{row.contender:<34}{row.rate:>12,.0f}  {f'{wrong:,} ({between})':<24}  {shown}".rstrip()
+        wrong, where, found = row.errors["wrong"], row.errors["where"], row.errors
+        between = " to ".join(map(percent, interval(wrong, found["judged"])))
+        said = [f"{found[kind]:,} {kind}" for kind in ("refused", "outside") if found.get(kind)]
+        if found.get("off"):
+            worst = f"the worst by {found['ulp_largest']:.3g} ulps"
+            said.append(f"{found['off']:,} of {found['coordinates']:,} coordinates not the nearest, {worst}")
+        said.append(", ".join(map(str, where[:6])) + ", ..." * (wrong > 6))
+        shown = "the judge" if row.contender == "ours" else "; ".join(filter(None, said))
+        rate = f"{row.rate:,.{0 if row.rate >= 10 else 2}f}"
+        yield f"{row.contender:<{wide}}{rate:>12}  {f'{wrong:,} ({between})':<24}  {shown}".rstrip()
 
 
-def main(words: Sequence[str] | None = None) -> int:
-    """Ask, print and write the page."""
+def seconds(text: str) -> float:
+    """Return a time of measuring."""
+    if not 0 < (value := float(text)) < math.inf:
+        raise argparse.ArgumentTypeError(f"{text}: some seconds, more than 0")
+    return value
+
+
+def page(text: str) -> str:
+    """Return the name of a file that can be written."""
+    if not text.endswith((".html", ".json")) or not Path(text).parent.is_dir():
+        raise argparse.ArgumentTypeError(
+            f"{text}: a file .html, or .json for the results alone, in a folder that is there"
+        )
+    return text
+
+
+def options(words: Sequence[str] | None) -> argparse.Namespace:
+    """Read the command line."""
     parser = argparse.ArgumentParser("python -m engine audit", description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)  # fmt: skip
     parser.add_argument("file", help="a solid or a layer")
     parser.add_argument("items", nargs="?", help="points, segments, a solid or a layer; else its own faces or edges")
     parser.add_argument("--question", choices=QUESTIONS, help="told by the files if left out")
     parser.add_argument("--poses", metavar="FILE", help="of the second body: rows [R | t], 12 numbers")
-    parser.add_argument("--seconds", type=float, default=1.0, help="of each contender")
-    parser.add_argument("-o", "--output", metavar="PAGE", help="an .html file; .json for the results alone")
-    given = parser.parse_args(words)
+    parser.add_argument("--seconds", type=seconds, default=1.0, help="of each contender")
+    parser.add_argument("--without", action="append", default=[], metavar="NAME", help="a contender to leave out")
+    parser.add_argument("-o", "--output", type=page, metavar="PAGE", help=".html, or .json for the results alone")
+    parser.add_argument("--asked", help=argparse.SUPPRESS)  # where the one who watches reads which package is asked
+    return parser.parse_args(words)
+
+
+def watched(words: Sequence[str]) -> int:
+    """Audit in a process of its own, and again without each package that ends it or gives no answer."""
+    without: list[str] = []
+    options(words)
+    with tempfile.TemporaryDirectory() as folder:
+        asked = Path(folder, "asked")
+        while True:  # bound: each turn but the last leaves a contender out
+            asked.write_text("")
+            more = [word for name in without for word in ("--without", name)]
+            process = subprocess.Popen([sys.executable, "-m", "engine", "audit", *words, "--asked", str(asked), *more])
+            while process.poll() is None:
+                time.sleep(0.05)
+                if asked.read_text() and time.time() - asked.stat().st_mtime > LIMIT:
+                    process.kill()
+            name = asked.read_text()
+            if process.returncode in (0, 1, 2) or not name or name in without:
+                return process.returncode
+            print(f"{name} ended the process, or gave no answer within {LIMIT:g} s: all again without it", flush=True)
+            without.append(name)
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Ask, print and write the page."""
+    given = options(words)
     files = [given.file, *([given.items] if given.items else [])]
     contest = contest_of(given.question, files, given.poses)
+    kept = [replace(each, make=_left_out) if each.name in given.without else each for each in contest.contenders]
+    ASKED[:] = [Path(given.asked).write_text] if given.asked else []
     facts = machine.facts(0, machine.cores())
-    rows = hold(contest, 3, given.seconds, has_latency=True)
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")  # what a peer says of its arithmetic
+        rows = hold(replace(contest, contenders=kept), 3, given.seconds, has_latency=True)
     print("\n".join(lines_of(rows)))
     found = facts | {"load_after": machine.load(), "seconds": given.seconds, "quick": False}
     found["rows"] = [asdict(row) | {"rate": row.rate, "net_rate": row.net_rate} for row in rows]
@@ -232,3 +312,7 @@ def main(words: Sequence[str] | None = None) -> int:
         asked = ((title, "yours", "", contest.name),)
         Path(given.output).write_text(web_page.text_of(found, "this page", asked), "utf-8")
     return 0
+
+
+def _left_out() -> Prepared:
+    raise NotApplicable("left out, since it ended the process, gave no answer in time, or was named")

@@ -37,6 +37,8 @@ QUESTIONS = 200
 """At most, for each of these sizes."""
 NAMED: list[str] = []
 """Contenders that no contest knows and the command names."""
+ASKED: list[Callable[[str], None]] = []
+"""Who wants to know which package is asked next, "" for our own code: one may end the process."""
 Goals = tuple[float | None, float | None]
 """What the ratio against a peer must be, and what it aims at."""
 
@@ -214,19 +216,27 @@ def hold(contest: Contest, rounds: int, seconds: float, has_latency: bool = Fals
         row = Row(contest.operation, contest.name, contest.is_hard, each.name, each.package, each.setting,
                   contest.about, goals=each.goals)  # fmt: skip
         rows.append(row)
+        _tell(row)
         if (entry := _entered(contest, each, row, seconds / rounds)) is not None:
             entries.append(entry)
     _judge(contest, entries)
     for round_ in range(rounds):
         for entry in entries if round_ % 2 == 0 else reversed(entries):
             gc.collect()
+            _tell(entry.row)
             wall, cpu, _ = clocked(partial(_repeat, entry))
             entry.row.seconds.append(wall / entry.times)
             entry.row.cpu.append(cpu / entry.times)
     if has_latency and not contest.count:
         for entry in entries:
+            _tell(entry.row)
             _ask_few(contest, entry, seconds / 8)
     return rows
+
+
+def _tell(row: Row) -> None:
+    for told in ASKED:
+        told(row.contender if row.package else "")
 
 
 def _repeat(entry: _Entry) -> None:
@@ -256,6 +266,8 @@ def _entered(contest: Contest, each: Contender, row: Row, seconds: float) -> _En
             raise
         how = "" if isinstance(error, ImportError | OSError) else "raised "
         row.absent = f"{how}{type(error).__name__}: {error}".splitlines()[0]
+        if isinstance(error, contenders.NotApplicable):
+            row.absent = f"not asked: {error}"
         return None
     return _Entry(row, each, prepared, items, answers, max(1, int(LEAST_SECONDS / max(taken, 1e-7))), taken)
 
@@ -316,6 +328,7 @@ def _judge(contest: Contest, entries: list[_Entry]) -> None:
         answers, n_items = entry.answers, len(contest.exact)
         if n_items > entry.row.n_items and not contest.count:
             n_items = min(n_items, max(entry.row.n_items, int(JUDGING * entry.row.n_items / max(entry.taken, 1e-9))))
+            _tell(entry.row)
             answers = entry.prepared.answer(entry.prepared.ask(entry.prepared.native(contest.items[:n_items])))
         _note(contest, entry, answers[:n_items], contest.exact[:n_items], np.arange(n_items))
 

@@ -70,11 +70,14 @@ def main(words: list[str] | None = None) -> int:
     parser.add_argument("--only", default="", metavar="WORD", help="only contests whose name contains WORD")
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args(words)
-    given.folder.mkdir(parents=True, exist_ok=True)
-    sums = []
-    for task in tasks(Size(given.seed), is_page=True):
-        if given.only not in task.name:
-            continue
+    sums, some = [], [task for task in tasks(Size(given.seed), is_page=True) if given.only in task.name]
+    if not some:
+        parser.error(f"no contest has {given.only!r} in its name")
+    try:
+        given.folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        parser.error(str(error))
+    for task in some:
         try:
             contest = task.make()
         except MissingDataError as error:

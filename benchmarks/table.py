@@ -47,6 +47,7 @@ def options(words: list[str] | None, description: str, **more: str) -> argparse.
     for name, about in more.items():
         parser.add_argument(f"--{name}", action="store_true", help=about)
     given = parser.parse_args(words)
+    given.refuse = parser.error
     given.rounds = given.rounds or (3 if given.quick else 7 if "pages" in more else 15)
     given.seconds = given.seconds or (0.3 if given.quick else 2.0 if "pages" in more else 3.0)
     given.writes = not (given.dry or given.quick or given.only or given.contender)
@@ -123,12 +124,13 @@ def _rate(row: Row) -> str:
 def measured(name: str, chosen: Iterable[Task], given: argparse.Namespace, has_latency: bool = False) -> dict[str, Any]:
     """Hold the contests and take the figures; print them; return what is stored, and how many are below their must."""
     found: dict[str, Any] = machine.facts(given.seed, machine.cores()) | {"quick": given.quick}
+    names, chosen = {"ours", *contenders.names_of(given.contender)}, list(chosen)
+    some = [task for task in chosen if given.only in task.name]
+    if not some:
+        given.refuse(f"no row has {given.only!r} in its name; there are {', '.join(task.name for task in chosen)}")
     print(head(name, found))
-    names = {"ours", *contenders.names_of(given.contender)}
     started, rows, figures, missed = time.perf_counter(), [], [], 0
-    for task in chosen:
-        if given.only not in task.name:
-            continue
+    for task in some:
         if sys.stderr.isatty():
             print(f"  ... {task.name}", end="\r", file=sys.stderr, flush=True)
         try:
@@ -149,6 +151,8 @@ def measured(name: str, chosen: Iterable[Task], given: argparse.Namespace, has_l
             print(line, flush=True)
         del made
         gc.collect()
+    if rows and given.contender and all(row.contender == "ours" for row in rows):
+        given.refuse(f"no contender {given.contender!r} in these rows; files: {', '.join(sorted(contenders.files()))}")
     found |= {"load_after": machine.load(), "seconds": round(time.perf_counter() - started, 1)}
     found |= {"rows": [asdict(row) | {"rate": row.rate, "net_rate": row.net_rate} for row in rows]}
     print(f"{len(rows)} rows, {len(figures)} figures, {missed} below their must, {found['seconds']} s, "

@@ -169,12 +169,12 @@ def _bounds(options: Options) -> None:
 def _audit(words: Sequence[str]) -> int:
     """Run the audit, whose peers are those of the benchmarks."""
     try:
-        run: Callable[[Sequence[str]], int] = import_module("benchmarks.audit").main
+        audit = import_module("benchmarks.audit")
     except ModuleNotFoundError as error:
         raise ValueError(
             f"the audit needs {error.name}: run it in a checkout of the repository after pip install -e '.[bench,test]'"
         ) from None
-    return run(words)
+    return int((audit.main if "--asked" in words else audit.watched)(words))
 
 
 def _warm(options: Options) -> None:

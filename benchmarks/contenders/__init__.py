@@ -151,7 +151,7 @@ def make(module: str, kind: str, subject: Any, threads: int = 2, *setting: float
     """Return a contender ready for questions of a kind; ImportError or OSError where its package does not run here."""
     makers = importlib.import_module(f"benchmarks.contenders.with_{module}").MAKERS
     if kind not in makers:
-        raise NotApplicable(kind)
+        raise NotApplicable(f"has no answer to {kind}")
     return makers[kind](subject, threads, *setting)
 
 

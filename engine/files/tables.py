@@ -37,6 +37,8 @@ def read_rows(source: str, shape: tuple[int, ...]) -> FloatArray:
         array = np.array(_positions(json.loads(path.read_text("utf-8"))))
     else:
         raise InvalidInputError(f"{source}: numbers are read from .npy, .csv or .geojson", ("file",))
+    if not array.size:
+        return np.zeros((0, *map(abs, shape)))
     try:
         return array.reshape((len(array), *shape)) if array.ndim else array.reshape(shape)
     except ValueError:
@@ -53,6 +55,8 @@ def _read_csv(path: Path) -> FloatArray:
             header = 0
         except ValueError:
             header = 1
+            if not file.readline():
+                return np.zeros((0, 0))
     try:
         return np.loadtxt(path, delimiter=",", skiprows=header, ndmin=2, encoding="utf-8")
     except ValueError as error:

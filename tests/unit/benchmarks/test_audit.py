@@ -28,7 +28,7 @@ def audited(folder: Path, first: object, second: object, *options: str) -> dict:
             path.write_text(json.dumps(content))
         names.append(str(path))
     found = folder / "found.json"
-    assert main(["audit", *names, "--seconds", "0.01", "-o", str(found), *options]) == 0
+    assert main(["audit", *names, "--seconds", "0.01", "-o", str(found), "--asked", "", *options]) == 0
     rows = json.loads(found.read_text())["rows"]
     return {row["contender"]: row["errors"] for row in rows if not row["absent"]}
 
@@ -80,5 +80,5 @@ def test_layers_of_different_lengths_are_refused(tmp_path: Path, capsys: pytest.
         features = [{"type": "Feature", "properties": {}, "geometry": SQUARE}] * n
         layers.append(str(tmp_path / f"{n}.geojson"))
         Path(layers[-1]).write_text(json.dumps({"type": "FeatureCollection", "features": features}))
-    assert main(["audit", *layers]) == 2
+    assert main(["audit", *layers, "--asked", ""]) == 2
     assert "2 and 3 polygons" in capsys.readouterr().err

@@ -73,7 +73,7 @@ def test_numbers_on_the_page_name_their_line_of_results() -> None:
     assert data["summary"][0][0] == "0 of 400"
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def browser() -> Any:
     if CHROMIUM is None:
         pytest.skip("no Chromium on this machine (Debian: apt-get install chromium)")
