@@ -30,7 +30,7 @@ import importlib
 import re
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -184,6 +184,21 @@ def in_threads(task: Callable[[slice], Any], n_items: int, threads: int) -> list
 def rows_of(found: np.ndarray, kept: np.ndarray) -> np.ndarray:
     """Return clipped segments as rows, NaN where not kept."""
     return np.where(np.asarray(kept)[:, None], found.reshape(len(found), -1), np.nan)
+
+
+def pieces_of(make: Callable[..., Prepared]) -> Callable[..., Prepared]:
+    """Return the maker of `pieces` by one of `segments`: one piece a segment at most."""
+
+    def of(region: Any, threads: int) -> Prepared:
+        made = make(region, threads)
+
+        def answer(found: Any) -> list[Any]:
+            ends = [np.split(row, 2) for row in made.answer(found)]
+            return [(i, *each) for i, each in enumerate(ends) if not np.isnan(each).any()]
+
+        return replace(made, answer=answer)
+
+    return of
 
 
 def each_or_nan(area: Callable[[Any], float]) -> Callable[[Any], np.ndarray]:

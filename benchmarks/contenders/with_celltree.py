@@ -10,7 +10,7 @@ from numba_celltree.algorithms.cohen_sutherland import cohen_sutherland_line_box
 from numba_celltree.constants import Box, Point
 
 import engine
-from benchmarks.contenders import NotApplicable, Prepared, rows_of
+from benchmarks.contenders import NotApplicable, Prepared, pieces_of, rows_of
 
 PACKAGE = "numba-celltree"
 NAMES = {"": "numba_celltree"}
@@ -36,13 +36,4 @@ def _segments(region: engine.Solid, threads: int) -> Prepared:
     )
 
 
-def _pieces(region: engine.Solid, threads: int) -> Prepared:
-    made = _segments(region, threads)
-
-    def answer(found: Any) -> list[Any]:
-        return [(i, row[:2], row[2:]) for i, row in enumerate(made.answer(found)) if not np.isnan(row[0])]
-
-    return Prepared(made.ask, answer=answer)
-
-
-MAKERS = {"segments": _segments, "pieces": _pieces}
+MAKERS = {"segments": _segments, "pieces": pieces_of(_segments)}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -16,21 +17,13 @@ from benchmarks.contenders import (
     in_threads,
     meshes_of,
     naive_clipping,
+    pieces_of,
     rows_of,
-)
+)  # fmt: skip
 from benchmarks.contenders.with_ours import ring_areas
 from benchmarks.errors import REFUSED
 from benchmarks.workloads import Mesh, Rings
-from engine.textbook import (
-    clip_polygons,
-    clip_segments,
-    collision,
-    greiner_hormann,
-    polygons,
-    polyhedra,
-    solids,
-    triangles,
-)
+from engine.textbook import clip_polygons, greiner_hormann, methods, polyhedra
 
 NAMES = {
     "by planes": "textbook: Cohen-Sutherland by planes", "cross and dot": "textbook: cross and dot",
@@ -43,9 +36,7 @@ NAMES = {
     "unsigned angles": "textbook: unsigned angles, 1e-6",
 }  # fmt: skip
 
-OBLIQUE = np.array([0.5773, 0.2113, 0.7886])
-"""A direction without zero components for the textbook's half-line."""
-Ask = Callable[[np.ndarray], Any]
+Maker = Callable[[Any, int], Prepared]
 
 
 def box_rows(box: engine.Aabb) -> np.ndarray:
@@ -55,38 +46,44 @@ def box_rows(box: engine.Aabb) -> np.ndarray:
     return np.column_stack([axes, np.stack([-box.min, box.max], axis=1).ravel()])
 
 
-def _points(subject: Any) -> Ask:
-    """A half-line from the point."""
+def _plain(subject: Any) -> Any:
+    """Return a subject as the textbook's methods read it; nothing is checked or prepared."""
     match subject:
         case Mesh(vertices=vertices, faces=faces):
-            return lambda points: polyhedra.by_half_line(points, vertices, faces, OBLIQUE)
-        case Rings(rings=[ring]):
-            return lambda points: polygons.by_half_line(points, ring, np.array([0, len(ring)]))
-    raise NotApplicable("a polyhedron, or a polygon of one ring")
+            return SimpleNamespace(type="polyhedron", vertices=vertices, triangles=faces)
+        case Rings(rings=rings):
+            offsets = np.cumsum([0, *map(len, rings)])
+            return SimpleNamespace(type="polygon", dimension=2, vertices=np.concatenate(rings), ring_offsets=offsets)
+    return subject
 
 
-def _recast(mesh: Mesh) -> Ask:
+def _book(of: Callable[..., methods.Methods], name: str) -> Maker:
+    """Return the maker of one of the textbook's methods, for those subjects that it is meant for."""
+
+    def make(subject: Any, threads: int) -> Prepared:
+        if name not in (found := of(_plain(subject))):
+            raise NotApplicable(f"{name}: not for this")
+        return Prepared(found[name][0])
+
+    return make
+
+
+def _pair(name: str) -> Maker:
+    def make(pair: Couple, threads: int) -> Prepared:
+        ask = methods.of_pairs(*map(_plain, meshes_of(pair)))[name][0]
+        return Prepared(lambda _: ask())
+
+    return make
+
+
+def _recast(mesh: Mesh, threads: int) -> Prepared:
     directions = np.random.default_rng(1).normal(size=(16, 3))
 
     def ask(points: np.ndarray) -> np.ndarray:
         contained, unfinished = polyhedra.by_other_half_lines(points, mesh.vertices, mesh.faces, directions, 1e-9)
         return np.where(unfinished, REFUSED, contained)
 
-    return ask
-
-
-def _clipped(kernel: Any, *names: str) -> Callable[[Any], Ask]:
-    """Return a maker of questions to a kernel that clips segments on a region with these attributes."""
-
-    def make(region: Any) -> Ask:
-        rest = [getattr(region, name) for name in names]
-        return lambda segments: _kept(kernel(segments, *rest))
-
-    return make
-
-
-def _kept(found: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-    return rows_of(found[0], found[1] == 1)
+    return Prepared(ask)
 
 
 def _naive_segments(region: Any, threads: int) -> Prepared:
@@ -103,7 +100,7 @@ def _naive_segments(region: Any, threads: int) -> Prepared:
     def ask(segments: np.ndarray) -> list[Any]:
         return in_threads(lambda part: kernel(segments[part], *rest), len(segments), threads)
 
-    return Prepared(ask, answer=lambda found: np.concatenate([_kept(part) for part in found]))
+    return Prepared(ask, answer=lambda found: np.concatenate([rows_of(part, kept == 1) for part, kept in found]))
 
 
 def _naive_polygons(region: engine.Aabb, threads: int) -> Prepared:
@@ -119,7 +116,7 @@ def _naive_polygons(region: engine.Aabb, threads: int) -> Prepared:
     return Prepared(ask, native, lambda found: np.diff(found[1]) > 0)
 
 
-def _polygon_areas(region: engine.Aabb) -> Ask:
+def _polygon_areas(region: engine.Aabb, threads: int) -> Prepared:
     rows = box_rows(region)
 
     def ask(rings: np.ndarray) -> np.ndarray:
@@ -129,10 +126,10 @@ def _polygon_areas(region: engine.Aabb) -> Ask:
         found[kept] = np.abs(ring_areas(np.concatenate(clipped), np.append(0, np.cumsum(sizes[kept]))))
         return found
 
-    return ask
+    return Prepared(ask)
 
 
-def _overlay(operation: str) -> Ask:
+def _overlay(operation: str, threads: int) -> Prepared:
     if operation != "intersection":
         raise NotApplicable(operation)
 
@@ -142,37 +139,29 @@ def _overlay(operation: str) -> Ask:
         found = [ring for ring in greiner_hormann.intersection(pair[0][0], pair[1][0]) if len(ring) > 2]
         return sum(abs(float(ring_areas(np.array(ring), np.array([0, len(ring)]))[0])) for ring in found)
 
-    return each_or_nan(area)
+    return Prepared(each_or_nan(area))
 
 
-def _pair(collide: Callable[..., bool]) -> Callable[[Couple, int], Prepared]:
-    def make(pair: Couple, threads: int) -> Prepared:
-        a, b = meshes_of(pair)
-        return Prepared(lambda _: collide(a.vertices, a.faces, b.vertices, b.faces))
-
-    return make
-
-
-ASKS: dict[str, Callable[[Any], Ask]] = {
-    "points": _points,
+BOOKS = {
+    methods.of_points: {
+        "points": "half-line", "signed angles": "signed angles", "unsigned angles": "unsigned angles",
+        "same side": "same side", "cross and dot": "cross and dot products", "projection": "projection",
+        "planes": "half-spaces",
+    },
+    methods.of_segments: {
+        "segments": "Cohen-Sutherland", "by planes": "Cohen-Sutherland by planes", "quadratic": "quadratic",
+    },
+}  # fmt: skip
+"""Kinds of question and the textbook's method for each."""
+MAKERS: dict[str, Maker] = {
+    **{kind: _book(of, name) for of, kinds in BOOKS.items() for kind, name in kinds.items()},
+    "pieces": pieces_of(_book(methods.of_segments, "Cohen-Sutherland")),
     "recast": _recast,
-    "signed angles": lambda subject: lambda points: polygons.by_signed_angles(points, subject.rings[0]),
-    "unsigned angles": lambda subject: lambda points: polygons.by_unsigned_angles(points, subject.rings[0], 1e-6),
-    "same side": lambda subject: lambda points: polygons.by_same_side(points, subject.rings[0]),
-    "cross and dot": lambda solid: lambda points: triangles.by_products(points, solid.vertices),
-    "projection": lambda solid: lambda points: triangles.by_projection(points, solid.vertices),
-    "planes": lambda solid: lambda points: solids.in_convex(points, solid.planes),
-    "segments": _clipped(clip_segments.on_box, "min", "max"),
-    "by planes": _clipped(clip_segments.on_convex, "planes"),
-    "quadratic": _clipped(clip_segments.on_sphere, "center", "radius"),
     "polygon areas": _polygon_areas,
     "overlay": _overlay,
-}
-MAKERS: dict[str, Callable[[Any, int], Prepared]] = {
-    **{kind: lambda subject, threads, make=make: Prepared(make(subject)) for kind, make in ASKS.items()},
     "naive segments": _naive_segments,
     "kept polygons": _naive_polygons,
-    "pair by vertices": _pair(collision.by_vertices),
-    "pair by edges": _pair(collision.by_edges),
-    "pair by volumes": _pair(collision.by_volumes),
+    "pair by vertices": _pair("vertices in the other"),
+    "pair by edges": _pair("edges through faces"),
+    "pair by volumes": _pair("volumes first"),
 }

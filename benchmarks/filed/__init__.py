@@ -54,7 +54,12 @@ PLANE = {"locate 2D": "points", "clip_segments 2D": "pieces", **OVERLAY}
 BY_VOLUMES = "pair by volumes"
 PEERS = (
     Peer("ours", "", {}),
-    Peer("textbook", "textbook", POINTS | {"locate 2D": "points", "overlay 2D": "overlay", "collide 3D": BY_VOLUMES}),
+    Peer(
+        "textbook",
+        "textbook",
+        POINTS
+        | {"locate 2D": "points", "overlay 2D": "overlay", "collide 3D": BY_VOLUMES, "clip_segments 2D": "pieces"},
+    ),
     Peer("shapely", "shapely", PLANE | {"collide 2D": "pair"}),
     Peer("shapely clip_by_rect", "shapely", {"clip_segments 2D": "pieces by rectangle", **CLIPPING}),
     Peer("matplotlib", "matplotlib", {"locate 2D": "points"}),

@@ -15,10 +15,10 @@ one bit per face, and signed distances in place of coordinates.
 Source: section 22.4.2 of the chapter on computer graphics in Algorithms of Informatics, algorithm
 Cohen-Sutherland-Line-Clipping (figure 22.28); exercises 22.4-6 (convex polyhedra) and 22.4-7 (spheres).
 What goes wrong: the cut point is rounded and may still be outside of the plane it was put on: the loop of the textbook
-then never ends, for example on (1, 1)-(-1, -1) and the box from 1e-9 to 3, and much more often on convex polyhedra,
-since the distance of a cut point from its own plane is hardly ever exactly zero. Here it is capped and says
-`unfinished`. Segments that pass close to an edge or a corner are accepted or rejected by rounding, and the intersection
-carries the error of t times the length of the segment.
+then never ends, for example on (1, 1)-(-1, -1) and the box from 1e-9 to 3 (evil-mad/plotink#40), and much more often on
+convex polyhedra, since the distance of a cut point from its own plane is hardly ever exactly zero. Here it is capped
+and says `unfinished`. Segments that pass close to an edge or a corner are accepted or rejected by rounding, and the
+intersection carries the error of t times the length of the segment.
 """
 
 from __future__ import annotations

@@ -313,7 +313,7 @@ SEGMENTS = {
              region=aabb((0, 0), (1, 1)),
              segments=[[[-1, 1], [1, -1]], [[-1, 1 - EPS / 2], [1, -1]], [[-1, -1], [2, 2]], [[-1, 1], [2, 1]], [[1, 1], [2, 2]],
                        [[0.5, 0.5], [0.5, 0.5]], [[1, 1], [1, 1]], [[2, 2], [2, 2]], [[0, 0], [1, 1]], [[1, 0], [3, 0]]]),
-        case("the loop that never ends", "the textbook's loop never ends on this", "Deltares/numba_celltree report",
+        case("the loop that never ends", "the textbook's loop never ends on this", "evil-mad/plotink#40",
              region=aabb((1e-9, 1e-9), (3, 3)), segments=[[[1, 1], [-1, -1]], [[-1, -1], [1, 1]], [[1, 1], [-1, -2]]]),
         case("box in space", "through corners and edges", region=aabb((0, 0, 0), (1, 1, 1)),
              segments=[[[-1, -1, -1], [2, 2, 2]], [[-1, 1, 0.5], [1, -1, 0.5]], [[-1, 1, 1], [1, -1, 1]], [[-1, 1, 1], [2, 1, 1]],

@@ -61,6 +61,8 @@ def test_the_section_counts_what_fails() -> None:
         ("matplotlib/matplotlib#2708", [True] * 6, "3 of 6 points, the first inside, where exact is outside", False),
         ("mikedh/trimesh#1860 equal", False, "no common point", True),
         ("AngusJohnson/Clipper2#821", [0.25], "area 0.25", False),
+        ("AngusJohnson/Clipper2#75", [], "0 pieces", True),
+        ("evil-mad/plotink#40", [], "0 pieces", False),
     ],
 )
 def test_the_museum_says_what_a_contender_answers(name: str, answer: object, said: str, is_rule: bool) -> None:
