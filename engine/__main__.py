@@ -16,13 +16,14 @@ import argparse
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -76,11 +77,13 @@ def _contains(options: Options) -> None:
     points = read_rows(options.points, (solid.dimension,))
     with _bar(len(points), "points", options) as progress:
         answer = locate(points, solid, progress=progress, deadline=options.deadline)
-    if options.output is None or options.output.endswith(".csv"):
-        labels = np.array([Location(value).name.lower() for value in (-1, 0, 1)])
-        write_table(options.output, {"location": labels[answer + 1]})
-    else:
-        write_table(options.output, {"location": answer})
+    _write_labels(options, "location", [Location(code).name.lower() for code in (0, 1, -1)], answer)
+
+
+def _write_labels(options: Options, name: str, labels: list[str], codes: Any) -> None:
+    """Write codes, into .csv as the labels at their places."""
+    is_text = options.output is None or options.output.endswith(".csv")
+    write_table(options.output, {name: np.array(labels)[codes] if is_text else codes})
 
 
 def _posed_pair(options: Options) -> tuple[Any, ...]:
@@ -95,10 +98,7 @@ def _collide(options: Options) -> None:
     pair = _posed_pair(options)
     with _bar(len(pair[2]), "poses", options) as progress:
         answer: Any = collide_poses(*pair, progress=progress, deadline=options.deadline)
-    if options.output is None or options.output.endswith(".csv"):
-        write_table(options.output, {"relation": np.array([each.label for each in Relation])[answer]})
-    else:
-        write_table(options.output, {"relation": answer})
+    _write_labels(options, "relation", [each.label for each in Relation], answer)
 
 
 def _clearance(options: Options) -> None:
@@ -221,16 +221,35 @@ class _Lines:
 @contextmanager
 def _bar(n_items: int, unit: str, options: Options) -> Iterator[Progress | None]:
     """Show a progress bar where someone looks at the standard error and tqdm is installed."""
-    if options.quiet or not sys.stderr.isatty():
+    if options.quiet or not sys.stderr.isatty() or find_spec("tqdm") is None:
         yield None
         return
-    try:
-        from tqdm import tqdm
-    except ImportError:
-        yield None
-        return
+    from tqdm import tqdm
+
     with tqdm(total=n_items, unit=f" {unit}", unit_scale=True, leave=False) as bar:
         yield bar.update
+
+
+SOLID: Final = {"solid": "see above"}
+POSES: Final = "a file with rows [R | t] of the second: 12 numbers in space, 6 in the plane"
+PAIR: Final = {"first": None, "second": None, "--poses": POSES}
+LAYER: Final = ".geojson file of polygons"
+KEPT: Final = "; properties and ids are kept"
+COMMANDS: Final[dict[str, tuple[Callable[[Options], None], str, Mapping[str, str | None]]]] = {
+    "contains": (_contains, "locate points in a solid: inside, boundary or outside",
+                 SOLID | {"points": "rows of 2 or 3 coordinates"}),
+    "collide": (_collide, "tell how two solids lie to each other, under one or many poses of the second", PAIR),
+    "clearance": (_clearance, "tell how far two solids are apart, under one or many poses of the second", PAIR),
+    "clip": (_clip, "clip segments on a solid, or polygons on a convex one",
+             {"region": None, "items": "rows of two positions; with --polygons a .geojson file"}),
+    "overlay": (_overlay, "Boolean operation on two layers, every feature with every one that it meets",
+                {"left": LAYER + KEPT, "right": LAYER}),
+    "union": (_union, "unite the features of a layer, all or those that agree in some properties", {"layer": LAYER}),
+    "join": (_join, "join points to the features that hold them, boundary included",
+             {"points": ".geojson file of points" + KEPT, "polygons": LAYER}),
+    "bounds": (_bounds, "smallest box and smallest sphere of a solid", SOLID),
+}  # fmt: skip
+"""What each does, and the files that it takes."""
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -245,49 +264,17 @@ def _parser() -> argparse.ArgumentParser:
     common.add_argument("--deadline", type=float, metavar="SECONDS", help="give up after so long")
     command = partial(commands.add_parser, parents=[common])
 
-    contains = command("contains", help="locate points in a solid: inside, boundary or outside")
-    contains.add_argument("solid", help="see above")
-    contains.add_argument("points", help="rows of 2 or 3 coordinates")
-    contains.set_defaults(run=_contains)
-
-    collide = command("collide", help="tell how two solids lie to each other, under one or many poses of the second")
-    apart = command("clearance", help="tell how far two solids are apart, under one or many poses of the second")
-    for pair, run in ((collide, _collide), (apart, _clearance)):
-        pair.add_argument("first")
-        pair.add_argument("second")
-        pair.add_argument(
-            "--poses", metavar="FILE", help="rows [R | t] of the second: 12 numbers in space, 6 in the plane"
-        )
-        pair.set_defaults(run=run)
-    apart.add_argument("--at-least", type=float, metavar="DISTANCE", help="tell whether they are so far apart or more")
-
-    clip = command("clip", help="clip segments on a solid, or polygons on a convex one")
-    clip.add_argument("region")
-    clip.add_argument("items", help="rows of two positions; with --polygons a .geojson file")
-    clip.add_argument("--polygons", action="store_true", help="Sutherland-Hodgman on the polygons of a .geojson file")
-    clip.set_defaults(run=_clip)
-
-    overlay = command("overlay", help="Boolean operation on two layers, every feature with every one that it meets")
-    overlay.add_argument("left", help=".geojson file of polygons; properties and ids are kept")
-    overlay.add_argument("right", help=".geojson file of polygons")
-    overlay.add_argument("--operation", choices=HOWS, default="intersection")
-    overlay.set_defaults(run=_overlay)
-
-    union = command("union", help="unite the features of a layer, all or those that agree in some properties")
-    union.add_argument("layer", help=".geojson file of polygons")
-    union.add_argument("--by", nargs="+", metavar="NAME", help="properties that are equal in what is united")
-    union.set_defaults(run=_union)
-
-    join = command("join", help="join points to the features that hold them, boundary included")
-    join.add_argument("points", help=".geojson file of points; properties and ids are kept")
-    join.add_argument("polygons", help=".geojson file of polygons")
-    join.add_argument("--outside", action="store_true", help="points that nothing holds too")
-    join.set_defaults(run=_join)
-
-    box = command("bounds", help="smallest box and smallest sphere of a solid")
-    box.add_argument("solid")
-    box.set_defaults(run=_bounds)
-
+    made = {}
+    for name, (run, about, places) in COMMANDS.items():
+        made[name] = command(name, help=about)
+        made[name].set_defaults(run=run)
+        for place, words in places.items():
+            made[name].add_argument(place, help=words)
+    made["clearance"].add_argument("--at-least", type=float, metavar="DISTANCE", help="are they so far apart or more")
+    made["clip"].add_argument("--polygons", action="store_true", help="Sutherland-Hodgman on polygons of .geojson")
+    made["overlay"].add_argument("--operation", choices=HOWS, default="intersection")
+    made["union"].add_argument("--by", nargs="+", metavar="NAME", help="properties that are equal in what is united")
+    made["join"].add_argument("--outside", action="store_true", help="points that nothing holds too")
     commands.add_parser("audit", help="who is wrong on your data: the textbook, float32 and peers, on one page")
     ready = commands.add_parser("warm", help="compile all kernels now, for this machine or to ship them")
     ready.add_argument("--into", metavar="FOLDER", help="a folder or .tar.xz for ENGINE_CACHE_SEED of other machines")

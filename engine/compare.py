@@ -85,7 +85,8 @@ def compare(
     items, second = arguments
     methods = textbook.of_pairs(items, second) if operation == "collide" else getattr(textbook, of)(second)
     if not methods:
-        raise UnsupportedSolidError(f"the textbook has no method for {operation} with {second.type}", ("solid",))
+        place = {"contains": "solid", "collide": "second"}.get(operation, "region")
+        raise UnsupportedSolidError(f"the textbook has no method for {operation} with {second.type}", (place,))
     name = next(iter(methods)) if method is None else method
     if name not in methods:
         raise InvalidOperationError(f"no method {name!r} here; one of {', '.join(methods)}", ("method",))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Iterable
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TextIO
 
 import numpy as np
 import numpy.typing as npt
@@ -85,7 +85,8 @@ def write_table(target: str | None, columns: dict[str, npt.NDArray[Any]]) -> Non
     elif suffix == ".npz":
         np.savez(str(target), **columns)  # type: ignore[arg-type]
     elif suffix in ("", ".csv"):
-        _write(target, _csv(columns))
+        with _opened(target) as file:
+            file.write(_csv(columns))
     else:
         several = "" if len(columns) == 1 else " (one .npy array cannot hold several columns)"
         raise InvalidInputError(f"{target}: this answer is written to .csv, .npy or .npz{several}", ("output",))
@@ -103,7 +104,7 @@ def _csv(columns: dict[str, npt.NDArray[Any]]) -> str:
 
 def write_geojson(target: str | None, features: Iterable[dict[str, Any]], crs: Any = None) -> None:
     """Write features, whose coordinates may be arrays, one a line; crs: a member of the collection, if there is one."""
-    with nullcontext(sys.stdout) if target is None else Path(target).open("w", encoding="utf-8") as file:
+    with _opened(target) as file:
         told = "" if crs is None else f'"crs": {json.dumps(crs)}, '
         file.write(f'{{"type": "FeatureCollection", {told}"features": [')
         for number, feature in enumerate(features):
@@ -112,8 +113,5 @@ def write_geojson(target: str | None, features: Iterable[dict[str, Any]], crs: A
         file.write("\n]}\n")
 
 
-def _write(target: str | None, text: str) -> None:
-    if target is None:
-        sys.stdout.write(text)
-    else:
-        Path(target).write_text(text, "utf-8")
+def _opened(target: str | None) -> AbstractContextManager[TextIO]:
+    return nullcontext(sys.stdout) if target is None else Path(target).open("w", encoding="utf-8")

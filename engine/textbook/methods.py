@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import reduce
 from typing import Any, Final
 
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray
+from engine.solids.convex import rows_of
 from engine.textbook import clip_polygons, clip_segments, collision, polygons, polyhedra, solids, triangles
 
 Methods = dict[str, tuple[Callable[..., Any], int]]
@@ -23,8 +25,14 @@ def of_points(solid: Any) -> Methods:
     match solid.type:
         case "half_space":
             return {"half-space": (lambda points: solids.in_half_space(points, solid.normal, solid.offset), 1)}
-        case "convex":
-            return {"half-spaces": (lambda points: solids.in_convex(points, solid.planes), len(solid.planes))}
+        case "convex" | "aabb":
+            rows = rows_of(solid)
+            return {"half-spaces": (lambda points: solids.in_convex(points, rows), len(rows))}
+        case "implicit" if solid.function is None:
+            terms = solid.powers, solid.coefficients
+            return {"sign of f": (lambda points: solids.in_implicit(points, *terms), len(terms[1]))}
+        case "csg":
+            return _of_tree(solid)
         case "polyhedron":
             rest = solid.vertices, solid.triangles, AHEAD
             return {"half-line": (lambda points: polyhedra.by_half_line(points, *rest), len(rest[1]))}
@@ -34,6 +42,15 @@ def of_points(solid: Any) -> Methods:
         case "triangle" | "polygon":
             return _of_rings(solid.vertices, getattr(solid, "ring_offsets", np.array([0, len(solid.vertices)])))
     return {}
+
+
+def _of_tree(solid: Any) -> Methods:
+    """Return the tree over the first method of every operand, nothing where one has none."""
+    if not all(operands := [list(of_points(operand).values())[:1] for operand in solid.operands]):
+        return {}
+    leaves: list[Any] = [leaf for ((leaf, _),) in operands]
+    tree = reduce(lambda tree, leaf: (solid.operation, tree, leaf), leaves)
+    return {"tree": (lambda points: solids.in_csg_tree(points, tree), sum(n for ((_, n),) in operands))}
 
 
 def _of_rings(vertices: FloatArray, offsets: Any) -> Methods:
@@ -68,17 +85,9 @@ def of_segments(region: Any) -> Methods:
 
 def of_polygons(region: Any) -> Methods:
     """Return what tells of polygons of one ring (n, size, dim) whether anything of them is kept."""
-    match region.type:
-        case "half_space":
-            rows = np.append(region.normal, region.offset)[None]
-        case "convex":
-            rows = region.planes
-        case "aabb":
-            axes = np.repeat(np.eye(region.dimension), 2, axis=0)
-            axes[1::2] *= -1.0
-            rows = np.column_stack([axes, np.stack([-region.min, region.max], axis=1).ravel()])
-        case _:
-            return {}
+    if region.type not in ("half_space", "convex", "aabb"):
+        return {}
+    rows = rows_of(region)
 
     def ask(polygons: FloatArray) -> BoolArray:
         return np.array([bool(clip_polygons.on_convex([ring], rows)) for ring in polygons], np.bool_)

@@ -58,7 +58,9 @@ class CompareRequest(Schema):
         description="What is asked of both; it says which other fields are needed."
     )
     method: str = left_out("One of the textbook's methods; left out, the first. A wrong one is answered with a list.")
-    solid: Solid = left_out("contains: half_space, convex, polyhedron, triangle or polygon.")
+    solid: Solid = left_out(
+        "contains: half_space, aabb, convex, polyhedron, triangle, polygon, implicit, or a csg of these."
+    )
     points: Points = left_out("contains.")
     first: Solid = left_out("collide: a polyhedron.")
     second: Solid = left_out("collide: a polyhedron.")

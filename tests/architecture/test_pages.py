@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.__main__ import NAMES
+from engine.__main__ import COMMANDS as COMMANDS_ON_FILES
 
 ROOT = Path(__file__).resolve().parents[2]
 NAMED = re.compile(r"`([\w./]+(?:\.py|/|\.md|\.json))`")
@@ -41,8 +42,7 @@ def test_the_glossary_names_constants_that_exist() -> None:
     assert all(re.search(rf"^{word}(: Final)? = ", sources, re.MULTILINE) for word in words)
 
 
-COMMAND = re.compile(r'(?:command|add_parser)\(\s*"([a-z-]+)"')
-COMMANDS = set(COMMAND.findall((ROOT / "engine" / "__main__.py").read_text("utf-8")))
+COMMANDS = {*COMMANDS_ON_FILES, "audit", "warm"}
 PAGES = sorted(
     path
     for folder in (".", "docs", "benchmarks", "benchmarks/filed", "tests/hard")

@@ -69,6 +69,10 @@ def test_polygons(region: Any) -> None:
 SOLIDS = [
     engine.HalfSpace([1.0, 2.0, 3.0], -1.0), engine.Convex([[1.0, 2.0, 3.0, -1.0], [0.0, 0.0, -1.0, 1.0]]),
     engine.Polyhedron(CORNERS, FACES), engine.Triangle(CORNERS[:3]), engine.Triangle(CORNERS[:3, :2]),
+    engine.Aabb([-0.5, -0.2, 0.1], [0.3, 0.9, 0.7]), engine.Implicit(powers=[[2, 0], [0, 0]], coefficients=[-1.0, 0.3]),
+    engine.Csg("difference", [engine.Aabb([-1.0] * 3, [0.5] * 3), engine.Polyhedron(CORNERS, FACES)]),
+    engine.Csg("union", [engine.Aabb([0.0, 0.0], [0.5, 0.5]), engine.Triangle(CORNERS[:3, :2]),
+                         engine.Csg("intersection", [engine.HalfSpace([1.0, 0.5], 0.2)])]),
 ]  # fmt: skip
 
 
@@ -85,8 +89,9 @@ def test_refusals() -> None:
     box, large = engine.Aabb([0, 0], [1, 1]), np.zeros((1, 2))
     with pytest.raises(engine.InvalidOperationError, match="one of contains, collide"):
         engine.compare("locate", large, box)  # type: ignore[arg-type]
-    with pytest.raises(engine.UnsupportedSolidError, match="no method for contains with aabb"):
-        engine.compare("contains", large, box)
+    with pytest.raises(engine.UnsupportedSolidError, match="no method for contains with sphere") as refused:
+        engine.compare("contains", large, engine.Sphere([0, 0], 1))
+    assert refused.value.where == ("solid",)
     with pytest.raises(engine.InvalidOperationError, match="one of Cohen-Sutherland"):
         engine.compare("clip_segments", np.zeros((1, 2, 2)), box, method="x")
     with pytest.raises(engine.WrongDimensionError, match=r"got shape \(1, 3\)"):

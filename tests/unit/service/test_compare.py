@@ -15,6 +15,7 @@ CORNERS = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
 FACES = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
 BODY = {"type": "polyhedron", "vertices": CORNERS, "faces": FACES}
 BOX = {"type": "aabb", "min": [0, 0], "max": [1, 3]}
+BALL = {"type": "sphere", "center": [0, 0], "radius": 1}
 
 
 @pytest.mark.parametrize(
@@ -39,7 +40,7 @@ async def test_both_answer(client: httpx.AsyncClient, question: dict[str, Any], 
     ("question", "code"),
     [
         ({"operation": "contains", "solid": BODY}, "invalid_request"),
-        ({"operation": "contains", "solid": BOX, "points": [[0, 0]]}, "unsupported_solid"),
+        ({"operation": "contains", "solid": BALL, "points": [[0, 0]]}, "unsupported_solid"),
         ({"operation": "clip_segments", "region": BOX, "segments": [], "method": "x"}, "invalid_operation"),
     ],
 )
