@@ -16,9 +16,10 @@ import engine
 from benchmarks.bodies import random_rotations
 from benchmarks.workloads import bumpy_sphere, generator, ring_around
 from engine.bounding.aabb import corners_of_box
-from engine.textbook import collision, polygons
+from engine.textbook import clip_segments, collision, polygons
 
 N = 20_000
+UNIT = np.zeros(3), np.ones(3)
 MARGIN = 1e-3
 """Of the triangle's size: how far points are inside or outside at least."""
 
@@ -37,18 +38,9 @@ def projections() -> Iterator[str]:
         points = weights @ corners
         for rows in (corners, points):
             rows[:, 2] = 0.3 + tilt * rows[:, 1] + 0.5 * tilt * rows[:, 0]
-        wrong = [np.mean(_in_projection(points, corners, axis) != inside) for axis in (2, 0)]
+        flat = [[np.ascontiguousarray(each[:, kept]) for each in (points, corners)] for kept in ([0, 1], [1, 2])]
+        wrong = [np.mean(polygons.by_same_side(*each) != inside) for each in flat]
         yield f"| {tilt:g} | {wrong[0]:.1%} | {wrong[1]:.1%} |"
-
-
-def _in_projection(points: np.ndarray, corners: np.ndarray, axis: int) -> np.ndarray:
-    u, v = (axis + 1) % 3, (axis + 2) % 3
-    sides = []
-    for k in range(3):
-        a, b = corners[k], corners[(k + 1) % 3]
-        sides.append((b[u] - a[u]) * (points[:, v] - a[v]) - (b[v] - a[v]) * (points[:, u] - a[u]))
-    left = np.array(sides) >= 0.0
-    return left.all(axis=0) | (np.array(sides) <= 0.0).all(axis=0)
 
 
 def outcodes() -> Iterator[str]:
@@ -71,20 +63,16 @@ def _cuts(p: np.ndarray, q: np.ndarray) -> int:
     """Return how many intersections Cohen and Sutherland compute; -1 accepted at once, -2 rejected at once."""
     p, q = p.copy(), q.copy()
     for n_cuts in range(7):
-        codes = [[(each[k] < 0, each[k] > 1) for k in range(3)] for each in (p, q)]
-        flat = [[bit for pair in code for bit in pair] for code in codes]
-        if not any(flat[0]) and not any(flat[1]):
+        codes = [clip_segments.code_word(each, *UNIT) for each in (p, q)]
+        if codes[0] | codes[1] == 0:
             return n_cuts or -1
-        if any(a and b for a, b in zip(*flat)):
+        if codes[0] & codes[1]:
             return n_cuts or -2
-        bit = next(k for k in range(6) if flat[0][k] != flat[1][k])
-        axis, plane = bit // 2, float(bit % 2)
-        point = p + (plane - p[axis]) / (q[axis] - p[axis]) * (q - p)
-        point[axis] = plane
-        if flat[0][bit]:
-            p = point
-        else:
-            q = point
+        differing = codes[0] ^ codes[1]
+        bit = (differing & -differing).bit_length() - 1
+        end = p if codes[0] >> bit & 1 else q
+        end[:] = clip_segments.cut(p, q, bit, *UNIT)
+        end[bit // 2] = UNIT[bit % 2][bit // 2]  # so that no plane is cut twice
     return 6
 
 

@@ -5,6 +5,7 @@ It lets go of the interpreter lock, so points are split over as many threads as 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -74,16 +75,21 @@ def _bounds(region: engine.Solid) -> tuple[float, ...]:
     return (*region.min.tolist(), *region.max.tolist())
 
 
-def _segments(region: engine.Aabb, threads: int) -> Prepared:
-    bounds = _bounds(region)
+def _by_rectangle(native: Any, answer: Any) -> Callable[[engine.Solid, int], Prepared]:
+    """Return the maker of `clip_by_rect`, which takes and answers so."""
 
-    def answer(clipped: np.ndarray) -> np.ndarray:
-        rows = np.full((len(clipped), 4), np.nan)
-        lines = np.flatnonzero(shapely.get_num_coordinates(clipped) == 2)
-        rows[lines] = shapely.get_coordinates(clipped[lines]).reshape(-1, 4)
-        return rows
+    def make(region: engine.Solid, threads: int) -> Prepared:
+        bounds = _bounds(region)
+        return Prepared(lambda shapes: shapely.clip_by_rect(shapes, *bounds), native, answer)
 
-    return Prepared(lambda lines: shapely.clip_by_rect(lines, *bounds), shapely.linestrings, answer)
+    return make
+
+
+def _rows_of(clipped: np.ndarray) -> np.ndarray:
+    rows = np.full((len(clipped), 4), np.nan)
+    lines = np.flatnonzero(shapely.get_num_coordinates(clipped) == 2)
+    rows[lines] = shapely.get_coordinates(clipped[lines]).reshape(-1, 4)
+    return rows
 
 
 def _pieces_of(found: Any) -> list[Any]:
@@ -101,18 +107,6 @@ def _lines(region: engine.Polygon, threads: int) -> Prepared:
     shape = shapely.polygons(region.vertices)
     shapely.prepare(shape)
     return Prepared(lambda lines: shapely.intersection(lines, shape), shapely.linestrings)
-
-
-def _pieces_by_rectangle(region: engine.Solid, threads: int) -> Prepared:
-    bounds = _bounds(region)
-    return Prepared(lambda lines: shapely.clip_by_rect(lines, *bounds), shapely.linestrings, _pieces_of)
-
-
-def _kept_polygons(region: engine.Aabb, threads: int) -> Prepared:
-    bounds = _bounds(region)
-    return Prepared(
-        lambda shapes: shapely.clip_by_rect(shapes, *bounds), shapely.polygons, lambda found: ~shapely.is_empty(found)
-    )
 
 
 def _polygon_areas(region: engine.Aabb, threads: int) -> Prepared:
@@ -156,11 +150,11 @@ def _gridded(pair: Any, grid: float = 0.0) -> Any:
 MAKERS = {
     "points": _points,
     "scene": _scene,
-    "segments": _segments,
+    "segments": _by_rectangle(shapely.linestrings, _rows_of),
     "pieces": _pieces,
     "lines": _lines,
-    "pieces by rectangle": _pieces_by_rectangle,
-    "kept polygons": _kept_polygons,
+    "pieces by rectangle": _by_rectangle(shapely.linestrings, _pieces_of),
+    "kept polygons": _by_rectangle(shapely.polygons, lambda found: ~shapely.is_empty(found)),
     "polygon areas": _polygon_areas,
     "pair": _pair,
     "clearance pairs": lambda _, threads: each_alone(

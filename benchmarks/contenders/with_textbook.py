@@ -23,6 +23,7 @@ from benchmarks.contenders import (
 from benchmarks.contenders.with_ours import ring_areas
 from benchmarks.errors import REFUSED
 from benchmarks.workloads import Mesh, Rings
+from engine.solids.convex import rows_of as planes_of
 from engine.textbook import clip_polygons, greiner_hormann, methods, polyhedra
 
 NAMES = {
@@ -37,13 +38,6 @@ NAMES = {
 }  # fmt: skip
 
 Maker = Callable[[Any, int], Prepared]
-
-
-def box_rows(box: engine.Aabb) -> np.ndarray:
-    """Return the half-spaces of a box, axis by axis: lower side, upper side."""
-    axes = np.repeat(np.eye(box.dimension), 2, axis=0)
-    axes[1::2] *= -1.0
-    return np.column_stack([axes, np.stack([-box.min, box.max], axis=1).ravel()])
 
 
 def _plain(subject: Any) -> Any:
@@ -104,7 +98,7 @@ def _naive_segments(region: Any, threads: int) -> Prepared:
 
 
 def _naive_polygons(region: engine.Aabb, threads: int) -> Prepared:
-    rows = box_rows(region)
+    rows = planes_of(region)
 
     def native(polygons: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         n, size, dimension = polygons.shape
@@ -117,7 +111,7 @@ def _naive_polygons(region: engine.Aabb, threads: int) -> Prepared:
 
 
 def _polygon_areas(region: engine.Aabb, threads: int) -> Prepared:
-    rows = box_rows(region)
+    rows = planes_of(region)
 
     def ask(rings: np.ndarray) -> np.ndarray:
         clipped = [next(iter(clip_polygons.on_convex([ring], rows)), np.empty((0, 2))) for ring in rings]

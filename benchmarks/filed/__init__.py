@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import engine
-from benchmarks.contenders import NotApplicable, Placed, answers, stated
+from benchmarks.contenders import NotApplicable, Placed, answers, rings_of, stated
 from benchmarks.filed import museum
 from benchmarks.machine import version_of
 from benchmarks.workloads import Mesh, Rings
@@ -136,14 +136,6 @@ def _long_pieces(pieces: Sequence[Any], slack: float) -> list[tuple[int, np.ndar
 # --- replaying --------------------------------------------------------------------------------------------------------
 
 
-def _rings(solid: dict[str, Any]) -> list[np.ndarray]:
-    """Return the rings of a polygon or a box of the plane."""
-    if solid["type"] == "aabb":
-        (x0, y0), (x1, y1) = solid["min"], solid["max"]
-        return [np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)], float)]
-    return [np.array(ring, float) for ring in solid["rings"]]
-
-
 def _subject(solid: dict[str, Any], is_region: bool = False) -> Any:
     """Return a solid as the contenders take it."""
     match solid["type"]:
@@ -153,10 +145,11 @@ def _subject(solid: dict[str, Any], is_region: bool = False) -> Any:
             return Mesh("case", np.array(solid["vertices"], float), np.array(solid["faces"], np.int64))
         case "sphere" if not is_region:
             return engine.Sphere(solid["center"], solid["radius"])
-        case "aabb" if is_region or len(solid["min"]) == 3:
-            return engine.Aabb(solid["min"], solid["max"])
-        case "polygon" | "aabb":
-            return Rings("case", _rings(solid))
+        case "aabb":
+            box = engine.Aabb(solid["min"], solid["max"])
+            return box if is_region or box.dimension == 3 else Rings("case", rings_of(box))
+        case "polygon":
+            return Rings("case", [np.array(ring, float) for ring in solid["rings"]])
     raise NotApplicable(solid["type"])
 
 
@@ -177,7 +170,8 @@ def _asked(module: str, kind: str, operation: str, data: dict[str, Any]) -> Any:
             polygons = [[np.array(ring, float) for ring in rings] for rings in data["polygons"]]
             return answers(module, kind, _subject(data["region"], True), polygons)
         case "overlay":
-            area = answers(module, kind, data["operation"], [(_rings(data["subject"]), _rings(data["clip"]))])[0]
+            pair = tuple(rings_of(_subject(data[key])) for key in ("subject", "clip"))
+            area = answers(module, kind, data["operation"], [pair])[0]
             if np.isinf(area):
                 raise NotApplicable("out of its domain")
             return area
