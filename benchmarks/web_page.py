@@ -11,27 +11,7 @@ from typing import Any
 from benchmarks.measure import interval
 
 PAGES = Path(__file__).with_name("pages")
-QUESTIONS = (
-    ("Points in a mesh", "containment 3D", "uniform", "boundary"),
-    ("Points in a polygon", "containment 2D", "uniform", "boundary"),
-    ("Points, convex polygon", "containment, convex polygon", "uniform", "boundary"),
-    ("Points in half-spaces", "containment, half-spaces", "uniform", "on a plane"),
-    ("Points in a prism", "containment, triangle in space", "", "on its walls"),
-    ("Do two bodies meet?", "collision", "apart or crossing", "contact"),
-    ("Bodies under poses", "collision", "", "near contact, 1k"),
-    ("Which of five relations?", "collision", "", "contact, which relation"),
-    ("Distance of two bodies", "clearance", "1k faces, mixed", "nearly in contact"),
-    ("Distance of two polygons", "clearance", "", "polygons nearly in contact"),
-    ("Segments on a box, 2D", "clipping segments", "box 2D, random", "box 2D, corners"),
-    ("Segments on a box, 3D", "clipping segments", "box 3D, random", "box 3D, corners"),
-    ("Segments on 20 planes", "clipping segments", "", "20 planes, edges"),
-    ("Segments on a sphere", "clipping segments", "", "sphere, tangents"),
-    ("Polygons on a box", "clipping polygons", "random stars", "along the box"),
-    ("Polygons on polygons", "overlay", "random stars", "lattice"),
-    ("Polygons of test suites", "overlay", "", "public suites"),
-    ("Determinant's sign, 2D", "orientation 2D", "random", "nearly degenerate"),
-    ("Determinant's sign, 3D", "orientation 3D", "random", "nearly degenerate"),
-)
+QUESTIONS: list[tuple[str, str, str, str]] = json.loads((PAGES / "questions.json").read_text("utf-8"))
 """Title, operation, its easy and its hard contest."""
 FACTS = ("commit", "processor", "cores", "seed", "load_before", "load_after", "seconds", "versions", "quick")
 BAD = ("wrong", "refused", "outside")
