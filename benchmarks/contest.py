@@ -220,6 +220,8 @@ def hold(contest: Contest, rounds: int, seconds: float, has_latency: bool = Fals
         if (entry := _entered(contest, each, row, seconds / rounds)) is not None:
             entries.append(entry)
     _judge(contest, entries)
+    gc.collect()
+    gc.freeze()  # what is there now is not gone through again at every turn
     for round_ in range(rounds):
         for entry in entries if round_ % 2 == 0 else reversed(entries):
             gc.collect()
@@ -227,6 +229,7 @@ def hold(contest: Contest, rounds: int, seconds: float, has_latency: bool = Fals
             wall, cpu, _ = clocked(partial(_repeat, entry))
             entry.row.seconds.append(wall / entry.times)
             entry.row.cpu.append(cpu / entry.times)
+    gc.unfreeze()
     if has_latency and not contest.count:
         for entry in entries:
             _tell(entry.row)
