@@ -212,6 +212,7 @@ def test_the_mouse_moves_the_second_body(page: Any) -> None:
 
 def test_the_switch_float64_asks_the_plain_method_too(page: Any) -> None:
     choose(page, "contains", 2)
+    page.select_option("#first", "comb")
     page.check("#snap")
     page.check("#plain")
     verdict(page)
