@@ -97,6 +97,8 @@ def _place(form: Any, turn: Any, move: Any, w: Any, first: int) -> float:
     for k in range(d):
         for m in range(d):
             is_turned = is_turned or turn[k, m] != (1.0 if k == m else 0.0)
+    if is_turned and not form[IS_BALL] > 0.0:
+        return float("inf")
     for k in range(d):
         for side in range(2):
             x = Wide(*two_sum(form[3 * side + k], move[k]))
@@ -109,7 +111,7 @@ def _place(form: Any, turn: Any, move: Any, w: Any, first: int) -> float:
             w[first + 4 * k + 2 * side], w[first + 4 * k + 2 * side + 1] = x.h, x.low
             if not abs(x.h) < _LARGEST:
                 return float("inf")
-    return 0.0 if not is_turned else (16.0 * U2 * size + _TINY if form[IS_BALL] > 0.0 else float("inf"))
+    return 16.0 * U2 * size + _TINY if is_turned else 0.0
 
 
 @inline
@@ -124,7 +126,9 @@ def gap_of_forms(
     d, error = move.shape[0], _place(form, turn, move, w, 0) + _place(other, their_turn, their_move, w, 12)
     faces = theirs = free = n_apart = 0
     square, rest = Wide(0.0, 0.0), Wide(0.0, 0.0)
-    is_sure, bound = error < float("inf"), 0.0
+    if not error < float("inf"):
+        return UNSURE, 0, 0, rest, error
+    is_sure, bound = True, 0.0
     for k in range(d):
         low, high = _wide(w, 4 * k), _wide(w, 4 * k + 2)
         their_low, their_high = _wide(w, 4 * k + 12), _wide(w, 4 * k + 14)

@@ -128,7 +128,9 @@ def gap_of_convex(pool: ConvexArrays, first: int, second: int, a: PlacedBody, b:
     this is not sure; where it is not to be measured 0.0 for one that is surely below."""
     error = a.place.error + b.place.error
     v = minus(inner_point(pool.numbers, first, a, CENTER), inner_point(pool.numbers, second, b, ASIDE))
-    corner, _ = _start(pool, a, b, v)
+    corner, along = _start(pool, a, b, v)
+    if along > (gap + a.round + b.round) * length(v) and _slab(pool, a, b, v, error) > gap:
+        return np.inf
     simplex, v, reach = Simplex(corner, corner, corner, 1), corner.at, largest_of(corner.at)
     if not (error < _LARGEST and reach < _LARGEST):
         return np.nan

@@ -53,14 +53,13 @@ def distances_below(
     if not gap:
         return result
     left = np.flatnonzero(_may_be_near(bodies, pairs, gap))
-    kinds, (i, j) = bodies.kinds[pairs[left]], pairs[left].T + 1
-    left = left[np.lexsort(kinds.T)]  # pairs of the same two solids are asked together
-    kinds, (i, j), found = bodies.kinds[pairs[left]], pairs[left].T + 1, np.empty(len(left))
+    places = pairs[left] + 1
+    kinds, (i, j), found = bodies.kinds[places - 1], places.T, np.empty(len(left))
     turns, moves = bodies.rotations, bodies.translations
-    is_equal = (turns[i] == turns[j]).all(axis=(1, 2)) & (moves[i] == moves[j]).all(axis=1)  # left out, as by `collide`
-    places = np.where(is_equal, 0, (i, j)).T.copy()
+    equal = np.flatnonzero((moves[i] == moves[j]).all(axis=1))  # of equal poses, which are left out, as by `collide`
+    places[equal[(turns[i[equal]] == turns[j[equal]]).all(axis=(1, 2))]] = 0
     forms = np.full((len(bodies.distinct), N_NUMBERS), np.nan)  # of solids that have none
-    for kind in np.unique(kinds).tolist():
+    for kind in np.flatnonzero(np.bincount(kinds.ravel(), minlength=len(forms))).tolist():
         form = form_of(bodies.distinct[kind])
         forms[kind] = forms[kind] if form is None else form
     pool, convex = _NONE, np.full(len(forms), -1, np.int64)
@@ -76,6 +75,7 @@ def distances_below(
 
     run_chunks(by_batch, len(left), budget=budget, workers=workers)
     still = np.flatnonzero(np.isnan(found))
+    still = still[np.lexsort(kinds[still].T)]  # pairs of the same two solids are asked together
 
     def by_search(start: int, stop: int) -> None:
         some = kinds[still[start:stop]]
