@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 import random
 
+import numpy as np
 import pytest
 
-from engine import Polygon, Pose, Sphere, clearance
+from engine import Polygon, Pose, Relation, Sphere, clearance, clearance_poses, collide
 from engine.collision.clearance.forms import between_outlines
 from engine.collision.clearance.result import Clearance, Feature
+from engine.collision.clearance.spreads import spread_pair
+from engine.collision.result import UNLIMITED
 from tests.unit.collision.clearance.makers import Json, distance, is_nearest
 from tests.unit.collision.lattices import solid
 
@@ -87,3 +90,22 @@ def test_a_ball_within_a_ring_is_as_far_as_its_sides_and_one_inside_meets() -> N
         assert met.distance == 0.0
     touching = between_outlines(frame, Sphere([5, 4], 2), (None, None), None)
     assert touching is None  # a contact is for rationals
+
+
+def test_many_edges_under_many_poses_are_as_far_as_the_search_over_trees_says() -> None:
+    draw, count = np.random.default_rng(3), 20
+    angles, turns = np.linspace(0.0, 2 * math.pi, 100, endpoint=False), draw.uniform(0.0, 7.0, count)
+    ring = np.stack([np.cos(angles), np.sin(angles)], axis=1) * draw.uniform(0.7, 1.0, (100, 1))
+    star, frame = Polygon([ring]), Polygon([4.0 * ring, 2.5 * ring])
+    cos, sin = np.cos(turns), np.sin(turns)
+    rotations, moves = np.stack([cos, -sin, sin, cos], axis=1).reshape(-1, 2, 2), draw.uniform(-3.0, 3.0, (count, 2))
+    for first, second in ((star, star), (frame, star)):
+        poses = [Pose(turn, move) for turn, move in zip(rotations, moves)]
+        expected = [
+            spread_pair(first, second, (None, pose), UNLIMITED).clearance(0).distance
+            if collide(first, second, second_pose=pose).relation == Relation.DISJOINT
+            else 0.0
+            for pose in poses
+        ]
+        assert np.array_equal(clearance_poses(first, second, rotations, moves), expected)  # type: ignore[arg-type]
+        assert [clearance(first, second, second_pose=pose).distance for pose in poses] == expected  # type: ignore[union-attr]
