@@ -178,7 +178,8 @@ def _bodies() -> list[Solid]:
 
 def _warm_clipping_2d() -> None:
     _clip(2)
-    clip_segments([[[-1.0, -1.0], [2.0, 2.0]]], Polygon([[[0, 0], [4, 0], [1, 1], [0, 4]]]))  # through corners
+    corners = [[[-1.0, -1.0], [2.0, 2.0]], [[0.0, 0.0], [1.0, 1.0]]]  # through corners, and from one to another
+    clip_segments(corners, Polygon([[[0, 0], [4, 0], [1, 1], [0, 4]]]))
 
 
 def _warm_clipping_3d() -> None:
