@@ -19,7 +19,7 @@ from engine.jit import kernel
 from engine.parallel import Budget
 from engine.predicates.loading import as_point2
 from engine.predicates.orientation import orient2d, orient3d
-from engine.segment_clipping.on_boundary.contacts import ALONG, DEGENERATE, END, GROUP
+from engine.segment_clipping.on_boundary.contacts import ALONG, DEGENERATE, END
 from engine.segment_clipping.on_boundary.found_contacts import contacts_with
 from engine.segment_clipping.on_boundary.prepared_boundary import Mesh, Outline
 from engine.segment_clipping.on_boundary.triangle_contact import corner
@@ -27,6 +27,8 @@ from engine.segment_clipping.on_boundary.triangle_contact import corner
 INSIDE_BEFORE: Final = 2
 OUTSIDE_BEFORE: Final = -2
 """Location of the second end that says where the line beside the segment is before its first contact."""
+_AT_ONCE: Final = 64
+"""Chords whose contacts are held together."""
 _PLACES: Final = (0.5, 0.3125, 0.8125)
 """Where along a segment a point beside it is tried; the next where one is on the boundary, or elements part it."""
 
@@ -35,9 +37,11 @@ def look_before(
     segments: FloatArray, locations: Int8Array, boundary: Outline | Mesh, locator: Locator, budget: Budget
 ) -> None:
     """Set the second of locations (n, 2) where both are 0 and it can be told, see `INSIDE_BEFORE`."""
+    if not boundary.are_safe:  # signs of the line beside the segment are exact only then
+        return
     chords = np.flatnonzero((locations == 0).all(axis=1))
-    for begin in range(0, len(chords), GROUP):
-        some = chords[begin : begin + GROUP]
+    for begin in range(0, len(chords), _AT_ONCE):
+        some = chords[begin : begin + _AT_ONCE]
         locations[some, 1] = _before(segments[some], boundary, locator, budget)
 
 
