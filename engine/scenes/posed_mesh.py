@@ -58,10 +58,10 @@ TREE, PLACES, TREE_PLACES = 8, 16, 27
 """Where these begin."""
 _Lines = namedtuple("_Lines", "addresses sizes places")
 Scratch = namedtuple("Scratch", "stack cuts room waiting keys entered best found near")
-"""Room for the work on one segment. stack: of one body, cuts: its
-`Crossings`, room: its pieces, the last row for the first of them all. waiting, keys: nodes and bodies to be asked, and
-where they are entered; entered (1, 8), of one node. best: where the first piece begins; found: the body it lies in, and
-whether another may begin there too. near: bodies."""
+"""Room for the work on one segment. stack: of one body, cuts: its `Crossings`, room: its pieces, the
+last row for the first of them all. waiting, keys: nodes and bodies to be asked, and where they are entered; entered
+(1, 8), of one node. best: where the first piece begins; found: the body it lies in, and whether another may begin there
+too. near: bodies."""
 _SIZES: Final = (
     STACK // 2, MOST_MET, MOST_MET, 3 * MOST_MET, MOST_MET, MOST_MET, MOST_MET + 1, 6 * MOST_MET + 6, 2 * MOST_MET + 2,
     2 * MOST_MET + 2, STACK // 2, STACK // 2, WIDTH // 2, 1, 2, MOST_MET,
@@ -303,7 +303,7 @@ def crossings_in(body: Any, segments: Any, item: int, is_any: bool, words: Any, 
     touches = False
     for i in range(n_met):
         touches |= scratch.cuts.codes[i] != CROSSED
-    if not sort_crossings(scratch.cuts, 0, n_met) and not touches:
+    if not sort_crossings(scratch.cuts, n_met) and not touches:
         return UNSURE, False
     return (_join_touches(mesh, scratch, n_met, is_in, is_closed) if touches else n_met), is_in
 

@@ -65,7 +65,7 @@ def _cut_on(
         cuts = scratch_at(scratch).cuts
         if body[1] == 0:
             return _emit_points(cuts, n_met, item, out, row)
-        return emit(segments, item, item, is_in, cuts, 0, n_met, out, row) - row
+        return emit(segments, item, item, is_in, cuts, n_met, out, row) - row
     if kind == BALL:
         meets, first, last = in_ball(body, segments, item, is_any)
     else:

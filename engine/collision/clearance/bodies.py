@@ -23,6 +23,8 @@ from engine.solids.mesh import Mesh
 from engine.solids.sphere import Sphere
 
 BALL: Final = Feature("ball")
+_AROUND: Final = (0, 1, 3, 2)
+"""Corners of a box of the plane, counted as of one of space, in the order of its outline."""
 
 
 def spread_of(solid: Solid) -> MeshBody:
@@ -68,7 +70,7 @@ class _Names(dict[int, Feature]):
         if not n:
             return BALL
         ends = [number] if number < n else [number - n, self._following[number - n]]
-        ends = sorted((0, 1, 3, 2)[end] if self._is_box else end for end in ends)
+        ends = sorted(_AROUND[end] if self._is_box else end for end in ends)
         self[number] = Feature("vertex" if number < n else "edge", tuple(ends))
         return self[number]
 
@@ -126,4 +128,4 @@ def _ring(solid: Solid, face: int) -> tuple[list[int], list[list[float]]]:
 
 def named(solid: Solid, number: int) -> int:
     """Return the vertex's number as the caller knows it: a box of the plane counts its corners as one of space."""
-    return (0, 1, 3, 2)[number] if solid.type == "aabb" and solid.dimension == 2 else number
+    return _AROUND[number] if solid.type == "aabb" and solid.dimension == 2 else number

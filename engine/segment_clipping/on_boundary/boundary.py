@@ -1,7 +1,7 @@
 """Segments on polygons and polyhedra: contacts by a box tree, pieces between them; several for each segment.
 
-The locator of the region tells the location of each first end. A kernel cuts the segments that meet the boundary in
-proper crossings only (boundary_cut.py); what meets it otherwise, in an edge, a vertex, a face, is cut in exact
+The locator of the region tells the location of each first end. A kernel cuts segments at what they cross
+(boundary_cut.py) and touch (touching_cut.py); what it leaves, those in the plane of a face above all, is cut in exact
 arithmetic (exact_pieces.py). Zero-length segments are points.
 """
 
@@ -65,6 +65,10 @@ def clip_on_boundary(
     return joined(pieces), n_left, n_left
 
 
+def _kernel_of(boundary: Outline | Mesh) -> Any:
+    return cut_on_mesh if isinstance(boundary, Mesh) else cut_on_outline
+
+
 def clip_few(segments: FloatArray, region: Bounded, boundary: Outline | Mesh) -> Pieces | None:
     """Return the pieces of a few segments, (n, 2, dim) float64, not yet looked at for NaN, in a third of the time that
     the general way takes; None where one is left open or begins on the boundary."""
@@ -75,8 +79,7 @@ def clip_few(segments: FloatArray, region: Bounded, boundary: Outline | Mesh) ->
     locations, state = np.zeros((n, 2), np.int8), np.empty(n, np.uint8)
     locations[:, 0] = found[0]
     pieces, done = room_for(_FEW_PIECES * n, dimension), np.array([0, 0, _LEAST_ROOM])
-    kernel: Any = cut_on_mesh if isinstance(boundary, Mesh) else cut_on_outline
-    entry_of(kernel)(segments, locations, boundary, UNLIMITED.flag, pieces, state, done)
+    entry_of(_kernel_of(boundary))(segments, locations, boundary, UNLIMITED.flag, pieces, state, done)
     reached, m, _ = done.tolist()
     return first_of(pieces, m) if reached == n and not state.any() else None
 
@@ -117,8 +120,7 @@ def cut_at_crossings(
     """Return the pieces of those segments that the kernel settles, and the state of each."""
     n = len(segments)
     state = np.full(n, OPEN, np.uint8)
-    kernel: Any = cut_on_mesh if isinstance(boundary, Mesh) else cut_on_outline
-    parts, room = [], _LEAST_ROOM + n
+    kernel, parts, room = _kernel_of(boundary), [], _LEAST_ROOM + n
     done = np.array([0, 0, _LEAST_ROOM + _CONTACTS * min(GROUP, n)])
     counted = least = int(done[2])
     while done[0] < n:

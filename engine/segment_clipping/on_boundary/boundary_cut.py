@@ -31,15 +31,13 @@ def group_size(n: int) -> int:
 
 
 @inline
-def emit(
-    segments: Any, item: int, source: int, is_inside: bool, cuts: Crossings, first: int, n: int, out: Pieces, row: int
-) -> int:
+def emit(segments: Any, item: int, source: int, is_inside: bool, cuts: Crossings, n: int, out: Pieces, row: int) -> int:
     """Write the pieces between n crossings to the rows of `out` from `row` on; return the row after them."""
     is_flat, end = segments.shape[2] == 2, 1 if is_inside else 0
     if is_inside:
         out.source[row] = source
         put_own_end(out, row, 0, segments, item, is_flat)
-    for place in range(first, first + n):
+    for place in range(n):
         i = cuts.order[place]
         out.source[row], out.t[row, end], out.faces[row, end] = source, cuts.t[i], cuts.faces[i]
         for k in range(segments.shape[2]):
@@ -79,7 +77,7 @@ def cut_segment(segments: Any, item: int, boundary: Any, contacts: Any, cuts: Cr
         cuts.t[place], is_sure = cut_at(segments, item, boundary.elements, element, at_p, along, cuts.points, place)
         if not is_sure:
             return False
-    return sort_crossings(cuts, 0, last - first)
+    return sort_crossings(cuts, last - first)
 
 
 @called
@@ -98,7 +96,7 @@ def cut_group(
             return place, row
         is_plain = all_proper(contacts.kinds, begin, end) and (end == begin or locations[place, 0] != 0)
         if is_plain and cut_segment(segments, item, boundary, contacts, cuts):
-            row = emit(segments, item, place, locations[place, 0] >= 0, cuts, 0, end - begin, out, row)
+            row = emit(segments, item, place, locations[place, 0] >= 0, cuts, end - begin, out, row)
             state[place] = SETTLED
             continue
         n = cut_touching(segments, item, boundary, contacts, cuts)

@@ -27,6 +27,8 @@ from engine.segment_clipping.on_boundary.triangle_contact import corner
 INSIDE_BEFORE: Final = 2
 OUTSIDE_BEFORE: Final = -2
 """Location of the second end that says where the line beside the segment is before its first contact."""
+_AT_END: Final = 2 * END + 5
+"""The code of what is crossed there; one less, of what is not."""
 _AT_ONCE: Final = 64
 """Chords whose contacts are held together."""
 _PLACES: Final = (0.5, 0.3125, 0.8125)
@@ -71,7 +73,7 @@ def _turns(
     sure and no edge runs there; then the elements that hold its end, and whose they are."""
     met, kinds, offsets = contacts_with(segments, boundary, budget)
     owners = np.repeat(np.arange(len(segments)), np.diff(offsets))
-    holds_end = (kinds >= 2 * END + 4) & (kinds <= 2 * END + 5)
+    holds_end = kinds | 1 == _AT_END
     turning = owners[(kinds & 1 == 1) & ~holds_end]
     is_sure = np.ones(len(segments), np.bool_)
     is_sure[owners[kinds == DEGENERATE]] = False

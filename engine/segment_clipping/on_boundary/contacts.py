@@ -73,6 +73,12 @@ def edge_contacts_for(n_segments: int, n_contacts: int) -> EdgeContacts:
 
 
 @merged
+def code_of(place: int, is_crossed: bool) -> int:
+    """Return the code of what is touched at a place."""
+    return 2 * place + (5 if is_crossed else 4)
+
+
+@merged
 def place_of(code: int) -> int:
     """Return the place that a code tells."""
     return ((code & (ALONG - 1)) >> 1) - 2
@@ -87,7 +93,7 @@ def touched_edge(of_a: int, of_b: int, of_p: int, of_q: int) -> int:
     if of_a == 0 and of_b == 0:
         return ALONG
     place = START if of_p == 0 else END if of_q == 0 else 0 if of_a == 0 else 1
-    return 2 * place + 4 + ((of_a == 1) != (of_b == 1))
+    return code_of(place, (of_a == 1) != (of_b == 1))
 
 
 @called

@@ -23,21 +23,21 @@ def crossings_for(n: int, dimension: int) -> Crossings:
 
 
 @inline
-def sort_crossings(cuts: Crossings, first: int, n: int) -> bool:
-    """Set the order of n crossings from `first` on by t; False where two are equal."""
+def sort_crossings(cuts: Crossings, n: int) -> bool:
+    """Set the order of the first n crossings by t; False where two are equal."""
     t, order = cuts.t, cuts.order
-    for i in range(first, first + n):
+    for i in range(n):
         order[i] = i
     gap = n // 2
     while gap > 0:  # bound: gap is halved; Shell's sort, n^1.5 steps
-        for i in range(first + gap, first + n):
+        for i in range(gap, n):
             moved, j = order[i], i
-            while j >= first + gap and t[order[j - gap]] > t[moved]:
+            while j >= gap and t[order[j - gap]] > t[moved]:
                 order[j] = order[j - gap]
                 j -= gap
             order[j] = moved
         gap //= 2
     differ = True
-    for i in range(first + 1, first + n):
+    for i in range(1, n):
         differ &= t[order[i - 1]] != t[order[i]]
     return differ

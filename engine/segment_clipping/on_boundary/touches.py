@@ -13,7 +13,7 @@ from engine.lanes.triangles import AXES_BEFORE, longest_axis
 from engine.predicates.error_free import workspace
 from engine.predicates.orientation import orient3d
 from engine.predicates.parameters import compare_differences
-from engine.segment_clipping.on_boundary.contacts import DEGENERATE, END, START, place_of
+from engine.segment_clipping.on_boundary.contacts import DEGENERATE, END, START, code_of, place_of
 from engine.segment_clipping.on_boundary.triangle_contact import UNDERFLOW, corner
 from engine.segment_clipping.pieces import Triple
 from engine.types import UNDECIDED, Point3
@@ -37,7 +37,7 @@ def touched_triangle(elements: Any, element: int, p: Point3, q: Point3) -> int:
     place = START if of_p == 0 else END if of_q == 0 else 3 if ab == 0 else 4 if bc == 0 else 5
     if place < START and (ab == 0) + (bc == 0) + (ca == 0) == 2:
         place = 0 if bc != 0 else 1 if ca != 0 else 2
-    return 2 * place + 4 + (first == second and second == third)
+    return code_of(place, first == second and second == third)
 
 
 @called

@@ -20,6 +20,7 @@ from engine.segment_clipping.on_boundary.contacts import (
     END,
     PROPER,
     START,
+    code_of,
     place_of,
 )
 from engine.segment_clipping.on_boundary.crossing_values import cut_at, is_item_safe, line_values, plane_values
@@ -48,7 +49,7 @@ def cut_touching(segments: Any, item: int, boundary: Any, contacts: Any, cuts: C
             n = _put_place(segments, item, boundary.elements, CROSSED if kind == PROPER else kind, cuts, n)
         if n == UNSURE:
             return UNSURE
-    sort_crossings(cuts, 0, n)
+    sort_crossings(cuts, n)
     return n
 
 
@@ -89,12 +90,12 @@ def _put_stretch(segments: Any, item: int, elements: Any, cuts: Crossings, n: in
     begin = START if (a <= p if rises else a >= p) else near
     end = END if (b >= q if rises else b <= q) else 1 - near
     if b == p or a == q:  # case: one point
-        return _put_place(segments, item, elements, (2 * (START if b == p else END) + 4) | ALONG, cuts, n)
-    n = _put_place(segments, item, elements, (2 * begin + 4) | ALONG | BEGINS, cuts, n)
+        return _put_place(segments, item, elements, code_of(START if b == p else END, False) | ALONG, cuts, n)
+    n = _put_place(segments, item, elements, code_of(begin, False) | ALONG | BEGINS, cuts, n)
     if n == UNSURE:
         return UNSURE
     cuts.met[n], cuts.faces[n] = element, face
-    return _put_place(segments, item, elements, (2 * end + 4) | ALONG | CEASES, cuts, n)
+    return _put_place(segments, item, elements, code_of(end, False) | ALONG | CEASES, cuts, n)
 
 
 @inline

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+import engine
 from engine.parallel import Budget
 from engine.segment_clipping.clip_segments import SegmentPieces, clip_segments
 from engine.segment_clipping.pieces import Piece
@@ -66,6 +70,16 @@ def assert_exact(pieces: SegmentPieces, segments: Floats, region: Solid) -> None
 def check(segments: Floats, region: Solid) -> None:
     segments = np.asarray(segments, np.float64)
     assert_exact(clip_segments(segments, region), segments, region)
+
+
+def assert_same_uncompiled(test: str) -> None:
+    """Assert that a test's `uncompiled_sample` passes with the kernels as plain Python, in a process of its own."""
+    root, code = Path(engine.__file__).resolve().parents[1], f"import {test} as t; t.uncompiled_sample()"
+    environment = {"NUMBA_DISABLE_JIT": "1", "PATH": "", "PYTHONPATH": str(root)}
+    run = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code], cwd=root, env=environment, capture_output=True, text=True
+    )
+    assert run.returncode == 0, run.stderr
 
 
 def nudged(rng: np.random.Generator, values: Floats, steps: int = 4) -> Floats:

@@ -5,10 +5,7 @@ from __future__ import annotations
 import doctest
 import itertools
 import math
-import subprocess
-import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -30,7 +27,14 @@ from engine.solids.convex import Convex
 from engine.solids.half_space import HalfSpace
 from engine.solids.sphere import Sphere
 from engine.solids.triangle import Triangle
-from tests.unit.segment_clipping.scenes import check, families, lattice_segments, random_segments, through
+from tests.unit.segment_clipping.scenes import (
+    assert_same_uncompiled,
+    check,
+    families,
+    lattice_segments,
+    random_segments,
+    through,
+)
 
 FAMILIES = ["random", "lattice", "targets", "tiny", "long", "mixed", "denormal", "chords"]
 CORNERS = {n: np.array(list(itertools.product([-1.0, 2.0], repeat=n))) for n in (2, 3)}
@@ -180,13 +184,7 @@ def test_the_example() -> None:
 
 def test_uncompiled_is_the_same() -> None:
     """The kernels as plain Python, in a process of their own, on a small sample."""
-    code = "import tests.unit.segment_clipping.test_clip_segments as t; t.uncompiled_sample()"
-    root = Path(__file__).resolve().parents[3]
-    environment = {"NUMBA_DISABLE_JIT": "1", "PATH": "", "PYTHONPATH": str(root)}
-    run = subprocess.run(
-        [sys.executable, "-W", "error", "-c", code], cwd=root, env=environment, capture_output=True, text=True
-    )
-    assert run.returncode == 0, run.stderr
+    assert_same_uncompiled(__name__)
 
 
 def uncompiled_sample() -> None:

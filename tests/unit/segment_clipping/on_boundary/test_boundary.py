@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +15,14 @@ from engine.solids.base import Solid
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
 from tests.reference.shapes import box, union_of
-from tests.unit.segment_clipping.scenes import assert_exact, check, families, random_segments, through
+from tests.unit.segment_clipping.scenes import (
+    assert_exact,
+    assert_same_uncompiled,
+    check,
+    families,
+    random_segments,
+    through,
+)
 
 FAMILIES = ["random", "lattice", "targets", "tiny", "long", "mixed", "denormal", "chords"]
 COMB = [[-2, -1], [2, -1], [2, 2], [1, 2], [1, 0], [0, 0], [0, 2], [-1, 2], [-1, 0], [-2, 0]]
@@ -170,13 +175,7 @@ def test_large_meshes_agree_with_point_location(data: Path) -> None:
 
 
 def test_uncompiled_is_the_same() -> None:
-    code = "import tests.unit.segment_clipping.on_boundary.test_boundary as t; t.uncompiled_sample()"
-    root = Path(__file__).resolve().parents[3]
-    environment = {"NUMBA_DISABLE_JIT": "1", "PATH": "", "PYTHONPATH": str(root)}
-    run = subprocess.run(
-        [sys.executable, "-W", "error", "-c", code], cwd=root, env=environment, capture_output=True, text=True
-    )
-    assert run.returncode == 0, run.stderr
+    assert_same_uncompiled(__name__)
 
 
 def uncompiled_sample() -> None:
