@@ -18,7 +18,7 @@ from starlette.requests import ClientDisconnect
 from starlette.types import Receive
 
 from service.errors import ServiceError
-from service.json_arrays import Body
+from service.json_pieces import Body
 from service.work import FOOTPRINT, Call
 
 JSON: Final = "application/json"

@@ -13,7 +13,6 @@ text, rows of several lengths, an integer too large) is `Unfit`: the other decod
 
 from __future__ import annotations
 
-import mmap
 import re
 from itertools import chain
 from math import prod
@@ -22,6 +21,9 @@ from typing import Any, Final
 import jiter
 import numpy as np
 import simdjson
+
+from service import json_pieces
+from service.json_pieces import Body
 
 PIECE: Final = 2**16
 """Bytes parsed at once: 0.2 ms, and text and result stay in the processor's cache."""
@@ -39,9 +41,6 @@ _MARK: Final = -(10**18)
 """Stands for the first array in the rest of the text; the others follow downwards."""
 
 
-Body = bytes | bytearray | mmap.mmap
-
-
 class Unfit(Exception):
     """The text, or an array in it, is none that is taken here."""
 
@@ -57,8 +56,8 @@ def decode(body: Body) -> Any:
     if not arrays:
         raise Unfit
     try:
-        document = jiter.from_json(b"".join([*rest, body[end:]]), cache_mode="keys", catch_duplicate_keys=True)
-    except ValueError:
+        document = json_pieces.decode(b"".join([*rest, body[end:]]))
+    except json_pieces.NotJson:
         raise Unfit from None
     waiting = {_MARK - i_array: array for i_array, array in enumerate(arrays, 1)}
     document = _put(document, waiting)
@@ -78,7 +77,7 @@ def _sections(body: Body) -> list[tuple[int, int]]:
         start, quote = quote + 1, _find(body, b'"', quote + 1, len(body))
         stop = quote if quote >= 0 else len(body)
         if stop - start >= LEAST:
-            value = _VALUE.match(body, start, stop)
+            value = _VALUE.match(body, start, min(stop, start + LEAST))
             brace = _find(body, b"}", start, stop)
             end = brace if brace >= 0 else body.rfind(b",", start, stop)
             if value is not None and end > value.end():

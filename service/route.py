@@ -27,7 +27,7 @@ from service import body, traces, wire
 from service.body import JSON
 from service.convert.questions import existing, is_light
 from service.errors import STATUS, ServiceError, faults_of, faults_of_validation, problem
-from service.json_arrays import Body
+from service.json_pieces import Body
 from service.work import Call, Pool
 
 log = logging.getLogger("service")
@@ -157,7 +157,7 @@ class _Job:
                     del document
             self.call.remaining()
             self.call.take(wire.cost_of(text))
-            document = wire.decode(text)
+            document = wire.decode(text, self.call.remaining)
             try:
                 self.question = self.adapter.validate_python(document, context=self.call)
             except ValidationError as error:

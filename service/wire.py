@@ -2,8 +2,9 @@
 
 Decoding: jiter, pydantic's own parser, as fast as orjson and stricter: integers of any size stay integers, 1e400 and
 NaN arrive as infinity and NaN and are refused later with a pointer, a field that stands twice is refused. Floats come
-out as `float()` makes them of the same text (tests hold it against many). Nesting ends at 200 levels. Long arrays of
-numbers in bodies without a fault go through simdjson instead (json_arrays.py), with the same result.
+out as `float()` makes them of the same text (tests hold it against many). Nesting ends at 200 levels. Long texts are
+parsed in pieces (json_pieces.py). Long arrays of numbers in bodies without a fault go through simdjson instead
+(json_arrays.py), with the same result.
 Encoding: orjson, straight from numpy arrays: 8 times faster than pydantic's encoder on booleans, 2.5 times on floats.
 Long lists are made and encoded in parts, since orjson lets no other thread run meanwhile, and sent so: none is ever
 whole in memory.
@@ -17,13 +18,12 @@ from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from typing import Any, Final, NamedTuple
 
-import jiter
 import numpy as np
 import orjson
 import zstandard
 from pydantic import BaseModel
 
-from service import json_arrays
+from service import json_arrays, json_pieces
 from service.errors import ServiceError
 
 PART: Final = 20_000
@@ -65,7 +65,7 @@ class Series(NamedTuple):
         return bool(max(self.n, n_numbers) > PART)
 
 
-def decode_fast(body: json_arrays.Body) -> Any:
+def decode_fast(body: json_pieces.Body) -> Any:
     """Return what `decode` returns, with ndarrays in the place of long arrays of numbers; None if there are none, or
     if anything about the body is not as it should be: then `decode` finds out what."""
     if len(body) < json_arrays.LEAST:
@@ -76,16 +76,18 @@ def decode_fast(body: json_arrays.Body) -> Any:
         return None
 
 
-def decode(body: json_arrays.Body) -> Any:
-    """Return the value that the JSON text `body` stands for; `not_json` otherwise."""
-    text = bytes(memoryview(body))
+def decode(body: json_pieces.Body, poll: Callable[[], object] = lambda: None) -> Any:
+    """Return the value that the JSON text `body` stands for; `not_json` otherwise.
+
+    poll: called now and then; what it raises ends the work.
+    """
     try:
-        return jiter.from_json(text, cache_mode="keys", catch_duplicate_keys=True)
-    except ValueError as error:
-        raise ServiceError("not_json", _refusal(text, str(error))) from None
+        return json_pieces.decode(body, poll)
+    except json_pieces.NotJson as error:
+        raise ServiceError("not_json", _refusal(body, str(error))) from None
 
 
-def cost_of(body: json_arrays.Body) -> int:
+def cost_of(body: json_pieces.Body) -> int:
     """Return how many bytes decoding holds at most beyond what is counted for each byte: short lists and objects take
     far more than their text."""
     if len(body) < json_arrays.LEAST:
@@ -98,14 +100,17 @@ def cost_of(body: json_arrays.Body) -> int:
     return max(0, sum(cost * counts[mark] for mark, cost in _COSTS.items()) - 2 * len(body))
 
 
-def _refusal(text: bytes, found: str) -> str:
-    if not text.strip():
+def _refusal(body: json_pieces.Body, found: str) -> str:
+    text = bytes(memoryview(body)[: json_pieces.PIECE])
+    if len(text) == len(body) and not text.strip():
         return "the body is empty; send a JSON object, /docs has an example for each call"
     if text.startswith(_BOM):
         return "the body begins with a byte order mark; send it as UTF-8 without one"
     if text[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return "the body is UTF-16; send it as UTF-8"
-    what = "leave one of the two out" if found.startswith("Detected duplicate key") else "correct it there"
+    what = "correct it there"
+    if found.startswith(("Detected duplicate key", "a name, text or number")):
+        what = "leave one of the two out" if found.startswith("D") else "shorten it"
     return f"the body is no JSON that is taken here: {found:.200}; {what}"
 
 

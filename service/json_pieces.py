@@ -1,0 +1,152 @@
+"""JSON text into Python values piece by piece, so that no other thread waits long and a deadline is seen.
+
+jiter, pydantic's own parser, holds the interpreter's lock while it parses: half a second for 30 MB. A long text is cut
+before commas that stand outside strings. A piece is made whole by the brackets that are open before it and after it,
+and parsed; what it adds goes into the lists and objects that are open still. So ``{"a":[1,2],"b":[3,4]}``, cut before
+its second comma, is read as ``{"a":[1,2]}`` and ``{MARK:0,"b":[3,4]}``.
+
+One name, text or number is never cut, and refused beyond `LONGEST`.
+"""
+
+from __future__ import annotations
+
+import mmap
+import re
+import secrets
+from collections.abc import Callable
+from typing import Any, Final
+
+import jiter
+import numpy as np
+
+Body = bytes | bytearray | mmap.mmap
+
+PIECE: Final = 2**16
+"""Bytes parsed at once: a millisecond."""
+LONGEST: Final = 2**20
+"""Bytes that may follow each other without a comma outside strings."""
+
+_PLACE: Final = re.compile(r"(.*) at line (\d+) column (\d+)", re.DOTALL)
+_MARK: Final = secrets.token_hex(16)
+"""The name, within a piece, of what an earlier piece began: none that a body could have by intent."""
+_NO_BRACKETS: Final = bytes(set(range(256)) - set(b"[]{}"))
+
+
+class NotJson(ValueError):
+    """The text is no JSON that is taken here; says what and where."""
+
+
+def decode(text: Body, poll: Callable[[], object] = lambda: None) -> Any:
+    """Return the value that `text` stands for; a name that stands twice in an object is refused.
+
+    poll: called between pieces; what it raises ends the work.
+    Raises: NotJson.
+    """
+    pieces = _Pieces()
+    start = 0
+    while True:  # bound: each piece takes a byte at least, and the last one all that is left
+        stop, brackets = _cut(text, start)
+        piece = bytes(memoryview(text)[start:stop])
+        if stop == len(text):
+            return pieces.last(piece)
+        pieces.add(piece, brackets)
+        start = stop
+        poll()
+
+
+def _cut(text: Body, start: int) -> tuple[int, bytes]:
+    """Return where a piece may end, before a comma or with the text, and the brackets in it outside strings."""
+    size = PIECE
+    while start + size < len(text):  # bound: it doubles, up to `LONGEST`
+        piece = _without_strings(bytes(memoryview(text)[start : start + size]))
+        stop = piece.rfind(b",")
+        if stop > 0:
+            return start + stop, piece[:stop].translate(None, _NO_BRACKETS)
+        size *= 2
+        if size > LONGEST:
+            raise NotJson(f"a name, text or number is longer than {LONGEST} bytes, or so many spaces, at byte {start}")
+    return len(text), b""
+
+
+def _without_strings(piece: bytes) -> bytes:
+    """Return a piece that begins outside of strings, with blanks for what is inside of them."""
+    if b'"' not in piece:
+        return piece
+    codes = np.frombuffer(piece.replace(rb"\\", b"__").replace(rb"\"", b"__"), np.uint8)
+    inside = np.add.accumulate(codes == ord('"'), dtype=np.uint8) & 1  # 256 quotes are as even as none
+    return (codes * (1 - inside)).tobytes()
+
+
+class _Pieces:
+    """What the pieces so far stand for, and what is open at their end."""
+
+    def __init__(self) -> None:
+        self._open: list[Any] = []  # lists and objects, from the outermost in
+        self._brackets = b""  # theirs
+        self._line, self._column = 1, 0  # of the text so far: which line it ends in, and after how many bytes of it
+
+    def add(self, piece: bytes, brackets: bytes) -> None:
+        """Add a piece that is not the last; brackets: those in it outside strings."""
+        opened = self._brackets + brackets
+        shorter = len(opened) + 1
+        while len(opened) < shorter:  # bound: each turn takes a pair at least
+            shorter = len(opened)
+            opened = opened.replace(b"[]", b"").replace(b"{}", b"")
+        if not opened:
+            piece += b","  # case: the text goes on after its value, which the parser refuses
+        elif piece.rstrip()[-1:] in (b"[", b"{"):
+            raise self._wrong(f"expected value at line 1 column {len(piece) + 1}", piece, 0)
+        value = self._parsed(piece, bytes(bracket + 2 for bracket in reversed(opened)))
+        root = self._joined(value, piece)
+        self._open = [root]
+        for _ in opened[1:]:
+            inmost = self._open[-1]
+            self._open.append(inmost[-1] if isinstance(inmost, list) else next(reversed(inmost.values())))
+        self._brackets = opened
+        self._go_past(piece)
+
+    def last(self, piece: bytes) -> Any:
+        """Return the value of the text that ends with `piece`."""
+        return self._joined(self._parsed(piece, b""), piece)
+
+    def _parsed(self, piece: bytes, closing: bytes) -> Any:
+        begun = b"".join(b"[" if bracket == ord("[") else b'{"%b":' % _MARK.encode() for bracket in self._brackets)
+        begun += b"0" if begun else b""
+        try:
+            return jiter.from_json(begun + piece + closing, cache_mode="keys", catch_duplicate_keys=True)
+        except ValueError as error:
+            raise self._wrong(str(error), piece, len(begun)) from None
+
+    def _joined(self, value: Any, piece: bytes) -> Any:
+        """Put what a piece adds into what is open, and return the outermost; value: what the piece stands for."""
+        if not self._open:
+            return value
+        part = value
+        for container in self._open:
+            if isinstance(container, list):
+                inner = part[0]
+                del part[0]
+                container += part
+            else:
+                inner = part.pop(_MARK)
+                if twice := container.keys() & part.keys():
+                    found = f"Detected duplicate key {min(twice)!r:.100} at line 1 column 1"
+                    raise self._wrong(found, piece, 0)
+                container |= part
+            part = inner
+        return self._open[0]
+
+    def _wrong(self, found: str, piece: bytes, n_before: int) -> NotJson:
+        """Return the error for what the parser `found` in a piece, before which `n_before` bytes were put."""
+        place = _PLACE.fullmatch(found)
+        if place is None:
+            return NotJson(found)
+        what, line, column = place[1], int(place[2]), int(place[3])
+        if line == 1:
+            column = max(0, min(column - n_before, len(piece) + 1)) + self._column
+        return NotJson(f"{what} at line {self._line + line - 1} column {column}")
+
+    def _go_past(self, piece: bytes) -> None:
+        n_lines = piece.count(b"\n")
+        self._line += n_lines
+        self._column = len(piece) - piece.rfind(b"\n") - 1 if n_lines else self._column + len(piece)
