@@ -17,8 +17,8 @@ import zstandard
 from starlette.requests import ClientDisconnect
 from starlette.types import Receive
 
+from service.decoding.pieces import Body
 from service.errors import ServiceError
-from service.json_pieces import Body
 from service.work import FOOTPRINT, Call
 
 JSON: Final = "application/json"

@@ -26,8 +26,8 @@ from engine import EngineError
 from service import body, traces, wire
 from service.body import JSON
 from service.convert.questions import existing, is_light
+from service.decoding.pieces import Body
 from service.errors import STATUS, ServiceError, faults_of, faults_of_validation, problem
-from service.json_pieces import Body
 from service.work import Call, Pool
 
 log = logging.getLogger("service")
@@ -148,7 +148,7 @@ class _Job:
             if self.adapter is None:
                 self.question = text
                 return
-            document = wire.decode_fast(text)
+            document = wire.decode_fast(text, self.call.take)
             if document is not None:
                 try:
                     self.question = self.adapter.validate_python(document, context=self.call)

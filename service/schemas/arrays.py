@@ -104,7 +104,9 @@ class Numbers:
         if not self.axes and type(value) is float and isfinite(value) and self.kind == "number":
             return value
         if isinstance(value, np.ndarray):
-            return self._taken(value, call)
+            return self._taken(value, self.axes, call)
+        if self.ragged and type(value) is list and value and isinstance(value[0], np.ndarray):
+            return self._all_taken(value, call)
         dtype, types, _ = _KINDS[self.kind]
         level = [value]
         shape: list[int] = []
@@ -134,11 +136,19 @@ class Numbers:
             return value
         return flat.reshape(shape) if shape else flat.item()
 
-    def _taken(self, array: Array, call: Any) -> Any:
-        """Return `array`, which the fast decoder made of a list without a fault in it, if this field takes it."""
-        if array.ndim != len(self.axes):
+    def _all_taken(self, arrays: list[Array], call: Any) -> list[Array] | None:
+        """Return the items of a list of several lengths if this field takes them."""
+        low, high = self.axes[0].low, _limit(self.axes[0], call)
+        if len(arrays) < low or (high is not None and len(arrays) > high):
             return None
-        for axis, length in zip(self.axes, array.shape):
+        taken = [self._taken(array, self.axes[1:], call) for array in arrays]
+        return taken if all(array is not None for array in taken) else None
+
+    def _taken(self, array: Array, axes: tuple[Axis, ...], call: Any) -> Any:
+        """Return `array`, which the fast decoder made of a list without a fault in it, if this field takes it."""
+        if array.ndim != len(axes):
+            return None
+        for axis, length in zip(axes, array.shape):
             high = _limit(axis, call)
             if length < axis.low or (high is not None and length > high):
                 return None

@@ -71,6 +71,13 @@ class Service:
             assert time.monotonic() < end, "".join(self.log)
             time.sleep(0.05)
 
+    def wait_for_line(self, words: str) -> None:
+        """Wait until the log says so: it arrives a little after what it tells of."""
+        end = time.monotonic() + 60
+        while not any(words in line for line in self.log):
+            assert time.monotonic() < end, "".join(self.log)
+            time.sleep(0.01)
+
     def stop(self) -> int:
         self.process.send_signal(signal.SIGTERM)
         return self.process.wait(300)
@@ -120,7 +127,7 @@ def test_it_becomes_ready_and_answers(service: Service) -> None:
     service.wait_until_ready()
     assert any('"starting on ' in line for line in service.log)
     assert all(json.loads(line)["level"] in ("info", "warning") for line in service.log)
-    assert any('"ready: kernels warm' in line for line in service.log)
+    service.wait_for_line('"ready: kernels warm')
     answer = httpx.post(f"{service.url}/v1/solids", json=SPHERE)
     assert answer.status_code == 201
     head = httpx.head(service.url + answer.headers["location"])

@@ -11,7 +11,7 @@ from typing import Any
 import httpx
 import pytest
 
-from service import json_arrays
+from service.decoding import arrays
 from tests.unit.service.asking import check_problem, examples
 
 pytestmark = pytest.mark.anyio
@@ -87,11 +87,11 @@ async def break_bodies(client: httpx.AsyncClient, count: int) -> set[int]:
 
 
 async def test_broken_bodies_are_refused(client: httpx.AsyncClient, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(json_arrays, "LEAST", 16)  # the examples are short
+    monkeypatch.setattr(arrays, "LEAST", 16)  # the examples are short
     assert await break_bodies(client, 2000) >= {200, 400, 422}
 
 
 @pytest.mark.full
 async def test_many_broken_bodies_are_refused(client: httpx.AsyncClient, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(json_arrays, "LEAST", 16)
+    monkeypatch.setattr(arrays, "LEAST", 16)
     await break_bodies(client, 100_000)

@@ -10,8 +10,8 @@ from typing import Any
 import jiter
 import pytest
 
-from service import json_pieces
-from service.json_pieces import NotJson
+from service.decoding import pieces
+from service.decoding.pieces import NotJson
 
 WORDS = ["", "a", ",", '"', "\\", '\\",', "[", "]}", "{", "é", "\n", '","', "\\\\", "\x00", "a" * 90]
 BYTES = [b",", b'"', b"\\", b"[", b"]", b"{", b"}", b":", b" ", b"\n", b"0", b"\xff", b""]
@@ -19,8 +19,8 @@ BYTES = [b",", b'"', b"\\", b"[", b"]", b"{", b"}", b":", b" ", b"\n", b"0", b"\
 
 @pytest.fixture(autouse=True)
 def small_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(json_pieces, "PIECE", 16)
-    monkeypatch.setattr(json_pieces, "LONGEST", 2**10)
+    monkeypatch.setattr(pieces, "PIECE", 16)
+    monkeypatch.setattr(pieces, "LONGEST", 2**10)
 
 
 def some_value(source: random.Random, depth: int) -> Any:
@@ -38,9 +38,9 @@ def whole(text: bytes) -> Any:
         return error
 
 
-def pieces(text: bytes) -> Any:
+def in_pieces(text: bytes) -> Any:
     try:
-        return repr(json_pieces.decode(text))
+        return repr(pieces.decode(text))
     except NotJson as error:
         return error
 
@@ -60,7 +60,7 @@ def texts(source: random.Random, n: int) -> list[bytes]:
 
 def test_the_value_is_that_of_the_whole_text(seed: str) -> None:
     for text in texts(random.Random(f"pieces {seed}"), 4000):
-        assert pieces(text) == whole(text), text
+        assert in_pieces(text) == whole(text), text
 
 
 def test_what_the_parser_refuses_is_refused(seed: str) -> None:
@@ -69,7 +69,7 @@ def test_what_the_parser_refuses_is_refused(seed: str) -> None:
     for text in texts(source, 6000):
         at = source.randrange(len(text) + 1)
         spoilt = text[:at] + source.choice(BYTES) + text[at + source.randrange(2) :]
-        expected, found = whole(spoilt), pieces(spoilt)
+        expected, found = whole(spoilt), in_pieces(spoilt)
         assert isinstance(found, NotJson) == isinstance(expected, ValueError), spoilt
         if isinstance(expected, str):
             assert found == expected, spoilt
@@ -83,7 +83,7 @@ def test_the_place_of_a_mistake_is_that_in_the_whole_text() -> None:
         spoilt = rows.copy()
         spoilt[i_row] = b"[1, nil]"
         text = b'{"points": [' + (b"," + line_break).join(spoilt) + b"]}"
-        assert str(pieces(text)) == str(whole(text))
+        assert str(in_pieces(text)) == str(whole(text))
 
 
 @pytest.mark.parametrize(
@@ -103,7 +103,7 @@ def test_the_place_of_a_mistake_is_that_in_the_whole_text() -> None:
 )
 def test_no_cut_hides_a_mistake(text: bytes) -> None:
     assert isinstance(whole(text), ValueError)
-    assert isinstance(pieces(text), NotJson)
+    assert isinstance(in_pieces(text), NotJson)
 
 
 @pytest.mark.parametrize(
@@ -111,7 +111,7 @@ def test_no_cut_hides_a_mistake(text: bytes) -> None:
 )
 def test_what_cannot_be_cut_is_refused_beyond_a_length(token: bytes) -> None:
     text = b"[1,2,3,4,5,6,7,8,9," + token + b",1]"
-    assert re.search(r"longer than 1024 bytes.*at byte 18$", str(pieces(text)))
+    assert re.search(r"longer than 1024 bytes.*at byte 18$", str(in_pieces(text)))
 
 
 def test_it_ends_where_it_is_told_to() -> None:
@@ -123,4 +123,4 @@ def test_it_ends_where_it_is_told_to() -> None:
             raise TimeoutError
 
     with pytest.raises(TimeoutError):
-        json_pieces.decode(b"[" + b"1," * 1000 + b"1]", poll)
+        pieces.decode(b"[" + b"1," * 1000 + b"1]", poll)

@@ -1,0 +1,1 @@
+"""JSON text into Python values, its long arrays of numbers into ndarrays."""
