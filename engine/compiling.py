@@ -134,7 +134,8 @@ class _KernelLibrary(_Library):
 
     def finalize(self) -> None:
         for library in reversed(self.below):  # callers first: the linker drops what nobody has asked for yet
-            self._reload_init.update(library._reload_init)
+            if hasattr(library, "_reload_init"):  # since numba 0.63
+                self._reload_init.update(library._reload_init)
             self._final_module.link_in(library.own_module(), preserve=True)
         super().finalize()
 
