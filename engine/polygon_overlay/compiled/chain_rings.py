@@ -59,7 +59,7 @@ def _following(chains: Chains, stars: Stars, n_simple: int, bounds: Any, half: i
 
 
 @merged
-def _pass_point(
+def pass_point(
     rings: Rings, start: int, at: int, point: int, edge: int, turns: bool, meets: int, doubt: int
 ) -> tuple[int, int]:
     """Write a point where the boundary turns, else only the doubt about what follows; return how many points, and the
@@ -88,7 +88,7 @@ def _emit(
         edge = leaving_edge(chains, half)
         meets = MEETS * (fan[node] > 2)
         turns = meets != 0 or turn_of_edges(edges, leaving_edge(chains, before ^ 1), edge) != 0
-        n_points, doubt = _pass_point(
+        n_points, doubt = pass_point(
             rings, start, n_points, nodes[node], edge, turns, meets | marks[edge] & DOUBTFUL, doubt
         )
         is_back, end = half & 1, leaving_edge(chains, half ^ 1)
@@ -99,7 +99,7 @@ def _emit(
             edge = edges.before[v] if is_back else v
             turns = marks[v] & BENT != 0 or orient(edges, edges.before[v], v, edges.after[v]) != 0
             meets = marks[edge] & (RUN | DOUBTFUL)
-            n_points, doubt = _pass_point(rings, start, n_points, v, edge, turns, meets, doubt)
+            n_points, doubt = pass_point(rings, start, n_points, v, edge, turns, meets, doubt)
         before = half
     rings.meets[n_points - 1] |= doubt
     return n_points

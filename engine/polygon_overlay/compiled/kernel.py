@@ -13,7 +13,8 @@ A pair is left MAY_CROSS where rounding came so near another edge that clearance
 vouch for the rounded rings, or put a vertex on the line of its neighbours: its rounded rings may cross. They come
 back as another pair then, each ring a source of its own (ring_nesting.py).
 
-The intersection of two convex rings is convex.py's where floating point is sure of all that it asks.
+The intersection of two convex rings is convex.py's where floating point is sure of all that it asks; two rings that
+only cross each other are walked by crossing_walk.py, from the events on.
 
 Scratch arrays come from the caller, who gives more and calls again where they do not suffice: nothing here allocates,
 so nothing counts references to arrays.
@@ -31,7 +32,8 @@ from engine.polygon_overlay.compiled.clearance import CLEARANCE, certify, corner
 from engine.polygon_overlay.compiled.components import join_faces
 from engine.polygon_overlay.compiled.convex import GENERAL, Passages, Points, intersect_convex
 from engine.polygon_overlay.compiled.crossing_signs import turn_of_edges
-from engine.polygon_overlay.compiled.edge_contacts import find_contacts
+from engine.polygon_overlay.compiled.crossing_walk import do_nothing_but_cross, walk_crossings
+from engine.polygon_overlay.compiled.edge_contacts import Contacts, find_contacts
 from engine.polygon_overlay.compiled.edge_events import sort_events
 from engine.polygon_overlay.compiled.edge_tree import FEW, POLL, RUN, build_tree
 from engine.polygon_overlay.compiled.loading import (
@@ -178,34 +180,53 @@ def _arrange(w: Workspace, loaded: Loaded, kept: Any, nesting: Nesting, stop: An
     if stop[0]:
         return _NONE
     corners_clear = corners_are_clear(edges, n, w.along, margin, w.tree.marks, stop)
+    if nesting.rule == PAIR and do_nothing_but_cross(w.given, w.events, contacts, n_rings, kept):
+        n_found, n_points = walk_crossings(
+            w.given, w.events, w.along, w.chains.at, w.tree.marks, kept, contacts.n_crossings, w.found, stop
+        )
+    else:
+        n_found, n_points = _arrange_chains(w, loaded, kept, nesting, contacts, stop)
+    if n_found == NO_ROOM:
+        return _Arranged(0, 0, 0, 0, False, room + 1)
+    is_clear = is_clear and contacts.are_far and are_clear and corners_clear
+    return _Arranged(n_found, n_points, contacts.n_crossings, contacts.n_exact, is_clear, n_contacts)
+
+
+@merged
+def _arrange_chains(
+    w: Workspace, loaded: Loaded, kept: Any, nesting: Nesting, contacts: Contacts, stop: Any
+) -> tuple[int, int]:
+    """Find the boundary rings of whatever its contacts are; return their number, or NO_ROOM, and that of their points.
+
+    Where the call is to end, nothing found is right.
+    """
+    n, n_rings, edges = loaded.n, loaded.n_rings, w.given.edges
     w.stars.node_of[: n + contacts.n_crossings] = -1
     n_nodes, n_simple, n_chains, n_loose = build_chains(
         w.given, w.events, w.along, w.unions, w.chains, w.stars, w.loose.half, n, n_rings, stop
     )
     if stop[0]:
-        return _NONE
+        return 0, 0
     build_stars(edges, w.chains, w.stars, w.loose, n_nodes, n_simple, n_loose, stop)
     if stop[0]:
-        return _NONE
+        return 0, 0
     n_cycles = number_cycles(w.chains, w.stars, w.faces, n_chains, n_simple, stop)
     if stop[0]:
-        return _NONE
+        return 0, 0
     join_faces(w, w.found.point, (n, n_rings, n_cycles, loaded.n_runs), stop)
     tells = nesting.rule == AGAIN
     n_entries = spread_sources(w.given, w.chains, w.faces, nesting, kept, w.holders, (n_chains, n_cycles), stop)
     if n_entries == NO_ROOM:
-        return _Arranged(0, 0, 0, 0, False, room + 1)
+        return NO_ROOM, 0
     choose_boundary(w.chains, w.faces, n_chains, n_nodes, stop)
     if tells:
         gather_evidence(w.faces, w.holders, n_entries, n_cycles, nesting.shells.shape[0], stop)
     if stop[0]:
-        return _NONE
-    n_found, n_points = walk_rings(
+        return 0, 0
+    return walk_rings(
         edges, w.chains, w.stars, w.faces, w.tree.marks, w.walk, w.found, w.holders, tells,
         (n_chains, n_nodes, n_simple), stop,
     )  # fmt: skip
-    is_clear = is_clear and contacts.are_far and are_clear and corners_clear
-    return _Arranged(n_found, n_points, contacts.n_crossings, contacts.n_exact, is_clear, n_contacts)
 
 
 @merged
