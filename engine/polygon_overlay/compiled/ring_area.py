@@ -12,7 +12,7 @@ What the bound leaves open (a tie, a sum that nearly cancels, exponents near the
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from engine.jit import called, inline, kernel, merged
 from engine.polygon_overlay.compiled.crossing_signs import weight_of
@@ -24,6 +24,11 @@ from engine.predicates.parameters import minor
 
 _TINY = 2.0**-1040
 """More than what an underflow may lose in a term."""
+_LANES: Final = 8
+_SUMS: Final = 3 * _LANES
+_BLOCK: Final = 32
+"""Vertices, one after another in the input, whose terms are summed apart, so many at once. The sums are joined at the
+end: eight terms more are within twice the bound of as many as a block has."""
 
 
 class _Place(NamedTuple):
@@ -150,6 +155,36 @@ def _place(pair: _Pair, sources: Any, k: int, ox: float, oy: float) -> _Place:
     return _exactly(vertices[v, 0], vertices[v, 1], ox, oy)
 
 
+@merged
+def _is_stretch(pair: _Pair, sources: Any, first: int, last: int) -> bool:
+    """Tell whether points first .. last are vertices of one polygon that follow each other in the input."""
+    v, w = sources[first, 0], sources[last, 0]
+    if abs(w - v) != last - first or (v < pair.n) != (w < pair.n):
+        return False
+    step, is_one = 1 if w > v else -1, True
+    some = sources[first : last + 1]
+    for j in range(some.shape[0]):  # no branches: the compiler makes vectors of this loop
+        is_one &= (some[j, 0] == v + step * j) & (some[j, 1] < 0)
+    return is_one
+
+
+@merged
+def _sum_block(vertices: Any, ox: float, oy: float, sign: float, sums: Any) -> None:
+    """Add the terms of `_BLOCK` vertices, those between the first and the last; ox, oy: as of `_twice_area`.
+
+    sums: (3, LANES) totals, what they lost, and sizes. sign: -1 where they are the ring's from the last to the first.
+    """
+    for row in range(1, _BLOCK, _LANES):
+        some = vertices[row - 1 : row + _LANES + 1]
+        for j in range(_LANES):  # no branches: the compiler makes vectors of this loop
+            xh, xl = two_diff(some[j + 1, 0], ox)
+            dh, dl = two_diff(some[j + 2, 1], some[j, 1])
+            ph, pl = dd_mul(xh, xl, sign * dh, sign * dl)
+            sums[j], lost = two_sum(sums[j], ph)
+            sums[_LANES + j] += lost + pl
+            sums[2 * _LANES + j] += abs(xh) * (abs(some[j + 2, 1] - oy) + abs(some[j, 1] - oy))
+
+
 @inline
 def _twice_area(pair: _Pair, sources: Any, first: int, last: int) -> tuple[float, float, float, float]:
     """Return twice the area of a ring as a double-double, the bound of its terms, and the sum of their sizes."""
@@ -159,7 +194,18 @@ def _twice_area(pair: _Pair, sources: Any, first: int, last: int) -> tuple[float
     now = _place(pair, sources, first, ox, oy)
     total = rest = error = size = 0.0
     start, end = now, before
-    for k in range(first, last):
+    sums = workspace(_SUMS)
+    sums[:] = 0.0
+    k = first
+    while k < last:  # bound: each turn passes a point at least
+        if first < k < last - _BLOCK and _is_stretch(pair, sources, k - 1, k + _BLOCK):
+            low, high = sources[k - 1, 0], sources[k + _BLOCK, 0]
+            some, v, _ = _found(pair, min(low, high))
+            _sum_block(some[v : v + _BLOCK + 2], ox, oy, 1.0 if low < high else -1.0, sums)
+            k += _BLOCK
+            before = _place(pair, sources, k - 1, ox, oy)
+            now = _place(pair, sources, k, ox, oy)
+            continue
         after = start if k + 1 == last else end
         if k + 2 < last:
             after = _place(pair, sources, k + 1, ox, oy)
@@ -171,6 +217,11 @@ def _twice_area(pair: _Pair, sources: Any, first: int, last: int) -> tuple[float
         error += now.error * (abs(dh) + off) + abs(now.xh) * off
         size += abs(now.xh) * (abs(after.yh) + abs(before.yh))
         before, now = now, after
+        k += 1
+    for j in range(_LANES):
+        total, lost = two_sum(total, sums[j])
+        rest += lost + sums[_LANES + j]
+        size += sums[2 * _LANES + j]
     total, rest = fast_two_sum(total, rest)
     return total, rest, error, size
 
