@@ -7,17 +7,24 @@ nothing here compares rounded numbers.
 
 from __future__ import annotations
 
+from collections import namedtuple
 from dataclasses import dataclass
 from typing import Any, Literal, Unpack, overload
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray, IntArray
+from engine.arrays import FloatArray, IntArray
+from engine.direct import entry_of
+from engine.jit import inline, kernel
 from engine.parallel import Cancel, Options, Progress, check_options
 from engine.segment_clipping.clip_segments import SegmentPieces, clip_segments
 from engine.solids.base import Solid
-from engine.solids.ragged import as_lines, within
+from engine.solids.ragged import as_lines
 from engine.types import Accuracy
+
+Joined = namedtuple("Joined", "vertices offsets source heads tails")
+"""Room for the pieces of lines: vertices (2 m, dim) of all, offsets (m + 1,) into them; the line of each (m,), and the
+piece of a segment that it begins with, and ends with."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,72 +113,101 @@ def clip_lines(
     check_options(workers, progress, report=report)
     dimension = getattr(region, "dimension", 2)  # what has none is refused below
     vertices, offsets = as_lines(lines, dimension)
-    ends = offsets[1:][np.diff(offsets) > 0] - 1
-    firsts = np.delete(np.arange(len(vertices)), ends)
+    firsts = np.arange(len(vertices) - 1) if len(offsets) == 2 else _firsts_of(offsets, len(vertices))
     segments = np.empty((len(firsts), 2, dimension))
     segments[:, 0], segments[:, 1] = vertices[firsts], vertices[firsts + 1]
-    pieces, accuracy = clip_segments(
-        segments, region, workers=workers, deadline=deadline, cancel=cancel, progress=progress, report=True
-    )
-    found = _joined(pieces, firsts[pieces.source], vertices, offsets)
-    return (found, accuracy) if report else found
+    options: Any = {"workers": workers, "deadline": deadline, "cancel": cancel, "progress": progress, "report": report}
+    pieces = clip_segments(segments, region, **options)
+    if report:
+        return _joined(pieces[0], firsts, vertices, offsets), pieces[1]
+    return _joined(pieces, firsts, vertices, offsets)
 
 
-def _joined(pieces: SegmentPieces, at: IntArray, vertices: FloatArray, offsets: IntArray) -> LinePieces:
-    """Join the pieces of segments; at: the vertex that the segment of each begins with."""
-    line = within(offsets, at)
-    reaches = pieces.faces == -1
-    goes_on = np.zeros(len(at), np.bool_)
-    goes_on[1:] = reaches[:-1, 1] & reaches[1:, 0] & (at[1:] == at[:-1] + 1)
-    order = _closed(line, at, reaches, goes_on, vertices, offsets)
-    if order is not None:
-        pieces = SegmentPieces(*(getattr(pieces, name)[order] for name in SegmentPieces.__slots__))
-        line, at, reaches, goes_on = line[order], at[order], reaches[order], goes_on[order]
-        goes_on[1:] |= (line[1:] == line[:-1]) & (at[1:] < at[:-1])
-    heads = np.flatnonzero(~goes_on)
-    tails = np.append(heads[1:], len(at))[: len(heads)] - 1
-    # the vertices of a piece are the starts of its parts and the end of its last
-    place = np.arange(len(at)) + np.cumsum(~goes_on) - 1
-    made = np.empty((len(at) + len(heads), vertices.shape[1]))
-    made[place], made[place[tails] + 1] = pieces.start, pieces.end[tails]
-    kept = np.ones(len(made), np.bool_)
-    long = heads < tails
-    is_cut = long & ~reaches[heads, 0]
-    after = place[heads[is_cut]] + 1
-    kept[after] = (made[after] != made[after - 1]).any(axis=1)
-    is_cut = long & ~reaches[tails, 1]
-    before = place[tails[is_cut]]
-    kept[before] &= (made[before] != made[before + 1]).any(axis=1)
-    begins = np.append(0, np.cumsum(kept))
-    ends = np.append(place[heads], len(made))
-    sides = np.stack([heads, tails], axis=1)
-    number = at - offsets[line]
+def _firsts_of(offsets: IntArray, n_vertices: int) -> IntArray:
+    """Return the vertices that segments begin with: all but the last of each line."""
+    return np.delete(np.arange(n_vertices), offsets[1:][np.diff(offsets) > 0] - 1)
+
+
+def _joined(pieces: SegmentPieces, firsts: IntArray, vertices: FloatArray, offsets: IntArray) -> LinePieces:
+    """Join the pieces of segments; firsts: the vertex that each segment begins with."""
+    m, at = len(pieces), firsts[pieces.source]
+    starts, ends = np.ascontiguousarray(pieces.start), np.ascontiguousarray(pieces.end)
+    made = Joined(np.empty((2 * m, vertices.shape[1])), np.empty(m + 1, np.int64), *np.empty((3, m), np.int64))
+    n = entry_of(join_parts)(starts, ends, pieces.faces, at, vertices, offsets, made)
+    source, heads, tails = made.source[:n], made.heads[:n], made.tails[:n]
+    sides = np.stack([at[heads], at[tails]], axis=1) - offsets[source][:, None]
     t, faces = (np.stack([each[heads, 0], each[tails, 1]], axis=1) for each in (pieces.t, pieces.faces))
-    return LinePieces(line[heads], made[kept], begins[ends], number[sides], t, faces)
+    return LinePieces(source, made.vertices[: made.offsets[n]], made.offsets[: n + 1], sides, t, faces)
 
 
-def _closed(
-    line: IntArray, at: IntArray, reaches: BoolArray, goes_on: BoolArray, vertices: FloatArray, offsets: IntArray
-) -> Any:
-    """Return the parts in an order in which those from the start of a closed line follow those up to its end.
+@kernel
+def join_parts(starts: Any, ends: Any, faces: Any, at: Any, vertices: Any, offsets: Any, out: Joined) -> int:
+    """Join pieces of segments, from starts (m, dim) to ends, where one begins at the vertex at which the one before
+    reaches the end of its segment; return how many there are then.
 
-    None where there are none to be moved: lines whose two ends differ, or not both within, or in one piece.
+    at: (m,) the vertex that the segment of each begins with; offsets: of the lines into all vertices.
     """
-    sizes = np.diff(offsets)
-    lines = np.flatnonzero(sizes > 0)
-    first, last = offsets[lines], offsets[lines + 1] - 1
-    closes = np.zeros(len(sizes), np.bool_)
-    closes[lines] = (vertices[first] == vertices[last]).all(axis=1)
-    opens = reaches[:, 0] & (at == offsets[line])  # parts that begin where their line does
-    ends = reaches[:, 1] & (at == offsets[line + 1] - 2)
-    for side in (opens, ends):
-        reached = np.zeros(len(sizes), np.bool_)
-        reached[line[side]] = True
-        closes &= reached
-    if not len(line) or not closes.any():
-        return None
-    run = np.cumsum(~goes_on)
-    head = np.searchsorted(line, np.arange(len(sizes)))  # the first part of each line
-    head, tail = head[line], np.searchsorted(line, np.arange(len(sizes)), "right")[line] - 1
-    is_moved = closes[line] & (run == run[head]) & (run[head] != run[tail])
-    return np.argsort(2 * line + is_moved, kind="stable") if is_moved.any() else None
+    n, n_made, begin, line = 0, 0, 0, 0
+    out.offsets[0] = 0
+    while begin < at.size:  # bound: each turn ends a line
+        while at[begin] >= offsets[line + 1]:
+            line += 1
+        end = begin + 1
+        while end < at.size and at[end] < offsets[line + 1]:
+            end += 1
+        size, moved = end - begin, _n_moved(faces, at, begin, end, vertices, offsets[line], offsets[line + 1] - 1)
+        head, before, is_kept = -1, -1, False
+        for place in range(moved, moved + size):
+            part, after = begin + place % size, begin + (place + 1) % size
+            if head < 0:
+                head, out.source[n], out.heads[n] = part, line, part
+                n_made = _put(out.vertices, n_made, starts, part)
+            else:
+                is_kept = before != head or faces[head, 0] < 0 or not _are_same(starts, head, starts, part)
+                n_made = _put(out.vertices, n_made, starts, part) if is_kept else n_made
+            before = part
+            if place + 1 < moved + size and (after == begin or _goes_on(faces, at, part, after)):
+                continue
+            if part != head and is_kept and faces[part, 1] >= 0 and _are_same(starts, part, ends, part):
+                n_made -= 1
+            n_made, head, out.tails[n] = _put(out.vertices, n_made, ends, part), -1, part
+            n += 1
+            out.offsets[n] = n_made
+        begin = end
+    return n
+
+
+@inline
+def _goes_on(faces: Any, at: Any, part: int, after: int) -> bool:
+    """Tell whether a part reaches the end of its segment, and the one after it begins the next there."""
+    return (faces[part, 1] < 0) & (faces[after, 0] < 0) & (at[after] == at[part] + 1)
+
+
+@inline
+def _n_moved(faces: Any, at: Any, begin: int, end: int, vertices: Any, first: int, last: int) -> int:
+    """Return how many parts of a line, from its first vertex on, follow those up to its last: 0 unless both vertices
+    are one, both within, and not all parts are connected."""
+    if at[begin] != first or at[end - 1] != last - 1 or faces[begin, 0] >= 0 or faces[end - 1, 1] >= 0:
+        return 0
+    if not _are_same(vertices, first, vertices, last):
+        return 0
+    for part in range(begin + 1, end):
+        if not _goes_on(faces, at, part - 1, part):
+            return part - begin
+    return 0
+
+
+@inline
+def _put(rows: Any, row: int, points: Any, point: int) -> int:
+    """Copy a point; return the row after it."""
+    for k in range(points.shape[1]):
+        rows[row, k] = points[point, k]
+    return row + 1
+
+
+@inline
+def _are_same(points: Any, point: int, others: Any, other: int) -> bool:
+    are_same = True
+    for k in range(points.shape[1]):
+        are_same &= points[point, k] == others[other, k]
+    return are_same
