@@ -38,7 +38,8 @@ def frames_of(poses: Sequence[Pose | None], dimension: int) -> Frames:
     is_moved = translations.any(axis=1) | (rotations != np.eye(3)).any(axis=(1, 2))
     rotations, translations = rotations[is_moved], np.ascontiguousarray(translations[is_moved])
     rows[np.array([body for body, _ in given])[is_moved]] = np.arange(len(rotations))
-    is_turn = np.isin(rotations, (-1.0, 0.0, 1.0)).all(axis=(1, 2)) & (np.abs(rotations).sum(axis=1) == 1.0).all(axis=1)
+    sizes = np.abs(rotations)
+    is_turn = ((sizes == 0.0) | (sizes == 1.0)).all(axis=(1, 2)) & (sizes.sum(axis=1) == 1.0).all(axis=1)
     return Frames(rows, rotations, _inverses(rotations), translations, is_turn)
 
 

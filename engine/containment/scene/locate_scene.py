@@ -15,6 +15,7 @@ import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray
 from engine.containment.scene.first_pass import drop_outside, put_in_order, scan_points, sort_by_cell
+from engine.containment.scene.one_by_one import are_few, locate_one_by_one
 from engine.containment.scene.second_pass import settle_rest
 from engine.containment.scene.tables import Scene, scene_of
 from engine.errors import InvalidArrayError, WrongDimensionError
@@ -118,8 +119,26 @@ def locate_scene(
     check_options(workers, progress, report=report)
     array = as_points(points, solids[0].dimension if len(solids) else None)
     with Budget(deadline, cancel) as budget:
-        found = locate_in(array, scene_of(solids, poses, array.shape[1], budget), budget, workers, progress)
+        if are_few(array, solids):
+            found = locate_few(array, solids, poses, budget)
+            if progress is not None:
+                progress(len(array))
+        else:
+            found = locate_in(array, scene_of(solids, poses, array.shape[1], budget), budget, workers, progress)
     return found if report else found[0]
+
+
+def locate_few(
+    array: FloatArray, solids: Sequence[Solid], poses: Sequence[Pose | None] | None, budget: Budget
+) -> tuple[SceneLocations, Accuracy]:
+    """Return the bodies that hold each of a few checked points (`are_few`)."""
+    located, counts, is_exact = locate_one_by_one(array, solids, poses, budget)
+    n = len(array)
+    owners, bodies = np.nonzero(located.T >= 0)
+    offsets = np.searchsorted(owners, np.arange(n + 1))
+    decisions: Literal["exact", "float64"] = "exact" if is_exact else "float64"
+    accuracy = Accuracy(decisions, None, n, min(n, counts.beyond), min(n, counts.rational), "box_grid")
+    return SceneLocations(offsets, bodies, located[bodies, owners] == 0), accuracy
 
 
 def locate_in(
