@@ -60,7 +60,7 @@ def words_of(bodies: BodyTree, names: IntArray, placed: IntArray) -> tuple[list[
     return [len(bodies.low), low, high, len(tree.child), boxes, child, bounded, len(bodies.listed), listed, *more], kept
 
 
-def order_of(segments: FloatArray, t: float, where: Where) -> IntArray:
+def order_of(segments: FloatArray, t: float, where: Any) -> IntArray:
     """Return an order of segments in which those follow each other that are near each other at t, where they are many:
     these find in the cache what others were asked about."""
     n = len(segments)

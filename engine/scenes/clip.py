@@ -8,19 +8,20 @@ from __future__ import annotations
 
 from dataclasses import fields
 from functools import lru_cache
+from math import isfinite
 from typing import Any, Final, cast
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray, IntArray
+from engine.arrays import BoolArray, FlagArray, FloatArray, IntArray
 from engine.containment.locators import locator_of
 from engine.direct import entry_of
-from engine.parallel import Budget, run_chunks
+from engine.parallel import UNLIMITED, Budget, run_chunks
 from engine.scenes.broad_phase import order_of
 from engine.scenes.ends import Exact, Found, ScenePieces, in_order, joined
 from engine.scenes.posed_mesh import MOST_MET, scratch_for
 from engine.scenes.standing import Standing
-from engine.scenes.through import MET, cut_near, find_first
+from engine.scenes.through import MET, Firsts, cut_near, find_first
 from engine.segment_clipping.clip_segments import method_for
 from engine.segment_clipping.decide_then_cut import FEW, clip_on_convex
 from engine.segment_clipping.on_boundary.boundary import clip_chunk, clip_few
@@ -28,6 +29,7 @@ from engine.segment_clipping.on_boundary.prepared_boundary import boundary_of
 from engine.segment_clipping.pieces import Pieces, first_of, room_for
 from engine.segment_clipping.profiles import ExactPiece, exact_pieces, settled
 from engine.solids.base import Solid
+from engine.solids.checks import is_ready
 from engine.solids.pose import Pose
 from engine.types import OPEN, UNDECIDED
 
@@ -74,15 +76,38 @@ def _exact_ends(segments: FloatArray, standing: Standing, budget: Budget) -> Exa
     return lambda source, body, number: (pieces(source, body)[number].first, pieces(source, body)[number].last)
 
 
+def answer_few(segments: Any, standing: Standing, keep: str) -> ScenePieces | BoolArray | None:
+    """Return what `Scene.clip_segments` does of an array of a few segments, not yet looked at for NaN, in half the time
+    that the general way takes; None where nothing is kept of the scene yet, or a segment is left open."""
+    solids = standing.base.solids
+    if not solids or not is_ready(segments, 2, solids[0].dimension) or not 0 < len(segments) < _FEW:
+        return None
+    if standing.base.kept("words") is None or type(keep) is not str or keep not in ("all", "first", "any"):
+        return None
+    if keep == "all":
+        parts, left = _cut_near(segments, order_of(segments, 0.5, None), 0, len(segments), standing, UNLIMITED)
+        if left or not isfinite(segments.sum()):
+            return None
+        found = joined(parts, segments.shape[2])
+        return in_order(found, len(segments), lambda: _exact_ends(segments, standing, UNLIMITED))
+    state, out = _searched(segments, standing, keep == "any", UNLIMITED, None)
+    if OPEN in state.tobytes():
+        return None
+    return state.view(np.bool_) if keep == "any" else _met(state, out)
+
+
+def _met(state: FlagArray, out: Firsts) -> ScenePieces:
+    """Return the pieces of those segments that are MET."""
+    met = np.flatnonzero(state == MET)
+    return ScenePieces(met, *(out if len(met) == len(state) else [each.take(met, axis=0) for each in out]))
+
+
 def clip_first(
     segments: FloatArray, standing: Standing, counts: Counts, budget: Budget, workers: int | None
 ) -> ScenePieces:
     """Return the first piece of each segment that meets a body, of those that begin at one point that of the first."""
-    state, bodies, out = _searched(segments, standing, False, budget, workers)
-    left, met = np.flatnonzero(state == OPEN), np.flatnonzero(state == MET)
-    sure = ScenePieces(met, *(each.take(met, axis=0) for each in (bodies, *out.ends, out.t, out.faces, out.faces)))
-    sure.ranks[:, 0], sure.ranks[:, 1] = 0, sure.faces[:, 1] >= -1
-    sure.faces[:, 1] = np.where(sure.ranks[:, 1], sure.faces[:, 1], sure.faces[:, 0])
+    state, out = _searched(segments, standing, False, budget, workers)
+    left, sure = np.flatnonzero(state == OPEN), _met(state, out)
     if not len(left):
         return sure
     more = Counts(len(left))
@@ -100,7 +125,7 @@ def meets_any(
     segments: FloatArray, standing: Standing, counts: Counts, budget: Budget, workers: int | None
 ) -> BoolArray:
     """Return of each segment whether it meets a body."""
-    state, _, _ = _searched(segments, standing, True, budget, workers)
+    state, _ = _searched(segments, standing, True, budget, workers)
     found: BoolArray = state == MET
     left = np.flatnonzero(state == OPEN)
     more = Counts(len(left))
@@ -112,16 +137,18 @@ def meets_any(
 
 def _searched(
     segments: FloatArray, standing: Standing, is_any: bool, budget: Budget, workers: int | None
-) -> tuple[Any, IntArray, Pieces]:
-    """Return of each segment the state, and where it is MET a body and, unless `is_any`, in its row the first piece."""
+) -> tuple[FlagArray, Firsts]:
+    """Return of each segment the state and, unless `is_any`, in its row the first piece where it is MET."""
     n, dimension = len(segments), segments.shape[2]
-    found = np.empty(n, np.uint8), np.empty(n, np.int64), room_for(0 if is_any else n, dimension)
-    words, order = standing.words(budget), order_of(segments, 0.0, standing.where(budget))
+    m, words, order = (0 if is_any else n), standing.words(budget), order_of(segments, 0.0, standing.where(budget))
+    state, numbers = np.empty(n, np.uint8), np.empty((2, m, 2), np.int64)
+    start, end = np.empty((2, m, dimension))
+    out = Firsts(np.empty(m, np.int64), start, end, np.empty((m, 2)), numbers[0], numbers[1])
 
     def task(first: int, last: int) -> None:
         reached, room = np.array([first, 0, 0]), scratch_for(standing.n_rows)
         while reached[0] < last:  # bound: each turn reaches the end, or prepares what a body wants
-            entry_of(find_first)(segments, order, last, words, room, is_any, budget.flag, *found, reached)
+            entry_of(find_first)(segments, order, last, words, room, is_any, budget.flag, state, out, reached)
             budget.check()
             if reached[1] < 0:
                 standing.prepare(int(reached[2]), int(reached[1]), budget)
@@ -130,7 +157,7 @@ def _searched(
         task(0, n)
     else:
         run_chunks(task, n, budget=budget, workers=workers)
-    return found
+    return state, out
 
 
 def _parts(

@@ -291,12 +291,16 @@ def crossings_in(body: Any, segments: Any, item: int, is_any: bool, words: Any, 
     if n_met < 0 or (is_any and n_met > 0):
         return n_met, False
     if is_closed and _is_near_box(numbers, p, blur):
-        if lines[TREE] == 0:
-            return WANTS_TREE, False
-        at, _ = locate_in_tree(_tree_of(body[2]), p, 2.0 * blur, scratch.stack, stop)
-        if at == UNDECIDED or (at == 0 and not is_any):
-            return UNSURE, False
-        is_in = at >= 0
+        if _is_near_box(numbers, q, blur):
+            if lines[TREE] == 0:
+                return WANTS_TREE, False
+            at, _ = locate_in_tree(_tree_of(body[2]), p, 2.0 * blur, scratch.stack, stop)
+            if at == UNDECIDED or (at == 0 and not is_any):
+                return UNSURE, False
+            is_in = at >= 0
+        else:
+            for i in range(n_met):
+                is_in ^= scratch.cuts.codes[i] & 1 == 1
     for i in range(n_met):
         if not _cut_at(mesh, segments, item, i, frame, scratch):
             return UNSURE, False

@@ -13,11 +13,12 @@ from engine.collision.clearance.clearance import checked_distance
 from engine.collision.codes import TOUCHING, UNSETTLED
 from engine.collision.collide import check_pose
 from engine.collision.scenes.collide_scene import Asked, ScenePairs, collide_bodies, pair_keys
-from engine.containment.scene.locate_scene import SceneLocations, check_bodies, locate_in
+from engine.containment.scene.locate_scene import SceneLocations, check_bodies, locate_few, locate_in
+from engine.containment.scene.one_by_one import are_few
 from engine.errors import EngineError, IndexOutOfRangeError, InvalidArrayError, InvalidOperationError
 from engine.parallel import Budget, Cancel, Options, Progress, check_options
 from engine.scenes.bodies import Bodies
-from engine.scenes.clip import Counts, clip_all, clip_first, meets_any
+from engine.scenes.clip import Counts, answer_few, clip_all, clip_first, meets_any
 from engine.scenes.ends import ScenePieces, in_order, joined
 from engine.scenes.standing import Standing
 from engine.segment_clipping.parameters import ONE, ZERO
@@ -134,6 +135,12 @@ class Scene(Immutable):
         standing, solids = self._standing, self.solids
         array = as_points(points, solids[0].dimension if solids else None)
         with Budget(deadline, cancel) as budget:
+            if not standing.base.kept("located") and are_few(array, solids):  # the first question
+                standing.base.prepared("located", lambda: True)
+                found, accuracy = locate_few(array, solids, self.poses, budget)
+                if progress is not None:
+                    progress(len(array))
+                return (found, accuracy) if report else found
             tables = standing.base.tables(array.shape[1], budget)
             if 0 < len(array) <= _FEW and solids:
                 found, accuracy = standing.located(array, budget)
@@ -270,6 +277,11 @@ class Scene(Immutable):
         >>> pieces.body.tolist(), pieces.t.tolist()
         ([1, 0], [[0.125, 0.25], [0.5, 0.75]])
         """
+        is_plain = workers is None or (type(workers) is int and workers > 0)
+        if is_plain and deadline is None and cancel is None and progress is None and report is False:
+            few = answer_few(segments, self._standing, keep)
+            if few is not None:
+                return few
         check_options(workers, progress, report=report)
         if not isinstance(keep, str) or keep not in ("all", "first", "any"):
             raise InvalidOperationError(f"keep must be all, first or any, got {keep!r:.50}", ("keep",))

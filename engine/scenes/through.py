@@ -8,6 +8,7 @@ segment whose first piece would be found by two that round alike, or on a body t
 
 from __future__ import annotations
 
+from collections import namedtuple
 from typing import Any, Final
 
 import numpy as np
@@ -43,6 +44,8 @@ MESH: Final = 3
 """Kinds of bodies, UNREADY until one is prepared; OTHER ones are cut in exact arithmetic."""
 MET: Final = 1
 """State of a segment, beside SETTLED, which meets nothing, and OPEN."""
+Firsts = namedtuple("Firsts", "body start end t faces ranks")
+"""One piece of each segment, as `ScenePieces` has them."""
 
 
 @inline
@@ -144,15 +147,21 @@ def _keep_first(scratch: Any, name: int) -> None:
     else:
         found[1] = 0
     best[0], found[0] = t, name
-    _copy_piece(room, 0, room, MOST_MET)
+    for end in range(2):
+        room.t[MOST_MET, end], room.faces[MOST_MET, end] = room.t[0, end], room.faces[0, end]
+        for k in range(3):
+            room.ends[end, MOST_MET, k] = room.ends[end, 0, k]
 
 
 @inline
-def _copy_piece(pieces: Pieces, row: int, out: Pieces, place: int) -> None:
+def _put_first(scratch: Any, out: Firsts, item: int) -> None:
+    """Write the first piece found as that of a segment."""
+    piece, is_long = scratch.room, scratch.room.faces[MOST_MET, 1] >= -1
+    out.body[item], out.ranks[item, 0], out.ranks[item, 1] = scratch.found[0], 0, is_long
+    for k in range(out.start.shape[1]):
+        out.start[item, k], out.end[item, k] = piece.ends[0, MOST_MET, k], piece.ends[1, MOST_MET, k]
     for end in range(2):
-        out.t[place, end], out.faces[place, end] = pieces.t[row, end], pieces.faces[row, end]
-        for k in range(out.ends.shape[2]):
-            out.ends[end, place, k] = pieces.ends[end, row, k]
+        out.t[item, end], out.faces[item, end] = piece.t[MOST_MET, end], piece.faces[MOST_MET, end * is_long]
 
 
 @inline
@@ -225,15 +234,15 @@ def _search(words: Any, side: int, segments: Any, item: int, is_any: bool, room:
 
 @kernel
 def find_first(
-    segments: Any, order: Any, last: int, words: Any, room: Any, is_any: bool, stop: Any, state: Any, bodies: Any,
-    out: Pieces, n: Any,
+    segments: Any, order: Any, last: int, words: Any, room: Any, is_any: bool, stop: Any, state: Any, out: Firsts,
+    n: Any,
 ) -> None:  # fmt: skip
     """Find the first piece of segments (n, 2, dim), those before `last` in an order (n,), or where `is_any` whether
     there is one.
 
-    state: (n,) uint8, SETTLED, MET or OPEN; bodies, out: of those that are MET what the body is called, and in row i
-    the piece. room: of `scratch_for`. n: the segment to begin with, afterwards where to go on; and 0, or why it is
-    not asked (what `crossings_in` wants), and the body.
+    state: (n,) uint8, SETTLED, MET or OPEN; out: of those that are MET, in row i, the piece, unless `is_any`. room: of
+    `scratch_for`. n: the segment to begin with, afterwards where to go on; and 0, or why it is not asked (what
+    `crossings_in` wants), and the body.
     """
     scratch = scratch_at(room)
     noted, n[1] = scratch.found, 0
@@ -253,7 +262,6 @@ def find_first(
         if found == SETTLED:
             found = OPEN if noted[1] != 0 else MET if noted[0] >= 0 else SETTLED
         if found == MET and not is_any:
-            out.source[item] = item
-            _copy_piece(scratch.room, MOST_MET, out, item)
-        state[item], bodies[item] = found, noted[0]
+            _put_first(scratch, out, item)
+        state[item] = found
     n[0] = last
