@@ -26,6 +26,7 @@ N_BODIES, LOW, HIGH, N_NODES, BOXES, CHILD, BOUNDED, N_LISTED, LISTED, NUMBERS, 
 """What stands of a `BodyTree` in a row of whole numbers, sizes and addresses: one is handed on where it would be a
 hundred numbers. NUMBERS: of (4,), inverse and origin. NAMES: of (n,), what moved bodies are called. PLACED: of the
 rows of their `Table`."""
+_MOST_WAY: Final = 2.0**1000
 _SLACK: Final = 2.0**-20
 """By how much a box in the tree's coordinates, at most 2 where it matters, is widened for its rounding to float32."""
 
@@ -134,12 +135,18 @@ def near_bodies(segments: Any, item: int, words: Any, room: Any) -> int:
 
 @inline
 def in_its_box(segments: Any, item: int, bodies: Any, body: int) -> bool:
-    """Tell whether the box of a segment meets that of a body."""
-    meet = True
+    """Tell whether a segment may meet the box of a body: (box - start) / (end - start) loses 4 units of rounding along
+    each axis, or 2^-1074 where it underflows; differences beyond `_MOST_WAY`, which may be infinite, say nothing."""
+    meet, enters, leaves = True, 0.0, 1.0
     for k in range(segments.shape[2]):
         start, end = segments[item, 0, k], segments[item, 1, k]
-        meet &= (min(start, end) <= bodies.high[body, k]) & (max(start, end) >= bodies.low[body, k])
-    return meet
+        low, high = bodies.low[body, k], bodies.high[body, k]
+        meet &= (min(start, end) <= high) & (max(start, end) >= low)
+        way = end - start
+        if way != 0.0 and abs(way) <= _MOST_WAY:
+            first, second = (low - start) / way, (high - start) / way
+            enters, leaves = max(enters, min(first, second)), min(leaves, max(first, second))
+    return meet and not enters > leaves + 2.0**-48 * (abs(enters) + abs(leaves)) + 2.0**-1000
 
 
 @inline
