@@ -139,25 +139,33 @@ def _searched(
     segments: FloatArray, standing: Standing, is_any: bool, budget: Budget, workers: int | None
 ) -> tuple[FlagArray, Firsts]:
     """Return of each segment the state and, unless `is_any`, in its row the first piece where it is MET."""
-    n, dimension = len(segments), segments.shape[2]
-    m, words, order = (0 if is_any else n), standing.words(budget), order_of(segments, 0.0, standing.where(budget))
-    state, numbers = np.empty(n, np.uint8), np.empty((2, m, 2), np.int64)
-    start, end = np.empty((2, m, dimension))
-    out = Firsts(np.empty(m, np.int64), start, end, np.empty((m, 2)), numbers[0], numbers[1])
+    n, words, order = len(segments), standing.words(budget), order_of(segments, 0.0, standing.where(budget))
+    state, out = np.empty(n, np.uint8), _NONE if is_any else _firsts_for(n, segments.shape[2])
 
     def task(first: int, last: int) -> None:
         reached, room = np.array([first, 0, 0]), scratch_for(standing.n_rows)
-        while reached[0] < last:  # bound: each turn reaches the end, or prepares what a body wants
+        while True:  # bound: each turn reaches the end, or prepares what a body wants
             entry_of(find_first)(segments, order, last, words, room, is_any, budget.flag, state, out, reached)
             budget.check()
-            if reached[1] < 0:
-                standing.prepare(int(reached[2]), int(reached[1]), budget)
+            _, wanted, body = reached.tolist()
+            if wanted == 0:
+                break
+            standing.prepare(body, wanted, budget)
 
     if n < _FEW:
         task(0, n)
     else:
         run_chunks(task, n, budget=budget, workers=workers)
     return state, out
+
+
+def _firsts_for(n: int, dimension: int) -> Firsts:
+    """Return room for the first piece of n segments."""
+    (start, end), (faces, ranks) = np.empty((2, n, dimension)), np.empty((2, n, 2), np.int64)
+    return Firsts(np.empty(n, np.int64), start, end, np.empty((n, 2)), faces, ranks)
+
+
+_NONE: Final = _firsts_for(0, 3)
 
 
 def _parts(
