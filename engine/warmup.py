@@ -29,6 +29,7 @@ from engine.polygon_clipping.clip_polygons import clip_polygons
 from engine.polygon_overlay.overlay import overlay
 from engine.scenes.scene import Scene
 from engine.segment_clipping.clip_segments import clip_segments
+from engine.segment_clipping.lines import clip_lines
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.bounds import bounds
@@ -103,8 +104,9 @@ def _locate(dimension: int) -> None:
     poses: list[Pose | None] = [Pose(np.eye(dimension), np.full(dimension, 0.25))] * len(solids)
     for solid in solids:
         locate(points, solid)
-    locate_scene(points, solids, poses)
-    locate_scene(points, solids)
+    many = np.tile(points, (4, 1))  # few are asked about body by body
+    locate_scene(many, solids, poses)
+    locate_scene(many, solids)
     with Budget() as budget:  # what a scene asks of a single body, where its first pass is not sure
         for solid, pose in zip(solids, poses):
             posed_locator(solid, pose).fill(as_points(points, dimension), np.empty(len(points), np.int8), budget)
@@ -147,7 +149,8 @@ def _warm_collision() -> None:
 def _warm_scenes() -> None:
     collide_scene(_bodies())
     Scene(_bodies()).collide(moved=[0])
-    Scene([Sphere([0, 0, 0], 1)]).locate([[0.25, 0, 0]])
+    for scene in [Scene([Sphere([0, 0, 0], 1)])] * 2:  # a question after the first
+        scene.locate([[0.25, 0, 0]])
     segments = [[[-1.0, 0.3, 0.2], [2.0, 0.4, 0.1]]]
     turned = Pose.from_quaternion([3, 1, 0, 0], [0.25, 0, 0])
     for dimension in (2, 3):
@@ -192,6 +195,7 @@ def _clip(dimension: int) -> None:
     contour = np.array([[-1.0, -1.0, 0.5], [2.0, 0.0, 0.5], [0.0, 2.0, 0.5]])[:, :dimension]
     for region in _regions(dimension):
         clip_segments(segments, region)
+        clip_lines(segments, region)
         if region.type not in ("sphere", "polygon"):
             clip_polygons([[contour]], region)
 

@@ -299,3 +299,42 @@ def test_a_mesh_of_many_faces_posed_and_not() -> None:
     segments[:2, 0] = belts[:2]
     expected = expected_pieces(segments, [body, body], [None, pose])
     assert_exact(Scene([body, body], [None, pose]).clip_segments(segments), segments, expected)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_few_segments_in_an_array_are_answered_as_lists_are(dimension: int) -> None:
+    rng = np.random.default_rng(dimension)
+    scene = Scene(*scene_of(rng, dimension, 8, 0.5))
+    segments = np.round(rng.uniform(-3, 3, (12, 2, dimension)) * 2) / 2
+    moved: Any
+    for moved in (scene, scene.moved({1: None})):
+        moved.clip_segments(segments.tolist())  # prepares
+        every = moved.clip_segments(segments.tolist())
+        few = moved.clip_segments(segments)
+        first = moved.clip_segments(segments, keep="first", workers=1)
+        rows = np.unique(every.source, return_index=True)[1]
+        for name in ("source", "body", "start", "end", "t", "faces"):
+            assert getattr(few, name).tolist() == getattr(every, name).tolist()
+            assert getattr(first, name).tolist() == getattr(every, name)[rows].tolist()
+        met = moved.clip_segments(segments, keep="any")
+        assert np.flatnonzero(met).tolist() == every.source[rows].tolist()
+        segments_with_nan = segments.copy()
+        segments_with_nan[3, 0, 0] = np.nan
+        for keep in ("all", "first", "any"):
+            with pytest.raises(NotFiniteError):
+                moved.clip_segments(segments_with_nan, keep=keep)
+            with pytest.raises(InvalidOperationError):
+                moved.clip_segments(segments, keep=keep.upper())
+
+
+def test_a_segment_that_leaves_the_box_begins_where_crossings_say() -> None:
+    """Inside of a mesh by parity: through faces, corners and sides, with its second end outside of the box."""
+    rng, shift = np.random.default_rng(3), np.array([3.0, 5.0, 9.0])
+    corners = np.array(OCTAHEDRON, np.float64) + shift
+    body = Polyhedron(corners, FACES)
+    start = shift + rng.integers(-3, 4, (60, 3)) / 8
+    through = np.concatenate([corners, corners[np.array(FACES)[:, :2]].mean(axis=1)])
+    end = start + 8.0 * (through[rng.integers(len(through), size=60)] - start)
+    for pose in (None, pose_of(rng, 3), pose_of(rng, 3)):
+        segments = np.stack([start, end], axis=1)
+        assert_exact(Scene([body], [pose]).clip_segments(segments), segments, expected_pieces(segments, [body], [pose]))
