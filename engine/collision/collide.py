@@ -4,18 +4,14 @@ from __future__ import annotations
 
 from typing import Literal, Unpack, overload
 
-from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, TOUCHING
 from engine.collision.detail import check_has_detail, detail_of
 from engine.collision.meshes.mesh_mesh import mesh_mesh
 from engine.collision.planar.outline_batch import collide_outlines
 from engine.collision.result import (
     BODIES,
-    FIRST_WITHIN,
     MESHES,
     OUTLINES,
-    SECOND_WITHIN,
     UNLIMITED,
-    UNNAMED,
     Collision,
     PairFunction,
     Poses,
@@ -23,36 +19,18 @@ from engine.collision.result import (
 )
 from engine.collision.simple.against_boundary import collide_body_sphere, collide_half_space_body
 from engine.collision.simple.closed_forms import (
-    collide_aabb_sphere,
+    by_forms_or,
+    collide_form_sphere,
     collide_half_space_sphere,
     collide_half_spaces,
-    collide_spheres,
-    relate_boxes,
-    touching_boxes,
 )
 from engine.errors import InvalidArrayError, UnsupportedPairError, UnsupportedSolidError, WrongDimensionError
 from engine.parallel import Budget, Cancel, Options, Progress, check_options
-from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
-from engine.types import Accuracy, Relation
+from engine.types import Accuracy
 
 TAKEN = {2: "polygon, triangle, aabb, sphere, half_space", 3: "polyhedron, surface, aabb, sphere, half_space"}
-
-
-def _aabb_aabb(first: Aabb, second: Aabb, poses: Poses, work: Work) -> Collision:
-    """Decide by comparisons where neither box has a pose; a witness of a contact is named as for other bodies."""
-    if poses[0] is None and poses[1] is None:
-        bounds = first.min.tolist(), first.max.tolist(), second.min.tolist(), second.max.tolist()
-        relation = relate_boxes(*bounds)
-        if relation == DISJOINT or not work.witness:
-            return UNNAMED[relation]
-        if relation < OVERLAPPING:
-            return FIRST_WITHIN if relation == FIRST_INSIDE_SECOND else SECOND_WITHIN
-        if relation == TOUCHING and first.dimension == 3 and (witness := touching_boxes(*bounds)) is not None:
-            return Collision(Relation.TOUCHING, witness)
-    bodies = mesh_mesh if first.dimension == 3 else collide_outlines
-    return bodies(first, second, poses, work)
 
 
 PAIRS: dict[tuple[int, str, str], PairFunction] = {
@@ -62,11 +40,11 @@ PAIRS: dict[tuple[int, str, str], PairFunction] = {
     **{(d, body, "sphere"): collide_body_sphere for d, body in BODIES},
 }
 for _dimension in (2, 3):
-    PAIRS[_dimension, "aabb", "aabb"] = _aabb_aabb
-    PAIRS[_dimension, "aabb", "sphere"] = collide_aabb_sphere
+    PAIRS[_dimension, "aabb", "aabb"] = by_forms_or(mesh_mesh if _dimension == 3 else collide_outlines)
+    PAIRS[_dimension, "aabb", "sphere"] = by_forms_or(collide_form_sphere)
     PAIRS[_dimension, "half_space", "half_space"] = collide_half_spaces
     PAIRS[_dimension, "half_space", "sphere"] = collide_half_space_sphere
-    PAIRS[_dimension, "sphere", "sphere"] = collide_spheres
+    PAIRS[_dimension, "sphere", "sphere"] = by_forms_or(collide_form_sphere)
 """Dimension and the two types to the function of that pair; a pair may stand in one order only."""
 
 _BOTH_ORDERS = {
@@ -122,6 +100,12 @@ def collide_pair(first: Solid, second: Solid, poses: Poses, work: Work) -> Colli
         poses = None, None
     function, is_swapped = pair_function(first, second)
     return function(second, first, poses[::-1], work).swapped() if is_swapped else function(first, second, poses, work)
+
+
+_UNCOUNTED = {
+    (witness, boolean): Work(UNLIMITED, witness, boolean) for witness in (False, True) for boolean in (False, True)
+}
+"""Of calls without deadline and report, whose counts nobody reads."""
 
 
 class CollideOptions(Options, total=False):
@@ -189,8 +173,8 @@ def collide(
     >>> collide(Aabb([0, 0, 0], [1, 1, 1]), Aabb([0, 0, 0], [2, 2, 2]), detail=True).detail.label
     'TPP'
     """
-    pair_function(first, second)
     if first_pose is not None or second_pose is not None:
+        pair_function(first, second)
         check_pose(first_pose, first, "first_pose")
         check_pose(second_pose, second, "second_pose")
     are_plain = type(report) is type(boolean) is type(witness) is type(detail) is bool
@@ -198,7 +182,8 @@ def collide(
         check_options(workers, progress, report=report, boolean=boolean, witness=witness, detail=detail)
     is_named, poses = witness and not boolean, (first_pose, second_pose)
     if deadline is None and cancel is None and progress is None and not (detail or report):
-        return collide_pair(first, second, poses, Work(UNLIMITED, is_named, boolean))
+        return collide_pair(first, second, poses, _UNCOUNTED[bool(is_named), bool(boolean)])
+    pair_function(first, second)
     if detail:
         check_has_detail(((("first",), first), (("second",), second)), boolean)
     with Budget(deadline, cancel) as budget:

@@ -15,14 +15,11 @@ from __future__ import annotations
 from typing import Any, Final
 
 from engine.collision.clearance.wide import Wide, less, over, plus, product, root, times
+from engine.collision.simple.form import IS_BALL, RADIUS
 from engine.jit import inline, kernel
 from engine.predicates.double_double import U2, surely_rounded
 from engine.predicates.error_free import two_sum, workspace
 
-RADIUS: Final = 6
-IS_BALL: Final = 7
-N_NUMBERS: Final = 8
-"""Of a form: low and high on three axes, the radius, and whether it is a ball (1.0)."""
 UNSURE: Final = -1.0
 """In place of a distance."""
 _LARGEST: Final = 2.0**1021

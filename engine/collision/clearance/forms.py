@@ -10,10 +10,9 @@ from typing import Final
 
 import numpy as np
 
-from engine.arrays import FloatArray, read_only
+from engine.arrays import FloatArray
 from engine.collision.clearance.bodies import BALL, outline_of
 from engine.collision.clearance.closed_forms import (
-    N_NUMBERS,
     UNSURE,
     ends_of_shared,
     nearest_of_forms,
@@ -25,6 +24,7 @@ from engine.collision.clearance.outlines import nearest_of_outlines, nearest_und
 from engine.collision.clearance.result import Clearance, Feature
 from engine.collision.exact_images import Vector, as_vector, image_point
 from engine.collision.result import UNLIMITED, Poses
+from engine.collision.simple.form import FORMS, form_of
 from engine.direct import entry_of
 from engine.parallel import Budget
 from engine.predicates.exact_vectors import minus, squared_length
@@ -37,7 +37,6 @@ from engine.solids.sphere import Sphere
 
 _MOST_PAIRS: Final = 1 << 18
 """Of edges of two outlines: to look at all of them takes some milliseconds, where boxes part none."""
-_FORMS: Final = ("aabb", "sphere")
 PLANE: Final = Feature("plane")
 MEETING: Final = Clearance(0.0)
 """The answer for bodies with a common point."""
@@ -59,25 +58,6 @@ FEATURES = {d: [_feature(faces, d) for faces in range(1 << 2 * d)] for d in (2, 
 """By dimension and faces."""
 
 
-def form_of(solid: Solid) -> FloatArray | None:
-    """Return a box that is not flat or a ball as kernels take it, None for others."""
-    if solid.type not in _FORMS:
-        return None
-    return solid.prepared("form", lambda: _form(solid))
-
-
-def _form(solid: Solid) -> FloatArray | None:
-    d, form = solid.dimension, np.zeros(N_NUMBERS)
-    if isinstance(solid, Sphere):
-        form[:d] = form[3 : 3 + d] = solid.center
-        form[6:] = solid.radius, 1.0
-        return read_only(form)
-    if isinstance(solid, Aabb) and bool((solid.min < solid.max).all()):
-        form[:d], form[3 : 3 + d] = solid.min, solid.max
-        return read_only(form)
-    return None
-
-
 def _told(distance: float, least: float | None) -> Clearance | bool | None:
     """Return what a distance tells by itself, as the distance rounded to nearest does; None for no answer yet."""
     if least is not None and distance not in (UNSURE, least):
@@ -88,7 +68,7 @@ def _told(distance: float, least: float | None) -> Clearance | bool | None:
 def between_forms(first: Solid, second: Solid, poses: Poses, least: float | None) -> Clearance | bool | None:
     """Return the clearance of two boxes or balls, or whether it is at least so much; None for other bodies, and boxes
     that are turned."""
-    if first.type not in _FORMS or second.type not in _FORMS:
+    if first.type not in FORMS or second.type not in FORMS:
         return None
     form, other = form_of(first), form_of(second)
     if form is None or other is None:

@@ -17,7 +17,7 @@ from engine.collision.meshes.mesh_arrays import STILL
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.planar.outline_batch import OutlineArrays, outline_pool, relate_outline_pairs
 from engine.collision.scenes.bodies import SceneBodies, scene_bodies
-from engine.collision.simple.closed_forms import relate_box_pairs
+from engine.collision.simple.form_relations import relate_box_pairs
 from engine.direct import entry_of
 from engine.parallel import Budget, run_chunks
 from engine.solids.aabb import Aabb

@@ -15,15 +15,15 @@ import numpy as np
 from engine.arrays import BoolArray, FloatArray, IntArray, read_only
 from engine.collision.clearance.bodies import in_space
 from engine.collision.clearance.clearance import has_plane
-from engine.collision.clearance.closed_forms import N_NUMBERS
 from engine.collision.clearance.convex_gaps import gaps_of_pairs
-from engine.collision.clearance.forms import are_small, form_of, told_under_poses
+from engine.collision.clearance.forms import are_small, told_under_poses
 from engine.collision.clearance.half_spaces import gap_of_planes
 from engine.collision.clearance.spreads import SpreadPair
 from engine.collision.convex.body import pooled
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.scenes.batches import SceneBatches
 from engine.collision.scenes.bodies import SceneBodies
+from engine.collision.simple.form import N_NUMBERS, form_of
 from engine.parallel import Budget, run_chunks
 
 _ROUNDING: Final = 2.0**-48

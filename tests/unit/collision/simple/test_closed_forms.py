@@ -11,7 +11,7 @@ from engine import Aabb, collide
 from engine.collision.codes import UNSETTLED
 from engine.collision.meshes.mesh_mesh import mesh_mesh
 from engine.collision.result import Work
-from engine.collision.simple.closed_forms import relate_box_pairs
+from engine.collision.simple.form_relations import relate_box_pairs
 from tests.unit.collision.lattices import COUNTS, Maker, aabb, check_pairs
 
 

@@ -1,0 +1,315 @@
+"""Compiled: how two boxes along the axes, or balls, lie to each other under poses, exactly.
+
+A pose that moves, permutes axes and turns signs leaves a box a box. Its bounds are then sums of two doubles, held as
+pairs without error; of these only the order on each axis counts, so they are replaced by their ranks. A ball stays one
+under every pose; of a box, or of another ball's centre as a box without extent, a point is nearest to its centre and a
+point farthest. The squares of their distances are compared with those of the sum and the difference of the radii, as
+expansions.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final, NamedTuple
+
+from engine.collision.codes import (
+    DISJOINT,
+    FIRST_INSIDE_SECOND,
+    OVERLAPPING,
+    SECOND_INSIDE_FIRST,
+    TOUCHING,
+    UNSETTLED,
+)
+from engine.collision.meshes.contact_kinds import EDGE_EDGE, EDGE_FACE, FACE_FACE, VERTEX_VERTEX
+from engine.collision.meshes.placement import orient2d_near
+from engine.collision.simple.form import HIGH, IS_BALL, RADIUS
+from engine.jit import called, inline, kernel
+from engine.predicates.error_free import two_sum, workspace
+from engine.predicates.expansion import add, add_product, grow, grow_product, is_safe, sign
+from engine.types import UNDECIDED, Point2
+
+KIND_AT: Final = 3
+FACE_AT: Final = 6
+THEIR_FACE_AT: Final = 9
+"""Where in the code of an answer the kind of the contact and the faces of two boxes stand, above the relation."""
+_LARGEST: Final = 2.0**1022
+_N_PAIRS: Final = 24
+_N_RANKS: Final = 12
+_THEIRS: Final = 6
+"""Ranks: low and high of the first on three axes each, then of the second."""
+_N_COORDINATE: Final = 32  # 2 components for each of 3 products of either body, two translations, a radius
+_N_TOTAL: Final = 1100  # as in `posed.py`
+
+
+class Placed(NamedTuple):
+    """A form with its rotation (d, d) and translation (d,)."""
+
+    form: Any
+    turn: Any
+    move: Any
+
+
+@inline
+def source_of(turn: Any, axis: int) -> tuple[int, float]:
+    """Return the axis that a rotation turns to another one, and with which sign; -1 where it mixes axes."""
+    found, factor = -1, 0.0
+    for m in range(turn.shape[0]):
+        if turn[axis, m] != 0.0:
+            if found >= 0 or abs(turn[axis, m]) != 1.0:
+                return -1, 0.0
+            found, factor = m, turn[axis, m]
+    return found, factor
+
+
+@inline
+def bound_at(form: Any, turn: Any, axis: int, side: int) -> float:
+    """Return the bound of a box on one side of an axis as a rotation of the lattice places it."""
+    source, factor = source_of(turn, axis)
+    return factor * form[source + (HIGH if (side == 1) == (factor > 0.0) else 0)]
+
+
+# ---- two boxes ------------------------------------------------------------------------------------------------------
+
+
+@inline
+def _place(a: Placed, w: Any, first: int) -> bool:
+    """Write the bounds of a placed box as pairs, low and high of each axis; tell whether it still is a box."""
+    form, turn, move = a
+    for axis in range(turn.shape[0]):
+        if source_of(turn, axis)[0] < 0:
+            return False
+        for side in range(2):
+            at = first + 4 * axis + 2 * side
+            w[at], w[at + 1] = two_sum(bound_at(form, turn, axis, side), move[axis])
+            if not abs(w[at]) < _LARGEST:
+                return False
+    return True
+
+
+@inline
+def _is_less(w: Any, i: int, j: int) -> bool:
+    """Tell whether one pair is less than another: the rounded sums tell, where they are equal the rests."""
+    return bool(w[i] < w[j] or (w[i] == w[j] and w[i + 1] < w[j + 1]))
+
+
+@inline
+def _rank(w: Any, d: int, ranks: Any) -> None:
+    """Write of each bound how many of the four on its axis are less."""
+    for axis in range(d):
+        for i in range(4):
+            ranks[3 * i + axis] = 0.0
+            for j in range(4):
+                one, other = 4 * axis + 2 * i + (8 if i > 1 else 0), 4 * axis + 2 * j + (8 if j > 1 else 0)
+                ranks[3 * i + axis] += 1.0 if _is_less(w, other, one) else 0.0
+
+
+def relate_boxes(low: Any, high: Any, their_low: Any, their_high: Any) -> int:
+    """Return the relation of two closed boxes of any dimension, flat ones too."""
+    meet = solid = i_within = j_within = interiors = True
+    for axis in range(len(low)):
+        a0, a1, b0, b1 = low[axis], high[axis], their_low[axis], their_high[axis]
+        meet &= a0 <= b1 and b0 <= a1
+        i_within &= b0 < a0 and a1 < b1
+        j_within &= a0 < b0 and b1 < a1
+        solid &= a0 < a1 and b0 < b1
+        interiors &= a0 < b1 and b0 < a1
+    if not meet:
+        return DISJOINT
+    if i_within or j_within:
+        return FIRST_INSIDE_SECOND if i_within else SECOND_INSIDE_FIRST
+    return OVERLAPPING if solid and interiors else TOUCHING
+
+
+_relate = inline(relate_boxes)
+
+
+@kernel
+def relate_box_pairs(low: Any, high: Any, is_box: Any, pairs: Any, relations: Any) -> None:
+    """Fill relations (n,) int8 for the pairs (n, 2) of which both are boxes without pose."""
+    for item in range(pairs.shape[0]):
+        i, j = pairs[item, 0], pairs[item, 1]
+        if is_box[i] and is_box[j]:
+            relations[item] = _relate(low[i], high[i], low[j], high[j])
+
+
+@inline
+def _face(turn: Any, axis: int, side: int) -> int:
+    """Return the face of a box that a pose turns to one side of an axis."""
+    source, factor = source_of(turn, axis)
+    return 2 * source + (side if factor > 0.0 else 1 - side)
+
+
+@inline
+def _side_of_diagonal(w: Any, own: int, their: int, i: int, p: int, j: int, q: int, is_rising: bool) -> int:
+    """Return on which side of the diagonal that cuts a face an edge passes it: 0 on it, UNDECIDED maybe."""
+    x, y = 12 * own + 4 * i + 2 * p, 12 * own + 4 * j + 2 * q
+    low, high = 12 * their + 4 * i, 12 * their + 4 * i + 2
+    start, end = 12 * their + 4 * j + (0 if is_rising else 2), 12 * their + 4 * j + (2 if is_rising else 0)
+    error = 0.0
+    for at in (x, y, low, high, start, end):
+        error = max(error, abs(w[at + 1]))
+    point = Point2(w[x], w[y])
+    return orient2d_near(Point2(w[low], w[start]), Point2(w[high], w[end]), point, error)
+
+
+@inline
+def _is_between(ranks: Any, body: int, axis: int, rank: float) -> bool:
+    """Tell whether a rank lies strictly between those of the bounds of a body."""
+    return bool(ranks[_THEIRS * body + axis] < rank < ranks[_THEIRS * body + 3 + axis])
+
+
+@called
+def _name_overlap(w: Any, ranks: Any, turn: Any, their_turn: Any) -> int:
+    """Return kind and faces of a contact of two boxes of space that overlap, or UNSETTLED.
+
+    Faces in one plane on one side share an area. Where there are none, an edge of one box passes through a face of the
+    other: of each axis either both ends of one box lie within the other, or one of each. It passes the diagonal that
+    cuts the face in two, or one of the triangles.
+    """
+    for face in range(6):
+        axis, side = face >> 1, face & 1
+        if ranks[3 * side + axis] == ranks[_THEIRS + 3 * side + axis]:
+            return FACE_FACE | _face(turn, axis, side) << 3 | _face(their_turn, axis, side) << 6
+    for item in range(48):
+        own, k, s, p, q = item & 1, item >> 4, item >> 1 & 1, item >> 2 & 1, item >> 3 & 1
+        i, j, their = (k + 1) % 3, (k + 2) % 3, 1 - own
+        if not _is_between(ranks, own, k, ranks[_THEIRS * their + 3 * s + k]):
+            continue
+        if not _is_between(ranks, their, i, ranks[_THEIRS * own + 3 * p + i]):
+            continue
+        if not _is_between(ranks, their, j, ranks[_THEIRS * own + 3 * q + j]):
+            continue
+        own_turn, other_turn = (turn, their_turn) if own == 0 else (their_turn, turn)
+        is_rising = source_of(other_turn, i)[1] == source_of(other_turn, j)[1]
+        side = _side_of_diagonal(w, own, their, i, p, j, q, is_rising)
+        edge, face = _face(own_turn, i, p), _face(other_turn, k, s)
+        faces = edge << 3 | face << 6 if own == 0 else face << 3 | edge << 6
+        return UNSETTLED if side == UNDECIDED else (EDGE_EDGE if side == 0 else EDGE_FACE) | faces
+    return UNSETTLED
+
+
+@inline
+def _name_touching(ranks: Any, turn: Any, their_turn: Any) -> int:
+    """Return kind and faces of the contact of two boxes of space that touch.
+
+    They share a part of a face, an edge or a vertex, by on how many axes they only touch; of the faces that meet there
+    the first is on the first of these axes.
+    """
+    n, faces = -1, 0
+    for axis in range(3):
+        side = 1 if ranks[3 + axis] == ranks[_THEIRS + axis] else 0
+        if side == 1 or ranks[_THEIRS + 3 + axis] == ranks[axis]:
+            n += 1
+            if n == 0:
+                faces = _face(turn, axis, side) << 3 | _face(their_turn, axis, 1 - side) << 6
+    return faces | (FACE_FACE if n == 0 else (EDGE_EDGE if n == 1 else VERTEX_VERTEX))
+
+
+@inline
+def _relate_boxes(a: Placed, b: Placed) -> int:
+    """Return the code of two boxes, UNSETTLED where one is turned otherwise than by the lattice."""
+    w, ranks, d = workspace(_N_PAIRS), workspace(_N_RANKS), a.turn.shape[0]
+    if not (_place(a, w, 0) and _place(b, w, 12)):
+        return UNSETTLED
+    _rank(w, d, ranks)
+    relation = _relate(ranks[:d], ranks[3 : 3 + d], ranks[_THEIRS : _THEIRS + d], ranks[_THEIRS + 3 : _THEIRS + 3 + d])
+    if d == 2 or relation < OVERLAPPING:
+        return relation
+    touch = relation == TOUCHING
+    name = _name_touching(ranks, a.turn, b.turn) if touch else _name_overlap(w, ranks, a.turn, b.turn)
+    return name if name == UNSETTLED else relation | name << KIND_AT
+
+
+# ---- against a ball -------------------------------------------------------------------------------------------------
+
+
+@inline
+def _grow_coordinate(e: Any, n: int, a: Placed, axis: int, side: int, factor: float) -> int:
+    """Add a bound of a placed box or a coordinate of a placed centre, times 1 or -1, to an expansion."""
+    form, turn, move = a
+    if form[IS_BALL] == 0.0:
+        n = grow(e, n, factor * bound_at(form, turn, axis, side))
+    else:
+        for m in range(turn.shape[0]):
+            n = grow_product(e, n, factor * turn[axis, m], form[m])
+    return grow(e, n, factor * move[axis])
+
+
+@inline
+def _are_safe(a: Placed) -> bool:
+    """Tell whether all numbers of a form are of sizes for which expansions of degree four are exact, and that it is no
+    box that the pose turns otherwise than by the lattice."""
+    form, turn, move = a
+    safe = is_safe(form[RADIUS])
+    for axis in range(turn.shape[0]):
+        safe = safe and is_safe(form[axis]) and is_safe(form[HIGH + axis]) and is_safe(move[axis])
+        safe = safe and (form[IS_BALL] != 0.0 or source_of(turn, axis)[0] >= 0)
+        for m in range(turn.shape[0]):
+            safe = safe and is_safe(turn[axis, m])
+    return safe
+
+
+@inline
+def _outside(e: Any, a: Placed, ball: Placed, axis: int, side: int) -> int:
+    """Set e to how far the centre of a ball lies outside a form on one side of an axis; return its length."""
+    factor = 1.0 if side == 0 else -1.0
+    n = _grow_coordinate(e, 0, a, axis, side, factor)
+    return _grow_coordinate(e, n, ball, axis, 0, -factor)
+
+
+@called
+def _order(a: Placed, ball: Placed, is_far: bool, factor: float) -> int:
+    """Return the sign of the square of the nearest (farthest) distance of a form from the centre of a ball, less the
+    square of the ball's radius plus factor times the form's."""
+    total, n = workspace(_N_TOTAL), 0
+    below, above, both = workspace(_N_COORDINATE), workspace(_N_COORDINATE), workspace(_N_COORDINATE)
+    for axis in range(a.turn.shape[0]):
+        m = _outside(below, a, ball, axis, 0)
+        k = _outside(above, a, ball, axis, 1)
+        is_below = sign(below, m) > 0
+        if is_far:  # of both, of which the sum is negative, the lesser is the farther
+            for i in range(m):
+                both[i] = -below[i]
+            is_below = sign(both, add(both, m, above, k)) > 0
+        elif not is_below and sign(above, k) < 0:
+            k = 0
+        n = add_product(total, n, below, m, below, m) if is_below else add_product(total, n, above, k, above, k)
+    m = grow(below, grow(below, 0, ball.form[RADIUS]), factor * a.form[RADIUS])
+    k = grow(above, grow(above, 0, -ball.form[RADIUS]), -factor * a.form[RADIUS])
+    return sign(total, add_product(total, n, below, m, above, k))
+
+
+@called
+def _is_within(a: Placed, ball: Placed) -> bool:
+    """Tell whether a ball lies within the open interior of a box."""
+    e = workspace(_N_COORDINATE)
+    for axis in range(a.turn.shape[0]):
+        for side in range(2):
+            n = _outside(e, a, ball, axis, side)
+            if sign(e, grow(e, n, ball.form[RADIUS])) >= 0:
+                return False
+    return True
+
+
+@inline
+def _relate_to_ball(a: Placed, ball: Placed) -> int:
+    """Return the relation of a box or ball (first) and a ball, or UNSETTLED."""
+    r, s, is_ball = ball.form[RADIUS], a.form[RADIUS], a.form[IS_BALL] != 0.0
+    if not (_are_safe(a) and _are_safe(ball)):
+        return UNSETTLED
+    by_sum = _order(a, ball, False, 1.0)
+    if by_sum > 0:
+        return DISJOINT
+    # of balls the farthest point is the nearest: the centre
+    if (r > s or is_ball) and _order(a, ball, True, -1.0) < 0:
+        return FIRST_INSIDE_SECOND if r > s else SECOND_INSIDE_FIRST
+    if not is_ball and _is_within(a, ball):
+        return SECOND_INSIDE_FIRST
+    return OVERLAPPING if by_sum < 0 and r > 0.0 and (s > 0.0 or not is_ball) else TOUCHING
+
+
+@kernel
+def relate_forms(form: Any, turn: Any, move: Any, other: Any, their_turn: Any, their_move: Any) -> int:
+    """Return the relation of two forms, the first a box where one is, each with rotation (d, d) and translation (d,);
+    above it, of two boxes of space that meet, the kind of their contact and their faces. UNSETTLED where not told."""
+    a, b = Placed(form, turn, move), Placed(other, their_turn, their_move)
+    return _relate_boxes(a, b) if other[IS_BALL] == 0.0 else _relate_to_ball(a, b)

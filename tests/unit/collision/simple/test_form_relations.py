@@ -1,0 +1,101 @@
+"""Boxes and balls in compiled code: the rational reference under poses of the lattice, and witnesses that are true."""
+
+from __future__ import annotations
+
+import itertools
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from engine import Aabb, Pose, Relation, Sphere, collide
+from engine.collision.codes import UNSETTLED
+from engine.collision.meshes.exact_body import exact_pair
+from engine.collision.meshes.exact_triangles import classify_exact, kind_of_contact
+from engine.collision.meshes.mesh_arrays import mesh_body_of
+from engine.collision.meshes.triangle_triangle import APART
+from engine.collision.simple.form import form_of
+from engine.collision.simple.form_relations import relate_forms
+from engine.solids.base import Solid
+from engine.solids.pose import motion_of
+from tests.reference.collision import relation
+
+TURNS = [
+    np.array(rows, float)[list(order)]
+    for order in itertools.permutations(range(3))
+    for rows in (np.diag(signs) for signs in itertools.product((1, -1), repeat=3))
+    if np.linalg.det(rows[list(order)]) > 0
+]
+ULP = 2.0**-52
+
+
+def told(first: Solid, second: Solid, poses: tuple[Pose | None, Pose | None] = (None, None)) -> int:
+    d, forms = first.dimension, (form_of(first), form_of(second))
+    assert forms[0] is not None
+    code: int = relate_forms(forms[0], *motion_of(poses[0], d), forms[1], *motion_of(poses[1], d))
+    return code if code == UNSETTLED else code & 7
+
+
+def box(draw: np.random.Generator, scale: float) -> Aabb:
+    low = draw.integers(0, 3, 3) * scale
+    return Aabb(low, low + draw.integers(1, 4, 3) * scale)
+
+
+def pose(draw: np.random.Generator, scale: float) -> Pose | None:
+    kind = draw.integers(4)
+    move = np.nextafter(draw.integers(-2, 3, 3) * scale, draw.choice([-9.0, 0.0, 9.0]) if kind > 1 else 0.0)
+    return None if kind == 0 else Pose(TURNS[draw.integers(len(TURNS))], move)
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.1])
+def test_boxes_that_poses_keep_boxes_equal_the_reference_and_name_true_witnesses(scale: float) -> None:
+    draw, kinds = np.random.default_rng(3), set()
+    for _ in range(60):
+        first, second = box(draw, scale), box(draw, scale)
+        poses = pose(draw, scale), pose(draw, scale)
+        values = [{"type": "aabb", "min": b.min.tolist(), "max": b.max.tolist()} for b in (first, second)]
+        placed = [p and {"rotation": p.rotation.tolist(), "translation": p.translation.tolist()} for p in poses]
+        expected = relation(*values, *placed)
+        assert told(first, second, poses) in (UNSETTLED, expected)
+        found = collide(first, second, first_pose=poses[0], second_pose=poses[1])
+        assert found.relation == expected
+        if found.relation < Relation.OVERLAPPING:
+            continue
+        witness, bodies = found.witness, exact_pair(mesh_body_of(first), mesh_body_of(second), poses)
+        assert witness is not None
+        named = witness.first_face, witness.second_face
+        own, their = (np.flatnonzero(body.mesh.faces == face).tolist() for body, face in zip(bodies, named))
+        pairs = [(bodies[0].corners(i), bodies[1].corners(j)) for i in own for j in their]
+        assert witness.kind in {kind_of_contact(*pair) for pair in pairs if classify_exact(*pair) != APART}
+        kinds.add((found.relation, witness.kind))
+    assert len(kinds) > 3
+
+
+def test_bounds_that_round_alike_are_told_apart() -> None:
+    for step, expected in (
+        (0.0, Relation.TOUCHING),
+        (-(2.0**-60), Relation.OVERLAPPING),
+        (2.0**-60, Relation.DISJOINT),
+    ):
+        moved = Pose(np.eye(3), [1.0, 0.0, 0.0])
+        other = Aabb([step, 0, 0], [3, 1, 1])  # 1 + step is rounded to 1
+        assert told(Aabb([0, 0, 0], [1, 1, 1]), other, (None, moved)) == expected
+
+
+def test_balls_that_touch_an_ulp_apart() -> None:
+    found = set()
+    for factor, size in itertools.product((1.0, 1.0 + ULP, 1.0 - ULP), (1.0, 3.0, 0.1)):
+        a, b = Sphere([0, 0, 0], 2 * size), Sphere(np.array([3.0, 4.0, 0.0]) * size * factor, 3 * size)
+        square, both = sum(Fraction(x) ** 2 for x in b.center.tolist()), Fraction(a.radius) + Fraction(b.radius)
+        order = (square > both**2) - (square < both**2)
+        assert told(a, b) == {1: Relation.DISJOINT, 0: Relation.TOUCHING, -1: Relation.OVERLAPPING}[order]
+        found.add(order)
+    assert found == {-1, 0, 1}
+
+
+def test_what_is_out_of_range_is_not_told() -> None:
+    turned = Pose([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]], [0, 0, 0])
+    cube = Aabb([0, 0, 0], [1, 1, 1])
+    assert told(cube, cube, (None, turned)) == UNSETTLED
+    assert told(Sphere([0, 0, 0], 1e-300), Sphere([1, 0, 0], 1.0)) == UNSETTLED
+    assert told(Aabb([-1e308] * 3, [1e308] * 3), cube, (Pose(np.eye(3), [1.7e308, 0, 0]), None)) == UNSETTLED
