@@ -146,6 +146,24 @@ def before_poses(s: Search, i: int, j: int) -> tuple[Facet, Facet]:
     return own, with_pose(triangle_of(s.second, j), 1 if s.place.b.is_posed else UNPOSED)
 
 
+@inline
+def exact_faces(s: Search, i: int, j: int) -> tuple[Facet, Facet, int, int]:
+    """Return a face of either body for exact signs, and an axis along which each has an area: placed, where that rounds
+    nothing, else before its pose."""
+    axis, their_axis = int(s.first.axis[i]), int(s.second.axis[j])
+    if s.place.error == 0.0:
+        t, u = placed_triangle(triangle_of(s.first, i), s.place.a), placed_triangle(triangle_of(s.second, j), s.place.b)
+        return with_pose(t), with_pose(u), axis_at(axis, s.place.a), axis_at(their_axis, s.place.b)
+    t, u = before_poses(s, i, j)
+    return t, u, axis, their_axis
+
+
+@inline
+def exact_error(s: Search) -> float:
+    """Return the error of the points of `exact_faces`, as the filter of exact signs takes it."""
+    return 0.0 if s.place.error == 0.0 else s.place.posed_error
+
+
 @merged
 def class_of_corner(s: Search, i: int, j: int, t: Facet, u: Facet) -> int:
     """Return the class of two faces, placed t and u, that surely meet in a common corner only; else UNDECIDED."""
@@ -157,15 +175,12 @@ def class_of_corner(s: Search, i: int, j: int, t: Facet, u: Facet) -> int:
 
 
 @merged
-def settle_class(s: Search, i: int, j: int, t: Facet, u: Facet) -> int:
+def settle_class(s: Search, i: int, j: int) -> int:
     """Return the class of two faces that is left open; UNDECIDED without area, or out of range."""
-    place, poses = s.place, s.descent.poses
     if s.first.axis[i] < 0 or s.second.axis[j] < 0:
         return UNDECIDED
-    if place.error == 0.0:  # the rounded points are the points
-        return classify(poses, with_pose(t), with_pose(u), axis_at(int(s.first.axis[i]), place.a), 0.0)
-    own, their = before_poses(s, i, j)
-    return classify(poses, own, their, int(s.first.axis[i]), place.posed_error)
+    own, their, axis, _ = exact_faces(s, i, j)
+    return classify(s.descent.poses, own, their, axis, exact_error(s))
 
 
 @merged
@@ -209,7 +224,7 @@ def classify_faces(s: Search, i: int, j: int, low: int, high: int, n_pairs: int)
         if kind == UNDECIDED and len(met) == 0:
             kind = class_of_corner(s, i_face, j_face, t, u)
         if kind == UNDECIDED:
-            kind = settle_class(s, i_face, j_face, t, u)
+            kind = settle_class(s, i_face, j_face)
         if kind >= CORNER and len(met) > 0:
             i_face, j_face, kind = keep_first(s.first.faces, s.second.faces, pairs, kinds, i_face, j_face, kind)
             n_first = len(s.first.faces)

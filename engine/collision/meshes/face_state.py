@@ -30,34 +30,15 @@ from engine.collision.meshes.triangle_triangle import (
     Facet,
     classify,
     classify_near,
+    corner,
     is_straddling,
-    projected,
+    passes_within,
     separation,
     with_pose,
 )
 from engine.jit import allocating, allocating_kernel, inline
-from engine.predicates.orientation import orient2d, orient3d
+from engine.predicates.orientation import orient3d
 from engine.types import UNDECIDED, Point3
-
-
-@inline
-def edge_meets_inside(t: Facet, axis: int, a: Point3, b: Point3) -> bool:
-    """Tell whether the segment a b in the plane of t may meet its relative interior (True where unsure)."""
-    p, q, r = projected(t.p, axis), projected(t.q, axis), projected(t.r, axis)
-    s, e = projected(a, axis), projected(b, axis)
-    turn = orient2d(p, q, r)
-    tail, head, third = p, q, r
-    for _ in range(3):
-        s_side, e_side = orient2d(tail, head, s), orient2d(tail, head, e)
-        tail, head, third = head, third, tail
-        if s_side == UNDECIDED or e_side == UNDECIDED:
-            return True
-        if s_side != turn and e_side != turn:  # the edge has the segment outside or on it
-            return False
-    p_side, q_side, r_side = orient2d(s, e, p), orient2d(s, e, q), orient2d(s, e, r)
-    if p_side == UNDECIDED or q_side == UNDECIDED or r_side == UNDECIDED:
-        return True
-    return is_straddling(p_side, q_side, r_side)
 
 
 @inline
@@ -87,20 +68,23 @@ def state_by(mesh: MeshArrays, face: int, other: int, poses: Any) -> int:
         if how == UNDECIDED:
             how = classify(poses, with_pose(t), with_pose(o), axis, 0.0)
         return STATE_STACKED if how == UNDECIDED else (STATE_CROSSED if how == CROSSING else STATE_CLEAN)
-    sides, corners = (p, q, r), (o.p, o.q, o.r)
+    sides = (p, q, r)
     for k in range(3):
         end = (k + 1) % 3
         if sides[k] == 0 and sides[end] == 0:
             is_own_edge = is_corner(mesh, face, other, k) and is_corner(mesh, face, other, end)
-            is_crossed = not is_own_edge and edge_meets_inside(t, axis, corners[k], corners[end])
-            return STATE_CROSSED if is_crossed else STATE_CLEAN
+            if is_own_edge:
+                return STATE_CLEAN
+            u, v = with_pose(t), with_pose(o)
+            how = passes_within(poses, corner(v, k), corner(v, end), u, u.p, axis, 0.0)
+            return STATE_CLEAN if how == 0 else STATE_CROSSED
     return STATE_CLEAN
 
 
 @inline
-def is_corner(mesh: MeshArrays, face: int, other: int, corner: int) -> bool:
+def is_corner(mesh: MeshArrays, face: int, other: int, k: int) -> bool:
     """Tell whether a corner of another face is one of this face too."""
-    vertex, corners = mesh.triangles[other, corner], mesh.triangles
+    vertex, corners = mesh.triangles[other, k], mesh.triangles
     return bool(vertex == corners[face, 0] or vertex == corners[face, 1] or vertex == corners[face, 2])
 
 

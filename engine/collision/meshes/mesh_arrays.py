@@ -59,11 +59,13 @@ BOX_TRIANGLES = np.array([[(a, b, c), (a, c, d)] for a, b, c, d in
 
 MeshArrays = namedtuple(
     "MeshArrays",
-    "vertices triangles axis state boxes child blocks discs origin scale extent components faces first_face has_inside",
+    "vertices triangles axis state inner boxes child blocks discs origin scale extent components faces first_face "
+    "has_inside",
 )
 """What kernels take; boxes to scale: the tree (`bvh.py`); blocks, discs: what its blocks (`lanes/faces.py`) and its
 inner nodes (`lanes/discs.py`) hold beside boxes, the rows of the other kind not set. `state` is filled by kernels
-as needed: any thread writes the same values. components: of the triangles connected through vertices, one triangle
+as needed, and `inner`, on which side of a face its body lies (`inner_side.py`), 0 unknown: any thread writes the same
+values. components: of the triangles connected through vertices, one triangle
 each, ascending. faces: the caller's face of each triangle; first_face: the least in the first component.
 has_inside: False for surfaces and flat boxes."""
 
@@ -136,8 +138,9 @@ def mesh_body_of_triangles(vertices: FloatArray, triangles: IntArray, faces: Int
     fill_discs(blocks, child, tree.boxes, discs)
     used = used[:n_used].copy() if n_used < len(used) else used
     arrays = MeshArrays(
-        read_only(used), read_only(ordered), read_only(axis), np.full(n_triangles, STATE_UNKNOWN, np.int8), tree.boxes,
-        read_only(child), read_only(blocks), read_only(discs), tree.origin, tree.scale,
+        read_only(used), read_only(ordered), read_only(axis), np.full(n_triangles, STATE_UNKNOWN, np.int8),
+        np.zeros(n_triangles, np.int8), tree.boxes, read_only(child), read_only(blocks), read_only(discs), tree.origin,
+        tree.scale,
         Extent(reach, ldexp(1.0, lowest_bit)), components[:n_components].copy(), faces[order], first_face, has_inside,
     )  # fmt: skip
     return MeshBody(arrays, shift)

@@ -18,7 +18,7 @@ from engine.collision.meshes.faces_near import ABOVE_ALL, SLACK, box_between, ne
 from engine.collision.meshes.mesh_arrays import MeshArrays, in_tree, triangle_of
 from engine.collision.meshes.placement import Placement, defect_of, orient2d_near, place_pair, placed, turned_back
 from engine.collision.meshes.triangle_triangle import Facet
-from engine.jit import allocating, inline, kernel
+from engine.jit import allocating, inline, kernel, merged
 from engine.predicates.loading import as_point3
 from engine.predicates.orientation import orient3d
 from engine.predicates.posed import orient3d_rounded
@@ -89,21 +89,46 @@ def brought_back(p: Point3, source: Placement, target: Placement, defect: float)
     return OwnPoint(own, 2.0 * off + (8.0 * defect + 2.0**-48) * largest_of(w) + 2.0**-1060)
 
 
+@merged
+def _last(p: Point3, axis: int) -> Point3:
+    """Return a point with its coordinates turned so that those of an axis come last."""
+    return p if axis == 2 else (Point3(p.y, p.z, p.x) if axis == 0 else Point3(p.z, p.x, p.y))
+
+
 @allocating
 def locate_point(own: OwnPoint, mesh: MeshArrays) -> int:
     """Return INSIDE, OUTSIDE, 0 (on a face) or UNDECIDED for one point."""
+    where = _locate(own, mesh, 2, -1, np.empty(STACK, np.int32))
+    for axis in range(2 if where == UNDECIDED else 0):  # another half-line may keep clear of edges
+        where = locate_along(own, mesh, axis, -1) if where == UNDECIDED else where
+    return where
+
+
+@allocating
+def locate_along(own: OwnPoint, mesh: MeshArrays, axis: int, left_out: int) -> int:
+    """Return what `locate_point` does by the half-line along any axis, one face left out."""
+    return _locate(own, mesh, axis, left_out, np.empty(STACK, np.int32))
+
+
+@merged
+def _locate(own: OwnPoint, mesh: MeshArrays, axis: int, left_out: int, stack: Any) -> int:
     q, error = own.point, own.error
     local, slack = in_tree(mesh, q), SLACK + error / mesh.scale
     if not (slack < 1.0 and np.isfinite(local.x + local.y + local.z)):  # case: the ends of the exponent range
         return UNDECIDED
     if largest_of(local) > 4.0 + slack:
         return OUTSIDE
-    box, stack = box_between(local, Point3(local.x, local.y, ABOVE_ALL), slack), np.empty(STACK, np.int32)
+    far = Point3(
+        ABOVE_ALL if axis == 0 else local.x, ABOVE_ALL if axis == 1 else local.y, ABOVE_ALL if axis == 2 else local.z
+    )
+    box, q = box_between(local, far, slack), _last(q, axis)
     stack[0] = 0
     n_above, unsure, on_face = 0, False, False
     face, n = next_face(mesh, stack, 1, box)
     while face >= 0:  # bound: the faces of the body
-        how = half_line_crosses(triangle_of(mesh, face), q, error)
+        t = triangle_of(mesh, face)
+        how = half_line_crosses(Facet(_last(t.p, axis), _last(t.q, axis), _last(t.r, axis)), q, error)
+        how = MISSED if face == left_out else how
         unsure |= how == UNDECIDED
         on_face |= how == 0
         n_above += how == 1

@@ -25,6 +25,7 @@ s_b / s_a + |T|; six products of denormal numbers round to less than 2^-1071 in 
 
 from __future__ import annotations
 
+from math import frexp, ldexp
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -82,6 +83,14 @@ def is_lattice_rotation(rotation: Any) -> bool:
 
 
 @inline
+def _grain_of(value: float) -> float:
+    """Return the largest power of two that divides a number but 0."""
+    mantissa, exponent = frexp(value)
+    whole = int(mantissa * 2.0**53)
+    return ldexp(float(whole & -whole), exponent - 53)
+
+
+@inline
 def place_pair(
     a: Extent, a_pose: PoseArrays, a_item: int, b: Extent, b_pose: PoseArrays, b_item: int
 ) -> tuple[Placement, Placement]:
@@ -91,9 +100,10 @@ def place_pair(
     shift, grain = largest_of(apart), min(a.grain, b.grain)
     is_exact = not (a_pose.is_posed or b_pose.is_posed)
     if not is_exact and is_lattice_rotation(a_pose.rotations[a_item]) and is_lattice_rotation(b_pose.rotations[b_item]):
-        is_exact = a.reach + b.reach + shift < 2.0**53 * grain and a.reach + b.reach + shift < 1e300
         for value in (s.x, s.y, s.z, t.x, t.y, t.z):
-            is_exact = is_exact and np.floor(value / grain) == value / grain and abs(value / grain) < 2.0**53
+            grain = min(grain, _grain_of(value)) if value != 0.0 else grain
+        is_exact = a.reach + b.reach + shift < 2.0**53 * grain and a.reach + b.reach + shift < 1e300
+        is_exact = is_exact and max(largest_of(s), largest_of(t)) < 2.0**53 * grain
     a_error = b_error = 0.0
     if a_pose.is_posed and not is_exact:
         a_error = 2.0**-50 * (3.0 * a.reach + (0.0 if b_pose.is_posed else shift)) + 2.0**-1060

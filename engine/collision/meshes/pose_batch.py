@@ -15,16 +15,18 @@ from engine.collision.meshes.dual_traversal import (
     Found,
     Place,
     Search,
-    before_poses,
+    exact_error,
+    exact_faces,
     place_bodies,
     room_of,
     search,
 )
+from engine.collision.meshes.free_faces import JUDGED
 from engine.collision.meshes.mesh_arrays import MeshArrays
 from engine.collision.meshes.parity import INSIDE, OUTSIDE, brought_back, locate_point
 from engine.collision.meshes.placement import Placement, PoseArrays, defect_of
-from engine.collision.meshes.touching import only_touch
-from engine.collision.meshes.triangle_triangle import COPLANAR, CORNER
+from engine.collision.meshes.touching import relate_by_contacts
+from engine.collision.meshes.triangle_triangle import COPLANAR, CORNER, CROSSING
 from engine.jit import called, inline, kernel, merged
 from engine.predicates.loading import as_point3
 from engine.types import UNDECIDED
@@ -35,8 +37,6 @@ N_COLUMNS = 5
 faces, the caller's, where one was asked for and compiled signs tell; how many contacts there are, ONE_SETTLES where one
 is enough."""
 ONE_SETTLES = -1
-JUDGED = 64
-"""Beside three bits for each face (`kind_of`), in place of the class of a contact."""
 
 
 @inline
@@ -74,9 +74,11 @@ def in_contact(s: Search, n: int, n_named: int, row: Any) -> None:
     """
     pairs, kinds, _ = s.found
     first, second = s.first, s.second
+    has_crossing = False
     for item in range(n):
         if kinds[item] == UNDECIDED:
             return
+        has_crossing |= kinds[item] == CROSSING
     put_in_order(first.faces, second.faces, pairs, kinds, n)
     is_free, is_named, best, face, their_face = True, n_named > 0, VERTEX_VERTEX + 1, 0, 0
     for item in range(n):
@@ -97,19 +99,17 @@ def in_contact(s: Search, n: int, n_named: int, row: Any) -> None:
             break
     if is_named:
         row[KIND], row[FIRST_FACE], row[SECOND_FACE] = best, face, their_face
-    if only_touch(s, n, is_free):
-        row[RELATION] = TOUCHING
+    row[RELATION] = relate_by_contacts(s, n, is_free, has_crossing)
 
 
 @merged
 def kind_of_pair(s: Search, i: int, j: int) -> tuple[int, bool]:
     """Return `kind_of` two faces, UNSETTLED where one has no area."""
-    axis, their_axis = int(s.first.axis[i]), int(s.second.axis[j])
+    t, u, axis, their_axis = exact_faces(s, i, j)
     if axis < 0 or their_axis < 0:
         s.descent.signs[FLUSH] = 0
         return UNSETTLED, True
-    t, u = before_poses(s, i, j)
-    return kind_of(s.descent.poses, t, axis, u, their_axis, s.place.posed_error, s.descent.signs)
+    return kind_of(s.descent.poses, t, axis, u, their_axis, exact_error(s), s.descent.signs)
 
 
 @inline

@@ -293,6 +293,42 @@ def outside_an_edge(poses: Any, t: Facet, u: Facet, off: PosedPoint3, axis: int,
     return UNDECIDED if unsure else best
 
 
+@called
+def passes_within(
+    poses: Any, a: PosedPoint3, b: PosedPoint3, t: Facet, off: PosedPoint3, axis: int, error: float
+) -> int:
+    """Tell whether a segment a b in the plane of t meets its open face: 1, or not: 0; UNDECIDED."""
+    turn = turn_in_plane(poses, t.p, t.q, t.r, off, axis, error)
+    if turn == UNDECIDED:
+        return UNDECIDED
+    unsure = False
+    for edge in range(3):
+        s, e = corner(t, edge), corner(t, edge + 1)
+        by_a, by_b = turn_in_plane(poses, s, e, a, off, axis, error), turn_in_plane(poses, s, e, b, off, axis, error)
+        if by_a == UNDECIDED or by_b == UNDECIDED:
+            unsure = True
+        elif by_a != turn and by_b != turn:  # the edge has the segment outside or on it
+            return 0
+    p, q = turn_in_plane(poses, a, b, t.p, off, axis, error), turn_in_plane(poses, a, b, t.q, off, axis, error)
+    r = turn_in_plane(poses, a, b, t.r, off, axis, error)
+    if unsure or p == UNDECIDED or q == UNDECIDED or r == UNDECIDED:
+        return UNDECIDED
+    return int(is_straddling(p, q, r))
+
+
+@called
+def is_on_face(poses: Any, p: PosedPoint3, t: Facet, off: PosedPoint3, axis: int, error: float) -> int:
+    """Tell whether a point in the plane of t lies on the closed face: 1, or not: 0; UNDECIDED."""
+    found, turn = 1, turn_in_plane(poses, t.p, t.q, t.r, off, axis, error)
+    for edge in range(3):
+        side = turn_in_plane(poses, corner(t, edge), corner(t, edge + 1), p, off, axis, error)
+        if turn == UNDECIDED or side == UNDECIDED:
+            found = UNDECIDED
+        elif side == -turn:
+            return 0
+    return found
+
+
 @inline
 def separation(poses: Any, t1: Facet, t2: Facet, axis: int, error: float) -> int:
     """Return how two coplanar triangles with area lie: 1 apart, 0 only their borders meet, -1 interiors meet."""
