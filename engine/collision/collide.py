@@ -11,7 +11,7 @@ from engine.collision.result import (
     BODIES,
     MESHES,
     OUTLINES,
-    UNLIMITED,
+    UNCOUNTED,
     Collision,
     PairFunction,
     Poses,
@@ -102,12 +102,6 @@ def collide_pair(first: Solid, second: Solid, poses: Poses, work: Work) -> Colli
     return function(second, first, poses[::-1], work).swapped() if is_swapped else function(first, second, poses, work)
 
 
-_UNCOUNTED = {
-    (witness, boolean): Work(UNLIMITED, witness, boolean) for witness in (False, True) for boolean in (False, True)
-}
-"""Of calls without deadline and report, whose counts nobody reads."""
-
-
 class CollideOptions(Options, total=False):
     """What `collide` takes by name, but for `report`, which changes what it returns."""
 
@@ -182,7 +176,7 @@ def collide(
         check_options(workers, progress, report=report, boolean=boolean, witness=witness, detail=detail)
     is_named, poses = witness and not boolean, (first_pose, second_pose)
     if deadline is None and cancel is None and progress is None and not (detail or report):
-        return collide_pair(first, second, poses, _UNCOUNTED[bool(is_named), bool(boolean)])
+        return collide_pair(first, second, poses, UNCOUNTED[bool(is_named), bool(boolean)])
     pair_function(first, second)
     if detail:
         check_has_detail(((("first",), first), (("second",), second)), boolean)

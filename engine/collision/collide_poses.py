@@ -19,7 +19,7 @@ from engine.collision.meshes.mesh_mesh import answer_of, told_by_kernel
 from engine.collision.meshes.mesh_pair import SPACE, what_to_seek
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.meshes.pose_batch import N_COLUMNS, RELATION, relate_poses
-from engine.collision.result import MESHES, RELATIONS, UNLIMITED, Collision, Work
+from engine.collision.result import MESHES, RELATIONS, UNCOUNTED, Collision, Work
 from engine.collision.scenes.batches import convex_poses
 from engine.direct import entry_of
 from engine.errors import InvalidArrayError, WrongDimensionError
@@ -78,9 +78,12 @@ def collide_poses(
     poses = PoseArrays(*as_poses(rotations, translations, first.dimension), True)
     n_poses = len(poses.rotations)
     if n_poses == 1 and progress is None and not (detail or report):
-        with UNLIMITED if deadline is None and cancel is None else Budget(deadline, cancel) as budget:
-            budget.check()
-            one = _collide_pose(first, second, poses, Work(budget, bool(witnesses), bool(boolean)))
+        if deadline is None and cancel is None:
+            one = _collide_pose(first, second, poses, UNCOUNTED[bool(witnesses), bool(boolean)])
+        else:
+            with Budget(deadline, cancel) as budget:
+                budget.check()
+                one = _collide_pose(first, second, poses, Work(budget, bool(witnesses), bool(boolean)))
         relations = _ALONE[one.relation].copy()
         return (relations, [one.witness]) if witnesses else relations
     with Budget(deadline, cancel) as budget:

@@ -148,5 +148,8 @@ class Work:
     n_rational: int = 0
 
 
+UNCOUNTED = {(named, boolean): Work(UNLIMITED, named, boolean) for named in (False, True) for boolean in (False, True)}
+"""By `witness` and `boolean`: of calls without deadline and report, whose counts nobody reads."""
+
 PairFunction = Callable[[Any, Any, Poses, Work], Collision]
 """The two solids are of the types that the table in `pairs.py` names."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -25,6 +26,7 @@ from engine.solids.base import Solid
 from engine.solids.pose import Pose
 from engine.types import Accuracy, Relation
 
+_FEW: Final = 16
 _BYTES: Final = 64
 _BYTES_OF_WITNESS: Final = 150
 """Of a pair that collides, in its block, put together, and sorted."""
@@ -220,9 +222,18 @@ def _candidates(
     if n_bodies < 2 or (wanted is not None and not len(wanted)):
         return
     high = bodies.high
+    if wanted is None and n_bodies <= _FEW:
+        wanted = _all_keys(n_bodies)
     blocks = pairs_of_boxes(low, high, budget.flag) if wanted is None else _wanted_pairs(low, high, wanted)
     for pairs in blocks:
         yield pairs if skipped is None else pairs[~np.isin(pairs[:, 0] * n_bodies + pairs[:, 1], skipped)]
+
+
+@lru_cache(_FEW)
+def _all_keys(n_bodies: int) -> IntArray:
+    """Return the keys of all pairs of so few bodies that no order of their boxes pays."""
+    first, second = np.triu_indices(n_bodies, 1)
+    return np.asarray(first * n_bodies + second, np.int64)
 
 
 def _wanted_pairs(low: FloatArray, high: FloatArray, wanted: IntArray) -> Iterator[IntArray]:
