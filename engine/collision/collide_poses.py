@@ -10,7 +10,7 @@ import numpy as np
 
 from engine.arrays import FloatArray, Int8Array, IntArray, read_only
 from engine.collision.answers import Answers, PlacedPair, Witnesses, accuracy_of
-from engine.collision.codes import DISJOINT, UNSETTLED
+from engine.collision.codes import DISJOINT, OVERLAPPING, UNSETTLED
 from engine.collision.collide import collide_pair, pair_function
 from engine.collision.detail import NO_DETAIL, check_has_detail, details_where_proven, has_interior
 from engine.collision.meshes.contact_kinds import N_NAMED
@@ -18,7 +18,7 @@ from engine.collision.meshes.mesh_arrays import STILL, mesh_body_of
 from engine.collision.meshes.mesh_mesh import answer_of, told_by_kernel
 from engine.collision.meshes.mesh_pair import SPACE, what_to_seek
 from engine.collision.meshes.placement import PoseArrays
-from engine.collision.meshes.pose_batch import N_COLUMNS, RELATION, relate_poses
+from engine.collision.meshes.pose_batch import N_COLUMNS, N_CONTACTS, ONE_SETTLES, RELATION, relate_poses
 from engine.collision.result import MESHES, RELATIONS, UNCOUNTED, Collision, Work
 from engine.collision.scenes.batches import convex_poses
 from engine.direct import entry_of
@@ -175,6 +175,8 @@ def batch_of(first: Solid, second: Solid, poses: PoseArrays, answers: Answers) -
             budget.flag,
         )  # fmt: skip
         budget.check()
+        if answers.details is not None:  # those speak of overlaps that a crossing proves
+            rows[(rows[:, RELATION] == OVERLAPPING) & (rows[:, N_CONTACTS] != ONE_SETTLES), RELATION] = UNSETTLED
         relations[items] = rows[:, RELATION]
         if witnesses is not None:
             numbers = range(start, stop) if isinstance(items, slice) else items.tolist()

@@ -20,7 +20,14 @@ from functools import lru_cache
 import numpy as np
 
 from engine.arrays import IntArray
-from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
+from engine.collision.codes import (
+    DISJOINT,
+    FIRST_INSIDE_SECOND,
+    OVERLAPPING,
+    SECOND_INSIDE_FIRST,
+    TOUCHING,
+    UNSETTLED,
+)
 from engine.collision.meshes.contact_kinds import STRENGTH
 from engine.collision.meshes.dual_traversal import (
     SEEK_OVERLAP,
@@ -164,8 +171,8 @@ def _relation(pair: MeshPair) -> Collision:
     if pair.is_settled:
         relation = Relation.OVERLAPPING if pair.seek == SEEK_OVERLAP else Relation.TOUCHING
         return Collision(relation, pair.named(piercing=pair.seek in (SEEK_PIERCING_BY_FIRST, SEEK_PIERCING_BY_SECOND)))
-    if pair.row[RELATION] == TOUCHING:
-        return Collision(Relation.TOUCHING, pair.named())
+    if pair.row[RELATION] in (OVERLAPPING, TOUCHING) and len(contacts):
+        return Collision(RELATIONS[pair.row[RELATION]], pair.named())
     patches = [pair.patches(own, contacts[:, own], INSIDE) for own in (0, 1)]
     if not len(contacts):
         n_inside = [sum(map(len, found)) for found in patches]

@@ -26,8 +26,6 @@ from engine.solids.pose import Pose
 
 _FEW: Final = 64
 """Distinct solids that are all described for a question about some of them."""
-_FEW_PAIRS: Final = 8
-"""Pairs that are sooner decided one by one than put into arrays."""
 
 
 class _Pools:
@@ -63,7 +61,7 @@ class SceneBatches:
         if bodies.dimension == 2:
             self._relate_outlines(pairs, found, budget, workers)
             return found
-        if len(pairs) <= _FEW_PAIRS or not (found == UNSETTLED).any():
+        if not (found == UNSETTLED).any():
             return found
         pool, convex = self.pool(budget)
         rows = np.append(np.int64(-1), convex[bodies.kinds])

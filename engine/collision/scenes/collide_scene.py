@@ -27,6 +27,9 @@ from engine.solids.pose import Pose
 from engine.types import Accuracy, Relation
 
 _FEW: Final = 16
+"""Bodies of which all pairs of boxes are compared, no order of them made."""
+_FEW_PAIRS: Final = 8
+"""Pairs that are sooner decided one by one than put into arrays."""
 _BYTES: Final = 64
 _BYTES_OF_WITNESS: Final = 150
 """Of a pair that collides, in its block, put together, and sorted."""
@@ -133,9 +136,11 @@ def collide_bodies(
     n_candidates = n_open = 0
     for pairs in _candidates(bodies, enlarged(bodies, gap), wanted, skipped, budget):
         budget.check()
-        relations = batches.relations(pairs, boolean, detail, budget, workers)
+        relations = np.full(len(pairs), UNSETTLED, np.int8)
+        if len(pairs) > _FEW_PAIRS:
+            relations = batches.relations(pairs, boolean, detail, budget, workers)
+            n_open += int((relations == UNSETTLED).sum())
         n_candidates += len(pairs)
-        n_open += int((relations == UNSETTLED).sum())
         details = batches.details(pairs, relations) if detail else None
         answers = Answers(budget, boolean, relations, [None] * len(pairs) if witnesses else None, details)
         _settle(bodies, pairs, answers, workers, progress)
@@ -231,7 +236,7 @@ def _candidates(
 
 @lru_cache(_FEW)
 def _all_keys(n_bodies: int) -> IntArray:
-    """Return the keys of all pairs of so few bodies that no order of their boxes pays."""
+    """Return the keys of all pairs of few bodies."""
     first, second = np.triu_indices(n_bodies, 1)
     return np.asarray(first * n_bodies + second, np.int64)
 
