@@ -143,6 +143,8 @@ def _warm_collision() -> None:
         collide_poses(first, bodies[0], turns, moves, witnesses=True)
         for other in (_cube(1.0), _cube(0.5), HalfSpace([1, 0, 0], -0.5), Sphere([0, 0, 0], 1)):
             collide(first, other)
+    cube = _cube()
+    collide(Polyhedron(cube.vertices, np.concatenate([cube.triangles] * 2)), _cube(0.5))  # faces that cancel: regions
     collide_poses(bodies[0], _cube(0.5), np.repeat(turns, 12, axis=0), np.repeat(moves, 12, axis=0))  # eight at a time
 
 
@@ -163,7 +165,7 @@ def _warm_scenes() -> None:
     many = [Aabb([k, 0, 0], [k + 2, 1, 1]) for k in range(300)]
     collide_scene(many)  # their boxes go into a grid
     flat: list[Solid] = [Polygon([[[0, 0], [4, 0], [1, 1], [0, 4]]]), Triangle([[0, 0], [1, 0], [0, 1]])]
-    collide_scene(flat)
+    collide_scene(flat * 5)
     crossing = Triangle([[0.5, 0.25], [5, 1], [1, 5]])
     collide(flat[0], crossing)
     for at in (None, Pose([[0.6, -0.8], [0.8, 0.6]], [5, 5])):
