@@ -108,7 +108,7 @@ class SceneBatches:
     def details(self, pairs: IntArray, relations: Int8Array) -> Int8Array:
         """Return the codes of `Rcc8` of pairs of bodies with interiors; NO_DETAIL where relations are UNSETTLED."""
         found = details_where_proven(relations)
-        boxes = np.flatnonzero(self._is_box[pairs].all(axis=1))
+        boxes = np.flatnonzero(self._is_box[pairs].all(axis=1) & (relations != UNSETTLED))
         found[boxes] = details_of_boxes(self.bodies.low, self.bodies.high, pairs[boxes], relations[boxes])
         return found
 

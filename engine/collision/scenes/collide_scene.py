@@ -139,7 +139,7 @@ def collide_bodies(
         relations = np.full(len(pairs), UNSETTLED, np.int8)
         if len(pairs) > _FEW_PAIRS:
             relations = batches.relations(pairs, boolean, detail, budget, workers)
-            n_open += int((relations == UNSETTLED).sum())
+        n_open += int((relations == UNSETTLED).sum())
         n_candidates += len(pairs)
         details = batches.details(pairs, relations) if detail else None
         answers = Answers(budget, boolean, relations, [None] * len(pairs) if witnesses else None, details)

@@ -32,6 +32,7 @@ from engine.collision.collide_poses import collide_poses
 from engine.collision.scenes.collide_scene import collide_scene
 from engine.errors import InvalidInputError
 from engine.jit import KERNELS
+from tests.reference.shapes import box
 
 EYE = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
 TURN = [[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]]
@@ -192,3 +193,19 @@ def test_a_scene_in_which_all_meet_all_ends_at_its_deadline() -> None:
     with pytest.raises(DeadlineExceededError):
         collide_scene(solids, deadline=0.2)
     assert time.process_time() - before < 5
+
+
+def test_few_bodies_lie_to_each_other_as_two_alone_do(seed: str) -> None:
+    source = random.Random(f"few bodies {seed}")
+    for _ in range(200):
+        solids = []
+        for _ in range(source.choice([2, 3, 5, 6])):
+            low = [source.randrange(3) for _ in range(3)]
+            high = [a + source.randrange(1, 3) for a in low]
+            mesh = Polyhedron(*(box(low, high)[name] for name in ("vertices", "faces")))
+            solids.append(source.choice([Aabb(low, high), Sphere(low, source.randrange(1, 3)), mesh]))
+        found = collide_scene(solids, detail=True)
+        told = zip(found.first.tolist(), found.second.tolist(), found.relation.tolist(), found.detail.tolist())
+        pairs = [(i, j) for j in range(len(solids)) for i in range(j)]
+        alone = [(i, j, collide(solids[i], solids[j], detail=True)) for i, j in sorted(pairs)]
+        assert [*told] == [(i, j, pair.relation, pair.detail) for i, j, pair in alone if pair.relation]
