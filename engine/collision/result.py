@@ -40,7 +40,8 @@ class Witness:
 
     kind: how the two faces meet, or `containment`.
     first_face, second_face: the caller's face of each body (aabb: 0..5 = xmin, xmax, ymin, ymax, zmin, zmax), -1 where
-        the body has no faces or the witness is a containment and this body is the one that contains.
+        the body has no faces or the witness is a containment and this body is the one that contains; -1 for both in a
+        containment of boxes, or of outlines of the plane.
     containing: for `containment` the body that contains, else "".
     piercing: touching only: some point of one body lies in the open interior of the other, although the open interiors
         do not meet (a surface, a flat body, or a wall that cancels).

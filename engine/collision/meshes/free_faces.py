@@ -108,11 +108,15 @@ def where_faces_are(s: Search, own: int, n: int, shares: Any, known: Any, is_flu
 def _where_within(
     source: MeshArrays, face: int, place: Placement, mesh: MeshArrays, target: Placement, defect: float
 ) -> int:
-    """Return where a point within a face lies that is off the other body, UNDECIDED where none tried tells."""
+    """Return where a point within a face lies that is off the other body, UNDECIDED where none tried tells.
+
+    Placing rounds such a point even where it rounds no vertex: each of two sums by 2^-53 of what it adds to.
+    """
     for item in range(3):
         p = point_within(source, face, item)
         q = brought_back(p.point, place, target, defect)
-        where = locate_point(OwnPoint(q.point, q.error + 2.0 * p.error), mesh)
+        moved = largest_of(p.point) + largest_of(place.shift) + largest_of(target.shift)
+        where = locate_point(OwnPoint(q.point, q.error + 2.0 * p.error + 2.0**-50 * moved), mesh)
         if where in (INSIDE, OUTSIDE):
             return where
     return UNDECIDED

@@ -131,7 +131,10 @@ def locate_scene(
 def locate_few(
     array: FloatArray, solids: Sequence[Solid], poses: Sequence[Pose | None] | None, budget: Budget
 ) -> tuple[SceneLocations, Accuracy]:
-    """Return the bodies that hold each of a few checked points (`are_few`)."""
+    """Return the bodies that hold each of a few checked points (`are_few`).
+
+    What went beyond the filter counts for each body, up to the number of points; tables count each point once.
+    """
     located, counts, is_exact = locate_one_by_one(array, solids, poses, budget)
     n = len(array)
     owners, bodies = np.nonzero(located.T >= 0)

@@ -91,3 +91,16 @@ def test_a_spike_in_the_tip_of_a_pit_below_a_face_only_touches() -> None:
         assert collide(made(body), made(spike)).relation == relation(body, spike) == Relation.TOUCHING
     narrow = {**pit, "vertices": [[2, 2, 4], [1.75, 1.75, 2], [2.25, 1.75, 2], [2, 2.25, 2]]}
     assert collide(made(body), made(narrow)).relation == relation(body, narrow)
+
+
+@pytest.mark.parametrize("slope", [100, 2**20])
+@pytest.mark.parametrize("exponent", range(31, 52, 2))
+def test_a_point_within_a_face_is_rounded_where_a_move_rounds_no_vertex(slope: int, exponent: int) -> None:
+    """Two steep bodies share a face, on both sides of it; the one far from the origin, the other moved there."""
+    face, by = [(0, 0, 0), (4, 0, 4 * slope), (0, 4, 0)], np.array([1, 1, slope < 2**20]) * 2.0**exponent
+    walls = [[0, 1, 3], [1, 2, 3], [2, 0, 3]]
+    above = [(1, 1, slope - 1), (1, 1, -1000 * slope)]
+    first = Polyhedron(np.array([*face, *above]) + by, [*walls, [1, 0, 4], [2, 1, 4], [0, 2, 4]])
+    second = Polyhedron([*face, (1, 1, 50 * slope)], [[0, 2, 1], *walls])
+    assert collide(first, second, second_pose=Pose(np.eye(3), by)).relation == Relation.TOUCHING
+    assert collide(second, first, first_pose=Pose(np.eye(3), by)).relation == Relation.TOUCHING
