@@ -17,6 +17,7 @@ import httpx
 import numpy as np
 import pytest
 
+from service.schemas.scenes import SCENE_ID
 from tests.unit.service.asking import SPHERE, examples
 from tests.unit.service.test_live import Service
 
@@ -64,7 +65,7 @@ def ask_everything(url: str) -> None:
         document: dict[str, Any] = client.get("/openapi.json").raise_for_status().json()
         asked = set()
         for path, example in examples(document):
-            client.post(path, json=example).raise_for_status()
+            client.post(path.replace("{scene_id}", SCENE_ID), json=example).raise_for_status()
             asked.add(path)
         stored = client.post("/v1/solids", json=SPHERE).raise_for_status().headers["location"]
         box = {"type": "aabb", "min": [0, 0, 0], "max": [1, 1, 1]}
