@@ -137,9 +137,7 @@ class Scene(Immutable):
         with Budget(deadline, cancel) as budget:
             if not standing.base.kept("located") and are_few(array, solids):  # the first question
                 standing.base.prepared("located", lambda: True)
-                found, accuracy = locate_few(array, solids, self.poses, budget)
-                if progress is not None:
-                    progress(len(array))
+                found, accuracy = locate_few(array, solids, self.poses, budget, progress)
                 return (found, accuracy) if report else found
             tables = standing.base.tables(array.shape[1], budget)
             if 0 < len(array) <= _FEW and solids:

@@ -120,16 +120,18 @@ def locate_scene(
     array = as_points(points, solids[0].dimension if len(solids) else None)
     with Budget(deadline, cancel) as budget:
         if are_few(array, solids):
-            found = locate_few(array, solids, poses, budget)
-            if progress is not None:
-                progress(len(array))
+            found = locate_few(array, solids, poses, budget, progress)
         else:
             found = locate_in(array, scene_of(solids, poses, array.shape[1], budget), budget, workers, progress)
     return found if report else found[0]
 
 
 def locate_few(
-    array: FloatArray, solids: Sequence[Solid], poses: Sequence[Pose | None] | None, budget: Budget
+    array: FloatArray,
+    solids: Sequence[Solid],
+    poses: Sequence[Pose | None] | None,
+    budget: Budget,
+    progress: Progress | None = None,
 ) -> tuple[SceneLocations, Accuracy]:
     """Return the bodies that hold each of a few checked points (`are_few`).
 
@@ -137,6 +139,8 @@ def locate_few(
     """
     located, counts, is_exact = locate_one_by_one(array, solids, poses, budget)
     n = len(array)
+    if progress is not None:
+        progress(n)
     owners, bodies = np.nonzero(located.T >= 0)
     offsets = np.searchsorted(owners, np.arange(n + 1))
     decisions: Literal["exact", "float64"] = "exact" if is_exact else "float64"
