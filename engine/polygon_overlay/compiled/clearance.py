@@ -41,7 +41,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 from engine.jit import inline, merged
-from engine.polygon_overlay.compiled.chain_rings import MEETS, Rings
+from engine.polygon_overlay.compiled.boundary.chain_rings import MEETS, Rings
 from engine.polygon_overlay.compiled.crossing_signs import Edges
 from engine.polygon_overlay.compiled.edge_events import Along
 from engine.polygon_overlay.compiled.edge_tree import (

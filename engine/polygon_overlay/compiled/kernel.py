@@ -25,20 +25,18 @@ from __future__ import annotations
 from typing import Any, Final, NamedTuple
 
 from engine.jit import kernel, merged
-from engine.polygon_overlay.compiled.chain_faces import number_cycles
-from engine.polygon_overlay.compiled.chain_rings import choose_boundary, walk_rings
-from engine.polygon_overlay.compiled.chains import build_chains, build_stars
+from engine.polygon_overlay.compiled.boundary.chain_faces import number_cycles
+from engine.polygon_overlay.compiled.boundary.chain_rings import choose_boundary, walk_rings
+from engine.polygon_overlay.compiled.boundary.chains import build_chains, build_stars
+from engine.polygon_overlay.compiled.boundary.components import join_faces
+from engine.polygon_overlay.compiled.boundary.crossing_walk import do_nothing_but_cross, walk_crossings
 from engine.polygon_overlay.compiled.clearance import CLEARANCE, certify, corners_are_clear, has_straight_point
-from engine.polygon_overlay.compiled.components import join_faces
 from engine.polygon_overlay.compiled.convex import GENERAL, Passages, Points, intersect_convex
-from engine.polygon_overlay.compiled.crossing_signs import turn_of_edges
-from engine.polygon_overlay.compiled.crossing_walk import do_nothing_but_cross, walk_crossings
 from engine.polygon_overlay.compiled.edge_contacts import Contacts, find_contacts
 from engine.polygon_overlay.compiled.edge_events import sort_events
-from engine.polygon_overlay.compiled.edge_tree import FEW, POLL, RUN, build_tree
+from engine.polygon_overlay.compiled.edge_tree import FEW, build_tree
 from engine.polygon_overlay.compiled.loading import (
     EVERYTHING,
-    LEFT_OUT,
     Box,
     Loaded,
     RingArrays,
@@ -51,6 +49,14 @@ from engine.polygon_overlay.compiled.loading import (
     mark_runs,
     mark_short,
 )
+from engine.polygon_overlay.compiled.pair_output import (
+    Filled,
+    has_room,
+    tell_evidence,
+    tell_parts,
+    write_convex,
+    write_rings,
+)
 from engine.polygon_overlay.compiled.reducing import count_left_out
 from engine.polygon_overlay.compiled.ring_nesting import (
     AGAIN,
@@ -59,7 +65,6 @@ from engine.polygon_overlay.compiled.ring_nesting import (
     Nesting,
     gather_evidence,
     spread_sources,
-    write_evidence,
 )
 from engine.polygon_overlay.compiled.ring_order import rank_rings
 from engine.polygon_overlay.compiled.rounded_crossings import LOST, round_points
@@ -83,15 +88,6 @@ class _Span(NamedTuple):
     first_end: int
     second: int
     second_end: int
-
-
-class _Filled(NamedTuple):
-    """How much output there is."""
-
-    n_vertices: int
-    n_rings: int
-    n_pieces: int
-    n_evidence: int
 
 
 class _Arranged(NamedTuple):
@@ -121,18 +117,6 @@ def _intersect_convex(
         Passages(w.unions.points, w.stars.node_of),
         Points(w.rounded.x, w.rounded.y, w.found.point, w.tree.places), stop,
     )  # fmt: skip
-
-
-@merged
-def _write_convex(w: Workspace, m: int, low: int, output: Output, filled: _Filled) -> None:
-    """Append the ring that `_intersect_convex` left, from its point ``low`` on."""
-    i = low
-    for k in range(filled.n_vertices, filled.n_vertices + m):
-        output.vertices[k, 0], output.vertices[k, 1] = w.rounded.x[i], w.rounded.y[i]
-        output.sources[k, 0], output.sources[k, 1] = w.found.point[i], w.tree.places[i]
-        i = i + 1 if i + 1 < m else 0
-    output.rings[filled.n_rings + 1] = filled.n_vertices + m
-    output.pieces[filled.n_pieces + 1] = filled.n_rings + 1
 
 
 @merged
@@ -244,64 +228,7 @@ def _round(w: Workspace, n: int, arranged: _Arranged, stop: Any) -> tuple[float,
 
 
 @merged
-def _source_of(w: Workspace, n: int, i: int) -> tuple[int, int]:
-    """Return the source of point i of the rings, as `overlay_pairs` tells it."""
-    point, edge, origins = w.found.point[i], w.found.edge[i], w.given.origins
-    if point >= n:
-        first, second = w.events.first[point - n], w.events.second[point - n]
-        is_beside = edge == first or (edge != second and turn_of_edges(w.given.edges, edge, first) == 0)
-        return origins[edge], origins[second if is_beside else first]
-    if w.found.meets[i] & RUN:
-        return origins[point], LEFT_OUT
-    return origins[point], -1 if edge == point else LEFT_OUT - 1 - origins[edge]
-
-
-@merged
-def _write(w: Workspace, n: int, n_found: int, output: Output, filled: _Filled, stop: Any) -> None:
-    """Append the rings in their order to the output."""
-    n_out, n_pieces = filled.n_vertices, filled.n_pieces
-    for k in range(n_found):
-        ring = w.ranking.order[k] if n_found > 1 else 0
-        first, last = w.found.offset[ring], w.found.offset[ring + 1]
-        i = w.ranking.start[ring]
-        for _ in range(last - first):
-            if n_out & POLL == 0 and stop[0]:
-                return
-            output.vertices[n_out, 0], output.vertices[n_out, 1] = w.rounded.x[i], w.rounded.y[i]
-            output.sources[n_out, 0], output.sources[n_out, 1] = _source_of(w, n, i)
-            n_out += 1
-            i = i + 1 if i + 1 < last else first
-        output.rings[filled.n_rings + k + 1] = n_out
-        is_hole = w.ranking.is_hole[ring]
-        n_pieces += int(not is_hole)
-        output.pieces[n_pieces] = filled.n_rings + k + 1
-
-
-@merged
-def _tell(w: Workspace, n_found: int, first: int, output: Output, filled: _Filled) -> int:
-    """Append the evidence of the rings to the output; return how much there is then, or NO_ROOM."""
-    n = filled.n_evidence
-    for k in range(n_found):
-        ring = w.ranking.order[k] if n_found > 1 else 0
-        is_hole, region = w.ranking.is_hole[ring] != 0, w.found.region[ring]
-        n = write_evidence(w.holders, ring, region, is_hole, filled.n_rings + k, first, output.evidence, n)
-        if n == NO_ROOM:
-            return n
-    return n
-
-
-@merged
-def _tell_parts(w: Workspace, n_found: int, output: Output, filled: _Filled) -> int:
-    """Append of each ring the part of the result that it bounds; return how many rings there are then."""
-    for k in range(n_found):
-        ring = w.ranking.order[k] if n_found > 1 else 0
-        at = filled.n_rings + k
-        output.evidence[at, 0], output.evidence[at, 1] = at, w.faces.inside[w.found.region[ring]]
-    return filled.n_rings + n_found
-
-
-@merged
-def _ended(pair: int, needs: int, filled: _Filled, n_left_out: int) -> tuple[int, int, int, int, int, int, int]:
+def _ended(pair: int, needs: int, filled: Filled, n_left_out: int) -> tuple[int, int, int, int, int, int, int]:
     n_vertices, n_rings, n_pieces, n_evidence = filled
     return pair, needs, n_vertices, n_rings, n_pieces, n_evidence, n_left_out
 
@@ -326,7 +253,7 @@ def overlay_pairs(
     """
     w = rows_of(buffers)
     is_intersection = not (kept[0] or kept[1] or kept[2])
-    filled = _Filled(0, 0, 0, 0)
+    filled = Filled(0, 0, 0, 0)
     n_left_out = 0
     status, counts, displacement = outcomes.status, outcomes.counts, outcomes.displacement
     for pair in range(begin, status.shape[0]):
@@ -346,12 +273,12 @@ def overlay_pairs(
             if is_intersection and span.first_end - span.first == 1 and span.second_end - span.second == 1:
                 m, low, moved_by = _intersect_convex(w, subjects, clips, span, stop)
                 if m != GENERAL:
-                    if not _has_room(output, filled, m, 1):
+                    if not has_room(output, filled, m, 1):
                         counts[pair, 1], counts[pair, 2] = 1, m
                         return _ended(pair, NEEDS_OUTPUT, filled, 0)
                     if m > 0:
-                        _write_convex(w, m, low, output, filled)
-                        filled = _Filled(filled.n_vertices + m, filled.n_rings + 1, filled.n_pieces + 1, 0)
+                        write_convex(w, m, low, output, filled)
+                        filled = Filled(filled.n_vertices + m, filled.n_rings + 1, filled.n_pieces + 1, 0)
                         counts[pair, 0], counts[pair, 1], counts[pair, 2] = 1, 1, m
                     status[pair], displacement[pair] = DONE, moved_by
                     continue
@@ -375,32 +302,24 @@ def overlay_pairs(
             break
         if n_pieces < 0:
             continue
-        if not _has_room(output, filled, m, n_found):
+        if not has_room(output, filled, m, n_found):
             counts[pair, 1], counts[pair, 2] = n_found, m
             return _ended(pair, NEEDS_OUTPUT, filled, 0)
         n_evidence = 0
         if nesting.rule == AGAIN:
-            n_evidence = _tell(w, n_found, span.first, output, filled)
+            n_evidence = tell_evidence(w, n_found, span.first, output, filled)
         elif kept[3] > 1:
-            n_evidence = _tell_parts(w, n_found, output, filled)
+            n_evidence = tell_parts(w, n_found, output, filled)
         if n_evidence == NO_ROOM:
             counts[pair, 2] = 2 * output.vertices.shape[0]
             return _ended(pair, NEEDS_OUTPUT, filled, 0)
-        _write(w, loaded.n, n_found, output, filled, stop)
+        write_rings(w, loaded.n, n_found, output, filled, stop)
         if stop[0]:
             break
         if loaded.n_runs > 0:
             for ring in range(n_found):
                 n_left_out += count_left_out(output.sources, output.rings[ring], output.rings[ring + 1])
-        filled = _Filled(filled.n_vertices + m, filled.n_rings + n_found, filled.n_pieces + n_pieces, n_evidence)
+        filled = Filled(filled.n_vertices + m, filled.n_rings + n_found, filled.n_pieces + n_pieces, n_evidence)
         counts[pair, 0], counts[pair, 1], counts[pair, 2], counts[pair, 3] = n_pieces, n_found, m, arranged.n_exact
         status[pair], displacement[pair] = (DONE if is_valid else MAY_CROSS), moved_by
     return _ended(status.shape[0], FINISHED, filled, n_left_out)
-
-
-@merged
-def _has_room(output: Output, filled: _Filled, n_vertices: int, n_rings: int) -> bool:
-    """Tell whether so much more fits into the output."""
-    return (filled.n_vertices + n_vertices <= output.vertices.shape[0]) & (
-        filled.n_rings + n_rings < output.rings.shape[0]
-    )

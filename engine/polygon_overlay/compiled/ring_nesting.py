@@ -26,8 +26,8 @@ from typing import Any, Final, NamedTuple
 
 from engine.arrangement.union_find import root_of
 from engine.jit import called, merged
-from engine.polygon_overlay.compiled.chain_faces import Faces
-from engine.polygon_overlay.compiled.chains import Chains, is_live
+from engine.polygon_overlay.compiled.boundary.chain_faces import Faces
+from engine.polygon_overlay.compiled.boundary.chains import Chains, is_live
 from engine.polygon_overlay.compiled.edge_tree import POLL
 from engine.polygon_overlay.compiled.loading import Given
 

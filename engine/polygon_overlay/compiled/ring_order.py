@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from engine.jit import inline
-from engine.polygon_overlay.compiled.chain_rings import Rings
+from engine.polygon_overlay.compiled.boundary.chain_rings import Rings
 from engine.polygon_overlay.compiled.edge_tree import OFTEN, POLL, box_holds
 from engine.polygon_overlay.compiled.rounded_crossings import Rounded
 from engine.predicates.orientation import orient2d

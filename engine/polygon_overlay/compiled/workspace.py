@@ -12,10 +12,10 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from engine.jit import merged
-from engine.polygon_overlay.compiled.chain_faces import Faces
-from engine.polygon_overlay.compiled.chain_rings import Rings, Walk
-from engine.polygon_overlay.compiled.chains import Chains, Loose, Stars
-from engine.polygon_overlay.compiled.components import Components
+from engine.polygon_overlay.compiled.boundary.chain_faces import Faces
+from engine.polygon_overlay.compiled.boundary.chain_rings import Rings, Walk
+from engine.polygon_overlay.compiled.boundary.chains import Chains, Loose, Stars
+from engine.polygon_overlay.compiled.boundary.components import Components
 from engine.polygon_overlay.compiled.crossing_signs import Edges
 from engine.polygon_overlay.compiled.edge_contacts import Events, Unions
 from engine.polygon_overlay.compiled.edge_events import Along

@@ -12,7 +12,7 @@ from collections import namedtuple
 from typing import Any, Final
 
 from engine.jit import inline, merged
-from engine.polygon_overlay.compiled.chains import Chains, Stars, is_live, place_before, standing
+from engine.polygon_overlay.compiled.boundary.chains import Chains, Stars, is_live, place_before, standing
 from engine.polygon_overlay.compiled.crossing_signs import Edges, crossing_against, exact_weight, orient, turn_of_edges
 from engine.polygon_overlay.compiled.edge_contacts import Events
 from engine.polygon_overlay.compiled.edge_events import Along

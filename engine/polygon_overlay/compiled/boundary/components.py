@@ -23,7 +23,7 @@ import numpy as np
 
 from engine.arrangement.union_find import root_of, unite
 from engine.jit import inline, merged
-from engine.polygon_overlay.compiled.chain_faces import NOTHING, edge_above, half_below, test_edge
+from engine.polygon_overlay.compiled.boundary.chain_faces import NOTHING, edge_above, half_below, test_edge
 from engine.polygon_overlay.compiled.crossing_signs import Edges
 from engine.polygon_overlay.compiled.edge_tree import LEAF, OFTEN, POLL, RUN, BoxTree, box_holds, build_tree, leaves_of
 from engine.polygon_overlay.compiled.loading import Given

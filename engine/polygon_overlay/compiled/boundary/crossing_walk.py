@@ -13,11 +13,11 @@ from __future__ import annotations
 from typing import Any
 
 from engine.jit import inline, merged
-from engine.polygon_overlay.compiled.chain_rings import Rings, pass_point
+from engine.polygon_overlay.compiled.boundary.chain_rings import Rings, pass_point, pass_vertex
 from engine.polygon_overlay.compiled.crossing_signs import Edges, orient
 from engine.polygon_overlay.compiled.edge_contacts import LEFT, NOT_SIMPLE, Contacts, Events
 from engine.polygon_overlay.compiled.edge_events import Along
-from engine.polygon_overlay.compiled.edge_tree import BENT, DOUBTFUL, POLL, RUN
+from engine.polygon_overlay.compiled.edge_tree import DOUBTFUL, POLL
 from engine.polygon_overlay.compiled.loading import Given
 
 
@@ -38,13 +38,6 @@ def _turns_left(given: Given, ring: int) -> bool:
     return orient(given.edges, given.edges.before[top], top, given.edges.after[top]) > 0
 
 
-@merged
-def _emit_vertex(edges: Edges, marks: Any, v: int, edge: int, rings: Rings, start: int, n: int) -> tuple[int, int]:
-    """Write vertex v if the boundary turns there, and goes on along ``edge``; returns as `pass_point`."""
-    turns = marks[v] & BENT != 0 or orient(edges, edges.before[v], v, edges.after[v]) != 0
-    return pass_point(rings, start, n, v, edge, turns, marks[edge] & (RUN | DOUBTFUL), 0)
-
-
 @inline
 def _follow(
     edges: Edges, events: Events, along: Along, place: Any, marks: Any, event: int, is_forward: bool, rings: Rings,
@@ -61,7 +54,7 @@ def _follow(
             break
         v = edges.after[edge] if is_forward else edge
         edge = v if is_forward else edges.before[v]
-        n, _ = _emit_vertex(edges, marks, v, edge, rings, start, n)
+        n, _ = pass_vertex(edges, marks, v, edge, rings, start, n, 0)
         at = along.starts[edge] if is_forward else along.starts[edge + 1] - 1
     return along.order[at], n
 

@@ -11,8 +11,8 @@ from typing import Any, Final
 
 from engine.arrangement.union_find import root_of, unite
 from engine.jit import inline, merged
-from engine.polygon_overlay.compiled.chain_faces import Faces
-from engine.polygon_overlay.compiled.chains import Chains, Stars, is_live, leaving_edge, origin, place_before
+from engine.polygon_overlay.compiled.boundary.chain_faces import Faces
+from engine.polygon_overlay.compiled.boundary.chains import Chains, Stars, is_live, leaving_edge, origin, place_before
 from engine.polygon_overlay.compiled.crossing_signs import Edges, orient, turn_of_edges
 from engine.polygon_overlay.compiled.edge_tree import BENT, DOUBTFUL, POLL, RUN
 from engine.polygon_overlay.compiled.ring_nesting import Holders, enter_beyond
@@ -73,6 +73,15 @@ def pass_point(
     return at, doubt | meets & DOUBTFUL
 
 
+@merged
+def pass_vertex(
+    edges: Edges, marks: Any, v: int, edge: int, rings: Rings, start: int, at: int, doubt: int
+) -> tuple[int, int]:
+    """Pass an input vertex, from which the boundary goes on along ``edge``; returns as `pass_point`."""
+    turns = marks[v] & BENT != 0 or orient(edges, edges.before[v], v, edges.after[v]) != 0
+    return pass_point(rings, start, at, v, edge, turns, marks[edge] & (RUN | DOUBTFUL), doubt)
+
+
 @inline
 def _emit(
     edges: Edges, chains: Chains, nodes: Any, fan: Any, marks: Any, path: Any, first: int, last: int, rings: Rings,
@@ -97,9 +106,7 @@ def _emit(
                 return n_points
             v = edge if is_back else edges.after[edge]
             edge = edges.before[v] if is_back else v
-            turns = marks[v] & BENT != 0 or orient(edges, edges.before[v], v, edges.after[v]) != 0
-            meets = marks[edge] & (RUN | DOUBTFUL)
-            n_points, doubt = pass_point(rings, start, n_points, v, edge, turns, meets, doubt)
+            n_points, doubt = pass_vertex(edges, marks, v, edge, rings, start, n_points, doubt)
         before = half
     rings.meets[n_points - 1] |= doubt
     return n_points
