@@ -49,10 +49,8 @@ def locate(
 ) -> Int8Array:
     """Locate points in a solid, see `engine.locate`."""
     rows = as_points(points, solid.dimension)
-    result = np.empty(len(rows), np.int8)
-    for start, answer in _answers(client, _locate, (solid,), (rows,), part, progress):
-        result[start : start + len(answer)] = answer
-    return result
+    function = partial(_about_rows, containment.locate)
+    return _filled(np.int8, _answers(client, function, (solid,), (rows,), part, progress), len(rows))
 
 
 def collide_poses(
@@ -67,10 +65,8 @@ def collide_poses(
 ) -> Int8Array:
     """Decide how `first` lies to `second` under many poses, see `engine.collide_poses`."""
     turns, moves = poses.as_poses(rotations, translations, first.dimension)
-    result = np.empty(len(turns), np.int8)
-    for start, answer in _answers(client, _collide_poses, (first, second), (turns, moves), part, progress):
-        result[start : start + len(answer)] = answer
-    return result
+    function = partial(_about_solids, poses.collide_poses)
+    return _filled(np.int8, _answers(client, function, (first, second), (turns, moves), part, progress), len(turns))
 
 
 def clearance_poses(
@@ -87,11 +83,9 @@ def clearance_poses(
     """Say how far `first` is from `second` under many poses, see `engine.clearance_poses`."""
     turns, moves = poses.as_poses(rotations, translations, first.dimension)
     least = None if at_least is None else checked_distance(at_least)
-    result: Any = np.empty(len(turns), np.float64 if least is None else np.bool_)
-    function = partial(_clearance_poses, at_least=least)
-    for start, answer in _answers(client, function, (first, second), (turns, moves), part, progress):
-        result[start : start + len(answer)] = answer
-    return result
+    function = partial(_about_solids, clearances.clearance_poses, at_least=least)
+    answers = _answers(client, function, (first, second), (turns, moves), part, progress)
+    return _filled(np.float64 if least is None else np.bool_, answers, len(turns))
 
 
 def clip_segments(
@@ -99,14 +93,9 @@ def clip_segments(
 ) -> clipping.SegmentPieces:
     """Clip segments on a region, see `engine.clip_segments`."""
     rows = as_point_groups(segments, 2, region.dimension, ("segments",))
-    found = sorted(_answers(client, _clip_segments, (region,), (rows,), part, progress), key=lambda each: each[0])
-    if not found:
-        return _clip_segments((region,), rows)
-    source = np.concatenate([start + pieces.source for start, pieces in found])
-    start, end, t, faces = (
-        np.concatenate([getattr(pieces, name) for _, pieces in found]) for name in ("start", "end", "t", "faces")
-    )
-    return clipping.SegmentPieces(source, start, end, t, faces)
+    function = partial(_about_rows, clipping.clip_segments)
+    found = _in_order(_answers(client, function, (region,), (rows,), part, progress))
+    return _joined(found) if found else function((region,), rows)
 
 
 def clip_segments_scene(
@@ -121,16 +110,11 @@ def clip_segments_scene(
     """Clip segments on the bodies of a scene, see `engine.Scene.clip_segments`; the scene is sent once to every worker
     and stays prepared there."""
     rows = as_point_groups(segments, 2, scene.solids[0].dimension if len(scene) else None, ("segments",))
-    function = partial(_clip_segments_scene, keep=keep)
-    answers = _answers(client, function, (scene,), (rows,), part, progress)
-    found = sorted(answers, key=lambda each: each[0])
+    function = partial(_about_solids, Scene.clip_segments, keep=keep)
+    found = _in_order(_answers(client, function, (scene,), (rows,), part, progress))
     if len(found) < 2:
         return found[0][1] if found else function((scene,), rows)
-    if keep == "any":
-        return np.concatenate([met for _, met in found])
-    source = np.concatenate([start + pieces.source for start, pieces in found])
-    names = [field.name for field in fields(ScenePieces)][1:]
-    return ScenePieces(source, *(np.concatenate([getattr(pieces, name) for _, pieces in found]) for name in names))
+    return np.concatenate([met for _, met in found]) if keep == "any" else _joined(found)
 
 
 def overlay_batch(
@@ -150,33 +134,37 @@ def overlay_batch(
         raise InvalidArrayError(
             f"subjects and clips must be of equal length, got {len(subjects)} and {len(clips)}", ("clips",)
         )
-    function = partial(_overlay_batch, **options)
-    found = sorted(_answers(client, function, (), (subjects, clips), part, progress), key=lambda each: each[0])
+    function = partial(_about_rows, overlay_pairs, **options)
+    found = _in_order(_answers(client, function, (), (subjects, clips), part, progress))
     return join_batches([none, *(batch for _, batch in found)])
 
 
-def _locate(solids: tuple[Solid, ...], points: Any) -> Any:
-    return containment.locate(points, solids[0], workers=1)
+def _about_rows(ask: Function, held: tuple[Any, ...], *rows: Any, **options: Any) -> Any:
+    return ask(*rows, *held, workers=1, **options)
 
 
-def _collide_poses(solids: tuple[Solid, ...], turns: Any, moves: Any) -> Any:
-    return poses.collide_poses(solids[0], solids[1], turns, moves, workers=1)
+def _about_solids(ask: Function, held: tuple[Any, ...], *rows: Any, **options: Any) -> Any:
+    return ask(*held, *rows, workers=1, **options)
 
 
-def _clearance_poses(solids: tuple[Solid, ...], turns: Any, moves: Any, at_least: float | None) -> Any:
-    return clearances.clearance_poses(solids[0], solids[1], turns, moves, at_least=at_least, workers=1)
+def _filled(kind: Any, answers: Iterator[tuple[int, Any]], n: int) -> Any:
+    """Return n answers, arrays of a kind that arrive in any order, as one array."""
+    result = np.empty(n, kind)
+    for start, answer in answers:
+        result[start : start + len(answer)] = answer
+    return result
 
 
-def _clip_segments(solids: tuple[Solid, ...], segments: Any) -> clipping.SegmentPieces:
-    return clipping.clip_segments(segments, solids[0], workers=1)
+def _in_order(answers: Iterator[tuple[int, Any]]) -> list[tuple[int, Any]]:
+    return sorted(answers, key=lambda each: each[0])
 
 
-def _clip_segments_scene(held: tuple[Any, ...], segments: Any, keep: Any) -> Any:
-    return held[0].clip_segments(segments, keep=keep, workers=1)
-
-
-def _overlay_batch(_: tuple[Solid, ...], subjects: Any, clips: Any, **options: Any) -> Any:
-    return overlay_pairs(subjects, clips, workers=1, **options)
+def _joined(found: list[tuple[int, Any]]) -> Any:
+    """Return pieces of segments, at least one part, each from the number of its first segment on, as one."""
+    kind = type(found[0][1])
+    source = np.concatenate([start + pieces.source for start, pieces in found])
+    names = [field.name for field in fields(kind)][1:]
+    return kind(source, *(np.concatenate([getattr(pieces, name) for _, pieces in found]) for name in names))
 
 
 def _answers(

@@ -264,7 +264,7 @@ _MAKERS: dict[type[Solid], Callable[..., Locator]] = {
     HalfSpace: _in_rows,
     Convex: _in_rows,
     Sphere: lambda solid: _by_kernel("squared_distance", locate_in_ball, solid, solid.center, 0.0, solid.radius),
-    Aabb: lambda solid: _by_kernel("comparison", locate_in_box, solid, solid.min, solid.max),
+    Aabb: lambda solid: _by_kernel("comparison", locate_in_box, solid, EXACT, solid.min, solid.max),
     Triangle: _in_triangle,
     Polygon: _in_polygon,
     Polyhedron: _in_polyhedron,

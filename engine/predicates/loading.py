@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from engine.jit import inline
+from engine.jit import inline, merged
 from engine.types import Point2, Point3
 
 
@@ -21,3 +21,10 @@ def as_point2(points: Any, row: int) -> Point2:
 def as_point3(points: Any, row: int) -> Point3:
     """Return row `row` of points (n, 3) float64."""
     return Point3(float(points[row, 0]), float(points[row, 1]), float(points[row, 2]))
+
+
+@merged
+def corners_of(vertices: Any, triangles: Any, triangle: int) -> tuple[Point3, Point3, Point3]:
+    """Return the corners of a triangle."""
+    a, b = as_point3(vertices, triangles[triangle, 0]), as_point3(vertices, triangles[triangle, 1])
+    return a, b, as_point3(vertices, triangles[triangle, 2])

@@ -22,7 +22,7 @@ import numpy as np
 
 from engine.arrays import FloatArray, read_only
 from engine.jit import allocating, inline, kernel
-from engine.predicates.loading import as_point3
+from engine.predicates.loading import as_point3, corners_of
 from engine.predicates.orientation import orient3d
 from engine.solids.polyhedron import Polyhedron
 from engine.types import Point3
@@ -60,15 +60,6 @@ def _certified(solid: Polyhedron) -> Convexity | None:
     return None if side == 0 else Convexity(center, bool(side < 0))
 
 
-@inline
-def _corners(vertices: Any, triangles: Any, item: int) -> tuple[Point3, Point3, Point3]:
-    return (
-        as_point3(vertices, triangles[item, 0]),
-        as_point3(vertices, triangles[item, 1]),
-        as_point3(vertices, triangles[item, 2]),
-    )
-
-
 @kernel
 def _certify(vertices: Any, triangles: Any, center: Any) -> int:
     """Return the side, 1 or -1, of every face on which the centre of a convex solid lies; 0 where not certified."""
@@ -76,7 +67,7 @@ def _certify(vertices: Any, triangles: Any, center: Any) -> int:
     n_faces = triangles.shape[0]
     side = 0
     for item in range(n_faces):
-        a, b, c = _corners(vertices, triangles, item)
+        a, b, c = corners_of(vertices, triangles, item)
         found = orient3d(a, b, c, o)
         if (found != 1 and found != -1) or (side != 0 and found != side):
             return 0
@@ -108,7 +99,7 @@ def _is_locally_convex(vertices: Any, triangles: Any, side: int) -> bool:
             return False
         if other < corner:
             continue  # the same four points
-        a, b, c = _corners(vertices, triangles, item)
+        a, b, c = corners_of(vertices, triangles, item)
         found = orient3d(a, b, c, as_point3(vertices, triangles[other // 3, (other + 2) % 3]))
         if found != 0 and found != side:
             return False
@@ -138,7 +129,7 @@ def _is_crossed_once(vertices: Any, triangles: Any, o: Point3, side: int) -> boo
     is the opposite of `side`.
     """
     for attempt in range(min(_TRIES, triangles.shape[0])):
-        a, b, c = _corners(vertices, triangles, attempt)
+        a, b, c = corners_of(vertices, triangles, attempt)
         q = Point3(
             0.5 * a.x + 0.3125 * b.x + 0.1875 * c.x,
             0.5 * a.y + 0.3125 * b.y + 0.1875 * c.y,
@@ -155,7 +146,7 @@ def _crossings(vertices: Any, triangles: Any, o: Point3, q: Point3, side: int) -
     """Return how many triangles the half-line from o through q crosses, -1 where it may meet an edge."""
     n_crossed = 0
     for item in range(triangles.shape[0]):
-        a, b, c = _corners(vertices, triangles, item)
+        a, b, c = corners_of(vertices, triangles, item)
         first, second, third = orient3d(o, a, b, q), orient3d(o, b, c, q), orient3d(o, c, a, q)
         if first == -side and second == -side and third == -side:
             n_crossed += 1

@@ -15,7 +15,7 @@ from engine.bounding.grid import Axis, cell_of
 from engine.containment.methods.polyhedron_ray_parity import BEYOND, CROSSED, ON_FACE, meet_upwards
 from engine.containment.posed.filters import NOT_FINITE, has_not_finite
 from engine.jit import allocating_kernel, inline
-from engine.predicates.loading import as_point3
+from engine.predicates.loading import as_point3, corners_of
 from engine.types import UNDECIDED
 
 _ODD, _ON_FACE, _OPEN, _BEYOND = 1, 2, 4, 8
@@ -87,9 +87,7 @@ def _pass_over(points: Any, cells: Any, vertices: Any, triangles: Any, z_min: fl
     for triangle in range(len(triangles)):
         if flag[0]:
             break
-        a = as_point3(vertices, triangles[triangle, 0])
-        b = as_point3(vertices, triangles[triangle, 1])
-        c = as_point3(vertices, triangles[triangle, 2])
+        a, b, c = corners_of(vertices, triangles, triangle)
         x_low, x_high = max(min(a.x, b.x, c.x), u.low), min(max(a.x, b.x, c.x), u.high)
         y_low, y_high = max(min(a.y, b.y, c.y), v.low), min(max(a.y, b.y, c.y), v.high)
         z_high = max(a.z, b.z, c.z)

@@ -29,13 +29,14 @@ from typing import Any, Final
 import numpy as np
 
 from engine.bounding.bvh import LEAST, STACK, WIDTH
-from engine.containment.posed.filters import NOT_FINITE, has_not_finite, orient2d_blurred, orient3d_blurred
+from engine.containment.posed.filters import NOT_FINITE, has_not_finite, orient2d_blurred
 from engine.jit import allocating_kernel, called, inline, kernel, merged
 from engine.lanes.boxes import EMPTY, inside_box
 from engine.lanes.lanes import count_bits, lowest_bit
 from engine.lanes.overhead import BAND, GROWTH, LEAST_REACH, OVERHEAD_ROWS, overhead
-from engine.predicates.loading import as_point3
+from engine.predicates.loading import as_point3, corners_of
 from engine.predicates.orientation import orient2d, orient2d_exact, orient2d_filter, orient3d_exact, orient3d_filter
+from engine.predicates.posed import orient3d_rounded
 from engine.types import UNDECIDED, Point2, Point3
 
 MISSED: Final = 0
@@ -167,7 +168,7 @@ def _meet_blurred(a: Any, b: Any, c: Any, q: Any, blur: float) -> int:
         return UNDECIDED | BEYOND
     if q.z + blur < min(a.z, b.z, c.z):
         return CROSSED
-    side = orient3d_blurred(a, b, c, q, blur)
+    side = orient3d_rounded(a, b, c, q, blur)
     return UNDECIDED | BEYOND if side == UNDECIDED else MISSED if side == first else CROSSED
 
 
@@ -207,9 +208,7 @@ def list_unsure(tree: Any, x: float, y: float, z: float, blur: float, found: Any
                 stack[n_stack] = child
                 n_stack += 1
                 continue
-            a = as_point3(tree.vertices, tree.triangles[-1 - child, 0])
-            b = as_point3(tree.vertices, tree.triangles[-1 - child, 1])
-            c = as_point3(tree.vertices, tree.triangles[-1 - child, 2])
+            a, b, c = corners_of(tree.vertices, tree.triangles, -1 - child)
             met = _meet_blurred(a, b, c, q, blur)
             is_odd ^= met == CROSSED
             if met & 3 == UNDECIDED:
@@ -251,9 +250,7 @@ def locate_in_tree(tree: Any, q: Any, blur: float, stack: Any, flag: Any) -> tup
                 stack[n_stack] = child
                 n_stack += 1
                 continue
-            a = as_point3(tree.vertices, tree.triangles[-1 - child, 0])
-            b = as_point3(tree.vertices, tree.triangles[-1 - child, 1])
-            c = as_point3(tree.vertices, tree.triangles[-1 - child, 2])
+            a, b, c = corners_of(tree.vertices, tree.triangles, -1 - child)
             met = meet_upwards(a, b, c, q) if blur == 0.0 else _meet_blurred(a, b, c, q, blur)
             beyond |= met & BEYOND
             if met & 3 == ON_FACE:
@@ -292,8 +289,7 @@ def _locate_each(points: Any, blurs: Any, tree: Any, locations: Any, stack: Any,
 def fill_triangle_boxes(vertices: Any, triangles: Any, boxes: Any) -> None:
     """Fill boxes (m, 6) with the least and the largest coordinates of triangles (m, 3)."""
     for triangle in range(len(triangles)):
-        a, b = as_point3(vertices, triangles[triangle, 0]), as_point3(vertices, triangles[triangle, 1])
-        c = as_point3(vertices, triangles[triangle, 2])
+        a, b, c = corners_of(vertices, triangles, triangle)
         boxes[triangle, 0], boxes[triangle, 3] = min(a.x, b.x, c.x), max(a.x, b.x, c.x)
         boxes[triangle, 1], boxes[triangle, 4] = min(a.y, b.y, c.y), max(a.y, b.y, c.y)
         boxes[triangle, 2], boxes[triangle, 5] = min(a.z, b.z, c.z), max(a.z, b.z, c.z)

@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 from engine.jit import inline, kernel
-from engine.predicates.orientation import BOUND_2D, BOUND_3D, GUARD_2D, GUARD_3D
+from engine.predicates.orientation import BOUND_2D, GUARD_2D
 from engine.types import UNDECIDED
 
 _SLACK: Final = 8.0 * 2.0**-53
@@ -37,25 +37,6 @@ def orient2d_blurred(a: Any, b: Any, q: Any, blur: float) -> int:
     turn = left - right
     bound = BOUND_2D * (abs(left) + abs(right)) + GUARD_2D + blur * (abs(b.x - a.x) + abs(b.y - a.y))
     return 1 if turn > bound else -1 if -turn > bound else UNDECIDED
-
-
-@inline
-def orient3d_blurred(a: Any, b: Any, c: Any, q: Any, blur: float) -> int:
-    """Return the sign of orient3d(a, b, c, .) on all of the blurred q, or UNDECIDED.
-
-    Taken from a: dot((b - a) x (c - a), q - a), whose change with q is at most the sum of the normal's parts.
-    """
-    ux, uy, uz = b.x - a.x, b.y - a.y, b.z - a.z
-    vx, vy, vz = c.x - a.x, c.y - a.y, c.z - a.z
-    wx, wy, wz = q.x - a.x, q.y - a.y, q.z - a.z
-    uy_vz, uz_vy = uy * vz, uz * vy
-    uz_vx, ux_vz = uz * vx, ux * vz
-    ux_vy, uy_vx = ux * vy, uy * vx
-    side = (uy_vz - uz_vy) * wx + (uz_vx - ux_vz) * wy + (ux_vy - uy_vx) * wz
-    nx, ny, nz = abs(uy_vz) + abs(uz_vy), abs(uz_vx) + abs(ux_vz), abs(ux_vy) + abs(uy_vx)
-    permanent = nx * abs(wx) + ny * abs(wy) + nz * abs(wz)
-    bound = BOUND_3D * permanent + GUARD_3D * (1.0 + (abs(wx) + abs(wy) + abs(wz))) + blur * (nx + ny + nz + GUARD_3D)
-    return 1 if side > bound else -1 if -side > bound else UNDECIDED
 
 
 @inline
@@ -95,20 +76,6 @@ def side_of_rows(rows: Any, first: int, last: int, p: Any, blur: float) -> int:
 def in_space(points: Any, item: int) -> Any:
     """Return a row of points (n, 2 or 3) as (x, y, z); z is 0 in the plane."""
     return float(points[item, 0]), float(points[item, 1]), 0.0 if points.shape[1] == 2 else float(points[item, 2])
-
-
-@kernel
-def locate_in_box_blurred(points: Any, blurs: Any, low: Any, high: Any, locations: Any, flag: Any) -> int:
-    """Fill `locations` (n,) int8 for points (n, dim) with blurs (n,); returns how many are not clearly in or out."""
-    n_open, is_flat = 0, len(low) == 2
-    least = low[0], low[1], 0.0 if is_flat else low[2]
-    most = high[0], high[1], 0.0 if is_flat else high[2]
-    for item in range(len(points)):
-        if flag[0]:
-            break
-        locations[item] = side_of_box(least, most, is_flat, in_space(points, item), blurs[item])
-        n_open += abs(locations[item]) != 1
-    return n_open
 
 
 @kernel

@@ -18,11 +18,12 @@ import numpy as np
 from engine.arrays import FloatArray, Int8Array, read_only
 from engine.containment.locators import Counts, Fill, Locator, csg_locator, locator_of, rational_half, settled
 from engine.containment.methods.ball import locate_in_ball
+from engine.containment.methods.box import locate_in_box
 from engine.containment.methods.polygon_one_pass import locate_by_ring_pass
 from engine.containment.methods.polygon_ray_parity import locate_in_rings
 from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
 from engine.containment.posed.body_frame import move_to_body_frame
-from engine.containment.posed.filters import locate_by_polynomial_blurred, locate_in_box_blurred, locate_in_rows_blurred
+from engine.containment.posed.filters import locate_by_polynomial_blurred, locate_in_rows_blurred
 from engine.containment.posed.frames import Frames, frames_of
 from engine.containment.prepared import prism_rows, rings_of, tree_of
 from engine.containment.rational_locate import Check, to_world_frame
@@ -97,7 +98,7 @@ def _blurred_kernel(solid: Solid) -> Blurred:
     """Return the blurred kernel over the prepared structures of `solid`."""
     prepared: Callable[[Check], tuple[Any, ...]]
     if isinstance(solid, Aabb):
-        kernel, prepared = locate_in_box_blurred, lambda _: (solid.min, solid.max)
+        kernel, prepared = locate_in_box, lambda _: (solid.min, solid.max)
     elif isinstance(solid, (HalfSpace, Convex)) or (isinstance(solid, Triangle) and solid.dimension == 3):
         rows = rows_in_space(prism_rows(solid)[0] if isinstance(solid, Triangle) else rows_of(solid))
         kernel, prepared = locate_in_rows_blurred, lambda _: (rows,)
