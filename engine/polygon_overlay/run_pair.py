@@ -5,7 +5,6 @@ Small overlays are called so often that what stands around the kernel counts: no
 
 from __future__ import annotations
 
-import functools
 from typing import Any, Final, NamedTuple, cast
 
 import numpy as np
@@ -36,8 +35,6 @@ BY_CONTACT: Final = 300
 _BY_VERTEX: Final = 200
 """Bytes of scratch and answer for each of them, at most."""
 _FEW_CONTACTS: Final = 1024
-_FEW_PIECES: Final = 64
-"""Pieces without holes up to which offsets are kept, since many results have the same."""
 UNNAMED: Final = Nesting(np.zeros(0, np.int64), np.zeros(0), PAIR)
 """That of two polygons."""
 _INT32: Final = np.dtype(np.int32)
@@ -126,7 +123,7 @@ def run_blocks(
             found = _expanded(output, n + n_left_out, n_found, subject, clip, budget)
         else:
             found = _copied(output.vertices, n), _copied(output.sources, n), _copied(output.rings, n_found + 1)
-        pieces = _counted(n_pieces) if n_pieces == n_found <= _FEW_PIECES else _copied(output.pieces, n_pieces + 1)
+        pieces = _copied(output.pieces, n_pieces + 1)
         made = FoundPair(status.item(0), counts.item(3), displacement.item(0), *found, pieces)
     keep(scratch)
     return made
@@ -149,9 +146,3 @@ def _copied(array: npt.NDArray[Any], n: int) -> npt.NDArray[Any]:
     made: Any = array[:n].copy()
     made.setflags(False)  # write: by its name it takes twice as long
     return cast("npt.NDArray[Any]", made)
-
-
-@functools.lru_cache(_FEW_PIECES + 1)
-def _counted(n: int) -> IntArray:
-    """Return 0 .. n, the ring offsets of so many pieces without holes; its memory cannot be written to."""
-    return np.frombuffer(np.arange(n + 1).tobytes(), np.int64)

@@ -18,7 +18,7 @@ from typing import Any, Final
 import numpy as np
 
 from engine.jit import inline
-from engine.polygon_overlay.compiled.loading import Box, RingArrays
+from engine.polygon_overlay.compiled.loading import Box, RingArrays, box_of
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
 
 NOT_RIGHT: Final = 2
@@ -54,13 +54,9 @@ def load_blocks(rings: RingArrays, size: int, blocks: Blocks, n: int, ring: int,
             b = min(a + size, end)
             part = vertices[a:b]
             closing = b if b < end else start
-            x_min = x_max = vertices[closing, 0]
-            y_min = y_max = vertices[closing, 1]
-            for k in range(b - a):
-                px, py = part[k, 0], part[k, 1]
-                x_min, x_max = min(x_min, px), max(x_max, px)
-                y_min, y_max = min(y_min, py), max(y_max, py)
-            boxes[n, 0], boxes[n, 1], boxes[n, 2], boxes[n, 3] = x_min, x_max, y_min, y_max
+            x_min, x_max, y_min, y_max = box_of(part, 0, b - a)
+            boxes[n, 0], boxes[n, 1] = min(x_min, vertices[closing, 0]), max(x_max, vertices[closing, 0])
+            boxes[n, 2], boxes[n, 3] = min(y_min, vertices[closing, 1]), max(y_max, vertices[closing, 1])
             first[n], last[n], blocks.marks[n] = a, b, 0
             n += 1
     blocks.firsts[ring + n_rings] = n

@@ -49,11 +49,3 @@ def test_overlay_of_any_layout(layout: str, operation: str) -> None:
     for name in ("vertices", "ring_offsets", "piece_offsets"):
         assert getattr(result, name).tolist() == getattr(expected, name).tolist()
         assert not getattr(result, name).flags.writeable
-
-
-def test_offsets_that_results_share_stay_as_they_are() -> None:
-    result = overlay(Polygon([SQUARE]), CLIP)
-    with pytest.raises(ValueError, match=r"(?i)writeable"):
-        result.piece_offsets.setflags(write=True)
-    with pytest.raises(ValueError, match="read-only"):
-        result.piece_offsets[0] = 1
