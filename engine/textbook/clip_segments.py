@@ -34,7 +34,6 @@ from engine.textbook.solids import signed_distance
 
 REJECTED, ACCEPTED, UNFINISHED = 0, 1, 2
 MAX_TURNS = 64  # six would do in exact arithmetic: each turn settles one plane
-MAX_PLANES = 62
 
 
 @allocating_kernel
@@ -124,7 +123,7 @@ def cut_on_plane(p: Any, q: Any, bit: int, planes: Any) -> Any:
 
 @allocating_kernel
 def on_convex(segments: FloatArray, planes: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Return (clipped segments (n, 2, dim), status (n,)); planes (m, dim + 1), m <= MAX_PLANES: bits of a code word."""
+    """Return (clipped segments (n, 2, dim), status (n,)); planes (m, dim + 1), m <= 62: bits of a code word."""
     clipped, status = segments.copy(), np.empty(len(segments), np.int64)
     for i in range(len(segments)):
         ends = clipped[i, 0], clipped[i, 1]

@@ -121,11 +121,6 @@ def boxes_meet(low: FloatArray, high: FloatArray, other_low: FloatArray, other_h
     return bool((low <= other_high).all() and (other_low <= high).all())
 
 
-def spheres_meet(center: FloatArray, radius: float, other_center: FloatArray, other_radius: float) -> bool:
-    """Tell whether two closed spheres have a common point."""
-    return float(np.linalg.norm(center - other_center)) <= radius + other_radius
-
-
 @inline
 def distance(a: Point3, b: Point3) -> float:
     """Return |a - b|."""
