@@ -8,12 +8,11 @@ from __future__ import annotations
 
 from dataclasses import fields
 from functools import lru_cache
-from math import isfinite
 from typing import Any, Final, cast
 
 import numpy as np
 
-from engine.arrays import BoolArray, FlagArray, FloatArray, IntArray
+from engine.arrays import BoolArray, FlagArray, FloatArray, IntArray, read_only
 from engine.containment.locators import locator_of
 from engine.direct import entry_of
 from engine.parallel import UNLIMITED, Budget, run_chunks
@@ -35,8 +34,8 @@ from engine.types import OPEN, UNDECIDED
 
 _BYTES: Final = 400
 """Of a piece, in its part, joined and in order."""
-_FEW: Final = 64
-"""Segments that are one piece of work."""
+_FEW: Final = 1024
+"""Segments that are one piece of work, as the first that `run_chunks` takes are."""
 _BODIES_KEPT: Final = 16
 _LEFT: Final = 16
 """Pairs left for which there is room at once, beside one for each segment."""
@@ -80,26 +79,29 @@ def answer_few(segments: Any, standing: Standing, keep: str) -> ScenePieces | Bo
     """Return what `Scene.clip_segments` does of an array of a few segments, not yet looked at for NaN, in half the time
     that the general way takes; None where nothing is kept of the scene yet, or a segment is left open."""
     solids = standing.base.solids
-    if not solids or not is_ready(segments, 2, solids[0].dimension) or not 0 < len(segments) < _FEW:
+    if not solids or not is_ready(segments, 2, solids[0].dimension) or not 0 < len(segments) <= _FEW:
         return None
     if standing.base.kept("words") is None or type(keep) is not str or keep not in ("all", "first", "any"):
         return None
+    n, dimension = len(segments), segments.shape[2]
     if keep == "all":
-        parts, left = _cut_near(segments, order_of(segments, 0.5, None), 0, len(segments), standing, UNLIMITED)
-        if left or not isfinite(segments.sum()):
+        parts, left, is_plain = _cut_near(segments, order_of(segments, 0.5, None), 0, n, standing, UNLIMITED)
+        if left or not is_plain:
             return None
-        found = joined(parts, segments.shape[2])
-        return in_order(found, len(segments), lambda: _exact_ends(segments, standing, UNLIMITED))
-    state, out = _searched(segments, standing, keep == "any", UNLIMITED, None)
-    if OPEN in state.tobytes():
+        return in_order(joined(parts, dimension), n, lambda: _exact_ends(segments, standing, UNLIMITED))
+    is_any, words, room, reached = (
+        keep == "any",
+        standing.words(UNLIMITED),
+        scratch_for(standing.n_rows),
+        _IN_ROWS.copy(),
+    )
+    state, out = np.empty(n, np.uint8), _NONE if is_any else _firsts_for(n, dimension)
+    order = order_of(segments, 0.0, None)
+    entry_of(find_first)(segments, order, n, words, room, is_any, UNLIMITED.flag, state, out, reached)
+    _, wanted, _, n_met, n_open, _ = reached.tolist()
+    if wanted or n_open:
         return None
-    return state.view(np.bool_) if keep == "any" else _met(state, out)
-
-
-def _met(state: FlagArray, out: Firsts) -> ScenePieces:
-    """Return the pieces of those segments that are MET."""
-    met = np.flatnonzero(state == MET)
-    return ScenePieces(met, *(out if len(met) == len(state) else [each.take(met, axis=0) for each in out]))
+    return state.view(np.bool_) if is_any else ScenePieces(*(out if n_met == n else [each[:n_met] for each in out]))
 
 
 def clip_first(
@@ -107,7 +109,8 @@ def clip_first(
 ) -> ScenePieces:
     """Return the first piece of each segment that meets a body, of those that begin at one point that of the first."""
     state, out = _searched(segments, standing, False, budget, workers)
-    left, sure = np.flatnonzero(state == OPEN), _met(state, out)
+    left, met = np.flatnonzero(state == OPEN), np.flatnonzero(state == MET)
+    sure = ScenePieces(*(out if len(met) == len(state) else [each.take(met, axis=0) for each in out]))
     if not len(left):
         return sure
     more = Counts(len(left))
@@ -143,16 +146,16 @@ def _searched(
     state, out = np.empty(n, np.uint8), _NONE if is_any else _firsts_for(n, segments.shape[2])
 
     def task(first: int, last: int) -> None:
-        reached, room = np.array([first, 0, 0]), scratch_for(standing.n_rows)
+        reached, room = np.array([first, 0, 0, 0, 0, 0]), scratch_for(standing.n_rows)
         while True:  # bound: each turn reaches the end, or prepares what a body wants
             entry_of(find_first)(segments, order, last, words, room, is_any, budget.flag, state, out, reached)
             budget.check()
-            _, wanted, body = reached.tolist()
+            _, wanted, body, *_ = reached.tolist()
             if wanted == 0:
                 break
             standing.prepare(body, wanted, budget)
 
-    if n < _FEW:
+    if n <= _FEW:
         task(0, n)
     else:
         run_chunks(task, n, budget=budget, workers=workers)
@@ -161,11 +164,14 @@ def _searched(
 
 def _firsts_for(n: int, dimension: int) -> Firsts:
     """Return room for the first piece of n segments."""
-    (start, end), (faces, ranks) = np.empty((2, n, dimension)), np.empty((2, n, 2), np.int64)
-    return Firsts(np.empty(n, np.int64), start, end, np.empty((n, 2)), faces, ranks)
+    ends, pairs = (n, dimension), (n, 2)
+    owners, points = (np.empty(n, np.int64), np.empty(n, np.int64)), (np.empty(ends), np.empty(ends))
+    return Firsts(*owners, *points, np.empty(pairs), np.empty(pairs, np.int64), np.empty(pairs, np.int64))
 
 
 _NONE: Final = _firsts_for(0, 3)
+_IN_ROWS: Final = read_only(np.array([0, 0, 0, 0, 0, 1]))
+"""What `find_first` counts in, where few are asked about."""
 
 
 def _parts(
@@ -176,9 +182,9 @@ def _parts(
     order = order_of(segments, 0.5, standing.where(budget))
 
     def task(first: int, last: int) -> None:
-        parts[first], left[first] = _cut_near(segments, order, first, last, standing, budget)
+        parts[first], left[first], _ = _cut_near(segments, order, first, last, standing, budget)
 
-    if n < _FEW:
+    if n <= _FEW:
         task(0, n)
     else:
         run_chunks(task, n, budget=budget, workers=workers)
@@ -193,26 +199,27 @@ def _parts(
 
 def _cut_near(
     segments: FloatArray, order: IntArray, first: int, last: int, standing: Standing, budget: Budget
-) -> tuple[list[Found], list[IntArray]]:
-    """Return the pieces of some segments within the bodies near them, and which of these pairs are left (k, 2)."""
-    parts, left, n = list[Found](), list[IntArray](), np.array([first, 0, 0, 0, 0, 0])
+) -> tuple[list[Found], list[IntArray], bool]:
+    """Return the pieces of some segments within the bodies near them, which of these pairs are left (k, 2), and whether
+    no segment is of numbers that kernels leave, NaN above all."""
+    parts, left, n = list[Found](), list[IntArray](), np.array([first, 0, 0, 0, 0, 0, 0])
     words, n_rows = standing.words(budget), 4 * (last - first) + MOST_MET
     scratch = scratch_for(standing.n_rows)
     while n[0] < last:  # bound: each turn has room for a body, or prepares what one wants
-        out, names = room_for(n_rows, segments.shape[2]), np.empty((n_rows, 2), np.int64)
+        out, names = room_for(n_rows, segments.shape[2]), np.empty((2, n_rows), np.int64)
         pairs = np.empty((_LEFT + last - first, 2), np.int64)
         entry_of(cut_near)(segments, order, last, words, scratch, budget.flag, out, names, pairs, n)
         budget.check()
-        _, _, m, m_left, wanted, body = n.tolist()
+        _, _, m, m_left, wanted, body, is_beyond = n.tolist()
         if m:
             budget.take(_BYTES * m)
             found = first_of(out, m)
-            parts.append(Found(found.source, names[:m, 0], names[:m, 1], *found[1:]))
+            parts.append(Found(found.source, names[0, :m], names[1, :m], *found[1:]))
         if m_left:
             left.append(pairs[:m_left])
         if wanted:
             standing.prepare(body, wanted, budget)
-    return parts, left
+    return parts, left, not is_beyond
 
 
 def _cut(

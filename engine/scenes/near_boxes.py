@@ -153,19 +153,18 @@ def in_its_box(segments: Any, item: int, bodies: Any, body: int) -> bool:
 def open_node(tree: Any, node: int, way: Way, last: Any, scratch: Any, depth: int) -> int:
     """Put what a node of a tree names, and a segment enters before `last`, on scratch.waiting from `depth` on, the
     nearest last; return where it ends."""
-    waiting, keys, first = scratch.waiting, scratch.keys, depth
+    waiting, keys, least, nearest = scratch.waiting, scratch.keys, np.float32(np.inf), depth
     bits = enter_boxes(tree.boxes, node, way.middle, way.inverse, way.slack, last, scratch.entered)
     while bits != 0:
         lane = lowest_bit(bits)
         bits &= bits - 1
-        below, key, place = tree.child[node, lane], scratch.entered[0, lane], depth
-        if below == EMPTY:
-            continue
-        while place > first and keys[place - 1] < key:
-            waiting[place], keys[place] = waiting[place - 1], keys[place - 1]
-            place -= 1
-        waiting[place], keys[place] = below, key
-        depth += 1
+        waiting[depth], keys[depth] = tree.child[node, lane], scratch.entered[0, lane]
+        nearest, least = depth if keys[depth] < least else nearest, min(keys[depth], least)
+        depth += waiting[depth] != EMPTY
+    if depth > nearest:
+        last = depth - 1
+        waiting[last], waiting[nearest] = waiting[nearest], waiting[last]
+        keys[last], keys[nearest] = keys[nearest], keys[last]
     return depth
 
 

@@ -25,11 +25,11 @@ from engine.lanes.tracing import LANES
 from engine.lanes.triangles import AXES_BEFORE, CORNER_ROWS, longest_axis, near_triangles
 from engine.predicates.double_double import dd_div, dd_sub
 from engine.scenes.posed_cut import in_frame, put_point, slack_of
-from engine.segment_clipping.on_boundary.contacts import APART, CROSSED, DEGENERATE, PROPER, START, TOUCHING, place_of
+from engine.segment_clipping.on_boundary.contacts import APART, CROSSED, DEGENERATE, PROPER, START, place_of
 from engine.segment_clipping.on_boundary.crossing_values import Vector, dot, is_item_safe, normal_of
 from engine.segment_clipping.on_boundary.mesh_contacts import inverse_of, local_segment
 from engine.segment_clipping.on_boundary.sorted_crossings import Crossings, sort_crossings
-from engine.segment_clipping.on_boundary.touches import are_one, touched_triangle
+from engine.segment_clipping.on_boundary.touches import are_one
 from engine.segment_clipping.on_boundary.triangle_contact import contact_filter, corner, exact_contact
 from engine.segment_clipping.pieces import Pieces
 from engine.segment_clipping.plane_meeting import T_BOUND
@@ -136,7 +136,8 @@ def _tree_of(address: int) -> Any:
 
 @inline
 def _contact(mesh: PlacedMesh, element: int, p: Point3, q: Point3, blur: float) -> int:
-    """Return what `exact_contact` does, or UNDECIDED, for a triangle and a segment known to `blur` a coordinate."""
+    """Return what `exact_contact` does, DEGENERATE for UNDECIDED, for a triangle and a segment known to `blur` a
+    coordinate."""
     a, b, c = corner(mesh.elements, element, 0), corner(mesh.elements, element, 1), corner(mesh.elements, element, 2)
     kind = contact_filter(a, b, c, p, q, blur)
     return exact_contact(a, b, c, p, q) if kind == UNDECIDED and blur == 0.0 else kind
@@ -182,18 +183,15 @@ def _gather(mesh: PlacedMesh, p: Point3, q: Point3, blur: float, is_any: bool, w
             kind = _contact(mesh, -1 - below, p, q, blur)
             if kind == APART:
                 continue
-            if is_any and kind in (PROPER, TOUCHING):
+            if is_any and kind != DEGENERATE:
                 return 1
-            how = CROSSED
-            if kind != PROPER:
-                how = touched_triangle(mesh.elements, -1 - below, p, q) if kind == TOUCHING and not is_any else UNSURE
-                how = UNSURE if how == DEGENERATE or place_of(how) >= START else how
-            if how == UNSURE or n_met == MOST_MET:
+            if kind == DEGENERATE or n_met == MOST_MET or (kind != PROPER and place_of(kind) >= START):
                 if not is_any:
                     return UNSURE
                 is_unsure = True
                 continue
-            cuts.met[n_met], cuts.codes[n_met] = -1 - below, how
+            prefetch(mesh.faces, -1 - below)
+            cuts.met[n_met], cuts.codes[n_met] = -1 - below, CROSSED if kind == PROPER else kind
             n_met += 1
     return UNSURE if is_unsure else n_met
 
@@ -247,6 +245,13 @@ def _cut_at(mesh: PlacedMesh, segments: Any, item: int, place: int, frame: Any, 
     (own, blur, along, along_blur), cuts, element = frame, scratch.cuts, scratch.cuts.met[place]
     if not (mesh.are_safe or is_item_safe(mesh.elements, element)):
         return False
+    cuts.faces[place], code = mesh.faces[element], cuts.codes[place]
+    for other in range(place if code != CROSSED else 0):
+        if are_one(mesh.elements, cuts.met[other], cuts.codes[other], element, code):
+            cuts.t[place] = cuts.t[other]
+            for k in range(3):
+                cuts.points[place, k] = cuts.points[other, k]
+            return True
     a, b, c = corner(mesh.elements, element, 0), corner(mesh.elements, element, 1), corner(mesh.elements, element, 2)
     normal = normal_of(a, b, c)
     from_a = (
@@ -258,8 +263,7 @@ def _cut_at(mesh: PlacedMesh, segments: Any, item: int, place: int, frame: Any, 
     d, d_low, d_bound = _values(dot(normal, along), along_blur, normal)
     slack = slack_of(s, s_bound, d, d_bound)
     t, low = dd_div(-s, -s_low, d, d_low)
-    cuts.t[place], cuts.faces[place] = t + low, mesh.faces[element]
-    n = place_of(cuts.codes[place])
+    cuts.t[place], n = t + low, place_of(code)
     if n > 2:
         return put_point(cuts.points[place], segments, item, t, low, slack)
     touched, bound = corner(mesh.elements, element, n), (T_BOUND + slack) * abs(t)

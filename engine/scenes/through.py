@@ -44,7 +44,7 @@ MESH: Final = 3
 """Kinds of bodies, UNREADY until one is prepared; OTHER ones are cut in exact arithmetic."""
 MET: Final = 1
 """State of a segment, beside SETTLED, which meets nothing, and OPEN."""
-Firsts = namedtuple("Firsts", "body start end t faces ranks")
+Firsts = namedtuple("Firsts", "source body start end t faces ranks")
 """One piece of each segment, as `ScenePieces` has them."""
 
 
@@ -97,11 +97,12 @@ def cut_near(
     segments: Any, order: Any, last: int, words: Any, scratch: Any, stop: Any, out: Pieces, names: Any, left: Any,
     n: Any,
 ) -> None:  # fmt: skip
-    """Cut segments (n, 2, dim), those before `last` in an order (n,), on the bodies that they may meet; names (m, 2):
+    """Cut segments (n, 2, dim), those before `last` in an order (n,), on the bodies that they may meet; names (2, m):
     of each piece the body, and whether it is longer than a point; left: rows of a segment and a body that are OPEN.
 
     n: the segment to begin with, and which of its bodies, afterwards where to go on; how many rows of `out`, and of
-    `left`, are filled; 0, or why the next is not cut (what `crossings_in` wants), and the body.
+    `left`, are filled; 0, or why the next is not cut (what `crossings_in` wants), and the body; whether a segment is of
+    numbers that no kernel takes.
     """
     near = scratch_at(scratch).near
     n[2], n[3], n[4] = 0, 0, 0
@@ -109,9 +110,10 @@ def cut_near(
         item, begin, n[0], n[1] = order[turn], n[1], turn, 0
         prefetch(segments, order[min(turn + AHEAD, last - 1)] * 2 * segments.shape[2])
         is_safe, n_near = is_item_safe(segments, item), near_bodies(segments, item, words, scratch)
+        n[6] |= not is_safe
         for place in range(begin, n_near):
             n[1], body, found = place, near[place], UNSURE
-            if stop[0] or n[2] + MOST_MET > names.shape[0] or n[3] == left.shape[0]:
+            if stop[0] or n[2] + MOST_MET > names.shape[1] or n[3] == left.shape[0]:
                 return
             if is_safe:
                 found = _cut_on(words, body, segments, item, False, scratch, stop, out, n[2])
@@ -123,9 +125,9 @@ def cut_near(
                 n[3] += 1
                 continue
             for row in range(n[2], n[2] + found):
-                names[row, 0] = name_in(words, body)
-                names[row, 1] = out.faces[row, 1] >= -1
-                if names[row, 1] == 0:
+                names[0, row] = name_in(words, body)
+                names[1, row] = out.faces[row, 1] >= -1
+                if names[1, row] == 0:
                     out.faces[row, 1] = out.faces[row, 0]
             n[2] += found
         n[1] = 0
@@ -154,14 +156,14 @@ def _keep_first(scratch: Any, name: int) -> None:
 
 
 @inline
-def _put_first(scratch: Any, out: Firsts, item: int) -> None:
-    """Write the first piece found as that of a segment."""
+def _put_first(scratch: Any, out: Firsts, row: int, item: int) -> None:
+    """Write the first piece found, that of a segment, to a row."""
     piece, is_long = scratch.room, scratch.room.faces[MOST_MET, 1] >= -1
-    out.body[item], out.ranks[item, 0], out.ranks[item, 1] = scratch.found[0], 0, is_long
+    out.source[row], out.body[row], out.ranks[row, 0], out.ranks[row, 1] = item, scratch.found[0], 0, is_long
     for k in range(out.start.shape[1]):
-        out.start[item, k], out.end[item, k] = piece.ends[0, MOST_MET, k], piece.ends[1, MOST_MET, k]
+        out.start[row, k], out.end[row, k] = piece.ends[0, MOST_MET, k], piece.ends[1, MOST_MET, k]
     for end in range(2):
-        out.t[item, end], out.faces[item, end] = piece.t[MOST_MET, end], piece.faces[MOST_MET, end * is_long]
+        out.t[row, end], out.faces[row, end] = piece.t[MOST_MET, end], piece.faces[MOST_MET, end * is_long]
 
 
 @inline
@@ -240,9 +242,10 @@ def find_first(
     """Find the first piece of segments (n, 2, dim), those before `last` in an order (n,), or where `is_any` whether
     there is one.
 
-    state: (n,) uint8, SETTLED, MET or OPEN; out: of those that are MET, in row i, the piece, unless `is_any`. room: of
-    `scratch_for`. n: the segment to begin with, afterwards where to go on; and 0, or why it is not asked (what
-    `crossings_in` wants), and the body.
+    state: (n,) uint8, SETTLED, MET or OPEN; out: of those that are MET the piece, unless `is_any`. room: of
+    `scratch_for`. n: the segment to begin with, afterwards where to go on; 0, or why it is not asked (what
+    `crossings_in` wants), and the body; how many are MET and how many OPEN; whether rows of `out` are filled one after
+    another, not each in its segment's place.
     """
     scratch = scratch_at(room)
     noted, n[1] = scratch.found, 0
@@ -262,6 +265,8 @@ def find_first(
         if found == SETTLED:
             found = OPEN if noted[1] != 0 else MET if noted[0] >= 0 else SETTLED
         if found == MET and not is_any:
-            _put_first(scratch, out, item)
+            _put_first(scratch, out, n[3] if n[5] != 0 else item, item)
         state[item] = found
+        n[3] += found == MET
+        n[4] += found == OPEN
     n[0] = last

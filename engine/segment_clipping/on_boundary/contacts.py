@@ -33,8 +33,6 @@ from engine.types import UNDECIDED, Point2
 APART: Final = 0
 PROPER: Final = 1
 DEGENERATE: Final = 2
-TOUCHING: Final = 3
-"""DEGENERATE, and surely one common point."""
 START: Final = 6
 END: Final = 7
 WITHIN: Final = 8

@@ -26,9 +26,8 @@ from engine.lanes.boxes import EMPTY, near_segment
 from engine.lanes.lanes import lowest_bit, prefetch
 from engine.lanes.tracing import LANES
 from engine.lanes.triangles import AXES_BEFORE, CORNER_ROWS, longest_axis, near_triangles
-from engine.segment_clipping.on_boundary.contacts import APART, NO_ROOM, STOPPED, TOUCHING, is_point
+from engine.segment_clipping.on_boundary.contacts import APART, NO_ROOM, STOPPED, is_point
 from engine.segment_clipping.on_boundary.mesh_contacts import local_segment
-from engine.segment_clipping.on_boundary.touches import touched_triangle
 from engine.segment_clipping.on_boundary.triangle_contact import corner, triangle_contact
 
 AHEAD: Final = 8
@@ -158,9 +157,6 @@ def _settle_triangles(streams: Any, mesh: Any, segments: Any, n_waiting: int, n_
         prefetch(mesh.faces, coming)
         item, element = waiting[place] & _SEGMENT, waiting[place] >> 16
         kind = triangle_contact(mesh.elements, element, segments, item)
-        if kind == TOUCHING:
-            ends = corner(segments, item, 0), corner(segments, item, 1)
-            kind = touched_triangle(mesh.elements, element, ends[0], ends[1])
         if kind != APART:
             if n_contacts == streams.owners.size:
                 return NO_ROOM

@@ -33,8 +33,8 @@ BODIES: list[Solid] = [
 def cut_on(segments: Any, solid: Solid, pose: Pose | None) -> tuple[Pieces, Any]:
     """Return the pieces of segments within a placed solid that are settled, and whether each segment is."""
     standing, m = Standing(Bodies((solid,), (pose,)), {}), len(segments)
-    n, order, parts, is_settled = np.zeros(6, np.int64), np.arange(m), [], np.ones(m, np.bool_)
-    out, names = room_for(MOST_MET + 2 * m, solid.dimension), np.empty((MOST_MET + 2 * m, 2), np.int64)
+    n, order, parts, is_settled = np.zeros(7, np.int64), np.arange(m), [], np.ones(m, np.bool_)
+    out, names = room_for(MOST_MET + 2 * m, solid.dimension), np.empty((2, MOST_MET + 2 * m), np.int64)
     left = np.empty((m, 2), np.int64)
     with Budget() as budget:
         while n[0] < m:
