@@ -210,7 +210,7 @@ def _cut_near(
         pairs = np.empty((_LEFT + last - first, 2), np.int64)
         entry_of(cut_near)(segments, order, last, words, scratch, budget.flag, out, names, pairs, n)
         budget.check()
-        _, _, m, m_left, wanted, body, is_beyond = n.tolist()
+        _, _, m, m_left, wanted, body, _ = n.tolist()
         if m:
             budget.take(_BYTES * m)
             found = first_of(out, m)
@@ -219,7 +219,7 @@ def _cut_near(
             left.append(pairs[:m_left])
         if wanted:
             standing.prepare(body, wanted, budget)
-    return parts, left, not is_beyond
+    return parts, left, not n[6]
 
 
 def _cut(

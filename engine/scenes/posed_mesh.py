@@ -27,6 +27,7 @@ from engine.predicates.double_double import dd_div, dd_sub
 from engine.scenes.posed_cut import in_frame, put_point, slack_of
 from engine.segment_clipping.on_boundary.contacts import APART, CROSSED, DEGENERATE, PROPER, START, place_of
 from engine.segment_clipping.on_boundary.crossing_values import Vector, dot, is_item_safe, normal_of
+from engine.segment_clipping.on_boundary.exact_crossing import cross_exactly
 from engine.segment_clipping.on_boundary.mesh_contacts import inverse_of, local_segment
 from engine.segment_clipping.on_boundary.sorted_crossings import Crossings, sort_crossings
 from engine.segment_clipping.on_boundary.touches import are_one
@@ -135,18 +136,71 @@ def _tree_of(address: int) -> Any:
 
 
 @inline
-def _contact(mesh: PlacedMesh, element: int, p: Point3, q: Point3, blur: float) -> int:
-    """Return what `exact_contact` does, DEGENERATE for UNDECIDED, for a triangle and a segment known to `blur` a
-    coordinate."""
-    a, b, c = corner(mesh.elements, element, 0), corner(mesh.elements, element, 1), corner(mesh.elements, element, 2)
-    kind = contact_filter(a, b, c, p, q, blur)
-    return exact_contact(a, b, c, p, q) if kind == UNDECIDED and blur == 0.0 else kind
+def _ask_triangles(mesh: PlacedMesh, ends: Any, n: int, is_any: bool, cuts: Crossings, n_met: int) -> int:
+    """Append those of the n triangles that wait in cuts.faces which a segment crosses to the n_met ones met before;
+    return as `_gather` does.
+
+    ends: p and q, known to a blur a coordinate.
+    """
+    p, q, blur = ends
+    for place in range(n):
+        element = cuts.faces[place]
+        a, b, c = (
+            corner(mesh.elements, element, 0),
+            corner(mesh.elements, element, 1),
+            corner(mesh.elements, element, 2),
+        )
+        kind = contact_filter(a, b, c, p, q, blur)
+        if kind == UNDECIDED and blur == 0.0:
+            kind = exact_contact(a, b, c, p, q)
+        if kind == APART:
+            continue
+        if is_any and kind != DEGENERATE:
+            return 1
+        if kind == DEGENERATE or n_met == MOST_MET or (kind != PROPER and place_of(kind) >= START):
+            n_met = UNSURE
+            if is_any:
+                continue
+            break
+        prefetch(mesh.faces, element)
+        cuts.met[n_met], cuts.codes[n_met] = element, CROSSED if kind == PROPER else kind
+        n_met += 1
+    return n_met
+
+
+@inline
+def _ask_blocks(mesh: PlacedMesh, ends: Any, ray: Any, n: int, is_any: bool, cuts: Crossings, n_met: int) -> int:
+    """Do what `_ask_triangles` does with the triangles of the n blocks that wait in cuts.order.
+
+    ray: what `near_triangles` takes of the segment.
+    """
+    i, j, k, place, r, s, reach, slack = ray
+    n_waiting = 0
+    for turn in range(n):
+        block = cuts.order[turn]
+        bits = near_triangles(mesh.corners, block, i, j, k, place, r, s, reach, slack)
+        while bits != 0:
+            below = mesh.child[mesh.n_inner + block, lowest_bit(bits)]
+            bits &= bits - 1
+            if below != EMPTY:
+                cuts.faces[n_waiting] = -1 - below
+                n_waiting += 1
+                prefetch(mesh.elements, (-1 - below) * 9)
+                prefetch(mesh.elements, (-1 - below) * 9 + 8)
+        if n_waiting + LANES > MOST_MET or turn == n - 1:
+            n_met, n_waiting = _ask_triangles(mesh, ends, n_waiting, is_any, cuts, n_met), 0
+            if n_met != 0 and (n_met > 0) == is_any:
+                break
+    return n_met
 
 
 @inline
 def _gather(mesh: PlacedMesh, p: Point3, q: Point3, blur: float, is_any: bool, words: Any) -> int:
     """Fill met with the triangles that a segment crosses; return how many, UNSURE where one may be met otherwise. Where
-    `is_any` one that is surely met is enough."""
+    `is_any` one that is surely met is enough, and 1 is returned.
+
+    What lies on another line of memory waits until all that is asked before it is asked: lines come side by side.
+    """
     scratch = scratch_at(words)
     stack, cuts = scratch.stack, scratch.cuts
     middle, half, slack, _, is_near = local_segment(p, q, mesh.origin, mesh.inverse)
@@ -161,39 +215,36 @@ def _gather(mesh: PlacedMesh, p: Point3, q: Point3, blur: float, is_any: bool, w
         np.float32(2.0 * (slack + room)),
     )  # see `_load` of mesh_streams.py
     place, r, s, reach = (middle[i], middle[j], middle[k]), half[i] / half[k], half[j] / half[k], abs(half[k]) + double
-    n_met, depth, is_unsure = 0, 1, False
-    stack[0] = 0
-    while depth > 0:  # bound: each node enters the stack once
-        depth -= 1
-        node = stack[depth]
-        if node >= mesh.n_inner:
-            bits = near_triangles(mesh.corners, node - mesh.n_inner, i, j, k, place, r, s, reach, double)
-        else:
+    ray, ends, n_met, n_blocks, depth = (i, j, k, place, r, s, reach, double), (p, q, blur), 0, 0, 1
+    stack[0], cuts.order[0] = 0, 0
+    if mesh.n_inner == 0:
+        depth, n_blocks = 0, 1
+    while depth > 0 or n_blocks > 0:  # bound: each node enters the stack once
+        if depth > 0:
+            depth -= 1
+            node = stack[depth]
             bits = enter_boxes(mesh.boxes, node, middle, inverse, slack_32, last, scratch.entered)
-        while bits != 0:
-            below = mesh.child[node, lowest_bit(bits)]
-            bits &= bits - 1
-            if below == EMPTY:
-                continue
-            if below >= 0:
+            while bits != 0:
+                below = mesh.child[node, lowest_bit(bits)]
+                bits &= bits - 1
+                if below < 0:  # case: numbers that are none, which nothing parts
+                    continue
                 prefetch(mesh.child, below * WIDTH)
-                stack[depth] = below
-                depth += 1
-                continue
-            kind = _contact(mesh, -1 - below, p, q, blur)
-            if kind == APART:
-                continue
-            if is_any and kind != DEGENERATE:
-                return 1
-            if kind == DEGENERATE or n_met == MOST_MET or (kind != PROPER and place_of(kind) >= START):
-                if not is_any:
-                    return UNSURE
-                is_unsure = True
-                continue
-            prefetch(mesh.faces, -1 - below)
-            cuts.met[n_met], cuts.codes[n_met] = -1 - below, CROSSED if kind == PROPER else kind
-            n_met += 1
-    return UNSURE if is_unsure else n_met
+                if below >= mesh.n_inner:
+                    cuts.order[n_blocks] = below - mesh.n_inner
+                    n_blocks += 1
+                    for line in range(0, CORNER_ROWS * LANES, 16):
+                        prefetch(mesh.corners, (below - mesh.n_inner) * (CORNER_ROWS * LANES) + line)
+                else:
+                    stack[depth] = below
+                    depth += 1
+                    for line in range(0, BOX_ROWS * WIDTH, 16):
+                        prefetch(mesh.boxes, below * (BOX_ROWS * WIDTH) + line)
+        if depth == 0 or n_blocks + WIDTH > MOST_MET:
+            n_met, n_blocks = _ask_blocks(mesh, ends, ray, n_blocks, is_any, cuts, n_met), 0
+            if n_met != 0 and (n_met > 0) == is_any:
+                break
+    return n_met
 
 
 @inline
@@ -265,11 +316,15 @@ def _cut_at(mesh: PlacedMesh, segments: Any, item: int, place: int, frame: Any, 
     t, low = dd_div(-s, -s_low, d, d_low)
     cuts.t[place], n = t + low, place_of(code)
     if n > 2:
-        return put_point(cuts.points[place], segments, item, t, low, slack)
-    touched, bound = corner(mesh.elements, element, n), (T_BOUND + slack) * abs(t)
-    cuts.points[place, 0], cuts.points[place, 1] = touched.x + 0.0, touched.y + 0.0
-    cuts.points[place, 2] = touched.z + 0.0
-    return slack < 0.001 and t + (low - bound) == t + (low + bound)
+        is_sure = put_point(cuts.points[place], segments, item, t, low, slack)
+    else:
+        touched, bound = corner(mesh.elements, element, n), (T_BOUND + slack) * abs(t)
+        cuts.points[place, 0], cuts.points[place, 1] = touched.x + 0.0, touched.y + 0.0
+        cuts.points[place, 2] = touched.z + 0.0
+        is_sure = slack < 0.001 and t + (low - bound) == t + (low + bound)
+    if not is_sure and along_blur == 0.0:  # case: unposed, a coordinate midway between two doubles above all
+        cuts.t[place], is_sure = cross_exactly(segments, item, mesh.elements, element, cuts.points[place])
+    return is_sure
 
 
 @inline
