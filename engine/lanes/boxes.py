@@ -68,21 +68,6 @@ def inside_box(boxes: Rows, node: int, low: Triple, high: Triple) -> int:
 
 
 @traced
-def near_segment(boxes: Rows, node: int, middle: Triple, half: Triple, slack: Number, tiny: Number) -> int:
-    """Return the lanes of a node (`bvh.py`), a bit each, that the segment may meet. All numbers are float32."""
-    b = [load(boxes, BOX_ROWS * node + row) for row in range(BOX_ROWS)]
-    w = [middle[k] - b[k] for k in range(3)]
-    h = [b[3 + k] + slack for k in range(3)]
-    e = [abs(half[k]) for k in range(3)]
-    apart = abs(w[0]) > h[0] + e[0]
-    for k in (1, 2):
-        apart |= abs(w[k]) > h[k] + e[k]
-    for i, j in ((0, 1), (1, 2), (2, 0)):
-        apart |= abs(half[i] * w[j] - half[j] * w[i]) > h[i] * e[j] + h[j] * e[i] + tiny
-    return bits_of(~apart)
-
-
-@traced
 def enter_boxes(
     boxes: Rows, node: int, middle: Triple, inverse: Triple, slack: Number, last: Number, entered: Rows
 ) -> int:

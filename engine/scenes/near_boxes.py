@@ -13,12 +13,10 @@ from engine.lanes.addresses import array_at
 from engine.lanes.boxes import BOX_ROWS, EMPTY, enter_boxes, inside_box
 from engine.lanes.lanes import lowest_bit
 from engine.scenes.posed_mesh import scratch_at
-from engine.segment_clipping.on_boundary.mesh_contacts import inverse_of, local_segment
+from engine.segment_clipping.on_boundary.mesh_contacts import Way, local_segment
 from engine.segment_clipping.pieces import point_of
 from engine.types import Point3
 
-Way = namedtuple("Way", "middle half inverse slack is_near")
-"""What `local_segment` tells of a segment, and 1 / half."""
 BodyTree = namedtuple("BodyTree", "low high tree inverse bounded listed")
 """The boxes of bodies, low and high (n, dimension), infinite where they may have no bounds; a `Bvh` over those that are
 bounded, where they are not few, 1 / its scale, and which body is where in it; the others, looked at one by one."""
@@ -99,42 +97,53 @@ def way_of(segments: Any, item: int, bodies: BodyTree) -> Way:
     is_flat = segments.shape[2] == 2
     px, py, pz = point_of(segments, item, 0, is_flat)
     qx, qy, qz = point_of(segments, item, 1, is_flat)
-    p, q = Point3(px, py, pz), Point3(qx, qy, qz)
-    middle, half, slack, _, is_near = local_segment(p, q, bodies.tree.origin, bodies.inverse)
-    return Way(middle, half, inverse_of(half), np.float32(slack), is_near)
+    return local_segment(Point3(px, py, pz), Point3(qx, qy, qz), bodies.tree.origin, bodies.inverse, 0.0)
+
+
+@inline
+def begin_way(bodies: Any, way: Way, scratch: Any) -> None:
+    """Begin to look for the bodies of a tree that a segment may meet."""
+    scratch.waiting[0], scratch.keys[0], scratch.depths[0], scratch.depths[1] = 0, -1.0, way.is_near, bodies.listed.size
+
+
+@inline
+def next_body(segments: Any, item: int, bodies: Any, way: Way, last: Any, scratch: Any) -> int:
+    """Return the next body whose box a segment may enter before `last`, about the nearest; -1 where there is none."""
+    depths = scratch.depths
+    while depths[0] > 0:  # bound: each node, and each body, waits once
+        depths[0] -= 1
+        node = scratch.waiting[depths[0]]
+        if scratch.keys[depths[0]] > last:
+            continue
+        if node < 0:
+            return bodies.bounded[-1 - node]
+        depths[0] = _open_node(bodies.tree, node, way, last, scratch, depths[0])
+    while depths[1] > 0:
+        depths[1] -= 1
+        body = bodies.listed[depths[1]]
+        if _in_its_box(segments, item, bodies, body):
+            return body
+    return -1
 
 
 @inline
 def near_bodies(segments: Any, item: int, words: Any, room: Any) -> int:
     """Fill scratch.near with the bodies that a segment may meet; return how many."""
-    scratch, last = scratch_at(room), np.float32(1.0)
-    stack, found, n_found = scratch.stack, scratch.near, 0
+    scratch, n_found = scratch_at(room), 0
     for side in range(1 + (words[1, N_BODIES] > 0)):
         bodies, n_before = tree_in(words[side], segments.shape[2]), side * words[0, N_BODIES]
         way = way_of(segments, item, bodies)
-        depth, stack[0] = int(way.is_near), 0
-        while depth > 0:  # bound: each node enters the stack once
-            depth -= 1
-            node = stack[depth]
-            bits = enter_boxes(bodies.tree.boxes, node, way.middle, way.inverse, way.slack, last, scratch.entered)
-            while bits != 0:
-                below = bodies.tree.child[node, lowest_bit(bits)]
-                bits &= bits - 1
-                if below >= 0:
-                    stack[depth] = below
-                    depth += 1
-                elif below != EMPTY:
-                    found[n_found] = n_before + bodies.bounded[-1 - below]
-                    n_found += side == 1 or not has_moved(words, found[n_found])
-        for body in bodies.listed:
-            found[n_found] = n_before + body
-            is_there = side == 1 or not has_moved(words, body)
-            n_found += is_there and in_its_box(segments, item, bodies, body)
+        begin_way(bodies, way, scratch)
+        body = next_body(segments, item, bodies, way, np.float32(1.0), scratch)
+        while body >= 0:
+            scratch.near[n_found] = n_before + body
+            n_found += side == 1 or not has_moved(words, body)
+            body = next_body(segments, item, bodies, way, np.float32(1.0), scratch)
     return n_found
 
 
 @inline
-def in_its_box(segments: Any, item: int, bodies: Any, body: int) -> bool:
+def _in_its_box(segments: Any, item: int, bodies: Any, body: int) -> bool:
     """Tell whether a segment may meet the box of a body: (box - start) / (end - start) loses 4 units of rounding along
     each axis, or 2^-1074 where it underflows; differences beyond `_MOST_WAY`, which may be infinite, say nothing."""
     meet, enters, leaves = True, 0.0, 1.0
@@ -150,7 +159,7 @@ def in_its_box(segments: Any, item: int, bodies: Any, body: int) -> bool:
 
 
 @inline
-def open_node(tree: Any, node: int, way: Way, last: Any, scratch: Any, depth: int) -> int:
+def _open_node(tree: Any, node: int, way: Way, last: Any, scratch: Any, depth: int) -> int:
     """Put what a node of a tree names, and a segment enters before `last`, on scratch.waiting from `depth` on, the
     nearest last; return where it ends."""
     waiting, keys, least, nearest = scratch.waiting, scratch.keys, np.float32(np.inf), depth

@@ -22,13 +22,13 @@ from engine.lanes.addresses import array_at
 from engine.lanes.boxes import BOX_ROWS, EMPTY, enter_boxes
 from engine.lanes.lanes import lowest_bit, prefetch
 from engine.lanes.tracing import LANES
-from engine.lanes.triangles import AXES_BEFORE, CORNER_ROWS, longest_axis, near_triangles
+from engine.lanes.triangles import CORNER_ROWS, near_triangles
 from engine.predicates.double_double import dd_div, dd_sub
 from engine.scenes.posed_cut import in_frame, put_point, slack_of
 from engine.segment_clipping.on_boundary.contacts import APART, CROSSED, DEGENERATE, PROPER, START, place_of
 from engine.segment_clipping.on_boundary.crossing_values import Vector, dot, is_item_safe, normal_of
 from engine.segment_clipping.on_boundary.exact_crossing import cross_exactly
-from engine.segment_clipping.on_boundary.mesh_contacts import inverse_of, local_segment
+from engine.segment_clipping.on_boundary.mesh_contacts import local_segment, shear_of
 from engine.segment_clipping.on_boundary.sorted_crossings import Crossings, sort_crossings
 from engine.segment_clipping.on_boundary.touches import are_one
 from engine.segment_clipping.on_boundary.triangle_contact import contact_filter, corner, exact_contact
@@ -58,14 +58,14 @@ MESH_WORDS: Final = 37
 TREE, PLACES, TREE_PLACES = 8, 16, 27
 """Where these begin."""
 _Lines = namedtuple("_Lines", "addresses sizes places")
-Scratch = namedtuple("Scratch", "stack cuts room waiting keys entered best found near")
+Scratch = namedtuple("Scratch", "stack cuts room waiting keys entered best found depths near")
 """Room for the work on one segment. stack: of one body, cuts: its `Crossings`, room: its pieces, the
 last row for the first of them all. waiting, keys: nodes and bodies to be asked, and where they are entered; entered
 (1, 8), of one node. best: where the first piece begins; found: the body it lies in, and whether another may begin there
-too. near: bodies."""
+too. depths: how many nodes and bodies of a tree wait, and how many of those without a place in it. near: bodies."""
 _SIZES: Final = (
     STACK // 2, MOST_MET, MOST_MET, 3 * MOST_MET, MOST_MET, MOST_MET, MOST_MET + 1, 6 * MOST_MET + 6, 2 * MOST_MET + 2,
-    2 * MOST_MET + 2, STACK // 2, STACK // 2, WIDTH // 2, 1, 2, MOST_MET,
+    2 * MOST_MET + 2, STACK // 2, STACK // 2, WIDTH // 2, 1, 2, 2, MOST_MET,
 )  # fmt: skip
 """Words of the arrays of a `Scratch`, in order, but for `near`."""
 _AT: Final = tuple(8 * (2 + sum(_SIZES[:k])) for k in range(len(_SIZES) + 1))
@@ -90,7 +90,7 @@ def scratch_at(words: Any) -> Scratch:
     cuts = Crossings(
         array_at(at + _AT[2], (m,), np.float64), array_at(at + _AT[3], (m, 3), np.float64),
         array_at(at + _AT[4], (m,), np.int64), array_at(at + _AT[5], (m,), np.int64),
-        array_at(at + _AT[15], (m,), np.int64), array_at(at + _AT[1], (m,), np.int64),
+        array_at(at + _AT[16], (m,), np.int64), array_at(at + _AT[1], (m,), np.int64),
     )  # fmt: skip
     room = Pieces(
         array_at(at + _AT[6], (m + 1,), np.int64), array_at(at + _AT[7], (2, m + 1, 3), np.float64),
@@ -100,7 +100,8 @@ def scratch_at(words: Any) -> Scratch:
         array_at(at + _AT[0], (STACK,), np.int32), cuts, room,
         array_at(at + _AT[10], (STACK,), np.int32), array_at(at + _AT[11], (STACK,), np.float32),
         array_at(at + _AT[12], (1, WIDTH), np.float32), array_at(at + _AT[13], (1,), np.float64),
-        array_at(at + _AT[14], (2,), np.int64), array_at(at + _AT[16], (words[1],), np.int64),
+        array_at(at + _AT[14], (2,), np.int64), array_at(at + _AT[15], (2,), np.int64),
+        array_at(at + _AT[17], (words[1],), np.int64),
     )  # fmt: skip
 
 
@@ -169,12 +170,12 @@ def _ask_triangles(mesh: PlacedMesh, ends: Any, n: int, is_any: bool, cuts: Cros
 
 
 @inline
-def _ask_blocks(mesh: PlacedMesh, ends: Any, ray: Any, n: int, is_any: bool, cuts: Crossings, n_met: int) -> int:
+def _ask_blocks(mesh: PlacedMesh, ends: Any, shear: Any, n: int, is_any: bool, cuts: Crossings, n_met: int) -> int:
     """Do what `_ask_triangles` does with the triangles of the n blocks that wait in cuts.order.
 
-    ray: what `near_triangles` takes of the segment.
+    shear: of `shear_of`.
     """
-    i, j, k, place, r, s, reach, slack = ray
+    (i, j, k), place, r, s, reach, slack = shear
     n_waiting = 0
     for turn in range(n):
         block = cuts.order[turn]
@@ -203,27 +204,16 @@ def _gather(mesh: PlacedMesh, p: Point3, q: Point3, blur: float, is_any: bool, w
     """
     scratch = scratch_at(words)
     stack, cuts = scratch.stack, scratch.cuts
-    middle, half, slack, _, is_near = local_segment(p, q, mesh.origin, mesh.inverse)
-    if not is_near:
-        return 0
-    room = 64.0 * blur * mesh.inverse
-    slack_32, inverse, last = np.float32(slack + room), inverse_of(half), np.float32(1.0)
-    k = longest_axis(half)
-    i, j, double = (
-        AXES_BEFORE[k],
-        AXES_BEFORE[k + 1],
-        np.float32(2.0 * (slack + room)),
-    )  # see `_load` of mesh_streams.py
-    place, r, s, reach = (middle[i], middle[j], middle[k]), half[i] / half[k], half[j] / half[k], abs(half[k]) + double
-    ray, ends, n_met, n_blocks, depth = (i, j, k, place, r, s, reach, double), (p, q, blur), 0, 0, 1
+    way, last = local_segment(p, q, mesh.origin, mesh.inverse, blur), np.float32(1.0)
+    shear, ends, n_met, n_blocks, depth = shear_of(way), (p, q, blur), 0, 0, int(way.is_near)
     stack[0], cuts.order[0] = 0, 0
     if mesh.n_inner == 0:
-        depth, n_blocks = 0, 1
+        depth, n_blocks = 0, depth
     while depth > 0 or n_blocks > 0:  # bound: each node enters the stack once
         if depth > 0:
             depth -= 1
             node = stack[depth]
-            bits = enter_boxes(mesh.boxes, node, middle, inverse, slack_32, last, scratch.entered)
+            bits = enter_boxes(mesh.boxes, node, way.middle, way.inverse, way.slack, last, scratch.entered)
             while bits != 0:
                 below = mesh.child[node, lowest_bit(bits)]
                 bits &= bits - 1
@@ -241,7 +231,7 @@ def _gather(mesh: PlacedMesh, p: Point3, q: Point3, blur: float, is_any: bool, w
                     for line in range(0, BOX_ROWS * WIDTH, 16):
                         prefetch(mesh.boxes, below * (BOX_ROWS * WIDTH) + line)
         if depth == 0 or n_blocks + WIDTH > MOST_MET:
-            n_met, n_blocks = _ask_blocks(mesh, ends, ray, n_blocks, is_any, cuts, n_met), 0
+            n_met, n_blocks = _ask_blocks(mesh, ends, shear, n_blocks, is_any, cuts, n_met), 0
             if n_met != 0 and (n_met > 0) == is_any:
                 break
     return n_met

@@ -20,11 +20,11 @@ from engine.lanes.triangles import longest_axis
 from engine.scenes.near_boxes import (
     N_BODIES,
     PLACED,
+    begin_way,
     has_moved,
-    in_its_box,
     name_in,
     near_bodies,
-    open_node,
+    next_body,
     tree_in,
     way_of,
 )
@@ -207,30 +207,17 @@ def _search(words: Any, side: int, segments: Any, item: int, is_any: bool, room:
     """Ask the bodies of one `BodyTree` that a segment may meet, about as it enters their boxes, until what was found
     comes before all others; return what `_ask` does."""
     scratch, bodies, n_before = scratch_at(room), tree_in(words[side], segments.shape[2]), side * words[0, N_BODIES]
-    way, n_listed, last = way_of(segments, item, bodies), bodies.listed.size, np.float32(1.0)
-    depth, scratch.waiting[0], scratch.keys[0] = int(way.is_near), 0, -1.0
-    while depth + n_listed > 0:  # bound: each node, and each body, waits once
-        if depth > 0:
-            depth -= 1
-            node = scratch.waiting[depth]
-            if scratch.keys[depth] > last:
-                continue
-            if node >= 0:
-                depth = open_node(bodies.tree, node, way, last, scratch, depth)
-                continue
-            body = bodies.bounded[-1 - node]
-        else:
-            n_listed -= 1
-            body = bodies.listed[n_listed]
-            if not in_its_box(segments, item, bodies, body):
-                continue
-        if side == 0 and has_moved(words, body):
-            continue
-        state = _ask(words, n_before + body, segments, item, is_any, room, stop)
-        if state != SETTLED:
-            return state
-        if not is_any:
-            last = _reached(scratch, bodies, way)
+    way, last = way_of(segments, item, bodies), np.float32(1.0)
+    begin_way(bodies, way, scratch)
+    body = next_body(segments, item, bodies, way, last, scratch)
+    while body >= 0:
+        if side == 1 or not has_moved(words, body):
+            state = _ask(words, n_before + body, segments, item, is_any, room, stop)
+            if state != SETTLED:
+                return state
+            if not is_any:
+                last = _reached(scratch, bodies, way)
+        body = next_body(segments, item, bodies, way, last, scratch)
     return SETTLED
 
 

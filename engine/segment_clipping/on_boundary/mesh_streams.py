@@ -3,7 +3,7 @@
 A segment by itself goes down a tree from one miss of the cache, and one branch nobody foresees, to the next. Here a
 group of segments goes down together:
 
-    inner nodes     the segments that reach a node stand in a list; their answers (`near_segment`) are sorted into one
+    inner nodes     the segments that reach a node stand in a list; their answers (`enter_boxes`) are sorted into one
                     list a child, without a branch for each; lists of children wait on a stack
     blocks          what reaches a block waits as a pair of block and segment; pairs are asked (`near_triangles`) in
                     order, the triangles of those that follow are on their way from memory
@@ -22,12 +22,12 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.jit import allocating, allocating_kernel, called, inline
-from engine.lanes.boxes import EMPTY, near_segment
+from engine.lanes.boxes import EMPTY, enter_boxes
 from engine.lanes.lanes import lowest_bit, prefetch
 from engine.lanes.tracing import LANES
-from engine.lanes.triangles import AXES_BEFORE, CORNER_ROWS, longest_axis, near_triangles
+from engine.lanes.triangles import AXES_BEFORE, CORNER_ROWS, near_triangles
 from engine.segment_clipping.on_boundary.contacts import APART, NO_ROOM, STOPPED, is_point
-from engine.segment_clipping.on_boundary.mesh_contacts import local_segment
+from engine.segment_clipping.on_boundary.mesh_contacts import local_segment, shear_of
 from engine.segment_clipping.on_boundary.triangle_contact import corner, triangle_contact
 
 AHEAD: Final = 8
@@ -44,14 +44,15 @@ class Streams(NamedTuple):
     """Room for a group of segments."""
 
     numbers: Any
-    """(m, 16) float32: middle, half, slack and tiny of `local_segment`; then middle, r, s, reach and slack of
-    `near_triangles`."""
+    """(m, 16) float32: middle, inverse and slack of a `Way`; then middle, r, s, reach and slack of `near_triangles`."""
     axes: Any
     """(m,) the longest axis."""
     members: Any
     """The lists, one after another: segments."""
     found: Any
     """(m,) the answers of a node to its list."""
+    entered: Any
+    """(1, 8), see `enter_boxes`."""
     stack: Any
     """(n, 3) nodes that wait, begin and end of their lists."""
     pairs: Any
@@ -77,7 +78,8 @@ def streams_for(mesh: Any, n_segments: int, n_contacts: int) -> Streams:
     return Streams(
         np.empty((n_segments, 16), np.float32), np.empty(n_segments, np.int64),
         np.empty(n_segments * (1 + LANES * mesh.n_levels), np.int32), np.empty(n_segments, np.int64),
-        np.empty((LANES * mesh.n_levels + 1, 3), np.int64), np.empty(n_pairs, np.int64), np.empty(_TRIANGLES, np.int64),
+        np.empty((1, LANES), np.float32), np.empty((LANES * mesh.n_levels + 1, 3), np.int64),
+        np.empty(n_pairs, np.int64), np.empty(_TRIANGLES, np.int64),
         np.empty(n_contacts, np.int32), np.empty(n_contacts, np.int64), np.empty(n_contacts, np.uint8),
         np.empty(n_contacts, np.int64), np.empty(n_contacts, np.uint8), np.empty(n_segments + 1, np.int64),
     )  # fmt: skip
@@ -88,22 +90,15 @@ def _load(streams: Any, mesh: Any, segments: Any, n: int) -> int:
     """Bring the first n of some segments (m, 2, 3) to the tree; list those that come near it, return how many."""
     n_near = 0
     for item in range(n):
-        middle, half, slack, tiny, is_near = local_segment(
-            corner(segments, item, 0), corner(segments, item, 1), mesh.origin, mesh.inverse
-        )
-        k = longest_axis(half)
-        i, j = AXES_BEFORE[k], AXES_BEFORE[k + 1]
-        row = streams.numbers[item]
-        row[0], row[1], row[2] = middle
-        row[3], row[4], row[5] = half
-        row[6], row[7] = slack, tiny
-        row[8], row[9], row[10] = middle[i], middle[j], middle[k]
-        row[11], row[12] = half[i] / half[k], half[j] / half[k]
-        double = 2.0 * slack  # 32 u (S + 2) of lanes/triangles.py, and twice what cutting loses
-        row[13], row[14] = abs(half[k]) + double, double
-        streams.axes[item] = k
+        way = local_segment(corner(segments, item, 0), corner(segments, item, 1), mesh.origin, mesh.inverse, 0.0)
+        axes, middle, r, s, reach, slack = shear_of(way)
+        row, streams.axes[item] = streams.numbers[item], axes[2]
+        row[0], row[1], row[2] = way.middle
+        row[3], row[4], row[5] = way.inverse
+        row[6], (row[7], row[8], row[9]) = way.slack, middle
+        row[10], row[11], row[12], row[13] = r, s, reach, slack
         streams.members[n_near] = item
-        n_near += is_near and not is_point(segments[item])
+        n_near += way.is_near and not is_point(segments[item])
     return n_near
 
 
@@ -120,8 +115,8 @@ def _settle_pairs(streams: Any, mesh: Any, segments: Any, n_pairs: int, n_contac
         item, block = pair & _SEGMENT, pair >> 16
         row, k = streams.numbers[item], streams.axes[item]
         bits = near_triangles(
-            corners, block, AXES_BEFORE[k], AXES_BEFORE[k + 1], k, (row[8], row[9], row[10]), row[11], row[12], row[13],
-            row[14],
+            corners, block, AXES_BEFORE[k], AXES_BEFORE[k + 1], k, (row[7], row[8], row[9]), row[10], row[11], row[12],
+            row[13],
         )  # fmt: skip
         pairs[n_kept] = (pair << LANES) | bits
         n_kept += bits != 0
@@ -193,7 +188,7 @@ def gather_contacts(streams: Any, mesh: Any, segments: Any, n: int, stop: Any) -
     """
     members, found, stack, pairs = streams.members, streams.found, streams.stack, streams.pairs
     n_near = _load(streams, mesh, segments, n)
-    n_pairs, n_contacts, depth = 0, 0, 0
+    n_pairs, n_contacts, depth, last = 0, 0, 0, np.float32(1.0)
     if mesh.n_inner == 0:
         for place in range(n_near):
             pairs[place] = members[place]
@@ -213,7 +208,9 @@ def gather_contacts(streams: Any, mesh: Any, segments: Any, n: int, stop: Any) -
         union = 0
         for place in range(begin, end):
             row = streams.numbers[members[place]]
-            bits = near_segment(mesh.boxes, node, (row[0], row[1], row[2]), (row[3], row[4], row[5]), row[6], row[7])
+            bits = enter_boxes(
+                mesh.boxes, node, (row[0], row[1], row[2]), (row[3], row[4], row[5]), row[6], last, streams.entered
+            )
             found[place - begin] = bits
             union |= bits
         top = end

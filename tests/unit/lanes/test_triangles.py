@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from engine.jit import kernel
-from engine.lanes.triangles import AXES_BEFORE, longest_axis, near_triangles
-from engine.segment_clipping.on_boundary.mesh_contacts import local_segment
+from engine.lanes.triangles import near_triangles
+from engine.segment_clipping.on_boundary.mesh_contacts import local_segment, shear_of
 from engine.segment_clipping.on_boundary.prepared_boundary import mesh_of
 from engine.types import Point3
 
@@ -35,15 +35,10 @@ def test_triangles_met_are_near(scale: float) -> None:
             corners = (np.concatenate([met, free]) + offset) * scale
             mesh = mesh_of(corners, np.arange(len(corners)))
             ends = Point3(*((p + offset) * scale)), Point3(*((q + offset) * scale))
-            middle, half, slack, _, is_near = local_segment(*ends, mesh.origin, mesh.inverse)
-            assert is_near
-            k = longest_axis(half)
-            i, j = AXES_BEFORE[k], AXES_BEFORE[k + 1]
-            double = np.float32(2.0 * slack)
-            arguments = (
-                i, j, k, (middle[i], middle[j], middle[k]),
-                np.float32(half[i] / half[k]), np.float32(half[j] / half[k]), np.float32(abs(half[k]) + double), double,
-            )  # fmt: skip
+            way = local_segment(*ends, mesh.origin, mesh.inverse, 0.0)
+            assert way.is_near
+            (i, j, k), middle, *numbers = shear_of(way)
+            arguments = (i, j, k, middle, *map(np.float32, numbers))
             for node in np.flatnonzero(mesh.child[:, 0] < 0):
                 block = node - mesh.n_inner
                 lanes = near_triangles(mesh.corners, block, *arguments)

@@ -15,7 +15,7 @@ def test_middle_and_half_are_within_their_slack() -> None:
         for _ in range(20):
             p = origin + rng.uniform(-1, 1, 3)  # near the tree: what is cut off lies far from it
             q = p + rng.uniform(-size, size, 3)
-            middle, half, slack, _, is_near = local_segment(Point3(*p), Point3(*q), origin, inverse)
+            middle, half, _, slack, is_near = local_segment(Point3(*p), Point3(*q), origin, inverse, 0.0)
             local_p, local_q = (p - origin) * inverse, (q - origin) * inverse
             ends = np.array(middle, float) - np.array(half, float), np.array(middle, float) + np.array(half, float)
             assert is_near
@@ -27,4 +27,4 @@ def test_middle_and_half_are_within_their_slack() -> None:
 
 
 def test_segments_that_pass_far_away_are_not_near() -> None:
-    assert not local_segment(Point3(10.0, -9.0, 0.0), Point3(10.0, 9.0, 0.0), np.zeros(3), 1.0)[-1]
+    assert not local_segment(Point3(10.0, -9.0, 0.0), Point3(10.0, 9.0, 0.0), np.zeros(3), 1.0, 0.0)[-1]
