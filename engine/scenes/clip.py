@@ -35,7 +35,7 @@ from engine.types import OPEN, UNDECIDED
 _BYTES: Final = 400
 """Of a piece, in its part, joined and in order."""
 _FEW: Final = 1024
-"""Segments that are one piece of work, as the first that `run_chunks` takes are."""
+"""Segments that are asked about at once, as many as `run_chunks` takes at first."""
 _BODIES_KEPT: Final = 16
 _LEFT: Final = 16
 """Pairs left for which there is room at once, beside one for each segment."""
@@ -155,10 +155,7 @@ def _searched(
                 break
             standing.prepare(body, wanted, budget)
 
-    if n <= _FEW:
-        task(0, n)
-    else:
-        run_chunks(task, n, budget=budget, workers=workers)
+    run_chunks(task, n, budget=budget, workers=workers)
     return state, out
 
 
@@ -184,10 +181,7 @@ def _parts(
     def task(first: int, last: int) -> None:
         parts[first], left[first], _ = _cut_near(segments, order, first, last, standing, budget)
 
-    if n <= _FEW:
-        task(0, n)
-    else:
-        run_chunks(task, n, budget=budget, workers=workers)
+    run_chunks(task, n, budget=budget, workers=workers)
     found = [part for first in sorted(parts) for part in parts[first]]
     pairs = [part for first in sorted(left) for part in left[first]]
     if pairs:

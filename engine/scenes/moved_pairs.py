@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from engine.jit import inline, kernel
-from engine.scenes.near_boxes import bodies_in, name_of, place_in
+from engine.scenes.near_boxes import bodies_in, place_in
 from engine.scenes.posed_mesh import scratch_at
 
 Placed = namedtuple("Placed", "kinds rotations translations")
@@ -56,14 +56,15 @@ def list_pairs(
             if reach != 0.0:
                 box[0, i], box[1, i] = _outward(box[0, i], reach, 0), _outward(box[1, i], reach, 1)
         for i in range(bodies_in(box[0], box[1], where, scratch.stack, scratch.near)):
-            other = name_of(where, scratch.near[i])
+            near = scratch.near[i]
+            other = near if near < n else where.names[near - n]
             if other == name or (other < name and place_in(named, other) >= 0):
                 continue
             if n_pairs < rows.keys.size:
                 rows.keys[n_pairs] = min(name, other) * n + max(name, other)
                 row = 2 * n_pairs + 1
                 _put_row(rows, row + (other < name), still, moved, body, name)
-                _put_row(rows, row + (name < other), still, moved, scratch.near[i], other)
+                _put_row(rows, row + (name < other), still, moved, near, other)
             n_pairs += 1
         if flag[0]:
             break

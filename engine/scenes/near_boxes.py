@@ -42,29 +42,6 @@ def place_in(names: Any, body: int) -> int:
     return low if low < names.size and names[low] == body else -1
 
 
-@inline
-def name_of(where: Any, body: int) -> int:
-    """Return what a body of a `Where` is called in the scene."""
-    n = where.together.low.shape[0]
-    return body if body < n else where.names[body - n]
-
-
-@inline
-def _join_moved(where: Any, found: Any, n_found: int, n_all: int) -> int:
-    """Leave out those of n_found bodies that moved, and count those that follow up to n_all as moved; return how many
-    there are."""
-    n, n_left = where.together.low.shape[0], 0
-    for place in range(n_all):
-        if place >= n_found:
-            found[n_left] = n + found[place]
-        elif place_in(where.names, found[place]) < 0:
-            found[n_left] = found[place]
-        else:
-            continue
-        n_left += 1
-    return n_left
-
-
 @merged
 def tree_in(row: Any, dimension: int) -> BodyTree:
     """Return the `BodyTree` of a row."""
@@ -79,7 +56,7 @@ def tree_in(row: Any, dimension: int) -> BodyTree:
 
 @inline
 def name_in(words: Any, body: int) -> int:
-    """Return what `name_of` does, by the rows of two `BodyTree`s."""
+    """Return what a body, of which those that moved count from n on, is called in the scene."""
     n, m = words[0, N_BODIES], words[1, N_BODIES]
     return body if body < n else array_at(words[1, NAMES], (m,), np.int64)[body - n]
 
@@ -181,19 +158,19 @@ def _open_node(tree: Any, node: int, way: Way, last: Any, scratch: Any, depth: i
 def bodies_in(low: Any, high: Any, where: Any, stack: Any, found: Any) -> int:
     """Fill `found` with the bodies of a `Where` whose boxes a box (dim,) meets, which may be infinite; return how
     many."""
-    n_found = _of_box(low, high, where.together, stack, found, 0)
-    if where.names.size > 0:
-        n_found = _join_moved(where, found, n_found, _of_box(low, high, where.moved, stack, found, n_found))
+    n_found, names = _of_box(low, high, where.together, 0, where.names, stack, found, 0), where.names
+    if names.size > 0:
+        n_found = _of_box(low, high, where.moved, where.together.low.shape[0], names[:0], stack, found, n_found)
     return n_found
 
 
 @inline
-def _is_met(low: Any, high: Any, bodies: Any, body: int) -> bool:
-    """Tell whether a box meets that of a body."""
+def _is_met(low: Any, high: Any, bodies: Any, body: int, left_out: Any) -> bool:
+    """Tell whether a box meets that of a body which is not among those left out."""
     meet = True
     for k in range(low.size):
         meet &= (low[k] <= bodies.high[body, k]) & (high[k] >= bodies.low[body, k])
-    return meet
+    return meet and place_in(left_out, body) < 0
 
 
 @inline
@@ -202,8 +179,11 @@ def _local(value: float, inverse: float, way: float) -> Any:
 
 
 @inline
-def _of_box(low: Any, high: Any, bodies: Any, stack: Any, found: Any, n_found: int) -> int:
-    """Fill `found` from n_found on with the bodies of a `BodyTree` whose boxes a box meets; return where they end."""
+def _of_box(
+    low: Any, high: Any, bodies: Any, n_before: int, left_out: Any, stack: Any, found: Any, n_found: int
+) -> int:
+    """Fill `found` from n_found on with the bodies of a `BodyTree` whose boxes a box meets, and that are not left out;
+    return where they end."""
     tree, inverse, depth, stack[0] = bodies.tree, bodies.inverse, 1, 0
     is_flat, x, y, z = low.size == 2, tree.origin[0], tree.origin[1], tree.origin[2]
     bottom, top = (0.0 if is_flat else low[2]) - z, (0.0 if is_flat else high[2]) - z
@@ -220,11 +200,12 @@ def _of_box(low: Any, high: Any, bodies: Any, stack: Any, found: Any, n_found: i
                 stack[depth] = below
                 depth += 1
             elif below != EMPTY:
-                found[n_found] = bodies.bounded[-1 - below]
-                n_found += _is_met(low, high, bodies, found[n_found])
-    for place in range(bodies.listed.size):
-        found[n_found] = bodies.listed[place]
-        n_found += _is_met(low, high, bodies, found[n_found])
+                body = bodies.bounded[-1 - below]
+                found[n_found] = n_before + body
+                n_found += _is_met(low, high, bodies, body, left_out)
+    for body in bodies.listed:
+        found[n_found] = n_before + body
+        n_found += _is_met(low, high, bodies, body, left_out)
     return n_found
 
 

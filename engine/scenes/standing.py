@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping
-from typing import Any, Final, Literal, NamedTuple
+from typing import Any, Final, Literal
 
 import numpy as np
 
@@ -33,13 +33,6 @@ _LISTED: Final = 128
 _NO_WORDS: Final = [0] * (PLACED + 1)
 
 
-class Words(NamedTuple):
-    """Rows of `words_of`, and what they give addresses of."""
-
-    rows: IntArray
-    kept: Any
-
-
 class Standing(Preparing):
     """Bodies, and those that moved since: safe to share between threads, as `Bodies` are."""
 
@@ -51,7 +44,7 @@ class Standing(Preparing):
         """Those that moved, ascending."""
         self._lock, self._prepared = threading.RLock(), dict[str, Any]()
         self._placed: tuple[Where, FloatArray, FloatArray] | None = None
-        self._words: Words | None = None
+        self._words: tuple[IntArray, Any] | None = None
 
     @property
     def poses(self) -> tuple[Pose | None, ...]:
@@ -128,15 +121,14 @@ class Standing(Preparing):
 
     def words(self, budget: Budget) -> IntArray:
         """Return what kernels for segments read of all bodies, and of those that moved."""
-        found: Words | None = self._words
-        if found is None:
+        if self._words is None:
             together, moved, kept = self.base.words(budget), _NO_WORDS, ()
             if self.moved:
                 moved, kept = words_of(self.where(budget).moved, self.names, unready(len(self.names)))
-            found = Words(np.array([together[0], moved]), (together[1], kept))
+            found = np.array([together[0], moved]), (together[1], kept)  # and what its addresses are of
             with self._lock:
-                self._words = found = self._words or found
-        return found.rows
+                self._words = self._words or found
+        return self._words[0]
 
     def prepare(self, body: int, wanted: int, budget: Budget) -> None:
         """Make ready what kernels want of a body."""
