@@ -246,10 +246,12 @@ def exact_inverse(pose: Pose) -> tuple[list[list[int]], int]:
 
 def to_world_frame(point: Sequence[Number], pose: Pose) -> list[Fraction]:
     """Return R point + t, exactly."""
-    return [
-        sum((Fraction(entry) * Fraction(value) for entry, value in zip(row, point)), Fraction(shift))
-        for row, shift in zip(pose.rotation.tolist(), pose.translation.tolist())
-    ]
+    entries, below = common_integers(pose.rotation.ravel().tolist())
+    numbers, common = common_integers((*point, *pose.translation.tolist()))
+    n, sums = len(point), [below * shift for shift in numbers[len(point) :]]
+    for place, entry in enumerate(entries):
+        sums[place // n] += entry * numbers[place % n]
+    return [Fraction(total, below * common) for total in sums]
 
 
 def rational_location(point: Sequence[Number], solid: Solid, pose: Pose | None = None, check: Check = no_check) -> int:

@@ -308,9 +308,9 @@ def _cut_at(mesh: PlacedMesh, segments: Any, item: int, place: int, frame: Any, 
     if n > 2:
         is_sure = put_point(cuts.points[place], segments, item, t, low, slack)
     else:
-        touched, bound = corner(mesh.elements, element, n), (T_BOUND + slack) * abs(t)
-        cuts.points[place, 0], cuts.points[place, 1] = touched.x + 0.0, touched.y + 0.0
-        cuts.points[place, 2] = touched.z + 0.0
+        for k in range(3):
+            cuts.points[place, k] = mesh.elements[element, n, k] + 0.0
+        bound = (T_BOUND + slack) * abs(t)
         is_sure = slack < 0.001 and t + (low - bound) == t + (low + bound)
     if not is_sure and along_blur == 0.0:  # case: unposed, a coordinate midway between two doubles above all
         cuts.t[place], is_sure = cross_exactly(segments, item, mesh.elements, element, cuts.points[place])

@@ -10,6 +10,7 @@ rationals.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from math import ulp
 from typing import Any
 
@@ -53,11 +54,16 @@ def posed_locator(solid: Solid, pose: Pose | None) -> Locator:
     if isinstance(solid, Sphere):
         return _in_posed_sphere(solid, pose)
     unposed = locator_of(solid)
-    frames = frames_of([pose], solid.dimension)
+    frames = _frames(pose)
     if isinstance(solid, Implicit) and solid.function is not None:
         by_preimage: Fill = lambda points, *rest: unposed.fill(_moved(points, frames)[0], *rest)  # noqa: E731
         return Locator(unposed.method, by_preimage, unposed.decisions)  # rounded: a callable decides in floats anyway
     return Locator(unposed.method, _filtered(solid, pose, unposed, frames), unposed.decisions)
+
+
+@lru_cache(maxsize=64)
+def _frames(pose: Pose) -> Frames:
+    return frames_of([pose], pose.dimension)
 
 
 def _moved(points: FloatArray, frames: Frames) -> tuple[FloatArray, FloatArray]:

@@ -29,7 +29,6 @@ from engine.predicates.error_free import workspace
 from engine.predicates.orientation import orient3d
 from engine.predicates.parameters import compare_differences
 from engine.segment_clipping.on_boundary.contacts import APART, DEGENERATE, END, PROPER, START, code_of
-from engine.segment_clipping.pieces import Triple
 from engine.types import UNDECIDED, Point3
 
 EDGE_BOUND: Final = 2.0**-48
@@ -56,12 +55,11 @@ def exact_contact(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3) -> int:
         return DEGENERATE
     if ab == bc and bc == ca and ab != 0 and of_p != 0 and of_q != 0:
         return PROPER
-    corners, start, end = ((a.x, a.y, a.z), (b.x, b.y, b.z), (c.x, c.y, c.z)), (p.x, p.y, p.z), (q.x, q.y, q.z)
     k = longest_axis((q.x - p.x, q.y - p.y, q.z - p.z))
-    way = 1 if end[k] > start[k] else -1
-    first = way * ab if ab != 0 else _beside(corners[0], corners[1], start, end, k)
-    second = way * bc if bc != 0 else _beside(corners[1], corners[2], start, end, k)
-    third = way * ca if ca != 0 else _beside(corners[2], corners[0], start, end, k)
+    way = 1 if q[k] > p[k] else -1
+    first = way * ab if ab != 0 else _beside(a, b, p, q, k)
+    second = way * bc if bc != 0 else _beside(b, c, p, q, k)
+    third = way * ca if ca != 0 else _beside(c, a, p, q, k)
     if max(first, second, third) == UNDECIDED:
         return DEGENERATE
     place = START if of_p == 0 else END if of_q == 0 else 3 if ab == 0 else 4 if bc == 0 else 5
@@ -71,7 +69,7 @@ def exact_contact(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3) -> int:
 
 
 @called
-def _beside(a: Triple, b: Triple, p: Triple, q: Triple, k: int) -> int:
+def _beside(a: Point3, b: Point3, p: Point3, q: Point3, k: int) -> int:
     """Return on which side of a side a b, which the line p q meets, that lies when it is moved: by eps along one axis,
     by eps^2 along the next. UNDECIDED where they are parallel."""
     side = _slope(a, b, p, q, AXES_BEFORE[k + 1], k)
@@ -81,7 +79,7 @@ def _beside(a: Triple, b: Triple, p: Triple, q: Triple, k: int) -> int:
 
 
 @inline
-def _slope(a: Triple, b: Triple, p: Triple, q: Triple, j: int, k: int) -> int:
+def _slope(a: Point3, b: Point3, p: Point3, q: Point3, j: int, k: int) -> int:
     """Return the sign of (a_j - b_j) (q_k - p_k) - (a_k - b_k) (q_j - p_j).
 
     A filter, six roundings and a sum, 2^-50 is twice that; then exact where sizes are what `is_safe` wants."""
