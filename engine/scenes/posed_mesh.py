@@ -25,13 +25,12 @@ from engine.lanes.tracing import LANES
 from engine.lanes.triangles import CORNER_ROWS, near_triangles
 from engine.predicates.double_double import dd_div, dd_sub
 from engine.scenes.posed_cut import in_frame, put_point, slack_of
-from engine.segment_clipping.on_boundary.contacts import APART, CROSSED, DEGENERATE, PROPER, START, place_of
+from engine.segment_clipping.on_boundary.contacts import APART, CROSSED, DEGENERATE, PROPER, START, are_one, place_of
 from engine.segment_clipping.on_boundary.crossing_values import Vector, dot, is_item_safe, normal_of
 from engine.segment_clipping.on_boundary.exact_crossing import cross_exactly
 from engine.segment_clipping.on_boundary.mesh_contacts import local_segment, shear_of
 from engine.segment_clipping.on_boundary.sorted_crossings import Crossings, sort_crossings
-from engine.segment_clipping.on_boundary.touches import are_one
-from engine.segment_clipping.on_boundary.triangle_contact import contact_filter, corner, exact_contact
+from engine.segment_clipping.on_boundary.triangle_contact import contact_filter, corner, exact_contact, triangle_at
 from engine.segment_clipping.pieces import Pieces
 from engine.segment_clipping.plane_meeting import T_BOUND
 from engine.types import UNDECIDED, Point3
@@ -146,11 +145,7 @@ def _ask_triangles(mesh: PlacedMesh, ends: Any, n: int, is_any: bool, cuts: Cros
     p, q, blur = ends
     for place in range(n):
         element = cuts.faces[place]
-        a, b, c = (
-            corner(mesh.elements, element, 0),
-            corner(mesh.elements, element, 1),
-            corner(mesh.elements, element, 2),
-        )
+        a, b, c = triangle_at(mesh.elements, element)
         kind = contact_filter(a, b, c, p, q, blur)
         if kind == UNDECIDED and blur == 0.0:
             kind = exact_contact(a, b, c, p, q)
@@ -159,10 +154,10 @@ def _ask_triangles(mesh: PlacedMesh, ends: Any, n: int, is_any: bool, cuts: Cros
         if is_any and kind != DEGENERATE:
             return 1
         if kind == DEGENERATE or n_met == MOST_MET or (kind != PROPER and place_of(kind) >= START):
+            if not is_any:
+                return UNSURE
             n_met = UNSURE
-            if is_any:
-                continue
-            break
+            continue
         prefetch(mesh.faces, element)
         cuts.met[n_met], cuts.codes[n_met] = element, CROSSED if kind == PROPER else kind
         n_met += 1
@@ -293,7 +288,7 @@ def _cut_at(mesh: PlacedMesh, segments: Any, item: int, place: int, frame: Any, 
             for k in range(3):
                 cuts.points[place, k] = cuts.points[other, k]
             return True
-    a, b, c = corner(mesh.elements, element, 0), corner(mesh.elements, element, 1), corner(mesh.elements, element, 2)
+    a, b, c = triangle_at(mesh.elements, element)
     normal = normal_of(a, b, c)
     from_a = (
         dd_sub(own[0][0], own[0][1], a.x, 0.0),

@@ -22,7 +22,7 @@ from engine.predicates.orientation import orient2d, orient3d
 from engine.segment_clipping.on_boundary.contacts import ALONG, DEGENERATE, END
 from engine.segment_clipping.on_boundary.found_contacts import contacts_with
 from engine.segment_clipping.on_boundary.prepared_boundary import Mesh, Outline
-from engine.segment_clipping.on_boundary.triangle_contact import corner
+from engine.segment_clipping.on_boundary.triangle_contact import corner, triangle_at
 
 INSIDE_BEFORE: Final = 2
 OUTSIDE_BEFORE: Final = -2
@@ -96,7 +96,7 @@ def leave_parted(elements: Any, met: Any, owners: Any, segments: Any, inner: Any
             side = orient2d(a, b, as_point2(segments[item], 0))
             other = orient2d(a, b, as_point2(inner[item], 0))
         else:
-            c, d, e = corner(elements, element, 0), corner(elements, element, 1), corner(elements, element, 2)
+            c, d, e = triangle_at(elements, element)
             side, other = orient3d(c, d, e, corner(segments, item, 0)), orient3d(c, d, e, corner(inner, item, 0))
         if side != other or abs(side) != 1:
             is_told[item] = False

@@ -25,7 +25,7 @@ from engine.predicates.cut_point import point_at
 from engine.predicates.double_double import U2, dd_div
 from engine.predicates.error_free import two_diff, two_prod, two_sum
 from engine.predicates.expansion import is_safe
-from engine.segment_clipping.on_boundary.triangle_contact import corner
+from engine.segment_clipping.on_boundary.triangle_contact import corner, triangle_at
 from engine.segment_clipping.pieces import Triple
 from engine.segment_clipping.plane_meeting import T_BOUND
 from engine.types import Point3
@@ -98,7 +98,7 @@ def line_values(elements: Any, element: int, segments: Any, item: int) -> tuple[
 @merged
 def plane_values(elements: Any, element: int, segments: Any, item: int) -> tuple[Any, Any]:
     """Return s(p) and d for one of some triangles (k, 3, 3) as double-doubles, each with its bound."""
-    a, b, c = corner(elements, element, 0), corner(elements, element, 1), corner(elements, element, 2)
+    a, b, c = triangle_at(elements, element)
     p, q = corner(segments, item, 0), corner(segments, item, 1)
     normal = normal_of(a, b, c)
     at_p = dot(normal, (two_diff(p.x, a.x), two_diff(p.y, a.y), two_diff(p.z, a.z)))

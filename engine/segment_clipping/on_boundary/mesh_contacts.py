@@ -4,7 +4,7 @@ The tree (bvh.py) holds float32 boxes in coordinates of its own. A segment is br
 near the tree, and stored as its middle and half in float32; the slack covers what all this rounds:
 
     middle, w = m - c      2^-24 (S + 2) each, S the largest coordinate (the tree's own are at most 2)
-    half, products         2^-24 of themselves, so of the bound |e_i| (S + 2), thrice
+    half, quotients        see `enter_boxes`
     cutting                2^-50 of the segment's coordinates before, in either end
 
 16 * 2^-24 (S + 2) for half widths is more than their sum.

@@ -20,13 +20,14 @@ from engine.segment_clipping.on_boundary.contacts import (
     END,
     PROPER,
     START,
+    are_one,
+    axis_of,
     code_of,
     place_of,
 )
 from engine.segment_clipping.on_boundary.crossing_values import cut_at, is_item_safe, line_values, plane_values
 from engine.segment_clipping.on_boundary.exact_crossing import cross_exactly, parameter_exactly
 from engine.segment_clipping.on_boundary.sorted_crossings import Crossings, sort_crossings
-from engine.segment_clipping.on_boundary.touches import are_one, axis_of
 from engine.segment_clipping.pieces import Pieces, put_own_end
 
 UNSURE: Final = -1

@@ -128,7 +128,7 @@ def contact_filter(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3, blur: 
 @merged
 def triangle_contact(elements: Any, element: int, segments: Any, item: int) -> int:
     """Return how one of some segments (m, 2, 3) and one of some triangles (k, 3, 3) meet."""
-    a, b, c = corner(elements, element, 0), corner(elements, element, 1), corner(elements, element, 2)
+    a, b, c = triangle_at(elements, element)
     p, q = corner(segments, item, 0), corner(segments, item, 1)
     kind = contact_filter(a, b, c, p, q, 0.0)
     return kind if kind != UNDECIDED else exact_contact(a, b, c, p, q)
@@ -140,3 +140,9 @@ def corner(elements: Any, element: int, place: int) -> Point3:
     return Point3(
         float(elements[element, place, 0]), float(elements[element, place, 1]), float(elements[element, place, 2])
     )
+
+
+@merged
+def triangle_at(elements: Any, element: int) -> tuple[Point3, Point3, Point3]:
+    """Return the corners of one of some triangles (k, 3, 3)."""
+    return corner(elements, element, 0), corner(elements, element, 1), corner(elements, element, 2)
