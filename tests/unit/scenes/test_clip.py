@@ -338,3 +338,36 @@ def test_a_segment_that_leaves_the_box_begins_where_crossings_say() -> None:
     for pose in (None, pose_of(rng, 3), pose_of(rng, 3)):
         segments = np.stack([start, end], axis=1)
         assert_exact(Scene([body], [pose]).clip_segments(segments), segments, expected_pieces(segments, [body], [pose]))
+
+
+def test_edges_touched_midway_between_doubles_are_left_to_nobody() -> None:
+    """A segment meets the middle of an edge at t = 1/2, whose coordinates end in half a unit: the even neighbour."""
+    rng, unit = np.random.default_rng(11), 2.0**-52
+    solid = Polyhedron(1.5 + 0.25 * np.array(OCTAHEDRON) + rng.integers(-9, 10, (6, 3)) * unit, FACES)
+    sides = solid.vertices[np.array(FACES)[:, :2]]
+    ends = sides[rng.integers(len(sides), size=60)]
+    starts = 1.5 + np.round(rng.uniform(-0.2, 0.2, (60, 3)) / unit) * unit
+    segments = np.stack([starts, ends[:, 0] + (ends[:, 1] - starts)], axis=1)  # all between 1 and 2: no rounding
+    sums = (segments / unit).astype(np.int64).sum(axis=1)
+    assert (sums == (ends / unit).astype(np.int64).sum(axis=1)).all()
+    assert (sums % 2).any(axis=1).sum() > 40
+    found, report = Scene([solid]).clip_segments(segments, report=True)
+    assert_exact(found, segments, expected_pieces(segments, [solid], [None]))
+    assert report.n_beyond_filter == 0
+    assert (found.t == 0.5).any(axis=1).sum() > 40
+
+
+def test_many_at_once_are_what_the_general_way_finds() -> None:
+    rng = np.random.default_rng(12)
+    solids, poses = scene_of(rng, 3, 12, 0.5)
+    scene, segments = Scene(solids, poses), rng.integers(-6, 7, (1024, 2, 3)) / 4.0
+    for keep in ("all", "first", "any"):
+        general: Any = scene.clip_segments(segments, keep=keep, deadline=600.0)  # a deadline is watched in parts
+        for n in (1, 63, 1024):
+            found: Any = scene.clip_segments(segments[:n], keep=keep)
+            if keep == "any":
+                assert found.tolist() == general[:n].tolist()
+                continue
+            m = int((general.source < n).sum())
+            for name in ("source", "body", "start", "end", "t", "faces", "ranks"):
+                np.testing.assert_array_equal(getattr(found, name), getattr(general, name)[:m])
