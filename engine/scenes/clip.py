@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import fields
 from functools import lru_cache
+from math import isfinite
 from typing import Any, Final, cast
 
 import numpy as np
@@ -77,40 +78,41 @@ def _exact_ends(segments: FloatArray, standing: Standing, budget: Budget) -> Exa
 
 def answer_few(segments: Any, standing: Standing, keep: str) -> ScenePieces | BoolArray | None:
     """Return what `Scene.clip_segments` does of an array of a few segments, not yet looked at for NaN, in half the time
-    that the general way takes; None where nothing is kept of the scene yet, or a segment is left open."""
+    that the general way takes; None where nothing is kept of the scene yet, or numbers are none that kernels take."""
     solids = standing.base.solids
     if not solids or not is_ready(segments, 2, solids[0].dimension) or not 0 < len(segments) <= _FEW:
         return None
     if standing.base.kept("words") is None or type(keep) is not str or keep not in ("all", "first", "any"):
         return None
-    n, dimension = len(segments), segments.shape[2]
+    n, is_any, order = len(segments), keep == "any", order_of(segments, 0.5, None)
     if keep == "all":
-        parts, left, is_plain = _cut_near(segments, order_of(segments, 0.5, None), 0, n, standing, UNLIMITED)
-        if left or not is_plain:
+        parts, left, is_plain = _cut_near(segments, order, 0, n, standing, UNLIMITED)
+        if not is_plain:
             return None
-        return in_order(joined(parts, dimension), n, lambda: _exact_ends(segments, standing, UNLIMITED))
-    is_any, words, room, reached = (
-        keep == "any",
-        standing.words(UNLIMITED),
-        scratch_for(standing.n_rows),
-        _IN_ROWS.copy(),
-    )
-    state, out = np.empty(n, np.uint8), _NONE if is_any else _firsts_for(n, dimension)
-    order = order_of(segments, 0.0, None)
+        if left:
+            parts += _cut(segments, standing, Counts(n), UNLIMITED, 1, *np.concatenate(left).T)
+        return in_order(joined(parts, segments.shape[2]), n, lambda: _exact_ends(segments, standing, UNLIMITED))
+    words, room, reached = standing.words(UNLIMITED), scratch_for(standing.n_rows), _IN_ROWS.copy()
+    state, out = np.empty(n, np.uint8), _NONE if is_any else _firsts_for(n, segments.shape[2])
     entry_of(find_first)(segments, order, n, words, room, is_any, UNLIMITED.flag, state, out, reached)
     _, wanted, _, n_met, n_open, _ = reached.tolist()
-    if wanted or n_open:
+    if wanted or (n_open and not isfinite(segments.sum())):
         return None
-    return state.view(np.bool_) if is_any else ScenePieces(*(out if n_met == n else [each[:n_met] for each in out]))
+    found = out if is_any or n_met == n else [each[:n_met] for each in out]
+    if n_open:
+        return (meets_any if is_any else clip_first)(segments, standing, Counts(n), UNLIMITED, 1, (state, found))
+    return state.view(np.bool_) if is_any else ScenePieces(*found)
 
 
 def clip_first(
-    segments: FloatArray, standing: Standing, counts: Counts, budget: Budget, workers: int | None
+    segments: FloatArray, standing: Standing, counts: Counts, budget: Budget, workers: int | None, found: Any = None
 ) -> ScenePieces:
-    """Return the first piece of each segment that meets a body, of those that begin at one point that of the first."""
-    state, out = _searched(segments, standing, False, budget, workers)
-    left, met = np.flatnonzero(state == OPEN), np.flatnonzero(state == MET)
-    sure = ScenePieces(*(out if len(met) == len(state) else [each.take(met, axis=0) for each in out]))
+    """Return the first piece of each segment that meets a body, of those that begin at one point that of the first.
+
+    found: what `_searched` returns, if it is known.
+    """
+    state, out = found or _searched(segments, standing, False, budget, workers)
+    left, sure = np.flatnonzero(state == OPEN), ScenePieces(*out)
     if not len(left):
         return sure
     more = Counts(len(left))
@@ -119,29 +121,29 @@ def clip_first(
     first = np.flatnonzero(np.append(True, some.source[1:] != some.source[:-1])[: len(some)])
     some.ranks[:, 1] = some.ranks[:, 1] > some.ranks[:, 0]
     some.source[:] = left[some.source]
-    found = [np.concatenate([getattr(sure, field.name), getattr(some, field.name)[first]]) for field in fields(sure)]
-    order = np.argsort(found[0])
-    return ScenePieces(*(each[order] for each in found))
+    joint = [np.concatenate([getattr(sure, field.name), getattr(some, field.name)[first]]) for field in fields(sure)]
+    order = np.argsort(joint[0])
+    return ScenePieces(*(each[order] for each in joint))
 
 
 def meets_any(
-    segments: FloatArray, standing: Standing, counts: Counts, budget: Budget, workers: int | None
+    segments: FloatArray, standing: Standing, counts: Counts, budget: Budget, workers: int | None, found: Any = None
 ) -> BoolArray:
-    """Return of each segment whether it meets a body."""
-    state, _ = _searched(segments, standing, True, budget, workers)
-    found: BoolArray = state == MET
+    """Return of each segment whether it meets a body; found: what `_searched` returns, if it is known."""
+    state, _ = found or _searched(segments, standing, True, budget, workers)
+    meets: BoolArray = state == MET
     left = np.flatnonzero(state == OPEN)
     more = Counts(len(left))
     for part in _parts(segments[left], standing, more, budget, workers) if len(left) else ():
-        found[left[part.source]] = True
+        meets[left[part.source]] = True
     counts.take(left, more)
-    return found
+    return meets
 
 
 def _searched(
     segments: FloatArray, standing: Standing, is_any: bool, budget: Budget, workers: int | None
-) -> tuple[FlagArray, Firsts]:
-    """Return of each segment the state and, unless `is_any`, in its row the first piece where it is MET."""
+) -> tuple[FlagArray, Any]:
+    """Return of each segment the state and, unless `is_any`, the first pieces of those that are MET."""
     n, words, order = len(segments), standing.words(budget), order_of(segments, 0.0, standing.where(budget))
     state, out = np.empty(n, np.uint8), _NONE if is_any else _firsts_for(n, segments.shape[2])
 
@@ -156,7 +158,8 @@ def _searched(
             standing.prepare(body, wanted, budget)
 
     run_chunks(task, n, budget=budget, workers=workers)
-    return state, out
+    met = np.flatnonzero(state == MET)
+    return state, out if is_any or len(met) == n else [each.take(met, axis=0) for each in out]
 
 
 def _firsts_for(n: int, dimension: int) -> Firsts:
@@ -187,7 +190,7 @@ def _parts(
     if pairs:
         owners, bodies = np.concatenate(pairs).T
         counts.is_beyond[owners] = True
-        found += _cut(segments, owners, bodies, standing, counts, budget, workers)
+        found += _cut(segments, standing, counts, budget, workers, owners, bodies)
     return found
 
 
@@ -217,8 +220,8 @@ def _cut_near(
 
 
 def _cut(
-    segments: FloatArray, owners: IntArray, bodies: IntArray, standing: Standing, counts: Counts, budget: Budget,
-    workers: int | None,
+    segments: FloatArray, standing: Standing, counts: Counts, budget: Budget, workers: int | None, owners: IntArray,
+    bodies: IntArray,
 ) -> list[Found]:  # fmt: skip
     """Return the pieces of pairs of a segment and a body that the kernels left, body by body."""
     bodies = standing.names_of(bodies)
