@@ -14,6 +14,7 @@ from engine.collision.codes import DISJOINT, OVERLAPPING, UNSETTLED
 from engine.collision.collide import collide_pair, pair_function
 from engine.collision.detail import NO_DETAIL, check_has_detail, details_where_proven, has_interior
 from engine.collision.meshes.contact_kinds import N_NAMED
+from engine.collision.meshes.dual_traversal import PIERCING
 from engine.collision.meshes.mesh_arrays import STILL, mesh_body_of
 from engine.collision.meshes.mesh_mesh import answer_of, told_by_kernel
 from engine.collision.meshes.mesh_pair import SPACE, what_to_seek
@@ -21,12 +22,13 @@ from engine.collision.meshes.placement import PoseArrays
 from engine.collision.meshes.pose_batch import N_COLUMNS, N_CONTACTS, ONE_SETTLES, RELATION, relate_poses
 from engine.collision.result import MESHES, RELATIONS, UNCOUNTED, Collision, Work
 from engine.collision.scenes.batches import convex_poses
+from engine.collision.simple.closed_forms import told_by_forms
 from engine.direct import entry_of
 from engine.errors import InvalidArrayError, WrongDimensionError
 from engine.parallel import Budget, Cancel, Progress, check_options, run_chunks
 from engine.solids.base import Solid
 from engine.solids.checks import as_floats, is_ready
-from engine.solids.pose import Pose, check_rotations, is_surely_rotation
+from engine.solids.pose import Pose, check_rotations, is_surely_rotation, motion_of
 from engine.types import Accuracy
 
 PoseCollisions = (
@@ -117,10 +119,15 @@ _ALONE = [np.array([relation], np.int8) for relation in RELATIONS]
 
 def _collide_pose(first: Solid, second: Solid, poses: PoseArrays, work: Work) -> Collision:
     """Return the answer to one pose; of two meshes without a `Pose`, which takes as long to make as to decide."""
-    if first.dimension == 3 and first.type in MESHES and second.type in MESHES:
-        told = told_by_kernel(mesh_body_of(first), mesh_body_of(second), (STILL, poses), work)
-        if isinstance(told, Collision):
+    if first.type == "aabb" or first.type == second.type == "sphere":
+        motion = read_only(poses.rotations[0]), read_only(poses.translations[0])
+        told = told_by_forms(first, second, motion_of(None, first.dimension), motion, work)
+        if told is not None:
             return told
+    if first.dimension == 3 and first.type in MESHES and second.type in MESHES:
+        answer = told_by_kernel(mesh_body_of(first), mesh_body_of(second), (STILL, poses), work)
+        if isinstance(answer, Collision):
+            return answer
     pose = Pose.of_checked(poses.rotations[0], poses.translations[0])
     return collide_pair(first, second, (None, pose), work)
 
@@ -165,7 +172,9 @@ def batch_of(first: Solid, second: Solid, poses: PoseArrays, answers: Answers) -
     def fill(start: int, stop: int) -> None:
         if convex is not None:
             convex(start, stop)
-        items: IntArray | slice = slice(start, stop) if convex is None else answers.left(start, stop)
+        items: IntArray | slice = slice(start, stop)
+        if convex is not None:  # those apart are told, and without witnesses more
+            items = start + np.flatnonzero(relations[items] != DISJOINT if is_named else relations[items] == UNSETTLED)
         some = PoseArrays(read_only(poses.rotations[items]), read_only(poses.translations[items]), True)
         rows = np.empty((len(some.rotations), N_COLUMNS), np.int64)
         if not len(rows):
@@ -180,8 +189,9 @@ def batch_of(first: Solid, second: Solid, poses: PoseArrays, answers: Answers) -
         relations[items] = rows[:, RELATION]
         if witnesses is not None:
             numbers = range(start, stop) if isinstance(items, slice) else items.tolist()
-            for item, row in zip(numbers, rows.tolist()):
-                if row[RELATION] > DISJOINT and (answer := answer_of(row, a, b, seek)) is not None:
+            pierces = (rows[:, N_CONTACTS] == ONE_SETTLES) & (seek in PIERCING)
+            for item, answer in zip(numbers, map(answer_of, *rows[:, :N_CONTACTS].T.tolist(), pierces.tolist())):
+                if answer is not None:
                     witnesses[item] = answer.witness
 
     return fill

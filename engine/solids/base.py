@@ -55,7 +55,8 @@ class Preparing:
         check: called every few milliseconds while another thread builds; what it raises ends the waiting.
         """
         try:
-            return cast(T, self._prepared[key])
+            found: T = self._prepared[key]
+            return found
         except KeyError:
             pass
         if check is None:

@@ -159,7 +159,11 @@ class Pose(Immutable):
 _STILL: Final = {d: (read_only(np.eye(d)), read_only(np.zeros(d))) for d in (2, 3)}
 
 
-def motion_of(pose: Pose | None, dimension: int) -> tuple[FloatArray, FloatArray]:
+Motion = tuple[FloatArray, FloatArray]
+"""Rotation (d, d) and translation (d,), read-only."""
+
+
+def motion_of(pose: Pose | None, dimension: int) -> Motion:
     """Return rotation and translation of a pose, those that leave everything where it is for a body without one."""
     return _STILL[dimension] if pose is None else (pose.rotation, pose.translation)
 
@@ -215,7 +219,10 @@ def check_rotations(
 
 def is_surely_rotation(matrix: FloatArray) -> bool:
     """Tell whether a read-only ``(1, d, d)`` float64 is surely a finite rotation; `check_rotations` tells others."""
-    return not entry_of(find_suspects)(matrix, _TOLERANCE - _UNSURE, np.empty(1, np.bool_))
+    return not entry_of(find_suspects)(matrix, _TOLERANCE - _UNSURE, _UNREAD)
+
+
+_UNREAD: Final = np.empty(1, np.bool_)
 
 
 @kernel

@@ -19,11 +19,11 @@ from engine.types import Point3
 
 
 @inline
-def _is_beside(a: Point3, b: Point3, c: Point3, d: Point3, error: float) -> bool:
-    """Tell whether c and d surely lie strictly on one side of the plane of the origin, a and b."""
+def _sides(a: Point3, b: Point3, c: Point3, d: Point3, error: float) -> tuple[int, int]:
+    """Return on which sides of the plane of the origin, a and b the points c and d surely lie, 0 where unsure."""
     n, bound = cross(a, b), bound_near(a, b, c, d, d, error)
     one, other = dot(n, c), dot(n, d)
-    return (one > bound and other > bound) or (one < -bound and other < -bound)
+    return int(one > bound) - int(one < -bound), int(other > bound) - int(other < -bound)
 
 
 @merged
@@ -31,7 +31,9 @@ def common_corner(poses: Any, t: Facet, u: Facet, own: Facet, their: Facet, erro
     """Return 3 k + m where corner k of a face surely is corner m of another, and they have no other common point, else
     -1; t, u: the rounded posed triangles, each coordinate off by at most `error`; own, their: before their poses.
 
-    The other corners of one lie strictly on one side of the plane of the other: it meets that plane in the corner.
+    The other corners v, w of one lie strictly on one side of the plane of the other, which it meets in the corner; or
+    both straddle, and from the corner leave along the line of the planes in opposite directions. With normals m and n
+    that is m x n times the sign of n . v, and n x m times that of m . x, x the corner of the other that stands for v.
     """
     for k in range(3):
         for m in range(3):
@@ -40,8 +42,11 @@ def common_corner(poses: Any, t: Facet, u: Facet, own: Facet, their: Facet, erro
                 continue
             v, w = minus(corner(t, k + 1), p), minus(corner(t, k + 2), p)
             x, y = minus(corner(u, m + 1), q), minus(corner(u, m + 2), q)
-            if not (_is_beside(v, w, x, y, error) or _is_beside(x, y, v, w, error)):
-                return -1
+            by_x, by_y = _sides(v, w, x, y, error)
+            if by_x * by_y != 1:
+                by_v, by_w = _sides(x, y, v, w, error)
+                if by_v * by_w == 0 or (by_v * by_w < 0 and (by_x * by_y == 0 or by_v != by_x)):
+                    return -1
             return 3 * k + m if error == 0.0 or surely_same(poses, corner(own, k), corner(their, m)) else -1
     return -1
 

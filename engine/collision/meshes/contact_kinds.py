@@ -30,9 +30,11 @@ from engine.jit import called, inline
 from engine.predicates.posed import UNPOSED, PosedPoint3
 from engine.types import UNDECIDED
 
-STRENGTH: tuple[Kind, ...] = ("face_face", "edge_face", "vertex_face", "edge_edge", "vertex_edge", "vertex_vertex")
+STRENGTH: tuple[Kind, ...] = (
+    "face_face", "edge_face", "vertex_face", "edge_edge", "vertex_edge", "vertex_vertex", "containment"
+)  # fmt: skip
 """Of several contacts the witness is the one of the kind that stands first here; at most `N_NAMED` are looked at."""
-FACE_FACE, EDGE_FACE, VERTEX_FACE, EDGE_EDGE, VERTEX_EDGE, VERTEX_VERTEX = range(6)
+FACE_FACE, EDGE_FACE, VERTEX_FACE, EDGE_EDGE, VERTEX_EDGE, VERTEX_VERTEX, CONTAINED = range(7)
 N_NAMED = 32
 
 _BAD, FLUSH, N_SIGNS = 9, 10, 11

@@ -35,6 +35,7 @@ SEEK_OVERLAP = 0
 SEEK_PIERCING_BY_FIRST = 1
 SEEK_PIERCING_BY_SECOND = 2
 SEEK_CONTACT = 3
+PIERCING = SEEK_PIERCING_BY_FIRST, SEEK_PIERCING_BY_SECOND
 """What ends a search early: a crossing that proves overlapping interiors; one that proves that the first (second) body,
 a surface, passes through the interior of the other; any contact at all."""
 

@@ -22,19 +22,12 @@ import numpy as np
 from engine.arrays import IntArray
 from engine.collision.codes import (
     DISJOINT,
-    FIRST_INSIDE_SECOND,
     OVERLAPPING,
-    SECOND_INSIDE_FIRST,
     TOUCHING,
     UNSETTLED,
 )
-from engine.collision.meshes.contact_kinds import STRENGTH
-from engine.collision.meshes.dual_traversal import (
-    SEEK_OVERLAP,
-    SEEK_PIERCING_BY_FIRST,
-    SEEK_PIERCING_BY_SECOND,
-    Found,
-)
+from engine.collision.meshes.contact_kinds import CONTAINED, STRENGTH
+from engine.collision.meshes.dual_traversal import PIERCING, SEEK_OVERLAP, Found
 from engine.collision.meshes.exact_regions import even_sides, pieces_of_segment, regions_of, sides_at, sides_within
 from engine.collision.meshes.exact_triangles import as_simplex
 from engine.collision.meshes.mesh_arrays import STATE_CLEAN, MeshBody, mesh_body_of
@@ -47,8 +40,8 @@ from engine.collision.meshes.mesh_pair import (
     what_to_seek,
 )
 from engine.collision.meshes.parity import INSIDE
-from engine.collision.meshes.pose_batch import N_CONTACTS, ONE_SETTLES, RELATION
-from engine.collision.result import NO_CONTACT, RELATIONS, UNNAMED, Collision, Poses, Witness, Work
+from engine.collision.meshes.pose_batch import ONE_SETTLES, RELATION
+from engine.collision.result import NO_CONTACT, RELATIONS, UNNAMED, Collision, Containing, Poses, Witness, Work
 from engine.solids.base import Solid
 from engine.types import Relation
 
@@ -130,39 +123,28 @@ def told_by_kernel(
     """Return the answer where `relate_poses` tells it, else what `relate` says."""
     seek = what_to_seek(first, second, work)
     row, found = relate(first, second, posed, seek, work)
-    relation = row[RELATION]
-    is_unnamed = relation == DISJOINT or not (work.witness or relation == UNSETTLED)
-    answer = UNNAMED[relation] if is_unnamed else answer_of(row, first, second, seek)
-    if answer is None:
-        return row, found
-    work.n_beyond_filter += max(0, row[N_CONTACTS])
+    relation, kind, face, their_face, n = row
+    if work.witness or relation == UNSETTLED:
+        answer = answer_of(relation, kind, face, their_face, n == ONE_SETTLES and seek in PIERCING)
+        if answer is None:
+            return row, found
+    else:
+        answer = UNNAMED[relation]
+    if n > 0:
+        work.n_beyond_filter += n
     return answer
 
 
-def answer_of(row: list[int], first: MeshBody, second: MeshBody, seek: int) -> Collision | None:
-    """Return what a row of `relate_poses` says of bodies that are not disjoint; None where it does not say all."""
-    relation, kind, first_face, second_face, n_contacts = row
-    if relation in (FIRST_INSIDE_SECOND, SECOND_INSIDE_FIRST):
-        own = int(relation == SECOND_INSIDE_FIRST)
-        return _contained(relation, own, (first, second)[own].arrays.first_face)
+@lru_cache(1 << 14)
+def answer_of(relation: int, kind: int, face: int, their_face: int, pierces: bool) -> Collision | None:
+    """Return what a row of `relate_poses` says, None where that is not all; made once: that takes longer than to find
+    a contact."""
+    if relation == DISJOINT:
+        return NO_CONTACT
     if UNSETTLED in (relation, kind):
         return None
-    pierces = n_contacts == ONE_SETTLES and seek in (SEEK_PIERCING_BY_FIRST, SEEK_PIERCING_BY_SECOND)
-    return _in_contact(relation, kind, first_face, second_face, pierces)
-
-
-@lru_cache(4096)
-def _in_contact(relation: int, kind: int, first_face: int, second_face: int, pierces: bool) -> Collision:
-    """Return an answer, made once: that takes longer than to find the contact."""
-    return Collision(RELATIONS[relation], Witness(STRENGTH[kind], first_face, second_face, "", pierces))
-
-
-@lru_cache(256)
-def _contained(relation: int, own: int, face: int, piercing: bool = False) -> Collision:
-    """Return a relation with a part of body `own` inside the other one as its witness."""
-    if own == 0:
-        return Collision(RELATIONS[relation], Witness("containment", face, -1, "second", piercing))
-    return Collision(RELATIONS[relation], Witness("containment", -1, face, "first", piercing))
+    containing: Containing = "" if kind != CONTAINED else ("second" if their_face < 0 else "first")
+    return Collision(RELATIONS[relation], Witness(STRENGTH[kind], face, their_face, containing, pierces))
 
 
 def _relation(pair: MeshPair) -> Collision:
@@ -170,7 +152,7 @@ def _relation(pair: MeshPair) -> Collision:
     contacts = pair.contacts
     if pair.is_settled:
         relation = Relation.OVERLAPPING if pair.seek == SEEK_OVERLAP else Relation.TOUCHING
-        return Collision(relation, pair.named(piercing=pair.seek in (SEEK_PIERCING_BY_FIRST, SEEK_PIERCING_BY_SECOND)))
+        return Collision(relation, pair.named(piercing=pair.seek in PIERCING))
     if pair.row[RELATION] in (OVERLAPPING, TOUCHING) and len(contacts):
         return Collision(RELATIONS[pair.row[RELATION]], pair.named())
     patches = [pair.patches(own, contacts[:, own], INSIDE) for own in (0, 1)]
@@ -215,6 +197,6 @@ def _overlap_or_touch(pair: MeshPair, patches: list[list[IntArray]]) -> Collisio
 
 def _contain(pair: MeshPair, relation: Relation, own: int, patch: IntArray, *, piercing: bool = False) -> Collision:
     """Return a relation with a patch of body `own` inside the other one as its witness."""
-    if not pair.work.witness:
-        return UNNAMED[relation]
-    return _contained(relation, own, int(pair.meshes[own].faces[patch].min()), piercing)
+    face = int(pair.meshes[own].faces[patch].min())
+    answer = answer_of(relation, CONTAINED, *((face, -1), (-1, face))[own], piercing)
+    return answer if pair.work.witness and answer is not None else UNNAMED[relation]

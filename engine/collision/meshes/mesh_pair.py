@@ -45,6 +45,7 @@ class _WorkSpace(threading.local):
 
     def __init__(self) -> None:
         self.descent, self.found, self.rows = new_descent(), new_found(ROOM_AT_ONCE), np.empty((1, N_COLUMNS), np.int64)
+        self.row = self.rows[0]
 
 
 PosedPair = tuple[PoseArrays, PoseArrays]
@@ -71,7 +72,7 @@ def relate(
             first.arrays, second.arrays, *posed, seek, N_NAMED if work.witness else 0, SPACE.descent, found, n_known,
             SPACE.rows, work.budget.flag,
         )  # fmt: skip
-        row: list[int] = SPACE.rows[0].tolist()
+        row: list[int] = SPACE.row.tolist()
         n = row[N_CONTACTS]
         if n <= room:
             return row, found
@@ -82,13 +83,12 @@ def relate(
 
 def what_to_seek(first: MeshBody, second: MeshBody, work: Work) -> int:
     """Return what ends the search for contacts early."""
-    if work.boolean or not (first.has_inside or second.has_inside):
-        return SEEK_CONTACT
-    if first.has_inside and second.has_inside:
+    own, their = first.arrays.has_inside, second.arrays.has_inside
+    if own and their and not work.boolean:
         return SEEK_OVERLAP
-    if not work.witness:
+    if work.boolean or not (work.witness and (own or their)):
         return SEEK_CONTACT
-    return SEEK_PIERCING_BY_SECOND if first.has_inside else SEEK_PIERCING_BY_FIRST
+    return SEEK_PIERCING_BY_SECOND if own else SEEK_PIERCING_BY_FIRST
 
 
 def met_by_face(contacts: IntArray, own: int) -> Iterator[tuple[int, IntArray]]:

@@ -5,7 +5,15 @@ from __future__ import annotations
 from typing import Any
 
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
-from engine.collision.meshes.contact_kinds import EDGE_FACE, FACE_FACE, FLUSH, N_NAMED, VERTEX_VERTEX, kind_of
+from engine.collision.meshes.contact_kinds import (
+    CONTAINED,
+    EDGE_FACE,
+    FACE_FACE,
+    FLUSH,
+    N_NAMED,
+    VERTEX_VERTEX,
+    kind_of,
+)
 from engine.collision.meshes.dual_traversal import (
     DONE,
     INTERRUPTED,
@@ -34,8 +42,8 @@ from engine.types import UNDECIDED
 RELATION, KIND, FIRST_FACE, SECOND_FACE, N_CONTACTS = range(5)
 N_COLUMNS = 5
 """Of a row that says how a pair lies: its relation, or UNSETTLED; the kind of the contact that is the witness and its
-faces, the caller's, where one was asked for and compiled signs tell; how many contacts there are, ONE_SETTLES where one
-is enough."""
+faces, the caller's, where one was asked for and compiled signs tell, of a body that lies within the other the least
+face; how many contacts there are, ONE_SETTLES where one is enough."""
 ONE_SETTLES = -1
 
 
@@ -158,5 +166,8 @@ def relate_poses(
                 row[FIRST_FACE], row[SECOND_FACE] = first.faces[i], second.faces[j]
         elif n_pairs == 0:
             row[RELATION] = relation_apart(first, second, place)
+            row[KIND] = CONTAINED
+            row[FIRST_FACE] = first.first_face if row[RELATION] == FIRST_INSIDE_SECOND else -1
+            row[SECOND_FACE] = second.first_face if row[RELATION] == SECOND_INSIDE_FIRST else -1
         elif n_known > 0 or n_pairs <= room_of(found):
             in_contact(s, n_pairs, n_named, row)

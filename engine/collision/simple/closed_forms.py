@@ -38,7 +38,7 @@ from engine.predicates.exact_vectors import largest_axis, squared_length
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.half_space import HalfSpace
-from engine.solids.pose import motion_of
+from engine.solids.pose import Motion, motion_of
 from engine.solids.sphere import Sphere
 from engine.types import Relation
 
@@ -48,18 +48,27 @@ def by_forms_or(otherwise: PairFunction) -> PairFunction:
     boxes, turned ones, witnesses in the plane and of a posed box on a ball, exponents beyond its range."""
 
     def collide_forms(first: Solid, second: Solid, poses: Poses, work: Work) -> Collision:
-        form, other, d = form_of(first), form_of(second), first.dimension
-        if form is None or other is None:
-            return otherwise(first, second, poses, work)
-        code = entry_of(relate_forms)(form, *motion_of(poses[0], d), other, *motion_of(poses[1], d))
-        is_unnamed = d == 2 if second.type == "aabb" else first.type == "aabb" and poses[0] is not None
-        if code == UNSETTLED or (work.witness and is_unnamed and code >= OVERLAPPING):
-            return otherwise(first, second, poses, work)
-        if not work.witness:
-            return UNNAMED[code & _RELATION]
-        return _named(code) if second.type == "aabb" else _BY_BALL[code]
+        d = first.dimension
+        told = told_by_forms(first, second, motion_of(poses[0], d), motion_of(poses[1], d), work)
+        return otherwise(first, second, poses, work) if told is None else told
 
     return collide_forms
+
+
+def told_by_forms(first: Solid, second: Solid, motion: Motion, their_motion: Motion, work: Work) -> Collision | None:
+    """Return what `relate_forms` tells of a box and a box or ball, or of two balls; None where that is not all."""
+    form, other, d = form_of(first), form_of(second), first.dimension
+    if form is None or other is None:
+        return None
+    code: int = entry_of(relate_forms)(form, *motion, other, *their_motion)
+    if code == UNSETTLED:
+        return None
+    if not work.witness:
+        return UNNAMED[code & _RELATION]
+    if second.type == "aabb":
+        return None if d == 2 and code >= OVERLAPPING else _named(code)
+    is_turned = first.type == "aabb" and motion is not motion_of(None, d)  # its faces may count
+    return None if is_turned and code >= OVERLAPPING else _BY_BALL[code]
 
 
 _RELATION = (1 << KIND_AT) - 1
