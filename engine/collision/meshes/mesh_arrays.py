@@ -236,8 +236,10 @@ def _box_triangles(box: Aabb) -> tuple[FloatArray, IntArray, IntArray]:
     """Return the triangles of a box by face (xmin, xmax, ymin, ymax, zmin, zmax); of a flat one each place once."""
     flat, corners = box.min == box.max, corners_of_box(box.min, box.max)
     faces = np.arange(6)
-    if flat.any():  # the two faces across a flat axis are one: keep that; a segment or point: any face will do
-        faces = faces[2 * int(np.argmax(flat)) :][:1]
+    if not flat.any():
+        return corners, BOX_TRIANGLES.reshape(-1, 3), np.repeat(faces, 2)
+    # the two faces across a flat axis are one: keep that; a segment or point: any face will do
+    faces = faces[2 * int(np.argmax(flat)) :][:1]
     _, first, merged = np.unique(corners, axis=0, return_index=True, return_inverse=True)
     return corners, first[merged.reshape(-1)][BOX_TRIANGLES[faces].reshape(-1, 3)], np.repeat(faces, 2)
 

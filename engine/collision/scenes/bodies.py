@@ -152,7 +152,7 @@ def numbered(keys: IntArray) -> tuple[IntArray, IntArray]:
     kinds, firsts = np.empty(len(keys), np.int64), np.empty(len(keys), np.int64)
     bits = max(4, (2 * len(keys)).bit_length())
     with np.errstate(over="ignore"):  # uncompiled runs only
-        n_kinds = _number(keys, np.full(1 << bits, -1, np.int64), kinds, firsts)
+        n_kinds = entry_of(_number)(keys, np.full(1 << bits, -1, np.int64), kinds, firsts)
     return kinds, firsts[:n_kinds].copy()
 
 

@@ -9,7 +9,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray
+from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray, read_only
 from engine.bounding.box_grid import pairs_of_boxes
 from engine.bounding.sweep import BLOCK
 from engine.collision.answers import Answers, PlacedPair, accuracy_of
@@ -227,28 +227,27 @@ def _candidates(
     if n_bodies < 2 or (wanted is not None and not len(wanted)):
         return
     high = bodies.high
-    if wanted is None and n_bodies <= _FEW:
-        wanted = _all_keys(n_bodies)
-    blocks = pairs_of_boxes(low, high, budget.flag) if wanted is None else _wanted_pairs(low, high, wanted)
+    named = _all_pairs(n_bodies) if wanted is None and n_bodies <= _FEW else None
+    if wanted is not None:
+        named = np.stack(np.divmod(np.unique(wanted), n_bodies), axis=1)
+        named = named[named[:, 0] < named[:, 1]]
+    blocks = pairs_of_boxes(low, high, budget.flag) if named is None else _meeting(low, high, named)
     for pairs in blocks:
         yield pairs if skipped is None else pairs[~np.isin(pairs[:, 0] * n_bodies + pairs[:, 1], skipped)]
 
 
 @lru_cache(_FEW)
-def _all_keys(n_bodies: int) -> IntArray:
-    """Return the keys of all pairs of few bodies."""
-    first, second = np.triu_indices(n_bodies, 1)
-    return np.asarray(first * n_bodies + second, np.int64)
+def _all_pairs(n_bodies: int) -> IntArray:
+    """Return all pairs of few bodies."""
+    return read_only(np.stack(np.triu_indices(n_bodies, 1), axis=1))
 
 
-def _wanted_pairs(low: FloatArray, high: FloatArray, wanted: IntArray) -> Iterator[IntArray]:
-    """Yield the pairs with the keys wanted whose boxes meet, in blocks."""
-    pairs = np.stack(np.divmod(np.unique(wanted), len(low)), axis=1)
-    pairs = pairs[pairs[:, 0] < pairs[:, 1]]
-    for start in range(0, len(pairs), BLOCK):
-        first, second = pairs[start : start + BLOCK].T
-        meet = ((low[first] <= high[second]) & (low[second] <= high[first])).all(axis=1)
-        yield pairs[start : start + BLOCK][meet]
+def _meeting(low: FloatArray, high: FloatArray, named: IntArray) -> Iterator[IntArray]:
+    """Yield the pairs named whose boxes meet, in blocks."""
+    for start in range(0, len(named), BLOCK):
+        pairs = named[start : start + BLOCK]
+        first, second = pairs.T
+        yield pairs[((low[first] <= high[second]) & (low[second] <= high[first])).all(axis=1)]
 
 
 def pair_keys(named: Any, n_bodies: int, name: str) -> IntArray:

@@ -12,7 +12,6 @@ half-space is told by its faces with vertices there; the half-space always stick
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable
 from fractions import Fraction
 
 import numpy as np
@@ -88,9 +87,8 @@ def _by_distances(body: Solid, ball: Sphere, poses: Poses, work: Work) -> Collis
     touched, entered = -1, candidates[:0]
     for count, face in enumerate(candidates.tolist()):
         work.budget.check()
-        corners = boundary.corners(face)
-        distance = None if _has_within(corners, center, limit) else simplex_distance(center, corners)
-        if distance is None or distance < limit:
+        distance = simplex_distance(center, boundary.corners(face))
+        if distance < limit:
             entered = candidates[count:]
             break
         if distance == limit and touched < 0:
@@ -122,15 +120,7 @@ def _candidates(nearest: FloatArray, limit: Fraction) -> IntArray:
 
 def _enters(boundary: Boundary, faces: IntArray, center: Vector, limit: Fraction) -> bool:
     """Tell whether something live of these faces comes nearer to the centre than a squared distance."""
-    return len(faces) > 0 and boundary.has_live(
-        faces, lambda piece: _has_within(piece.vertices(), center, limit) or piece.squared_distance(center) < limit
-    )
-
-
-def _has_within(points: Iterable[Vector], center: Vector, limit: Fraction) -> bool:
-    """Tell whether one of some points is nearer to the centre than a squared distance: the distance of a face takes ten
-    times as long."""
-    return any(squared_length(minus(p, center)) < limit for p in points)
+    return len(faces) > 0 and boundary.has_live(faces, lambda piece: piece.squared_distance(center) < limit)
 
 
 def _is_within_walls(body: Solid, pose: Pose | None, center: Vector, radius: float, work: Work) -> bool:
