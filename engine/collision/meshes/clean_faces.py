@@ -54,7 +54,7 @@ def _enters(
 
 
 @called
-def _flush(s: Search, i: int, j: int, t: Facet, u: Facet, axis: int, off: PosedPoint3) -> tuple[int, bool]:
+def flush(s: Search, i: int, j: int, t: Facet, u: Facet, axis: int, off: PosedPoint3) -> tuple[int, bool]:
     """Return OVERLAPPING where two faces of one plane share an area and their bodies lie on one side of both, TOUCHING
     where not, or UNSETTLED; and whether they share an area. off: a point off the plane."""
     poses, error = s.descent.poses, exact_error(s)
@@ -106,7 +106,7 @@ def judge(s: Search, item: int) -> tuple[int, bool]:
         return UNSETTLED, False
     kinds[item] = JUDGED | on | theirs_on << 3
     if sides[0] == 0 and sides[1] == 0 and sides[2] == 0:
-        return _flush(s, i, j, t, u, axis, off)
+        return flush(s, i, j, t, u, axis, off)
     by_own = _enters(s, t, sides, u, their_off, their_flat, s.second, j)
     if by_own == OVERLAPPING and state_of(s.first, i, poses) == STATE_STACKED:
         by_own = UNSETTLED

@@ -36,6 +36,7 @@ STRENGTH: tuple[Kind, ...] = (
 """Of several contacts the witness is the one of the kind that stands first here; at most `N_NAMED` are looked at."""
 FACE_FACE, EDGE_FACE, VERTEX_FACE, EDGE_EDGE, VERTEX_EDGE, VERTEX_VERTEX, CONTAINED = range(7)
 N_NAMED = 32
+BOTH = 3
 
 _BAD, FLUSH, N_SIGNS = 9, 10, 11
 """Places in the work space, after nine turns: that a sign was open; the corners that lie in the plane of the other
@@ -182,27 +183,27 @@ def _is_edge_across(poses: Any, t: Facet, u: Facet, sides: Signs, their_sides: S
 
 
 @called
-def kind_of(poses: Any, t: Facet, axis: int, u: Facet, their_axis: int, error: float, work: Any) -> tuple[int, bool]:
-    """Return the kind of the contact of two faces with area, UNSETTLED where a sign is open, and whether it may cut an
-    open face: False where all that they share is one point, or on the borders of both. Sets FLUSH."""
+def kind_of(poses: Any, t: Facet, axis: int, u: Facet, their_axis: int, error: float, work: Any) -> tuple[int, int]:
+    """Return the kind of the contact of two faces with area, UNSETTLED where a sign is open, and whether it may cut the
+    open face t (1), u (2) or BOTH: not where all that they share is one point, or lies on its border. Sets FLUSH."""
     work[_BAD] = work[FLUSH] = 0
     sides, their_sides = sides_of(poses, u, t, error), sides_of(poses, t, u, error)
     for k in range(3):
         if sides[k] == UNDECIDED or their_sides[k] == UNDECIDED:
-            return UNSETTLED, True
+            return UNSETTLED, BOTH
         work[FLUSH] |= int(sides[k] == 0) << k | int(their_sides[k] == 0) << 3 + k
     own, their = lone_zero(sides), lone_zero(their_sides)
     for k in range(3):
         if (own >= 0 and is_same(corner(t, own), corner(u, k))) or (
             their >= 0 and is_same(corner(u, their), corner(t, k))
         ):
-            return VERTEX_VERTEX, False
+            return VERTEX_VERTEX, 0
     if work[FLUSH] == 0 and _is_edge_across(poses, t, u, sides, their_sides, error):
-        return EDGE_FACE, True
+        return EDGE_FACE, BOTH
     if sides[0] == 0 and sides[1] == 0 and sides[2] == 0:
         how = separation(poses, t, u, axis, error)
         if how == UNDECIDED or how < 0:
-            return UNSETTLED if how == UNDECIDED else FACE_FACE, True
+            return UNSETTLED if how == UNDECIDED else FACE_FACE, BOTH
     one = _against_face(poses, t, sides, u, their_axis, error, work)
     other = _against_face(poses, u, their_sides, t, axis, error, work)
     found = min(one, other)
@@ -211,10 +212,10 @@ def kind_of(poses: Any, t: Facet, axis: int, u: Facet, their_axis: int, error: f
     elif found > VERTEX_FACE:
         found = max(one, other)  # a common corner, if there is one
     if work[_BAD] != 0:
-        return UNSETTLED, True
+        return UNSETTLED, BOTH
     if own >= 0 or their >= 0 or found == VERTEX_VERTEX:
-        return found, False
+        return found, 0
     # case: both straddle and are cut by the line of their planes in one and the same segment; no corner is common then
     are_across = is_straddling(sides[0], sides[1], sides[2])
     are_across = are_across and is_straddling(their_sides[0], their_sides[1], their_sides[2])
-    return found, found <= VERTEX_FACE or are_across
+    return found, BOTH if are_across else int(other <= VERTEX_FACE) | int(one <= VERTEX_FACE) << 1

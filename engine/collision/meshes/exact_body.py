@@ -16,8 +16,7 @@ import numpy as np
 from engine.arrays import IntArray
 from engine.bounding.bvh import STACK, WIDTH
 from engine.collision.exact_images import rounded_quotient
-from engine.collision.meshes.face_state import states_of
-from engine.collision.meshes.mesh_arrays import STATE_CLEAN, MeshArrays, MeshBody, lattice_shift
+from engine.collision.meshes.mesh_arrays import MeshArrays, MeshBody, lattice_shift
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.result import Poses
 from engine.jit import allocating_kernel, inline
@@ -88,10 +87,6 @@ class ExactBody:
     def axis(self, face: int) -> int:
         """Return the axis on which a triangle's normal is largest, -1 if it has no area."""
         return largest_axis(self.plane(face)[:3])
-
-    def is_clean(self, face: int) -> bool:
-        """Tell whether no other face of the body meets a triangle within."""
-        return bool(states_of(self.mesh.arrays, np.array([face]))[0] == STATE_CLEAN)
 
     def faces_in(self, low: list[float], high: list[float]) -> list[int]:
         """Return, ascending, at least the triangles that meet the closed box; bounds may be infinite."""

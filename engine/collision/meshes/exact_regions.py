@@ -18,9 +18,8 @@ from fractions import Fraction
 from itertools import pairwise
 from typing import NamedTuple
 
-from engine.arrays import IntArray
 from engine.collision.meshes.exact_body import Corners, ExactBody, Plane, Vector, rounded_outward
-from engine.collision.meshes.exact_triangles import meets_open_face, open_face, share_area, value_at, without_axis
+from engine.collision.meshes.exact_triangles import value_at, without_axis
 from engine.parallel import Budget
 from engine.predicates.exact_vectors import cross, dot, minus
 from engine.predicates.rational import sign_of
@@ -78,68 +77,11 @@ def sides_over(body: ExactBody, q: Homogeneous, axis: int, plane: Plane | None) 
     return Sides(above, above != changes, above and not is_on_face)
 
 
-def sides_within(body: ExactBody, face: int, other: ExactBody, met: IntArray) -> tuple[Sides, Sides] | None:
-    """Return the status of either body beside some point within a clean face of the first, None where none tried tells.
-
-    Beside a face flush with a clean one of the other, `met` (those that meet it), the other lies as beside that.
-    """
-    ours, plane = sides_of_clean(body, face), body.plane(face)
-    if ours is None:
-        return None
-    corners = body.corners(face)
-    for their_face in met.tolist():
-        points = other.corners(their_face)
-        if any(value_at(plane, p) for p in points) or not any(other.plane(their_face)):
-            continue
-        if share_area(corners, points, body.axis(face)) and other.is_clean(their_face):
-            theirs = sides_of_clean(other, their_face)
-            if theirs is not None:
-                return ours, theirs
-    for q in _points_within(corners):
-        theirs = sides_over(other, q, body.axis(face), plane)
-        if theirs is not None:
-            return ours, theirs
-    return None
-
-
-def sides_of_clean(body: ExactBody, face: int) -> Sides | None:
-    """Return on which sides of a clean face its body lies, along its axis, None where no point tried tells; kept, by
-    the side that its normal points to, with the mesh."""
-    plane, axis = body.plane(face), body.axis(face)
-    kept = body.mesh.inner.get(face)
-    if kept is None:
-        found = (sides_over(body, q, axis, plane) for q in _points_within(body.corners(face)))
-        sides = next((sides for sides in found if sides is not None), None)
-        if sides is None:
-            return None
-        kept = (sides.above, sides.below) if plane[axis] > 0 else (sides.below, sides.above)
-        body.mesh.inner[face] = kept
-    return Sides(*(kept if plane[axis] > 0 else kept[::-1]), False)
-
-
-def _points_within(corners: Corners) -> Iterator[Homogeneous]:
+def points_within(corners: Corners) -> Iterator[Homogeneous]:
+    """Yield a few points within a face."""
     for weights in WITHIN:
         x, y, z = (sum(w * p[side] for w, p in zip(weights, corners)) for side in range(3))
         yield x, y, z, sum(weights)
-
-
-def even_sides(body: ExactBody, face: int, other: ExactBody, met: IntArray) -> tuple[bool, bool]:
-    """Tell whether another body has one status just above (below) the whole of a face with area; `met`: all faces of
-    the other body that meet this one.
-
-    A face of the body comes between only where it meets the open face and leaves the plane on that side.
-    """
-    plane, axis = body.plane(face), body.axis(face)
-    ours = open_face(body.corners(face), axis)
-    above = below = True
-    for points in map(other.corners, met.tolist()):
-        values = [value_at(plane, p) for p in points]
-        low, high = min(values), max(values)
-        if (low, high) == (0, 0) or not meets_open_face(_flat_trace(points, values, axis), ours):
-            continue
-        above = above and (high if plane[axis] > 0 else -low) <= 0
-        below = below and (-low if plane[axis] > 0 else high) <= 0
-    return above, below
 
 
 def _flat_trace(points: Corners, values: list[int], axis: int) -> Sequence[Vector]:

@@ -11,13 +11,12 @@ some of its points have the signs wanted.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import combinations
 
 from engine.collision.meshes.exact_body import Corners, Plane, Vector, plane_through
 from engine.collision.meshes.triangle_triangle import APART, CONTACT, COPLANAR, CROSSING
 from engine.collision.result import Kind
-from engine.predicates.exact_vectors import cross, dot, minus
+from engine.predicates.exact_vectors import cross, minus
 from engine.predicates.rational import sign_of
 
 Flat = tuple[int, int]
@@ -112,32 +111,3 @@ def kind_of_contact(t1: Corners, t2: Corners) -> Kind:
 def _features(s: tuple[Vector, ...]) -> tuple[list[tuple[Vector, ...]], ...]:
     """Return the corners, the edges and the faces of a simplex."""
     return tuple(list(combinations(s, n)) for n in (1, 2, 3))
-
-
-def share_area(t1: Corners, t2: Corners, axis: int) -> bool:
-    """Tell whether the open faces of two coplanar triangles with area meet: no edge has all of the other outside."""
-    (flat1, lines1), (flat2, lines2) = open_face(t1, axis), open_face(t2, axis)
-    return all(
-        max(dot(line, p) for p in flat) > 0 for lines, flat in ((lines1, flat2), (lines2, flat1)) for line in lines
-    )
-
-
-def open_face(t: Corners, axis: int) -> tuple[list[Vector], list[Vector]]:
-    """Return the corners (x, y, 1) of a face with area along an axis, and the lines of its edges, positive inside."""
-    flat: list[Vector] = [(*without_axis(p, axis), 1) for p in t]
-    if dot(cross(flat[0], flat[1]), flat[2]) < 0:
-        flat.reverse()
-    return flat, [cross(flat[i], flat[(i + 1) % 3]) for i in range(3)]
-
-
-def meets_open_face(ends: Sequence[Vector], face: tuple[list[Vector], list[Vector]]) -> bool:
-    """Tell whether a segment or point (x, y, w), w > 0, meets an `open_face`: no line of an edge, nor its own line, has
-    the two on different closed sides."""
-    flat, lines = face
-    if any(max(dot(line, end) for end in ends) <= 0 for line in lines):
-        return False
-    if len(ends) < 2:
-        return True
-    own = cross(ends[0], ends[1])
-    values = [dot(own, p) for p in flat]
-    return not any(own) or min(values) < 0 < max(values)

@@ -7,7 +7,7 @@ inside. All arrays are in the body's own coordinates: poses are applied where a 
 from __future__ import annotations
 
 from collections import namedtuple
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import frexp, ldexp
 from typing import Any
 
@@ -72,12 +72,10 @@ has_inside: False for surfaces and flat boxes."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeshBody:
-    """Triangles of one body. arrays: for kernels; shift: every coordinate times 2^shift is an integer; inner: of clean
-    faces asked for so far, whether the body lies on the side of the normal, and on the other."""
+    """Triangles of one body. arrays: for kernels; shift: every coordinate times 2^shift is an integer."""
 
     arrays: MeshArrays
     shift: int
-    inner: dict[int, tuple[bool, bool]] = field(default_factory=dict)
 
     @property
     def faces(self) -> IntArray:

@@ -16,14 +16,16 @@ from __future__ import annotations
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
-from engine.collision.meshes.exact_regions import Sides, even_sides, regions_of, sides_at, sides_within
+from engine.collision.meshes.exact_regions import Sides, points_within, regions_of, sides_at, sides_over
 from engine.collision.meshes.mesh_arrays import STATE_CLEAN, MeshBody, mesh_body_of
-from engine.collision.meshes.mesh_pair import MeshPair, met_by_face, unless_identity
+from engine.collision.meshes.mesh_pair import MeshPair, unless_identity
 from engine.collision.meshes.parity import INSIDE, OUTSIDE
+from engine.collision.meshes.pose_batch import DETAIL, OPPOSITE, SAME_SIDE
 from engine.collision.result import Parts, Poses, Work
 from engine.solids.base import Solid
 
 _BOTH, _NEITHER = Sides(True, True, True), Sides(False, False, False)
+_ABOVE, _BELOW = Sides(True, False, False), Sides(False, True, False)
 
 
 def mesh_parts(first: Solid, second: Solid, poses: Poses, work: Work) -> Parts:
@@ -32,7 +34,7 @@ def mesh_parts(first: Solid, second: Solid, poses: Poses, work: Work) -> Parts:
         a, b, poses = mesh_body_of(first), mesh_body_of(second), unless_identity(poses)
         if poses == (None, None) and _have_equal_faces(a, b):
             return Parts(False, False, True)
-        return _OverlappingPair(a, b, poses, Work(work.budget, witness=False)).parts()
+        return _OverlappingPair(a, b, poses, Work(work.budget, witness=False), DETAIL).parts()
 
 
 def _have_equal_faces(first: MeshBody, second: MeshBody) -> bool:
@@ -74,9 +76,11 @@ class _OverlappingPair(MeshPair):
                     if all(self._sticks_out):
                         return
         for own in (0, 1):
-            for face, met in met_by_face(contacts, own):
+            order = np.argsort(contacts[:, own], kind="stable")
+            faces, firsts = np.unique(contacts[order, own], return_index=True)
+            for face, kinds in zip(faces.tolist(), np.split(self.kinds[order], firsts[1:])):
                 self.work.budget.check()
-                self._see_face(own, face, met)
+                self._see_face(own, face, set(kinds.tolist()))
                 if all(self._sticks_out):
                     return
 
@@ -88,17 +92,23 @@ class _OverlappingPair(MeshPair):
             if other and not mine:
                 self._sticks_out[1 - own] = True
 
-    def _see_face(self, own: int, face: int, met: IntArray) -> None:
+    def _see_face(self, own: int, face: int, kinds: set[int]) -> None:
+        """Take note of what lies beside a face whose contacts are of some kinds (`in_detail`)."""
         body, other = self.exact[own], self.exact[1 - own]
         axis = body.axis(face)
         if axis < 0:
             return
         is_clean = self.state(own, face) == STATE_CLEAN
-        if is_clean and all(even_sides(body, face, other, met)):
-            sides = sides_within(body, face, other, met)
-            if sides is not None:
-                self._see(own, *sides)
+        is_cut = any(kind < SAME_SIDE and kind >> own & 1 for kind in kinds)
+        if is_clean and not is_cut:  # one region, and its own body on one side of it: call that above
+            if not kinds.isdisjoint((SAME_SIDE, OPPOSITE)):
+                self._see(own, _ABOVE, _ABOVE if SAME_SIDE in kinds else _BELOW)
                 return
+            for q in points_within(body.corners(face)):
+                theirs = sides_over(other, q, axis, body.plane(face))
+                if theirs is not None and theirs.above == theirs.below:
+                    self._see(own, _ABOVE, theirs)
+                    return
         for q in regions_of(body, face, [other] if is_clean else [other, body], self.work.budget):
             self._see(own, sides_at(body, q, axis), sides_at(other, q, axis))
             if all(self._sticks_out):

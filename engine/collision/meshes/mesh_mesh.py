@@ -28,13 +28,12 @@ from engine.collision.codes import (
 )
 from engine.collision.meshes.contact_kinds import CONTAINED, STRENGTH
 from engine.collision.meshes.dual_traversal import PIERCING, SEEK_OVERLAP, Found
-from engine.collision.meshes.exact_regions import even_sides, pieces_of_segment, regions_of, sides_at, sides_within
+from engine.collision.meshes.exact_regions import pieces_of_segment, regions_of, sides_at
 from engine.collision.meshes.exact_triangles import as_simplex
 from engine.collision.meshes.mesh_arrays import STATE_CLEAN, MeshBody, mesh_body_of
 from engine.collision.meshes.mesh_pair import (
     MeshPair,
     PosedPair,
-    met_by_face,
     relate,
     unless_identity,
     what_to_seek,
@@ -46,7 +45,7 @@ from engine.solids.base import Solid
 from engine.types import Relation
 
 
-def look_at_regions(pair: MeshPair, own: int, face: int, met: IntArray) -> tuple[bool, bool]:
+def look_at_regions(pair: MeshPair, own: int, face: int) -> tuple[bool, bool]:
     """Tell whether both insides come up to one side of a region of a face; and whether one is inside the other."""
     body, other = pair.exact[own], pair.exact[1 - own]
     axis = body.axis(face)
@@ -55,10 +54,6 @@ def look_at_regions(pair: MeshPair, own: int, face: int, met: IntArray) -> tuple
     cutters = [other]
     if body.mesh.has_inside and pair.state(own, face) != STATE_CLEAN:
         cutters.append(body)
-    elif body.mesh.has_inside:
-        overlaps = _overlaps_evenly(pair, own, face, met)
-        if overlaps is not None:
-            return overlaps, False
     pierces = False
     for q in regions_of(body, face, cutters, pair.work.budget):
         theirs = sides_at(other, q, axis)
@@ -68,25 +63,6 @@ def look_at_regions(pair: MeshPair, own: int, face: int, met: IntArray) -> tuple
                 return True, False
         pierces = pierces or theirs.at
     return False, pierces
-
-
-def _overlaps_evenly(pair: MeshPair, own: int, face: int, met: IntArray) -> bool | None:
-    """Tell whether both insides come up to one side of a clean face, None where that is not known.
-
-    It is known where the other's status is one all along the side of the face's inside. No other answer is missing: a
-    point of the face in the other's open interior has both insides beside it.
-    """
-    body, other = pair.exact[own], pair.exact[1 - own]
-    is_even_above, is_even_below = even_sides(body, face, other, met)
-    if not (is_even_above or is_even_below):
-        return None
-    sides = sides_within(body, face, other, met)
-    if sides is None:
-        return None
-    ours, theirs = sides
-    if (ours.above and not is_even_above) or (ours.below and not is_even_below):
-        return None
-    return (ours.above and theirs.above) or (ours.below and theirs.below)
 
 
 def pierces_without_area(pair: MeshPair, own: int, face: int) -> bool:
@@ -179,9 +155,9 @@ def _overlap_or_touch(pair: MeshPair, patches: list[list[IntArray]]) -> Collisio
                 return _contain(pair, Relation.OVERLAPPING, own, patch)
     for own in (0, 1):
         is_told = not both and (piercing or not pair.work.witness or not pair.meshes[1 - own].has_inside)
-        for face, met in () if is_told else met_by_face(contacts, own):
+        for face in [] if is_told else np.unique(contacts[:, own]).tolist():
             pair.work.budget.check()
-            overlaps, pierces = look_at_regions(pair, own, face, met)
+            overlaps, pierces = look_at_regions(pair, own, face)
             if overlaps:
                 return Collision(Relation.OVERLAPPING, pair.named())
             piercing = piercing or pierces

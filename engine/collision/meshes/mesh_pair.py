@@ -61,15 +61,18 @@ def unless_identity(poses: Poses) -> Poses:
 
 
 def relate(
-    first: MeshBody, second: MeshBody, posed: PosedPair, seek: int, work: Work, known: Found | None = None
-) -> tuple[list[int], Found]:
+    first: MeshBody, second: MeshBody, posed: PosedPair, seek: int, work: Work, known: Found | None = None,
+    n_named: int | None = None,
+) -> tuple[list[int], Found]:  # fmt: skip
     """Return what `relate_poses` says of a pair, and where its contacts are, all of them, until the next call; known:
-    all contacts, their classes too, where they are found already."""
+    all contacts, their classes too, where they are found already; n_named: as `relate_poses` takes it, None
+    for what `work` wants."""
     found, n_known = (SPACE.found, 0) if known is None else (known, len(known.kinds))
+    n_named = (N_NAMED if work.witness else 0) if n_named is None else n_named
     room = len(found.kinds)
     while True:  # bound: each turn has more room
         entry_of(relate_poses)(
-            first.arrays, second.arrays, *posed, seek, N_NAMED if work.witness else 0, SPACE.descent, found, n_known,
+            first.arrays, second.arrays, *posed, seek, n_named, SPACE.descent, found, n_known,
             SPACE.rows, work.budget.flag,
         )  # fmt: skip
         row: list[int] = SPACE.row.tolist()
@@ -91,22 +94,17 @@ def what_to_seek(first: MeshBody, second: MeshBody, work: Work) -> int:
     return SEEK_PIERCING_BY_SECOND if own else SEEK_PIERCING_BY_FIRST
 
 
-def met_by_face(contacts: IntArray, own: int) -> Iterator[tuple[int, IntArray]]:
-    """Yield each face of a body in contacts (n, 2), ascending, with the faces of the other body that it meets."""
-    order = np.argsort(contacts[:, own], kind="stable")
-    faces, firsts = np.unique(contacts[order, own], return_index=True)
-    yield from zip(faces.tolist(), np.split(contacts[order, 1 - own], firsts[1:]))
-
-
 class MeshPair:
     """One question, what kernels say of it, and the exact coordinates computed for it so far.
 
     row: of `relate_poses`; contacts (n, 2): the pairs of faces with a common point, in order, or the one that settles
-    all, as is_settled tells; filled by `find_contacts`.
+    all, as is_settled tells; kinds (n,): their classes, or what `relate_poses` puts in their place. Filled by
+    `find_contacts`.
     """
 
-    def __init__(self, first: MeshBody, second: MeshBody, poses: Poses, work: Work) -> None:
+    def __init__(self, first: MeshBody, second: MeshBody, poses: Poses, work: Work, n_named: int | None = None) -> None:
         self.meshes = (first, second)
+        self.n_named = n_named
         self.poses = poses
         self.posed = (first.posed(poses[0]), second.posed(poses[1]))
         self.work = work
@@ -122,13 +120,13 @@ class MeshPair:
 
     def find_contacts(self, seen: tuple[list[int], Found] | None = None) -> None:
         """Find all contacts; seen: what `relate` said of the pair, where it was asked already."""
-        self.row, found = seen or relate(*self.meshes, self.posed, self.seek, self.work)
+        self.row, found = seen or relate(*self.meshes, self.posed, self.seek, self.work, n_named=self.n_named)
         self.work.budget.check()
         n, self.is_settled = abs(self.row[N_CONTACTS]), self.row[N_CONTACTS] == ONE_SETTLES
-        self.contacts, kinds = found.pairs[:n].copy(), found.kinds[:n].copy()
+        self.contacts, self.kinds = found.pairs[:n].copy(), found.kinds[:n].copy()
         self.work.n_beyond_filter += n
-        if not self.is_settled and (kinds == UNDECIDED).any():
-            self._settle_classes(kinds)
+        if not self.is_settled and (self.kinds == UNDECIDED).any():
+            self._settle_classes(self.kinds)
 
     def _settle_classes(self, kinds: Int8Array) -> None:
         """Find the classes that kernels left open, and let them judge all contacts then."""
@@ -142,10 +140,10 @@ class MeshPair:
             if kinds[index] != APART and self._is_settled_by(int(kinds[index]), i, j):
                 self.contacts, self.is_settled = self.contacts[index : index + 1], True
                 return
-        self.contacts, kinds = self.contacts[kinds != APART], kinds[kinds != APART]
-        if len(kinds):
-            found = Found(self.contacts, kinds, np.empty(0, np.bool_))
-            self.row, _ = relate(*self.meshes, self.posed, self.seek, self.work, found)
+        self.contacts, self.kinds = self.contacts[kinds != APART], kinds[kinds != APART]
+        if len(self.kinds):
+            found = Found(self.contacts, self.kinds, np.empty(0, np.bool_))
+            self.row, _ = relate(*self.meshes, self.posed, self.seek, self.work, found, self.n_named)
             self.work.budget.check()
 
     def _is_settled_by(self, kind: int, i: int, j: int) -> bool:

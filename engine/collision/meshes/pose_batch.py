@@ -5,7 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
+from engine.collision.meshes.clean_faces import flush
 from engine.collision.meshes.contact_kinds import (
+    BOTH,
     CONTAINED,
     EDGE_FACE,
     FACE_FACE,
@@ -34,7 +36,7 @@ from engine.collision.meshes.mesh_arrays import MeshArrays
 from engine.collision.meshes.parity import INSIDE, OUTSIDE, brought_back, locate_point
 from engine.collision.meshes.placement import Placement, PoseArrays, defect_of
 from engine.collision.meshes.touching import relate_by_contacts
-from engine.collision.meshes.triangle_triangle import COPLANAR, CORNER, CROSSING
+from engine.collision.meshes.triangle_triangle import COPLANAR, CORNER, CROSSING, beside
 from engine.jit import called, inline, kernel, merged
 from engine.predicates.loading import as_point3
 from engine.types import UNDECIDED
@@ -45,6 +47,10 @@ N_COLUMNS = 5
 faces, the caller's, where one was asked for and compiled signs tell, of a body that lies within the other the least
 face; how many contacts there are, ONE_SETTLES where one is enough."""
 ONE_SETTLES = -1
+
+DETAIL = -1
+BESIDE, SAME_SIDE, OPPOSITE = 16, 20, 21
+"""In place of the class of a contact, see `in_detail`."""
 
 
 @inline
@@ -92,7 +98,7 @@ def in_contact(s: Search, n: int, n_named: int, row: Any) -> None:
     for item in range(n):
         i, j = pairs[item, 0], pairs[item, 1]
         if kinds[item] >= CORNER:
-            kind, may_cut, common = VERTEX_VERTEX, False, kinds[item] - CORNER
+            kind, may_cut, common = VERTEX_VERTEX, 0, kinds[item] - CORNER
             s.descent.signs[FLUSH] = 1 << common // 3 | 8 << common % 3
         else:
             kind, may_cut = kind_of_pair(s, i, j)
@@ -100,7 +106,7 @@ def in_contact(s: Search, n: int, n_named: int, row: Any) -> None:
         f, g = first.faces[i], second.faces[j]
         if item < n_named and (kind < best or (kind == best and (f < face or (f == face and g < their_face)))):
             best, face, their_face = kind, f, g
-        is_free, is_named = is_free and not may_cut, is_named and best != UNSETTLED
+        is_free, is_named = is_free and may_cut == 0, is_named and best != UNSETTLED
         if s.flag[0] != 0:
             return
         if kind == FACE_FACE or not (is_free or (item + 1 < n_named and best > EDGE_FACE)):  # none later is stronger
@@ -110,13 +116,35 @@ def in_contact(s: Search, n: int, n_named: int, row: Any) -> None:
     row[RELATION] = relate_by_contacts(s, n, is_free, has_crossing)
 
 
+@called
+def in_detail(s: Search, n: int) -> None:
+    """Write how each of n contacts lies in place of its class, nothing where a class is open: BESIDE and which of the
+    two open faces it may cut (`kind_of`); SAME_SIDE, OPPOSITE for two clean faces that share an area, by on which side
+    of it their bodies lie."""
+    pairs, kinds, _ = s.found
+    for item in range(n):
+        if kinds[item] == UNDECIDED:
+            return
+    for item in range(n):
+        i, j = pairs[item, 0], pairs[item, 1]
+        kind, may_cut = (VERTEX_VERTEX, 0) if kinds[item] >= CORNER else kind_of_pair(s, i, j)
+        kinds[item] = BESIDE | may_cut
+        if kind == FACE_FACE:
+            t, u, axis, _ = exact_faces(s, i, j)
+            how, shares = flush(s, i, j, t, u, axis, beside(t, axis))
+            if shares:
+                kinds[item] = SAME_SIDE if how == OVERLAPPING else OPPOSITE
+        if s.flag[0] != 0:
+            return
+
+
 @merged
-def kind_of_pair(s: Search, i: int, j: int) -> tuple[int, bool]:
+def kind_of_pair(s: Search, i: int, j: int) -> tuple[int, int]:
     """Return `kind_of` two faces, UNSETTLED where one has no area."""
     t, u, axis, their_axis = exact_faces(s, i, j)
     if axis < 0 or their_axis < 0:
         s.descent.signs[FLUSH] = 0
-        return UNSETTLED, True
+        return UNSETTLED, BOTH
     return kind_of(s.descent.poses, t, axis, u, their_axis, exact_error(s), s.descent.signs)
 
 
@@ -144,7 +172,8 @@ def relate_poses(
 ) -> None:  # fmt: skip
     """Fill rows (n, N_COLUMNS) int64 for the poses (n) of the second body; still: the one of the first.
 
-    n_named: how many contacts name the witness; without any, relations are all that is told. `descent` and `found` are
+    n_named: how many contacts name the witness; without any, relations are all that is told, and for DETAIL only how
+    the contacts lie. `descent` and `found` are
     work space: pairs in contact at more faces than fit into `found`, and those no proof here settles, are UNSETTLED.
     What is found of the last pose stays there. n_known: of one pose, how many contacts there are, where all of them are
     in `found` already, their classes known; else 0.
@@ -170,4 +199,7 @@ def relate_poses(
             row[FIRST_FACE] = first.first_face if row[RELATION] == FIRST_INSIDE_SECOND else -1
             row[SECOND_FACE] = second.first_face if row[RELATION] == SECOND_INSIDE_FIRST else -1
         elif n_known > 0 or n_pairs <= room_of(found):
-            in_contact(s, n_pairs, n_named, row)
+            if n_named == DETAIL:
+                in_detail(s, n_pairs)
+            else:
+                in_contact(s, n_pairs, n_named, row)

@@ -8,12 +8,12 @@ import pytest
 from engine import Pose, Surface
 from engine.collision.codes import UNSETTLED
 from engine.collision.meshes.contact_kinds import STRENGTH
-from engine.collision.meshes.dual_traversal import SEEK_CONTACT, Found
+from engine.collision.meshes.dual_traversal import SEEK_CONTACT, SEEK_OVERLAP, Found
 from engine.collision.meshes.exact_body import exact_pair
 from engine.collision.meshes.exact_triangles import classify_exact, kind_of_contact
-from engine.collision.meshes.mesh_arrays import mesh_body_of
+from engine.collision.meshes.mesh_arrays import STILL, mesh_body_of
 from engine.collision.meshes.mesh_pair import relate
-from engine.collision.meshes.pose_batch import KIND
+from engine.collision.meshes.pose_batch import BESIDE, DETAIL, KIND
 from engine.collision.meshes.triangle_triangle import APART, CONTACT
 from engine.collision.result import Work
 from tests.unit.collision.meshes.bodies import TURN
@@ -42,3 +42,25 @@ def test_agrees_with_exact_integers(size: int, pose: Pose | None) -> None:
             assert STRENGTH[row[KIND]] == kind_of_contact(*faces)
             seen.add(row[KIND])
     assert seen == set(range(6))
+
+
+@pytest.mark.parametrize(
+    ("other", "cut"),
+    [
+        (((1, 1, 0), (2, 1, 5), (1, 2, 5)), 0),  # stands on the open face
+        (((0, 0, 0), (0, -9, 5), (0, -9, -5)), 0),  # passes a corner
+        (((0, 0, 0), (9, 0, 0), (0, 0, 9)), 0),  # stands on an edge
+        (((1, 1, 0), (2, 1, 0), (1, 1, 5)), 1),  # stands on the open face with an edge
+        (((1, 0, 0), (2, -1, 5), (2, -2, 5)), 0),  # touches an edge with a corner
+        (((-1, 0, -9), (10, 0, -9), (4, 0, 18)), 2),  # holds an edge within
+        (((1, -1, -5), (1, 9, 0), (1, -1, 5)), 3),  # goes through
+    ],
+)
+def test_which_open_face_is_cut(other: tuple[tuple[int, int, int], ...], cut: int) -> None:
+    for face in (((0, 0, 0), (9, 0, 0), (0, 9, 0)), ((0, 9, 0), (9, 0, 0), (0, 0, 0))):
+        bodies = [mesh_body_of(Surface(corners, [[0, 1, 2]])) for corners in (face, other)]
+        for first, second, bits in ((*bodies, cut), (*bodies[::-1], (0, 2, 1, 3)[cut])):
+            found = Found(np.zeros((1, 2), np.int64), np.full(1, CONTACT, np.int8), np.empty(0, np.bool_))
+            with np.errstate(all="ignore"):
+                relate(first, second, (STILL, STILL), SEEK_OVERLAP, Work(), found, DETAIL)
+            assert found.kinds.tolist() == [BESIDE | bits]

@@ -1,4 +1,4 @@
-"""Regions of a face: one point in each, what lies on either side, and sides that a whole body keeps one status on."""
+"""Regions of a face: one point in each, and what lies on either side."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 
 from engine import Pose, Surface
 from engine.collision.meshes.exact_body import ExactBody, exact_pair
-from engine.collision.meshes.exact_regions import Sides, even_sides, regions_of, sides_at, sides_within
+from engine.collision.meshes.exact_regions import Sides, points_within, regions_of, sides_at, sides_over
 from engine.collision.meshes.mesh_arrays import mesh_body_of
 from engine.parallel import Budget
 from tests.unit.collision.meshes.bodies import TURN, mesh
@@ -17,23 +17,6 @@ def sheet(*triangles: tuple[tuple[int, ...], ...]) -> ExactBody:
     corners = [corner for triangle in triangles for corner in triangle]
     faces = np.arange(len(corners)).reshape(-1, 3)
     return ExactBody(mesh_body_of(Surface(corners, faces)), None, 0)
-
-
-@pytest.mark.parametrize(
-    ("other", "expected"),
-    [
-        (((1, 1, 0), (2, 1, 5), (1, 2, 5)), (False, True)),  # stands on the open face
-        (((1, 1, 0), (2, 1, -5), (1, 2, -5)), (True, False)),
-        (((0, 0, 0), (0, -9, 5), (0, -9, -5)), (True, True)),  # passes a corner
-        (((0, 0, 0), (9, 0, 0), (0, 0, 9)), (True, True)),  # stands on an edge
-        (((1, -1, -5), (1, 9, 0), (1, -1, 5)), (False, False)),  # goes through
-        (((1, 1, 0), (2, 1, 0), (1, 2, 0)), (True, True)),  # lies in the plane
-    ],
-)
-def test_even_sides(other: tuple[tuple[int, int, int], ...], expected: tuple[bool, bool]) -> None:
-    face = ((0, 0, 0), (9, 0, 0), (0, 9, 0))
-    for corners in (face, (face[0], face[2], face[1])):
-        assert even_sides(sheet(corners), 0, sheet(other), np.array([0])) == expected
 
 
 def test_a_point_in_every_region() -> None:
@@ -50,10 +33,11 @@ def test_a_point_in_every_region() -> None:
 def test_sides_of_the_faces_of_a_box(pose: Pose | None) -> None:
     body, other = exact_pair(mesh(2), mesh(1, (0.5, 0.5, 2)), (pose, pose))
     for face in range(len(body.mesh.faces)):
-        sides = sides_within(body, face, other, np.empty(0, np.int64))
-        assert sides is not None
-        assert sides[0].above != sides[0].below
-        assert not sides[0].at
+        for q in points_within(body.corners(face)):
+            sides = sides_over(body, q, body.axis(face), body.plane(face))
+            assert sides is not None
+            assert sides.above != sides.below
+            assert not sides.at
     n = len(body.mesh.arrays.vertices)
     centre = (*map(sum, zip(*(body.vertex(vertex) for vertex in range(n)))), n)
     assert sides_at(body, centre, 2).at
