@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
 from engine.parallel import Budget
-from engine.solids.base import setters_of
 from engine.solids.pose import Pose
 from engine.types import Rcc8, Relation
 
@@ -34,7 +33,7 @@ _SWAPPED_RELATION = {
 }
 
 
-@dataclass(frozen=True, slots=True, init=False)
+@dataclass(frozen=True, slots=True)
 class Witness:
     """One reason why two bodies have a common point.
 
@@ -53,25 +52,8 @@ class Witness:
     containing: Containing = ""
     piercing: bool = False
 
-    def __init__(
-        self,
-        kind: Kind,
-        first_face: int = -1,
-        second_face: int = -1,
-        containing: Containing = "",
-        piercing: bool = False,
-    ) -> None:
-        _set_kind(self, kind)
-        _set_first(self, first_face)
-        _set_second(self, second_face)
-        _set_containing(self, containing)
-        _set_piercing(self, piercing)
 
-
-_set_kind, _set_first, _set_second, _set_containing, _set_piercing = setters_of(Witness)
-
-
-@dataclass(frozen=True, slots=True, init=False)
+@dataclass(frozen=True, slots=True)
 class Collision:
     """How two bodies lie to each other; `witness` is None when they are disjoint, or where none was asked for.
 
@@ -82,11 +64,6 @@ class Collision:
     witness: Witness | None = None
     detail: Rcc8 | None = None
 
-    def __init__(self, relation: Relation, witness: Witness | None = None, detail: Rcc8 | None = None) -> None:
-        _set_relation(self, relation)
-        _set_witness(self, witness)
-        _set_detail(self, detail)
-
     def swapped(self) -> Collision:
         """Return the answer for the two bodies in the other order."""
         w, detail = self.witness, None if self.detail is None else self.detail.swapped
@@ -94,8 +71,6 @@ class Collision:
             w = Witness(w.kind, w.second_face, w.first_face, _SWAPPED[w.containing], w.piercing)
         return Collision(_SWAPPED_RELATION.get(self.relation, self.relation), w, detail)
 
-
-_set_relation, _set_witness, _set_detail = setters_of(Collision)
 
 MESHES = ("polyhedron", "surface", "aabb")
 OUTLINES = ("polygon", "triangle", "aabb")

@@ -98,7 +98,7 @@ def _last(p: Point3, axis: int) -> Point3:
 @allocating
 def locate_point(own: OwnPoint, mesh: MeshArrays) -> int:
     """Return INSIDE, OUTSIDE, 0 (on a face) or UNDECIDED for one point."""
-    where = _locate(own, mesh, 2, -1, np.empty(STACK, np.int32))
+    where = locate_along(own, mesh, 2, -1)
     for axis in range(2 if where == UNDECIDED else 0):  # another half-line may keep clear of edges
         where = locate_along(own, mesh, axis, -1) if where == UNDECIDED else where
     return where
@@ -107,11 +107,6 @@ def locate_point(own: OwnPoint, mesh: MeshArrays) -> int:
 @allocating
 def locate_along(own: OwnPoint, mesh: MeshArrays, axis: int, left_out: int) -> int:
     """Return what `locate_point` does by the half-line along any axis, one face left out."""
-    return _locate(own, mesh, axis, left_out, np.empty(STACK, np.int32))
-
-
-@merged
-def _locate(own: OwnPoint, mesh: MeshArrays, axis: int, left_out: int, stack: Any) -> int:
     q, error = own.point, own.error
     local, slack = in_tree(mesh, q), SLACK + error / mesh.scale
     if not (slack < 1.0 and np.isfinite(local.x + local.y + local.z)):  # case: the ends of the exponent range
@@ -121,7 +116,7 @@ def _locate(own: OwnPoint, mesh: MeshArrays, axis: int, left_out: int, stack: An
     far = Point3(
         ABOVE_ALL if axis == 0 else local.x, ABOVE_ALL if axis == 1 else local.y, ABOVE_ALL if axis == 2 else local.z
     )
-    box, q = box_between(local, far, slack), _last(q, axis)
+    box, q, stack = box_between(local, far, slack), _last(q, axis), np.empty(STACK, np.int32)
     stack[0] = 0
     n_above, unsure, on_face = 0, False, False
     face, n = next_face(mesh, stack, 1, box)
