@@ -1,9 +1,8 @@
 """Compiled: what contacts none of which proves an overlap by crossing tell of two bodies, and a plane between them.
 
-Two convex bodies that touch are always separated by a plane through a face in contact, or through two edges that cross
-(a face of their Minkowski difference holds the origin); a plane through two crossing edges is the one through the first
-and an end of the second. Many bodies that are not convex lie that way too. Of others the faces in contact may tell
-(`free_faces.py`, `clean_faces.py`). Where no proof is found, nothing is said.
+Two convex bodies that touch are separated by a plane through a face in contact, unless only edges cross; many bodies
+that are not convex too. Of others the faces in contact may tell (`free_faces.py`, `clean_faces.py`). Where no proof is
+found, nothing is said.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from engine.collision.meshes.clean_faces import relate_clean
 from engine.collision.meshes.dual_traversal import Search, exact_error, exact_faces
 from engine.collision.meshes.free_faces import by_places
 from engine.collision.meshes.placement import Placement, placed
-from engine.collision.meshes.triangle_triangle import Facet, corner, sign_of_four
+from engine.collision.meshes.triangle_triangle import Facet, sign_of_four
 from engine.jit import allocating, called, inline
 from engine.predicates.loading import as_point3
 from engine.predicates.posed import UNPOSED, PosedPoint3
@@ -25,8 +24,7 @@ from engine.types import UNDECIDED
 
 N_FIRST = 2
 N_FACES = 32
-N_EDGES = 8
-"""So many contacts give the planes of their faces, the first of them at once, so many those of their edges."""
+"""So many contacts give the planes of their faces, the first of them at once."""
 _SAMPLED = 16
 
 
@@ -75,9 +73,8 @@ def separates(poses: Any, plane: Facet, u: Vertices, v: Vertices, error: float) 
 
 
 @called
-def are_separated(s: Search, first: int, n_faces: int, n_edges: int) -> bool:
-    """Tell whether a plane through faces of the contacts from `first` to n_faces, or edges of the first n_edges, is
-    known to separate the two bodies."""
+def are_separated(s: Search, first: int, n_faces: int) -> bool:
+    """Tell whether a plane through faces of the contacts from `first` to n_faces is known to separate the bodies."""
     poses, error, is_exact = s.descent.poses, exact_error(s), s.place.error == 0.0
     u = Vertices(s.first.vertices, s.place.a, UNPOSED if is_exact or not s.place.a.is_posed else 0)
     v = Vertices(s.second.vertices, s.place.b, UNPOSED if is_exact or not s.place.b.is_posed else 1)
@@ -85,16 +82,6 @@ def are_separated(s: Search, first: int, n_faces: int, n_edges: int) -> bool:
         t, w, _, _ = exact_faces(s, s.found.pairs[item, 0], s.found.pairs[item, 1])
         if separates(poses, t, u, v, error) or separates(poses, w, u, v, error):
             return True
-        if s.flag[0] != 0:
-            return False
-    for item in range(n_edges):  # order: a plane of a face is likelier, and tried with all
-        t, w, _, _ = exact_faces(s, s.found.pairs[item, 0], s.found.pairs[item, 1])
-        for edge in range(6):
-            one, other = (t, w) if edge < 3 else (w, t)
-            for end in range(3):
-                plane = Facet(corner(one, edge), corner(one, edge + 1), corner(other, end))
-                if separates(poses, plane, u, v, error):
-                    return True
         if s.flag[0] != 0:
             return False
     return False
@@ -112,10 +99,10 @@ def relate_by_contacts(s: Search, n: int, is_free: bool, has_crossing: bool) -> 
         found = by_places(s, n, np.empty(0, np.bool_))
         if found != UNSETTLED:
             return found
-    if are_separated(s, 0, min(N_FIRST, n), 0):
+    if are_separated(s, 0, min(N_FIRST, n)):
         return TOUCHING
     if both and not is_free and not has_crossing:
         found = relate_clean(s, n)
         if found != UNSETTLED:
             return found
-    return TOUCHING if are_separated(s, N_FIRST, min(N_FACES, n), min(N_EDGES, n)) else UNSETTLED
+    return TOUCHING if are_separated(s, N_FIRST, min(N_FACES, n)) else UNSETTLED
