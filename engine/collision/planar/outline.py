@@ -104,7 +104,8 @@ def arrange_outlines(outlines: list[Outline], budget: Budget) -> tuple[Arrangeme
 
 def _nodes_of(outlines: list[Outline], budget: Budget) -> tuple[NodeTable, list[list[int]]]:
     if any(outline.is_posed for outline in outlines):
-        nodes, flat = rational_nodes([point for outline in outlines for point in outline.points], budget)
+        points, down = [point for outline in outlines for point in outline.points], _down(outlines)
+        nodes, flat = rational_nodes(points if down == 1 else [(x / down, y / down) for x, y in points], budget)
     else:
         nodes, flat = float_nodes(np.concatenate([outline.floats for outline in outlines]), budget)
     numbers, start = [], 0
@@ -114,10 +115,20 @@ def _nodes_of(outlines: list[Outline], budget: Budget) -> tuple[NodeTable, list[
     return nodes, numbers
 
 
+def _down(outlines: list[Outline]) -> int:
+    """Return what coordinates are divided by where they are arranged: poses may take some beyond the largest double,
+    not as far as to four times that."""
+    return 1 if all(np.isfinite(outline.floats).all() for outline in outlines) else 4
+
+
 def live_edges(outline: Outline, budget: Budget) -> list[tuple[Point, Point]]:
     """Return the pieces of edges that even-odd does not cancel: exactly these have the open interior on one side."""
     arrangement, _ = arrange_outlines([outline], budget)
-    kept, exact = [edge for edge, mask in enumerate(arrangement.masks) if mask], arrangement.nodes.exact
+    kept, down = [edge for edge, mask in enumerate(arrangement.masks) if mask], _down([outline])
+
+    def exact(node: int) -> Point:
+        return tuple(x * down for x in arrangement.nodes.exact(node))
+
     return [(exact(arrangement.tails[edge]), exact(arrangement.heads[edge])) for edge in kept]
 
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from engine import Aabb, Polygon, Pose, Triangle
+import pytest
+
+from engine import Aabb, Polygon, Pose, Sphere, Triangle, collide
 from engine.collision.planar.outline import is_clean, live_edges, outline_of, rounded, single_points
 from engine.parallel import Budget
 
@@ -43,3 +45,22 @@ def test_rings_of_one_position_are_points() -> None:
 def test_rounding_keeps_the_order_beyond_all_doubles() -> None:
     assert rounded(Fraction(1, 3)) == 1 / 3
     assert rounded(Fraction(10) ** 400) == float("inf") == -rounded(-(Fraction(10) ** 400))
+
+
+@pytest.mark.parametrize("x", [0.25, 0.75, 1.25, 1.5])
+def test_images_beyond_the_largest_double_lie_as_smaller_ones_do(x: float) -> None:
+    turn, found = [[0.6, -0.8], [0.8, 0.6]], []
+    for unit in (1.0, 2.0**1023):
+        box, pose = Aabb([0, 0], [1.25 * unit, 1.25 * unit]), Pose(turn, [x * unit, 0.5 * unit])
+        ball = Sphere([0.5 * unit, 1.5 * unit], 0.25 * unit)
+        found.append(
+            [collide(box, other, first_pose=pose, detail=True) for other in (box, Polygon([box_ring(box)]), ball)]
+        )
+        live = live_edges(outline_of(Polygon([box_ring(box)]), pose, Budget()), Budget())
+        found[-1].append([sorted(tuple(value / Fraction(unit) for value in end) for end in edge) for edge in live])
+    assert found[0] == found[1]
+
+
+def box_ring(box: Aabb) -> list[list[float]]:
+    (a, b), (c, d) = box.min.tolist(), box.max.tolist()
+    return [[a, b], [c, b], [c, d], [a, d]]
