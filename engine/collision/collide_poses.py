@@ -120,7 +120,7 @@ _ALONE = [np.array([relation], np.int8) for relation in RELATIONS]
 def _collide_pose(first: Solid, second: Solid, poses: PoseArrays, work: Work) -> Collision:
     """Return the answer to one pose; of two meshes without a `Pose`, which takes as long to make as to decide."""
     if first.type == "aabb" or first.type == second.type == "sphere":
-        motion = read_only(poses.rotations[0]), read_only(poses.translations[0])
+        motion = poses.rotations[0], poses.translations[0]
         told = told_by_forms(first, second, motion_of(None, first.dimension), motion, work)
         if told is not None:
             return told
@@ -133,7 +133,7 @@ def _collide_pose(first: Solid, second: Solid, poses: PoseArrays, work: Work) ->
 
 
 def as_poses(rotations: object, translations: object, dimension: int) -> tuple[FloatArray, FloatArray]:
-    """Return checked rotations (n, d, d) and translations (n, d)."""
+    """Return checked rotations (n, d, d) and translations (n, d), read-only."""
     turn: Any = rotations
     move: Any = translations
     if is_ready(turn, dimension, dimension) and is_ready(move, dimension) and len(turn) == 1 == len(move):
@@ -155,7 +155,7 @@ def as_poses(rotations: object, translations: object, dimension: int) -> tuple[F
         )
     if len(turns):
         check_rotations(turns)
-    return turns, moves
+    return read_only(turns), read_only(moves)
 
 
 def batch_of(first: Solid, second: Solid, poses: PoseArrays, answers: Answers) -> Callable[[int, int], None] | None:
@@ -163,7 +163,6 @@ def batch_of(first: Solid, second: Solid, poses: PoseArrays, answers: Answers) -
     if first.dimension == 2 or first.type not in MESHES or second.type not in MESHES:
         return None
     budget, relations, witnesses = answers.budget, answers.relations, answers.witnesses
-    poses = PoseArrays(read_only(poses.rotations), read_only(poses.translations), True)
     is_named = witnesses is not None  # then a search for contacts has to follow, and tells all relations
     convex = convex_poses(first, second, poses, relations, budget, answers.boolean or is_named)
     a, b = mesh_body_of(first), mesh_body_of(second)

@@ -91,7 +91,7 @@ class MeshBody:
         """Return the pose as kernels take it."""
         if pose is None:
             return STILL
-        return PoseArrays(read_only(pose.rotation[None]), read_only(pose.translation[None]), True)
+        return PoseArrays(pose.rotation[None], pose.translation[None], True)
 
 
 def mesh_body_of(solid: Solid) -> MeshBody:
