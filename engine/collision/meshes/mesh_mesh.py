@@ -28,7 +28,7 @@ from engine.collision.codes import (
 )
 from engine.collision.meshes.contact_kinds import CONTAINED, STRENGTH
 from engine.collision.meshes.dual_traversal import PIERCING, SEEK_OVERLAP, Found
-from engine.collision.meshes.exact_regions import pieces_of_segment, regions_of, sides_at
+from engine.collision.meshes.exact_regions import pieces_of_segment, regions_of, side_of_clean, sides_at
 from engine.collision.meshes.exact_triangles import as_simplex
 from engine.collision.meshes.mesh_arrays import STATE_CLEAN, MeshBody, mesh_body_of
 from engine.collision.meshes.mesh_pair import (
@@ -41,6 +41,7 @@ from engine.collision.meshes.mesh_pair import (
 from engine.collision.meshes.parity import INSIDE
 from engine.collision.meshes.pose_batch import ONE_SETTLES, RELATION
 from engine.collision.result import NO_CONTACT, RELATIONS, UNNAMED, Collision, Containing, Poses, Witness, Work
+from engine.predicates.rational import sign_of
 from engine.solids.base import Solid
 from engine.types import Relation
 
@@ -51,11 +52,17 @@ def look_at_regions(pair: MeshPair, own: int, face: int) -> tuple[bool, bool]:
     axis = body.axis(face)
     if axis < 0:
         return False, False
-    cutters = [other]
-    if body.mesh.has_inside and pair.state(own, face) != STATE_CLEAN:
-        cutters.append(body)
+    side = side_of_clean(body, face) if body.mesh.has_inside and pair.state(own, face) == STATE_CLEAN else 0
+    if side != 0:  # all that counts lies on one side: only faces that reach there cut it
+        met = pair.contacts[pair.contacts[:, own] == face, 1 - own].tolist()
+        is_above = side == sign_of(body.plane(face)[axis])
+        for q in regions_of(body, face, [other], pair.work.budget, (side, met)):
+            theirs = sides_at(other, q, axis)
+            if theirs.above if is_above else theirs.below:
+                return True, False
+        return False, False  # a point of the face within the other body has both insides beside it
     pierces = False
-    for q in regions_of(body, face, cutters, pair.work.budget):
+    for q in regions_of(body, face, [other, body] if body.mesh.has_inside else [other], pair.work.budget):
         theirs = sides_at(other, q, axis)
         if theirs.above or theirs.below:
             ours = sides_at(body, q, axis)
