@@ -157,7 +157,7 @@ def collide(
     they are; walls that cancel under even-odd are part of the body but bound no interior.
     Accuracy: exact for all finite input, under poses too.
     Cost: two trees, built once per solid; then about the number of pairs of faces near each other. detail: nothing more
-    where faces cross, about 1 ms for each face in contact where bodies lie flush.
+    where faces cross, some 20 us for each face in contact where bodies lie flush, 1 ms for one that the other cuts.
     Raises: UnsupportedSolidError, UnsupportedPairError, WrongDimensionError, InvalidArrayError, InvalidInputError
     (boolean with detail), DeadlineExceededError, CancelledError.
 
