@@ -17,7 +17,8 @@ from engine.collision.result import (
     Poses,
     Work,
 )
-from engine.collision.simple.against_boundary import collide_body_sphere, collide_half_space_body
+from engine.collision.simple.against_ball import collide_body_sphere
+from engine.collision.simple.against_half_space import collide_half_space_body
 from engine.collision.simple.closed_forms import (
     by_forms_or,
     collide_form_sphere,

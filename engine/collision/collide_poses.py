@@ -10,6 +10,7 @@ import numpy as np
 
 from engine.arrays import FloatArray, Int8Array, IntArray, read_only
 from engine.collision.answers import Answers, PlacedPair, Witnesses, accuracy_of
+from engine.collision.ball_poses import ball_batch
 from engine.collision.codes import DISJOINT, OVERLAPPING, UNSETTLED
 from engine.collision.collide import collide_pair, pair_function
 from engine.collision.detail import NO_DETAIL, check_has_detail, details_where_proven, has_interior
@@ -158,8 +159,13 @@ def as_poses(rotations: object, translations: object, dimension: int) -> tuple[F
     return read_only(turns), read_only(moves)
 
 
+_BALL_AND_MESH = ({"sphere", "polyhedron"}, {"sphere", "surface"})
+
+
 def batch_of(first: Solid, second: Solid, poses: PoseArrays, answers: Answers) -> Callable[[int, int], None] | None:
     """Return the function that lets kernels answer a range of poses, UNSETTLED where they cannot; None without one."""
+    if {first.type, second.type} in _BALL_AND_MESH:
+        return ball_batch(first, second, poses, answers)
     if first.dimension == 2 or first.type not in MESHES or second.type not in MESHES:
         return None
     budget, relations, witnesses = answers.budget, answers.relations, answers.witnesses

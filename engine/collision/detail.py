@@ -29,7 +29,8 @@ from engine.collision.planar.outline import (
     single_points,
 )
 from engine.collision.result import BODIES, MESHES, OUTLINES, Parts, Poses, Work
-from engine.collision.simple.against_boundary import body_sphere_parts, half_space_body_parts
+from engine.collision.simple.against_ball import body_sphere_parts
+from engine.collision.simple.against_half_space import half_space_body_parts
 from engine.containment.rational_locate import rational_location
 from engine.errors import InvalidInputError, UnsupportedSolidError
 from engine.parallel import Budget

@@ -30,7 +30,7 @@ from engine.collision.result import (
     Witness,
     Work,
 )
-from engine.collision.simple.against_boundary import collide_body_sphere
+from engine.collision.simple.against_ball import collide_body_sphere
 from engine.collision.simple.form import form_of
 from engine.collision.simple.form_relations import FACE_AT, KIND_AT, THEIR_FACE_AT, relate_forms
 from engine.direct import entry_of

@@ -7,7 +7,7 @@ import pytest
 import engine
 from engine import Aabb, Polygon, Relation, Solid, Sphere, collide
 from engine.collision.result import Parts, Work
-from engine.collision.simple.against_boundary import body_sphere_parts
+from engine.collision.simple.against_ball import body_sphere_parts
 from tests.reference.shapes import box, union_of
 from tests.unit.collision.lattices import (
     COUNTS,

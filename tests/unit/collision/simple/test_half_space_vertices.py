@@ -6,7 +6,7 @@ import pytest
 
 from engine import Aabb, HalfSpace, Polygon
 from engine.collision.result import Parts, Work
-from engine.collision.simple.against_boundary import half_space_body_parts
+from engine.collision.simple.against_half_space import half_space_body_parts
 from tests.unit.collision.lattices import (
     COUNTS,
     Maker,

@@ -1,12 +1,9 @@
-"""A body with faces or edges (mesh, box, polygon, triangle) against a ball, by distances, or a half-space, by signs.
+"""A body with faces or edges (mesh, box, polygon, triangle) against a ball, by distances.
 
-**Ball.** Is everything strictly inside the ball (the farthest vertex)? Does the boundary meet the ball, and does the
-part of it beside the open interior reach into the open ball (the nearest live face)? Where the boundary keeps clear of
-the ball, is the centre inside? Boxes of faces give float64 bounds of the distances; only faces whose bounds allow a
-contact are measured, in rationals, nearest first.
-
-**Half-space.** A linear function is largest and smallest over a body at vertices. What of the body lies beyond the
-half-space is told by its faces with vertices there; the half-space always sticks out of the body.
+Is everything strictly inside the ball (the farthest vertex)? Does the boundary meet the ball, and does the part of it
+beside the open interior reach into the open ball (the nearest live face)? Where the boundary keeps clear of the ball,
+is the centre inside? Floats prove most of it (`ball_on_mesh.py`). Else boxes of faces give float64 bounds of the
+distances, and only faces whose bounds allow a contact are measured, in rationals, nearest first.
 """
 
 from __future__ import annotations
@@ -17,43 +14,81 @@ from fractions import Fraction
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
-from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING
-from engine.collision.exact_images import HalfSpaceImage, Vector, image_half_space, image_point, rounded, value_at
+from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
+from engine.collision.exact_images import (
+    Vector,
+    image_point,
+    rounded,
+)
 from engine.collision.meshes.face_state import state_at
 from engine.collision.meshes.live_faces import simplex_distance
-from engine.collision.meshes.mesh_arrays import STATE_STACKED, mesh_body_of
+from engine.collision.meshes.mesh_arrays import STATE_STACKED, MeshBody, mesh_body_of
 from engine.collision.result import FIRST_WITHIN, NO_CONTACT, SECOND_WITHIN, Collision, Parts, Poses, Witness, Work
-from engine.collision.simple.ball_on_mesh import relate_ball
-from engine.collision.simple.boundary import Boundary, boundary_of, signs_of
+from engine.collision.simple.ball_on_mesh import relate_balls
+from engine.collision.simple.boundary import Boundary, boundary_of
 from engine.containment.rational_locate import rational_location
 from engine.direct import entry_of
 from engine.predicates.exact_vectors import minus, squared_length
 from engine.solids.base import Solid
 from engine.solids.bounds import own_box
-from engine.solids.half_space import HalfSpace
 from engine.solids.pose import Pose
 from engine.solids.sphere import Sphere
 from engine.types import Location, Relation
 
+Moves = tuple[FloatArray, FloatArray] | None
+"""Rotations (n, d, d) and translations (n, d); None for none."""
+
 
 def collide_body_sphere(body: Solid, ball: Sphere, poses: Poses, work: Work) -> Collision:
     """Return the relation of a body with a boundary of faces or edges (first) and a ball or disc (second), exact."""
-    pose, ball_pose = poses
-    if pose is None:
-        center = [rounded(c) for c in image_point(ball.center, ball_pose)]
-        if _is_ball_beside(body, center, ball.radius):
+    if poses[0] is None or body.dimension == 3:
+        is_posed = poses[0] is not None or poses[1] is not None
+        row = centers_in_frame(ball, *map(_as_arrays, poses))[0].tolist() if is_posed else [*ball.center.tolist(), 0.0]
+        if _is_ball_beside(body, row, ball.radius):
             return NO_CONTACT
         if body.dimension == 3:
-            answer = _by_floats(body, center, ball_pose is not None, ball.radius, work)
+            answer = _by_floats(body, row, ball.radius, work)
             if answer is not None:
                 return answer
     with np.errstate(over="ignore", invalid="ignore"):  # an infinite bound only sends a face to the exact test
         return _by_distances(body, ball, poses, work)
 
 
+def _as_arrays(pose: Pose | None) -> Moves:
+    return None if pose is None else (pose.rotation[None], pose.translation[None])
+
+
+def centers_in_frame(ball: Sphere, body_poses: Moves, ball_poses: Moves) -> FloatArray:
+    """Return the centres of placed balls as seen from a placed body (n, d + 1), and how far each coordinate may be off.
+
+    **Placed.** A coordinate is the sum of at most three products and a number: seven roundings of 2^-53 of their
+    magnitudes, below 2^-50 of the sum of these, and what underflows, below 2^-1060.
+    **Seen.** R^T (c - t) for the true R^-1 (c - t). R^T R is the identity but for 1e-12 an entry, so the two differ by
+    less than 2^-38 |c - t|; and R keeps distances but for that part, which for those near the radius is that much of it
+    more. What tells a distance from the radius by twice the error is right about that of the image.
+    """
+    d = ball.dimension
+    centers, error = ball.center[None], np.zeros((1, 1))
+    with np.errstate(all="ignore"):  # what overflows is left open
+        if ball_poses is not None:
+            products = ball_poses[0] * ball.center
+            centers = products.sum(axis=2) + ball_poses[1]
+            sizes = np.abs(products).sum(axis=2) + np.abs(ball_poses[1])
+            error = 2.0**-50 * sizes.max(axis=1, keepdims=True) + 2.0**-1060
+        if body_poses is not None:
+            arms = centers - body_poses[1]
+            sizes = np.abs(centers).sum(axis=1, keepdims=True) + np.abs(body_poses[1]).sum(axis=1, keepdims=True)
+            centers = (arms[:, :, None] * body_poses[0]).sum(axis=1)
+            error = 2.0 * error + 2.0**-37 * (sizes + ball.radius) + 2.0**-1060
+    placed = np.empty((len(centers), d + 1))
+    placed[:, :d], placed[:, d:] = centers, error
+    return placed
+
+
 def _is_ball_beside(body: Solid, center: list[float], radius: float) -> bool:
     """Tell whether a ball surely keeps clear of the box around a body; three roundings of 2^-53 are below 2^-50."""
-    reach = radius * (1.0 + 2.0**-50)
+    *center, error = center
+    reach = radius * (1.0 + 2.0**-50) + 2.0 * error
     low, high, _ = own_box(body)
     for c, a, b in zip(center, low.tolist(), high.tolist()):
         if max(a - c, c - b) - 2.0**-50 * (abs(c) + max(abs(a), abs(b))) > reach:
@@ -61,18 +96,23 @@ def _is_ball_beside(body: Solid, center: list[float], radius: float) -> bool:
     return False
 
 
-def _by_floats(body: Solid, center: list[float], is_rounded: bool, radius: float, work: Work) -> Collision | None:
-    """Return the relation of a mesh and a ball about a point, rounded maybe, where floats prove it."""
-    mesh = mesh_body_of(body)
-    error = 2.0**-52 * max(map(abs, center)) + 2.0**-1074 if is_rounded else 0.0
-    relation, triangle = entry_of(relate_ball)(mesh.arrays, *center, error, float(radius), work.budget.flag)
+def _by_floats(body: Solid, center: list[float], radius: float, work: Work) -> Collision | None:
+    """Return the relation of a mesh and a ball about a point, off by the fourth number, where floats prove it."""
+    mesh, found = mesh_body_of(body), np.empty((1, 2), np.int64)
+    entry_of(relate_balls)(mesh.arrays, np.array([center]), float(radius), work.witness, found, work.budget.flag)
     work.budget.check()
-    if relation == OVERLAPPING and state_at(mesh.arrays, triangle) == STATE_STACKED:
+    relation, triangle = found[0].tolist()
+    if relation == UNSETTLED or (relation == OVERLAPPING and state_at(mesh.arrays, triangle) == STATE_STACKED):
         return None
+    return named(mesh, relation, triangle)
+
+
+def named(mesh: MeshBody, relation: int, triangle: int) -> Collision:
+    """Return the answer to what `relate_balls` found."""
     if relation in (OVERLAPPING, TOUCHING):
         face = int(mesh.faces[triangle])
         return Collision(Relation(relation), Witness("surface", face, piercing=relation == TOUCHING))
-    return _WITHIN.get(relation)
+    return _WITHIN[relation]
 
 
 _WITHIN = {DISJOINT: NO_CONTACT, FIRST_INSIDE_SECOND: FIRST_WITHIN, SECOND_INSIDE_FIRST: SECOND_WITHIN}
@@ -178,56 +218,3 @@ def body_sphere_parts(body: Solid, ball: Sphere, poses: Poses, work: Work) -> Pa
             for corners in map(boundary.corners, np.intersect1d(candidates, beyond).tolist())
         )
     return Parts(body_sticks_out, ball_sticks_out, meet)
-
-
-def collide_half_space_body(space: HalfSpace, body: Solid, poses: Poses, work: Work) -> Collision:
-    """Return the relation of a half-space (first) and a body with vertices (second), exact."""
-    if poses[0] is None and poses[1] is None and (side := _side_of_box(space, body)) != 0:
-        return SECOND_WITHIN if side > 0 else NO_CONTACT
-    plane = image_half_space(space, poses[0])
-    low, high, _ = own_box(body)
-    corners = np.array(list(itertools.product(*zip(low.tolist(), high.tolist()))))
-    signs = signs_of(plane, corners, poses[1], work)  # of a linear function: one side with these is one with the body
-    if not ((signs < 0).all() or (signs > 0).all()):
-        boundary = boundary_of(body, poses[1], work)
-        signs = boundary.signs(plane)
-    if (signs < 0).all():
-        return NO_CONTACT
-    if (signs > 0).all():
-        return SECOND_WITHIN
-    enters = bool((signs > 0).any())
-    face = boundary.number_at(int(np.argmax(signs > 0 if enters else signs == 0)))
-    if enters and boundary.has_inside and _reaches(boundary, boundary.faces_at(signs > 0), plane, 1):
-        return Collision(Relation.OVERLAPPING, Witness("surface", second_face=face))
-    return Collision(Relation.TOUCHING, Witness("surface", second_face=face, piercing=enters))
-
-
-def _side_of_box(half_space: HalfSpace, body: Solid) -> int:
-    """Return the side of a plane, 1 or -1, on which the box around a body surely lies, 0 where it may meet it.
-
-    The largest and the smallest of n . p + d over a box are sums of products of its bounds: seven roundings of at most
-    2^-53 of the sum of magnitudes, far below 2^-48 of it; what underflows is below 2^-1000.
-    """
-    low, high, _ = own_box(body)
-    least = most = half_space.offset
-    size = abs(half_space.offset)
-    for n, a, b in zip(half_space.normal.tolist(), low.tolist(), high.tolist()):
-        least += min(n * a, n * b)
-        most += max(n * a, n * b)
-        size += abs(n) * max(abs(a), abs(b))
-    slack = 2.0**-48 * size + 2.0**-1000
-    return int(least > slack) - int(most < -slack)
-
-
-def _reaches(boundary: Boundary, faces: IntArray, plane: HalfSpaceImage, side: int) -> bool:
-    """Tell whether something live of these faces lies on one side, 1 or -1, of a plane."""
-    return boundary.has_live(faces, lambda piece: any(side * value_at(plane, p) > 0 for p in piece.vertices()))
-
-
-def half_space_body_parts(space: HalfSpace, body: Solid, poses: Poses, work: Work) -> Parts:
-    """Return what of a half-space and a body with vertices (second) that overlap lies outside the other."""
-    boundary, plane = boundary_of(body, poses[1], work), image_half_space(space, poses[0])
-    signs = boundary.signs(plane)
-    sticks_out = _reaches(boundary, boundary.faces_at(signs < 0), plane, -1)
-    meet = np.intersect1d(boundary.faces_at(signs <= 0), boundary.faces_at(signs >= 0), assume_unique=True)
-    return Parts(True, sticks_out, len(meet) > 0)

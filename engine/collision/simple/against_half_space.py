@@ -1,0 +1,141 @@
+"""A body with faces or edges (mesh, box, polygon, triangle) against a half-space, by signs.
+
+A linear function is largest and smallest over a body at vertices. What of the body lies beyond the half-space is told
+by its faces with vertices there; the half-space always sticks out of the body.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from engine.arrays import FloatArray, IntArray
+from engine.collision.exact_images import (
+    HalfSpaceImage,
+    as_vector,
+    image_half_space,
+    value_at,
+)
+from engine.collision.meshes.face_state import state_at
+from engine.collision.meshes.mesh_arrays import STATE_STACKED, MeshBody, mesh_body_of
+from engine.collision.result import NO_CONTACT, SECOND_WITHIN, Collision, Parts, Poses, Witness, Work
+from engine.collision.simple.boundary import Boundary, boundary_of, pulled_back
+from engine.collision.simple.sides_of_plane import scan_sides, triangle_at
+from engine.direct import entry_of
+from engine.predicates.rational import sign_of
+from engine.solids.base import Solid
+from engine.solids.bounds import own_box
+from engine.solids.half_space import HalfSpace
+from engine.types import Relation
+
+_FEW_UNSURE = 16
+"""Vertices whose side of a plane is asked one by one; more are asked together."""
+
+
+def collide_half_space_body(space: HalfSpace, body: Solid, poses: Poses, work: Work) -> Collision:
+    """Return the relation of a half-space (first) and a body with vertices (second), exact."""
+    if poses[0] is None and poses[1] is None and (side := _side_of_box(space, body)) != 0:
+        return SECOND_WITHIN if side > 0 else NO_CONTACT
+    if body.dimension == 3:
+        answer = _by_scan(space, body, poses, work)
+        if answer is not None:
+            return answer
+    plane, boundary = image_half_space(space, poses[0]), boundary_of(body, poses[1], work)
+    signs = boundary.signs(plane)
+    if (signs < 0).all():
+        return NO_CONTACT
+    if (signs > 0).all():
+        return SECOND_WITHIN
+    enters = bool((signs > 0).any())
+    face = boundary.number_at(int(np.argmax(signs > 0 if enters else signs == 0)))
+    if enters and boundary.has_inside and _reaches(boundary, boundary.faces_at(signs > 0), plane, 1):
+        return Collision(Relation.OVERLAPPING, Witness("surface", second_face=face))
+    return Collision(Relation.TOUCHING, Witness("surface", second_face=face, piercing=enters))
+
+
+def _by_scan(space: HalfSpace, body: Solid, poses: Poses, work: Work) -> Collision | None:
+    """Return the relation of a half-space and a mesh where floats tell the sides of nearly all vertices, else None.
+
+    The face at the first vertex beyond the plane, or on it, is named. Where nothing cancels a face that reaches beyond,
+    there is open interior beside it.
+    """
+    mesh, unsure = mesh_body_of(body), np.empty(_FEW_UNSURE, np.int64)
+    plane = _plane_in_frame(space, poses)
+    beyond, before, n_unsure = entry_of(scan_sides)(mesh.arrays, plane, unsure, work.budget.flag)
+    work.budget.check()
+    if n_unsure > len(unsure):
+        return None
+    work.n_beyond_filter += n_unsure
+    work.n_rational += n_unsure
+    signs = _exact_signs(space, mesh, poses, unsure[:n_unsure].tolist())
+    first = {sign: min((vertex for vertex in signs if signs[vertex] == sign), default=-1) for sign in (1, 0, -1)}
+    first[1], before = min((v for v in (beyond, first[1]) if v >= 0), default=-1), max(before, first[-1])
+    if first[1] < 0 and first[0] < 0:
+        return NO_CONTACT
+    if before < 0 and first[0] < 0:
+        return SECOND_WITHIN
+    enters = first[1] >= 0
+    triangle = entry_of(triangle_at)(mesh.arrays, first[1] if enters else first[0])
+    overlaps = enters and mesh.has_inside
+    if overlaps and state_at(mesh.arrays, triangle) == STATE_STACKED:
+        return None
+    relation = Relation.OVERLAPPING if overlaps else Relation.TOUCHING
+    return Collision(relation, Witness("surface", second_face=int(mesh.faces[triangle]), piercing=enters != overlaps))
+
+
+def _exact_signs(space: HalfSpace, mesh: MeshBody, poses: Poses, vertices: list[int]) -> dict[int, int]:
+    """Return on which side of a half-space some vertices of a mesh lie, by vertex."""
+    if not vertices:
+        return {}
+    plane, _, _ = pulled_back(image_half_space(space, poses[0]), poses[1])
+    return {v: sign_of(value_at(plane, as_vector(mesh.arrays.vertices[v].tolist()))) for v in vertices}
+
+
+def _plane_in_frame(space: HalfSpace, poses: Poses) -> FloatArray:
+    """Return the function of a half-space in the frame of a body as `scan_sides` takes it.
+
+    Under a pose of the body a weight is the sum of three products, the offset one of four numbers: seven roundings of
+    2^-53 of their magnitudes, whose sum is the size, and what underflows. Under a pose of its own both are rationals,
+    rounded once.
+    """
+    normal, offset = space.normal, float(space.offset)
+    sizes, size = np.abs(normal), abs(offset)
+    with np.errstate(all="ignore"):  # what overflows is unsure
+        if poses[0] is not None:
+            _, normal, offset = pulled_back(image_half_space(space, poses[0]), poses[1])
+            sizes, size = np.abs(normal), abs(offset)
+        elif poses[1] is not None:
+            turn, move = poses[1].rotation, poses[1].translation
+            offset, size = offset + float(normal @ move), size + float(sizes @ np.abs(move))
+            normal, sizes = normal @ turn, sizes @ np.abs(turn)
+    return np.array([normal, sizes, [offset, size, 0.0]])
+
+
+def _side_of_box(half_space: HalfSpace, body: Solid) -> int:
+    """Return the side of a plane, 1 or -1, on which the box around a body surely lies, 0 where it may meet it.
+
+    The largest and the smallest of n . p + d over a box are sums of products of its bounds: seven roundings of at most
+    2^-53 of the sum of magnitudes, far below 2^-48 of it; what underflows is below 2^-1000.
+    """
+    low, high, _ = own_box(body)
+    least = most = half_space.offset
+    size = abs(half_space.offset)
+    for n, a, b in zip(half_space.normal.tolist(), low.tolist(), high.tolist()):
+        least += min(n * a, n * b)
+        most += max(n * a, n * b)
+        size += abs(n) * max(abs(a), abs(b))
+    slack = 2.0**-48 * size + 2.0**-1000
+    return int(least > slack) - int(most < -slack)
+
+
+def _reaches(boundary: Boundary, faces: IntArray, plane: HalfSpaceImage, side: int) -> bool:
+    """Tell whether something live of these faces lies on one side, 1 or -1, of a plane."""
+    return boundary.has_live(faces, lambda piece: any(side * value_at(plane, p) > 0 for p in piece.vertices()))
+
+
+def half_space_body_parts(space: HalfSpace, body: Solid, poses: Poses, work: Work) -> Parts:
+    """Return what of a half-space and a body with vertices (second) that overlap lies outside the other."""
+    boundary, plane = boundary_of(body, poses[1], work), image_half_space(space, poses[0])
+    signs = boundary.signs(plane)
+    sticks_out = _reaches(boundary, boundary.faces_at(signs < 0), plane, -1)
+    meet = np.intersect1d(boundary.faces_at(signs <= 0), boundary.faces_at(signs >= 0), assume_unique=True)
+    return Parts(True, sticks_out, len(meet) > 0)
