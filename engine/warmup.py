@@ -88,11 +88,8 @@ def _regions(dimension: int) -> list[Solid]:
     return [*simple, Polygon([[[0, 0], [4, 0], [1, 1], [0, 4]]]) if dimension == 2 else _cube()]
 
 
-def _warm_containment_2d() -> None:
+def _warm_containment() -> None:
     _locate(2)
-
-
-def _warm_containment_3d() -> None:
     _locate(3)
 
 
@@ -181,13 +178,11 @@ def _bodies() -> list[Solid]:
     return [_cube(), sheet, Aabb([0, 0, 0], [1, 1, 1])]
 
 
-def _warm_clipping_2d() -> None:
+def _warm_clipping() -> None:
+    """Clip in the plane and in space: a third of what either compiles is the other's too."""
     _clip(2)
     corners = [[[-1.0, -1.0], [2.0, 2.0]], [[0.0, 0.0], [1.0, 1.0]]]  # through corners, and from one to another
     clip_segments(corners, Polygon([[[0, 0], [4, 0], [1, 1], [0, 4]]]))
-
-
-def _warm_clipping_3d() -> None:
     _clip(3)
     clip_segments([[[-3.0, -3.0, -1.0], [3.0, 3.0, 1.0]]], _cube())  # through a corner, its middle inside no double
 
@@ -231,15 +226,13 @@ def _warm_bounds() -> None:
 STEPS = (
     _warm_collision,
     _warm_overlay,
-    _warm_clipping_2d,
-    _warm_clipping_3d,
-    _warm_containment_3d,
-    _warm_bounds,
+    _warm_clipping,
     _warm_scenes,
-    _warm_cells,
+    _warm_bounds,
+    _warm_containment,
     _warm_overlay_rest,
-    _warm_containment_2d,
+    _warm_cells,
 )
 """Parts of the work, long ones first; what several need is compiled by the first, or by a process each."""
-SHARES = (24, 22, 15, 8, 7, 6, 6, 5, 4, 3)
+SHARES = (24, 20, 19, 14, 8, 7, 4, 4)
 """How long each of `STEPS` takes, in hundredths of all."""
