@@ -222,6 +222,12 @@ def check_options(workers: object, progress: object, **flags: object) -> None:
             raise InvalidInputError(f"{name} must be True or False, got {_shown(flag)}", (name,))
 
 
+def is_unlimited(workers: object, deadline: object, cancel: object, progress: object) -> bool:
+    """Tell whether a call may be answered at once where its items are few: no limit, and any number of threads."""
+    is_any = workers is None or (type(workers) is int and workers > 0)
+    return is_any and deadline is None and cancel is None and progress is None
+
+
 def _shown(value: object) -> str:
     """Return a number as it is, of anything else its type: its text could be endless."""
     is_short = isinstance(value, float) or (isinstance(value, int) and abs(value) < 10**20)

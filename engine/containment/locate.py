@@ -14,7 +14,7 @@ from engine.containment.at_once import located_at_once
 from engine.containment.cells.order import gathered
 from engine.containment.locators import locator_of
 from engine.errors import NotFiniteError
-from engine.parallel import Budget, Cancel, Options, Progress, check_options, run_chunks
+from engine.parallel import Budget, Cancel, Options, Progress, check_options, is_unlimited, run_chunks
 from engine.solids.base import Solid
 from engine.solids.checks import as_points, check_finite
 from engine.types import Accuracy
@@ -67,7 +67,7 @@ def locate(
     >>> locate([[0.5, 0.5], [1.0, 0.2], [2.0, 2.0]], Aabb([0, 0], [1, 1])).tolist()
     [1, 0, -1]
     """
-    if workers is None and deadline is None and cancel is None and progress is None and isinstance(report, bool):
+    if isinstance(report, bool) and is_unlimited(workers, deadline, cancel, progress):
         found = located_at_once(points, solid)
         if found is not None:
             return (found[0], Accuracy("exact", None, len(found[0]), *found[1:])) if report else found[0]

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray, read_only
 from engine.direct import entry_of
 from engine.errors import EmptyGeometryError, InvalidArrayError, TooComplexError, UnsupportedSolidError
-from engine.parallel import UNLIMITED, Budget, Cancel, Options, Progress, check_options, run_chunks
+from engine.parallel import UNLIMITED, Budget, Cancel, Options, Progress, check_options, is_unlimited, run_chunks
 from engine.polygon_clipping.batches import AXES, clip_chunk, kernel_scene
 from engine.polygon_clipping.convex_planes import convex_planes
 from engine.polygon_clipping.in_integers import Row, clip_polygon, integer_row, reduced
@@ -132,7 +132,7 @@ def clip_polygons(
     >>> clipped.rings(0)[0].tolist()
     [[0.0, 0.0], [1.0, 0.0], [1.0, 3.0], [0.0, 4.0]]
     """
-    if workers is None and deadline is None and cancel is None and progress is None and report is False:
+    if report is False and is_unlimited(workers, deadline, cancel, progress):
         few = _clip_array(polygons, region) if isinstance(region, Solid) and isinstance(polygons, np.ndarray) else None
         if few is not None:
             return few

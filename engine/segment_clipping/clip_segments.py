@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from engine.arrays import FloatArray, IntArray
 from engine.errors import UnsupportedSolidError
-from engine.parallel import Budget, Cancel, Options, Progress, check_options
+from engine.parallel import Budget, Cancel, Options, Progress, check_options, is_unlimited
 from engine.predicates.scaling import balanced_rows
 from engine.segment_clipping.ball_cut import fill_on_sphere
 from engine.segment_clipping.ball_interval import decide_on_sphere
@@ -113,7 +113,7 @@ def clip_segments(
     >>> pieces.start.tolist(), pieces.end.tolist(), pieces.t.tolist(), pieces.faces.tolist()
     ([[0.0, 1.0]], [[2.0, 1.0]], [[0.25, 0.75]], [[0, 1]])
     """
-    if workers is None and deadline is None and cancel is None and progress is None and report is False:
+    if report is False and is_unlimited(workers, deadline, cancel, progress):
         few = _clip_array(segments, region)
         if few is not None:
             return few

@@ -13,7 +13,7 @@ import pytest
 
 from engine import parallel
 from engine.errors import CancelledError, DeadlineExceededError, InvalidInputError
-from engine.parallel import Budget, Cancel, check_options, run_chunks
+from engine.parallel import Budget, Cancel, check_options, is_unlimited, run_chunks
 
 
 @pytest.mark.parametrize("workers", [1, 2, 5, None])
@@ -256,3 +256,13 @@ def test_an_error_leaves_nothing_that_only_a_search_for_cycles_finds() -> None:
         assert gone() is None
     finally:
         gc.enable()
+
+
+@pytest.mark.parametrize(
+    ("workers", "is_any"), [(None, True), (1, True), (8, True), (0, False), (True, False), ("1", False)]
+)
+def test_what_may_be_answered_at_once(workers: object, is_any: bool) -> None:
+    assert is_unlimited(workers, None, None, None) is is_any
+    assert not is_unlimited(workers, 1.0, None, None)
+    assert not is_unlimited(workers, None, Cancel(), None)
+    assert not is_unlimited(workers, None, None, print)
