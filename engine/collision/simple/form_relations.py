@@ -228,7 +228,7 @@ def _are_parted(a: Placed, b: Placed) -> bool:
     Along a direction d, as it is computed, a box reaches from its centre as far as half its sides times |d . axis|.
     With S for the magnitudes of translations and 3.1 times those of coordinates, as the entries of a column of a
     rotation add up to at most 1.75, d . (centre - centre) is off by less than 10 u |d|_1 S (u = 2^-53), six products by
-    20 u and their sum by 12 u of that: below 2^-46 |d|_1 S in all; what underflows is below 2^-1000.
+    20 u and their sum by 12 u of that: below 2^-46 |d|_1 S in all; what underflows is below 2^-1060 S, or 2^-1000.
     """
     between, size = minus(_middle(b), _middle(a)), 0.0
     for k in range(3):
@@ -240,7 +240,7 @@ def _are_parted(a: Placed, b: Placed) -> bool:
         d = _axis(a, item) if item < 3 else _axis(b, item % 3)
         if item >= 6:
             d = cross(_axis(a, item // 3 - 2), d)
-        gap = abs(dot(d, between)) - 2.0**-46 * (abs(d.x) + abs(d.y) + abs(d.z)) * size - 2.0**-1000
+        gap = abs(dot(d, between)) - (2.0**-46 * (abs(d.x) + abs(d.y) + abs(d.z)) + 2.0**-1060) * size - 2.0**-1000
         for k in range(3):
             gap -= 0.5 * (a.form[HIGH + k] - a.form[k]) * abs(dot(d, _axis(a, k)))
             gap -= 0.5 * (b.form[HIGH + k] - b.form[k]) * abs(dot(d, _axis(b, k)))

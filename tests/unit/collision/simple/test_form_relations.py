@@ -99,3 +99,12 @@ def test_what_is_out_of_range_is_not_told() -> None:
     assert told(cube, cube, (None, turned)) == UNSETTLED
     assert told(Sphere([0, 0, 0], 1e-300), Sphere([1, 0, 0], 1.0)) == UNSETTLED
     assert told(Aabb([-1e308] * 3, [1e308] * 3), cube, (Pose(np.eye(3), [1.7e308, 0, 0]), None)) == UNSETTLED
+
+
+def test_boxes_across_a_direction_that_underflows() -> None:
+    tiny, big = 2.0**-1074, 2.0**100
+    turn = [[1, 0, 0], [tiny, 0.28, -0.96], [0, 0.96, 0.28]]  # the first axes of both leave (0, 0, tiny) between them
+    long = Aabb([-big / 100, -big / 100, -big], [big / 100, big / 100, big])
+    away = Pose(turn, [0, 0.672 * big, -0.196 * big])
+    assert told(Aabb([-1] * 3, [1] * 3), long, (None, away)) == UNSETTLED
+    assert collide(Aabb([-1] * 3, [1] * 3), long, second_pose=away).relation == Relation.FIRST_INSIDE_SECOND
