@@ -69,6 +69,7 @@ class Bodies(Preparing):
         arrays, kinds = self.arrays(budget), (Csg, Triangle) if self.solids[0].dimension == 3 else Csg
         odd = self.prepared("odd", lambda: [k for k, solid in enumerate(arrays.distinct) if isinstance(solid, kinds)])
         for place in np.flatnonzero(np.isin(arrays.kinds[names], odd)).tolist() if odd else ():
+            budget.check()
             low[place], high[place] = body_box(self.solids[names[place]], poses[place], budget.check)
 
     def under(

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from dataclasses import fields
 from functools import lru_cache
-from math import isfinite
 from typing import Any, Final, cast
 
 import numpy as np
@@ -96,7 +95,7 @@ def answer_few(segments: Any, standing: Standing, keep: str) -> ScenePieces | Bo
     state, out = np.empty(n, np.uint8), _NONE if is_any else _firsts_for(n, segments.shape[2])
     entry_of(find_first)(segments, order, n, words, room, is_any, UNLIMITED.flag, state, out, reached)
     _, wanted, _, n_met, n_open, _ = reached.tolist()
-    if wanted or (n_open and not isfinite(segments.sum())):
+    if wanted or (n_open and not np.isfinite(segments).all()):
         return None
     found = out if is_any or n_met == n else [each[:n_met] for each in out]
     if n_open:

@@ -7,7 +7,6 @@ arithmetic (exact_pieces.py). Zero-length segments are points.
 
 from __future__ import annotations
 
-from math import isfinite
 from typing import Any, Final
 
 import numpy as np
@@ -73,7 +72,7 @@ def clip_few(segments: FloatArray, region: Bounded, boundary: Outline | Mesh) ->
     """Return the pieces of a few segments, (n, 2, dim) float64, not yet looked at for NaN, in a third of the time that
     the general way takes; None where one is left open or begins on the boundary."""
     n, _, dimension = segments.shape
-    found = located_at_once(segments[:, 0].copy(), region) if isfinite(segments.sum()) else None
+    found = located_at_once(segments[:, 0].copy(), region) if np.isfinite(segments).all() else None
     if found is None or not found[0].all():
         return None
     locations, state = np.zeros((n, 2), np.int8), np.empty(n, np.uint8)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 import numpy as np
@@ -371,3 +372,28 @@ def test_many_at_once_are_what_the_general_way_finds() -> None:
             m = int((general.source < n).sum())
             for name in ("source", "body", "start", "end", "t", "faces", "ranks"):
                 np.testing.assert_array_equal(getattr(found, name), getattr(general, name)[:m])
+
+
+def test_numbers_whose_sum_is_none_are_no_error_and_no_warning() -> None:
+    segments = np.full((4, 2, 3), 1.5e308) * [[[1.0], [-1.0]]]
+    segments[2:, :, 0] = 1.25e308
+    scene = Scene([Polyhedron(OCTAHEDRON, FACES), Sphere([0, 0, 0], 1)])
+    every, infinite = scene.clip_segments(segments), np.where(np.arange(4)[:, None, None] < 2, segments, np.inf)
+    infinite[3, 1, 1] = -np.inf
+    with np.errstate(all="raise"):
+        for keep in ("all", "first", "any"):
+            found: Any = scene.clip_segments(segments, keep=keep)
+            assert (found.tolist() == [True, True, False, False]) if keep == "any" else len(found)
+            with pytest.raises(NotFiniteError, match=r"segments\[2\]\[0\]\[0\]"):
+                scene.clip_segments(infinite, keep=keep)
+        assert_first_and_any(scene, segments, every)
+
+
+@pytest.mark.parametrize("keep", ["all", "first", "any"])
+def test_ends_soon_where_many_trees_of_solids_are_placed(keep: Any) -> None:
+    tree = Csg("difference", [Aabb([-1, -1, -1], [1, 1, 1]), Sphere([0, 0, 0], 0.5)])
+    pose = Pose([[0, -1, 0], [1, 0, 0], [0, 0, 1]], [0.5, 0, 0])
+    scene, start = Scene([tree] * 10_000, [pose] * 10_000), time.process_time()
+    with pytest.raises(DeadlineExceededError):
+        scene.clip_segments(np.ones((60, 2, 3)) * [[[-2.0], [2.0]]], keep=keep, deadline=0.02)
+    assert time.process_time() - start < 0.5
