@@ -12,6 +12,7 @@ from engine.collision.result import (
     MESHES,
     OUTLINES,
     UNCOUNTED,
+    UNNAMED,
     Collision,
     PairFunction,
     Poses,
@@ -100,7 +101,10 @@ def collide_pair(first: Solid, second: Solid, poses: Poses, work: Work) -> Colli
     if poses[0] is not None and poses[0] == poses[1]:
         poses = None, None
     function, is_swapped = pair_function(first, second)
-    return function(second, first, poses[::-1], work).swapped() if is_swapped else function(first, second, poses, work)
+    answer = (
+        function(second, first, poses[::-1], work).swapped() if is_swapped else function(first, second, poses, work)
+    )
+    return answer if work.witness else UNNAMED[answer.relation]
 
 
 class CollideOptions(Options, total=False):

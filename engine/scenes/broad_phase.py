@@ -17,7 +17,7 @@ from engine.direct import entry_of
 from engine.lanes.boxes import BOX_ROWS, EMPTY
 from engine.parallel import Budget
 from engine.scenes.near_boxes import BodyTree, list_near, put_keys
-from engine.scenes.posed_mesh import scratch_for
+from engine.scenes.scratch import scratch_for
 
 _MANY: Final = 4096
 _AS_GIVEN: Final = read_only(np.arange(_MANY))

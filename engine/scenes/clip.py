@@ -18,7 +18,7 @@ from engine.direct import entry_of
 from engine.parallel import UNLIMITED, Budget, run_chunks
 from engine.scenes.broad_phase import order_of
 from engine.scenes.ends import Exact, Found, ScenePieces, in_order, joined
-from engine.scenes.posed_mesh import MOST_MET, scratch_for
+from engine.scenes.scratch import MOST_MET, scratch_for
 from engine.scenes.standing import Standing
 from engine.scenes.through import MET, Firsts, cut_near, find_first
 from engine.segment_clipping.clip_segments import method_for

@@ -9,7 +9,7 @@ import numpy as np
 
 from engine.jit import inline, kernel
 from engine.scenes.near_boxes import bodies_in, place_in
-from engine.scenes.posed_mesh import scratch_at
+from engine.scenes.scratch import scratch_at
 
 Placed = namedtuple("Placed", "kinds rotations translations")
 """What `SceneBodies` says of where bodies stand: kinds (n,), rotations (n + 1, d, d), translations (n + 1, d)."""

@@ -7,17 +7,15 @@ first end, by a vertical ray in the same frame, is all that is wanted beside the
 
 from __future__ import annotations
 
-import threading
 from collections import namedtuple
 from typing import Any, Final
 
 import numpy as np
 
-from engine.arrays import IntArray
-from engine.bounding.bvh import STACK, WIDTH
+from engine.bounding.bvh import WIDTH
 from engine.containment.methods.polyhedron_ray_parity import locate_in_tree
 from engine.containment.scene.trees import tree_at
-from engine.jit import inline, merged
+from engine.jit import inline
 from engine.lanes.addresses import array_at
 from engine.lanes.boxes import BOX_ROWS, EMPTY, enter_boxes
 from engine.lanes.lanes import lowest_bit, prefetch
@@ -25,27 +23,20 @@ from engine.lanes.tracing import LANES
 from engine.lanes.triangles import CORNER_ROWS, near_triangles
 from engine.predicates.double_double import dd_div, dd_sub
 from engine.scenes.posed_cut import in_frame, put_point, slack_of
+from engine.scenes.scratch import MOST_MET, Scratch, scratch_at
 from engine.segment_clipping.on_boundary.contacts import APART, CROSSED, DEGENERATE, PROPER, START, are_one, place_of
 from engine.segment_clipping.on_boundary.crossing_values import Vector, dot, is_item_safe, normal_of
 from engine.segment_clipping.on_boundary.exact_crossing import cross_exactly
 from engine.segment_clipping.on_boundary.mesh_contacts import local_segment, shear_of
 from engine.segment_clipping.on_boundary.sorted_crossings import Crossings, sort_crossings
 from engine.segment_clipping.on_boundary.triangle_contact import contact_filter, corner, exact_contact, triangle_at
-from engine.segment_clipping.pieces import Pieces
 from engine.segment_clipping.plane_meeting import T_BOUND
 from engine.types import UNDECIDED, Point3
 
-MOST_MET: Final = 512
-"""Triangles that a segment crosses; with more it is UNDECIDED."""
 UNSURE: Final = -1
 WANTS_BODY: Final = -2
 WANTS_TREE: Final = -3
 """In place of a number of pieces: UNDECIDED, or the body, or the tree that points are located by, is not prepared."""
-
-
-_here: Final = threading.local()
-_MOST_KEPT: Final = 1 << 14
-"""Bodies of a scene whose room is kept: some 800 kB a thread."""
 
 
 PlacedMesh = namedtuple("PlacedMesh", "elements faces boxes child origin inverse are_safe n_inner corners")
@@ -57,51 +48,6 @@ MESH_WORDS: Final = 37
 TREE, PLACES, TREE_PLACES = 8, 16, 27
 """Where these begin."""
 _Lines = namedtuple("_Lines", "addresses sizes places")
-Scratch = namedtuple("Scratch", "stack cuts room waiting keys entered best found depths near")
-"""Room for the work on one segment. stack: of one body, cuts: its `Crossings`, room: its pieces, the
-last row for the first of them all. waiting, keys: nodes and bodies to be asked, and where they are entered; entered
-(1, 8), of one node. best: where the first piece begins; found: the body it lies in, and whether another may begin there
-too. depths: how many nodes and bodies of a tree wait, and how many of those without a place in it. near: bodies."""
-_SIZES: Final = (
-    STACK // 2, MOST_MET, MOST_MET, 3 * MOST_MET, MOST_MET, MOST_MET, MOST_MET + 1, 6 * MOST_MET + 6, 2 * MOST_MET + 2,
-    2 * MOST_MET + 2, STACK // 2, STACK // 2, WIDTH // 2, 1, 2, 2, MOST_MET,
-)  # fmt: skip
-"""Words of the arrays of a `Scratch`, in order, but for `near`."""
-_AT: Final = tuple(8 * (2 + sum(_SIZES[:k])) for k in range(len(_SIZES) + 1))
-"""Where these begin, in bytes."""
-
-
-def scratch_for(n_bodies: int) -> IntArray:
-    """Return room for the work on one segment at a time (`scratch_at`); each thread keeps its own."""
-    found: IntArray | None = getattr(_here, "scratch", None)
-    if found is None or found[1] <= n_bodies:
-        found = np.empty(_AT[-1] // 8 + n_bodies + 1, np.int64)
-        found[:2] = found.ctypes.data, n_bodies + 1
-        if n_bodies <= _MOST_KEPT:
-            _here.scratch = found
-    return found
-
-
-@merged
-def scratch_at(words: Any) -> Scratch:
-    """Return the arrays that `scratch_for` has room for."""
-    at, m = words[0], MOST_MET
-    cuts = Crossings(
-        array_at(at + _AT[2], (m,), np.float64), array_at(at + _AT[3], (m, 3), np.float64),
-        array_at(at + _AT[4], (m,), np.int64), array_at(at + _AT[5], (m,), np.int64),
-        array_at(at + _AT[16], (m,), np.int64), array_at(at + _AT[1], (m,), np.int64),
-    )  # fmt: skip
-    room = Pieces(
-        array_at(at + _AT[6], (m + 1,), np.int64), array_at(at + _AT[7], (2, m + 1, 3), np.float64),
-        array_at(at + _AT[8], (m + 1, 2), np.float64), array_at(at + _AT[9], (m + 1, 2), np.int64),
-    )  # fmt: skip
-    return Scratch(
-        array_at(at + _AT[0], (STACK,), np.int32), cuts, room,
-        array_at(at + _AT[10], (STACK,), np.int32), array_at(at + _AT[11], (STACK,), np.float32),
-        array_at(at + _AT[12], (1, WIDTH), np.float32), array_at(at + _AT[13], (1,), np.float64),
-        array_at(at + _AT[14], (2,), np.int64), array_at(at + _AT[15], (2,), np.int64),
-        array_at(at + _AT[17], (words[1],), np.int64),
-    )  # fmt: skip
 
 
 @inline
@@ -237,7 +183,7 @@ def _join_touches(mesh: PlacedMesh, scratch: Scratch, n: int, is_in: bool, is_cl
     """Make one of crossings, which are sorted, that lie in one point; return how many are in order then, or UNSURE.
 
     Where the location does not turn over, a closed mesh is met in a point, or not left: such a point stands there
-    twice, the second time by -2 - face.
+    twice, the second time by -2 - face. At least two crossings make such a point, so that 4 n places are enough.
     """
     cuts, order, n_out, begin = scratch.cuts, scratch.cuts.order, 2 * n, 0
     if 4 * n > MOST_MET:

@@ -19,7 +19,7 @@ from engine.scenes.bodies import Bodies
 from engine.scenes.broad_phase import NO_BODIES, NOBODY, Where, body_tree, candidates, words_of
 from engine.scenes.moved_pairs import PairRows, Placed, list_pairs
 from engine.scenes.near_boxes import PLACED
-from engine.scenes.posed_mesh import scratch_for
+from engine.scenes.scratch import scratch_for
 from engine.scenes.table import unready
 from engine.solids.base import Preparing, Solid
 from engine.solids.pose import Pose

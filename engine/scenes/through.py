@@ -29,7 +29,8 @@ from engine.scenes.near_boxes import (
     way_of,
 )
 from engine.scenes.posed_cut import between_planes, in_ball, put_piece
-from engine.scenes.posed_mesh import MOST_MET, UNSURE, WANTS_BODY, crossings_in, scratch_at
+from engine.scenes.posed_mesh import UNSURE, WANTS_BODY, crossings_in
+from engine.scenes.scratch import MOST_MET, scratch_at
 from engine.segment_clipping.on_boundary.boundary_cut import SETTLED, emit
 from engine.segment_clipping.on_boundary.crossing_values import is_item_safe
 from engine.segment_clipping.on_boundary.mesh_streams import AHEAD

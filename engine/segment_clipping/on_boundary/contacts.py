@@ -32,7 +32,7 @@ from engine.types import UNDECIDED, Point2
 
 APART: Final = 0
 PROPER: Final = 1
-DEGENERATE: Final = 2
+DEGENERATE: Final = UNDECIDED  # a sign that is none is handed on
 START: Final = 6
 END: Final = 7
 WITHIN: Final = 8

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import engine
-from engine import Aabb, Polyhedron, Pose, Relation, Surface, collide
+from engine import Aabb, HalfSpace, Polyhedron, Pose, Relation, Sphere, Surface, collide
 from tests.reference.collision import relation
 from tests.reference.shapes import Solid, box, reversed_faces, tetrahedron, union_of
 
@@ -344,3 +344,14 @@ def test_errors() -> None:
     switch.set()
     with pytest.raises(engine.CancelledError):
         collide(cube, cube, cancel=switch)
+
+
+@pytest.mark.parametrize("option", [{"witness": False}, {"boolean": True}])
+@pytest.mark.parametrize("other", [Sphere([0, 0, 0], 1), HalfSpace([0, 0, 1], -0.5), Aabb([0, 0, 0], [2, 2, 2])])
+def test_no_witness_where_none_is_asked_for(other: engine.Solid, option: dict[str, bool]) -> None:
+    body = Polyhedron([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+    for pose in (None, Pose(np.eye(3), [0.25, 0, 0])):
+        for first, second in ((body, other), (other, body)):
+            found = collide(first, second, first_pose=pose, **option)
+            assert found.relation != Relation.DISJOINT
+            assert found.witness is None

@@ -8,7 +8,7 @@ import pytest
 from engine import Aabb, Pose, Scene
 from engine.parallel import Budget
 from engine.scenes.moved_pairs import PairRows, Placed, list_pairs
-from engine.scenes.posed_mesh import scratch_for
+from engine.scenes.scratch import scratch_for
 
 
 @pytest.mark.parametrize("dimension", [2, 3])

@@ -10,7 +10,8 @@ import pytest
 from engine import Aabb, Convex, HalfSpace, Polyhedron, Pose, Scene, Solid, Sphere, Surface
 from engine.parallel import Budget
 from engine.scenes.bodies import Bodies
-from engine.scenes.posed_mesh import MOST_MET, WANTS_BODY, scratch_for
+from engine.scenes.posed_mesh import WANTS_BODY
+from engine.scenes.scratch import MOST_MET, scratch_for
 from engine.scenes.standing import Standing
 from engine.scenes.through import OTHER, cut_near
 from engine.segment_clipping.parameters import compare
