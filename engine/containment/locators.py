@@ -23,7 +23,7 @@ from engine.containment.methods.polygon_ray_parity import locate_in_rings
 from engine.containment.methods.polyhedron_one_pass import locate_by_pass
 from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
 from engine.containment.methods.polynomial import locate_by_polynomial
-from engine.containment.policy import CELLS, PASS, choose_for_mesh, choose_for_rings
+from engine.containment.policy import CELLS, LONG_PASS, PASS, choose_for_mesh, choose_for_rings
 from engine.containment.posed.filters import NOT_FINITE
 from engine.containment.prepared import EXACT, prism_rows, rings_of, tree_of
 from engine.containment.rational_locate import Check, combine, over_tree, rational_location, unsupported
@@ -68,6 +68,8 @@ class Locator(NamedTuple):
     """Returns the order in which a large batch is best asked, None for as it is."""
     direct: tuple[Any, ...] = ()
     """The kernel, and what stands between points and locations among its arguments, where that is all there is."""
+    is_long: bool = False
+    """Whether a call takes long whatever the number of points, so that all of a batch are best asked at once."""
 
     def chosen(self, n_points: int, budget: Budget) -> Locator:
         """Return the locator for a batch of `n_points`."""
@@ -179,7 +181,8 @@ def _in_polyhedron(solid: Polyhedron) -> Locator:
 def polyhedron_by(solid: Polyhedron, choice: int, budget: Budget) -> Locator:
     """Return the locator by what policy.py chose; it builds that."""
     if choice == PASS:
-        return _by_kernel("ray_parity", locate_by_pass, solid, solid.vertices, solid.triangles)
+        by_pass = _by_kernel("ray_parity", locate_by_pass, solid, solid.vertices, solid.triangles)
+        return by_pass._replace(is_long=len(solid.triangles) > LONG_PASS)
     by_rays = _by_kernel("ray_parity", locate_by_tree, solid, EXACT, tree_of(solid, budget.check))
     if choice != CELLS:
         return by_rays

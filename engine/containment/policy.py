@@ -25,6 +25,8 @@ _FEW_RAYS: Final = 256
 """Of points through faces: a pass over so many costs less than to hand over a tree."""
 _POINTS_A_PASS: Final = 1024
 _PASS_A_FACE: Final = 20.0
+LONG_PASS: Final = 1 << 12
+"""Faces from which a pass takes so long, whatever the points, that one a chunk (`run_chunks`) is too many."""
 _TREE: Final = 40_000.0
 _TREE_A_FACE: Final = 280.0
 _SOON: Final = 1.0 / 16.0
@@ -85,6 +87,8 @@ def choose_for_mesh(solid: Polyhedron, n_points: int, budget: Budget) -> int:
     if n_points > _FEW and _pay_cells(solid, seen, budget):
         return CELLS
     if solid.kept("tree") is not None:
+        return LISTS
+    if n_points > _POINTS_A_PASS and n_faces > LONG_PASS:
         return LISTS
     calls = solid.prepared("passes", lambda: [0.0])
     earlier, tree = calls[0] * _PASS_A_FACE * n_faces, _TREE + _TREE_A_FACE * n_faces

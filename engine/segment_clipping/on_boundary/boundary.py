@@ -41,6 +41,8 @@ _FEW_PIECES: Final = 4
 """Of each of a few segments, for which there is room at first."""
 _CONTACT_BYTES: Final = 60
 """Of a contact, while a kernel runs."""
+_FIRST_CHUNK: Final = 16
+"""Segments, one of which may cross everything."""
 
 
 def clip_on_boundary(
@@ -57,7 +59,8 @@ def clip_on_boundary(
     def chunk(first: int, last: int) -> None:
         chunks[first] = clip_chunk(segments, first, last, region, locator, budget)
 
-    run_chunks(chunk, len(segments), budget=budget, workers=workers, progress=progress, first_chunk=16)
+    least = len(segments) if locator.is_long else _FIRST_CHUNK
+    run_chunks(chunk, len(segments), budget=budget, workers=workers, progress=progress, first_chunk=least)
     parts = [chunks[first] for first in sorted(chunks)] or [clip_chunk(segments, 0, 0, region, locator, budget)]
     pieces, left = zip(*parts)
     n_left = sum(map(len, left))

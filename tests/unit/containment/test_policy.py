@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from engine import Polygon, Polyhedron, locate
+from engine.containment.locators import locator_of
 from engine.containment.policy import (
     CELLS,
     LISTS,
+    LONG_PASS,
     PASS,
     choose_for_mesh,
     choose_for_rings,
@@ -32,6 +34,20 @@ def test_the_second_question_about_a_large_mesh_builds_the_tree() -> None:
     answers += [locate(points, solid).tobytes() for _ in range(3)]
     assert solid.kept("tree") is not None
     assert len(set(answers)) == 1
+
+
+def test_a_long_pass_is_made_once() -> None:
+    many = np.random.default_rng(0).uniform(0, 400, (3000, 3))
+    for n_points, choice in ((300, PASS), (1024, PASS), (1025, LISTS), (3000, LISTS)):
+        solid = _boxes(400)
+        assert len(solid.triangles) > LONG_PASS
+        with Budget() as budget:
+            assert choose_for_mesh(solid, n_points, budget) == choice
+            locator = locator_of(_boxes(400)).chosen(n_points, budget)
+        assert locator.is_long == (choice == PASS)
+        first, again = (locate(many[:n_points], solid).tobytes() for _ in range(2))
+        assert first == again
+    assert not locator_of(_boxes(100)).chosen(300, Budget()).is_long
 
 
 def test_many_points_get_cells_and_bad_shapes_a_tree() -> None:
