@@ -87,7 +87,7 @@ def centers_in_frame(ball: Sphere, body_poses: Moves, ball_poses: Moves) -> Floa
 
 def _is_ball_beside(body: Solid, center: list[float], radius: float) -> bool:
     """Tell whether a ball surely keeps clear of the box around a body; three roundings of 2^-53 are below 2^-50."""
-    *center, error = center
+    *center, error = center  # the last is how far the others may be off
     reach = radius * (1.0 + 2.0**-50) + 2.0 * error
     low, high, _ = own_box(body)
     for c, a, b in zip(center, low.tolist(), high.tolist()):

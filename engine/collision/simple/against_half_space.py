@@ -9,17 +9,12 @@ from __future__ import annotations
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
-from engine.collision.exact_images import (
-    HalfSpaceImage,
-    as_vector,
-    image_half_space,
-    value_at,
-)
+from engine.collision.exact_images import HalfSpaceImage, as_vector, image_half_space, value_at
 from engine.collision.meshes.face_state import state_at
 from engine.collision.meshes.mesh_arrays import STATE_STACKED, MeshBody, mesh_body_of
 from engine.collision.result import NO_CONTACT, SECOND_WITHIN, Collision, Parts, Poses, Witness, Work
 from engine.collision.simple.boundary import Boundary, boundary_of, pulled_back
-from engine.collision.simple.sides_of_plane import scan_sides, triangle_at
+from engine.collision.simple.sides_of_plane import first_triangle_at, scan_sides
 from engine.direct import entry_of
 from engine.predicates.rational import sign_of
 from engine.solids.base import Solid
@@ -27,16 +22,19 @@ from engine.solids.bounds import own_box
 from engine.solids.half_space import HalfSpace
 from engine.types import Relation
 
+_Function = tuple[FloatArray, FloatArray, float, float]
+"""Of points: weights of the coordinates, their sizes, which bound their errors, an offset, and its size."""
 _FEW_UNSURE = 16
 """Vertices whose side of a plane is asked one by one; more are asked together."""
 
 
 def collide_half_space_body(space: HalfSpace, body: Solid, poses: Poses, work: Work) -> Collision:
     """Return the relation of a half-space (first) and a body with vertices (second), exact."""
-    if poses[0] is None and poses[1] is None and (side := _side_of_box(space, body)) != 0:
+    function = _function_in_frame(space, poses)
+    if (side := _side_of_box(function, body)) != 0:
         return SECOND_WITHIN if side > 0 else NO_CONTACT
     if body.dimension == 3:
-        answer = _by_scan(space, body, poses, work)
+        answer = _by_scan(function, space, body, poses, work)
         if answer is not None:
             return answer
     plane, boundary = image_half_space(space, poses[0]), boundary_of(body, poses[1], work)
@@ -52,14 +50,15 @@ def collide_half_space_body(space: HalfSpace, body: Solid, poses: Poses, work: W
     return Collision(Relation.TOUCHING, Witness("surface", second_face=face, piercing=enters))
 
 
-def _by_scan(space: HalfSpace, body: Solid, poses: Poses, work: Work) -> Collision | None:
+def _by_scan(function: _Function, space: HalfSpace, body: Solid, poses: Poses, work: Work) -> Collision | None:
     """Return the relation of a half-space and a mesh where floats tell the sides of nearly all vertices, else None.
 
     The face at the first vertex beyond the plane, or on it, is named. Where nothing cancels a face that reaches beyond,
     there is open interior beside it.
     """
     mesh, unsure = mesh_body_of(body), np.empty(_FEW_UNSURE, np.int64)
-    plane = _plane_in_frame(space, poses)
+    normal, sizes, offset, size = function
+    plane = np.array([normal, sizes, [offset, size, 0.0]])
     beyond, before, n_unsure = entry_of(scan_sides)(mesh.arrays, plane, unsure, work.budget.flag)
     work.budget.check()
     if n_unsure > len(unsure):
@@ -74,7 +73,7 @@ def _by_scan(space: HalfSpace, body: Solid, poses: Poses, work: Work) -> Collisi
     if before < 0 and first[0] < 0:
         return SECOND_WITHIN
     enters = first[1] >= 0
-    triangle = entry_of(triangle_at)(mesh.arrays, first[1] if enters else first[0])
+    triangle = entry_of(first_triangle_at)(mesh.arrays, first[1] if enters else first[0])
     overlaps = enters and mesh.has_inside
     if overlaps and state_at(mesh.arrays, triangle) == STATE_STACKED:
         return None
@@ -90,40 +89,41 @@ def _exact_signs(space: HalfSpace, mesh: MeshBody, poses: Poses, vertices: list[
     return {v: sign_of(value_at(plane, as_vector(mesh.arrays.vertices[v].tolist()))) for v in vertices}
 
 
-def _plane_in_frame(space: HalfSpace, poses: Poses) -> FloatArray:
-    """Return the function of a half-space in the frame of a body as `scan_sides` takes it.
+def _function_in_frame(space: HalfSpace, poses: Poses) -> _Function:
+    """Return the function of a half-space in the frame of a body, rounded.
 
     Under a pose of the body a weight is the sum of three products, the offset one of four numbers: seven roundings of
-    2^-53 of their magnitudes, whose sum is the size, and what underflows. Under a pose of its own both are rationals,
-    rounded once.
+    2^-53 of their magnitudes, whose sum is the size, and what underflows, below 2^-1070. Under a pose of its own both
+    are rationals, rounded once.
     """
     normal, offset = space.normal, float(space.offset)
     sizes, size = np.abs(normal), abs(offset)
+    if poses[0] is not None:
+        _, normal, offset = pulled_back(image_half_space(space, poses[0]), poses[1])
+        return normal, np.abs(normal), offset, abs(offset)
+    if poses[1] is None:
+        return normal, sizes, offset, size
+    turn, move = poses[1].rotation, poses[1].translation
     with np.errstate(all="ignore"):  # what overflows is unsure
-        if poses[0] is not None:
-            _, normal, offset = pulled_back(image_half_space(space, poses[0]), poses[1])
-            sizes, size = np.abs(normal), abs(offset)
-        elif poses[1] is not None:
-            turn, move = poses[1].rotation, poses[1].translation
-            offset, size = offset + float(normal @ move), size + float(sizes @ np.abs(move))
-            normal, sizes = normal @ turn, sizes @ np.abs(turn)
-    return np.array([normal, sizes, [offset, size, 0.0]])
+        offset, size = offset + float(normal @ move), size + float(sizes @ np.abs(move))
+        return normal @ turn, sizes @ np.abs(turn), offset, size
 
 
-def _side_of_box(half_space: HalfSpace, body: Solid) -> int:
+def _side_of_box(function: _Function, body: Solid) -> int:
     """Return the side of a plane, 1 or -1, on which the box around a body surely lies, 0 where it may meet it.
 
-    The largest and the smallest of n . p + d over a box are sums of products of its bounds: seven roundings of at most
-    2^-53 of the sum of magnitudes, far below 2^-48 of it; what underflows is below 2^-1000.
+    The largest and the smallest of n . p + d over a box are sums of products of its bounds: seven roundings of 2^-53
+    of the sum of magnitudes at most, and as much for what weights and offset are off by, far below 2^-48 of it.
     """
+    weights, sizes, offset, size = function
     low, high, _ = own_box(body)
-    least = most = half_space.offset
-    size = abs(half_space.offset)
-    for n, a, b in zip(half_space.normal.tolist(), low.tolist(), high.tolist()):
+    least, most, reach = offset, offset, 0.0
+    for n, s, a, b in zip(weights.tolist(), sizes.tolist(), low.tolist(), high.tolist()):
         least += min(n * a, n * b)
         most += max(n * a, n * b)
-        size += abs(n) * max(abs(a), abs(b))
-    slack = 2.0**-48 * size + 2.0**-1000
+        size += s * max(abs(a), abs(b))
+        reach += max(abs(a), abs(b))
+    slack = 2.0**-48 * size + 2.0**-1060 * reach + 2.0**-1000
     return int(least > slack) - int(most < -slack)
 
 

@@ -16,7 +16,9 @@ from engine.collision.meshes.live_faces import LivePiece, live_piece
 from engine.collision.meshes.mesh_arrays import mesh_body_of
 from engine.collision.planar.outline import is_clean, live_edges, outline_of
 from engine.collision.result import Work
+from engine.collision.simple.sides_of_plane import first_triangle_at
 from engine.containment.rational_locate import rational_location
+from engine.direct import entry_of
 from engine.predicates.exact_vectors import dot
 from engine.predicates.rational import sign_of
 from engine.solids.base import Solid
@@ -128,7 +130,7 @@ def _mesh_boundary(body: Solid, pose: Pose | None, work: Work) -> Boundary:
     return Boundary(
         triangles, floats, error, near, lambda vertex: image(vertices[vertex].tolist()),
         lambda face: int(mesh.faces[face]),
-        lambda vertex: int(mesh.faces[np.argmax((triangles == vertex).any(axis=1))]),
+        lambda vertex: int(mesh.faces[entry_of(first_triangle_at)(mesh.arrays, vertex)]),
         lambda plane: signs_of(plane, vertices, pose, work), live, is_inside, mesh.has_inside,
     )  # fmt: skip
 

@@ -65,7 +65,7 @@ def scan_sides(mesh: MeshArrays, plane: Any, unsure: Any, flag: Any) -> tuple[in
 
 
 @kernel
-def triangle_at(mesh: MeshArrays, vertex: int) -> int:
+def first_triangle_at(mesh: MeshArrays, vertex: int) -> int:
     """Return the first triangle with a vertex."""
     for triangle in range(mesh.triangles.shape[0]):
         t = triangle

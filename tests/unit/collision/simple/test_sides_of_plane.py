@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from engine import HalfSpace, Polyhedron, Pose, Solid, Surface
+from engine import HalfSpace, Polygon, Polyhedron, Pose, Relation, Solid, Surface
 from engine.collision.exact_images import as_vector, image_half_space, value_at
 from engine.collision.meshes.mesh_arrays import mesh_body_of
 from engine.collision.result import Work
 from engine.collision.simple import against_half_space
-from engine.collision.simple.against_half_space import _by_scan, _plane_in_frame, collide_half_space_body
+from engine.collision.simple.against_half_space import _by_scan, _function_in_frame, collide_half_space_body
 from engine.collision.simple.boundary import pulled_back
-from engine.collision.simple.sides_of_plane import scan_sides, triangle_at
+from engine.collision.simple.sides_of_plane import first_triangle_at, scan_sides
 from engine.predicates.rational import sign_of
 
 FACES = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
@@ -41,9 +41,9 @@ def test_agrees_with_rationals(scale: float, poses: tuple[Pose | None, Pose | No
             exact, _, _ = pulled_back(image_half_space(space, poses[0]), poses[1])
             signs = [sign_of(value_at(exact, as_vector(p))) for p in mesh.arrays.vertices.tolist()]
             unsure = np.empty(400, np.int64)
-            beyond, before, n_unsure = scan_sides(
-                mesh.arrays, _plane_in_frame(space, poses), unsure, Work().budget.flag
-            )
+            normal, sizes, offset, size = _function_in_frame(space, poses)
+            plane = np.array([normal, sizes, [offset, size, 0.0]])
+            beyond, before, n_unsure = scan_sides(mesh.arrays, plane, unsure, Work().budget.flag)
             assert beyond < 0 or (signs[beyond] > 0 and set(range(beyond)) & _at(signs, 1) <= set(unsure[:n_unsure]))
             assert before < 0 or (signs[before] < 0 and set(range(before)) & _at(signs, -1) <= set(unsure[:n_unsure]))
             assert beyond >= 0 or _at(signs, 1) <= set(unsure[:n_unsure].tolist())
@@ -59,20 +59,42 @@ def _at(signs: list[int], sign: int) -> set[int]:
 def test_answers_as_without_the_scan(
     solid: type[Solid], poses: tuple[Pose | None, Pose | None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    draw, n_told = np.random.default_rng(3), 0
+    draw = np.random.default_rng(3)
     questions = []
     for _ in range(60):
         space = HalfSpace(draw.integers(-2, 3, 3) + np.array([0, 0, 0.5]), float(draw.integers(-10, 11)) / 2)
         questions.append((space, _mesh(draw, int(draw.integers(1, 9)), 1.0, solid)))
     answers = [collide_half_space_body(*question, poses, Work()) for question in questions]
-    n_told = sum(_by_scan(*question, poses, Work()) is not None for question in questions)
+    n_told = sum(
+        _by_scan(_function_in_frame(question[0], poses), *question, poses, Work()) is not None for question in questions
+    )
     monkeypatch.setattr(against_half_space, "_by_scan", lambda *_: None)
     assert answers == [collide_half_space_body(*question, poses, Work()) for question in questions]
     assert n_told > 40
 
 
-def test_the_first_triangle_at_a_vertex() -> None:
+def test_the_first_first_triangle_at_a_vertex() -> None:
     mesh = mesh_body_of(_mesh(np.random.default_rng(1), 5, 1.0, Polyhedron)).arrays
     for vertex in range(len(mesh.vertices)):
-        assert triangle_at(mesh, vertex) == int(np.argmax((mesh.triangles == vertex).any(axis=1)))
-    assert triangle_at(mesh, len(mesh.vertices)) == -1
+        assert first_triangle_at(mesh, vertex) == int(np.argmax((mesh.triangles == vertex).any(axis=1)))
+    assert first_triangle_at(mesh, len(mesh.vertices)) == -1
+
+
+@pytest.mark.parametrize("is_own", [False, True])
+@pytest.mark.parametrize("scale", [1.0, 2.0**-400, 2.0**900])
+def test_a_body_far_from_the_plane_is_told_by_its_box(
+    scale: float, is_own: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr(against_half_space, "boundary_of", refuse)
+    monkeypatch.setattr(against_half_space, "_by_scan", refuse)
+    flat, solid = Pose([[0.6, -0.8], [0.8, 0.6]], [scale, 0]), Pose(TURN.rotation, TURN.translation * scale)
+    bodies = [(flat, [0, 1], Polygon([np.array([[0, 0], [4, 0], [1, 1], [0, 4]]) * scale]))]
+    bodies.append((solid, [0, 0, 1], Polyhedron(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]) * scale, FACES)))
+    for pose, normal, body in bodies:
+        for offset, relation in ((-90.0, Relation.DISJOINT), (90.0, Relation.SECOND_INSIDE_FIRST)):
+            poses = (pose, None) if is_own else (None, pose)
+            found = collide_half_space_body(HalfSpace(normal, offset * scale), body, poses, Work())
+            assert found.relation == relation
