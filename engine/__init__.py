@@ -1,6 +1,7 @@
 """Exact answers to four questions about a scene: containment, collision, segment clipping, polygon clipping."""
 
 from engine import layers
+from engine.budget import Cancel
 from engine.collision.clearance.clearance import clearance
 from engine.collision.clearance.clearance_poses import clearance_poses
 from engine.collision.clearance.result import Clearance, Feature
@@ -40,7 +41,6 @@ from engine.errors import (
     ZeroNormalError,
 )
 from engine.files.meshes import read_mesh
-from engine.parallel import Cancel
 from engine.polygon_clipping.clip_polygons import ClippedPolygons, PolygonStatus, clip_polygons
 from engine.polygon_overlay.batch import OverlayBatch, overlay_batch
 from engine.polygon_overlay.compiled.workspace import release

@@ -10,10 +10,10 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, IntArray
+from engine.budget import Budget, Cancel
 from engine.collision.collide import collide
 from engine.containment.locate import locate
 from engine.errors import InvalidOperationError, TooComplexError, UnsupportedSolidError, WrongDimensionError
-from engine.parallel import Budget, Cancel
 from engine.polygon_clipping.clip_polygons import clip_polygons
 from engine.segment_clipping.clip_segments import clip_segments
 from engine.solids.base import Solid

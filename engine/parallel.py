@@ -1,4 +1,4 @@
-"""Splits a batch into chunks of 1-3 ms over a thread pool, with a deadline, a cancel flag and progress.
+"""Splits a batch into chunks of 1-3 ms over a thread pool, within a budget, and tells progress.
 
 Kernels are serial and release the interpreter lock, so plain threads run them side by side; two kernels that each start
 threads of their own would abort the process under numba's workqueue layer. Between chunks there is room for other
@@ -8,18 +8,16 @@ returns early when it is set; slow Python loops call `Budget.check`.
 
 from __future__ import annotations
 
-import heapq
 import os
 import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass, field
 from typing import Final, TypedDict
 
 import numpy as np
 
-from engine.arrays import FlagArray
+from engine.budget import Budget, Cancel, shown, work_under
 from engine.errors import CancelledError, DeadlineExceededError, InvalidInputError
 
 Progress = Callable[[int], object]
@@ -32,92 +30,6 @@ _SMALLEST: Final = 8
 """The last chunks are not smaller than this part of a full one."""
 
 
-class Cancel:
-    """A switch that another thread may throw: every call given it ends soon with `CancelledError`."""
-
-    __slots__ = ("_flags", "_lock", "is_set")
-
-    def __init__(self) -> None:
-        self.is_set = False
-        self._flags: list[FlagArray] = []
-        self._lock = threading.Lock()
-
-    def set(self) -> None:
-        """Throw the switch; it stays thrown."""
-        with self._lock:
-            self.is_set = True
-            for flag in self._flags:
-                flag[0] = 1
-
-    def attach(self, flag: FlagArray) -> None:
-        """Have `flag` raised when the switch is thrown."""
-        with self._lock:
-            self._flags.append(flag)
-            if self.is_set:
-                flag[0] = 1
-
-    def detach(self, flag: FlagArray) -> None:
-        """Forget `flag`."""
-        with self._lock:
-            self._flags = [kept for kept in self._flags if kept is not flag]
-
-    def take(self, n_bytes: int) -> None:
-        """Hear that an answer is about to take so many more bytes; who must bound them overrides this, and raises."""
-
-
-@dataclass(order=True, slots=True)
-class _Waiting:
-    """A flag and when to raise it."""
-
-    end: float
-    flag: FlagArray | None = field(compare=False)  # None: no longer
-
-
-class _Clock:
-    """Raises flags when their time has come, all from one thread: to start one takes as long as a small call."""
-
-    def __init__(self) -> None:
-        self._heap: list[_Waiting] = []
-        self._n_dropped = 0
-        self._changed = threading.Condition()
-        self._runs = False
-
-    def add(self, end: float, flag: FlagArray) -> _Waiting:
-        """Have `flag` raised at the time `end` of the monotonic clock."""
-        waiting = _Waiting(end, flag)
-        with self._changed:
-            heapq.heappush(self._heap, waiting)
-            if not self._runs:
-                self._runs = True
-                threading.Thread(target=self._run, name="deadlines", daemon=True).start()
-            elif self._heap[0] is waiting:
-                self._changed.notify()
-        return waiting
-
-    def drop(self, waiting: _Waiting) -> None:
-        """Forget a flag, raised or not."""
-        with self._changed:
-            waiting.flag = None
-            self._n_dropped += 1
-            if 2 * self._n_dropped > len(self._heap) + 100:
-                self._heap = [kept for kept in self._heap if kept.flag is not None]
-                heapq.heapify(self._heap)
-                self._n_dropped = 0
-
-    def _run(self) -> None:
-        with self._changed:
-            while True:  # ends with the process
-                now = time.monotonic()
-                while self._heap and (self._heap[0].end <= now or self._heap[0].flag is None):
-                    flag = heapq.heappop(self._heap).flag
-                    if flag is not None:
-                        flag[0] = 1
-                self._changed.wait(self._heap[0].end - now if self._heap else None)
-
-
-_clock = _Clock()
-
-
 class Options(TypedDict, total=False):
     """What every public function takes by keyword, as its overloads spell it."""
 
@@ -127,111 +39,23 @@ class Options(TypedDict, total=False):
     progress: Progress | None
 
 
-_here = threading.local()
-
-
-def poll() -> None:
-    """Check every `Budget` that the work of this thread is done under, if any: for what is built deep below a call.
-
-    Raises: what `Budget.check` raises.
-    """
-    budget: Budget | None = getattr(_here, "budget", None)
-    while budget is not None:
-        budget.check()
-        budget = budget.around
-
-
-class Budget:
-    """Deadline and cancel switch of one call; use as a context manager, which `poll` then knows of.
-
-    deadline: seconds from now, None for no limit. cancel: a switch shared with other threads, or None. around: the one
-    that this one was entered under. `flag` is the one-element uint8 array that kernels poll.
-    """
-
-    def __init__(self, deadline: float | None = None, cancel: Cancel | None = None) -> None:
-        if deadline is not None and (
-            isinstance(deadline, bool) or not isinstance(deadline, (int, float)) or deadline != deadline  # NaN
-        ):
-            raise InvalidInputError(
-                f"deadline must be a number of seconds or None, got {_shown(deadline)}", ("deadline",)
-            )
-        if cancel is not None and not isinstance(cancel, Cancel):
-            raise InvalidInputError(f"cancel must be an engine.Cancel or None, got {_shown(cancel)}", ("cancel",))
-        longest = threading.TIMEOUT_MAX  # of the timer, some centuries: more than that is no limit
-        self.deadline = None if deadline is None or deadline > longest else float(max(deadline, -longest))
-        self.flag: FlagArray = np.zeros(1, np.uint8)
-        self._cancel = cancel
-        self._end = None if self.deadline is None else time.monotonic() + self.deadline
-        self._waiting: _Waiting | None = None
-        self.around: Budget | None = None
-
-    def __enter__(self) -> Budget:
-        if self._cancel is None and self._end is None:  # nothing to poll for
-            return self
-        self.around, _here.budget = getattr(_here, "budget", None), self
-        if self._cancel is not None:
-            self._cancel.attach(self.flag)
-        if self._end is not None:
-            self._waiting = _clock.add(self._end, self.flag)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._cancel is None and self._end is None:
-            return
-        _here.budget = self.around
-        if self._waiting is not None:
-            _clock.drop(self._waiting)
-        if self._cancel is not None:
-            self._cancel.detach(self.flag)
-
-    def check(self) -> None:
-        """Raise `CancelledError` or `DeadlineExceededError` if the call must end; cheap enough for inner loops.
-
-        A raised `flag` counts by itself: a kernel may have seen it and left its answers incomplete.
-        """
-        if self._cancel is not None and self._cancel.is_set:
-            raise CancelledError("the call was cancelled by its caller")
-        if self._end is not None and (self.flag[0] or time.monotonic() >= self._end):
-            raise DeadlineExceededError(
-                f"the deadline of {self.deadline!r} s passed before the call was done; "
-                "ask for less in one call or give it more time"
-            )
-        if self.flag[0]:
-            raise CancelledError("another part of the call failed")
-
-    def take(self, n_bytes: int) -> None:
-        """Say, before it is gathered, by how many bytes an answer grows whose size the question does not tell."""
-        if self._cancel is not None:
-            self._cancel.take(n_bytes)
-
-
-UNLIMITED: Final = Budget()
-"""Shared by all calls without a limit that hand it to no other thread: nothing ever raises its flag."""
-
-
 def check_options(workers: object, progress: object, **flags: object) -> None:
     """Raise unless `workers` is a whole number from 1 or None, `progress` callable or None, and each flag a bool."""
     if workers is not None and (isinstance(workers, bool) or not isinstance(workers, (int, np.integer)) or workers < 1):
         raise InvalidInputError(
-            f"workers must be at least 1, got {_shown(workers)}; leave it out for one per core", ("workers",)
+            f"workers must be at least 1, got {shown(workers)}; leave it out for one per core", ("workers",)
         )
     if progress is not None and not callable(progress):
-        raise InvalidInputError(f"progress must be callable or None, got {_shown(progress)}", ("progress",))
+        raise InvalidInputError(f"progress must be callable or None, got {shown(progress)}", ("progress",))
     for name, flag in flags.items():
         if flag is not True and flag is not False and not isinstance(flag, np.bool_):
-            raise InvalidInputError(f"{name} must be True or False, got {_shown(flag)}", (name,))
+            raise InvalidInputError(f"{name} must be True or False, got {shown(flag)}", (name,))
 
 
 def is_unlimited(workers: object, deadline: object, cancel: object, progress: object) -> bool:
     """Tell whether a call may be answered at once where its items are few: no limit, and any number of threads."""
     is_any = workers is None or (type(workers) is int and workers > 0)
     return is_any and deadline is None and cancel is None and progress is None
-
-
-def _shown(value: object) -> str:
-    """Return a number as it is, of anything else its type: its text could be endless."""
-    is_short = isinstance(value, float) or (isinstance(value, int) and abs(value) < 10**20)
-    return repr(value) if is_short else f"a value of type {type(value).__name__}"
 
 
 def default_workers() -> int:
@@ -246,9 +70,9 @@ _n_calls = 0
 
 
 def _forget_pool() -> None:
-    """A forked child has the pool's object but none of its threads, and so with the clock."""
-    global _pool, _pool_lock, _n_calls, _clock
-    _pool, _pool_lock, _n_calls, _clock = None, threading.Lock(), 0, _Clock()
+    """A forked child has the pool's object but none of its threads."""
+    global _pool, _pool_lock, _n_calls
+    _pool, _pool_lock, _n_calls = None, threading.Lock(), 0
 
 
 if hasattr(os, "register_at_fork"):
@@ -355,7 +179,8 @@ def _run_threaded(
     failures: list[tuple[int, BaseException]] = []
 
     def work() -> int:
-        _here.budget, n_done = budget, 0
+        work_under(budget)
+        n_done = 0
         while not failures and (found := ranges.take()) is not None:
             first, stop = found
             before = time.perf_counter()

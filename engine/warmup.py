@@ -12,6 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from engine.budget import Budget
 from engine.cold_start import fill_cache, note_full
 from engine.collision.clearance.clearance import clearance
 from engine.collision.collide import collide
@@ -24,7 +25,6 @@ from engine.containment.locate import locate
 from engine.containment.posed.locators import posed_locator
 from engine.containment.rational_locate import rational_location
 from engine.containment.scene.locate_scene import locate_scene
-from engine.parallel import Budget
 from engine.polygon_clipping.clip_polygons import clip_polygons
 from engine.polygon_overlay.overlay import overlay
 from engine.scenes.scene import Scene

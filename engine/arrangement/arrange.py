@@ -26,7 +26,7 @@ import numpy as np
 from engine.arrangement.nodes import Homogeneous, NodeTable, float_nodes, reduced
 from engine.arrays import FloatArray, Int8Array, IntArray
 from engine.bounding.sweep import pairs_of_boxes
-from engine.parallel import Budget
+from engine.budget import Budget
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
 from engine.types import UNDECIDED
 

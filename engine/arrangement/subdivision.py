@@ -20,7 +20,7 @@ import numpy as np
 from engine.arrangement.arrange import Arrangement, Line, side
 from engine.arrangement.nodes import Homogeneous
 from engine.arrangement.union_find import UnionFind
-from engine.parallel import Budget
+from engine.budget import Budget
 
 _POLL = 512  # nodes, some microseconds each, between two looks at the clock
 

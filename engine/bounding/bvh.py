@@ -28,11 +28,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from engine.arrays import Float32Array, FloatArray, Int32Array, read_only
+from engine.budget import poll
 from engine.jit import allocating, allocating_kernel, inline, kernel
 from engine.lanes.boxes import EMPTY
 from engine.lanes.lanes import aligned
 from engine.lanes.rows import exchange, fill, join
-from engine.parallel import poll
 
 WIDTH = 8
 N_BINS = 16

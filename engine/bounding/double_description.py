@@ -19,8 +19,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
+from engine.budget import Budget
 from engine.errors import TooComplexError
-from engine.parallel import Budget
 from engine.predicates.rational import scaled_integers
 
 Vector = tuple[int, ...]

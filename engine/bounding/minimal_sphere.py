@@ -25,8 +25,8 @@ import numpy as np
 
 from engine.arrays import FloatArray
 from engine.bounding.support_ball import smallest_ball
+from engine.budget import Budget
 from engine.errors import NotRepresentableError
-from engine.parallel import Budget
 from engine.predicates.error_free import two_sum
 from engine.predicates.rational import nearest_float
 

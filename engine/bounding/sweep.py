@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
+from engine.budget import Budget
 from engine.jit import inline, kernel
-from engine.parallel import Budget
 
 BLOCK = 1 << 18
 """Pairs given out at once: a scene in which all meet all has n^2 / 2, which need not fit into memory. Sorting one block

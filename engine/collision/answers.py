@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from engine.arrays import Int8Array, IntArray
+from engine.budget import Budget
 from engine.collision.codes import DISJOINT, UNSETTLED
 from engine.collision.collide import collide_pair
 from engine.collision.detail import NO_DETAIL, code_of, detail_of
 from engine.collision.result import Poses, Witness, Work
-from engine.parallel import Budget
 from engine.solids.base import Solid
 from engine.types import Accuracy
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Literal, Unpack, overload
 
+from engine.budget import Budget, Cancel
 from engine.collision.detail import check_has_detail, detail_of
 from engine.collision.meshes.mesh_mesh import mesh_mesh
 from engine.collision.planar.outline_batch import collide_outlines
@@ -27,7 +28,7 @@ from engine.collision.simple.closed_forms import (
     collide_half_spaces,
 )
 from engine.errors import InvalidArrayError, UnsupportedPairError, UnsupportedSolidError, WrongDimensionError
-from engine.parallel import Budget, Cancel, Options, Progress, check_options
+from engine.parallel import Options, Progress, check_options
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
 from engine.types import Accuracy

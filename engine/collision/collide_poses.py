@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from engine.arrays import FloatArray, Int8Array, IntArray, read_only
+from engine.budget import Budget, Cancel
 from engine.collision.answers import Answers, PlacedPair, Witnesses, accuracy_of
 from engine.collision.ball_poses import ball_batch
 from engine.collision.codes import DISJOINT, OVERLAPPING, UNSETTLED
@@ -26,7 +27,7 @@ from engine.collision.scenes.batches import convex_poses
 from engine.collision.simple.closed_forms import told_by_forms
 from engine.direct import entry_of
 from engine.errors import InvalidArrayError, WrongDimensionError
-from engine.parallel import Budget, Cancel, Progress, check_options, run_chunks
+from engine.parallel import Progress, check_options, run_chunks
 from engine.solids.base import Solid
 from engine.solids.checks import as_floats, is_ready
 from engine.solids.pose import Pose, check_rotations, is_surely_rotation, motion_of

@@ -14,6 +14,7 @@ import numpy as np
 
 from engine.arrangement.subdivision import label_faces, subdivide
 from engine.arrays import FloatArray, Int8Array, IntArray
+from engine.budget import Budget
 from engine.collision.codes import UNSETTLED
 from engine.collision.exact_images import image_half_space, image_point, value_at
 from engine.collision.meshes.live_faces import live_piece
@@ -33,7 +34,6 @@ from engine.collision.simple.against_ball import body_sphere_parts
 from engine.collision.simple.against_half_space import half_space_body_parts
 from engine.containment.rational_locate import rational_location
 from engine.errors import InvalidInputError, UnsupportedSolidError
-from engine.parallel import Budget
 from engine.predicates.exact_vectors import largest_axis, minus, squared_length
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
-from engine.parallel import Budget
+from engine.budget import Budget
 from engine.solids.pose import Pose
 from engine.types import Rcc8, Relation
 

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from engine.arrays import FloatArray, Int8Array
+from engine.budget import Budget, Cancel
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
 from engine.collision.meshes.exact_triangles import classify_exact
 from engine.collision.meshes.mesh_arrays import NO_AREA, UNKNOWN_AXIS, axis_of
@@ -25,7 +26,7 @@ from engine.collision.planar.outline import collide_outline_outline
 from engine.collision.result import Work
 from engine.errors import InvalidArrayError, WrongDimensionError
 from engine.jit import allocating_kernel, inline, kernel, merged
-from engine.parallel import Budget, Cancel, Progress, check_options, run_chunks
+from engine.parallel import Progress, check_options, run_chunks
 from engine.predicates.loading import as_point2
 from engine.predicates.orientation import orient2d
 from engine.predicates.rational import scaled_integers

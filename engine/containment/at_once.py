@@ -11,13 +11,13 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 
 from engine.arrays import Int8Array
+from engine.budget import UNLIMITED
 from engine.containment.locators import locator_of, polygon_by, polyhedron_by
 from engine.containment.policy import CELLS, LISTS, PASS, choose_for_mesh, choose_for_rings
 from engine.containment.posed.filters import NOT_FINITE
 from engine.containment.rational_locate import combine, over_tree, rational_location
 from engine.direct import entry_of
 from engine.errors import NotFiniteError
-from engine.parallel import UNLIMITED
 from engine.solids.base import Solid
 from engine.solids.checks import DOUBLE, as_points, check_finite, plain_floats
 from engine.solids.csg import Csg

@@ -12,6 +12,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from engine.arrays import FloatArray, Int8Array, IntArray, read_only
+from engine.budget import Budget
 from engine.containment.cells.build import cells_of
 from engine.containment.cells.locate import locate_by_cells
 from engine.containment.cells.order import order_if_it_pays
@@ -30,7 +31,6 @@ from engine.containment.rational_locate import Check, combine, over_tree, ration
 from engine.containment.ring_cells.build import ring_cells_of
 from engine.containment.ring_cells.locate import locate_by_ring_cells
 from engine.errors import InvalidArrayError, NotFiniteError
-from engine.parallel import Budget
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.convex import Convex, rows_of

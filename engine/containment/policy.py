@@ -11,8 +11,8 @@ from typing import Final
 
 import numpy as np
 
+from engine.budget import Budget
 from engine.containment.cells.top import can_have_cells, lattice_of
-from engine.parallel import Budget
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
 

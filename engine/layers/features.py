@@ -16,6 +16,7 @@ from typing import Any, Final
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
+from engine.budget import Cancel
 from engine.errors import (
     EngineError,
     InvalidArrayError,
@@ -26,7 +27,7 @@ from engine.errors import (
     WrongDimensionError,
 )
 from engine.layers.rows import NONE, Layer, LayerRows, Limits, dissolved, held, layer_of, overlay_rows, with_alone
-from engine.parallel import Cancel, check_options
+from engine.parallel import check_options
 from engine.polygon_overlay.polygon_arrays import arrays_of
 from engine.polygon_overlay.union_all import union_all
 from engine.solids.checks import Where, as_points, shown

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from engine.budget import Cancel
 from engine.errors import EngineError, InvalidInputError, InvalidOperationError, NotFiniteError, UnsupportedSolidError
 from engine.layers.rows import (
     NONE,
@@ -20,7 +21,6 @@ from engine.layers.rows import (
     overlay_rows,
     with_alone,
 )
-from engine.parallel import Cancel
 from engine.polygon_overlay.polygon_arrays import PolygonArrays, arrays_of
 from engine.polygon_overlay.touching import Touching
 from engine.solids.ragged import within

@@ -17,9 +17,9 @@ import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.bounding.box_grid import pairs_of_boxes
+from engine.budget import Budget, Cancel
 from engine.containment.scene.locate_scene import locate_scene
 from engine.errors import InvalidOperationError, NotRepresentableError
-from engine.parallel import Budget, Cancel
 from engine.polygon_overlay.batch import OverlayBatch, overlay_batch
 from engine.polygon_overlay.found import chained, places_of
 from engine.polygon_overlay.polygon_arrays import Chosen, PolygonArrays, joined_arrays

@@ -9,8 +9,8 @@ from typing import Final
 import numpy as np
 
 from engine.arrays import BoolArray, FlagArray, FloatArray, IntArray
+from engine.budget import Budget
 from engine.direct import entry_of
-from engine.parallel import Budget
 from engine.polygon_clipping.in_integers import Row
 from engine.polygon_clipping.rings import PlaneTables
 from engine.polygon_clipping.sutherland_hodgman import clip_rings

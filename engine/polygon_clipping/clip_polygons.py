@@ -13,9 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray, read_only
+from engine.budget import UNLIMITED, Budget, Cancel
 from engine.direct import entry_of
 from engine.errors import EmptyGeometryError, InvalidArrayError, TooComplexError, UnsupportedSolidError
-from engine.parallel import UNLIMITED, Budget, Cancel, Options, Progress, check_options, is_unlimited, run_chunks
+from engine.parallel import Options, Progress, check_options, is_unlimited, run_chunks
 from engine.polygon_clipping.batches import AXES, clip_chunk, kernel_scene
 from engine.polygon_clipping.convex_planes import convex_planes
 from engine.polygon_clipping.in_integers import Row, clip_polygon, integer_row, reduced

@@ -9,8 +9,9 @@ from typing import Final, cast
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray, read_only
+from engine.budget import Budget, Cancel
 from engine.errors import InvalidArrayError, NotRepresentableError
-from engine.parallel import Budget, Cancel, Progress, check_options, run_chunks
+from engine.parallel import Progress, check_options, run_chunks
 from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.found import NO_PAIRS, Found, chained, joined, one_pair, taken

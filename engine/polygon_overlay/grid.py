@@ -18,9 +18,9 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.arrays import FloatArray, Int32Array, IntArray, read_only
+from engine.budget import Budget
 from engine.direct import entry_of
 from engine.errors import InvalidInputError, NotRepresentableError
-from engine.parallel import Budget
 from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
 from engine.polygon_overlay.compiled.snapping import FOLDS, scale, snap
 from engine.polygon_overlay.compiled.workspace import keep, scratch_for

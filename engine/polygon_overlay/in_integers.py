@@ -18,8 +18,8 @@ from engine.arrangement.exact_area import ExactRings
 from engine.arrangement.rings import Piece, trace_pieces
 from engine.arrangement.subdivision import Subdivision, label_faces, subdivide
 from engine.arrays import FloatArray, IntArray
+from engine.budget import Budget
 from engine.errors import TooComplexError
-from engine.parallel import Budget
 from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.compiled.ring_nesting import FIRST_ALONE, NEGATIVE, NON_ZERO, PAIR, POSITIVE, Nesting

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, IntArray, read_only
-from engine.parallel import Budget
+from engine.budget import Budget
 from engine.polygon_overlay.compiled.kernel import MAY_CROSS
 from engine.polygon_overlay.found import NO_PAIRS, Found, joined, one_pair, taken
 from engine.polygon_overlay.implicit_rings import edges_along, rings_alone

@@ -18,8 +18,9 @@ from typing import Final, Literal, Unpack, overload
 
 import numpy as np
 
+from engine.budget import UNLIMITED, Budget, Cancel
 from engine.errors import InvalidOperationError, UnsupportedSolidError
-from engine.parallel import UNLIMITED, Budget, Cancel, Progress, check_options
+from engine.parallel import Progress, check_options
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.compiled.ring_nesting import Nesting
 from engine.polygon_overlay.grid import from_units, grid_of

@@ -24,7 +24,7 @@ import numpy as np
 from engine.arrangement.snap_rounding import snap_rings
 from engine.arrangement.union_find import UnionFind
 from engine.arrays import BoolArray, FloatArray, IntArray, read_only
-from engine.parallel import Budget
+from engine.budget import Budget
 from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
 from engine.polygon_overlay.found import Found, joined, one_pair, places_of, taken
 from engine.polygon_overlay.implicit_rings import edges_along

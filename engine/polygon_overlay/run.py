@@ -9,8 +9,8 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, IntArray, read_only
+from engine.budget import Budget
 from engine.direct import entry_of
-from engine.parallel import Budget
 from engine.polygon_overlay.compiled.kernel import DONE, NEEDS_CONTACTS, NEEDS_OUTPUT, overlay_pairs
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.compiled.ring_nesting import AGAIN, Nesting

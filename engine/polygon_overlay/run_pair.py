@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
+from engine.budget import Budget
 from engine.direct import entry_of
-from engine.parallel import Budget
 from engine.polygon_overlay.compiled.kernel import DONE, FINISHED, NEEDS_CONTACTS, overlay_pairs
 from engine.polygon_overlay.compiled.loading import Loaded, RingArrays
 from engine.polygon_overlay.compiled.reducing import expand_rings, reduce_pair

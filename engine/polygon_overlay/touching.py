@@ -19,7 +19,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, IntArray
-from engine.parallel import Budget, run_chunks
+from engine.budget import Budget
+from engine.parallel import run_chunks
 from engine.polygon_overlay.compiled.kernel import DONE
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.found import Found, chained, places_of, ring_numbers, taken

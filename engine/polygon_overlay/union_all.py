@@ -13,8 +13,9 @@ from typing import Final, Literal, Unpack, cast, overload
 import numpy as np
 
 from engine.arrays import IntArray
+from engine.budget import Budget, Cancel
 from engine.errors import InvalidArrayError, InvalidOperationError
-from engine.parallel import Budget, Cancel, Progress, check_options
+from engine.parallel import Progress, check_options
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.compiled.ring_nesting import ANY, FIRST_ALONE, NEGATIVE, NON_ZERO, POSITIVE, Nesting
 from engine.polygon_overlay.implicit_rings import NOTHING

@@ -10,6 +10,7 @@ import numpy as np
 
 from engine.arrays import FloatArray, IntArray
 from engine.bounding.posed_boxes import place_boxes
+from engine.budget import Budget
 from engine.collision.scenes.batches import SceneBatches
 from engine.collision.scenes.bodies import SceneBodies, bodies_of, check_collidable, distinct_of
 from engine.containment.locators import Locator
@@ -19,7 +20,6 @@ from engine.containment.scene.first_pass import SECOND_PASS
 from engine.containment.scene.tables import Scene as LocateTables
 from engine.containment.scene.tables import scene_of
 from engine.direct import entry_of
-from engine.parallel import Budget
 from engine.scenes.broad_phase import NOBODY, body_tree, words_of
 from engine.scenes.near_boxes import BodyTree
 from engine.scenes.table import Table

@@ -13,9 +13,9 @@ import numpy as np
 
 from engine.arrays import FloatArray, IntArray, read_only
 from engine.bounding.bvh import UNUSED, WIDTH, Bvh, build_bvh
+from engine.budget import Budget
 from engine.direct import entry_of
 from engine.lanes.boxes import BOX_ROWS, EMPTY
-from engine.parallel import Budget
 from engine.scenes.near_boxes import BodyTree, list_near, put_keys
 from engine.scenes.scratch import scratch_for
 

@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Final, Literal, Unpack, cast, overload
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray
+from engine.budget import Budget, Cancel
 from engine.collision.clearance.clearance import checked_distance
 from engine.collision.codes import TOUCHING, UNSETTLED
 from engine.collision.collide import check_pose
@@ -16,7 +17,7 @@ from engine.collision.scenes.collide_scene import Asked, ScenePairs, collide_bod
 from engine.containment.scene.locate_scene import SceneLocations, check_bodies, locate_few, locate_in
 from engine.containment.scene.one_by_one import are_few
 from engine.errors import EngineError, IndexOutOfRangeError, InvalidArrayError, InvalidOperationError
-from engine.parallel import Budget, Cancel, Options, Progress, check_options
+from engine.parallel import Options, Progress, check_options
 from engine.scenes.bodies import Bodies
 from engine.scenes.clip import Counts, answer_few, clip_all, clip_first, meets_any
 from engine.scenes.ends import ScenePieces, in_order, joined

@@ -12,9 +12,9 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from engine.arrays import FloatArray, Int8Array, IntArray
+from engine.budget import Budget
 from engine.containment.scene.locate_scene import SceneLocations
 from engine.direct import entry_of
-from engine.parallel import Budget
 from engine.scenes.bodies import Bodies
 from engine.scenes.broad_phase import NO_BODIES, NOBODY, Where, body_tree, candidates, words_of
 from engine.scenes.moved_pairs import PairRows, Placed, list_pairs

@@ -9,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.arrays import FloatArray, IntArray
+from engine.budget import Budget, Cancel
 from engine.errors import UnsupportedSolidError
-from engine.parallel import Budget, Cancel, Options, Progress, check_options, is_unlimited
+from engine.parallel import Options, Progress, check_options, is_unlimited
 from engine.predicates.scaling import balanced_rows
 from engine.segment_clipping.ball_cut import fill_on_sphere
 from engine.segment_clipping.ball_interval import decide_on_sphere

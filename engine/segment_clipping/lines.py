@@ -14,9 +14,10 @@ from typing import Any, Literal, Unpack, overload
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
+from engine.budget import Cancel
 from engine.direct import entry_of
 from engine.jit import inline, kernel
-from engine.parallel import Cancel, Options, Progress, check_options
+from engine.parallel import Options, Progress, check_options
 from engine.segment_clipping.clip_segments import SegmentPieces, clip_segments
 from engine.solids.base import Solid
 from engine.solids.ragged import as_lines

@@ -15,6 +15,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
+from engine.budget import Budget
 from engine.containment.rational_locate import (
     combine,
     over_tree,
@@ -24,7 +25,6 @@ from engine.containment.rational_locate import (
     to_world_frame,
 )
 from engine.errors import UnsupportedSolidError
-from engine.parallel import Budget
 from engine.predicates.rational import Number, common_integers, nearest_with_root
 from engine.segment_clipping.exact_pieces import Contact, contacts_of, nodes_with_locations
 from engine.segment_clipping.on_boundary.found_contacts import contacts_with

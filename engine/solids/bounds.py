@@ -12,8 +12,9 @@ from engine.arrays import FloatArray
 from engine.bounding.aabb import box_of_points, corners_of_box
 from engine.bounding.double_description import corners_of_half_spaces
 from engine.bounding.minimal_sphere import MinimalSphere, minimal_sphere, minimal_sphere_of_rationals
+from engine.budget import Budget, Cancel
 from engine.errors import EmptyGeometryError, NotRepresentableError, UnsupportedSolidError
-from engine.parallel import Budget, Cancel, Options, Progress, check_options
+from engine.parallel import Options, Progress, check_options
 from engine.predicates.rational import nearest_float
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid

@@ -17,8 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.arrays import BoolArray, FloatArray
+from engine.budget import poll
 from engine.errors import EmptyGeometryError, InvalidArrayError, NotFiniteError, WrongDimensionError
-from engine.parallel import poll
 
 Where = tuple[str | int, ...]
 

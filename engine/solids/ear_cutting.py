@@ -28,9 +28,9 @@ from typing import Final
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
+from engine.budget import Budget
 from engine.direct import entry_of
 from engine.errors import FaceNotSimpleError
-from engine.parallel import Budget
 from engine.predicates.rational import orient2d_rational, scaled_integers
 from engine.solids import ears as ears_of
 from engine.solids import simple_ring

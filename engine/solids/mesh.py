@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.arrays import FloatArray, IntArray, read_only
+from engine.budget import Budget, Cancel, poll
 from engine.direct import entry_of
 from engine.errors import (
     InconsistentOrientationError,
@@ -24,7 +25,6 @@ from engine.errors import (
     RepeatedIndexError,
     RingTooShortError,
 )
-from engine.parallel import Budget, Cancel, poll
 from engine.solids.base import Solid
 from engine.solids.checks import as_points, check_not_empty, digits, frozen, shown
 from engine.solids.ear_cutting import cut_faces

@@ -17,7 +17,8 @@ FLOORS = {
     "engine.kernel_cache": 0,
     "engine.compiling": 1,
     "engine.jit": 2,
-    "engine.parallel": 0,
+    "engine.budget": 0,
+    "engine.parallel": 1,
     "engine.cold_start": 3,
     "engine.predicates": 3,
     "engine.lanes": 3,
@@ -39,7 +40,7 @@ FLOORS = {
     "engine": 10,
     "engine.__main__": 11,
 }
-SAME_FLOOR_ALLOWED = {("engine.parallel", "engine.errors"), ("engine.parallel", "engine.arrays")}
+SAME_FLOOR_ALLOWED = {("engine.budget", "engine.errors"), ("engine.budget", "engine.arrays")}
 SPEAKS_LLVM = {"engine.compiling", "engine.predicates.error_free"}
 """Beside `engine.lanes`: the only modules that may."""
 LLVM = ("llvmlite", "numba.core", "numba.extending", "numba.types")

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from engine import parallel
+from engine.budget import Budget, Cancel
 from engine.errors import CancelledError, DeadlineExceededError, InvalidInputError
-from engine.parallel import Budget, Cancel, check_options, is_unlimited, run_chunks
+from engine.parallel import check_options, is_unlimited, run_chunks
 
 
 @pytest.mark.parametrize("workers", [1, 2, 5, None])
@@ -38,26 +39,6 @@ def test_a_chunk_that_waits_for_the_flag_ends_at_the_deadline() -> None:
     with Budget(deadline=0.05) as budget, pytest.raises(DeadlineExceededError, match=r"0\.05"):
         run_chunks(task, 10, budget=budget, first_chunk=1)
     assert budget.flag[0] == 1
-
-
-def test_each_deadline_passes_at_its_own_time() -> None:
-    with Budget(deadline=1000) as long, Budget(deadline=0.01) as over:
-        with Budget(deadline=0.05) as short:
-            while not short.flag[0]:  # bound: the deadline
-                time.sleep(0.001)
-        assert over.flag[0] == 1
-        assert long.flag[0] == 0
-    with Budget(deadline=0.02) as over:
-        pass
-    time.sleep(0.1)
-    assert over.flag[0] == 0
-
-
-def test_deadlines_of_many_calls_take_no_memory() -> None:
-    for _ in range(2000):
-        with Budget(deadline=1000):
-            pass
-    assert len(parallel._clock._heap) < 200
 
 
 def test_a_deadline_of_zero_does_no_work() -> None:
@@ -182,19 +163,6 @@ def test_a_forked_child_gets_a_pool_of_its_own() -> None:
     expected = _sum_in_chunks(50_000)
     with multiprocessing.get_context("fork").Pool(1) as pool:
         assert pool.apply_async(_sum_in_chunks, (50_000,)).get(timeout=300) == expected
-
-
-@pytest.mark.parametrize("deadline", [float("nan"), "1", True, [1.0], np.zeros(2)])
-def test_a_deadline_that_is_no_time_is_refused(deadline: object) -> None:
-    with pytest.raises(InvalidInputError, match="deadline must be a number of seconds"):
-        Budget(deadline)  # type: ignore[arg-type] # the case
-
-
-@pytest.mark.parametrize("deadline", [float("inf"), 1e300, None])
-def test_a_deadline_beyond_all_clocks_is_none(deadline: float | None) -> None:
-    with Budget(deadline) as budget:
-        budget.check()
-        assert budget.deadline is None
 
 
 def test_other_options_of_the_wrong_type_are_refused() -> None:

@@ -7,6 +7,7 @@ from typing import Any, Literal, Unpack, overload
 
 import numpy as np
 
+from engine.budget import Budget, Cancel
 from engine.collision.clearance.forms import MEETING, between_form_and_plane, between_forms, between_outlines
 from engine.collision.clearance.half_spaces import gap_of_planes
 from engine.collision.clearance.result import Clearance
@@ -14,7 +15,7 @@ from engine.collision.clearance.spreads import spread_pair
 from engine.collision.collide import check_pose, collide_pair, pair_function
 from engine.collision.result import UNLIMITED, Poses, Work
 from engine.errors import InvalidInputError
-from engine.parallel import Budget, Cancel, Options, Progress, check_options
+from engine.parallel import Options, Progress, check_options
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
 from engine.types import Accuracy, Relation

@@ -7,6 +7,7 @@ from fractions import Fraction
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, read_only
+from engine.budget import Budget, Cancel
 from engine.collision.answers import Answers
 from engine.collision.clearance.bodies import in_space
 from engine.collision.clearance.clearance import checked_distance, do_meet, has_plane
@@ -19,7 +20,7 @@ from engine.collision.collide_poses import as_poses, batch_of
 from engine.collision.meshes.mesh_arrays import STILL
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.result import Poses
-from engine.parallel import Budget, Cancel, Progress, check_options, run_chunks
+from engine.parallel import Progress, check_options, run_chunks
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
 from engine.types import Accuracy

@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 
 from engine.arrays import FloatArray
+from engine.budget import Budget
 from engine.collision.clearance.bodies import BALL, outline_of
 from engine.collision.clearance.closed_forms import (
     UNSURE,
@@ -26,7 +27,6 @@ from engine.collision.exact_images import Vector, as_vector, image_point
 from engine.collision.result import UNLIMITED, Poses
 from engine.collision.simple.form import FORMS, form_of
 from engine.direct import entry_of
-from engine.parallel import Budget
 from engine.predicates.exact_vectors import minus, squared_length
 from engine.predicates.rational import sign_of
 from engine.solids.aabb import Aabb

@@ -9,6 +9,7 @@ from fractions import Fraction
 
 import numpy as np
 
+from engine.budget import Budget
 from engine.collision.clearance.bodies import feature_of, radius_of, spread_of
 from engine.collision.clearance.exact import ScaledGap
 from engine.collision.clearance.forms import PLANE, scaled_gap
@@ -16,7 +17,6 @@ from engine.collision.clearance.result import Feature
 from engine.collision.exact_images import Vector, image_half_space, image_map, value_at
 from engine.collision.result import Poses
 from engine.collision.simple.boundary import pulled_back
-from engine.parallel import Budget
 from engine.predicates.exact_vectors import squared_length
 from engine.solids.base import Solid
 from engine.solids.half_space import HalfSpace

@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 
 from engine.arrays import FloatArray
+from engine.budget import Budget
 from engine.collision.clearance.blocks import DONE
 from engine.collision.clearance.bodies import feature_of, in_space, radius_of, spread_of
 from engine.collision.clearance.boxes import Room, new_room
@@ -23,7 +24,6 @@ from engine.collision.meshes.mesh_arrays import STILL, MeshBody, lattice_shift
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.result import Poses
 from engine.direct import entry_of
-from engine.parallel import Budget
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
 

@@ -18,9 +18,9 @@ from fractions import Fraction
 from itertools import pairwise
 from typing import NamedTuple
 
+from engine.budget import Budget
 from engine.collision.meshes.exact_body import Corners, ExactBody, Plane, Vector, rounded_outward
 from engine.collision.meshes.exact_triangles import value_at, without_axis
-from engine.parallel import Budget
 from engine.predicates.exact_vectors import cross, dot, minus
 from engine.predicates.rational import sign_of
 

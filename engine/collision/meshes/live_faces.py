@@ -17,10 +17,10 @@ import numpy as np
 from engine.arrangement.arrange import arrange
 from engine.arrangement.nodes import float_nodes
 from engine.arrangement.subdivision import label_faces, subdivide
+from engine.budget import Budget
 from engine.collision.exact_images import Vector, as_vector
 from engine.collision.meshes.face_state import states_of
 from engine.collision.meshes.mesh_arrays import NO_AREA, STATE_STACKED, MeshBody
-from engine.parallel import Budget
 from engine.predicates.exact_vectors import cross, dot, largest_axis, minus, squared_length
 from engine.predicates.rational import common_integers, orient2d_rational, orient3d_rational
 

@@ -20,10 +20,10 @@ from engine.arrangement.arrange import Arrangement, arrange
 from engine.arrangement.nodes import NodeTable, float_nodes, rational_nodes
 from engine.arrangement.subdivision import label_faces, subdivide
 from engine.arrays import FloatArray, IntArray
+from engine.budget import Budget
 from engine.collision.exact_images import image_map, rounded
 from engine.collision.result import FIRST_WITHIN, NO_CONTACT, SECOND_WITHIN, Collision, Kind, Poses, Witness, Work
 from engine.containment.rational_locate import rational_location
-from engine.parallel import Budget
 from engine.predicates.rational import orient2d_rational
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid

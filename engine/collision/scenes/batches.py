@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from engine.arrays import FloatArray, Int8Array, IntArray
+from engine.budget import Budget
 from engine.collision.codes import UNSETTLED
 from engine.collision.convex.body import ConvexArrays, ConvexBody, convex_body_of, pooled
 from engine.collision.convex.pair import relate_convex_pairs
@@ -19,7 +20,7 @@ from engine.collision.planar.outline_batch import OutlineArrays, outline_pool, r
 from engine.collision.scenes.bodies import SceneBodies, scene_bodies
 from engine.collision.simple.form_relations import relate_box_pairs
 from engine.direct import entry_of
-from engine.parallel import Budget, run_chunks
+from engine.parallel import run_chunks
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.pose import Pose

@@ -12,6 +12,7 @@ import numpy as np
 from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray, read_only
 from engine.bounding.box_grid import pairs_of_boxes
 from engine.bounding.sweep import BLOCK
+from engine.budget import Budget, Cancel
 from engine.collision.answers import Answers, PlacedPair, accuracy_of
 from engine.collision.clearance.clearance import checked_distance
 from engine.collision.codes import UNSETTLED
@@ -21,7 +22,7 @@ from engine.collision.scenes.batches import SceneBatches
 from engine.collision.scenes.bodies import SceneBodies, scene_bodies
 from engine.collision.scenes.near_pairs import distances_below, enlarged
 from engine.errors import IndexOutOfRangeError, InvalidArrayError
-from engine.parallel import Budget, Cancel, Progress, check_options, run_chunks
+from engine.parallel import Progress, check_options, run_chunks
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
 from engine.types import Accuracy, Relation

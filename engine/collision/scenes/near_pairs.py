@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, IntArray, read_only
+from engine.budget import Budget
 from engine.collision.clearance.bodies import in_space
 from engine.collision.clearance.clearance import has_plane
 from engine.collision.clearance.convex_gaps import gaps_of_pairs
@@ -24,7 +25,7 @@ from engine.collision.meshes.placement import PoseArrays
 from engine.collision.scenes.batches import SceneBatches
 from engine.collision.scenes.bodies import SceneBodies
 from engine.collision.simple.form import N_NUMBERS, form_of
-from engine.parallel import Budget, run_chunks
+from engine.parallel import run_chunks
 
 _ROUNDING: Final = 2.0**-48
 """Of a distance of two boxes: differences, two hypotenuses and the products here round by less than 16 u."""

@@ -12,6 +12,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from engine.arrays import Float32Array, Int8Array, Int32Array, IntArray
+from engine.budget import Budget
 from engine.containment.cells.lattice import (
     LEVELS,
     PARTS,
@@ -31,7 +32,6 @@ from engine.containment.policy import cost_in_tree
 from engine.containment.prepared import TriangleTree, tree_of
 from engine.lanes.cells import groups_of
 from engine.lanes.tracing import LANES
-from engine.parallel import Budget
 from engine.solids.polyhedron import Polyhedron
 
 _LONG_ON_TOP, _LONG_IN_SMALL, _LONG = 24, 8, 32

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from engine.arrays import FloatArray, Int8Array, read_only
+from engine.budget import Budget
 from engine.containment.locators import Counts, Fill, Locator, csg_locator, locator_of, rational_half, settled
 from engine.containment.methods.ball import locate_in_ball
 from engine.containment.methods.box import locate_in_box
@@ -28,7 +29,6 @@ from engine.containment.posed.filters import locate_by_polynomial_blurred, locat
 from engine.containment.posed.frames import Frames, frames_of
 from engine.containment.prepared import prism_rows, rings_of, tree_of
 from engine.containment.rational_locate import Check, to_world_frame
-from engine.parallel import Budget
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.convex import Convex, rows_in_space, rows_of

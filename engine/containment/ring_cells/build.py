@@ -12,10 +12,10 @@ from typing import Final
 import numpy as np
 
 from engine.arrays import FloatArray, Int8Array, Int32Array, IntArray, read_only
+from engine.budget import Budget
 from engine.containment.rational_locate import next_in_ring
 from engine.containment.ring_cells.lists import LevelOfNodes, choose_cuts, count_level, fill_level, place_edges
 from engine.containment.ring_cells.locate import FINE_BITS, LAST, SPLIT_BITS, RingCells
-from engine.parallel import Budget
 from engine.solids.polygon import Polygon
 
 _MOST: Final = 1 << 27

@@ -14,12 +14,13 @@ from typing import Final, Literal, Unpack, overload
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray
+from engine.budget import Budget, Cancel
 from engine.containment.scene.first_pass import drop_outside, put_in_order, scan_points, sort_by_cell
 from engine.containment.scene.one_by_one import are_few, locate_one_by_one
 from engine.containment.scene.second_pass import settle_rest
 from engine.containment.scene.tables import Scene, scene_of
 from engine.errors import InvalidArrayError, WrongDimensionError
-from engine.parallel import Budget, Cancel, Options, Progress, check_options, run_chunks
+from engine.parallel import Options, Progress, check_options, run_chunks
 from engine.solids.base import Solid
 from engine.solids.checks import as_points
 from engine.solids.pose import Pose

@@ -8,11 +8,11 @@ from typing import Final
 import numpy as np
 
 from engine.arrays import FloatArray, Int8Array
+from engine.budget import Budget
 from engine.containment.at_once import located_at_once
 from engine.containment.locators import Counts
 from engine.containment.posed.locators import posed_locator
 from engine.errors import EngineError
-from engine.parallel import Budget
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
 

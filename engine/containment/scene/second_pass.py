@@ -13,13 +13,14 @@ import numpy as np
 
 from engine.arrays import FloatArray, Int8Array, IntArray
 from engine.bounding.bvh import STACK
+from engine.budget import Budget
 from engine.containment.cells.order import counting_sort
 from engine.containment.cells.top import MOST_FACES, top_cells_if_they_pay
 from engine.containment.locators import Counts
 from engine.containment.prepared import tree_of
 from engine.containment.scene.tables import Scene
 from engine.containment.scene.trees import TreeTables, locate_groups, tree_line
-from engine.parallel import Budget, run_chunks
+from engine.parallel import run_chunks
 from engine.solids.polyhedron import Polyhedron
 from engine.types import UNDECIDED
 

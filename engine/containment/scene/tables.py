@@ -12,6 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
+from engine.budget import Budget
 from engine.containment.cells.top import TopCells
 from engine.containment.locators import Locator
 from engine.containment.methods.polygon_one_pass import close_rings
@@ -21,7 +22,6 @@ from engine.containment.scene.bodies import body_box, grown_boxes, moved_boxes
 from engine.containment.scene.first_pass import BALL, BOX, CELLS, RINGS, ROWS, SECOND_PASS, SceneTables
 from engine.containment.scene.grid import SceneGrid, build_scene_grid
 from engine.errors import EngineError
-from engine.parallel import Budget
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.bounds import own_box

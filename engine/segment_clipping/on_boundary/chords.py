@@ -13,10 +13,10 @@ from typing import Any, Final
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray
+from engine.budget import Budget
 from engine.containment.locators import Locator
 from engine.direct import entry_of
 from engine.jit import kernel
-from engine.parallel import Budget
 from engine.predicates.loading import as_point2
 from engine.predicates.orientation import orient2d, orient3d
 from engine.segment_clipping.on_boundary.contacts import ALONG, DEGENERATE, END

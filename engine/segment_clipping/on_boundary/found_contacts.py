@@ -7,8 +7,8 @@ from typing import Any, Final
 import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, IntArray
+from engine.budget import Budget
 from engine.direct import entry_of
-from engine.parallel import Budget
 from engine.segment_clipping.on_boundary.contacts import NO_ROOM, find_contacts_2d
 from engine.segment_clipping.on_boundary.mesh_streams import find_mesh_contacts
 from engine.segment_clipping.on_boundary.prepared_boundary import Mesh, Outline

@@ -7,9 +7,9 @@ import pytest
 
 from engine.bounding import bvh
 from engine.bounding.bvh import MAX_DEPTH, UNUSED, WIDTH, Bvh, build_bvh
+from engine.budget import Budget, Cancel
 from engine.errors import CancelledError
 from engine.lanes.boxes import EMPTY
-from engine.parallel import Budget, Cancel
 
 
 def check_tree(boxes: np.ndarray, tree: Bvh) -> None:

@@ -23,8 +23,8 @@ from engine.bounding.minimal_sphere import (
     minimal_sphere_of_rationals,
     root_up,
 )
+from engine.budget import Budget, Cancel
 from engine.errors import CancelledError, DeadlineExceededError, NotRepresentableError
-from engine.parallel import Budget, Cancel
 from engine.predicates.rational import nearest_float
 
 Rational = tuple[Fraction, ...]

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from engine.bounding.sweep import meeting_boxes, pairs_of_boxes
+from engine.budget import Budget, Cancel
 from engine.errors import CancelledError
-from engine.parallel import Budget, Cancel
 
 
 @pytest.mark.parametrize("dimension", [2, 3])

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from engine import Aabb, Relation, Solid
+from engine.budget import Budget
 from engine.collision.answers import Answers, PlacedPair, accuracy_of
 from engine.collision.codes import UNSETTLED
 from engine.collision.detail import NO_DETAIL
-from engine.parallel import Budget
 from engine.types import Rcc8
 
 BOX = Aabb([0, 0, 0], [1, 1, 1])

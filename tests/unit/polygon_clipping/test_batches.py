@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from engine.budget import Budget
 from engine.errors import CancelledError
-from engine.parallel import Budget
 from engine.polygon_clipping import clip_polygons as polygons_module
 from engine.polygon_clipping.batches import clip_chunk, kernel_scene
 from engine.solids.aabb import Aabb

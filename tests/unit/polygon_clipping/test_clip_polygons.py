@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from engine.budget import Cancel
 from engine.errors import (
     CancelledError,
     DeadlineExceededError,
@@ -19,7 +20,6 @@ from engine.errors import (
     UnsupportedSolidError,
     WrongDimensionError,
 )
-from engine.parallel import Cancel
 from engine.polygon_clipping import clip_polygons as polygons_module
 from engine.polygon_clipping.clip_polygons import ClippedPolygons, PolygonStatus, clip_polygons
 from engine.solids.aabb import Aabb

@@ -12,7 +12,7 @@ import pytest
 import engine
 from engine.arrangement.snap_rounding import snap_rings
 from engine.arrays import read_only
-from engine.parallel import Budget
+from engine.budget import Budget
 from engine.polygon_overlay import grid as grids
 from tests.reference import fast_overlay
 from tests.reference.exact import Q

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from engine.parallel import Budget
+from engine.budget import Budget
 from engine.polygon_overlay.compiled.kernel import DONE
 from engine.polygon_overlay.found import one_pair
 from engine.polygon_overlay.in_integers import arranged_again, overlay_exactly

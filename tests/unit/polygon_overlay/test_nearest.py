@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.parallel import Budget
+from engine.budget import Budget
 from engine.polygon_overlay.in_integers import overlay_exactly
 from engine.polygon_overlay.nearest import NearestRings, nearest_rings
 from engine.polygon_overlay.run import overlay_compiled

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from engine.budget import Cancel
 from engine.errors import (
     CancelledError,
     DeadlineExceededError,
@@ -18,7 +19,6 @@ from engine.errors import (
     NotRepresentableError,
     UnsupportedSolidError,
 )
-from engine.parallel import Cancel
 from engine.polygon_overlay.batch import overlay_batch
 from engine.polygon_overlay.overlay import Operation, overlay
 from engine.polygon_overlay.result import Overlay

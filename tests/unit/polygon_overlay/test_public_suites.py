@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from engine.arrays import read_only
-from engine.parallel import Budget
+from engine.budget import Budget
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.overlay import overlay_rings
 from engine.polygon_overlay.result import Overlay

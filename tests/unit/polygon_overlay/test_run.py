@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from engine.parallel import Budget
+from engine.budget import Budget
 from engine.polygon_overlay.compiled.kernel import DONE
 from engine.polygon_overlay.polygon_arrays import gathered
 from engine.polygon_overlay.run import KEPT_ARRAYS, run_kernel

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import engine
-from engine.parallel import Budget
+from engine.budget import Budget
 from engine.polygon_overlay.compiled.ring_nesting import ANY, NEGATIVE, NON_ZERO, POSITIVE, Nesting
 from engine.polygon_overlay.implicit_rings import NOTHING
 from engine.polygon_overlay.in_integers import overlay_exactly

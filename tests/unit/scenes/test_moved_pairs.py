@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from engine import Aabb, Pose, Scene
-from engine.parallel import Budget
+from engine.budget import Budget
 from engine.scenes.moved_pairs import PairRows, Placed, list_pairs
 from engine.scenes.scratch import scratch_for
 

@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from engine.parallel import Budget, Cancel
+from engine.budget import Budget, Cancel
 from engine.segment_clipping.profiles import exact_pieces
 from engine.solids.convex import Convex
 from engine.solids.polygon import Polygon

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import engine
-from engine.parallel import Budget
+from engine.budget import Budget
 from engine.solids.convex_faces import UNSURE
 from engine.solids.ear_cutting import cut_faces, cut_ring
 from tests.reference.exact import vector

@@ -10,8 +10,8 @@ import pytest
 
 import engine.collision.clearance.spreads as spreads
 from engine import DeadlineExceededError, Polyhedron, Pose, clearance
+from engine.budget import Budget
 from engine.collision.clearance.spreads import SpreadPair, _ExactPair, spread_pair
-from engine.parallel import Budget
 
 
 def ball(n: int, seed: int) -> Polyhedron:

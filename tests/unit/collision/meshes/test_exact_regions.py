@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from engine import Pose, Surface
+from engine.budget import Budget
 from engine.collision.meshes.exact_body import ExactBody, exact_pair
 from engine.collision.meshes.exact_regions import Sides, points_within, regions_of, sides_at, sides_over
 from engine.collision.meshes.mesh_arrays import mesh_body_of
-from engine.parallel import Budget
 from tests.unit.collision.meshes.bodies import TURN, mesh
 
 

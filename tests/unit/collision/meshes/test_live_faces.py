@@ -7,9 +7,9 @@ from fractions import Fraction
 import pytest
 
 from engine import Polyhedron
+from engine.budget import Budget
 from engine.collision.meshes.live_faces import live_piece
 from engine.collision.meshes.mesh_arrays import mesh_body_of
-from engine.parallel import Budget
 from tests.unit.collision.meshes.bodies import brick
 
 TWO = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]

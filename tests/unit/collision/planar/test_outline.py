@@ -7,8 +7,8 @@ from fractions import Fraction
 import pytest
 
 from engine import Aabb, Polygon, Pose, Sphere, Triangle, collide
+from engine.budget import Budget
 from engine.collision.planar.outline import is_clean, live_edges, outline_of, rounded, single_points
-from engine.parallel import Budget
 
 SQUARE = [[0, 0], [4, 0], [4, 4], [0, 4]]
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from engine import Cancel, CancelledError, Csg, Polyhedron, locate
+from engine.budget import Budget
 from engine.containment import policy
 from engine.containment.cells.build import build_cells
-from engine.parallel import Budget
 from tests.unit.containment.scenes import box_mesh, made
 
 

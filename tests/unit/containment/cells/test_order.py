@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from engine import locate
+from engine.budget import Budget
 from engine.containment import policy
 from engine.containment.cells import order as cell_order
 from engine.containment.cells.build import build_cells
-from engine.parallel import Budget
 from tests.unit.containment.scenes import box_mesh, made, merged
 
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from engine import Polyhedron, locate
+from engine.budget import Budget
 from engine.containment.cells.side import side_in_cell
 from engine.containment.cells.top import TopCells, build_top_cells, can_have_cells
 from engine.jit import kernel
 from engine.lanes.addresses import array_at, plain_array_at, plain_int8_at
-from engine.parallel import Budget
 from engine.types import UNDECIDED
 from tests.unit.containment.scenes import box_mesh, made, merged
 

@@ -7,10 +7,10 @@ import pytest
 
 from engine import Cancel, CancelledError, locate
 from engine.arrays import read_only
+from engine.budget import Budget
 from engine.containment.methods.polyhedron_one_pass import locate_by_pass
 from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
 from engine.containment.prepared import tree_of
-from engine.parallel import Budget
 from tests.unit.containment.scenes import box_mesh, lattice_points, made, merged
 
 

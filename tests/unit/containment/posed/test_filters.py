@@ -10,9 +10,9 @@ import pytest
 
 from engine import Aabb, Convex, HalfSpace, Implicit, Polygon, Solid
 from engine.arrays import read_only
+from engine.budget import Budget
 from engine.containment.posed.locators import _blurred_kernel
 from engine.containment.rational_locate import rational_location
-from engine.parallel import Budget
 from tests.unit.containment.scenes import box_mesh, made
 
 SOLIDS: list[Callable[[], Solid]] = [

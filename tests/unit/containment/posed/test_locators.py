@@ -7,9 +7,9 @@ import pytest
 
 from engine import Implicit, Pose
 from engine.arrays import read_only
+from engine.budget import Budget
 from engine.containment.posed.locators import posed_center, posed_locator
 from engine.containment.rational_locate import rational_location, to_world_frame
-from engine.parallel import Budget
 from engine.solids.sphere import Sphere
 from tests.unit.containment.scenes import lattice_points, lattice_solids, made
 

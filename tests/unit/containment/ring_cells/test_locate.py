@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from engine import Polygon
+from engine.budget import Budget
 from engine.containment.methods.polygon_ray_parity import locate_in_rings
 from engine.containment.prepared import rings_of
 from engine.containment.rational_locate import no_check, rational_location
 from engine.containment.ring_cells.build import build_ring_cells
 from engine.containment.ring_cells.locate import RingCells, locate_by_ring_cells
-from engine.parallel import Budget
 from engine.solids.checks import as_points
 from engine.types import UNDECIDED
 

@@ -6,10 +6,10 @@ import numpy as np
 
 from engine import Aabb, Convex, HalfSpace, Polygon, Pose, Sphere
 from engine.arrays import read_only
+from engine.budget import Budget
 from engine.containment.rational_locate import rational_location
 from engine.containment.scene.first_pass import drop_outside, put_in_order, scan_points, sort_by_cell
 from engine.containment.scene.tables import scene_of
-from engine.parallel import Budget
 from engine.types import UNDECIDED
 
 SOLIDS = [

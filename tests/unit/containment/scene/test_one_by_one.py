@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from engine import Polygon, Surface, locate_scene
+from engine.budget import Budget
 from engine.containment.scene.locate_scene import locate_few, locate_in
 from engine.containment.scene.one_by_one import are_few
 from engine.containment.scene.tables import scene_of
 from engine.errors import UnsupportedSolidError
-from engine.parallel import Budget
 from tests.unit.scenes.scenes import scene_of as bodies_of
 
 

@@ -9,11 +9,11 @@ import pytest
 
 from engine import Pose, Sphere
 from engine.arrays import read_only
+from engine.budget import Budget
 from engine.containment.rational_locate import rational_location
 from engine.containment.scene import second_pass
 from engine.containment.scene.second_pass import settle_rest
 from engine.containment.scene.tables import scene_of
-from engine.parallel import Budget
 from tests.unit.containment.scenes import box_mesh, made, merged
 
 TURN = Pose([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]], [0.5, 0.25, 1])

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from engine import Aabb, Convex, HalfSpace, Implicit, Polygon, Pose, Sphere, Triangle
+from engine.budget import Budget
 from engine.containment.scene.first_pass import BALL, BOX, RINGS, ROWS, SECOND_PASS
 from engine.containment.scene.tables import scene_of
-from engine.parallel import Budget
 from tests.unit.containment.scenes import box_mesh, made
 
 

@@ -6,11 +6,11 @@ import numpy as np
 
 from engine.arrays import read_only
 from engine.bounding.bvh import STACK
+from engine.budget import Budget
 from engine.containment.prepared import tree_of
 from engine.containment.rational_locate import rational_location
 from engine.containment.scene.tables import scene_of
 from engine.containment.scene.trees import TreeTables, locate_groups, tree_line
-from engine.parallel import Budget
 from engine.types import UNDECIDED
 from tests.unit.containment.scenes import box_mesh, made
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from engine.arrays import read_only
-from engine.parallel import Budget
+from engine.budget import Budget
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.in_integers import overlay_exactly
 from engine.polygon_overlay.run import Operation, overlay_compiled

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from engine.arrays import read_only
-from engine.parallel import Budget
+from engine.budget import Budget
 from engine.polygon_overlay.compiled.kernel import DONE
 from engine.polygon_overlay.compiled.loading import LEFT_OUT, RingArrays
 from engine.polygon_overlay.compiled.reducing import count_left_out, expand_rings

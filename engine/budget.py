@@ -1,0 +1,204 @@
+"""Deadline and cancel switch of one call, and the flag that kernels poll."""
+
+from __future__ import annotations
+
+import heapq
+import os
+import threading
+import time
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+
+from engine.arrays import FlagArray
+from engine.errors import CancelledError, DeadlineExceededError, InvalidInputError
+
+
+class Cancel:
+    """A switch that another thread may throw: every call given it ends soon with `CancelledError`."""
+
+    __slots__ = ("_flags", "_lock", "is_set")
+
+    def __init__(self) -> None:
+        self.is_set = False
+        self._flags: list[FlagArray] = []
+        self._lock = threading.Lock()
+
+    def set(self) -> None:
+        """Throw the switch; it stays thrown."""
+        with self._lock:
+            self.is_set = True
+            for flag in self._flags:
+                flag[0] = 1
+
+    def attach(self, flag: FlagArray) -> None:
+        """Have `flag` raised when the switch is thrown."""
+        with self._lock:
+            self._flags.append(flag)
+            if self.is_set:
+                flag[0] = 1
+
+    def detach(self, flag: FlagArray) -> None:
+        """Forget `flag`."""
+        with self._lock:
+            self._flags = [kept for kept in self._flags if kept is not flag]
+
+    def take(self, n_bytes: int) -> None:
+        """Hear that an answer is about to take so many more bytes; who must bound them overrides this, and raises."""
+
+
+@dataclass(order=True, slots=True)
+class _Waiting:
+    """A flag and when to raise it."""
+
+    end: float
+    flag: FlagArray | None = field(compare=False)  # None: no longer
+
+
+class _Clock:
+    """Raises flags when their time has come, all from one thread: to start one takes as long as a small call."""
+
+    def __init__(self) -> None:
+        self._heap: list[_Waiting] = []
+        self._n_dropped = 0
+        self._changed = threading.Condition()
+        self._runs = False
+
+    def add(self, end: float, flag: FlagArray) -> _Waiting:
+        """Have `flag` raised at the time `end` of the monotonic clock."""
+        waiting = _Waiting(end, flag)
+        with self._changed:
+            heapq.heappush(self._heap, waiting)
+            if not self._runs:
+                self._runs = True
+                threading.Thread(target=self._run, name="deadlines", daemon=True).start()
+            elif self._heap[0] is waiting:
+                self._changed.notify()
+        return waiting
+
+    def drop(self, waiting: _Waiting) -> None:
+        """Forget a flag, raised or not."""
+        with self._changed:
+            waiting.flag = None
+            self._n_dropped += 1
+            if 2 * self._n_dropped > len(self._heap) + 100:
+                self._heap = [kept for kept in self._heap if kept.flag is not None]
+                heapq.heapify(self._heap)
+                self._n_dropped = 0
+
+    def _run(self) -> None:
+        with self._changed:
+            while True:  # ends with the process
+                now = time.monotonic()
+                while self._heap and (self._heap[0].end <= now or self._heap[0].flag is None):
+                    flag = heapq.heappop(self._heap).flag
+                    if flag is not None:
+                        flag[0] = 1
+                self._changed.wait(self._heap[0].end - now if self._heap else None)
+
+
+_clock = _Clock()
+
+
+def _forget_clock() -> None:
+    """A forked child has the clock's object but not its thread."""
+    global _clock
+    _clock = _Clock()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forget_clock)
+
+
+_here = threading.local()
+
+
+def work_under(budget: Budget) -> None:
+    """Have `poll` know, in this thread, of a budget that was entered in another."""
+    _here.budget = budget
+
+
+def poll() -> None:
+    """Check every `Budget` that the work of this thread is done under, if any: for what is built deep below a call.
+
+    Raises: what `Budget.check` raises.
+    """
+    budget: Budget | None = getattr(_here, "budget", None)
+    while budget is not None:
+        budget.check()
+        budget = budget.around
+
+
+class Budget:
+    """Deadline and cancel switch of one call; use as a context manager, which `poll` then knows of.
+
+    deadline: seconds from now, None for no limit. cancel: a switch shared with other threads, or None. around: the one
+    that this one was entered under. `flag` is the one-element uint8 array that kernels poll.
+    """
+
+    def __init__(self, deadline: float | None = None, cancel: Cancel | None = None) -> None:
+        if deadline is not None and (
+            isinstance(deadline, bool) or not isinstance(deadline, (int, float)) or deadline != deadline  # NaN
+        ):
+            raise InvalidInputError(
+                f"deadline must be a number of seconds or None, got {shown(deadline)}", ("deadline",)
+            )
+        if cancel is not None and not isinstance(cancel, Cancel):
+            raise InvalidInputError(f"cancel must be an engine.Cancel or None, got {shown(cancel)}", ("cancel",))
+        longest = threading.TIMEOUT_MAX  # of the timer, some centuries: more than that is no limit
+        self.deadline = None if deadline is None or deadline > longest else float(max(deadline, -longest))
+        self.flag: FlagArray = np.zeros(1, np.uint8)
+        self._cancel = cancel
+        self._end = None if self.deadline is None else time.monotonic() + self.deadline
+        self._waiting: _Waiting | None = None
+        self.around: Budget | None = None
+
+    def __enter__(self) -> Budget:
+        if self._cancel is None and self._end is None:  # nothing to poll for
+            return self
+        self.around, _here.budget = getattr(_here, "budget", None), self
+        if self._cancel is not None:
+            self._cancel.attach(self.flag)
+        if self._end is not None:
+            self._waiting = _clock.add(self._end, self.flag)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._cancel is None and self._end is None:
+            return
+        _here.budget = self.around
+        if self._waiting is not None:
+            _clock.drop(self._waiting)
+        if self._cancel is not None:
+            self._cancel.detach(self.flag)
+
+    def check(self) -> None:
+        """Raise `CancelledError` or `DeadlineExceededError` if the call must end; cheap enough for inner loops.
+
+        A raised `flag` counts by itself: a kernel may have seen it and left its answers incomplete.
+        """
+        if self._cancel is not None and self._cancel.is_set:
+            raise CancelledError("the call was cancelled by its caller")
+        if self._end is not None and (self.flag[0] or time.monotonic() >= self._end):
+            raise DeadlineExceededError(
+                f"the deadline of {self.deadline!r} s passed before the call was done; "
+                "ask for less in one call or give it more time"
+            )
+        if self.flag[0]:
+            raise CancelledError("another part of the call failed")
+
+    def take(self, n_bytes: int) -> None:
+        """Say, before it is gathered, by how many bytes an answer grows whose size the question does not tell."""
+        if self._cancel is not None:
+            self._cancel.take(n_bytes)
+
+
+UNLIMITED: Final = Budget()
+"""Shared by all calls without a limit that hand it to no other thread: nothing ever raises its flag."""
+
+
+def shown(value: object) -> str:
+    """Return a number as it is, of anything else its type: its text could be endless."""
+    is_short = isinstance(value, float) or (isinstance(value, int) and abs(value) < 10**20)
+    return repr(value) if is_short else f"a value of type {type(value).__name__}"
