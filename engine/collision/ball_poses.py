@@ -7,17 +7,18 @@ from collections.abc import Callable
 import numpy as np
 
 from engine.collision.answers import Answers
-from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
+from engine.collision.codes import DISJOINT, OVERLAPPING, UNSETTLED
 from engine.collision.meshes.face_state import states_of
 from engine.collision.meshes.mesh_arrays import STATE_STACKED, mesh_body_of
 from engine.collision.meshes.placement import PoseArrays
+from engine.collision.result import RELATIONS, SWAPPED_RELATION
 from engine.collision.simple.against_ball import centers_in_frame, named
 from engine.collision.simple.ball_on_mesh import relate_balls
 from engine.direct import entry_of
 from engine.solids.base import Solid
 from engine.solids.sphere import Sphere
 
-_SWAPPED = np.array([DISJOINT, SECOND_INSIDE_FIRST, FIRST_INSIDE_SECOND, OVERLAPPING, TOUCHING, UNSETTLED], np.int8)
+_SWAPPED = np.array([*(SWAPPED_RELATION.get(relation, relation) for relation in RELATIONS), UNSETTLED], np.int8)
 """What a relation, or UNSETTLED as the last, is for the two bodies in the other order."""
 
 

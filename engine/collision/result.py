@@ -27,7 +27,7 @@ Poses = tuple[Pose | None, Pose | None]
 Containing = Literal["", "first", "second"]
 
 _SWAPPED: dict[Containing, Containing] = {"": "", "first": "second", "second": "first"}
-_SWAPPED_RELATION = {
+SWAPPED_RELATION = {
     Relation.FIRST_INSIDE_SECOND: Relation.SECOND_INSIDE_FIRST,
     Relation.SECOND_INSIDE_FIRST: Relation.FIRST_INSIDE_SECOND,
 }
@@ -69,7 +69,7 @@ class Collision:
         w, detail = self.witness, None if self.detail is None else self.detail.swapped
         if w is not None:
             w = Witness(w.kind, w.second_face, w.first_face, _SWAPPED[w.containing], w.piercing)
-        return Collision(_SWAPPED_RELATION.get(self.relation, self.relation), w, detail)
+        return Collision(SWAPPED_RELATION.get(self.relation, self.relation), w, detail)
 
 
 MESHES = ("polyhedron", "surface", "aabb")
