@@ -189,11 +189,7 @@ def _contest(rows: list[tuple[int, Row]]) -> dict[str, Any]:
     return {"name": first["contest"], "hard": first["is_hard"], "about": first.get("about", ""), "rows": made}
 
 
-def text_of(
-    found: dict[str, Any],
-    path: str,
-    titles: Sequence[tuple[str, str, str, str]] = QUESTIONS,
-) -> str:
+def text_of(found: dict[str, Any], path: str, titles: Sequence[tuple[str, str, str, str]] = QUESTIONS) -> str:
     """Return the page; path: of the results, from the root of the repository; titles: as `QUESTIONS`."""
     rows, contests = found["rows"], {}
     asked = questions(rows, titles)

@@ -69,11 +69,7 @@ class Store:
     """A dictionary of solids and scenes by name with a budget of bytes; safe to share between threads."""
 
     def __init__(
-        self,
-        budget: int,
-        folder: Path | None = None,
-        folder_budget: int = 2**40,
-        metrics: Metrics | None = None,
+        self, budget: int, folder: Path | None = None, folder_budget: int = 2**40, metrics: Metrics | None = None
     ) -> None:
         self._budget = budget
         self._metrics = metrics or Metrics()

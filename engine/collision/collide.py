@@ -8,17 +8,7 @@ from engine.budget import Budget, Cancel
 from engine.collision.detail import check_has_detail, detail_of
 from engine.collision.meshes.mesh_mesh import mesh_mesh
 from engine.collision.planar.outline_batch import collide_outlines
-from engine.collision.result import (
-    BODIES,
-    MESHES,
-    OUTLINES,
-    UNCOUNTED,
-    UNNAMED,
-    Collision,
-    PairFunction,
-    Poses,
-    Work,
-)
+from engine.collision.result import BODIES, MESHES, OUTLINES, UNCOUNTED, UNNAMED, Collision, PairFunction, Poses, Work
 from engine.collision.simple.against_ball import collide_body_sphere
 from engine.collision.simple.against_half_space import collide_half_space_body
 from engine.collision.simple.closed_forms import (

@@ -5,12 +5,7 @@ from __future__ import annotations
 import engine
 from service.convert import answers, questions
 from service.routes.base import router_of
-from service.schemas.containment import (
-    ContainsRequest,
-    ContainsResponse,
-    ContainsSceneRequest,
-    ContainsSceneResponse,
-)
+from service.schemas.containment import ContainsRequest, ContainsResponse, ContainsSceneRequest, ContainsSceneResponse
 from service.work import CallOf
 
 router = router_of("containment")

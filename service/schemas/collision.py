@@ -92,10 +92,7 @@ class CollideSceneRequest(Schema):
             "bodies": [
                 {"solid": _CUBE},
                 {"solid": _BALL},
-                {
-                    "solid": _CUBE,
-                    "pose": {"rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "translation": [1, 0, 0]},
-                },
+                {"solid": _CUBE, "pose": {"rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "translation": [1, 0, 0]}},
             ]
         },
         {
@@ -108,10 +105,7 @@ class CollideSceneRequest(Schema):
             "bodies": [
                 {"solid": _CUBE},
                 {"solid": _CUBE},
-                {
-                    "solid": _CHIP,
-                    "pose": {"rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "translation": [1.5, 0, 0]},
-                },
+                {"solid": _CHIP, "pose": {"rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "translation": [1.5, 0, 0]}},
             ],
             "skip": [[0, 1]],
             "gap": 1,

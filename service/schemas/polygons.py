@@ -20,10 +20,7 @@ class ClipPolygonsRequest(Schema):
     """What does Sutherland-Hodgman leave of these polygons on this convex region?"""
 
     model_config = with_example(
-        {
-            "region": {"type": "half_space", "normal": [-1, 0], "offset": 1},
-            "polygons": [[[[0, 0], [4, 0], [0, 4]]]],
-        }
+        {"region": {"type": "half_space", "normal": [-1, 0], "offset": 1}, "polygons": [[[[0, 0], [4, 0], [0, 4]]]]}
     )
 
     region: Solid = Field(description="half_space, aabb, convex, or a polyhedron that is convex.")

@@ -17,10 +17,7 @@ class ClipSegmentsRequest(Schema):
     """What remains of these segments within this region?"""
 
     model_config = with_example(
-        {
-            "region": {"type": "aabb", "min": [0, 0], "max": [2, 2]},
-            "segments": [[[-1, 1], [3, 1]], [[5, 5], [6, 6]]],
-        }
+        {"region": {"type": "aabb", "min": [0, 0], "max": [2, 2]}, "segments": [[[-1, 1], [3, 1]], [[5, 5], [6, 6]]]}
     )
 
     region: Solid = Field(description="half_space, aabb, convex, sphere, polygon or polyhedron.")

@@ -13,13 +13,7 @@ import numpy as np
 from engine.arrays import FloatArray
 from engine.budget import Budget
 from engine.collision.clearance.bodies import BALL, outline_of
-from engine.collision.clearance.closed_forms import (
-    UNSURE,
-    ends_of_shared,
-    nearest_of_forms,
-    nearest_of_plane,
-    touched,
-)
+from engine.collision.clearance.closed_forms import UNSURE, ends_of_shared, nearest_of_forms, nearest_of_plane, touched
 from engine.collision.clearance.exact import Gap, Rational, ScaledGap
 from engine.collision.clearance.outlines import nearest_of_outlines, nearest_under_poses
 from engine.collision.clearance.result import Clearance, Feature

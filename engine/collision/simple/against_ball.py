@@ -15,11 +15,7 @@ import numpy as np
 
 from engine.arrays import FloatArray, IntArray
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
-from engine.collision.exact_images import (
-    Vector,
-    image_point,
-    rounded,
-)
+from engine.collision.exact_images import Vector, image_point, rounded
 from engine.collision.meshes.face_state import state_at
 from engine.collision.meshes.live_faces import simplex_distance
 from engine.collision.meshes.mesh_arrays import STATE_STACKED, MeshBody, mesh_body_of

@@ -11,10 +11,7 @@ from __future__ import annotations
 from fractions import Fraction
 from functools import lru_cache
 
-from engine.collision.codes import (
-    OVERLAPPING,
-    UNSETTLED,
-)
+from engine.collision.codes import OVERLAPPING, UNSETTLED
 from engine.collision.exact_images import as_vector, image_half_space, image_point, value_at
 from engine.collision.meshes.contact_kinds import STRENGTH
 from engine.collision.result import (

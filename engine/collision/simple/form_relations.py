@@ -11,14 +11,7 @@ from __future__ import annotations
 
 from typing import Any, Final, NamedTuple
 
-from engine.collision.codes import (
-    DISJOINT,
-    FIRST_INSIDE_SECOND,
-    OVERLAPPING,
-    SECOND_INSIDE_FIRST,
-    TOUCHING,
-    UNSETTLED,
-)
+from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
 from engine.collision.meshes.contact_kinds import EDGE_EDGE, EDGE_FACE, FACE_FACE, VERTEX_VERTEX
 from engine.collision.meshes.placement import orient2d_near
 from engine.collision.simple.form import HIGH, IS_BALL, RADIUS
