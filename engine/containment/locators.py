@@ -1,12 +1,12 @@
 """One explicit table from solid type to method: how the points of a batch are located in each solid.
 
 A `Locator` has a compiled half, which fills in an int8 location for each point of a chunk and leaves UNDECIDED what is
-out of its range, and a rational half, which settles one such point. Structures are prepared once a solid.
+out of its range, and a rational half, which settles those. Structures are prepared once a solid.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -27,7 +27,7 @@ from engine.containment.methods.polynomial import locate_by_polynomial
 from engine.containment.policy import CELLS, LONG_PASS, PASS, choose_for_mesh, choose_for_rings
 from engine.containment.posed.filters import NOT_FINITE
 from engine.containment.prepared import EXACT, prism_rows, rings_of, tree_of
-from engine.containment.rational_locate import Check, combine, over_tree, rational_location, unsupported
+from engine.containment.rational_locate import combine, over_tree, rational_location, unsupported
 from engine.containment.ring_cells.build import ring_cells_of
 from engine.containment.ring_cells.locate import locate_by_ring_cells
 from engine.errors import InvalidArrayError, NotFiniteError
@@ -76,10 +76,8 @@ class Locator(NamedTuple):
         return self if self.for_batch is None else self.for_batch(n_points, budget)
 
 
-def settled(
-    kernel: Callable[[FloatArray, Int8Array, Budget], int], settle: Callable[[Sequence[float], Check], int]
-) -> Fill:
-    """Return the fill that runs `kernel` over a chunk and settles what it leaves UNDECIDED one by one.
+def settled(kernel: Callable[[FloatArray, Int8Array, Budget], int], rest: Fill) -> Fill:
+    """Return the fill that runs `kernel` over a chunk and asks another fill about what it leaves UNDECIDED.
 
     kernel: returns how many points needed more than its filter, those left UNDECIDED among them, or NOT_FINITE.
     Raises NotFiniteError, which names no point, and what `Budget.check` raises, also when the kernel stopped early.
@@ -95,12 +93,17 @@ def settled(
             return Counts(0, 0)
         if n_beyond == NOT_FINITE:
             raise NotFiniteError("a point is not finite", ("points",))
-        undecided = np.flatnonzero(locations == UNDECIDED)
-        for item in undecided:
-            locations[item] = settle(points[item].tolist(), budget.check)
-        return Counts(n_beyond, len(undecided))
+        return Counts(n_beyond, fill_some(rest, points, locations, np.flatnonzero(locations == UNDECIDED), budget))
 
     return fill
+
+
+def fill_some(fill: Fill, points: FloatArray, locations: Int8Array, items: IntArray, budget: Budget) -> int:
+    """Locate those points of a chunk that `items` numbers; return how many took rational arithmetic."""
+    found = np.empty(len(items), np.int8)
+    counts = fill(points[items], found, budget)
+    locations[items] = found
+    return counts.rational
 
 
 def locator_of(solid: Solid) -> Locator:
@@ -114,18 +117,26 @@ def locator_of(solid: Solid) -> Locator:
     return maker(solid)
 
 
-def rational_half(solid: Solid, pose: Pose | None = None) -> Callable[[Sequence[float], Check], int]:
-    """Return what settles one point of a chunk."""
-    return lambda point, check: rational_location(point, solid, pose, check)
+def rational_half(solid: Solid, pose: Pose | None = None) -> Fill:
+    """Return the fill that asks rational arithmetic about each point."""
+
+    def fill(points: FloatArray, locations: Int8Array, budget: Budget) -> Counts:
+        for item, point in enumerate(points.tolist()):
+            locations[item] = rational_location(point, solid, pose, budget.check)
+        return Counts(len(points), len(points))
+
+    return fill
 
 
-def _by_kernel(method: str, kernel: Callable[..., int], solid: Solid, *prepared: object) -> Locator:
+def by_kernel(
+    method: str, kernel: Callable[..., int], solid: Solid, *prepared: object, pose: Pose | None = None
+) -> Locator:
     """Return the locator by a kernel that takes points, what is prepared of the solid, locations and flag."""
+    return Locator(method, _filled_by(kernel, *prepared, rest=rational_half(solid, pose)), direct=(kernel, *prepared))
 
-    def run(points: FloatArray, out: Int8Array, budget: Budget) -> int:
-        return kernel(points, *prepared, out, budget.flag)
 
-    return Locator(method, settled(run, rational_half(solid)), direct=(kernel, *prepared))
+def _filled_by(kernel: Callable[..., int], *prepared: object, rest: Fill) -> Fill:
+    return settled(lambda points, out, budget: kernel(points, *prepared, out, budget.flag), rest)
 
 
 def _by_choice(method: str, choose: Callable[[int, Budget], Locator]) -> Locator:
@@ -137,18 +148,18 @@ def _by_choice(method: str, choose: Callable[[int, Budget], Locator]) -> Locator
 def _in_rows(solid: HalfSpace | Convex) -> Locator:
     rows = rows_of(solid)
     kernel = locate_in_half_planes if solid.dimension == 2 else locate_in_half_spaces
-    return _by_kernel("half_spaces", kernel, solid, rows, np.ones(len(rows), np.bool_))
+    return by_kernel("half_spaces", kernel, solid, rows, np.ones(len(rows), np.bool_))
 
 
 def _in_triangle(solid: Triangle) -> Locator:
     if solid.dimension == 2:
         return by_ring_pass("same_side", solid)
-    return _by_choice("prism", lambda _, budget: _by_kernel("prism", locate_in_half_spaces, solid, *prism_rows(solid)))
+    return _by_choice("prism", lambda _, budget: by_kernel("prism", locate_in_half_spaces, solid, *prism_rows(solid)))
 
 
 def by_ring_pass(method: str, solid: Polygon | Triangle) -> Locator:
     """Return the locator that passes over all edges."""
-    return _by_kernel(method, locate_by_ring_pass, solid, EXACT, solid.vertices, solid.ring_offsets)
+    return by_kernel(method, locate_by_ring_pass, solid, EXACT, solid.vertices, solid.ring_offsets)
 
 
 def _in_polygon(solid: Polygon) -> Locator:
@@ -161,7 +172,7 @@ def polygon_by(solid: Polygon, choice: int, budget: Budget) -> Locator:
     """Return the locator by what policy.py chose; it builds that."""
 
     def by_rays(budget: Budget) -> Locator:
-        return _by_kernel("ring_crossing", locate_in_rings, solid, EXACT, *rings_of(solid, budget.check))
+        return by_kernel("ring_crossing", locate_in_rings, solid, EXACT, *rings_of(solid, budget.check))
 
     if choice == PASS:
         return by_ring_pass("ring_crossing", solid)
@@ -169,7 +180,7 @@ def polygon_by(solid: Polygon, choice: int, budget: Budget) -> Locator:
     if cells is None:
         return by_rays(budget)
     rays: Fill = lambda points, out, budget: by_rays(budget).fill(points, out, budget)  # noqa: E731
-    return Locator("ring_cells", _in_cells(locate_by_ring_cells, cells, rays))
+    return Locator("ring_cells", _filled_by(locate_by_ring_cells, cells, rest=rays))
 
 
 def _in_polyhedron(solid: Polyhedron) -> Locator:
@@ -181,44 +192,24 @@ def _in_polyhedron(solid: Polyhedron) -> Locator:
 def polyhedron_by(solid: Polyhedron, choice: int, budget: Budget) -> Locator:
     """Return the locator by what policy.py chose; it builds that."""
     if choice == PASS:
-        by_pass = _by_kernel("ray_parity", locate_by_pass, solid, solid.vertices, solid.triangles)
+        by_pass = by_kernel("ray_parity", locate_by_pass, solid, solid.vertices, solid.triangles)
         return by_pass._replace(is_long=len(solid.triangles) > LONG_PASS)
-    by_rays = _by_kernel("ray_parity", locate_by_tree, solid, EXACT, tree_of(solid, budget.check))
+    by_rays = by_kernel("ray_parity", locate_by_tree, solid, EXACT, tree_of(solid, budget.check))
     if choice != CELLS:
         return by_rays
     cells = cells_of(solid, budget)
     return Locator(
         "segment_parity",
-        _in_cells(locate_by_cells, cells, by_rays.fill),
+        _filled_by(locate_by_cells, cells, rest=by_rays.fill),
         order=lambda points, budget: order_if_it_pays(points, cells, budget),
     )
-
-
-def _in_cells(kernel: Callable[..., int], cells: object, by_rays: Fill) -> Fill:
-    """Return the fill that asks the cells, and casts rays for the points that are too close to a plane for them."""
-
-    def fill(points: FloatArray, locations: Int8Array, budget: Budget) -> Counts:
-        with np.errstate(all="ignore"):
-            n_open = int(kernel(read_only(points), cells, locations, budget.flag))
-        if n_open == NOT_FINITE:
-            raise NotFiniteError("a point is not finite", ("points",))
-        if n_open == 0:
-            return Counts(0, 0)
-        budget.check()
-        still_open = np.flatnonzero(locations == UNDECIDED)
-        found = np.empty(len(still_open), np.int8)
-        counts = by_rays(points[still_open], found, budget)
-        locations[still_open] = found
-        return Counts(n_open, counts.rational)
-
-    return fill
 
 
 def _in_implicit(solid: Implicit) -> Locator:
     if solid.function is not None:
         return Locator("callable", _call(solid), "float64")
     degree = int(solid.powers.sum(axis=1).max())
-    return _by_kernel("polynomial", locate_by_polynomial, solid, solid.powers, solid.coefficients, degree)
+    return by_kernel("polynomial", locate_by_polynomial, solid, solid.powers, solid.coefficients, degree)
 
 
 def _call(solid: Implicit) -> Fill:
@@ -266,8 +257,8 @@ def csg_locator(solid: Csg, leaf_locator: Callable[[Solid], Locator]) -> Locator
 _MAKERS: dict[type[Solid], Callable[..., Locator]] = {
     HalfSpace: _in_rows,
     Convex: _in_rows,
-    Sphere: lambda solid: _by_kernel("squared_distance", locate_in_ball, solid, solid.center, 0.0, solid.radius),
-    Aabb: lambda solid: _by_kernel("comparison", locate_in_box, solid, EXACT, solid.min, solid.max),
+    Sphere: lambda solid: by_kernel("squared_distance", locate_in_ball, solid, solid.center, 0.0, solid.radius),
+    Aabb: lambda solid: by_kernel("comparison", locate_in_box, solid, EXACT, solid.min, solid.max),
     Triangle: _in_triangle,
     Polygon: _in_polygon,
     Polyhedron: _in_polyhedron,

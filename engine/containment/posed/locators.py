@@ -18,7 +18,16 @@ import numpy as np
 
 from engine.arrays import FloatArray, Int8Array, read_only
 from engine.budget import Budget
-from engine.containment.locators import Counts, Fill, Locator, csg_locator, locator_of, rational_half, settled
+from engine.containment.locators import (
+    Counts,
+    Fill,
+    Locator,
+    by_kernel,
+    csg_locator,
+    fill_some,
+    locator_of,
+    rational_half,
+)
 from engine.containment.methods.ball import locate_in_ball
 from engine.containment.methods.box import locate_in_box
 from engine.containment.methods.polygon_one_pass import locate_by_ring_pass
@@ -52,7 +61,7 @@ def posed_locator(solid: Solid, pose: Pose | None) -> Locator:
     if isinstance(solid, Csg):
         return csg_locator(solid, lambda leaf: posed_locator(leaf, pose))
     if isinstance(solid, Sphere):
-        return _in_posed_sphere(solid, pose)
+        return by_kernel("squared_distance", locate_in_ball, solid, *posed_center(solid, pose), solid.radius, pose=pose)
     unposed = locator_of(solid)
     frames = _frames(pose)
     if isinstance(solid, Implicit) and solid.function is not None:
@@ -76,7 +85,7 @@ def _moved(points: FloatArray, frames: Frames) -> tuple[FloatArray, FloatArray]:
 def _filtered(solid: Solid, pose: Pose, unposed: Locator, frames: Frames) -> Fill:
     """Return the fill that tries exact preimages, then the blurred filter, then integers."""
     blurred = _blurred_kernel(solid)
-    settle = rational_half(solid, pose)
+    rest = rational_half(solid, pose)
 
     def fill(points: FloatArray, locations: Int8Array, budget: Budget) -> Counts:
         moved, blurs = _moved(points, frames)
@@ -88,14 +97,9 @@ def _filtered(solid: Solid, pose: Pose, unposed: Locator, frames: Frames) -> Fil
         n_rational = 0
         if frames.is_turn[0]:
             exact = np.flatnonzero((blurs == 0.0) & (locations == UNDECIDED))
-            if len(exact):
-                found = np.empty(len(exact), np.int8)
-                n_rational += unposed.fill(moved[exact], found, budget).rational
-                locations[exact] = found
-        undecided = np.flatnonzero(locations == UNDECIDED)
-        for item in undecided:
-            locations[item] = settle(points[item].tolist(), budget.check)
-        return Counts(n_beyond, n_rational + len(undecided))
+            n_rational = fill_some(unposed.fill, moved, locations, exact, budget)
+        n_rational += fill_some(rest, points, locations, np.flatnonzero(locations == UNDECIDED), budget)
+        return Counts(n_beyond, n_rational)
 
     return fill
 
@@ -130,12 +134,3 @@ def posed_center(solid: Sphere, pose: Pose) -> tuple[FloatArray, float]:
         return np.zeros(solid.dimension), np.inf
     blur = 0.0 if center.tolist() == exact else ulp(float(np.abs(center).max()))
     return read_only(center), blur
-
-
-def _in_posed_sphere(solid: Sphere, pose: Pose) -> Locator:
-    ball = *posed_center(solid, pose), solid.radius
-
-    def run(points: FloatArray, locations: Int8Array, budget: Budget) -> int:
-        return int(locate_in_ball(points, *ball, locations, budget.flag))
-
-    return Locator("squared_distance", settled(run, rational_half(solid, pose)))
