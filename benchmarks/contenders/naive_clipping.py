@@ -15,8 +15,7 @@ import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.jit import allocating_kernel, inline
-from engine.predicates.loading import as_point2, as_point3
-from engine.predicates.vectors import along
+from engine.predicates.vectors import along, as_point2, as_point3
 from engine.textbook.clip_segments import ACCEPTED, MAX_TURNS, REJECTED, UNFINISHED
 from engine.types import Point2, Point3
 

@@ -13,8 +13,7 @@ import numpy as np
 from engine.jit import allocating_kernel, inline
 from engine.lanes.boxes import EMPTY
 from engine.lanes.tracing import LANES
-from engine.predicates.loading import as_point3
-from engine.predicates.vectors import cross, dot, length, minus
+from engine.predicates.vectors import as_point3, cross, dot, length, minus
 from engine.types import Point3
 
 _ENLARGED: Final = 2.0**-20

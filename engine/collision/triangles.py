@@ -27,9 +27,9 @@ from engine.collision.result import Work
 from engine.errors import InvalidArrayError, WrongDimensionError
 from engine.jit import allocating_kernel, inline, kernel, merged
 from engine.parallel import Progress, check_options, run_chunks
-from engine.predicates.loading import as_point2
 from engine.predicates.orientation import orient2d
 from engine.predicates.rational import scaled_integers
+from engine.predicates.vectors import as_point2
 from engine.solids.checks import as_point_groups
 from engine.solids.triangle import Triangle
 from engine.types import UNDECIDED, Accuracy, Relation

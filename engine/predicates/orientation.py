@@ -36,9 +36,8 @@ from engine.jit import called, inline, kernel, merged
 from engine.predicates.double_double import U2, dd_add, dd_mul, dd_sub
 from engine.predicates.error_free import two_diff, workspace
 from engine.predicates.expansion import Components, add_scaled, sign
-from engine.predicates.loading import as_point3
 from engine.predicates.parameters import compare_differences, compare_in_pairs, minor
-from engine.predicates.vectors import minus
+from engine.predicates.vectors import as_point3, minus
 from engine.types import UNDECIDED, Point2, Point3
 
 BOUND_2D = 2.0**-51  # 4u

@@ -22,8 +22,8 @@ import numpy as np
 
 from engine.arrays import FloatArray, read_only
 from engine.jit import allocating, inline, kernel
-from engine.predicates.loading import as_point3, corners_of
 from engine.predicates.orientation import orient3d
+from engine.predicates.vectors import as_point3, corners_of
 from engine.solids.polyhedron import Polyhedron
 from engine.types import Point3
 

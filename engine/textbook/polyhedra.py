@@ -16,8 +16,7 @@ import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.jit import allocating_kernel, inline
-from engine.predicates.loading import as_point3
-from engine.predicates.vectors import cross, dot, minus
+from engine.predicates.vectors import as_point3, cross, dot, minus
 from engine.types import Point3
 
 OUT, IN, CLOSE_TO_AN_EDGE = 0, 1, 2

@@ -13,8 +13,7 @@ import numpy as np
 
 from engine.arrays import BoolArray, FloatArray
 from engine.jit import allocating_kernel, inline
-from engine.predicates.loading import as_point3
-from engine.predicates.vectors import cross, dot, minus
+from engine.predicates.vectors import as_point3, cross, dot, minus
 from engine.types import Point2, Point3
 
 

@@ -12,9 +12,9 @@ from engine.collision.clearance.wide import Wide, less
 from engine.collision.planar.outline_batch import BLOCK
 from engine.jit import called, inline
 from engine.predicates.error_free import workspace
-from engine.predicates.loading import as_point2
 from engine.predicates.orientation import lower
 from engine.predicates.parameters import compare_differences
+from engine.predicates.vectors import as_point2
 from engine.types import Point2
 
 MOST_NEAR: Final = 64

@@ -20,7 +20,7 @@ from engine.collision.planar.outline_batch import inside, n_blocks, relate_place
 from engine.jit import allocating_kernel, called, inline
 from engine.predicates.double_double import U2, surely_rounded
 from engine.predicates.error_free import two_sum, workspace
-from engine.predicates.loading import as_point2
+from engine.predicates.vectors import as_point2
 from engine.types import UNDECIDED
 
 _SMALLEST: Final = 2.0**-140

@@ -27,8 +27,7 @@ from engine.collision.meshes.triangle_triangle import Facet, corner
 from engine.jit import called, inline
 from engine.predicates.double_double import surely_rounded
 from engine.predicates.error_free import two_diff
-from engine.predicates.loading import as_point3
-from engine.predicates.vectors import dot, minus
+from engine.predicates.vectors import as_point3, dot, minus
 from engine.types import Point3
 
 ROUNDING: Final = 2.0**-94

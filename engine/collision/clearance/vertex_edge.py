@@ -18,7 +18,7 @@ import numpy as np
 from engine.collision.clearance.wide import Wide, less, over, plus, product, root, times
 from engine.collision.planar.outline_batch import box_blocks
 from engine.jit import called, inline
-from engine.predicates.loading import as_point2
+from engine.predicates.vectors import as_point2
 
 LARGEST: Final = 2.0**200
 """Of coordinates that the bounds hold for."""

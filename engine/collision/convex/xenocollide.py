@@ -32,8 +32,7 @@ from engine.collision.codes import UNSETTLED
 from engine.collision.convex.body import REACH, ROUND, ConvexArrays, point_of
 from engine.collision.meshes.placement import Placement, PoseArrays, as_placement, placed, turned_back
 from engine.jit import inline, merged
-from engine.predicates.loading import as_point3
-from engine.predicates.vectors import cross, dot, largest_of, length, minus, negative
+from engine.predicates.vectors import as_point3, cross, dot, largest_of, length, minus, negative
 from engine.types import Point3
 
 APART, MEETING = 0, 1

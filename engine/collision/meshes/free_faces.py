@@ -24,8 +24,7 @@ from engine.collision.meshes.mesh_arrays import STATE_STACKED, MeshArrays, in_tr
 from engine.collision.meshes.parity import INSIDE, OUTSIDE, OwnPoint, brought_back, locate_point
 from engine.collision.meshes.placement import Placement, defect_of
 from engine.jit import allocating, called, inline
-from engine.predicates.loading import as_point3
-from engine.predicates.vectors import largest_of, minus
+from engine.predicates.vectors import as_point3, largest_of, minus
 from engine.types import UNDECIDED
 
 JUDGED = 64

@@ -26,9 +26,8 @@ from engine.lanes.boxes import EMPTY
 from engine.lanes.discs import DISC_ROWS
 from engine.lanes.faces import NOWHERE
 from engine.lanes.triangles import CORNER_ROWS
-from engine.predicates.loading import as_point3
 from engine.predicates.orientation import orient2d
-from engine.predicates.vectors import cross, minus
+from engine.predicates.vectors import as_point3, cross, minus
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.mesh import Mesh

@@ -19,10 +19,9 @@ from engine.collision.meshes.mesh_arrays import MeshArrays, in_tree, triangle_of
 from engine.collision.meshes.placement import Placement, defect_of, orient2d_near, place_pair, placed, turned_back
 from engine.collision.meshes.triangle_triangle import Facet
 from engine.jit import allocating, inline, kernel, merged
-from engine.predicates.loading import as_point3
 from engine.predicates.orientation import orient3d
 from engine.predicates.posed import orient3d_rounded
-from engine.predicates.vectors import largest_of, minus
+from engine.predicates.vectors import as_point3, largest_of, minus
 from engine.types import UNDECIDED, Point2, Point3
 
 OUTSIDE = -1

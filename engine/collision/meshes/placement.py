@@ -32,9 +32,8 @@ import numpy as np
 
 from engine.arrays import FloatArray
 from engine.jit import inline, merged
-from engine.predicates.loading import as_point3
 from engine.predicates.orientation import orient2d
-from engine.predicates.vectors import dot, largest_of, minus
+from engine.predicates.vectors import as_point3, dot, largest_of, minus
 from engine.types import UNDECIDED, Point2, Point3
 
 

@@ -38,7 +38,7 @@ from engine.collision.meshes.placement import Placement, PoseArrays, defect_of
 from engine.collision.meshes.touching import relate_by_contacts
 from engine.collision.meshes.triangle_triangle import COPLANAR, CORNER, CROSSING, beside
 from engine.jit import called, inline, kernel, merged
-from engine.predicates.loading import as_point3
+from engine.predicates.vectors import as_point3
 from engine.types import UNDECIDED
 
 RELATION, KIND, FIRST_FACE, SECOND_FACE, N_CONTACTS = range(5)

@@ -18,8 +18,8 @@ from engine.collision.meshes.free_faces import by_places
 from engine.collision.meshes.placement import Placement, placed
 from engine.collision.meshes.triangle_triangle import Facet, sign_of_four
 from engine.jit import allocating, called, inline
-from engine.predicates.loading import as_point3
 from engine.predicates.posed import UNPOSED, PosedPoint3
+from engine.predicates.vectors import as_point3
 from engine.types import UNDECIDED
 
 N_FIRST = 2

@@ -21,10 +21,9 @@ from typing import Any
 import numpy as np
 
 from engine.jit import called, inline, merged
-from engine.predicates.loading import as_point3
 from engine.predicates.orientation import orient2d
 from engine.predicates.posed import UNPOSED, PosedPoint3, orient3d_posed, posed_point
-from engine.predicates.vectors import cross, dot, largest_of, minus
+from engine.predicates.vectors import as_point3, cross, dot, largest_of, minus
 from engine.types import UNDECIDED, Point2, Point3
 
 APART = 0

@@ -21,8 +21,8 @@ from engine.collision.planar.outline import collide_outline_outline, rings_of
 from engine.collision.result import FIRST_WITHIN, OUTLINES, SECOND_WITHIN, UNNAMED, Collision, Poses, Witness, Work
 from engine.direct import entry_of
 from engine.jit import allocating_kernel, inline, kernel
-from engine.predicates.loading import as_point2
 from engine.predicates.orientation import orient2d
+from engine.predicates.vectors import as_point2
 from engine.solids.base import Solid
 from engine.solids.pose import motion_of
 from engine.solids.ragged import next_in_rings

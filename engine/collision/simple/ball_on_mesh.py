@@ -21,8 +21,7 @@ from engine.collision.meshes.mesh_arrays import MeshArrays, in_tree, triangle_of
 from engine.collision.meshes.parity import INSIDE, OUTSIDE, OwnPoint, locate_point
 from engine.collision.meshes.triangle_triangle import Facet
 from engine.jit import allocating, inline, kernel
-from engine.predicates.loading import as_point3
-from engine.predicates.vectors import dot, largest_of, minus
+from engine.predicates.vectors import as_point3, dot, largest_of, minus
 from engine.types import Point3
 
 _MANY = 4096

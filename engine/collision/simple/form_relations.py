@@ -18,8 +18,7 @@ from engine.collision.simple.form import HIGH, IS_BALL, RADIUS
 from engine.jit import called, inline, kernel
 from engine.predicates.error_free import two_sum, workspace
 from engine.predicates.expansion import add, add_product, grow, grow_product, is_safe, sign
-from engine.predicates.loading import as_point3
-from engine.predicates.vectors import cross, dot, minus
+from engine.predicates.vectors import as_point3, cross, dot, minus
 from engine.types import UNDECIDED, Point2, Point3
 
 KIND_AT: Final = 3

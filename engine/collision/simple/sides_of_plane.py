@@ -6,8 +6,7 @@ from typing import Any
 
 from engine.collision.meshes.mesh_arrays import MeshArrays
 from engine.jit import inline, kernel
-from engine.predicates.loading import as_point3
-from engine.predicates.vectors import dot
+from engine.predicates.vectors import as_point3, dot
 from engine.types import Point3
 
 _BLOCK = 64

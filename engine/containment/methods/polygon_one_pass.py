@@ -19,8 +19,8 @@ from engine.arrays import FloatArray, IntArray
 from engine.containment.methods.polygon_ray_parity import CROSSED, ON_EDGE, meet_edge
 from engine.containment.posed.filters import NOT_FINITE, has_not_finite
 from engine.jit import allocating, allocating_kernel, called, inline, merged
-from engine.predicates.loading import as_point2
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
+from engine.predicates.vectors import as_point2
 from engine.types import UNDECIDED, Point2
 
 _BLOCK: Final = 256

@@ -19,8 +19,8 @@ from typing import Any
 from engine.bounding.grid import cell_of
 from engine.containment.posed.filters import NOT_FINITE, has_not_finite, orient2d_blurred
 from engine.jit import called, inline, kernel, merged
-from engine.predicates.loading import as_point2
 from engine.predicates.orientation import orient2d_exact, orient2d_filter
+from engine.predicates.vectors import as_point2
 from engine.types import UNDECIDED
 
 MISSED, CROSSED, ON_EDGE, BEYOND = 0, 1, 3, 4

@@ -15,7 +15,7 @@ from engine.bounding.grid import Axis, cell_of
 from engine.containment.methods.polyhedron_ray_parity import BEYOND, CROSSED, ON_FACE, meet_upwards
 from engine.containment.posed.filters import NOT_FINITE, has_not_finite
 from engine.jit import allocating_kernel, inline
-from engine.predicates.loading import as_point3, corners_of
+from engine.predicates.vectors import as_point3, corners_of
 from engine.types import UNDECIDED
 
 _ODD, _ON_FACE, _OPEN, _BEYOND = 1, 2, 4, 8

@@ -34,9 +34,9 @@ from engine.jit import allocating_kernel, called, inline, kernel, merged
 from engine.lanes.boxes import EMPTY, inside_box
 from engine.lanes.lanes import count_bits, lowest_bit
 from engine.lanes.overhead import BAND, GROWTH, LEAST_REACH, OVERHEAD_ROWS, overhead
-from engine.predicates.loading import as_point3, corners_of
 from engine.predicates.orientation import orient2d, orient2d_exact, orient2d_filter, orient3d_exact, orient3d_filter
 from engine.predicates.posed import orient3d_rounded
+from engine.predicates.vectors import as_point3, corners_of
 from engine.types import UNDECIDED, Point2, Point3
 
 MISSED: Final = 0

@@ -20,7 +20,7 @@ import numpy as np
 from engine.arrays import FloatArray, Int32Array, IntArray
 from engine.containment.ring_cells.locate import EDGE_SHIFT, GOES_ON_DOWN, GOES_ON_UP, as_edge
 from engine.jit import allocating_kernel, inline, kernel
-from engine.predicates.loading import as_point2
+from engine.predicates.vectors import as_point2
 
 
 class Node(NamedTuple):

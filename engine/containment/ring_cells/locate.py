@@ -45,7 +45,7 @@ import numpy as np
 from engine.arrays import FlagArray, FloatArray, Int32Array
 from engine.containment.posed.filters import NOT_FINITE, has_not_finite
 from engine.jit import allocating_kernel, inline, merged
-from engine.predicates.loading import as_point2
+from engine.predicates.vectors import as_point2
 from engine.types import UNDECIDED
 
 FINE_BITS: Final = 30

@@ -17,8 +17,8 @@ from engine.budget import Budget
 from engine.containment.locators import Locator
 from engine.direct import entry_of
 from engine.jit import kernel
-from engine.predicates.loading import as_point2
 from engine.predicates.orientation import orient2d, orient3d
+from engine.predicates.vectors import as_point2
 from engine.segment_clipping.on_boundary.contacts import ALONG, DEGENERATE, END
 from engine.segment_clipping.on_boundary.found_contacts import contacts_with
 from engine.segment_clipping.on_boundary.prepared_boundary import Mesh, Outline

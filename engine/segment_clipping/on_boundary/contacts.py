@@ -25,8 +25,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.jit import allocating, allocating_kernel, called, inline, merged
-from engine.predicates.loading import as_point2
 from engine.predicates.orientation import orient2d
+from engine.predicates.vectors import as_point2
 from engine.segment_clipping.on_boundary.box_tree import DEEPEST, LEAF_SIZE, may_meet
 from engine.types import UNDECIDED, Point2
 

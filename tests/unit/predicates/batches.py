@@ -7,10 +7,10 @@ from typing import Any
 import numba
 
 from engine.jit import _OPTIONS
-from engine.predicates.loading import as_point2, as_point3
 from engine.predicates.orientation import orient2d, orient2d_filter, orient3d_filter
 from engine.predicates.polynomial import sign_of_polynomial_exact, sign_of_polynomial_filter
 from engine.predicates.side import side_of_plane
+from engine.predicates.vectors import as_point2, as_point3
 from engine.types import UNDECIDED, HalfSpace3
 
 kernel = numba.njit(**_OPTIONS)

@@ -12,7 +12,7 @@ from engine import Pose
 from engine.collision.exact_images import image_point
 from engine.collision.meshes.placement import place_pair, placed
 from engine.jit import kernel
-from engine.predicates.loading import as_point3
+from engine.predicates.vectors import as_point3
 from tests.unit.collision.meshes.bodies import TURN, mesh
 
 QUARTER = Pose([[0, -1, 0], [1, 0, 0], [0, 0, 1]], [3, 0, -2])

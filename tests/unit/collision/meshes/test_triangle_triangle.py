@@ -19,8 +19,8 @@ from engine.collision.meshes.triangle_triangle import (
     with_pose,
 )
 from engine.jit import allocating_kernel, kernel
-from engine.predicates.loading import as_point3
 from engine.predicates.posed import orient3d_rounded
+from engine.predicates.vectors import as_point3
 from engine.types import UNDECIDED
 from tests.reference.contact import triangles_meet
 from tests.reference.exact import Vector, vector
