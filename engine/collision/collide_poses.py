@@ -11,19 +11,21 @@ import numpy as np
 from engine.arrays import FloatArray, Int8Array, IntArray, read_only
 from engine.budget import Budget, Cancel
 from engine.collision.answers import Answers, PlacedPair, Witnesses, accuracy_of
-from engine.collision.ball_poses import ball_batch
 from engine.collision.codes import DISJOINT, OVERLAPPING, UNSETTLED
 from engine.collision.collide import collide_pair, pair_function
 from engine.collision.detail import NO_DETAIL, check_has_detail, details_where_proven, has_interior
 from engine.collision.meshes.contact_kinds import N_NAMED
 from engine.collision.meshes.dual_traversal import PIERCING
-from engine.collision.meshes.mesh_arrays import STILL, mesh_body_of
+from engine.collision.meshes.face_state import states_of
+from engine.collision.meshes.mesh_arrays import STATE_STACKED, STILL, mesh_body_of
 from engine.collision.meshes.mesh_mesh import answer_of, told_by_kernel
 from engine.collision.meshes.mesh_pair import SPACE, what_to_seek
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.meshes.pose_batch import N_COLUMNS, N_CONTACTS, ONE_SETTLES, RELATION, relate_poses
-from engine.collision.result import MESHES, RELATIONS, UNCOUNTED, Collision, Work
+from engine.collision.result import MESHES, RELATIONS, SWAPPED_RELATION, UNCOUNTED, Collision, Work
 from engine.collision.scenes.batches import convex_poses
+from engine.collision.simple.against_ball import centers_in_frame, named
+from engine.collision.simple.ball_on_mesh import relate_balls
 from engine.collision.simple.closed_forms import told_by_forms
 from engine.direct import entry_of
 from engine.errors import InvalidArrayError, WrongDimensionError
@@ -31,6 +33,7 @@ from engine.parallel import Progress, check_options, run_chunks
 from engine.solids.base import Solid
 from engine.solids.checks import as_floats, is_ready
 from engine.solids.pose import Pose, check_rotations, is_surely_rotation, motion_of
+from engine.solids.sphere import Sphere
 from engine.types import Accuracy
 
 PoseCollisions = (
@@ -166,7 +169,7 @@ _BALL_AND_MESH = ({"sphere", "polyhedron"}, {"sphere", "surface"})
 def batch_of(first: Solid, second: Solid, poses: PoseArrays, answers: Answers) -> Callable[[int, int], None] | None:
     """Return the function that lets kernels answer a range of poses, UNSETTLED where they cannot; None without one."""
     if {first.type, second.type} in _BALL_AND_MESH:
-        return ball_batch(first, second, poses, answers)
+        return _ball_batch(first, second, poses, answers)
     if first.dimension == 2 or first.type not in MESHES or second.type not in MESHES:
         return None
     budget, relations, witnesses = answers.budget, answers.relations, answers.witnesses
@@ -199,5 +202,41 @@ def batch_of(first: Solid, second: Solid, poses: PoseArrays, answers: Answers) -
             for item, answer in zip(numbers, map(answer_of, *rows[:, :N_CONTACTS].T.tolist(), pierces.tolist())):
                 if answer is not None:
                     witnesses[item] = answer.witness
+
+    return fill
+
+
+_SWAPPED = np.array([*(SWAPPED_RELATION.get(relation, relation) for relation in RELATIONS), UNSETTLED], np.int8)
+"""What a relation, or UNSETTLED as the last, is for the two bodies in the other order."""
+
+
+def _ball_batch(first: Solid, second: Solid, poses: PoseArrays, answers: Answers) -> Callable[[int, int], None]:
+    """Return the function that answers a range of poses of the second, UNSETTLED where floats do not prove it.
+
+    One of the two is a ball, the other a polyhedron or a surface.
+    """
+    is_swapped = isinstance(first, Sphere)
+    body, ball = (second, first) if is_swapped else (first, second)
+    assert isinstance(ball, Sphere)
+    mesh = mesh_body_of(body)
+
+    def fill(start: int, stop: int) -> None:
+        moves = poses.rotations[start:stop], poses.translations[start:stop]
+        centers = centers_in_frame(ball, *((moves, None) if is_swapped else (None, moves)))
+        found = np.empty((stop - start, 2), np.int64)
+        is_named = answers.witnesses is not None
+        entry_of(relate_balls)(mesh.arrays, centers, float(ball.radius), is_named, found, answers.budget.flag)
+        answers.budget.check()
+        relations, triangles = found.T
+        overlapping = np.flatnonzero(relations == OVERLAPPING)
+        # That a face enters says nothing of the detail, and nothing at all where even-odd cancels it.
+        is_open = answers.details is not None or states_of(mesh.arrays, triangles[overlapping]) == STATE_STACKED
+        relations[overlapping] = np.where(is_open, UNSETTLED, OVERLAPPING)
+        answers.relations[start:stop] = _SWAPPED[relations] if is_swapped else relations
+        if is_named:
+            assert answers.witnesses is not None
+            for row in np.flatnonzero(relations > DISJOINT).tolist():
+                answer = named(mesh, *found[row].tolist())
+                answers.witnesses[start + row] = (answer.swapped() if is_swapped else answer).witness
 
     return fill

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
-from engine.budget import Budget
+from engine.budget import UNLIMITED, Budget
 from engine.solids.pose import Pose
 from engine.types import Rcc8, Relation
 
@@ -85,8 +85,6 @@ FIRST_WITHIN = Collision(Relation.FIRST_INSIDE_SECOND, Witness("containment", co
 SECOND_WITHIN = Collision(Relation.SECOND_INSIDE_FIRST, Witness("containment", containing="first"))
 OVERLAP, TOUCH = Collision(Relation.OVERLAPPING, Witness("surface")), Collision(Relation.TOUCHING, Witness("surface"))
 """What bodies without faces are answered with."""
-UNLIMITED = Budget()
-"""Of a call without deadline and switch: nobody raises its flag."""
 
 
 class Parts(NamedTuple):

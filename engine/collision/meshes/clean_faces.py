@@ -1,6 +1,6 @@
 """Compiled: what contacts with clean faces tell, flush ones above all.
 
-Of a clean face its body lies on one side only (`inner_side.py`). Two that share an area overlap if that is the same
+Of a clean face its body lies on one side only (`face_state.py`). Two that share an area overlap if that is the same
 side of both, else neither has the other body on its own inner side there. A face with an edge across an open clean one,
 going to its inner side from there, has points in the open interior beside it: they overlap. Where no contact is of
 these kinds, all of the inner side of each face lies in or out of the other body: out, where they share an area; else
@@ -15,9 +15,8 @@ import numpy as np
 
 from engine.collision.codes import OVERLAPPING, TOUCHING, UNSETTLED
 from engine.collision.meshes.dual_traversal import Search, exact_error, exact_faces
-from engine.collision.meshes.face_state import state_of
+from engine.collision.meshes.face_state import UNTOLD, inner_side, state_of
 from engine.collision.meshes.free_faces import JUDGED, by_places
-from engine.collision.meshes.inner_side import UNTOLD, inner_side
 from engine.collision.meshes.mesh_arrays import STATE_STACKED, MeshArrays
 from engine.collision.meshes.triangle_triangle import (
     CORNER,

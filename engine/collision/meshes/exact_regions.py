@@ -81,7 +81,7 @@ def sides_over(body: ExactBody, q: Homogeneous, axis: int, plane: Plane | None) 
 
 def side_of_clean(body: ExactBody, face: int) -> int:
     """Return the side of a clean face, 1 that of its normal or -1, on which its body lies, 0 where no point tells it;
-    kept with the mesh, as by `inner_side.py`."""
+    kept with the mesh, as by `face_state.py`."""
     kept, axis, plane = body.mesh.arrays.inner, body.axis(face), body.plane(face)
     if kept[face] not in (1, -1):
         for q in points_within(body.corners(face)):

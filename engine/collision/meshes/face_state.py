@@ -1,15 +1,18 @@
-"""How a face lies among the other faces of its own body: clean, crossed or stacked (see `mesh_arrays.py`).
+"""How a face lies among the other faces of its own body: clean, crossed or stacked (see `mesh_arrays.py`); and on which
+side of a clean one the body lies. Neither depends on a pose; both are computed on demand and kept with the mesh.
 
 A strict crossing of two faces proves that two interiors overlap if nothing else of the two bodies cancels or fans out
 along it. Near a general point of the crossing line a body whose face is clean there is a half-space; the other body's
 face, not stacked, changes its inside on both sides of the first plane: so one of its two changes lies in that
-half-space. Hence the rule `proves_overlap`. The state of a face does not depend on a pose, is computed on demand from
-exact signs of the with_pose coordinates, and kept.
+half-space. Hence the rule `proves_overlap`. The state is computed from exact signs of the coordinates as given.
+
+Beside a clean face no other one covers it, so its body lies on one side of it, all along but for single points. The
+faces above a point within it, along an axis that crosses it, tell which: an odd number, above.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -25,6 +28,7 @@ from engine.collision.meshes.mesh_arrays import (
     in_tree,
     triangle_of,
 )
+from engine.collision.meshes.parity import INSIDE, OUTSIDE, OwnPoint, locate_along
 from engine.collision.meshes.triangle_triangle import (
     CROSSING,
     Facet,
@@ -33,11 +37,13 @@ from engine.collision.meshes.triangle_triangle import (
     corner,
     is_straddling,
     passes_within,
+    projected,
     separation,
     with_pose,
 )
-from engine.jit import allocating, allocating_kernel, inline
-from engine.predicates.orientation import orient3d
+from engine.jit import allocating, allocating_kernel, called, inline
+from engine.predicates.orientation import orient2d, orient3d
+from engine.predicates.vectors import largest_of
 from engine.types import UNDECIDED, Point3
 
 
@@ -143,3 +149,38 @@ def _find_states(mesh: MeshArrays, faces: Any, states: Any) -> None:
     poses = np.zeros((1, 12))
     for item in range(faces.shape[0]):
         states[item] = state_of(mesh, faces[item], poses)
+
+
+UNTOLD: Final = 2
+"""In place of a side: the face is not clean, or another one comes near each of the points within."""
+
+
+@called
+def point_within(mesh: MeshArrays, face: int, item: int) -> OwnPoint:
+    """Return one of three points within a face; its weights are (1, 1, 1), (1, 1, 2) or (2, 1, 1)."""
+    t = triangle_of(mesh, face)
+    u, v = 2.0 if item == 2 else 1.0, 2.0 if item == 1 else 1.0
+    w = 3.0 if item == 0 else 4.0
+    x, y = u * t.p.x + t.q.x + v * t.r.x, u * t.p.y + t.q.y + v * t.r.y
+    z = u * t.p.z + t.q.z + v * t.r.z
+    error = 2.0**-50 * max(largest_of(t.p), largest_of(t.q), largest_of(t.r)) + 2.0**-1060
+    return OwnPoint(Point3(x / w, y / w, z / w), error)
+
+
+@allocating
+def inner_side(mesh: MeshArrays, face: int, poses: Any) -> int:
+    """Return the side of a face, 1 that of its normal or -1, on which its body lies; UNTOLD. poses: as `state_of`."""
+    if mesh.inner[face] == 0:
+        mesh.inner[face] = _side_of_clean(mesh, face) if state_of(mesh, face, poses) == STATE_CLEAN else UNTOLD
+    return int(mesh.inner[face])
+
+
+@allocating
+def _side_of_clean(mesh: MeshArrays, face: int) -> int:
+    axis, t = int(mesh.axis[face]), triangle_of(mesh, face)
+    turn = orient2d(projected(t.p, axis), projected(t.q, axis), projected(t.r, axis))
+    for item in range(3):
+        where = locate_along(point_within(mesh, face, item), mesh, axis, face)
+        if where in (INSIDE, OUTSIDE):
+            return turn * where
+    return UNTOLD

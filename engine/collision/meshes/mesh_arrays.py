@@ -63,7 +63,7 @@ MeshArrays = namedtuple(
 )
 """What kernels take; boxes to scale: the tree (`bvh.py`); blocks, discs: what its blocks (`lanes/faces.py`) and its
 inner nodes (`lanes/discs.py`) hold beside boxes, the rows of the other kind not set. `state` is filled by kernels
-as needed, and `inner`, on which side of a face its body lies (`inner_side.py`), 0 unknown: any thread writes the same
+as needed, and `inner`, on which side of a face its body lies (`face_state.py`), 0 unknown: any thread writes the same
 values. components: of the triangles connected through vertices, one triangle
 each, ascending. faces: the caller's face of each triangle; first_face: the least in the first component.
 has_inside: False for surfaces and flat boxes."""

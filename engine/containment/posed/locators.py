@@ -1,7 +1,7 @@
 """Locates points in posed solids: filters in the body's own frame, exact on input and transform.
 
 A posed solid is the exact image of the solid under p -> R p + t, but for spheres, which keep their radius about the
-exact image of the centre. Points are moved into the solid's frame with a bound on the rounding (body_frame.py),
+exact image of the centre. Points are moved into the solid's frame with a bound on the rounding (frames.py),
 located there where that bound allows (filters.py), and settled in integers where it does not. Pure translations and
 quarter turns whose differences are exact use the unposed kernels, so that flush instances on a lattice never reach
 rationals.
@@ -33,9 +33,8 @@ from engine.containment.methods.box import locate_in_box
 from engine.containment.methods.polygon_one_pass import locate_by_ring_pass
 from engine.containment.methods.polygon_ray_parity import locate_in_rings
 from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
-from engine.containment.posed.body_frame import move_to_body_frame
 from engine.containment.posed.filters import locate_by_polynomial_blurred, locate_in_rows_blurred
-from engine.containment.posed.frames import Frames, frames_of
+from engine.containment.posed.frames import Frames, frames_of, move_to_body_frame
 from engine.containment.prepared import prism_rows, rings_of, tree_of
 from engine.containment.rational_locate import Check, to_world_frame
 from engine.solids.aabb import Aabb

@@ -3,7 +3,7 @@
 A point's candidates are the bodies whose boxes hold it, by the cells of a grid, and the bodies without bounds, merged
 in ascending order. A candidate is decided by what its solid has: the sides of a box, squared distance, rows of planes,
 the edges of a small polygon, the cells of a polyhedron. A body under a pose is asked in its own frame, where the point
-carries a blur (posed/body_frame.py). Filters decide with proven bounds (those of half_spaces.py, ball.py and
+carries a blur (posed/frames.py). Filters decide with proven bounds (those of half_spaces.py, ball.py and
 posed/filters.py), what they leave is UNDECIDED and listed for the methods of single solids.
 """
 
@@ -15,8 +15,8 @@ from engine.arrays import BoolArray, FloatArray, Int8Array, Int32Array, IntArray
 from engine.containment.cells.side import side_in_cell
 from engine.containment.methods.ball import located
 from engine.containment.methods.polygon_one_pass import locate_in_small_rings
-from engine.containment.posed.body_frame import to_frame
 from engine.containment.posed.filters import in_space, side_of_box, side_of_rows
+from engine.containment.posed.frames import to_frame
 from engine.containment.scene.grid import cell_at
 from engine.jit import kernel, merged
 from engine.types import UNDECIDED
@@ -41,7 +41,7 @@ class SceneTables(NamedTuple):
     frames: Int32Array
     """Row of a body's pose in the next three, -1 for none."""
     inverses: FloatArray
-    """``(n_poses, 3, 3)``: R^-1 rounded (posed/body_frame.py); the plane's in the upper left."""
+    """``(n_poses, 3, 3)``: R^-1 rounded (posed/frames.py); the plane's in the upper left."""
     translations: FloatArray
     is_turn: BoolArray
     box_lows: FloatArray

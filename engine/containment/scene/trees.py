@@ -14,8 +14,8 @@ from engine.arrays import FloatArray, Int32Array, IntArray
 from engine.bounding.bvh import WIDTH
 from engine.containment.cells.side import side_in_cell
 from engine.containment.methods.polyhedron_ray_parity import locate_in_tree
-from engine.containment.posed.body_frame import to_frame
 from engine.containment.posed.filters import in_space
+from engine.containment.posed.frames import to_frame
 from engine.containment.prepared import TriangleTree
 from engine.containment.scene.first_pass import SECOND_PASS
 from engine.jit import inline, kernel
