@@ -4,10 +4,9 @@ from engine import layers
 from engine.budget import Cancel
 from engine.collision.clearance.clearance import clearance
 from engine.collision.clearance.clearance_poses import clearance_poses
-from engine.collision.clearance.result import Clearance, Feature
 from engine.collision.collide import collide
 from engine.collision.collide_poses import collide_poses
-from engine.collision.result import Collision, Witness
+from engine.collision.result import Clearance, Collision, Feature, Witness
 from engine.collision.scenes.collide_scene import ScenePairs, collide_scene
 from engine.collision.triangles import collide_triangles
 from engine.compare import Comparison, compare

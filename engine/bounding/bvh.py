@@ -30,9 +30,8 @@ import numpy as np
 from engine.arrays import Float32Array, FloatArray, Int32Array, read_only
 from engine.budget import poll
 from engine.jit import allocating, allocating_kernel, inline, kernel
-from engine.lanes.boxes import EMPTY
+from engine.lanes.boxes import EMPTY, exchange, fill, join
 from engine.lanes.lanes import aligned
-from engine.lanes.rows import exchange, fill, join
 
 WIDTH = 8
 N_BINS = 16
@@ -72,7 +71,7 @@ class Bvh(NamedTuple):
 
 
 Items = namedtuple("Items", "boxes centres order")
-"""The items, in the order of the tree: boxes (n, 8), as lanes/rows.py has them; centres (n, 8), boxes without extent;
+"""The items, in the order of the tree: boxes (n, 8), as lanes/boxes.py has them; centres (n, 8), boxes without extent;
 order (n,), which item it is."""
 
 Halves = namedtuple("Halves", "boxes centres left runs")

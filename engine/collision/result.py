@@ -1,4 +1,4 @@
-"""What a collision call answers, and what one pair of solids is asked with.
+"""What calls of collision and clearance answer, and what one pair of solids is asked with.
 
 Every pair of types has one function ``(first, second, poses, work) -> Collision``; the table in
 `collide.py` finds it. `Work` carries what such a function may spend and what it should report.
@@ -10,7 +10,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
+from engine.arrays import FloatArray
 from engine.budget import UNLIMITED, Budget
+from engine.solids.base import setters_of
 from engine.solids.pose import Pose
 from engine.types import Rcc8, Relation
 
@@ -127,3 +129,39 @@ UNCOUNTED = {(named, boolean): Work(UNLIMITED, named, boolean) for named in (Fal
 
 PairFunction = Callable[[Any, Any, Poses, Work], Collision]
 """The two solids are of the types that the table in `pairs.py` names."""
+
+
+class Feature(NamedTuple):
+    """What of a body the nearest point lies on.
+
+    kind: vertex, edge or face; ball; plane (of a half_space). indices: of a vertex one index, of an edge two, the
+    smaller first, of a face its own; none of a ball or a plane. Vertices are numbered as given (polygon: over all
+    rings; aabb: bit k of a corner's number says low or high on axis k), of several at one position the first; aabb
+    faces are 0..5 = xmin, xmax, ymin, ymax, zmin, zmax. What lies inside a face is on it, whatever it was cut into.
+    """
+
+    kind: Literal["vertex", "edge", "face", "ball", "plane"]
+    indices: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False, init=False)
+class Clearance:
+    """How far apart two bodies are.
+
+    distance: the double nearest to the exact distance; 0.0 exactly where they have a common point. points: (2, d) a
+    point of each at that distance, and features what these lie on (`Feature`); None where they have a common point.
+    """
+
+    distance: float
+    points: FloatArray | None = None
+    features: tuple[Feature, Feature] | None = None
+
+    def __init__(
+        self, distance: float, points: FloatArray | None = None, features: tuple[Feature, Feature] | None = None
+    ) -> None:
+        _set_distance(self, distance)
+        _set_points(self, points)
+        _set_features(self, features)
+
+
+_set_distance, _set_points, _set_features = setters_of(Clearance)

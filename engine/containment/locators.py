@@ -17,7 +17,6 @@ from engine.containment.cells.build import cells_of
 from engine.containment.cells.locate import locate_by_cells
 from engine.containment.cells.order import order_if_it_pays
 from engine.containment.methods.ball import locate_in_ball
-from engine.containment.methods.box import locate_in_box
 from engine.containment.methods.half_spaces import locate_in_half_planes, locate_in_half_spaces
 from engine.containment.methods.polygon_one_pass import locate_by_ring_pass
 from engine.containment.methods.polygon_ray_parity import locate_in_rings
@@ -25,7 +24,7 @@ from engine.containment.methods.polyhedron_one_pass import locate_by_pass
 from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
 from engine.containment.methods.polynomial import locate_by_polynomial
 from engine.containment.policy import CELLS, LONG_PASS, PASS, choose_for_mesh, choose_for_rings
-from engine.containment.posed.filters import NOT_FINITE
+from engine.containment.posed.filters import NOT_FINITE, locate_in_box
 from engine.containment.prepared import EXACT, prism_rows, rings_of, tree_of
 from engine.containment.rational_locate import combine, over_tree, rational_location, unsupported
 from engine.containment.ring_cells.build import ring_cells_of

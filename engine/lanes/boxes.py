@@ -7,13 +7,16 @@ they spare). Boxes and margins hold whatever float32 rounds.
 
     frames (2, 22, 8) float32, every number in all lanes: [0] takes the second tree to the first, [1] the first to the
     second. Rows: matrix by rows (9), magnitudes of its entries (9), shift (3), margin (1).
+
+While a tree is built a box is one row (low x, y, z, 0, -high x, -y, -z, 0): the least of two rows is the box around
+both, one comparison of eight lanes.
 """
 
 from __future__ import annotations
 
 from typing import Final
 
-from engine.lanes.lanes import any_above, bits_of, bytes_of, dot, lane_of, load, select, store
+from engine.lanes.lanes import any_above, bits_of, bytes_of, dot, lane_of, lesser, load, select, store
 from engine.lanes.tracing import LANES, Lanes, Mask, Number, Rows, Triple, traced
 
 FRAME_ROWS: Final = 22
@@ -90,3 +93,23 @@ def enter_boxes(
         end = select(far < end, far, end)
     store(entered, 0, first)
     return bits_of(~(first > end))
+
+
+@traced
+def fill(rows: Rows, row: int, value: Number) -> None:
+    """Set all numbers of a row to one."""
+    store(rows, row, value)
+
+
+@traced
+def join(boxes: Rows, box: int, others: Rows, other: int) -> None:
+    """Set a row to the least of itself and a row of another array, number by number."""
+    store(boxes, box, lesser(load(boxes, box), load(others, other)))
+
+
+@traced
+def exchange(rows: Rows, i: int, j: int) -> None:
+    """Exchange two rows."""
+    first, second = load(rows, i), load(rows, j)
+    store(rows, i, second)
+    store(rows, j, first)

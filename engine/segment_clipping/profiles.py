@@ -27,7 +27,7 @@ from engine.containment.rational_locate import (
 from engine.errors import UnsupportedSolidError
 from engine.predicates.rational import Number, common_integers, nearest_with_root
 from engine.segment_clipping.exact_pieces import Contact, contacts_of, nodes_with_locations
-from engine.segment_clipping.on_boundary.found_contacts import contacts_with
+from engine.segment_clipping.on_boundary.chords import contacts_with
 from engine.segment_clipping.on_boundary.prepared_boundary import boundary_of
 from engine.segment_clipping.parameters import ONE, ZERO, Parameter, compare, parameter
 from engine.segment_clipping.pieces import Piece, Pieces, as_pieces

@@ -13,10 +13,10 @@ import numpy as np
 from engine.arrays import FloatArray, IntArray, read_only
 from engine.bounding.aabb import corners_of_box
 from engine.collision.clearance.near_triangles import FACE
-from engine.collision.clearance.result import Feature
 from engine.collision.meshes.mesh_arrays import BOX_TRIANGLES, MeshBody, mesh_body_of, mesh_body_of_triangles
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.planar.outline_batch import outline_arrays
+from engine.collision.result import Feature
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.mesh import Mesh

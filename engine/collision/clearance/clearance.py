@@ -10,10 +10,9 @@ import numpy as np
 from engine.budget import UNLIMITED, Budget, Cancel
 from engine.collision.clearance.forms import MEETING, between_form_and_plane, between_forms, between_outlines
 from engine.collision.clearance.half_spaces import gap_of_planes
-from engine.collision.clearance.result import Clearance
 from engine.collision.clearance.spreads import spread_pair
 from engine.collision.collide import check_pose, collide_pair, pair_function
-from engine.collision.result import Poses, Work
+from engine.collision.result import Clearance, Poses, Work
 from engine.errors import InvalidInputError
 from engine.parallel import Options, Progress, check_options
 from engine.solids.base import Solid

@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from engine.collision.clearance.near_triangles import FACE
-from engine.collision.clearance.result import Clearance, Feature
+from engine.collision.result import Clearance, Feature
 from engine.errors import NotRepresentableError
 from engine.predicates.exact_vectors import cross, dot, minus, squared_length
 from engine.predicates.rational import nearest, nearest_with_root

@@ -16,9 +16,8 @@ from engine.collision.clearance.bodies import BALL, outline_of
 from engine.collision.clearance.closed_forms import UNSURE, ends_of_shared, nearest_of_forms, nearest_of_plane, touched
 from engine.collision.clearance.exact import Gap, Rational, ScaledGap
 from engine.collision.clearance.outlines import nearest_of_outlines, nearest_under_poses
-from engine.collision.clearance.result import Clearance, Feature
 from engine.collision.exact_images import Vector, as_vector, image_point
-from engine.collision.result import Poses
+from engine.collision.result import Clearance, Feature, Poses
 from engine.collision.simple.form import FORMS, form_of
 from engine.direct import entry_of
 from engine.predicates.exact_vectors import minus, squared_length

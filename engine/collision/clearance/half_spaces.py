@@ -13,9 +13,8 @@ from engine.budget import Budget
 from engine.collision.clearance.bodies import feature_of, radius_of, spread_of
 from engine.collision.clearance.exact import ScaledGap
 from engine.collision.clearance.forms import PLANE, scaled_gap
-from engine.collision.clearance.result import Feature
 from engine.collision.exact_images import Vector, image_half_space, image_map, value_at
-from engine.collision.result import Poses
+from engine.collision.result import Feature, Poses
 from engine.collision.simple.boundary import pulled_back
 from engine.predicates.exact_vectors import squared_length
 from engine.solids.base import Solid

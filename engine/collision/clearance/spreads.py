@@ -17,12 +17,11 @@ from engine.collision.clearance.blocks import DONE
 from engine.collision.clearance.bodies import feature_of, in_space, radius_of, spread_of
 from engine.collision.clearance.boxes import Room, new_room
 from engine.collision.clearance.exact import Gap, ScaledGap, Wall, is_beyond, nearest_of_triangles, walls
-from engine.collision.clearance.result import Clearance, Feature
 from engine.collision.clearance.traversal import BEYOND, TOLD, Asked, find_nearest
 from engine.collision.meshes.exact_body import exact_pair, on_lattice
 from engine.collision.meshes.mesh_arrays import STILL, MeshBody, lattice_shift
 from engine.collision.meshes.placement import PoseArrays
-from engine.collision.result import Poses
+from engine.collision.result import Clearance, Feature, Poses
 from engine.direct import entry_of
 from engine.solids.base import Solid
 from engine.solids.pose import Pose

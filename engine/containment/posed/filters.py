@@ -127,3 +127,26 @@ def locate_by_polynomial_blurred(
         locations[item] = 1 if value > bound else -1 if -value > bound else UNDECIDED
         n_open += locations[item] == UNDECIDED
     return n_open
+
+
+@kernel
+def locate_in_box(points: Any, blurs: Any, low: Any, high: Any, locations: Any, flag: Any) -> int:
+    """Fill `locations` (n,) int8 for points (n, dim) and the corners low, high (dim,); returns how many stay open.
+
+    Six comparisons, exact as they stand.
+    blurs: (n,), or (0,) for points that are exact; then none stays open, and NOT_FINITE is returned where one is not
+    finite. Where low = high on an axis every point of the box lies on its boundary: the comparisons say so by
+    themselves.
+    """
+    if len(blurs) == 0 and has_not_finite(points):
+        return NOT_FINITE
+    n_open, is_flat = 0, len(low) == 2
+    least = low[0], low[1], 0.0 if is_flat else low[2]
+    most = high[0], high[1], 0.0 if is_flat else high[2]
+    for item in range(len(points)):
+        if flag[0]:
+            break
+        blur = float(blurs[item]) if len(blurs) > 0 else 0.0
+        locations[item] = side_of_box(least, most, is_flat, in_space(points, item), blur)
+        n_open += locations[item] == UNDECIDED
+    return n_open

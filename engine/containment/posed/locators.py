@@ -29,11 +29,10 @@ from engine.containment.locators import (
     rational_half,
 )
 from engine.containment.methods.ball import locate_in_ball
-from engine.containment.methods.box import locate_in_box
 from engine.containment.methods.polygon_one_pass import locate_by_ring_pass
 from engine.containment.methods.polygon_ray_parity import locate_in_rings
 from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
-from engine.containment.posed.filters import locate_by_polynomial_blurred, locate_in_rows_blurred
+from engine.containment.posed.filters import locate_by_polynomial_blurred, locate_in_box, locate_in_rows_blurred
 from engine.containment.posed.frames import Frames, frames_of, move_to_body_frame
 from engine.containment.prepared import prism_rows, rings_of, tree_of
 from engine.containment.rational_locate import Check, to_world_frame

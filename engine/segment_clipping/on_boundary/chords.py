@@ -12,15 +12,15 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray
+from engine.arrays import BoolArray, FlagArray, FloatArray, Int8Array, IntArray
 from engine.budget import Budget
 from engine.containment.locators import Locator
 from engine.direct import entry_of
 from engine.jit import kernel
 from engine.predicates.orientation import orient2d, orient3d
 from engine.predicates.vectors import as_point2
-from engine.segment_clipping.on_boundary.contacts import ALONG, DEGENERATE, END
-from engine.segment_clipping.on_boundary.found_contacts import contacts_with
+from engine.segment_clipping.on_boundary.contacts import ALONG, DEGENERATE, END, NO_ROOM, find_contacts_2d
+from engine.segment_clipping.on_boundary.mesh_streams import find_mesh_contacts
 from engine.segment_clipping.on_boundary.prepared_boundary import Mesh, Outline
 from engine.segment_clipping.on_boundary.triangle_contact import corner, triangle_at
 
@@ -100,3 +100,22 @@ def leave_parted(elements: Any, met: Any, owners: Any, segments: Any, inner: Any
             side, other = orient3d(c, d, e, corner(segments, item, 0)), orient3d(c, d, e, corner(inner, item, 0))
         if side != other or abs(side) != 1:
             is_told[item] = False
+
+
+_LEAST_ROOM: Final = 1 << 8
+"""Contacts looked for at once, beside a few for each segment; doubled where there are more."""
+_EACH: Final = 8
+
+
+def contacts_with(
+    segments: FloatArray, boundary: Outline | Mesh, budget: Budget
+) -> tuple[IntArray, FlagArray, IntArray]:
+    """Return the elements that segments (n, 2, dim) may meet, GROUP at most, and how; offsets (n + 1,) of each."""
+    kernel: Any = find_mesh_contacts if isinstance(boundary, Mesh) else find_contacts_2d
+    room, found = _LEAST_ROOM + _EACH * len(segments), NO_ROOM
+    met, kinds, offsets = np.zeros(0, np.int64), np.zeros(0, np.uint8), np.zeros(0, np.int64)
+    while found == NO_ROOM:  # bound: room is doubled, and a segment meets an element once
+        found, met, kinds, offsets = entry_of(kernel)(segments, boundary, budget.flag, room)
+        budget.check()
+        room *= 2
+    return met[:found], kinds[:found], offsets[: len(segments) + 1]

@@ -25,9 +25,15 @@ from engine.segment_clipping.on_boundary.contacts import (
     code_of,
     place_of,
 )
-from engine.segment_clipping.on_boundary.crossing_values import cut_at, is_item_safe, line_values, plane_values
+from engine.segment_clipping.on_boundary.crossing_values import (
+    Crossings,
+    cut_at,
+    is_item_safe,
+    line_values,
+    plane_values,
+    sort_crossings,
+)
 from engine.segment_clipping.on_boundary.exact_crossing import cross_exactly, parameter_exactly
-from engine.segment_clipping.on_boundary.sorted_crossings import Crossings, sort_crossings
 from engine.segment_clipping.pieces import Pieces, put_own_end
 
 UNSURE: Final = -1

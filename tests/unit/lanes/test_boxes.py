@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from engine.jit import kernel
-from engine.lanes.boxes import FRAME_ROWS, inside_box, meeting
+from engine.lanes.boxes import FRAME_ROWS, exchange, fill, inside_box, join, meeting
 from engine.lanes.lanes import lowest_bit
 
 
@@ -76,3 +76,22 @@ def test_lanes_say_what_tables_of_pairs_say(seed: int) -> None:
         lanes = sum(1 << lane for lane in np.flatnonzero(meets).tolist())
         assert inside_box(first, item, tuple(low), tuple(high)) == lanes
         assert found[item].tolist() == [lanes, np.flatnonzero([*meets, True])[0]]
+
+
+@kernel
+def _work(rows: Any, others: Any) -> None:
+    join(rows, 0, others, 1)
+    exchange(rows, 1, 2)
+    exchange(rows, 3, 3)
+    fill(rows, 4, np.float32(np.inf))
+    join(rows, 4, others, 0)
+
+
+def test_rows_are_joined_exchanged_and_filled() -> None:
+    random = np.random.default_rng(0)
+    before, others = (random.normal(size=(n, 8)).astype(np.float32) for n in (5, 2))
+    wanted = np.array([np.minimum(before[0], others[1]), before[2], before[1], before[3], others[0]])
+    for work in (_work, getattr(_work, "py_func", _work)):
+        rows = before.copy()
+        work(rows, others)
+        assert (rows == wanted).all()

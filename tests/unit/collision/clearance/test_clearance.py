@@ -25,7 +25,7 @@ from engine import (
     UnsupportedPairError,
     clearance,
 )
-from engine.collision.clearance.result import Clearance, Feature
+from engine.collision.result import Clearance, Feature
 from tests.unit.collision.clearance.makers import (
     FAMILIES,
     KINDS,

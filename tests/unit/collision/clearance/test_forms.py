@@ -15,7 +15,7 @@ from engine.budget import Budget
 from engine.collision.clearance.closed_forms import UNSURE
 from engine.collision.clearance.forms import MEETING, between_form_and_plane, between_forms
 from engine.collision.clearance.half_spaces import gap_of_planes
-from engine.collision.clearance.result import Clearance, Feature
+from engine.collision.result import Clearance, Feature
 from tests.unit.collision.clearance.makers import turn
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine import Aabb, Convex, HalfSpace, Implicit, Polygon, Solid
+from engine import Aabb, Convex, HalfSpace, Implicit, Polygon, Solid, locate
 from engine.arrays import read_only
 from engine.budget import Budget
 from engine.containment.posed.locators import _blurred_kernel
@@ -39,3 +39,15 @@ def test_an_answer_holds_all_over_the_blur(make: Callable[[], Any]) -> None:
     for point, blur, location in zip(points, blurs, found.tolist()):
         if abs(location) == 1:
             assert {rational_location(each, solid) for each in (point + blur * corners).tolist()} == {location}
+
+
+def test_flat_box_has_only_boundary() -> None:
+    assert locate([[0.5, 0.5, 1.0], [0.5, 0.5, 1.1]], Aabb([0, 0, 1], [1, 1, 1])).tolist() == [0, -1]
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_comparisons_are_the_definition(dimension: int) -> None:
+    low, high = np.arange(dimension) - 2.0, np.arange(dimension) + 0.0
+    points = np.random.default_rng(0).integers(-4, 5, (2000, dimension)) / 2.0
+    distance = np.minimum(points - low, high - points).min(axis=1)  # exact: halves of small integers
+    assert locate(points, Aabb(low, high)).tolist() == np.sign(distance).astype(int).tolist()
