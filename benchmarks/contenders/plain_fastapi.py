@@ -15,7 +15,6 @@ from pydantic import BaseModel
 import engine
 from service.schemas.containment import ContainsRequest
 
-NAME = "plain FastAPI"
 app = FastAPI()
 
 

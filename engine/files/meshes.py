@@ -13,18 +13,12 @@ from engine.arrays import FloatArray, IntArray
 from engine.errors import EmptyGeometryError, IndexOutOfRangeError, InvalidInputError
 from engine.solids.checks import frozen
 from engine.solids.mesh import first_equal
-from engine.solids.polyhedron import Polyhedron
 
 FORMATS: Final = ("stl", "obj", "ply", "off", "glb")
 
 
 _NAMES: Final = re.compile(rb"^[ \t]*(?:g|o|s|usemtl|mtllib)(?:[ \t][^\r\n]*)?$", re.MULTILINE)
 """Lines of an OBJ file that say nothing of its shape: trimesh's time grows with their number squared."""
-
-
-def read_polyhedron(file: IO[bytes], file_format: str) -> Polyhedron:
-    """Return the polyhedron that a mesh file describes, with the checks and the errors of its constructor."""
-    return Polyhedron(*read_mesh(file, file_format))
 
 
 def read_mesh(file: IO[bytes], file_format: str) -> tuple[FloatArray, IntArray]:

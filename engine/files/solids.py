@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from engine.errors import InvalidInputError
-from engine.files.meshes import FORMATS, read_polyhedron
+from engine.files.meshes import FORMATS, read_mesh
 from engine.layers.features import polygon_of
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
@@ -50,7 +50,7 @@ def read_solids(source: str) -> list[Solid]:
     suffix = path.suffix.lower().removeprefix(".")
     if suffix in FORMATS:
         with path.open("rb") as file:
-            return [read_polyhedron(file, suffix)]
+            return [Polyhedron(*read_mesh(file, suffix))]
     if suffix == "npz":
         with np.load(path, allow_pickle=False) as arrays:
             missing = {"vertices", "faces"} - set(arrays.files)

@@ -11,7 +11,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, Final, Literal, cast
+from typing import Any, Final, cast
 
 import numpy as np
 
@@ -32,7 +32,6 @@ from engine.solids.polygon import Polygon
 from engine.solids.ragged import closed_rings, summed
 from engine.types import Accuracy
 
-How = Literal["intersection", "union", "identity", "difference", "symmetric_difference"]
 HOWS: Final[dict[str, tuple[bool, bool, bool]]] = {
     "intersection": (True, False, False),
     "union": (True, True, True),

@@ -22,7 +22,7 @@ from engine.predicates.expansion import Components, compress, grow, scale, sign
 from engine.predicates.side import NO_TERM
 from engine.types import UNDECIDED
 
-MAX_DEGREE = 16  # total degree; the caller guarantees it
+MAX_DEGREE = 16  # total degree of a term; `Implicit` takes no more
 MAX_TERMS = 1000
 N_POWERS = MAX_DEGREE + 1
 N_TABLE = 3 * N_POWERS

@@ -8,11 +8,12 @@ first brought to integers: no greatest common divisors are taken in the arithmet
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from decimal import Decimal
 from fractions import Fraction
 
 from engine.errors import NotRepresentableError
+from engine.predicates.exact_vectors import cross, dot, minus
 
 Number = float | int | Fraction
 """Any finite number; numpy scalars of float64 are floats."""
@@ -21,11 +22,6 @@ Number = float | int | Fraction
 def sign_of(value: Number) -> int:
     """Return -1, 0 or 1."""
     return (value > 0) - (value < 0)
-
-
-def fractions(point: Iterable[Number]) -> tuple[Fraction, ...]:
-    """Return the coordinates of a point as Fractions, each the exact value."""
-    return tuple(Fraction(value) for value in point)
 
 
 def common_integers(values: Sequence[Number]) -> tuple[list[int], int]:
@@ -49,11 +45,8 @@ def orient2d_rational(a: Sequence[Number], b: Sequence[Number], c: Sequence[Numb
 
 def orient3d_rational(a: Sequence[Number], b: Sequence[Number], c: Sequence[Number], d: Sequence[Number]) -> int:
     """Return 1 if d lies on the side the normal (b - a) x (c - a) points to, -1 opposite, 0 on the plane."""
-    ax, bx, cx, dx = scaled_integers((a[0], b[0], c[0], d[0]))
-    ay, by, cy, dy = scaled_integers((a[1], b[1], c[1], d[1]))
-    az, bz, cz, dz = scaled_integers((a[2], b[2], c[2], d[2]))
-    bx, by, bz, cx, cy, cz, dx, dy, dz = bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az, dx - ax, dy - ay, dz - az
-    return sign_of(dx * (by * cz - bz * cy) + dy * (bz * cx - bx * cz) + dz * (bx * cy - by * cx))
+    p, q, r, s = zip(*(scaled_integers(axis) for axis in zip(a, b, c, d)))
+    return sign_of(dot(cross(minus(q, p), minus(r, p)), minus(s, p)))
 
 
 def side_rational(row: Sequence[Number], point: Sequence[Number]) -> int:

@@ -81,11 +81,8 @@ class Standing(Preparing):
 
     def few(self) -> Bodies:
         """Return those that moved, where they are; at least one."""
-        return self.prepared("few", self._as_bodies)
-
-    def _as_bodies(self) -> Bodies:
-        solids = tuple(self.base.solids[body] for body in self.moved)
-        return Bodies(solids, tuple(self.moved.values()), self.base)
+        solids, poses = tuple(self.base.solids[body] for body in self.moved), tuple(self.moved.values())
+        return self.prepared("few", lambda: Bodies(solids, poses, self.base))
 
     def pose(self, body: int) -> Pose | None:
         """Return the pose of a body."""

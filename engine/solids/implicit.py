@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, ClassVar, Final
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from engine.arrays import FloatArray, IntArray, read_only
 from engine.errors import InvalidArrayError, InvalidPolynomialError, WrongDimensionError
+from engine.predicates.polynomial import MAX_DEGREE, MAX_TERMS
 from engine.solids.base import Solid
 from engine.solids.checks import (
     DIMENSIONS,
@@ -21,11 +22,6 @@ from engine.solids.checks import (
     shown,
     spell,
 )
-
-MAX_DEGREE: Final = 16
-"""Largest total degree of a term."""
-MAX_TERMS: Final = 1000
-"""Largest number of terms."""
 
 PointFunction = Callable[[FloatArray], npt.ArrayLike]
 """Takes points ``(n, dimension)`` float64 and returns n numbers, not negative inside."""

@@ -161,11 +161,6 @@ def _found(a: Placed, b: Placed, vertex: int, edge: int, is_first: bool) -> tupl
 
 
 @inline
-def _is_end(following: Any, edge: int, vertex: int) -> bool:
-    return edge == vertex or following[edge] == vertex
-
-
-@inline
 def _way(a: Placed, b: Placed, found: Found) -> Wide2:
     return minus2(point(a.points, found.first), point(b.points, found.second))
 
@@ -188,7 +183,7 @@ def _are_tied(a: Placed, b: Placed, one: Found, two: Found) -> bool:
     else:
         own, other, of_first, of_second = a, b, (one if one.is_first else two), (two if one.is_first else one)
         p, edge = of_second.first - n, of_first.second - m
-        if p < 0 or edge < 0 or not _is_end(b.following, edge, of_second.second):
+        if p < 0 or edge < 0 or of_second.second not in (edge, b.following[edge]):
             return False
         q = a.following[p]
         if of_first.first != p and of_first.first != q:

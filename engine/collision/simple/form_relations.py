@@ -80,20 +80,15 @@ def _place(a: Placed, w: Any, first: int) -> bool:
 
 
 @inline
-def _is_less(w: Any, i: int, j: int) -> bool:
-    """Tell whether one pair is less than another: the rounded sums tell, where they are equal the rests."""
-    return bool(w[i] < w[j] or (w[i] == w[j] and w[i + 1] < w[j + 1]))
-
-
-@inline
 def _rank(w: Any, d: int, ranks: Any) -> None:
-    """Write of each bound how many of the four on its axis are less."""
+    """Write of each bound how many of the four on its axis are less: rounded sums tell, then what they lack."""
     for axis in range(d):
         for i in range(4):
             ranks[3 * i + axis] = 0.0
             for j in range(4):
                 one, other = 4 * axis + 2 * i + (8 if i > 1 else 0), 4 * axis + 2 * j + (8 if j > 1 else 0)
-                ranks[3 * i + axis] += 1.0 if _is_less(w, other, one) else 0.0
+                is_less = w[other] < w[one] or (w[other] == w[one] and w[other + 1] < w[one + 1])
+                ranks[3 * i + axis] += 1.0 if is_less else 0.0
 
 
 def relate_boxes(low: Any, high: Any, their_low: Any, their_high: Any) -> int:

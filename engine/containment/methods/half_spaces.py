@@ -85,12 +85,6 @@ def _largest(values: Any, folded: Any) -> float:
     return float(folded[0])
 
 
-@inline
-def _pays(row: int, n_rows: int) -> bool:
-    """Tell whether to leave out the points that are outside by now: after 8, 16, 32 ... rows, if many are to come."""
-    return row >= 8 and row & (row - 1) == 0 and n_rows - row >= 24
-
-
 @merged
 def _value(h: Any, x: Any, y: Any, z: Any, is_flat: bool) -> Any:
     return h.a * x + h.b * y + h.d if is_flat else h.a * x + h.b * y + h.c * z + h.d
@@ -123,7 +117,7 @@ def _locate(points: Any, planes: Any, is_exact: Any, locations: Any, flag: Any, 
         for row in range(0, len(planes), _ROWS):
             if flag[0]:
                 return n_beyond
-            if _pays(row, len(planes)):
+            if row >= 8 and row & (row - 1) == 0 and len(planes) - row >= 24:  # after 8, 16 ... if many are to come
                 if not is_thinned:
                     is_thinned = True
                     for k in range(count):

@@ -12,7 +12,6 @@ import pytest
 
 from engine.errors import NotRepresentableError
 from engine.predicates.rational import (
-    fractions,
     nearest_float,
     orient2d_rational,
     orient3d_rational,
@@ -48,7 +47,6 @@ def test_extremes_of_the_range() -> None:
 
 def test_fractions_are_taken_as_they_are() -> None:
     third = Fraction(1, 3)
-    assert fractions((0.5, 1, third)) == (Fraction(1, 2), Fraction(1), third)
     assert orient2d_rational((0, 0), (third, third), (2 * third, 2 * third)) == 0
     assert side_rational((3, -1), (third,)) == 0
     assert polynomial_sign_rational([(3,), (0,)], [27, -1], (third,)) == 0
