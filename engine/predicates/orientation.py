@@ -62,11 +62,7 @@ def orient2d_filter(a: Point2, b: Point2, c: Point2) -> int:
     right = (a.y - c.y) * (b.x - c.x)
     det = left - right
     threshold = BOUND_2D * (abs(left) + abs(right)) + GUARD_2D
-    if det > threshold:
-        return 1
-    if -det > threshold:
-        return -1
-    return UNDECIDED
+    return 1 if det > threshold else (-1 if -det > threshold else UNDECIDED)
 
 
 @inline
@@ -99,11 +95,7 @@ def orient3d_filter(a: Point3, b: Point3, c: Point3, d: Point3) -> int:
     u, v, w = minus(a, d), minus(b, d), minus(c, d)
     det, permanent = rounded_determinant(u, v, w)
     threshold = BOUND_3D * permanent + GUARD_3D * (1.0 + (abs(u.z) + abs(v.z) + abs(w.z)))
-    if det > threshold:
-        return 1
-    if -det > threshold:
-        return -1
-    return UNDECIDED
+    return 1 if det > threshold else (-1 if -det > threshold else UNDECIDED)
 
 
 @inline

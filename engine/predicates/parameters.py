@@ -43,11 +43,7 @@ def compare_ratios_filter(
     slack = a * b_bound + (b + b_bound) * a_bound + c * d_bound + (d + d_bound) * c_bound
     bound = 1.01 * slack + 2.0**-50 * (left + right) + TINY
     gap = left - right
-    if gap > bound:
-        return 1
-    if -gap > bound:
-        return -1
-    return UNDECIDED
+    return 1 if gap > bound else (-1 if -gap > bound else UNDECIDED)
 
 
 @inline

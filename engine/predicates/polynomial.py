@@ -71,11 +71,7 @@ def sign_of_polynomial_filter(powers: Any, coefficients: Any, degree: int, point
         value += term
         magnitude += size
     threshold = (degree + coefficients.shape[0] + SPARE_ROUNDINGS) * UNIT_ROUNDOFF * magnitude
-    if value > threshold:
-        return 1
-    if -value > threshold:
-        return -1
-    return UNDECIDED
+    return 1 if value > threshold else (-1 if -value > threshold else UNDECIDED)
 
 
 @inline

@@ -101,11 +101,7 @@ def orient3d_rounded(a: Point3, b: Point3, c: Point3, d: Point3, error: float) -
     y = abs(u.y) + abs(v.y) + abs(w.y) + 3.0 * moved
     z = abs(u.z) + abs(v.z) + abs(w.z) + 3.0 * moved
     threshold = BOUND_3D * permanent + GUARD_3D * (1.0 + z) + moved * (y * z + x * z + x * y)
-    if det > threshold:
-        return 1
-    if -det > threshold:
-        return -1
-    return UNDECIDED
+    return 1 if det > threshold else (-1 if -det > threshold else UNDECIDED)
 
 
 @inline

@@ -42,11 +42,7 @@ def side_of_plane_filter(h: HalfSpace3, p: Point3) -> int:
     ax, by, cz = h.a * p.x, h.b * p.y, h.c * p.z
     value = ax + by + cz + h.d
     threshold = BOUND_PLANE * (abs(ax) + abs(by) + abs(cz) + abs(h.d)) + GUARD
-    if value > threshold:
-        return 1
-    if -value > threshold:
-        return -1
-    return UNDECIDED
+    return 1 if value > threshold else (-1 if -value > threshold else UNDECIDED)
 
 
 @inline
