@@ -27,12 +27,11 @@ from engine.segment_clipping.profiles import check_cut
 from engine.solids.base import Preparing, Solid
 from engine.solids.csg import Csg
 from engine.solids.polyhedron import Polyhedron
-from engine.solids.pose import Pose, motion_of
+from engine.solids.pose import Pose, motions_of
 from engine.solids.triangle import Triangle
 
 _LISTED: Final = 4
 """Bodies that have no tree: their boxes are looked at sooner than one is built."""
-_STILL: Final = {d: b"".join(each.tobytes() for each in motion_of(None, d)) for d in (2, 3)}
 
 
 class Bodies(Preparing):
@@ -77,9 +76,7 @@ class Bodies(Preparing):
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return rotations (m, d, d) and translations of some bodies under other poses, and boxes, low and high."""
         arrays, m, d = self.arrays(budget), len(names), self.solids[0].dimension
-        joined = b"".join([_STILL[d] if pose is None else pose.numbers for pose in poses])
-        numbers = np.frombuffer(joined).reshape(m, -1)
-        turns, moves = numbers[:, : d * d].copy().reshape(m, d, d), numbers[:, d * d :].copy()
+        turns, moves = motions_of(poses, d)
         low, high, rows = np.empty((m, d)), np.empty((m, d)), np.arange(m)
         if type(None) in map(type, poses):
             rows[[pose is None for pose in poses]] = -1

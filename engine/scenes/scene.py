@@ -17,7 +17,7 @@ from engine.collision.scenes.collide_scene import Asked, ScenePairs, collide_bod
 from engine.containment.scene.locate_scene import SceneLocations, check_bodies, locate_few, locate_in
 from engine.containment.scene.one_by_one import are_few
 from engine.errors import EngineError, IndexOutOfRangeError, InvalidArrayError, InvalidOperationError
-from engine.parallel import Options, Progress, check_options
+from engine.parallel import Options, Progress, check_options, is_unlimited
 from engine.scenes.bodies import Bodies
 from engine.scenes.clip import Counts, answer_few, clip_all, clip_first, meets_any
 from engine.scenes.ends import ScenePieces, in_order, joined
@@ -276,8 +276,7 @@ class Scene(Immutable):
         >>> pieces.body.tolist(), pieces.t.tolist()
         ([1, 0], [[0.125, 0.25], [0.5, 0.75]])
         """
-        is_plain = workers is None or (type(workers) is int and workers > 0)
-        if is_plain and deadline is None and cancel is None and progress is None and report is False:
+        if report is False and is_unlimited(workers, deadline, cancel, progress):
             few = answer_few(segments, self._standing, keep)
             if few is not None:
                 return few

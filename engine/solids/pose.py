@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any, ClassVar, Final
 
@@ -166,6 +167,13 @@ Motion = tuple[FloatArray, FloatArray]
 def motion_of(pose: Pose | None, dimension: int) -> Motion:
     """Return rotation and translation of a pose, those that leave everything where it is for a body without one."""
     return _STILL[dimension] if pose is None else (pose.rotation, pose.translation)
+
+
+def motions_of(poses: Sequence[Pose | None], dimension: int) -> tuple[FloatArray, FloatArray]:
+    """Return rotations (n, d, d) and translations (n, d), as `motion_of` has them; ValueError for other dimensions."""
+    joined = b"".join([_IDENTITIES[dimension - 2] if pose is None else pose.numbers for pose in poses])
+    rows = np.frombuffer(joined).reshape(len(poses), dimension**2 + dimension)
+    return rows[:, : dimension**2].copy().reshape(-1, dimension, dimension), rows[:, dimension**2 :].copy()
 
 
 _IDENTITIES: Final = tuple(np.eye(d).tobytes() + np.zeros(d).tobytes() for d in (2, 3))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from engine.errors import InvalidArrayError, UnsupportedPairError, UnsupportedSo
 from engine.jit import kernel
 from engine.solids.base import Solid
 from engine.solids.bounds import own_box
-from engine.solids.pose import Pose
+from engine.solids.pose import Pose, motions_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,9 +48,6 @@ class SceneBodies:
         """Return some bodies under poses that fit them; the distinct solids are those of all."""
         solids = [self.solids[body] for body in names.tolist()]
         return _placed(solids, poses, self.distinct, self.kinds[names], self.own)
-
-
-_UNTURNED: Final = {dimension: np.eye(dimension) for dimension in (2, 3)}
 
 
 class OwnBoxes(NamedTuple):
@@ -89,33 +86,17 @@ def _placed(
 ) -> SceneBodies:
     """Return bodies where their poses put them."""
     n, dimension = len(kinds), own.boxes.shape[2]
-    is_posed, numbers = _pose_numbers(poses, dimension, solids)
-    rotations, translations = np.empty((n + 1, dimension, dimension)), np.zeros((n + 1, dimension))
-    rotations[0] = _UNTURNED[dimension]
-    rows: IntArray | slice = slice(1, None)
-    pose_rows = np.arange(1, n + 1)
-    if len(numbers) < n:
-        rotations[1:], rows = rotations[0], np.flatnonzero(is_posed) + 1
-        pose_rows[~is_posed] = -1
-    rotations[rows] = numbers[:, : dimension**2].reshape(-1, dimension, dimension)
-    translations[rows] = numbers[:, dimension**2 :]
+    try:
+        rotations, translations = motions_of([None, *poses], dimension)
+    except (AttributeError, TypeError, ValueError):  # one is no pose, or of another dimension
+        for index, pose in enumerate(poses):
+            check_pose(pose, solids[index], f"poses[{index}]")
+        raise
+    is_posed = np.array([pose is not None for pose in poses], np.bool_)
+    pose_rows = np.where(is_posed, np.arange(1, n + 1), -1)
     low, high = np.empty((n, dimension)), np.empty((n, dimension))
     entry_of(place_boxes)(*own, kinds, pose_rows, rotations, translations, low, high)
     return SceneBodies(solids, poses, distinct, kinds, is_posed, rotations, translations, low, high, own)
-
-
-def _pose_numbers(placed: Sequence[Pose | None], d: int, bodies: Sequence[Solid]) -> tuple[BoolArray, FloatArray]:
-    """Return which bodies have a pose, and rows of rotation and translation; raise on the first that is none."""
-    types, moving, is_posed = set(map(type, placed)), placed, np.ones(len(placed), np.bool_)
-    if type(None) in types:
-        moving, is_posed = [pose for pose in placed if pose is not None], np.array([p is not None for p in placed])
-    if types <= {Pose, type(None)}:
-        numbers = np.frombuffer(b"".join([pose.numbers for pose in moving]))  # type: ignore[union-attr]
-        if len(numbers) == len(moving) * (d**2 + d):  # none of 2 rows makes up for one of 3
-            return is_posed, numbers.reshape(-1, d**2 + d)
-    for index, pose in enumerate(placed):
-        check_pose(pose, bodies[index], f"poses[{index}]")
-    raise AssertionError("unreachable")
 
 
 def check_collidable(bodies: Sequence[Solid]) -> tuple[list[Solid], IntArray]:
