@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
-from engine.predicates.exact_vectors import determinant
+from engine.predicates.rational import determinant
 
 IntPoint = tuple[int, ...]
 

@@ -34,7 +34,7 @@ from engine.collision.simple.against_ball import body_sphere_parts
 from engine.collision.simple.against_half_space import half_space_body_parts
 from engine.containment.rational_locate import rational_location
 from engine.errors import InvalidInputError, UnsupportedSolidError
-from engine.predicates.exact_vectors import largest_axis, minus, squared_length
+from engine.predicates.rational import largest_axis, minus, squared_length
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.checks import spell

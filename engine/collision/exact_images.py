@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable
 from fractions import Fraction
 
 from engine.containment.rational_locate import adjugate
-from engine.predicates.exact_vectors import dot
+from engine.predicates.rational import dot
 from engine.solids.half_space import HalfSpace
 from engine.solids.pose import Pose
 

@@ -22,9 +22,8 @@ from engine.containment.methods.polygon_one_pass import locate_by_ring_pass
 from engine.containment.methods.polygon_ray_parity import locate_in_rings
 from engine.containment.methods.polyhedron_one_pass import locate_by_pass
 from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
-from engine.containment.methods.polynomial import locate_by_polynomial
 from engine.containment.policy import CELLS, LONG_PASS, PASS, choose_for_mesh, choose_for_rings
-from engine.containment.posed.filters import NOT_FINITE, locate_in_box
+from engine.containment.posed.filters import NOT_FINITE, locate_by_polynomial, locate_in_box
 from engine.containment.prepared import EXACT, prism_rows, rings_of, tree_of
 from engine.containment.rational_locate import combine, over_tree, rational_location, unsupported
 from engine.containment.ring_cells.build import ring_cells_of

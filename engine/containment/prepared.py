@@ -13,7 +13,7 @@ from engine.bounding.bvh import WIDTH, build_bvh, on_lines
 from engine.bounding.grid import BoxGrid, build_box_grid
 from engine.containment.methods.polyhedron_ray_parity import fill_triangle_boxes, lay_out
 from engine.containment.rational_locate import Check, next_in_ring, no_check, prism_walls
-from engine.lanes.overhead import OVERHEAD_ROWS
+from engine.lanes.triangles import OVERHEAD_ROWS
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
 from engine.solids.triangle import Triangle

@@ -21,10 +21,12 @@ import numpy as np
 from engine.arrays import FloatArray, IntArray
 from engine.containment.methods.polyhedron_ray_parity import fill_triangle_boxes, list_unsure
 from engine.errors import UnsupportedSolidError
-from engine.predicates.exact_vectors import cross, dot, minus
 from engine.predicates.rational import (
     Number,
     common_integers,
+    cross,
+    dot,
+    minus,
     polynomial_sign_rational,
     scaled_integers,
     side_rational,

@@ -1,4 +1,5 @@
-"""The predicates in Python's unlimited integers: right for any finite floats, integers and Fractions, and slow.
+"""The predicates in Python's unlimited integers: right for any finite floats, integers and Fractions, and slow; and
+vectors of exact numbers, integers or Fractions, in the plane and in space, as tuples.
 
 Kernels answer UNDECIDED where an exponent leaves their range; public functions settle such an item here. The sign of a
 determinant does not change when the numbers of one axis are multiplied by a common positive factor, so each axis is
@@ -11,9 +12,52 @@ import math
 from collections.abc import Sequence
 from decimal import Decimal
 from fractions import Fraction
+from typing import TypeVar
 
 from engine.errors import NotRepresentableError
-from engine.predicates.exact_vectors import cross, dot, minus
+
+Exact = TypeVar("Exact", int, Fraction)
+
+
+def minus(u: Sequence[Exact], v: Sequence[Exact]) -> tuple[Exact, ...]:
+    """Return u - v."""
+    if len(u) == 2:
+        return u[0] - v[0], u[1] - v[1]
+    return u[0] - v[0], u[1] - v[1], u[2] - v[2]
+
+
+def dot(u: Sequence[Exact], v: Sequence[Exact]) -> Exact:
+    """Return u . v."""
+    if len(u) == 2:
+        return u[0] * v[0] + u[1] * v[1]
+    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+
+
+def squared_length(u: Sequence[Exact]) -> Exact:
+    """Return u . u."""
+    return dot(u, u)
+
+
+def cross(u: Sequence[Exact], v: Sequence[Exact]) -> tuple[Exact, Exact, Exact]:
+    """Return u x v of two vectors of space."""
+    return u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
+
+
+def largest_axis(u: Sequence[Exact]) -> int:
+    """Return the first axis of the largest magnitude, -1 for the zero vector."""
+    sizes = [abs(value) for value in u]
+    largest = max(sizes)
+    return sizes.index(largest) if largest else -1
+
+
+def determinant(matrix: Sequence[Sequence[Exact]]) -> Exact | int:
+    """Return the determinant of a matrix of at most 3 rows; 1 for none."""
+    if len(matrix) == 3:
+        return dot(matrix[0], cross(matrix[1], matrix[2]))
+    if len(matrix) == 2:
+        return matrix[0][0] * matrix[1][1] - matrix[0][1] * matrix[1][0]
+    return matrix[0][0] if matrix else 1
+
 
 Number = float | int | Fraction
 """Any finite number; numpy scalars of float64 are floats."""

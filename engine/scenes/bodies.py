@@ -15,8 +15,8 @@ from engine.collision.scenes.batches import SceneBatches
 from engine.collision.scenes.bodies import SceneBodies, bodies_of, check_collidable, distinct_of
 from engine.containment.locators import Locator
 from engine.containment.posed.locators import posed_locator
-from engine.containment.scene.bodies import body_box
 from engine.containment.scene.first_pass import SECOND_PASS
+from engine.containment.scene.grid import body_box
 from engine.containment.scene.tables import Scene as LocateTables
 from engine.containment.scene.tables import scene_of
 from engine.direct import entry_of

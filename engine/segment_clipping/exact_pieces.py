@@ -17,8 +17,7 @@ from fractions import Fraction
 from itertools import groupby
 from typing import Final, NamedTuple
 
-from engine.predicates.exact_vectors import cross, dot, minus
-from engine.predicates.rational import nearest
+from engine.predicates.rational import cross, dot, minus, nearest
 
 Integers = Sequence[int]
 ZERO, ONE = Fraction(0), Fraction(1)

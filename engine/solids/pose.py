@@ -12,8 +12,7 @@ from engine.arrays import FloatArray, read_only
 from engine.direct import entry_of
 from engine.errors import InvalidArrayError, NotRigidError, WrongDimensionError
 from engine.jit import kernel
-from engine.predicates.exact_vectors import cross, determinant
-from engine.predicates.rational import scaled_integers
+from engine.predicates.rational import cross, determinant, scaled_integers
 from engine.solids.base import Immutable
 from engine.solids.checks import (
     as_floats,

@@ -16,8 +16,7 @@ import numpy as np
 from engine.collision.clearance.near_triangles import FACE
 from engine.collision.result import Clearance, Feature
 from engine.errors import NotRepresentableError
-from engine.predicates.exact_vectors import cross, dot, minus, squared_length
-from engine.predicates.rational import nearest, nearest_with_root
+from engine.predicates.rational import cross, dot, minus, nearest, nearest_with_root, squared_length
 
 Vector = tuple[int, ...]
 Corners = tuple[Vector, Vector, Vector]

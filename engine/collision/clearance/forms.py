@@ -20,8 +20,7 @@ from engine.collision.exact_images import Vector, as_vector, image_point
 from engine.collision.result import Clearance, Feature, Poses
 from engine.collision.simple.form import FORMS, form_of
 from engine.direct import entry_of
-from engine.predicates.exact_vectors import minus, squared_length
-from engine.predicates.rational import sign_of
+from engine.predicates.rational import minus, sign_of, squared_length
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.half_space import HalfSpace

@@ -16,7 +16,7 @@ from engine.collision.clearance.forms import PLANE, scaled_gap
 from engine.collision.exact_images import Vector, image_half_space, image_map, value_at
 from engine.collision.result import Feature, Poses
 from engine.collision.simple.boundary import pulled_back
-from engine.predicates.exact_vectors import squared_length
+from engine.predicates.rational import squared_length
 from engine.solids.base import Solid
 from engine.solids.half_space import HalfSpace
 

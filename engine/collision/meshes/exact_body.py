@@ -21,7 +21,7 @@ from engine.collision.meshes.placement import PoseArrays
 from engine.collision.result import Poses
 from engine.jit import allocating_kernel, inline
 from engine.lanes.boxes import EMPTY
-from engine.predicates.exact_vectors import cross, dot, largest_axis, minus
+from engine.predicates.rational import cross, dot, largest_axis, minus
 from engine.solids.pose import Pose
 
 Vector = tuple[int, ...]

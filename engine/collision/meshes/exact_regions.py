@@ -21,8 +21,7 @@ from typing import NamedTuple
 from engine.budget import Budget
 from engine.collision.meshes.exact_body import Corners, ExactBody, Plane, Vector, rounded_outward
 from engine.collision.meshes.exact_triangles import value_at, without_axis
-from engine.predicates.exact_vectors import cross, dot, minus
-from engine.predicates.rational import sign_of
+from engine.predicates.rational import cross, dot, minus, sign_of
 
 Rational = int | Fraction  # integers where they suffice: they are ten times faster
 Rational2 = tuple[Rational, Rational]

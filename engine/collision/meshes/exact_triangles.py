@@ -16,8 +16,7 @@ from itertools import combinations
 from engine.collision.meshes.exact_body import Corners, Plane, Vector, plane_through
 from engine.collision.meshes.triangle_triangle import APART, CONTACT, COPLANAR, CROSSING
 from engine.collision.result import Kind
-from engine.predicates.exact_vectors import cross, minus
-from engine.predicates.rational import sign_of
+from engine.predicates.rational import cross, minus, sign_of
 
 Flat = tuple[int, int]
 

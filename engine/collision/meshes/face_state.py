@@ -18,7 +18,6 @@ import numpy as np
 
 from engine.arrays import Int8Array, IntArray
 from engine.bounding.bvh import STACK
-from engine.collision.meshes.faces_near import SLACK, box_between, next_face
 from engine.collision.meshes.mesh_arrays import (
     STATE_CLEAN,
     STATE_CROSSED,
@@ -28,7 +27,7 @@ from engine.collision.meshes.mesh_arrays import (
     in_tree,
     triangle_of,
 )
-from engine.collision.meshes.parity import INSIDE, OUTSIDE, OwnPoint, locate_along
+from engine.collision.meshes.parity import INSIDE, OUTSIDE, SLACK, OwnPoint, box_between, locate_along, next_face
 from engine.collision.meshes.triangle_triangle import (
     CROSSING,
     Facet,

@@ -18,9 +18,17 @@ from engine.bounding.bvh import STACK
 from engine.collision.codes import OVERLAPPING, TOUCHING, UNSETTLED
 from engine.collision.meshes.dual_traversal import Search
 from engine.collision.meshes.face_state import point_within, state_of
-from engine.collision.meshes.faces_near import SLACK, box_between, next_face
 from engine.collision.meshes.mesh_arrays import STATE_STACKED, MeshArrays, in_tree, triangle_of
-from engine.collision.meshes.parity import INSIDE, OUTSIDE, OwnPoint, brought_back, locate_point
+from engine.collision.meshes.parity import (
+    INSIDE,
+    OUTSIDE,
+    SLACK,
+    OwnPoint,
+    box_between,
+    brought_back,
+    locate_point,
+    next_face,
+)
 from engine.collision.meshes.placement import Placement, defect_of
 from engine.jit import allocating, called, inline
 from engine.predicates.vectors import as_point3, largest_of, minus

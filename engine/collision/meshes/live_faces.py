@@ -21,8 +21,16 @@ from engine.budget import Budget
 from engine.collision.exact_images import Vector, as_vector
 from engine.collision.meshes.face_state import states_of
 from engine.collision.meshes.mesh_arrays import NO_AREA, STATE_STACKED, MeshBody
-from engine.predicates.exact_vectors import cross, dot, largest_axis, minus, squared_length
-from engine.predicates.rational import common_integers, orient2d_rational, orient3d_rational
+from engine.predicates.rational import (
+    common_integers,
+    cross,
+    dot,
+    largest_axis,
+    minus,
+    orient2d_rational,
+    orient3d_rational,
+    squared_length,
+)
 
 Point2 = tuple[Fraction, Fraction]
 IN_FACE, IN_ODD, LIVE = 1, 2, 3

@@ -14,11 +14,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from engine.bounding.bvh import STACK
-from engine.collision.meshes.faces_near import ABOVE_ALL, SLACK, box_between, next_face
 from engine.collision.meshes.mesh_arrays import MeshArrays, in_tree, triangle_of
 from engine.collision.meshes.placement import Placement, defect_of, orient2d_near, place_pair, placed, turned_back
 from engine.collision.meshes.triangle_triangle import Facet
 from engine.jit import allocating, inline, kernel, merged
+from engine.lanes.boxes import inside_box
+from engine.lanes.lanes import lowest_bit
 from engine.predicates.orientation import orient3d
 from engine.predicates.posed import orient3d_rounded
 from engine.predicates.vectors import as_point3, largest_of, minus
@@ -145,3 +146,34 @@ def locate_vertices(
             return
         own = brought_back(as_point3(source.vertices, vertices[item]), a, b, defect)
         found[item] = locate_point(own, mesh)
+
+
+SLACK = 2.0**-20
+"""By how much a box in the tree's coordinates is widened for its rounding to float32."""
+ABOVE_ALL = 1e6
+"""In the coordinates of a tree, which are at most 2."""
+
+
+@inline
+def box_between(a: Point3, b: Point3, slack: float) -> tuple[Any, Any]:
+    """Return the ends of the box from a to b, widened, as far as it matters, as triples of float32."""
+    x, y, z = max(a.x - slack, -ABOVE_ALL), max(a.y - slack, -ABOVE_ALL), max(a.z - slack, -ABOVE_ALL)
+    p, q, r = min(b.x + slack, ABOVE_ALL), min(b.y + slack, ABOVE_ALL), min(b.z + slack, ABOVE_ALL)
+    return (np.float32(x), np.float32(y), np.float32(z)), (np.float32(p), np.float32(q), np.float32(r))
+
+
+@inline
+def next_face(mesh: MeshArrays, stack: Any, n: int, box: tuple[Any, Any]) -> tuple[int, int]:
+    """Return a face whose box meets a box, -1 if there is none left, and how much waits on the stack (STACK,) int32,
+    which begins with the root, 0: nodes, and faces as in `MeshArrays.child`."""
+    while n > 0:  # bound: each node and face enters once
+        n -= 1
+        child = int(stack[n])
+        if child < 0:
+            return -1 - child, n
+        lanes = inside_box(mesh.boxes, child, box[0], box[1])
+        while lanes != 0:
+            stack[n] = mesh.child[child, lowest_bit(lanes)]
+            lanes &= lanes - 1
+            n += 1
+    return -1, 0

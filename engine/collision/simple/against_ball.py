@@ -24,7 +24,7 @@ from engine.collision.simple.ball_on_mesh import relate_balls
 from engine.collision.simple.boundary import Boundary, boundary_of
 from engine.containment.rational_locate import rational_location
 from engine.direct import entry_of
-from engine.predicates.exact_vectors import minus, squared_length
+from engine.predicates.rational import minus, squared_length
 from engine.solids.base import Solid
 from engine.solids.bounds import own_box
 from engine.solids.pose import Pose

@@ -19,8 +19,7 @@ from engine.collision.result import Work
 from engine.collision.simple.sides_of_plane import first_triangle_at
 from engine.containment.rational_locate import rational_location
 from engine.direct import entry_of
-from engine.predicates.exact_vectors import dot
-from engine.predicates.rational import sign_of
+from engine.predicates.rational import dot, sign_of
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
 from engine.types import Location

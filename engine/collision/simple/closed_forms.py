@@ -31,7 +31,7 @@ from engine.collision.simple.against_ball import collide_body_sphere
 from engine.collision.simple.form import form_of
 from engine.collision.simple.form_relations import FACE_AT, KIND_AT, THEIR_FACE_AT, relate_forms
 from engine.direct import entry_of
-from engine.predicates.exact_vectors import largest_axis, squared_length
+from engine.predicates.rational import largest_axis, squared_length
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.half_space import HalfSpace

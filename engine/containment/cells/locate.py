@@ -3,6 +3,10 @@
 A point in a cell without triangles has the cell's side; in another one, the side of the reference point, turned by each
 triangle that the segment crosses. Points too close to a plane of an entry are left UNDECIDED, for the vertical ray.
 
+For scenes a point, which may carry a blur (posed/filters.py), is looked up in level 0 of the cells of one of many
+polyhedra (tables: top.py). It must lie in one cell with all of its blur: an index is ``int((x - low) * scale)``, each
+step monotone.
+
 Source: space-partitioned point containment with reference points; the two-level grid after Kalojanov, Billeter and
 Slusallek 2011, "Two-level grids for ray tracing on GPUs". Changed: certified in single precision, exact behind it.
 """
@@ -16,6 +20,7 @@ import numpy as np
 from engine.containment.cells.lattice import LEVELS, PARTS, PLACE, finest, parts_of, reference_coordinate, share_of
 from engine.containment.posed.filters import NOT_FINITE, has_not_finite
 from engine.jit import allocating_kernel, called, inline, merged
+from engine.lanes.addresses import int8_at
 from engine.lanes.cells import ROWS, group_parity, prefetch_group
 from engine.types import UNDECIDED
 
@@ -172,3 +177,35 @@ def locate_by_cells(points: Any, cells: Any, locations: Any, flag: Any) -> int:
         n_open += _count_open(locations, item_of, n_kept)
         n_kept = np.uint64(0)
     return n_open
+
+
+@inline
+def _index(value: float, low: float, scale: float) -> int:
+    """Return the index of a value that is not below `low`."""
+    return int((value - low) * scale)
+
+
+@inline
+def side_in_cell(frames: Any, places: Any, row: int, p: Any, blur: float) -> int:
+    """Return the location of a blurred point (x, y, z) if its cell tells it, else UNDECIDED.
+
+    frames: (n, 6), places: (n, 4), what `TopCells` has of each polyhedron, of which `row` counts.
+    """
+    x, y, z = p
+    x_low, y_low, z_low = frames[row, 0], frames[row, 1], frames[row, 2]
+    x_scale, y_scale, z_scale = frames[row, 3], frames[row, 4], frames[row, 5]
+    address, nx, ny, nz = places[row, 0], places[row, 1], places[row, 2], places[row, 3]
+    is_within = (x - blur >= x_low) & (y - blur >= y_low) & (z - blur >= z_low)
+    is_within &= ((x + blur) - x_low) * x_scale < nx
+    is_within &= ((y + blur) - y_low) * y_scale < ny
+    is_within &= ((z + blur) - z_low) * z_scale < nz
+    if not is_within:
+        return UNDECIDED
+    column, line, layer = _index(x, x_low, x_scale), _index(y, y_low, y_scale), _index(z, z_low, z_scale)
+    if blur > 0.0:
+        is_one = _index(x - blur, x_low, x_scale) == _index(x + blur, x_low, x_scale)
+        is_one &= _index(y - blur, y_low, y_scale) == _index(y + blur, y_low, y_scale)
+        is_one &= _index(z - blur, z_low, z_scale) == _index(z + blur, z_low, z_scale)
+        if not is_one:
+            return UNDECIDED
+    return int(int8_at(address, (layer * ny + line) * nx + column))

@@ -15,7 +15,7 @@ Both triangles at an edge decide the zero on their common edge alike, so the par
 for every surface that is even at each edge: also self-intersecting, non-manifold and degenerate ones.
 
 The triangles over q are found in a tree of boxes (bvh.py), whose float32 boxes hold theirs; q is widened by more than
-its own rounding. Eight at a time are counted or left out in single precision (overhead.py), the rest one by one. A q
+its own rounding. Eight at a time are counted or left out in single precision (`overhead`), the rest one by one. A q
 with a blur (posed/filters.py) is located where all rays of it agree, else left UNDECIDED.
 
 Source: the textbook's ray and parity test; symbolic perturbation after Edelsbrunner and Muecke 1990, "Simulation of
@@ -33,7 +33,7 @@ from engine.containment.posed.filters import NOT_FINITE, has_not_finite, orient2
 from engine.jit import allocating_kernel, called, inline, kernel, merged
 from engine.lanes.boxes import EMPTY, inside_box
 from engine.lanes.lanes import count_bits, lowest_bit
-from engine.lanes.overhead import BAND, GROWTH, LEAST_REACH, OVERHEAD_ROWS, overhead
+from engine.lanes.triangles import BAND, GROWTH, LEAST_REACH, OVERHEAD_ROWS, overhead
 from engine.predicates.orientation import orient2d, orient2d_exact, orient2d_filter, orient3d_exact, orient3d_filter
 from engine.predicates.posed import orient3d_rounded
 from engine.predicates.vectors import as_point3, corners_of

@@ -12,6 +12,7 @@ from typing import Any, Final
 
 from engine.jit import inline, kernel
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
+from engine.predicates.polynomial import sign_of_polynomial_exact, sign_of_polynomial_filter
 from engine.types import UNDECIDED
 
 _SLACK: Final = 8.0 * 2.0**-53
@@ -150,3 +151,24 @@ def locate_in_box(points: Any, blurs: Any, low: Any, high: Any, locations: Any, 
         locations[item] = side_of_box(least, most, is_flat, in_space(points, item), blur)
         n_open += locations[item] == UNDECIDED
     return n_open
+
+
+@kernel
+def locate_by_polynomial(points: Any, powers: Any, coefficients: Any, degree: int, locations: Any, flag: Any) -> int:
+    """Fill `locations` (n,) int8 for points (n, dim) with the sign of the polynomial, or UNDECIDED.
+
+    powers: (t, dim) int64; coefficients: (t,); degree: the largest total power. Returns the count beyond the
+    filter, or NOT_FINITE.
+    """
+    if has_not_finite(points):
+        return NOT_FINITE
+    n_beyond = 0
+    for item in range(len(points)):
+        if flag[0]:
+            break
+        sign = sign_of_polynomial_filter(powers, coefficients, degree, points, item)
+        if sign == UNDECIDED:
+            n_beyond += 1
+            sign = sign_of_polynomial_exact(powers, coefficients, points, item)
+        locations[item] = sign
+    return n_beyond

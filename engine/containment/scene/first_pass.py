@@ -12,7 +12,7 @@ from __future__ import annotations
 from typing import Any, Final, NamedTuple
 
 from engine.arrays import BoolArray, FloatArray, Int8Array, Int32Array, IntArray
-from engine.containment.cells.side import side_in_cell
+from engine.containment.cells.locate import side_in_cell
 from engine.containment.methods.ball import located
 from engine.containment.methods.polygon_one_pass import locate_in_small_rings
 from engine.containment.posed.filters import in_space, side_of_box, side_of_rows

@@ -18,9 +18,8 @@ from engine.containment.locators import Locator
 from engine.containment.methods.polygon_one_pass import close_rings
 from engine.containment.posed.frames import frames_of
 from engine.containment.posed.locators import posed_locator
-from engine.containment.scene.bodies import body_box, grown_boxes, moved_boxes
 from engine.containment.scene.first_pass import BALL, BOX, CELLS, RINGS, ROWS, SECOND_PASS, SceneTables
-from engine.containment.scene.grid import SceneGrid, build_scene_grid
+from engine.containment.scene.grid import SceneGrid, body_box, build_scene_grid, grown_boxes, moved_boxes
 from engine.errors import EngineError
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid

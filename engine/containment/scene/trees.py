@@ -12,7 +12,7 @@ import numpy as np
 
 from engine.arrays import FloatArray, Int32Array, IntArray
 from engine.bounding.bvh import WIDTH
-from engine.containment.cells.side import side_in_cell
+from engine.containment.cells.locate import side_in_cell
 from engine.containment.methods.polyhedron_ray_parity import locate_in_tree
 from engine.containment.posed.filters import in_space
 from engine.containment.posed.frames import to_frame
@@ -21,7 +21,7 @@ from engine.containment.scene.first_pass import SECOND_PASS
 from engine.jit import inline, kernel
 from engine.lanes.addresses import array_at
 from engine.lanes.boxes import BOX_ROWS
-from engine.lanes.overhead import OVERHEAD_ROWS
+from engine.lanes.triangles import OVERHEAD_ROWS
 from engine.types import UNDECIDED, Point3
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from engine import HalfSpace, Pose
 from engine.collision.exact_images import as_vector, image_half_space, image_point, value_at
-from engine.predicates.exact_vectors import dot
+from engine.predicates.rational import dot
 
 
 @pytest.mark.parametrize("d", [2, 3])

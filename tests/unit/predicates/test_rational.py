@@ -12,12 +12,17 @@ import pytest
 
 from engine.errors import NotRepresentableError
 from engine.predicates.rational import (
+    cross,
+    dot,
+    largest_axis,
+    minus,
     nearest_float,
     orient2d_rational,
     orient3d_rational,
     polynomial_sign_rational,
     scaled_integers,
     side_rational,
+    squared_length,
 )
 
 TINY, HUGE = 5e-324, 1.7976931348623157e308
@@ -78,3 +83,18 @@ def test_nearest_float_at_the_edges() -> None:
     assert nearest_float(Fraction(HUGE) + step / 2 - 1) == HUGE
     with pytest.raises(NotRepresentableError, match=r"1\.7976931348623158e\+308"):
         nearest_float(Fraction(HUGE) + step / 2)
+
+
+def test_identities_in_integers_and_fractions() -> None:
+    rng = random.Random(1)
+    for _ in range(50):
+        u, v = (tuple(rng.randint(-9, 9) for _ in range(3)) for _ in range(2))
+        assert dot(cross(u, v), u) == dot(cross(u, v), v) == 0
+        assert squared_length(cross(u, v)) == squared_length(u) * squared_length(v) - dot(u, v) ** 2
+        for n in (2, 3):
+            p, q = (tuple(Fraction(x, 7) for x in w[:n]) for w in (u, v))
+            assert squared_length(minus(p, q)) == squared_length(p) - 2 * dot(p, q) + squared_length(q)
+
+
+def test_largest_axis_is_the_first_of_equals() -> None:
+    assert [largest_axis(u) for u in ((0, 0, 0), (1, -1, 0), (0, -3, 2), (0, 0, 5))] == [-1, 0, 1, 2]

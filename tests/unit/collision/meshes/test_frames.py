@@ -13,7 +13,7 @@ from engine.collision.exact_images import image_point
 from engine.collision.meshes.dual_traversal import new_descent, place_bodies
 from engine.collision.meshes.placement import NEVER_APART
 from engine.jit import kernel
-from engine.predicates.exact_vectors import dot
+from engine.predicates.rational import dot
 from tests.unit.collision.meshes.bodies import TURN, mesh
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from engine import Polyhedron, locate
 from engine.budget import Budget
-from engine.containment.cells.side import side_in_cell
+from engine.containment.cells.locate import side_in_cell
 from engine.containment.cells.top import TopCells, build_top_cells, can_have_cells
 from engine.jit import kernel
 from engine.lanes.addresses import array_at, plain_array_at, plain_int8_at

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from engine.predicates.exact_vectors import cross, minus
-from engine.predicates.rational import common_integers
+from engine.predicates.rational import common_integers, cross, minus
 from engine.segment_clipping.exact_pieces import is_crossed, triangle_stretch
 from engine.segment_clipping.on_boundary.contacts import APART, DEGENERATE, END, START
 from engine.segment_clipping.on_boundary.mesh_streams import find_mesh_contacts
