@@ -91,13 +91,15 @@ def settled(kernel: Callable[[FloatArray, Int8Array, Budget], int], rest: Fill) 
             return Counts(0, 0)
         if n_beyond == NOT_FINITE:
             raise NotFiniteError("a point is not finite", ("points",))
-        return Counts(n_beyond, fill_some(rest, points, locations, np.flatnonzero(locations == UNDECIDED), budget))
+        return Counts(n_beyond, settle(rest, points, locations, np.flatnonzero(locations == UNDECIDED), budget))
 
     return fill
 
 
-def fill_some(fill: Fill, points: FloatArray, locations: Int8Array, items: IntArray, budget: Budget) -> int:
+def settle(fill: Fill, points: FloatArray, locations: Int8Array, items: IntArray, budget: Budget) -> int:
     """Locate those points of a chunk that `items` numbers; return how many took rational arithmetic."""
+    if not len(items):
+        return 0
     found = np.empty(len(items), np.int8)
     counts = fill(points[items], found, budget)
     locations[items] = found

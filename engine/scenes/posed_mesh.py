@@ -25,16 +25,10 @@ from engine.predicates.double_double import dd_div, dd_sub
 from engine.scenes.posed_cut import in_frame, put_point, slack_of
 from engine.scenes.scratch import MOST_MET, Scratch, scratch_at
 from engine.segment_clipping.on_boundary.contacts import APART, CROSSED, DEGENERATE, PROPER, START, are_one, place_of
-from engine.segment_clipping.on_boundary.crossing_values import (
-    Crossings,
-    Vector,
-    dot,
-    is_item_safe,
-    normal_of,
-    sort_crossings,
-)
+from engine.segment_clipping.on_boundary.crossing_values import Vector, dot, is_item_safe, normal_of
 from engine.segment_clipping.on_boundary.exact_crossing import cross_exactly
 from engine.segment_clipping.on_boundary.mesh_contacts import local_segment, shear_of
+from engine.segment_clipping.on_boundary.touching_cut import Crossings, sort_crossings
 from engine.segment_clipping.on_boundary.triangle_contact import contact_filter, corner, exact_contact, triangle_at
 from engine.segment_clipping.plane_meeting import T_BOUND
 from engine.types import UNDECIDED, Point3

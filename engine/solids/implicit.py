@@ -12,16 +12,7 @@ from engine.arrays import FloatArray, IntArray, read_only
 from engine.errors import InvalidArrayError, InvalidPolynomialError, WrongDimensionError
 from engine.predicates.polynomial import MAX_DEGREE, MAX_TERMS
 from engine.solids.base import Solid
-from engine.solids.checks import (
-    DIMENSIONS,
-    as_floats,
-    as_number,
-    check_given_dimension,
-    check_not_empty,
-    frozen,
-    shown,
-    spell,
-)
+from engine.solids.checks import as_floats, as_number, check_given_dimension, check_not_empty, frozen, shown, spell
 
 PointFunction = Callable[[FloatArray], npt.ArrayLike]
 """Takes points ``(n, dimension)`` float64 and returns n numbers, not negative inside."""
@@ -132,7 +123,7 @@ def _as_powers(powers: object, where: tuple[str | int, ...], *, one: bool = Fals
             f"{spell(where)} must be {shape} of 2 or 3 whole numbers from 0 to {MAX_DEGREE}, got {shown(powers, 80)}",
             where,
         )
-    if array.shape[1] not in DIMENSIONS:
+    if array.shape[1] not in (2, 3):
         raise WrongDimensionError(f"{spell(where)} must have 2 or 3 powers, got {array.shape[1]}", where)
     return array
 

@@ -93,13 +93,6 @@ def scaled(p: Point3, unit: float) -> Point3:
     return Point3(p.x * unit, p.y * unit, p.z * unit)
 
 
-@merged
-def half_of(view: View, at: int) -> float:
-    """Return the largest half width of a box."""
-    node, lane, b = at >> 3, at & 7, view.mesh.boxes
-    return 2.0 if at == ROOT else float(max(b[node, 3, lane], b[node, 4, lane], b[node, 5, lane]))
-
-
 @inline
 def fix(view: View, at: int, fixed: Any) -> None:
     """Write box and disc of a lane, or what holds the whole tree, to the first column of `fixed`."""

@@ -24,18 +24,7 @@ import numpy as np
 
 from engine.collision.clearance.along_line import approach, finish_along_line
 from engine.collision.clearance.blocks import CLOSER, DONE, FULL, INTERRUPTED, block_reach, keep_below, measure_blocks
-from engine.collision.clearance.boxes import (
-    ROOT,
-    Search,
-    View,
-    fix,
-    half_of,
-    margin_of,
-    scaled,
-    set_line,
-    size_of,
-    way_of,
-)
+from engine.collision.clearance.boxes import ROOT, Search, View, fix, margin_of, scaled, set_line, size_of, way_of
 from engine.collision.clearance.certified import certify
 from engine.collision.clearance.refined import refine
 from engine.collision.meshes.mesh_arrays import MeshArrays
@@ -116,6 +105,13 @@ def _open(s: Search, n: int, pair: tuple[int, int, bool], most: float) -> int:
     return n
 
 
+@merged
+def _half_of(view: View, at: int) -> float:
+    """Return the largest half width of a box."""
+    node, lane, b = at >> 3, at & 7, view.mesh.boxes
+    return 2.0 if at == ROOT else float(max(b[node, 3, lane], b[node, 4, lane], b[node, 5, lane]))
+
+
 @inline
 def _search(s: Search, limits: Any, flag: Any) -> tuple[int, int]:
     """Fill the candidates; return how the search ended, and their number. See `find_nearest`."""
@@ -150,7 +146,7 @@ def _search(s: Search, limits: Any, flag: Any) -> tuple[int, int]:
             if how != DONE:
                 return how, 0
             continue
-        is_first = not i_block and (j_block or half_of(s.a, i) * sizes[0] >= half_of(s.b, j) * sizes[1])
+        is_first = not i_block and (j_block or _half_of(s.a, i) * sizes[0] >= _half_of(s.b, j) * sizes[1])
         n = _open(s, n, (node if is_first else their_node, j if is_first else i, is_first), limits[0])
     return DONE, keep_below(s.room.found, n_found, limits[0])
 

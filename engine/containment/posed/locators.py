@@ -18,16 +18,7 @@ import numpy as np
 
 from engine.arrays import FloatArray, Int8Array, read_only
 from engine.budget import Budget
-from engine.containment.locators import (
-    Counts,
-    Fill,
-    Locator,
-    by_kernel,
-    csg_locator,
-    fill_some,
-    locator_of,
-    rational_half,
-)
+from engine.containment.locators import Counts, Fill, Locator, by_kernel, csg_locator, locator_of, rational_half, settle
 from engine.containment.methods.ball import locate_in_ball
 from engine.containment.methods.polygon_one_pass import locate_by_ring_pass
 from engine.containment.methods.polygon_ray_parity import locate_in_rings
@@ -95,8 +86,8 @@ def _filtered(solid: Solid, pose: Pose, unposed: Locator, frames: Frames) -> Fil
         n_rational = 0
         if frames.is_turn[0]:
             exact = np.flatnonzero((blurs == 0.0) & (locations == UNDECIDED))
-            n_rational = fill_some(unposed.fill, moved, locations, exact, budget)
-        n_rational += fill_some(rest, points, locations, np.flatnonzero(locations == UNDECIDED), budget)
+            n_rational = settle(unposed.fill, moved, locations, exact, budget)
+        n_rational += settle(rest, points, locations, np.flatnonzero(locations == UNDECIDED), budget)
         return Counts(n_beyond, n_rational)
 
     return fill

@@ -12,17 +12,16 @@ from typing import Any, Final
 
 from engine.jit import allocating_kernel, called, inline
 from engine.segment_clipping.on_boundary.contacts import GROUP, PROPER, edge_contacts_for, gather_edges
-from engine.segment_clipping.on_boundary.crossing_values import (
+from engine.segment_clipping.on_boundary.crossing_values import cut_at, is_item_safe, line_values, plane_values
+from engine.segment_clipping.on_boundary.mesh_streams import gather_contacts, streams_for
+from engine.segment_clipping.on_boundary.touching_cut import (
+    UNSURE,
     Crossings,
     crossings_for,
-    cut_at,
-    is_item_safe,
-    line_values,
-    plane_values,
+    cut_touching,
+    emit_touching,
     sort_crossings,
 )
-from engine.segment_clipping.on_boundary.mesh_streams import gather_contacts, streams_for
-from engine.segment_clipping.on_boundary.touching_cut import UNSURE, cut_touching, emit_touching
 from engine.segment_clipping.pieces import Pieces, put_own_end
 from engine.types import OPEN
 

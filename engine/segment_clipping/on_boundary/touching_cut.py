@@ -7,9 +7,12 @@ span to span the location turns over as often as the line beside the segment cro
 
 from __future__ import annotations
 
+from collections import namedtuple
 from typing import Any, Final
 
-from engine.jit import called, inline
+import numpy as np
+
+from engine.jit import allocating, called, inline
 from engine.segment_clipping.on_boundary.chords import INSIDE_BEFORE
 from engine.segment_clipping.on_boundary.contacts import (
     ALONG,
@@ -25,18 +28,14 @@ from engine.segment_clipping.on_boundary.contacts import (
     code_of,
     place_of,
 )
-from engine.segment_clipping.on_boundary.crossing_values import (
-    Crossings,
-    cut_at,
-    is_item_safe,
-    line_values,
-    plane_values,
-    sort_crossings,
-)
+from engine.segment_clipping.on_boundary.crossing_values import cut_at, is_item_safe, line_values, plane_values
 from engine.segment_clipping.on_boundary.exact_crossing import cross_exactly, parameter_exactly
 from engine.segment_clipping.pieces import Pieces, put_own_end
 
 UNSURE: Final = -1
+Crossings = namedtuple("Crossings", "t points faces order codes met")
+"""Crossings of one segment, as many as there is room for: t, points and faces of each; codes, met: how it meets which
+element, see contacts.py; order: of t."""
 
 
 @called
@@ -173,3 +172,33 @@ def emit_touching(
         put_own_end(out, row, 1, segments, item, segments.shape[2] == 2)
         row += 1
     return row
+
+
+@allocating
+def crossings_for(n: int, dimension: int) -> Crossings:
+    """Return room for n contacts."""
+    return Crossings(
+        np.empty(n), np.empty((n, dimension)), np.empty(n, np.int64), np.empty(n, np.int64), np.empty(n, np.int64),
+        np.empty(n, np.int64),
+    )  # fmt: skip
+
+
+@inline
+def sort_crossings(cuts: Crossings, n: int) -> bool:
+    """Set the order of the first n crossings by t; False where two are equal."""
+    t, order = cuts.t, cuts.order
+    for i in range(n):
+        order[i] = i
+    gap = n // 2
+    while gap > 0:  # bound: gap is halved; Shell's sort, n^1.5 steps
+        for i in range(gap, n):
+            moved, j = order[i], i
+            while j >= gap and t[order[j - gap]] > t[moved]:
+                order[j] = order[j - gap]
+                j -= gap
+            order[j] = moved
+        gap //= 2
+    differ = True
+    for i in range(1, n):
+        differ &= t[order[i - 1]] != t[order[i]]
+    return differ
