@@ -14,14 +14,13 @@ revisited", 1996 (lines kept apart, combinatorial neighbours).
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
 from engine.budget import Budget
 from engine.errors import TooComplexError
-from engine.predicates.rational import scaled_integers
+from engine.predicates.rational import reduced, scaled_integers
 
 Vector = tuple[int, ...]
 MAX_RAYS = 20_000
@@ -56,7 +55,7 @@ def corners_of_half_spaces(rows: Sequence[Sequence[float]], budget: Budget | Non
     """
     budget = budget or Budget()
     size = len(rows[0])
-    constraints = [(*([0] * (size - 1)), 1), *(_reduced(scaled_integers(row)) for row in rows)]
+    constraints = [(*([0] * (size - 1)), 1), *(reduced(scaled_integers(row)) for row in rows)]
     lines: list[Vector] = [tuple(int(i == axis) for i in range(size)) for axis in range(size)]
     rays: list[_Ray] = []
     for number, constraint in enumerate(constraints):
@@ -113,7 +112,7 @@ def _cut(constraint: Vector, bit: int, rays: list[_Ray], n_common: int, budget: 
             if common.bit_count() < n_common:
                 continue
             if sum(common & other == common for other in zeros) == 2:  # only these two: neighbours
-                vector = _reduced([up * y - down * x for x, y in zip(first.vector, second.vector)])
+                vector = reduced([up * y - down * x for x, y in zip(first.vector, second.vector)])
                 kept.append(_Ray(vector, common | bit))
     return kept
 
@@ -121,14 +120,8 @@ def _cut(constraint: Vector, bit: int, rays: list[_Ray], n_common: int, budget: 
 def _onto(constraint: Vector, vector: Vector, line: Vector, slope: int) -> Vector:
     """Return `vector` moved along the line until the constraint is zero, times a positive number."""
     value = _dot(constraint, vector)
-    return _reduced([slope * x - value * y for x, y in zip(vector, line)])
+    return reduced([slope * x - value * y for x, y in zip(vector, line)])
 
 
 def _dot(a: Sequence[int], b: Sequence[int]) -> int:
     return sum(x * y for x, y in zip(a, b))
-
-
-def _reduced(vector: Sequence[int]) -> Vector:
-    """Return the vector without the common factor of its numbers."""
-    common = math.gcd(*vector)
-    return tuple(x // common for x in vector) if common > 1 else tuple(vector)

@@ -16,7 +16,7 @@ from engine.polygon_clipping.rings import PlaneTables
 from engine.polygon_clipping.sutherland_hodgman import clip_rings
 from engine.predicates.digits import packed_numbers
 from engine.predicates.expansion import LARGEST, SMALLEST
-from engine.predicates.rational import nearest
+from engine.predicates.rational import nearest_pair
 from engine.predicates.scaling import exponent_above, scaled_back, shifted
 from engine.solids.base import Solid
 from engine.types import OPEN
@@ -70,7 +70,7 @@ def _plane_tables(planes: list[Row], exponent: int, budget: Budget) -> PlaneTabl
                 high[i, k], low[i, k] = _double_double(number, shift)
             across = [k for k, number in enumerate(normal) if number]
             if len(across) == 1:
-                place, rest = _double_double_quotient(-offset, normal[across[0]])
+                place, rest = nearest_pair(-offset, normal[across[0]])
                 axes[i], at[i] = (across[0], place) if rest == 0 else (-1, 0.0)
         except OverflowError:
             return None
@@ -83,17 +83,10 @@ def _plane_tables(planes: list[Row], exponent: int, budget: Budget) -> PlaneTabl
 
 def _double_double(number: int, shift: int) -> tuple[float, float]:
     """Return number / 2^shift as a double-double, whose low part is zero only where the high part is exact."""
-    high, low = _double_double_quotient(number, 1 << shift)
+    high, low = nearest_pair(number, 1 << shift)
     if low == 0.0 and Fraction(high) * (1 << shift) != number:
         raise OverflowError(number)  # the low part underflows
     return high, low
-
-
-def _double_double_quotient(top: int, bottom: int) -> tuple[float, float]:
-    """Return the double nearest to a quotient of integers, and the double nearest to what is left."""
-    high = nearest(top, bottom)
-    numerator, denominator = high.as_integer_ratio()
-    return high, nearest(top * denominator - numerator * bottom, bottom * denominator)
 
 
 def clip_chunk(

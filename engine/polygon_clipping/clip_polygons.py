@@ -19,9 +19,10 @@ from engine.errors import EmptyGeometryError, InvalidArrayError, TooComplexError
 from engine.parallel import Options, Progress, check_options, is_unlimited, run_chunks
 from engine.polygon_clipping.batches import AXES, clip_chunk, kernel_scene
 from engine.polygon_clipping.convex_planes import convex_planes
-from engine.polygon_clipping.in_integers import Row, clip_polygon, integer_row, reduced
+from engine.polygon_clipping.in_integers import Row, clip_polygon, integer_row
 from engine.polygon_clipping.rings import CLIPPED, PlaneTables
 from engine.polygon_clipping.sutherland_hodgman import clip_rings
+from engine.predicates.rational import reduced
 from engine.predicates.scaling import largest_of
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid

@@ -19,9 +19,9 @@ import numpy as np
 from engine.arrays import FloatArray, Int8Array, IntArray
 from engine.containment.rational_locate import rational_location
 from engine.errors import UnsupportedSolidError
-from engine.polygon_clipping.in_integers import Row, plane_through, reduced
+from engine.polygon_clipping.in_integers import Row, plane_through
 from engine.predicates.orientation import orient3d_batch
-from engine.predicates.rational import orient3d_rational
+from engine.predicates.rational import orient3d_rational, reduced
 from engine.solids.checks import digits
 from engine.solids.convexity import convexity
 from engine.solids.polyhedron import Polyhedron

@@ -14,10 +14,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from itertools import pairwise
-from math import gcd
 
 from engine.errors import TooComplexError
-from engine.predicates.rational import common_integers, nearest
+from engine.predicates.rational import common_integers, cross, dot, minus, nearest, reduced
 
 Vertex = tuple[int, ...]
 Row = tuple[int, ...]
@@ -35,15 +34,9 @@ def integer_row(row: Sequence[float]) -> Row:
 def plane_through(a: Sequence[float], b: Sequence[float], c: Sequence[float]) -> Row:
     """Return the integer row that is positive on the side the normal (b - a) x (c - a) points away from."""
     n, scale = common_integers([*a, *b, *c])
-    u, v = [n[k + 3] - n[k] for k in range(3)], [n[k + 6] - n[k] for k in range(3)]
-    normal = [v[1] * u[2] - v[2] * u[1], v[2] * u[0] - v[0] * u[2], v[0] * u[1] - v[1] * u[0]]
-    return (*(x * scale for x in normal), -sum(x * y for x, y in zip(normal, n)))
-
-
-def reduced(vertex: Sequence[int]) -> Vertex:
-    """Return the vertex without a common divisor."""
-    divisor = gcd(*vertex)
-    return tuple(x // divisor for x in vertex)
+    p, q, r = n[:3], n[3:6], n[6:]
+    normal = cross(minus(r, p), minus(q, p))
+    return (*(x * scale for x in normal), -dot(normal, p))
 
 
 def merged(contour: list[Vertex]) -> list[Vertex]:

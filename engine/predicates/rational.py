@@ -75,6 +75,12 @@ def common_integers(values: Sequence[Number]) -> tuple[list[int], int]:
     return [top * (common // bottom) for top, bottom in ratios], common
 
 
+def reduced(numbers: Sequence[int]) -> tuple[int, ...]:
+    """Return integers without their common divisor."""
+    divisor = math.gcd(*numbers)
+    return tuple(x // divisor for x in numbers) if divisor > 1 else tuple(numbers)
+
+
 def scaled_integers(values: Sequence[Number]) -> list[int]:
     """Return the values times a common positive factor that makes all of them integers."""
     return common_integers(values)[0]
@@ -138,6 +144,13 @@ def nearest_float(value: Number) -> float:
 def nearest(numerator: int, denominator: int) -> float:
     """Return the double nearest to a quotient of integers, zero as +0.0."""
     return numerator / denominator + 0.0
+
+
+def nearest_pair(numerator: int, denominator: int) -> tuple[float, float]:
+    """Return a quotient as a double-double: the double nearest to it, and the double nearest to what is left."""
+    head = nearest(numerator, denominator)
+    n, d = head.as_integer_ratio()
+    return head, nearest(numerator * d - n * denominator, denominator * d)
 
 
 def nearest_with_root(u: int, v: int, w: int, z: int) -> float:

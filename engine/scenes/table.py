@@ -13,6 +13,7 @@ from engine.containment.prepared import tree_of
 from engine.containment.rational_locate import exact_inverse, to_world_frame
 from engine.containment.scene.trees import tree_line
 from engine.predicates.expansion import LARGEST, SMALLEST
+from engine.predicates.rational import nearest_pair
 from engine.scenes.posed_mesh import MESH_WORDS, PLACES, TREE, TREE_PLACES, WANTS_TREE
 from engine.scenes.through import BALL, MESH, OTHER, ROWS, UNREADY
 from engine.segment_clipping.on_boundary.prepared_boundary import boundary_of
@@ -64,7 +65,7 @@ class Table:
             if not _are_safe([*solid.center, solid.radius, *(() if pose is None else pose.translation)]):
                 return OTHER
             center = solid.center.tolist() if pose is None else to_world_frame(solid.center.tolist(), pose)
-            doubles = [_double(*Fraction(x).as_integer_ratio()) for x in center]
+            doubles = [nearest_pair(*Fraction(x).as_integer_ratio()) for x in center]
             ball = np.zeros(7)
             ball[: 2 * len(center)], ball[6] = np.ravel(doubles), solid.radius
             self._own.append(ball)
@@ -112,16 +113,9 @@ def _frame_of(pose: Pose) -> FloatArray | None:
     entries, below = exact_inverse(pose)
     n, frame = pose.dimension, np.zeros((3, 7))
     frame[2, 4] = 1.0
-    frame[:n, : 2 * n] = [np.ravel([_double(entry, below) for entry in row]) for row in entries]
+    frame[:n, : 2 * n] = [np.ravel([nearest_pair(entry, below) for entry in row]) for row in entries]
     frame[:n, 6] = pose.translation
     return frame if _are_safe(frame[:, ::2].ravel().tolist()) else None
-
-
-def _double(above: int, below: int) -> tuple[float, float]:
-    """Return a quotient as a double-double; division of integers rounds to nearest. below: positive."""
-    head = above / below
-    n, d = head.as_integer_ratio()
-    return head, (above * d - n * below) / (below * d)
 
 
 def _are_safe(numbers: Iterable[float]) -> bool:
