@@ -16,11 +16,6 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
-from benchmarks.measure import memory_of, percentile
-
-__all__ = [
-    "Connection", "Seen", "free_port", "in_process", "loop", "many", "memory_of", "percentile", "request", "wait_until",
-]  # fmt: skip
 NAME = "blocking sockets, Python"
 _LENGTH = re.compile(rb"\r\ncontent-length: (\d+)", re.IGNORECASE)
 

@@ -11,14 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.contenders import packages
+from engine.parallel import default_workers as cores
 
 ROOT = Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "benchmarks" / "results"
-
-
-def cores() -> int:
-    """Return how many cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def processor() -> str:

@@ -17,7 +17,7 @@ import httpx
 import pytest
 import zstandard
 
-from benchmarks.load import memory_of
+from benchmarks.measure import memory_of
 from service.schemas.scenes import SCENE_ID
 from tests.contract.test_deadlines import MANY_SIDES, ZIGZAG, across, comb, features, stripes
 from tests.unit.service.asking import SPHERE, examples

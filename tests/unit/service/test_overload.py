@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from benchmarks import load
+from benchmarks import load, measure
 from tests.unit.service.asking import SPHERE
 from tests.unit.service.test_live import Service
 
@@ -36,15 +36,15 @@ def overload(service: Service, seconds: float) -> None:
     clients = [load.in_process(load.many, service.port, message, seconds / 5, 30) for _ in range(2)]
     for client in clients:
         client()
-    before = load.memory_of(service.process.pid)
+    before = measure.memory_of(service.process.pid)
     clients = [load.in_process(load.many, service.port, message, seconds, 30) for _ in range(2)]
     seen = [client() for client in clients]
     statuses = sum((one.statuses for one in seen), Counter[int]())
     accepted = [second for one in seen for second in one.seconds]
     assert set(statuses) == {200, 503}, statuses
     assert not any(one.lost for one in seen)
-    assert load.percentile(accepted, 0.99) < DEADLINE
-    after = load.memory_of(service.process.pid)
+    assert measure.percentile(accepted, 0.99) < DEADLINE
+    after = measure.memory_of(service.process.pid)
     assert not after > 1.25 * before + 50, (before, after)
 
 
