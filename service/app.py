@@ -32,15 +32,14 @@ from service.routes import (
     binary,
     bounds,
     clearance,
+    clipping,
     collision,
     compare,
     containment,
     health,
     layers,
     overlay,
-    polygons,
     scenes,
-    segments,
     solids,
 )
 from service.settings import Settings
@@ -51,10 +50,7 @@ from service.work import Memory, Pool, give_back_freed
 log = logging.getLogger("service")
 
 ROUTERS: Final = (
-    *(
-        module.router
-        for module in (containment, collision, clearance, segments, polygons, overlay, layers, bounds, compare)
-    ),
+    *(module.router for module in (containment, collision, clearance, clipping, overlay, layers, bounds, compare)),
     *(module.router for module in (solids, scenes, binary, health)),
     solids.lookup,
     scenes.lookup,

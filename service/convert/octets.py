@@ -1,14 +1,16 @@
-"""Raw float64 of the binary lane to arrays, and answers and their accuracy to raw numbers and a header."""
+"""Raw float64 of the binary lane and files of meshes to arrays and solids; answers and their accuracy to raw numbers and
+a header."""
 
 from __future__ import annotations
 
 import math
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import numpy as np
 from starlette import responses
 
 import engine
+from service import mesh_reader
 from service.convert.answers import from_accuracy
 from service.work import Call
 
@@ -55,3 +57,15 @@ def from_pieces(pieces: engine.SegmentPieces, n_segments: int, dimension: int, c
     ends[pieces.source, 0] = pieces.start
     ends[pieces.source, 1] = pieces.end
     return ends
+
+
+Format = Literal["stl", "obj", "ply", "off", "glb"]
+
+
+def to_solid(octets: bytes | bytearray, kind: Format, solid_type: str, call: Call) -> engine.Solid:
+    """Return the polyhedron or surface in a file."""
+    with call.phase("decode"):
+        vertices, faces = mesh_reader.read(octets, kind, call)
+    with call.phase("prepare"):
+        make = engine.Polyhedron if solid_type == "polyhedron" else engine.Surface
+        return make(vertices, faces)

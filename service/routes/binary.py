@@ -9,7 +9,7 @@ from pydantic import WithJsonSchema
 
 import engine
 from service.body import OCTETS
-from service.convert import answers, meshes, octets
+from service.convert import answers, octets
 from service.route import GeometryRoute
 from service.routes.base import responses
 from service.routes.solids import Id, put
@@ -23,7 +23,7 @@ router = APIRouter(
 _BINARY: Final = {"type": "string", "format": "binary"}
 Octets = Annotated[bytes, Body(media_type=OCTETS), WithJsonSchema(_BINARY)]
 
-Format = Annotated[meshes.Format, Query(description="Of the file.")]
+Format = Annotated[octets.Format, Query(description="Of the file.")]
 MeshType = Annotated[
     Literal["polyhedron", "surface"],
     Query(description="polyhedron unless given; a surface may be open and holds nothing."),
@@ -74,5 +74,5 @@ def clip_segments_stored(solid_id: Id, question: Octets, call: CallOf) -> Any:
 def import_solid(question: Octets, format: Format, call: CallOf, type: MeshType = "polyhedron") -> StoredSolidSummary:
     """Keep a mesh from a file, vertices at equal coordinates merged, as `POST /v1/solids` keeps a solid. It must be
     closed unless it is to be a surface. Polygons are cut into triangles."""
-    solid = meshes.to_solid(question, format, type, call)
+    solid = octets.to_solid(question, format, type, call)
     return answers.from_stored(put(solid, "solids", call), solid)

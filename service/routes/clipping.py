@@ -1,10 +1,11 @@
-"""What remains of segments and lines within a region?"""
+"""What remains of segments, lines and polygons within a region?"""
 
 from __future__ import annotations
 
 import engine
 from service.convert import answers, questions
 from service.routes.base import router_of
+from service.schemas.polygons import ClipPolygonsRequest, ClipPolygonsResponse
 from service.schemas.segments import ClipLinesRequest, ClipLinesResponse, ClipSegmentsRequest, ClipSegmentsResponse
 from service.work import CallOf
 
@@ -25,3 +26,10 @@ def clip_lines(question: ClipLinesRequest, call: CallOf) -> ClipLinesResponse:
     region = questions.to_solid(question.region, call, ("region",))
     lines = question.lines
     return answers.from_line_pieces(*call.compute(engine.clip_lines, lines if len(lines) else [], region))
+
+
+@router.post("/v1/clip/polygons", operation_id="clip_polygons")
+def clip_polygons(question: ClipPolygonsRequest, call: CallOf) -> ClipPolygonsResponse:
+    """Clip polygons on a convex region, contour by contour; what is left of a polygon stays connected."""
+    region = questions.to_solid(question.region, call, ("region",))
+    return answers.from_clipped(*call.compute(engine.clip_polygons, question.polygons, region))
