@@ -1,5 +1,4 @@
-"""Raw float64 of the binary lane and files of meshes to arrays and solids; answers and their accuracy to raw numbers and
-a header."""
+"""Raw float64 and files of meshes to arrays and solids; answers and their accuracy to raw numbers and a header."""
 
 from __future__ import annotations
 
