@@ -9,9 +9,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from benchmarks.answers import clipping, collision, containment, overlays, refusals, scenes, wire  # noqa: F401 (families)
-from benchmarks.answers.asking import CHUNKS, Chunk
-from benchmarks.answers.digest import joined
+from benchmarks.answers import clipping, collision, containment, overlays, refusals, wire  # noqa: F401 (families)
+from benchmarks.answers.asking import CHUNKS, Chunk, joined
 
 STORED = Path(__file__).resolve().parent / "answers.json"
 

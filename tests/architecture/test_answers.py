@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 import engine
-from benchmarks.answers.asking import CHUNKS
-from benchmarks.answers.digest import digest, joined
+from benchmarks.answers.asking import CHUNKS, digest, joined
 from benchmarks.answers.stored import Row, asked, chosen, differences, load
 
 TENTH = 4
