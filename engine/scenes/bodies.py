@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
-from engine.bounding.posed_boxes import place_boxes
+from engine.bounding.aabb import place_boxes
 from engine.budget import Budget
 from engine.collision.scenes.batches import SceneBatches
 from engine.collision.scenes.bodies import SceneBodies, bodies_of, check_collidable, distinct_of

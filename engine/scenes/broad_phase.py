@@ -1,6 +1,6 @@
 """Which bodies of a scene may a segment, or another body, meet: a tree over the boxes of all bodies with bounds.
 
-Boxes are rounded outward (posed_boxes.py), so no body is missed; those without bounds stand apart and are always named.
+Boxes are rounded outward (`place_boxes`), so no body is missed; those without bounds stand apart and are always named.
 """
 
 from __future__ import annotations

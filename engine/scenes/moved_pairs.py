@@ -73,6 +73,6 @@ def list_pairs(
 
 @inline
 def _outward(value: float, reach: float, side: int) -> float:
-    """Return a side of a box moved by more than a pose may stretch `reach` (posed_boxes.py)."""
+    """Return a side of a box moved by more than a pose may stretch `reach` (bounding/aabb.py)."""
     far = 1.001 * reach
     return np.nextafter(value - far, -np.inf) if side == 0 else np.nextafter(value + far, np.inf)

@@ -14,8 +14,8 @@ from engine.collision.clearance.clearance import checked_distance
 from engine.collision.codes import TOUCHING, UNSETTLED
 from engine.collision.collide import check_pose
 from engine.collision.scenes.collide_scene import Asked, ScenePairs, collide_bodies, pair_keys
+from engine.containment.at_once import are_few
 from engine.containment.scene.locate_scene import SceneLocations, check_bodies, locate_few, locate_in
-from engine.containment.scene.one_by_one import are_few
 from engine.errors import EngineError, IndexOutOfRangeError, InvalidArrayError, InvalidOperationError
 from engine.parallel import Options, Progress, check_options, is_unlimited
 from engine.scenes.bodies import Bodies

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, IntArray
-from engine.bounding.posed_boxes import place_boxes
+from engine.bounding.aabb import place_boxes
 from engine.collision.collide import TAKEN, check_pose, pair_function
 from engine.direct import entry_of
 from engine.errors import InvalidArrayError, UnsupportedPairError, UnsupportedSolidError, WrongDimensionError

@@ -12,8 +12,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.arrays import FloatArray, Int32Array, IntArray
+from engine.bounding.aabb import place_boxes
 from engine.bounding.grid import Axis, cell_of, list_in_cells
-from engine.bounding.posed_boxes import place_boxes
 from engine.containment.posed.frames import Frames, frames_of
 from engine.containment.rational_locate import Check, over_tree
 from engine.jit import inline

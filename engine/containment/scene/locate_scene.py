@@ -15,8 +15,8 @@ import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray
 from engine.budget import Budget, Cancel
+from engine.containment.at_once import are_few, locate_one_by_one
 from engine.containment.scene.first_pass import drop_outside, put_in_order, scan_points, sort_by_cell
-from engine.containment.scene.one_by_one import are_few, locate_one_by_one
 from engine.containment.scene.second_pass import settle_rest
 from engine.containment.scene.tables import Scene, scene_of
 from engine.errors import InvalidArrayError, WrongDimensionError
