@@ -28,6 +28,7 @@ from engine.arrays import FloatArray, Int8Array, IntArray
 from engine.bounding.sweep import pairs_of_boxes
 from engine.budget import Budget
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
+from engine.predicates.rational import cross
 from engine.types import UNDECIDED
 
 Line = tuple[int, int, int]
@@ -65,9 +66,8 @@ class Arrangement:
         return (self.heads if half_edge & 1 else self.tails)[half_edge >> 1]
 
 
-def line_through(a: Homogeneous, b: Homogeneous) -> Line:
-    """Return the line from `a` to `b`, two different points."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+line_through = cross
+"""The line from one point to another, a different one."""
 
 
 def side(line: Line, point: Homogeneous) -> int:
@@ -78,8 +78,7 @@ def side(line: Line, point: Homogeneous) -> int:
 
 def crossing(first: Line, second: Line) -> Homogeneous:
     """Return the point where two lines meet that are not parallel."""
-    (a, b, c), (p, q, r) = first, second
-    return reduced(b * r - c * q, c * p - a * r, a * q - b * p)
+    return reduced(*cross(first, second))
 
 
 def arrange(
