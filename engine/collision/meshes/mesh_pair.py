@@ -176,9 +176,6 @@ class MeshPair:
             best = min(found)
         return Witness(STRENGTH[best[0]], best[1], best[2], "", piercing)
 
-    def states(self, own: int, faces: IntArray) -> Int8Array:
-        return states_of(self.meshes[own].arrays, faces)
-
     def state(self, own: int, face: int) -> int:
         return state_at(self.meshes[own].arrays, face)
 
@@ -213,7 +210,7 @@ class MeshPair:
         with_area = patch[body.mesh.arrays.axis[patch] != NO_AREA]
         for start in range(0, len(with_area), _BLOCK):
             self.work.budget.check()
-            if (self.states(own, with_area[start : start + _BLOCK]) != STATE_STACKED).any():
+            if (states_of(body.mesh.arrays, with_area[start : start + _BLOCK]) != STATE_STACKED).any():
                 yield Sides(True, False, False)
                 return
         for face in with_area.tolist():
