@@ -1,8 +1,9 @@
-"""Filters of blurred points: what they tell holds at every corner of the blur."""
+"""Filters of blurred points: what they tell holds at every corner of the blur; boxes and polynomials, exact."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -51,3 +52,12 @@ def test_comparisons_are_the_definition(dimension: int) -> None:
     points = np.random.default_rng(0).integers(-4, 5, (2000, dimension)) / 2.0
     distance = np.minimum(points - low, high - points).min(axis=1)  # exact: halves of small integers
     assert locate(points, Aabb(low, high)).tolist() == np.sign(distance).astype(int).tolist()
+
+
+def test_signs_are_those_of_rationals() -> None:
+    terms = [([0, 0], 25.0), ([2, 0], -1.0), ([0, 2], -1.0), ([3, 1], 0.5)]
+    solid = Implicit([{"powers": powers, "coefficient": coefficient} for powers, coefficient in terms])
+    points = np.random.default_rng(0).integers(-6, 7, (500, 2)).astype(float)
+    points = np.concatenate([points, np.nextafter(points, 9.0), [[3.0, 4.0], [0.0, 5.0]]])
+    values = [sum(Fraction(c) * Fraction(x) ** i * Fraction(y) ** j for (i, j), c in terms) for x, y in points.tolist()]
+    assert locate(points, solid).tolist() == [(value > 0) - (value < 0) for value in values]
