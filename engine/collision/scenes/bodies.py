@@ -92,7 +92,7 @@ def _placed(
         for index, pose in enumerate(poses):
             check_pose(pose, solids[index], f"poses[{index}]")
         raise
-    is_posed = np.array([pose is not None for pose in poses], np.bool_)
+    is_posed = np.frombuffer(bytes([pose is not None for pose in poses]), np.bool_)  # of a list it takes as long again
     pose_rows = np.where(is_posed, np.arange(1, n + 1), -1)
     low, high = np.empty((n, dimension)), np.empty((n, dimension))
     entry_of(place_boxes)(*own, kinds, pose_rows, rotations, translations, low, high)
