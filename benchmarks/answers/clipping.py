@@ -69,14 +69,11 @@ def lines_on_all_regions(draw: Draw) -> Iterator[Question]:
         yield partial(lines_clipped, [*closed, *np.repeat(ends[20:30], 2, axis=1), *ends[30:]], shape.solid)
 
 
-def _small_ball(draw: Draw) -> shapes.Mesh:
-    return shapes.ball(draw, draw.one(0, 1))
-
-
 def _cutters(draw: Draw, dimension: int, place: Place) -> Shape:
     makers = [solids.half_space, solids.aabb, solids.convex, solids.aabb]
     if dimension == 3 and draw.chance(0.3):
-        return solids.polyhedron_of(draw.pick([shapes.box, shapes.tetrahedron, _small_ball])(draw), place)
+        makers = [shapes.box, shapes.tetrahedron, lambda draw: shapes.ball(draw, draw.one(0, 1))]
+        return solids.polyhedron_of(draw.pick(makers)(draw), place)
     return draw.pick(makers)(draw, dimension, place)
 
 

@@ -45,8 +45,7 @@ def _determinant(dimension: int, threads: int) -> Prepared:
     return Prepared(ask)
 
 
-def _linalg(dimension: int, threads: int) -> Prepared:
-    return Prepared(lambda items: np.sign(np.linalg.det(items[:, 1:] - items[:, :1])))
-
-
-MAKERS = {"points": _points, "determinant": _determinant, "linalg": _linalg}
+MAKERS = {
+    "points": _points, "determinant": _determinant,
+    "linalg": lambda *_: Prepared(lambda items: np.sign(np.linalg.det(items[:, 1:] - items[:, :1]))),
+}  # fmt: skip
