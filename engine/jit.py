@@ -6,7 +6,7 @@ Decorators. `kernel`: an outer loop over arrays, called from Python, releases th
 handed, its caller keeps. `allocating_kernel` and `allocating` (a `called` one) are for what makes arrays. Arithmetic is
 strict IEEE double: `fastmath` is off everywhere, and nothing is fused unless `fma` (error_free.py) is called by name.
 
-What is not in numba's documentation stands in compiling.py. Where this numba lacks any of it, a warning says so, and
+What is not in numba's documentation stands in compiling/. Where this numba lacks any of it, a warning says so, and
 kernels are compiled by what is documented: as right and as fast, but slower to compile, and anew in each process.
 """
 
@@ -20,9 +20,11 @@ from typing import Any
 import numba
 from numba import config as numba_config
 
-_compiling: Any = None
+_caches: Any = None
+_compilers: Any = None
 try:
-    import engine.compiling as _compiling
+    import engine.compiling.caches as _caches
+    import engine.compiling.compilers as _compilers
 except (ImportError, AttributeError) as error:
     warnings.warn(f"kernels are compiled anew in each process: {error}", RuntimeWarning, stacklevel=1)
 
@@ -34,13 +36,13 @@ _OPTIONS: dict[str, Any] = {"nogil": True, "fastmath": False, "error_model": "nu
 
 def _compiled(function: Callable[..., Any], **options: Any) -> Any:
     """Return what Python calls."""
-    more = {} if _compiling is None else {"pipeline_class": _compiling.KernelCompiler}
+    more = {} if _compilers is None else {"pipeline_class": _compilers.KernelCompiler}
     return numba.njit(**more, **options)(function)
 
 
 def complete_signs() -> list[str]:
     """Return the names of the files that say that all is compiled for a CPU, each CPU whose kernels can be run here."""
-    return [] if _compiling is None else _compiling.signs()
+    return [] if _compilers is None else _caches.signs()
 
 
 class _Kernel:
@@ -49,14 +51,14 @@ class _Kernel:
     def __init__(self, function: Callable[..., Any], **options: Any) -> None:
         functools.update_wrapper(self, function)
         self.py_func = function
-        self._options = _OPTIONS | options
+        self._options = _OPTIONS | {"no_cfunc_wrapper": True} | options
 
     @functools.cached_property
     def dispatcher(self) -> Any:
         """What numba makes of it."""
         compiled = _compiled(self.py_func, **self._options)
-        if _compiling is not None:
-            compiled._cache = _compiling.KernelCache(self.py_func)
+        if _compilers is not None:
+            compiled._cache = _caches.KernelCache(self.py_func)
         return compiled
 
     def __call__(self, *arguments: Any) -> Any:
@@ -101,11 +103,11 @@ class _Inline:
 
     @functools.cached_property
     def _dispatcher(self) -> Any:
-        if _compiling is None:
+        if _compilers is None:
             return numba.njit(**self._options)(self.py_func)
         options = {"nopython": True, **self._options}
-        compiler = getattr(_compiling, self._compiler)
-        return _compiling.InnerDispatcher(self.py_func, targetoptions=options, pipeline_class=compiler)
+        compiler = getattr(_compilers, self._compiler)
+        return _compilers.InnerDispatcher(self.py_func, targetoptions=options, pipeline_class=compiler)
 
     @property
     def _numba_type_(self) -> Any:

@@ -31,7 +31,9 @@ FILL = "from engine.cold_start import fill_cache; fill_cache('engine.work', (1, 
 def place(tmp_path: Path) -> Path:
     package = tmp_path / "engine"
     package.mkdir()
-    for name in ("__init__.py", "jit.py", "compiling.py", "kernel_cache.py", "cold_start.py"):
+    (package / "compiling").mkdir()
+    compiling = [f"compiling/{path.name}" for path in (ROOT / "engine" / "compiling").glob("*.py")]
+    for name in ("__init__.py", "jit.py", *compiling, "kernel_cache.py", "cold_start.py"):
         text = "" if name == "__init__.py" else (ROOT / "engine" / name).read_text("utf-8")
         (package / name).write_text(text)
     (tmp_path / "done").mkdir()

@@ -22,7 +22,11 @@ from engine import jit, kernel_cache
 ROOT = Path(__file__).resolve().parents[2]
 pytestmark = pytest.mark.skipif(bool(numba_config.DISABLE_JIT), reason="the compiler is disabled")
 
-COMPILER = ("jit.py", "compiling.py", "kernel_cache.py")
+COMPILER = (
+    "jit.py",
+    "kernel_cache.py",
+    *(f"compiling/{path.name}" for path in (ROOT / "engine" / "compiling").glob("*.py")),
+)
 HELPER = """
 from engine.jit import inline
 
@@ -48,6 +52,7 @@ def make_project(folder: Path) -> Path:
     """Return a small package named `engine` whose kernel calls a helper two imports away."""
     package = folder / "project" / "engine"
     (package / "deep").mkdir(parents=True)
+    (package / "compiling").mkdir()
     for name in COMPILER:
         (package / name).write_text((ROOT / "engine" / name).read_text("utf-8"))
     for folder in (package, package / "deep"):

@@ -1,32 +1,20 @@
-"""All that the engine takes from numba's inside; where a name is missing, importing this file fails and says which.
-
-How kernels and inner functions are written (`KernelCompiler`, `InnerCompiler`, `CalledCompiler`, `InnerDispatcher`),
-how kernels are kept on disk (`KernelCache`), and for which CPUs.
-"""
+"""The steps by which kernels and inner functions are compiled: once for each kind of arguments, optimised once."""
 
 from __future__ import annotations
 
 import copy
 import functools
 import gc
-import hashlib
-import pickle
 from collections.abc import Callable
 from types import CodeType
-from typing import Any, Final
+from typing import Any
 
 import llvmlite.binding
-import numba
-from numba import config as numba_config
-from numba.core.caching import NullCache
-from numba.core.codegen import CPUCodeLibrary, JITCodeLibrary, JITCPUCodegen, get_host_cpu_features
-from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder, compile_result
+from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
 from numba.core.environment import lookup_environment
-from numba.core.lowering import Lower
 from numba.core.registry import CPUDispatcher
-from numba.core.runtime import rtsys
-from numba.core.serialize import dumps
 from numba.core.targetconfig import ConfigStack
 from numba.core.typed_passes import NativeLowering, NopythonRewrites
 from numba.core.types import Dispatcher
@@ -34,56 +22,8 @@ from numba.core.types.misc import unliteral
 from numba.core.typing import Context
 from numba.core.untyped_passes import InlineClosureLikes
 
-from engine.kernel_cache import COMPLETE, cache_folder, keep, kept, source_digest
-
-_ASKED_FOR = {
-    JITCodeLibrary: ("_finalize_final_module", "_finalize_dynamic_globals", "add_linking_library"),
-    CPUCodeLibrary: (
-        *("_set_compiled_object", "enable_object_caching", "_optimize_functions", "_optimize_final_module"),
-        *("_get_module_for_linking", "finalize"),
-    ),
-    JITCPUCodegen: ("set_env", "create_library", "_library_class", "_module_pass_manager"),
-    NullCache: ("load_overload", "save_overload"),
-    CompileResult: ("_reduce",),
-    CompilerBase: ("compile_extra",),
-    ConfigStack: ("top_or_none",),
-    Context: ("resolve_function_type", "resolve_getattr"),
-    CPUDispatcher: ("get_call_template",),
-    Lower: ("setup_function",),
-    NativeLowering: ("run_pass", "lowering_class"),
-}
-for _owner, _names in _ASKED_FOR.items():
-    for _name in _names:
-        if not hasattr(_owner, _name):
-            raise ImportError(f"numba {numba.__version__} has no {_owner.__name__}.{_name}")
-
-_V2 = ("cx16", "popcnt", "sse3", "sse4.1", "sse4.2", "ssse3")
-_V3 = (*_V2, "avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
-_V4 = (*_V3, "avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl")
-BASELINES: Final = {"x86-64-v4": _V4, "x86-64-v3": _V3, "x86-64-v2": _V2, "generic": ()}
-"""Families of CPUs whose kernels a host may take, and what it must be able to do for that."""
-
-
-@functools.cache
-def cpus() -> list[tuple[str, str]]:
-    """Return the CPUs whose kernels are taken, as numba names them (name, features): the one compiled for first.
-
-    That alone where ``NUMBA_CPU_NAME`` names it, else the families that the host is of too.
-    """
-    name, features = numba_config.CPU_NAME, numba_config.CPU_FEATURES
-    own = (
-        llvmlite.binding.get_host_cpu_name() if name is None else name,
-        get_host_cpu_features() if features is None else features,
-    )
-    if name is not None:
-        return [own]
-    able = llvmlite.binding.get_host_cpu_features()
-    return [own, *((family, "") for family, needed in BASELINES.items() if all(map(able.get, needed)))]
-
-
-def signs() -> list[str]:
-    """Return the names of the empty files that say that all is compiled for each of `cpus`."""
-    return [f"{COMPLETE}-{name}-{hashlib.sha256(features.encode()).hexdigest()[:8]}" for name, features in cpus()]
+from engine.compiling.lowering import CalledLower, InnerLower, PlainContext, PlainLower
+from engine.compiling.tidying import tidy
 
 
 class _Library(JITCodeLibrary):  # type: ignore[misc] # numba carries no types
@@ -95,6 +35,11 @@ class _Library(JITCodeLibrary):  # type: ignore[misc] # numba carries no types
     def __init__(self, codegen: JITCPUCodegen, name: str) -> None:
         super().__init__(codegen, name)
         self.below: dict[_InnerLibrary, None] = {}  # what is called, directly or not, before its callers
+
+    def add_ir_module(self, module: Any) -> None:
+        for function in module.functions:
+            tidy(function)
+        super().add_ir_module(module)
 
     def add_linking_library(self, library: JITCodeLibrary) -> None:
         if isinstance(library, _InnerLibrary):
@@ -171,11 +116,13 @@ class _KernelLowering(NativeLowering):  # type: ignore[misc]
     """Writes a kernel; what numba itself compiles to be called from there becomes inner libraries."""
 
     _name = "engine_kernel_lowering"
+    lowering_class = PlainLower
 
     def run_pass(self, state: Any) -> bool:
         context, codegen = state.targetctx, state.targetctx.codegen()
         state.library = self._library(state.func_id.func_qualname, codegen)
         state.targetctx = copy.copy(context)
+        state.targetctx.__class__ = PlainContext
         state.targetctx._internal_codegen = _InnerCodegen(codegen)
         done: bool = super().run_pass(state)
         state.targetctx = context
@@ -197,6 +144,7 @@ class _KernelLowering(NativeLowering):  # type: ignore[misc]
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _InnerLowering(_KernelLowering):
     _name = "engine_inner_lowering"
+    lowering_class = InnerLower
 
     def _library(self, name: str, codegen: JITCPUCodegen) -> JITCodeLibrary:
         return _InnerLibrary(_InnerCodegen(codegen), name)
@@ -205,18 +153,10 @@ class _InnerLowering(_KernelLowering):
         pass
 
 
-class _CalledLower(Lower):  # type: ignore[misc]
-    """Writes a function that the compiler may not copy into its callers."""
-
-    def setup_function(self, fndesc: Any) -> None:
-        super().setup_function(fndesc)
-        self.function.attributes.add("noinline")
-
-
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _CalledLowering(_InnerLowering):
     _name = "engine_called_lowering"
-    lowering_class = _CalledLower
+    lowering_class = CalledLower
 
 
 class _Typing(Context):  # type: ignore[misc]
@@ -316,71 +256,3 @@ class InnerDispatcher(CPUDispatcher):  # type: ignore[misc]
             for made in self.overloads.values():
                 _check_result(self.targetctx, made.signature.return_type, self.py_func.__qualname__)
         return found
-
-
-class KernelCache(NullCache):  # type: ignore[misc]
-    """What one kernel was compiled to: a file for each kind of arguments and CPU.
-
-    Machine code alone. numba puts the code from before the last steps of compiling beside it, for callers that are
-    compiled later, and parses that at each load: more than half of all loading. No compiled function calls a kernel (a
-    test looks), and should one, numba says that the kernel is unfit for linking. The constants of a function that has
-    none, and the annotated source, are left out too. numba's own files (an index, numbered data, both named by times of
-    sources) may end with another's code where two processes write, or one is killed.
-    """
-
-    def __init__(self, function: Callable[..., Any]) -> None:
-        self._function = function
-
-    @property
-    def cache_path(self) -> str:
-        return f"{cache_folder()}/{source_digest(self._function.__module__)}"
-
-    def _name(self, types: Any, cpu: tuple[str, str]) -> str:
-        key = hashlib.sha256(repr((types, cpu)).encode()).hexdigest()[:20]
-        return f"{source_digest(self._function.__module__)}/{self._function.__qualname__}-{key}.nbc"
-
-    def load_overload(self, types: Any, target_context: Any) -> CompileResult | None:
-        """Return the kernel for `types` and this CPU, else for a family that it is of; None if it is not there.
-
-        numba first brings in everything that it can compile, a third of a second; compiling does that by itself.
-        """
-        rtsys.initialize(target_context)
-        contents = (kept(self._name(types, cpu)) for cpu in cpus())
-        return next((_rebuilt(target_context, *pickle.loads(content)) for content in contents if content), None)
-
-    def save_overload(self, types: Any, result: CompileResult) -> None:
-        """Keep a kernel."""
-        if not result.library.has_dynamic_globals:
-            (name, _, (code, _)), fndesc, environment, signature, *_, reload, constants = result._reduce()
-            constants = [item for item in constants if item.consts]
-            content = dumps((name, code, fndesc, environment, signature, reload, constants))
-            keep(self._name(types, cpus()[0]), content)
-
-
-def _rebuilt(
-    context: Any, name: str, code: bytes, fndesc: Any, environment: Any, signature: Any, reload: Any, constants: Any
-) -> CompileResult:
-    """Return the kernel that was kept, ready to be called."""
-    for prepare in reload:
-        prepare()
-    codegen = context.codegen()
-    library = codegen.create_library(name)
-    library.enable_object_caching()
-    library._set_compiled_object(code)
-    library._finalize_final_module()
-    codegen._engine._defined_symbols |= {fndesc.llvm_func_name, fndesc.llvm_cpython_wrapper_name}
-    for item in constants:
-        codegen.set_env(item.env_name, item)
-    return compile_result(
-        target_context=context,
-        typing_context=context.typing_context,
-        library=library,
-        environment=environment,
-        entry_point=context.get_executable(library, fndesc, environment),
-        fndesc=fndesc,
-        signature=signature,
-        objectmode=False,
-        lifted=(),
-        reload_init=reload,
-        referenced_envs=constants,
-    )

@@ -1,0 +1,115 @@
+"""How kernels are kept on disk, and for which CPUs."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import pickle
+from collections.abc import Callable
+from typing import Any, Final
+
+import llvmlite.binding
+from numba import config as numba_config
+from numba.core.caching import NullCache
+from numba.core.codegen import get_host_cpu_features
+from numba.core.compiler import CompileResult, compile_result
+from numba.core.runtime import rtsys
+from numba.core.serialize import dumps
+
+from engine.kernel_cache import COMPLETE, cache_folder, keep, kept, source_digest
+
+_V2 = ("cx16", "popcnt", "sse3", "sse4.1", "sse4.2", "ssse3")
+_V3 = (*_V2, "avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
+_V4 = (*_V3, "avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl")
+BASELINES: Final = {"x86-64-v4": _V4, "x86-64-v3": _V3, "x86-64-v2": _V2, "generic": ()}
+"""Families of CPUs whose kernels a host may take, and what it must be able to do for that."""
+
+
+@functools.cache
+def cpus() -> list[tuple[str, str]]:
+    """Return the CPUs whose kernels are taken, as numba names them (name, features): the one compiled for first.
+
+    That alone where ``NUMBA_CPU_NAME`` names it, else the families that the host is of too.
+    """
+    name, features = numba_config.CPU_NAME, numba_config.CPU_FEATURES
+    own = (
+        llvmlite.binding.get_host_cpu_name() if name is None else name,
+        get_host_cpu_features() if features is None else features,
+    )
+    if name is not None:
+        return [own]
+    able = llvmlite.binding.get_host_cpu_features()
+    return [own, *((family, "") for family, needed in BASELINES.items() if all(map(able.get, needed)))]
+
+
+def signs() -> list[str]:
+    """Return the names of the empty files that say that all is compiled for each of `cpus`."""
+    return [f"{COMPLETE}-{name}-{hashlib.sha256(features.encode()).hexdigest()[:8]}" for name, features in cpus()]
+
+
+class KernelCache(NullCache):  # type: ignore[misc]
+    """What one kernel was compiled to: a file for each kind of arguments and CPU.
+
+    Machine code alone. numba puts the code from before the last steps of compiling beside it, for callers that are
+    compiled later, and parses that at each load: more than half of all loading. No compiled function calls a kernel (a
+    test looks), and should one, numba says that the kernel is unfit for linking. The constants of a function that has
+    none, and the annotated source, are left out too. numba's own files (an index, numbered data, both named by times of
+    sources) may end with another's code where two processes write, or one is killed.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._function = function
+
+    @property
+    def cache_path(self) -> str:
+        return f"{cache_folder()}/{source_digest(self._function.__module__)}"
+
+    def _name(self, types: Any, cpu: tuple[str, str]) -> str:
+        key = hashlib.sha256(repr((types, cpu)).encode()).hexdigest()[:20]
+        return f"{source_digest(self._function.__module__)}/{self._function.__qualname__}-{key}.nbc"
+
+    def load_overload(self, types: Any, target_context: Any) -> CompileResult | None:
+        """Return the kernel for `types` and this CPU, else for a family that it is of; None if it is not there.
+
+        numba first brings in everything that it can compile, a third of a second; compiling does that by itself.
+        """
+        rtsys.initialize(target_context)
+        contents = (kept(self._name(types, cpu)) for cpu in cpus())
+        return next((_rebuilt(target_context, *pickle.loads(content)) for content in contents if content), None)
+
+    def save_overload(self, types: Any, result: CompileResult) -> None:
+        """Keep a kernel."""
+        if not result.library.has_dynamic_globals:
+            (name, _, (code, _)), fndesc, environment, signature, *_, reload, constants = result._reduce()
+            constants = [item for item in constants if item.consts]
+            content = dumps((name, code, fndesc, environment, signature, reload, constants))
+            keep(self._name(types, cpus()[0]), content)
+
+
+def _rebuilt(
+    context: Any, name: str, code: bytes, fndesc: Any, environment: Any, signature: Any, reload: Any, constants: Any
+) -> CompileResult:
+    """Return the kernel that was kept, ready to be called."""
+    for prepare in reload:
+        prepare()
+    codegen = context.codegen()
+    library = codegen.create_library(name)
+    library.enable_object_caching()
+    library._set_compiled_object(code)
+    library._finalize_final_module()
+    codegen._engine._defined_symbols |= {fndesc.llvm_func_name, fndesc.llvm_cpython_wrapper_name}
+    for item in constants:
+        codegen.set_env(item.env_name, item)
+    return compile_result(
+        target_context=context,
+        typing_context=context.typing_context,
+        library=library,
+        environment=environment,
+        entry_point=context.get_executable(library, fndesc, environment),
+        fndesc=fndesc,
+        signature=signature,
+        objectmode=False,
+        lifted=(),
+        reload_init=reload,
+        referenced_envs=constants,
+    )
