@@ -187,7 +187,7 @@ def rows_of(buffers: Buffers) -> Workspace:
         ),
         events=Events(c[0], c[1], c[2], cx[0], cx[1], cx[2], c[3], c[4], hb[0]),
         unions=Unions(p[3], pb[1], r[2]),
-        along=Along(v[4], c[12], crossing_x, crossing_y, c[13]),
+        along=Along(v[4], c[12], crossing_x, px[0], crossing_y, c[13], c[14]),
         chains=Chains(c[5], c[6], c[7], c[8], hl[1], c[9], c[18], p[1]),
         stars=Stars(p[4], c[13], c[14], c[15], h[0], h[1]),
         loose=Loose(h[3], hl[0], px[0], px[1]),
@@ -197,5 +197,5 @@ def rows_of(buffers: Buffers) -> Workspace:
         walk=Walk(hb[3], h[6], c[17]),
         found=Rings(p[0], p[5], pb[0], c[10], c[11]),
         rounded=Rounded(px[0], px[1], pb[3], crossing_x, crossing_y, error),
-        ranking=Ranking(c[5], cx[0], hb[0], c[6], c[7], c[8]),  # in place of chains, and of parameters of events
+        ranking=Ranking(c[5], cx[0], cx[2], hb[0], c[6], c[7], c[8], c[9]),  # in place of chains, and of parameters of events
     )  # fmt: skip
