@@ -184,17 +184,17 @@ def _arrange_chains(
 
     Where the call is to end, nothing found is right.
     """
-    n, n_rings, edges = loaded.n, loaded.n_rings, w.given.edges
-    w.stars.node_of[: n + contacts.n_crossings] = -1
-    n_nodes, n_simple, n_chains, n_loose = build_chains(
-        w.given, w.events, w.along, w.unions, w.chains, w.stars, w.loose.half, n, n_rings, stop
+    n, n_rings, edges, n_crossings = loaded.n, loaded.n_rings, w.given.edges, contacts.n_crossings
+    w.stars.node_of[: n + n_crossings] = -1
+    n_nodes, n_chains, n_loose = build_chains(
+        w.given, w.events, w.along, w.unions, w.chains, w.stars, w.loose.half, (n, n_rings, n_crossings), stop
     )
     if stop[0]:
         return 0, 0
-    build_stars(edges, w.chains, w.stars, w.loose, n_nodes, n_simple, n_loose, stop)
+    build_stars(edges, w.chains, w.stars, w.loose, n_crossings, n_nodes, n_loose, stop)
     if stop[0]:
         return 0, 0
-    n_cycles = number_cycles(w.chains, w.stars, w.faces, n_chains, n_simple, stop)
+    n_cycles = number_cycles(w.chains, w.stars, w.faces.cycle, n_chains, stop)
     if stop[0]:
         return 0, 0
     join_faces(w, w.found.point, (n, n_rings, n_cycles, loaded.n_runs), stop)
@@ -202,14 +202,14 @@ def _arrange_chains(
     n_entries = spread_sources(w.given, w.chains, w.faces, nesting, kept, w.holders, (n_chains, n_cycles), stop)
     if n_entries == NO_ROOM:
         return NO_ROOM, 0
-    choose_boundary(w.chains, w.faces, n_chains, n_nodes, stop)
+    choose_boundary(w.chains, w.faces, n_chains, n_crossings, n_nodes, stop)
     if tells:
         gather_evidence(w.faces, w.holders, n_entries, n_cycles, nesting.shells.shape[0], stop)
     if stop[0]:
         return 0, 0
     return walk_rings(
         edges, w.chains, w.stars, w.faces, w.tree.marks, w.walk, w.found, w.holders, tells,
-        (n_chains, n_nodes, n_simple), stop,
+        (n_chains, n_nodes, n, n_crossings), stop,
     )  # fmt: skip
 
 

@@ -12,7 +12,16 @@ from collections import namedtuple
 from typing import Any, Final
 
 from engine.jit import inline, merged
-from engine.polygon_overlay.compiled.boundary.chains import Chains, Stars, is_live, place_before, standing
+from engine.polygon_overlay.compiled.boundary.chains import (
+    NOT_YET,
+    Chains,
+    Stars,
+    across_end,
+    is_live,
+    place_before,
+    standing,
+    to_the_left,
+)
 from engine.polygon_overlay.compiled.crossing_signs import Edges, crossing_against, exact_weight, orient, turn_of_edges
 from engine.polygon_overlay.compiled.edge_contacts import Events
 from engine.polygon_overlay.compiled.edge_events import Along
@@ -23,24 +32,27 @@ from engine.predicates.orientation import BOUND_2D, GUARD_2D
 
 NOTHING: Final = -1
 
-Faces = namedtuple("Faces", "cycle following joined regions inside bounds fan")
-"""By half-chain: cycle, or -1 where another half-chain stands for it; following: the one that goes on around its face.
+Faces = namedtuple("Faces", "cycle joined regions inside bounds fan")
+"""By half-chain: cycle, or -1 where another half-chain stands for it.
 By cycle, of which entry n_cycles is the unbounded face: joined, a forest of those of one face; regions, of those of one
 region of the result; inside: the part of the result that it is in, or 0. bounds: by chain, whether it bounds one; fan:
-by node, how many that do."""
+by node that is not simple, how many that do."""
+
+
+@merged
+def _following(chains: Chains, stars: Stars, half: int) -> int:
+    """Return the half-chain that goes on around the face of ``half``."""
+    across = across_end(chains, half)
+    if across != NOT_YET:
+        return to_the_left(across, half)
+    twin = half ^ 1
+    return stars.half[place_before(chains, stars, stars.place[twin], twin)]
 
 
 @inline
-def number_cycles(chains: Chains, stars: Stars, faces: Faces, n_chains: int, n_simple: int, stop: Any) -> int:
-    """Fill ``following`` and ``cycle``; return how many cycles."""
-    cycle, following = faces.cycle, faces.following
+def number_cycles(chains: Chains, stars: Stars, cycle: Any, n_chains: int, stop: Any) -> int:
+    """Fill ``cycle``, by half-chain; return how many cycles."""
     cycle[: 2 * n_chains] = -1
-    for chain in range(n_chains):
-        if chain & POLL == 0 and stop[0]:
-            return 0
-        if is_live(chains, chain):
-            for half in (2 * chain, 2 * chain + 1):
-                following[half] = stars.half[place_before(chains, stars, n_simple, stars.place[half ^ 1], half ^ 1)]
     n_cycles = 0
     for first in range(2 * n_chains):
         if cycle[first] < 0 and is_live(chains, first >> 1):
@@ -53,7 +65,7 @@ def number_cycles(chains: Chains, stars: Stars, faces: Faces, n_chains: int, n_s
                 if steps & POLL == 0 and stop[0]:
                     return n_cycles
                 cycle[half] = n_cycles
-                half = following[half]
+                half = _following(chains, stars, half)
             n_cycles += 1
     return n_cycles
 

@@ -12,12 +12,23 @@ from typing import Any, Final
 from engine.arrangement.union_find import root_of, unite
 from engine.jit import inline, merged
 from engine.polygon_overlay.compiled.boundary.chain_faces import Faces
-from engine.polygon_overlay.compiled.boundary.chains import Chains, Stars, is_live, leaving_edge, origin, place_before
+from engine.polygon_overlay.compiled.boundary.chains import (
+    NOT_YET,
+    Chains,
+    Stars,
+    across_end,
+    is_live,
+    leaving_edge,
+    origin,
+    place_before,
+    to_the_left,
+)
 from engine.polygon_overlay.compiled.crossing_signs import Edges, orient, turn_of_edges
 from engine.polygon_overlay.compiled.edge_tree import BENT, DOUBTFUL, POLL, RUN
 from engine.polygon_overlay.compiled.ring_nesting import Holders, enter_beyond
 
 MEETS: Final = 1
+_FORKED: Final = 2
 
 Rings = namedtuple("Rings", "point edge meets offset region")
 """point: united points, ring after ring; edge: along which the ring goes on from there; meets: MEETS where rings meet,
@@ -25,14 +36,15 @@ RUN where those up to the next point are left out, DOUBTFUL where an edge up to 
 ring begins; region: a number of the region it bounds."""
 
 Walk = namedtuple("Walk", "seen path place")
-"""Scratch. seen: by half-chain, uint8; path: the half-chains of a walk; place: by node its place on the path."""
+"""Scratch. seen: by half-chain, uint8, not 0 once it was walked, _FORKED if rings meet where it begins; path: the
+half-chains of a walk; place: by node where rings meet its place on the path."""
 
 
 @inline
-def choose_boundary(chains: Chains, faces: Faces, n_chains: int, n_nodes: int, stop: Any) -> None:
-    """Fill ``bounds`` and ``fan``, and join regions; ``inside`` is filled."""
-    cycle = faces.cycle
-    faces.fan[:n_nodes] = 0
+def choose_boundary(chains: Chains, faces: Faces, n_chains: int, n_simple: int, n_nodes: int, stop: Any) -> None:
+    """Fill ``bounds`` and ``fan``, and join regions; ``inside`` is filled. The first n_simple nodes are simple."""
+    cycle, fan = faces.cycle, faces.fan
+    fan[n_simple:n_nodes] = 0
     for chain in range(n_chains):
         if chain & POLL == 0 and stop[0]:
             return
@@ -43,19 +55,37 @@ def choose_boundary(chains: Chains, faces: Faces, n_chains: int, n_nodes: int, s
                 unite(faces.regions, left, right)
             else:
                 faces.bounds[chain] = 1
-                faces.fan[chains.tail[chain]] += 1
-                faces.fan[chains.head[chain]] += 1
+                for node in (chains.tail[chain], chains.head[chain]):
+                    if node >= n_simple:
+                        fan[node] += 1
 
 
 @merged
-def _following(chains: Chains, stars: Stars, n_simple: int, bounds: Any, half: int) -> int:
-    """Return the boundary half-chain that goes on around the region to the left of ``half``."""
+def _is_forked(chains: Chains, faces: Faces, half: int) -> bool:
+    """Tell whether more than two boundary chains end where one of them, ``half``, begins."""
+    across = across_end(chains, half ^ 1)
+    if across == NOT_YET:
+        return faces.fan[origin(chains, half)] > 2
+    other = across >> 1
+    return (faces.bounds[other] & faces.bounds[other - 1]) != 0  # an even number is on the boundary
+
+
+@merged
+def _go_on(chains: Chains, stars: Stars, faces: Faces, half: int) -> tuple[int, bool]:
+    """Return the boundary half-chain that goes on around the region to the left of ``half``, and whether it
+    `_is_forked`."""
+    bounds, across = faces.bounds, across_end(chains, half)
+    if across != NOT_YET:
+        left, ahead = to_the_left(across, half), half + 2 - 4 * (half & 1)
+        if bounds[left >> 1]:
+            return left, bounds[ahead >> 1] != 0
+        return ahead if bounds[ahead >> 1] else to_the_left(across, half ^ 1), False
     twin = half ^ 1
     at = stars.place[twin]
     while True:  # bound: once around the star; the twin itself is on the boundary
-        at = place_before(chains, stars, n_simple, at, twin)
+        at = place_before(chains, stars, at, twin)
         if bounds[stars.half[at] >> 1]:
-            return stars.half[at]
+            return stars.half[at], faces.fan[origin(chains, twin)] > 2
 
 
 @merged
@@ -84,22 +114,21 @@ def pass_vertex(
 
 @inline
 def _emit(
-    edges: Edges, chains: Chains, nodes: Any, fan: Any, marks: Any, path: Any, first: int, last: int, rings: Rings,
-    n_points: int, stop: Any,
+    edges: Edges, chains: Chains, points: Any, marks: Any, walk: Walk, first: int, last: int, rings: Rings,
+    n_points: int, sizes: tuple[int, int, int, int], stop: Any,
 ) -> int:  # fmt: skip
     """Write the points of the ring of the half-chains ``path[first:last]``, straight ones left out; return how many."""
-    before, start, doubt = path[last - 1], n_points, 0
+    path, (_, _, n, n_simple) = walk.path, sizes
+    start, doubt, edge = n_points, 0, leaving_edge(chains, path[last - 1] ^ 1)
     for k in range(first, last):
         if k & POLL == 0 and stop[0]:
             return n_points
         half = path[k]
-        node = origin(chains, half)
-        edge = leaving_edge(chains, half)
-        meets = MEETS * (fan[node] > 2)
-        turns = meets != 0 or turn_of_edges(edges, leaving_edge(chains, before ^ 1), edge) != 0
-        n_points, doubt = pass_point(
-            rings, start, n_points, nodes[node], edge, turns, meets | marks[edge] & DOUBTFUL, doubt
-        )
+        node, before, edge = origin(chains, half), edge, leaving_edge(chains, half)
+        is_simple, meets = node < n_simple, MEETS * (walk.seen[half] == _FORKED)
+        turns = meets != 0 or (edge != before and (is_simple or turn_of_edges(edges, before, edge) != 0))
+        point = n + node if is_simple else points[node]
+        n_points, doubt = pass_point(rings, start, n_points, point, edge, turns, meets | marks[edge] & DOUBTFUL, doubt)
         is_back, end = half & 1, leaving_edge(chains, half ^ 1)
         while edge != end:  # bound: the vertices of the chain
             if edge & POLL == 0 and stop[0]:
@@ -107,7 +136,6 @@ def _emit(
             v = edge if is_back else edges.after[edge]
             edge = edges.before[v] if is_back else v
             n_points, doubt = pass_vertex(edges, marks, v, edge, rings, start, n_points, doubt)
-        before = half
     rings.meets[n_points - 1] |= doubt
     return n_points
 
@@ -115,15 +143,15 @@ def _emit(
 @inline
 def walk_rings(
     edges: Edges, chains: Chains, stars: Stars, faces: Faces, marks: Any, walk: Walk, rings: Rings, holders: Holders,
-    is_named: bool, sizes: tuple[int, int, int], stop: Any,
+    is_named: bool, sizes: tuple[int, int, int, int], stop: Any,
 ) -> tuple[int, int]:  # fmt: skip
     """Write all boundary rings, and what is beyond them if rings are named; return how many rings and points.
 
     marks: of the edges, BENT where the boundary surely turns at the first vertex, RUN where one stands for many,
-    DOUBTFUL as clearance.py says. sizes: the numbers of chains, nodes and simple nodes.
+    DOUBTFUL as clearance.py says. sizes: the numbers of chains, nodes, vertices and simple nodes.
     """
-    n_chains, n_nodes, n_simple = sizes
-    seen, path, place, fan = walk.seen, walk.path, walk.place, faces.fan
+    n_chains, n_nodes, _, _ = sizes
+    seen, path, place = walk.seen, walk.path, walk.place
     seen[: 2 * n_chains] = 0
     place[:n_nodes] = -1
     rings.offset[0] = 0
@@ -133,29 +161,29 @@ def walk_rings(
             continue
         if stop[0]:
             return n_rings, n_points
-        half, depth, is_closed = start, 0, False
+        half, depth, is_closed, is_forked = start, 0, False, _is_forked(chains, faces, start)
         # invariant: a node of more than two boundary chains where path[k] begins has place k, no other is on the path
         while not is_closed:  # bound: each turn marks one half-chain, but for the last
             if depth & POLL == 0 and stop[0]:
                 return n_rings, n_points
             is_closed = seen[half] != 0
-            node = origin(chains, half)
-            first = 0 if is_closed else place[node] if fan[node] > 2 else -1
+            first = 0 if is_closed else place[origin(chains, half)] if is_forked else -1
             if first >= 0:  # a ring, cut off where the walk passes a node twice
-                n_points = _emit(edges, chains, stars.point, fan, marks, path, first, depth, rings, n_points, stop)
+                n_points = _emit(edges, chains, stars.point, marks, walk, first, depth, rings, n_points, sizes, stop)
                 if is_named:
                     enter_beyond(faces, holders, path, first, depth, n_rings)
                 rings.region[n_rings] = root_of(faces.regions, faces.cycle[path[first]])
                 n_rings += 1
                 rings.offset[n_rings] = n_points
                 for k in range(first, depth):
-                    place[origin(chains, path[k])] = -1
+                    if seen[path[k]] == _FORKED:
+                        place[origin(chains, path[k])] = -1
                 depth = first
             if not is_closed:
-                seen[half] = 1
-                if fan[node] > 2:
-                    place[node] = depth
+                seen[half] = _FORKED if is_forked else 1
+                if is_forked:
+                    place[origin(chains, half)] = depth
                 path[depth] = half
                 depth += 1
-                half = _following(chains, stars, n_simple, faces.bounds, half)
+                half, is_forked = _go_on(chains, stars, faces, half)
     return n_rings, n_points

@@ -3,9 +3,16 @@ r"""Chains: the stretches of rings between nodes, and the star of chains around 
 A node is a point where something happens: a crossing, a vertex on another edge, and one vertex of every ring. All
 work after this is by chains, however many vertices these have. Half-chain 2 c runs along its ring, 2 c + 1 back;
 ``h ^ 1`` is the twin. A star lists the half-chains that leave a node, counter-clockwise, beginning after straight
-up; at a simple node, the crossing of two edges and nothing else, it begins with one half-chain of the first edge, and
-four places are all that it has. Chains that leave a node in one direction coincide as far as the next node: one stands
-for all, its source mask the exclusive or of theirs.
+up. A simple node, the crossing of two edges and nothing else, needs none: chain e of the other ring leaves there to the
+left of chain c, or to its right, and those are all four.
+
+           e                2 c goes on from 2 c - 2 straight ahead; to the left of it 2 e leaves, to the right 2 e - 1,
+     c-1   |   c            which is chain e - 1 back.
+    ------>o------>
+           | e-1            Simple nodes have the numbers of their crossings, other nodes those that follow.
+
+Chains that leave a node in one direction coincide as far as the next node: one stands for all, its source mask the
+exclusive or of theirs.
 """
 
 from __future__ import annotations
@@ -23,16 +30,18 @@ from engine.polygon_overlay.compiled.loading import Given
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
 
 NOT_YET: Final = -1
-"""In a star, in the place of a half-chain that is not known yet."""
+"""In the place of a chain that is not known yet, or not there, and of the beginning of a star."""
 
-Chains = namedtuple("Chains", "tail head first last mask stands twin at")
+Chains = namedtuple("Chains", "tail head first last mask stands twin at across")
 """By chain: node at its tail and head, its first and last edge, the mask of its sources, and the half-chain that stands
 for its half-chain 2 c (itself, unless chains coincide). twin: the next of the chains that one stands for, or -1. at:
-for each edge the chain at its beginning; the chains after the nodes inside it follow one by one."""
+for each edge the chain at its beginning; the chains after the nodes inside it follow one by one. across: twice the
+chain that leaves the tail in the other ring, and 1 if to the left, where that is a simple node; else NOT_YET."""
 
 Stars = namedtuple("Stars", "node_of point starts ends half place")
-"""Half-chains around nodes. node_of: by point its node, or -1; by node its point, and where its half-chains begin and
-end in ``half``; place: by half-chain its index there. Simple nodes have the first places, four each."""
+"""Half-chains around nodes that are not simple. node_of: by point its node, or -1; of simple ones the chain that left
+there first. By node its point, and where its half-chains begin and end in ``half``; place: by half-chain its index
+there."""
 
 Loose = namedtuple("Loose", "half masks dx dy")
 """Half-chains that leave nodes that are not simple, ascending, to be sorted into stars. Scratch: masks, by chain those
@@ -58,10 +67,20 @@ def origin(chains: Chains, half: int) -> int:
 
 
 @merged
-def place_before(chains: Chains, stars: Stars, n_simple: int, at: int, half: int) -> int:
+def across_end(chains: Chains, half: int) -> int:
+    """Return what ``across`` says of the node where a half-chain ends."""
+    return chains.across[((half ^ 1) + 1) >> 1]
+
+
+@merged
+def to_the_left(across: int, half: int) -> int:
+    """Return the half-chain that leaves a simple node to the left of one that ends there."""
+    return (across & ~1) - 1 + ((across ^ half) & 1)
+
+
+@merged
+def place_before(chains: Chains, stars: Stars, at: int, half: int) -> int:
     """Return the place before ``at`` in the star of the node where half-chain ``half`` begins, around its end."""
-    if at < 4 * n_simple:
-        return at - 1 if at & 3 else at + 3
     node = origin(chains, half)
     return (at if at > stars.starts[node] else stars.ends[node]) - 1
 
@@ -82,56 +101,35 @@ def _node(stars: Stars, n_nodes: int, point: int) -> tuple[int, int]:
     return stars.node_of[point], n_nodes
 
 
-@inline
-def _pass_crossing(
-    events: Events, stars: Stars, n: int, n_nodes: int, n_simple: int, n_chains: int, point: int, e: int
-) -> tuple[int, int, int]:
-    """Enter the two half-chains that leave a simple node along edge e; return the node, how many there are, how many
-    of them simple.
-
-             2nd              The first edge's take the places 0 and 2; from the left of it, counter-clockwise, the
-              1               second's forward half-chain is at 1, from its right at 3.
-        1st 2 + 0 ->  1st
-              3
-    """
-    star, place = stars.half, stars.place
-    node = stars.node_of[point]
-    crossing = point - n
-    if node < 0:  # here for the first time
-        node, first = n_nodes, 4 * n_simple
-        stars.node_of[point], stars.point[node] = node, point
-        stars.starts[node], stars.ends[node] = first, first + 4
-        n_nodes += 1
-        n_simple += 1
-        is_first = events.first[crossing] == e
-        star[first] = NOT_YET
-    else:
-        first = stars.starts[node]
-        is_first = star[first] == NOT_YET
-    forward = first if is_first else first + (1 if events.turn[crossing] == LEFT else 3)
-    back = first + ((forward - first + 2) & 3)
-    star[forward], place[2 * n_chains + 2] = 2 * n_chains + 2, forward
-    star[back], place[2 * n_chains + 1] = 2 * n_chains + 1, back
-    return node, n_nodes, n_simple
+@merged
+def _pass_crossing(events: Events, chains: Chains, stars: Stars, point: int, crossing: int, chain: int, e: int) -> None:
+    """Enter that a chain leaves a simple node along edge e."""
+    other = stars.node_of[point]
+    if other < 0:  # here for the first time
+        stars.node_of[point] = chain
+        return
+    goes_left = (events.turn[crossing] == LEFT) == (events.first[crossing] == e)
+    chains.across[chain], chains.across[other] = 2 * other + goes_left, 2 * chain + 1 - goes_left
 
 
 @merged
 def _begin_chain(chains: Chains, chain: int, node: int, edge: int, mask: int) -> None:
-    chains.tail[chain], chains.first[chain], chains.mask[chain] = node, edge, mask
+    chains.tail[chain], chains.first[chain], chains.mask[chain], chains.across[chain] = node, edge, mask, NOT_YET
 
 
 @inline
 def build_chains(
-    given: Given, events: Events, along: Along, unions: Unions, chains: Chains, stars: Stars, loose: Any, n: int,
-    n_rings: int, stop: Any,
-) -> tuple[int, int, int, int]:  # fmt: skip
-    """Walk every ring from its top vertex and cut it at its nodes, and fill the stars of simple nodes.
+    given: Given, events: Events, along: Along, unions: Unions, chains: Chains, stars: Stars, loose: Any,
+    sizes: tuple[int, int, int], stop: Any,
+) -> tuple[int, int, int]:  # fmt: skip
+    """Walk every ring from its top vertex and cut it at its nodes.
 
-    unions.is_node: the tops among them. stars.node_of: -1 on entry. ``loose`` gets the half-chains that leave other
-    nodes, whose stars begin NOT_YET. Returns the numbers of nodes, simple nodes, chains and loose half-chains.
+    unions.is_node: the tops among them. stars.node_of: -1 on entry. ``loose`` gets the half-chains that leave nodes
+    that are not simple, whose stars begin NOT_YET. sizes: the numbers of vertices, rings and crossings. Returns the
+    numbers of nodes, chains and loose half-chains.
     """
-    edges = given.edges
-    n_nodes = n_simple = n_chains = n_loose = 0
+    edges, (n, n_rings, n_crossings) = given.edges, sizes
+    n_nodes, n_chains, n_loose = n_crossings, 0, 0
     for ring in range(n_rings):
         top, mask = given.tops[ring], given.masks[ring]
         node, n_nodes = _node(stars, n_nodes, root_of(unions.points, top))
@@ -141,13 +139,14 @@ def build_chains(
         e = top
         while True:  # bound: once around the ring
             if stop[0]:
-                return n_nodes, n_simple, n_chains, n_loose
+                return n_nodes, n_chains, n_loose
             chains.at[e] = n_chains
             before = -1
             for k in range(along.starts[e], along.starts[e + 1]):
                 point = events.point[along.order[k]]
-                if point >= n and events.turn[point - n] != NOT_SIMPLE:
-                    node, n_nodes, n_simple = _pass_crossing(events, stars, n, n_nodes, n_simple, n_chains, point, e)
+                is_simple = point >= n and events.turn[point - n] != NOT_SIMPLE
+                if is_simple:
+                    node = point - n
                 else:
                     node, n_nodes = _node(stars, n_nodes, root_of(unions.points, point))
                     if node == before:
@@ -158,6 +157,8 @@ def build_chains(
                 chains.head[n_chains], chains.last[n_chains] = node, e
                 n_chains += 1
                 _begin_chain(chains, n_chains, node, e, mask)
+                if is_simple:
+                    _pass_crossing(events, chains, stars, point, node, n_chains, e)
             e = edges.after[e]
             if unions.is_node[e]:
                 node, n_nodes = _node(stars, n_nodes, root_of(unions.points, e))
@@ -172,7 +173,8 @@ def build_chains(
                 _begin_chain(chains, n_chains, node, e, mask)
     for chain in range(n_chains):
         chains.stands[chain], chains.twin[chain] = 2 * chain, -1
-    return n_nodes, n_simple, n_chains, n_loose
+    chains.across[n_chains] = NOT_YET
+    return n_nodes, n_chains, n_loose
 
 
 @inline
@@ -230,9 +232,9 @@ def _unite_twins(edges: Edges, chains: Chains, star: Any, first: int, last: int,
 
 @inline
 def _group_loose(
-    chains: Chains, stars: Stars, loose: Loose, n_nodes: int, n_simple: int, n_loose: int, stop: Any
+    chains: Chains, stars: Stars, loose: Loose, n_simple: int, n_nodes: int, n_loose: int, stop: Any
 ) -> None:
-    """Put the loose half-chains of each node together, behind those of simple nodes, in any order."""
+    """Put the loose half-chains of each node together, in any order."""
     starts, ends = stars.starts, stars.ends
     for k in range(n_loose):
         if k & POLL == 0 and stop[0]:
@@ -240,13 +242,12 @@ def _group_loose(
         chain = loose.half[k] >> 1
         loose.masks[chain] = chains.mask[chain]
         ends[origin(chains, loose.half[k])] += 1
-    end = 4 * n_simple
-    for node in range(n_nodes):
+    end = 0
+    for node in range(n_simple, n_nodes):
         if node & POLL == 0 and stop[0]:
             return
-        if starts[node] == NOT_YET:
-            starts[node], end = end, end + ends[node]
-            ends[node] = starts[node]
+        starts[node], end = end, end + ends[node]
+        ends[node] = starts[node]
     for k in range(n_loose):
         if k & POLL == 0 and stop[0]:
             return
@@ -290,15 +291,13 @@ def _sort_star(edges: Edges, chains: Chains, star: Any, loose: Loose, first: int
 
 @inline
 def build_stars(
-    edges: Edges, chains: Chains, stars: Stars, loose: Loose, n_nodes: int, n_simple: int, n_loose: int, stop: Any
+    edges: Edges, chains: Chains, stars: Stars, loose: Loose, n_simple: int, n_nodes: int, n_loose: int, stop: Any
 ) -> None:
-    """Fill the stars of nodes that are not simple; of chains that coincide one is left, which stands for all."""
-    _group_loose(chains, stars, loose, n_nodes, n_simple, n_loose, stop)
+    """Fill the stars of the nodes from n_simple on; of chains that coincide one is left, which stands for all."""
+    _group_loose(chains, stars, loose, n_simple, n_nodes, n_loose, stop)
     star = stars.half
-    for node in range(n_nodes):
+    for node in range(n_simple, n_nodes):
         first, last = stars.starts[node], stars.ends[node]
-        if first < 4 * n_simple:
-            continue
         if stop[0]:
             return
         if _sort_star(edges, chains, star, loose, first, last):
