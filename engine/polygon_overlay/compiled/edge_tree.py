@@ -1,7 +1,7 @@
 """Pairs of boxes that meet, by an implicit tree over boxes in the order of the rings they come from.
 
 Consecutive edges of a ring lie near each other: four make a leaf, node i has the children 2 i and 2 i + 1, and the
-boxes of a level are found from the one below. Only where one edge lies far from the next (many small rings) are they
+boxes of a level are found from the one below. Only where one edge lies far from the next, or one small ring, are they
 first put in the order of a space-filling curve. The tree is walked against itself. Each box is
 ``(x_min, x_max, y_min, y_max)``.
 
@@ -164,10 +164,15 @@ def order_boxes(boxes: Any, n: int, places: Any, stop: Any) -> bool:
 
 @inline
 def build_tree(tree: BoxTree, n: int, stop: Any) -> None:
-    """Fill the nodes, their marks and the places of the first n boxes; empty nodes are inverted."""
+    """Fill the nodes, their marks and the places of the first n boxes."""
+    fill_nodes(tree, n, ANYWHERE if order_boxes(tree.boxes, n, tree.places, stop) else 0, stop)
+
+
+@inline
+def fill_nodes(tree: BoxTree, n: int, added: int, stop: Any) -> None:
+    """Fill the nodes and their marks, with the one that is added, by ``places``; empty nodes are inverted."""
     boxes, nodes, node_marks, places = tree.boxes, tree.nodes, tree.node_marks, tree.places
     n_leaves = leaves_of(n)
-    added = ANYWHERE if order_boxes(boxes, n, places, stop) else 0
     for leaf in range(n_leaves):
         if leaf & POLL == 0 and stop[0]:
             return

@@ -34,13 +34,14 @@ from engine.polygon_overlay.compiled.clearance import CLEARANCE, certify, corner
 from engine.polygon_overlay.compiled.convex import GENERAL, Passages, Points, intersect_convex
 from engine.polygon_overlay.compiled.edge_contacts import Contacts, find_contacts
 from engine.polygon_overlay.compiled.edge_events import sort_events
-from engine.polygon_overlay.compiled.edge_tree import FEW, build_tree
+from engine.polygon_overlay.compiled.edge_tree import FEW
 from engine.polygon_overlay.compiled.loading import (
     EVERYTHING,
     Box,
     Loaded,
     RingArrays,
     box_of,
+    build_edge_tree,
     common_box,
     fill_boxes,
     is_empty,
@@ -148,7 +149,7 @@ def _arrange(w: Workspace, loaded: Loaded, kept: Any, nesting: Nesting, stop: An
     if not is_clear:
         mark_short(edges, n, margin, w.tree.marks)
     if n > FEW:
-        build_tree(w.tree, n, stop)
+        build_edge_tree(edges, n, n_rings, w.components.highest, w.tree, stop)
     contacts = find_contacts(edges, n, n_rings, margin, w.events, w.unions, w.tree, stop)
     room = w.along.order.shape[0] - 9
     if stop[0] or contacts.n_events < 0:
