@@ -35,7 +35,7 @@ _MANY_CONTACTS: Final = 2**15
 Buffers = namedtuple(
     "Buffers",
     "vertex_floats vertex_integers ring_integers contact_floats contact_integers half_integers half_labels "
-    "half_octets point_floats point_integers point_codes point_octets boxes tree tree_marks stack pairs",
+    "half_octets point_floats point_integers point_codes point_octets boxes tree tree_marks stack pairs ends",
 )
 """Scratch by size: a row for each purpose, by vertex, ring, contact, half-chain and point of a boundary ring."""
 
@@ -162,12 +162,13 @@ def buffers_for(n_vertices: int, n_rings: int, n_contacts: int) -> Buffers:
     return Buffers(
         vertex_floats=np.empty((2, n + 1)), vertex_integers=np.empty((5, n + 1), np.int32),
         ring_integers=np.empty((8, n_rings + 1), np.int64), contact_floats=np.empty((5, k)),
-        contact_integers=np.empty((21, k + 1), np.int32), half_integers=np.empty((11, 2 * k + 1), np.int32),
+        contact_integers=np.empty((18, k + 1), np.int32), half_integers=np.empty((11, 2 * k + 1), np.int32),
         half_labels=np.empty((2, 2 * k + 1), np.int64), half_octets=np.empty((4, 2 * k + 1), np.uint8),
         point_floats=np.empty((2, m)), point_integers=np.empty((6, m), np.int32),
         point_codes=np.empty((2, m), np.int64), point_octets=np.empty((4, m), np.uint8), boxes=np.empty((m, 4)),
         tree=np.empty((2 * n_leaves, 4)), tree_marks=np.empty(2 * n_leaves, np.uint8),
         stack=np.empty((DEEPEST, 2), np.int64), pairs=np.empty((PORTION, 2), np.int32),
+        ends=np.empty((k + 1, 4), np.int32),
     )  # fmt: skip
 
 
@@ -178,6 +179,7 @@ def rows_of(buffers: Buffers) -> Workspace:
     cx, c = buffers.contact_floats, buffers.contact_integers
     h, hl, hb = buffers.half_integers, buffers.half_labels, buffers.half_octets
     px, p, pb, codes = buffers.point_floats, buffers.point_integers, buffers.point_octets, buffers.point_codes
+    ends = buffers.ends
     crossing_x, crossing_y, error = cx[3], cx[4], cx[1]
     return Workspace(
         given=Given(Edges(vx[0], vx[1], v[0], v[1], v[2]), v[3], r[0], r[1]),
@@ -188,13 +190,13 @@ def rows_of(buffers: Buffers) -> Workspace:
         events=Events(c[0], c[1], c[2], cx[0], cx[1], cx[2], c[3], c[4], hb[0]),
         unions=Unions(p[3], pb[1], r[2]),
         along=Along(v[4], c[12], crossing_x, px[0], crossing_y, c[13], c[14]),
-        chains=Chains(c[5], c[6], c[7], c[8], hl[1], c[9], c[18], p[1], c[20]),
+        chains=Chains(ends[:, 0], ends[:, 1], ends[:, 2], ends[:, 3], hl[1], c[5], c[6], p[1], c[7]),
         stars=Stars(p[4], c[13], c[14], c[15], h[0], h[1]),
         loose=Loose(h[3], hl[0], px[0], px[1]),
         faces=Faces(h[2], h[4], h[5], hb[1], hb[2], c[16]),
         components=Components(r[3], r[4], r[5], r[6], r[7]),
-        holders=Holders(r[4], r[5], r[6], h[3], h[6], hl[0], h[7], h[8], h[9], h[10], c[19]),
-        walk=Walk(hb[3], h[6], c[17]),
+        holders=Holders(r[4], r[5], r[6], h[3], h[6], hl[0], h[7], h[8], h[9], h[10], c[17]),
+        walk=Walk(h[6], c[8]),
         found=Rings(p[0], p[5], pb[0], c[10], c[11]),
         rounded=Rounded(px[0], px[1], pb[3], crossing_x, crossing_y, error),
         ranking=Ranking(c[5], cx[0], cx[2], hb[0], c[6], c[7], c[8], c[9]),  # in place of chains, and of parameters of events

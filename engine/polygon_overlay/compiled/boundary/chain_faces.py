@@ -32,11 +32,11 @@ from engine.predicates.orientation import BOUND_2D, GUARD_2D
 
 NOTHING: Final = -1
 
-Faces = namedtuple("Faces", "cycle joined regions inside bounds fan")
-"""By half-chain: cycle, or -1 where another half-chain stands for it.
-By cycle, of which entry n_cycles is the unbounded face: joined, a forest of those of one face; regions, of those of one
-region of the result; inside: the part of the result that it is in, or 0. bounds: by chain, whether it bounds one; fan:
-by node that is not simple, how many that do."""
+Faces = namedtuple("Faces", "cycle joined regions inside state fan")
+"""By half-chain: cycle, or -1 where another half-chain stands for it; state: as chain_rings.py has it. By cycle, of
+which entry n_cycles is the unbounded face: joined, a forest of those of one face; regions, of those of one region of
+the result; inside: the part of the result that it is in, or 0. fan: by node that is not simple, how many chains bound
+a region."""
 
 
 @merged

@@ -28,33 +28,38 @@ from engine.polygon_overlay.compiled.edge_tree import BENT, DOUBTFUL, POLL, RUN
 from engine.polygon_overlay.compiled.ring_nesting import Holders, enter_beyond
 
 MEETS: Final = 1
-_FORKED: Final = 2
+_BOUNDS: Final = 1
+_INSIDE: Final = 2
+_SEEN: Final = 4
+_FORKED: Final = 8
+"""Bits of the state of a half-chain: its chain bounds a region, its own face is in the result, it was walked, and rings
+meet where it begins."""
 
 Rings = namedtuple("Rings", "point edge meets offset region")
 """point: united points, ring after ring; edge: along which the ring goes on from there; meets: MEETS where rings meet,
 RUN where those up to the next point are left out, DOUBTFUL where an edge up to there has that mark; offset: where each
 ring begins; region: a number of the region it bounds."""
 
-Walk = namedtuple("Walk", "seen path place")
-"""Scratch. seen: by half-chain, uint8, not 0 once it was walked, _FORKED if rings meet where it begins; path: the
-half-chains of a walk; place: by node where rings meet its place on the path."""
+Walk = namedtuple("Walk", "path place")
+"""Scratch. path: the half-chains of a walk; place: by node where rings meet its place on the path."""
 
 
 @inline
 def choose_boundary(chains: Chains, faces: Faces, n_chains: int, n_simple: int, n_nodes: int, stop: Any) -> None:
-    """Fill ``bounds`` and ``fan``, and join regions; ``inside`` is filled. The first n_simple nodes are simple."""
-    cycle, fan = faces.cycle, faces.fan
+    """Fill ``state`` and ``fan``, and join regions; ``inside`` is filled. The first n_simple nodes are simple."""
+    cycle, inside, state, fan = faces.cycle, faces.inside, faces.state, faces.fan
     fan[n_simple:n_nodes] = 0
     for chain in range(n_chains):
         if chain & POLL == 0 and stop[0]:
             return
-        faces.bounds[chain] = 0
+        state[2 * chain] = state[2 * chain + 1] = 0
         if is_live(chains, chain):
             left, right = cycle[2 * chain], cycle[2 * chain + 1]
-            if faces.inside[left] == faces.inside[right]:
+            if inside[left] == inside[right]:
                 unite(faces.regions, left, right)
             else:
-                faces.bounds[chain] = 1
+                state[2 * chain] = _BOUNDS | _INSIDE * (inside[left] != 0)
+                state[2 * chain + 1] = _BOUNDS | _INSIDE * (inside[right] != 0)
                 for node in (chains.tail[chain], chains.head[chain]):
                     if node >= n_simple:
                         fan[node] += 1
@@ -66,25 +71,25 @@ def _is_forked(chains: Chains, faces: Faces, half: int) -> bool:
     across = across_end(chains, half ^ 1)
     if across == NOT_YET:
         return faces.fan[origin(chains, half)] > 2
-    other = across >> 1
-    return (faces.bounds[other] & faces.bounds[other - 1]) != 0  # an even number is on the boundary
+    ahead, back = across & ~1, (across & ~1) - 1
+    return faces.state[ahead] & faces.state[back] & _BOUNDS != 0  # an even number is on the boundary
 
 
 @merged
 def _go_on(chains: Chains, stars: Stars, faces: Faces, half: int) -> tuple[int, bool]:
     """Return the boundary half-chain that goes on around the region to the left of ``half``, and whether it
     `_is_forked`."""
-    bounds, across = faces.bounds, across_end(chains, half)
+    state, across = faces.state, across_end(chains, half)
     if across != NOT_YET:
         left, ahead = to_the_left(across, half), half + 2 - 4 * (half & 1)
-        if bounds[left >> 1]:
-            return left, bounds[ahead >> 1] != 0
-        return ahead if bounds[ahead >> 1] else to_the_left(across, half ^ 1), False
+        if state[left]:
+            return left, state[ahead] != 0
+        return ahead if state[ahead] else to_the_left(across, half ^ 1), False
     twin = half ^ 1
     at = stars.place[twin]
     while True:  # bound: once around the star; the twin itself is on the boundary
         at = place_before(chains, stars, at, twin)
-        if bounds[stars.half[at] >> 1]:
+        if state[stars.half[at]]:
             return stars.half[at], faces.fan[origin(chains, twin)] > 2
 
 
@@ -114,18 +119,18 @@ def pass_vertex(
 
 @inline
 def _emit(
-    edges: Edges, chains: Chains, points: Any, marks: Any, walk: Walk, first: int, last: int, rings: Rings,
+    edges: Edges, chains: Chains, points: Any, state: Any, marks: Any, path: Any, first: int, last: int, rings: Rings,
     n_points: int, sizes: tuple[int, int, int, int], stop: Any,
 ) -> int:  # fmt: skip
     """Write the points of the ring of the half-chains ``path[first:last]``, straight ones left out; return how many."""
-    path, (_, _, n, n_simple) = walk.path, sizes
+    _, _, n, n_simple = sizes
     start, doubt, edge = n_points, 0, leaving_edge(chains, path[last - 1] ^ 1)
     for k in range(first, last):
         if k & POLL == 0 and stop[0]:
             return n_points
         half = path[k]
         node, before, edge = origin(chains, half), edge, leaving_edge(chains, half)
-        is_simple, meets = node < n_simple, MEETS * (walk.seen[half] == _FORKED)
+        is_simple, meets = node < n_simple, MEETS * (state[half] & _FORKED != 0)
         turns = meets != 0 or (edge != before and (is_simple or turn_of_edges(edges, before, edge) != 0))
         point = n + node if is_simple else points[node]
         n_points, doubt = pass_point(rings, start, n_points, point, edge, turns, meets | marks[edge] & DOUBTFUL, doubt)
@@ -151,13 +156,12 @@ def walk_rings(
     DOUBTFUL as clearance.py says. sizes: the numbers of chains, nodes, vertices and simple nodes.
     """
     n_chains, n_nodes, _, _ = sizes
-    seen, path, place = walk.seen, walk.path, walk.place
-    seen[: 2 * n_chains] = 0
+    state, path, place = faces.state, walk.path, walk.place
     place[:n_nodes] = -1
     rings.offset[0] = 0
     n_rings = n_points = 0
     for start in range(2 * n_chains):
-        if not faces.bounds[start >> 1] or not faces.inside[faces.cycle[start]] or seen[start]:
+        if state[start] & (_INSIDE | _SEEN) != _INSIDE:
             continue
         if stop[0]:
             return n_rings, n_points
@@ -166,21 +170,23 @@ def walk_rings(
         while not is_closed:  # bound: each turn marks one half-chain, but for the last
             if depth & POLL == 0 and stop[0]:
                 return n_rings, n_points
-            is_closed = seen[half] != 0
+            is_closed = state[half] & _SEEN != 0
             first = 0 if is_closed else place[origin(chains, half)] if is_forked else -1
             if first >= 0:  # a ring, cut off where the walk passes a node twice
-                n_points = _emit(edges, chains, stars.point, marks, walk, first, depth, rings, n_points, sizes, stop)
+                n_points = _emit(
+                    edges, chains, stars.point, state, marks, path, first, depth, rings, n_points, sizes, stop
+                )
                 if is_named:
                     enter_beyond(faces, holders, path, first, depth, n_rings)
                 rings.region[n_rings] = root_of(faces.regions, faces.cycle[path[first]])
                 n_rings += 1
                 rings.offset[n_rings] = n_points
                 for k in range(first, depth):
-                    if seen[path[k]] == _FORKED:
+                    if state[path[k]] & _FORKED:
                         place[origin(chains, path[k])] = -1
                 depth = first
             if not is_closed:
-                seen[half] = _FORKED if is_forked else 1
+                state[half] |= _SEEN | _FORKED * is_forked
                 if is_forked:
                     place[origin(chains, half)] = depth
                 path[depth] = half
