@@ -1,9 +1,9 @@
 """Which faces are inside, and for rounded rings that are arranged again which rings tell so.
 
 The faces are walked as a tree, from the unbounded one and back: each step takes up or lays down the sources that it
-crosses, however many there are. What is inside is a rule: a table over the labels of two polygons (bit k: inside source
-k, even-odd); where any source is (even-odd within each), or the first alone; where all rings together have a winding
-number that is not zero, positive, or negative; or that of a round of rounding:
+crosses, however many there are (labels of two polygons are ring_labels.py's). What is inside is a rule: where any
+source is (even-odd within each), or the first alone; where all rings together have a winding number that is not zero,
+positive, or negative; or that of a round of rounding:
 
 A face is inside where it lies (even-odd) in a shell and in no hole of that shell. Its evidence names those shells; that
 of a face outside names the holes that it lies in, the innermost of them: those whose shell is smallest. Evidence tells,
@@ -69,11 +69,9 @@ first entry. beyond: regions on the other side of the rings of the result, those
 def _cross(given: Given, chains: Chains, nesting: Nesting, h: Holders, half: int, n_held: int) -> int:
     """Go over a half-chain, from its left, and take up or lay down all that it stands for; return how many are held.
 
-    Of winding numbers, and labels of two polygons: return the one beyond, ``n_held`` being the one here.
+    Of winding numbers: return the one beyond, ``n_held`` being the one here.
     """
     chain = half >> 1
-    if nesting.rule == PAIR:
-        return n_held ^ chains.mask[chain]
     while chain >= 0:  # bound: the chains that coincide
         ring = given.masks[given.edges.ring[chains.first[chain]]]
         if NON_ZERO <= nesting.rule <= NEGATIVE:
@@ -93,10 +91,8 @@ def _cross(given: Given, chains: Chains, nesting: Nesting, h: Holders, half: int
 
 
 @merged
-def _is_inside(rule: int, kept: Any, h: Holders, n_held: int) -> int:
-    """Tell whether a face is inside by a rule other than AGAIN; of two polygons return what the table says."""
-    if rule == PAIR:
-        return int(kept[n_held])
+def _is_inside(rule: int, h: Holders, n_held: int) -> int:
+    """Tell whether a face is inside by a rule other than AGAIN."""
     if rule == FIRST_ALONE:
         return int(n_held == 1 and h.place[0] == 0)
     return int(n_held < 0 if rule == NEGATIVE else n_held > 0 if rule != NON_ZERO else n_held != 0)
@@ -129,13 +125,11 @@ def _judge(nesting: Nesting, h: Holders, face: int, n_held: int, n: int) -> tupl
 
 @called
 def spread_sources(
-    given: Given, chains: Chains, faces: Faces, nesting: Nesting, kept: Any, h: Holders, sizes: tuple[int, int],
-    stop: Any,
-) -> int:  # fmt: skip
+    given: Given, chains: Chains, faces: Faces, nesting: Nesting, h: Holders, sizes: tuple[int, int], stop: Any
+) -> int:
     """Fill ``faces.inside`` and the entries of evidence, ``after`` with their faces; return how many, or NO_ROOM.
 
-    kept: (4,) uint8, by the label of two polygons whether a face of it is inside. sizes: the numbers of chains and
-    cycles. ``faces.joined`` joins the cycles of one face.
+    sizes: the numbers of chains and cycles. ``faces.joined`` joins the cycles of one face.
     """
     n_chains, n_cycles = sizes
     cycle, joined, inside = faces.cycle, faces.joined, faces.inside
@@ -161,7 +155,7 @@ def spread_sources(
             if h.entered[other] == _NOT_YET:
                 n_held = _cross(given, chains, nesting, h, half, n_held)
                 if nesting.rule != AGAIN:
-                    inside[other] = _is_inside(nesting.rule, kept, h, n_held)
+                    inside[other] = _is_inside(nesting.rule, h, n_held)
                 else:
                     inside[other], n_entries = _judge(nesting, h, other, n_held, n_entries)
                     if n_entries == NO_ROOM:

@@ -16,6 +16,7 @@ from engine.polygon_overlay.compiled.boundary.chain_faces import Faces
 from engine.polygon_overlay.compiled.boundary.chain_rings import Rings, Walk
 from engine.polygon_overlay.compiled.boundary.chains import Chains, Loose, Stars
 from engine.polygon_overlay.compiled.boundary.components import Components
+from engine.polygon_overlay.compiled.boundary.ring_labels import Labels
 from engine.polygon_overlay.compiled.crossing_signs import Edges
 from engine.polygon_overlay.compiled.edge_contacts import Events, Unions
 from engine.polygon_overlay.compiled.edge_events import Along
@@ -53,6 +54,7 @@ class Workspace(NamedTuple):
     loose: Loose
     faces: Faces
     components: Components
+    labels: Labels
     holders: Holders
     walk: Walk
     found: Rings
@@ -161,7 +163,7 @@ def buffers_for(n_vertices: int, n_rings: int, n_contacts: int) -> Buffers:
         n_leaves *= 2
     return Buffers(
         vertex_floats=np.empty((2, n + 1)), vertex_integers=np.empty((5, n + 1), np.int32),
-        ring_integers=np.empty((8, n_rings + 1), np.int64), contact_floats=np.empty((5, k)),
+        ring_integers=np.empty((9, n_rings + 1), np.int64), contact_floats=np.empty((5, k)),
         contact_integers=np.empty((18, k + 1), np.int32), half_integers=np.empty((11, 2 * k + 1), np.int32),
         half_labels=np.empty((2, 2 * k + 1), np.int64), half_octets=np.empty((4, 2 * k + 1), np.uint8),
         point_floats=np.empty((2, m)), point_integers=np.empty((6, m), np.int32),
@@ -195,6 +197,7 @@ def rows_of(buffers: Buffers) -> Workspace:
         loose=Loose(h[3], hl[0], px[0], px[1]),
         faces=Faces(h[2], h[4], h[5], hb[1], hb[2], c[16]),
         components=Components(r[3], r[4], r[5], r[6], r[7]),
+        labels=Labels(r[4], r[8]),
         holders=Holders(r[4], r[5], r[6], h[3], h[6], hl[0], h[7], h[8], h[9], h[10], c[17]),
         walk=Walk(h[6], c[8]),
         found=Rings(p[0], p[5], pb[0], c[10], c[11]),

@@ -13,7 +13,6 @@ from typing import Any, Final
 
 from engine.jit import inline, merged
 from engine.polygon_overlay.compiled.boundary.chains import (
-    NOT_YET,
     Chains,
     Stars,
     across_end,
@@ -33,7 +32,7 @@ from engine.predicates.orientation import BOUND_2D, GUARD_2D
 NOTHING: Final = -1
 
 Faces = namedtuple("Faces", "cycle joined regions inside state fan")
-"""By half-chain: cycle, or -1 where another half-chain stands for it; state: as chain_rings.py has it. By cycle, of
+"""By half-chain: cycle, or -1 where another half-chain stands for it; state: as ring_labels.py has it. By cycle, of
 which entry n_cycles is the unbounded face: joined, a forest of those of one face; regions, of those of one region of
 the result; inside: the part of the result that it is in, or 0. fan: by node that is not simple, how many chains bound
 a region."""
@@ -43,7 +42,7 @@ a region."""
 def _following(chains: Chains, stars: Stars, half: int) -> int:
     """Return the half-chain that goes on around the face of ``half``."""
     across = across_end(chains, half)
-    if across != NOT_YET:
+    if across >= 0:
         return to_the_left(across, half)
     twin = half ^ 1
     return stars.half[place_before(chains, stars, stars.place[twin], twin)]

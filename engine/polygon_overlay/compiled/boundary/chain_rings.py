@@ -13,7 +13,6 @@ from engine.arrangement.union_find import root_of, unite
 from engine.jit import inline, merged
 from engine.polygon_overlay.compiled.boundary.chain_faces import Faces
 from engine.polygon_overlay.compiled.boundary.chains import (
-    NOT_YET,
     Chains,
     Stars,
     across_end,
@@ -23,18 +22,12 @@ from engine.polygon_overlay.compiled.boundary.chains import (
     place_before,
     to_the_left,
 )
+from engine.polygon_overlay.compiled.boundary.ring_labels import BOUNDS, FORKED, INSIDE, LABELLED, SEEN, label_of
 from engine.polygon_overlay.compiled.crossing_signs import Edges, orient, turn_of_edges
 from engine.polygon_overlay.compiled.edge_tree import BENT, DOUBTFUL, POLL, RUN
 from engine.polygon_overlay.compiled.ring_nesting import Holders, enter_beyond
 
 MEETS: Final = 1
-_BOUNDS: Final = 1
-_INSIDE: Final = 2
-_SEEN: Final = 4
-_FORKED: Final = 8
-"""Bits of the state of a half-chain: its chain bounds a region, its own face is in the result, it was walked, and rings
-meet where it begins."""
-
 Rings = namedtuple("Rings", "point edge meets offset region")
 """point: united points, ring after ring; edge: along which the ring goes on from there; meets: MEETS where rings meet,
 RUN where those up to the next point are left out, DOUBTFUL where an edge up to there has that mark; offset: where each
@@ -45,34 +38,49 @@ Walk = namedtuple("Walk", "path place")
 
 
 @inline
-def choose_boundary(chains: Chains, faces: Faces, n_chains: int, n_simple: int, n_nodes: int, stop: Any) -> None:
-    """Fill ``state`` and ``fan``, and join regions; ``inside`` is filled. The first n_simple nodes are simple."""
-    cycle, inside, state, fan = faces.cycle, faces.inside, faces.state, faces.fan
-    fan[n_simple:n_nodes] = 0
+def mark_boundary(chains: Chains, faces: Faces, n_chains: int, stop: Any) -> None:
+    """Fill ``state`` where ``inside`` is filled."""
+    cycle, inside, state = faces.cycle, faces.inside, faces.state
     for chain in range(n_chains):
         if chain & POLL == 0 and stop[0]:
             return
         state[2 * chain] = state[2 * chain + 1] = 0
         if is_live(chains, chain):
-            left, right = cycle[2 * chain], cycle[2 * chain + 1]
-            if inside[left] == inside[right]:
-                unite(faces.regions, left, right)
-            else:
-                state[2 * chain] = _BOUNDS | _INSIDE * (inside[left] != 0)
-                state[2 * chain + 1] = _BOUNDS | _INSIDE * (inside[right] != 0)
-                for node in (chains.tail[chain], chains.head[chain]):
-                    if node >= n_simple:
-                        fan[node] += 1
+            left, right = inside[cycle[2 * chain]], inside[cycle[2 * chain + 1]]
+            state[2 * chain] = BOUNDS * (left != right) | INSIDE * (left != 0)
+            state[2 * chain + 1] = BOUNDS * (left != right) | INSIDE * (right != 0)
+
+
+@inline
+def join_regions(chains: Chains, stars: Stars, faces: Faces, is_named: bool, sizes: tuple[int, int, int], stop: Any) -> None:
+    """Join the regions of faces, and fill ``fan``; ``state`` is filled.
+
+    is_named: join what is not in the result as well. sizes: the numbers of chains, simple nodes and nodes.
+    """
+    n_chains, n_simple, n_nodes = sizes
+    cycle, state = faces.cycle, faces.state
+    for chain in range(n_chains):
+        if chain & POLL == 0 and stop[0]:
+            return
+        if state[2 * chain] & BOUNDS == 0 and (is_live(chains, chain) if is_named else state[2 * chain] & INSIDE):
+            unite(faces.regions, cycle[2 * chain], cycle[2 * chain + 1])
+    for node in range(n_simple, n_nodes):
+        if node & POLL == 0 and stop[0]:
+            return
+        n = 0
+        for k in range(stars.starts[node], stars.ends[node]):
+            n += state[stars.half[k]] & BOUNDS
+        faces.fan[node] = n
 
 
 @merged
 def _is_forked(chains: Chains, faces: Faces, half: int) -> bool:
     """Tell whether more than two boundary chains end where one of them, ``half``, begins."""
     across = across_end(chains, half ^ 1)
-    if across == NOT_YET:
+    if across < 0:
         return faces.fan[origin(chains, half)] > 2
     ahead, back = across & ~1, (across & ~1) - 1
-    return faces.state[ahead] & faces.state[back] & _BOUNDS != 0  # an even number is on the boundary
+    return faces.state[ahead] & faces.state[back] & BOUNDS != 0  # an even number is on the boundary
 
 
 @merged
@@ -80,16 +88,16 @@ def _go_on(chains: Chains, stars: Stars, faces: Faces, half: int) -> tuple[int, 
     """Return the boundary half-chain that goes on around the region to the left of ``half``, and whether it
     `_is_forked`."""
     state, across = faces.state, across_end(chains, half)
-    if across != NOT_YET:
+    if across >= 0:
         left, ahead = to_the_left(across, half), half + 2 - 4 * (half & 1)
-        if state[left]:
-            return left, state[ahead] != 0
-        return ahead if state[ahead] else to_the_left(across, half ^ 1), False
+        if state[left] & BOUNDS:
+            return left, state[ahead] & BOUNDS != 0
+        return ahead if state[ahead] & BOUNDS else to_the_left(across, half ^ 1), False
     twin = half ^ 1
     at = stars.place[twin]
     while True:  # bound: once around the star; the twin itself is on the boundary
         at = place_before(chains, stars, at, twin)
-        if state[stars.half[at]]:
+        if state[stars.half[at]] & BOUNDS:
             return stars.half[at], faces.fan[origin(chains, twin)] > 2
 
 
@@ -130,7 +138,7 @@ def _emit(
             return n_points
         half = path[k]
         node, before, edge = origin(chains, half), edge, leaving_edge(chains, half)
-        is_simple, meets = node < n_simple, MEETS * (state[half] & _FORKED != 0)
+        is_simple, meets = node < n_simple, MEETS * (state[half] & FORKED != 0)
         turns = meets != 0 or (edge != before and (is_simple or turn_of_edges(edges, before, edge) != 0))
         point = n + node if is_simple else points[node]
         n_points, doubt = pass_point(rings, start, n_points, point, edge, turns, meets | marks[edge] & DOUBTFUL, doubt)
@@ -148,7 +156,7 @@ def _emit(
 @inline
 def walk_rings(
     edges: Edges, chains: Chains, stars: Stars, faces: Faces, marks: Any, walk: Walk, rings: Rings, holders: Holders,
-    is_named: bool, sizes: tuple[int, int, int, int], stop: Any,
+    is_named: bool, kept: Any, sizes: tuple[int, int, int, int], stop: Any,
 ) -> tuple[int, int]:  # fmt: skip
     """Write all boundary rings, and what is beyond them if rings are named; return how many rings and points.
 
@@ -161,7 +169,7 @@ def walk_rings(
     rings.offset[0] = 0
     n_rings = n_points = 0
     for start in range(2 * n_chains):
-        if state[start] & (_INSIDE | _SEEN) != _INSIDE:
+        if state[start] & (BOUNDS | INSIDE | SEEN) != BOUNDS | INSIDE:
             continue
         if stop[0]:
             return n_rings, n_points
@@ -170,7 +178,7 @@ def walk_rings(
         while not is_closed:  # bound: each turn marks one half-chain, but for the last
             if depth & POLL == 0 and stop[0]:
                 return n_rings, n_points
-            is_closed = state[half] & _SEEN != 0
+            is_closed = state[half] & SEEN != 0
             first = 0 if is_closed else place[origin(chains, half)] if is_forked else -1
             if first >= 0:  # a ring, cut off where the walk passes a node twice
                 n_points = _emit(
@@ -178,15 +186,18 @@ def walk_rings(
                 )
                 if is_named:
                     enter_beyond(faces, holders, path, first, depth, n_rings)
-                rings.region[n_rings] = root_of(faces.regions, faces.cycle[path[first]])
+                region = root_of(faces.regions, faces.cycle[path[first]])
+                if state[path[first]] & LABELLED:
+                    faces.inside[region] = kept[label_of(state[path[first]])]
+                rings.region[n_rings] = region
                 n_rings += 1
                 rings.offset[n_rings] = n_points
                 for k in range(first, depth):
-                    if state[path[k]] & _FORKED:
+                    if state[path[k]] & FORKED:
                         place[origin(chains, path[k])] = -1
                 depth = first
             if not is_closed:
-                state[half] |= _SEEN | _FORKED * is_forked
+                state[half] |= SEEN | FORKED * is_forked
                 if is_forked:
                     place[origin(chains, half)] = depth
                 path[depth] = half

@@ -23,20 +23,22 @@ from typing import Any, Final
 from engine.arrangement.union_find import root_of
 from engine.jit import called, inline, merged
 from engine.polygon_overlay.compiled.crossing_signs import Edges, turn_of_edges
-from engine.polygon_overlay.compiled.edge_contacts import LEFT, NOT_SIMPLE, Events, Unions
+from engine.polygon_overlay.compiled.edge_contacts import BEGINS, LEFT, NOT_SIMPLE, Events, Unions
 from engine.polygon_overlay.compiled.edge_events import Along
 from engine.polygon_overlay.compiled.edge_tree import POLL
 from engine.polygon_overlay.compiled.loading import Given
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
 
 NOT_YET: Final = -1
-"""In the place of a chain that is not known yet, or not there, and of the beginning of a star."""
+"""In the place of a chain that is not known yet."""
+ALONE: Final = -2
+"""In the place of a chain across a node where one ring begins, and no other passes."""
 
 Chains = namedtuple("Chains", "tail head first last mask stands twin at across")
 """By chain: node at its tail and head, its first and last edge, the mask of its sources, and the half-chain that stands
 for its half-chain 2 c (itself, unless chains coincide). twin: the next of the chains that one stands for, or -1. at:
 for each edge the chain at its beginning; the chains after the nodes inside it follow one by one. across: twice the
-chain that leaves the tail in the other ring, and 1 if to the left, where that is a simple node; else NOT_YET."""
+chain that leaves the tail in the other ring, and 1 if to the left, where that is a simple node; else less than 0."""
 
 Stars = namedtuple("Stars", "node_of point starts ends half place")
 """Half-chains around nodes that are not simple. node_of: by point its node, or -1; of simple ones the chain that left
@@ -136,6 +138,8 @@ def build_chains(
         loose[n_loose] = 2 * n_chains
         n_loose += 1
         _begin_chain(chains, n_chains, node, top, mask)
+        if unions.is_node[top] == BEGINS:
+            chains.across[n_chains] = ALONE
         e = top
         while True:  # bound: once around the ring
             if stop[0]:
