@@ -43,7 +43,8 @@ margin of clearance.py, where that is not in doubt already, and the slack. By cr
 turn: LEFT or RIGHT as the second leaves to that side of the first, or NOT_SIMPLE."""
 
 Unions = namedtuple("Unions", "points is_node rings")
-"""points: forest of points that are one; is_node: by vertex, uint8, BEGINS where a ring begins and meets nothing; rings: forest of rings that hang together."""
+"""points: forest of points that are one; is_node: by vertex, uint8, BEGINS where a ring begins and
+nothing meets it; rings: forest of rings that hang together."""
 
 
 @merged

@@ -7,6 +7,10 @@ sum of n terms, each is off by the errors of its factors and 12 u^2 of its size;
 double, which is off by less than (2 n + n^2) u^2 of all sizes, twice over. Where a weight is less than a thousand times
 its bound both come from expansions, if exponents allow.
 
+Where the ring runs along the input for long, x is counted from a double o from which no difference is rounded: that of
+the ring's first vertex where all are between its half and its double (P. H. Sterbenz, Floating-point computation, 1974,
+theorem 4.3.1), or else zero, and then x is no larger than twice what the ring is wide.
+
 What the bound leaves open (a tie, a sum that nearly cancels, exponents near the ends) the caller settles in integers.
 """
 
@@ -14,11 +18,13 @@ from __future__ import annotations
 
 from typing import Any, Final, NamedTuple
 
+import numpy as np
+
 from engine.jit import called, inline, kernel, merged
 from engine.polygon_overlay.compiled.crossing_signs import weight_of
 from engine.polygon_overlay.compiled.rounded_crossings import common_place, leading
 from engine.predicates.double_double import U2, dd_add, dd_div, dd_mul, dd_sub, surely_rounded
-from engine.predicates.error_free import fast_two_sum, two_diff, two_sum, workspace
+from engine.predicates.error_free import fast_two_sum, fma, two_diff, two_sum, workspace
 from engine.predicates.expansion import is_safe
 from engine.predicates.parameters import minor
 
@@ -156,40 +162,60 @@ def _place(pair: _Pair, sources: Any, k: int, ox: float, oy: float) -> _Place:
 
 
 @merged
-def _is_stretch(pair: _Pair, sources: Any, first: int, last: int) -> bool:
-    """Tell whether points first .. last are vertices of one polygon that follow each other in the input."""
+def _is_stretch(pair: _Pair, sources: Any, first: int) -> bool:
+    """Tell whether `_BLOCK` points and two, from ``first`` on, are vertices that follow each other in the input."""
+    last = first + _BLOCK + 1
     v, w = sources[first, 0], sources[last, 0]
     if abs(w - v) != last - first or (v < pair.n) != (w < pair.n):
         return False
-    step, is_one = 1 if w > v else -1, True
+    step, off, seconds = 1 if w > v else -1, 0, -1
     some = sources[first : last + 1]
-    for j in range(some.shape[0]):  # no branches: the compiler makes vectors of this loop
-        is_one &= (some[j, 0] == v + step * j) & (some[j, 1] < 0)
-    return is_one
+    for j in range(_BLOCK + 2):  # no branches: the compiler makes vectors of this loop
+        off |= some[j, 0] - v - step * j
+        seconds &= some[j, 1]
+    return off == 0 and seconds < 0
 
 
 @merged
-def _sum_block(vertices: Any, ox: float, oy: float, sign: float, sums: Any) -> None:
-    """Add the terms of `_BLOCK` vertices, those between the first and the last; ox, oy: as of `_twice_area`.
+def _sum_block(vertices: Any, ox: float, sign: float, sums: Any) -> bool:
+    """Add the terms of `_BLOCK` vertices, those between the first and the last; tell whether ``ox`` is as needed.
 
     sums: (3, LANES) totals, what they lost, and sizes. sign: -1 where they are the ring's from the last to the first.
     """
+    low, high = (min(0.5 * ox, 2.0 * ox), max(0.5 * ox, 2.0 * ox)) if ox != 0.0 else (-np.inf, np.inf)
+    is_exact = True
     for row in range(1, _BLOCK, _LANES):
         some = vertices[row - 1 : row + _LANES + 1]
         for j in range(_LANES):  # no branches: the compiler makes vectors of this loop
-            xh, xl = two_diff(some[j + 1, 0], ox)
+            is_exact &= (some[j + 1, 0] >= low) & (some[j + 1, 0] <= high)
+            x = sign * (some[j + 1, 0] - ox)
             dh, dl = two_diff(some[j + 2, 1], some[j, 1])
-            ph, pl = dd_mul(xh, xl, sign * dh, sign * dl)
+            ph = x * dh
             sums[j], lost = two_sum(sums[j], ph)
-            sums[_LANES + j] += lost + pl
-            sums[2 * _LANES + j] += abs(xh) * (abs(some[j + 2, 1] - oy) + abs(some[j, 1] - oy))
+            sums[_LANES + j] += lost + fma(x, dl, fma(x, dh, -ph))
+            sums[2 * _LANES + j] += abs(ph)
+    return is_exact
 
 
 @inline
 def _twice_area(pair: _Pair, sources: Any, first: int, last: int) -> tuple[float, float, float, float]:
     """Return twice the area of a ring as a double-double, the bound of its terms, and the sum of their sizes."""
     vertices, v, _ = _found(pair, sources[first, 0])
-    ox, oy = vertices[v, 0], vertices[v, 1]
+    ox, n = vertices[v, 0], (last - first) >> 2
+    for k in range(first, last if n > _BLOCK else first, max(n, 1)):  # the others are likely to be like these
+        some, at, _ = _found(pair, sources[k, 0])
+        ox = ox if abs(some[at, 0] - 1.25 * ox) <= 0.75 * abs(ox) else 0.0
+    total, rest, error, size = _twice_area_from(pair, sources, first, last, ox, vertices[v, 1])
+    if error < 0.0:
+        total, rest, error, size = _twice_area_from(pair, sources, first, last, 0.0, vertices[v, 1])
+    return total, rest, error, size
+
+
+@inline
+def _twice_area_from(
+    pair: _Pair, sources: Any, first: int, last: int, ox: float, oy: float
+) -> tuple[float, float, float, float]:
+    """Return what `_twice_area` does, places counted from o; a bound below 0 where that must be zero."""
     before = _place(pair, sources, last - 1, ox, oy)
     now = _place(pair, sources, first, ox, oy)
     total = rest = error = size = 0.0
@@ -198,14 +224,16 @@ def _twice_area(pair: _Pair, sources: Any, first: int, last: int) -> tuple[float
     sums[:] = 0.0
     k = first
     while k < last:  # bound: each turn passes a point at least
-        if first < k < last - _BLOCK and _is_stretch(pair, sources, k - 1, k + _BLOCK):
+        begin = k
+        while first < k < last - _BLOCK and _is_stretch(pair, sources, k - 1):  # bound: each turn passes points
             low, high = sources[k - 1, 0], sources[k + _BLOCK, 0]
             some, v, _ = _found(pair, min(low, high))
-            _sum_block(some[v : v + _BLOCK + 2], ox, oy, 1.0 if low < high else -1.0, sums)
+            if not _sum_block(some[v : v + _BLOCK + 2], ox, 1.0 if low < high else -1.0, sums):
+                return 0.0, 0.0, -1.0, 0.0
             k += _BLOCK
+        if k > begin:
             before = _place(pair, sources, k - 1, ox, oy)
             now = _place(pair, sources, k, ox, oy)
-            continue
         after = start if k + 1 == last else end
         if k + 2 < last:
             after = _place(pair, sources, k + 1, ox, oy)

@@ -202,5 +202,5 @@ def rows_of(buffers: Buffers) -> Workspace:
         walk=Walk(h[6], c[8]),
         found=Rings(p[0], p[5], pb[0], c[10], c[11]),
         rounded=Rounded(px[0], px[1], pb[3], crossing_x, crossing_y, error),
-        ranking=Ranking(c[5], cx[0], cx[2], hb[0], c[6], c[7], c[8], c[9]),  # in place of chains, and of parameters of events
+        ranking=Ranking(c[5], cx[0], cx[2], hb[0], c[6], c[7], c[8], c[9]),  # in place of chains and events
     )  # fmt: skip

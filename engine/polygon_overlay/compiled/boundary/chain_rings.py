@@ -52,7 +52,9 @@ def mark_boundary(chains: Chains, faces: Faces, n_chains: int, stop: Any) -> Non
 
 
 @inline
-def join_regions(chains: Chains, stars: Stars, faces: Faces, is_named: bool, sizes: tuple[int, int, int], stop: Any) -> None:
+def join_regions(
+    chains: Chains, stars: Stars, faces: Faces, is_named: bool, sizes: tuple[int, int, int], stop: Any
+) -> None:
     """Join the regions of faces, and fill ``fan``; ``state`` is filled.
 
     is_named: join what is not in the result as well. sizes: the numbers of chains, simple nodes and nodes.

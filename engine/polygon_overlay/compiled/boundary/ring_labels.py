@@ -18,7 +18,7 @@ from typing import Any, Final
 from engine.arrangement.union_find import root_of
 from engine.jit import inline, merged
 from engine.polygon_overlay.compiled.boundary.chain_faces import NOTHING
-from engine.polygon_overlay.compiled.boundary.chains import ALONE, Chains, is_live, origin, standing
+from engine.polygon_overlay.compiled.boundary.chains import ALONE, is_live, origin, standing
 from engine.polygon_overlay.compiled.edge_contacts import BEGINS
 
 BOUNDS: Final = 1
