@@ -22,6 +22,14 @@ def test_many_crossings_on_one_edge(n_teeth: int, is_even: bool) -> None:
     assert agree([comb], [bar], "symmetric_difference")
 
 
+def test_many_crossings_in_a_small_part_of_an_edge() -> None:
+    """Where the parameters are no address, since nearly all are one part of the edge: runs, merged."""
+    x = np.concatenate([np.random.default_rng(1).permutation(60) * 2.0**-20, [500.0, 1000.0]])
+    needles = [[(place, 0.0), (place + 2.0**-22, 0.0), (place, 9.0)] for place in x]
+    for operation in ("intersection", "difference"):
+        assert agree(needles, [[(-9.0, 1.0), (2000.0, 2.0), (2000.0, 3.0), (-9.0, 4.0)]], operation)
+
+
 def test_many_lines_through_one_point() -> None:
     angles = np.arange(10) * np.pi / 10
     blades = [np.round(64 * np.array([(-np.cos(a), -np.sin(a)), (np.cos(a), np.sin(a)), (np.cos(a), 1 + np.sin(a))]))

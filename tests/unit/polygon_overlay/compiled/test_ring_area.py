@@ -46,6 +46,18 @@ def test_most_areas_are_sure_without_the_exact_sum() -> None:
         assert found.sure_areas(np.array([0, found.n_rings]))[1] == 0
 
 
+@pytest.mark.parametrize("x", [0.0, 1.5, 3.0, -3.0, -1e7, 2.0**40])
+def test_areas_of_long_rings_wherever_they_lie(x: float) -> None:
+    """Counted from zero, or from their first vertex where all are between its half and its double."""
+    angles = np.arange(500) * np.pi / 250
+    rings = [np.stack([x + shift + np.cos(angles), np.sin(angles)], axis=1) for shift in (0.0, 0.3)]
+    for subject, clip in (rings, (rings[0][::-1], rings[1])):
+        found = overlay(Polygon([subject]), Polygon([clip]), "union")
+        assert_nearest(found)
+        assert isinstance(found.exact, ImplicitRings)
+        assert found.exact.sure_areas(np.array([0, found.exact.n_rings]))[1] == 0
+
+
 def test_a_tie_and_a_sum_that_cancels_are_left_to_the_exact_sum() -> None:
     far, width = 2.0**27, 2.0**27 + 1  # (2^27 + 1)^2 = 2^54 + 2^28 + 1 is not a double
     square = Polygon([[(0, 0), (width, 0), (width, width), (0, width)]])
