@@ -205,9 +205,11 @@ def _twice_area(pair: _Pair, sources: Any, first: int, last: int) -> tuple[float
     for k in range(first, last if n > _BLOCK else first, max(n, 1)):  # the others are likely to be like these
         some, at, _ = _found(pair, sources[k, 0])
         ox = ox if abs(some[at, 0] - 1.25 * ox) <= 0.75 * abs(ox) else 0.0
-    total, rest, error, size = _twice_area_from(pair, sources, first, last, ox, vertices[v, 1])
-    if error < 0.0:
-        total, rest, error, size = _twice_area_from(pair, sources, first, last, 0.0, vertices[v, 1])
+    total = rest = size = 0.0
+    error = -1.0
+    while error < 0.0:  # bound: two turns, since zero is always as needed
+        total, rest, error, size = _twice_area_from(pair, sources, first, last, ox, vertices[v, 1])
+        ox = 0.0
     return total, rest, error, size
 
 

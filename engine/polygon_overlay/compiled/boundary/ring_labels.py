@@ -16,7 +16,7 @@ from collections import namedtuple
 from typing import Any, Final
 
 from engine.arrangement.union_find import root_of
-from engine.jit import inline, merged
+from engine.jit import called, inline, merged
 from engine.polygon_overlay.compiled.boundary.chain_faces import NOTHING
 from engine.polygon_overlay.compiled.boundary.chains import ALONE, is_live, origin, standing
 from engine.polygon_overlay.compiled.edge_contacts import BEGINS
@@ -62,7 +62,7 @@ def _chains_of(w: Any, chain: int, sizes: tuple[int, int, int, int]) -> tuple[in
     return w.chains.at[w.given.tops[ring]], end
 
 
-@merged
+@inline
 def _take(w: Any, state: Any, chain: int, n: int, sizes: tuple[int, int, int, int]) -> int:
     """Put the ring of a chain in the queue of n rings unless it was there; return how many these are then."""
     if state[2 * chain] & LABELLED:
@@ -74,7 +74,7 @@ def _take(w: Any, state: Any, chain: int, n: int, sizes: tuple[int, int, int, in
     return n + 1
 
 
-@merged
+@called
 def _go_around(w: Any, state: Any, kept: Any, half: int, n: int, sizes: tuple[int, int, int, int]) -> int:
     """Enter the labels around the node where a half-chain of known label begins, and take the rings that pass there."""
     chains, stars = w.chains, w.stars
