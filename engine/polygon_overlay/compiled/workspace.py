@@ -29,6 +29,9 @@ from engine.polygon_overlay.compiled.rounded_crossings import Rounded
 
 _kept: list[Scratch] = []
 """Scratch that nobody uses now, for whichever thread is next: the last used first, whose pages are in the cache."""
+spare: list[Scratch] = []
+"""Scratch for `FEW_VERTICES` that nobody uses now: taken and given back without a look at its size."""
+FEW_VERTICES: Final = 500
 _MOST_KEPT: Final = 256_000_000
 """Bytes of all that is kept; of most of them a fifth was ever written to."""
 _MORE_CONTACTS: Final = 2**15
@@ -121,6 +124,14 @@ def scratch_for(n_vertices: int, n_rings: int, n_contacts: int, n_out: int, n_ou
     return Scratch(n_bytes, n_vertices, n_rings, n_contacts, buffers, output, outcome, words)
 
 
+def scratch_for_few() -> Scratch:
+    """Return scratch for one pair of up to `FEW_VERTICES`, whatever its rings; to be appended to `spare`."""
+    try:
+        return spare.pop()
+    except IndexError:  # as in scratch_for
+        return scratch_for(FEW_VERTICES, FEW_VERTICES // 2, first_contacts(FEW_VERTICES), 0, 0)
+
+
 def first_contacts(n_vertices: int) -> int:
     """Return for how many contacts to try first; of large polygons few, so that the scratch is not too much to keep."""
     return max(256, min(4 * n_vertices, n_vertices + _MORE_CONTACTS))
@@ -150,6 +161,7 @@ def release() -> None:
     >>> engine.release()
     """
     _kept.clear()
+    spare.clear()
 
 
 def _spread(length: int) -> int:
@@ -201,36 +213,23 @@ def output_at(words: Any) -> Output:
 
 
 @merged
-def _buffers_at(words: Any) -> Buffers:
-    n, n_rings, k, m, n_nodes = words[0], words[1], words[2], words[3], words[4]
-    at = words[_N_SIZES : _N_SIZES + _N_BUFFERS]
-    return Buffers(
-        array_at(at[0], (2, n), np.float64), array_at(at[1], (5, n), np.int32), array_at(at[2], (8, n_rings), np.int64),
-        array_at(at[3], (5, k), np.float64), array_at(at[4], (20, k + 1), np.int32),
-        array_at(at[5], (11, 2 * k + 1), np.int32), array_at(at[6], (2, 2 * k + 1), np.int64),
-        array_at(at[7], (4, 2 * k + 1), np.uint8), array_at(at[8], (2, m), np.float64),
-        array_at(at[9], (6, m), np.int32), array_at(at[10], (2, m), np.int64), array_at(at[11], (4, m), np.uint8),
-        array_at(at[12], (m, 4), np.float64), array_at(at[13], (n_nodes, 4), np.float64),
-        array_at(at[14], (n_nodes,), np.uint8), array_at(at[15], (DEEPEST, 2), np.int64),
-        array_at(at[16], (PORTION, 2), np.int32),
-    )  # fmt: skip
-
-
-@merged
 def rows_of(words: Any) -> Workspace:
     """Return the rows of the buffers of a `Scratch` by name; those that are in one place are not in use at one time."""
-    buffers = _buffers_at(words)
-    vx, v, r = buffers.vertex_floats, buffers.vertex_integers, buffers.ring_integers
-    cx, c = buffers.contact_floats, buffers.contact_integers
-    h, hl, hb = buffers.half_integers, buffers.half_labels, buffers.half_octets
-    px, p, pb, codes = buffers.point_floats, buffers.point_integers, buffers.point_octets, buffers.point_codes
+    n, n_rings, k, m, n_nodes = words[0], words[1], words[2], words[3], words[4]
+    at = words[_N_SIZES : _N_SIZES + _N_BUFFERS]
+    vx, v = array_at(at[0], (2, n), np.float64), array_at(at[1], (5, n), np.int32)
+    r, cx = array_at(at[2], (8, n_rings), np.int64), array_at(at[3], (5, k), np.float64)
+    c, h = array_at(at[4], (20, k + 1), np.int32), array_at(at[5], (11, 2 * k + 1), np.int32)
+    hl, hb = array_at(at[6], (2, 2 * k + 1), np.int64), array_at(at[7], (4, 2 * k + 1), np.uint8)
+    px, p = array_at(at[8], (2, m), np.float64), array_at(at[9], (6, m), np.int32)
+    codes, pb = array_at(at[10], (2, m), np.int64), array_at(at[11], (4, m), np.uint8)
+    boxes, nodes = array_at(at[12], (m, 4), np.float64), array_at(at[13], (n_nodes, 4), np.float64)
+    node_marks, stack = array_at(at[14], (n_nodes,), np.uint8), array_at(at[15], (DEEPEST, 2), np.int64)
+    pairs = array_at(at[16], (PORTION, 2), np.int32)
     crossing_x, crossing_y, error = cx[3], cx[4], cx[1]
     return Workspace(
         given=Given(Edges(vx[0], vx[1], v[0], v[1], v[2]), v[3], r[0], r[1]),
-        tree=BoxTree(
-            buffers.boxes, pb[2], buffers.tree, buffers.tree_marks, p[2], codes[0], codes[1], buffers.stack,
-            buffers.pairs,
-        ),
+        tree=BoxTree(boxes, pb[2], nodes, node_marks, p[2], codes[0], codes[1], stack, pairs),
         events=Events(c[0], c[1], c[2], cx[0], cx[1], cx[2], c[3], c[4], hb[0]),
         unions=Unions(p[3], pb[1], r[2]),
         along=Along(v[4], c[12], crossing_x, crossing_y, c[13]),
