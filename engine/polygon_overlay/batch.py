@@ -15,6 +15,7 @@ from engine.parallel import Progress, check_options, run_chunks
 from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.found import NO_PAIRS, Found, chained, joined, one_pair, taken
+from engine.polygon_overlay.held import are_polygons
 from engine.polygon_overlay.implicit_rings import ImplicitRings, areas_of
 from engine.polygon_overlay.nearest import nearest_pairs
 from engine.polygon_overlay.overlay import accuracy_of, check_words, overlay_rings, rings_of, ulps_moved
@@ -29,6 +30,8 @@ from engine.types import OPEN, Accuracy
 
 NOT_REPRESENTABLE: Final = 1
 _FIRST_CHUNK: Final = 8
+_FIRST_VERTICES: Final = 4096
+"""Vertices of the first chunk, at most 64 times `_FIRST_CHUNK` pairs: a chunk costs 40 us besides."""
 _DOUBTFUL: Final = 256
 """Pairs whose rings are arranged again together, whatever their time: a call costs as much as some hundred of them."""
 
@@ -161,12 +164,13 @@ def overlay_batch(
     for solids, name in ((subjects, "subjects"), (clips, "clips")):
         if not isinstance(solids, (list, tuple, Chosen)):
             raise InvalidArrayError(f"{name} must be a list of polygons, got {type(solids).__name__}", (name,))
+    subjects, clips = (each if isinstance(each, Chosen) else tuple(each) for each in (subjects, clips))
     if len(subjects) != len(clips):
         raise InvalidArrayError(
             f"subjects and clips must be of equal length, got {len(subjects)} and {len(clips)}", ("clips",)
         )
     for solids, name in ((subjects, "subjects"), (clips, "clips")):
-        if not isinstance(solids, Chosen) and set(map(type, solids)) - {Polygon}:
+        if not isinstance(solids, Chosen) and not are_polygons(solids):
             for i_pair, solid in enumerate(solids):
                 rings_of(solid, name, i_pair)
     parts: dict[int, Found] = {}
@@ -177,7 +181,9 @@ def overlay_batch(
             # Gathered here, chunk by chunk: one thread does while another's kernel runs, and what it wrote is near.
             parts[start] = run_kernel(_gathered(subjects[start:stop]), _gathered(clips[start:stop]), kept, budget)
 
-        run_chunks(task, len(subjects), budget=budget, first_chunk=_FIRST_CHUNK, workers=workers, progress=progress)
+        n_few = max(1, _n_vertices(subjects[:_FIRST_CHUNK]) + _n_vertices(clips[:_FIRST_CHUNK]))
+        first_chunk = _FIRST_CHUNK * min(64, max(1, _FIRST_VERTICES // n_few))
+        run_chunks(task, len(subjects), budget=budget, first_chunk=first_chunk, workers=workers, progress=progress)
         found = first_found = joined([parts[start] for start in sorted(parts)] or [NO_PAIRS])
         rest = np.zeros(len(subjects), np.int8), np.zeros(len(subjects), np.bool_), dict[int, Overlay]()
         status, is_rounded_again, apart = rest
@@ -189,9 +195,8 @@ def overlay_batch(
     batch = OverlayBatch(
         status=status, vertices=found.vertices, ring_offsets=found.ring_offsets, piece_offsets=found.piece_offsets,
         pair_offsets=summed(found.counts[:, 0]), displacement=found.displacement,
-        _subjects=subjects if isinstance(subjects, Chosen) else tuple(subjects),
-        _clips=clips if isinstance(clips, Chosen) else tuple(clips), _operation=operation, _output=output,
-        _exact=first_found, _is_rounded_again=is_rounded_again, _apart=apart,
+        _subjects=subjects, _clips=clips, _operation=operation, _output=output, _exact=first_found,
+        _is_rounded_again=is_rounded_again, _apart=apart,
     )  # fmt: skip
     if not report:
         return batch
