@@ -195,6 +195,8 @@ def find_contacts(
         for k in range(found):
             i, j = pairs[k, 0], pairs[k, 1]
             b, d = after[i], after[j]
+            if b == j and tree.marks[j] & BENT:
+                continue
             to_j = turns(x, y, i, b, j, d)
             nearest = smaller_of(to_j)
             if agree(to_j) and nearest > margin * to_j.length and nearest > to_j.bound:
