@@ -15,7 +15,6 @@ from engine.parallel import Progress, check_options, run_chunks
 from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.found import NO_PAIRS, Found, chained, joined, one_pair, taken
-from engine.polygon_overlay.held import are_polygons
 from engine.polygon_overlay.implicit_rings import ImplicitRings, areas_of
 from engine.polygon_overlay.nearest import nearest_pairs
 from engine.polygon_overlay.overlay import accuracy_of, check_words, overlay_rings, rings_of, ulps_moved
@@ -170,7 +169,7 @@ def overlay_batch(
             f"subjects and clips must be of equal length, got {len(subjects)} and {len(clips)}", ("clips",)
         )
     for solids, name in ((subjects, "subjects"), (clips, "clips")):
-        if not isinstance(solids, Chosen) and not are_polygons(solids):
+        if not isinstance(solids, Chosen) and set(map(type, solids)) - {Polygon}:
             for i_pair, solid in enumerate(solids):
                 rings_of(solid, name, i_pair)
     parts: dict[int, Found] = {}

@@ -1,7 +1,7 @@
 """Polygons as arrays, read from memory where CPython keeps objects as expected, else asked for one by one.
 
 Nothing is taken for granted: where a tuple holds its items, and an object its class, slots and numbers, is looked for
-in two polygons whose parts are known. Where any is not found in one place, nothing is ever read.
+in a polygon whose parts are known. Where any is not found in one place, nothing is ever read.
 """
 
 from __future__ import annotations
@@ -45,14 +45,6 @@ def _layout() -> Layout | None:
         )  # fmt: skip
     except ValueError:
         return None
-
-
-def are_polygons(solids: tuple[Any, ...]) -> bool:
-    """Tell whether all are of the class `Polygon` itself."""
-    layout = _layout() if sys.implementation.name == "cpython" else None
-    if layout is None:
-        return set(map(type, solids)) <= {Polygon}
-    return bool(entry_of(measure_polygons)(id(solids), len(solids), layout)[0] == len(solids))
 
 
 def arrays_held(polygons: tuple[Polygon, ...]) -> tuple[FloatArray, IntArray, IntArray] | None:

@@ -36,15 +36,9 @@ def test_arrays_are_those_that_are_asked_for(monkeypatch: pytest.MonkeyPatch) ->
         assert not array.flags.writeable
 
 
-@pytest.mark.parametrize("is_read", [True, False])
-def test_only_polygons_are_polygons(is_read: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    if not is_read:
-        monkeypatch.setattr(held, "_layout", lambda: None)
+def test_where_one_is_no_polygon_none_is_read() -> None:
     others: Any = Aabb(min=[0, 0], max=[1, 1]), "text", None, 1, FEW, Named([[(0, 0), (1, 0), (0, 1)]])
-    assert held.are_polygons(FEW)
-    assert held.are_polygons(())
     for other in others:
-        assert not held.are_polygons((*FEW, other))
         assert held.arrays_held((*FEW, other)) is None
 
 
