@@ -29,8 +29,8 @@ from engine.types import OPEN, Accuracy
 
 NOT_REPRESENTABLE: Final = 1
 _FIRST_CHUNK: Final = 8
-_FIRST_VERTICES: Final = 4096
-"""Vertices of the first chunk, at most 64 times `_FIRST_CHUNK` pairs: a chunk costs 40 us besides."""
+_FIRST_VERTICES: Final = 16_384
+"""Vertices of the first chunk, at most 64 times `_FIRST_CHUNK` pairs: a chunk costs 20 us besides."""
 _DOUBTFUL: Final = 256
 """Pairs whose rings are arranged again together, whatever their time: a call costs as much as some hundred of them."""
 

@@ -8,7 +8,9 @@ from typing import Final, NamedTuple, cast, overload
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray, read_only
+from engine.direct import entry_of
 from engine.errors import RingTooShortError
+from engine.polygon_overlay.compiled.gathering import find_most
 from engine.polygon_overlay.found import chained, places_of
 from engine.polygon_overlay.held import arrays_held
 from engine.polygon_overlay.implicit_rings import one_polygon
@@ -51,8 +53,8 @@ class PolygonArrays(NamedTuple):
 
     def most(self) -> tuple[int, int]:
         """Return the most vertices, and the most rings, that one has."""
-        starts = self.polygon_offsets
-        return int(self.sizes().max(initial=0)), int((starts[1:] - starts[:-1]).max(initial=0))
+        found: tuple[int, int] = entry_of(find_most)(self.ring_offsets, self.polygon_offsets)
+        return found
 
     def boxes(self, numbers: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return the low and the high corners (n, 2) of some, none of which is empty and which are in order."""

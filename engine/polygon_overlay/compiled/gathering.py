@@ -41,6 +41,16 @@ def _found(array: int, layout: Layout) -> tuple[int, int]:
 
 
 @kernel
+def find_most(ring_offsets: Any, polygon_offsets: Any) -> tuple[int, int]:
+    """Return the most vertices, and the most rings, that a polygon has."""
+    n_vertices = n_rings = 0
+    for k in range(polygon_offsets.shape[0] - 1):
+        first, end = polygon_offsets[k], polygon_offsets[k + 1]
+        n_vertices, n_rings = max(n_vertices, ring_offsets[end] - ring_offsets[first]), max(n_rings, end - first)
+    return n_vertices, n_rings
+
+
+@kernel
 def measure_polygons(objects: int, n: int, layout: Layout) -> tuple[int, int, int]:
     """Return how many of a tuple's first n objects, up to one that is none, are polygons; their vertices and rings.
 
@@ -57,9 +67,7 @@ def measure_polygons(objects: int, n: int, layout: Layout) -> tuple[int, int, in
 
 
 @kernel
-def gather_polygons(
-    objects: int, layout: Layout, coordinates: Any, ring_offsets: Any, polygon_offsets: Any
-) -> None:  # fmt: skip
+def gather_polygons(objects: int, layout: Layout, coordinates: Any, ring_offsets: Any, polygon_offsets: Any) -> None:
     """Fill arrays that `measure_polygons` tells the sizes of; coordinates: (2 n_vertices,)."""
     n_vertices = n_rings = 0
     ring_offsets[0] = polygon_offsets[0] = 0

@@ -195,7 +195,8 @@ def _twice_area(pair: _Pair, sources: Any, first: int, last: int) -> tuple[float
     total = rest = error = size = 0.0
     start, end = now, before
     sums = workspace(_SUMS)
-    sums[:] = 0.0
+    for j in range(_SUMS):
+        sums[j] = 0.0
     k = first
     while k < last:  # bound: each turn passes a point at least
         if first < k < last - _BLOCK and _is_stretch(pair, sources, k - 1, k + _BLOCK):

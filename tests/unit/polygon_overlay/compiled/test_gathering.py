@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from engine.polygon_overlay import held
-from engine.polygon_overlay.compiled.gathering import gather_polygons, measure_polygons
+from engine.polygon_overlay.compiled.gathering import find_most, gather_polygons, measure_polygons
 from engine.solids.polygon import Polygon
 
 
@@ -21,3 +21,5 @@ def test_rings_are_gathered() -> None:
     gather_polygons(id(some), layout, coordinates, ring_offsets, polygon_offsets)
     assert coordinates.tolist() == 2 * frame.vertices.ravel().tolist()
     assert (ring_offsets.tolist(), polygon_offsets.tolist()) == ([0, 3, 7, 10, 14], [0, 2, 2, 4])
+    assert find_most(ring_offsets, polygon_offsets) == (7, 2)
+    assert find_most(ring_offsets[:1], polygon_offsets[:1]) == (0, 0)
