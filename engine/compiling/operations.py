@@ -18,8 +18,8 @@ from engine.compiling.values import DATA, SHAPE, Parts, is_plain, part, plain_ar
 
 Way = Callable[..., Any] | None
 FROM_THE_FIRST: Final = ("engine.polygon_overlay.", "engine.arrangement.")
-"""Modules whose functions count no element from the last: an index below zero that is not written out is an error there,
-and to look for it at each access takes a tenth to a fifth of a small overlay."""
+"""Modules whose functions count no element from the last: an index below zero that is not written out is an error, and
+to look for it at each access takes a tenth to a fifth of a small overlay."""
 
 
 def _place(context: Any, array: Any, index: Any) -> Way:
