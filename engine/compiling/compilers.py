@@ -23,6 +23,7 @@ from numba.core.typing import Context
 from numba.core.untyped_passes import InlineClosureLikes
 
 from engine.compiling.lowering import CalledLower, InnerLower, PlainContext, PlainLower
+from engine.compiling.operations import FROM_THE_FIRST
 from engine.compiling.tidying import tidy
 
 
@@ -123,6 +124,7 @@ class _KernelLowering(NativeLowering):  # type: ignore[misc]
         state.library = self._library(state.func_id.func_qualname, codegen)
         state.targetctx = copy.copy(context)
         state.targetctx.__class__ = PlainContext
+        state.targetctx.counts_from_the_first = state.func_id.modname.startswith(FROM_THE_FIRST)
         state.targetctx._internal_codegen = _InnerCodegen(codegen)
         done: bool = super().run_pass(state)
         state.targetctx = context

@@ -28,7 +28,12 @@ from engine.compiling.values import NITEMS, SHAPE, Parts, is_plain, part
 
 
 class PlainContext(CPUContext):  # type: ignore[misc]
-    """numba's knowledge of how each operation is written; a copy of its own becomes one by its class alone."""
+    """numba's knowledge of how each operation is written; a copy of its own becomes one by its class alone.
+
+    counts_from_the_first: whether the function to be written is of `FROM_THE_FIRST`.
+    """
+
+    counts_from_the_first = False
 
     @property
     def call_conv(self) -> Convention:

@@ -1,13 +1,13 @@
 """How single operations are written: an index by whole numbers, a loop over a `range`, `len`, `min`, `max`.
 
 numba copies all of an array to memory before it takes what an index asks for, and looks at each turn of a loop whether
-its step is zero. An index counts from the end where it is negative, as ever.
+its step is zero. An index counts from the end where it is negative, as ever, but for variables in `FROM_THE_FIRST`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Final
 
 from llvmlite import ir
 from numba import types
@@ -17,6 +17,9 @@ from numba.core.types.misc import unliteral
 from engine.compiling.values import DATA, SHAPE, Parts, is_plain, part, plain_array
 
 Way = Callable[..., Any] | None
+FROM_THE_FIRST: Final = ("engine.polygon_overlay.", "engine.arrangement.")
+"""Modules whose functions count no element from the last: an index below zero that is not written out is an error, and
+to look for it at each access takes a tenth to a fifth of a small overlay."""
 
 
 def _place(context: Any, array: Any, index: Any) -> Way:
@@ -24,7 +27,7 @@ def _place(context: Any, array: Any, index: Any) -> Way:
     kinds = list(map(unliteral, index.types if isinstance(index, types.BaseTuple) else [index]))
     if context.enable_boundscheck or not is_plain(array) or not 0 < len(kinds) <= array.ndim:
         return None
-    if not all(isinstance(kind, types.Integer) and kind.bitwidth == 64 for kind in kinds):
+    if not all(isinstance(kind, types.Integer) for kind in kinds):
         return None
 
     def write(builder: Any, value: Any, indices: Any) -> Any:
@@ -35,7 +38,10 @@ def _place(context: Any, array: Any, index: Any) -> Way:
                 place = builder.mul(place, count)
             if axis < len(kinds):
                 at = part(builder, indices, axis) if isinstance(index, types.BaseTuple) else indices
-                if kinds[axis].signed and not (isinstance(at, ir.Constant) and at.constant >= 0):
+                if kinds[axis].bitwidth < 64:
+                    at = (builder.sext if kinds[axis].signed else builder.zext)(at, count.type)
+                is_sure = at.constant >= 0 if isinstance(at, ir.Constant) else context.counts_from_the_first
+                if kinds[axis].signed and not is_sure:
                     at = builder.select(builder.icmp_signed("<", at, at.type(0)), builder.add(at, count), at)
                 place = builder.add(place, at) if axis else at
         return builder.gep(part(builder, value, DATA), [place])

@@ -29,6 +29,8 @@ from engine.types import OPEN, Accuracy
 
 NOT_REPRESENTABLE: Final = 1
 _FIRST_CHUNK: Final = 8
+_FIRST_VERTICES: Final = 16_384
+"""Vertices of the first chunk, at most 64 times `_FIRST_CHUNK` pairs: a chunk costs 20 us besides."""
 _DOUBTFUL: Final = 256
 """Pairs whose rings are arranged again together, whatever their time: a call costs as much as some hundred of them."""
 
@@ -161,6 +163,7 @@ def overlay_batch(
     for solids, name in ((subjects, "subjects"), (clips, "clips")):
         if not isinstance(solids, (list, tuple, Chosen)):
             raise InvalidArrayError(f"{name} must be a list of polygons, got {type(solids).__name__}", (name,))
+    subjects, clips = (each if isinstance(each, Chosen) else tuple(each) for each in (subjects, clips))
     if len(subjects) != len(clips):
         raise InvalidArrayError(
             f"subjects and clips must be of equal length, got {len(subjects)} and {len(clips)}", ("clips",)
@@ -177,7 +180,9 @@ def overlay_batch(
             # Gathered here, chunk by chunk: one thread does while another's kernel runs, and what it wrote is near.
             parts[start] = run_kernel(_gathered(subjects[start:stop]), _gathered(clips[start:stop]), kept, budget)
 
-        run_chunks(task, len(subjects), budget=budget, first_chunk=_FIRST_CHUNK, workers=workers, progress=progress)
+        n_few = max(1, _n_vertices(subjects[:_FIRST_CHUNK]) + _n_vertices(clips[:_FIRST_CHUNK]))
+        first_chunk = _FIRST_CHUNK * min(64, max(1, _FIRST_VERTICES // n_few))
+        run_chunks(task, len(subjects), budget=budget, first_chunk=first_chunk, workers=workers, progress=progress)
         found = first_found = joined([parts[start] for start in sorted(parts)] or [NO_PAIRS])
         rest = np.zeros(len(subjects), np.int8), np.zeros(len(subjects), np.bool_), dict[int, Overlay]()
         status, is_rounded_again, apart = rest
@@ -189,9 +194,8 @@ def overlay_batch(
     batch = OverlayBatch(
         status=status, vertices=found.vertices, ring_offsets=found.ring_offsets, piece_offsets=found.piece_offsets,
         pair_offsets=summed(found.counts[:, 0]), displacement=found.displacement,
-        _subjects=subjects if isinstance(subjects, Chosen) else tuple(subjects),
-        _clips=clips if isinstance(clips, Chosen) else tuple(clips), _operation=operation, _output=output,
-        _exact=first_found, _is_rounded_again=is_rounded_again, _apart=apart,
+        _subjects=subjects, _clips=clips, _operation=operation, _output=output, _exact=first_found,
+        _is_rounded_again=is_rounded_again, _apart=apart,
     )  # fmt: skip
     if not report:
         return batch

@@ -128,7 +128,7 @@ def snap_vertices(vertices: FloatArray, offsets: IntArray, piece_offsets: IntArr
         budget.take(8 * n_most)
         scratch = scratch_for(n, n_rings, 256, 0, 0)
         n_moved, m, n_corners, are_apart = entry_of(snap)(
-            vertices, offsets, piece_offsets, budget.flag, scratch.buffers, pixels, corners, starts, passages
+            vertices, offsets, piece_offsets, budget.flag, scratch.words, pixels, corners, starts, passages
         )
         budget.check()
         keep(scratch)

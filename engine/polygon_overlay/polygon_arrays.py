@@ -8,8 +8,11 @@ from typing import Final, NamedTuple, cast, overload
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray, read_only
+from engine.direct import entry_of
 from engine.errors import RingTooShortError
+from engine.polygon_overlay.compiled.gathering import find_most
 from engine.polygon_overlay.found import chained, places_of
+from engine.polygon_overlay.held import arrays_held
 from engine.polygon_overlay.implicit_rings import one_polygon
 from engine.solids.polygon import Polygon
 from engine.solids.ragged import parted, summed
@@ -50,8 +53,8 @@ class PolygonArrays(NamedTuple):
 
     def most(self) -> tuple[int, int]:
         """Return the most vertices, and the most rings, that one has."""
-        starts = self.polygon_offsets
-        return int(self.sizes().max(initial=0)), int((starts[1:] - starts[:-1]).max(initial=0))
+        found: tuple[int, int] = entry_of(find_most)(self.ring_offsets, self.polygon_offsets)
+        return found
 
     def boxes(self, numbers: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return the low and the high corners (n, 2) of some, none of which is empty and which are in order."""
@@ -89,10 +92,14 @@ def joined_arrays(parts: Sequence[PolygonArrays]) -> PolygonArrays:
 def gathered(polygons: Sequence[Polygon]) -> PolygonArrays:
     """Return polygons as arrays.
 
-    Joined as bytes: numpy takes three times as long to put small arrays one after another.
+    Read from memory where they are held as expected, else joined as bytes: numpy takes three times as long to put small
+    arrays one after another.
     """
     if len(polygons) == 1:
         return PolygonArrays(polygons[0].vertices, polygons[0].ring_offsets, one_polygon(polygons[0].n_rings))
+    held = arrays_held(tuple(polygons))
+    if held is not None:
+        return PolygonArrays(*held)
     vertices = np.frombuffer(b"".join(cast("list[bytes]", [each.vertices for each in polygons])))
     offsets = np.frombuffer(b"".join(cast("list[bytes]", [each.ring_offsets for each in polygons])), np.int64)
     if len(offsets) == 2 * len(polygons) and not offsets[::2].any():  # one ring each: a small batch waits for this

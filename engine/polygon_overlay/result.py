@@ -127,6 +127,7 @@ class Overlay:
     largest_displacement: proven bound on the distance between an edge of the exact result and its image.
     snapped: the coarser lattice of snap rounding was needed.
     exact: the rings of the exact result, from which `area_exact` and `area` are computed when asked for.
+    _later: makes fields that are not there yet (few.py); missing: all are.
     _lost: of what `collapsed` is made when asked for; None where rounding lost nothing.
     _edges: by vertex the input edge along which its ring goes on, by its first vertex; or sources, as
         ``exact`` has them, that tell; None: those.
@@ -152,6 +153,15 @@ class Overlay:
     holes_parted: int = 0
     vertices_moved: int = 0
     snapped: bool = False
+
+    def __getattr__(self, name: str) -> Any:
+        """Return a field that is made when it, or another such, is asked for first; only what is missing comes here."""
+        later = vars(self).get("_later")
+        made = {} if later is None or name.startswith("__") else later()
+        if name not in made:
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        vars(self).update(made)
+        return made[name]
 
     @property
     def n_pieces(self) -> int:

@@ -60,7 +60,7 @@ def run_kernel(
         scratch = scratch_for(n_vertices, n_rings, n_contacts, n_out, n_out_rings)
         n_known = sum(len(part[2]) - 1 for part in parts)
         reached, needs, filled, n_filled, n_pieces, n_evidence, _ = entry_of(overlay_pairs)(
-            *sides, reached, NOT_REDUCED, kept, nesting, budget.flag, scratch.buffers, outcomes, scratch.output
+            *sides, reached, NOT_REDUCED, kept, nesting, budget.flag, scratch.words, outcomes
         )
         budget.check()
         sizes = filled, filled, n_filled + 1, n_pieces + 1, n_evidence

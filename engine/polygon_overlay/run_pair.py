@@ -99,14 +99,14 @@ def run_blocks(
     while True:  # bound: each turn makes room, geometrically
         scratch = scratch_for(n_vertices, n_rings, n_contacts, n_out, n_out_rings)
         if size:
-            reduced = entry_of(reduce_pair)(subject, clip, size, n_most, kept, budget.flag, scratch.buffers)
+            reduced = entry_of(reduce_pair)(subject, clip, size, n_most, kept, budget.flag, scratch.words)
             if reduced.n == 0:
                 budget.check()
                 keep(scratch)
                 return None
         (status, counts, displacement), output = scratch.outcome, scratch.output
         _, needs, n, n_found, n_pieces, _, n_left_out = entry_of(overlay_pairs)(
-            *sides, 0, reduced, kept, nesting, budget.flag, scratch.buffers, scratch.outcome, output
+            *sides, 0, reduced, kept, nesting, budget.flag, scratch.words, scratch.outcome
         )
         budget.check()
         if needs == FINISHED:

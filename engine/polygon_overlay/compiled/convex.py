@@ -21,7 +21,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.jit import inline, merged
+from engine.jit import called, inline, merged
 from engine.polygon_overlay.compiled.crossing_signs import Edges
 from engine.polygon_overlay.compiled.edge_contacts import agree, smaller_of, turns
 from engine.polygon_overlay.compiled.edge_tree import POLL
@@ -295,7 +295,7 @@ def _walk(
     return GENERAL, 0.0
 
 
-@inline
+@called
 def intersect_convex(
     subject: Any, clip: Any, given: Given, passages: Passages, points: Points, stop: Any
 ) -> tuple[int, int, float]:  # fmt: skip

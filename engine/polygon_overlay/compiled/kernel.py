@@ -70,7 +70,7 @@ from engine.polygon_overlay.compiled.ring_nesting import (
 )
 from engine.polygon_overlay.compiled.ring_order import rank_rings
 from engine.polygon_overlay.compiled.rounded_crossings import LOST, round_points
-from engine.polygon_overlay.compiled.workspace import Buffers, Outcomes, Output, Workspace, rows_of
+from engine.polygon_overlay.compiled.workspace import Outcomes, Workspace, output_at, rows_of
 from engine.predicates.expansion import LARGEST
 from engine.types import OPEN
 
@@ -245,9 +245,9 @@ def _ended(pair: int, needs: int, filled: Filled, n_left_out: int) -> tuple[int,
 @kernel
 def overlay_pairs(
     subjects: RingArrays, subject_items: Any, clips: RingArrays, clip_items: Any, begin: int, reduced: Loaded,
-    kept: Any, nesting: Nesting, stop: Any, buffers: Buffers, outcomes: Outcomes, output: Output,
+    kept: Any, nesting: Nesting, stop: Any, words: Any, outcomes: Outcomes,
 ) -> tuple[int, int, int, int, int, int, int]:  # fmt: skip
-    """Overlay the pairs from ``begin`` on; fill outcomes, by pair, and output from its beginning.
+    """Overlay the pairs from ``begin`` on; fill outcomes, by pair, and the output of words from its beginning.
 
     subject_items, clip_items: the first ring of each polygon, and the end of the last one's. kept: (4,) uint8 by label,
     of more than one part where some are above 1: then evidence is of each ring its number and its part. nesting: of the
@@ -260,7 +260,7 @@ def overlay_pairs(
     pair reached, FINISHED or what is needed to go on with it, numbers of vertices, rings, pieces, rows of evidence, and
     how many vertices are left out.
     """
-    w = rows_of(buffers)
+    w, output = rows_of(words), output_at(words)
     is_intersection = not (kept[0] or kept[1] or kept[2])
     filled = Filled(0, 0, 0, 0)
     n_left_out = 0

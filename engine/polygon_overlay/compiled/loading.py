@@ -172,7 +172,8 @@ def is_empty(box: Box) -> bool:
 def fill_boxes(edges: Edges, n: int, margin: float, tree: BoxTree, stop: Any) -> float:
     """Fill the box of every edge, with a margin around it, and its mark; return the least length of an edge.
 
-    Its length is the larger of both coordinates'.
+    Its length is the larger of both coordinates'. BENT: where `find_contacts` would not be in doubt either that this
+    edge and the one before it have a vertex in common and no more; numbers are those of its `turns`.
     """
     x, y, boxes, marks = edges.x, edges.y, tree.boxes, tree.marks
     shortest = np.inf
@@ -186,12 +187,14 @@ def fill_boxes(edges: Edges, n: int, margin: float, tree: BoxTree, stop: Any) ->
             if i & POLL == 0 and stop[0]:
                 return 0.0
             j = i + 1 if i < last else first
-            px, py, qx, qy = qx, qy, x[j], y[j]
+            ox, oy, px, py, qx, qy = px, py, qx, qy, x[j], y[j]
             ux, uy = qx - px, qy - py
             boxes[i, 0], boxes[i, 1] = min(px, qx) - margin, max(px, qx) + margin
             boxes[i, 2], boxes[i, 3] = min(py, qy) - margin, max(py, qy) + margin
-            left, right = vx * uy, vy * ux
-            is_bent = abs(left - right) > BOUND_2D * (abs(left) + abs(right)) + GUARD_2D  # see turn_of_edges
+            left, right, size = vx * uy, vy * ux, 0.0
+            if i > first:
+                left, right, size = vx * (qy - oy), vy * (qx - ox), 2.0 * abs(vx * vy)
+            is_bent = abs(left - right) > BOUND_2D * max(size, abs(left) + abs(right)) + GUARD_2D
             marks[i] = BENT * is_bent | (heading(ux, uy) if i < last else ANYWHERE)
             shortest = min(shortest, max(abs(ux), abs(uy)))
             vx, vy = ux, uy

@@ -43,7 +43,7 @@ from engine.polygon_overlay.compiled.ring_blocks import (
     load_blocks,
     mark_blocks,
 )
-from engine.polygon_overlay.compiled.workspace import Buffers, rows_of
+from engine.polygon_overlay.compiled.workspace import rows_of
 from engine.predicates.expansion import LARGEST, is_safe
 
 
@@ -198,14 +198,14 @@ def _wake(
 
 @kernel
 def reduce_pair(
-    subjects: RingArrays, clips: RingArrays, size: int, n_most: int, kept: Any, stop: Any, buffers: Buffers
+    subjects: RingArrays, clips: RingArrays, size: int, n_most: int, kept: Any, stop: Any, words: Any
 ) -> Loaded:
     """Load the edges of two polygons into the scratch of overlay_pairs, those that meet nothing as runs.
 
     size: edges of a block. n_most: edges that are too many to be looked at one by one. kept: as of overlay_pairs.
     There is scratch for a thousand contacts at least. Returns no vertices if it is not worth while.
     """
-    w = rows_of(buffers)
+    w = rows_of(words)
     n_subject = subjects.offsets.shape[0] - 1
     blocks = Blocks(
         w.unions.points, w.stars.node_of, w.chains.at, w.tree.boxes, w.rounded.moved, w.found.meets, w.along.starts

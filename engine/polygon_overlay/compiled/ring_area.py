@@ -223,7 +223,8 @@ def _twice_area_from(
     total = rest = error = size = 0.0
     start, end = now, before
     sums = workspace(_SUMS)
-    sums[:] = 0.0
+    for j in range(_SUMS):
+        sums[j] = 0.0
     k = first
     while k < last:  # bound: each turn passes a point at least
         begin = k

@@ -24,7 +24,7 @@ import numpy as np
 from engine.jit import called, inline, kernel, merged
 from engine.polygon_overlay.compiled.edge_tree import FEW, POLL, begin_pairs, boxes_meet, build_tree, next_pairs
 from engine.polygon_overlay.compiled.loading import EVERYTHING, RingArrays, fill_boxes, load_rings
-from engine.polygon_overlay.compiled.workspace import Buffers, rows_of
+from engine.polygon_overlay.compiled.workspace import rows_of
 from engine.predicates.orientation import BOUND_2D, orient2d
 from engine.types import Point2
 
@@ -143,7 +143,7 @@ def _add_passage(passages: Any, m: int, edges: Any, e: int, f: int, px: float, p
 
 @kernel
 def snap(
-    vertices: Any, offsets: Any, pieces: Any, stop: Any, buffers: Buffers, pixels: Any, corners: Any, starts: Any,
+    vertices: Any, offsets: Any, pieces: Any, stop: Any, words: Any, pixels: Any, corners: Any, starts: Any,
     passages: Any,
 ) -> tuple[int, int, int, bool]:  # fmt: skip
     """Fill what tells what becomes of valid rings, coordinates below 2^51.
@@ -157,7 +157,7 @@ def snap(
     n_moved = _find_pixels(vertices, pixels, stop)
     if n_moved == 0:
         return 0, 0, vertices.shape[0], False
-    w = rows_of(buffers)
+    w = rows_of(words)
     edges, tree = w.given.edges, w.tree
     rings, n_rings = RingArrays(vertices, offsets), offsets.shape[0] - 1
     n, _, _ = load_rings(rings, 0, n_rings, 0, True, 0, EVERYTHING, w.given, tree, 0, 0, stop)

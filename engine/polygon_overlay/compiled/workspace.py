@@ -1,17 +1,19 @@
 """Scratch of the compiled overlay: few arrays by size, their rows by name.
 
-The kernel is handed the few arrays and takes their rows itself: handing over eighty costs more than a small overlay.
+The kernel is handed their addresses and takes rows itself: handing over eighty costs more than a small overlay.
 """
 
 from __future__ import annotations
 
 from collections import namedtuple
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from engine.arrays import IntArray
 from engine.jit import merged
+from engine.lanes.addresses import array_at
 from engine.polygon_overlay.compiled.boundary.chain_faces import Faces
 from engine.polygon_overlay.compiled.boundary.chain_rings import Rings, Walk
 from engine.polygon_overlay.compiled.boundary.chains import Chains, Loose, Stars
@@ -28,6 +30,9 @@ from engine.polygon_overlay.compiled.rounded_crossings import Rounded
 
 _kept: list[Scratch] = []
 """Scratch that nobody uses now, for whichever thread is next: the last used first, whose pages are in the cache."""
+spare: list[Scratch] = []
+"""Scratch for `FEW_VERTICES` that nobody uses now: taken and given back without a look at its size."""
+FEW_VERTICES: Final = 500
 _MOST_KEPT: Final = 256_000_000
 """Bytes of all that is kept; of most of them a fifth was ever written to."""
 _MORE_CONTACTS: Final = 2**15
@@ -39,6 +44,8 @@ Buffers = namedtuple(
     "half_octets point_floats point_integers point_codes point_octets boxes tree tree_marks stack pairs ends",
 )
 """Scratch by size: a row for each purpose, by vertex, ring, contact, half-chain and point of a boundary ring."""
+_N_SIZES: Final = 7
+_N_BUFFERS: Final = len(Buffers._fields)
 
 
 class Workspace(NamedTuple):
@@ -73,7 +80,10 @@ displacement (n,) float64: how far rounding moved a vertex at most."""
 
 @dataclass(frozen=True, slots=True)
 class Scratch:
-    """What the kernel writes to, for pairs of up to so many vertices, rings and contacts; outcome: of one pair."""
+    """What the kernel writes to, for pairs of up to so many vertices, rings and contacts; outcome: of one pair.
+
+    words: sizes and addresses of buffers and output, as `rows_of` and `output_at` take them.
+    """
 
     n_bytes: int
     n_vertices: int
@@ -82,6 +92,7 @@ class Scratch:
     buffers: Buffers
     output: Output
     outcome: Outcomes
+    words: IntArray
 
 
 def scratch_for(n_vertices: int, n_rings: int, n_contacts: int, n_out: int, n_out_rings: int) -> Scratch:
@@ -111,7 +122,16 @@ def scratch_for(n_vertices: int, n_rings: int, n_contacts: int, n_out: int, n_ou
     else:
         buffers = buffers_for(n_vertices, n_rings, n_contacts)
     n_bytes = sum(array.nbytes for array in (*buffers, *output))
-    return Scratch(n_bytes, n_vertices, n_rings, n_contacts, buffers, output, outcome)
+    words = words_of(buffers, output)
+    return Scratch(n_bytes, n_vertices, n_rings, n_contacts, buffers, output, outcome, words)
+
+
+def scratch_for_few() -> Scratch:
+    """Return scratch for one pair of up to `FEW_VERTICES`, whatever its rings; to be appended to `spare`."""
+    try:
+        return spare.pop()
+    except IndexError:  # as in scratch_for
+        return scratch_for(FEW_VERTICES, FEW_VERTICES // 2, first_contacts(FEW_VERTICES), 0, 0)
 
 
 def first_contacts(n_vertices: int) -> int:
@@ -143,6 +163,7 @@ def release() -> None:
     >>> engine.release()
     """
     _kept.clear()
+    spare.clear()
 
 
 def _spread(length: int) -> int:
@@ -174,21 +195,44 @@ def buffers_for(n_vertices: int, n_rings: int, n_contacts: int) -> Buffers:
     )  # fmt: skip
 
 
+def words_of(buffers: Buffers, output: Output) -> IntArray:
+    """Return sizes and addresses of what stays as long as they are in use."""
+    sizes = (
+        buffers.vertex_floats.shape[1], buffers.ring_integers.shape[1], buffers.contact_floats.shape[1],
+        len(buffers.boxes), len(buffers.tree), len(output.vertices), len(output.rings),
+    )  # fmt: skip
+    return np.array([*sizes, *(array.ctypes.data for array in (*buffers, *output))])
+
+
 @merged
-def rows_of(buffers: Buffers) -> Workspace:
-    """Return the rows of some buffers by name; those that are in one place are not in use at one time."""
-    vx, v, r = buffers.vertex_floats, buffers.vertex_integers, buffers.ring_integers
-    cx, c = buffers.contact_floats, buffers.contact_integers
-    h, hl, hb = buffers.half_integers, buffers.half_labels, buffers.half_octets
-    px, p, pb, codes = buffers.point_floats, buffers.point_integers, buffers.point_octets, buffers.point_codes
-    ends = buffers.ends
+def output_at(words: Any) -> Output:
+    """Return the output of a `Scratch` by its words."""
+    n, n_rings, first = words[5], words[6], _N_SIZES + _N_BUFFERS
+    return Output(
+        array_at(words[first], (n, 2), np.float64), array_at(words[first + 1], (n, 2), np.int32),
+        array_at(words[first + 2], (n_rings,), np.int64), array_at(words[first + 3], (n_rings,), np.int64),
+        array_at(words[first + 4], (n, 2), np.int64),
+    )  # fmt: skip
+
+
+@merged
+def rows_of(words: Any) -> Workspace:
+    """Return the rows of the buffers of a `Scratch` by name; those that are in one place are not in use at one time."""
+    n, n_rings, k, m, n_nodes = words[0], words[1], words[2], words[3], words[4]
+    at = words[_N_SIZES : _N_SIZES + _N_BUFFERS]
+    vx, v = array_at(at[0], (2, n), np.float64), array_at(at[1], (5, n), np.int32)
+    r, cx = array_at(at[2], (9, n_rings), np.int64), array_at(at[3], (5, k), np.float64)
+    c, h = array_at(at[4], (18, k + 1), np.int32), array_at(at[5], (11, 2 * k + 1), np.int32)
+    hl, hb = array_at(at[6], (2, 2 * k + 1), np.int64), array_at(at[7], (4, 2 * k + 1), np.uint8)
+    px, p = array_at(at[8], (2, m), np.float64), array_at(at[9], (6, m), np.int32)
+    codes, pb = array_at(at[10], (2, m), np.int64), array_at(at[11], (4, m), np.uint8)
+    boxes, nodes = array_at(at[12], (m, 4), np.float64), array_at(at[13], (n_nodes, 4), np.float64)
+    node_marks, stack = array_at(at[14], (n_nodes,), np.uint8), array_at(at[15], (DEEPEST, 2), np.int64)
+    pairs, ends = array_at(at[16], (PORTION, 2), np.int32), array_at(at[17], (k + 1, 4), np.int32)
     crossing_x, crossing_y, error = cx[3], cx[4], cx[1]
     return Workspace(
         given=Given(Edges(vx[0], vx[1], v[0], v[1], v[2]), v[3], r[0], r[1]),
-        tree=BoxTree(
-            buffers.boxes, pb[2], buffers.tree, buffers.tree_marks, p[2], codes[0], codes[1], buffers.stack,
-            buffers.pairs,
-        ),
+        tree=BoxTree(boxes, pb[2], nodes, node_marks, p[2], codes[0], codes[1], stack, pairs),
         events=Events(c[0], c[1], c[2], cx[0], cx[1], cx[2], c[3], c[4], hb[0]),
         unions=Unions(p[3], pb[1], r[2]),
         along=Along(v[4], c[12], crossing_x, px[0], crossing_y, c[13], c[14]),

@@ -31,6 +31,12 @@ def item_of_three(values, plane, row, column):
 
 
 @kernel
+def take(values, places, found):
+    for k in range(len(places)):
+        found[k] = values[places[k]]
+
+
+@kernel
 def ends(values):
     return values[0], values[-1], values[len(values) - 1], values.size, values.shape[0]
 
@@ -210,3 +216,12 @@ def test_the_least_and_the_most_are_those_of_python() -> None:
         assert least_and_most(a, b, c) == (min(a, b), max(a, b), min(a, b, c), max(c, b, a))
     assert least_and_most(1, 2.5, -1) == (1, 2.5, -1, 2.5)
     assert least_and_most(np.uint64(2**63), np.uint64(1), np.uint64(0)) == (1, 2**63, 0, 2**63)
+
+
+@pytest.mark.parametrize("kind", [np.int8, np.int32, np.uint8, np.uint32, np.int64])
+def test_an_index_of_any_kind(kind: type) -> None:
+    values = np.arange(12.0)
+    places = np.array([0, 3, 11] if np.iinfo(kind).min == 0 else [0, 3, 11, -1, -12], kind)
+    found = np.empty(len(places))
+    take(values, places, found)
+    assert found.tolist() == values[places].tolist()

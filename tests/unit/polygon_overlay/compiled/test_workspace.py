@@ -15,7 +15,8 @@ def arrays_of(part: Any) -> list[np.ndarray]:
 
 
 def test_rows_in_use_together_lie_apart() -> None:
-    w = workspace.rows_of(workspace.buffers_for(100, 5, 300))
+    scratch = workspace.scratch_for(100, 5, 300, 0, 0)
+    w = workspace.rows_of(scratch.words)
     steps = (
         [w.given, w.tree, w.events, w.unions, w.along],
         [w.given, w.tree, w.events, w.unions, w.along.starts, w.along.order, w.chains, w.stars, w.loose],
