@@ -26,8 +26,8 @@ from engine.containment.posed.locators import posed_locator
 from engine.containment.rational_locate import rational_location
 from engine.containment.scene.locate_scene import locate_scene
 from engine.polygon_clipping.clip_polygons import clip_polygons
+from engine.polygon_overlay.batch import overlay_batch
 from engine.polygon_overlay.overlay import overlay
-from engine.polygon_overlay.polygon_arrays import gathered as gathered_polygons
 from engine.scenes.scene import Scene
 from engine.segment_clipping.clip_segments import clip_segments
 from engine.segment_clipping.lines import clip_lines
@@ -201,7 +201,7 @@ def _clip(dimension: int) -> None:
 def _warm_overlay() -> None:
     first = Polygon([[[0, 0], [4, 0], [1, 1], [0, 4]]])
     float(overlay(first, Polygon([[[0.5, 0.3], [5, 1], [1, 5]]])).area)
-    gathered_polygons((first, first))
+    overlay_batch([first, first], [first, first])
 
 
 def _warm_overlay_rest() -> None:

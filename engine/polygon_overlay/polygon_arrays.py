@@ -10,9 +10,8 @@ import numpy as np
 from engine.arrays import FloatArray, IntArray, read_only
 from engine.direct import entry_of
 from engine.errors import RingTooShortError
-from engine.polygon_overlay.compiled.gathering import find_most
+from engine.polygon_overlay.compiled.loading import find_most
 from engine.polygon_overlay.found import chained, places_of
-from engine.polygon_overlay.held import arrays_held
 from engine.polygon_overlay.implicit_rings import one_polygon
 from engine.solids.polygon import Polygon
 from engine.solids.ragged import parted, summed
@@ -90,16 +89,9 @@ def joined_arrays(parts: Sequence[PolygonArrays]) -> PolygonArrays:
 
 
 def gathered(polygons: Sequence[Polygon]) -> PolygonArrays:
-    """Return polygons as arrays.
-
-    Read from memory where they are held as expected, else joined as bytes: numpy takes three times as long to put small
-    arrays one after another.
-    """
+    """Return polygons as arrays; joined as bytes: numpy takes three times as long to put small ones one after another."""
     if len(polygons) == 1:
         return PolygonArrays(polygons[0].vertices, polygons[0].ring_offsets, one_polygon(polygons[0].n_rings))
-    held = arrays_held(tuple(polygons))
-    if held is not None:
-        return PolygonArrays(*held)
     vertices = np.frombuffer(b"".join(cast("list[bytes]", [each.vertices for each in polygons])))
     offsets = np.frombuffer(b"".join(cast("list[bytes]", [each.ring_offsets for each in polygons])), np.int64)
     if len(offsets) == 2 * len(polygons) and not offsets[::2].any():  # one ring each: a small batch waits for this

@@ -11,7 +11,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
-from engine.jit import inline
+from engine.jit import inline, kernel
 from engine.polygon_overlay.compiled.crossing_signs import Edges
 from engine.polygon_overlay.compiled.edge_tree import (
     ANYWHERE,
@@ -247,3 +247,13 @@ def mark_short(edges: Edges, n: int, margin: float, marks: Any) -> None:
             marks[edges.before[e]] |= DOUBTFUL
             marks[e] |= DOUBTFUL
             marks[after] |= DOUBTFUL
+
+
+@kernel
+def find_most(ring_offsets: Any, polygon_offsets: Any) -> tuple[int, int]:
+    """Return the most vertices, and the most rings, that a polygon has."""
+    n_vertices = n_rings = 0
+    for k in range(polygon_offsets.shape[0] - 1):
+        first, end = polygon_offsets[k], polygon_offsets[k + 1]
+        n_vertices, n_rings = max(n_vertices, ring_offsets[end] - ring_offsets[first]), max(n_rings, end - first)
+    return n_vertices, n_rings

@@ -13,6 +13,7 @@ from engine.polygon_overlay.compiled.loading import (
     RingArrays,
     box_of,
     common_box,
+    find_most,
     is_empty,
     load_rings,
 )
@@ -60,3 +61,9 @@ def test_boxes() -> None:
     assert common_box((0.0, 4.0, 0.0, 4.0), (1.0, 9.0, -1.0, 2.0)) == (1.0, 4.0, 0.0, 2.0)
     assert is_empty(box_of(vertices, 0, 0))
     assert is_empty(common_box((0.0, 1.0, 0.0, 1.0), (2.0, 3.0, 0.0, 1.0)))
+
+
+def test_the_largest_of_many_is_found() -> None:
+    ring_offsets, polygon_offsets = np.array([0, 3, 7, 10, 14]), np.array([0, 2, 2, 4])
+    assert find_most(ring_offsets, polygon_offsets) == (7, 2)
+    assert find_most(ring_offsets[:1], polygon_offsets[:1]) == (0, 0)
