@@ -89,7 +89,7 @@ def joined_arrays(parts: Sequence[PolygonArrays]) -> PolygonArrays:
 
 
 def gathered(polygons: Sequence[Polygon]) -> PolygonArrays:
-    """Return polygons as arrays; joined as bytes: numpy takes three times as long to put small ones one after another."""
+    """Return polygons as arrays, joined as bytes: numpy takes three times as long to put small ones together."""
     if len(polygons) == 1:
         return PolygonArrays(polygons[0].vertices, polygons[0].ring_offsets, one_polygon(polygons[0].n_rings))
     vertices = np.frombuffer(b"".join(cast("list[bytes]", [each.vertices for each in polygons])))
