@@ -158,15 +158,19 @@ def _clip_array(polygons: npt.NDArray[Any], region: Solid) -> ClippedPolygons | 
     # the largest coordinate lies between the root of this sum, and that over the root of how many there are
     if not (0 < n * size <= _FEW and 2.0**-100 < flat.dot(flat) < 2.0**120):
         return None
-    ring_offsets, numbers = _one_ring(size) if n == 1 else (size * (numbers := np.arange(n + 1)), numbers)
-    found = _clip_few(flat, tables, ring_offsets, numbers, UNLIMITED)
+    found = _clip_few(flat, tables, *(_one_ring(size) if n == 1 else _equal_rings(n, size)), UNLIMITED)
     return None if found is None else found[0]
 
 
 @functools.lru_cache(64)
 def _one_ring(size: int) -> tuple[IntArray, IntArray]:
-    """Return the offsets of the ring of one polygon, and of that polygon."""
-    return read_only(np.array([0, size])), read_only(np.array([0, 1]))
+    return _equal_rings(1, size)
+
+
+def _equal_rings(n: int, size: int) -> tuple[IntArray, IntArray]:
+    """Return the offsets of the rings of n polygons, and of these; read-only, as kernels are compiled for."""
+    numbers = np.arange(n + 1)
+    return read_only(size * numbers), read_only(numbers)
 
 
 def _clip_few(
@@ -256,7 +260,7 @@ def as_contours(polygons: Any, dimension: int) -> Contours:
         largest = largest_of(array)
         if not np.isfinite(largest):
             check_finite(array, ("polygons",))
-        return Contours(array.reshape(-1, dimension), size * np.arange(n + 1), np.arange(n + 1), largest)
+        return Contours(array.reshape(-1, dimension), *_equal_rings(n, size), largest)
     if not isinstance(polygons, (list, tuple)):
         raise InvalidArrayError(
             f"polygons must be a list of polygons, got {type(polygons).__name__}; put a single one into a list",

@@ -41,13 +41,14 @@ answers = [
     engine.locate(points.reshape(8, 3), engine.Sphere([0, 0, 0], 1)).sum(),
     engine.locate(points.reshape(8, 3), cube).sum(),
     len(engine.clip_segments(points.reshape(4, 2, 3), box).source),
+    *engine.clip_polygons(points.reshape(4, 3, 2), engine.Aabb([0, 0], [1, 1])).status.tolist(),
     engine.collide(cube, other).relation.label,
     engine.overlay(square, engine.Polygon([[[1, 0], [1, 1], [0, 1]]])).pieces[0].shell.size,
 ]
 engine.warm(processes=2)
 print(*answers, counter.n)
 """
-ANSWERS = "-2 -4 2 overlapping 6"
+ANSWERS = "-2 -4 2 0 0 0 0 overlapping 6"
 
 
 @pytest.fixture(scope="module")
