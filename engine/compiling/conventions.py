@@ -115,7 +115,7 @@ def calling(descriptor: PlainDescriptor, libraries: Any) -> Callable[..., Any]:
 
     def call(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         convention = PlainConvention(context)
-        function = declare(context, convention, builder.module, descriptor)
+        function = declare(convention, builder.module, descriptor)
         if descriptor.mangled_name not in CANNOT_RAISE:
             status, value = convention.call_function(builder, function, descriptor.restype, descriptor.argtypes, values)
             with cgutils.if_unlikely(builder, status.is_error):
@@ -130,7 +130,8 @@ def calling(descriptor: PlainDescriptor, libraries: Any) -> Callable[..., Any]:
     return call
 
 
-def declare(context: Any, convention: Any, module: Any, descriptor: Any) -> Any:
+def declare(convention: Any, module: Any, descriptor: Any) -> Any:
+    """Return an inner function as a module knows it, to be written or called."""
     kind = convention.get_function_type(descriptor.restype, descriptor.argtypes)
     function = cgutils.get_or_insert_function(module, kind, descriptor.mangled_name)
     convention.decorate_function(function, descriptor.args, descriptor.argtypes)

@@ -41,7 +41,7 @@ class PlainContext(CPUContext):  # type: ignore[misc]
 
     def declare_function(self, module: Any, descriptor: Any) -> Any:
         if isinstance(descriptor, PlainDescriptor):
-            return declare(self, PlainConvention(self), module, descriptor)
+            return declare(PlainConvention(self), module, descriptor)
         return super().declare_function(module, descriptor)
 
     def insert_user_function(self, function: Any, descriptor: Any, libraries: Any = ()) -> None:
@@ -140,8 +140,7 @@ class InnerLower(PlainLower):
 
     @property
     def call_conv(self) -> Any:
-        is_plain = isinstance(self.fndesc, PlainDescriptor)
-        return PlainConvention(self.context) if is_plain else self.context.call_conv
+        return PlainConvention(self.context) if isinstance(self.fndesc, PlainDescriptor) else super().call_conv
 
     def lower(self) -> None:
         super().lower()
