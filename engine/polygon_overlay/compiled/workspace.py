@@ -44,6 +44,10 @@ Buffers = namedtuple(
     "half_octets point_floats point_integers point_codes point_octets boxes tree tree_marks stack pairs ends",
 )
 """Scratch by size: a row for each purpose, by vertex, ring, contact, half-chain and point of a boundary ring."""
+_VERTEX_FLOATS, _VERTEX_INTEGERS, _RING_INTEGERS, _CONTACT_FLOATS, _CONTACT_INTEGERS = 2, 5, 9, 5, 18
+_HALF_INTEGERS, _HALF_LABELS, _HALF_OCTETS = 11, 2, 4
+_POINT_FLOATS, _POINT_INTEGERS, _POINT_CODES, _POINT_OCTETS = 2, 6, 2, 4
+"""How many rows there are of each."""
 _N_SIZES: Final = 7
 _N_BUFFERS: Final = len(Buffers._fields)
 
@@ -183,12 +187,14 @@ def buffers_for(n_vertices: int, n_rings: int, n_contacts: int) -> Buffers:
     while n_leaves * LEAF < m:  # bound: 60 doublings
         n_leaves *= 2
     return Buffers(
-        vertex_floats=np.empty((2, n + 1)), vertex_integers=np.empty((5, n + 1), np.int32),
-        ring_integers=np.empty((9, n_rings + 1), np.int64), contact_floats=np.empty((5, k)),
-        contact_integers=np.empty((18, k + 1), np.int32), half_integers=np.empty((11, 2 * k + 1), np.int32),
-        half_labels=np.empty((2, 2 * k + 1), np.int64), half_octets=np.empty((4, 2 * k + 1), np.uint8),
-        point_floats=np.empty((2, m)), point_integers=np.empty((6, m), np.int32),
-        point_codes=np.empty((2, m), np.int64), point_octets=np.empty((4, m), np.uint8), boxes=np.empty((m, 4)),
+        vertex_floats=np.empty((_VERTEX_FLOATS, n + 1)), vertex_integers=np.empty((_VERTEX_INTEGERS, n + 1), np.int32),
+        ring_integers=np.empty((_RING_INTEGERS, n_rings + 1), np.int64), contact_floats=np.empty((_CONTACT_FLOATS, k)),
+        contact_integers=np.empty((_CONTACT_INTEGERS, k + 1), np.int32),
+        half_integers=np.empty((_HALF_INTEGERS, 2 * k + 1), np.int32),
+        half_labels=np.empty((_HALF_LABELS, 2 * k + 1), np.int64),
+        half_octets=np.empty((_HALF_OCTETS, 2 * k + 1), np.uint8), point_floats=np.empty((_POINT_FLOATS, m)),
+        point_integers=np.empty((_POINT_INTEGERS, m), np.int32), point_codes=np.empty((_POINT_CODES, m), np.int64),
+        point_octets=np.empty((_POINT_OCTETS, m), np.uint8), boxes=np.empty((m, 4)),
         tree=np.empty((2 * n_leaves, 4)), tree_marks=np.empty(2 * n_leaves, np.uint8),
         stack=np.empty((DEEPEST, 2), np.int64), pairs=np.empty((PORTION, 2), np.int32),
         ends=np.empty((k + 1, 4), np.int32),
@@ -220,12 +226,12 @@ def rows_of(words: Any) -> Workspace:
     """Return the rows of the buffers of a `Scratch` by name; those that are in one place are not in use at one time."""
     n, n_rings, k, m, n_nodes = words[0], words[1], words[2], words[3], words[4]
     at = words[_N_SIZES : _N_SIZES + _N_BUFFERS]
-    vx, v = array_at(at[0], (2, n), np.float64), array_at(at[1], (5, n), np.int32)
-    r, cx = array_at(at[2], (9, n_rings), np.int64), array_at(at[3], (5, k), np.float64)
-    c, h = array_at(at[4], (18, k + 1), np.int32), array_at(at[5], (11, 2 * k + 1), np.int32)
-    hl, hb = array_at(at[6], (2, 2 * k + 1), np.int64), array_at(at[7], (4, 2 * k + 1), np.uint8)
-    px, p = array_at(at[8], (2, m), np.float64), array_at(at[9], (6, m), np.int32)
-    codes, pb = array_at(at[10], (2, m), np.int64), array_at(at[11], (4, m), np.uint8)
+    vx, v = array_at(at[0], (_VERTEX_FLOATS, n), np.float64), array_at(at[1], (_VERTEX_INTEGERS, n), np.int32)
+    r, cx = array_at(at[2], (_RING_INTEGERS, n_rings), np.int64), array_at(at[3], (_CONTACT_FLOATS, k), np.float64)
+    c, h = array_at(at[4], (_CONTACT_INTEGERS, k + 1), np.int32), array_at(at[5], (_HALF_INTEGERS, 2 * k + 1), np.int32)
+    hl, hb = array_at(at[6], (_HALF_LABELS, 2 * k + 1), np.int64), array_at(at[7], (_HALF_OCTETS, 2 * k + 1), np.uint8)
+    px, p = array_at(at[8], (_POINT_FLOATS, m), np.float64), array_at(at[9], (_POINT_INTEGERS, m), np.int32)
+    codes, pb = array_at(at[10], (_POINT_CODES, m), np.int64), array_at(at[11], (_POINT_OCTETS, m), np.uint8)
     boxes, nodes = array_at(at[12], (m, 4), np.float64), array_at(at[13], (n_nodes, 4), np.float64)
     node_marks, stack = array_at(at[14], (n_nodes,), np.uint8), array_at(at[15], (DEEPEST, 2), np.int64)
     pairs, ends = array_at(at[16], (PORTION, 2), np.int32), array_at(at[17], (k + 1, 4), np.int32)
