@@ -87,8 +87,8 @@ def overlay(
     Cost: n log n for n edges, plus pairs of edges whose boxes overlap, plus about a microsecond per crossing;
     twice that and more where rounding comes near other edges; some 10 us per edge and crossing where exponents lie
     further than 2^240 apart; some 0.2 ms per vertex where twelve rounds of rounding do not end. An edge costs 27 to
-    40 ns, one of a stretch of a large ring that is near nothing 3 to 5; a call costs 3 us besides, which
-    `overlay_batch` spares.
+    40 ns, one of a stretch of a large ring that is near nothing 3 to 5; a call costs 4 us besides, which
+    `overlay_batch` spares, and up to as much again where fields of a small result are read first.
     Raises: UnsupportedSolidError, InvalidOperationError, DeadlineExceededError, CancelledError.
 
     >>> from engine import Polygon, overlay
