@@ -143,13 +143,18 @@ def choose_planes(s: Scratch, planes: Any) -> tuple[int, bool]:
 
 
 @merged
-def value_at(s: Scratch, plane: Plane, v: int) -> float:
-    """Return the value of a plane at a vertex in doubles."""
-    d = len(s.vertices.names)
-    value = plane.high[plane.number, d]
-    for k in range(d):
-        value += plane.high[plane.number, k] * s.vertices.pool[v * d + k]
-    return value
+def row_of(s: Scratch, plane: Plane) -> tuple[float, float, float, float]:
+    """Return the row of a plane in doubles, read once for all vertices."""
+    d, rows, number = len(s.vertices.names), plane.high, plane.number
+    return rows[number, 0], rows[number, 1], 0.0 if d == 2 else rows[number, 2], rows[number, d]
+
+
+@merged
+def value_at(s: Scratch, row: tuple[float, float, float, float], v: int) -> float:
+    """Return the value of a plane, given by its row, at a vertex in doubles."""
+    pool, d = s.vertices.pool, len(s.vertices.names)
+    value = row[3] + row[0] * pool[v * d] + row[1] * pool[v * d + 1]
+    return value if d == 2 else value + row[2] * pool[v * d + 2]
 
 
 @merged
@@ -166,8 +171,9 @@ def mark_sides(s: Scratch, planes: Any, n_cutting: int, n: int) -> None:
                 x = pool[i * d + axis]
                 codes[i] |= bit if x < place else (ALONE if x == place else 0)
         else:
+            row = row_of(s, plane)
             for i in range(n):
-                value = value_at(s, plane, i)
+                value = value_at(s, row, i)
                 codes[i] |= bit if value < -near else (ALONE if value <= near else 0)
 
 
@@ -218,9 +224,9 @@ def classify_across(s: Scratch, plane: Plane, ring: Any, n: int, n_ring: int) ->
 @merged
 def classify_by_value(s: Scratch, plane: Plane, near: float, ring: Any, n: int) -> tuple[int, int]:
     """Set the signs of n vertices at a plane across no axis; see `classify_across`. None is on it for sure."""
-    n_in = 0
+    row, n_in = row_of(s, plane), 0
     for i in range(n):
-        value = value_at(s, plane, ring[i])
+        value = value_at(s, row, ring[i])
         if abs(value) <= near:
             return DOUBT, 0
         s.signs[i] = 1 if value > 0.0 else -1
