@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 import ssl
 import subprocess
 import threading
@@ -15,15 +14,14 @@ from pathlib import Path
 import httpx
 import numpy as np
 import orjson
-import pytest
 
 import engine
 from benchmarks.load import Connection, free_port, request, wait_until
+from tests.programs import program
 from tests.unit.service.test_live import Service
 
 ROOT = Path(__file__).resolve().parents[2]
 CONF = (ROOT / "deploy" / "nginx.conf").read_text("utf-8")
-NGINX = shutil.which("nginx", path=f"{os.environ.get('PATH', '')}:/usr/sbin")
 
 
 def test_compose_states_the_same_topology() -> None:
@@ -55,12 +53,12 @@ def wait_for(statuses: list[int], count: int) -> None:
         time.sleep(0.05)
 
 
-@pytest.mark.skipif(NGINX is None, reason="nginx is not installed (Debian's package nginx)")
 def test_a_replica_killed_under_load_loses_nothing(tmp_path: Path) -> None:
+    command = program("nginx", package="nginx")
     is_over = threading.Event()
     replicas = [Service(store_folder=tmp_path / "solids", access_log=False) for _ in range(2)]
     port = free_port()
-    nginx = subprocess.Popen([str(NGINX), "-p", str(tmp_path), "-c", str(config(tmp_path, port, replicas))])
+    nginx = subprocess.Popen([command, "-p", str(tmp_path), "-c", str(config(tmp_path, port, replicas))])
     try:
         for replica in replicas:
             replica.wait_until_ready()
@@ -110,14 +108,14 @@ def test_a_replica_killed_under_load_loses_nothing(tmp_path: Path) -> None:
             replica.close()
 
 
-@pytest.mark.skipif(NGINX is None or shutil.which("openssl") is None, reason="nginx or openssl is not installed")
 def test_below_a_path_of_a_site_with_tls(tmp_path: Path) -> None:
     """Everything is found below the path, links lead there, and the log names the client and not the proxy."""
+    command, openssl = program("nginx", package="nginx"), program("openssl", package="openssl")
     service, port = Service(root_path="/geometry", trusted_proxies="127.0.0.1"), free_port()
     made = (tmp_path / "cert.pem", tmp_path / "cert.key")
     words = "req -x509 -newkey rsa:2048 -nodes -days 1 -subj /CN=127.0.0.1 -addext subjectAltName=IP:127.0.0.1"
     subprocess.run(
-        ["openssl", *words.split(), "-out", made[0], "-keyout", made[1]], check=True, capture_output=True, timeout=60
+        [openssl, *words.split(), "-out", made[0], "-keyout", made[1]], check=True, capture_output=True, timeout=60
     )
     text = (ROOT / "deploy" / "nginx-tls.conf").read_text("utf-8")
     for shown, here in (
@@ -130,7 +128,7 @@ def test_below_a_path_of_a_site_with_tls(tmp_path: Path) -> None:
         assert text.count(shown) == 1
         text = text.replace(shown, here)
     path = config(tmp_path, port, [], text)
-    nginx = subprocess.Popen([str(NGINX), "-p", str(tmp_path), "-c", str(path)])
+    nginx = subprocess.Popen([command, "-p", str(tmp_path), "-c", str(path)])
     try:
         service.wait_until_ready()
         trust = ssl.create_default_context(cafile=made[0])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 import shlex
-import shutil
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -13,10 +12,8 @@ from urllib.parse import unquote
 import pytest
 
 from benchmarks import web_page
+from tests.programs import chromium
 
-CHROMIUM = next(
-    (path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None
-)
 REQUEST = ("/v1/contains", {"solid": {"type": "polygon", "rings": [[[0, 0], [4, 0], [0, 4]]]}, "points": [[2, 2]]})
 WORST = {"item": 7, "answer": 0, "exact": 1, "request": REQUEST}
 DOCS = Path(__file__).resolve().parents[3] / "docs"
@@ -75,11 +72,9 @@ def test_numbers_on_the_page_name_their_line_of_results() -> None:
 
 @pytest.fixture(scope="module")
 def browser() -> Any:
-    if CHROMIUM is None:
-        pytest.skip("no Chromium on this machine (Debian: apt-get install chromium)")
     api = pytest.importorskip("playwright.sync_api", reason="needs playwright")
     with api.sync_playwright() as driver:
-        made = driver.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu"])
+        made = driver.chromium.launch(executable_path=chromium(), args=["--no-sandbox", "--disable-gpu"])
         yield made
         made.close()
 
