@@ -88,8 +88,9 @@ class PlainLower(Lower):  # type: ignore[misc]
     _disable_sroa_like_opt = False
 
     def _find_singly_assigned_variable(self) -> None:
-        self._counts = self.context.enable_nrt
-        if self._counts:
+        # case: a generator, which keeps between two values what has a place in memory, and nothing else
+        self._as_usual = self.context.enable_nrt or self.func_ir.func_id.is_generator
+        if self._as_usual:
             super()._find_singly_assigned_variable()
         else:
             self._singly_assigned_vars = _values(self.blocks)
@@ -99,7 +100,7 @@ class PlainLower(Lower):  # type: ignore[misc]
         self.pre_block(block)
         for step in block.body:
             self.loc = step.loc
-            if self._counts or not isinstance(step, (Assign, Del)):
+            if self._as_usual or not isinstance(step, (Assign, Del)):
                 self.lower_inst(step)
             elif isinstance(step, Assign):
                 self._assign(step)

@@ -81,6 +81,21 @@ def walk(values):
 COMPILED = {function: kernel(function) for function in (exchange, set_late, branch, nested, walk)}
 
 
+@inline
+def steps(values, factor):
+    both = (values[0], factor)
+    for k in range(len(values)):
+        yield both[0] + both[1] * values[k]
+
+
+@kernel
+def sum_of_steps(values, factor):
+    found = 0.0
+    for value in steps(values, factor):
+        found += value
+    return found
+
+
 def python_pair(a, b):
     return b, (a, a + b)
 
@@ -112,3 +127,7 @@ def test_loops_that_end_in_the_middle() -> None:
         ours, theirs = np.array(values), list(values)
         assert COMPILED[walk](ours) == walk(theirs)
         assert ours.tolist() == theirs
+
+
+def test_generators_remember_their_variables() -> None:
+    assert sum_of_steps(np.array([1.0, 2.0, 3.0]), 10.0) == 11.0 + 21.0 + 31.0
