@@ -53,7 +53,8 @@ def nearest_rings(
         rings = [_from_first(vertices, kept[starts[ring] : starts[ring + 1]]) for ring in there]
         if rings:
             pieces.append([rings[0], *sorted(rings[1:])])
-    ordered = [ring for piece in sorted(pieces) for ring in piece]
+    pieces.sort()
+    ordered = [ring for piece in pieces for ring in piece]
     numbers = np.array([number for _, own in ordered for number in own], np.int64)
     return NearestRings(
         vertices[numbers], np.cumsum([0, *(len(own) for _, own in ordered)]), np.cumsum([0, *map(len, pieces)]),

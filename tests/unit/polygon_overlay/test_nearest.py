@@ -88,3 +88,13 @@ def test_a_ring_that_passes_its_first_vertex_twice_begins_where_it_comes_first()
     assert places(found) == [[[(0, 0), (1, 0), (0, 1)]], [[(0, 0), (2, 1), (2, 2), (0, 0), (3, 0), (3, 1)]]]
     assert (len(found.vertices), found.ring_offsets.tolist()) == (9, [0, 3, 9])
     assert (found.piece_offsets.tolist(), found.numbers.tolist()) == ([0, 1, 2], [7, 8, 9, 3, 4, 5, 6, 0, 1])
+
+
+def test_holes_stay_with_their_shell_where_pieces_change_places() -> None:
+    """What is exactly left of another piece need not be any more once both are rounded."""
+    square: list[tuple[float, float]] = [(1, 0), (9, 0), (9, 9), (1, 9)]
+    hole: list[tuple[float, float]] = [(3, 3), (3, 4), (4, 3)]
+    left: list[tuple[float, float]] = [(0, 0), (1, 0), (0, 1)]
+    found = nearest([square, hole], [left])
+    assert places(found) == [[left], [square, hole]]
+    assert (found.piece_offsets.tolist(), found.numbers.tolist()) == ([0, 1, 3], [7, 8, 9, 0, 1, 2, 3, 4, 5, 6])
