@@ -8,6 +8,7 @@ whose error is below one unit per term, and the fraction is made only where thos
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
@@ -16,6 +17,7 @@ import numpy as np
 
 from engine.arrangement.nodes import Homogeneous, nearest_quotient
 from engine.arrays import BoolArray, FloatArray, IntArray
+from engine.errors import NotRepresentableError
 
 _PRECISIONS = (160, 640)  # bits of the largest term that are kept; the second for sums that nearly cancel
 
@@ -72,9 +74,10 @@ class ExactRings:
         """Return the double nearest to the exact area. Raises `NotRepresentableError` beyond the largest double."""
         terms = self._terms()
         for low, high, shift in _bounds(terms):
-            ends = {_nearest(end, 1, 2 * self.exponent - 1 - shift) for end in (low, high)}
-            if len(ends) == 1:
-                return ends.pop()
+            with suppress(NotRepresentableError):  # case: a bound is beyond the doubles, and the area may be none
+                ends = {_nearest(end, 1, 2 * self.exponent - 1 - shift) for end in (low, high)}
+                if len(ends) == 1:
+                    return ends.pop()
         return _nearest(*_sum(terms), 2 * self.exponent - 1)
 
     def are_shells(self) -> BoolArray:

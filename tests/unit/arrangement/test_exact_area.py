@@ -41,6 +41,14 @@ def test_area_that_nearly_cancels() -> None:
 
 def test_nothing_and_too_much() -> None:
     assert ExactRings((), 0).area() == 0
-    assert str(ExactRings((), 0).nearest_area()) == "0.0"
+    for exponent in (0, 900, -900):
+        assert str(ExactRings((), exponent).nearest_area()) == "0.0"
     with pytest.raises(NotRepresentableError):
         ExactRings((((0, 0, 1), (1, 0, 1), (0, 1, 1)),), 600).nearest_area()
+
+
+def test_bounds_may_be_too_much_where_the_area_is_not() -> None:
+    far, third = 1 << 1500, reduced(1, 1, 3)
+    there, back = ((0, 0, 1), (far, 0, 1), third), (third, (far, 0, 1), (0, 0, 1))
+    rings = ExactRings((there, back, ((0, 0, 1), (1, 0, 1), (0, 1, 1))), 400)
+    assert rings.nearest_area() == 2.0**799
