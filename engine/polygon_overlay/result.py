@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import pairwise
@@ -162,6 +162,10 @@ class Overlay:
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
         vars(self).update(made)
         return made[name]
+
+    def __dir__(self) -> Iterable[str]:
+        """Name what is not made yet as well, for who completes names."""
+        return {*super().__dir__(), *self.__dataclass_fields__}
 
     @property
     def n_pieces(self) -> int:

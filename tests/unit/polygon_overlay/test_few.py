@@ -61,6 +61,12 @@ def test_what_no_overlay_has_is_an_attribute_error() -> None:
             result.vertex  # noqa: B018
 
 
+def test_fields_are_listed_before_they_are_made() -> None:
+    made = overlay(*TWO, "union")
+    assert {field.name for field in dataclasses.fields(Overlay)} <= set(dir(made))
+    assert "vertices" not in vars(made)
+
+
 def test_many_vertices_and_doubt_are_left() -> None:
     circle = np.stack([np.cos(np.arange(300.0)), np.sin(np.arange(300.0))], axis=1)
     far = Polygon([1e200 * np.array(TWO[0].vertices[:4])])
