@@ -209,7 +209,7 @@ def _in_implicit(solid: Implicit) -> Locator:
     if solid.function is not None:
         return Locator("callable", _call(solid), "float64")
     degree = int(solid.powers.sum(axis=1).max())
-    return by_kernel("polynomial", locate_by_polynomial, solid, solid.powers, solid.coefficients, degree)
+    return by_kernel("polynomial", locate_by_polynomial, solid, EXACT, solid.powers, solid.coefficients, degree)
 
 
 def _call(solid: Implicit) -> Fill:

@@ -3,7 +3,9 @@
 **The filter.** u = 2^-53. A term takes at most `degree` rounded products and t terms take t - 1 sums, so the value is
 off by at most (degree + t + small) u times the sum of magnitudes. Underflow: powers of |x| < 1 are each off by at
 most 16 times 2^-1075, later products by 2^-1075 times the factors that follow. Both are covered by adding the floor
-2^-1010 to every magnitude on the way, because even u 2^-1010 = 2^-1063 is more than 16 times 2^-1075.
+2^-1010 to every magnitude on the way, because even u 2^-1010 = 2^-1063 is more than 16 times 2^-1075. A blur
+(posed/filters.py) changes a term by at most degree times blur times the same term with one factor left out, all factors
+grown by the blur; each factor is at most the largest grown coordinate or 1, m: by less than degree |c| m^degree blur.
 
 **The exact stage** multiplies significands (in [1/2, 1)) as expansions, so that every term of degree D is a multiple of
 2^(-53 (D + 1)), and shifts it by its exponent relative to the largest term. A term that would lose bits (more than
@@ -51,19 +53,20 @@ def _fill_powers(points: Any, row: int, powers: Components) -> None:
 
 
 @inline
-def sign_of_polynomial_filter(powers: Any, coefficients: Any, degree: int, points: Any, row: int) -> int:
-    """Return the sign of the sum of coefficient * prod(p[k] ** powers[k]) at p = points[row] where rounding cannot have
-    changed it, else UNDECIDED.
+def sign_of_polynomial_filter(powers: Any, coefficients: Any, degree: int, points: Any, row: int, blur: float) -> int:
+    """Return the sign of the sum of coefficient * prod(p[k] ** powers[k]) on all of the blurred p = points[row] where
+    rounding cannot have changed it, else UNDECIDED.
 
     powers (t, dim) int64, coefficients (t,) float64, points (n, dim) float64, dim 2 or 3. Caller guarantees finite
-    numbers, powers >= 0 with row sums <= degree <= MAX_DEGREE, and t <= MAX_TERMS.
+    numbers, but for points with a blur, powers >= 0 with row sums <= degree <= MAX_DEGREE, and t <= MAX_TERMS.
     """
     table = workspace(N_TABLE)
     _fill_powers(points, row, table)
-    value, magnitude = 0.0, 0.0
+    value, magnitude, weight = 0.0, 0.0, 0.0
     for i_term in range(coefficients.shape[0]):
         term = float(coefficients[i_term])
         size = abs(term)
+        weight += size
         for axis in range(powers.shape[1]):
             factor = table[axis * N_POWERS + powers[i_term, axis]]
             term *= factor
@@ -71,6 +74,13 @@ def sign_of_polynomial_filter(powers: Any, coefficients: Any, degree: int, point
         value += term
         magnitude += size
     threshold = (degree + coefficients.shape[0] + SPARE_ROUNDINGS) * UNIT_ROUNDOFF * magnitude
+    if blur > 0.0:
+        largest, change = 1.0, 2.0 * degree * blur  # order: what underflows in the end is far below the floors
+        for axis in range(points.shape[1]):
+            largest = max(largest, abs(points[row, axis]) + blur)
+        for _ in range(degree):
+            change *= largest
+        threshold += change * weight
     return 1 if value > threshold else (-1 if -value > threshold else UNDECIDED)
 
 

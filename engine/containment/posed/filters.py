@@ -95,42 +95,6 @@ def locate_in_rows_blurred(points: Any, blurs: Any, rows: Any, locations: Any, f
 
 
 @kernel
-def locate_by_polynomial_blurred(
-    points: Any, blurs: Any, powers: Any, coefficients: Any, degree: int, locations: Any, flag: Any
-) -> int:
-    """Fill `locations` (n,) int8 with the sign of the polynomial; returns how many stay open.
-
-    A term changes by at most degree times blur times the same term with one factor left out, all factors grown by the
-    blur; each factor is at most the largest grown coordinate or 1, m: the change is below degree |c| m^degree blur. A
-    product that underflows is off by 2^-1075 m^degree; there are at most 16,000.
-    """
-    n_axes, n_open = points.shape[1], 0
-    for item in range(len(points)):
-        if flag[0]:
-            break
-        largest = 1.0
-        for axis in range(n_axes):
-            largest = max(largest, abs(points[item, axis]) + blurs[item])
-        change, grown = blurs[item] * degree, 1.0
-        for _ in range(degree):
-            grown *= largest
-        change *= grown
-        value, size, weight = 0.0, 0.0, 0.0
-        for term in range(len(coefficients)):
-            product = float(coefficients[term])
-            for axis in range(n_axes):
-                for _ in range(powers[term, axis]):
-                    product *= points[item, axis]
-            value += product
-            size += abs(product)
-            weight += abs(coefficients[term])
-        bound = (degree + len(coefficients) + 16) * 2.0**-53 * size + 2.0 * change * weight + 1e-300 * grown
-        locations[item] = 1 if value > bound else -1 if -value > bound else UNDECIDED
-        n_open += locations[item] == UNDECIDED
-    return n_open
-
-
-@kernel
 def locate_in_box(points: Any, blurs: Any, low: Any, high: Any, locations: Any, flag: Any) -> int:
     """Fill `locations` (n,) int8 for points (n, dim) and the corners low, high (dim,); returns how many stay open.
 
@@ -154,21 +118,25 @@ def locate_in_box(points: Any, blurs: Any, low: Any, high: Any, locations: Any, 
 
 
 @kernel
-def locate_by_polynomial(points: Any, powers: Any, coefficients: Any, degree: int, locations: Any, flag: Any) -> int:
+def locate_by_polynomial(
+    points: Any, blurs: Any, powers: Any, coefficients: Any, degree: int, locations: Any, flag: Any
+) -> int:
     """Fill `locations` (n,) int8 for points (n, dim) with the sign of the polynomial, or UNDECIDED.
 
-    powers: (t, dim) int64; coefficients: (t,); degree: the largest total power. Returns the count beyond the
-    filter, or NOT_FINITE.
+    blurs: as for `locate_in_box`. powers: (t, dim) int64; coefficients: (t,); degree: the largest total power. Returns
+    the count beyond the filter, or NOT_FINITE.
     """
-    if has_not_finite(points):
+    if len(blurs) == 0 and has_not_finite(points):
         return NOT_FINITE
     n_beyond = 0
     for item in range(len(points)):
         if flag[0]:
             break
-        sign = sign_of_polynomial_filter(powers, coefficients, degree, points, item)
+        blur = float(blurs[item]) if len(blurs) > 0 else 0.0
+        sign = sign_of_polynomial_filter(powers, coefficients, degree, points, item, blur)
         if sign == UNDECIDED:
             n_beyond += 1
-            sign = sign_of_polynomial_exact(powers, coefficients, points, item)
+            if blur == 0.0:
+                sign = sign_of_polynomial_exact(powers, coefficients, points, item)
         locations[item] = sign
     return n_beyond

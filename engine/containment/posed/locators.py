@@ -23,7 +23,7 @@ from engine.containment.methods.ball import locate_in_ball
 from engine.containment.methods.polygon_one_pass import locate_by_ring_pass
 from engine.containment.methods.polygon_ray_parity import locate_in_rings
 from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
-from engine.containment.posed.filters import locate_by_polynomial_blurred, locate_in_box, locate_in_rows_blurred
+from engine.containment.posed.filters import locate_by_polynomial, locate_in_box, locate_in_rows_blurred
 from engine.containment.posed.frames import Frames, frames_of, move_to_body_frame
 from engine.containment.prepared import prism_rows, rings_of, tree_of
 from engine.containment.rational_locate import Check, to_world_frame
@@ -110,7 +110,7 @@ def _blurred_kernel(solid: Solid) -> Blurred:
     else:
         assert isinstance(solid, Implicit)
         degree = int(solid.powers.sum(axis=1).max())
-        kernel, prepared = locate_by_polynomial_blurred, lambda _: (solid.powers, solid.coefficients, degree)
+        kernel, prepared = locate_by_polynomial, lambda _: (solid.powers, solid.coefficients, degree)
     return lambda points, blurs, out, budget: int(kernel(points, blurs, *prepared(budget.check), out, budget.flag))
 
 

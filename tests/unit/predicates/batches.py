@@ -41,7 +41,7 @@ def orient3d_filter_batch(a: Any, b: Any, c: Any, d: Any, sides: Any) -> None:
 def sign_of_polynomial_batch(powers: Any, coefficients: Any, degree: int, points: Any, sides: Any) -> None:
     """Fill sides (n,) int8 with the sign of the polynomial at the rows of points (n, dim) float64."""
     for item in range(sides.shape[0]):
-        sides[item] = sign_of_polynomial_filter(powers, coefficients, degree, points, item)
+        sides[item] = sign_of_polynomial_filter(powers, coefficients, degree, points, item, 0.0)
         if sides[item] == UNDECIDED:
             sides[item] = sign_of_polynomial_exact(powers, coefficients, points, item)
 
