@@ -1,9 +1,26 @@
-"""The parity of a segment over eight triangles at once: the entries of a cell side by side, one to a lane.
+"""The parity of a segment over the triangles of a cell, eight at once: what a cell keeps of them, one to a lane.
 
-A group is (14, 8) float32: what cells/entries.py keeps of a triangle, number by number, for eight of them; lanes
-without a triangle hold one that is never crossed. One group answers in some 40 vector instructions and no branch, where
-a loop over four entries spends most of its time on mispredicted ends. The arithmetic is that of cells/entries.py, plain
-products and sums in the same order, and so is the band.
+A cell has a reference point R whose location is known. A point q of the cell is on the other side of the surface if
+the segment from R to q crosses it an odd number of times. For one triangle a, b, c and x = q - R, in units of the
+cell:
+
+- s = n . x - d, its plane, turned so that R is on the positive side (d < 0);
+- e_k = m_k . x, the three planes through R and an edge. x is in the (double) cone of R over the triangle where the
+  three have one sign.
+
+The segment crosses where s < 0 and the three e agree; it misses, and q is not on the triangle, where s > 0 or two e
+have opposite signs. Each normal is scaled to a largest component of 1, so all of this is sure beyond a band of 2^-18:
+
+  |x| < 0.75, |d| < 4 and |n|, |m| <= 1 are rounded to single precision (2^-24 relative); three products, their sums and
+  the sum with d add 2^-24 of at most 6.3 each; the errors of n, m and d in double precision are bounded below, and an
+  entry is made NaN, sure of nothing, where they exceed 2^-24. In total less than 40 * 2^-24 < 2^-18.
+
+Points that are not sure go to the vertical ray (polyhedron_ray_parity.py): nothing is decided here that rounding could
+have changed.
+
+A group is (14, 8) float32: the entries of eight triangles, number by number; lanes without a triangle hold one that is
+never crossed. One group answers in some 40 vector instructions and no branch, where a loop over four entries spends
+most of its time on mispredicted ends. All is plain products and sums, in the order above.
 """
 
 from __future__ import annotations
@@ -13,16 +30,71 @@ from typing import Any, Final
 
 import numpy as np
 
+from engine.jit import inline
 from engine.lanes.lanes import aligned, any_of, bits_of, count_bits, dot, greater, lesser, load, prefetch
 from engine.lanes.tracing import LANES, Lanes, Number, Rows, traced
 from engine.types import UNDECIDED
 
+_UNSURE: Final = 2.0**-24
+_ROUNDING: Final = 16.0 * 2.0**-53
+"""A component of u x v is off by less than this part of the sizes of its two products: 2 u for the two factors, each a
+rounded difference times a power of two, u for the product, u for the sum; taken four times."""
+_FAR: Final = 4.0
 BAND: Final = np.float32(2.0**-18)
-"""Planes of an entry are this far from a point at least where they decide: derived in cells/entries.py."""
+"""Planes of an entry are this far from a point at least where they decide."""
 ROWS: Final = 14
-"""Numbers a triangle: those of an entry, and 1.0 in the last group of a leaf, else 0.0."""
+"""Numbers a triangle: n and d, the three m, and 1.0 in the last group of a leaf, else 0.0."""
 _LINE: Final = 16
 """Numbers that a line of the cache holds."""
+
+
+@inline
+def _set_normal(row: Any, place: int, u: Any, v: Any) -> float:
+    """Write u x v, scaled to a largest component of 1, to row[place : place + 3]; return a bound on its error."""
+    x, y, z = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
+    size = max(
+        abs(u[1] * v[2]) + abs(u[2] * v[1]), abs(u[2] * v[0]) + abs(u[0] * v[2]), abs(u[0] * v[1]) + abs(u[1] * v[0])
+    )
+    largest = max(abs(x), abs(y), abs(z))
+    if not (largest > 1e-280 and largest < 1e280):  # underflow, off by 2^-1074, is far below what is still sure
+        return np.nan
+    scale = 1.0 / largest
+    row[place], row[place + 1], row[place + 2] = x * scale, y * scale, z * scale
+    return size * scale * _ROUNDING
+
+
+@inline
+def set_nothing(row: Any) -> None:
+    """Write the entry of a triangle that no segment in the cell crosses."""
+    for k in range(ROWS - 1):
+        row[k] = 0.0
+    row[3] = -_FAR
+
+
+@inline
+def set_entry(row: Any, a: Any, b: Any, c: Any, u: Any, v: Any) -> None:
+    """Write the entry of a triangle to row (13,) or longer.
+
+    a, b, c: corners less R; u, v: b - a and c - a; all of them differences of the given numbers, each rounded once, in
+    units of the cell.
+    """
+    normal_error = _set_normal(row, 0, u, v)
+    distance = row[0] * a[0] + row[1] * a[1] + row[2] * a[2]
+    reach = max(abs(a[0]), abs(a[1]), abs(a[2]))
+    is_sure = normal_error < _UNSURE and (3.0 * normal_error + _ROUNDING) * reach < _UNSURE
+    if is_sure and abs(distance) > _FAR:  # the plane does not reach the cell: on R's side everywhere
+        set_nothing(row)
+        return
+    is_sure = is_sure and abs(distance) > 2.0**-16  # R is clearly on one side
+    if distance > 0.0:
+        row[0], row[1], row[2], distance = -row[0], -row[1], -row[2], -distance
+    row[3] = distance
+    is_sure = is_sure and _set_normal(row, 4, a, b) < _UNSURE
+    is_sure = is_sure and _set_normal(row, 7, b, c) < _UNSURE
+    is_sure = is_sure and _set_normal(row, 10, c, a) < _UNSURE
+    if not is_sure:
+        for k in range(ROWS - 1):
+            row[k] = np.nan
 
 
 @traced

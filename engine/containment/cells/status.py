@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from engine.containment.cells.entries import set_entry, set_nothing
 from engine.containment.cells.lattice import (
     LEVELS,
     PARTS,
@@ -26,7 +25,7 @@ from engine.containment.cells.lattice import (
     share_of,
 )
 from engine.jit import inline, kernel
-from engine.lanes.cells import ROWS, group_parity
+from engine.lanes.cells import ROWS, group_parity, set_entry, set_nothing
 from engine.lanes.tracing import LANES
 from engine.types import UNDECIDED
 

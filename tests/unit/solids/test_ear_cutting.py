@@ -10,8 +10,7 @@ import pytest
 
 import engine
 from engine.budget import Budget
-from engine.solids.convex_faces import UNSURE
-from engine.solids.ear_cutting import cut_faces, cut_ring
+from engine.solids.ear_cutting import UNSURE, cut_faces, cut_ring
 from tests.reference.exact import vector
 from tests.reference.solids import cut_face
 
