@@ -14,6 +14,7 @@ from typing import Any, Final, NamedTuple
 from engine.arrays import FloatArray, Int8Array, Int32Array, IntArray
 from engine.containment.cells.reach import layer_reached, row_reached, walls_of
 from engine.jit import inline, kernel
+from engine.predicates.vectors import corners_of
 
 LEVELS: Final = 12
 """At most: 96 cells cut eleven times have indices below 2^30."""
@@ -90,24 +91,13 @@ def share_of(level: int) -> float:
 
 
 @inline
-def reference_coordinate(low: float, size: float, index: int, place: float) -> float:
-    """Return a coordinate of the reference point of cell `index` of a level with cells of `size`."""
-    return low + (index + place) * size
-
-
-@inline
-def corner(vertices: Any, vertex: int) -> Any:
-    """Return a vertex as a tuple."""
-    return (float(vertices[vertex, 0]), float(vertices[vertex, 1]), float(vertices[vertex, 2]))
-
-
-@inline
-def corners(vertices: Any, triangles: Any, triangle: int) -> Any:
-    """Return the corners of a triangle."""
+def reference_point(lattice: Any, x: int, y: int, z: int, level: int) -> Any:
+    """Return the reference point of a cell by its indices on a level."""
+    low, size, share = lattice.low, lattice.size, share_of(level)
     return (
-        corner(vertices, triangles[triangle, 0]),
-        corner(vertices, triangles[triangle, 1]),
-        corner(vertices, triangles[triangle, 2]),
+        low[0] + (x + PLACE[0]) * (size[0] * share),
+        low[1] + (y + PLACE[1]) * (size[1] * share),
+        low[2] + (z + PLACE[2]) * (size[2] * share),
     )
 
 
@@ -122,7 +112,7 @@ def _list_triangle(mesh: Any, triangle: int, block: Any, ends: Any, items: Any, 
     """Count or list a triangle in the cells of a block that it reaches into, in scanning order."""
     low, scale, (depth, x_low, y_low, z_low, nx, ny, nz, first_cell) = mesh.lattice.low, mesh.lattice.scale, block
     parts, shift = parts_of(depth), 2 * (LEVELS - 1 - depth)
-    a, b, c = corners(mesh.vertices, mesh.triangles, triangle)
+    a, b, c = corners_of(mesh.vertices, mesh.triangles, triangle)
     x_first = max((finest(min(a[0], b[0], c[0]), low[0], scale[0]) >> shift) - x_low, 0)
     x_last = min((finest(max(a[0], b[0], c[0]), low[0], scale[0]) >> shift) - x_low, nx - 1)
     y_first = max((finest(min(a[1], b[1], c[1]), low[1], scale[1]) >> shift) - y_low, 0)
@@ -189,7 +179,7 @@ def keep_of_details(mesh: Any, level: Any, cells: Any, is_kept: Any, flag: Any) 
             break
         first, end, n_small = level.firsts[cell], level.firsts[cell + 1], 0
         for entry in range(first, end):
-            a, b, c = corners(mesh.vertices, mesh.triangles, level.lists[entry])
+            a, b, c = corners_of(mesh.vertices, mesh.triangles, level.lists[entry])
             largest = 0.0
             for axis in range(3):
                 low, high = min(a[axis], b[axis], c[axis]), max(a[axis], b[axis], c[axis])

@@ -17,11 +17,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.containment.cells.lattice import LEVELS, PARTS, PLACE, finest, parts_of, reference_coordinate, share_of
+from engine.containment.cells.lattice import LEVELS, PARTS, finest, parts_of, reference_point, scaled_difference
 from engine.containment.posed.filters import NOT_FINITE, has_not_finite
 from engine.jit import allocating_kernel, called, inline, merged
 from engine.lanes.addresses import int8_at
 from engine.lanes.cells import ROWS, group_parity, prefetch_group
+from engine.predicates.vectors import as_point3
 from engine.types import UNDECIDED
 
 OUTSIDE_CELL: Final = -4
@@ -119,7 +120,7 @@ def parity_across(groups: Any, group: int, wx: Any, wy: Any, wz: Any) -> int:
 @merged
 def ask_leaves(points: Any, cells: Any, kept_points: Any, n_waiting: Any, locations: Any) -> None:
     """Locate the points that wait, in their leaves."""
-    low, scale, size, groups = cells.lattice.low, cells.lattice.scale, cells.lattice.size, cells.groups
+    lattice, groups = cells.lattice, cells.groups
     item_of, code_of, level_of, places, waiting = kept_points
     for turn in range(min(n_waiting, np.uint64(_AHEAD))):
         prefetch_group(groups, code_of[waiting[turn]] >> 2)
@@ -128,15 +129,11 @@ def ask_leaves(points: Any, cells: Any, kept_points: Any, n_waiting: Any, locati
             prefetch_group(groups, code_of[waiting[turn + np.uint64(_AHEAD)]] >> 2)
         kept = waiting[turn]
         item, level, code = item_of[kept], level_of[kept], code_of[kept]
-        parts, share, part_shift = parts_of(level), share_of(level), 2 * (LEVELS - 1 - level)
+        part_shift = 2 * (LEVELS - 1 - level)
         x, y, z = places[kept, 0] >> part_shift, places[kept, 1] >> part_shift, places[kept, 2] >> part_shift
-        rx = reference_coordinate(low[0], size[0] * share, x, PLACE[0])
-        ry = reference_coordinate(low[1], size[1] * share, y, PLACE[1])
-        rz = reference_coordinate(low[2], size[2] * share, z, PLACE[2])
-        wx = np.float32((points[item, 0] - rx) * (scale[0] * parts))
-        wy = np.float32((points[item, 1] - ry) * (scale[1] * parts))
-        wz = np.float32((points[item, 2] - rz) * (scale[2] * parts))
-        parity = parity_across(groups, code >> 2, wx, wy, wz)
+        reference = reference_point(lattice, x, y, z, level)
+        w = scaled_difference(as_point3(points, item), reference, lattice.scale, parts_of(level))
+        parity = parity_across(groups, code >> 2, np.float32(w[0]), np.float32(w[1]), np.float32(w[2]))
         locations[item] = UNDECIDED if parity & UNDECIDED else ((code ^ (parity << 1)) & 2) - 1
 
 

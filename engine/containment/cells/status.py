@@ -14,19 +14,17 @@ import numpy as np
 from engine.containment.cells.lattice import (
     LEVELS,
     PARTS,
-    PLACE,
     SPLIT,
     UNKNOWN,
-    corners,
     finest,
     parts_of,
-    reference_coordinate,
+    reference_point,
     scaled_difference,
-    share_of,
 )
 from engine.jit import inline, kernel
 from engine.lanes.cells import ROWS, group_parity, set_entry, set_nothing
 from engine.lanes.tracing import LANES
+from engine.predicates.vectors import corners_of
 from engine.types import UNDECIDED
 
 
@@ -54,17 +52,6 @@ def label_empty(counts: Any, nx: int, ny: int, labels: Any) -> None:
 
 
 @inline
-def reference_point(lattice: Any, x: int, y: int, z: int, share: float) -> Any:
-    """Return the reference point of a cell by its indices on a level whose cells are `share` of one of level 0."""
-    low, size = lattice.low, lattice.size
-    return (
-        reference_coordinate(low[0], size[0] * share, x, PLACE[0]),
-        reference_coordinate(low[1], size[1] * share, y, PLACE[1]),
-        reference_coordinate(low[2], size[2] * share, z, PLACE[2]),
-    )
-
-
-@inline
 def _is_in_cell(lattice: Any, point: Any, x: int, y: int, z: int, shift: int) -> bool:
     low, scale = lattice.low, lattice.scale
     return (
@@ -79,7 +66,7 @@ def reference_points(lattice: Any, places: Any, level: int, points: Any, is_vali
     """Fill points (n, 3) and is_valid (n,) with the reference points of cells and whether they lie in them."""
     for item in range(len(places)):
         x, y, z = places[item, 0], places[item, 1], places[item, 2]
-        point = reference_point(lattice, x, y, z, share_of(level))
+        point = reference_point(lattice, x, y, z, level)
         points[item, 0], points[item, 1], points[item, 2] = point
         is_valid[item] = _is_in_cell(lattice, point, x, y, z, 2 * (LEVELS - 1 - level))
 
@@ -100,7 +87,7 @@ def _fill_groups(groups: Any, first_group: int, mesh: Any, level: Any, cell: int
         set_nothing(groups[first_group + place // LANES, :, place % LANES])
     for place in range(last - first):
         row = groups[first_group + place // LANES, :, place % LANES]
-        a, b, c = corners(mesh.vertices, mesh.triangles, level.lists[first + place])
+        a, b, c = corners_of(mesh.vertices, mesh.triangles, level.lists[first + place])
         set_entry(
             row, scaled_difference(a, reference, scale, parts), scaled_difference(b, reference, scale, parts),
             scaled_difference(c, reference, scale, parts), scaled_difference(b, a, scale, parts),
@@ -135,7 +122,7 @@ def locate_parts(mesh: Any, level: Any, parents: Any, counts: Any, groups: Any, 
             break
         cell, first = parents[parent], parent * PARTS
         x0, y0, z0 = level.places[cell, 0], level.places[cell, 1], level.places[cell, 2]
-        reference = reference_point(lattice, x0, y0, z0, share_of(level.depth))
+        reference = reference_point(lattice, x0, y0, z0, level.depth)
         n_groups = _fill_groups(groups, 0, mesh, level, cell, reference)
         for part in range(PARTS):
             before = _empty_before(counts, first, part, SPLIT, SPLIT) if counts[first + part] == 0 else -1
@@ -143,7 +130,7 @@ def locate_parts(mesh: Any, level: Any, parents: Any, counts: Any, groups: Any, 
                 found[first + part] = found[before]
                 continue
             x, y, z = x0 * SPLIT + part % SPLIT, y0 * SPLIT + part // SPLIT % SPLIT, z0 * SPLIT + part // SPLIT**2
-            point, status = reference_point(lattice, x, y, z, share_of(below)), UNKNOWN
+            point, status = reference_point(lattice, x, y, z, below), UNKNOWN
             if level.statuses[cell] != UNKNOWN and _is_in_cell(lattice, point, x, y, z, shift):
                 w = scaled_difference(point, reference, lattice.scale, parts)
                 status = _across(groups, n_groups, w, level.statuses[cell])
@@ -157,5 +144,5 @@ def fill_leaves(mesh: Any, level: Any, leaves: Any, starts: Any, groups: Any, fl
         if flag[0]:
             break
         x, y, z = level.places[leaves[item], 0], level.places[leaves[item], 1], level.places[leaves[item], 2]
-        reference = reference_point(mesh.lattice, x, y, z, share_of(level.depth))
+        reference = reference_point(mesh.lattice, x, y, z, level.depth)
         _fill_groups(groups, starts[item], mesh, level, leaves[item], reference)
