@@ -30,7 +30,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.jit import inline
+from engine.jit import inline, merged
 from engine.lanes.lanes import aligned, any_of, bits_of, count_bits, dot, greater, lesser, load, prefetch
 from engine.lanes.tracing import LANES, Lanes, Number, Rows, traced
 from engine.types import UNDECIDED
@@ -105,6 +105,17 @@ def group_parity(groups: Rows, group: int, x: Number, y: Number, z: Number) -> i
     is_crossed = (side < -BAND) & ((least > BAND) | (most < -BAND))
     is_apart = (side > BAND) | ((least < -BAND) & (most > BAND))
     return (count_bits(bits_of(is_crossed)) & 1) | any_of(~(is_apart | is_crossed)) * UNDECIDED
+
+
+@merged
+def parity_across(groups: Any, group: int, wx: Any, wy: Any, wz: Any) -> int:
+    """Return the parity of the segment from the reference point to w, over all groups of a leaf, plus UNDECIDED."""
+    parity = group_parity(groups, group, wx, wy, wz)
+    while groups[group, ROWS - 1, 0] == 0.0:  # bound: the last group of each leaf says so
+        group += 1
+        found = group_parity(groups, group, wx, wy, wz)
+        parity = ((parity ^ found) & 1) | ((parity | found) & UNDECIDED)
+    return parity
 
 
 def planes_of(groups: Rows, group: int, point: Sequence[Lanes]) -> tuple[Lanes, Lanes, Lanes]:

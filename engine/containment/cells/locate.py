@@ -21,7 +21,7 @@ from engine.containment.cells.lattice import LEVELS, PARTS, finest, parts_of, re
 from engine.containment.posed.filters import NOT_FINITE, has_not_finite
 from engine.jit import allocating_kernel, called, inline, merged
 from engine.lanes.addresses import int8_at
-from engine.lanes.cells import ROWS, group_parity, prefetch_group
+from engine.lanes.cells import parity_across, prefetch_group
 from engine.predicates.vectors import as_point3
 from engine.types import UNDECIDED
 
@@ -104,17 +104,6 @@ def _descend(cells: Any, kept_points: Any, n_waiting: Any, level: int, locations
         waiting[n_left] = kept
         n_left += np.uint64(code >= 0)
     return n_left
-
-
-@merged
-def parity_across(groups: Any, group: int, wx: Any, wy: Any, wz: Any) -> int:
-    """Return the parity of the segment from the reference point to w, over all groups of a leaf, plus UNDECIDED."""
-    parity = group_parity(groups, group, wx, wy, wz)
-    while groups[group, ROWS - 1, 0] == 0.0:  # bound: the last group of each leaf says so
-        group += 1
-        found = group_parity(groups, group, wx, wy, wz)
-        parity = ((parity ^ found) & 1) | ((parity | found) & UNDECIDED)
-    return parity
 
 
 @merged

@@ -22,7 +22,7 @@ from engine.containment.cells.lattice import (
     scaled_difference,
 )
 from engine.jit import inline, kernel
-from engine.lanes.cells import ROWS, group_parity, set_entry, set_nothing
+from engine.lanes.cells import ROWS, parity_across, set_entry, set_nothing
 from engine.lanes.tracing import LANES
 from engine.predicates.vectors import corners_of
 from engine.types import UNDECIDED
@@ -72,11 +72,8 @@ def reference_points(lattice: Any, places: Any, level: int, points: Any, is_vali
 
 
 @inline
-def _fill_groups(groups: Any, first_group: int, mesh: Any, level: Any, cell: int, reference: Any) -> int:
-    """Write the groups of a cell's triangles about its reference point, in units of the cells of its level.
-
-    Returns how many they are.
-    """
+def _fill_groups(groups: Any, first_group: int, mesh: Any, level: Any, cell: int, reference: Any) -> None:
+    """Write the groups of a cell's triangles about its reference point, in units of the cells of its level."""
     scale, parts = mesh.lattice.scale, parts_of(level.depth)
     first, last = level.firsts[cell], level.firsts[cell + 1]
     n_groups = (last - first + LANES - 1) // LANES
@@ -93,19 +90,6 @@ def _fill_groups(groups: Any, first_group: int, mesh: Any, level: Any, cell: int
             scaled_difference(c, reference, scale, parts), scaled_difference(b, a, scale, parts),
             scaled_difference(c, a, scale, parts),
         )  # fmt: skip
-    return n_groups
-
-
-@inline
-def _across(groups: Any, n_groups: int, w: Any, status: int) -> int:
-    """Return the status of a point w from that of the reference point of the groups, UNKNOWN where they cannot tell."""
-    wx, wy, wz = np.float32(w[0]), np.float32(w[1]), np.float32(w[2])
-    parity = 0
-    for group in range(n_groups):
-        parity ^= group_parity(groups, group, wx, wy, wz)
-        if parity & UNDECIDED:
-            return UNKNOWN
-    return -status if parity & 1 else status
 
 
 @kernel
@@ -123,7 +107,7 @@ def locate_parts(mesh: Any, level: Any, parents: Any, counts: Any, groups: Any, 
         cell, first = parents[parent], parent * PARTS
         x0, y0, z0 = level.places[cell, 0], level.places[cell, 1], level.places[cell, 2]
         reference = reference_point(lattice, x0, y0, z0, level.depth)
-        n_groups = _fill_groups(groups, 0, mesh, level, cell, reference)
+        _fill_groups(groups, 0, mesh, level, cell, reference)
         for part in range(PARTS):
             before = _empty_before(counts, first, part, SPLIT, SPLIT) if counts[first + part] == 0 else -1
             if before >= 0:
@@ -133,7 +117,8 @@ def locate_parts(mesh: Any, level: Any, parents: Any, counts: Any, groups: Any, 
             point, status = reference_point(lattice, x, y, z, below), UNKNOWN
             if level.statuses[cell] != UNKNOWN and _is_in_cell(lattice, point, x, y, z, shift):
                 w = scaled_difference(point, reference, lattice.scale, parts)
-                status = _across(groups, n_groups, w, level.statuses[cell])
+                parity = parity_across(groups, 0, np.float32(w[0]), np.float32(w[1]), np.float32(w[2]))
+                status = UNKNOWN if parity & UNDECIDED else level.statuses[cell] * (1 - 2 * parity)
             found[first + part] = status
 
 

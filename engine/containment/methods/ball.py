@@ -19,7 +19,8 @@ from typing import Any, Final
 
 from engine.containment.posed.filters import NOT_FINITE, has_not_finite
 from engine.jit import called, inline, kernel, merged
-from engine.predicates.error_free import two_diff, two_prod, two_sum, workspace
+from engine.predicates.error_free import two_diff, workspace
+from engine.predicates.expansion import grow_product, sign
 from engine.types import UNDECIDED
 
 _SLACK: Final = 16.0 * 2.0**-53
@@ -28,26 +29,6 @@ _SMALLEST: Final = 2.0**-480
 _LARGEST: Final = 2.0**500
 _BLOCK: Final = 64
 """Points looked at together: four numbers each stay in the nearest cache."""
-
-
-@inline
-def _grow(expansion: Any, length: int, value: float) -> int:
-    """Add `value` to the expansion of `length` components held in the workspace, exactly; return the new length."""
-    for component in range(length):
-        value, expansion[component] = two_sum(value, expansion[component])
-    expansion[length] = value
-    return length + 1
-
-
-@inline
-def _add_square(expansion: Any, length: int, value: float, sign: float) -> int:
-    """Add sign * value^2 exactly; returns -1 where the square is no exact pair."""
-    if value == 0.0 or length < 0:
-        return length
-    if not _SMALLEST < abs(value) < _LARGEST:
-        return -1
-    high, low = two_prod(value, value)
-    return _grow(expansion, _grow(expansion, length, sign * low), sign * high)
 
 
 @merged
@@ -61,20 +42,23 @@ def located(dx: float, dy: float, dz: float, square: float, reach: float, blur: 
     return -1.0 if is_out else (1.0 if excess > bound else 2.0)
 
 
+@inline
+def _has_exact_square(value: float) -> bool:
+    return value == 0.0 or _SMALLEST < abs(value) < _LARGEST
+
+
 @called
 def _settle(points: Any, item: int, center: Any, radius: float, expansion: Any) -> int:
     """Return the location by exact sums; UNDECIDED where differences or squares are no exact pairs."""
-    length = _add_square(expansion, 0, radius, 1.0)
+    if not _has_exact_square(radius):
+        return UNDECIDED
+    n = grow_product(expansion, 0, radius, radius)
     for axis in range(len(center)):
         high, low = two_diff(points[item, axis], center[axis])
-        length = _add_square(expansion, length, high, -1.0) if low == 0.0 else -1
-    if length < 0:
-        return UNDECIDED
-    sign = 0
-    for component in range(length):  # the last component that is not zero outweighs all before it
-        if expansion[component] != 0.0:
-            sign = 1 if expansion[component] > 0.0 else -1
-    return sign
+        if low != 0.0 or not _has_exact_square(high):
+            return UNDECIDED
+        n = grow_product(expansion, n, -high, high)
+    return sign(expansion, n)
 
 
 @kernel
