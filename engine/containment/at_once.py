@@ -14,11 +14,11 @@ import numpy as np
 
 from engine.arrays import FloatArray, Int8Array
 from engine.budget import UNLIMITED, Budget
-from engine.containment.locators import Counts, locator_of, polygon_by, polyhedron_by
+from engine.containment.locators import Counts, locator_of, polygon_by, polyhedron_by, rational_half, settle
 from engine.containment.policy import CELLS, LISTS, PASS, choose_for_mesh, choose_for_rings
 from engine.containment.posed.filters import NOT_FINITE
 from engine.containment.posed.locators import posed_locator
-from engine.containment.rational_locate import combine, over_tree, rational_location
+from engine.containment.rational_locate import combine, over_tree
 from engine.direct import entry_of
 from engine.errors import EngineError, NotFiniteError
 from engine.solids.base import Solid
@@ -86,10 +86,8 @@ def located_at_once(points: object, solid: Solid) -> Located | None:
 def _settled(array: Any, solid: Solid, locations: Int8Array, n_beyond: int, method: str) -> Located:
     if n_beyond == NOT_FINITE:
         check_finite(array, ("points",))
-    undecided = np.flatnonzero(locations == UNDECIDED)
-    for item in undecided:
-        locations[item] = rational_location(array[item].tolist(), solid)
-    return locations, n_beyond, len(undecided), method
+    rest = np.flatnonzero(locations == UNDECIDED)
+    return locations, n_beyond, settle(rational_half(solid), array, locations, rest, UNLIMITED), method
 
 
 def _in_cells(array: Any, solid: Solid) -> Located:

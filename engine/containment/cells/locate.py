@@ -126,14 +126,6 @@ def ask_leaves(points: Any, cells: Any, kept_points: Any, n_waiting: Any, locati
         locations[item] = UNDECIDED if parity & UNDECIDED else ((code ^ (parity << 1)) & 2) - 1
 
 
-@inline
-def _count_open(locations: Any, item_of: Any, n_kept: Any) -> int:
-    n_open = 0
-    for kept in range(n_kept):
-        n_open += locations[item_of[kept]] == UNDECIDED
-    return n_open
-
-
 @allocating_kernel
 def locate_by_cells(points: Any, cells: Any, locations: Any, flag: Any) -> int:
     """Fill `locations` (n,) int8 for points (n, 3) from a `Cells`; returns how many are left UNDECIDED.
@@ -160,7 +152,8 @@ def locate_by_cells(points: Any, cells: Any, locations: Any, flag: Any) -> int:
         for level in range(1, cells.n_levels):
             n_waiting = _descend(cells, kept_points, n_waiting, level, locations)
         ask_leaves(points, cells, kept_points, n_waiting, locations)
-        n_open += _count_open(locations, item_of, n_kept)
+        for kept in range(n_kept):
+            n_open += locations[item_of[kept]] == UNDECIDED
         n_kept = np.uint64(0)
     return n_open
 
