@@ -10,7 +10,6 @@ import ctypes
 from typing import Any
 
 import numpy as np
-from llvmlite import ir
 from numba import config as numba_config
 from numba import types
 from numba.core import cgutils
@@ -46,21 +45,3 @@ def _array_intrinsic(typing_context: Any, address: Any, shape: Any, dtype: Any) 
 
 
 array_at: Any = plain_array_at if numba_config.DISABLE_JIT else intrinsic(_array_intrinsic)
-
-
-def plain_int8_at(address: int, place: int) -> int:
-    """Return one number of the int8 array that begins at `address`, without an array."""
-    return ctypes.c_int8.from_address(int(address) + int(place)).value
-
-
-def _int8_intrinsic(typing_context: Any, address: Any, place: Any) -> Any:
-    """Return what `plain_int8_at` does."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        there = builder.inttoptr(builder.add(*arguments), ir.IntType(8).as_pointer())
-        return builder.sext(builder.load(there), ir.IntType(64))
-
-    return types.int64(types.int64, types.int64), generate
-
-
-int8_at: Any = plain_int8_at if numba_config.DISABLE_JIT else intrinsic(_int8_intrinsic)

@@ -20,7 +20,7 @@ import numpy as np
 from engine.containment.cells.lattice import LEVELS, PARTS, finest, parts_of, reference_point, scaled_difference
 from engine.containment.posed.filters import NOT_FINITE, has_not_finite
 from engine.jit import allocating_kernel, called, inline, merged
-from engine.lanes.addresses import int8_at
+from engine.lanes.addresses import array_at
 from engine.lanes.cells import parity_across, prefetch_group
 from engine.predicates.vectors import as_point3
 from engine.types import UNDECIDED
@@ -187,4 +187,4 @@ def side_in_cell(frames: Any, places: Any, row: int, p: Any, blur: float) -> int
         is_one &= _index(z - blur, z_low, z_scale) == _index(z + blur, z_low, z_scale)
         if not is_one:
             return UNDECIDED
-    return int(int8_at(address, (layer * ny + line) * nx + column))
+    return int(array_at(address, (nx * ny * nz,), np.int8)[(layer * ny + line) * nx + column])

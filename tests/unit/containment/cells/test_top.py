@@ -12,7 +12,7 @@ from engine.budget import Budget
 from engine.containment.cells.locate import side_in_cell
 from engine.containment.cells.top import TopCells, build_top_cells, can_have_cells
 from engine.jit import kernel
-from engine.lanes.addresses import array_at, plain_array_at, plain_int8_at
+from engine.lanes.addresses import array_at, plain_array_at
 from engine.types import UNDECIDED
 from tests.unit.containment.scenes import box_mesh, made, merged
 
@@ -68,5 +68,3 @@ def test_an_array_by_its_address() -> None:
     assert plain_array_at(values.ctypes.data, (2, 3), np.float64).tolist() == [[0, 1, 2], [3, 4, 5]]
     assert plain_array_at(values.ctypes.data, (0,), np.float64).tolist() == []
     assert _first_of(values.ctypes.data) == 5.0
-    bytes_ = np.array([1, -1, 2], np.int8)
-    assert [plain_int8_at(bytes_.ctypes.data, place) for place in range(3)] == [1, -1, 2]
