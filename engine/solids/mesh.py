@@ -28,7 +28,7 @@ from engine.errors import (
 from engine.solids.base import Solid
 from engine.solids.checks import as_points, check_not_empty, digits, frozen, shown
 from engine.solids.ear_cutting import cut_faces
-from engine.solids.mesh_checks import first_unbalanced, look_over
+from engine.solids.mesh_checks import look_over
 
 _AT_ONCE: Final = 1 << 15
 """Faces of a list looked at between two looks at the clock."""
@@ -65,15 +65,15 @@ class Mesh(Solid):
         budget.check()
         offsets = np.arange(0, len(indices) + 1, 3) if given is None else given
         merged = np.empty(len(indices), np.int64)
+        named = np.full((_N_NAMED, 5), -1)
         i_face, n_different, n_odd, n_turned = entry_of(look_over)(
-            points.view(np.uint64), offsets, indices, self._must_close, merged, budget.flag
+            points.view(np.uint64), offsets, indices, self._must_close, merged, named, budget.flag
         )
         budget.check()
         if i_face >= 0:
             raise _repeated_index(i_face, indices[offsets[i_face] : offsets[i_face + 1]])
         triangles, triangle_faces = indices if n_different == len(points) else merged, None
         if n_odd + n_turned > 0:
-            named = first_unbalanced(offsets, triangles, n_odd > 0, _N_NAMED)
             raise _unbalanced_edges(points, indices, named, n_odd, n_turned)
         if given is not None:
             triangles, triangle_faces = cut_faces(points, offsets, indices, triangles, budget)
@@ -211,7 +211,8 @@ def first_equal(points: FloatArray) -> IntArray | None:
     n = len(points)
     every, first = np.arange(n), np.empty(n, np.int64)
     one_face, no_flag = np.array([0, n]), np.zeros(1, np.uint8)
-    n_different = entry_of(look_over)(points.view(np.uint64), one_face, every, False, first, no_flag)[1]
+    none = np.empty((0, 5), np.int64)
+    n_different = entry_of(look_over)(points.view(np.uint64), one_face, every, False, first, none, no_flag)[1]
     return None if n_different == n else first
 
 
@@ -240,7 +241,7 @@ def _unbalanced_edges(
         f"edge {indices[corner]}-{indices[following]} of face {face}, "
         f"from {digits(vertices[indices[corner]])} to {digits(vertices[indices[following]])}, "
         f"used {forth} times in this direction and {back} in the other"
-        for face, corner, following, forth, back in named.tolist()
+        for face, corner, following, forth, back in named[named[:, 0] >= 0].tolist()
     ]
     more = "; ..." if n > len(lines) else ""
     return kind(f"{n} edges {claim}: {'; '.join(lines)}{more}; {advice}", ("faces", int(named[0, 0])))

@@ -10,9 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.arrays import IntArray
 from engine.jit import allocating, allocating_kernel, called, inline
-from engine.solids.ragged import next_in_rings, within
 
 _POLL: Final = 0x3FFF
 """Items between two looks at the flag, one less than a power of two: a fraction of a millisecond."""
@@ -21,6 +19,8 @@ _ODD: Final = np.uint64(0x9E3779B97F4A7C15)
 _ODD_TOO: Final = np.uint64(0xBF58476D1CE4E5B9)
 """Constants of splitmix64; products wrap around."""
 _HALF: Final = np.uint64(32)
+_ODD_USES: Final = 1
+_TURNED: Final = 2
 
 
 @inline
@@ -115,10 +115,10 @@ def _group_edges(offsets: Any, indices: Any, starts: Any, ends: Any, flag: Any) 
 
 
 @allocating
-def _count_unbalanced(starts: Any, ends: Any, flag: Any) -> tuple[int, int]:
+def _count_unbalanced(starts: Any, ends: Any, marks: Any, flag: Any) -> tuple[int, int]:
     """Return how many edges are used an odd number of times, and how many others more often in one direction.
 
-    starts, ends: from `_group_edges`.
+    starts, ends: from `_group_edges`. marks: int8, set to _ODD_USES or _TURNED at every use of such edges, else 0.
     """
     uses, n_odd, n_turned = np.zeros(starts.shape[0], np.int64), 0, 0
     for low in range(starts.shape[0] - 2):
@@ -131,6 +131,9 @@ def _count_unbalanced(starts: Any, ends: Any, flag: Any) -> tuple[int, int]:
             else:
                 uses[~end] -= 1
         for place in range(starts[low], starts[low + 1]):
+            net = uses[max(ends[place], ~ends[place])]
+            marks[place] = 0 if net == 0 else _ODD_USES if net & 1 == 1 else _TURNED
+        for place in range(starts[low], starts[low + 1]):
             high = max(ends[place], ~ends[place])
             if uses[high] & 1 == 1:
                 n_odd += 1
@@ -140,14 +143,49 @@ def _count_unbalanced(starts: Any, ends: Any, flag: Any) -> tuple[int, int]:
     return n_odd, n_turned
 
 
+@allocating
+def _name_unbalanced(
+    offsets: Any, corners: Any, starts: Any, ends: Any, marks: Any, wanted: int, named: Any, flag: Any
+) -> None:
+    """Set `named` (k, 5) to the first edges that are marked so: the face and the corner where the edge is used first,
+    the next corner, how often it is used in this direction and in the other."""
+    places = np.empty_like(starts)
+    for vertex in range(len(starts)):
+        places[vertex] = starts[vertex]
+    n_named = 0
+    for face in range(offsets.shape[0] - 1):
+        if face & _POLL == 0 and flag[0] != 0:
+            return
+        for corner in range(offsets[face], offsets[face + 1]):
+            following = _following(offsets, face, corner)
+            start, end = corners[corner], corners[following]
+            low, high = min(start, end), max(start, end)
+            place = places[low]
+            if start != end:
+                places[low] += 1  # the uses of its edges stand in the order of the faces
+            if start != end and marks[place] == wanted:
+                up, down = 0, 0
+                for other in range(starts[low], starts[low + 1]):
+                    up += ends[other] == high
+                    down += ends[other] == ~high
+                    if ends[other] == high or ends[other] == ~high:
+                        marks[other] = 0  # named once
+                named[n_named, 0], named[n_named, 1], named[n_named, 2] = face, corner, following
+                named[n_named, 3], named[n_named, 4] = (up, down) if start == low else (down, up)
+                n_named += 1
+                if n_named == named.shape[0]:
+                    return
+
+
 @allocating_kernel
 def look_over(
-    bits: Any, offsets: Any, indices: Any, must_close: bool, merged: Any, flag: Any
+    bits: Any, offsets: Any, indices: Any, must_close: bool, merged: Any, named: Any, flag: Any
 ) -> tuple[int, int, int, int]:
     """Return the first face that names a vertex twice (-1: none), the number of different vertices, and what
     `_count_unbalanced` does (0, 0 unless each edge must be used equally often in both directions).
 
     bits: the vertices (n, 3) uint64. merged: set to the first of all equal vertices at each corner, if two are equal.
+    named: set by `_name_unbalanced`, of the first kind that there is.
     """
     n = bits.shape[0]
     repeated = _find_repeat(offsets, indices, n, flag)
@@ -165,23 +203,8 @@ def look_over(
     corners = merged if n_different < n else indices
     starts, ends = np.zeros(n + 2, np.int64), np.empty(indices.shape[0], np.int64)
     _group_edges(offsets, corners, starts, ends, flag)
-    n_odd, n_turned = _count_unbalanced(starts, ends, flag)
+    marks = np.empty(indices.shape[0], np.int8)
+    n_odd, n_turned = _count_unbalanced(starts, ends, marks, flag)
+    if n_odd + n_turned > 0:
+        _name_unbalanced(offsets, corners, starts, ends, marks, _ODD_USES if n_odd > 0 else _TURNED, named, flag)
     return -1, n_different, n_odd, n_turned
-
-
-def first_unbalanced(offsets: IntArray, corners: IntArray, are_odd: bool, n_most: int) -> IntArray:
-    """Return the first edges that are not used equally often in both directions, or used an odd number of times: rows
-    of the face and the corner where one is used first, the next corner, how often in this direction and in the other.
-
-    Some 50 ns an edge: only a mesh that is refused is looked at so closely.
-    """
-    following = next_in_rings(offsets)
-    starts, ends = corners, corners[following]
-    keys = np.minimum(starts, ends) * (corners.max() + 1) + np.maximum(starts, ends)
-    _, firsts, edges = np.unique(keys, return_index=True, return_inverse=True)
-    ups, downs = (np.bincount(edges[each], minlength=len(firsts)) for each in (starts < ends, starts > ends))
-    net = ups - downs
-    found = np.sort(firsts[net % 2 == 1 if are_odd else net != 0])[:n_most]
-    up, down = ups[edges[found]], downs[edges[found]]
-    uses = np.where(starts[found] < ends[found], (up, down), (down, up))
-    return np.column_stack([within(offsets, found), found, following[found], *uses])

@@ -14,15 +14,15 @@ from engine.direct import entry_of
 from engine.solids import mesh_checks
 from engine.solids.checks import frozen
 from engine.solids.mesh import first_equal
-from engine.solids.mesh_checks import first_unbalanced, look_over
+from engine.solids.mesh_checks import look_over
 
 STILL = np.zeros(1, np.uint8)
 
 
-def looked_over(points: Any, offsets: Any, indices: Any, flag: Any = STILL) -> tuple[Any, list[int]]:
-    merged, bits = np.array(indices), frozen(points).view(np.uint64)
-    found = entry_of(look_over)(bits, np.asarray(offsets), np.asarray(indices), True, merged, flag)
-    return found, merged.tolist()
+def looked_over(points: Any, offsets: Any, indices: Any, flag: Any = STILL) -> tuple[Any, list[int], Any]:
+    merged, named, bits = np.array(indices), np.full((3, 5), -1), frozen(points).view(np.uint64)
+    found = entry_of(look_over)(bits, np.asarray(offsets), np.asarray(indices), True, merged, named, flag)
+    return found, merged.tolist(), named
 
 
 def test_equal_rows() -> None:
@@ -60,7 +60,7 @@ def test_edges_against_a_count() -> None:
         corners = [[first[corner] for corner in face] for face in faces]
         uses = Counter(edge for face in corners for edge in zip(face, face[1:] + face[:1]) if edge[0] != edge[1])
         balance = {(a, b): uses[a, b] - uses[b, a] for a in range(n_vertices) for b in range(a + 1, n_vertices)}
-        found, merged = looked_over(points, offsets, indices)
+        found, merged, named = looked_over(points, offsets, indices)
         if any(repeated):
             assert found == (repeated.index(True), n_vertices, 0, 0)
             continue
@@ -72,16 +72,20 @@ def test_edges_against_a_count() -> None:
             for edge in uses
             if (balance[min(edge), max(edge)] % 2 if n_odd else balance[min(edge), max(edge)])
         )
-        named = first_unbalanced(offsets, np.array(merged), n_odd > 0, 3).tolist()
-        assert [tuple(sorted((merged[a], merged[b]))) for _, a, b, _, _ in named] == list(kept)[:3]
-        for face, a, b, forth, back in named:
-            assert (uses[merged[a], merged[b]], uses[merged[b], merged[a]]) == (forth, back)
-            assert b == (a + 1 if a + 1 < offsets[face + 1] else offsets[face])
+        assert [(min(edge), max(edge)) for edge in edges_of(named, merged)] == list(kept)[:3]
+        for edge, (forth, back) in edges_of(named, merged).items():
+            assert (uses[edge], uses[edge[::-1]]) == (forth, back)
+
+
+def edges_of(named: Any, merged: list[int]) -> dict[tuple[int, int], tuple[int, int]]:
+    return {(merged[a], merged[b]): (forth, back) for face, a, b, forth, back in named.tolist() if face >= 0}
 
 
 def test_a_raised_flag_ends_every_kernel() -> None:
     raised, offsets, indices = np.ones(1, np.uint8), np.array([0, 3, 6]), np.array([0, 1, 0, 0, 1, 2])
-    assert looked_over(np.zeros((3, 3)), offsets, indices, raised) == ((-1, 3, 0, 0), indices.tolist())
+    found, merged, named = looked_over(np.zeros((3, 3)), offsets, indices, raised)
+    assert (found, merged) == ((-1, 3, 0, 0), indices.tolist())
+    assert (named == -1).all()
 
 
 def test_faults_far_inside_a_large_mesh_are_named() -> None:
