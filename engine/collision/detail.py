@@ -17,7 +17,7 @@ from engine.arrays import FloatArray, Int8Array, IntArray
 from engine.budget import Budget
 from engine.collision.codes import UNSETTLED
 from engine.collision.exact_images import image_half_space, image_point, value_at
-from engine.collision.meshes.live_faces import live_piece
+from engine.collision.meshes.live_faces import live_parts
 from engine.collision.meshes.mesh_arrays import mesh_body_of
 from engine.collision.meshes.mesh_detail import mesh_parts
 from engine.collision.planar.outline import (
@@ -124,7 +124,7 @@ def _has_interior(solid: Solid, budget: Budget) -> bool:
     if solid.dimension == 2:
         return bool(live_edges(outline_of(solid, None, budget), budget))
     mesh = mesh_body_of(solid)
-    return mesh.has_inside and any(live_piece(mesh, face, budget) is not None for face in range(len(mesh.faces)))
+    return mesh.has_inside and any(any(live_parts(mesh, face, budget)) for face in range(len(mesh.faces)))
 
 
 def _sphere_sphere(first: Sphere, second: Sphere, poses: Poses, work: Work) -> Parts:

@@ -141,14 +141,20 @@ def regions_of(
 
     only: a side of the face's plane and the faces that meet the face, where what lies on that side is all that counts.
     """
-    corners, plane, axis = body.corners(face), body.plane(face), body.axis(face)
     traces = _traces(body, face, cutters, budget, only)
     if not traces:
-        yield next(points_within(corners))
-        return
-    own = [_segment(without_axis(corners[i], axis), without_axis(corners[i - 2], axis)) for i in range(3)]
-    for x, y in _samples(own, traces, budget):
-        yield _lifted(x, y, plane, axis)
+        yield next(points_within(body.corners(face)))
+    for (x, y), _ in _samples(body, face, traces, budget) if traces else ():
+        yield _lifted(x, y, body.plane(face), body.axis(face))
+
+
+def cells_of(body: ExactBody, face: int, budget: Budget) -> Iterator[tuple[Homogeneous, list[Homogeneous]]]:
+    """Yield a point within and the corners of each of convex cells that fill a face with area, between the traces of
+    the other faces of its body."""
+    plane, axis = body.plane(face), body.axis(face)
+    for (x, y), (x0, x1, low, high) in _samples(body, face, _traces(body, face, [body], budget, None), budget):
+        corners = (x0, _height(low, x0)), (x1, _height(low, x1)), (x1, _height(high, x1)), (x0, _height(high, x0))
+        yield _lifted(x, y, plane, axis), [_lifted(*corner, plane, axis) for corner in corners]
 
 
 def _lifted(x: Rational, y: Rational, plane: Plane, axis: int) -> Homogeneous:
@@ -194,9 +200,11 @@ def _trace(points: Corners, values: list[int], axis: int) -> list[tuple[Rational
 
 
 def _samples(
-    own: list[tuple[Rational2, Rational2]], traces: list[tuple[Rational2, Rational2]], budget: Budget
-) -> Iterator[Rational2]:
-    """Yield a point in every region that `traces` cut from the triangle with the edges `own`."""
+    body: ExactBody, face: int, traces: list[tuple[Rational2, Rational2]], budget: Budget
+) -> Iterator[tuple[Rational2, _Cell]]:
+    """Yield a point in every region that `traces` cut from a face, projected along its axis, and the cell around it."""
+    corners = [without_axis(corner, body.axis(face)) for corner in body.corners(face)]
+    own = [_segment(corners[i], corners[i - 2]) for i in range(3)]
     left, right = min(p[0] for p, _ in own), max(q[0] for _, q in own)
     segments = [_on_line(s) for s in sorted({*own, *traces}) if s[0][0] <= right and s[1][0] >= left]
     stops = {end[0] for s in segments for end in s.ends if left <= end[0] <= right}
@@ -214,9 +222,9 @@ def _samples(
         x = Fraction(x0 + x1, 2)
         ends = [_height(s, x) for s in edges if s.ends[0][0] < x < s.ends[1][0]]
         low, high = min(ends), max(ends)
-        heights = {_height(s, x) for s in segments if s.ends[0][0] < x < s.ends[1][0]}
+        heights = {_height(s, x): s for s in segments if s.ends[0][0] < x < s.ends[1][0]}
         for y0, y1 in pairwise(sorted(y for y in heights if low <= y <= high)):
-            yield x, (y0 + y1) / 2
+            yield (x, (y0 + y1) / 2), (x0, x1, heights[y0], heights[y1])
 
 
 class _Segment(NamedTuple):
@@ -235,7 +243,11 @@ def _on_line(ends: tuple[Rational2, Rational2]) -> _Segment:
     return _Segment(ends, left, right, cross(left, right))
 
 
-def _height(s: _Segment, x: Fraction) -> Fraction:
+_Cell = tuple[Rational, Rational, _Segment, _Segment]
+"""Between two abscissas and two segments that do not cross there."""
+
+
+def _height(s: _Segment, x: Rational) -> Fraction:
     a, b, c = s.line
     return Fraction(-(a * x.numerator + c * x.denominator), b * x.denominator)
 

@@ -156,7 +156,7 @@ def _candidates(nearest: FloatArray, limit: Fraction) -> IntArray:
 
 def _enters(boundary: Boundary, faces: IntArray, center: Vector, limit: Fraction) -> bool:
     """Tell whether something live of these faces comes nearer to the centre than a squared distance."""
-    return len(faces) > 0 and boundary.has_live(faces, lambda piece: piece.squared_distance(center) < limit)
+    return len(faces) > 0 and boundary.has_live(faces, lambda corners: simplex_distance(center, corners) < limit)
 
 
 def _is_within_walls(body: Solid, pose: Pose | None, center: Vector, radius: float, work: Work) -> bool:
@@ -206,11 +206,15 @@ def body_sphere_parts(body: Solid, ball: Sphere, poses: Poses, work: Work) -> Pa
     ball_sticks_out = _enters(boundary, candidates, center, limit)
     beyond = np.flatnonzero(farthest >= rounded(limit) * (1.0 - 2.0**-50) - 2.0**-1000)
     beyond = beyond[np.argsort(-nearest[beyond], kind="stable")]
-    body_sticks_out = boundary.has_live(beyond, lambda piece: piece.farthest(center) > limit)
+    body_sticks_out = boundary.has_live(beyond, lambda corners: _farthest(center, corners) > limit)
     meet = ball_sticks_out and body_sticks_out
     if not meet:
         meet = any(  # of a face, some part is as near as the sphere, and some corner as far
-            simplex_distance(center, corners) <= limit <= max(squared_length(minus(p, center)) for p in corners)
+            simplex_distance(center, corners) <= limit <= _farthest(center, corners)
             for corners in map(boundary.corners, np.intersect1d(candidates, beyond).tolist())
         )
     return Parts(body_sticks_out, ball_sticks_out, meet)
+
+
+def _farthest(center: Vector, corners: tuple[Vector, ...]) -> Fraction:
+    return max(squared_length(minus(p, center)) for p in corners)

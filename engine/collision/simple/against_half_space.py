@@ -129,7 +129,7 @@ def _side_of_box(function: _Function, body: Solid) -> int:
 
 def _reaches(boundary: Boundary, faces: IntArray, plane: HalfSpaceImage, side: int) -> bool:
     """Tell whether something live of these faces lies on one side, 1 or -1, of a plane."""
-    return boundary.has_live(faces, lambda piece: any(side * value_at(plane, p) > 0 for p in piece.vertices()))
+    return boundary.has_live(faces, lambda corners: any(side * value_at(plane, p) > 0 for p in corners))
 
 
 def half_space_body_parts(space: HalfSpace, body: Solid, poses: Poses, work: Work) -> Parts:

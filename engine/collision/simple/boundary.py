@@ -12,7 +12,7 @@ from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray
 from engine.collision.exact_images import HalfSpaceImage, Vector, as_vector, image_map, rounded, value_at
 from engine.collision.meshes.exact_body import exact_pair, faces_in
 from engine.collision.meshes.exact_regions import sides_at
-from engine.collision.meshes.live_faces import LivePiece, live_piece
+from engine.collision.meshes.live_faces import live_parts
 from engine.collision.meshes.mesh_arrays import mesh_body_of
 from engine.collision.planar.outline import is_clean, live_edges, outline_of
 from engine.collision.result import Work
@@ -52,7 +52,8 @@ class Boundary:
     ends: (n, d) the vertices of each face or edge. floats: of a place in it the rounded posed vertices, each number
     within `error` of the exact one. near: all faces that come as near to a point as a radius, ascending, and maybe
     others. exact: the position of a vertex. number, number_at: the caller's number of a face, and of one at a vertex.
-    signs: of a plane at each vertex. live: what even-odd leaves of faces; of an outline maybe of other edges too.
+    signs: of a plane at each vertex. live: what even-odd leaves of faces, the corners of triangles; of edges their ends,
+    maybe of others too.
     is_inside: whether a point on no face lies in the body. has_inside: False for surfaces and flat boxes.
     """
 
@@ -64,7 +65,7 @@ class Boundary:
     number: Callable[[int], int]
     number_at: Callable[[int], int]
     signs: Callable[[HalfSpaceImage], Int8Array]
-    live: Callable[[list[int]], Iterator[LivePiece]]
+    live: Callable[[list[int]], Iterator[tuple[Vector, ...]]]
     is_inside: Callable[[Vector], bool]
     has_inside: bool
 
@@ -89,8 +90,8 @@ class Boundary:
         """Return the faces with a corner among the vertices chosen."""
         return np.flatnonzero(reduce(np.logical_or, is_chosen[self.ends.T]))
 
-    def has_live(self, faces: IntArray, condition: Callable[[LivePiece], bool]) -> bool:
-        """Tell whether a condition holds for something live of these faces."""
+    def has_live(self, faces: IntArray, condition: Callable[[tuple[Vector, ...]], bool]) -> bool:
+        """Tell whether a condition holds for a live part of these faces, given by its corners."""
         return any(map(condition, self.live(faces.tolist())))
 
 
@@ -119,12 +120,11 @@ def _mesh_boundary(body: Solid, pose: Pose | None, work: Work) -> Boundary:
         exact, _ = exact_pair(mesh, mesh, (pose, pose))
         return mesh.has_inside and sides_at(exact, exact.at(center), 2).at
 
-    def live(faces: list[int]) -> Iterator[LivePiece]:
+    def live(faces: list[int]) -> Iterator[tuple[Vector, ...]]:
         for face in faces:
             work.budget.check()
-            piece = live_piece(mesh, face, work.budget)
-            if piece is not None:
-                yield piece if pose is None else piece.moved(image)
+            for corners in live_parts(mesh, face, work.budget):
+                yield corners if pose is None else tuple(map(image, corners))
 
     return Boundary(
         triangles, floats, error, near, lambda vertex: image(vertices[vertex].tolist()),
@@ -137,12 +137,12 @@ def _mesh_boundary(body: Solid, pose: Pose | None, work: Work) -> Boundary:
 def _outline_boundary(body: Solid, pose: Pose | None, work: Work) -> Boundary:
     outline = outline_of(body, pose, work.budget)
 
-    def live(edges: list[int]) -> Iterator[LivePiece]:
+    def live(edges: list[int]) -> Iterator[tuple[Vector, ...]]:
         for edge in edges:
             work.budget.check()
             if is_clean(outline, edge):
-                yield LivePiece(outline.edge(edge), None)
-        yield from (LivePiece(ends, None) for ends in live_edges(outline, work.budget))
+                yield outline.edge(edge)
+        yield from live_edges(outline, work.budget)
 
     error = 2.0**-52 * float(np.abs(outline.floats).max()) + 2.0**-1074
     return Boundary(
