@@ -13,7 +13,7 @@ from engine.budget import Budget
 from engine.collision.clearance.bodies import feature_of, radius_of, spread_of
 from engine.collision.clearance.exact import ScaledGap
 from engine.collision.clearance.forms import PLANE, scaled_gap
-from engine.collision.exact_images import Vector, image_half_space, image_map, value_at
+from engine.collision.exact_images import Vector, image_half_space, image_point, value_at
 from engine.collision.result import Feature, Poses
 from engine.collision.simple.boundary import pulled_back
 from engine.predicates.rational import squared_length
@@ -39,7 +39,7 @@ def gap_of_planes(one: Solid, other: Solid, poses: Poses, budget: Budget) -> tup
 def _foot_and_vertex(space: HalfSpace, body: Solid, poses: Poses, budget: Budget) -> tuple[Vector, Vector, Feature]:
     """Return the point of a plane and the point of a body that are nearest, and the vertex the latter is."""
     mesh, d = spread_of(body), body.dimension
-    plane, image = image_half_space(space, poses[0]), image_map(poses[1])
+    plane = image_half_space(space, poses[0])
     best: tuple[Fraction, Vector, Feature] | None = None
     (_, weights, _), points = pulled_back(plane, poses[1]), mesh.arrays.vertices[:, :d]
     with np.errstate(all="ignore"):  # the rounding is that of `signs_of`
@@ -48,7 +48,7 @@ def _foot_and_vertex(space: HalfSpace, body: Solid, poses: Poses, budget: Budget
         is_below = values + bounds < np.max(values - bounds)
     for vertex in np.flatnonzero(~is_below).tolist():
         budget.check()
-        point = image(mesh.arrays.vertices[vertex, :d].tolist())
+        point = image_point(mesh.arrays.vertices[vertex, :d].tolist(), poses[1])
         value = value_at(plane, point)
         if best is None or value >= best[0]:
             triangle, corner = np.argwhere(mesh.arrays.triangles == vertex)[0].tolist()

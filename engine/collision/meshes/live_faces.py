@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
-from itertools import chain
+from itertools import chain, pairwise
 from typing import Any
 
 from engine.budget import Budget
@@ -59,4 +59,4 @@ def live_parts(mesh: MeshBody, face: int, budget: Budget) -> Iterator[tuple[Vect
         sides = sides_at(body, middle, body.axis(face))
         if sides.above != sides.below:
             a, *others = (tuple(Fraction(x, w << mesh.shift) for x in xyz) for *xyz, w in corners)
-            yield from ((a, *pair) for pair in zip(others, others[1:]))
+            yield from ((a, *pair) for pair in pairwise(others))

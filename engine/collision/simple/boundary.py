@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import reduce
+from functools import partial, reduce
 
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray
-from engine.collision.exact_images import HalfSpaceImage, Vector, as_vector, image_map, rounded, value_at
+from engine.collision.exact_images import HalfSpaceImage, Vector, as_vector, image_point, rounded, value_at
 from engine.collision.meshes.exact_body import exact_pair, faces_in
 from engine.collision.meshes.exact_regions import sides_at
 from engine.collision.meshes.live_faces import live_parts
@@ -52,9 +52,9 @@ class Boundary:
     ends: (n, d) the vertices of each face or edge. floats: of a place in it the rounded posed vertices, each number
     within `error` of the exact one. near: all faces that come as near to a point as a radius, ascending, and maybe
     others. exact: the position of a vertex. number, number_at: the caller's number of a face, and of one at a vertex.
-    signs: of a plane at each vertex. live: what even-odd leaves of faces, the corners of triangles; of edges their ends,
-    maybe of others too.
-    is_inside: whether a point on no face lies in the body. has_inside: False for surfaces and flat boxes.
+    signs: of a plane at each vertex. live: what even-odd leaves of faces, the corners of triangles; the ends of edges,
+    maybe of others too. is_inside: whether a point on no face lies in the body. has_inside: False for surfaces and
+    flat boxes.
     """
 
     ends: IntArray
@@ -101,7 +101,7 @@ def boundary_of(body: Solid, pose: Pose | None, work: Work) -> Boundary:
 
 
 def _mesh_boundary(body: Solid, pose: Pose | None, work: Work) -> Boundary:
-    mesh, image = mesh_body_of(body), image_map(pose)
+    mesh, image = mesh_body_of(body), partial(image_point, pose=pose)
     vertices, triangles = mesh.arrays.vertices, mesh.arrays.triangles
     error = 0.0
     if pose is not None:  # the error is derived in `placement.py`
