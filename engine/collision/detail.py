@@ -17,7 +17,6 @@ from engine.arrays import FloatArray, Int8Array, IntArray
 from engine.budget import Budget
 from engine.collision.codes import UNSETTLED
 from engine.collision.exact_images import image_half_space, image_point, value_at
-from engine.collision.meshes.live_faces import live_parts
 from engine.collision.meshes.mesh_arrays import mesh_body_of
 from engine.collision.meshes.mesh_detail import mesh_parts
 from engine.collision.planar.outline import (
@@ -32,6 +31,7 @@ from engine.collision.planar.outline import (
 from engine.collision.result import BODIES, MESHES, OUTLINES, Parts, Poses, Work
 from engine.collision.simple.against_ball import body_sphere_parts
 from engine.collision.simple.against_half_space import half_space_body_parts
+from engine.collision.simple.boundary import live_parts
 from engine.containment.rational_locate import rational_location
 from engine.errors import InvalidInputError, UnsupportedSolidError
 from engine.predicates.rational import largest_axis, minus, squared_length

@@ -11,8 +11,7 @@ from engine.budget import Budget, Cancel
 from engine.collision.answers import Answers
 from engine.collision.clearance.bodies import in_space
 from engine.collision.clearance.clearance import checked_distance, do_meet, has_plane
-from engine.collision.clearance.forms import STILL2, are_small, told_under_poses
-from engine.collision.clearance.half_spaces import gap_of_planes
+from engine.collision.clearance.forms import STILL2, are_small, gap_of_planes, told_under_poses
 from engine.collision.clearance.spreads import SpreadPair
 from engine.collision.codes import DISJOINT, TOUCHING, UNSETTLED
 from engine.collision.collide import pair_function

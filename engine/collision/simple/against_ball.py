@@ -17,11 +17,10 @@ from engine.arrays import FloatArray, IntArray
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
 from engine.collision.exact_images import Vector, image_point, rounded
 from engine.collision.meshes.face_state import state_at
-from engine.collision.meshes.live_faces import simplex_distance
 from engine.collision.meshes.mesh_arrays import STATE_STACKED, MeshBody, mesh_body_of
 from engine.collision.result import FIRST_WITHIN, NO_CONTACT, SECOND_WITHIN, Collision, Parts, Poses, Witness, Work
 from engine.collision.simple.ball_on_mesh import relate_balls
-from engine.collision.simple.boundary import Boundary, boundary_of
+from engine.collision.simple.boundary import Boundary, boundary_of, simplex_distance
 from engine.containment.rational_locate import rational_location
 from engine.direct import entry_of
 from engine.predicates.rational import minus, squared_length

@@ -9,9 +9,8 @@ import pytest
 
 from engine import Aabb, HalfSpace, Polygon, Pose, Solid
 from engine.collision.exact_images import image_half_space, value_at
-from engine.collision.meshes.live_faces import simplex_distance
 from engine.collision.result import Work
-from engine.collision.simple.boundary import boundary_of
+from engine.collision.simple.boundary import boundary_of, simplex_distance
 from engine.predicates.rational import minus, sign_of, squared_length
 
 BLOCK, SQUARE = Aabb([0, 0, 0], [1, 2, 3]), Polygon([[[0, 0], [2, 0], [2, 1], [0, 1]]])

@@ -8,8 +8,8 @@ import pytest
 
 from engine import Polyhedron
 from engine.budget import Budget
-from engine.collision.meshes.live_faces import live_parts, simplex_distance
 from engine.collision.meshes.mesh_arrays import mesh_body_of
+from engine.collision.simple.boundary import live_parts, simplex_distance
 from engine.predicates.rational import cross, minus
 from tests.unit.collision.meshes.bodies import brick
 
