@@ -8,7 +8,6 @@ Boxes are rounded outward (`place_boxes`), so no body is missed; those without b
 from __future__ import annotations
 
 import threading
-from collections import namedtuple
 from collections.abc import Sequence
 from math import isfinite
 from typing import Any, Final
@@ -29,7 +28,7 @@ from engine.containment.scene.tables import Scene as LocateTables
 from engine.containment.scene.tables import scene_of
 from engine.direct import entry_of
 from engine.lanes.boxes import BOX_ROWS, EMPTY
-from engine.scenes.near_boxes import BodyTree, list_near, put_keys
+from engine.scenes.near_boxes import BodyTree, Where, list_near, put_keys
 from engine.scenes.scratch import scratch_for
 from engine.scenes.table import Table
 from engine.segment_clipping.profiles import check_cut
@@ -59,8 +58,7 @@ class Bodies(Preparing):
         return self.prepared("arrays", lambda: self._as_arrays(budget), budget.check)
 
     def _as_arrays(self, budget: Budget) -> SceneBodies:
-        distinct, kinds, _ = distinct_of(self.solids)
-        return bodies_of(self.solids, self.poses, distinct, kinds, budget.check)
+        return bodies_of(self.solids, self.poses, *distinct_of(self.solids)[:2], budget.check)
 
     def tree(self, budget: Budget) -> BodyTree:
         """Return the tree over the boxes of the bodies, at least one."""
@@ -145,9 +143,6 @@ def _has_new_cells(tables: LocateTables) -> bool:
 
 _MANY: Final = 4096
 _AS_GIVEN: Final = read_only(np.arange(_MANY))
-Where = namedtuple("Where", "together moved names")
-"""Where the bodies of a scene are: the `BodyTree` of n of them together, and of those that moved since, which count
-from n on; what these are called in the scene, ascending."""
 
 
 def body_tree(low: FloatArray, high: FloatArray, most_listed: int) -> BodyTree:

@@ -18,8 +18,8 @@ from engine.budget import Budget
 from engine.containment.scene.locate_scene import SceneLocations
 from engine.direct import entry_of
 from engine.jit import inline, kernel
-from engine.scenes.bodies import NO_BODIES, NOBODY, Bodies, Where, body_tree, candidates, words_of
-from engine.scenes.near_boxes import PLACED, bodies_in, place_in
+from engine.scenes.bodies import NO_BODIES, NOBODY, Bodies, body_tree, candidates, words_of
+from engine.scenes.near_boxes import PLACED, Where, bodies_in, place_in
 from engine.scenes.scratch import scratch_at, scratch_for
 from engine.scenes.table import unready
 from engine.solids.base import Preparing, Solid
