@@ -175,12 +175,6 @@ def _blocks_along(s: Search, view: View, row: int, least: float, is_listed: bool
 
 
 @inline
-def _reach(s: Search, view: View, row: int) -> float:
-    """Return how far a body reaches along the line toward the other; the block that does is listed first."""
-    return _blocks_along(s, view, row, -np.inf, False)[0]
-
-
-@inline
 def approach(s: Search, limits: Any) -> tuple[int, int]:
     """Measure the blocks that reach furthest along the line as long as that brings an upper bound down and turns it.
 
@@ -188,7 +182,10 @@ def approach(s: Search, limits: Any) -> tuple[int, int]:
     """
     for _ in range(MOST_STEPS):
         before = limits[0]
-        reach, their_reach = _reach(s, s.a, 0), _reach(s, s.b, 1)
+        (reach, _), (their_reach, _) = (
+            _blocks_along(s, s.a, 0, -np.inf, False),
+            _blocks_along(s, s.b, 1, -np.inf, False),
+        )
         if -their_reach - reach - s.margin > limits[0]:
             return DONE, 0
         i, j = int(s.room.listed[0, 0]), int(s.room.listed[1, 0])
@@ -206,7 +203,7 @@ def finish_along_line(s: Search, limits: Any) -> tuple[int, int]:
     and -1 where they are many, and there is nothing gained; FULL and 0 where what was found before is lost.
     """
     margin = s.margin
-    furthest, theirs = _reach(s, s.a, 0), _reach(s, s.b, 1)
+    (furthest, _), (theirs, _) = _blocks_along(s, s.a, 0, -np.inf, False), _blocks_along(s, s.b, 1, -np.inf, False)
     _, n_first = _blocks_along(s, s.a, 0, -theirs - limits[0] - 2.0 * margin, True)
     if n_first > MOST_LISTED:
         return FULL, -1

@@ -111,7 +111,7 @@ def between_outlines(first: Solid, second: Solid, poses: Poses, least: float | N
             vertices, following, radius, others, their_following, their_radius, points
         )
     else:
-        own_pose, their_pose = ([array[None] for array in motion_of(pose, 2)] for pose in poses)
+        own_pose, their_pose = (STILL2 if at is None else (at.rotation[None], at.translation[None]) for at in poses)
         (found,) = under_poses(first, second, (*own_pose, *their_pose), UNLIMITED, points).tolist()
         distance, own, theirs = found[0], int(found[1]), int(found[2])
     if own < 0 or least is not None:

@@ -19,8 +19,15 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from engine.budget import Budget
-from engine.collision.meshes.exact_body import Corners, ExactBody, Plane, Vector, rounded_outward
-from engine.collision.meshes.exact_triangles import value_at, without_axis
+from engine.collision.meshes.exact_body import (
+    Corners,
+    ExactBody,
+    Plane,
+    Vector,
+    rounded_outward,
+    value_at,
+    without_axis,
+)
 from engine.predicates.rational import cross, dot, minus, sign_of
 
 Rational = int | Fraction  # integers where they suffice: they are ten times faster
@@ -97,19 +104,6 @@ def points_within(corners: Corners) -> Iterator[Homogeneous]:
     for weights in WITHIN:
         x, y, z = (sum(w * p[side] for w, p in zip(weights, corners)) for side in range(3))
         yield x, y, z, sum(weights)
-
-
-def _flat_trace(points: Corners, values: list[int], axis: int) -> Sequence[Vector]:
-    """Return the ends (x, y, w), w > 0, of the segment or point in which a face meets a plane that does not hold it."""
-    j, k = (axis + 1) % 3, (axis + 2) % 3
-    ends = [(points[i][j], points[i][k], 1) for i in range(3) if values[i] == 0]
-    for i in range(3):
-        f, g = values[i], values[i - 2]
-        if f * g < 0:
-            p, q = points[i], points[i - 2]
-            x, y, w = f * q[j] - g * p[j], f * q[k] - g * p[k], f - g
-            ends.append((x, y, w) if w > 0 else (-x, -y, -w))
-    return ends
 
 
 def _around(body: ExactBody, points: Sequence[Homogeneous]) -> tuple[list[float], list[float]]:
@@ -194,9 +188,13 @@ def _trace(points: Corners, values: list[int], axis: int) -> list[tuple[Rational
     """Return the segments in which a face meets the plane at which its corners have `values`."""
     if not any(values):
         return [(without_axis(points[i], axis), without_axis(points[i - 2], axis)) for i in range(3)]
-    ends = _flat_trace(points, values, axis)
-    flat: list[Rational2] = [(x, y) if w == 1 else (Fraction(x, w), Fraction(y, w)) for x, y, w in ends]
-    return [(flat[0], flat[1])] if len(flat) == 2 else []
+    flat = [without_axis(p, axis) for p in points]
+    ends: list[Rational2] = [p for p, value in zip(flat, values) if value == 0]
+    for i in range(3):
+        (f, (x, y)), (g, (z, w)) = (values[i], flat[i]), (values[i - 2], flat[i - 2])
+        if f * g < 0:
+            ends.append((Fraction(f * z - g * x, f - g), Fraction(f * w - g * y, f - g)))
+    return [(ends[0], ends[1])] if len(ends) == 2 else []
 
 
 def _samples(

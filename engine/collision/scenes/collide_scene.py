@@ -11,9 +11,9 @@ import numpy as np
 from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray
 from engine.bounding.box_grid import BLOCK, pairs_of_boxes
 from engine.budget import Budget, Cancel
-from engine.collision.answers import Answers, PlacedPair, accuracy_of
 from engine.collision.clearance.clearance import checked_distance
 from engine.collision.codes import UNSETTLED
+from engine.collision.collide import Answers, PlacedPair, accuracy_of
 from engine.collision.detail import NO_DETAIL, check_has_detail, has_interior
 from engine.collision.result import Witness, Work
 from engine.collision.scenes.batches import SceneBatches

@@ -13,7 +13,7 @@ import numpy as np
 from engine.arrays import FloatArray, IntArray
 from engine.collision.exact_images import HalfSpaceImage, as_vector, image_half_space, value_at
 from engine.collision.meshes.face_state import state_at
-from engine.collision.meshes.mesh_arrays import STATE_STACKED, MeshArrays, MeshBody, mesh_body_of
+from engine.collision.meshes.mesh_arrays import STATE_STACKED, MeshArrays, mesh_body_of
 from engine.collision.result import NO_CONTACT, SECOND_WITHIN, Collision, Parts, Poses, Witness, Work
 from engine.collision.simple.boundary import Boundary, boundary_of, first_triangle_at, pulled_back
 from engine.direct import entry_of
@@ -70,7 +70,11 @@ def _by_scan(function: _Function, space: HalfSpace, body: Solid, poses: Poses, w
         return None
     work.n_beyond_filter += n_unsure
     work.n_rational += n_unsure
-    signs = _exact_signs(space, mesh, poses, unsure[:n_unsure].tolist())
+    signs: dict[int, int] = {}
+    if n_unsure:
+        exact, _, _ = pulled_back(image_half_space(space, poses[0]), poses[1])
+        points = mesh.arrays.vertices[unsure[:n_unsure]].tolist()
+        signs = {v: sign_of(value_at(exact, as_vector(p))) for v, p in zip(unsure.tolist(), points)}
     first = {sign: min((vertex for vertex in signs if signs[vertex] == sign), default=-1) for sign in (1, 0, -1)}
     first[1], before = min((v for v in (beyond, first[1]) if v >= 0), default=-1), max(before, first[-1])
     if first[1] < 0 and first[0] < 0:
@@ -134,14 +138,6 @@ def scan_sides(mesh: MeshArrays, plane: Any, unsure: Any, flag: Any) -> tuple[in
         if n_unsure > len(unsure) or (start % _MANY == 0 and flag[0] != 0):
             return beyond, before, len(unsure) + 1
     return beyond, before, n_unsure
-
-
-def _exact_signs(space: HalfSpace, mesh: MeshBody, poses: Poses, vertices: list[int]) -> dict[int, int]:
-    """Return on which side of a half-space some vertices of a mesh lie, by vertex."""
-    if not vertices:
-        return {}
-    plane, _, _ = pulled_back(image_half_space(space, poses[0]), poses[1])
-    return {v: sign_of(value_at(plane, as_vector(mesh.arrays.vertices[v].tolist()))) for v in vertices}
 
 
 def _function_in_frame(space: HalfSpace, poses: Poses) -> _Function:
