@@ -14,7 +14,7 @@ import numpy as np
 from engine.arrays import Int8Array, IntArray
 from engine.budget import Budget, Cancel
 from engine.collision.codes import DISJOINT, UNSETTLED
-from engine.collision.detail import NO_DETAIL, check_has_detail, code_of, detail_of
+from engine.collision.detail import NO_DETAIL, check_has_detail, detail_of
 from engine.collision.meshes.mesh_mesh import mesh_mesh
 from engine.collision.planar.outline_batch import collide_outlines
 from engine.collision.result import (
@@ -251,7 +251,8 @@ class Answers:
             if self.witnesses is not None:
                 self.witnesses[item] = answer.witness
             if self.details is not None and self.details[item] == NO_DETAIL:
-                self.details[item] = code_of(detail_of(*pair, answer.relation, work))
+                named = detail_of(*pair, answer.relation, work)
+                self.details[item] = NO_DETAIL if named is None else named
 
 
 def accuracy_of(n_pairs: int, n_open: int, works: list[Work], method: str) -> Accuracy:

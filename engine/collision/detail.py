@@ -85,11 +85,6 @@ def details_of_boxes(low: FloatArray, high: FloatArray, pairs: IntArray, relatio
     return np.where(relations == Relation.OVERLAPPING, split, _WHERE_PROVEN[relations]).astype(np.int8)
 
 
-def code_of(detail: Rcc8 | None) -> int:
-    """Return the code of a relation of RCC-8 in arrays."""
-    return NO_DETAIL if detail is None else int(detail)
-
-
 def detail_of(first: Solid, second: Solid, poses: Poses, relation: Relation, work: Work) -> Rcc8 | None:
     """Return the relation of RCC-8 of a checked pair whose relation is known; None where a body has no interior."""
     if relation != Relation.OVERLAPPING:
