@@ -158,15 +158,6 @@ def _open_edges_meet(
 
 
 @inline
-def corners_in_plane(sides: Signs, their_sides: Signs) -> int:
-    """Return the corners of two faces that lie in the plane of the other one, three bits for each face."""
-    found = 0
-    for k in range(3):
-        found |= int(sides[k] == 0) << k | int(their_sides[k] == 0) << 3 + k
-    return found
-
-
-@inline
 def lone_zero(sides: Signs) -> int:
     """Return the corner of a face that alone lies on a plane, the others strictly on one side of it; -1 for none."""
     for k in range(3):
@@ -195,11 +186,12 @@ def _is_edge_across(poses: Any, t: Facet, u: Facet, sides: Signs, their_sides: S
 def kind_of(poses: Any, t: Facet, axis: int, u: Facet, their_axis: int, error: float, work: Any) -> tuple[int, int]:
     """Return the kind of the contact of two faces with area, UNSETTLED where a sign is open, and whether it may cut the
     open face t (1), u (2) or BOTH: not where all that they share is one point, or lies on its border. Sets FLUSH."""
+    work[_BAD] = work[FLUSH] = 0
     sides, their_sides = sides_of(poses, u, t, error), sides_of(poses, t, u, error)
-    work[_BAD], work[FLUSH] = 0, corners_in_plane(sides, their_sides)
     for k in range(3):
         if sides[k] == UNDECIDED or their_sides[k] == UNDECIDED:
             return UNSETTLED, BOTH
+        work[FLUSH] |= int(sides[k] == 0) << k | int(their_sides[k] == 0) << 3 + k
     own, their = lone_zero(sides), lone_zero(their_sides)
     for k in range(3):
         if (own >= 0 and is_same(corner(t, own), corner(u, k))) or (

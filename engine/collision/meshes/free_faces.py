@@ -71,8 +71,8 @@ def where_faces_are(s: Search, own: int, n: int, shares: Any, known: Any, is_flu
     corner off it does not, nor any component without contact; INSIDE where one surely lies inside and has an inside of
     its own beside it; else UNDECIDED.
 
-    own: the column of the body in contacts (n, 2); their classes: of each the corners that lie in the plane of the
-    other face. shares (n,), or none: whether the two faces share an area. known,
+    own: the column of the body in contacts (n, 2); their classes: of each the corners that lie on the other face, and
+    maybe others of its plane (`kind_of`, `judge`). shares (n,), or none: whether the two faces share an area. known,
     is_flush, told: tables (`place_of`) of vertices and of faces that share an area.
     """
     contacts, flush, met = s.found

@@ -315,6 +315,19 @@ def passes_within(
     return int(is_straddling(p, q, r))
 
 
+@called
+def is_on_face(poses: Any, p: PosedPoint3, t: Facet, off: PosedPoint3, axis: int, error: float) -> int:
+    """Tell whether a point in the plane of t lies on the closed face: 1, or not: 0; UNDECIDED."""
+    found, turn = 1, turn_in_plane(poses, t.p, t.q, t.r, off, axis, error)
+    for edge in range(3):
+        side = turn_in_plane(poses, corner(t, edge), corner(t, edge + 1), p, off, axis, error)
+        if turn == UNDECIDED or side == UNDECIDED:
+            found = UNDECIDED
+        elif side == -turn:
+            return 0
+    return found
+
+
 @inline
 def separation(poses: Any, t1: Facet, t2: Facet, axis: int, error: float) -> int:
     """Return how two coplanar triangles with area lie: 1 apart, 0 only their borders meet, -1 interiors meet."""
