@@ -1,4 +1,4 @@
-"""Pairs of boxes with a common point, by a grid of cells at least as wide as all boxes but a few large ones.
+"""Pairs of boxes with a common point: by a grid of cells at least as wide as all boxes but a few, or by a sweep.
 
 A box stands in the cell of its low corner. Two boxes of one cell's width or less that meet have their low corners at
 most a width apart on each axis, so in the same or in neighbouring cells. Each pair is looked for from one side only:
@@ -9,9 +9,14 @@ most a width apart on each axis, so in the same or in neighbouring cells. Each p
 
 The few largest boxes, infinite ones among them, stand last and are compared with all others. `cell_of` is monotone in
 floating point and corners a width apart are at most one cell apart, because the width is enlarged first. Right for many
-boxes of like size; `engine.bounding.sweep` is for others.
+boxes of like size.
 
-Source: C. Ericson, Real-Time Collision Detection, 2005, section 7.1 (uniform grids); here by one sort, for one instant.
+Few are all compared. Others are sorted by their start on one axis, each compared with those that start before it ends:
+on the axis on which the boxes cover the smallest share of the whole width. Infinite bounds are welcome: such a box
+meets everything that its finite bounds allow.
+
+Source: C. Ericson, Real-Time Collision Detection, 2005, section 7.1 (uniform grids); here by one sort, for one instant;
+D. Baraff, Dynamic simulation of non-penetrating rigid bodies, 1992 (sweep and prune), for one instant too.
 """
 
 from __future__ import annotations
@@ -23,10 +28,15 @@ from typing import Any, Final
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
-from engine.bounding.sweep import BLOCK, meeting_boxes
+from engine.budget import Budget
+from engine.direct import entry_of
 from engine.jit import allocating_kernel, inline, kernel
 
-_FEWEST: Final = 256
+BLOCK: Final = 1 << 18
+"""Pairs given out at once: a scene in which all meet all has n^2 / 2, which need not fit into memory. Sorting one block
+takes some 20 ms."""
+_FEW, _FEWEST = 96, 256
+"""Boxes that are all compared, and those that a grid is made for."""
 _LARGE: Final = 64
 _ENLARGED: Final = 1.0 + 2.0**-20
 _CROWD: Final = 48
@@ -34,28 +44,60 @@ _CROWD: Final = 48
 
 
 CornerGrid = namedtuple("CornerGrid", "boxes numbers cells starts row layer")
-"""Boxes by cell, the large ones last.
+"""Boxes by cell, the large ones last; or, without cells, all as large ones.
 
 boxes (n, 6): low, then high. numbers (n,): which box each is. cells (n,): its cell, -1 where it is large. starts
-(n_cells + 1,) int32: where each cell begins among them. row, layer: how far the next cell on y and on z is.
+(n_cells + 1,) int32: where each cell begins among them. row, layer: how far the next cell on y and on z is; 0
+without cells where the first column of `boxes` ascends.
 """
 
 
 def pairs_of_boxes(low: FloatArray, high: FloatArray, flag: Any, block: int = BLOCK) -> Iterator[IntArray]:
-    """Yield the pairs of `meeting_boxes`, by a grid where the boxes are many and of like size; each block is sorted,
-    but where there are several a later one may hold smaller indices."""
+    """Yield ``(n_pairs, 2)`` pairs first < second of closed boxes ``(n, d)`` with a common point, block by block.
+
+    Each block is sorted, but where there are several a later one may hold smaller indices; it has about `block` pairs,
+    or those of one box if these are more.
+    Polls `flag` (1,) uint8 and ends early, with wrong blocks, when it is set: the caller looks at it after each.
+    """
     n_boxes = len(low)
-    grid = _grid_of(low, high) if n_boxes >= _FEWEST else None
-    if grid is None:
-        yield from meeting_boxes(low, high, flag, block)
-        return
-    start, room = 0, max(block, 1) + n_boxes  # one box meets fewer others than there are
-    keys = np.empty(room, np.int64)
+    grid = _without_cells(low, high, np.arange(n_boxes), 1) if n_boxes < _FEW else None
+    grid = grid or (_grid_of(low, high) if n_boxes >= _FEWEST else None) or _sorted_along_axis(low, high)
+    start, enough = 0, max(block, 1)
+    keys = np.empty(min(enough, n_boxes * n_boxes // 2) + n_boxes, np.int64)  # one box meets fewer than there are
     while start < n_boxes:  # bound: start grows
-        n_found, start = _collect(grid, start, max(block, 1), keys, flag)
+        n_found, start = entry_of(_collect)(grid, start, enough, keys, flag)
         found = np.sort(keys[:n_found])
         if n_found:
             yield np.stack([found // n_boxes, found % n_boxes], axis=1)
+
+
+def all_pairs_of_boxes(low: FloatArray, high: FloatArray, budget: Budget) -> IntArray:
+    """Return all of `pairs_of_boxes` at once, sorted. Raises as `Budget.check` when the call must end."""
+    blocks = [np.zeros((0, 2), np.int64)]
+    for block in pairs_of_boxes(low, high, budget.flag) if len(low) else ():
+        budget.check()
+        blocks.append(block)
+    budget.check()
+    pairs = np.concatenate(blocks)
+    return pairs if len(blocks) <= 2 else pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+
+
+@np.errstate(all="ignore")
+def _sorted_along_axis(low: FloatArray, high: FloatArray) -> CornerGrid:
+    """Return boxes by where they start on the axis on which they are thin against the width of the whole."""
+    finite = np.isfinite(low) & np.isfinite(high)
+    width = np.where(finite, high, -np.inf).max(axis=0) - np.where(finite, low, np.inf).min(axis=0)
+    share = np.where(finite, high - low, 0.0).sum(axis=0) / width
+    axis = int(np.argmin(np.where(np.isfinite(share), share, np.inf)))
+    columns = (axis + np.arange(low.shape[1])) % low.shape[1]
+    order = np.argsort(low[:, axis], kind="stable")
+    return _without_cells(low[order][:, columns], high[order][:, columns], order, 0)
+
+
+def _without_cells(low: FloatArray, high: FloatArray, numbers: IntArray, row: int) -> CornerGrid:
+    (n_boxes, dimension), boxes = low.shape, np.zeros((len(low), 6))
+    boxes[:, :dimension], boxes[:, 3 : 3 + dimension] = low, high
+    return CornerGrid(boxes, numbers, np.full(n_boxes, -1), np.zeros(1, np.int32), row, 0)
 
 
 @np.errstate(all="ignore")
@@ -180,7 +222,10 @@ def _collect(grid: CornerGrid, start: int, enough: int, keys: Any, flag: Any) ->
             return n_found, box
         cell = grid.cells[box]
         if cell < 0:
-            n_found = _add_run(boxes, numbers, box, box + 1, n_boxes, keys, n_found)
+            stop = n_boxes if row > 0 else box + 1
+            while stop < n_boxes and boxes[stop, 0] <= boxes[box, 3]:
+                stop += 1
+            n_found = _add_run(boxes, numbers, box, box + 1, stop, keys, n_found)
             continue
         n_found = _add_run(boxes, numbers, box, box + 1, starts[cell + 2], keys, n_found)
         cell += row

@@ -10,9 +10,8 @@ import numpy as np
 
 from engine.arrays import FloatArray, Int8Array, IntArray, read_only
 from engine.budget import Budget, Cancel
-from engine.collision.answers import Answers, PlacedPair, Witnesses, accuracy_of
 from engine.collision.codes import DISJOINT, OVERLAPPING, UNSETTLED
-from engine.collision.collide import collide_pair, pair_function
+from engine.collision.collide import Answers, PlacedPair, Witnesses, accuracy_of, collide_pair, pair_function
 from engine.collision.detail import NO_DETAIL, check_has_detail, details_where_proven, has_interior
 from engine.collision.meshes.contact_kinds import N_NAMED
 from engine.collision.meshes.dual_traversal import PIERCING

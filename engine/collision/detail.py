@@ -17,7 +17,6 @@ from engine.arrays import FloatArray, Int8Array, IntArray
 from engine.budget import Budget
 from engine.collision.codes import UNSETTLED
 from engine.collision.exact_images import image_half_space, image_point, value_at
-from engine.collision.meshes.live_faces import live_piece
 from engine.collision.meshes.mesh_arrays import mesh_body_of
 from engine.collision.meshes.mesh_detail import mesh_parts
 from engine.collision.planar.outline import (
@@ -32,6 +31,7 @@ from engine.collision.planar.outline import (
 from engine.collision.result import BODIES, MESHES, OUTLINES, Parts, Poses, Work
 from engine.collision.simple.against_ball import body_sphere_parts
 from engine.collision.simple.against_half_space import half_space_body_parts
+from engine.collision.simple.boundary import live_parts
 from engine.containment.rational_locate import rational_location
 from engine.errors import InvalidInputError, UnsupportedSolidError
 from engine.predicates.rational import largest_axis, minus, squared_length
@@ -85,11 +85,6 @@ def details_of_boxes(low: FloatArray, high: FloatArray, pairs: IntArray, relatio
     return np.where(relations == Relation.OVERLAPPING, split, _WHERE_PROVEN[relations]).astype(np.int8)
 
 
-def code_of(detail: Rcc8 | None) -> int:
-    """Return the code of a relation of RCC-8 in arrays."""
-    return NO_DETAIL if detail is None else int(detail)
-
-
 def detail_of(first: Solid, second: Solid, poses: Poses, relation: Relation, work: Work) -> Rcc8 | None:
     """Return the relation of RCC-8 of a checked pair whose relation is known; None where a body has no interior."""
     if relation != Relation.OVERLAPPING:
@@ -124,7 +119,7 @@ def _has_interior(solid: Solid, budget: Budget) -> bool:
     if solid.dimension == 2:
         return bool(live_edges(outline_of(solid, None, budget), budget))
     mesh = mesh_body_of(solid)
-    return mesh.has_inside and any(live_piece(mesh, face, budget) is not None for face in range(len(mesh.faces)))
+    return mesh.has_inside and any(any(live_parts(mesh, face, budget)) for face in range(len(mesh.faces)))
 
 
 def _sphere_sphere(first: Sphere, second: Sphere, poses: Poses, work: Work) -> Parts:

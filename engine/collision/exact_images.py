@@ -7,10 +7,10 @@ half-space n . p + d >= 0 is that of the affine map: with A the adjugate of R, R
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from fractions import Fraction
 
-from engine.containment.rational_locate import adjugate
+from engine.containment.rational_locate import adjugate, to_world_frame
 from engine.predicates.rational import dot
 from engine.solids.half_space import HalfSpace
 from engine.solids.pose import Pose
@@ -26,22 +26,10 @@ def as_vector(numbers: Point) -> Vector:
     return tuple(Fraction(number) for number in numbers)
 
 
-def image_map(pose: Pose | None) -> Callable[[Point], Vector]:
-    """Return the function that gives the exact image of a point."""
-    if pose is None:
-        return as_vector
-    rows, shifts = [as_vector(row) for row in pose.rotation.tolist()], as_vector(pose.translation.tolist())
-
-    def image(point: Point) -> Vector:
-        p = as_vector(point)
-        return tuple(dot(row, p) + shift for row, shift in zip(rows, shifts))
-
-    return image
-
-
 def image_point(point: Point, pose: Pose | None) -> Vector:
     """Return the exact image of a point."""
-    return image_map(pose)(point)
+    p = as_vector(point)
+    return p if pose is None else tuple(to_world_frame(p, pose))
 
 
 def image_half_space(half_space: HalfSpace, pose: Pose | None) -> HalfSpaceImage:

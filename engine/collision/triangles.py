@@ -19,7 +19,7 @@ import numpy as np
 from engine.arrays import FloatArray, Int8Array
 from engine.budget import Budget, Cancel
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
-from engine.collision.meshes.exact_triangles import classify_exact
+from engine.collision.meshes.exact_body import classify_exact
 from engine.collision.meshes.mesh_arrays import NO_AREA, UNKNOWN_AXIS, axis_of
 from engine.collision.meshes.triangle_triangle import APART, Facet, classify, classify_near, facet_at, with_pose
 from engine.collision.planar.outline import collide_outline_outline

@@ -17,7 +17,7 @@ from engine.budget import UNLIMITED, Budget
 from engine.containment.locators import locator_of
 from engine.direct import entry_of
 from engine.parallel import run_chunks
-from engine.scenes.broad_phase import order_of
+from engine.scenes.bodies import order_of
 from engine.scenes.ends import Exact, Found, ScenePieces, in_order, joined
 from engine.scenes.scratch import MOST_MET, scratch_for
 from engine.scenes.standing import Standing

@@ -20,6 +20,9 @@ from engine.types import Point3
 BodyTree = namedtuple("BodyTree", "low high tree inverse bounded listed")
 """The boxes of bodies, low and high (n, dimension), infinite where they may have no bounds; a `Bvh` over those that are
 bounded, where they are not few, 1 / its scale, and which body is where in it; the others, looked at one by one."""
+Where = namedtuple("Where", "together moved names")
+"""Where the bodies of a scene are: the `BodyTree` of n of them together, and of those that moved since, which count
+from n on; what these are called in the scene, ascending."""
 N_BODIES, LOW, HIGH, N_NODES, BOXES, CHILD, BOUNDED, N_LISTED, LISTED, NUMBERS, NAMES, PLACED = range(12)
 """What stands of a `BodyTree` in a row of whole numbers, sizes and addresses: one is handed on where it would be a
 hundred numbers. NUMBERS: of (4,), inverse and origin. NAMES: of (n,), what moved bodies are called. PLACED: of the

@@ -9,7 +9,7 @@ in double-doubles with running bounds (u = 2^-53): an entry of M carries u^2, it
 a coordinate of p' is within 32 u^2 sum |p - t|, and one of e' likewise; entries of M are below 1.01. A body without a
 pose is one under the identity, whose p' and e' carry no error. A ball stays in the world, about the image of its
 centre. What a bound leaves open (a sign, the order of two parameters, a coordinate that may round either way) is
-UNDECIDED.
+UNDECIDED. Doubles tell whether a body is met, and by which planes: what they leave open, double-doubles seldom tell.
 """
 
 from __future__ import annotations
@@ -30,6 +30,9 @@ from engine.segment_clipping.plane_meeting import T_BOUND
 from engine.types import UNDECIDED
 
 _FRAME_BOUND: Final = 32.0 * U2
+
+_OWN_START, _OWN_END = (-1.0, 0.0, 0.0, -1), (2.0, 0.0, 0.0, -1)
+"""Ends of a piece, as `put_piece` takes them, that are those of the segment."""
 
 Pair = tuple[float, float]
 Frame = tuple[Vector, float, Vector, float]
@@ -91,14 +94,6 @@ def slack_of(s: float, s_bound: float, d: float, d_bound: float) -> float:
     if not (2.0**-400 <= abs(d) <= 2.0**400 and abs(s) >= 2.0**-500):
         return np.inf
     return 1.01 * (s_bound / abs(s) + d_bound / abs(d))
-
-
-@inline
-def _order(t: float, t_low: float, slack: float, other: float, other_low: float, other_slack: float) -> int:
-    """Return the sign of the difference of two parameters, each within 32 u^2 + slack of itself."""
-    gap = (t - other) + (t_low - other_low)
-    bound = 1.01 * ((32.0 * U2 + slack) * abs(t) + (32.0 * U2 + other_slack) * abs(other))
-    return _sign(gap, bound + 2.0**-52 * abs(gap))
 
 
 @inline
@@ -180,36 +175,18 @@ def between_planes(body: Any, segments: Any, item: int, is_any: bool) -> tuple[i
     piece as `put_piece` takes them, unless `is_any`."""
     frame, rows = in_frame(body, segments, item), array_at(body[2], (body[1], 4), np.float64)
     own, blur, along, along_blur = frame
-    first, last = (-1.0, 0.0, 0.0, -1), (2.0, 0.0, 0.0, -1)
     meets, entered, left = _planes_cut(rows, frame)
-    if meets == -1 or (meets == 1 and is_any):
-        return meets, first, last
-    for face in range(rows.shape[0]):
-        if meets == 1 and face != entered and face != left:
-            continue
-        row = rows[face]
-        s, s_low, s_bound = _plane_at(row, own, row[3], blur)
-        d, d_low, d_bound = _plane_at(row, along, 0.0, along_blur)
-        at_q, _ = dd_add(s, s_low, d, d_low)
-        of_p = _sign(s, s_bound)
-        of_q = _sign(at_q, 1.01 * (s_bound + d_bound) + 8.0 * U2 * (abs(s) + abs(d)))
-        if of_p == -1 and of_q == -1:
-            return -1, first, last
-        if of_p == UNDECIDED or of_q == UNDECIDED:
-            return UNDECIDED, first, last
-        if of_p == of_q:
-            continue
-        t, t_low = dd_div(-s, -s_low, d, d_low)
-        slack = slack_of(s, s_bound, d, d_bound)
-        best = first if of_p < 0 else last
-        order = _order(t, t_low, slack, best[0], best[1], best[2])
-        if order == UNDECIDED:
-            return UNDECIDED, first, last
-        if of_p < 0 and order > 0:
-            first = (t, t_low, slack, face)
-        elif of_q < 0 and order < 0:
-            last = (t, t_low, slack, face)
-    return _order(last[0], last[1], last[2], first[0], first[1], first[2]), first, last
+    first, last = _OWN_START, _OWN_END
+    for face in (entered, left):
+        if meets == 1 and face >= 0 and not is_any:
+            s, s_low, s_bound = _plane_at(rows[face], own, rows[face, 3], blur)
+            d, d_low, d_bound = _plane_at(rows[face], along, 0.0, along_blur)
+            t, t_low = dd_div(-s, -s_low, d, d_low)
+            if face == entered:
+                first = (t, t_low, slack_of(s, s_bound, d, d_bound), face)
+            else:
+                last = (t, t_low, slack_of(s, s_bound, d, d_bound), face)
+    return meets, first, last
 
 
 @inline
@@ -228,16 +205,19 @@ def in_ball(body: Any, segments: Any, item: int, is_any: bool) -> tuple[int, Any
     p, q = point_of(segments, item, 0, is_flat), point_of(segments, item, 1, is_flat)
     along = (two_diff(q[0], p[0]), two_diff(q[1], p[1]), two_diff(q[2], p[2]))
     own = (dd_sub(p[0], 0.0, c[0], c[1]), dd_sub(p[1], 0.0, c[2], c[3]), dd_sub(p[2], 0.0, c[4], c[5]))
-    size = max(abs(p[0]), abs(p[1]), abs(p[2]), abs(c[0]), abs(c[2]), abs(c[4]))
-    meets = _meets_ball(along, own, 8.0 * U2 * size, c[6])
-    if meets == -1 or (meets == 1 and is_any):
-        return meets, (-1.0, 0.0, 0.0, -1), (2.0, 0.0, 0.0, -1)
-    return _between_roots(along, own, 8.0 * U2 * size, c[6])
+    blur = 8.0 * U2 * max(abs(p[0]), abs(p[1]), abs(p[2]), abs(c[0]), abs(c[2]), abs(c[4]))
+    meets, of_p, of_q = _meets_ball(along, own, blur, c[6])
+    if meets != 1 or is_any or (of_p == -1 and of_q == -1):
+        return meets, _OWN_START, _OWN_END
+    if of_p == UNDECIDED or of_q == UNDECIDED:
+        return UNDECIDED, _OWN_START, _OWN_END
+    return _between_roots(along, own, blur, c[6], of_p, of_q)
 
 
 @inline
-def _meets_ball(d: Vector, f: Vector, blur: float, radius: float) -> int:
-    """Return what `_between_roots` does, by the heads of the pairs: sums of three products lose 6 u of their size."""
+def _meets_ball(d: Vector, f: Vector, blur: float, radius: float) -> tuple[int, int, int]:
+    """Return whether a segment meets a ball, as `in_ball` does, and whether either end surely lies within (-1) or
+    without (1), by the heads of the pairs: sums of three products lose 6 u of their size."""
     d_size, f_size = abs(d[0][0]) + abs(d[1][0]) + abs(d[2][0]), abs(f[0][0]) + abs(f[1][0]) + abs(f[2][0])
     a = d[0][0] * d[0][0] + d[1][0] * d[1][0] + d[2][0] * d[2][0]
     b = d[0][0] * f[0][0] + d[1][0] * f[1][0] + d[2][0] * f[2][0]
@@ -248,18 +228,24 @@ def _meets_ball(d: Vector, f: Vector, blur: float, radius: float) -> int:
     q_bound = 1.01 * (a_bound + 2.0 * b_bound + c_bound) + 2.0**-50 * (a + 2.0 * abs(b) + abs(c))
     d_bound = 1.01 * ((2.0 * abs(b) + b_bound) * b_bound + a * c_bound + (abs(c) + c_bound) * a_bound)
     d_bound += 2.0**-50 * (b * b + a * abs(c))
-    gap, past = b * b - a * c, a_bound + b_bound + 2.0**-50 * (a + abs(b))
-    if c < -c_bound or at_q < -q_bound or (gap > d_bound and b < -b_bound and a + b > past):
-        return 1
-    is_out = c > c_bound and at_q > q_bound and (b > b_bound or a + b < -past or gap < -d_bound)
-    return -1 if is_out else UNDECIDED
+    gap, past, of_p, of_q = (
+        b * b - a * c,
+        a_bound + b_bound + 2.0**-50 * (a + abs(b)),
+        _sign(c, c_bound),
+        _sign(at_q, q_bound),
+    )
+    if of_p == -1 or of_q == -1 or (gap > d_bound and b < -b_bound and a + b > past):
+        return 1, of_p, of_q
+    is_out = of_p == 1 and of_q == 1 and (b > b_bound or a + b < -past or gap < -d_bound)
+    return (-1 if is_out else UNDECIDED), of_p, of_q
 
 
 @inline
-def _between_roots(d: Vector, f: Vector, blur: float, radius: float) -> tuple[int, Any, Any]:
-    """Return what `in_ball` does: a t^2 + 2 b t + c <= 0 with a = d . d, b = d . f, c = f . f - r^2, f known to
-    `blur` a coordinate; sums of squares and products carry 12 u^2 of their size."""
-    first, last = (-1.0, 0.0, 0.0, -1), (2.0, 0.0, 0.0, -1)
+def _between_roots(d: Vector, f: Vector, blur: float, radius: float, of_p: int, of_q: int) -> tuple[int, Any, Any]:
+    """Return what `in_ball` does of a segment that meets the ball, its ends without it where of_p and of_q are 1:
+    a t^2 + 2 b t + c <= 0 with a = d . d, b = d . f, c = f . f - r^2, f known to `blur` a coordinate; sums of squares
+    and products carry 12 u^2 of their size."""
+    first, last = _OWN_START, _OWN_END
     d_size, f_size = abs(d[0][0]) + abs(d[1][0]) + abs(d[2][0]), abs(f[0][0]) + abs(f[1][0]) + abs(f[2][0])
     ah, al = _dot(d, d)
     bh, bl = _dot(d, f)
@@ -268,24 +254,11 @@ def _between_roots(d: Vector, f: Vector, blur: float, radius: float) -> tuple[in
     a_bound, b_bound = 16.0 * U2 * ah, 16.0 * U2 * d_size * f_size + 1.01 * blur * d_size
     c_bound = 16.0 * U2 * (f_size * f_size + rh) + 2.02 * blur * (f_size + 2.0 * blur)
     ch, cl = dd_sub(ch, cl, rh, rl)
-    eh, el = dd_add(ah, al, 2.0 * bh, 2.0 * bl)
-    eh, el = dd_add(eh, el, ch, cl)
-    of_p = _sign(ch, c_bound)
-    of_q = _sign(eh, 1.01 * (a_bound + 2.0 * b_bound + c_bound) + 16.0 * U2 * (ah + 2.0 * abs(bh) + abs(ch)))
-    if of_p == UNDECIDED or of_q == UNDECIDED:
-        return UNDECIDED, first, last
-    if of_p < 0 and of_q < 0:
-        return 1, first, last
     bbh, bbl = dd_mul(bh, bl, bh, bl)
     ach, acl = dd_mul(ah, al, ch, cl)
     dh, dl = dd_sub(bbh, bbl, ach, acl)
     d_bound = 1.01 * (2.0 * abs(bh) * b_bound + ah * c_bound + abs(ch) * a_bound + b_bound * b_bound)
     d_bound += 32.0 * U2 * (bbh + abs(ach))
-    if of_p > 0 and of_q > 0:
-        if bh > b_bound or ah + bh < -(a_bound + b_bound + 2.0**-50 * (ah + abs(bh))) or dh < -d_bound:
-            return -1, first, last
-        if not (bh < -b_bound and ah + bh > a_bound + b_bound + 2.0**-50 * (ah + abs(bh))):
-            return UNDECIDED, first, last
     if not dh > 1024.0 * d_bound:
         return UNDECIDED, first, last
     sh = math.sqrt(dh)

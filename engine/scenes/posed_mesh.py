@@ -51,12 +51,6 @@ _Lines = namedtuple("_Lines", "addresses sizes places")
 
 
 @inline
-def _lines_at(body: Any) -> tuple[Any, Any]:
-    """Return what stands of a body's mesh, as whole numbers and as doubles."""
-    return array_at(body[2], (MESH_WORDS,), np.int64), array_at(body[2], (MESH_WORDS,), np.float64)
-
-
-@inline
 def _mesh_of(lines: Any, numbers: Any) -> PlacedMesh:
     return PlacedMesh(
         array_at(lines[0], (lines[5], 3, 3), np.float64),
@@ -271,7 +265,8 @@ def _ends_of(own: Vector, blur: float, along: Vector, along_blur: float, is_plac
 def crossings_in(body: Any, segments: Any, item: int, is_any: bool, words: Any, stop: Any) -> tuple[int, bool]:
     """Make the crossings of a segment with a placed mesh, in order; return how many, or why not, and whether the first
     end lies in it. Where `is_any` they are not made, and any positive number says that there is one."""
-    is_placed, is_closed, scratch, (lines, numbers) = body[3] != 0, body[1] != 0, scratch_at(words), _lines_at(body)
+    is_placed, is_closed, scratch = body[3] != 0, body[1] != 0, scratch_at(words)
+    lines, numbers = array_at(body[2], (MESH_WORDS,), np.int64), array_at(body[2], (MESH_WORDS,), np.float64)
     frame = in_frame(body, segments, item)
     p, q, blur = _ends_of(frame[0], frame[1], frame[2], frame[3], is_placed)
     if not is_placed:

@@ -8,8 +8,13 @@ from typing import Any, Literal, Unpack, overload
 import numpy as np
 
 from engine.budget import UNLIMITED, Budget, Cancel
-from engine.collision.clearance.forms import MEETING, between_form_and_plane, between_forms, between_outlines
-from engine.collision.clearance.half_spaces import gap_of_planes
+from engine.collision.clearance.forms import (
+    MEETING,
+    between_form_and_plane,
+    between_forms,
+    between_outlines,
+    gap_of_planes,
+)
 from engine.collision.clearance.spreads import spread_pair
 from engine.collision.collide import check_pose, collide_pair, pair_function
 from engine.collision.result import Clearance, Poses, Work

@@ -8,14 +8,12 @@ import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, read_only
 from engine.budget import Budget, Cancel
-from engine.collision.answers import Answers
 from engine.collision.clearance.bodies import in_space
 from engine.collision.clearance.clearance import checked_distance, do_meet, has_plane
-from engine.collision.clearance.forms import STILL2, are_small, told_under_poses
-from engine.collision.clearance.half_spaces import gap_of_planes
+from engine.collision.clearance.forms import STILL2, are_small, gap_of_planes, told_under_poses
 from engine.collision.clearance.spreads import SpreadPair
 from engine.collision.codes import DISJOINT, TOUCHING, UNSETTLED
-from engine.collision.collide import pair_function
+from engine.collision.collide import Answers, pair_function
 from engine.collision.collide_poses import as_poses, batch_of
 from engine.collision.meshes.mesh_arrays import STILL
 from engine.collision.meshes.placement import PoseArrays

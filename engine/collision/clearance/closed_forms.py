@@ -15,7 +15,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 from engine.collision.clearance.wide import Wide, less, over, plus, product, root, times
-from engine.collision.simple.form import IS_BALL, RADIUS
+from engine.collision.simple.form_relations import IS_BALL, RADIUS
 from engine.jit import inline, kernel
 from engine.predicates.double_double import U2, surely_rounded
 from engine.predicates.error_free import two_sum, workspace

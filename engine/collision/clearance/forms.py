@@ -1,5 +1,9 @@
 """Boxes along the axes, balls and half-spaces: how far apart, by `closed_forms.py`, in rationals where that is not
-sure. Small bodies of the plane by `outlines.py`."""
+sure. Small bodies of the plane by `outlines.py`.
+
+A linear function over a body is largest at a vertex: of a half-space and any body floats leave the vertices that may be
+it, rationals decide.
+"""
 
 from __future__ import annotations
 
@@ -12,13 +16,14 @@ import numpy as np
 
 from engine.arrays import FloatArray
 from engine.budget import UNLIMITED, Budget
-from engine.collision.clearance.bodies import BALL, outline_of
+from engine.collision.clearance.bodies import BALL, feature_of, outline_of, radius_of, spread_of
 from engine.collision.clearance.closed_forms import UNSURE, ends_of_shared, nearest_of_forms, nearest_of_plane, touched
 from engine.collision.clearance.exact import Gap, Rational, ScaledGap
 from engine.collision.clearance.outlines import nearest_of_outlines, nearest_under_poses
-from engine.collision.exact_images import Vector, as_vector, image_point
+from engine.collision.exact_images import Vector, as_vector, image_half_space, image_point, value_at
 from engine.collision.result import Clearance, Feature, Poses
-from engine.collision.simple.form import FORMS, form_of
+from engine.collision.simple.boundary import pulled_back
+from engine.collision.simple.closed_forms import FORMS, form_of
 from engine.direct import entry_of
 from engine.predicates.rational import minus, sign_of, squared_length
 from engine.solids.aabb import Aabb
@@ -106,7 +111,7 @@ def between_outlines(first: Solid, second: Solid, poses: Poses, least: float | N
             vertices, following, radius, others, their_following, their_radius, points
         )
     else:
-        own_pose, their_pose = ([array[None] for array in motion_of(pose, 2)] for pose in poses)
+        own_pose, their_pose = (STILL2 if at is None else (at.rotation[None], at.translation[None]) for at in poses)
         (found,) = under_poses(first, second, (*own_pose, *their_pose), UNLIMITED, points).tolist()
         distance, own, theirs = found[0], int(found[1]), int(found[2])
     if own < 0 or least is not None:
@@ -213,3 +218,42 @@ def scaled_gap(p: Vector, q: Vector, radii: tuple[float, float]) -> ScaledGap:
     a, b = tuple(whole[:n]), tuple(whole[n : 2 * n])
     gap = Gap(Rational(a, 1), Rational(b, 1), 0, 0, squared_length(minus(b, a)), 1)
     return ScaledGap(gap, (whole[-2], whole[-1]), scale)
+
+
+def gap_of_planes(one: Solid, other: Solid, poses: Poses, budget: Budget) -> tuple[ScaledGap, tuple[Feature, Feature]]:
+    """Return the gap of two bodies without a common point, one of them a half-space or both, and what it ends on."""
+    if isinstance(one, HalfSpace) and isinstance(other, HalfSpace):
+        # their planes are parallel; of all lines across, that through the origin
+        planes = image_half_space(one, poses[0]), image_half_space(other, poses[1])
+        p, q = (tuple(-offset * x / squared_length(normal) for x in normal) for normal, offset in planes)
+        return scaled_gap(p, q, (0.0, 0.0)), (PLANE, PLANE)
+    if isinstance(one, HalfSpace):
+        foot, point, feature = _foot_and_vertex(one, other, poses, budget)
+        return scaled_gap(foot, point, (0.0, radius_of(other))), (PLANE, feature)
+    assert isinstance(other, HalfSpace)
+    foot, point, feature = _foot_and_vertex(other, one, poses[::-1], budget)
+    return scaled_gap(point, foot, (radius_of(one), 0.0)), (feature, PLANE)
+
+
+def _foot_and_vertex(space: HalfSpace, body: Solid, poses: Poses, budget: Budget) -> tuple[Vector, Vector, Feature]:
+    """Return the point of a plane and the point of a body that are nearest, and the vertex the latter is."""
+    mesh, d = spread_of(body), body.dimension
+    plane = image_half_space(space, poses[0])
+    best: tuple[Fraction, Vector, Feature] | None = None
+    (_, weights, _), points = pulled_back(plane, poses[1]), mesh.arrays.vertices[:, :d]
+    with np.errstate(all="ignore"):  # the rounding is that of `signs_of`
+        values = points @ weights
+        bounds = 2.0**-49 * (np.abs(points) @ np.abs(weights)) + 2.0**-1000 + 2.0**-1073 * np.abs(points).sum(axis=1)
+        is_below = values + bounds < np.max(values - bounds)
+    for vertex in np.flatnonzero(~is_below).tolist():
+        budget.check()
+        point = image_point(mesh.arrays.vertices[vertex, :d].tolist(), poses[1])
+        value = value_at(plane, point)
+        if best is None or value >= best[0]:
+            triangle, corner = np.argwhere(mesh.arrays.triangles == vertex)[0].tolist()
+            feature = feature_of(body, mesh, triangle, corner)
+            if best is None or value > best[0] or feature.indices < best[2].indices:
+                best = value, point, feature
+    assert best is not None
+    value, point, feature = best
+    return tuple(x - value * n / squared_length(plane[0]) for x, n in zip(point, plane[0])), point, feature

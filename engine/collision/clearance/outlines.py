@@ -15,13 +15,11 @@ from engine.collision.clearance.outline_search import MOST_NEAR, ROOM, Look, lin
 from engine.collision.clearance.vertex_edge import LARGEST, Found, Placed, Wide2, foot_of, minus2, place, point, still
 from engine.collision.clearance.wide import Wide, less, over, plus, times
 from engine.collision.codes import DISJOINT, UNSETTLED
-from engine.collision.meshes.placement import orient2d_near
 from engine.collision.planar.outline_batch import inside, n_blocks, relate_placed
 from engine.jit import allocating_kernel, called, inline
 from engine.predicates.double_double import U2, surely_rounded
 from engine.predicates.error_free import two_sum, workspace
 from engine.predicates.vectors import as_point2
-from engine.types import UNDECIDED
 
 _SMALLEST: Final = 2.0**-140
 """Of distances that the bounds hold for."""
@@ -29,8 +27,8 @@ _POLL_EVERY: Final = 16
 
 
 @inline
-def _are_parted(own: Placed, other: Placed, vertex: int, edge: int, error: float) -> bool:
-    """Tell whether bodies surely lie on two sides of a line: across the way from an edge to a vertex, or along it.
+def _are_parted(own: Placed, other: Placed, vertex: int, edge: int) -> bool:
+    """Tell whether bodies surely lie on two sides of a line across the way from an edge to a vertex.
 
     Of a way n a product n . x is off by less than 8 u |n| of the largest coordinate.
     """
@@ -39,21 +37,7 @@ def _are_parted(own: Placed, other: Placed, vertex: int, edge: int, error: float
         low = min(low, way.x * own.points[vertex, 0] + way.y * own.points[vertex, 1])
     for vertex in range(len(other.following)):
         high = max(high, way.x * other.points[vertex, 0] + way.y * other.points[vertex, 1])
-    if low - high > 2.0**-50 * (abs(way.x) + abs(way.y)) * (own.reach + other.reach) + 2.0**-1000:
-        return True
-    start, end, side = edge, other.following[edge], 0
-    c, d = as_point2(other.points, start), as_point2(other.points, end)
-    for vertex in range(len(own.following)):
-        found = orient2d_near(c, d, as_point2(own.points, vertex), error)
-        if found == 0 or found == UNDECIDED or found == -side:
-            return False
-        side = found
-    for vertex in range(len(other.following)):
-        if vertex not in (start, end):
-            found = orient2d_near(c, d, as_point2(other.points, vertex), error)
-            if found not in (0, -side):
-                return False
-    return True
+    return low - high > 2.0**-50 * (abs(way.x) + abs(way.y)) * (own.reach + other.reach) + 2.0**-1000
 
 
 @called
@@ -72,7 +56,7 @@ def _are_apart(a: Placed, b: Placed, near: Any, look: Look) -> int:
     for row in range(min(look.n, MOST_NEAR)):
         if near[4 * row] == look.least:
             is_first, vertex, edge = row_of(near, row)
-            if _are_parted(a, b, vertex, edge, error) if is_first else _are_parted(b, a, vertex, edge, error):
+            if _are_parted(a, b, vertex, edge) if is_first else _are_parted(b, a, vertex, edge):
                 return 1
             break
     if len(a.following) == 1 or len(b.following) == 1:

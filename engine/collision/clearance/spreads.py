@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 from itertools import product
 from math import isfinite, nextafter
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -108,9 +108,10 @@ class SpreadPair:
         placed = _pose_at(own, min(item, len(own.rotations) - 1)), _pose_at(poses, item)
         exact = _ExactPair(a, b, placed, self._radii)
 
-        def rank(i: int, j: int) -> tuple[int, int, list[float], list[float]]:
+        def rank(i: int, j: int) -> tuple[Any, ...]:
             """Order by faces, of one face by corners: the order of the tree is nobody's."""
-            return int(a.faces[i]), int(b.faces[j]), _corners(a, i), _corners(b, j)
+            corners = (body.arrays.vertices[body.arrays.triangles[k]].ravel().tolist() for body, k in ((a, i), (b, j)))
+            return int(a.faces[i]), int(b.faces[j]), *corners
 
         best: ScaledGap | None = None
         kept = (-1, -1)
@@ -129,11 +130,6 @@ class SpreadPair:
                 exact.hold(found.gap)
         assert best is not None
         return best, kept
-
-
-def _corners(body: MeshBody, triangle: int) -> list[float]:
-    corners: list[float] = body.arrays.vertices[body.arrays.triangles[triangle]].ravel().tolist()
-    return corners
 
 
 class _ExactPair:

@@ -22,8 +22,17 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.collision.clearance.along_line import approach, finish_along_line
-from engine.collision.clearance.blocks import CLOSER, DONE, FULL, INTERRUPTED, block_reach, keep_below, measure_blocks
+from engine.collision.clearance.blocks import (
+    CLOSER,
+    DONE,
+    FULL,
+    INTERRUPTED,
+    approach,
+    block_reach,
+    finish_along_line,
+    keep_below,
+    measure_blocks,
+)
 from engine.collision.clearance.boxes import ROOT, Search, View, fix, margin_of, scaled, set_line, size_of, way_of
 from engine.collision.clearance.certified import certify
 from engine.collision.clearance.refined import refine

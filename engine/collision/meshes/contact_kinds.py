@@ -1,6 +1,6 @@
 """Compiled: how faces in contact meet (the kind of a witness).
 
-As `exact_triangles.kind_of_contact`. An edge of t passes the open face u where its ends lie on two sides of u's plane
+As `exact_body.kind_of_contact`. An edge of t passes the open face u where its ends lie on two sides of u's plane
 and u's edges turn one way about it, or where it lies in that plane with corners of u on both sides. Open edges cross
 where they are coplanar and each has the other's ends on two sides, in a plane told by a third corner.
 """

@@ -19,8 +19,15 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from engine.budget import Budget
-from engine.collision.meshes.exact_body import Corners, ExactBody, Plane, Vector, rounded_outward
-from engine.collision.meshes.exact_triangles import value_at, without_axis
+from engine.collision.meshes.exact_body import (
+    Corners,
+    ExactBody,
+    Plane,
+    Vector,
+    rounded_outward,
+    value_at,
+    without_axis,
+)
 from engine.predicates.rational import cross, dot, minus, sign_of
 
 Rational = int | Fraction  # integers where they suffice: they are ten times faster
@@ -99,19 +106,6 @@ def points_within(corners: Corners) -> Iterator[Homogeneous]:
         yield x, y, z, sum(weights)
 
 
-def _flat_trace(points: Corners, values: list[int], axis: int) -> Sequence[Vector]:
-    """Return the ends (x, y, w), w > 0, of the segment or point in which a face meets a plane that does not hold it."""
-    j, k = (axis + 1) % 3, (axis + 2) % 3
-    ends = [(points[i][j], points[i][k], 1) for i in range(3) if values[i] == 0]
-    for i in range(3):
-        f, g = values[i], values[i - 2]
-        if f * g < 0:
-            p, q = points[i], points[i - 2]
-            x, y, w = f * q[j] - g * p[j], f * q[k] - g * p[k], f - g
-            ends.append((x, y, w) if w > 0 else (-x, -y, -w))
-    return ends
-
-
 def _around(body: ExactBody, points: Sequence[Homogeneous]) -> tuple[list[float], list[float]]:
     """Return the ends of a box of doubles around points on one denominator."""
     scale, sides = points[0][3] << body.shift, list(zip(*points))[:3]
@@ -141,14 +135,20 @@ def regions_of(
 
     only: a side of the face's plane and the faces that meet the face, where what lies on that side is all that counts.
     """
-    corners, plane, axis = body.corners(face), body.plane(face), body.axis(face)
     traces = _traces(body, face, cutters, budget, only)
     if not traces:
-        yield next(points_within(corners))
-        return
-    own = [_segment(without_axis(corners[i], axis), without_axis(corners[i - 2], axis)) for i in range(3)]
-    for x, y in _samples(own, traces, budget):
-        yield _lifted(x, y, plane, axis)
+        yield next(points_within(body.corners(face)))
+    for (x, y), _ in _samples(body, face, traces, budget) if traces else ():
+        yield _lifted(x, y, body.plane(face), body.axis(face))
+
+
+def cells_of(body: ExactBody, face: int, budget: Budget) -> Iterator[tuple[Homogeneous, list[Homogeneous]]]:
+    """Yield a point within and the corners of each of convex cells that fill a face with area, between the traces of
+    the other faces of its body."""
+    plane, axis = body.plane(face), body.axis(face)
+    for (x, y), (x0, x1, low, high) in _samples(body, face, _traces(body, face, [body], budget, None), budget):
+        corners = (x0, _height(low, x0)), (x1, _height(low, x1)), (x1, _height(high, x1)), (x0, _height(high, x0))
+        yield _lifted(x, y, plane, axis), [_lifted(*corner, plane, axis) for corner in corners]
 
 
 def _lifted(x: Rational, y: Rational, plane: Plane, axis: int) -> Homogeneous:
@@ -188,15 +188,21 @@ def _trace(points: Corners, values: list[int], axis: int) -> list[tuple[Rational
     """Return the segments in which a face meets the plane at which its corners have `values`."""
     if not any(values):
         return [(without_axis(points[i], axis), without_axis(points[i - 2], axis)) for i in range(3)]
-    ends = _flat_trace(points, values, axis)
-    flat: list[Rational2] = [(x, y) if w == 1 else (Fraction(x, w), Fraction(y, w)) for x, y, w in ends]
-    return [(flat[0], flat[1])] if len(flat) == 2 else []
+    flat = [without_axis(p, axis) for p in points]
+    ends: list[Rational2] = [p for p, value in zip(flat, values) if value == 0]
+    for i in range(3):
+        (f, (x, y)), (g, (z, w)) = (values[i], flat[i]), (values[i - 2], flat[i - 2])
+        if f * g < 0:
+            ends.append((Fraction(f * z - g * x, f - g), Fraction(f * w - g * y, f - g)))
+    return [(ends[0], ends[1])] if len(ends) == 2 else []
 
 
 def _samples(
-    own: list[tuple[Rational2, Rational2]], traces: list[tuple[Rational2, Rational2]], budget: Budget
-) -> Iterator[Rational2]:
-    """Yield a point in every region that `traces` cut from the triangle with the edges `own`."""
+    body: ExactBody, face: int, traces: list[tuple[Rational2, Rational2]], budget: Budget
+) -> Iterator[tuple[Rational2, _Cell]]:
+    """Yield a point in every region that `traces` cut from a face, projected along its axis, and the cell around it."""
+    corners = [without_axis(corner, body.axis(face)) for corner in body.corners(face)]
+    own = [_segment(corners[i], corners[i - 2]) for i in range(3)]
     left, right = min(p[0] for p, _ in own), max(q[0] for _, q in own)
     segments = [_on_line(s) for s in sorted({*own, *traces}) if s[0][0] <= right and s[1][0] >= left]
     stops = {end[0] for s in segments for end in s.ends if left <= end[0] <= right}
@@ -214,9 +220,9 @@ def _samples(
         x = Fraction(x0 + x1, 2)
         ends = [_height(s, x) for s in edges if s.ends[0][0] < x < s.ends[1][0]]
         low, high = min(ends), max(ends)
-        heights = {_height(s, x) for s in segments if s.ends[0][0] < x < s.ends[1][0]}
+        heights = {_height(s, x): s for s in segments if s.ends[0][0] < x < s.ends[1][0]}
         for y0, y1 in pairwise(sorted(y for y in heights if low <= y <= high)):
-            yield x, (y0 + y1) / 2
+            yield (x, (y0 + y1) / 2), (x0, x1, heights[y0], heights[y1])
 
 
 class _Segment(NamedTuple):
@@ -235,7 +241,11 @@ def _on_line(ends: tuple[Rational2, Rational2]) -> _Segment:
     return _Segment(ends, left, right, cross(left, right))
 
 
-def _height(s: _Segment, x: Fraction) -> Fraction:
+_Cell = tuple[Rational, Rational, _Segment, _Segment]
+"""Between two abscissas and two segments that do not cross there."""
+
+
+def _height(s: _Segment, x: Rational) -> Fraction:
     a, b, c = s.line
     return Fraction(-(a * x.numerator + c * x.denominator), b * x.denominator)
 

@@ -40,6 +40,7 @@ from engine.collision.meshes.triangle_triangle import (
     separation,
     with_pose,
 )
+from engine.direct import entry_of
 from engine.jit import allocating, allocating_kernel, called, inline
 from engine.predicates.orientation import orient2d, orient3d
 from engine.predicates.vectors import largest_of
@@ -131,8 +132,7 @@ def proves_overlap(first: MeshArrays, i: int, second: MeshArrays, j: int, poses:
 def states_of(mesh: MeshArrays, faces: IntArray) -> Int8Array:
     """Return the state of each of `faces` (n,)."""
     states = np.empty(len(faces), np.int8)
-    with np.errstate(all="ignore"):  # uncompiled runs only
-        _find_states(mesh, faces, states)
+    entry_of(_find_states)(mesh, faces, states)
     return states
 
 

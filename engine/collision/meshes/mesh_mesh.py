@@ -23,8 +23,8 @@ from engine.arrays import IntArray
 from engine.collision.codes import DISJOINT, OVERLAPPING, TOUCHING, UNSETTLED
 from engine.collision.meshes.contact_kinds import CONTAINED, STRENGTH
 from engine.collision.meshes.dual_traversal import PIERCING, SEEK_OVERLAP, Found
+from engine.collision.meshes.exact_body import as_simplex
 from engine.collision.meshes.exact_regions import pieces_of_segment, regions_of, side_of_clean, sides_at
-from engine.collision.meshes.exact_triangles import as_simplex
 from engine.collision.meshes.mesh_arrays import STATE_CLEAN, MeshBody, mesh_body_of
 from engine.collision.meshes.mesh_pair import MeshPair, PosedPair, relate, unless_identity, what_to_seek
 from engine.collision.meshes.parity import INSIDE

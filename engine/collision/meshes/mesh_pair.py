@@ -24,9 +24,8 @@ from engine.collision.meshes.dual_traversal import (
     new_descent,
     new_found,
 )
-from engine.collision.meshes.exact_body import ExactBody, exact_pair
+from engine.collision.meshes.exact_body import ExactBody, classify_exact, exact_pair, kind_of_contact
 from engine.collision.meshes.exact_regions import Sides, regions_of, sides_at
-from engine.collision.meshes.exact_triangles import classify_exact, kind_of_contact
 from engine.collision.meshes.face_state import state_at, states_of
 from engine.collision.meshes.mesh_arrays import NO_AREA, STATE_CLEAN, STATE_STACKED, MeshBody, join_vertices
 from engine.collision.meshes.parity import INSIDE, OUTSIDE, locate_vertices

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
-from engine.collision.meshes.clean_faces import flush
 from engine.collision.meshes.contact_kinds import (
     BOTH,
     CONTAINED,
@@ -35,7 +34,7 @@ from engine.collision.meshes.free_faces import JUDGED
 from engine.collision.meshes.mesh_arrays import MeshArrays
 from engine.collision.meshes.parity import INSIDE, OUTSIDE, brought_back, locate_point
 from engine.collision.meshes.placement import Placement, PoseArrays, defect_of
-from engine.collision.meshes.touching import relate_by_contacts
+from engine.collision.meshes.touching import flush, relate_by_contacts
 from engine.collision.meshes.triangle_triangle import COPLANAR, CORNER, CROSSING, beside
 from engine.jit import called, inline, kernel, merged
 from engine.predicates.vectors import as_point3

@@ -7,7 +7,7 @@ plane, the edges are separating axes. Two stages:
 - `classify_near`: float64 with one bound for all signs; answers APART or CROSSING, UNDECIDED where any sign is near 0.
 - `classify`: every sign exact, of points under their poses; answers always but out of exponent range.
 
-Caller guarantees that both triangles have an area (`exact_triangles.py` takes those without).
+Caller guarantees that both triangles have an area (`exact_body.py` takes those without).
 
 Source: P. Guigue, O. Devillers, Fast and robust triangle-triangle overlap test using orientation predicates, 2003.
 Changed: the permutations are replaced by a rule that names the lone vertex; strict and weak contacts are told apart.

@@ -21,7 +21,7 @@ from engine.arrangement.nodes import NodeTable, float_nodes, rational_nodes
 from engine.arrangement.subdivision import label_faces, subdivide
 from engine.arrays import FloatArray, IntArray
 from engine.budget import Budget
-from engine.collision.exact_images import image_map, rounded
+from engine.collision.exact_images import image_point, rounded
 from engine.collision.result import FIRST_WITHIN, NO_CONTACT, SECOND_WITHIN, Collision, Kind, Poses, Witness, Work
 from engine.containment.rational_locate import rational_location
 from engine.predicates.rational import orient2d_rational
@@ -71,11 +71,10 @@ def outline_of(body: Solid, pose: Pose | None, budget: Budget) -> Outline:
     ends[:, 1] = ends[:, 0] + 1
     ends[offsets[1:] - 1, 1] = offsets[:-1]
     points: list[Point] = []
-    image = image_map(pose)
     for vertex, p in enumerate(vertices.tolist()):
         if vertex % _CHECK_EVERY == 0:
             budget.check()
-        points.append(image(p))
+        points.append(image_point(p, pose))
     floats = vertices if pose is None else np.array([[rounded(x), rounded(y)] for x, y in points])
     low, high = np.minimum(floats[ends[:, 0]], floats[ends[:, 1]]), np.maximum(floats[ends[:, 0]], floats[ends[:, 1]])
     return Outline(points, ends, low, high, floats, pose is not None)

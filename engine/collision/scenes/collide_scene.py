@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray, read_only
-from engine.bounding.box_grid import pairs_of_boxes
-from engine.bounding.sweep import BLOCK
+from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray
+from engine.bounding.box_grid import BLOCK, pairs_of_boxes
 from engine.budget import Budget, Cancel
-from engine.collision.answers import Answers, PlacedPair, accuracy_of
 from engine.collision.clearance.clearance import checked_distance
 from engine.collision.codes import UNSETTLED
+from engine.collision.collide import Answers, PlacedPair, accuracy_of
 from engine.collision.detail import NO_DETAIL, check_has_detail, has_interior
 from engine.collision.result import Witness, Work
 from engine.collision.scenes.batches import SceneBatches
@@ -27,8 +25,6 @@ from engine.solids.base import Solid
 from engine.solids.pose import Pose
 from engine.types import Accuracy, Relation
 
-_FEW: Final = 16
-"""Bodies of which all pairs of boxes are compared, no order of them made."""
 _FEW_PAIRS: Final = 8
 """Pairs that are sooner decided one by one than put into arrays."""
 _BYTES: Final = 64
@@ -228,27 +224,16 @@ def _candidates(
     if n_bodies < 2 or (wanted is not None and not len(wanted)):
         return
     high = bodies.high
-    named = _all_pairs(n_bodies) if wanted is None and n_bodies <= _FEW else None
-    if wanted is not None:
-        named = np.stack(np.divmod(np.unique(wanted), n_bodies), axis=1)
-        named = named[named[:, 0] < named[:, 1]]
-    blocks = pairs_of_boxes(low, high, budget.flag) if named is None else _meeting(low, high, named)
-    for pairs in blocks:
+    for pairs in pairs_of_boxes(low, high, budget.flag) if wanted is None else _meeting(low, high, np.unique(wanted)):
         yield pairs if skipped is None else pairs[~np.isin(pairs[:, 0] * n_bodies + pairs[:, 1], skipped)]
 
 
-@lru_cache(_FEW)
-def _all_pairs(n_bodies: int) -> IntArray:
-    """Return all pairs of few bodies."""
-    return read_only(np.stack(np.triu_indices(n_bodies, 1), axis=1))
-
-
-def _meeting(low: FloatArray, high: FloatArray, named: IntArray) -> Iterator[IntArray]:
-    """Yield the pairs named whose boxes meet, in blocks."""
-    for start in range(0, len(named), BLOCK):
-        pairs = named[start : start + BLOCK]
-        first, second = pairs.T
-        yield pairs[((low[first] <= high[second]) & (low[second] <= high[first])).all(axis=1)]
+def _meeting(low: FloatArray, high: FloatArray, keys: IntArray) -> Iterator[IntArray]:
+    """Yield the pairs named by their keys whose boxes meet, in blocks."""
+    for start in range(0, len(keys), BLOCK):
+        first, second = np.divmod(keys[start : start + BLOCK], len(low))
+        meet = (first < second) & ((low[first] <= high[second]) & (low[second] <= high[first])).all(axis=1)
+        yield np.stack([first[meet], second[meet]], axis=1)
 
 
 def pair_keys(named: Any, n_bodies: int, name: str) -> IntArray:

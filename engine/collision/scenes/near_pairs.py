@@ -17,14 +17,15 @@ from engine.budget import Budget
 from engine.collision.clearance.bodies import in_space
 from engine.collision.clearance.clearance import has_plane
 from engine.collision.clearance.convex_gaps import gaps_of_pairs
-from engine.collision.clearance.forms import are_small, told_under_poses
-from engine.collision.clearance.half_spaces import gap_of_planes
+from engine.collision.clearance.forms import are_small, gap_of_planes, told_under_poses
 from engine.collision.clearance.spreads import SpreadPair
 from engine.collision.convex.body import pooled
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.scenes.batches import SceneBatches
 from engine.collision.scenes.bodies import SceneBodies
-from engine.collision.simple.form import N_NUMBERS, form_of
+from engine.collision.simple.closed_forms import form_of
+from engine.collision.simple.form_relations import N_NUMBERS
+from engine.direct import entry_of
 from engine.parallel import run_chunks
 
 _ROUNDING: Final = 2.0**-48
@@ -68,11 +69,10 @@ def distances_below(
         pool, convex = batches.pool(budget)
 
     def by_batch(start: int, stop: int) -> None:
-        with np.errstate(all="ignore"):  # uncompiled runs only
-            gaps_of_pairs(
-                forms, pool, convex, kinds[start:stop], PoseArrays(turns, moves, True), places[start:stop], gap,
-                is_measured, found[start:stop], budget.flag,
-            )  # fmt: skip
+        entry_of(gaps_of_pairs)(
+            forms, pool, convex, kinds[start:stop], PoseArrays(turns, moves, True), places[start:stop], gap,
+            is_measured, found[start:stop], budget.flag,
+        )  # fmt: skip
 
     run_chunks(by_batch, len(left), budget=budget, workers=workers)
     still = np.flatnonzero(np.isnan(found))

@@ -17,11 +17,10 @@ from engine.arrays import FloatArray, IntArray
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
 from engine.collision.exact_images import Vector, image_point, rounded
 from engine.collision.meshes.face_state import state_at
-from engine.collision.meshes.live_faces import simplex_distance
 from engine.collision.meshes.mesh_arrays import STATE_STACKED, MeshBody, mesh_body_of
 from engine.collision.result import FIRST_WITHIN, NO_CONTACT, SECOND_WITHIN, Collision, Parts, Poses, Witness, Work
 from engine.collision.simple.ball_on_mesh import relate_balls
-from engine.collision.simple.boundary import Boundary, boundary_of
+from engine.collision.simple.boundary import Boundary, boundary_of, simplex_distance
 from engine.containment.rational_locate import rational_location
 from engine.direct import entry_of
 from engine.predicates.rational import minus, squared_length
@@ -156,7 +155,7 @@ def _candidates(nearest: FloatArray, limit: Fraction) -> IntArray:
 
 def _enters(boundary: Boundary, faces: IntArray, center: Vector, limit: Fraction) -> bool:
     """Tell whether something live of these faces comes nearer to the centre than a squared distance."""
-    return len(faces) > 0 and boundary.has_live(faces, lambda piece: piece.squared_distance(center) < limit)
+    return len(faces) > 0 and boundary.has_live(faces, lambda corners: simplex_distance(center, corners) < limit)
 
 
 def _is_within_walls(body: Solid, pose: Pose | None, center: Vector, radius: float, work: Work) -> bool:
@@ -206,11 +205,15 @@ def body_sphere_parts(body: Solid, ball: Sphere, poses: Poses, work: Work) -> Pa
     ball_sticks_out = _enters(boundary, candidates, center, limit)
     beyond = np.flatnonzero(farthest >= rounded(limit) * (1.0 - 2.0**-50) - 2.0**-1000)
     beyond = beyond[np.argsort(-nearest[beyond], kind="stable")]
-    body_sticks_out = boundary.has_live(beyond, lambda piece: piece.farthest(center) > limit)
+    body_sticks_out = boundary.has_live(beyond, lambda corners: _farthest(center, corners) > limit)
     meet = ball_sticks_out and body_sticks_out
     if not meet:
         meet = any(  # of a face, some part is as near as the sphere, and some corner as far
-            simplex_distance(center, corners) <= limit <= max(squared_length(minus(p, center)) for p in corners)
+            simplex_distance(center, corners) <= limit <= _farthest(center, corners)
             for corners in map(boundary.corners, np.intersect1d(candidates, beyond).tolist())
         )
     return Parts(body_sticks_out, ball_sticks_out, meet)
+
+
+def _farthest(center: Vector, corners: tuple[Vector, ...]) -> Fraction:
+    return max(squared_length(minus(p, center)) for p in corners)

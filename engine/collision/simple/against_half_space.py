@@ -6,26 +6,31 @@ by its faces with vertices there; the half-space always sticks out of the body.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
 from engine.collision.exact_images import HalfSpaceImage, as_vector, image_half_space, value_at
 from engine.collision.meshes.face_state import state_at
-from engine.collision.meshes.mesh_arrays import STATE_STACKED, MeshBody, mesh_body_of
+from engine.collision.meshes.mesh_arrays import STATE_STACKED, MeshArrays, mesh_body_of
 from engine.collision.result import NO_CONTACT, SECOND_WITHIN, Collision, Parts, Poses, Witness, Work
-from engine.collision.simple.boundary import Boundary, boundary_of, pulled_back
-from engine.collision.simple.sides_of_plane import first_triangle_at, scan_sides
+from engine.collision.simple.boundary import Boundary, boundary_of, first_triangle_at, pulled_back
 from engine.direct import entry_of
+from engine.jit import inline, kernel
 from engine.predicates.rational import sign_of
+from engine.predicates.vectors import as_point3, dot
 from engine.solids.base import Solid
 from engine.solids.bounds import own_box
 from engine.solids.half_space import HalfSpace
-from engine.types import Relation
+from engine.types import Point3, Relation
 
 _Function = tuple[FloatArray, FloatArray, float, float]
 """Of points: weights of the coordinates, their sizes, which bound their errors, an offset, and its size."""
 _FEW_UNSURE = 16
 """Vertices whose side of a plane is asked one by one; more are asked together."""
+_BLOCK = 64
+_MANY = 64 * _BLOCK
 
 
 def collide_half_space_body(space: HalfSpace, body: Solid, poses: Poses, work: Work) -> Collision:
@@ -65,7 +70,11 @@ def _by_scan(function: _Function, space: HalfSpace, body: Solid, poses: Poses, w
         return None
     work.n_beyond_filter += n_unsure
     work.n_rational += n_unsure
-    signs = _exact_signs(space, mesh, poses, unsure[:n_unsure].tolist())
+    signs: dict[int, int] = {}
+    if n_unsure:
+        exact, _, _ = pulled_back(image_half_space(space, poses[0]), poses[1])
+        points = mesh.arrays.vertices[unsure[:n_unsure]].tolist()
+        signs = {v: sign_of(value_at(exact, as_vector(p))) for v, p in zip(unsure.tolist(), points)}
     first = {sign: min((vertex for vertex in signs if signs[vertex] == sign), default=-1) for sign in (1, 0, -1)}
     first[1], before = min((v for v in (beyond, first[1]) if v >= 0), default=-1), max(before, first[-1])
     if first[1] < 0 and first[0] < 0:
@@ -81,12 +90,54 @@ def _by_scan(function: _Function, space: HalfSpace, body: Solid, poses: Poses, w
     return Collision(relation, Witness("surface", second_face=int(mesh.faces[triangle]), piercing=enters != overlaps))
 
 
-def _exact_signs(space: HalfSpace, mesh: MeshBody, poses: Poses, vertices: list[int]) -> dict[int, int]:
-    """Return on which side of a half-space some vertices of a mesh lie, by vertex."""
-    if not vertices:
-        return {}
-    plane, _, _ = pulled_back(image_half_space(space, poses[0]), poses[1])
-    return {v: sign_of(value_at(plane, as_vector(mesh.arrays.vertices[v].tolist()))) for v in vertices}
+@inline
+def _side(mesh: MeshArrays, vertex: int, plane: Any) -> int:
+    """Return 1 or -1 where that is sure, else 0.
+
+    Each weight may be off by 2^-50 of its size, which is no less than the weight, and 2^-1070; the sum of three
+    products and a number by 2^-50 of the sum of magnitudes more.
+    """
+    p = as_point3(mesh.vertices, vertex)
+    around = Point3(abs(p.x), abs(p.y), abs(p.z))
+    value = dot(as_point3(plane, 0), p) + plane[2, 0]
+    size = dot(as_point3(plane, 1), around) + plane[2, 1]
+    slack = 2.0**-48 * size + 2.0**-1060 * (around.x + around.y + around.z) + 2.0**-1000
+    return int(value > slack) - int(value < -slack)
+
+
+@kernel
+def scan_sides(mesh: MeshArrays, plane: Any, unsure: Any, flag: Any) -> tuple[int, int, int]:
+    """Look along the vertices of a mesh until one lies surely beyond a plane and one surely before it.
+
+    plane: (3, 3), the weights of the coordinates; their sizes, which bound their errors; the offset and its size.
+    Returns: the first vertex surely beyond, and surely before, -1 where there is none; and how many passed on the way
+    are unsure: the first of them are listed in `unsure` (n,) int64. One more than fit there where the flag was raised.
+    """
+    beyond, before, n_unsure, n = -1, -1, 0, mesh.vertices.shape[0]
+    for start in range(0, n, _BLOCK):  # many vertices at once, without branches
+        stop, n_beyond, n_before = min(start + _BLOCK, n), 0, 0
+        for vertex in range(start, stop):
+            side = _side(mesh, vertex, plane)
+            n_beyond += side > 0
+            n_before += side < 0
+        is_sure = n_beyond + n_before == stop - start
+        if is_sure and (n_beyond == 0 or beyond >= 0) and (n_before == 0 or before >= 0):
+            continue
+        for vertex in range(start, stop):
+            side = _side(mesh, vertex, plane)
+            if side > 0 and beyond < 0:
+                beyond = vertex
+            elif side < 0 and before < 0:
+                before = vertex
+            elif side == 0:
+                if n_unsure < len(unsure):
+                    unsure[n_unsure] = vertex
+                n_unsure += 1
+            if beyond >= 0 and before >= 0:
+                return beyond, before, n_unsure
+        if n_unsure > len(unsure) or (start % _MANY == 0 and flag[0] != 0):
+            return beyond, before, len(unsure) + 1
+    return beyond, before, n_unsure
 
 
 def _function_in_frame(space: HalfSpace, poses: Poses) -> _Function:
@@ -129,7 +180,7 @@ def _side_of_box(function: _Function, body: Solid) -> int:
 
 def _reaches(boundary: Boundary, faces: IntArray, plane: HalfSpaceImage, side: int) -> bool:
     """Tell whether something live of these faces lies on one side, 1 or -1, of a plane."""
-    return boundary.has_live(faces, lambda piece: any(side * value_at(plane, p) > 0 for p in piece.vertices()))
+    return boundary.has_live(faces, lambda corners: any(side * value_at(plane, p) > 0 for p in corners))
 
 
 def half_space_body_parts(space: HalfSpace, body: Solid, poses: Poses, work: Work) -> Parts:

@@ -1,25 +1,34 @@
-"""The boundary of one placed body as balls and half-spaces see it: the faces of a mesh, or the edges of an outline."""
+"""The boundary of one placed body as balls and half-spaces see it: the faces of a mesh, or the edges of an outline.
+
+Only beside what even-odd does not cancel of a face lies the body's open interior. Most faces are whole: no other face
+of the body covers a part of them. A stacked face (see `face_state.py`) is cut into cells (`exact_regions.py`); one with
+the open interior on one side is live.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import reduce
+from fractions import Fraction
+from functools import partial, reduce
+from itertools import chain, pairwise
+from typing import Any
 
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray
-from engine.collision.exact_images import HalfSpaceImage, Vector, as_vector, image_map, rounded, value_at
-from engine.collision.meshes.exact_body import exact_pair, faces_in
-from engine.collision.meshes.exact_regions import sides_at
-from engine.collision.meshes.live_faces import LivePiece, live_piece
-from engine.collision.meshes.mesh_arrays import mesh_body_of
+from engine.budget import Budget
+from engine.collision.exact_images import HalfSpaceImage, Vector, as_vector, image_point, rounded, value_at
+from engine.collision.meshes.exact_body import ExactBody, exact_pair, faces_in
+from engine.collision.meshes.exact_regions import cells_of, sides_at
+from engine.collision.meshes.face_state import state_at
+from engine.collision.meshes.mesh_arrays import NO_AREA, STATE_STACKED, MeshArrays, MeshBody, mesh_body_of
 from engine.collision.planar.outline import is_clean, live_edges, outline_of
 from engine.collision.result import Work
-from engine.collision.simple.sides_of_plane import first_triangle_at
 from engine.containment.rational_locate import rational_location
 from engine.direct import entry_of
-from engine.predicates.rational import dot, sign_of
+from engine.jit import kernel
+from engine.predicates.rational import common_integers, cross, dot, minus, sign_of, squared_length
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
 from engine.types import Location
@@ -52,8 +61,9 @@ class Boundary:
     ends: (n, d) the vertices of each face or edge. floats: of a place in it the rounded posed vertices, each number
     within `error` of the exact one. near: all faces that come as near to a point as a radius, ascending, and maybe
     others. exact: the position of a vertex. number, number_at: the caller's number of a face, and of one at a vertex.
-    signs: of a plane at each vertex. live: what even-odd leaves of faces; of an outline maybe of other edges too.
-    is_inside: whether a point on no face lies in the body. has_inside: False for surfaces and flat boxes.
+    signs: of a plane at each vertex. live: what even-odd leaves of faces, the corners of triangles; the ends of edges,
+    maybe of others too. is_inside: whether a point on no face lies in the body. has_inside: False for surfaces and
+    flat boxes.
     """
 
     ends: IntArray
@@ -64,7 +74,7 @@ class Boundary:
     number: Callable[[int], int]
     number_at: Callable[[int], int]
     signs: Callable[[HalfSpaceImage], Int8Array]
-    live: Callable[[list[int]], Iterator[LivePiece]]
+    live: Callable[[list[int]], Iterator[tuple[Vector, ...]]]
     is_inside: Callable[[Vector], bool]
     has_inside: bool
 
@@ -89,8 +99,8 @@ class Boundary:
         """Return the faces with a corner among the vertices chosen."""
         return np.flatnonzero(reduce(np.logical_or, is_chosen[self.ends.T]))
 
-    def has_live(self, faces: IntArray, condition: Callable[[LivePiece], bool]) -> bool:
-        """Tell whether a condition holds for something live of these faces."""
+    def has_live(self, faces: IntArray, condition: Callable[[tuple[Vector, ...]], bool]) -> bool:
+        """Tell whether a condition holds for a live part of these faces, given by its corners."""
         return any(map(condition, self.live(faces.tolist())))
 
 
@@ -100,7 +110,7 @@ def boundary_of(body: Solid, pose: Pose | None, work: Work) -> Boundary:
 
 
 def _mesh_boundary(body: Solid, pose: Pose | None, work: Work) -> Boundary:
-    mesh, image = mesh_body_of(body), image_map(pose)
+    mesh, image = mesh_body_of(body), partial(image_point, pose=pose)
     vertices, triangles = mesh.arrays.vertices, mesh.arrays.triangles
     error = 0.0
     if pose is not None:  # the error is derived in `placement.py`
@@ -119,12 +129,11 @@ def _mesh_boundary(body: Solid, pose: Pose | None, work: Work) -> Boundary:
         exact, _ = exact_pair(mesh, mesh, (pose, pose))
         return mesh.has_inside and sides_at(exact, exact.at(center), 2).at
 
-    def live(faces: list[int]) -> Iterator[LivePiece]:
+    def live(faces: list[int]) -> Iterator[tuple[Vector, ...]]:
         for face in faces:
             work.budget.check()
-            piece = live_piece(mesh, face, work.budget)
-            if piece is not None:
-                yield piece if pose is None else piece.moved(image)
+            for corners in live_parts(mesh, face, work.budget):
+                yield corners if pose is None else tuple(map(image, corners))
 
     return Boundary(
         triangles, floats, error, near, lambda vertex: image(vertices[vertex].tolist()),
@@ -137,12 +146,12 @@ def _mesh_boundary(body: Solid, pose: Pose | None, work: Work) -> Boundary:
 def _outline_boundary(body: Solid, pose: Pose | None, work: Work) -> Boundary:
     outline = outline_of(body, pose, work.budget)
 
-    def live(edges: list[int]) -> Iterator[LivePiece]:
+    def live(edges: list[int]) -> Iterator[tuple[Vector, ...]]:
         for edge in edges:
             work.budget.check()
             if is_clean(outline, edge):
-                yield LivePiece(outline.edge(edge), None)
-        yield from (LivePiece(ends, None) for ends in live_edges(outline, work.budget))
+                yield outline.edge(edge)
+        yield from live_edges(outline, work.budget)
 
     error = 2.0**-52 * float(np.abs(outline.floats).max()) + 2.0**-1074
     return Boundary(
@@ -185,3 +194,55 @@ def pulled_back(plane: HalfSpaceImage, pose: Pose | None) -> tuple[HalfSpaceImag
         normal = tuple(dot(normal, as_vector(column)) for column in pose.rotation.T.tolist())
     largest = max(abs(value) for value in (*normal, offset))
     return (normal, offset), np.array([float(value / largest) for value in normal]), float(offset / largest)
+
+
+def segment_distance(point: Sequence[Any], a: Sequence[Any], b: Sequence[Any]) -> Fraction:
+    """Return the squared distance from `point` to the closed segment a b, which may be a point."""
+    along, to_point = minus(b, a), minus(point, a)
+    length, t = squared_length(along), dot(to_point, along)
+    if t <= 0 or t >= length:
+        return Fraction(squared_length(minus(point, b) if t > 0 else to_point))
+    return squared_length(to_point) - Fraction(t * t, length)
+
+
+def simplex_distance(point: Vector, corners: Sequence[Vector]) -> Fraction:
+    """Return the squared distance from `point` to the closed segment or triangle of these corners, degenerate or not.
+
+    Over an open triangle it is the distance to the plane, elsewhere that to the nearest edge. In integers, with a
+    twentieth of the time that fractions take.
+    """
+    d, (numbers, scale) = len(point), common_integers([*point, *chain(*corners)])
+    q, *ends = [tuple(numbers[at : at + d]) for at in range(0, len(numbers), d)]
+    if len(ends) == 2:
+        return segment_distance(q, *ends) / scale**2
+    edges = list(zip(ends, (*ends[1:], ends[0])))
+    normal = cross(minus(ends[1], ends[0]), minus(ends[2], ends[0]))
+    if any(normal) and all(dot(cross(minus(b, a), minus(q, a)), normal) >= 0 for a, b in edges):
+        return Fraction(dot(normal, minus(q, ends[0])) ** 2, squared_length(normal) * scale**2)
+    return min(segment_distance(q, a, b) for a, b in edges) / scale**2
+
+
+def live_parts(mesh: MeshBody, face: int, budget: Budget) -> Iterator[tuple[Vector, ...]]:
+    """Yield the corners of triangles that together are what even-odd leaves of one face, in the body's own coordinates:
+    of a whole face its own."""
+    if mesh.arrays.axis[face] == NO_AREA:
+        return
+    if state_at(mesh.arrays, face) != STATE_STACKED:
+        yield tuple(map(as_vector, mesh.arrays.vertices[mesh.arrays.triangles[face]].tolist()))
+        return
+    body = ExactBody(mesh, None, mesh.shift)
+    for middle, corners in cells_of(body, face, budget):
+        sides = sides_at(body, middle, body.axis(face))
+        if sides.above != sides.below:
+            a, *others = (tuple(Fraction(x, w << mesh.shift) for x in xyz) for *xyz, w in corners)
+            yield from ((a, *pair) for pair in pairwise(others))
+
+
+@kernel
+def first_triangle_at(mesh: MeshArrays, vertex: int) -> int:
+    """Return the first triangle with a vertex."""
+    for triangle in range(mesh.triangles.shape[0]):
+        t = triangle
+        if mesh.triangles[t, 0] == vertex or mesh.triangles[t, 1] == vertex or mesh.triangles[t, 2] == vertex:
+            return triangle
+    return -1

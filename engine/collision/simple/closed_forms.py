@@ -1,7 +1,7 @@
 """Boxes that no pose turns, balls and half-spaces among each other: a few exact comparisons decide.
 
-Boxes and balls: compiled (`form_relations.py`), or in rationals: the nearest and the farthest point of a box, or of
-another ball's centre, from the centre of a ball, against the sum and the difference of the radii. A
+Boxes that are not flat and balls: compiled (`form_relations.py`), or in rationals: the nearest and the farthest point
+of a box, or of another ball's centre, from the centre of a ball, against the sum and the difference of the radii. A
 half-space and a ball: the signed distance of the centre against the radius, both sides squared. Two half-spaces overlap
 unless their planes are parallel; then their thresholds along one normal decide.
 """
@@ -10,7 +10,11 @@ from __future__ import annotations
 
 from fractions import Fraction
 from functools import lru_cache
+from typing import Final
 
+import numpy as np
+
+from engine.arrays import FloatArray, read_only
 from engine.collision.codes import OVERLAPPING, UNSETTLED
 from engine.collision.exact_images import as_vector, image_half_space, image_point, value_at
 from engine.collision.meshes.contact_kinds import STRENGTH
@@ -28,8 +32,15 @@ from engine.collision.result import (
     Work,
 )
 from engine.collision.simple.against_ball import collide_body_sphere
-from engine.collision.simple.form import form_of
-from engine.collision.simple.form_relations import FACE_AT, KIND_AT, THEIR_FACE_AT, relate_forms
+from engine.collision.simple.form_relations import (
+    FACE_AT,
+    HIGH,
+    KIND_AT,
+    N_NUMBERS,
+    RADIUS,
+    THEIR_FACE_AT,
+    relate_forms,
+)
 from engine.direct import entry_of
 from engine.predicates.rational import largest_axis, squared_length
 from engine.solids.aabb import Aabb
@@ -38,6 +49,27 @@ from engine.solids.half_space import HalfSpace
 from engine.solids.pose import Motion, motion_of
 from engine.solids.sphere import Sphere
 from engine.types import Relation
+
+FORMS: Final = ("aabb", "sphere")
+
+
+def form_of(solid: Solid) -> FloatArray | None:
+    """Return a box that is not flat or a ball as kernels take it, None for others."""
+    if solid.type not in FORMS:
+        return None
+    return solid.prepared("form", lambda: _form(solid))
+
+
+def _form(solid: Solid) -> FloatArray | None:
+    d, form = solid.dimension, np.zeros(N_NUMBERS)
+    if isinstance(solid, Sphere):
+        form[:d] = form[HIGH : HIGH + d] = solid.center
+        form[RADIUS:] = solid.radius, 1.0
+        return read_only(form)
+    if isinstance(solid, Aabb) and bool((solid.min < solid.max).all()):
+        form[:d], form[HIGH : HIGH + d] = solid.min, solid.max
+        return read_only(form)
+    return None
 
 
 def by_forms_or(otherwise: PairFunction) -> PairFunction:

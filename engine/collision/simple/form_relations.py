@@ -14,13 +14,17 @@ from typing import Any, Final, NamedTuple
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
 from engine.collision.meshes.contact_kinds import EDGE_EDGE, EDGE_FACE, FACE_FACE, VERTEX_VERTEX
 from engine.collision.meshes.placement import orient2d_near
-from engine.collision.simple.form import HIGH, IS_BALL, RADIUS
 from engine.jit import called, inline, kernel
 from engine.predicates.error_free import two_sum, workspace
 from engine.predicates.expansion import add, add_product, grow, grow_product, is_safe, sign
 from engine.predicates.vectors import as_point3, cross, dot, minus
 from engine.types import UNDECIDED, Point2, Point3
 
+HIGH: Final = 3
+RADIUS: Final = 6
+IS_BALL: Final = 7
+N_NUMBERS: Final = 8
+"""Of a form: low and high on three axes, the radius, and whether it is a ball (1.0)."""
 KIND_AT: Final = 3
 FACE_AT: Final = 6
 THEIR_FACE_AT: Final = 9

@@ -1,12 +1,15 @@
-"""The grid finds the pairs that the sweep finds, for boxes of any mix of sizes."""
+"""Pairs of boxes that meet: the brute-force answer, for boxes of any mix of sizes, whatever the blocks."""
 
 from __future__ import annotations
+
+from functools import partial
 
 import numpy as np
 import pytest
 
-from engine.bounding.box_grid import pairs_of_boxes
-from engine.bounding.sweep import meeting_boxes
+from engine.bounding.box_grid import all_pairs_of_boxes, pairs_of_boxes
+from engine.budget import Budget, Cancel
+from engine.errors import CancelledError
 
 FLAG = np.zeros(1, np.uint8)
 
@@ -15,9 +18,14 @@ def all_pairs(blocks) -> list[list[int]]:
     return np.concatenate([np.empty((0, 2), np.int64), *blocks]).tolist()
 
 
+def brute_force(low: np.ndarray, high: np.ndarray) -> list[list[int]]:
+    meet = ((low[:, None] <= high) & (low <= high[:, None])).all(axis=2)
+    return np.argwhere(np.triu(meet, 1)).tolist()
+
+
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("kind", ["alike", "lattice", "mixed", "infinite", "flat", "far", "one_place", "tiny"])
-def test_the_pairs_are_those_of_the_sweep(kind: str, dimension: int) -> None:
+def test_the_pairs_are_those_that_meet(kind: str, dimension: int) -> None:
     rng = np.random.default_rng(dimension)
     low = rng.uniform(0, 12, (700, dimension))
     size = rng.uniform(0.5, 1.0, (700, dimension))
@@ -36,7 +44,7 @@ def test_the_pairs_are_those_of_the_sweep(kind: str, dimension: int) -> None:
     high = low + size
     if kind == "infinite":
         low[5], high[5], low[6] = -np.inf, np.inf, -np.inf
-    expected = all_pairs(meeting_boxes(low, high, FLAG))
+    expected = brute_force(low, high)
     assert all_pairs(pairs_of_boxes(low, high, FLAG)) == expected
     blocks = list(pairs_of_boxes(low, high, FLAG, 100))
     assert all(block.tolist() == sorted(block.tolist()) for block in blocks)
@@ -46,3 +54,34 @@ def test_the_pairs_are_those_of_the_sweep(kind: str, dimension: int) -> None:
 def test_a_raised_flag_ends_it() -> None:
     low = np.random.default_rng(0).uniform(0, 10, (500, 3))
     assert all_pairs(pairs_of_boxes(low, low + 1, np.ones(1, np.uint8))) == []
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("block", [1, 7, 1 << 18])
+def test_every_pair_of_few_once(dimension: int, block: int) -> None:
+    rng = np.random.default_rng(dimension)
+    low = rng.integers(0, 8, (40, dimension)).astype(float)
+    high = low + rng.integers(0, 3, low.shape)
+    low[5], high[6], low[7], high[7] = -np.inf, np.inf, -np.inf, np.inf
+    blocks = list(pairs_of_boxes(low, high, FLAG, block))
+    assert sorted(all_pairs(blocks)) == brute_force(low, high)
+    assert all(len(part) < block + len(low) for part in blocks)
+
+
+@pytest.mark.parametrize("stretch", [(1.0, 1.0), (100.0, 1.0), (1.0, 100.0)])
+def test_all_pairs_at_once(stretch: tuple[float, float], monkeypatch: pytest.MonkeyPatch) -> None:
+    random = np.random.default_rng(7)
+    low = random.integers(0, 40, (150, 2)) * stretch
+    high = low + random.integers(0, 6, (150, 2)) * stretch
+    expected = brute_force(low, high)
+    assert all_pairs_of_boxes(low, high, Budget()).tolist() == expected
+    monkeypatch.setattr("engine.bounding.box_grid.pairs_of_boxes", partial(pairs_of_boxes, block=50))
+    assert all_pairs_of_boxes(low, high, Budget()).tolist() == expected
+    assert all_pairs_of_boxes(low[:0], high[:0], Budget()).shape == (0, 2)
+
+
+def test_all_pairs_end_when_cancelled() -> None:
+    cancel = Cancel()
+    cancel.set()
+    with Budget(cancel=cancel) as budget, pytest.raises(CancelledError):
+        all_pairs_of_boxes(np.zeros((200, 2)), np.ones((200, 2)), budget)

@@ -6,8 +6,8 @@ import numpy as np
 
 from engine import Aabb, Relation, Solid
 from engine.budget import Budget
-from engine.collision.answers import Answers, PlacedPair, accuracy_of
 from engine.collision.codes import UNSETTLED
+from engine.collision.collide import Answers, PlacedPair, accuracy_of
 from engine.collision.detail import NO_DETAIL
 from engine.types import Rcc8
 

@@ -7,8 +7,8 @@ import pytest
 
 from engine import Aabb, Pose, Scene
 from engine.budget import Budget
-from engine.scenes.moved_pairs import PairRows, Placed, list_pairs
 from engine.scenes.scratch import scratch_for
+from engine.scenes.standing import PairRows, Placed, list_pairs
 
 
 @pytest.mark.parametrize("dimension", [2, 3])

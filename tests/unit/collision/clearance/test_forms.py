@@ -13,8 +13,7 @@ import engine.collision.clearance.forms as forms
 from engine import Aabb, HalfSpace, Pose, Sphere, clearance
 from engine.budget import Budget
 from engine.collision.clearance.closed_forms import UNSURE
-from engine.collision.clearance.forms import MEETING, between_form_and_plane, between_forms
-from engine.collision.clearance.half_spaces import gap_of_planes
+from engine.collision.clearance.forms import MEETING, between_form_and_plane, between_forms, gap_of_planes
 from engine.collision.result import Clearance, Feature
 from tests.unit.collision.clearance.makers import turn
 

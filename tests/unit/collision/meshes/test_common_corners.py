@@ -8,7 +8,7 @@ import pytest
 from engine import Polyhedron, Pose, Relation, Surface, collide
 from engine.collision.meshes.common_corners import common_corner
 from engine.collision.meshes.dual_traversal import SEEK_OVERLAP, new_found
-from engine.collision.meshes.exact_triangles import kind_of_contact
+from engine.collision.meshes.exact_body import kind_of_contact
 from engine.collision.meshes.mesh_arrays import STILL, mesh_body_of
 from engine.collision.meshes.mesh_pair import N_CONTACTS, SPACE, relate
 from engine.collision.meshes.triangle_triangle import Facet, with_pose

@@ -9,8 +9,7 @@ from engine import Pose, Surface
 from engine.collision.codes import UNSETTLED
 from engine.collision.meshes.contact_kinds import STRENGTH
 from engine.collision.meshes.dual_traversal import SEEK_CONTACT, SEEK_OVERLAP, Found
-from engine.collision.meshes.exact_body import exact_pair
-from engine.collision.meshes.exact_triangles import classify_exact, kind_of_contact
+from engine.collision.meshes.exact_body import classify_exact, exact_pair, kind_of_contact
 from engine.collision.meshes.mesh_arrays import STILL, mesh_body_of
 from engine.collision.meshes.mesh_pair import relate
 from engine.collision.meshes.pose_batch import BESIDE, DETAIL, KIND

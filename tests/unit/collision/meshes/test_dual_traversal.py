@@ -9,8 +9,7 @@ import pytest
 
 from engine import Pose
 from engine.collision.meshes.dual_traversal import SEEK_CONTACT, SEEK_OVERLAP, new_found
-from engine.collision.meshes.exact_body import exact_pair
-from engine.collision.meshes.exact_triangles import classify_exact, kind_of_contact
+from engine.collision.meshes.exact_body import classify_exact, exact_pair, kind_of_contact
 from engine.collision.meshes.mesh_pair import SPACE, relate
 from engine.collision.meshes.pose_batch import N_CONTACTS, ONE_SETTLES
 from engine.collision.meshes.triangle_triangle import APART, CROSSING

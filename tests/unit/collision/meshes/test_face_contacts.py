@@ -9,7 +9,7 @@ import pytest
 
 from engine import Pose
 from engine.collision.meshes.contact_kinds import N_NAMED
-from engine.collision.meshes.exact_triangles import classify_exact
+from engine.collision.meshes.exact_body import classify_exact
 from engine.collision.meshes.mesh_pair import MeshPair
 from engine.collision.meshes.triangle_triangle import APART, COPLANAR
 from engine.collision.result import Work

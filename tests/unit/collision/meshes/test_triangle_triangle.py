@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.collision.meshes.exact_triangles import classify_exact, kind_of_contact
+from engine.collision.meshes.exact_body import classify_exact, kind_of_contact
 from engine.collision.meshes.triangle_triangle import (
     APART,
     CONTACT,

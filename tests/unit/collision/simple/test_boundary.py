@@ -9,9 +9,8 @@ import pytest
 
 from engine import Aabb, HalfSpace, Polygon, Pose, Solid
 from engine.collision.exact_images import image_half_space, value_at
-from engine.collision.meshes.live_faces import simplex_distance
 from engine.collision.result import Work
-from engine.collision.simple.boundary import boundary_of
+from engine.collision.simple.boundary import boundary_of, simplex_distance
 from engine.predicates.rational import minus, sign_of, squared_length
 
 BLOCK, SQUARE = Aabb([0, 0, 0], [1, 2, 3]), Polygon([[[0, 0], [2, 0], [2, 1], [0, 1]]])
@@ -38,9 +37,9 @@ def test_rounded_vertices_bounds_and_signs_hold_the_exact_ones(body: Solid, pose
             lower[face]
             <= simplex_distance(center, boundary.corners(face))
             == min(
-                piece.squared_distance(center)
-                for piece in boundary.live([face])
-                if piece.corners == boundary.corners(face)
+                simplex_distance(center, corners)
+                for corners in boundary.live([face])
+                if corners == boundary.corners(face)
             )
         )
 
@@ -48,5 +47,5 @@ def test_rounded_vertices_bounds_and_signs_hold_the_exact_ones(body: Solid, pose
 def test_what_is_live_of_a_square() -> None:
     boundary, corner = boundary_of(SQUARE, None, Work()), (Fraction(2), Fraction(1))
     edges = np.arange(4)
-    assert boundary.has_live(edges, lambda piece: piece.farthest(corner) == 5)
-    assert not boundary.has_live(edges, lambda piece: piece.squared_distance(corner) > 4)
+    assert boundary.has_live(edges, lambda ends: max(squared_length(minus(p, corner)) for p in ends) == 5)
+    assert not boundary.has_live(edges, lambda ends: simplex_distance(corner, ends) > 4)

@@ -6,8 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from engine.collision.meshes.live_faces import segment_distance, simplex_distance
-from engine.collision.simple.boundary import box_distance_bounds
+from engine.collision.simple.boundary import box_distance_bounds, segment_distance, simplex_distance
 from tests.reference.contact import squared_distance_to_segment, squared_distance_to_triangle
 from tests.reference.exact import vector
 

@@ -10,11 +10,10 @@ import pytest
 
 from engine import Aabb, Pose, Relation, Sphere, collide
 from engine.collision.codes import UNSETTLED
-from engine.collision.meshes.exact_body import exact_pair
-from engine.collision.meshes.exact_triangles import classify_exact, kind_of_contact
+from engine.collision.meshes.exact_body import classify_exact, exact_pair, kind_of_contact
 from engine.collision.meshes.mesh_arrays import mesh_body_of
 from engine.collision.meshes.triangle_triangle import APART
-from engine.collision.simple.form import form_of
+from engine.collision.simple.closed_forms import form_of
 from engine.collision.simple.form_relations import relate_forms
 from engine.solids.base import Solid
 from engine.solids.pose import motion_of

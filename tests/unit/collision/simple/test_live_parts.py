@@ -8,8 +8,9 @@ import pytest
 
 from engine import Polyhedron
 from engine.budget import Budget
-from engine.collision.meshes.live_faces import live_piece
 from engine.collision.meshes.mesh_arrays import mesh_body_of
+from engine.collision.simple.boundary import live_parts, simplex_distance
+from engine.predicates.rational import cross, minus
 from tests.unit.collision.meshes.bodies import brick
 
 TWO = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
@@ -27,19 +28,20 @@ def glued(top: float) -> Polyhedron:
 def test_a_common_wall_is_not_live(top: float, n_left: int, square: Fraction) -> None:
     body = mesh_body_of(glued(top))
     with Budget(None, None) as budget:
-        pieces = [live_piece(body, face, budget) for face in range(8)]
-        assert sum(piece is not None for piece in pieces) == n_left
-        cut = [piece for piece in pieces if piece is not None and piece.edges is not None]
+        parts = [list(live_parts(body, face, budget)) for face in range(8)]
+        assert sum(map(bool, parts)) == n_left
+        cut = [found for found in parts if len(found) > 1]
         assert len(cut) == n_left - 6
-        for piece in cut:  # of the base what the smaller one leaves: beyond x + y = 3
-            assert piece.squared_distance((Fraction(1), Fraction(1), Fraction(0))) == square
+        for found in cut:  # of the base what the smaller one leaves: beyond x + y = 3
+            center = Fraction(1), Fraction(1), Fraction(0)
+            assert min(simplex_distance(center, corners) for corners in found) == square
+            doubled = (cross(minus(q, p), minus(r, p)) for p, q, r in found)
+            assert sum(abs(normal[2]) for normal in doubled) == 36 - 9
 
 
 def test_all_of_a_box_is_live() -> None:
     body = mesh_body_of(brick(1))
     with Budget(None, None) as budget:
         for face in range(12):
-            piece = live_piece(body, face, budget)
-            assert piece is not None
-            assert piece.edges is None
-            assert len(piece.vertices()) == 3
+            (corners,) = live_parts(body, face, budget)
+            assert len(corners) == 3

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from engine.collision.meshes.exact_body import Corners
-from engine.collision.meshes.exact_triangles import as_simplex, classify_exact, kind_of_contact
+from engine.collision.meshes.exact_body import Corners, as_simplex, classify_exact, kind_of_contact
 from engine.collision.meshes.triangle_triangle import APART
 from tests.reference.contact import triangles_meet
 from tests.reference.exact import vector
