@@ -74,8 +74,15 @@ class KernelCache(NullCache):  # type: ignore[misc]
         numba first brings in everything that it can compile, a third of a second; compiling does that by itself.
         """
         rtsys.initialize(target_context)
-        contents = (kept(self._name(types, cpu)) for cpu in cpus())
-        return next((_rebuilt(target_context, *pickle.loads(content)) for content in contents if content), None)
+        for cpu in cpus():
+            content = kept(self._name(types, cpu))
+            if content:
+                try:
+                    parts = pickle.loads(content)
+                except (ImportError, AttributeError):  # case: the class of an argument has moved to another module
+                    continue
+                return _rebuilt(target_context, *parts)
+        return None
 
     def save_overload(self, types: Any, result: CompileResult) -> None:
         """Keep a kernel."""

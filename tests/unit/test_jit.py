@@ -287,6 +287,19 @@ def test_a_damaged_file_is_compiled_anew(project: Path) -> None:
     assert run(project, **cache)[:2] == ["2.0", "1"]
 
 
+def test_a_kernel_is_compiled_anew_where_the_class_of_an_argument_has_moved(project: Path) -> None:
+    """The source of the kernel does not name the module of that class, and so its key is the same."""
+    cache, package = {"ENGINE_CACHE_DIR": str(project / "cache")}, project / "engine"
+    (package / "work.py").write_text("from engine.jit import kernel\n\n@kernel\ndef run(p):\n    return p.x + p.y\n")
+    use = "from engine.{} import Place; " + USE.replace("run(1.0)", "run(Place(1.0, 2.0))")
+    for module, hits in (("here", "0"), ("here", "1"), ("there", "0"), ("there", "1")):
+        for path in (package / "here.py", package / "there.py"):
+            path.unlink(missing_ok=True)
+        text = "from collections import namedtuple\n\nPlace = namedtuple('Place', 'x y')\n"
+        (package / f"{module}.py").write_text(text)
+        assert run(project, use.format(module), **cache)[:2] == ["3.0", hits]
+
+
 def test_what_only_the_compiler_needs_is_not_imported(project: Path) -> None:
     """numba's own functions on arrays: a tenth of a second to import, a third to register."""
     cache = {"ENGINE_CACHE_DIR": str(project / "cache")}
