@@ -23,12 +23,11 @@ from engine.errors import InvalidOperationError, UnsupportedSolidError
 from engine.parallel import Progress, check_options, is_unlimited
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.compiled.ring_nesting import Nesting
-from engine.polygon_overlay.few import overlay_few
 from engine.polygon_overlay.grid import from_units, grid_of
 from engine.polygon_overlay.in_integers import overlay_exactly
 from engine.polygon_overlay.result import Output, Overlay, OverlayOptions
 from engine.polygon_overlay.run import KEPT, KEPT_ARRAYS, Operation, arranged_again, overlay_compiled
-from engine.polygon_overlay.run_pair import UNNAMED
+from engine.polygon_overlay.run_pair import UNNAMED, overlay_few
 from engine.solids.base import Solid
 from engine.solids.checks import shown
 from engine.solids.polygon import Polygon

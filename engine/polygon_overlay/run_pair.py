@@ -1,24 +1,38 @@
 """Runs the compiled overlay on one pair of polygons; of large ones without looking at most edges one by one.
 
-Small overlays are called so often that what stands around the kernel counts: nothing is made that is not asked for.
+Small overlays are called so often that what stands around the kernel counts, of which an array made, or a tuple with
+names, takes a tenth of the whole call: nothing is made that is not asked for. For two small polygons the kernel is
+called at once, and what it leaves stays bytes until it is asked for.
 """
 
 from __future__ import annotations
 
+import functools
 from typing import Any, Final, NamedTuple, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
-from engine.budget import Budget
+from engine.budget import UNLIMITED, Budget
 from engine.direct import entry_of
 from engine.polygon_overlay.compiled.kernel import DONE, FINISHED, NEEDS_CONTACTS, overlay_pairs
 from engine.polygon_overlay.compiled.loading import Loaded, RingArrays
 from engine.polygon_overlay.compiled.reducing import expand_rings, reduce_pair
 from engine.polygon_overlay.compiled.ring_nesting import PAIR, Nesting
-from engine.polygon_overlay.compiled.workspace import Output, first_contacts, keep, more_contacts, scratch_for
-from engine.polygon_overlay.implicit_rings import one_polygon
+from engine.polygon_overlay.compiled.workspace import (
+    FEW_VERTICES,
+    first_contacts,
+    keep,
+    more_contacts,
+    scratch_for,
+    scratch_for_few,
+    spare,
+)
+from engine.polygon_overlay.compiled.workspace import Output as Written
+from engine.polygon_overlay.implicit_rings import ImplicitRings, one_polygon
+from engine.polygon_overlay.result import Output, Overlay
+from engine.solids.polygon import Polygon
 
 NOT_REDUCED: Final = Loaded(0, 0, 0, 0.0)
 """What stands in the place of the result of reduce_pair."""
@@ -90,10 +104,9 @@ def run_blocks(
     """
     n_vertices, n_rings = len(subject.vertices) + len(clip.vertices), len(subject.offsets) + len(clip.offsets) - 2
     sides = subject, one_polygon(len(subject.offsets) - 1), clip, one_polygon(len(clip.offsets) - 1)
-    if size:
-        reduced, n_contacts, n_out, n_out_rings = NOT_REDUCED, _FEW_CONTACTS, 0, 0
-    else:
-        reduced, n_contacts, n_out, n_out_rings = NOT_REDUCED, first_contacts(n_vertices), 8 + n_vertices, 2
+    reduced, n_contacts, n_out, n_out_rings = NOT_REDUCED, _FEW_CONTACTS, 0, 0
+    if not size:
+        n_contacts, n_out, n_out_rings = first_contacts(n_vertices), 8 + n_vertices, 2
     if n_vertices >= _MANY:
         budget.take(_BY_VERTEX * n_vertices)
     while True:  # bound: each turn makes room, geometrically
@@ -129,7 +142,7 @@ def run_blocks(
     return made
 
 
-def _expanded(output: Output, n: int, n_rings: int, subject: RingArrays, clip: RingArrays, budget: Budget) -> _Rings:
+def _expanded(output: Written, n: int, n_rings: int, subject: RingArrays, clip: RingArrays, budget: Budget) -> _Rings:
     """Return vertices, sources and offsets of rings, n vertices in all, with what was left out of them."""
     made: Any = np.empty((n, 2)), np.empty((n, 2), _INT32), np.empty(n_rings + 1, _INT64)
     entry_of(expand_rings)(
@@ -146,3 +159,48 @@ def _copied(array: npt.NDArray[Any], n: int) -> npt.NDArray[Any]:
     made: Any = array[:n].copy()
     made.setflags(False)  # write: by its name it takes twice as long
     return cast("npt.NDArray[Any]", made)
+
+
+def overlay_few(subject: Polygon, clip: Polygon, kept: FlagArray, output: Output) -> Overlay | None:
+    """Return the overlay of two polygons, without a limit; None of more vertices, or where the kernel leaves doubt."""
+    first, second = RingArrays(subject.vertices, subject.ring_offsets), RingArrays(clip.vertices, clip.ring_offsets)
+    if len(first.vertices) + len(second.vertices) > FEW_VERTICES:
+        return None
+    scratch = scratch_for_few()
+    items = one_polygon(len(first.offsets) - 1), one_polygon(len(second.offsets) - 1)
+    _, needs, n, n_rings, n_pieces, _, _ = entry_of(overlay_pairs)(
+        first, items[0], second, items[1], 0, NOT_REDUCED, kept, UNNAMED, UNLIMITED.flag, scratch.words, scratch.outcome
+    )
+    status, _, displacement = scratch.outcome
+    is_done, moved_by, left = needs == FINISHED and status.item(0) == DONE, displacement.item(0), scratch.output
+    vertices, sources, rings = left.vertices[:n].tobytes(), left.sources[:n].tobytes(), None
+    if n_rings != 1:
+        rings = left.rings[: n_rings + 1].tobytes(), left.pieces[: n_pieces + 1].tobytes()
+    spare.append(scratch)
+    if not is_done:
+        return None
+    told: dict[str, Any] = {
+        "output": output,
+        "_later": functools.partial(_fields, first, second, vertices, sources, rings),
+    }
+    if moved_by > 0.0:
+        told |= {"may_be_invalid": output == "nearest", "rounds": 1, "largest_displacement": moved_by}
+    result = object.__new__(Overlay)
+    object.__setattr__(result, "__dict__", told)
+    return result
+
+
+def _fields(
+    subject: RingArrays, clip: RingArrays, vertices: bytes, sources: bytes, rings: tuple[bytes, bytes] | None
+) -> dict[str, Any]:
+    """Return the fields of an `Overlay` that are made when one of them is asked for."""
+    places = np.frombuffer(vertices).reshape(-1, 2)
+    ring_offsets, piece_offsets = one_polygon(len(places)), one_polygon(1)
+    if rings is not None:
+        ring_offsets, piece_offsets = (np.frombuffer(each, np.int64) for each in rings)
+    exact = ImplicitRings(subject, clip, np.frombuffer(sources, np.int32).reshape(-1, 2), ring_offsets)
+    n_pieces = len(piece_offsets) - 1
+    return {
+        "vertices": places, "ring_offsets": ring_offsets, "piece_offsets": piece_offsets, "exact": exact,
+        "n_pieces_exact": n_pieces, "n_holes_exact": len(ring_offsets) - 1 - n_pieces,
+    }  # fmt: skip

@@ -43,6 +43,7 @@ from typing import Any, Final
 from engine.jit import inline, merged
 from engine.polygon_overlay.compiled.boundary.chain_rings import MEETS, Rings
 from engine.polygon_overlay.compiled.crossing_signs import Edges
+from engine.polygon_overlay.compiled.edge_contacts import is_far, segments_are_far
 from engine.polygon_overlay.compiled.edge_events import Along
 from engine.polygon_overlay.compiled.edge_tree import (
     ANYWHERE,
@@ -57,7 +58,6 @@ from engine.polygon_overlay.compiled.edge_tree import (
     next_pairs,
 )
 from engine.polygon_overlay.compiled.rounded_crossings import Rounded
-from engine.polygon_overlay.compiled.segment_distance import is_far, segments_are_far
 from engine.predicates.orientation import orient2d
 from engine.types import Point2
 

@@ -8,6 +8,9 @@ Pairs whose boxes meet are looked at in floating point; exact signs decide what 
     overlap                the ends of one inside the other, as above
     fold                   two consecutive edges in one direction: an overlap, and their common vertex a node
 
+Whether edges that do not meet are further apart than a margin is told in floating point: the margins of clearance.py
+hold its errors.
+
 Points are numbered: vertices first, crossings after them. Equal points are united (the smallest number stands for
 all, so a vertex where there is one), crossings through one point later, when the events of an edge are sorted.
 """
@@ -23,8 +26,57 @@ from engine.arrangement.union_find import root_of, unite
 from engine.jit import called, inline, merged
 from engine.polygon_overlay.compiled.crossing_signs import Edges, orient
 from engine.polygon_overlay.compiled.edge_tree import BENT, DOUBTFUL, FEW, BoxTree, begin_pairs, boxes_meet, next_pairs
-from engine.polygon_overlay.compiled.segment_distance import segments_are_far
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
+
+
+@merged
+def is_far(px: float, py: float, ax: float, ay: float, bx: float, by: float, square: float) -> bool:
+    """Tell whether p is further from the segment ab than the root of ``square``."""
+    dx, dy, ex, ey = bx - ax, by - ay, px - ax, py - ay
+    along, length = ex * dx + ey * dy, dx * dx + dy * dy
+    if along <= 0.0:
+        return ex * ex + ey * ey > square
+    if along >= length:
+        ex, ey = px - bx, py - by
+        return ex * ex + ey * ey > square
+    across = dx * ey - dy * ex
+    return across * across > square * length
+
+
+@merged
+def _is_beside(x: Any, y: Any, a: int, b: int, c: int, d: int, square: float) -> bool:
+    """Tell whether c and d are on one side of the line ab, further from it than the root of ``square``."""
+    dx, dy = x[b] - x[a], y[b] - y[a]
+    side_c, side_d = dx * (y[c] - y[a]) - dy * (x[c] - x[a]), dx * (y[d] - y[a]) - dy * (x[d] - x[a])
+    nearest = min(abs(side_c), abs(side_d))
+    return ((side_c > 0.0) == (side_d > 0.0)) & (nearest * nearest > square * (dx * dx + dy * dy))
+
+
+@merged
+def _crosses(x: Any, y: Any, a: int, b: int, c: int, d: int) -> bool:
+    """Tell whether c and d are on two sides of ab, and a and b on two sides of cd, in floating point."""
+    dx, dy = x[b] - x[a], y[b] - y[a]
+    side_c, side_d = dx * (y[c] - y[a]) - dy * (x[c] - x[a]), dx * (y[d] - y[a]) - dy * (x[d] - x[a])
+    if (side_c > 0.0) == (side_d > 0.0):
+        return False
+    dx, dy = x[d] - x[c], y[d] - y[c]
+    side_a, side_b = dx * (y[a] - y[c]) - dy * (x[a] - x[c]), dx * (y[b] - y[c]) - dy * (x[b] - x[c])
+    return (side_a > 0.0) != (side_b > 0.0)
+
+
+@called
+def segments_are_far(x: Any, y: Any, a: int, b: int, c: int, d: int, square: float) -> bool:
+    """Tell whether the segments ab and cd are further apart than the root of ``square``."""
+    if _is_beside(x, y, a, b, c, d, square) or _is_beside(x, y, c, d, a, b, square):
+        return True
+    return (
+        is_far(x[b], y[b], x[c], y[c], x[d], y[d], square)
+        and is_far(x[d], y[d], x[a], y[a], x[b], y[b], square)
+        and is_far(x[a], y[a], x[c], y[c], x[d], y[d], square)
+        and is_far(x[c], y[c], x[a], y[a], x[b], y[b], square)
+        and not _crosses(x, y, a, b, c, d)
+    )
+
 
 _ANY_SLACK: Final = 4.0
 """Slack of a parameter known by its sign only: any comparison with it is made exactly."""

@@ -20,7 +20,6 @@ from typing import Any
 import numpy as np
 
 from engine.jit import inline, kernel, merged
-from engine.polygon_overlay.compiled.block_tree import count_active, wake_above, wake_near
 from engine.polygon_overlay.compiled.clearance import CLEARANCE
 from engine.polygon_overlay.compiled.edge_tree import POLL, BoxTree, build_tree
 from engine.polygon_overlay.compiled.loading import (
@@ -39,9 +38,12 @@ from engine.polygon_overlay.compiled.ring_blocks import (
     EVERYWHERE,
     Blocks,
     box_of_blocks,
+    count_active,
     cut_beyond,
     load_blocks,
     mark_blocks,
+    wake_above,
+    wake_near,
 )
 from engine.polygon_overlay.compiled.workspace import rows_of
 from engine.predicates.expansion import LARGEST, is_safe
