@@ -36,6 +36,8 @@ CUT_BOUND: Final = 64.0 * U2
 POINT_BOUND: Final = 48.0 * U2
 """Of `point_at`, times |p| + |t (q - p)|: t carries 18 u^2; the low parts, none above u (|p| + 3.1 |t (q - p)|), lose
 17 u^2 in five sums and two products, their product that is left out 3.1 u^2, the test 6 u^2: below 45 u^2."""
+T_BOUND: Final = 24.0 * U2
+"""Of t in double-double, relative: 18 u^2 where it is a quotient of double-doubles, and the test of its rounding."""
 TINY: Final = 2.0**-1070
 """Added to bounds for products that underflow: at most four of 2^-1074."""
 _SCALE: Final = 2.0**600

@@ -21,12 +21,11 @@ import numpy as np
 
 from engine.jit import inline
 from engine.lanes.addresses import array_at
-from engine.predicates.cut_point import point_at
+from engine.predicates.cut_point import T_BOUND, point_at
 from engine.predicates.double_double import U2, dd_add, dd_div, dd_mul, dd_scale, dd_sub
 from engine.predicates.error_free import fma, two_diff, two_prod
 from engine.segment_clipping.on_boundary.crossing_values import Vector
 from engine.segment_clipping.pieces import Pieces, point_of, put_own_end
-from engine.segment_clipping.plane_meeting import T_BOUND
 from engine.types import UNDECIDED
 
 _FRAME_BOUND: Final = 32.0 * U2

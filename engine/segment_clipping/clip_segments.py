@@ -15,14 +15,13 @@ from engine.parallel import Options, Progress, check_options, is_unlimited
 from engine.predicates.scaling import balanced_rows
 from engine.segment_clipping.ball_cut import fill_on_sphere
 from engine.segment_clipping.ball_interval import decide_on_sphere
-from engine.segment_clipping.box_cut import fill_on_boxes
 from engine.segment_clipping.cohen_sutherland import decide_on_boxes
 from engine.segment_clipping.cyrus_beck import as_columns, decide_on_rows
 from engine.segment_clipping.decide_then_cut import FEW, Method, Scaled, clip_few, clip_on_convex, scaled
 from engine.segment_clipping.on_boundary.boundary import clip_few as clip_few_on_boundary
 from engine.segment_clipping.on_boundary.boundary import clip_on_boundary
 from engine.segment_clipping.pieces import Pieces
-from engine.segment_clipping.planes_cut import fill_on_rows
+from engine.segment_clipping.planes_cut import fill_on_boxes, fill_on_rows
 from engine.solids.aabb import Aabb, rows_between
 from engine.solids.base import Solid
 from engine.solids.checks import as_point_groups, is_ready

@@ -18,8 +18,13 @@ The textbook cuts the outside end at one plane after another until the codes say
 The first two comparisons are made for a block of segments at once, without branches: so the compiler uses vectors, and
 no processor has to foretell on which side of a plane a point lies. In the plane z is 0 throughout.
 
-Two kernels: `decide_on_boxes` says which planes bound each piece, `fill_on_boxes` (box_cut.py) makes the points of
+Two kernels: `decide_on_boxes` says which planes bound each piece, `fill_on_boxes` (planes_cut.py) makes the points of
 the pieces that there are.
+
+**Bound of a meeting.** t = n / d with n = at - p and d = q - p on the plane's axis, each known as what rounding left and what it
+lost. With u = 2^-53, the quotient t of the rounded n and d is within u, so n - t d is a double (fma finds it) of at
+most u n; what n lost is as small, and so is t times what d lost. Adding the three up costs 6 u^2 n, their quotient by d
+3 u^2 t, leaving out what d lost there 3 u^2 t: t + t_low is within 13 u^2 of itself, and t_low at most 3.1 u t.
 
 Source: Cohen and Sutherland in W. M. Newman, R. F. Sproull, Principles of Interactive Computer Graphics, 1979; the
 textbook's section on clipping segments on an AABB.
@@ -27,19 +32,77 @@ textbook's section on clipping segments on an AABB.
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from engine.jit import kernel, merged
-from engine.predicates.error_free import workspace
+from engine.predicates.double_double import U2
+from engine.predicates.error_free import fma, two_diff, two_prod, workspace
 from engine.segment_clipping.cyrus_beck import coordinate_limit, decide_alone
 from engine.segment_clipping.pieces import BLOCK, KEPT, Triple, is_plain, point_of
-from engine.segment_clipping.plane_meeting import gap_between, meetings
 from engine.types import OPEN
 
 T_GAP: Final = 16.0 * 2.0**-53
 """Parameters t are quotients of two differences, within 3 u (1 + u)^2 of themselves; two of them and this test: 8 u."""
 T_TINY: Final = 2.0**-1060
 """Parameters that underflow."""
+SHORTEST: Final = 2.0**-400
+LONGEST: Final = 2.0**400
+"""Sizes of d for which that of a meeting holds: the quotients of products that underflow are below `_UNDERFLOW`."""
+_UNDERFLOW: Final = 2.0**-600
+_CLOSE: Final = 48.0 * U2
+"""Two parameters are within 26 u^2 of the larger one, the difference of their low parts loses 6 u^2; that of their high
+parts loses nothing where they are within a factor of two, and elsewhere does not matter."""
+
+
+class Meeting(NamedTuple):
+    """A place where a segment enters or leaves a slab.
+
+    t, t_low: parameter, a double-double. n, d: as above, rounded. is_exact: they lost nothing. plane: 0.0 .. 5.0, or
+    -1.0 for none, with a t outside of [0, 1] that is like no other.
+    """
+
+    t: float
+    t_low: float
+    n: float
+    d: float
+    is_exact: bool
+    plane: float
+
+
+@merged
+def meeting(p: float, q: float, at: float, plane: float) -> Meeting:
+    """Return where p q, its coordinates on one axis, meets the plane at `at`."""
+    n, n_low = two_diff(at, p)
+    d, d_low = two_diff(q, p)
+    d = d if p != q else 1.0  # not met: any number
+    t = n / d
+    return Meeting(t, ((fma(-t, d, n) + n_low) - t * d_low) / d, n, d, (n_low == 0.0) & (d_low == 0.0), plane)
+
+
+@merged
+def meetings(p: float, q: float, low: float, high: float, axis: float) -> tuple[Meeting, Meeting, bool]:
+    """Return where p q enters the slab low .. high of an axis and where it leaves; False where q - p has no range."""
+    is_entered, is_left = (p < low) | (p > high), (q < low) | (q > high)
+    entered = meeting(p, q, low if p < low else high, 2.0 * axis if p < low else 2.0 * axis + 1.0)
+    left = meeting(p, q, low if q < low else high, 2.0 * axis if q < low else 2.0 * axis + 1.0)
+    length = abs(entered.d)
+    has_range = ((length >= SHORTEST) & (length <= LONGEST)) | (not (is_entered | is_left))
+    entered = entered if is_entered else Meeting(-1.0 - axis, 0.0, 0.0, 1.0, False, -1.0)
+    left = left if is_left else Meeting(2.0 + axis, 0.0, 0.0, 1.0, False, -1.0)
+    return entered, left, has_range
+
+
+@merged
+def gap_between(a: Meeting, b: Meeting) -> tuple[float, bool]:
+    """Return the parameter of a less that of b, and whether its sign is sure: exactly zero where both are equal.
+
+    Of exact differences equality shows as n_a d_b = n_b d_a (lattices: diagonals through corners).
+    """
+    gap = (a.t - b.t) + (a.t_low - b.t_low)
+    left, left_tail = two_prod(a.n, b.d)
+    right, right_tail = two_prod(b.n, a.d)
+    is_tie = a.is_exact & b.is_exact & (left == right) & (left_tail == right_tail) & (abs(left) > _UNDERFLOW)
+    return (0.0 if is_tie else gap), (abs(gap) > _CLOSE * max(abs(a.t), abs(b.t)) + _UNDERFLOW) | is_tie
 
 
 @merged

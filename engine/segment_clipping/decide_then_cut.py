@@ -65,7 +65,7 @@ def scaled(points: FloatArray, *region: FloatArray) -> Scaled | None:
 class Method:
     """How segments are clipped on one region.
 
-    decide, fill: kernels; see cohen_sutherland.py, box_cut.py. region: their arguments. scale: returns the batch
+    decide, fill: kernels; see cohen_sutherland.py, planes_cut.py. region: their arguments. scale: returns the batch
     scaled, None where it is well as it is or cannot be scaled exactly.
     """
 

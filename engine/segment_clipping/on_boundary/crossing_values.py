@@ -21,13 +21,12 @@ from __future__ import annotations
 from typing import Any, Final
 
 from engine.jit import merged
-from engine.predicates.cut_point import point_at
+from engine.predicates.cut_point import T_BOUND, point_at
 from engine.predicates.double_double import U2, dd_div
 from engine.predicates.error_free import two_diff, two_prod, two_sum
 from engine.predicates.expansion import is_safe
 from engine.segment_clipping.on_boundary.triangle_contact import corner, triangle_at
 from engine.segment_clipping.pieces import Triple
-from engine.segment_clipping.plane_meeting import T_BOUND
 from engine.types import Point3
 
 VALUE_BOUND: Final = 80.0 * U2

@@ -1,4 +1,6 @@
-"""Which triangles the segments of a group meet: those of all triangles asked one by one."""
+"""Which triangles the segments of a group meet: those of all triangles asked one by one. Segments in the coordinates of
+a tree: within their slack of where they are, however far they reach.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +9,7 @@ import numpy as np
 from engine.predicates.rational import common_integers, cross, minus
 from engine.segment_clipping.exact_pieces import is_crossed, triangle_stretch
 from engine.segment_clipping.on_boundary.contacts import APART, DEGENERATE, END, START
-from engine.segment_clipping.on_boundary.mesh_streams import find_mesh_contacts
+from engine.segment_clipping.on_boundary.mesh_streams import LIMIT, find_mesh_contacts, local_segment
 from engine.segment_clipping.on_boundary.prepared_boundary import Mesh, mesh_of
 from engine.segment_clipping.on_boundary.triangle_contact import exact_contact
 from engine.types import Point3
@@ -57,3 +59,25 @@ def test_contacts_are_those_of_all_triangles() -> None:
     for k, pairs in enumerate(expected):
         mine = slice(offsets[k], offsets[k + 1])
         assert set(zip(met[mine].tolist(), kinds[mine].tolist())) == pairs
+
+
+def test_middle_and_half_are_within_their_slack() -> None:
+    rng = np.random.default_rng(1)
+    origin, inverse = np.array([3.0, -1.0, 100.0]), 0.25
+    for size in (1e-6, 1.0, 8.0, 1e4):
+        for _ in range(20):
+            p = origin + rng.uniform(-1, 1, 3)  # near the tree: what is cut off lies far from it
+            q = p + rng.uniform(-size, size, 3)
+            middle, half, _, slack, is_near = local_segment(Point3(*p), Point3(*q), origin, inverse, 0.0)
+            local_p, local_q = (p - origin) * inverse, (q - origin) * inverse
+            ends = np.array(middle, float) - np.array(half, float), np.array(middle, float) + np.array(half, float)
+            assert is_near
+            assert np.abs(ends[0] - local_p).max() <= slack
+            if np.abs(local_q).max() <= LIMIT:
+                assert np.abs(ends[1] - local_q).max() <= slack
+            else:
+                assert np.abs(ends[1]).max() >= LIMIT - slack
+
+
+def test_segments_that_pass_far_away_are_not_near() -> None:
+    assert not local_segment(Point3(10.0, -9.0, 0.0), Point3(10.0, 9.0, 0.0), np.zeros(3), 1.0, 0.0)[-1]
