@@ -26,8 +26,7 @@ from engine.predicates.double_double import dd_div, dd_sub
 from engine.scenes.posed_cut import in_frame, put_point, slack_of
 from engine.scenes.scratch import MOST_MET, Scratch, scratch_at
 from engine.segment_clipping.on_boundary.contacts import APART, CROSSED, DEGENERATE, PROPER, START, are_one, place_of
-from engine.segment_clipping.on_boundary.crossing_values import Vector, dot, is_item_safe, normal_of
-from engine.segment_clipping.on_boundary.exact_crossing import cross_exactly
+from engine.segment_clipping.on_boundary.crossing_values import Vector, cross_exactly, dot, is_item_safe, normal_of
 from engine.segment_clipping.on_boundary.mesh_streams import local_segment, shear_of
 from engine.segment_clipping.on_boundary.touching_cut import Crossings, sort_crossings
 from engine.segment_clipping.on_boundary.triangle_contact import contact_filter, corner, exact_contact, triangle_at

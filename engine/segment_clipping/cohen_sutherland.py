@@ -21,10 +21,11 @@ no processor has to foretell on which side of a plane a point lies. In the plane
 Two kernels: `decide_on_boxes` says which planes bound each piece, `fill_on_boxes` (planes_cut.py) makes the points of
 the pieces that there are.
 
-**Bound of a meeting.** t = n / d with n = at - p and d = q - p on the plane's axis, each known as what rounding left and what it
-lost. With u = 2^-53, the quotient t of the rounded n and d is within u, so n - t d is a double (fma finds it) of at
-most u n; what n lost is as small, and so is t times what d lost. Adding the three up costs 6 u^2 n, their quotient by d
-3 u^2 t, leaving out what d lost there 3 u^2 t: t + t_low is within 13 u^2 of itself, and t_low at most 3.1 u t.
+**Bound of a meeting.** t = n / d with n = at - p and d = q - p on the plane's axis, each known as what rounding left
+and what it lost. With u = 2^-53, the quotient t of the rounded n and d is within u, so n - t d is a double (fma finds
+it) of at most u n; what n lost is as small, and so is t times what d lost. Adding the three up costs 6 u^2 n, their
+quotient by d 3 u^2 t, leaving out what d lost there 3 u^2 t: t + t_low is within 13 u^2 of itself, and t_low at most
+3.1 u t.
 
 Source: Cohen and Sutherland in W. M. Newman, R. F. Sproull, Principles of Interactive Computer Graphics, 1979; the
 textbook's section on clipping segments on an AABB.

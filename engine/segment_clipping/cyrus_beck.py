@@ -71,11 +71,13 @@ def as_columns(rows: FloatArray) -> FloatArray:
 
 
 @inline
-def is_row_safe(row: Any) -> bool:
-    """Tell whether every number of a row is zero or of a size for which expansions are exact."""
+def are_safe(row: Any, segment: Any) -> bool:
+    """Tell whether every number of a row and a segment is zero or of a size for which expansions are exact."""
     safe = True
     for k in range(row.size):
         safe = safe and is_safe(row[k])
+    for k in range(segment.shape[1]):
+        safe = safe and is_safe(segment[0, k]) and is_safe(segment[1, k])
     return safe
 
 
@@ -106,15 +108,6 @@ def exact_order(row_i: Any, row_j: Any, segment: Any) -> int:
 
 
 @inline
-def is_segment_safe(segment: Any) -> bool:
-    """Tell whether every coordinate is zero or of a size for which expansions are exact."""
-    safe = True
-    for k in range(segment.shape[1]):
-        safe = safe and is_safe(segment[0, k]) and is_safe(segment[1, k])
-    return safe
-
-
-@inline
 def decide_by_rows(
     segment: Any, columns: Any, s_p: Any, s_q: Any, bounds: Any, chosen: Any, n: int
 ) -> tuple[int, int, int, int]:
@@ -124,16 +117,15 @@ def decide_by_rows(
     open sign or order outside of the safe range is left open.
     """
     entered = left = -1
-    beyond, checked = 0, False
+    beyond = 0
     for i in range(n):
         unsure = UNDECIDED if bounds[i] > 0.0 else 0
         sign_p = 1 if s_p[i] > bounds[i] else (-1 if -s_p[i] > bounds[i] else unsure)
         sign_q = 1 if s_q[i] > bounds[i] else (-1 if -s_q[i] > bounds[i] else unsure)
         if sign_p == UNDECIDED or sign_q == UNDECIDED:
             beyond = 1
-            checked = checked or is_segment_safe(segment)
             row = columns[:-2, int(chosen[i])]
-            if not (checked and is_row_safe(row)):
+            if not are_safe(row, segment):
                 return OPEN, -1, -1, 1
             if sign_p == UNDECIDED:
                 sign_p = exact_sign(row, segment[0])
@@ -172,7 +164,7 @@ def compare_rows(
     if order != UNDECIDED:
         return order, True
     row_i, row_j = columns[:-2, int(chosen[i])], columns[:-2, int(chosen[j])]
-    if not (is_segment_safe(segment) and is_row_safe(row_i) and is_row_safe(row_j)):
+    if not (are_safe(row_i, segment) and are_safe(row_j, segment)):
         return UNDECIDED, False
     return exact_order(row_i, row_j, segment), False
 

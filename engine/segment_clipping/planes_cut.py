@@ -13,11 +13,11 @@ from typing import Any
 from engine.jit import called, inline, kernel, merged
 from engine.predicates.cut_point import T_BOUND, parameter_and_point, point_at
 from engine.predicates.double_double import dd_add, dd_div
-from engine.predicates.error_free import two_diff, workspace
-from engine.predicates.expansion import Components, grow, is_safe, sign
+from engine.predicates.error_free import workspace
+from engine.predicates.expansion import is_safe, magnitude, put_distance
 from engine.predicates.side import dd_value
 from engine.segment_clipping.cohen_sutherland import LONGEST, SHORTEST, corners_of, meeting
-from engine.segment_clipping.cyrus_beck import expand_value, is_row_safe, is_segment_safe
+from engine.segment_clipping.cyrus_beck import are_safe, expand_value
 from engine.segment_clipping.pieces import BLOCK, Pieces, Triple, point_of, put_end, put_own_end
 
 
@@ -32,13 +32,6 @@ def parameter_of(sp: Triple, sq: Triple) -> tuple[float, float, float, bool]:
     return th, tl, r, (r < 0.001) & (abs(sum_h) >= 2.0**-400) & (abs(sum_h) <= 2.0**400) & (abs(sp_h) >= 2.0**-500)
 
 
-@inline
-def expand_difference(x: float, y: float, e: Components) -> int:
-    """Set e to x - y as an expansion; two places. Returns its length."""
-    h, low = two_diff(x, y)
-    return grow(e, grow(e, 0, low), h)
-
-
 @called
 def cut_by_signs(row: Any, segment: Any, point: Any, axis: int, at: float) -> tuple[float, bool]:
     """Set `point` to where `segment` crosses the plane of `row`, by exact signs; return t and whether all is sure.
@@ -50,15 +43,12 @@ def cut_by_signs(row: Any, segment: Any, point: Any, axis: int, at: float) -> tu
         p, q = segment[0, axis], segment[1, axis]
         if not (is_safe(p) and is_safe(q) and is_safe(at)):
             return 0.0, False
-        n_wp, n_wq = expand_difference(p, at, wp), expand_difference(q, at, wq)
+        n_wp, n_wq = put_distance(wp, p, at), put_distance(wq, q, at)
     else:
-        if not (is_row_safe(row) and is_segment_safe(segment)):
+        if not are_safe(row, segment):
             return 0.0, False
-        n_wp, n_wq = expand_value(row, segment[0], wp), expand_value(row, segment[1], wq)
-    for e_w, n_w in ((wp, n_wp), (wq, n_wq)):
-        if sign(e_w, n_w) < 0:
-            for i in range(n_w):
-                e_w[i] = -e_w[i]
+        n_wp = magnitude(wp, expand_value(row, segment[0], wp))
+        n_wq = magnitude(wq, expand_value(row, segment[1], wq))
     return parameter_and_point(segment, wp, n_wp, wq, n_wq, axis, at, point, e)
 
 

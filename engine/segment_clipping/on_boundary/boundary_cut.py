@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from engine.jit import allocating_kernel, called, inline
 from engine.segment_clipping.on_boundary.contacts import GROUP, PROPER, edge_contacts_for, gather_edges
-from engine.segment_clipping.on_boundary.crossing_values import cut_at, is_item_safe, line_values, plane_values
+from engine.segment_clipping.on_boundary.crossing_values import cut_at, is_item_safe
 from engine.segment_clipping.on_boundary.mesh_streams import gather_contacts, streams_for
 from engine.segment_clipping.on_boundary.touching_cut import (
     UNSURE,
@@ -74,13 +74,9 @@ def cut_segment(segments: Any, item: int, boundary: Any, contacts: Any, cuts: Cr
         element = contacts.met[i]
         if not (boundary.are_safe or is_item_safe(boundary.elements, element)):
             return False
-        if segments.shape[2] == 2:
-            at_p, along = line_values(boundary.elements, element, segments, item)
-        else:
-            at_p, along = plane_values(boundary.elements, element, segments, item)
         place = i - first
         cuts.faces[place] = boundary.faces[element]
-        cuts.t[place], is_sure = cut_at(segments, item, boundary.elements, element, at_p, along, cuts.points, place)
+        cuts.t[place], is_sure = cut_at(segments, item, boundary.elements, element, cuts.points, place)
         if not is_sure:
             return False
     return sort_crossings(cuts, last - first)

@@ -4,7 +4,8 @@ With s(x) = ((b - a) x (c - a)) . (x - a), in the plane (b - a) x (x - a), the c
 
     t = s(p) / d,    d = s(p) - s(q) = ((b - a) x (c - a)) . (p - q),    x = p + t (q - p),
 
-all in double-double with a running bound.
+all in double-double with a running bound. What that leaves open is found from the exact values s(p) and s(q), ties and
+zeros too (cut_point.py).
 
 **The bound.** With u = 2^-53, differences of coordinates are pairs without error, tails below u of the head. A
 component n = U V - X Y of the normal is kept as h + low, with m = |u v| + |x y|: products of two tails are left out
@@ -20,11 +21,12 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from engine.jit import merged
-from engine.predicates.cut_point import T_BOUND, point_at
+from engine.jit import called, merged
+from engine.predicates.cut_point import T_BOUND, nearest, parameter_and_point, point_at
 from engine.predicates.double_double import U2, dd_div
-from engine.predicates.error_free import two_diff, two_prod, two_sum
-from engine.predicates.expansion import is_safe
+from engine.predicates.error_free import two_diff, two_prod, two_sum, workspace
+from engine.predicates.expansion import Components, add_scaled, is_safe, magnitude, put_distance
+from engine.predicates.parameters import minor as exact_minor
 from engine.segment_clipping.on_boundary.triangle_contact import corner, triangle_at
 from engine.segment_clipping.pieces import Triple
 from engine.types import Point3
@@ -116,10 +118,12 @@ def is_item_safe(items: Any, item: int) -> bool:
 
 
 @merged
-def cut_at(
-    segments: Any, item: int, elements: Any, element: int, at_p: Any, along: Any, points: Any, row: int
-) -> tuple[float, bool]:
+def cut_at(segments: Any, item: int, elements: Any, element: int, points: Any, row: int) -> tuple[float, bool]:
     """Set a row of `points` to where a segment crosses an element; return t and whether all is surely nearest."""
+    if segments.shape[2] == 2:
+        at_p, along = line_values(elements, element, segments, item)
+    else:
+        at_p, along = plane_values(elements, element, segments, item)
     s, s_low, s_bound = at_p
     d, d_low, d_bound = along
     th, tl = dd_div(s, s_low, d, d_low)
@@ -139,3 +143,49 @@ def cut_at(
         points[row, k] = x + 0.0
         sure &= is_x
     return th + tl, sure
+
+
+@called
+def _size_at(elements: Any, element: int, segments: Any, item: int, end: int, e: Components) -> int:
+    """Set e, 192 places, to |s| at an end of a segment; return its length.
+
+    Of a triangle a b c the sum over k of component k of (b - a) x (c - a) times (x - a)_k; of an edge a b the last
+    component of (b - a) x (x - a).
+    """
+    m, n, is_flat = workspace(16), 0, segments.shape[2] == 2
+    for k in range(2 if is_flat else 0, 3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        u, u_tail = two_diff(elements[element, 1, i], elements[element, 0, i])
+        v, v_tail = two_diff(elements[element, 1, j], elements[element, 0, j])
+        x, x_tail = two_diff(segments[item, end, i] if is_flat else elements[element, 2, i], elements[element, 0, i])
+        y, y_tail = two_diff(segments[item, end, j] if is_flat else elements[element, 2, j], elements[element, 0, j])
+        length = exact_minor(m, u, u_tail, v, v_tail, x, x_tail, y, y_tail)
+        factor, tail = (1.0, 0.0) if is_flat else two_diff(segments[item, end, k], elements[element, 0, k])
+        for part in (tail, factor):
+            if part != 0.0:
+                n = add_scaled(e, n, m, length, part)
+    return magnitude(e, n)
+
+
+@called
+def cross_exactly(segments: Any, item: int, elements: Any, element: int, point: Any) -> tuple[float, bool]:
+    """Set `point` to where a segment crosses an element, where double-doubles leave that open; return t and whether all
+    is sure.
+
+    The ends lie on different sides, or one of them on the element's line or plane. Coordinates are zero or of sizes
+    within 2^-120 .. 2^120, so differences are multiples of 2^-172 and values of 2^-516, below 2^366.
+    """
+    wp, wq, e = workspace(192), workspace(192), workspace(2304)
+    n_wp = _size_at(elements, element, segments, item, 0, wp)
+    n_wq = _size_at(elements, element, segments, item, 1, wq)
+    return parameter_and_point(segments[item], wp, n_wp, wq, n_wq, -1, 0.0, point, e)
+
+
+@called
+def parameter_exactly(p: float, q: float, x: float) -> tuple[float, bool]:
+    """Return (x - p) / (q - p), x between p and q, and whether it is surely the nearest double."""
+    wp, wq, e = workspace(2), workspace(2), workspace(24)
+    n_wp, n_wq = put_distance(wp, x, p), put_distance(wq, q, x)
+    h, low = two_diff(q, p)
+    way = 1.0 if h > 0.0 else -1.0
+    return nearest(0.0, 1.0, wp, n_wp, wq, n_wq, way * h, way * low, e)

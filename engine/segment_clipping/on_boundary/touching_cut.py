@@ -28,8 +28,7 @@ from engine.segment_clipping.on_boundary.contacts import (
     code_of,
     place_of,
 )
-from engine.segment_clipping.on_boundary.crossing_values import cut_at, is_item_safe, line_values, plane_values
-from engine.segment_clipping.on_boundary.exact_crossing import cross_exactly, parameter_exactly
+from engine.segment_clipping.on_boundary.crossing_values import cross_exactly, cut_at, is_item_safe, parameter_exactly
 from engine.segment_clipping.pieces import Pieces, put_own_end
 
 UNSURE: Final = -1
@@ -75,11 +74,7 @@ def _put_place(segments: Any, item: int, elements: Any, code: int, cuts: Crossin
         for k in range(dimension):
             cuts.points[n, k] = elements[element, place, k] + 0.0
         return n + 1 if sure else UNSURE
-    if dimension == 2:
-        at_p, along = line_values(elements, element, segments, item)
-    else:
-        at_p, along = plane_values(elements, element, segments, item)
-    cuts.t[n], sure = cut_at(segments, item, elements, element, at_p, along, cuts.points, n)
+    cuts.t[n], sure = cut_at(segments, item, elements, element, cuts.points, n)
     if not sure:
         cuts.t[n], sure = cross_exactly(segments, item, elements, element, cuts.points[n])
     return n + 1 if sure else UNSURE

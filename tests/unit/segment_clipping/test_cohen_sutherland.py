@@ -1,4 +1,4 @@
-"""Segments on boxes: the loop ends, ties go to the smaller plane, pieces stay in the box; meetings are within bounds."""
+"""Segments on boxes: the loop ends, ties go to the smaller plane, pieces stay in the box; meetings keep their bound."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ def test_values_and_crossings_are_those_of_rationals(dimension: int) -> None:
         found = values(elements, i, segments, i)
         for exact, (h, low, bound) in zip((at_p, along), found):
             assert abs(Fraction(h) + Fraction(low) - exact) <= Fraction(bound)
-        t, is_sure = cut_at(segments, i, elements, i, *found, points, 0)
+        t, is_sure = cut_at(segments, i, elements, i, points, 0)
         if is_sure and 0 <= at_p / along <= 1:
             exact_t = at_p / along
             assert t == float(exact_t)
