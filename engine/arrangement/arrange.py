@@ -127,16 +127,17 @@ def _meet_all(
     else:
         verdicts = np.full(len(pairs), UNDECIDED, np.int8)
     n_exact = 0
-    for count, ((i, j), verdict) in enumerate(zip(pairs.tolist(), verdicts.tolist())):
-        if count % _POLL == 0:
-            budget.check()
-        if verdict == CROSS:
-            number = nodes.add(crossing(lines[i], lines[j]))
-            on_segment.setdefault(i, set()).add(number)
-            on_segment.setdefault(j, set()).add(number)
-        else:
-            n_exact += 1
-            _meet(nodes, ends, lines, i, j, on_segment)
+    for start in range(0, len(pairs), _POLL):  # a list of millions of pairs holds its caller for seconds
+        budget.check()
+        some = slice(start, start + _POLL)
+        for (i, j), verdict in zip(pairs[some].tolist(), verdicts[some].tolist()):
+            if verdict == CROSS:
+                number = nodes.add(crossing(lines[i], lines[j]))
+                on_segment.setdefault(i, set()).add(number)
+                on_segment.setdefault(j, set()).add(number)
+            else:
+                n_exact += 1
+                _meet(nodes, ends, lines, i, j, on_segment)
     return on_segment, n_exact
 
 

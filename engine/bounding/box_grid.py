@@ -59,6 +59,28 @@ def pairs_of_boxes(low: FloatArray, high: FloatArray, flag: Any, block: int = BL
     or those of one box if these are more.
     Polls `flag` (1,) uint8 and ends early, with wrong blocks, when it is set: the caller looks at it after each.
     """
+    for keys in _keys_of_pairs(low, high, flag, block):
+        yield np.stack([keys // len(low), keys % len(low)], axis=1)
+
+
+def all_pairs_of_boxes(low: FloatArray, high: FloatArray, budget: Budget) -> IntArray:
+    """Return all of `pairs_of_boxes` at once, sorted. Raises as `Budget.check` when the call must end."""
+    blocks = [np.zeros(0, np.int64)]
+    for block in _keys_of_pairs(low, high, budget.flag, BLOCK):
+        budget.check()
+        blocks.append(block)
+    budget.check()
+    keys = np.sort(np.concatenate(blocks))
+    pairs = np.empty((len(keys), 2), np.int64)
+    for start in range(0, len(keys), BLOCK):
+        budget.check()
+        some = pairs[start : start + BLOCK]
+        np.divmod(keys[start : start + BLOCK], len(low), out=(some[:, 0], some[:, 1]))
+    return pairs
+
+
+def _keys_of_pairs(low: FloatArray, high: FloatArray, flag: Any, block: int) -> Iterator[IntArray]:
+    """Yield the blocks of `pairs_of_boxes`, a pair as first * n + second."""
     n_boxes = len(low)
     grid = _without_cells(low, high, np.arange(n_boxes), 1) if n_boxes < _FEW else None
     grid = grid or (_grid_of(low, high) if n_boxes >= _FEWEST else None) or _sorted_along_axis(low, high)
@@ -66,20 +88,8 @@ def pairs_of_boxes(low: FloatArray, high: FloatArray, flag: Any, block: int = BL
     keys = np.empty(min(enough, n_boxes * n_boxes // 2) + n_boxes, np.int64)  # one box meets fewer than there are
     while start < n_boxes:  # bound: start grows
         n_found, start = entry_of(_collect)(grid, start, enough, keys, flag)
-        found = np.sort(keys[:n_found])
         if n_found:
-            yield np.stack([found // n_boxes, found % n_boxes], axis=1)
-
-
-def all_pairs_of_boxes(low: FloatArray, high: FloatArray, budget: Budget) -> IntArray:
-    """Return all of `pairs_of_boxes` at once, sorted. Raises as `Budget.check` when the call must end."""
-    blocks = [np.zeros((0, 2), np.int64)]
-    for block in pairs_of_boxes(low, high, budget.flag) if len(low) else ():
-        budget.check()
-        blocks.append(block)
-    budget.check()
-    pairs = np.concatenate(blocks)
-    return pairs if len(blocks) <= 2 else pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+            yield np.sort(keys[:n_found])
 
 
 @np.errstate(all="ignore")

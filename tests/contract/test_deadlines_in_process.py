@@ -19,7 +19,20 @@ import pytest
 
 import engine
 from engine.solids.base import _restored
-from tests.contract.test_deadlines import MANY_SIDES, TIN, ZIGZAG, ball, check_ends, circle, comb, far_apart, prism
+from tests.contract.test_deadlines import (
+    MANY_SIDES,
+    TIN,
+    TINY,
+    ZIGZAG,
+    across,
+    ball,
+    check_ends,
+    circle,
+    comb,
+    far_apart,
+    prism,
+    stripes,
+)
 from tests.contract.test_deadlines import vanishing as vanishing_terms
 
 DEADLINE, SOON = 0.2, 0.05
@@ -234,3 +247,9 @@ def test_work_ends(name: str, is_cancelled: bool) -> None:
 @pytest.mark.parametrize("name", FIRST)
 def test_building_for_a_first_question_ends(name: str) -> None:
     check_ends(lambda: cpu_after(partial(FIRST[name], new(solid("fine"))), SOON, False))
+
+
+@pytest.mark.parametrize("seconds", [0.05, 0.4, 1.5, 3.0])
+def test_nine_million_crossings_end_in_every_stage(seconds: float) -> None:
+    bars = [engine.Polygon([ring]) for ring in [*stripes(1_500), *across(1_500), TINY]]
+    check_ends(lambda: cpu_after(partial(engine.union_all, bars), seconds, False))
