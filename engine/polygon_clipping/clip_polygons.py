@@ -7,30 +7,24 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from itertools import accumulate
-from typing import Any, Final, Literal, NamedTuple, Unpack, cast, overload
+from typing import Any, Final, Literal, NamedTuple, Unpack, overload
 
 import numpy as np
 import numpy.typing as npt
 
-from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray, read_only
+from engine.arrays import BoolArray, FlagArray, FloatArray, Int8Array, IntArray, read_only
 from engine.budget import UNLIMITED, Budget, Cancel
 from engine.direct import entry_of
-from engine.errors import EmptyGeometryError, InvalidArrayError, TooComplexError, UnsupportedSolidError
+from engine.errors import EmptyGeometryError, InvalidArrayError, TooComplexError
 from engine.parallel import Options, Progress, check_options, is_unlimited, run_chunks
-from engine.polygon_clipping.batches import AXES, clip_chunk, kernel_scene
-from engine.polygon_clipping.convex_planes import convex_planes
-from engine.polygon_clipping.in_integers import Row, clip_polygon, integer_row
+from engine.polygon_clipping.in_integers import Row, clip_polygon
+from engine.polygon_clipping.planes import plane_tables, planes_of
 from engine.polygon_clipping.rings import CLIPPED, PlaneTables
 from engine.polygon_clipping.sutherland_hodgman import clip_rings
-from engine.predicates.rational import reduced
-from engine.predicates.scaling import largest_of
-from engine.solids.aabb import Aabb
+from engine.predicates.scaling import exponent_above, largest_of, scaled_back, shifted
 from engine.solids.base import Solid
 from engine.solids.checks import as_point_groups, as_points, check_dimension, check_finite, is_ready
-from engine.solids.convex import Convex, rows_of
-from engine.solids.half_space import HalfSpace
 from engine.solids.polygon import Polygon
-from engine.solids.polyhedron import Polyhedron
 from engine.solids.ragged import summed
 from engine.types import OPEN, Accuracy
 
@@ -72,6 +66,9 @@ class ClippedPolygons:
         return [self.vertices[i:j] for i, j in pairs]
 
 
+_AXES: Final = {2: (0, 1), 3: (0, 1, 2)}  # the `names` of `clip_rings`
+_DEEPEST: Final = -900
+"""Scenes below 2^-900 have subnormal results, which the kernel would round twice."""
 _FEW: Final = 1024
 """Vertices that are clipped in the time that it takes to plan more."""
 Polygons = Sequence[Polygon] | Sequence[Sequence[npt.ArrayLike]] | npt.NDArray[Any]
@@ -140,7 +137,7 @@ def clip_polygons(
             return few
     check_options(workers, progress, report=report)
     with Budget(deadline, cancel) as budget:
-        planes = _planes(region, budget)
+        planes = planes_of(region, budget.check)
         contours = as_contours(polygons, region.dimension)
         clipped, n_beyond, n_rational = _clip(contours, region, planes, budget, workers, progress)
     if not report:
@@ -158,19 +155,18 @@ def _clip_array(polygons: npt.NDArray[Any], region: Solid) -> ClippedPolygons | 
     # the largest coordinate lies between the root of this sum, and that over the root of how many there are
     if not (0 < n * size <= _FEW and 2.0**-100 < flat.dot(flat) < 2.0**120):
         return None
-    found = _clip_few(flat, tables, *(_one_ring(size) if n == 1 else _equal_rings(n, size)), UNLIMITED)
+    found = _clip_few(flat, tables, *_few_rings(n, size), UNLIMITED)
     return None if found is None else found[0]
-
-
-@functools.lru_cache(64)
-def _one_ring(size: int) -> tuple[IntArray, IntArray]:
-    return _equal_rings(1, size)
 
 
 def _equal_rings(n: int, size: int) -> tuple[IntArray, IntArray]:
     """Return the offsets of the rings of n polygons, and of these; read-only, as kernels are compiled for."""
     numbers = np.arange(n + 1)
     return read_only(size * numbers), read_only(numbers)
+
+
+_few_rings = functools.lru_cache(64)(_equal_rings)
+"""Those of arrays that are clipped at once, of up to `_FEW` vertices."""
 
 
 def _clip_few(
@@ -185,7 +181,7 @@ def _clip_few(
     ring_sizes, status = np.empty(n_rings, np.int64), np.zeros(n, np.int8)
     state, bridges = np.empty(n, np.uint8), np.empty(n, np.bool_)
     reached, written = entry_of(clip_rings, d)(
-        vertices, ring_offsets, polygon_offsets, tables, 0, n, budget.flag, out, ring_sizes, state, bridges, AXES[d]
+        vertices, ring_offsets, polygon_offsets, tables, 0, n, budget.flag, out, ring_sizes, state, bridges, _AXES[d]
     )
     budget.check()
     if reached < n or OPEN in (states := state.tolist()):
@@ -206,34 +202,6 @@ def _gathered(
     owners = np.repeat(polygon_offsets[:-1], np.diff(polygon_offsets))
     contours, ends = (np.arange(len(sizes)) - owners)[left], summed(sizes > 0)[polygon_offsets]
     return ClippedPolygons(vertices, summed(sizes[left]), ends, contours, status, may_have_bridges)
-
-
-def _planes(region: Solid, budget: Budget) -> list[Row]:
-    """Return the planes of a region as integer rows in clipping order, repeated ones once: they cut nothing twice."""
-    kept = region.kept("clipping_planes") if isinstance(region, Solid) else None
-    if kept is not None:
-        return cast(list[Row], kept)
-    match region:
-        case HalfSpace() | Aabb() | Convex():
-            rows = rows_of(region)
-        case Polyhedron():
-            return convex_planes(region, budget.check)
-        case _:
-            raise UnsupportedSolidError(
-                f"clip_polygons does not take a {getattr(region, 'type', type(region).__name__)}; give a half_space, "
-                "aabb, convex or convex polyhedron, or use overlay for polygons in the plane",
-                ("region",),
-            )
-
-    def build() -> list[Row]:
-        found: dict[Row, None] = {}
-        for index, row in enumerate(rows.tolist()):
-            if index % 256 == 0:
-                budget.check()
-            found[reduced(integer_row(row))] = None
-        return list(found)
-
-    return region.prepared("clipping_planes", build, budget.check)
 
 
 class Contours(NamedTuple):
@@ -290,14 +258,70 @@ def as_contours(polygons: Any, dimension: int) -> Contours:
     return Contours(vertices, summed([len(ring) for ring in rings]), summed(counts), largest_of(vertices))
 
 
+class KernelScene(NamedTuple):
+    """What the kernel takes of a scene: vertices (m, dim) float64 times 2^-exponent, and the planes for them."""
+
+    vertices: FloatArray
+    exponent: int
+    tables: PlaneTables
+
+
+def kernel_scene(region: Solid, contours: Contours, planes: list[Row], budget: Budget) -> KernelScene | None:
+    """Return a scene as the kernel takes it, None where numbers lie too far apart for it; planes: of the region."""
+    exponent = exponent_above(contours.largest)
+    points = shifted(contours.vertices, -exponent) if exponent else contours.vertices
+    if points is None or exponent < _DEEPEST or not planes:
+        return None
+    if exponent:
+        tables = plane_tables(planes, exponent, budget.check)
+    else:
+        tables = region.prepared("clipping_tables", lambda: plane_tables(planes, 0, budget.check), budget.check)
+    return None if tables is None else KernelScene(points, exponent, tables)
+
+
+def clip_chunk(
+    scene: KernelScene, ring_offsets: IntArray, polygon_offsets: IntArray, first: int, last: int, budget: Budget,
+    sizes: IntArray, state: FlagArray, may_have_bridges: BoolArray,
+) -> FloatArray:  # fmt: skip
+    """Clip polygons first .. last - 1 as far as the kernel can; return the vertices of those it settled, in order.
+
+    Fills sizes (of rings), state and may_have_bridges (of polygons); see `clip_rings`.
+    """
+    n_vertices = int(ring_offsets[polygon_offsets[last]] - ring_offsets[polygon_offsets[first]])
+    vertices, tables, done, parts = scene.vertices, scene.tables, first, list[FloatArray]()
+    d = vertices.shape[1]
+    room, clip = d * (n_vertices + 4 * len(tables.high) + 64), entry_of(clip_rings, d)
+    flat, found = vertices.reshape(-1), (sizes, state, may_have_bridges)
+    while done < last:
+        out = np.empty(room)
+        reached, written = clip(
+            flat, ring_offsets, polygon_offsets, tables, done, last, budget.flag, out, *found, _AXES[d]
+        )
+        budget.check()
+        parts.append(out[: written * d].reshape(-1, d))
+        budget.take(2 * parts[-1].nbytes)
+        if reached == done:
+            room *= 2
+            budget.take(room * out.itemsize)
+        done = reached
+    vertices = parts[0] if len(parts) == 1 else np.concatenate([np.zeros((0, d)), *parts])
+    if scene.exponent:
+        vertices, doubtful = scaled_back(vertices, scene.exponent)
+        if doubtful.any():
+            state[first:last] = OPEN
+            sizes[polygon_offsets[first] : polygon_offsets[last]] = 0
+            return vertices[:0]
+    return vertices
+
+
 def _clip(
     contours: Contours, region: Solid, planes: list[Row], budget: Budget, workers: int | None,
     progress: Progress | None,
 ) -> tuple[ClippedPolygons, int, int]:  # fmt: skip
     """Clip every polygon; return the result, how many polygons needed more than the filter, and rational arithmetic."""
-    vertices, ring_offsets, polygon_offsets, largest = contours
+    vertices, ring_offsets, polygon_offsets, _ = contours
     n, dimension = len(polygon_offsets) - 1, vertices.shape[1]
-    scene = kernel_scene(region, vertices, largest, planes, budget)
+    scene = kernel_scene(region, contours, planes, budget)
     if scene is not None and scene.exponent == 0 and len(vertices) <= _FEW:
         few = _clip_few(vertices.reshape(-1), scene.tables, ring_offsets, polygon_offsets, budget)
         if few is not None:

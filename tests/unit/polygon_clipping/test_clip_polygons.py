@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.budget import Cancel
+from engine.budget import Budget, Cancel
 from engine.errors import (
     CancelledError,
     DeadlineExceededError,
@@ -21,7 +21,14 @@ from engine.errors import (
     WrongDimensionError,
 )
 from engine.polygon_clipping import clip_polygons as polygons_module
-from engine.polygon_clipping.clip_polygons import ClippedPolygons, PolygonStatus, clip_polygons
+from engine.polygon_clipping.clip_polygons import (
+    ClippedPolygons,
+    PolygonStatus,
+    as_contours,
+    clip_chunk,
+    clip_polygons,
+    kernel_scene,
+)
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.convex import Convex
@@ -244,3 +251,15 @@ def test_refuses_what_it_cannot_take() -> None:
 
 def test_the_example() -> None:
     assert doctest.testmod(polygons_module) == (0, 3)
+
+
+def test_a_raised_flag_ends_a_chunk() -> None:
+    """The kernel stopping for it does not pass for a lack of room, of which more and more would be made."""
+    region, budget, offsets = Aabb([-1, -1], [1, 1]), Budget(), np.arange(6)
+    contours = as_contours(np.ones((5, 3, 2)), 2)
+    scene = kernel_scene(region, contours, polygons_module.planes_of(region, budget.check), budget)
+    assert scene is not None
+    budget.flag[0] = 1
+    found = np.zeros(5, np.int64), np.zeros(5, np.uint8), offsets > 9
+    with pytest.raises(CancelledError):
+        clip_chunk(scene, contours.ring_offsets, offsets, 0, 5, budget, *found)

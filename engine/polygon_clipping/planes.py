@@ -1,4 +1,4 @@
-"""The planes of a region that Sutherland-Hodgman clips on, and the certificate that a polyhedron is convex.
+"""The planes of a region that Sutherland-Hodgman clips on: in integers, as double-doubles, and of a convex polyhedron.
 
 A polyhedron's planes are rarely rows of doubles, so they stay implicit: three vertices each. It is convex when no
 vertex lies outside of any of its planes (exact orientation) and a point inside of all planes is inside of it. Then all
@@ -10,26 +10,35 @@ without area, and solids that are not convex, so that the answer can say why.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from fractions import Fraction
-from typing import Final
+from itertools import starmap
+from typing import Final, cast
 
 import numpy as np
 
 from engine.arrays import FloatArray, Int8Array, IntArray
 from engine.containment.rational_locate import rational_location
 from engine.errors import UnsupportedSolidError
-from engine.polygon_clipping.in_integers import Row, plane_through
+from engine.polygon_clipping.in_integers import Row, integer_row, plane_through
+from engine.polygon_clipping.rings import PlaneTables
+from engine.predicates.digits import packed_numbers
+from engine.predicates.expansion import LARGEST, SMALLEST
 from engine.predicates.orientation import orient3d_batch
-from engine.predicates.rational import orient3d_rational, reduced
+from engine.predicates.rational import nearest_pair, orient3d_rational, reduced
+from engine.solids.aabb import Aabb
+from engine.solids.base import Solid
 from engine.solids.checks import digits
+from engine.solids.convex import Convex, rows_of
 from engine.solids.convexity import convexity
+from engine.solids.half_space import HalfSpace
 from engine.solids.polyhedron import Polyhedron
 from engine.types import UNDECIDED, Location
 
 Check = Callable[[], object]
 
 _BATCH: Final = 1 << 17  # orientations in one kernel call: a few milliseconds
+_CHECK_EVERY: Final = 256
 
 
 def orientations(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> Int8Array:
@@ -42,21 +51,71 @@ def orientations(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> 
     return signs
 
 
-def convex_planes(region: Polyhedron, check: Check) -> list[Row]:
-    """Return the planes of a convex polyhedron as integer rows, in the order of its faces, each plane once.
+def planes_of(region: Solid, check: Check) -> list[Row]:
+    """Return the planes of a region as integer rows in clipping order, repeated ones once: they cut nothing twice.
 
-    Raises: UnsupportedSolidError where the polyhedron is not convex, naming a face and a vertex beyond it.
+    Raises: UnsupportedSolidError, where a polyhedron is not convex naming a face and a vertex beyond it.
     """
+    kept = region.kept("clipping_planes") if isinstance(region, Solid) else None
+    if kept is not None:
+        return cast(list[Row], kept)
+
+    if not isinstance(region, HalfSpace | Aabb | Convex | Polyhedron):
+        raise UnsupportedSolidError(
+            f"clip_polygons does not take a {getattr(region, 'type', type(region).__name__)}; give a half_space, "
+            "aabb, convex or convex polyhedron, or use overlay for polygons in the plane",
+            ("region",),
+        )
 
     def build() -> list[Row]:
+        if isinstance(region, Polyhedron):
+            rows: Iterable[Row] = starmap(plane_through, region.vertices[_outward_triangles(region, check)].tolist())
+        else:
+            rows = map(integer_row, rows_of(region).tolist())
         found: dict[Row, None] = {}
-        for turn, (a, b, c) in enumerate(region.vertices[_outward_triangles(region, check)].tolist()):
-            if turn % 256 == 0:
+        for turn, row in enumerate(rows):
+            if turn % _CHECK_EVERY == 0:
                 check()
-            found[reduced(plane_through(a, b, c))] = None
+            found[reduced(row)] = None
         return list(found)
 
-    return region.prepared("convex_planes", build)
+    return region.prepared("clipping_planes", build, check)
+
+
+def plane_tables(planes: list[Row], exponent: int, check: Check) -> PlaneTables | None:
+    """Return planes as the kernel takes them, for vertices times 2^-exponent; None where numbers lie too far apart."""
+    high, low = np.zeros((len(planes), len(planes[0]))), np.zeros((len(planes), len(planes[0])))
+    axes, at = np.full(len(planes), -1, np.int64), np.zeros(len(planes))
+    rows: list[list[int]] = []
+    for i, row in enumerate(planes):
+        if i % _CHECK_EVERY == 0:
+            check()
+        *normal, offset = [x << exponent for x in row[:-1]] + [row[-1]] if exponent > 0 else row
+        offset = offset << -exponent if exponent < 0 else offset
+        rows.append([*normal, offset])
+        shift = max(map(int.bit_length, normal))  # the row is divided by 2^shift: its largest number is about 1
+        try:
+            for k, number in enumerate([*normal, offset]):
+                high[i, k], low[i, k] = _double_double(number, shift)
+            across = [k for k, number in enumerate(normal) if number]
+            if len(across) == 1:
+                place, rest = nearest_pair(-offset, normal[across[0]])
+                axes[i], at[i] = (across[0], place) if rest == 0 else (-1, 0.0)
+        except OverflowError:
+            return None
+    sizes = np.abs(np.concatenate([high.ravel(), low.ravel()]))
+    if ((sizes != 0.0) & ((sizes < SMALLEST) | (sizes > LARGEST))).any():
+        return None
+    packed = packed_numbers(rows)
+    return None if packed is None else PlaneTables(high, low, axes, at, *packed)
+
+
+def _double_double(number: int, shift: int) -> tuple[float, float]:
+    """Return number / 2^shift as a double-double, whose low part is zero only where the high part is exact."""
+    high, low = nearest_pair(number, 1 << shift)
+    if low == 0.0 and Fraction(high) * (1 << shift) != number:
+        raise OverflowError(number)  # the low part underflows
+    return high, low
 
 
 def _outward_triangles(region: Polyhedron, check: Check) -> IntArray:

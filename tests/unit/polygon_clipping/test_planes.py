@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from engine import Polyhedron, UnsupportedSolidError
-from engine.polygon_clipping.convex_planes import convex_planes
+from engine.polygon_clipping.planes import planes_of
 
 CUBE = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]]
 CORNERS = np.array([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)], float)
 
 
 def planes(faces: list[list[int]], vertices: np.ndarray = CORNERS) -> list:
-    return convex_planes(Polyhedron(vertices, faces), lambda: None)
+    return planes_of(Polyhedron(vertices, faces), lambda: None)
 
 
 def test_a_cube_has_six_planes_whichever_way_its_faces_are_turned() -> None:
