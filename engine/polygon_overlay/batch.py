@@ -79,7 +79,7 @@ class OverlayBatch:
             return None
         if pair in self._apart:
             return self._apart[pair]
-        subject, clip = _arrays(self._subjects[pair]), _arrays(self._clips[pair])
+        subject, clip = rings_of(self._subjects[pair]), rings_of(self._clips[pair])
         if self._is_rounded_again[pair]:
             return overlay_rings(subject, clip, self._operation, self._output, Budget())[0]
         one = taken(self._exact, np.array([pair]))
@@ -125,13 +125,8 @@ class OverlayBatch:
         return tuple(self)
 
 
-def _arrays(solid: Solid) -> RingArrays:
-    assert isinstance(solid, Polygon)
-    return RingArrays(solid.vertices, solid.ring_offsets)
-
-
 def _n_vertices(solids: Sequence[Solid]) -> int:
-    return solids.n_vertices if isinstance(solids, Chosen) else sum(len(_arrays(each).vertices) for each in solids)
+    return solids.n_vertices if isinstance(solids, Chosen) else sum(len(rings_of(each).vertices) for each in solids)
 
 
 def _gathered(solids: Sequence[Solid]) -> PolygonArrays:
@@ -225,7 +220,7 @@ def _settled(
     def overlay_alone(start: int, stop: int) -> None:
         for pair in left[start:stop].tolist():
             budget.check()
-            both = _arrays(subjects[pair]), _arrays(clips[pair])
+            both = rings_of(subjects[pair]), rings_of(clips[pair])
             try:
                 alone[pair] = overlay_rings(*both, operation, output, budget)
             except NotRepresentableError:
@@ -238,18 +233,15 @@ def _settled(
     left = np.flatnonzero((found.status != DONE) & ~is_rounded_again)
     run_chunks(overlay_alone, len(left), budget=budget, first_chunk=1, workers=workers)
     apart.update((pair, result) for pair, (result, _, _) in alone.items())
-    more = [*(each.found for each in together), *(_found_of(*each) for each in alone.values())]
+    more = [each.found for each in together]
+    for result, n_exact, _ in alone.values():
+        rings = result.vertices, result.ring_offsets, result.piece_offsets
+        more.append(one_pair(*rings, result.largest_displacement, n_exact))
     pairs = np.concatenate([*(each.pairs for each in together), np.array([*alone], np.int64)])
     rows = np.arange(len(found.status))
     rows[pairs] = len(rows) + np.arange(len(pairs))
     ulps = [0.5, *(each.ulps for each in together), *(ulps_moved(result) for result, _, _ in alone.values())]
     return taken(joined([found, *more]), rows), max(ulps), sum(n for _, _, n in alone.values())
-
-
-def _found_of(result: Overlay, n_exact: int, _: int) -> Found:
-    """Return what was found for one pair from its object; n_exact: pairs of edges beyond the filter."""
-    rings = result.vertices, result.ring_offsets, result.piece_offsets
-    return one_pair(*rings, result.largest_displacement, n_exact)
 
 
 def join_batches(batches: Sequence[OverlayBatch]) -> OverlayBatch:

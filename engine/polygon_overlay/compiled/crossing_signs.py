@@ -39,6 +39,9 @@ Edges = namedtuple("Edges", "x y after before ring")
 x, y: float64; after, before, ring: int64; one entry a vertex.
 """
 
+Ends = tuple[float, float, float, float]
+"""x and y of the first end of an edge, and of the other."""
+
 
 @merged
 def orient(edges: Edges, a: int, b: int, c: int) -> int:
@@ -86,17 +89,16 @@ def _exact_turn(edges: Edges, a: int, b: int, c: int, d: int) -> int:
     if (x[a] == x[d]) & (y[a] == y[d]) & (x[b] == x[c]) & (y[b] == y[c]):  # case: as above
         return 0
     e = workspace(16)
-    return sign(e, _cross(edges, a, b, c, d, e))
+    return sign(e, exact_cross((x[a], y[a], x[b], y[b]), (x[c], y[c], x[d], y[d]), e))
 
 
-@inline
-def _cross(edges: Edges, a: int, b: int, c: int, d: int, e: Components) -> int:
-    """Set e to the cross product of b - a and d - c; return its length, at most WEIGHT_ROOM."""
-    x, y = edges.x, edges.y
-    ux, ux_tail = two_diff(x[b], x[a])
-    uy, uy_tail = two_diff(y[b], y[a])
-    vx, vx_tail = two_diff(x[d], x[c])
-    vy, vy_tail = two_diff(y[d], y[c])
+@merged
+def exact_cross(first: Ends, second: Ends, e: Components) -> int:
+    """Set e to the cross product of the directions of two edges; return its length, at most WEIGHT_ROOM."""
+    ux, ux_tail = two_diff(first[2], first[0])
+    uy, uy_tail = two_diff(first[3], first[1])
+    vx, vx_tail = two_diff(second[2], second[0])
+    vy, vy_tail = two_diff(second[3], second[1])
     return minor(e, ux, ux_tail, uy, uy_tail, vx, vx_tail, vy, vy_tail)
 
 
@@ -122,7 +124,8 @@ def weight_of(cx: float, cy: float, dx: float, dy: float, px: float, py: float) 
 @called
 def exact_weight(edges: Edges, c: int, d: int, p: int, e: Components) -> int:
     """Set e to orient(c, d, p); return its length, at most WEIGHT_ROOM."""
-    return _cross(edges, c, d, c, p, e)
+    x, y = edges.x, edges.y
+    return exact_cross((x[c], y[c], x[d], y[d]), (x[c], y[c], x[p], y[p]), e)
 
 
 @inline

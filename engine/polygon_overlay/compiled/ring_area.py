@@ -1,8 +1,8 @@
 """Areas of rings of implicit points, as certified doubles: double-doubles with a running bound.
 
 Twice the area is the sum of x_k (y_k+1 - y_k-1), places counted from a vertex near the ring. A vertex is known exactly;
-the crossing of the edges ab and cd lies at a + t (b - a) with t = w_a / (w_a - w_b), the weights of crossing_signs.py,
-of opposite signs: t carries their relative errors and 20 u^2, the place that of t (b - a) and 4 u^2 for each sum. In a
+the crossing of the edges ab and cd lies at a + t (b - a) with t = |w_a| / (|w_a| + |w_b|), the weights of
+crossing_signs.py: t carries their relative errors and 20 u^2, the place that of t (b - a) and 4 u^2 for each sum. In a
 sum of n terms, each is off by the errors of its factors and 12 u^2 of its size; what sums lose adds up to a second
 double, which is off by less than (2 n + n^2) u^2 of all sizes, twice over. Where a weight is less than a thousand times
 its bound both come from expansions, if exponents allow.
@@ -20,13 +20,11 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.jit import called, inline, kernel, merged
-from engine.polygon_overlay.compiled.crossing_signs import weight_of
-from engine.polygon_overlay.compiled.rounded_crossings import common_place, leading
+from engine.jit import inline, kernel, merged
+from engine.polygon_overlay.compiled.crossing_signs import Ends
+from engine.polygon_overlay.compiled.rounded_crossings import common_places, weights_of
 from engine.predicates.double_double import U2, dd_add, dd_div, dd_mul, dd_sub, surely_rounded
 from engine.predicates.error_free import fast_two_sum, fma, two_diff, two_sum, workspace
-from engine.predicates.expansion import is_safe
-from engine.predicates.parameters import minor
 
 _TINY = 2.0**-1040
 """More than what an underflow may lose in a term."""
@@ -92,24 +90,11 @@ def _end_of(vertices: Any, offsets: Any, v: int, known: Any, side: int) -> int:
 
 
 @merged
-def _edge(pair: _Pair, e: int) -> tuple[float, float, float, float]:
+def _edge(pair: _Pair, e: int) -> Ends:
     """Return the ends of the edge that begins with vertex e."""
     vertices, v, side = _found(pair, e)
     after = _end_of(vertices, pair.clips.offsets if side else pair.subjects.offsets, v, pair.known, side)
     return vertices[v, 0], vertices[v, 1], vertices[after, 0], vertices[after, 1]
-
-
-@called
-def _exact_weight(
-    cx: float, cy: float, dx: float, dy: float, px: float, py: float
-) -> tuple[float, float, float]:  # fmt: skip
-    e = workspace(16)
-    ux, ux_tail = two_diff(dx, cx)
-    uy, uy_tail = two_diff(dy, cy)
-    vx, vx_tail = two_diff(px, cx)
-    vy, vy_tail = two_diff(py, cy)
-    h, low = leading(e, minor(e, ux, ux_tail, uy, uy_tail, vx, vx_tail, vy, vy_tail))
-    return h, low, 4.0 * U2 * abs(h)
 
 
 @merged
@@ -123,25 +108,17 @@ def _exactly(x: float, y: float, ox: float, oy: float) -> _Place:
 @inline
 def _crossing(pair: _Pair, e: int, f: int, ox: float, oy: float) -> _Place:
     """Return where two edges cross, counted from o; exactly where both run along the axes."""
-    ax, ay, bx, by = _edge(pair, e)
-    cx, cy, dx, dy = _edge(pair, f)
-    x, knows_x = common_place(ax, bx, cx, dx)
-    y, knows_y = common_place(ay, by, cy, dy)
+    ends, others = _edge(pair, e), _edge(pair, f)
+    (x, knows_x), (y, knows_y) = common_places(ends, others)
     if knows_x and knows_y:
         return _exactly(x, y, ox, oy)
-    ah, al, ae = weight_of(cx, cy, dx, dy, ax, ay)
-    bh, bl, be = weight_of(cx, cy, dx, dy, bx, by)
-    if ae > 0.001 * abs(ah) or be > 0.001 * abs(bh):
-        safe = is_safe(ax) & is_safe(ay) & is_safe(bx) & is_safe(by)
-        if safe & is_safe(cx) & is_safe(cy) & is_safe(dx) & is_safe(dy):
-            ah, al, ae = _exact_weight(cx, cy, dx, dy, ax, ay)
-            bh, bl, be = _exact_weight(cx, cy, dx, dy, bx, by)
-    sum_h, sum_l = dd_sub(ah, al, bh, bl)
+    ax, ay, bx, by = ends
+    ah, al, bh, bl, relative = weights_of(ends, others)
+    sum_h, sum_l = dd_add(ah, al, bh, bl)
     th, tl = dd_div(ah, al, sum_h, sum_l)
-    relative = 2.5 * max(ae / abs(ah), be / abs(bh)) + 20.0 * U2
     uh, ul = two_diff(bx, ax)
     vh, vl = two_diff(by, ay)
-    error = relative * abs(th) * max(abs(uh), abs(vh))
+    error = (relative + 20.0 * U2) * th * max(abs(uh), abs(vh))
     uh, ul = dd_mul(th, tl, uh, ul)
     vh, vl = dd_mul(th, tl, vh, vl)
     xh, xl = two_diff(ax, ox)

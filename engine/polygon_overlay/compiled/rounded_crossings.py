@@ -17,12 +17,19 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.jit import called, inline, merged
-from engine.polygon_overlay.compiled.crossing_signs import Edges, crossing_against, exact_weight, weight
+from engine.polygon_overlay.compiled.crossing_signs import (
+    Edges,
+    Ends,
+    crossing_against,
+    exact_cross,
+    exact_weight,
+    weight_of,
+)
 from engine.polygon_overlay.compiled.edge_contacts import Events
 from engine.polygon_overlay.compiled.edge_tree import OFTEN
-from engine.predicates.double_double import U2, dd_add, dd_div, dd_scale, surely_rounded
+from engine.predicates.double_double import U2, dd_add, dd_div, dd_scale, even_of, surely_rounded
 from engine.predicates.error_free import fast_two_sum, workspace
-from engine.predicates.expansion import add_scaled, compress, sign
+from engine.predicates.expansion import add_scaled, compress, is_safe, sign
 
 CUT_BOUND: Final = 40.0 * U2
 LOST: Final = -1.0
@@ -61,45 +68,63 @@ def round_crossing(edges: Edges, e: int, f: int) -> tuple[float, float, float, f
     An error of 0 says that the coordinate is that double exactly; LOST that it could not be found (the caller settles
     it in rationals).
     """
-    a, b, fb = e, edges.after[e], edges.after[f]
-    x, knows_x = common_place(edges.x[a], edges.x[b], edges.x[f], edges.x[fb])
-    y, knows_y = common_place(edges.y[a], edges.y[b], edges.y[f], edges.y[fb])
+    ends, others = _ends_of(edges, e), _ends_of(edges, f)
+    (x, knows_x), (y, knows_y) = common_places(ends, others)
     if knows_x and knows_y:
         return x, y, 0.0, 0.0
-    ah, al, ae = weight(edges, f, fb, a)
-    bh, bl, be = weight(edges, f, fb, b)
-    ah, al = _abs2(ah, al)
-    bh, bl = _abs2(bh, bl)
-    if ae > 0.001 * ah or be > 0.001 * bh:
-        ah, al, bh, bl = _weights_from_expansions(edges, a, b, f, fb)
-        ae, be = 4.0 * U2 * ah, 4.0 * U2 * bh
-    relative = 2.5 * max(ae / ah, be / bh)
+    ah, al, bh, bl, relative = weights_of(ends, others)
     sum_h, sum_l = dd_add(ah, al, bh, bl)
     cut = _Cut(e, f, ah, al, bh, bl, sum_h, sum_l, relative)
     x_error = y_error = 0.0
     if not knows_x:
-        x, x_error = _coordinate(edges, cut, 0, edges.x[a], edges.x[b])
+        x, x_error = _coordinate(edges, cut, 0, ends[0], ends[2])
     if not knows_y:
-        y, y_error = _coordinate(edges, cut, 1, edges.y[a], edges.y[b])
+        y, y_error = _coordinate(edges, cut, 1, ends[1], ends[3])
     return x, y, x_error, y_error
 
 
 @merged
-def common_place(p: float, q: float, r: float, s: float) -> tuple[float, bool]:
-    """Return the coordinate that all of an edge from p to q, or of one from r to s, has; and whether one has one."""
-    return (p if p == q else r), (p == q) | (r == s)
+def _ends_of(edges: Edges, e: int) -> Ends:
+    return edges.x[e], edges.y[e], edges.x[edges.after[e]], edges.y[edges.after[e]]
+
+
+@merged
+def common_places(first: Ends, second: Ends) -> tuple[tuple[float, bool], tuple[float, bool]]:
+    """Return of each axis the coordinate that all of one of two edges has, and whether one has one."""
+    ax, ay, bx, by = first
+    cx, cy, dx, dy = second
+    return ((ax if ax == bx else cx), (ax == bx) | (cx == dx)), ((ay if ay == by else cy), (ay == by) | (cy == dy))
+
+
+@merged
+def weights_of(ends: Ends, others: Ends) -> tuple[float, float, float, float, float]:
+    """Return the weights of the ends of an edge as positive double-doubles, and 2.5 r, where both are known to r.
+
+    They come from expansions where the bound of one is not small beside it, if exponents allow.
+    """
+    ax, ay, bx, by = ends
+    cx, cy, dx, dy = others
+    ah, al, ae = weight_of(cx, cy, dx, dy, ax, ay)
+    bh, bl, be = weight_of(cx, cy, dx, dy, bx, by)
+    ah, al = _abs2(ah, al)
+    bh, bl = _abs2(bh, bl)
+    if ae > 0.001 * ah or be > 0.001 * bh:
+        safe = True
+        for k in range(4):
+            safe &= is_safe(ends[k]) & is_safe(others[k])
+        if safe:
+            ah, al = _weight_from_expansion(ax, ay, others)
+            bh, bl = _weight_from_expansion(bx, by, others)
+            ae, be = 4.0 * U2 * ah, 4.0 * U2 * bh
+    return ah, al, bh, bl, 2.5 * max(ae / ah, be / bh)
 
 
 @called
-def _weights_from_expansions(edges: Edges, a: int, b: int, f: int, fb: int) -> tuple[float, float, float, float]:
-    """Return the weights of a and b to twice 53 bits, both as positive double-doubles."""
-    first, second = workspace(16), workspace(16)
-    n, m = exact_weight(edges, f, fb, a, first), exact_weight(edges, f, fb, b, second)
-    ah, al = leading(first, n)
-    bh, bl = leading(second, m)
-    ah, al = _abs2(ah, al)
-    bh, bl = _abs2(bh, bl)
-    return ah, al, bh, bl
+def _weight_from_expansion(x: float, y: float, others: Ends) -> tuple[float, float]:
+    """Return the weight of a point to twice 53 bits, as a positive double-double."""
+    e = workspace(16)
+    h, low = leading(e, exact_cross(others, (others[0], others[1], x, y), e))
+    return _abs2(h, low)
 
 
 @inline
@@ -137,7 +162,7 @@ def _settle(edges: Edges, e: int, f: int, axis: int, h: float, bound: float) -> 
         half = (other - h) / 2.0
         beyond = crossing_against(edges, e, f, axis, h, half)
         if beyond == 0:  # case: a tie; of two neighbours the one with an even last bit is nearer to nothing else
-            return _even(h, other) + 0.0, abs(half)
+            return even_of(h, other) + 0.0, abs(half)
         if beyond != side:
             return h + 0.0, abs(half)
         h = other
@@ -164,12 +189,6 @@ def _from_expansions(edges: Edges, e: int, f: int, axis: int) -> float:
     dh, dl = leading(below, m)
     h, _ = dd_div(nh, nl, dh, dl)
     return h + 0.0
-
-
-@inline
-def _even(a: float, b: float) -> float:
-    """Return the one of two neighbouring doubles whose last bit is 0."""
-    return (a + b) / 2.0 if abs(a) < 2.0**1022 and abs(b) < 2.0**1022 else a
 
 
 @merged

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections import namedtuple
 from typing import Any, Final
 
+from engine.arrangement.union_find import root_of
 from engine.jit import inline, merged
 from engine.polygon_overlay.compiled.boundary.chains import (
     Chains,
@@ -158,9 +159,7 @@ def half_below(edges: Edges, events: Events, along: Along, points: Any, chains: 
     chain, before = chains.at[e], NOTHING
     for k in range(along.starts[e], along.starts[e + 1]):  # linear: once a component, and ends at v
         point, other = events.point[along.order[k]], events.other[along.order[k]]
-        root = points[point]
-        while root != points[root]:  # bound: the path to the root
-            root = points[root]
+        root = root_of(points, point)
         if other < 0:
             side = 1 if x[point] > x[v] else -1 if x[point] < x[v] else 0
         else:
