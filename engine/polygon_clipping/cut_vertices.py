@@ -20,7 +20,7 @@ from typing import Final, NamedTuple
 
 from engine.jit import inline, merged
 from engine.polygon_clipping.rings import Plane
-from engine.predicates.cut_point import CUT_BOUND, POINT_BOUND
+from engine.predicates.cut_point import CUT_BOUND, POINT_BOUND, point_along
 from engine.predicates.double_double import U2, dd_add, dd_div, dd_mul, surely_rounded
 from engine.predicates.error_free import fma, two_diff, two_prod, two_sum
 
@@ -47,10 +47,8 @@ def share_of_edge(a: float, b: float, place: float) -> tuple[float, float, bool]
 @inline
 def on_edge(x: float, y: float, th: float, tl: float) -> tuple[float, float, float]:
     """Return x + t (y - x) and its bound, for original x and y."""
-    dh, dl = two_diff(y, x)
-    mh, ml = two_prod(th, dh)
-    sh, sl = two_sum(x, mh)
-    h, rest = two_sum(sh, (sl + ml) + (tl * dh + th * dl))
+    h, low, mh, _ = point_along(x, y, th, tl)
+    h, rest = two_sum(h, low)
     return h, rest, (EDGE_BOUND * (abs(x) + abs(mh)) + TINY if x != y else 0.0)
 
 
@@ -78,22 +76,6 @@ def distance_across(x: float, low: float, bound: float, at: float) -> tuple[floa
         return h, rest, bound
     h, rest = dd_add(x, low, -at, 0.0)
     return h, rest, bound + 4.0 * U2 * abs(h)
-
-
-@inline
-def plus_term(
-    h: float, rest: float, size: float, moved: float, a: float, a_low: float, x: float, x_low: float, bound: float
-) -> tuple[float, float, float, float]:
-    """Return the sum h + rest with a x added to it, and its sums of sizes and of bounds; see `value_bound`."""
-    ph, pl = dd_mul(a, a_low, x, x_low)
-    h, rest = dd_add(h, rest, ph, pl)
-    return h, rest, size + abs(ph), moved + abs(a) * bound
-
-
-@inline
-def value_bound(size: float, moved: float) -> float:
-    """Return the bound of a value of a plane at a vertex, from the sums that `plus_term` makes."""
-    return DD_VALUE_BOUND * size + 1.01 * moved + TINY
 
 
 class Share(NamedTuple):
@@ -124,10 +106,8 @@ def between(x: Triple, y: Triple, s: Share) -> Triple:
         return h, rest, bound + TINY
     if x_h == y_h:
         return x_h, 0.0, 0.0
-    dh, dl = two_diff(y_h, x_h)
-    mh, ml = two_prod(s.th, dh)
-    sh, sl = two_sum(x_h, mh)
-    h, rest = two_sum(sh, (sl + ml) + (s.tl * dh + s.th * dl))
+    h, low, mh, dh = point_along(x_h, y_h, s.th, s.tl)
+    h, rest = two_sum(h, low)
     return h, rest, 1.01 * (POINT_BOUND * (abs(x_h) + abs(mh)) + s.r * abs(dh)) + TINY
 
 
@@ -176,10 +156,10 @@ def value_of(s: Vertices, plane: Plane, v: int, n_ring: int) -> Triple:
     size, moved = abs(h), 0.0
     for k in range(d):
         x, rest, bound = coordinate(s, v, k, n_ring)
-        h, low, size, moved = plus_term(
-            h, low, size, moved, plane.high[number, k], plane.low[number, k], x, rest, bound
-        )
-    return h, low, value_bound(size, moved)
+        ph, pl = dd_mul(plane.high[number, k], plane.low[number, k], x, rest)
+        h, low = dd_add(h, low, ph, pl)
+        size, moved = size + abs(ph), moved + abs(plane.high[number, k]) * bound
+    return h, low, DD_VALUE_BOUND * size + 1.01 * moved + TINY
 
 
 @merged

@@ -27,7 +27,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.jit import called, inline
+from engine.jit import called, inline, merged
 from engine.predicates.double_double import U2, dd_add, dd_div, dd_scale, even_of, surely_rounded
 from engine.predicates.error_free import two_diff, two_prod, two_sum
 from engine.predicates.expansion import LARGEST, Components, grow_product, sign
@@ -45,16 +45,22 @@ _NEXT: Final = 4
 """Neighbours that `nearest` goes on to: a guess is off by one or two units."""
 
 
+@merged
+def point_along(p: float, q: float, th: float, tl: float) -> tuple[float, float, float, float]:
+    """Return p + t (q - p) for t as a double-double as a sum of two doubles, and t (q - p) and q - p, rounded."""
+    dh, dl = two_diff(q, p)
+    mh, ml = two_prod(th, dh)
+    sh, sl = two_sum(p, mh)
+    return sh, (sl + ml) + (tl * dh + th * dl), mh, dh
+
+
 @inline
 def point_at(p: float, q: float, th: float, tl: float, slack: float) -> tuple[float, bool]:
     """Return p + t (q - p) and whether it is surely the nearest double; t is known within 18 u^2 + `slack` of itself.
 
     Coordinates below 2^1000. A zero is never sure unless p = q.
     """
-    dh, dl = two_diff(q, p)
-    mh, ml = two_prod(th, dh)
-    sh, sl = two_sum(p, mh)
-    low = (sl + ml) + (tl * dh + th * dl)
+    sh, low, mh, _ = point_along(p, q, th, tl)
     bound = POINT_BOUND * (abs(p) + abs(mh)) + slack * abs(mh) + TINY
     return sh + low, (sh + (low - bound) == sh + (low + bound)) | (p == q)
 

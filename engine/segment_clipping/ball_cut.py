@@ -14,6 +14,7 @@ from typing import Any, Final
 
 from engine.jit import called, inline, kernel, merged
 from engine.predicates.cut_point import TINY as CUT_TINY
+from engine.predicates.cut_point import point_along
 from engine.predicates.double_double import U2, dd_add, dd_div, dd_mul
 from engine.predicates.error_free import fast_two_sum, two_diff, two_prod, two_sum
 from engine.segment_clipping.ball_interval import (
@@ -67,10 +68,7 @@ def coordinate_at(p: float, q: float, t: float, step: float, slack: float) -> tu
     """Return p + (t + step) (q - p) and whether it is surely the nearest double; the step is known within `slack`."""
     if p == q:
         return p, True
-    dh, dl = two_diff(q, p)
-    mh, ml = two_prod(t, dh)
-    sh, sl = two_sum(p, mh)
-    low = (sl + ml) + (step * dh + t * dl)
+    sh, low, mh, dh = point_along(p, q, t, step)
     bound = 24.0 * U2 * (abs(p) + abs(mh)) + (1.01 * slack + 4.0 * 2.0**-53 * abs(step)) * abs(dh) + CUT_TINY
     return sh + low, sh + (low - bound) == sh + (low + bound)
 
