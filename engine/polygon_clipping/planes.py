@@ -23,9 +23,9 @@ from engine.errors import UnsupportedSolidError
 from engine.polygon_clipping.in_integers import Row, integer_row, plane_through
 from engine.polygon_clipping.rings import PlaneTables
 from engine.predicates.digits import packed_numbers
-from engine.predicates.expansion import LARGEST, SMALLEST
 from engine.predicates.orientation import orient3d_batch
 from engine.predicates.rational import nearest_pair, orient3d_rational, reduced
+from engine.predicates.scaling import are_all_safe
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.checks import digits
@@ -103,10 +103,7 @@ def plane_tables(planes: list[Row], exponent: int, check: Check) -> PlaneTables 
                 axes[i], at[i] = (across[0], place) if rest == 0 else (-1, 0.0)
         except OverflowError:
             return None
-    sizes = np.abs(np.concatenate([high.ravel(), low.ravel()]))
-    if ((sizes != 0.0) & ((sizes < SMALLEST) | (sizes > LARGEST))).any():
-        return None
-    packed = packed_numbers(rows)
+    packed = packed_numbers(rows) if are_all_safe(high) and are_all_safe(low) else None
     return None if packed is None else PlaneTables(high, low, axes, at, *packed)
 
 

@@ -14,6 +14,7 @@ from typing import Final
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, IntArray, read_only
+from engine.predicates.expansion import LARGEST, SMALLEST
 
 COMFORTABLE: Final = 64
 """Scenes whose largest coordinate lies within 2^-64 .. 2^64 stay as they are; kernels are exact to 2^-120 .. 2^120."""
@@ -23,6 +24,12 @@ SMALLEST_NORMAL: Final = 2.0**-1022
 def largest_of(*arrays: FloatArray) -> float:
     """Return the largest magnitude of any coordinate, no finite number where one is none."""
     return max((max(array.max().item(), -array.min().item()) for array in arrays if array.size), default=0.0)
+
+
+def are_all_safe(numbers: FloatArray) -> bool:
+    """Tell whether every number is what `is_safe` wants."""
+    sizes = np.abs(numbers)
+    return bool(((sizes == 0.0) | ((sizes >= SMALLEST) & (sizes <= LARGEST))).all())
 
 
 def exponent_of(*arrays: FloatArray) -> int:

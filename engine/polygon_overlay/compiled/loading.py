@@ -11,7 +11,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
-from engine.jit import inline, kernel
+from engine.jit import inline, kernel, merged
 from engine.polygon_overlay.compiled.crossing_signs import Edges
 from engine.polygon_overlay.compiled.edge_tree import (
     ANYWHERE,
@@ -64,6 +64,12 @@ class Loaded(NamedTuple):
     n_rings: int
     n_runs: int
     largest: float
+
+
+@merged
+def is_before(vertices: Any, i: int, j: int) -> bool:
+    """Tell whether vertex i is further left than j, or as far and lower."""
+    return vertices[i, 0] < vertices[j, 0] or (vertices[i, 0] == vertices[j, 0] and vertices[i, 1] < vertices[j, 1])
 
 
 @inline

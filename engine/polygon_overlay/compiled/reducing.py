@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from engine.jit import inline, kernel, merged
+from engine.jit import inline, kernel
 from engine.polygon_overlay.compiled.clearance import CLEARANCE
 from engine.polygon_overlay.compiled.edge_tree import POLL, BoxTree, build_tree
 from engine.polygon_overlay.compiled.loading import (
@@ -30,6 +30,7 @@ from engine.polygon_overlay.compiled.loading import (
     RingArrays,
     common_box,
     end_ring,
+    is_before,
     is_empty,
     magnitude,
 )
@@ -49,12 +50,6 @@ from engine.polygon_overlay.compiled.workspace import rows_of
 from engine.predicates.expansion import LARGEST, is_safe
 
 
-@merged
-def _is_lower(vertices: Any, i: int, j: int) -> bool:
-    """Tell whether vertex i is further left than j, or as far and lower."""
-    return vertices[i, 0] < vertices[j, 0] or (vertices[i, 0] == vertices[j, 0] and vertices[i, 1] < vertices[j, 1])
-
-
 @inline
 def _top_of(vertices: Any, blocks: Blocks, begin: int, end: int) -> int:
     """Return the rightmost vertex, the highest of such, of the blocks of a ring."""
@@ -66,7 +61,7 @@ def _top_of(vertices: Any, blocks: Blocks, begin: int, end: int) -> int:
         if blocks.boxes[i, 1] == x_max:
             a = blocks.first[i]
             for k in range(a, a + 1 if blocks.marks[i] & CHORD else blocks.last[i]):
-                if top < 0 or _is_lower(vertices, top, k):
+                if top < 0 or is_before(vertices, top, k):
                     top = k
     return top
 
@@ -81,7 +76,7 @@ def _low_of(vertices: Any, blocks: Blocks, begin: int, end: int) -> int:
     for i in range(begin, end):
         if blocks.boxes[i, 0] == x_min:
             for k in range(blocks.first[i], blocks.last[i]):
-                if _is_lower(vertices, k, low):
+                if is_before(vertices, k, low):
                     low = k
     return low
 

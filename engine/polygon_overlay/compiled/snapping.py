@@ -23,7 +23,7 @@ import numpy as np
 
 from engine.jit import called, inline, kernel, merged
 from engine.polygon_overlay.compiled.edge_tree import FEW, POLL, begin_pairs, boxes_meet, build_tree, next_pairs
-from engine.polygon_overlay.compiled.loading import EVERYTHING, RingArrays, fill_boxes, load_rings
+from engine.polygon_overlay.compiled.loading import EVERYTHING, RingArrays, fill_boxes, is_before, load_rings
 from engine.polygon_overlay.compiled.workspace import rows_of
 from engine.predicates.orientation import BOUND_2D, orient2d
 from engine.types import Point2
@@ -84,11 +84,6 @@ def _find_pixels(vertices: Any, pixels: Any, stop: Any) -> int:
     return n_moved
 
 
-@merged
-def _is_before(pixels: Any, i: int, j: int) -> bool:
-    return pixels[i, 0] < pixels[j, 0] or (pixels[i, 0] == pixels[j, 0] and pixels[i, 1] < pixels[j, 1])
-
-
 @inline
 def _find_corners(pixels: Any, offsets: Any, pieces: Any, corners: Any, starts: Any, stop: Any) -> int:
     """Fill ``corners`` with the vertices where rings turn, ``starts`` with where those of each ring begin there.
@@ -104,7 +99,7 @@ def _find_corners(pixels: Any, offsets: Any, pieces: Any, corners: Any, starts: 
             piece += 1
         elif before == pieces[piece - 1]:
             before = -1
-        if before >= 0 and not _is_before(pixels, offsets[before], first):
+        if before >= 0 and not is_before(pixels, offsets[before], first):
             return FOLDS
         i, starts[ring] = last - 1, n
         for j in range(first, last):
@@ -123,7 +118,7 @@ def _find_corners(pixels: Any, offsets: Any, pieces: Any, corners: Any, starts: 
                     if not ux * vx + uy * vy > 0.0:
                         return FOLDS
                     n -= 1
-            if _is_before(pixels, j, first):
+            if is_before(pixels, j, first):
                 return FOLDS
             i = j
     starts[offsets.shape[0] - 1] = n

@@ -16,6 +16,8 @@ end.
 What touches has a code, 2 * place + 5 where the line beside the segment crosses the element, else 2 * place + 4:
 
     0 .. 2  in that corner        3 .. 5  in the side from corner place - 3 on        START, END  there the segment ends
+
+Source: the separating axes of segment and box stand in C. Ericson, Real-time collision detection, 2005, section 5.3.3.
 """
 
 from __future__ import annotations
@@ -27,7 +29,6 @@ import numpy as np
 from engine.jit import allocating, allocating_kernel, called, inline, merged
 from engine.predicates.orientation import orient2d
 from engine.predicates.vectors import as_point2
-from engine.segment_clipping.on_boundary.box_tree import DEEPEST, LEAF_SIZE, may_meet
 from engine.types import UNDECIDED, Point2
 
 APART: Final = 0
@@ -50,6 +51,16 @@ STOPPED: Final = -2
 """Instead of a number of contacts."""
 
 
+LEAF_SIZE: Final = 4
+"""Edges of a leaf, see `build_box_tree`."""
+_DEEPEST: Final = 64
+"""Places on the traversal's stack: a tree of depth d holds at most d + 1 nodes at once, and d < 60."""
+_SLACK: Final = 2.0**-46
+"""Bound of the axis test: about 24 roundings of 2^-53, in terms up to 4 times the largest product."""
+_TOO_LARGE: Final = 2.0**500
+"""Beyond this products may overflow, and only the boxes are compared."""
+
+
 class EdgeContacts(NamedTuple):
     """Room for the contacts of a group of segments: elements and kinds one segment after another, and offsets."""
 
@@ -58,7 +69,7 @@ class EdgeContacts(NamedTuple):
     offsets: Any
     """(m + 1,) where those of each segment begin."""
     stack: Any
-    """(DEEPEST,) int64, nodes that wait."""
+    """(_DEEPEST,) int64, nodes that wait."""
 
 
 @allocating
@@ -66,7 +77,7 @@ def edge_contacts_for(n_segments: int, n_contacts: int) -> EdgeContacts:
     """Return room for groups of so many segments at most, and so many contacts of a group."""
     return EdgeContacts(
         np.empty(n_contacts, np.int64), np.empty(n_contacts, np.uint8), np.empty(n_segments + 1, np.int64),
-        np.empty(DEEPEST, np.int64),
+        np.empty(_DEEPEST, np.int64),
     )  # fmt: skip
 
 
@@ -155,6 +166,31 @@ def edge_contact(edge: Any, segment: Any) -> int:
         return PROPER  # two different signs each
     code = touched_edge(of_a, of_b, of_p, of_q)
     return code if code != ALONG else along_edge(a, b, p, q)
+
+
+@inline
+def may_meet(segment: Any, box: Any) -> bool:
+    """Tell whether a segment may meet a closed box; False only where some axis surely separates them."""
+    n = segment.shape[1]
+    largest = 0.0
+    for k in range(n):
+        p, q, low, high = segment[0, k], segment[1, k], box[0, k], box[1, k]
+        if (p < low and q < low) or (p > high and q > high):
+            return False
+        largest = max(largest, abs(p), abs(q), abs(low), abs(high))
+    if largest > _TOO_LARGE:
+        return True
+    for k in range(n):
+        for j in range(k):
+            u, v = segment[1, j] - segment[0, j], segment[1, k] - segment[0, k]
+            center_u, center_v = box[0, j] + box[1, j], box[0, k] + box[1, k]  # twice the centre, and so on
+            half_u, half_v = box[1, j] - box[0, j], box[1, k] - box[0, k]
+            from_u, from_v = center_u - 2.0 * segment[0, j], center_v - 2.0 * segment[0, k]
+            reach = half_u * abs(v) + half_v * abs(u)
+            slack = _SLACK * largest * (abs(u) + abs(v)) + 2.0**-1000
+            if abs(from_u * v - from_v * u) > reach + slack:
+                return False
+    return True
 
 
 @inline

@@ -1,10 +1,19 @@
-"""What the kernels read of a polygon or polyhedron whose boundary segments are cut on, prepared once a solid."""
+"""What the kernels read of a polygon or polyhedron whose boundary segments are cut on, prepared once a solid.
+
+Of a polygon that is a tree of boxes over its edges. The rings are put in the order of a space-filling curve through
+their centres; the tree over them is implicit: node i has the children 2 i and 2 i + 1, the second half are leaves of
+`LEAF_SIZE` edges, and a box that holds nothing has low = +inf. Boxes are the exact ones of the doubles given, so a test
+without rounding errs on neither side; where the test rounds, it keeps.
+
+Source: the order is that of G. M. Morton, A computer oriented geodetic data base, 1966.
+"""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from engine.arrays import Float32Array, FloatArray, Int32Array, IntArray, read_only
 from engine.bounding.bvh import UNUSED, Bvh, build_bvh, on_lines
@@ -12,12 +21,15 @@ from engine.containment.rational_locate import next_in_ring
 from engine.lanes.boxes import EMPTY
 from engine.lanes.tracing import LANES
 from engine.lanes.triangles import CORNER_ROWS
-from engine.predicates.expansion import LARGEST, SMALLEST
-from engine.segment_clipping.on_boundary.box_tree import build_box_tree
+from engine.predicates.scaling import are_all_safe
+from engine.segment_clipping.on_boundary.contacts import LEAF_SIZE
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
 from engine.solids.surface import Surface
 from engine.solids.triangle import Triangle
+
+_BITS: Final = 20
+"""Of each coordinate in the curve's order."""
 
 
 class Outline(NamedTuple):
@@ -74,13 +86,57 @@ def outline_of(elements: FloatArray, faces: IntArray, offsets: IntArray) -> Outl
     """Return what the kernels read of the edges (k, 2, 2) of some rings."""
     low, high = np.minimum(elements[:, 0], elements[:, 1]), np.maximum(elements[:, 0], elements[:, 1])
     order, boxes = build_box_tree(low, high, offsets)
-    return Outline(read_only(elements), _are_safe(elements), read_only(faces), read_only(order), read_only(boxes))
+    return Outline(read_only(elements), are_all_safe(elements), read_only(faces), read_only(order), read_only(boxes))
 
 
-def _are_safe(elements: FloatArray) -> bool:
-    """Tell whether every coordinate is what `is_safe` wants."""
-    sizes = np.abs(elements)
-    return bool(((sizes == 0.0) | ((sizes >= SMALLEST) & (sizes <= LARGEST))).all())
+def build_box_tree(low: FloatArray, high: FloatArray, offsets: IntArray) -> tuple[IntArray, FloatArray]:
+    """Return the tree over elements with the boxes `low`, `high`, (n, dim) float64 each; offsets: of their rings.
+
+    (n,) int64, elements by leaf; (2 n_leaves, 2, dim) float64, low and high of node i at row i.
+    """
+    n, dimension = low.shape
+    order = _order(low, high, offsets)
+    n_leaves = 1
+    while n_leaves * LEAF_SIZE < n:
+        n_leaves *= 2
+    boxes = np.empty((2 * n_leaves, 2, dimension))
+    boxes[:, 0], boxes[:, 1] = np.inf, -np.inf
+    starts = np.arange(0, n, LEAF_SIZE)
+    boxes[n_leaves : n_leaves + len(starts), 0] = np.minimum.reduceat(low[order], starts)
+    boxes[n_leaves : n_leaves + len(starts), 1] = np.maximum.reduceat(high[order], starts)
+    level = n_leaves
+    while level > 1:
+        level //= 2
+        children = boxes[2 * level : 4 * level].reshape(level, 2, 2, dimension)
+        boxes[level : 2 * level, 0] = np.minimum(children[:, 0, 0], children[:, 1, 0])
+        boxes[level : 2 * level, 1] = np.maximum(children[:, 0, 1], children[:, 1, 1])
+    return order, boxes
+
+
+def _order(low: FloatArray, high: FloatArray, offsets: IntArray) -> IntArray:
+    """Return elements ring by ring, in the order of the curve; those of a ring follow one another in space too."""
+    if len(offsets) == 2:
+        return np.arange(len(low))
+    starts = offsets[:-1]
+    keys = _curve(np.minimum.reduceat(low, starts), np.maximum.reduceat(high, starts))
+    return np.argsort(np.repeat(keys, np.diff(offsets)), kind="stable")
+
+
+def _curve(low: FloatArray, high: FloatArray) -> npt.NDArray[np.uint64]:
+    """Return the place of each box's centre on the curve; any order is right, a good one is fast."""
+    centers = low / 2 + high / 2
+    smallest = centers.min(axis=0)
+    extent = (centers / 2 - smallest / 2).max(axis=0)
+    extent[extent == 0.0] = 1.0
+    with np.errstate(all="ignore"):
+        cells = np.nan_to_num((centers / 2 - smallest / 2) / extent * (2**_BITS - 1), nan=0.0)
+    cells = np.clip(cells, 0, 2**_BITS - 1).astype(np.uint64)
+    key = np.zeros(len(low), np.uint64)
+    dimension = low.shape[1]
+    for bit in range(_BITS):
+        for k in range(dimension):
+            key |= ((cells[:, k] >> np.uint64(bit)) & np.uint64(1)) << np.uint64(bit * dimension + k)
+    return key
 
 
 def mesh_of(elements: FloatArray, faces: IntArray) -> Mesh:
@@ -88,7 +144,7 @@ def mesh_of(elements: FloatArray, faces: IntArray) -> Mesh:
     low, high = elements.min(axis=1), elements.max(axis=1)
     tree, n_inner = _inner_first(build_bvh(np.concatenate([low, high], axis=1)))
     return Mesh(
-        on_lines(elements), _are_safe(elements), read_only(faces), tree.boxes, tree.child, tree.origin,
+        on_lines(elements), are_all_safe(elements), read_only(faces), tree.boxes, tree.child, tree.origin,
         1.0 / tree.scale, n_inner, _levels_of(tree.child[:n_inner]), corners_of(tree, n_inner, elements),
     )  # fmt: skip
 
