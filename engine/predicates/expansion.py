@@ -18,7 +18,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 from engine.jit import called, inline
-from engine.predicates.error_free import fast_two_sum, two_diff, two_prod, two_sum
+from engine.predicates.error_free import fast_two_sum, two_prod, two_sum
 
 Components = Any  # a float64 array, or a list of floats when the compiler is disabled
 LARGEST: Final = 2.0**120
@@ -142,10 +142,3 @@ def magnitude(e: Components, n: int) -> int:
         for i in range(n):
             e[i] = -e[i]
     return n
-
-
-@inline
-def put_distance(e: Components, x: float, y: float) -> int:
-    """Set e to |x - y|; two places."""
-    h, low = two_diff(x, y)
-    return magnitude(e, grow(e, grow(e, 0, low), h))

@@ -14,7 +14,7 @@ from engine.jit import called, inline, kernel, merged
 from engine.predicates.cut_point import T_BOUND, parameter_and_point, point_at
 from engine.predicates.double_double import dd_add, dd_div
 from engine.predicates.error_free import workspace
-from engine.predicates.expansion import is_safe, magnitude, put_distance
+from engine.predicates.expansion import is_safe, magnitude
 from engine.predicates.side import dd_value
 from engine.segment_clipping.cohen_sutherland import LONGEST, SHORTEST, corners_of, meeting
 from engine.segment_clipping.cyrus_beck import are_safe, expand_value
@@ -36,19 +36,17 @@ def parameter_of(sp: Triple, sq: Triple) -> tuple[float, float, float, bool]:
 def cut_by_signs(row: Any, segment: Any, point: Any, axis: int, at: float) -> tuple[float, bool]:
     """Set `point` to where `segment` crosses the plane of `row`, by exact signs; return t and whether all is sure.
 
-    axis, at: across an axis, where, so that values are differences; else -1 and anything.
+    axis, at: across an axis, where, and the row has a 1 or -1 there alone; else -1 and anything.
     """
     wp, wq, e = workspace(8), workspace(8), workspace(96)
-    if axis >= 0:
-        p, q = segment[0, axis], segment[1, axis]
-        if not (is_safe(p) and is_safe(q) and is_safe(at)):
-            return 0.0, False
-        n_wp, n_wq = put_distance(wp, p, at), put_distance(wq, q, at)
+    if axis >= 0:  # what is not safe on other axes is multiplied by zero
+        safe = is_safe(segment[0, axis]) and is_safe(segment[1, axis]) and is_safe(at)
     else:
-        if not are_safe(row, segment):
-            return 0.0, False
-        n_wp = magnitude(wp, expand_value(row, segment[0], wp))
-        n_wq = magnitude(wq, expand_value(row, segment[1], wq))
+        safe = are_safe(row, segment)
+    if not safe:
+        return 0.0, False
+    n_wp = magnitude(wp, expand_value(row, segment[0], wp))
+    n_wq = magnitude(wq, expand_value(row, segment[1], wq))
     return parameter_and_point(segment, wp, n_wp, wq, n_wq, axis, at, point, e)
 
 

@@ -21,11 +21,11 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from engine.jit import called, merged
+from engine.jit import called, inline, merged
 from engine.predicates.cut_point import T_BOUND, nearest, parameter_and_point, point_at
 from engine.predicates.double_double import U2, dd_div
 from engine.predicates.error_free import two_diff, two_prod, two_sum, workspace
-from engine.predicates.expansion import Components, add_scaled, is_safe, magnitude, put_distance
+from engine.predicates.expansion import Components, add_scaled, grow, is_safe, magnitude
 from engine.predicates.parameters import minor as exact_minor
 from engine.segment_clipping.on_boundary.triangle_contact import corner, triangle_at
 from engine.segment_clipping.pieces import Triple
@@ -185,7 +185,14 @@ def cross_exactly(segments: Any, item: int, elements: Any, element: int, point: 
 def parameter_exactly(p: float, q: float, x: float) -> tuple[float, bool]:
     """Return (x - p) / (q - p), x between p and q, and whether it is surely the nearest double."""
     wp, wq, e = workspace(2), workspace(2), workspace(24)
-    n_wp, n_wq = put_distance(wp, x, p), put_distance(wq, q, x)
+    n_wp, n_wq = _put_distance(wp, x, p), _put_distance(wq, q, x)
     h, low = two_diff(q, p)
     way = 1.0 if h > 0.0 else -1.0
     return nearest(0.0, 1.0, wp, n_wp, wq, n_wq, way * h, way * low, e)
+
+
+@inline
+def _put_distance(e: Components, x: float, y: float) -> int:
+    """Set e to |x - y|; two places."""
+    h, low = two_diff(x, y)
+    return magnitude(e, grow(e, grow(e, 0, low), h))
