@@ -16,11 +16,10 @@ from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.found import NO_PAIRS, Found, chained, joined, one_pair, taken
 from engine.polygon_overlay.implicit_rings import ImplicitRings, areas_of
-from engine.polygon_overlay.nearest import nearest_pairs
 from engine.polygon_overlay.overlay import accuracy_of, check_words, overlay_rings, rings_of, ulps_moved
 from engine.polygon_overlay.polygon_arrays import Chosen, PolygonArrays, gathered
 from engine.polygon_overlay.result import Output, Overlay
-from engine.polygon_overlay.rounds import SettledPairs, settle_pairs
+from engine.polygon_overlay.rounds import SettledPairs, nearest_pairs, settle_pairs
 from engine.polygon_overlay.run import KEPT_ARRAYS, Operation, arranged_again, as_overlay, run_kernel
 from engine.solids.base import Solid
 from engine.solids.polygon import Polygon

@@ -25,9 +25,8 @@ from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.compiled.ring_nesting import FIRST_ALONE, NEGATIVE, NON_ZERO, PAIR, POSITIVE, Nesting
 from engine.polygon_overlay.found import Found, one_pair, ring_sizes
 from engine.polygon_overlay.grid import snapped_to_units
-from engine.polygon_overlay.nearest import leave_nearest
 from engine.polygon_overlay.result import Output, Overlay
-from engine.polygon_overlay.rounds import settle_rings
+from engine.polygon_overlay.rounds import leave_nearest, settle_rings
 from engine.polygon_overlay.run import KEPT, Operation
 from engine.polygon_overlay.run_pair import UNNAMED
 

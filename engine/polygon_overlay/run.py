@@ -18,10 +18,9 @@ from engine.polygon_overlay.compiled.workspace import Outcomes, first_contacts, 
 from engine.polygon_overlay.found import Found, one_pair, put_together, ring_sizes
 from engine.polygon_overlay.grid import Grid, as_it_stays, from_units, snap_vertices, snapped_to_units
 from engine.polygon_overlay.implicit_rings import NOTHING, ImplicitRings
-from engine.polygon_overlay.nearest import leave_nearest
 from engine.polygon_overlay.polygon_arrays import PolygonArrays
 from engine.polygon_overlay.result import Output, Overlay, made_overlay
-from engine.polygon_overlay.rounds import settle_rings
+from engine.polygon_overlay.rounds import leave_nearest, settle_rings
 from engine.polygon_overlay.run_pair import BY_CONTACT, NOT_REDUCED, UNNAMED, run_pair
 from engine.predicates.scaling import exponent_of, scaled_back, shifted
 from engine.solids.ragged import summed

@@ -20,6 +20,7 @@ from engine.polygon_overlay.compiled.kernel import DONE, FINISHED, NEEDS_CONTACT
 from engine.polygon_overlay.compiled.loading import Loaded, RingArrays
 from engine.polygon_overlay.compiled.reducing import expand_rings, reduce_pair
 from engine.polygon_overlay.compiled.ring_nesting import PAIR, Nesting
+from engine.polygon_overlay.compiled.ring_order import Output as Written
 from engine.polygon_overlay.compiled.workspace import (
     FEW_VERTICES,
     first_contacts,
@@ -29,7 +30,6 @@ from engine.polygon_overlay.compiled.workspace import (
     scratch_for_few,
     spare,
 )
-from engine.polygon_overlay.compiled.workspace import Output as Written
 from engine.polygon_overlay.implicit_rings import ImplicitRings, one_polygon
 from engine.polygon_overlay.result import Output, Overlay
 from engine.solids.polygon import Polygon

@@ -51,14 +51,6 @@ from engine.polygon_overlay.compiled.loading import (
     mark_runs,
     mark_short,
 )
-from engine.polygon_overlay.compiled.pair_output import (
-    Filled,
-    has_room,
-    tell_evidence,
-    tell_parts,
-    write_convex,
-    write_rings,
-)
 from engine.polygon_overlay.compiled.reducing import count_left_out
 from engine.polygon_overlay.compiled.ring_nesting import (
     AGAIN,
@@ -68,7 +60,15 @@ from engine.polygon_overlay.compiled.ring_nesting import (
     gather_evidence,
     spread_sources,
 )
-from engine.polygon_overlay.compiled.ring_order import rank_rings
+from engine.polygon_overlay.compiled.ring_order import (
+    Filled,
+    has_room,
+    rank_rings,
+    tell_evidence,
+    tell_parts,
+    write_convex,
+    write_rings,
+)
 from engine.polygon_overlay.compiled.rounded_crossings import LOST, round_points
 from engine.polygon_overlay.compiled.workspace import Outcomes, Workspace, output_at, rows_of
 from engine.predicates.expansion import LARGEST

@@ -25,7 +25,7 @@ from engine.polygon_overlay.compiled.edge_events import Along
 from engine.polygon_overlay.compiled.edge_tree import DEEPEST, LEAF, PORTION, BoxTree
 from engine.polygon_overlay.compiled.loading import Given
 from engine.polygon_overlay.compiled.ring_nesting import Holders
-from engine.polygon_overlay.compiled.ring_order import Ranking
+from engine.polygon_overlay.compiled.ring_order import Output, Ranking
 from engine.polygon_overlay.compiled.rounded_crossings import Rounded
 
 _kept: list[Scratch] = []
@@ -72,10 +72,6 @@ class Workspace(NamedTuple):
     rounded: Rounded
     ranking: Ranking
 
-
-Output = namedtuple("Output", "vertices sources rings pieces evidence")
-"""Pair after pair: vertices (m, 2) float64, their sources (m, 2) int32, ends of rings and of pieces (n + 1,) int64,
-that begin with 0, evidence (m, 2) int64: a ring, and one that it comes from."""
 
 Outcomes = namedtuple("Outcomes", "status counts displacement")
 """By pair: status (n,) int8; counts (n, 4) int64: pieces, rings, vertices, pairs of edges beyond the filter;
