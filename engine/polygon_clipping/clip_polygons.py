@@ -18,10 +18,10 @@ from engine.direct import entry_of
 from engine.errors import EmptyGeometryError, InvalidArrayError, TooComplexError
 from engine.parallel import Options, Progress, check_options, is_unlimited, run_chunks
 from engine.polygon_clipping.in_integers import Row, clip_polygon
-from engine.polygon_clipping.planes import plane_tables, planes_of
+from engine.polygon_clipping.planes import KernelScene, kernel_scene, planes_of
 from engine.polygon_clipping.rings import CLIPPED, PlaneTables
 from engine.polygon_clipping.sutherland_hodgman import clip_rings
-from engine.predicates.scaling import exponent_above, largest_of, scaled_back, shifted
+from engine.predicates.scaling import largest_of, scaled_back
 from engine.solids.base import Solid
 from engine.solids.checks import as_point_groups, as_points, check_dimension, check_finite, is_ready
 from engine.solids.polygon import Polygon
@@ -67,8 +67,6 @@ class ClippedPolygons:
 
 
 _AXES: Final = {2: (0, 1), 3: (0, 1, 2)}  # the `names` of `clip_rings`
-_DEEPEST: Final = -900
-"""Scenes below 2^-900 have subnormal results, which the kernel would round twice."""
 _FEW: Final = 1024
 """Vertices that are clipped in the time that it takes to plan more."""
 Polygons = Sequence[Polygon] | Sequence[Sequence[npt.ArrayLike]] | npt.NDArray[Any]
@@ -258,27 +256,6 @@ def as_contours(polygons: Any, dimension: int) -> Contours:
     return Contours(vertices, summed([len(ring) for ring in rings]), summed(counts), largest_of(vertices))
 
 
-class KernelScene(NamedTuple):
-    """What the kernel takes of a scene: vertices (m, dim) float64 times 2^-exponent, and the planes for them."""
-
-    vertices: FloatArray
-    exponent: int
-    tables: PlaneTables
-
-
-def kernel_scene(region: Solid, contours: Contours, planes: list[Row], budget: Budget) -> KernelScene | None:
-    """Return a scene as the kernel takes it, None where numbers lie too far apart for it; planes: of the region."""
-    exponent = exponent_above(contours.largest)
-    points = shifted(contours.vertices, -exponent) if exponent else contours.vertices
-    if points is None or exponent < _DEEPEST or not planes:
-        return None
-    if exponent:
-        tables = plane_tables(planes, exponent, budget.check)
-    else:
-        tables = region.prepared("clipping_tables", lambda: plane_tables(planes, 0, budget.check), budget.check)
-    return None if tables is None else KernelScene(points, exponent, tables)
-
-
 def clip_chunk(
     scene: KernelScene, ring_offsets: IntArray, polygon_offsets: IntArray, first: int, last: int, budget: Budget,
     sizes: IntArray, state: FlagArray, may_have_bridges: BoolArray,
@@ -319,9 +296,9 @@ def _clip(
     progress: Progress | None,
 ) -> tuple[ClippedPolygons, int, int]:  # fmt: skip
     """Clip every polygon; return the result, how many polygons needed more than the filter, and rational arithmetic."""
-    vertices, ring_offsets, polygon_offsets, _ = contours
+    vertices, ring_offsets, polygon_offsets, largest = contours
     n, dimension = len(polygon_offsets) - 1, vertices.shape[1]
-    scene = kernel_scene(region, contours, planes, budget)
+    scene = kernel_scene(region, vertices, largest, planes, budget.check)
     if scene is not None and scene.exponent == 0 and len(vertices) <= _FEW:
         few = _clip_few(vertices.reshape(-1), scene.tables, ring_offsets, polygon_offsets, budget)
         if few is not None:

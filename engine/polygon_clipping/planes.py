@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from fractions import Fraction
 from itertools import starmap
-from typing import Final, cast
+from typing import Final, NamedTuple, cast
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from engine.polygon_clipping.rings import PlaneTables
 from engine.predicates.digits import packed_numbers
 from engine.predicates.orientation import orient3d_batch
 from engine.predicates.rational import nearest_pair, orient3d_rational, reduced
-from engine.predicates.scaling import are_all_safe
+from engine.predicates.scaling import are_all_safe, exponent_above, shifted
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.checks import digits
@@ -39,6 +39,8 @@ Check = Callable[[], object]
 
 _BATCH: Final = 1 << 17  # orientations in one kernel call: a few milliseconds
 _CHECK_EVERY: Final = 256
+_DEEPEST: Final = -900
+"""Scenes below 2^-900 have subnormal results, which the kernel would round twice."""
 
 
 def orientations(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> Int8Array:
@@ -82,7 +84,33 @@ def planes_of(region: Solid, check: Check) -> list[Row]:
     return region.prepared("clipping_planes", build, check)
 
 
-def plane_tables(planes: list[Row], exponent: int, check: Check) -> PlaneTables | None:
+class KernelScene(NamedTuple):
+    """What the kernel takes of a scene: vertices (m, dim) float64 times 2^-exponent, and the planes for them."""
+
+    vertices: FloatArray
+    exponent: int
+    tables: PlaneTables
+
+
+def kernel_scene(
+    region: Solid, vertices: FloatArray, largest: float, planes: list[Row], check: Check
+) -> KernelScene | None:
+    """Return a scene as the kernel takes it, None where numbers lie too far apart for it.
+
+    largest: magnitude of any coordinate. planes: those of the region.
+    """
+    exponent = exponent_above(largest)
+    points = shifted(vertices, -exponent) if exponent else vertices
+    if points is None or exponent < _DEEPEST or not planes:
+        return None
+    if exponent:
+        tables = _plane_tables(planes, exponent, check)
+    else:
+        tables = region.prepared("clipping_tables", lambda: _plane_tables(planes, 0, check), check)
+    return None if tables is None else KernelScene(points, exponent, tables)
+
+
+def _plane_tables(planes: list[Row], exponent: int, check: Check) -> PlaneTables | None:
     """Return planes as the kernel takes them, for vertices times 2^-exponent; None where numbers lie too far apart."""
     high, low = np.zeros((len(planes), len(planes[0]))), np.zeros((len(planes), len(planes[0])))
     axes, at = np.full(len(planes), -1, np.int64), np.zeros(len(planes))

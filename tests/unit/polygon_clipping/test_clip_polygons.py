@@ -27,8 +27,9 @@ from engine.polygon_clipping.clip_polygons import (
     as_contours,
     clip_chunk,
     clip_polygons,
-    kernel_scene,
 )
+from engine.polygon_clipping.planes import kernel_scene
+from engine.polygon_clipping.planes import planes_of as planes_of_solid
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.convex import Convex
@@ -257,7 +258,7 @@ def test_a_raised_flag_ends_a_chunk() -> None:
     """The kernel stopping for it does not pass for a lack of room, of which more and more would be made."""
     region, budget, offsets = Aabb([-1, -1], [1, 1]), Budget(), np.arange(6)
     contours = as_contours(np.ones((5, 3, 2)), 2)
-    scene = kernel_scene(region, contours, polygons_module.planes_of(region, budget.check), budget)
+    scene = kernel_scene(region, contours.vertices, 1.0, planes_of_solid(region, budget.check), budget.check)
     assert scene is not None
     budget.flag[0] = 1
     found = np.zeros(5, np.int64), np.zeros(5, np.uint8), offsets > 9
