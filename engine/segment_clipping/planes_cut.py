@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from engine.jit import called, inline, kernel, merged
+from engine.jit import called, kernel, merged
 from engine.predicates.cut_point import T_BOUND, parameter_and_point, point_at
 from engine.predicates.double_double import dd_add, dd_div
 from engine.predicates.error_free import workspace
@@ -19,17 +19,6 @@ from engine.predicates.side import dd_value
 from engine.segment_clipping.cohen_sutherland import LONGEST, SHORTEST, corners_of, meeting
 from engine.segment_clipping.cyrus_beck import are_safe, expand_value
 from engine.segment_clipping.pieces import BLOCK, Pieces, Triple, point_of, put_end, put_own_end
-
-
-@inline
-def parameter_of(sp: Triple, sq: Triple) -> tuple[float, float, float, bool]:
-    """Return t = s_p / (s_p - s_q) as a double-double, how far relative to itself it may be off, and if that holds."""
-    sp_h, sp_l, sp_bound = sp
-    sq_h, sq_l, sq_bound = sq
-    sum_h, sum_l = dd_add(sp_h, sp_l, -sq_h, -sq_l)
-    th, tl = dd_div(sp_h, sp_l, sum_h, sum_l)
-    r = 1.01 * (sp_bound / abs(sp_h) + sq_bound / abs(sq_h))
-    return th, tl, r, (r < 0.001) & (abs(sum_h) >= 2.0**-400) & (abs(sum_h) <= 2.0**400) & (abs(sp_h) >= 2.0**-500)
 
 
 @called
@@ -52,8 +41,16 @@ def cut_by_signs(row: Any, segment: Any, point: Any, axis: int, at: float) -> tu
 
 @merged
 def cut_by_values(p: Triple, q: Triple, sp: Triple, sq: Triple) -> tuple[float, float, float, float, bool]:
-    """Return where p q crosses a plane that has these values there, t, and whether all is surely nearest."""
-    th, tl, slack, sure = parameter_of(sp, sq)
+    """Return where p q crosses a plane that has these values there, t, and whether all is surely nearest.
+
+    slack: how far t may be off relative to itself.
+    """
+    sp_h, sp_l, sp_bound = sp
+    sq_h, sq_l, sq_bound = sq
+    sum_h, sum_l = dd_add(sp_h, sp_l, -sq_h, -sq_l)
+    th, tl = dd_div(sp_h, sp_l, sum_h, sum_l)
+    slack = 1.01 * (sp_bound / abs(sp_h) + sq_bound / abs(sq_h))
+    sure = (slack < 0.001) & (abs(sum_h) >= 2.0**-400) & (abs(sum_h) <= 2.0**400) & (abs(sp_h) >= 2.0**-500)
     x, is_x = point_at(p[0], q[0], th, tl, slack)
     y, is_y = point_at(p[1], q[1], th, tl, slack)
     z, is_z = point_at(p[2], q[2], th, tl, slack)
