@@ -22,7 +22,7 @@ from functools import cmp_to_key
 from engine.arrangement.arrange import Arrangement
 from engine.arrangement.subdivision import Subdivision, next_half_edges, turn_of
 from engine.arrangement.union_find import UnionFind
-from engine.budget import Budget
+from engine.budget import poll, polled
 
 
 @dataclass(slots=True)
@@ -41,33 +41,29 @@ class Piece:
     hole_evidence: list[frozenset[int]] = field(default_factory=list)
 
 
-def trace_pieces(
-    subdivision: Subdivision, inside: Sequence[int], evidence: Sequence[frozenset[int]], budget: Budget | None = None
-) -> list[Piece]:
+def trace_pieces(subdivision: Subdivision, inside: Sequence[int], evidence: Sequence[frozenset[int]]) -> list[Piece]:
     """Return the regions that the faces marked `inside` make, in the order of their shells.
 
     inside, evidence: one for each face; face 0 must be outside, marked 0; faces of two marks are two regions. Shells
     run counter-clockwise, holes clockwise; pieces are in lexicographic order of their shells' nodes, holes likewise:
     the order does not depend on that of the input.
     """
-    budget = budget or Budget()
     arrangement, faces = subdivision.arrangement, subdivision.faces
-    bounds = [inside[left] != inside[right] for left, right in zip(faces[0::2], faces[1::2])]
+    bounds = [inside[left] != inside[right] for left, right in polled(zip(faces[0::2], faces[1::2]))]
     regions = UnionFind(subdivision.n_faces)
-    for edge, is_boundary in enumerate(bounds):
+    for edge, is_boundary in enumerate(polled(bounds)):
         if not is_boundary:
             regions.unite(faces[2 * edge], faces[2 * edge + 1])
-    region_of = [regions.find(face) for face in range(subdivision.n_faces)]
+    region_of = [regions.find(face) for face in polled(range(subdivision.n_faces))]
     gathered: list[frozenset[int]] = [frozenset()] * subdivision.n_faces
-    for face, region in enumerate(region_of):
+    for face, region in enumerate(polled(region_of)):
         gathered[region] |= evidence[face]
-    fans = [[half_edge for half_edge in fan if bounds[half_edge >> 1]] for fan in subdivision.around]
-    starts = [half_edge for half_edge, face in enumerate(faces) if bounds[half_edge >> 1] and inside[face]]
-    budget.check()
+    fans = [[half_edge for half_edge in fan if bounds[half_edge >> 1]] for fan in polled(subdivision.around)]
+    starts = [half_edge for half_edge, face in enumerate(polled(faces)) if bounds[half_edge >> 1] and inside[face]]
     rank = _ranks(arrangement, fans)
     pieces: dict[int, Piece] = {}
     for ring in _simple_rings(arrangement, next_half_edges(fans, len(faces)), starts):
-        budget.check()
+        poll()
         region = region_of[faces[ring[0]]]
         piece = pieces.setdefault(region, Piece(evidence=gathered[region]))
         corners, is_shell = _corners(arrangement, fans, rank, ring)
@@ -93,10 +89,10 @@ def trace_pieces(
 def _ranks(arrangement: Arrangement, fans: Sequence[Sequence[int]]) -> dict[int, int]:
     """Return the place of each node that has boundary edges in the order by x, then by y."""
     nodes = arrangement.nodes
-    used = sorted((node for node, fan in enumerate(fans) if fan), key=nodes.xs.__getitem__)
+    used = sorted((node for node, fan in enumerate(polled(fans)) if fan), key=nodes.xs.__getitem__)
     in_order: list[int] = []
     run: list[int] = []
-    for node in used:  # only runs of equal rounded x need the exact comparison
+    for node in polled(used):  # only runs of equal rounded x need the exact comparison
         if run and nodes.xs[run[0]] != nodes.xs[node]:
             in_order += sorted(run, key=cmp_to_key(nodes.compare)) if len(run) > 1 else run
             run = []
@@ -109,7 +105,7 @@ def _simple_rings(arrangement: Arrangement, following: Sequence[int], starts: Se
     """Return the cycles of `following` through `starts`, cut where they pass a node twice, as half-edges."""
     seen = [False] * len(following)
     rings: list[list[int]] = []
-    for start in starts:
+    for start in polled(starts):
         if seen[start]:
             continue
         path: list[int] = []
@@ -140,7 +136,7 @@ def _corners(
     corners: list[int] = []
     first, is_shell = -1, False
     before = ring[-1]
-    for half_edge in ring:
+    for half_edge in polled(ring):
         node = arrangement.origin(half_edge)
         arriving, leaving = lines[before >> 1], lines[half_edge >> 1]
         if len(fans[node]) > 2 or turn_of(arriving, leaving) != 0:

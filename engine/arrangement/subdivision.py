@@ -20,9 +20,7 @@ import numpy as np
 from engine.arrangement.arrange import Arrangement, Line, side
 from engine.arrangement.nodes import Homogeneous
 from engine.arrangement.union_find import UnionFind
-from engine.budget import Budget
-
-_POLL = 512  # nodes, some microseconds each, between two looks at the clock
+from engine.budget import poll, polled
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +45,7 @@ def turn_of(first: Line, second: Line) -> int:
     return (value > 0) - (value < 0)
 
 
-def half_edges_around(arrangement: Arrangement, budget: Budget) -> list[list[int]]:
+def half_edges_around(arrangement: Arrangement) -> list[list[int]]:
     """Return for each node its outgoing half-edges, counter-clockwise, beginning after straight down."""
     lines = arrangement.lines
 
@@ -59,13 +57,11 @@ def half_edges_around(arrangement: Arrangement, budget: Budget) -> list[list[int
     by_angle = cmp_to_key(order)
     rightward: list[list[int]] = [[] for _ in arrangement.nodes.points]
     leftward: list[list[int]] = [[] for _ in arrangement.nodes.points]
-    for edge, (tail, head) in enumerate(zip(arrangement.tails, arrangement.heads)):
+    for edge, (tail, head) in enumerate(polled(zip(arrangement.tails, arrangement.heads))):
         rightward[tail].append(2 * edge)
         leftward[head].append(2 * edge + 1)
     for fans in (rightward, leftward):
-        for node, fan in enumerate(fans):
-            if node % _POLL == 0:
-                budget.check()
+        for fan in polled(fans):
             if len(fan) > 1:
                 fan.sort(key=by_angle)
     return [right + left for right, left in zip(rightward, leftward)]
@@ -74,7 +70,7 @@ def half_edges_around(arrangement: Arrangement, budget: Budget) -> list[list[int
 def next_half_edges(around: Sequence[Sequence[int]], n_half_edges: int) -> list[int]:
     """Return for each half-edge the one that follows it around the face to its left (-1 for those not in `around`)."""
     following = [-1] * n_half_edges
-    for fan in around:
+    for fan in polled(around):
         before = fan[-1] if fan else -1
         for half_edge in fan:
             following[half_edge ^ 1] = before
@@ -86,7 +82,7 @@ def cycles_of(following: Sequence[int]) -> tuple[list[int], int]:
     """Return for each half-edge the number of its cycle under `following`, and how many cycles there are."""
     cycle = [-1] * len(following)
     n_cycles = 0
-    for start in range(len(following)):
+    for start in polled(range(len(following))):
         if cycle[start] < 0:
             half_edge = start
             while cycle[half_edge] < 0:  # bound: each turn numbers one half-edge
@@ -96,23 +92,24 @@ def cycles_of(following: Sequence[int]) -> tuple[list[int], int]:
     return cycle, n_cycles
 
 
-def subdivide(arrangement: Arrangement, budget: Budget | None = None) -> Subdivision:
-    """Return the faces of `arrangement`; cost: linear, plus one stab for each connected component of the edges."""
-    budget = budget or Budget()
-    around = half_edges_around(arrangement, budget)
+def subdivide(arrangement: Arrangement) -> Subdivision:
+    """Return the faces of `arrangement`; cost: linear, plus one stab for each connected component of the edges.
+
+    Polls, as all functions here do: the time of the call that this is done for ends the work.
+    """
+    around = half_edges_around(arrangement)
     cycle, n_cycles = cycles_of(next_half_edges(around, 2 * len(arrangement.tails)))
-    budget.check()
     # Cycle n_cycles stands for the boundary at infinity; joined to it, a cycle bounds the unbounded face.
     joined = UnionFind(n_cycles + 1)
     below = EdgesBelow(arrangement)
     for first in _first_nodes(arrangement):
-        budget.check()
+        poll()
         edge = below.find(first)
         # The lowest half-edge that leaves the first node has the outer side of its component to its right.
         joined.unite(cycle[around[first][0] ^ 1], n_cycles if edge < 0 else cycle[2 * edge])
     unbounded = joined.find(n_cycles)
     numbers = {unbounded: 0}
-    faces = [numbers.setdefault(joined.find(number), len(numbers)) for number in cycle]
+    faces = [numbers.setdefault(joined.find(number), len(numbers)) for number in polled(cycle)]
     return Subdivision(arrangement, around, faces, len(numbers))
 
 
@@ -120,10 +117,10 @@ def _first_nodes(arrangement: Arrangement) -> list[int]:
     """Return the first node, by x, then by y, of each connected component of the edges."""
     compare = arrangement.nodes.compare
     joined = UnionFind(len(arrangement.nodes.points))
-    for tail, head in zip(arrangement.tails, arrangement.heads):
+    for tail, head in polled(zip(arrangement.tails, arrangement.heads)):
         joined.unite(tail, head)
     first: dict[int, int] = {}
-    for node in arrangement.tails:  # the first node of a component is the tail of its edges
+    for node in polled(arrangement.tails):  # the first node of a component is the tail of its edges
         root = joined.find(node)
         known = first.setdefault(root, node)
         if known != node and compare(node, known) < 0:
@@ -141,7 +138,7 @@ def label_faces(subdivision: Subdivision, masks: Sequence[Any] | None = None, wi
     masks = subdivision.arrangement.masks if masks is None else masks
     faces = subdivision.faces
     neighbours: list[list[tuple[int, Any]]] = [[] for _ in range(subdivision.n_faces)]
-    for edge, mask in enumerate(masks):
+    for edge, mask in enumerate(polled(masks)):
         left, right = faces[2 * edge], faces[2 * edge + 1]
         if left != right:
             neighbours[left].append((right, -mask if winds else mask))
@@ -149,8 +146,7 @@ def label_faces(subdivision: Subdivision, masks: Sequence[Any] | None = None, wi
     labels: list[Any] = [masks[0] ^ masks[0] if len(masks) else 0] * subdivision.n_faces
     reached = [False] * subdivision.n_faces
     reached[0], waiting = True, [0]
-    while waiting:  # bound: each face is entered once; all are reached, since no face is enclosed by nothing
-        face = waiting.pop()
+    for face in polled(waiting):  # it grows: each face is entered once, since no face is enclosed by nothing
         for other, mask in neighbours[face]:
             if not reached[other]:
                 reached[other] = True

@@ -147,7 +147,7 @@ def _half_space_sphere(space: HalfSpace, ball: Sphere, poses: Poses, work: Work)
 def _outlines(first: Solid, second: Solid, poses: Poses, work: Work) -> Parts:
     outlines = [outline_of(first, poses[0], work.budget), outline_of(second, poses[1], work.budget)]
     arrangement, _ = arrange_outlines(outlines, work.budget)
-    labels, meet = label_faces(subdivide(arrangement, work.budget)), boundaries_meet(arrangement)
+    labels, meet = label_faces(subdivide(arrangement)), boundaries_meet(arrangement)
     for outline, other, pose in ((outlines[0], second, poses[1]), (outlines[1], first, poses[0])):
         for vertex in single_points(outline):
             meet |= rational_location(outline.points[vertex], other, pose, work.budget.check) == Location.BOUNDARY

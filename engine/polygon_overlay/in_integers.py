@@ -18,7 +18,7 @@ from engine.arrangement.exact_area import ExactRings
 from engine.arrangement.rings import Piece, trace_pieces
 from engine.arrangement.subdivision import Subdivision, label_faces, subdivide
 from engine.arrays import FloatArray, IntArray
-from engine.budget import Budget
+from engine.budget import Budget, polled
 from engine.errors import TooComplexError
 from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
 from engine.polygon_overlay.compiled.loading import RingArrays
@@ -40,7 +40,7 @@ def overlay_exactly(
     """Return the overlay of checked rings (either may be empty), and how many pairs of edges the filter left open."""
     subdivision, inside = _labelled(subject, clip, KEPT[operation], budget, nesting)
     arrangement = subdivision.arrangement
-    pieces = trace_pieces(subdivision, inside, [frozenset()] * subdivision.n_faces, budget)
+    pieces = trace_pieces(subdivision, inside, [frozenset()] * subdivision.n_faces)
     nodes = arrangement.nodes
     corners = [[arrangement.origin(half_edge) for half_edge in ring] for ring in rings_of(pieces)]
     exact = ExactRings(tuple(tuple(nodes.points[node] for node in ring) for ring in corners), nodes.exponent)
@@ -60,7 +60,7 @@ def overlay_exactly(
 def parts_exactly(subject: RingArrays, clip: RingArrays, budget: Budget) -> tuple[Found, IntArray]:
     """Return what the kernel does that keeps each part, and of each vertex a number of its exact place."""
     subdivision, inside = _labelled(subject, clip, range(4), budget)
-    pieces = trace_pieces(subdivision, inside, [frozenset((part,)) for part in inside], budget)
+    pieces = trace_pieces(subdivision, inside, [frozenset((part,)) for part in inside])
     found = rounded(subdivision.arrangement, pieces)
     parts = [part for piece in pieces for part in (*piece.evidence,) * (1 + len(piece.holes))]
     places = [subdivision.arrangement.origin(half_edge) for ring in rings_of(pieces) for half_edge in ring]
@@ -74,7 +74,7 @@ def _labelled(
     vertices = np.concatenate([subject.vertices, clip.vertices])
     offsets = [*subject.offsets.tolist(), *(clip.offsets[1:] + len(subject.vertices)).tolist()]
     arrangement = arrange_rings(vertices, offsets, None, budget)
-    subdivision = subdivide(arrangement, budget)
+    subdivision = subdivide(arrangement)
     sources = nesting.shells
     if nesting.rule == PAIR:
         sources = np.repeat([0, 1], [len(subject.offsets) - 1, len(clip.offsets) - 1])
@@ -83,7 +83,7 @@ def _labelled(
         inside = [{NON_ZERO: label != 0, POSITIVE: label > 0, NEGATIVE: label < 0}[nesting.rule] for label in labels]
     else:
         source_of = np.repeat(sources, np.diff(offsets)).tolist()
-        masks = [_odd(source_of[k] for k in edges) for edges in arrangement.cover]
+        masks = [_odd(source_of[k] for k in edges) for edges in polled(arrangement.cover)]
         labels = [label or frozenset() for label in label_faces(subdivision, masks)]  # 0 where there is no edge
         if nesting.rule == PAIR:
             inside = [kept[sum(1 << source for source in label)] for label in labels]
@@ -106,9 +106,9 @@ def _windings(arrangement: Arrangement, vertices: FloatArray, offsets: Sequence[
     places = list(map(tuple, vertices.tolist()))
     along = [0] * len(places)
     for start, stop in itertools.pairwise(offsets):
-        for k in range(start, stop):
+        for k in polled(range(start, stop)):
             along[k] = 1 if places[k] < places[k + 1 if k + 1 < stop else start] else -1
-    return [sum(along[k] for k in edges) for edges in arrangement.cover]
+    return [sum(along[k] for k in edges) for edges in polled(arrangement.cover)]
 
 
 def rings_of(pieces: Iterable[Piece]) -> list[list[int]]:
@@ -123,9 +123,9 @@ def rounded(arrangement: Arrangement, pieces: Sequence[Piece]) -> Found:
     """
     rings, nodes = rings_of(pieces), arrangement.nodes
     half_edges = [half_edge for ring in rings for half_edge in ring]
-    used = [arrangement.origin(half_edge) for half_edge in half_edges]
-    edges = [min(arrangement.cover[half_edge >> 1]) for half_edge in half_edges]
-    displacement = max(map(nodes.displacement, set(used)), default=0.0)
+    used = [arrangement.origin(half_edge) for half_edge in polled(half_edges)]
+    edges = [min(arrangement.cover[half_edge >> 1]) for half_edge in polled(half_edges)]
+    displacement = max(map(nodes.displacement, polled(set(used))), default=0.0)
     return one_pair(
         np.array([(nodes.xs[node], nodes.ys[node]) for node in used]).reshape(-1, 2), np.cumsum([0, *map(len, rings)]),
         np.cumsum([0, *(1 + len(piece.holes) for piece in pieces)]), displacement, 0,
@@ -140,7 +140,7 @@ def arranged_again(rings: Found, budget: Budget) -> Found:
     sizes = np.repeat(ring_sizes(rings)[rings.piece_offsets[:-1]], np.diff(rings.piece_offsets)).tolist()
     ring_of = np.repeat(np.arange(len(sizes)), np.diff(rings.ring_offsets)).tolist()
     arrangement = arrange_rings(rings.vertices, rings.ring_offsets.tolist(), None, budget)
-    subdivision = subdivide(arrangement, budget)
+    subdivision = subdivide(arrangement)
     budget.check()
 
     @functools.cache
@@ -151,10 +151,10 @@ def arranged_again(rings: Found, budget: Budget) -> Found:
         least = min((sizes[hole] for hole in holes), default=0.0)
         return bool(inside), inside or frozenset(hole for hole in holes if sizes[hole] == least)
 
-    masks = [_odd(ring_of[k] for k in edges) for edges in arrangement.cover]
+    masks = [_odd(ring_of[k] for k in edges) for edges in polled(arrangement.cover)]
     labels = [label or frozenset() for label in label_faces(subdivision, masks)]
     inside, evidence = zip(*map(verdict, labels), strict=True)
-    pieces = trace_pieces(subdivision, inside, evidence, budget)
+    pieces = trace_pieces(subdivision, inside, evidence)
     meant = [sorted(named) for piece in pieces for named in (piece.evidence, *piece.hole_evidence)]
     told = [(ring, source) for ring, sources in enumerate(meant) for source in sources]
     return rounded(arrangement, pieces)._replace(evidence=np.array(told, np.int64).reshape(-1, 2))

@@ -61,7 +61,7 @@ def clip_all(
     """Return all pieces of segments (n, 2, dim)."""
     parts = _parts(segments, standing, counts, budget, workers)
     found = joined(parts, segments.shape[2])
-    return in_order(found, len(segments), lambda: _exact_ends(segments, standing, budget))
+    return in_order(found, len(segments), lambda: _exact_ends(segments, standing, budget), budget)
 
 
 def _exact_ends(segments: FloatArray, standing: Standing, budget: Budget) -> Exact:

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
+from engine.budget import UNLIMITED, Budget, concatenated
 from engine.direct import entry_of
 from engine.jit import inline, kernel
 from engine.segment_clipping.parameters import ONE, ZERO, Parameter, compare
@@ -70,7 +71,7 @@ def joined(parts: list[Found], dimension: int) -> Found:
     if not parts:
         return nothing
     each = list(zip(nothing, *parts))
-    return Found(*(np.concatenate(each[k], axis=int(k == 3)) for k in range(6)))
+    return Found(*(concatenated(each[k], axis=int(k == 3)) for k in range(6)))
 
 
 def taken(found: Found, rows: Any) -> Found:
@@ -79,7 +80,7 @@ def taken(found: Found, rows: Any) -> Found:
     return Found(source[rows], body[rows], are_long[rows], ends[:, rows], t[rows], faces[rows])
 
 
-def in_order(found: Found, n_sources: int, exact: Callable[[], Exact]) -> ScenePieces:
+def in_order(found: Found, n_sources: int, exact: Callable[[], Exact], budget: Budget = UNLIMITED) -> ScenePieces:
     """Return pieces, those of one source and body in order, in the exact order of their starts."""
     m = len(found.source)
     numbers, ends = np.empty((2, m), np.int64), np.empty((2, m, found.ends.shape[2]))
@@ -87,7 +88,10 @@ def in_order(found: Found, n_sources: int, exact: Callable[[], Exact]) -> SceneP
     order, ranks, offsets = np.empty(4 * m, np.int64), np.empty((m, 2), np.int64), np.zeros(n_sources + 2, np.int64)
     given = found.source, found.body, found.are_long, found.ends[0], found.ends[1], found.t, found.faces
     is_tied = np.zeros(n_sources, np.bool_)
-    if not entry_of(put_in_order)(tuple(map(np.ascontiguousarray, given)), offsets, order, ranks, is_tied, out):
+    arrays = tuple(map(np.ascontiguousarray, given))
+    are_exact = entry_of(put_in_order)(arrays, offsets, order, ranks, is_tied, out, budget.flag)
+    budget.check()
+    if not are_exact:
         rows, some = np.flatnonzero(is_tied[out[0]]), taken(found, np.flatnonzero(is_tied[found.source]))
         for array, looked_at in zip(out, _in_exact_order(some, exact())):
             array[rows] = looked_at
@@ -126,12 +130,13 @@ def _in_exact_order(found: Found, exact: Exact) -> tuple[Any, ...]:
 
 
 @kernel
-def put_in_order(given: Any, offsets: Any, order: Any, ranks: Any, is_tied: Any, out: Any) -> bool:
+def put_in_order(given: Any, offsets: Any, order: Any, ranks: Any, is_tied: Any, out: Any, flag: Any) -> bool:
     """Fill `out`, the arrays of `ScenePieces`, with pieces given by those before the last, and `are_long`; tell whether
     their order is exact, and of which sources it is not: of ends that round alike those of one piece may be known to
     differ, or to be one, and the segment's own are one.
 
-    Room to work in: offsets (n + 2,) zeros, for n sources; order (4 m,), ranks (m, 2). is_tied: (n,) zeros.
+    Room to work in: offsets (n + 2,) zeros, for n sources; order (4 m,), ranks (m, 2). is_tied: (n,) zeros. Polls
+    `flag`.
     """
     source, body, are_long, start, end, t, faces = given
     are_exact = True
@@ -144,6 +149,8 @@ def put_in_order(given: Any, offsets: Any, order: Any, ranks: Any, is_tied: Any,
         offsets[source[piece] + 1] += 1
         order[2 * place], order[2 * place + 1] = 2 * piece, 2 * piece + 1
     for item in range(offsets.size - 2):
+        if flag[0]:
+            break
         first, last = 2 * offsets[item], 2 * offsets[item + 1]
         _sort_ends(order, first, last, body, t)
         rank, n_starts = -1, offsets[item]
@@ -161,6 +168,8 @@ def put_in_order(given: Any, offsets: Any, order: Any, ranks: Any, is_tied: Any,
                 order[2 * source.size + n_starts] = piece
                 n_starts += 1
     for place in range(source.size):
+        if flag[0]:
+            break
         piece = order[2 * source.size + place]
         out[0][place], out[1][place] = source[piece], body[piece]
         for k in range(start.shape[1]):

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from collections import namedtuple
 from dataclasses import dataclass
-from typing import Any, Literal, Unpack, overload
+from typing import Any, Final, Literal, Unpack, overload
 
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
-from engine.budget import Cancel
+from engine.budget import Budget, Cancel
 from engine.direct import entry_of
 from engine.jit import inline, kernel
 from engine.parallel import Options, Progress, check_options
@@ -26,6 +26,8 @@ from engine.types import Accuracy
 Joined = namedtuple("Joined", "vertices offsets source heads tails")
 """Room for the pieces of lines: vertices (2 m, dim) of all, offsets (m + 1,) into them; the line of each (m,), and the
 piece of a segment that it begins with, and ends with."""
+_AT_ONCE: Final = 1 << 20
+"""Pieces whose columns are gathered without a look at the clock."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,10 +120,11 @@ def clip_lines(
     segments = np.empty((len(firsts), 2, dimension))
     segments[:, 0], segments[:, 1] = vertices[firsts], vertices[firsts + 1]
     options: Any = {"workers": workers, "deadline": deadline, "cancel": cancel, "progress": progress, "report": report}
-    pieces = clip_segments(segments, region, **options)
-    if report:
-        return _joined(pieces[0], firsts, vertices, offsets), pieces[1]
-    return _joined(pieces, firsts, vertices, offsets)
+    with Budget(deadline, cancel) as budget:
+        pieces = clip_segments(segments, region, **options)
+        if report:
+            return _joined(pieces[0], firsts, vertices, offsets, budget), pieces[1]
+        return _joined(pieces, firsts, vertices, offsets, budget)
 
 
 def _firsts_of(offsets: IntArray, n_vertices: int) -> IntArray:
@@ -129,28 +132,36 @@ def _firsts_of(offsets: IntArray, n_vertices: int) -> IntArray:
     return np.delete(np.arange(n_vertices), offsets[1:][np.diff(offsets) > 0] - 1)
 
 
-def _joined(pieces: SegmentPieces, firsts: IntArray, vertices: FloatArray, offsets: IntArray) -> LinePieces:
+def _joined(
+    pieces: SegmentPieces, firsts: IntArray, vertices: FloatArray, offsets: IntArray, budget: Budget
+) -> LinePieces:
     """Join the pieces of segments; firsts: the vertex that each segment begins with."""
     m, at = len(pieces), firsts[pieces.source]
     starts, ends = np.ascontiguousarray(pieces.start), np.ascontiguousarray(pieces.end)
     made = Joined(np.empty((2 * m, vertices.shape[1])), np.empty(m + 1, np.int64), *np.empty((3, m), np.int64))
-    n = entry_of(join_parts)(starts, ends, pieces.faces, at, vertices, offsets, made)
+    budget.check()
+    n = entry_of(join_parts)(starts, ends, pieces.faces, at, vertices, offsets, made, budget.flag)
     source, heads, tails = made.source[:n], made.heads[:n], made.tails[:n]
-    sides = np.stack([at[heads], at[tails]], axis=1) - offsets[source][:, None]
-    t, faces = (np.stack([each[heads, 0], each[tails, 1]], axis=1) for each in (pieces.t, pieces.faces))
+    sides, t, faces = np.empty((n, 2), np.int64), np.empty((n, 2)), np.empty((n, 2), np.int64)
+    for some in (slice(first, first + _AT_ONCE) for first in range(0, n, _AT_ONCE)):
+        budget.check()
+        for side, parts in enumerate((heads[some], tails[some])):
+            sides[some, side] = at[parts] - offsets[source[some]]
+            t[some, side], faces[some, side] = pieces.t[parts, side], pieces.faces[parts, side]
+    budget.check()
     return LinePieces(source, made.vertices[: made.offsets[n]], made.offsets[: n + 1], sides, t, faces)
 
 
 @kernel
-def join_parts(starts: Any, ends: Any, faces: Any, at: Any, vertices: Any, offsets: Any, out: Joined) -> int:
+def join_parts(starts: Any, ends: Any, faces: Any, at: Any, vertices: Any, offsets: Any, out: Joined, flag: Any) -> int:
     """Join pieces of segments, from starts (m, dim) to ends, where one begins at the vertex at which the one before
     reaches the end of its segment; return how many there are then.
 
-    at: (m,) the vertex that the segment of each begins with; offsets: of the lines into all vertices.
+    at: (m,) the vertex that the segment of each begins with; offsets: of the lines into all vertices. Polls `flag`.
     """
     n, n_made, begin, line = 0, 0, 0, 0
     out.offsets[0] = 0
-    while begin < at.size:  # bound: each turn ends a line
+    while begin < at.size and not flag[0]:  # bound: each turn ends a line
         while at[begin] >= offsets[line + 1]:
             line += 1
         end = begin + 1
@@ -159,6 +170,8 @@ def join_parts(starts: Any, ends: Any, faces: Any, at: Any, vertices: Any, offse
         size, moved = end - begin, _n_moved(faces, at, begin, end, vertices, offsets[line], offsets[line + 1] - 1)
         head, before, is_kept = -1, -1, False
         for place in range(moved, moved + size):
+            if flag[0]:
+                break
             part, after = begin + place % size, begin + (place + 1) % size
             if head < 0:
                 head, out.source[n], out.heads[n] = part, line, part

@@ -8,6 +8,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from engine.budget import concatenated
 from engine.jit import merged
 
 Triple = tuple[float, float, float]
@@ -41,7 +42,7 @@ def room_for(m: int, dimension: int) -> Pieces:
 def joined(parts: Sequence[Pieces]) -> Pieces:
     """Return the pieces of some parts one after another."""
     source, ends, t, faces = zip(*parts)
-    return Pieces(np.concatenate(source), np.concatenate(ends, axis=1), np.concatenate(t), np.concatenate(faces))
+    return Pieces(concatenated(source), concatenated(ends, axis=1), concatenated(t), concatenated(faces))
 
 
 def first_of(pieces: Pieces, m: int) -> Pieces:

@@ -253,3 +253,10 @@ def test_building_for_a_first_question_ends(name: str) -> None:
 def test_nine_million_crossings_end_in_every_stage(seconds: float) -> None:
     bars = [engine.Polygon([ring]) for ring in [*stripes(1_500), *across(1_500), TINY]]
     check_ends(lambda: cpu_after(partial(engine.union_all, bars), seconds, False))
+
+
+@pytest.mark.parametrize("seconds", [0.1, 0.8, 2.2])
+def test_an_overlay_in_integers_ends_in_every_stage(seconds: float) -> None:
+    """After the crossings come the faces, their labels and the rings."""
+    pair = [engine.Polygon([*(ring[::-1] for ring in rings), TINY]) for rings in (stripes(300), across(300))]
+    check_ends(lambda: cpu_after(partial(engine.overlay, *pair, "symmetric_difference"), seconds, False))

@@ -172,7 +172,7 @@ def collide_outline_outline(first: Solid, second: Solid, poses: Poses, work: Wor
     if (a.low.min(0) > b.high.max(0)).any() or (b.low.min(0) > a.high.max(0)).any():
         return NO_CONTACT
     arrangement, _ = arrange_outlines([a, b], work.budget)
-    subdivision = subdivide(arrangement, work.budget)
+    subdivision = subdivide(arrangement)
     labels = label_faces(subdivision)
     beside = [(labels[f], labels[g]) for f, g in zip(subdivision.faces[0::2], subdivision.faces[1::2])]
     first_points = [rational_location(a.points[k], second, poses[1], work.budget.check) for k in single_points(a)]

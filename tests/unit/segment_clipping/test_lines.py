@@ -7,14 +7,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine import Aabb, HalfSpace, LinePieces, Polygon, Solid, Sphere, Triangle, clip_lines
+from engine import Aabb, HalfSpace, LinePieces, Polygon, Solid, Sphere, Triangle, clip_lines, clip_segments
+from engine.budget import Budget
 from engine.errors import (
+    CancelledError,
     DeadlineExceededError,
     InvalidArrayError,
     NotFiniteError,
     UnsupportedSolidError,
     WrongDimensionError,
 )
+from engine.segment_clipping import lines
 from tests.reference.segments import clip_segments as reference_pieces
 from tests.unit.segment_clipping.on_boundary.test_boundary import REGIONS as BOUNDARIES
 from tests.unit.segment_clipping.on_boundary.test_boundary import vertices_of
@@ -165,3 +168,11 @@ def test_other_solids_are_refused() -> None:
     with pytest.raises(UnsupportedSolidError):
         clip_lines([SQUARE], Triangle([[0, 0], [1, 0], [0, 1]]))
     assert len(clip_lines([SQUARE], Polygon([SQUARE[:4]]))) == 1
+
+
+def test_the_joining_of_pieces_ends_with_the_call() -> None:
+    segments, budget = np.tile([[0.0, 0.0], [1.0, 1.0]], (5, 1, 1)), Budget()
+    pieces = clip_segments(segments, Sphere([0.0, 0.0], 9.0))
+    budget.flag[0] = 1
+    with pytest.raises(CancelledError):
+        lines._joined(pieces, np.arange(5), np.arange(12.0).reshape(6, 2), np.array([0, 6]), budget)
