@@ -10,6 +10,7 @@ import os
 import signal
 import sys
 import tempfile
+import threading
 from contextlib import ExitStack
 from pathlib import Path
 from typing import NoReturn
@@ -18,7 +19,7 @@ import uvicorn
 from pydantic import ValidationError
 
 from service import logs
-from service.settings import Settings
+from service.settings import WARM_UP, Settings
 
 log = logging.getLogger("service")
 
@@ -58,6 +59,7 @@ def main(arguments: list[str] | None = None) -> None:
     if not settings.api_keys and not _is_loopback(settings.host):
         log.warning("anyone who reaches %s may use this service: GEOMETRY_API_KEYS is not set", settings.host)
     with ExitStack() as stack:
+        stack.push(_end_at_once)
         if settings.workers > 1:
             _share(Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="geometry-"))), settings)
         from service.protocol import Protocol
@@ -77,6 +79,14 @@ def main(arguments: list[str] | None = None) -> None:
             server_header=False,
             forwarded_allow_ips=settings.trusted_proxies,
         )
+
+
+def _end_at_once(_kind: object, ended: object, _trace: object) -> None:
+    """End the process where a thread still compiles: Python's own end would stop it within C++, which aborts."""
+    is_well = isinstance(ended, SystemExit) and not ended.code
+    if is_well and any(thread.name == WARM_UP for thread in threading.enumerate()):
+        logging.shutdown()
+        os._exit(0)
 
 
 def _variable(name: object) -> str:

@@ -42,7 +42,7 @@ from service.routes import (
     scenes,
     solids,
 )
-from service.settings import Settings
+from service.settings import WARM_UP, Settings
 from service.store import Store
 from service.tools import add_tools, running
 from service.work import Memory, Pool, give_back_freed
@@ -59,6 +59,8 @@ ROUTERS: Final = (
 SWITCH_SECONDS: Final = 0.0002
 """How long one thread keeps the interpreter while others wait: the event loop hands over several times a request, and
 with Python's 5 ms each time beside a batch, small requests would wait for tens of milliseconds."""
+WARM_UP_SECONDS: Final = 2.0
+"""How long a process that ends waits for its warm-up, which looks between two parts whether it is still wanted."""
 NEVER: Final = 2**31 - 1
 """Collections of younger objects until the oldest are looked at."""
 DESCRIPTION = """Containment, collision and clipping with exact decisions.
@@ -148,7 +150,7 @@ def _prepare(state: State, settings: Settings) -> None:
     state.metrics = Metrics()
     state.store = Store(settings.store_bytes, settings.store_folder, settings.store_folder_bytes, state.metrics)
     state.memory = Memory(settings.request_bytes)
-    state.warm, state.warm_error = threading.Event(), None
+    state.warm, state.warm_error, state.is_ending = threading.Event(), None, False
     state.warm_begin, state.warm_hundredths = time.perf_counter(), 0
 
 
@@ -163,13 +165,20 @@ async def _running(state: State) -> AsyncIterator[None]:
     """Compile or load the kernels in a thread, so that /healthz answers meanwhile; drain the pool at the end."""
     state.pool = Pool(state.settings, state.metrics)
     sys.setswitchinterval(SWITCH_SECONDS)
-    threading.Thread(target=_warm, args=(state,), name="warm-up", daemon=True).start()
+    warming = threading.Thread(target=_warm, args=(state,), name=WARM_UP, daemon=True)
+    warming.start()
     try:
         yield
     finally:
+        state.is_ending = True
+        warming.join(WARM_UP_SECONDS)  # a thread within the compiler when Python ends would abort the process
         state.warm.clear()
         state.metrics.ready.set(0)
         state.pool.close()
+
+
+class _EndingError(Exception):
+    """Ends the warm-up of a service that ends."""
 
 
 def _warm(state: State) -> None:
@@ -177,9 +186,13 @@ def _warm(state: State) -> None:
 
     def note(share: int) -> None:
         state.warm_hundredths += share
+        if state.is_ending:
+            raise _EndingError
 
     try:
         engine.warm(progress=note, processes=os.cpu_count() or 1)
+    except _EndingError:
+        return
     except Exception as error:
         state.warm_error = f"warm-up failed: {error}; restart the service"
         log.exception("warm-up failed")

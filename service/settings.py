@@ -14,6 +14,8 @@ from typing import Annotated, Final, Literal
 from pydantic import BeforeValidator, ByteSize, Field, SecretStr, TypeAdapter, field_validator
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
+WARM_UP: Final = "warm-up"
+"""The name of the thread that compiles."""
 _SIZE: Final = TypeAdapter(ByteSize)
 
 

@@ -10,12 +10,19 @@ import shlex
 import shutil
 import subprocess
 import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import httpx
 import pytest
+from fastapi.testclient import TestClient
 
-from service.settings import Settings
+import engine
+from service.app import create_app
+from service.settings import WARM_UP, Settings
 from tests.contract.test_openapi import STORED
 from tests.unit.service.test_live import ROOT, Service
 
@@ -173,3 +180,36 @@ def test_the_grafana_board_shows_what_is_counted() -> None:
     assert {re.sub(r"_(total|bucket|count|sum)$", "", name) for name in shown} == named - {"geometry_build_info"}
     places = [(panel["gridPos"]["x"], panel["gridPos"]["y"]) for panel in board["panels"]]
     assert len(set(places)) == len(places)
+
+
+def is_warming() -> bool:
+    return any(thread.name == WARM_UP for thread in threading.enumerate())
+
+
+def test_the_warm_up_ends_with_the_service(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Python stops a thread that outlives it where it stands, which within the compiler's C++ aborts the process."""
+
+    def warm(progress: Callable[[int], object], processes: int) -> None:
+        while True:  # bound: the end of the service
+            time.sleep(0.01)
+            progress(0)
+
+    monkeypatch.setattr(engine, "warm", warm)
+    with TestClient(create_app(Settings())) as client:
+        assert client.get("/readyz").status_code == 503
+        assert is_warming()
+    assert not is_warming()
+
+
+@pytest.mark.parametrize("seconds", [0.0, 1.0])
+def test_a_stop_while_kernels_compile_is_a_stop(tmp_path: Path, seconds: float) -> None:
+    around = {**os.environ, "ENGINE_CACHE_DIR": str(tmp_path), "ENGINE_CACHE_SEED": ""}
+    service = Service(around=around)
+    try:
+        time.sleep(seconds)
+        begin = time.monotonic()
+        assert service.stop() == 0, "".join(service.log)
+        assert time.monotonic() - begin < 30
+        assert "terminate" not in "".join(service.log)
+    finally:
+        service.close()
