@@ -18,6 +18,7 @@ from engine.arrays import FloatArray, IntArray
 from engine.budget import Budget
 from engine.parallel import Options
 from engine.polygon_overlay.implicit_rings import ImplicitRings, edges_along
+from engine.solids.checks import as_nested_offsets
 from engine.solids.ragged import as_geojson
 
 Output = Literal["valid", "nearest"]
@@ -162,6 +163,13 @@ class Overlay:
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
         vars(self).update(made)
         return made[name]
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Fill in what was pickled, checked: kernels, and whoever goes by offsets, trust these."""
+        vars(self).update(state)
+        as_nested_offsets(len(self.vertices), ring_offsets=self.ring_offsets, piece_offsets=self.piece_offsets)
+        if isinstance(self.exact, ImplicitRings):
+            self.exact.check()
 
     def __dir__(self) -> Iterable[str]:
         """Name what is not made yet as well, for who completes names."""
