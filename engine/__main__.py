@@ -33,7 +33,7 @@ from engine.containment.locate import locate
 from engine.errors import EngineError, InvalidInputError
 from engine.files.solids import read_features, read_solid, read_solids
 from engine.files.tables import read_rows, write_geojson, write_table
-from engine.kernel_cache import cache_folder, seal
+from engine.kernel_cache import cache_folder, check_owner, seal
 from engine.layers.features import dissolve_features, locate_features, overlay_features
 from engine.layers.rows import HOWS
 from engine.parallel import Progress
@@ -198,7 +198,8 @@ def _warm_elsewhere(options: Options) -> None:
         archive = Path(options.into) if options.into and options.into.endswith(".tar.xz") else None
         folder = Path(options.into) if options.into and archive is None else Path(temporary)
         if options.into:
-            (archive.parent if archive else folder).mkdir(parents=True, exist_ok=True)
+            (archive.parent if archive else folder).mkdir(mode=0o755, parents=True, exist_ok=True)
+            check_owner(folder)
             surroundings["ENGINE_CACHE_DIR"] = str(folder.resolve())
             surroundings.pop("ENGINE_CACHE_SEED", None)
         if subprocess.run([*command, *["--quiet"] * options.quiet], env=surroundings, check=False).returncode:
