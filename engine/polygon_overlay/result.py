@@ -72,6 +72,11 @@ class Lost(NamedTuple):
     holes: list[int]
     unit: Fraction = Fraction(1)
 
+    def shells(self) -> list[list[tuple[float, float]]]:
+        """Return the shells of pieces, each vertex the nearest doubles."""
+        places = self.exact.some(self.pieces).places()
+        return [[(nearest(x), nearest(y)) for x, y in ring] for ring in places]
+
     def parts(self, budget: Budget) -> tuple[Collapse, ...]:
         """Return the pieces, then the holes, each in lexicographic order; raises as `Budget.check`."""
         if not self.pieces and not self.holes:
@@ -105,8 +110,13 @@ def _first_vertex(ring: ExactRings) -> tuple[list[_Place], tuple[float, float]]:
     """Return a ring from its first vertex on, and the doubles nearest to that vertex."""
     (places,) = ring.places()
     k = places.index(min(places))
-    x, y = (nearest_quotient(*value.as_integer_ratio()) for value in places[k])
-    return places[k:] + places[:k], (x, y)
+    x, y = places[k]
+    return places[k:] + places[:k], (nearest(x), nearest(y))
+
+
+def nearest(value: Fraction) -> float:
+    """Return the nearest double."""
+    return nearest_quotient(*value.as_integer_ratio())
 
 
 @dataclass(frozen=True)
