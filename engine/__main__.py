@@ -72,8 +72,13 @@ def _refused(message: str) -> int:
     return 2
 
 
+def _note(options: Options) -> Callable[[str], None] | None:
+    """Return what says what was left out of a file."""
+    return None if options.quiet else partial(print, file=sys.stderr)
+
+
 def _contains(options: Options) -> None:
-    solid = read_solid(options.solid)
+    solid = read_solid(options.solid, _note(options))
     points = read_rows(options.points, (solid.dimension,))
     with _bar(len(points), "points", options) as progress:
         answer = locate(points, solid, progress=progress, deadline=options.deadline)
@@ -88,7 +93,7 @@ def _write_labels(options: Options, name: str, labels: list[str], codes: Any) ->
 
 def _posed_pair(options: Options) -> tuple[Any, ...]:
     """Return both solids, and rotations and translations of the second; no pose is the identity."""
-    first, second = read_solid(options.first), read_solid(options.second)
+    first, second = read_solid(options.first, _note(options)), read_solid(options.second, _note(options))
     size = first.dimension
     rows = np.eye(size, size + 1)[np.newaxis] if options.poses is None else read_rows(options.poses, (size, size + 1))
     return first, second, rows[:, :, :size], rows[:, :, size]
@@ -109,7 +114,7 @@ def _clearance(options: Options) -> None:
 
 
 def _clip(options: Options) -> None:
-    region = read_solid(options.region)
+    region = read_solid(options.region, _note(options))
     if options.polygons:
         _clip_polygons(region, options)
         return
@@ -121,7 +126,7 @@ def _clip(options: Options) -> None:
 
 
 def _clip_polygons(region: Any, options: Options) -> None:
-    polygons = read_solids(options.items)
+    polygons = read_solids(options.items, _note(options))
     with _bar(len(polygons), "polygons", options) as progress:
         clipped = clip_polygons(polygons, region, progress=progress, deadline=options.deadline)  # type: ignore[arg-type]
     if clipped.status.any():
@@ -160,7 +165,7 @@ def _write_features(rows: Any, options: Options) -> None:
 
 
 def _bounds(options: Options) -> None:
-    found = bounds(read_solid(options.solid), deadline=options.deadline)
+    found = bounds(read_solid(options.solid, _note(options)), deadline=options.deadline)
     radius = np.array([found.sphere.radius])
     row = {"min": found.aabb.min, "max": found.aabb.max, "center": found.sphere.center, "radius": radius}
     write_table(options.output, {name: value[np.newaxis] for name, value in row.items()})
