@@ -166,9 +166,11 @@ def _reached(module: str) -> dict[str, bytes] | None:
         name = waiting.pop()
         spec, found = _spec(name), read_source(name)
         if spec is None or found is None:
-            return _uncached("a source cannot be read", name)
+            _uncached("a source cannot be read", name)
+            return None
         if _has_changed(spec):
-            return _uncached("a source has changed since it was imported", name)
+            _uncached("a source has changed since it was imported", name)
+            return None
         reached[name] = found[0]
         waiting |= found[1] - reached.keys()
     return reached

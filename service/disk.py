@@ -271,9 +271,7 @@ CODECS: Final[dict[str, Codec]] = {
     "aabb": Codec(("min", "max"), engine.Aabb),
     "convex": Codec(("planes",), engine.Convex),
     "triangle": Codec(("vertices",), engine.Triangle),
-    "polygon": Codec(
-        ("vertices", "ring_offsets"), lambda vertices, offsets: engine.Polygon(_split(vertices, offsets))
-    ),
+    "polygon": Codec(("vertices", "ring_offsets"), lambda vertices, offsets: engine.Polygon(_split(vertices, offsets))),
     "polyhedron": Codec(
         ("vertices", "face_offsets", "face_indices"),
         lambda vertices, offsets, indices: engine.Polyhedron(vertices, _faces(offsets, indices)),

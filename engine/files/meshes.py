@@ -49,7 +49,7 @@ class MeshOfFile(_Arrays):
             names = {"faces": self.faces_in_file, "vertices": self.vertices_in_file}
             what, *place = error.where or ("",)
             if what in names and place:
-                error.where = (what, int(names[str(what)][place[0]]), *place[1:])
+                error.where = (what, int(names[str(what)][int(place[0])]), *place[1:])
             text = re.sub(r"(?<=\bfaces\[)\d+|(?<=\bface )\d+", lambda m: str(names["faces"][int(m[0])]), error.message)
             text = re.sub(r"\bedge (\d+)-(\d+) of face", self._edge, text)
             error.message = re.sub(r"\bvertices\[(\d+)\]", self._vertex, text)

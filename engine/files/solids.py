@@ -35,8 +35,9 @@ Note = Callable[[str], object]
 def read_solid(source: str, note: Note | None = None) -> Solid:
     """Return the one solid that `source` names.
 
-    note: called with a sentence on triangles that were left out. source: a mesh file (.stl, .obj, .ply, .off, .glb), an .npz file of `vertices` and `faces`, a .json file with a
-    solid as the HTTP interface writes it, a .geojson file with one polygon, or the JSON of a solid itself.
+    source: a mesh file (.stl, .obj, .ply, .off, .glb), an .npz file of `vertices` and `faces`, a .json file with a
+    solid as the HTTP interface writes it, a .geojson file with one polygon, or the JSON of a solid itself. note: called
+    with a sentence where triangles are left out.
     """
     solids = read_solids(source, note)
     if len(solids) != 1:

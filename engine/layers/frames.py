@@ -145,7 +145,7 @@ def sjoin(
     _check_frames("sjoin", others, left=left, right=right)
     _, shapely = _geopandas()
     if not isinstance(how, str) or how not in ("inner", "left"):
-        raise InvalidOperationError(f"how must be inner or left; got {how!r}", ("how",))
+        raise InvalidOperationError(f"how must be inner or left; got {shown(how)}", ("how",))
     limits = Limits(deadline, cancel)
     points = np.asarray(left.geometry.array)
     if len(wrong := np.flatnonzero(~np.isin(shapely.get_type_id(points), (-1, 0)))):

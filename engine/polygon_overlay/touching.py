@@ -207,7 +207,9 @@ def _noded(ring: list[Place], budget: Budget) -> list[tuple[Place, Place]]:
         near = places[((places >= (a, min(b, d))) & (places <= (c, max(b, d)))).all(axis=1)]
         width, height = Fraction(c) - Fraction(a), Fraction(d) - Fraction(b)
         on_edge = [
-            (x, y) for x, y in near.tolist() if width * (Fraction(y) - Fraction(b)) == height * (Fraction(x) - Fraction(a))
+            (x, y)
+            for x, y in near.tolist()
+            if width * (Fraction(y) - Fraction(b)) == height * (Fraction(x) - Fraction(a))
         ]
         edges.update(pairwise(on_edge))
     return sorted(edges)

@@ -161,7 +161,7 @@ def plain_floats(values: Any, depth: int) -> FloatArray | None:
             is_plain &= kinds <= {float, int} and min(items) >= -_FLOAT_INTEGERS and max(items) <= _FLOAT_INTEGERS
         if is_plain and items and kinds <= {float, int} and math.isfinite(sum(items)):
             return np.array(values, np.float64)
-    except (TypeError, ValueError):  # no lists, or of different lengths
+    except (TypeError, ValueError, NotImplementedError):  # no lists, of different lengths, views of several axes
         pass
     return None
 
@@ -297,7 +297,10 @@ def frozen(array: FloatArray) -> FloatArray:
 
 def as_offsets(offsets: object, n_items: int, where: Where) -> IntArray:
     """Return `offsets`, whole numbers that never fall, from 0 or later up to `n_items` or earlier, as int64."""
-    array = np.asarray(offsets)
+    try:
+        array = np.asarray(offsets)
+    except ValueError:  # ragged
+        array = np.array(None)
     if array.ndim != 1 or array.dtype.kind not in "iu" or not len(array):
         what = f"an array of dtype {array.dtype} and shape {array.shape}"
         raise InvalidArrayError(

@@ -66,7 +66,7 @@ def _joined(lines: list[Any] | tuple[Any, ...], dimension: int, where: Where) ->
         else:
             flat = list(chain.from_iterable(lines))
         return as_points(flat, dimension, where), offsets
-    except (EngineError, TypeError, ValueError):
+    except (EngineError, TypeError, ValueError, NotImplementedError):
         parts = [as_points(line, dimension, (*where, i_line)) for i_line, line in enumerate(lines)]
     return np.concatenate([np.zeros((0, dimension)), *parts]), np.cumsum([0, *map(len, parts)])
 

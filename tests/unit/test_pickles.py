@@ -1,4 +1,4 @@
-"""A pickle is checked as it is read: kernels trust offsets and indices, and one that was changed crashed the process."""
+"""A pickle is checked as it is read: kernels trust offsets and indices, a changed one crashed the process."""
 
 from __future__ import annotations
 
@@ -73,7 +73,12 @@ def test_a_changed_pickle_is_refused_or_means_something(name: str) -> None:
     n_refused = 0
     for array in list(whole_numbers(value)):
         for place in range(array.size):
-            for number in (2 ** (8 * array.itemsize - 24), -1, -(2 ** (8 * array.itemsize - 2)), int(array.flat[0]) + 1):
+            for number in (
+                2 ** (8 * array.itemsize - 24),
+                -1,
+                -(2 ** (8 * array.itemsize - 2)),
+                int(array.flat[0]) + 1,
+            ):
                 changed = array.copy()
                 changed.flat[place] = number
                 if array.tobytes() in octets:
