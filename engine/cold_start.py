@@ -62,7 +62,7 @@ def fill_cache(
         return ()
     with contextlib.suppress(OSError):
         own = folder / digest
-        own.mkdir(mode=0o700, parents=True, exist_ok=True)
+        own.mkdir(mode=0o755, parents=True, exist_ok=True)
         with _alone(own / "lock"):
             if not _is_full(module):
                 done = _run(module, shares, processes, progress)
@@ -80,7 +80,7 @@ def note_full(module: str) -> None:
     if is_of_its_source(module):
         with contextlib.suppress(OSError):
             own = folder / digest
-            own.mkdir(mode=0o700, parents=True, exist_ok=True)
+            own.mkdir(mode=0o755, parents=True, exist_ok=True)
             for sign in complete_signs()[:1]:
                 (own / sign).touch()
 

@@ -144,15 +144,12 @@ def tools() -> str:
 @functools.cache
 def source_digest(module: str) -> str | None:
     """Return a hash of `module`, of all engine modules below it, of those that compile, and of `tools`; None where it
-    would not be that of the code that runs.
-
-    Not of this one: how code is kept changes no code.
-    """
+    would not be that of the code that runs."""
     reached = _reached(module.removeprefix(_PREFIX))
     if reached is None:
         return None
     digest = hashlib.sha256((tools() + _PREFIX).encode())  # what is kept names our modules as they are imported
-    for name in sorted(reached.keys() - {"engine.kernel_cache"}):
+    for name in sorted(reached):
         digest.update(f"\0{name}\0".encode() + reached[name])
     return digest.hexdigest()[:20]
 
@@ -161,7 +158,7 @@ def _reached(module: str) -> dict[str, bytes] | None:
     """Return the hash of each module that the kernels of one are made of; None where one cannot be read, or changed
     since the engine was imported."""
     reached: dict[str, bytes] = {}
-    waiting = {module, "engine.jit"}
+    waiting = {module, "engine.jit"}  # the compiler too
     while waiting:
         name = waiting.pop()
         spec, found = _spec(name), read_source(name)
@@ -172,21 +169,24 @@ def _reached(module: str) -> dict[str, bytes] | None:
             _uncached("a source has changed since it was imported", name)
             return None
         reached[name] = found[0]
-        waiting |= found[1] - reached.keys()
+        waiting |= found[1] - reached.keys() - {"engine.kernel_cache"}  # how code is kept changes no code
     return reached
 
 
-@functools.cache
 def is_of_its_source(module: str) -> bool:
-    """Tell whether Python runs what the sources of a module's kernels say: bytecode is taken for that of a source of
+    """Tell whether Python runs what the sources of a module's kernels say: it takes bytecode for that of any source of
     the same size and second."""
-    for name in _reached(module.removeprefix(_PREFIX)) or ():
-        spec: Any = _spec(name)
-        get_code = getattr(spec.loader, "get_code", None)  # a loader that has none keeps no bytecode
-        source, code = _source(spec), get_code and get_code(spec.name)
-        if source and code and compile(source, code.co_filename, "exec", dont_inherit=True) != code:
-            _uncached("bytecode is not that of the source", name)
-            return False
+    return all(map(_has_own_bytecode, _reached(module.removeprefix(_PREFIX)) or ()))
+
+
+@functools.cache
+def _has_own_bytecode(module: str) -> bool:
+    spec: Any = _spec(module)
+    get_code = getattr(spec.loader, "get_code", None)  # a loader that has none keeps no bytecode
+    source, code = _source(spec), get_code and get_code(spec.name)
+    if source and code and compile(source, code.co_filename, "exec", dont_inherit=True) != code:
+        _uncached("bytecode is not that of the source", module)
+        return False
     return True
 
 
@@ -235,8 +235,8 @@ def keep(name: str, content: bytes) -> None:
     part = folder / f"{name}.{uuid.uuid4().hex}"
     with suppress(OSError):
         try:
-            part.parent.mkdir(mode=0o700, exist_ok=True)
-            part.touch(mode=0o644)  # also where new files are the group's to write
+            part.parent.mkdir(mode=0o755, exist_ok=True)  # also where what is new is the group's to write; a seed's
+            part.touch(mode=0o644)  # users read it
             part.write_bytes(_seal_of(name, content) + content)
             part.replace(folder / name)
         finally:
@@ -246,8 +246,10 @@ def keep(name: str, content: bytes) -> None:
 def kept(name: str) -> bytes | None:
     """Return the file `name` of the cache, else that of the seed; None where neither has it as it was written."""
     for folder in (cache_folder(), seed()):
-        if folder is not None and (folder / name).exists() and _is_trusted((folder / name).parent):
+        if folder is not None:
             try:
+                if not (folder / name).exists() or not _is_trusted((folder / name).parent):
+                    continue
                 check_owner(folder / name)
                 written = (folder / name).read_bytes()
                 if _seal_of(name, written[32:]) == written[:32]:
@@ -321,7 +323,7 @@ def _unpacked(archive: Path) -> Path:
                 raise ValueError("it is too large")
             tar.extractall(f"{room}/seed", filter="data")
             for part in [Path(room, "seed"), *filter(Path.is_dir, Path(room, "seed").rglob("*"))]:
-                part.chmod(0o700)
+                part.chmod(0o755)
             with suppress(OSError):  # another process was faster
                 Path(room, "seed").rename(target)
     return target

@@ -213,6 +213,13 @@ def test_what_others_can_write_is_not_loaded(project: Path, what: str, mode: int
         assert run(project, **cache)[:2] == ["2.0", "1"]
 
 
+def test_a_seed_can_be_read_by_users_of_an_image(project: Path) -> None:
+    (project / "seed").mkdir(mode=0o755)
+    run(project, f"import os; os.umask(0o022); {USE}", ENGINE_CACHE_DIR=str(project / "seed"))
+    for path in (project / "seed").rglob("*"):
+        assert stat.S_IMODE(path.stat().st_mode) == (0o755 if path.is_dir() else 0o644)
+
+
 def test_where_new_files_are_the_group_s_to_write_the_cache_is_ours_all_the_same(project: Path) -> None:
     cache = {"ENGINE_CACHE_DIR": str(project / "cache")}
     for hits in ("0", "1"):
