@@ -9,7 +9,7 @@ written:
 2. ``XDG_CACHE_HOME`` or ``~/.cache``, then ``exact-geometry``;
 3. a private folder of this user under the system's temporary folder.
 
-Where none can be written, kernels are compiled anew in each process; so are those of sources that cannot be read, that
+Where none can be written, kernels are compiled in each process again; so are those of sources that cannot be read, that
 changed since they were imported, or whose bytecode is of other sources: a line in the log says so.
 
 **Seeds.** ``ENGINE_CACHE_SEED`` names a folder or a .tar.xz that ``python -m engine warm --into`` has written, maybe on
@@ -96,8 +96,8 @@ def _spec(module: str) -> ModuleSpec | None:
     name = _PREFIX * is_ours + module
     if name in sys.modules or not is_ours:
         return getattr(sys.modules.get(name), "__spec__", None)
-    found = PathFinder.find_spec(name, [str(_ROOT.joinpath(*module.split(".")[1:-1]))])
-    return None if found is None or found.loader is None else found
+    spec = PathFinder.find_spec(name, [str(_ROOT.joinpath(*module.split(".")[1:-1]))])
+    return None if spec is None or spec.loader is None else spec
 
 
 def _source(spec: ModuleSpec) -> bytes | None:
@@ -148,7 +148,7 @@ def source_digest(module: str) -> str | None:
     reached = _reached(module.removeprefix(_PREFIX))
     if reached is None:
         return None
-    digest = hashlib.sha256((tools() + _PREFIX).encode())  # what is kept names our modules as they are imported
+    digest = hashlib.sha256((tools() + _PREFIX).encode())  # compiled code names our modules as they are imported
     for name in sorted(reached):
         digest.update(f"\0{name}\0".encode() + reached[name])
     return digest.hexdigest()[:20]
@@ -161,15 +161,15 @@ def _reached(module: str) -> dict[str, bytes] | None:
     waiting = {module, "engine.jit"}  # the compiler too
     while waiting:
         name = waiting.pop()
-        spec, found = _spec(name), read_source(name)
-        if spec is None or found is None:
+        spec, source = _spec(name), read_source(name)
+        if spec is None or source is None:
             _uncached("a source cannot be read", name)
             return None
         if _has_changed(spec):
             _uncached("a source has changed since it was imported", name)
             return None
-        reached[name] = found[0]
-        waiting |= found[1] - reached.keys() - {"engine.kernel_cache"}  # how code is kept changes no code
+        reached[name] = source[0]
+        waiting |= source[1] - reached.keys() - {"engine.kernel_cache"}  # how code is stored changes no code
     return reached
 
 
@@ -190,14 +190,14 @@ def _has_own_bytecode(module: str) -> bool:
     return True
 
 
-_said: set[object] = set()
+_reported: set[object] = set()
 
 
 def _uncached(reason: str, module: str) -> None:
     """Say once why kernels are not cached."""
-    if reason not in _said:
-        _said.add(reason)
-        log.warning("kernels are compiled anew in each process: %s (%s)", reason, module)
+    if reason not in _reported:
+        _reported.add(reason)
+        log.warning("kernels are compiled in each process again: %s (%s)", reason, module)
 
 
 def _is_writable(folder: Path) -> bool:
@@ -270,8 +270,8 @@ def _is_trusted(folder: Path) -> bool:
     try:
         check_owner(folder)
     except ValueError as error:
-        if folder not in _said:
-            _said.add(folder)
+        if folder not in _reported:
+            _reported.add(folder)
             log.warning("compiled kernels in %s are not used: %s", folder, error)
         return False
     return True

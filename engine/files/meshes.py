@@ -56,12 +56,12 @@ class MeshOfFile(_Arrays):
             error.args = (error.message,)
             raise
 
-    def _edge(self, found: re.Match[str]) -> str:
-        first, second = (self.vertices_in_file[int(number)] for number in found.groups())
+    def _edge(self, match: re.Match[str]) -> str:
+        first, second = (self.vertices_in_file[int(number)] for number in match.groups())
         return "an edge of face" if self._is_soup else f"edge {first}-{second} of face"
 
-    def _vertex(self, found: re.Match[str]) -> str:
-        number = int(self.vertices_in_file[int(found[1])])
+    def _vertex(self, match: re.Match[str]) -> str:
+        number = int(self.vertices_in_file[int(match[1])])
         return f"face {number // 3}, corner {number % 3}" if self._is_soup else f"vertices[{number}]"
 
 
@@ -124,19 +124,19 @@ def read_mesh(file: IO[bytes] | bytes, file_format: str) -> MeshOfFile:
 def _merged(vertices: FloatArray, faces: IntArray, file_format: str) -> MeshOfFile:
     """Return the vertices at different coordinates in their first order, and the faces with their new indices but for
     those that this collapses."""
-    n_faces, kept = len(faces), np.arange(len(faces))
+    n_faces, remaining = len(faces), np.arange(len(faces))
     first, originals = first_equal(frozen(vertices)), np.arange(len(vertices))
     if first is not None:
         is_first = first == originals
         merged = (np.cumsum(is_first) - 1)[first][faces]
-        kept = np.flatnonzero(~_has_equal(merged) | _has_equal(faces))
-        vertices, faces, originals = vertices[is_first], merged[kept], np.flatnonzero(is_first)
-    if not len(kept):
+        remaining = np.flatnonzero(~_has_equal(merged) | _has_equal(faces))
+        vertices, faces, originals = vertices[is_first], merged[remaining], np.flatnonzero(is_first)
+    if not len(remaining):
         raise EmptyGeometryError(
             f"all triangles of the {file_format} file have two equal corners; write it with more digits", ("file",)
         )
     made = MeshOfFile(vertices, faces)
-    made.n_collapsed, made.faces_in_file, made.vertices_in_file = n_faces - len(kept), kept, originals
+    made.n_collapsed, made.faces_in_file, made.vertices_in_file = n_faces - len(remaining), remaining, originals
     made._is_soup = file_format in _SOUPS
     return made
 

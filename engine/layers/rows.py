@@ -284,8 +284,7 @@ def _touching(firsts: Chosen, seconds: Chosen, batch: OverlayBatch, limits: Limi
         result = limits.noted(overlay(firsts[pair], seconds[pair], "intersection", **limits.options()))
         shells += [(pair, ring) for ring in (result._lost.shells() if result._lost else ())]
     with limits.budget() as budget:
-        found = touching(firsts, seconds, budget, limits.workers)
-        return joined_touching([found, collapsed(shells, budget)])
+        return joined_touching([touching(firsts, seconds, budget, limits.workers), collapsed(shells, budget)])
 
 
 def _is_lost(batch: OverlayBatch) -> BoolArray:

@@ -186,7 +186,7 @@ def collapsed(rings: Iterable[tuple[int, list[Place]]], budget: Budget) -> Touch
     points: list[tuple[int, Place]] = []
     for pair, ring in rings:
         edges = _noded(ring, budget)
-        lines += [(pair, line) for line in _chains(edges)]
+        lines += [(pair, line) for line in _joined_edges(edges)]
         points += [] if edges else [(pair, ring[0])]
     return Touching(
         np.array([pair for pair, _ in lines], np.int64),
@@ -215,14 +215,14 @@ def _noded(ring: list[Place], budget: Budget) -> list[tuple[Place, Place]]:
     return sorted(edges)
 
 
-def _chains(edges: list[tuple[Place, Place]]) -> list[list[Place]]:
+def _joined_edges(edges: list[tuple[Place, Place]]) -> list[list[Place]]:
     """Return edges joined wherever two of them meet and no other."""
     beside: dict[Place, list[Place]] = {}
     for start, end in edges:
         beside.setdefault(start, []).append(end)
         beside.setdefault(end, []).append(start)
     ends = dict.fromkeys(place for place, others in beside.items() if len(others) != 2)
-    found = []
+    chains = []
     for start in [*ends, *beside]:  # those from an end first: what is left are closed lines
         while beside[start]:
             line = [start]
@@ -230,5 +230,5 @@ def _chains(edges: list[tuple[Place, Place]]) -> list[list[Place]]:
                 after = beside[line[-1]].pop()
                 beside[after].remove(line[-1])
                 line.append(after)
-            found.append(line)
-    return found
+            chains.append(line)
+    return chains

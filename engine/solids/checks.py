@@ -321,10 +321,10 @@ def as_offsets(offsets: object, n_items: int, where: Where) -> IntArray:
 def as_nested_offsets(n_items: int, **levels: object) -> list[IntArray]:
     """Return offsets, read-only: those of the first level divide all of `n_items`, those of each other the parts of the
     level before it."""
-    found = []
+    checked = []
     for name, offsets in levels.items():
-        found.append(read_only(as_offsets(offsets, n_items, (name,))))
-        if found[-1][0] != 0 or found[-1][-1] != n_items:
+        checked.append(read_only(as_offsets(offsets, n_items, (name,))))
+        if checked[-1][0] != 0 or checked[-1][-1] != n_items:
             raise InvalidArrayError(f"{name} must go from 0 to {n_items}, all items that there are", (name,))
-        n_items = len(found[-1]) - 1
-    return found
+        n_items = len(checked[-1]) - 1
+    return checked

@@ -141,7 +141,7 @@ def test_a_source_that_is_edited_while_it_runs_leaves_no_kernel(project: Path) -
 
 
 def zipped(project: Path) -> Path:
-    """Return the zip file of the project's sources, made anew."""
+    """Return the zip file of the project's sources as they are."""
     (project / "lib.zip").unlink(missing_ok=True)
     with zipfile.ZipFile(project / "lib.zip", "w") as file:
         for path in (project / "engine").rglob("*.py"):
@@ -179,7 +179,7 @@ def test_files_that_were_swapped_are_noticed(project: Path) -> None:
     both = "from engine.work import run; print(run(1.0), run(1j), sum(run.dispatcher.stats.cache_hits.values()))"
     assert run(project, both, **cache) == ["2.0", "(1+1j)", "0"]
     one, other = (project / "cache").rglob("*.nbc")
-    for source, target in ((one, "kept"), (other, one.name), (one.with_name("kept"), other.name)):
+    for source, target in ((one, "aside"), (other, one.name), (one.with_name("aside"), other.name)):
         source.rename(source.with_name(target))
     words, logged = logged_run(project, both, **cache)
     assert words == ["2.0", "(1+1j)", "0"]
