@@ -39,7 +39,7 @@ from engine.errors import (
     WrongDimensionError,
     ZeroNormalError,
 )
-from engine.files.solids import read_mesh
+from engine.files.meshes import read_mesh
 from engine.polygon_clipping.clip_polygons import ClippedPolygons, PolygonStatus, clip_polygons
 from engine.polygon_overlay.batch import OverlayBatch, overlay_batch
 from engine.polygon_overlay.compiled.workspace import release

@@ -33,7 +33,7 @@ from engine.containment.locate import locate
 from engine.errors import EngineError, InvalidInputError
 from engine.files.solids import read_features, read_solid, read_solids
 from engine.files.tables import read_rows, write_geojson, write_table
-from engine.kernel_cache import cache_folder, seal
+from engine.kernel_cache import cache_folder, check_owner, seal
 from engine.layers.features import dissolve_features, locate_features, overlay_features
 from engine.layers.rows import HOWS
 from engine.parallel import Progress
@@ -72,8 +72,13 @@ def _refused(message: str) -> int:
     return 2
 
 
+def _note(options: Options) -> Callable[[str], None] | None:
+    """Return what says what was left out of a file."""
+    return None if options.quiet else partial(print, file=sys.stderr)
+
+
 def _contains(options: Options) -> None:
-    solid = read_solid(options.solid)
+    solid = read_solid(options.solid, _note(options))
     points = read_rows(options.points, (solid.dimension,))
     with _bar(len(points), "points", options) as progress:
         answer = locate(points, solid, progress=progress, deadline=options.deadline)
@@ -88,7 +93,7 @@ def _write_labels(options: Options, name: str, labels: list[str], codes: Any) ->
 
 def _posed_pair(options: Options) -> tuple[Any, ...]:
     """Return both solids, and rotations and translations of the second; no pose is the identity."""
-    first, second = read_solid(options.first), read_solid(options.second)
+    first, second = read_solid(options.first, _note(options)), read_solid(options.second, _note(options))
     size = first.dimension
     rows = np.eye(size, size + 1)[np.newaxis] if options.poses is None else read_rows(options.poses, (size, size + 1))
     return first, second, rows[:, :, :size], rows[:, :, size]
@@ -109,7 +114,7 @@ def _clearance(options: Options) -> None:
 
 
 def _clip(options: Options) -> None:
-    region = read_solid(options.region)
+    region = read_solid(options.region, _note(options))
     if options.polygons:
         _clip_polygons(region, options)
         return
@@ -121,7 +126,7 @@ def _clip(options: Options) -> None:
 
 
 def _clip_polygons(region: Any, options: Options) -> None:
-    polygons = read_solids(options.items)
+    polygons = read_solids(options.items, _note(options))
     with _bar(len(polygons), "polygons", options) as progress:
         clipped = clip_polygons(polygons, region, progress=progress, deadline=options.deadline)  # type: ignore[arg-type]
     if clipped.status.any():
@@ -160,7 +165,7 @@ def _write_features(rows: Any, options: Options) -> None:
 
 
 def _bounds(options: Options) -> None:
-    found = bounds(read_solid(options.solid), deadline=options.deadline)
+    found = bounds(read_solid(options.solid, _note(options)), deadline=options.deadline)
     radius = np.array([found.sphere.radius])
     row = {"min": found.aabb.min, "max": found.aabb.max, "center": found.sphere.center, "radius": radius}
     write_table(options.output, {name: value[np.newaxis] for name, value in row.items()})
@@ -198,7 +203,8 @@ def _warm_elsewhere(options: Options) -> None:
         archive = Path(options.into) if options.into and options.into.endswith(".tar.xz") else None
         folder = Path(options.into) if options.into and archive is None else Path(temporary)
         if options.into:
-            (archive.parent if archive else folder).mkdir(parents=True, exist_ok=True)
+            (archive.parent if archive else folder).mkdir(mode=0o755, parents=True, exist_ok=True)
+            check_owner(folder)
             surroundings["ENGINE_CACHE_DIR"] = str(folder.resolve())
             surroundings.pop("ENGINE_CACHE_SEED", None)
         if subprocess.run([*command, *["--quiet"] * options.quiet], env=surroundings, check=False).returncode:

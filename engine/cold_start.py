@@ -14,7 +14,7 @@ from pathlib import Path
 from numba import config as numba_config
 
 from engine.jit import complete_signs
-from engine.kernel_cache import cache_folder, seed, source_digest
+from engine.kernel_cache import cache_folder, is_of_its_source, seed, source_digest
 
 try:
     import fcntl
@@ -53,13 +53,16 @@ def fill_cache(
     progress: called with the share of each step that ended.
     """
     folder, found = cache_folder(), seed()
-    if found is not None and not _has_all(found, module):
+    if found is not None and source_digest(module) is not None and not _has_all(found, module):
         log.warning("the kernel seed %s lacks kernels of this version for this CPU: they are compiled", found)
-    if folder is None or numba_config.DISABLE_JIT or processes < 2 or not sys.executable or _is_full(module):
+    digest = source_digest(module)
+    if folder is None or digest is None or numba_config.DISABLE_JIT or processes < 2 or not sys.executable:
+        return ()
+    if _is_full(module):
         return ()
     with contextlib.suppress(OSError):
-        own = folder / source_digest(module)
-        own.mkdir(parents=True, exist_ok=True)
+        own = folder / digest
+        own.mkdir(mode=0o755, parents=True, exist_ok=True)
         with _alone(own / "lock"):
             if not _is_full(module):
                 done = _run(module, shares, processes, progress)
@@ -71,11 +74,13 @@ def fill_cache(
 
 def note_full(module: str) -> None:
     """Note that the cache holds all that the steps of `module` compile: every one of them was called."""
-    folder = cache_folder()
-    if folder is not None and not numba_config.DISABLE_JIT and not _is_full(module):
+    folder, digest = cache_folder(), source_digest(module)
+    if folder is None or digest is None or numba_config.DISABLE_JIT or _is_full(module):
+        return
+    if is_of_its_source(module):
         with contextlib.suppress(OSError):
-            own = folder / source_digest(module)
-            own.mkdir(parents=True, exist_ok=True)
+            own = folder / digest
+            own.mkdir(mode=0o755, parents=True, exist_ok=True)
             for sign in complete_signs()[:1]:
                 (own / sign).touch()
 
@@ -86,7 +91,8 @@ def _is_full(module: str) -> bool:
 
 
 def _has_all(folder: Path, module: str) -> bool:
-    return any((folder / source_digest(module) / sign).exists() for sign in complete_signs())
+    digest = source_digest(module)
+    return digest is not None and any((folder / digest / sign).exists() for sign in complete_signs())
 
 
 @contextlib.contextmanager

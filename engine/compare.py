@@ -13,10 +13,17 @@ from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.budget import Budget, Cancel
 from engine.collision.collide import collide
 from engine.containment.locate import locate
-from engine.errors import InvalidOperationError, TooComplexError, UnsupportedSolidError, WrongDimensionError
+from engine.errors import (
+    InvalidInputError,
+    InvalidOperationError,
+    TooComplexError,
+    UnsupportedSolidError,
+    WrongDimensionError,
+)
 from engine.polygon_clipping.clip_polygons import clip_polygons
 from engine.segment_clipping.clip_segments import clip_segments
 from engine.solids.base import Solid
+from engine.solids.checks import as_floats, shown
 from engine.types import Accuracy, Relation
 
 Compared = Literal["contains", "collide", "clip_segments", "clip_polygons"]
@@ -77,19 +84,27 @@ def compare(
     >>> found.method, found.exact.tolist(), found.plain.tolist(), found.differing.tolist()
     ('half-space', [True, True], [True, True], [])
     """
-    if operation not in OPERATIONS:
-        raise InvalidOperationError(f"cannot compare {operation!r}; one of {', '.join(OPERATIONS)}", ("operation",))
+    if not isinstance(operation, str) or operation not in OPERATIONS:
+        raise InvalidOperationError(
+            f"cannot compare {shown(operation)}; one of {', '.join(OPERATIONS)}", ("operation",)
+        )
     from engine.textbook import methods as textbook  # whoever compares nothing does not load it
 
     exactly, of = OPERATIONS[operation]
+    deadline = Budget(deadline, cancel).deadline  # checks both
+    if len(arguments) != 2:
+        raise InvalidInputError(f"compare takes two arguments for {operation}, got {len(arguments)}", ("arguments",))
     items, second = arguments
+    for solid in arguments if operation == "collide" else arguments[1:]:
+        if not isinstance(solid, Solid):
+            raise InvalidInputError(f"{operation} takes a solid here, got {shown(solid)}", ("arguments",))
     methods = textbook.of_pairs(items, second) if operation == "collide" else getattr(textbook, of)(second)
     if not methods:
         place = {"contains": "solid", "collide": "second"}.get(operation, "region")
         raise UnsupportedSolidError(f"the textbook has no method for {operation} with {second.type}", (place,))
     name = next(iter(methods)) if method is None else method
-    if name not in methods:
-        raise InvalidOperationError(f"no method {name!r} here; one of {', '.join(methods)}", ("method",))
+    if not isinstance(name, str) or name not in methods:
+        raise InvalidOperationError(f"no method {shown(name)} here; one of {', '.join(methods)}", ("method",))
     ask, n_steps = methods[name]
     if n_steps > MOST_STEPS:
         raise TooComplexError(f"{n_steps:,} steps for the textbook's method; at most {MOST_STEPS:,}", ("second",))
@@ -119,8 +134,8 @@ def compare(
 
 
 def _as_items(items: Any, dimension: int, n_axes: int) -> FloatArray:
-    found = np.ascontiguousarray(items, np.float64)
-    if found.ndim != n_axes or found.shape[-1] != dimension:
+    found = as_floats(items, n_axes, ("items",))
+    if found.shape[-1] != dimension:
         wanted = "(n, dim)" if n_axes == 2 else "(n, size, dim)"
         raise WrongDimensionError(f"expected {wanted} with dim = {dimension}, got shape {found.shape}")
     return found

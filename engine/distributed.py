@@ -36,7 +36,7 @@ from engine.scenes.ends import ScenePieces
 from engine.scenes.scene import Keep, Scene
 from engine.segment_clipping import clip_segments as clipping
 from engine.solids.base import Solid
-from engine.solids.checks import as_point_groups, as_points
+from engine.solids.checks import as_point_groups, as_points, shown
 
 PARTS_PER_THREAD = 3
 """Parts in flight: so many that no thread waits for the network, so few that a batch may be larger than a worker."""
@@ -178,7 +178,7 @@ def _answers(
     """Yield the start of each part and its answer as they arrive; on an error cancel what is under way."""
     check_options(None, progress)
     if isinstance(part, bool) or not isinstance(part, int) or part < 1:
-        raise InvalidInputError(f"part must be a whole number from 1, got {part!r}", ("part",))
+        raise InvalidInputError(f"part must be a whole number from 1, got {shown(part)}", ("part",))
     starts = list(range(0, len(arrays[0]), part))[::-1]
     waiting: dict[Future, int] = {}
 

@@ -9,12 +9,15 @@ written:
 2. ``XDG_CACHE_HOME`` or ``~/.cache``, then ``exact-geometry``;
 3. a private folder of this user under the system's temporary folder.
 
-Where none can be written, kernels are compiled anew in each process.
+Where none can be written, kernels are compiled in each process again; so are those of sources that cannot be read, that
+changed since they were imported, or whose bytecode is of other sources: a line in the log says so.
 
 **Seeds.** ``ENGINE_CACHE_SEED`` names a folder or a .tar.xz that ``python -m engine warm --into`` has written, maybe on
-another machine. What the cache lacks is looked up there, read in place and never written. Each file begins with the
-sha256 of the rest: one that differs is not run, nor one that belongs to neither this user nor root or that any user can
-write, nor a seed that other tools made; a line in the log says so, and its kernels are compiled.
+another machine. What the cache lacks is looked up there, read in place and never written.
+
+**Trust.** Each file begins with the sha256 of its name and the rest: one that differs is not run, nor one that belongs
+to neither this user nor root or that another can write, or in such a folder, nor a seed that other tools made; a line
+in the log says so, and its kernels are compiled.
 """
 
 from __future__ import annotations
@@ -31,7 +34,9 @@ import tempfile
 import uuid
 from collections.abc import Iterator
 from contextlib import suppress
+from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
+from typing import Any
 
 import numba
 from numba import config as numba_config
@@ -58,33 +63,71 @@ _IMPORT = re.compile(
 )
 
 
-@functools.cache
-def _file(module: str) -> Path | None:
-    """Return the source of the dotted `module`, of the engine or one that has kernels of its own; None if none is."""
-    if module.partition(".")[0] != "engine":
-        own = getattr(sys.modules.get(module), "__file__", None)
-        return None if own is None else Path(own)
-    base = _folder(module)
-    found = (path for path in (base.with_suffix(".py"), base / "__init__.py") if path.is_file())
-    return None if module == "engine" else next(found, None)
+def _stamp(path: str) -> tuple[int, ...]:
+    status = os.stat(path)
+    return status.st_mtime_ns, status.st_ctime_ns, status.st_size, status.st_ino
+
+
+def _stamps() -> dict[str, tuple[int, ...]]:
+    """Return what tells of each file of the engine whether it changes from now on."""
+    archive = getattr(__spec__.loader, "archive", None)  # a zip file
+    folders = os.walk(os.path.dirname(__file__))
+    paths = (os.path.join(folder, name) for folder, _, names in folders for name in names if name.endswith(".py"))
+    return {path: _stamp(path) for path in ([archive] if archive else paths)}
+
+
+def _has_changed(spec: ModuleSpec) -> bool:
+    """Tell whether the file that a module was loaded from has changed since the engine was imported."""
+    path = getattr(spec.loader, "archive", None) or spec.origin or ""
+    try:
+        stamp = _stamp(path)
+    except OSError:
+        return path in _AT_IMPORT
+    return _AT_IMPORT.setdefault(path, stamp) != stamp
+
+
+_AT_IMPORT = _stamps()
 
 
 @functools.cache
-def read_source(module: str) -> tuple[bytes, set[str]]:
-    """Return a hash of a module, and the engine modules that its import lines name, `engine` left out."""
-    path, named = _file(module), set()
-    text = "" if path is None else path.read_text("utf-8")
-    for match in _IMPORT.finditer(text):
+def _spec(module: str) -> ModuleSpec | None:
+    """Return how a module is loaded, of the engine or one that has kernels of its own; None if there is none."""
+    is_ours = module.partition(".")[0] == "engine"
+    name = _PREFIX * is_ours + module
+    if name in sys.modules or not is_ours:
+        return getattr(sys.modules.get(name), "__spec__", None)
+    spec = PathFinder.find_spec(name, [str(_ROOT.joinpath(*module.split(".")[1:-1]))])
+    return None if spec is None or spec.loader is None else spec
+
+
+def _source(spec: ModuleSpec) -> bytes | None:
+    """Return the source that the loader of a module has, None if it has none."""
+    loader: Any = spec.loader
+    try:
+        if (spec.origin or "").endswith(".py"):
+            return bytes(loader.get_data(spec.origin))
+        text = loader.get_source(spec.name)
+    except (AttributeError, ImportError, OSError):
+        return None
+    return None if text is None else text.encode()
+
+
+@functools.cache
+def read_source(module: str) -> tuple[bytes, set[str]] | None:
+    """Return a hash of a module, and the engine modules that its import lines name, `engine` left out; None where its
+    source cannot be read."""
+    spec = _spec(module)
+    source = None if spec is None else _source(spec)
+    if source is None:
+        return None
+    named = set()
+    for match in _IMPORT.finditer(source.decode("utf-8")):
         package = "engine" + (match[1] or match[3] or "")
         named.add(package)
-        if _folder(package).is_dir():
+        if getattr(_spec(package), "submodule_search_locations", None) is not None:
             names = re.findall(r"\w+", re.sub(r"#.*|\bas\s+\w+", "", match[2] or ""))
             named.update(f"{package}.{name}" for name in names)
-    return hashlib.sha256(text.encode()).digest(), {name for name in named if _file(name) is not None}
-
-
-def _folder(module: str) -> Path:
-    return _ROOT.joinpath(*module.split(".")[1:])
+    return hashlib.sha256(source).digest(), {name for name in named - {"engine"} if _spec(name) is not None}
 
 
 @functools.cache
@@ -99,28 +142,70 @@ def tools() -> str:
 
 
 @functools.cache
-def source_digest(module: str) -> str:
-    """Return a hash of `module`, of all engine modules below it, of those that compile, and of `tools`.
-
-    Not of this one: how code is kept changes no code.
-    """
-    reached, waiting = set(), {module.removeprefix(_PREFIX), "engine.jit"}
-    while waiting:
-        name = waiting.pop()
-        reached.add(name)
-        waiting |= read_source(name)[1] - reached
-    digest = hashlib.sha256((tools() + _PREFIX).encode())  # what is kept names our modules as they are imported
-    for name in sorted(reached - {"engine.kernel_cache"}):
-        digest.update(f"\0{name}\0".encode() + read_source(name)[0])
+def source_digest(module: str) -> str | None:
+    """Return a hash of `module`, of all engine modules below it, of those that compile, and of `tools`; None where it
+    would not be that of the code that runs."""
+    reached = _reached(module.removeprefix(_PREFIX))
+    if reached is None:
+        return None
+    digest = hashlib.sha256((tools() + _PREFIX).encode())  # compiled code names our modules as they are imported
+    for name in sorted(reached):
+        digest.update(f"\0{name}\0".encode() + reached[name])
     return digest.hexdigest()[:20]
 
 
+def _reached(module: str) -> dict[str, bytes] | None:
+    """Return the hash of each module that the kernels of one are made of; None where one cannot be read, or changed
+    since the engine was imported."""
+    reached: dict[str, bytes] = {}
+    waiting = {module, "engine.jit"}  # the compiler too
+    while waiting:
+        name = waiting.pop()
+        spec, source = _spec(name), read_source(name)
+        if spec is None or source is None:
+            _uncached("a source cannot be read", name)
+            return None
+        if _has_changed(spec):
+            _uncached("a source has changed since it was imported", name)
+            return None
+        reached[name] = source[0]
+        waiting |= source[1] - reached.keys() - {"engine.kernel_cache"}  # how code is stored changes no code
+    return reached
+
+
+def is_of_its_source(module: str) -> bool:
+    """Tell whether Python runs what the sources of a module's kernels say: it takes bytecode for that of any source of
+    the same size and second."""
+    return all(map(_has_own_bytecode, _reached(module.removeprefix(_PREFIX)) or ()))
+
+
+@functools.cache
+def _has_own_bytecode(module: str) -> bool:
+    spec: Any = _spec(module)
+    get_code = getattr(spec.loader, "get_code", None)  # a loader that has none keeps no bytecode
+    source, code = _source(spec), get_code and get_code(spec.name)
+    if source and code and compile(source, code.co_filename, "exec", dont_inherit=True) != code:
+        _uncached("bytecode is not that of the source", module)
+        return False
+    return True
+
+
+_reported: set[object] = set()
+
+
+def _uncached(reason: str, module: str) -> None:
+    """Say once why kernels are not cached."""
+    if reason not in _reported:
+        _reported.add(reason)
+        log.warning("kernels are compiled in each process again: %s (%s)", reason, module)
+
+
 def _is_writable(folder: Path) -> bool:
-    """Tell whether `folder` belongs to this user and a file can be made in it; make the folder if it is missing."""
+    """Tell whether `folder` is nobody else's and a file can be made in it; make the folder if it is missing."""
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        if hasattr(os, "getuid") and folder.stat().st_uid != os.getuid():
-            return False  # compiled code is run as found: never from another user's folder
+        if not _is_trusted(folder):
+            return False
         with tempfile.TemporaryFile(dir=folder):
             return True
     except (OSError, RuntimeError):
@@ -143,15 +228,16 @@ def cache_folder() -> Path | None:
 
 
 def keep(name: str, content: bytes) -> None:
-    """Write the file `name` of the cache, whole or not at all, its sha256 in front; not where the disk is full."""
+    """Write the file `name` of the cache, whole or not at all, its seal in front; not where the disk is full."""
     folder = cache_folder()
     if folder is None:
         return
     part = folder / f"{name}.{uuid.uuid4().hex}"
     with suppress(OSError):
         try:
-            part.parent.mkdir(mode=0o700, exist_ok=True)
-            part.write_bytes(hashlib.sha256(content).digest() + content)
+            part.parent.mkdir(mode=0o755, exist_ok=True)  # also where what is new is the group's to write; a seed's
+            part.touch(mode=0o644)  # users read it
+            part.write_bytes(_seal_of(name, content) + content)
             part.replace(folder / name)
         finally:
             part.unlink(missing_ok=True)
@@ -160,16 +246,35 @@ def keep(name: str, content: bytes) -> None:
 def kept(name: str) -> bytes | None:
     """Return the file `name` of the cache, else that of the seed; None where neither has it as it was written."""
     for folder in (cache_folder(), seed()):
-        if folder is not None and (folder / name).exists():
+        if folder is not None:
             try:
-                _check_owner(folder / name)
+                if not (folder / name).exists() or not _is_trusted((folder / name).parent):
+                    continue
+                check_owner(folder / name)
                 written = (folder / name).read_bytes()
-                if hashlib.sha256(written[32:]).digest() == written[:32]:
+                if _seal_of(name, written[32:]) == written[:32]:
                     return written[32:]
-                raise ValueError("it is damaged")
+                raise ValueError("it is damaged, or another file")
             except (OSError, ValueError) as error:
                 log.warning("%s in %s is not used: %s", name, folder, error)
     return None
+
+
+def _seal_of(name: str, content: bytes) -> bytes:
+    """Return the sha256 that binds a file to its name."""
+    return hashlib.sha256(f"{name}\0".encode() + content).digest()
+
+
+def _is_trusted(folder: Path) -> bool:
+    """Tell whether nobody else can put files into a folder; say once if somebody can."""
+    try:
+        check_owner(folder)
+    except ValueError as error:
+        if folder not in _reported:
+            _reported.add(folder)
+            log.warning("compiled kernels in %s are not used: %s", folder, error)
+        return False
+    return True
 
 
 @functools.cache
@@ -179,9 +284,9 @@ def seed() -> Path | None:
     if not named:
         return None
     try:
-        _check_owner(Path(named))
+        check_owner(Path(named))
         folder = Path(named) if Path(named).is_dir() else _unpacked(Path(named))
-        _check_owner(folder / _MADE_BY)
+        check_owner(folder / _MADE_BY)
         if (made_by := (folder / _MADE_BY).read_text("utf-8")) != tools():
             raise ValueError(f"made by {made_by[:1000]}; here is {tools()}")
         return folder
@@ -190,11 +295,14 @@ def seed() -> Path | None:
         return None
 
 
-def _check_owner(path: Path) -> None:
+def check_owner(path: Path) -> None:
     """Refuse what others may write: compiled code is run as found."""
     status = path.stat()
-    if hasattr(os, "getuid") and (status.st_uid not in (0, os.getuid()) or status.st_mode & 0o002):
-        raise ValueError(f"{path.name} belongs to user {status.st_uid}, mode {status.st_mode & 0o777:o}")
+    if hasattr(os, "getuid") and (status.st_uid not in (0, os.getuid()) or status.st_mode & 0o022):
+        raise ValueError(
+            f"{path.name} belongs to user {status.st_uid}, mode {status.st_mode & 0o777:o}; it must be this user's or "
+            "root's, and nobody else's to write: chmod go-w"
+        )
 
 
 def _unpacked(archive: Path) -> Path:
@@ -214,6 +322,8 @@ def _unpacked(archive: Path) -> Path:
             if sum(member.size for member in tar.getmembers()) > _LARGEST_SEED:
                 raise ValueError("it is too large")
             tar.extractall(f"{room}/seed", filter="data")
+            for part in [Path(room, "seed"), *filter(Path.is_dir, Path(room, "seed").rglob("*"))]:
+                part.chmod(0o755)
             with suppress(OSError):  # another process was faster
                 Path(room, "seed").rename(target)
     return target
@@ -221,6 +331,7 @@ def _unpacked(archive: Path) -> Path:
 
 def seal(folder: Path, archive: Path | None = None) -> None:
     """Make a seed of `folder`, by a file that says what made it; write it to `archive` (.tar.xz) if that is named."""
+    (folder / _MADE_BY).touch(mode=0o644)
     (folder / _MADE_BY).write_text(tools(), "utf-8")
     if archive is not None:
         import tarfile

@@ -25,6 +25,8 @@ from engine.containment.locate import locate
 from engine.containment.posed.locators import posed_locator
 from engine.containment.rational_locate import rational_location
 from engine.containment.scene.locate_scene import locate_scene
+from engine.errors import InvalidInputError
+from engine.parallel import check_options
 from engine.polygon_clipping.clip_polygons import clip_polygons
 from engine.polygon_overlay.batch import overlay_batch
 from engine.polygon_overlay.overlay import overlay
@@ -34,7 +36,7 @@ from engine.segment_clipping.lines import clip_lines
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.bounds import bounds
-from engine.solids.checks import as_points
+from engine.solids.checks import as_points, shown
 from engine.solids.convex import Convex
 from engine.solids.half_space import HalfSpace
 from engine.solids.implicit import Implicit
@@ -59,6 +61,9 @@ def warm(progress: Callable[[int], object] | None = None, *, processes: int = 1)
     progress: called with hundredths of all the work as they are done, 100 in the end: ``tqdm(total=100).update`` fits.
     processes: where nothing is cached, up to so many more are started that compile (up to 1 GB each), and end.
     """
+    check_options(None, progress)
+    if isinstance(processes, bool) or not isinstance(processes, int) or processes < 1:
+        raise InvalidInputError(f"processes must be a whole number from 1, got {shown(processes)}", ("processes",))
     with _lock:
         if _is_warm.is_set():
             return

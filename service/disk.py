@@ -21,7 +21,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -31,24 +31,10 @@ from service.errors import ServiceError
 
 log = logging.getLogger("service")
 
-FIELDS: Final[dict[str, tuple[str, ...]]] = {
-    "half_space": ("normal", "offset"),
-    "sphere": ("center", "radius"),
-    "aabb": ("min", "max"),
-    "convex": ("planes",),
-    "triangle": ("vertices",),
-    "polygon": ("vertices", "ring_offsets"),
-    "polyhedron": ("vertices", "face_offsets", "face_indices"),
-    "surface": ("vertices", "face_offsets", "face_indices"),
-    "implicit": ("powers", "coefficients"),
-}
-"""What a solid is made of, by type; csg is made of solids."""
-
 _NAME: Final = re.compile(r"[0-9a-f]{64}")
 _PARTIAL: Final = ".part"
 _STALE_SECONDS: Final = 3600.0
 """Age at which a partial file has no writer any more."""
-
 
 _FULL: Final = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 _READ: Final = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
@@ -114,7 +100,10 @@ class Folder:
         return True
 
     def get(self, name: str) -> Solid | Scene | None:
-        """Return the solid called `name`, or None if there is no file that holds it; `store_unavailable`."""
+        """Return the solid called `name`, or None if there is no file that holds it.
+
+        Raises: `store_unavailable`, `unsupported_solid`.
+        """
         if _NAME.fullmatch(name) is None:
             return None
         path = self._path / name
@@ -124,6 +113,8 @@ class Folder:
             return None
         try:
             solid = from_octets(octets)
+        except ServiceError:  # a file of a later version: other processes of the volume read it
+            raise
         except Exception as error:  # whatever damaged bytes lead to
             solid, reason = None, f"{type(error).__name__}: {error}"
         if solid is None or self._name_of(solid) != name:
@@ -217,7 +208,7 @@ def _add_node(solid: Any, nodes: list[dict[str, Any]], arrays: dict[str, Any], p
         node |= {"solids": [_add_node(body, nodes, arrays, places) for body in solid.solids], "poses": "poses"}
         arrays["poses"] = pose_rows(solid)
     else:
-        for field in FIELDS[solid.type]:
+        for field in codec_of(solid.type).fields:
             node[field] = f"array_{len(arrays)}"
             arrays[node[field]] = np.asarray(getattr(solid, field))
     nodes.append(node)
@@ -250,7 +241,8 @@ def from_octets(octets: bytes) -> Solid | Scene:
                 poses = [_posed(row, solids[0].dimension) for row in arrays[node["poses"]]]
                 return Scene(solids, poses)
             else:
-                made.append(_MAKERS[node["type"]](*(arrays[node[field]] for field in FIELDS[node["type"]])))
+                codec = codec_of(node["type"])
+                made.append(codec.make(*(arrays[node[field]] for field in codec.fields)))
     found: Solid = made[-1]
     return found
 
@@ -266,16 +258,44 @@ def _faces(offsets: Any, indices: Any) -> Any:
     return [face.tolist() for face in _split(indices, offsets)]
 
 
-_MAKERS: Final[dict[str, Callable[..., Solid]]] = {
-    "half_space": lambda normal, offset: engine.HalfSpace(normal, float(offset)),
-    "sphere": lambda center, radius: engine.Sphere(center, float(radius)),
-    "aabb": engine.Aabb,
-    "convex": engine.Convex,
-    "triangle": engine.Triangle,
-    "polygon": lambda vertices, offsets: engine.Polygon(_split(vertices, offsets)),
-    "polyhedron": lambda vertices, offsets, indices: engine.Polyhedron(vertices, _faces(offsets, indices)),
-    "surface": lambda vertices, offsets, indices: engine.Surface(vertices, _faces(offsets, indices)),
-    "implicit": lambda powers, coefficients: engine.Implicit(
-        [{"powers": p, "coefficient": c} for p, c in zip(powers.tolist(), coefficients.tolist())]
+class Codec(NamedTuple):
+    """The fields that make up a solid of one type, arrays or numbers, and what makes the solid of them."""
+
+    fields: tuple[str, ...]
+    make: Callable[..., Solid]
+
+
+CODECS: Final[dict[str, Codec]] = {
+    "half_space": Codec(("normal", "offset"), lambda normal, offset: engine.HalfSpace(normal, float(offset))),
+    "sphere": Codec(("center", "radius"), lambda center, radius: engine.Sphere(center, float(radius))),
+    "aabb": Codec(("min", "max"), engine.Aabb),
+    "convex": Codec(("planes",), engine.Convex),
+    "triangle": Codec(("vertices",), engine.Triangle),
+    "polygon": Codec(("vertices", "ring_offsets"), lambda vertices, offsets: engine.Polygon(_split(vertices, offsets))),
+    "polyhedron": Codec(
+        ("vertices", "face_offsets", "face_indices"),
+        lambda vertices, offsets, indices: engine.Polyhedron(vertices, _faces(offsets, indices)),
+    ),
+    "surface": Codec(
+        ("vertices", "face_offsets", "face_indices"),
+        lambda vertices, offsets, indices: engine.Surface(vertices, _faces(offsets, indices)),
+    ),
+    "implicit": Codec(
+        ("powers", "coefficients"),
+        lambda powers, coefficients: engine.Implicit(
+            [{"powers": p, "coefficient": c} for p, c in zip(powers.tolist(), coefficients.tolist())]
+        ),
     ),
 }
+"""By type; csg and scenes are made of solids."""
+
+
+def codec_of(kind: str) -> Codec:
+    """Return the codec of a type; `unsupported_solid` where there is none."""
+    if kind in CODECS:
+        return CODECS[kind]
+    raise ServiceError(
+        "unsupported_solid",
+        f"this version of the service stores no solid of type {kind[:64]!r}; send it with each request, or let every "
+        "service of the store folder run the version that wrote it",
+    )

@@ -37,8 +37,8 @@ def context() -> Any:
     return found
 
 
-def read(octets: bytes | bytearray | memoryview, kind: str, call: Call) -> tuple[Any, Any]:
-    """Return vertices and triangles of a mesh file; `invalid_mesh` where it cannot be read, in time or at all."""
+def read(octets: bytes | bytearray | memoryview, kind: str, call: Call) -> Any:
+    """Return what `engine.read_mesh` does of a mesh file; `invalid_mesh` where it cannot be read, in time or at all."""
     if find_spec("trimesh") is None:
         raise ServiceError("not_installed", "this service reads no mesh files; send vertices and faces as JSON")
     around = context()

@@ -16,7 +16,7 @@ from numba.core.compiler import CompileResult, compile_result
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
-from engine.kernel_cache import COMPLETE, cache_folder, keep, kept, source_digest
+from engine.kernel_cache import COMPLETE, cache_folder, is_of_its_source, keep, kept, source_digest
 
 _V2 = ("cx16", "popcnt", "sse3", "sse4.1", "sse4.2", "ssse3")
 _V3 = (*_V2, "avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
@@ -74,7 +74,7 @@ class KernelCache(NullCache):  # type: ignore[misc]
         numba first brings in everything that it can compile, a third of a second; compiling does that by itself.
         """
         rtsys.initialize(target_context)
-        for cpu in cpus():
+        for cpu in cpus() if source_digest(self._function.__module__) else ():
             content = kept(self._name(types, cpu))
             if content:
                 try:
@@ -85,8 +85,9 @@ class KernelCache(NullCache):  # type: ignore[misc]
         return None
 
     def save_overload(self, types: Any, result: CompileResult) -> None:
-        """Keep a kernel."""
-        if not result.library.has_dynamic_globals:
+        """Keep a kernel, where what it was compiled from is what its name says."""
+        module = self._function.__module__
+        if not result.library.has_dynamic_globals and source_digest(module) and is_of_its_source(module):
             (name, _, (code, _)), fndesc, environment, signature, *_, reload, constants = result._reduce()
             constants = [item for item in constants if item.consts]
             content = dumps((name, code, fndesc, environment, signature, reload, constants))

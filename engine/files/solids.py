@@ -1,29 +1,23 @@
-"""Solids from files: meshes through trimesh, which is installed with the extra ``formats``, GeoJSON polygons, and the
-JSON of the HTTP interface."""
+"""Solids from files: meshes, GeoJSON polygons, and the JSON of the HTTP interface."""
 
 from __future__ import annotations
 
-import io
 import json
-import logging
-import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import IO, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray
-from engine.errors import EmptyGeometryError, IndexOutOfRangeError, InvalidInputError
+from engine.errors import InvalidInputError
+from engine.files.meshes import FORMATS, read_mesh
 from engine.layers.features import polygon_of
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
-from engine.solids.checks import frozen
 from engine.solids.convex import Convex
 from engine.solids.csg import Csg
 from engine.solids.half_space import HalfSpace
 from engine.solids.implicit import Implicit
-from engine.solids.mesh import first_equal
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
 from engine.solids.sphere import Sphere
@@ -35,20 +29,23 @@ CLASSES: Final[dict[str, Callable[..., Solid]]] = {
     "surface": Surface, "triangle": Triangle, "polygon": Polygon, "implicit": Implicit, "csg": Csg,
 }  # fmt: skip
 
+Note = Callable[[str], object]
 
-def read_solid(source: str) -> Solid:
+
+def read_solid(source: str, note: Note | None = None) -> Solid:
     """Return the one solid that `source` names.
 
     source: a mesh file (.stl, .obj, .ply, .off, .glb), an .npz file of `vertices` and `faces`, a .json file with a
-    solid as the HTTP interface writes it, a .geojson file with one polygon, or the JSON of a solid itself.
+    solid as the HTTP interface writes it, a .geojson file with one polygon, or the JSON of a solid itself. note: called
+    with a sentence where triangles are left out.
     """
-    solids = read_solids(source)
+    solids = read_solids(source, note)
     if len(solids) != 1:
         raise InvalidInputError(f"{source} holds {len(solids)} polygons; this command takes one solid", ("file",))
     return solids[0]
 
 
-def read_solids(source: str) -> list[Solid]:
+def read_solids(source: str, note: Note | None = None) -> list[Solid]:
     """Return all solids of `source`: several only where it is a GeoJSON collection."""
     if source.lstrip().startswith("{"):
         return from_json(_parsed(source, "the argument"))
@@ -56,7 +53,10 @@ def read_solids(source: str) -> list[Solid]:
     suffix = path.suffix.lower().removeprefix(".")
     if suffix in FORMATS:
         with path.open("rb") as file:
-            return [Polyhedron(*read_mesh(file, suffix))]
+            mesh = read_mesh(file, suffix)
+        if mesh.n_collapsed and note is not None:
+            note(f"{source}: {mesh.n_collapsed} triangles have two equal corners and are left out")
+        return [mesh.solid()]
     if suffix == "npz":
         with np.load(path, allow_pickle=False) as arrays:
             missing = {"vertices", "faces"} - set(arrays.files)
@@ -114,68 +114,3 @@ def _parsed(text: str, name: str) -> Any:
         raise InvalidInputError(f"{name} is not JSON: {error}", ("file",)) from None
     except RecursionError:
         raise InvalidInputError(f"{name} is nested too deeply", ("file",)) from None
-
-
-FORMATS: Final = ("stl", "obj", "ply", "off", "glb")
-
-
-_NAMES: Final = re.compile(rb"^[ \t]*(?:g|o|s|usemtl|mtllib)(?:[ \t][^\r\n]*)?$", re.MULTILINE)
-"""Lines of an OBJ file that say nothing of its shape: trimesh's time grows with their number squared."""
-
-
-def read_mesh(file: IO[bytes], file_format: str) -> tuple[FloatArray, IntArray]:
-    """Return the vertices and the triangles of a mesh file, for `Polyhedron` or `Surface`, which check them.
-
-    Vertices at equal coordinates become one, in the order of the file; nothing else is repaired, and polygons are cut
-    into triangles. Nothing that the file names is read.
-
-    Parameters: file: open for reading bytes; file_format: stl, obj, ply, off or glb.
-    Returns: vertices ``(n, 3) float64`` and indices of them ``(m, 3) int64``.
-    Accuracy: coordinates are those of the file: decimals become the nearest double, single precision is exact in
-    double. The meshes of a GLB scene are put together; a node's transform is applied in floating point, so that its
-    coordinates are rounded once.
-    Raises: InvalidInputError for another format, a file that cannot be read, or where trimesh is not installed;
-    EmptyGeometryError for a file without faces; IndexOutOfRangeError where a face names a vertex that is not there.
-    """
-    if file_format not in FORMATS:
-        raise InvalidInputError(f"format must be one of {', '.join(FORMATS)}, got {file_format!r}", ("format",))
-    try:
-        import trimesh
-    except ImportError:
-        raise InvalidInputError(
-            "mesh files need the package trimesh: pip install 'exact-geometry[formats]'", ("format",)
-        ) from None
-    logging.getLogger("trimesh").setLevel(logging.CRITICAL)  # its warnings about repairs that we do not ask for
-    try:
-        if file_format == "obj":
-            file = io.BytesIO(_NAMES.sub(b"", file.read()))
-        with np.errstate(all="ignore"):
-            scene = trimesh.load_scene(
-                file, file_type=file_format, process=False, maintain_order=True, skip_materials=True
-            )
-            mesh = scene.to_mesh()
-            vertices, faces = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
-    except MemoryError:
-        raise
-    except Exception as error:  # the parsers raise whatever the bytes lead them to
-        raise InvalidInputError(
-            f"the file cannot be read as {file_format}: {type(error).__name__}: {error!s:.200}", ("file",)
-        ) from error
-    if not len(faces):
-        raise EmptyGeometryError(f"the {file_format} file holds no faces", ("file",))
-    if len(beyond := np.argwhere((faces < 0) | (faces >= len(vertices)))):
-        face, corner = beyond[0].tolist()
-        raise IndexOutOfRangeError(
-            f"triangle {face} names vertex {faces[face, corner]}, the file holds {len(vertices)}; correct the file",
-            ("file",),
-        )
-    return _merged(vertices, faces)
-
-
-def _merged(vertices: Any, faces: Any) -> tuple[FloatArray, IntArray]:
-    """Return the vertices at different coordinates in their first order, and the faces with their new indices."""
-    first = first_equal(frozen(vertices))
-    if first is None:
-        return vertices, faces
-    is_first = first == np.arange(len(first))
-    return vertices[is_first], (np.cumsum(is_first) - 1)[first][faces]

@@ -23,6 +23,7 @@ from engine.layers.rows import (
 )
 from engine.polygon_overlay.polygon_arrays import PolygonArrays, arrays_of
 from engine.polygon_overlay.touching import Touching
+from engine.solids.checks import shown
 from engine.solids.ragged import within
 
 if TYPE_CHECKING:
@@ -30,6 +31,10 @@ if TYPE_CHECKING:
 
 _POLYGONS = (3, 6)
 """Shapely's numbers of polygons and of such of several parts."""
+_ABOUT_ATTRIBUTES = (
+    *("as_index", "level", "sort", "observed", "dropna"), *("numeric_only", "min_count", "engine", "engine_kwargs"),
+)  # fmt: skip
+"""Options of dissolve that geopandas answers: how rows are grouped, and what the functions on columns take."""
 _POINT = 0
 _LINE = 1
 
@@ -43,6 +48,7 @@ def overlay(
     workers: int | None = None,
     deadline: float | None = None,
     cancel: Cancel | None = None,
+    **others: Any,
 ) -> GeoDataFrame:
     """Overlay two layers of polygons, every feature with every one that it meets, as geopandas.overlay does.
 
@@ -52,8 +58,9 @@ def overlay(
     Parameters: left, right: GeoDataFrames of Polygon and MultiPolygon; missing and empty geometries are welcome. how:
     "intersection", "union", "identity", "difference" or "symmetric_difference". keep_geom_type: None (as True, with a
     warning where rows without geometry are left out), True, or False, which keeps these rows, and of every pair the
-    lines and points in which features meet without common area: alone, or with the area in a GeometryCollection.
-    deadline in seconds.
+    lines and points in which features meet without common area, alone or with the area in a GeometryCollection, and
+    those to which rounding collapses an area. deadline in seconds. No other option of geopandas is taken: its precision
+    and its repairs are not those of here.
     Boundary, degenerate input: features that only touch make no row, but with keep_geom_type=False. Lines bend where
     borders do, and end where lines meet. A ring that crosses itself is even-odd; the parts of a MultiPolygon that
     overlap are united. A z is refused.
@@ -62,17 +69,20 @@ def overlay(
     Raises: InvalidInputError where geopandas is not installed; InvalidOperationError, UnsupportedSolidError,
     NotFiniteError (each names the feature), NotRepresentableError, DeadlineExceededError, CancelledError.
     """
-    _geopandas()
+    _check_frames("overlay", others, left=left, right=right)
     check_how(how)
+    if keep_geom_type is not None and not isinstance(keep_geom_type, (bool, np.bool_)):
+        what = f"keep_geom_type must be None, True or False, got {shown(keep_geom_type)}"
+        raise InvalidInputError(what, ("keep_geom_type",))
     if left.crs is not None and right.crs is not None and left.crs != right.crs:
         warnings.warn("the layers have different CRS; coordinates are taken as they are", UserWarning, stacklevel=2)
     limits = Limits(deadline, cancel, workers)
     layers = _layer(left, "left", limits), _layer(right, "right", limits)
-    rows = overlay_rows(*layers, how, limits, with_touching=keep_geom_type is False)
+    rows = overlay_rows(*layers, how, limits, with_touching=keep_geom_type is not None and not keep_geom_type)
     if rows.n_collapsed:
         warnings.warn(f"rounding left nothing of {rows.n_collapsed} rows with area", UserWarning, stacklevel=2)
     frame = _frame(left, right, rows, how)
-    if keep_geom_type is not False and (missing := frame.geometry.isna()).any():
+    if keep_geom_type in (None, True) and (missing := frame.geometry.isna()).any():
         frame = frame[~missing]
         if keep_geom_type is None:
             warnings.warn(f"{int(missing.sum())} rows without geometry are left out", UserWarning, stacklevel=2)
@@ -90,9 +100,12 @@ def dissolve(
 ) -> GeoDataFrame:
     """Unite the polygons of each group exactly, and gather their attributes, as GeoDataFrame.dissolve does.
 
-    Parameters: by, aggfunc and further options as there (as_index, level, sort, observed, dropna); deadline, cancel as
-    `overlay`. A group without polygons has an empty geometry. Raises: as `overlay`.
+    Parameters: by, aggfunc as there, and of its options those about attributes: as_index, level, sort, observed,
+    dropna, and for aggfunc numeric_only, min_count, engine, engine_kwargs. Others are refused. deadline, cancel as
+    `overlay`. A group without polygons has an empty geometry.
+    Raises: as `overlay`, and InvalidInputError for what geopandas cannot group by or gather.
     """
+    _check_frames("dissolve", options, _ABOUT_ATTRIBUTES, layer=layer)
     geopandas, shapely = _geopandas()
     limits = Limits(deadline, cancel)
     name = layer.geometry.name
@@ -101,7 +114,12 @@ def dissolve(
     places = layer.copy()
     places[name] = points
     # geopandas gathers rows and attributes; points on a line tell which features are in which group
-    found = places.dissolve(by, aggfunc, method="unary", **options)
+    try:
+        found = places.dissolve(by, aggfunc, method="unary", **options)
+    except Exception as error:  # whatever pandas makes of them
+        given = f"by={shown(by)}, aggfunc={shown(aggfunc)}"
+        what = f"the layer cannot be dissolved with {given}: {type(error).__name__}: {error!s:.200}"
+        raise InvalidInputError(what, ("by",)) from error
     at, group = shapely.get_coordinates(np.asarray(found.geometry.array), return_index=True)
     groups = np.full(len(layer), NONE)
     groups[at[:, 0].astype(int)] = group
@@ -117,15 +135,17 @@ def sjoin(
     *,
     deadline: float | None = None,
     cancel: Cancel | None = None,
+    **others: Any,
 ) -> GeoDataFrame:
     """Join points to the polygons that hold them, boundary included, decided exactly: geopandas.sjoin, "intersects".
 
     Parameters: left: of points; missing ones are in nothing. right: of polygons. how: "inner" or "left".
     Raises: as `overlay`.
     """
+    _check_frames("sjoin", others, left=left, right=right)
     _, shapely = _geopandas()
-    if how not in ("inner", "left"):
-        raise InvalidOperationError(f"how must be inner or left; got {how!r}", ("how",))
+    if not isinstance(how, str) or how not in ("inner", "left"):
+        raise InvalidOperationError(f"how must be inner or left; got {shown(how)}", ("how",))
     limits = Limits(deadline, cancel)
     points = np.asarray(left.geometry.array)
     if len(wrong := np.flatnonzero(~np.isin(shapely.get_type_id(points), (-1, 0)))):
@@ -154,6 +174,26 @@ def _geopandas() -> tuple[Any, Any]:
     except ImportError:
         raise InvalidInputError("GeoDataFrames need geopandas: pip install 'exact-geometry[geo]'", ()) from None
     return geopandas, shapely
+
+
+def _check_frames(function: str, others: Any, taken: tuple[str, ...] = (), **frames: object) -> None:
+    """Raise on an option that is not ours, though geopandas may have it, and on what is no GeoDataFrame."""
+    geopandas, _ = _geopandas()
+    if others.keys() - set(taken):
+        name = sorted(others.keys() - set(taken))[0]
+        also = f"{', '.join(taken)} beside " if taken else ""
+        raise InvalidInputError(
+            f"{function} takes no option {name!r}: coordinates and what meets are decided here, not by geopandas; it "
+            f"takes {also}the options in its signature",
+            (name,),
+        )
+    for name, frame in frames.items():
+        if not isinstance(frame, geopandas.GeoDataFrame) or frame._geometry_column_name not in frame.columns:
+            raise InvalidInputError(f"{name} must be a GeoDataFrame with a geometry, got {_named(frame)}", (name,))
+
+
+def _named(frame: object) -> str:
+    return f"one without ({type(frame).__name__})" if hasattr(frame, "columns") else shown(frame)
 
 
 def _refused(error: type[EngineError], frame: GeoDataFrame, where: tuple[str, int], what: str) -> EngineError:

@@ -22,10 +22,11 @@ from engine.containment.scene.locate_scene import locate_scene
 from engine.errors import InvalidOperationError, NotRepresentableError
 from engine.polygon_overlay.batch import OverlayBatch, overlay_batch
 from engine.polygon_overlay.found import chained, places_of
+from engine.polygon_overlay.overlay import overlay
 from engine.polygon_overlay.polygon_arrays import Chosen, PolygonArrays, joined_arrays
 from engine.polygon_overlay.result import Output, Overlay
 from engine.polygon_overlay.run import Operation
-from engine.polygon_overlay.touching import Touching, touching
+from engine.polygon_overlay.touching import Touching, collapsed, joined_touching, touching
 from engine.polygon_overlay.union_all import less_all, union_all
 from engine.solids.checks import shown
 from engine.solids.polygon import Polygon
@@ -70,7 +71,7 @@ class LayerRows:
     left, right: (m,) int64, the feature of either layer that a row comes from, -1 where of none.
     vertices: (n, 2) float64. ring_offsets into them; no ring repeats its first vertex. piece_offsets into the rings, a
     shell counter-clockwise before its holes, clockwise. row_offsets (m + 1,) into the pieces; a row without pieces is
-    that of a feature without geometry, or of two that meet without common area.
+    that of a feature without geometry, or of two that meet without common area, or with one that rounding takes.
     n_collapsed: rows that are not here because rounding left no piece of them.
     touching: where pairs meet without common area, by row; None where nobody asked.
     """
@@ -145,7 +146,8 @@ def overlay_rows(left: Layer, right: Layer, how: str, limits: Limits, with_touch
     if of_pairs:
         sides = Chosen(left.arrays, pairs[:, 0]), Chosen(right.arrays, pairs[:, 1])
         batch = _overlaid(*sides, "intersection", limits)
-        parts.append(_rows(batch, pairs[:, 0], pairs[:, 1], _touching(*sides, limits) if with_touching else None))
+        more = _touching(*sides, batch, limits) if with_touching else None
+        parts.append(_rows(batch, pairs[:, 0], pairs[:, 1], more))
     if of_left:
         parts.append(_differences(left, right, pairs, rivals[1], limits))
     if of_right:
@@ -275,9 +277,19 @@ def _overlaid(
     return cast(OverlayBatch, limits.noted(found))
 
 
-def _touching(firsts: Chosen, seconds: Chosen, limits: Limits) -> Touching:
+def _touching(firsts: Chosen, seconds: Chosen, batch: OverlayBatch, limits: Limits) -> Touching:
+    """Return where pairs meet without common area, or, of those whose common area rounding takes, what is left."""
+    shells = []
+    for pair in np.flatnonzero(_is_lost(batch)).tolist():
+        result = limits.noted(overlay(firsts[pair], seconds[pair], "intersection", **limits.options()))
+        shells += [(pair, ring) for ring in (result._lost.shells() if result._lost else ())]
     with limits.budget() as budget:
-        return touching(firsts, seconds, budget, limits.workers)
+        return joined_touching([touching(firsts, seconds, budget, limits.workers), collapsed(shells, budget)])
+
+
+def _is_lost(batch: OverlayBatch) -> BoolArray:
+    """Tell of each pair whether it has common area of which rounding leaves nothing."""
+    return (np.diff(batch.pair_offsets) == 0) & (batch.n_pieces_exact > 0)
 
 
 def _rows(batch: OverlayBatch, left: IntArray, right: IntArray, more: Touching | None = None) -> LayerRows:
@@ -296,7 +308,7 @@ def _rows(batch: OverlayBatch, left: IntArray, right: IntArray, more: Touching |
         rows = np.cumsum(is_row) - 1
         more = more._replace(lines=rows[more.lines], points=rows[more.points])
     kept = np.flatnonzero(is_row)
-    lost = int(((n_pieces == 0) & (batch.n_pieces_exact > 0)).sum())
+    lost = int((_is_lost(batch) & ~is_row).sum())
     rings = batch.vertices, batch.ring_offsets, batch.piece_offsets
     return LayerRows(left[kept], right[kept], *rings, summed(n_pieces[kept]), lost, more)
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from itertools import accumulate
-from typing import Any, Final, Literal, NamedTuple, Unpack, overload
+from typing import Any, ClassVar, Final, Literal, NamedTuple, Unpack, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -25,7 +25,7 @@ from engine.predicates.scaling import largest_of, scaled_back
 from engine.solids.base import Solid
 from engine.solids.checks import as_point_groups, as_points, check_dimension, check_finite, is_ready
 from engine.solids.polygon import Polygon
-from engine.solids.ragged import summed
+from engine.solids.ragged import Ragged, summed
 from engine.types import OPEN, Accuracy
 
 
@@ -38,7 +38,7 @@ class PolygonStatus(IntEnum):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ClippedPolygons:
+class ClippedPolygons(Ragged):
     """What is left of a batch of polygons, polygon by polygon, ring by ring.
 
     vertices: (m, dim) float64, each coordinate the double nearest to the exact one.
@@ -49,6 +49,7 @@ class ClippedPolygons:
     may_have_bridges: (n,) bool, whether edges along a plane may run there and back, or along another contour.
     """
 
+    _levels: ClassVar[tuple[str, ...]] = ("vertices", "ring_offsets", "polygon_offsets")
     vertices: FloatArray
     ring_offsets: IntArray
     polygon_offsets: IntArray

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Final, cast
+from typing import Any, ClassVar, Final, cast
 
 import numpy as np
 
@@ -15,15 +15,16 @@ from engine.parallel import Progress, check_options, run_chunks
 from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.found import NO_PAIRS, Found, chained, joined, one_pair, taken
-from engine.polygon_overlay.implicit_rings import ImplicitRings, areas_of
+from engine.polygon_overlay.implicit_rings import ImplicitRings, areas_of, check_sources
 from engine.polygon_overlay.overlay import accuracy_of, check_words, overlay_rings, rings_of, ulps_moved
 from engine.polygon_overlay.polygon_arrays import Chosen, PolygonArrays, gathered
 from engine.polygon_overlay.result import Output, Overlay
 from engine.polygon_overlay.rounds import SettledPairs, nearest_pairs, settle_pairs
 from engine.polygon_overlay.run import KEPT_ARRAYS, Operation, arranged_again, as_overlay, run_kernel
 from engine.solids.base import Solid
+from engine.solids.checks import as_nested_offsets
 from engine.solids.polygon import Polygon
-from engine.solids.ragged import closed_rings, summed
+from engine.solids.ragged import Ragged, closed_rings, summed
 from engine.types import OPEN, Accuracy
 
 NOT_REPRESENTABLE: Final = 1
@@ -35,7 +36,7 @@ _DOUBTFUL: Final = 256
 
 
 @dataclass(frozen=True, slots=True)
-class OverlayBatch:
+class OverlayBatch(Ragged):
     """Results of many overlays, as flat arrays; `overlays` and indexing make objects from them.
 
     status: (n_pairs,) int8; 0 done; 1 a coordinate of the result is beyond the largest double (the pair has no pieces
@@ -49,6 +50,7 @@ class OverlayBatch:
         _apart: objects made already, by pair.
     """
 
+    _levels: ClassVar[tuple[str, ...]] = ("vertices", "ring_offsets", "piece_offsets", "pair_offsets")
     status: Int8Array
     vertices: FloatArray
     ring_offsets: IntArray
@@ -62,6 +64,17 @@ class OverlayBatch:
     _exact: Found = field(repr=False)
     _is_rounded_again: BoolArray = field(repr=False)
     _apart: dict[int, Overlay] = field(repr=False)
+
+    @classmethod
+    def _restored(cls, *values: Any) -> OverlayBatch:
+        made: OverlayBatch = super(OverlayBatch, cls)._restored(*values)
+        exact = made._exact
+        as_nested_offsets(len(exact.vertices), rings=exact.ring_offsets, pieces=exact.piece_offsets)
+        for column, items in enumerate((exact.piece_offsets[1:], exact.ring_offsets[1:], exact.vertices)):
+            as_nested_offsets(len(items), counts=summed(exact.counts[:, column]))
+        n_inputs = _gathered(made._subjects).sizes() + _gathered(made._clips).sizes()
+        check_sources(exact.sources, np.repeat(n_inputs, exact.counts[:, 2]))
+        return made
 
     def __len__(self) -> int:
         return len(self.status)

@@ -12,7 +12,7 @@ from __future__ import annotations
 import functools
 from dataclasses import replace
 from fractions import Fraction
-from math import frexp, inf, isfinite, log10, nextafter, ulp
+from math import frexp, inf, log10, nextafter, ulp
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -78,9 +78,12 @@ class Grid(NamedTuple):
         return read_only(places), largest
 
 
+_LARGEST: Final = float(np.finfo(np.float64).max)
+
+
 def grid_of(size: object) -> Grid:
     """Return the grid of a spacing; refuse what is no power of two or ten."""
-    if isinstance(size, (int, float, np.floating)) and not isinstance(size, bool) and isfinite(size) and size > 0:
+    if isinstance(size, (int, float, np.floating)) and not isinstance(size, bool) and 0 < size <= _LARGEST:
         if (found := _grid_of(float(size))) is not None:
             return found
     raise InvalidInputError(

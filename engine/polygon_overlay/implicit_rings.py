@@ -19,8 +19,10 @@ from engine.arrangement.exact_area import ExactRings
 from engine.arrangement.nodes import Homogeneous, float_nodes
 from engine.arrays import BoolArray, FloatArray, IntArray, read_only
 from engine.direct import entry_of
+from engine.errors import IndexOutOfRangeError, InvalidArrayError
 from engine.polygon_overlay.compiled.loading import LEFT_OUT, RingArrays
 from engine.polygon_overlay.compiled.ring_area import sum_areas
+from engine.solids.checks import as_nested_offsets, as_points
 
 _NEVER: Final = np.zeros(1, np.uint8)
 
@@ -49,6 +51,17 @@ def areas_of(
     return areas, sum_them(subjects, subject_items, clips, clip_items, sources, offsets, groups, _NEVER, areas)
 
 
+def check_sources(sources: npt.NDArray[np.signedinteger], n_inputs: int | IntArray) -> None:
+    """Raise unless sources, of a pickle, name input vertices alone, of which there are n_inputs, one number or by row;
+    kernels look no further."""
+    if sources.shape != (np.size(n_inputs) if np.ndim(n_inputs) else len(sources), 2) or sources.dtype.kind != "i":
+        raise InvalidArrayError(f"sources have dtype {sources.dtype} and shape {sources.shape}", ("sources",))
+    firsts, seconds = sources.astype(np.int64).T
+    seconds = np.where(seconds < LEFT_OUT, LEFT_OUT - 1 - seconds, seconds)
+    if len(bad := np.flatnonzero((firsts < 0) | (firsts >= n_inputs) | (seconds >= n_inputs))):
+        raise IndexOutOfRangeError(f"sources[{bad[0]}] names a vertex that is not there", ("sources", int(bad[0])))
+
+
 class ImplicitRings(NamedTuple):
     """Exact rings over two polygons, made when asked for.
 
@@ -65,6 +78,13 @@ class ImplicitRings(NamedTuple):
     @property
     def n_rings(self) -> int:
         return len(self.offsets) - 1
+
+    def check(self) -> None:
+        """Raise unless all is in range: for rings from a pickle."""
+        for side in (self.subject, self.clip):
+            as_nested_offsets(len(as_points(side.vertices, 2)), offsets=side.offsets)
+        as_nested_offsets(len(self.sources), offsets=self.offsets)
+        check_sources(self.sources, len(self.subject.vertices) + len(self.clip.vertices))
 
     def sure_areas(self, groups: IntArray) -> tuple[FloatArray, int]:
         """Return (n,) float64, the doubles nearest to the areas of the rings groups[k] .. groups[k + 1] - 1, or NaN.

@@ -18,6 +18,7 @@ from engine.arrays import FloatArray, IntArray
 from engine.budget import Budget
 from engine.parallel import Options
 from engine.polygon_overlay.implicit_rings import ImplicitRings, edges_along
+from engine.solids.checks import as_nested_offsets
 from engine.solids.ragged import as_geojson
 
 Output = Literal["valid", "nearest"]
@@ -71,6 +72,11 @@ class Lost(NamedTuple):
     holes: list[int]
     unit: Fraction = Fraction(1)
 
+    def shells(self) -> list[list[tuple[float, float]]]:
+        """Return the shells of pieces, each vertex the nearest doubles."""
+        places = self.exact.some(self.pieces).places()
+        return [[(nearest(x), nearest(y)) for x, y in ring] for ring in places]
+
     def parts(self, budget: Budget) -> tuple[Collapse, ...]:
         """Return the pieces, then the holes, each in lexicographic order; raises as `Budget.check`."""
         if not self.pieces and not self.holes:
@@ -104,8 +110,13 @@ def _first_vertex(ring: ExactRings) -> tuple[list[_Place], tuple[float, float]]:
     """Return a ring from its first vertex on, and the doubles nearest to that vertex."""
     (places,) = ring.places()
     k = places.index(min(places))
-    x, y = (nearest_quotient(*value.as_integer_ratio()) for value in places[k])
-    return places[k:] + places[:k], (x, y)
+    x, y = places[k]
+    return places[k:] + places[:k], (nearest(x), nearest(y))
+
+
+def nearest(value: Fraction) -> float:
+    """Return the nearest double."""
+    return nearest_quotient(*value.as_integer_ratio())
 
 
 @dataclass(frozen=True)
@@ -162,6 +173,13 @@ class Overlay:
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
         vars(self).update(made)
         return made[name]
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Fill in what was pickled, checked: kernels, and whoever goes by offsets, trust these."""
+        vars(self).update(state)
+        as_nested_offsets(len(self.vertices), ring_offsets=self.ring_offsets, piece_offsets=self.piece_offsets)
+        if isinstance(self.exact, ImplicitRings):
+            self.exact.check()
 
     def __dir__(self) -> Iterable[str]:
         """Name what is not made yet as well, for who completes names."""

@@ -1,4 +1,5 @@
-"""Where two polygons meet without common area: the stretches of border that they share, and single points.
+"""Where two polygons meet without common area: the stretches of border that they share, and single points; and the
+lines and points to which rounding collapses an area that they share.
 
 A point of both belongs to their common area, or lies on a line that has one polygon on one side and the other on the
 other, or stands alone. All is read from one exact arrangement, whose parts are what lies in the first polygon alone, in
@@ -14,6 +15,9 @@ the second alone, and in both:
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from fractions import Fraction
+from itertools import pairwise
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -40,7 +44,7 @@ _BLOCK: Final = 1024
 
 
 class Touching(NamedTuple):
-    """Lines and points of some pairs. lines, points: the pair of each, ascending. vertices (n, 2) float64 of all lines,
+    """Lines and points of some pairs. lines, points: the pair of each. vertices (n, 2) float64 of all lines,
     one after another; offsets of each into them; places (n_points, 2) float64."""
 
     lines: IntArray
@@ -81,10 +85,10 @@ def touching(firsts: Chosen, seconds: Chosen, budget: Budget, workers: int | Non
             alone, places = parts_exactly(RingArrays(*first[:2]), RingArrays(*second[:2]), budget)
             parts = alone.evidence[:, 1]
             read.append(_read(alone, parts, np.full(len(parts), start + pair), places))
-        found[start] = _joined(read)
+        found[start] = joined_touching(read)
 
     run_chunks(task, -(-len(firsts) // _BLOCK), budget=budget, first_chunk=1, workers=workers)
-    return _joined([_NOWHERE, *(found[start] for start in sorted(found))])
+    return joined_touching([_NOWHERE, *(found[start] for start in sorted(found))])
 
 
 def _may_touch(found: Found) -> BoolArray:
@@ -160,10 +164,71 @@ def _in_line(offsets: IntArray, rings: IntArray, is_line: BoolArray, goes_on: Bo
     return edges, np.flatnonzero(is_head[edges])
 
 
-def _joined(parts: list[Touching]) -> Touching:
+def joined_touching(parts: list[Touching]) -> Touching:
     """Return the lines and points of some pairs, those of one part after another's."""
     lines, vertices, offsets, points, places = zip(*parts)
     return Touching(
         np.concatenate(lines), np.concatenate(vertices), chained(offsets), np.concatenate(points),
         np.concatenate(places),
     )  # fmt: skip
+
+
+Place = tuple[float, float]
+
+
+def collapsed(rings: Iterable[tuple[int, list[Place]]], budget: Budget) -> Touching:
+    """Return the lines and points that are left of closed rings, each with its pair, that rounding left no area.
+
+    A ring that is one place is a point; else its edges, split where another vertex lies on them, each once, joined to
+    lines that bend where edges do and end where lines meet.
+    """
+    lines: list[tuple[int, list[Place]]] = []
+    points: list[tuple[int, Place]] = []
+    for pair, ring in rings:
+        edges = _noded(ring, budget)
+        lines += [(pair, line) for line in _joined_edges(edges)]
+        points += [] if edges else [(pair, ring[0])]
+    return Touching(
+        np.array([pair for pair, _ in lines], np.int64),
+        np.array([place for _, line in lines for place in line]).reshape(-1, 2),
+        summed([len(line) for _, line in lines]),
+        np.array([pair for pair, _ in points], np.int64),
+        np.array([place for _, place in points]).reshape(-1, 2),
+    )
+
+
+def _noded(ring: list[Place], budget: Budget) -> list[tuple[Place, Place]]:
+    """Return the edges of a ring between neighbouring vertices, decided exactly, each once and in order."""
+    places = np.array(sorted(set(ring)))
+    edges: set[tuple[Place, Place]] = set()
+    for start, end in zip(ring, ring[1:] + ring[:1]):
+        budget.check()
+        (a, b), (c, d) = sorted([start, end])
+        near = places[((places >= (a, min(b, d))) & (places <= (c, max(b, d)))).all(axis=1)]
+        width, height = Fraction(c) - Fraction(a), Fraction(d) - Fraction(b)
+        on_edge = [
+            (x, y)
+            for x, y in near.tolist()
+            if width * (Fraction(y) - Fraction(b)) == height * (Fraction(x) - Fraction(a))
+        ]
+        edges.update(pairwise(on_edge))
+    return sorted(edges)
+
+
+def _joined_edges(edges: list[tuple[Place, Place]]) -> list[list[Place]]:
+    """Return edges joined wherever two of them meet and no other."""
+    beside: dict[Place, list[Place]] = {}
+    for start, end in edges:
+        beside.setdefault(start, []).append(end)
+        beside.setdefault(end, []).append(start)
+    ends = dict.fromkeys(place for place, others in beside.items() if len(others) != 2)
+    chains = []
+    for start in [*ends, *beside]:  # those from an end first: what is left are closed lines
+        while beside[start]:
+            line = [start]
+            while beside[line[-1]] and (len(line) == 1 or line[-1] not in ends):  # bound: takes an edge each time
+                after = beside[line[-1]].pop()
+                beside[after].remove(line[-1])
+                line.append(after)
+            chains.append(line)
+    return chains

@@ -24,7 +24,7 @@ from engine.scenes.ends import ScenePieces, in_order, joined
 from engine.scenes.standing import Standing
 from engine.segment_clipping.parameters import ONE, ZERO
 from engine.solids.base import Immutable, Solid, _collect_arrays
-from engine.solids.checks import as_point_groups, as_points
+from engine.solids.checks import as_point_groups, as_points, shown
 from engine.solids.pose import Pose
 from engine.types import Accuracy
 
@@ -282,7 +282,7 @@ class Scene(Immutable):
                 return few
         check_options(workers, progress, report=report)
         if not isinstance(keep, str) or keep not in ("all", "first", "any"):
-            raise InvalidOperationError(f"keep must be all, first or any, got {keep!r:.50}", ("keep",))
+            raise InvalidOperationError(f"keep must be all, first or any, got {shown(keep)}", ("keep",))
         array = as_point_groups(segments, 2, self.solids[0].dimension if len(self) else None, ("segments",))
         n = len(array)
         counts = Counts(n)
@@ -317,7 +317,7 @@ class Scene(Immutable):
             if isinstance(body, (bool, np.bool_)) or not isinstance(body, (int, np.integer)):
                 raise InvalidArrayError(f"{name} names bodies by index, got {type(body).__name__}", (name, place))
             if not 0 <= body < n:
-                message = f"{name} names body {body}, which is not there; the scene has {n}"
+                message = f"{name} names body {shown(body)}, which is not there; the scene has {n}"
                 raise IndexOutOfRangeError(message, (name, place))
             found.add(int(body))
         return sorted(found)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import namedtuple
 from dataclasses import dataclass
-from typing import Any, Final, Literal, Unpack, overload
+from typing import Any, ClassVar, Final, Literal, Unpack, overload
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from engine.jit import inline, kernel
 from engine.parallel import Options, Progress, check_options
 from engine.segment_clipping.clip_segments import SegmentPieces, clip_segments
 from engine.solids.base import Solid
-from engine.solids.ragged import as_lines
+from engine.solids.ragged import Ragged, as_lines
 from engine.types import Accuracy
 
 Joined = namedtuple("Joined", "vertices offsets source heads tails")
@@ -31,7 +31,7 @@ _AT_ONCE: Final = 1 << 20
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LinePieces:
+class LinePieces(Ragged):
     """The pieces of a batch of polylines within a region, by source and then along the line.
 
     source: (m,) int64, the line each piece is a part of.
@@ -42,6 +42,7 @@ class LinePieces:
     faces: (m, 2) int64, the plane or face crossed at either end, -1 where the end is the line's own.
     """
 
+    _levels: ClassVar[tuple[str, ...]] = ("vertices", "offsets")
     source: IntArray
     vertices: FloatArray
     offsets: IntArray

@@ -26,6 +26,7 @@ class Aabb(Solid):
     __slots__ = ("max", "min")
 
     type: ClassVar[str] = "aabb"
+    _pickled: ClassVar[tuple[str, ...]] = ("min", "max")
     min: FloatArray
     max: FloatArray
 

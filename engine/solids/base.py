@@ -88,6 +88,8 @@ class Solid(Preparing, Immutable):
     __slots__ = (*_RUNTIME, "dimension")
 
     dimension: int
+    _pickled: ClassVar[tuple[str, ...]] = ()
+    """The fields that a pickle holds: those that the constructor takes, unless `_restored` says otherwise."""
 
     def _set(self, **values: object) -> None:
         """Fill the fields, once; called at the end of each constructor, when every check has passed."""
@@ -111,24 +113,19 @@ class Solid(Preparing, Immutable):
         names = [name for owner in cls.__mro__ for name in getattr(owner, "__slots__", ())]
         return [name for name in names if name not in _RUNTIME]
 
-    def __reduce__(self) -> tuple[Callable[..., Solid], tuple[Any, dict[str, Any]]]:
-        return _restored, (self.__class__, {name: getattr(self, name) for name in self._fields()})
+    def __reduce__(self) -> tuple[Callable[..., Solid], tuple[Any, ...]]:
+        return type(self)._restored, tuple(getattr(self, name) for name in self._pickled)
+
+    @classmethod
+    def _restored(cls, *values: Any) -> Solid:
+        """Return the solid of a pickle, checked as any other: kernels read what offsets and indices say."""
+        return cls(*values)
 
     def __copy__(self) -> Solid:
         return self
 
     def __deepcopy__(self, _memo: object) -> Solid:
         return self
-
-
-def _restored(kind: Any, values: dict[str, Any]) -> Solid:
-    """Return the solid that was pickled: its checks passed when it was made, so they are not repeated."""
-    for value in values.values():
-        if isinstance(value, np.ndarray):
-            value.setflags(write=False)
-    solid: Solid = object.__new__(kind)
-    solid._set(**values)
-    return solid
 
 
 def _collect_arrays(start: object, found: dict[int, int], seen: set[int]) -> None:

@@ -16,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from engine.arrays import BoolArray, FloatArray
+from engine.arrays import BoolArray, FloatArray, IntArray, read_only
 from engine.budget import poll
 from engine.errors import EmptyGeometryError, InvalidArrayError, NotFiniteError, WrongDimensionError
 
@@ -161,7 +161,7 @@ def plain_floats(values: Any, depth: int) -> FloatArray | None:
             is_plain &= kinds <= {float, int} and min(items) >= -_FLOAT_INTEGERS and max(items) <= _FLOAT_INTEGERS
         if is_plain and items and kinds <= {float, int} and math.isfinite(sum(items)):
             return np.array(values, np.float64)
-    except (TypeError, ValueError):  # no lists, or of different lengths
+    except (TypeError, ValueError, NotImplementedError):  # no lists, of different lengths, views of several axes
         pass
     return None
 
@@ -293,3 +293,38 @@ def frozen(array: FloatArray) -> FloatArray:
             np.add(array[first : first + _AT_ONCE], 0.0, out=copy[first : first + _AT_ONCE])
     copy.setflags(write=False)
     return copy
+
+
+def as_offsets(offsets: object, n_items: int, where: Where) -> IntArray:
+    """Return `offsets`, whole numbers that never fall, from 0 or later up to `n_items` or earlier, as int64."""
+    try:
+        array = np.asarray(offsets)
+    except ValueError:  # ragged
+        array = np.array(None)
+    if array.ndim != 1 or array.dtype.kind not in "iu" or not len(array):
+        what = f"an array of dtype {array.dtype} and shape {array.shape}"
+        raise InvalidArrayError(
+            f"{spell(where)} must be whole numbers in one row, one more than items; got {what}", where
+        )
+    found = array.astype(np.int64, copy=False)
+    falls = np.flatnonzero(np.diff(found) < 0)
+    if len(falls):
+        place = (*where, int(falls[0]) + 1)
+        raise InvalidArrayError(f"{spell(place)} is {found[falls[0] + 1]}, less than the one before it", place)
+    if found[0] < 0 or found[-1] > n_items:
+        raise InvalidArrayError(
+            f"{spell(where)} go from {found[0]} to {found[-1]}, but there are {n_items} items", where
+        )
+    return found
+
+
+def as_nested_offsets(n_items: int, **levels: object) -> list[IntArray]:
+    """Return offsets, read-only: those of the first level divide all of `n_items`, those of each other the parts of the
+    level before it."""
+    checked = []
+    for name, offsets in levels.items():
+        checked.append(read_only(as_offsets(offsets, n_items, (name,))))
+        if checked[-1][0] != 0 or checked[-1][-1] != n_items:
+            raise InvalidArrayError(f"{name} must go from 0 to {n_items}, all items that there are", (name,))
+        n_items = len(checked[-1]) - 1
+    return checked

@@ -28,6 +28,7 @@ class Convex(Solid):
     __slots__ = ("planes",)
 
     type: ClassVar[str] = "convex"
+    _pickled: ClassVar[tuple[str, ...]] = ("planes",)
     planes: FloatArray
 
     def __init__(self, planes: object) -> None:

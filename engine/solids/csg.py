@@ -41,6 +41,7 @@ class Csg(Solid):
     __slots__ = ("depth", "n_leaves", "operands", "operation")
 
     type: ClassVar[str] = "csg"
+    _pickled: ClassVar[tuple[str, ...]] = ("operation", "operands")
     operation: str
     operands: tuple[Solid, ...]
     depth: int

@@ -26,6 +26,7 @@ class HalfSpace(Solid):
     __slots__ = ("normal", "offset", "row")
 
     type: ClassVar[str] = "half_space"
+    _pickled: ClassVar[tuple[str, ...]] = ("normal", "offset")
     normal: FloatArray
     offset: float
     row: FloatArray

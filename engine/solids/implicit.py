@@ -34,6 +34,7 @@ class Implicit(Solid):
     __slots__ = ("coefficients", "function", "powers")
 
     type: ClassVar[str] = "implicit"
+    _pickled: ClassVar[tuple[str, ...]] = ("powers", "coefficients", "function")
     powers: IntArray
     """``(n, dimension)``; no rows where `function` decides."""
     coefficients: FloatArray
@@ -80,6 +81,13 @@ class Implicit(Solid):
         powers, coefficients = read_only(np.zeros((0, dimension), np.int64)), frozen(np.zeros(0))
         solid._set(dimension=int(dimension), powers=powers, coefficients=coefficients, function=function)
         return solid
+
+    @classmethod
+    def _restored(cls, *values: Any) -> Implicit:
+        powers, coefficients, function = values
+        if function is not None:
+            return cls.from_callable(function, np.shape(powers)[-1])
+        return cls(powers=powers, coefficients=coefficients)
 
     def __repr__(self) -> str:
         what = "callable" if self.function is not None else f"{len(self.powers)} terms"

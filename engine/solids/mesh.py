@@ -8,7 +8,7 @@ without repeated positions, the common case, keeps one array for both.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import chain
+from itertools import chain, pairwise
 from typing import Any, ClassVar, Final
 
 import numpy as np
@@ -26,7 +26,7 @@ from engine.errors import (
     RingTooShortError,
 )
 from engine.solids.base import Solid
-from engine.solids.checks import as_points, check_not_empty, digits, frozen, shown
+from engine.solids.checks import as_nested_offsets, as_points, check_not_empty, digits, frozen, shown
 from engine.solids.ear_cutting import cut_faces
 from engine.solids.mesh_checks import look_over
 
@@ -45,6 +45,7 @@ class Mesh(Solid):
     face_indices: IntArray
     """The vertex indices of all faces as given, one face after another."""
     _must_close: ClassVar[bool] = False
+    _pickled: ClassVar[tuple[str, ...]] = ("vertices", "face_indices", "_face_offsets")
     _face_offsets: IntArray | None  # None: every face is a triangle
     _triangles: IntArray | None  # None: `face_indices`, three by three
     _triangle_faces: IntArray | None  # None: triangle i is face i
@@ -88,6 +89,14 @@ class Mesh(Solid):
             _triangles=None if triangles is indices else triangles,
             _triangle_faces=triangle_faces,
         )
+
+    @classmethod
+    def _restored(cls, *values: Any) -> Mesh:
+        vertices, indices, offsets = values
+        if offsets is None:
+            return cls(vertices, indices.reshape(-1, 3))
+        (offsets,) = as_nested_offsets(len(indices), face_offsets=offsets)
+        return cls(vertices, [indices[start:stop].tolist() for start, stop in pairwise(offsets.tolist())])
 
     @property
     def n_faces(self) -> int:

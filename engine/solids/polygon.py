@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import accumulate
-from typing import Any, ClassVar, cast
+from typing import Any, ClassVar, Final, cast
 
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
 from engine.errors import InvalidArrayError, RingTooShortError
 from engine.solids.base import Solid, T
-from engine.solids.checks import as_points, check_finite, check_not_empty, frozen, is_ready
+from engine.solids.checks import as_nested_offsets, as_points, check_finite, check_not_empty, frozen, is_ready
 
 _NO_VERTICES = np.zeros((0, 2))
+_LEAST: Final = 3
+"""Vertices of a ring, as it is stored: no kernel is handed one of fewer."""
 
 
 class Polygon(Solid):
@@ -35,6 +37,7 @@ class Polygon(Solid):
     __slots__ = ("ring_offsets", "vertices")
 
     type: ClassVar[str] = "polygon"
+    _pickled: ClassVar[tuple[str, ...]] = ("vertices", "ring_offsets")
     vertices: FloatArray
     """``(n, 2)``: the vertices of all rings, one ring after another; of two positions the last is there twice."""
     ring_offsets: IntArray
@@ -68,6 +71,15 @@ class Polygon(Solid):
         polygon = object.__new__(cls)
         polygon._set(dimension=2, vertices=vertices, ring_offsets=ring_offsets)
         return polygon
+
+    @classmethod
+    def _restored(cls, *values: Any) -> Polygon:
+        vertices = frozen(as_points(values[0], 2, ("vertices",)))
+        (offsets,) = as_nested_offsets(len(vertices), ring_offsets=values[1])
+        if len(short := np.flatnonzero(np.diff(offsets) < _LEAST)):
+            where = ("rings", int(short[0]))
+            raise RingTooShortError(f"rings[{where[1]}] has fewer than {_LEAST} vertices", where)
+        return cls.of_arrays(vertices, offsets)
 
     @property
     def n_rings(self) -> int:
@@ -103,4 +115,4 @@ def _as_ring(ring: object, where: tuple[str | int, ...]) -> FloatArray:
         raise RingTooShortError(f"rings[{where[-1]}] has {len(points)} vertices; a ring needs at least 2", where)
     if len(points) > 2 and points[0].tolist() == points[-1].tolist():
         points = points[:-1]
-    return points if len(points) > 2 else points[[0, 1, 1]]  # no kernel is handed a ring of fewer
+    return points if len(points) >= _LEAST else points[[0, 1, 1]]

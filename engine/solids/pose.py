@@ -64,7 +64,7 @@ class Pose(Immutable):
         if matrix.shape[0] != matrix.shape[1]:
             raise WrongDimensionError(f"rotation must be square, got shape {matrix.shape}", ("rotation",))
         limit = TOLERANCE
-        if tolerance != _TOLERANCE:
+        if type(tolerance) is not float or tolerance != _TOLERANCE:
             if not 0.0 <= as_number(tolerance, ("tolerance",)) <= MOST_TOLERANCE:
                 raise InvalidArrayError(
                     f"tolerance is {tolerance!r}; it must be from 0.0 to {MOST_TOLERANCE}", ("tolerance",)
@@ -131,7 +131,9 @@ class Pose(Immutable):
     @classmethod
     def of_checked(cls, rotation: FloatArray, translation: FloatArray) -> Pose:
         """Return the pose of arrays that `check_rotations` and the like have passed, copied."""
-        return _restored(rotation, translation)
+        pose = object.__new__(cls)
+        pose._set(read_only(rotation + 0.0), read_only(translation + 0.0))  # of -0.0: 0.0
+        return pose
 
     @property
     def dimension(self) -> int:
@@ -150,7 +152,7 @@ class Pose(Immutable):
         return hash(self.numbers)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _restored, (self.rotation, self.translation)
+        return Pose, (self.rotation, self.translation)
 
     def __repr__(self) -> str:
         return f"Pose(rotation={digits(self.rotation)}, translation={digits(self.translation)})"
@@ -176,13 +178,6 @@ def motions_of(poses: Sequence[Pose | None], dimension: int) -> tuple[FloatArray
 
 
 _IDENTITIES: Final = tuple(np.eye(d).tobytes() + np.zeros(d).tobytes() for d in (2, 3))
-
-
-def _restored(rotation: FloatArray, translation: FloatArray) -> Pose:
-    """Return the pose that was pickled, its arrays read-only again."""
-    pose = object.__new__(Pose)
-    pose._set(read_only(rotation + 0.0), read_only(translation + 0.0))  # of -0.0: 0.0
-    return pose
 
 
 def check_rotations(

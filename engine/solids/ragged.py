@@ -3,35 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import fields
 from itertools import chain, pairwise
-from typing import Any
+from typing import Any, ClassVar, cast
 
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, IntArray, read_only
 from engine.errors import EngineError, InvalidArrayError
-from engine.solids.checks import Where, as_point_groups, as_points, frozen, shown, spell
+from engine.solids.checks import Where, as_nested_offsets, as_offsets, as_point_groups, as_points, frozen, shown, spell
 from engine.solids.polygon import Polygon
 
 
-def as_offsets(offsets: object, n_items: int, where: Where) -> IntArray:
-    """Return `offsets`, whole numbers that never fall, from 0 or later up to `n_items` or earlier, as int64."""
-    array = np.asarray(offsets)
-    if array.ndim != 1 or array.dtype.kind not in "iu" or not len(array):
-        what = f"an array of dtype {array.dtype} and shape {array.shape}"
-        raise InvalidArrayError(
-            f"{spell(where)} must be whole numbers in one row, one more than items; got {what}", where
-        )
-    found = array.astype(np.int64, copy=False)
-    falls = np.flatnonzero(np.diff(found) < 0)
-    if len(falls):
-        place = (*where, int(falls[0]) + 1)
-        raise InvalidArrayError(f"{spell(place)} is {found[falls[0] + 1]}, less than the one before it", place)
-    if found[0] < 0 or found[-1] > n_items:
-        raise InvalidArrayError(
-            f"{spell(where)} go from {found[0]} to {found[-1]}, but there are {n_items} items", where
-        )
-    return found
+class Ragged:
+    """Base of results that are ragged arrays: a pickle of one is checked as it is read, since kernels, and whoever
+    goes by offsets, trust these."""
+
+    __slots__ = ()
+
+    _levels: ClassVar[tuple[str, ...]]
+    """The field of the items, then those of offsets, each into the one before."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self)._restored, tuple(getattr(self, each.name) for each in fields(cast(Any, self)))
+
+    @classmethod
+    def _restored(cls, *values: Any) -> Any:
+        made = cls(*values)
+        items, *levels = cls._levels
+        as_nested_offsets(len(getattr(made, items)), **{name: getattr(made, name) for name in levels})
+        return made
 
 
 def as_lines(lines: object, dimension: int) -> tuple[FloatArray, IntArray]:
@@ -65,7 +66,7 @@ def _joined(lines: list[Any] | tuple[Any, ...], dimension: int, where: Where) ->
         else:
             flat = list(chain.from_iterable(lines))
         return as_points(flat, dimension, where), offsets
-    except (EngineError, TypeError, ValueError):
+    except (EngineError, TypeError, ValueError, NotImplementedError):
         parts = [as_points(line, dimension, (*where, i_line)) for i_line, line in enumerate(lines)]
     return np.concatenate([np.zeros((0, dimension)), *parts]), np.cumsum([0, *map(len, parts)])
 

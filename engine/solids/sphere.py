@@ -24,6 +24,7 @@ class Sphere(Solid):
     __slots__ = ("center", "radius")
 
     type: ClassVar[str] = "sphere"
+    _pickled: ClassVar[tuple[str, ...]] = ("center", "radius")
     center: FloatArray
     radius: float
 

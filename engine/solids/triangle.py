@@ -26,6 +26,7 @@ class Triangle(Solid):
     __slots__ = ("vertices",)
 
     type: ClassVar[str] = "triangle"
+    _pickled: ClassVar[tuple[str, ...]] = ("vertices",)
     vertices: FloatArray
     ring_offsets: ClassVar[IntArray] = read_only(np.array([0, 3], np.int64))
     """Of the plane's: those of its one ring."""

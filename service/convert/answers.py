@@ -57,8 +57,8 @@ def from_accuracy(accuracy: engine.Accuracy) -> Accuracy:
     )
 
 
-def from_stored(name: str, solid: Solid) -> solids.StoredSolidSummary:
-    """Return what the store says of a solid."""
+def from_stored(name: str, solid: Solid, collapsed: int | None = None) -> solids.StoredSolidSummary:
+    """Return what the store says of a solid; collapsed: triangles that were left out of its file."""
     counts = {field: len(getattr(solid, field)) for field in ("planes", "powers", "operands") if hasattr(solid, field)}
     if isinstance(solid, engine.Polygon):
         counts["rings"] = len(solid.ring_offsets) - 1
@@ -71,6 +71,7 @@ def from_stored(name: str, solid: Solid) -> solids.StoredSolidSummary:
         vertices=len(solid.vertices) if hasattr(solid, "vertices") else None,
         faces=next(iter(counts.values()), None),
         memory=solid.memory,
+        collapsed=collapsed,
     )
 
 

@@ -61,10 +61,9 @@ def from_pieces(pieces: engine.SegmentPieces, n_segments: int, dimension: int, c
 Format = Literal["stl", "obj", "ply", "off", "glb"]
 
 
-def to_solid(octets: bytes | bytearray, kind: Format, solid_type: str, call: Call) -> engine.Solid:
-    """Return the polyhedron or surface in a file."""
+def to_solid(octets: bytes | bytearray, kind: Format, solid_type: str, call: Call) -> tuple[engine.Solid, int]:
+    """Return the polyhedron or surface in a file, and how many triangles are left out."""
     with call.phase("decode"):
-        vertices, faces = mesh_reader.read(octets, kind, call)
+        mesh = mesh_reader.read(octets, kind, call)
     with call.phase("prepare"):
-        make = engine.Polyhedron if solid_type == "polyhedron" else engine.Surface
-        return make(vertices, faces)
+        return mesh.solid(engine.Polyhedron if solid_type == "polyhedron" else engine.Surface), mesh.n_collapsed

@@ -204,6 +204,9 @@ class StoredSolidSummary(Schema):
     vertices: Count = left_out("Number of vertices, for solids that have them.")
     faces: Count = left_out("Number of faces, planes, rings, terms or operands, for solids that have them.")
     memory: Count = Field(description="Bytes its arrays hold.")
+    collapsed: Count = left_out(
+        "Triangles of a file that are left out: two of their corners have equal coordinates.", [248]
+    )
 
 
 CsgSolid.model_rebuild()

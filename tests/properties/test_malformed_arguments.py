@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import collections
 import contextlib
 import datetime
 import inspect
@@ -78,6 +79,36 @@ MALFORMED: dict[str, Any] = {
     "unsigned overflow": np.array([[2**64 - 1, 0, 1]], np.uint64),
     "structured": np.zeros(3, [("a", "f8")]),
     "solid": BOX,
+    "octets": bytearray(b"abcdefgh"),
+    "view of bytes": memoryview(b"abcdefgh"),
+    "views of bytes": [memoryview(b"abcdefgh")] * 2,
+    "view of numbers": memoryview(np.zeros((2, 3))),
+    "list of bytes": [b"ab", b"cd"],
+    "list of text": ["ab", "cd"],
+    "list of none": [None, None],
+    "list of solids": [BOX, POLYGON],
+    "list of sets": [{1, 2}, {3}],
+    "array in a tuple": (np.zeros((2, 3)), "x"),
+    "array and offsets": (np.zeros((2, 3)), np.array([0, 5])),
+    "object array": np.array([BOX, None], object),
+    "object without axes": np.array(None),
+    "text array": np.array(["a", "b"]),
+    "bytes array": np.array([b"a", b"b"]),
+    "one boolean": np.array(True),
+    "many booleans": np.ones(7, bool),
+    "huge integers": np.array([2**63, 2**64 - 1], np.uint64),
+    "huge objects": np.array([10**30], object),
+    "float32": np.float32(1.5),
+    "long double": np.array([1.5], np.longdouble),
+    "frozen set": frozenset({"a"}),
+    "mapping by number": {0: None, 10**30: 1},
+    "mapping of lists": {"type": [], "features": {}},
+    "collection": {"type": "FeatureCollection", "features": [None, 1, {"type": "Feature"}]},
+    "geometry": {"type": "Polygon", "coordinates": [[None]]},
+    "function": len,
+    "generator": (x for x in [1, 2]),
+    "deque": collections.deque([[0, 0, 0]]),
+    "exception": ValueError("x"),
 }
 
 CALLS: dict[str, Callable[[Any], object]] = {
@@ -156,10 +187,124 @@ OPTIONS: dict[str, Callable[..., object]] = {
     "Scene.locate": lambda **given: engine.Scene([BOX]).locate(POINT, **given),
     "Scene.collide": lambda **given: engine.Scene([BOX, BOX]).collide(**given),
     "Scene.clip_segments": lambda **given: engine.Scene([BOX]).clip_segments(SEGMENT, **given),
+    "compare": lambda **given: engine.compare("contains", POINT, BOX, **given),
+    "filled": lambda **given: engine.filled([[[0, 0], [1, 0], [0, 1]]], "positive", **given),
+    "Polyhedron": lambda **given: engine.Polyhedron(VERTICES, FACES, **given),
+    "Surface": lambda **given: engine.Surface(VERTICES, FACES, **given),
     "overlay_features": lambda **given: engine.layers.overlay_features(LAYER, LAYER, **given),
     "dissolve_features": lambda **given: engine.layers.dissolve_features(LAYER, **given),
     "locate_features": lambda **given: engine.layers.locate_features(NOTHING, LAYER, **given),
 }
+
+
+FLAGS = ("report", "boolean", "witness", "witnesses", "detail", "outside")
+POSE = engine.Pose.identity(3)
+POSES: dict[str, Any] = {"rotations": [np.eye(3)], "translations": [[0, 0, 0]]}
+PAIR: dict[str, Any] = {"first": BOX, "second": POLYHEDRON}
+SCENE = engine.Scene([BOX, POLYHEDRON])
+POINTS: dict[str, Any] = {"type": "FeatureCollection", "features": [
+    {"type": "Feature", "geometry": {"type": "Point", "coordinates": [0.5, 0.5]}, "properties": None}]}  # fmt: skip
+OFF = b"OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n"
+ASKED: dict[str, dict[str, Any]] = {
+    "Aabb": {"min": [0, 0], "max": [1, 1]},
+    "Convex": {"planes": [[1, 0, 0]]},
+    "Csg": {"operation": "union", "operands": [BOX]},
+    "HalfSpace": {"normal": [1, 0], "offset": 0},
+    "Implicit": {"terms": None, "powers": [[1, 0]], "coefficients": [1.0]},
+    "Implicit.from_callable": {"function": len, "dimension": 2},
+    "Polygon": {"rings": [[[0, 0], [1, 0], [0, 1]]]},
+    "Polyhedron": {"vertices": VERTICES, "faces": FACES},
+    "Pose": {"rotation": np.eye(3), "translation": [0, 0, 0], "tolerance": 1e-12},
+    "Pose.identity": {"dimension": 3},
+    "Pose.from_quaternion": {"quaternion": [1, 0, 0, 0], "translation": [0, 0, 0]},
+    "Pose.from_matrix": {"matrix": np.eye(4), "tolerance": 1e-12},
+    "Scene": {"solids": [BOX], "poses": [None]},
+    "Scene.moved": {"self": SCENE, "poses": {0: POSE}},
+    "Scene.locate": {"self": SCENE, "points": POINT},
+    "Scene.collide": {"self": SCENE, "moved": [1], "skip": None, "only": None, "gap": 0.5},
+    "Scene.clip_segments": {"self": SCENE, "segments": SEGMENT, "keep": "all"},
+    "Sphere": {"center": [0, 0], "radius": 1},
+    "Surface": {"vertices": VERTICES, "faces": FACES},
+    "Triangle": {"vertices": [[0, 0], [1, 0], [0, 1]]},
+    "bounds": {"solid": BOX},
+    "clearance": {**PAIR, "first_pose": POSE, "second_pose": POSE, "at_least": 0.5},
+    "clearance_poses": {**PAIR, **POSES, "at_least": 0.5},
+    "clip_lines": {"lines": [[[0, 0], [1, 1]]], "region": POLYGON},
+    "clip_polygons": {"polygons": [POLYGON], "region": engine.Aabb([0, 0], [1, 1])},
+    "clip_segments": {"segments": SEGMENT, "region": BOX},
+    "collide": {**PAIR, "first_pose": POSE, "second_pose": POSE},
+    "collide_poses": {**PAIR, **POSES},
+    "collide_scene": {"solids": [BOX, BOX], "poses": [None, POSE], "skip": None, "only": None, "gap": 0.5},
+    "collide_triangles": {"first": [VERTICES[:3]], "second": [VERTICES[:3]]},
+    "compare": {"operation": "contains", "arguments": POINT, "method": None},
+    "contains": {"points": POINT, "solid": BOX},
+    "filled": {"rings": [[[0, 0], [1, 0], [0, 1]]], "rule": "non_zero"},
+    "layers.dissolve_features": {"layer": LAYER, "by": ["a"]},
+    "layers.locate_features": {"points": POINTS, "polygons": LAYER},
+    "layers.overlay_features": {"left": LAYER, "right": LAYER, "how": "union"},
+    "layers.polygon_of": {"geometry": SQUARE},
+    "locate": {"points": POINT, "solid": BOX},
+    "locate_scene": {"points": POINT, "solids": [BOX], "poses": [None]},
+    "overlay": {"subject": POLYGON, "clip": POLYGON, "operation": "union", "output": "valid", "grid": None},
+    "overlay_batch": {"subjects": [POLYGON], "clips": [POLYGON], "operation": "union", "output": "valid"},
+    "polygons": {"coordinates": [[0, 0], [1, 0], [0, 1]], "ring_offsets": [0, 3], "polygon_offsets": [0, 1]},
+    "read_mesh": {"file": OFF, "file_format": "off"},
+    "union_all": {"polygons": [POLYGON], "output": "valid", "grid": None},
+}
+"""A good question of everything that is public, options left out that many have: those are below."""
+SHARED = {"workers", "deadline", "cancel", "progress", "report", *FLAGS, "others", "options"}
+ELSEWHERE = {"release", "warm", "layers.overlay", "layers.dissolve", "layers.sjoin", "layers.FeatureRows"}
+"""Without arguments; looked at below; of frames: tests/unit/layers/test_frames.py; an answer."""
+
+
+def asks(name: str) -> Callable[..., object]:
+    """Return a public function, or a constructor of a class, by the name under which it is public."""
+    found: Any = engine
+    for part in name.split("."):
+        found = getattr(found, part)
+    return found  # type: ignore[no-any-return]
+
+
+def test_everything_public_is_asked_with_all_its_arguments() -> None:
+    solids = {name for name in engine.__all__ if isinstance(asks(name), type) and issubclass(asks(name), engine.Solid)}
+    functions = {name for name in engine.__all__ if inspect.isfunction(asks(name))}
+    of_layers = {f"layers.{name}" for name in engine.layers.__all__}
+    assert (solids | functions | of_layers | {"Pose", "Scene"}) - {"Solid"} <= ASKED.keys() | ELSEWHERE
+    for name, given in ASKED.items():
+        assert set(inspect.signature(asks(name)).parameters) - SHARED == given.keys(), name
+
+
+PLACES = [(name, argument) for name, given in ASKED.items() for argument in given if argument != "self"]
+
+
+@pytest.mark.parametrize(("name", "argument"), PLACES, ids=map(".".join, PLACES))
+def test_any_value_of_any_argument_is_taken_or_refused(name: str, argument: str) -> None:
+    ask, given = asks(name), ASKED[name]
+    call = (lambda operation, arguments, method: engine.compare(operation, arguments, BOX, method=method)) if (
+        name == "compare"
+    ) else ask  # fmt: skip
+    call(**given)
+    for kind, value in MALFORMED.items():
+        bad = [value] if kind in ("generator", "one-tuple") else [value, [value], (value, value)]
+        for each in bad:
+            message = "taken"
+            try:
+                with np.errstate(all="ignore"):
+                    call(**{**given, argument: each})
+            except engine.EngineError as error:
+                message = str(error)
+            except Exception as error:
+                raise AssertionError(f"{kind}, {each!r:.60}: {type(error).__name__}: {error}") from error
+            assert 0 < len(message) < 700, kind
+
+
+def test_warm_looks_at_its_arguments_first() -> None:
+    for value in (None, "x", 0, -1, 1.5, True, [2], np.zeros(2)):
+        with pytest.raises(engine.InvalidInputError, match="processes must be"):
+            engine.warm(processes=value)  # type: ignore[arg-type]
+    for value in ("x", 1, [len]):
+        with pytest.raises(engine.InvalidInputError, match="progress must be"):
+            engine.warm(value)  # type: ignore[arg-type]
 
 
 def taken_by(name: str) -> set[str]:
@@ -169,7 +314,6 @@ def taken_by(name: str) -> set[str]:
     return set(inspect.signature(function).parameters)
 
 
-FLAGS = ("report", "boolean", "witness", "witnesses", "detail", "outside")
 FLAGGED = [(name, flag) for name, call in OPTIONS.items() for flag in FLAGS if flag in taken_by(name)]
 
 

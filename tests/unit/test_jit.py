@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import compileall
 import hashlib
 import importlib
 import os
@@ -11,6 +12,7 @@ import stat
 import subprocess
 import sys
 import tarfile
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -89,6 +91,14 @@ def run(project: Path, code: str = USE, **variables: str) -> list[str]:
     return output.split()
 
 
+def logged_run(project: Path, code: str = USE, **variables: str) -> tuple[list[str], str]:
+    """Return the words that a fresh process prints, and its log."""
+    process = start(project, f"import logging; logging.basicConfig(); {code}", **variables)
+    output, errors = process.communicate(timeout=120)
+    assert process.returncode == 0, errors
+    return output.split(), errors
+
+
 def test_a_changed_helper_elsewhere_is_noticed(project: Path) -> None:
     cache = {"ENGINE_CACHE_DIR": str(project / "cache")}
     assert run(project, **cache)[:2] == ["2.0", "0"]
@@ -98,14 +108,134 @@ def test_a_changed_helper_elsewhere_is_noticed(project: Path) -> None:
     assert run(project, **cache)[:2] == ["11.0", "0"]
 
 
+def edit_in_place(file: Path, text: str) -> None:
+    """Write a text of the same size, with the time of the one before: Python takes its bytecode for that of the new."""
+    status = file.stat()
+    assert len(text) == status.st_size
+    file.write_text(text)
+    os.utime(file, ns=(status.st_atime_ns, status.st_mtime_ns))
+
+
+def test_bytecode_of_another_source_leaves_no_kernel(project: Path) -> None:
+    cache, helper = {"ENGINE_CACHE_DIR": str(project / "cache")}, project / "engine" / "deep" / "helper.py"
+    for path in project.rglob("*.py"):
+        os.utime(path, (1, 1))
+    run(project, "import engine.work", PYTHONDONTWRITEBYTECODE="", **cache)
+    edit_in_place(helper, HELPER.format(step=2.0))
+    words, logged = logged_run(project, **cache)
+    assert words[:2] == ["2.0", "0"]  # as Python has it: the old code
+    assert logged.count("bytecode is not that of the source") == 1
+    shutil.rmtree(helper.parent / "__pycache__")
+    assert run(project, **cache)[:2] == ["3.0", "0"]
+    assert run(project, **cache)[:2] == ["3.0", "1"]
+
+
+def test_a_source_that_is_edited_while_it_runs_leaves_no_kernel(project: Path) -> None:
+    cache, helper = {"ENGINE_CACHE_DIR": str(project / "cache")}, project / "engine" / "deep" / "helper.py"
+    edit = f"import engine.work; open({str(helper)!r}, 'w').write({HELPER.format(step=5.0)!r}); {USE}"
+    words, logged = logged_run(project, edit, **cache)
+    assert words[:2] == ["2.0", "0"]
+    assert logged.count("has changed since it was imported") == 1
+    assert run(project, **cache)[:2] == ["6.0", "0"]
+    assert run(project, **cache)[:2] == ["6.0", "1"]
+
+
+def zipped(project: Path) -> Path:
+    """Return the zip file of the project's sources as they are."""
+    (project / "lib.zip").unlink(missing_ok=True)
+    with zipfile.ZipFile(project / "lib.zip", "w") as file:
+        for path in (project / "engine").rglob("*.py"):
+            file.write(path, path.relative_to(project))
+    return project / "lib.zip"
+
+
+def test_an_engine_in_a_zip_file_is_kept_by_its_sources(project: Path) -> None:
+    cache = {"ENGINE_CACHE_DIR": str(project / "cache"), "PYTHONPATH": str(zipped(project)), "PYTHONSAFEPATH": "1"}
+    assert run(project, **cache)[:2] == ["2.0", "0"]
+    assert run(project, **cache)[:2] == ["2.0", "1"]
+    (project / "engine" / "deep" / "helper.py").write_text(HELPER.format(step=10.0))
+    zipped(project)
+    assert run(project, **cache)[:2] == ["11.0", "0"]
+    assert run(project, **cache)[:2] == ["11.0", "1"]
+
+
+def test_an_engine_without_sources_is_never_kept(project: Path) -> None:
+    cache, bare = {"ENGINE_CACHE_DIR": str(project / "cache"), "PYTHONSAFEPATH": "1"}, project / "bare"
+    for step, expected in ((1.0, "2.0"), (10.0, "11.0")):
+        (project / "engine" / "deep" / "helper.py").write_text(HELPER.format(step=step))
+        shutil.rmtree(bare, ignore_errors=True)
+        shutil.copytree(project / "engine", bare / "engine", ignore=shutil.ignore_patterns("__pycache__"))
+        assert compileall.compile_dir(bare, legacy=True, quiet=1)
+        for path in bare.rglob("*.py"):
+            path.unlink()
+        words, logged = logged_run(project, PYTHONPATH=str(bare), **cache)
+        assert words[:2] == [expected, "0"]
+        assert logged.count("a source cannot be read") == 1
+    assert not list((project / "cache").rglob("*.nbc"))
+
+
+def test_files_that_were_swapped_are_noticed(project: Path) -> None:
+    cache = {"ENGINE_CACHE_DIR": str(project / "cache")}
+    both = "from engine.work import run; print(run(1.0), run(1j), sum(run.dispatcher.stats.cache_hits.values()))"
+    assert run(project, both, **cache) == ["2.0", "(1+1j)", "0"]
+    one, other = (project / "cache").rglob("*.nbc")
+    for source, target in ((one, "aside"), (other, one.name), (one.with_name("aside"), other.name)):
+        source.rename(source.with_name(target))
+    words, logged = logged_run(project, both, **cache)
+    assert words == ["2.0", "(1+1j)", "0"]
+    assert logged.count("is damaged, or another file") == 2
+    assert run(project, both, **cache) == ["2.0", "(1+1j)", "2"]
+
+
+OTHERS = [
+    pytest.param(what, mode, owner, id=f"{what}-{mode:o}-{owner}")
+    for what in ("cache", "folder", "file")
+    for mode, owner in ((0o777, None), (0o775, None), (0o664, None), (0o644, 12345))
+    if what == "file" or mode != 0o664
+]
+
+
+@pytest.mark.parametrize(("what", "mode", "owner"), OTHERS)
+def test_what_others_can_write_is_not_loaded(project: Path, what: str, mode: int, owner: int | None) -> None:
+    if owner is not None and os.getuid():
+        pytest.skip("only root gives files away")
+    cache = {"ENGINE_CACHE_DIR": str(project / "cache")}
+    run(project, **cache)
+    (file,) = (project / "cache").rglob("*.nbc")
+    changed = {"cache": project / "cache", "folder": file.parent, "file": file}[what]
+    changed.chmod(mode if changed == file else mode | 0o111)
+    if owner is not None:
+        os.chown(changed, owner, owner)
+    words, logged = logged_run(project, **cache)
+    assert words[:2] == ["2.0", "0"]
+    assert logged.count("not used") == logged.count("chmod go-w") == 1
+    if what == "file":  # replaced by one of our own
+        assert run(project, **cache)[:2] == ["2.0", "1"]
+
+
+def test_a_seed_can_be_read_by_users_of_an_image(project: Path) -> None:
+    (project / "seed").mkdir(mode=0o755)
+    run(project, f"import os; os.umask(0o022); {USE}", ENGINE_CACHE_DIR=str(project / "seed"))
+    for path in (project / "seed").rglob("*"):
+        assert stat.S_IMODE(path.stat().st_mode) == (0o755 if path.is_dir() else 0o644)
+
+
+def test_where_new_files_are_the_group_s_to_write_the_cache_is_ours_all_the_same(project: Path) -> None:
+    cache = {"ENGINE_CACHE_DIR": str(project / "cache")}
+    for hits in ("0", "1"):
+        assert run(project, f"import os; os.umask(0o002); {USE}", **cache)[:2] == ["2.0", hits]
+
+
 def test_the_digest_covers_what_is_imported_and_nothing_else(project: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def digests() -> tuple[str, str]:
         kernel_cache.read_source.cache_clear()
+        kernel_cache._AT_IMPORT.clear()
         return kernel_cache.source_digest.__wrapped__("engine.work"), kernel_cache.source_digest.__wrapped__(
             "engine.deep.helper"
         )
 
     monkeypatch.setattr(kernel_cache, "_ROOT", project / "engine")
+    monkeypatch.setattr(kernel_cache, "_AT_IMPORT", {})
     before = digests()
     (project / "engine" / "other.py").write_text("x = 1\n")
     assert digests() == before
@@ -157,7 +287,10 @@ def test_without_any_writable_place_it_runs_uncached(project: Path) -> None:
 def test_a_folder_of_another_user_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert kernel_cache._is_writable(tmp_path / "own")
     assert stat.S_IMODE((tmp_path / "own").stat().st_mode) == 0o700
-    monkeypatch.setattr(os, "getuid", lambda: (tmp_path / "own").stat().st_uid + 1)
+    if os.getuid():
+        monkeypatch.setattr(os, "getuid", lambda: (tmp_path / "own").stat().st_uid + 1)
+    else:  # what is root's is everybody's to load
+        os.chown(tmp_path / "own", 12345, 12345)
     assert not kernel_cache._is_writable(tmp_path / "own")
 
 
@@ -181,10 +314,13 @@ def seed(project: Path, made_seed: Path) -> Path:
 def started(project: Path, seed: Path, **more: str) -> tuple[list[str], str]:
     """Return the words of a process that has an empty cache and this seed, and its log."""
     cache = {"ENGINE_CACHE_DIR": str(project / "cache"), "ENGINE_CACHE_SEED": str(seed), **more}
-    process = start(project, f"import logging; logging.basicConfig(); {USE}", **cache)
-    output, errors = process.communicate(timeout=120)
-    assert process.returncode == 0, errors
-    return output.split(), errors
+    return logged_run(project, **cache)
+
+
+def test_an_archive_is_unpacked_where_new_files_are_the_group_s_to_write(project: Path, seed: Path) -> None:
+    use = f"import os; os.umask(0o002); {USE}"
+    cache = {"ENGINE_CACHE_DIR": str(project / "cache"), "ENGINE_CACHE_SEED": f"{seed}.tar.xz"}
+    assert run(project, use, **cache)[:2] == ["2.0", "1"]
 
 
 @pytest.mark.parametrize("kind", ["folder", "archive"])

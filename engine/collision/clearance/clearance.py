@@ -21,6 +21,7 @@ from engine.collision.result import Clearance, Poses, Work
 from engine.errors import InvalidInputError
 from engine.parallel import Options, Progress, check_options
 from engine.solids.base import Solid
+from engine.solids.checks import shown
 from engine.solids.pose import Pose
 from engine.types import Accuracy, Relation
 
@@ -114,7 +115,7 @@ def checked_distance(value: Any, name: str = "at_least") -> float:
     except (TypeError, ValueError, OverflowError):
         number = -1.0
     if isinstance(value, (bool, str)) or not 0.0 <= number < float("inf"):
-        raise InvalidInputError(f"{name} must be a distance, finite and 0 or more, got {value!r}", (name,))
+        raise InvalidInputError(f"{name} must be a distance, finite and 0 or more, got {shown(value)}", (name,))
     return number
 
 

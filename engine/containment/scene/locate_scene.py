@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Final, Literal, Unpack, overload
+from typing import ClassVar, Final, Literal, Unpack, overload
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from engine.parallel import Options, Progress, check_options, run_chunks
 from engine.solids.base import Solid
 from engine.solids.checks import as_points
 from engine.solids.pose import Pose
+from engine.solids.ragged import Ragged
 from engine.types import Accuracy
 
 _MOST_PAIRS: Final = 1 << 23
@@ -36,9 +37,10 @@ _MOST_IN_BLOCK: Final = 1 << 16
 
 
 @dataclass(frozen=True, slots=True)
-class SceneLocations:
+class SceneLocations(Ragged):
     """The bodies that hold each point: those of point i are ``indices[offsets[i]:offsets[i + 1]]``, ascending."""
 
+    _levels: ClassVar[tuple[str, ...]] = ("indices", "offsets")
     offsets: IntArray
     """``(n_points + 1,)`` int64."""
     indices: IntArray

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import warnings
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
 
 import engine
+from engine.budget import Budget
 from engine.errors import InvalidInputError, InvalidOperationError, NotFiniteError, UnsupportedSolidError
 from engine.layers.rows import HOWS
+from engine.polygon_overlay.touching import collapsed
 from tests.unit.layers.cells import Cells, layer, runs
 
 geopandas = pytest.importorskip("geopandas")
@@ -69,6 +73,99 @@ def by_kind(geometry: Any) -> list[Any]:
     return [shapely.union_all([part for part in parts if part.geom_type == kind] or None) for kind in KINDS]
 
 
+SLIVER = [[0.2, 0.2], [0.6000000000000001, 0.2], [0.8, 0.6000000000000001]]
+BESIDE = [[0.30000000000000004, 0.4], [0.5, 0.4], [0.5, 0.5], [0.30000000000000004, 0.5]]
+LEFT, RIGHT = (shapely.box(*corners) for corners in ((0, 0, 1, 4), (1, 0, 2, 4)))
+
+
+def one(*shapes: Any) -> Any:
+    return geopandas.GeoDataFrame({"n": range(len(shapes))}, geometry=list(shapes))
+
+
+@pytest.mark.parametrize("how", HOWS)
+def test_an_area_that_rounding_takes_is_a_row_as_one_that_touches(how: str) -> None:
+    left, right = one(shapely.Polygon(SLIVER)), one(shapely.Polygon(BESIDE))
+    of_pairs, of_left, of_right = HOWS[how]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = engine.layers.overlay(left, right, how, keep_geom_type=False)
+    assert len(found) == of_pairs + of_left + of_right
+    assert not of_pairs or found.geometry[0].equals(shapely.Point(0.5, 0.4))
+    if of_pairs:
+        with pytest.warns(UserWarning, match="left nothing of 1 rows"):
+            rows = engine.layers.overlay(left, right, how, keep_geom_type=True)
+        assert len(rows) == of_left + of_right
+
+
+def test_whoever_meets_makes_a_row() -> None:
+    """Triangles of tenths: corners that are not quite on edges, by less than a coordinate can say."""
+    source = np.random.default_rng(11)
+    triangles = [[shapely.Polygon(ring) for ring in source.integers(0, 9, (60, 3, 2)) / 10] for _ in range(2)]
+    left, right = ([each for each in some if each.area > 0.001] for some in triangles)
+    found = engine.layers.overlay(one(*left), one(*right), keep_geom_type=False)
+    expected = [
+        [i, k]
+        for i, first in enumerate(left)
+        for k, second in enumerate(right)
+        if engine.collide(engine.Polygon(first), engine.Polygon(second)).relation != engine.Relation.DISJOINT
+    ]
+    assert found[["n_1", "n_2"]].to_numpy().tolist() == expected
+    kinds = {geometry.geom_type for geometry in found.geometry}
+    assert {"Point", "LineString", "Polygon"} <= kinds
+    for i, k, geometry in found.itertuples(index=False):
+        corners = shapely.points(shapely.get_coordinates(geometry))
+        assert max(shapely.distance(side, corners).max() for side in (left[i], right[k])) < 1e-15
+    with pytest.warns(UserWarning, match="rounding left nothing of"):
+        engine.layers.overlay(one(*left), one(*right), keep_geom_type=True)
+
+
+def test_what_rounding_leaves_of_rings_are_lines_that_end_where_lines_meet() -> None:
+    budget = Budget()
+    back = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (3.0, 1.0), (1.0, 1.0), (1.0, 0.0)]
+    star = [(0.0, 0.0), (2.0, 0.0), (0.0, 0.0), (0.0, 2.0), (0.0, 0.0), (-2.0, 0.0)]
+    made = collapsed([(3, back), (4, star), (7, [(5.0, 5.0)] * 3), (8, [(0.0, 0.0), (2.0, 2.0), (1.0, 1.0)])], budget)
+    lines = [made.vertices[start:stop].tolist() for start, stop in pairwise(made.offsets)]
+    assert made.lines.tolist() == [3, 4, 4, 4, 8]
+    assert lines[0] == [[0, 0], [1, 0], [1, 1], [3, 1]]
+    assert all(len(line) == 2 for line in lines[1:4])
+    assert lines[4] == [[0, 0], [1, 1], [2, 2]]
+    assert (made.points.tolist(), made.places.tolist()) == ([7], [[5, 5]])
+    ring = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]
+    assert len(collapsed([(0, ring)], budget).vertices) == 4
+
+
+@pytest.mark.parametrize(
+    ("function", "options"),
+    [
+        *[("overlay", option) for option in ({"grid_size": 1.0}, {"make_valid": True}, {"keep_geom_type": "no"})],
+        *[("dissolve", option) for option in ({"grid_size": 10}, {"method": "unary"}, {"x": 1}, {"by": "absent"})],
+        *[("dissolve", option) for option in ({"aggfunc": 3}, {"level": 9}, {"aggfunc": "no such"})],
+        *[("sjoin", option) for option in ({"predicate": "within"}, {"lsuffix": "l"}, {"how": "right"}, {"how": [1]})],
+    ],
+)
+def test_an_option_that_is_not_ours_is_refused_by_name(function: str, options: Any) -> None:
+    """Passed on to geopandas, a grid_size lost members of groups without a word."""
+    given = one(LEFT, RIGHT)
+    sides = {"overlay": [given, given], "dissolve": [given], "sjoin": [one(shapely.Point(1, 1)), given]}[function]
+    with pytest.raises(InvalidInputError, match="|".join([*options, "absent", "no such"])):
+        getattr(engine.layers, function)(*sides, **options)
+
+
+@pytest.mark.parametrize("value", [None, "x", 3, [], {}, np.zeros(3), shapely.box(0, 0, 1, 1), object()])
+def test_what_is_no_layer_is_refused(value: Any) -> None:
+    given, pandas = one(LEFT), pytest.importorskip("pandas")
+    for bad in (value, pandas.DataFrame({"a": [1]}), geopandas.GeoDataFrame({"a": [1]})):
+        for call in (
+            lambda bad=bad: engine.layers.overlay(bad, given),
+            lambda bad=bad: engine.layers.overlay(given, bad),
+            lambda bad=bad: engine.layers.dissolve(bad),
+            lambda bad=bad: engine.layers.sjoin(bad, given),
+            lambda bad=bad: engine.layers.sjoin(one(shapely.Point(1, 1)), bad),
+        ):
+            with pytest.raises(InvalidInputError, match="must be a GeoDataFrame"):
+                call()
+
+
 def test_what_is_dropped_is_said() -> None:
     left, right = frame(0, "abc"), frame(1, "xyz")
     with pytest.warns(UserWarning, match="without geometry"):
@@ -92,7 +189,12 @@ def test_parts_that_overlap_are_united() -> None:
 
 
 @pytest.mark.parametrize(
-    "options", [{"by": "c"}, {}, {"by": ["c", "n"], "as_index": False}, {"by": "a", "sort": False}]
+    "options",
+    [
+        *({"by": "c"}, {}, {"by": ["c", "n"], "as_index": False}, {"by": "a", "sort": False}, {"level": 0}),
+        *({"by": "c", "aggfunc": "sum", "numeric_only": True}, {"by": "a", "dropna": False, "observed": True}),
+        {"by": "c", "aggfunc": {"n": "max", "b": "sum"}},
+    ],
 )
 def test_dissolve_is_that_of_geopandas(options: Any) -> None:
     given = frame(3, "abc").rename_geometry("shape")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import random
+import re
 from typing import Any
 
 import httpx
@@ -14,6 +15,7 @@ from fastapi import FastAPI
 import engine
 from service.app import create_app
 from service.settings import Settings
+from tests.unit.files.soups import FAR, ball, binary, has_equal
 from tests.unit.service.asking import SPHERE, check_problem, client_of
 
 pytestmark = pytest.mark.anyio
@@ -113,6 +115,26 @@ async def test_every_format_of_a_mesh_is_the_same_solid(client: httpx.AsyncClien
         if "stl" not in kind:
             names.add(answer.json()["id"])
     assert len(names) == 1
+
+
+async def test_triangles_that_equal_corners_collapse_are_left_out_and_counted(client: httpx.AsyncClient) -> None:
+    pytest.importorskip("trimesh", reason="the extra 'formats' is not installed")
+    corners = 3 * ball(56) + FAR
+    answer = await send(client, "/v1/solids/import?format=stl", binary(corners))
+    n_lost = int(has_equal(corners).sum())
+    assert n_lost > 100
+    assert answer.status_code == 201, answer.text
+    assert (answer.json()["collapsed"], answer.json()["faces"]) == (n_lost, len(corners) - n_lost)
+    assert "collapsed" not in (await client.get(f"/v1/solids/{answer.json()['id']}")).json()
+    assert "collapsed" not in (await send(client, "/v1/solids/import?format=stl", binary(ball(8)))).json()
+    turned = corners.copy()
+    face = int(np.flatnonzero(~has_equal(corners))[-1])
+    turned[face] = turned[face, ::-1]
+    problem = (await send(client, "/v1/solids/import?format=stl", binary(turned))).json()
+    assert problem["code"] == "inconsistent_orientation"
+    named = re.findall(r"an edge of face (\d+), from", problem["detail"])
+    assert named
+    assert not has_equal(corners)[[int(place) for place in named]].any()
 
 
 async def test_meshes_are_checked(client: httpx.AsyncClient) -> None:

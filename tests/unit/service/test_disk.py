@@ -11,12 +11,13 @@ import threading
 import time
 from multiprocessing.connection import Connection
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import engine
-from service import mesh_reader
+from service import disk, mesh_reader
 from service.disk import Folder
 from service.errors import ServiceError
 from service.store import Store, solid_id
@@ -61,6 +62,49 @@ def test_damaged_files_are_never_served(tmp_path: Path, caplog: pytest.LogCaptur
             served += 1  # bytes that mean nothing, such as times in the archive
             assert solid_id(found) == name
     assert served < 150
+
+
+class Torus(engine.Solid):
+    """A type that the service knows nothing of."""
+
+    __slots__ = ()
+    type = "torus"
+
+    def __init__(self) -> None:
+        self._set(dimension=3)
+
+
+BEHIND = {
+    "alone": lambda solid: solid,
+    "operand": lambda solid: engine.Csg("union", [sphere(0), solid]),
+    "body": lambda solid: engine.Scene([sphere(0), solid]),
+}
+
+
+@pytest.mark.parametrize("has_folder", [True, False])
+@pytest.mark.parametrize("behind", BEHIND.values(), ids=BEHIND.keys())
+def test_a_type_without_a_codec_is_refused_by_name(tmp_path: Path, behind: Any, has_folder: bool) -> None:
+    store = Store(10**6, tmp_path if has_folder else None)
+    with pytest.raises(ServiceError, match="type 'torus'; send it with each request") as caught:
+        store.put(behind(Torus()))
+    assert caught.value.code == "unsupported_solid"
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("behind", BEHIND.values(), ids=BEHIND.keys())
+def test_a_file_of_another_version_is_refused_and_stays(
+    tmp_path: Path, behind: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Replicas of two versions share a folder: what the older one cannot read is no damage."""
+    with monkeypatch.context() as later:
+        later.setitem(disk.CODECS, "torus", disk.Codec((), Torus))
+        name, _ = Store(10**6, tmp_path).put(behind(Torus()))
+    store = Store(10**6, tmp_path)
+    for get in (store.get, store.get_scene):
+        with pytest.raises(ServiceError, match="type 'torus'") as caught:
+            get(name)
+        assert caught.value.code == "unsupported_solid"
+    assert (tmp_path / name).exists()
 
 
 def test_a_file_under_another_name_is_not_served(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

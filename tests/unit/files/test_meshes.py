@@ -1,0 +1,108 @@
+"""What a mesh file holds: equal corners become one, what that collapses is left out, errors speak of the file."""
+
+from __future__ import annotations
+
+import io
+import pickle
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+
+import engine
+from engine.__main__ import main
+from tests.unit.files.soups import FAR, ascii_stl, ball, binary, has_equal, obj
+
+trimesh = pytest.importorskip("trimesh", reason="the extra `formats` is not installed")
+
+
+WRITERS = {"stl": binary, "stl ascii": ascii_stl, "obj": obj}
+written = pytest.mark.parametrize("kind", WRITERS)
+
+
+def read(kind: str, corners: Any) -> Any:
+    return engine.read_mesh(WRITERS[kind](corners), kind.partition(" ")[0])
+
+
+@written
+def test_a_ball_of_surveyors_coordinates_in_single_precision(kind: str) -> None:
+    """At 448 km two numbers are 3 cm apart: triangles of a ball of 3 m have corners in one place."""
+    corners = 3 * ball(56) + FAR
+    lost = has_equal(corners)
+    assert 0 < lost.sum() < len(corners) / 3
+    mesh = read(kind, corners)
+    assert mesh.n_collapsed == lost.sum()
+    assert mesh.faces_in_file.tolist() == np.flatnonzero(~lost).tolist()
+    for solid in (engine.Polyhedron(*mesh), mesh.solid(), mesh.solid(engine.Surface)):
+        assert solid.n_faces == len(corners) - lost.sum()
+    assert engine.contains([FAR], mesh.solid()).all()
+    again = pickle.loads(pickle.dumps(mesh))
+    assert (again.n_collapsed, again.faces_in_file.tolist()) == (mesh.n_collapsed, mesh.faces_in_file.tolist())
+
+
+@written
+def test_errors_name_faces_as_the_file_has_them(kind: str) -> None:
+    corners = 3 * ball(56) + FAR
+    lost = np.flatnonzero(has_equal(corners))
+    face = int(np.flatnonzero(~has_equal(corners))[-1])
+    assert face > lost[0] + 100
+    turned = corners.copy()
+    turned[face] = turned[face, ::-1]
+    with pytest.raises(engine.InconsistentOrientationError) as caught:
+        read(kind, turned).solid()
+    named = caught.value.where[1]
+    assert not has_equal(corners[named : named + 1])[0]
+    assert f"of face {named}, from" in caught.value.message
+    shared = [(corner == turned[face].astype(np.float32)).all(axis=1).any() for corner in
+              np.asarray(turned[named], np.float32)]  # fmt: skip
+    assert sum(shared) >= 2  # the face itself, or one beside it
+    assert str(caught.value) == caught.value.message
+
+
+def test_of_triangles_without_numbers_no_number_of_a_vertex_is_said() -> None:
+    corners = 3 * ball(56) + FAR
+    with pytest.raises(engine.NotClosedError, match="open: an edge of face 5, from") as caught:
+        read("stl", corners[:101]).solid()
+    assert re.search(r"edge \d", caught.value.message) is None
+    corners[77, 1, 2] = np.nan
+    with pytest.raises(engine.NotFiniteError, match="face 77, corner 1"):
+        read("stl", corners).solid()
+
+
+def test_a_triangle_that_names_a_vertex_twice_is_refused_as_it_was() -> None:
+    text = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 0 0 1\nf 4 5 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\nf 1 1 2\n"
+    mesh = engine.read_mesh(text, "obj")
+    assert mesh.n_collapsed == 1
+    with pytest.raises(engine.RepeatedIndexError, match=r"faces\[5\]"):
+        mesh.solid()
+
+
+def test_where_everything_collapses_it_is_said() -> None:
+    with pytest.raises(engine.EmptyGeometryError, match="all triangles of the stl file have two equal corners"):
+        read("stl", np.zeros((5, 3, 3)))
+
+
+def test_bytes_and_open_files_are_taken_and_nothing_else() -> None:
+    octets = binary(ball(8))
+    for given in (octets, bytearray(octets), memoryview(octets), io.BytesIO(octets)):
+        assert len(engine.read_mesh(given, "stl").faces) == len(ball(8))
+    for bad in (None, "ball.stl", 3, [octets], np.zeros(3), b""):
+        with pytest.raises(engine.InvalidInputError):
+            engine.read_mesh(bad, "stl")  # type: ignore[arg-type]
+    for bad in (None, b"stl", ["stl"], np.zeros(3), {}):
+        with pytest.raises(engine.InvalidInputError, match="format must be one of"):
+            engine.read_mesh(octets, bad)  # type: ignore[arg-type]
+
+
+def test_the_command_line_says_how_many_are_left_out(tmp_path: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    corners = 3 * ball(56) + FAR
+    (tmp_path / "ball.stl").write_bytes(binary(corners))
+    (tmp_path / "p.csv").write_text("448262,5411932,150\n")
+    arguments = ["contains", str(tmp_path / "ball.stl"), str(tmp_path / "p.csv")]
+    assert main(arguments) == 0
+    found = capsys.readouterr()
+    assert found.out.split() == ["location", "inside"]
+    assert f"ball.stl: {has_equal(corners).sum()} triangles have two equal corners and are left out" in found.err
+    assert main([*arguments, "--quiet"]) == 0
+    assert not capsys.readouterr().err
