@@ -2,20 +2,24 @@
 
     python -m benchmarks soak                # an hour
     python -m benchmarks soak --minutes 2
+    python -m benchmarks soak --each         # each attack alone, then eight of it at once: a table
 
 Loopback only; the clients share the cores with the service. Small questions (points, segments, a pair, an overlay) come
-evenly, `--rate` a second; one question in ten is a hostile body of tests/contract/test_memory.py, at most 2 MB and
-wanting far more, two at a time at most. Every minute says what was answered, how long small questions took, and what
-the service holds.
+evenly, `--rate` a second, and their answers are compared with the first; one question in ten is hostile: a body of
+tests/contract/test_memory.py, at most 2 MB and wanting far more, or an attack of tests/contract/attacks.py, two at a
+time at most. Every minute says what was answered, how long small questions took, and the memory of the service.
 """
 
 from __future__ import annotations
 
 import argparse
+import signal
 import threading
 import time
 from collections import Counter
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager, suppress
 from itertools import count, cycle
 from typing import Any
 
@@ -33,80 +37,190 @@ SMALL: dict[str, dict[str, Any]] = {
     "/v1/overlay": {"subject": SQUARE, "clip": OTHER, "operation": "union"},
 }
 ALLOWED = {503, 504}
+SETTINGS: dict[str, object] = {
+    "deadline_seconds": 2, "request_bytes": 2**28, "store_bytes": 2**24, "access_log": False, "drain_seconds": 3,
+}  # fmt: skip
+Send = Callable[[int], list[int]]
 
 
-def ask_small(port: int, seconds: float, rate: float) -> tuple[Counter[int], list[float]]:
-    """Ask small questions in turn, so many a second; return the statuses, and the seconds each took."""
-    messages = cycle([request(path, orjson.dumps(body)) for path, body in SMALL.items()])
-    connection, statuses, took = Connection(port), Counter[int](), []
+def ask_small(port: int, seconds: float, rate: float) -> tuple[Counter[int], list[float], int]:
+    """Ask small questions in turn, so many a second; return the statuses, the seconds each took, and how many answers
+    differ from the first to the same question."""
+    messages = [request(path, orjson.dumps(body)) for path, body in SMALL.items()]
+    connection, statuses, took, wrong = Connection(port), Counter[int](), [], 0
+    first: dict[bytes, bytes] = {}
     begin = time.perf_counter()
-    for turn in range(int(seconds * rate)):
+    for turn, message in zip(range(int(seconds * rate)), cycle(messages)):
         time.sleep(max(0.0, begin + turn / rate - time.perf_counter()))
         before = time.perf_counter()
-        statuses[connection.ask(next(messages))[0]] += 1
+        status, answer = connection.ask(message)
         took.append(time.perf_counter() - before)
-    return statuses, took
+        statuses[status] += 1
+        if status == 200:
+            wrong += first.setdefault(message, answer) != answer
+    return statuses, took, wrong
 
 
-def ask_hostile(port: int, end: float, rate: float, statuses: Counter[int]) -> None:
-    """Send hostile bodies in turn, so many a second and two at a time at most, until the clock says `end`."""
-    from tests.contract.test_memory import bodies  # what they are is the test's matter
+def hostile_sends() -> list[Send]:
+    """Return everything hostile that the tests send."""
+    from tests.contract.attacks import all_attacks  # what they are is the tests' matter
+    from tests.contract.test_memory import bodies
 
-    messages = []
+    def sending(message: bytes) -> Send:
+        return lambda port: [Connection(port).ask(message)[0]]
+
+    sends = [attack.send for attack in all_attacks()]
     for path, body, headers in bodies():
         if "{" not in path:
-            message = request(f"/v1/{path}", body)
             lines = "".join(f"{name}: {value}\r\n" for name, value in headers.items())
-            messages.append(message.replace(b"\r\n\r\n", b"\r\n" + lines.encode() + b"\r\n", 1))
-    turns, lock, begin = count(), threading.Lock(), time.perf_counter()
+            message = request(f"/v1/{path}", body).replace(b"\r\n\r\n", b"\r\n" + lines.encode() + b"\r\n", 1)
+            sends.append(sending(message))
+    return sends
+
+
+def send_hostile(port: int, seconds: float, rate: float) -> Counter[int]:
+    """Send what is hostile in turn, so many a second and two at a time at most; return the statuses."""
+    sends, turns, lock, statuses = hostile_sends(), count(), threading.Lock(), Counter[int]()
+    begin = time.perf_counter()
 
     def loop() -> None:
-        connection = Connection(port)
-        while time.perf_counter() < end:
+        while time.perf_counter() < begin + seconds:
             with lock:
                 turn = next(turns)
             time.sleep(max(0.0, begin + turn / rate - time.perf_counter()))
             try:
-                status = connection.ask(messages[turn % len(messages)])[0]
+                found = sends[turn % len(sends)](port)
             except OSError:
-                connection.close()
-                status = 0
+                found = [0]
             with lock:
-                statuses[status] += 1
+                statuses.update(found)
 
     with ThreadPoolExecutor(2) as pool:
         for client in [pool.submit(loop) for _ in range(2)]:
             client.result()
+    return statuses
+
+
+class Watch:
+    """The longest wait for /healthz, and the most memory, while something else happens."""
+
+    def __init__(self) -> None:
+        self.wait = self.memory = 0.0
+
+    @contextmanager
+    def over(self, port: int, pid: int) -> Iterator[None]:
+        is_over, message = threading.Event(), b"GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n"
+
+        def look() -> None:
+            connection = Connection(port)
+            while not is_over.is_set():
+                before = time.perf_counter()
+                connection.ask(message)
+                self.wait = max(self.wait, time.perf_counter() - before)
+                self.memory = max(self.memory, memory_of(pid))
+                is_over.wait(0.01)
+
+        watcher = threading.Thread(target=look)
+        watcher.start()
+        try:
+            yield
+        finally:
+            is_over.set()
+            watcher.join()
+
+
+def _many(name: str, port: int, n: int) -> tuple[list[int], float]:
+    """Send an attack n times at once; return the statuses, and the seconds that the slowest took."""
+    from tests.contract.attacks import all_attacks
+
+    send = next(attack.send for attack in all_attacks() if attack.name == name)
+    with suppress(OSError):
+        send(0)  # makes the body: nobody listens there
+
+    def one(_: int) -> tuple[list[int], float]:
+        before = time.perf_counter()
+        return send(port), time.perf_counter() - before
+
+    with ThreadPoolExecutor(n) as pool:
+        found = list(pool.map(one, range(n)))
+    return [status for statuses, _ in found for status in statuses], max(seconds for _, seconds in found)
+
+
+def each_alone() -> None:
+    """Print what each attack does, once and eight times at once."""
+    from tests.contract.attacks import all_attacks
+
+    with serving("service", ready="/readyz", **SETTINGS) as (port, process):
+        in_process(ask_small, port, 4.0, 10.0)()
+        print(f"at rest {memory_of(process.pid):.0f} MB; seconds until answered, longest /healthz, most memory", flush=True)
+        for attack in all_attacks():
+            cells = []
+            for n in (1, 8):
+                watch = Watch()
+                with watch.over(port, process.pid):
+                    statuses, seconds = in_process(_many, attack.name, port, n)()
+                cells.append(
+                    f"{dict(Counter(statuses))!s:24} {seconds:6.2f} s {watch.wait:6.3f} s {watch.memory:5.0f} MB"
+                )
+            print(f"{attack.name:44} {' | '.join(cells)}", flush=True)
+
+
+def stops(n: int) -> None:
+    """Print how long SIGTERM takes, n times under each attack, eight of it at once."""
+    from tests.contract.attacks import all_attacks
+
+    for attack in all_attacks():
+        took, codes = [], Counter[int]()
+        for _ in range(n):
+            with serving("service", ready="/readyz", **SETTINGS) as (port, process):
+                sender = in_process(_many, attack.name, port, 8)
+                time.sleep(2.5)
+                before = time.perf_counter()
+                process.send_signal(signal.SIGTERM)
+                codes[process.wait(60)] += 1
+                took.append(time.perf_counter() - before)
+                with suppress(OSError):
+                    sender()
+        print(
+            f"{attack.name:44} {max(took):5.1f} s at most of {SETTINGS['drain_seconds']} + 2; ended with {dict(codes)}",
+            flush=True,
+        )
 
 
 def main(words: list[str]) -> int:
-    """Run the load; return 1 where the service answered with a status that it must not."""
+    """Run the load; return 1 where the service answered with a status that it must not, or wrong."""
     parser = argparse.ArgumentParser(prog="benchmarks soak", description=__doc__.split("\n")[0])
     parser.add_argument("--minutes", type=float, default=60.0)
     parser.add_argument("--rate", type=float, default=10.0, help="small questions a second")
+    parser.add_argument("--each", action="store_true", help="each attack alone and eight times at once")
+    parser.add_argument("--stops", type=int, default=0, help="end the service so many times under each attack")
     asked = parser.parse_args(words)
-    settings = {"deadline_seconds": 2, "request_bytes": 2**29, "store_bytes": 2**24, "access_log": False}
-    hostile, worst = Counter[int](), Counter[int]()
-    with serving("service", ready="/readyz", **settings) as (port, process):
+    if asked.each or asked.stops:
+        if asked.each:
+            each_alone()
+        if asked.stops:
+            stops(asked.stops)
+        return 0
+    worst, wrong = Counter[int](), 0
+    with serving("service", ready="/readyz", **SETTINGS) as (port, process):
         ask_small(port, 4.0, 10.0)
         print(f"at rest: {memory_of(process.pid):.0f} MB, {_quantiles(ask_small(port, 10.0, asked.rate)[1])}")
-        end = time.perf_counter() + 60.0 * asked.minutes
-        sender = threading.Thread(target=ask_hostile, args=(port, end, asked.rate / 10, hostile))
-        sender.start()
-        minute = 0
-        while time.perf_counter() < end:
-            minute += 1
-            statuses, took = in_process(ask_small, port, min(60.0, end - time.perf_counter()), asked.rate)()
-            worst += statuses
-            print(
-                f"minute {minute:3}: {memory_of(process.pid):5.0f} MB; small {dict(statuses)}, {_quantiles(took)}; "
-                f"hostile so far {dict(hostile)}",
-                flush=True,
-            )
-        sender.join()
-    wrong = {status for status in (*worst, *hostile) if status == 0 or (status >= 500 and status not in ALLOWED)}
-    print(f"statuses that must not be: {wrong or 'none'}")
-    return int(bool(wrong))
+        seconds = 60.0 * asked.minutes
+        end = time.perf_counter() + seconds
+        hostile = in_process(send_hostile, port, seconds, asked.rate / 10)
+        every: list[float] = []
+        for minute in count(1):
+            if (left := end - time.perf_counter()) <= 0:
+                break
+            statuses, took, n_wrong = in_process(ask_small, port, min(60.0, left), asked.rate)()
+            worst, wrong, every = worst + statuses, wrong + n_wrong, every + took
+            memory = memory_of(process.pid)
+            print(f"minute {minute:3}: {memory:5.0f} MB; small {dict(statuses)}, {_quantiles(took)}", flush=True)
+        bad = hostile()
+        print(f"small in all: {_quantiles(every)}, {wrong} wrong; hostile: {dict(bad)}")
+    refused = {status for status in (*worst, *bad) if status >= 500 and status not in ALLOWED}
+    print(f"statuses that must not be: {refused or 'none'}")
+    return int(bool(refused or wrong))
 
 
 def _quantiles(took: list[float]) -> str:
