@@ -152,7 +152,10 @@ def each_alone() -> None:
 
     with serving("service", ready="/readyz", **SETTINGS) as (port, process):
         in_process(ask_small, port, 4.0, 10.0)()
-        print(f"at rest {memory_of(process.pid):.0f} MB; seconds until answered, longest /healthz, most memory", flush=True)
+        print(
+            f"at rest {memory_of(process.pid):.0f} MB; seconds until answered, longest /healthz, most memory",
+            flush=True,
+        )
         for attack in all_attacks():
             cells = []
             for n in (1, 8):
