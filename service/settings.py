@@ -100,6 +100,8 @@ class Settings(BaseSettings):
     """Time for the headers of a request to arrive, from the connection or their first byte."""
     write_seconds: Seconds = 10.0
     """Time for a client to read the next some 200 kB of an answer; one that does not is dropped."""
+    answer_seconds: Seconds = 300.0
+    """Time for a client to read a whole answer, however steadily it reads: meanwhile the answer holds its memory."""
     body_seconds: Seconds = 60.0
     """Time for a body to arrive: a slow sender must not hold its memory for ever."""
     drain_seconds: Seconds = 30.0
