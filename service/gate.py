@@ -99,8 +99,8 @@ class Gate:
                 await (await answer(Request(scope, receive, send_on)))(scope, receive, send_on)
         except asyncio.CancelledError:  # the drain is over; an answer that has begun ends with the connection
             if not status:
-                error = ServiceError("cancelled", "the service is shutting down; send the request again")
-                await problem(faults_of(error), {"Connection": "close"})(scope, receive, send_on)
+                ended = ServiceError("cancelled", "the service is shutting down; send the request again")
+                await problem(faults_of(ended), {"Connection": "close"})(scope, receive, send_on)
         finally:
             seconds = time.perf_counter() - before
             metrics.in_flight.dec()

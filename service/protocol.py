@@ -42,7 +42,7 @@ _FREE_OF_CHUNK: Final = 16
 _FREE_OF_DATA: Final = 3
 _STEP: Final = 2**11
 """Bytes parsed at once where chunks or requests may end among them: a millisecond where chunks are of one byte."""
-_EVENTS: Final = 256
+_EVENTS: Final = 64
 """Parts of a body after which a connection lets others take their turn."""
 _DROPPED: Final = 2**20
 _LINGER: Final = 2.0
@@ -249,17 +249,13 @@ class Protocol(HttpToolsProtocol):
         """Answer what the parser refuses."""
         self._refuse("bad_request", "this is no valid HTTP/1.1 request; correct its first line, headers or chunks")
 
-    def on_chunk_header(self) -> None:
-        """Leave the line of a chunk out of the count, as far as it may be long."""
-        self._overhead -= _FREE_OF_CHUNK
-
     def on_body(self, body: bytes) -> None:
         """Hand a part of the body on as it is where no other waits: uvicorn copies it into a buffer and out of it."""
         if self.is_closing:
             return
         cycle, size = self.cycle, len(body)
         self._n_events += 1
-        self._overhead -= _FREE_OF_DATA * size if self._is_chunked else size
+        self._overhead -= _FREE_OF_CHUNK + _FREE_OF_DATA * size if self._is_chunked else size
         self._left = max(0, self._left - size)
         if not cycle.body:
             cycle.body = body  # type: ignore[assignment]

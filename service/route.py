@@ -116,7 +116,7 @@ class GeometryRoute(APIRoute):
 def _guard_of(route: APIRoute) -> Answer | None:
     """Return what solves the dependencies that an application gave to the router, None if there are none.
 
-    FastAPI's own handler would solve them; since 0.137 (`_effective_route_context_var`) they are not copied into routes.
+    FastAPI's own handler would solve them. Newer versions do not copy them into the routes of an included router.
     """
     context = getattr(routing, "_effective_route_context_var", None)
     effective = (context and context.get()) or route

@@ -69,8 +69,8 @@ class Call(Cancel):
     """
 
     __slots__ = (
-        "_answer", "_is_over", "_is_running", "_memory", "_most", "_taken", "coding", "end", "headers", "instead", "is_light", "may_wait",
-        "media_type", "seconds", "settings", "status", "store",
+        "_answer", "_is_over", "_is_running", "_memory", "_most", "_taken", "coding", "end", "headers", "instead",
+        "is_light", "may_wait", "media_type", "seconds", "settings", "status", "store",
     )  # fmt: skip
 
     def __init__(self, settings: Settings, store: Store, memory: Memory) -> None:

@@ -1,4 +1,4 @@
-"""What surrounds requests on a connection is bounded: trailers, lines of chunks, bodies after answers, requests ahead."""
+"""What surrounds requests is bounded: trailers, lines of chunks, bodies after answers, requests ahead."""
 
 from __future__ import annotations
 
