@@ -1,16 +1,12 @@
 """HTTP/1.1 over httptools, one request after another: nothing a client sends ahead, or after its body, is taken in.
 
-A client may offer HTTP/2 with any request (`Upgrade: h2c`; Java's HttpClient does so by default) and a server may
-ignore it (RFC 9110, 7.8). httptools stops after the headers of such a request, and uvicorn then hands the application
-a request without its body. Here the headers are parsed again without the offer, and what follows them is the body.
-
 | what a client sends | what becomes of it |
 |---|---|
 | headers that do not arrive in time, or do not end | 408, 431, the connection is closed |
 | what is no HTTP/1.1 | 400, closed |
 | trailers | counted and dropped: they are no headers (RFC 9110, 6.5.1); 431 and closed where they do not end |
 | lines of chunks: sizes and extensions | as trailers, with 16 bytes a chunk and twice its data left out of the count |
-| a body whose answer was sent before it was whole | `_DROPPED` bytes within `_LINGER` seconds are dropped, then closed |
+| a body whose answer was sent before it was whole | some of it is dropped (`_DROPPED`, `_LINGER`), then closed |
 | requests ahead of the answer to one before | stay as bytes, those of one read or two; the rest stays in the socket |
 
 A client that reads its answer too slowly is dropped: the next 200 kB by `write_seconds`, all of it by `answer_seconds`.
@@ -21,16 +17,15 @@ from __future__ import annotations
 import asyncio
 import secrets
 from collections.abc import Callable
-from contextlib import suppress
 from functools import cache
 from http import HTTPStatus
 from typing import Any, Final
 
-import httptools
 from uvicorn.protocols.http.flow_control import HIGH_WATER_LIMIT
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
 from service.errors import problem
+from service.offers import Parser
 from service.schemas.arrays import Fault
 from service.settings import Settings
 
@@ -49,7 +44,6 @@ _LINGER: Final = 2.0
 """Bytes and seconds that a client may go on sending once it was answered: to close at once might cost it the answer."""
 _END: Final = b"\n\r\n"
 """Ends headers, and a body in chunks."""
-_OFFER: Final = (b"upgrade", b"http2-settings", b"connection")
 
 
 @cache
@@ -63,7 +57,7 @@ class Protocol(HttpToolsProtocol):
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
-        self.parser: Any = _Parser(self)
+        self.parser: Any = Parser(self)
         self._timers: dict[str, asyncio.TimerHandle] = {}
         """By what they wait for: headers, the client to read, it to have read a whole answer, its end."""
         self._raw = b""  # received and not parsed yet
@@ -300,47 +294,3 @@ class _Transport:
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._real, name)
-
-
-class _Parser:
-    """httptools' parser; after an offer a new one takes its place."""
-
-    def __init__(self, protocol: Protocol) -> None:
-        self._protocol = protocol
-        self._parser = _new_parser(protocol)
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._parser, name)
-
-    def is_offer(self) -> bool:
-        """Tell whether the request offers another protocol (CONNECT asks for nothing else, and is refused)."""
-        return self._parser.should_upgrade() and self._parser.get_method() != b"CONNECT"
-
-    def feed_data(self, data: bytes) -> None:
-        """Parse `data`; it may hold several requests, hence several offers."""
-        while True:  # bound: each turn but the last takes the headers of a request off `data`
-            try:
-                self._parser.feed_data(data)
-                return
-            except httptools.HttpParserUpgrade as offer:
-                if not self.is_offer():
-                    raise
-                data = data[offer.args[0] :]
-                self._parse_again()
-
-    def _parse_again(self) -> None:
-        protocol, method = self._protocol, self._parser.get_method()
-        lines = [method + b" " + protocol.url + b" HTTP/1.1"]
-        lines += [name + b": " + value for name, value in protocol.headers if name not in _OFFER]
-        if not self._parser.should_keep_alive():
-            lines.append(b"connection: close")
-        self._parser = _new_parser(protocol)
-        self._parser.feed_data(b"\r\n".join([*lines, b"", b""]))
-
-
-def _new_parser(protocol: Protocol) -> Any:
-    """Return a parser as uvicorn makes it."""
-    parser = httptools.HttpRequestParser(protocol)
-    with suppress(AttributeError):  # older httptools
-        parser.set_dangerous_leniencies(lenient_data_after_close=True)
-    return parser
