@@ -43,6 +43,7 @@ PHASES: Final = ("decode", "prepare", "compute", "encode")
 
 THREADS: Final = "geometry-"
 """Begins the names of threads that answer requests."""
+_LATE: Final = "late"
 GRACE: Final = 0.2
 """Seconds that a request has after its deadline to say itself what it did not get done."""
 
@@ -273,17 +274,19 @@ class Pool:
             raise ServiceError("queue_full", "the service is shutting down; try again") from None
         future.add_done_callback(lambda done: self._forget(lane, call, done.cancelled()))
         result = asyncio.wrap_future(future)
+        left = max(0.0, call.end - time.monotonic()) + GRACE
+        timer = asyncio.get_running_loop().call_later(left, result.cancel, _LATE)
         try:
-            done, _ = await asyncio.wait((result,), timeout=max(0.0, call.end - time.monotonic()) + GRACE)
-            if done:
-                return result.result()
-            raise call.too_late()
+            return await result
+        except asyncio.CancelledError as cancelled:
+            call.set()
+            if future.cancel():
+                waiting.clear()  # the executor lets go of it only when a thread comes to it
+            if cancelled.args == (_LATE,):
+                raise call.too_late() from None
+            raise
         finally:
-            if not result.done():
-                call.set()
-                if future.cancel():
-                    waiting.clear()  # the executor lets go of it only when a thread comes to it
-                result.cancel()
+            timer.cancel()
 
     def close(self, seconds: float = 0.0) -> None:
         """Cancel what still runs, take nothing more, and wait some time for the end of it."""
