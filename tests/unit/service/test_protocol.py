@@ -108,12 +108,9 @@ def test_an_answered_body_of_some_length_may_end(service: Service) -> None:
 
 def test_trailers_are_no_headers(service: Service) -> None:
     """They give no key, no name, no type."""
-    with connect(service) as connection:
-        connection.sendall(CHUNKED + chunk(BODY) + b"0\r\nX-API-Key: secret\r\n\r\n")
-        assert connection.recv(2**16).startswith(b"HTTP/1.1 401 ")
-        last = b"0\r\nX-Request-ID: evil\r\nContent-Type: text/plain\r\nContent-Encoding: gzip\r\n\r\n"
-        connection.sendall(HEAD % (b"Transfer-Encoding: chunked" + KEY) + chunk(BODY) + last)
-        answer = connection.recv(2**16)
+    assert service.send(CHUNKED + chunk(BODY) + b"0\r\nX-API-Key: secret\r\n\r\n").startswith(b"HTTP/1.1 401 ")
+    last = b"0\r\nX-Request-ID: evil\r\nContent-Type: text/plain\r\nContent-Encoding: gzip\r\n\r\n"
+    answer = service.send(HEAD % (b"Transfer-Encoding: chunked" + KEY) + chunk(BODY) + last)
     assert answer[9:12] in (b"200", b"201"), answer
     assert b"evil" not in answer
     assert not any("evil" in line for line in service.log)
