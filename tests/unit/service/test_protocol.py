@@ -13,7 +13,7 @@ import httpx
 import pytest
 
 from benchmarks.measure import memory_of
-from tests.contract.test_deadlines import far_apart
+from tests.contract.test_deadlines import vanishing
 from tests.unit.service.asking import SPHERE
 from tests.unit.service.test_live import Service
 
@@ -139,8 +139,9 @@ def test_requests_ahead_are_answered_in_order(service: Service) -> None:
 
 
 def slow_request() -> bytes:
-    body = json.dumps(far_apart()).encode()
-    return (HEAD % (b"Content-Length: %d" % len(body) + KEY)).replace(b"/solids", b"/overlay") + body
+    """Return a request for seconds of work that takes next to no memory."""
+    body = json.dumps({"solid": vanishing(400), "points": [[3, 5]] * 10_000}).encode()
+    return (HEAD % (b"Content-Length: %d" % len(body) + KEY)).replace(b"/solids", b"/contains") + body
 
 
 def test_requests_behind_a_slow_one_take_no_memory(service: Service) -> None:
