@@ -10,23 +10,21 @@ import os
 import signal
 import sys
 import tempfile
-import threading
 from contextlib import ExitStack
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
-import uvicorn
 from pydantic import ValidationError
 
 from service import logs
-from service.settings import WARM_UP, Settings
+from service.settings import Settings
 
 log = logging.getLogger("service")
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Serve until SIGTERM or SIGINT, finish what is under way, exit with 0."""
-    gc.disable()  # while modules are imported (app.py): an eighth of the time until ready
+    gc.disable()  # while modules are imported (process.py): an eighth of the time until ready
     _take_flags(sys.argv[1:] if arguments is None else arguments)
     try:
         settings = Settings()
@@ -59,34 +57,51 @@ def main(arguments: list[str] | None = None) -> None:
     if not settings.api_keys and not _is_loopback(settings.host):
         log.warning("anyone who reaches %s may use this service: GEOMETRY_API_KEYS is not set", settings.host)
     with ExitStack() as stack:
-        stack.push(_end_at_once)
+        stack.push(_leave_threads)
         if settings.workers > 1:
             _share(Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="geometry-"))), settings)
-        from service.protocol import Protocol
-
-        uvicorn.run(
-            "service.app:create_app",
-            factory=True,
-            host=settings.host,
-            port=settings.port,
-            workers=settings.workers,
-            http=Protocol,
-            ws="none",
-            log_config=config,
-            log_level=settings.log_level,
-            access_log=False,
-            timeout_graceful_shutdown=round(settings.drain_seconds),
-            server_header=False,
-            forwarded_allow_ips=settings.trusted_proxies,
-        )
+        _serve(settings, config, stack)
 
 
-def _end_at_once(_kind: object, ended: object, _trace: object) -> None:
-    """End the process where a thread still compiles: Python's own end would stop it within C++, which aborts."""
-    is_well = isinstance(ended, SystemExit) and not ended.code
-    if is_well and any(thread.name == WARM_UP for thread in threading.enumerate()):
-        logging.shutdown()
-        os._exit(0)
+def _serve(settings: Settings, log_config: dict[str, Any], stack: ExitStack) -> None:
+    """Serve until a signal comes; stack: what is to be cleaned up at the end."""
+    import uvicorn
+
+    from service.protocol import Protocol
+    from service.server import HEALTH_SECONDS, Server, Supervisor
+
+    config = uvicorn.Config(
+        "service.process:create_app",
+        factory=True,
+        host=settings.host,
+        port=settings.port,
+        workers=settings.workers,
+        http=Protocol,
+        ws="none",
+        log_config=log_config,
+        log_level=settings.log_level,
+        access_log=False,
+        timeout_graceful_shutdown=settings.drain_seconds,  # type: ignore[arg-type]
+        timeout_worker_healthcheck=HEALTH_SECONDS,
+        server_header=False,
+        forwarded_allow_ips=settings.trusted_proxies,
+    )
+    if settings.workers > 1:
+        gc.enable()
+        Supervisor(config, [config.bind_socket()], stack.close).run()
+        return
+    server = Server(config, stack.close)
+    server.run()
+    if not server.started:
+        sys.exit(3)  # as uvicorn does
+
+
+def _leave_threads(_kind: object, ended: object, _trace: object) -> None:
+    """End the process where threads cannot be stopped; one within the compiler's C++ would abort it."""
+    from service.server import end_process, is_left_behind
+
+    if isinstance(ended, SystemExit) and not ended.code and is_left_behind():
+        end_process()
 
 
 def _variable(name: object) -> str:

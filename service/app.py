@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import gc
+import asyncio
+import atexit
 import logging
 import os
-import sys
 import threading
 import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from functools import partial
 from typing import Any, Final
 
-from fastapi import APIRouter, FastAPI
+from fastapi import APIRouter, Depends, FastAPI
 from starlette.datastructures import State
 from starlette.exceptions import HTTPException
 from starlette.middleware.cors import CORSMiddleware
@@ -24,9 +23,11 @@ import engine
 from service import traces
 from service.errors import faults_of, http_fault, problem
 from service.gate import Gate
+from service.memory import Memory
 from service.metrics import Metrics
 from service.openapi import completed, openapi_of
 from service.pages import add_pages
+from service.process import freeze
 from service.route import posts_of
 from service.routes import (
     binary,
@@ -45,7 +46,7 @@ from service.routes import (
 from service.settings import WARM_UP, Settings
 from service.store import Store
 from service.tools import add_tools, running
-from service.work import Memory, Pool, give_back_freed
+from service.work import Pool
 
 log = logging.getLogger("service")
 
@@ -56,13 +57,9 @@ ROUTERS: Final = (
     scenes.lookup,
     scenes.binary,
 )
-SWITCH_SECONDS: Final = 0.0002
-"""How long one thread keeps the interpreter while others wait: the event loop hands over several times a request, and
-with Python's 5 ms each time beside a batch, small requests would wait for tens of milliseconds."""
-WARM_UP_SECONDS: Final = 2.0
-"""How long a process that ends waits for its warm-up, which looks between two parts whether it is still wanted."""
-NEVER: Final = 2**31 - 1
-"""Collections of younger objects until the oldest are looked at."""
+END_SECONDS: Final = 0.7
+"""How long a service that ends waits for its threads, which look at their switch, and then for its warm-up, which looks
+between two parts whether it is still wanted."""
 DESCRIPTION = """Containment, collision and clipping with exact decisions.
 
 Every float64 given is taken as the exact number it is; every yes/no, side, order, count and relation equals what exact
@@ -71,10 +68,8 @@ object and the header `Server-Timing` (decode, prepare, compute, encode). Errors
 """
 
 
-def create_app(settings: Settings | None = None) -> FastAPI:
-    """Return the service as an ASGI application."""
-    gc.enable()  # all is imported (__main__.py)
-    give_back_freed()
+def create_app(settings: Settings | None = None, owns_process: bool = False) -> FastAPI:
+    """Return the service as an ASGI application; owns_process: whether nothing else lives there (process.py)."""
     settings = settings or Settings()
     app = FastAPI(
         title="exact-geometry",
@@ -85,7 +80,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         redoc_url=None,
         redirect_slashes=False,
     )
-    _prepare(app.state, settings)
+    _prepare(app.state, settings, owns_process)
     app.openapi = openapi_of(app, settings)  # type: ignore[method-assign]
     for router in ROUTERS:
         app.include_router(router)
@@ -118,38 +113,63 @@ def create_router(settings: Settings | None = None) -> APIRouter:
     """Return the calls of the service as a router for another FastAPI application.
 
     Its lifespan, which FastAPI runs with the application's own, warms the kernels and keeps stored solids and threads;
-    `/readyz` tells when the kernels are warm. Keys, names of requests and log lines are the application's own matter.
-    Limits and examples are put into the application's OpenAPI document when it starts.
+    `/readyz` tells when the kernels are warm. In an application that is mounted in another, whose lifespan nobody runs,
+    the first request begins this. Keys, names of requests and log lines are the application's own matter: guard the
+    calls by `include_router(..., dependencies=[...])` or a middleware. Nothing of the process is changed. Limits and
+    examples are put into the application's OpenAPI document when it starts.
     """
     settings = settings or Settings()
-    router = APIRouter(lifespan=partial(_embedded, settings))
+    if settings.api_keys:
+        log.warning(
+            "GEOMETRY_API_KEYS is not looked at within another application: whoever reaches it may call; guard the "
+            "calls yourself: app.include_router(service.router(), dependencies=[Depends(check_key)])"
+        )
+    guest = _Guest(settings)
+    router = APIRouter(lifespan=guest.lifespan, dependencies=[Depends(guest.start_once)])
     for each in ROUTERS:
         router.include_router(each)
     return router
 
 
-@asynccontextmanager
-async def _embedded(settings: Settings, app: FastAPI) -> AsyncIterator[None]:
-    state = app.state.geometry = State()
-    _prepare(state, settings)
-    make = app.openapi
+class _Guest:
+    """The service within somebody else's application."""
 
-    def document() -> dict[str, Any]:
-        if app.openapi_schema is None:
-            app.openapi_schema = completed(make(), settings)
-        return app.openapi_schema
+    def __init__(self, settings: Settings) -> None:
+        self._settings = settings
 
-    app.openapi_schema, app.openapi = None, document  # type: ignore[method-assign]
-    async with _running(state):
-        yield
+    @asynccontextmanager
+    async def lifespan(self, app: FastAPI) -> AsyncIterator[None]:
+        """Start with the application, end with it."""
+        async with _running(self._started(app)):
+            yield
+
+    async def start_once(self, request: Request) -> None:
+        """Start with the first request where nobody runs the application's lifespan."""
+        if not hasattr(request.app.state, "geometry"):
+            state = self._started(request.app)
+            warming = _start(state)
+            atexit.register(_end, state, warming)
+
+    def _started(self, app: FastAPI) -> State:
+        state = app.state.geometry = State()
+        _prepare(state, self._settings, owns_process=False)
+        make = app.openapi
+
+        def document() -> dict[str, Any]:
+            if app.openapi_schema is None:
+                app.openapi_schema = completed(make(), self._settings)
+            return app.openapi_schema
+
+        app.openapi_schema, app.openapi = None, document  # type: ignore[method-assign]
+        return state
 
 
-def _prepare(state: State, settings: Settings) -> None:
+def _prepare(state: State, settings: Settings, owns_process: bool) -> None:
     """Make what requests share."""
-    state.settings = settings
+    state.settings, state.owns_process = settings, owns_process
     state.metrics = Metrics()
     state.store = Store(settings.store_bytes, settings.store_folder, settings.store_folder_bytes, state.metrics)
-    state.memory = Memory(settings.request_bytes)
+    state.memory = Memory(settings.request_bytes, owns_process)
     state.warm, state.warm_error, state.is_ending = threading.Event(), None, False
     state.warm_begin, state.warm_hundredths = time.perf_counter(), 0
 
@@ -162,19 +182,28 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
 
 @asynccontextmanager
 async def _running(state: State) -> AsyncIterator[None]:
-    """Compile or load the kernels in a thread, so that /healthz answers meanwhile; drain the pool at the end."""
-    state.pool = Pool(state.settings, state.metrics)
-    sys.setswitchinterval(SWITCH_SECONDS)
-    warming = threading.Thread(target=_warm, args=(state,), name=WARM_UP, daemon=True)
-    warming.start()
+    """Start, and end again: what runs is cancelled, and waited for for a while."""
+    warming = _start(state)
     try:
         yield
     finally:
-        state.is_ending = True
-        warming.join(WARM_UP_SECONDS)  # a thread within the compiler when Python ends would abort the process
-        state.warm.clear()
-        state.metrics.ready.set(0)
-        state.pool.close()
+        await asyncio.to_thread(_end, state, warming)
+
+
+def _start(state: State) -> threading.Thread:
+    """Compile or load the kernels in a thread, so that /healthz answers meanwhile."""
+    state.pool = Pool(state.settings, state.metrics)
+    warming = threading.Thread(target=_warm, args=(state,), name=WARM_UP, daemon=True)
+    warming.start()
+    return warming
+
+
+def _end(state: State, warming: threading.Thread) -> None:
+    state.is_ending = True
+    state.pool.close(END_SECONDS)
+    warming.join(END_SECONDS)  # a thread within the compiler when Python ends would abort the process
+    state.warm.clear()
+    state.metrics.ready.set(0)
 
 
 class _EndingError(Exception):
@@ -197,9 +226,8 @@ def _warm(state: State) -> None:
         state.warm_error = f"warm-up failed: {error}; restart the service"
         log.exception("warm-up failed")
         return
-    if not gc.get_freeze_count():
-        gc.freeze()  # half a million objects of modules and compiler that no later collection has to walk through
-    gc.set_threshold(*gc.get_threshold()[:2], NEVER)  # work.py looks at all objects when there are few
+    if state.owns_process:
+        freeze()
     state.warm.set()
     state.metrics.ready.set(1)
     log.info("ready: kernels warm after %.1f s", time.perf_counter() - before)

@@ -11,6 +11,7 @@ import mmap
 import zlib
 from collections.abc import Iterator
 from contextlib import suppress
+from io import BytesIO
 from typing import Final
 
 import zstandard
@@ -19,7 +20,8 @@ from starlette.types import Receive
 
 from service.decoding.pieces import Body
 from service.errors import ServiceError
-from service.work import FOOTPRINT, Call
+from service.memory import FOOTPRINT, PART
+from service.work import Call
 
 JSON: Final = "application/json"
 OCTETS: Final = "application/octet-stream"
@@ -28,6 +30,8 @@ LARGE: Final = 2**22
 CODINGS: Final = ("gzip", "zstd")
 _STEP: Final = 2**18
 """Bytes inflated at once: half a millisecond."""
+_STEP_IN: Final = 2**14
+"""Bytes of gzip given to it at once: a member may be of 20 bytes, and what follows one is copied."""
 _BLOCKS: Final = 2**8
 """Bytes of zstd inflated at once: a block takes four at least, and gives 128 KB at most."""
 _WINDOW: Final = 2**23
@@ -69,11 +73,13 @@ def declared_length(headers: dict[bytes, bytes], limit: int) -> int:
 
 
 async def read(receive: Receive, declared: int, call: Call) -> Body:
-    """Return the body, refused as soon as it is known to be too long, declared or not, or too slow."""
+    """Return the body, refused as soon as it is known to be too long, declared or not, or too slow.
+
+    What has arrived is counted, not what is declared: that is only refused where it would not fit now.
+    """
     limit, seconds = call.settings.max_body_bytes, call.settings.body_seconds
     await call.wait_for(FOOTPRINT * declared)
-    call.take(FOOTPRINT * declared)
-    room = _room(declared) if declared >= LARGE else None
+    room: bytearray | mmap.mmap | None = None
     parts: list[bytes] = []
     size, is_more = 0, True
     try:
@@ -86,10 +92,14 @@ async def read(receive: Receive, declared: int, call: Call) -> Body:
                 end = size + len(part)
                 if end > limit:
                     raise _too_large(limit)
-                if end > declared:
-                    call.take(FOOTPRINT * (end - max(size, declared)))
-                    if room is not None:  # case: a server that does not hold bodies to their declared length
-                        parts, room = [bytes(room[:size])], None
+                cost = FOOTPRINT * len(part) + PART
+                await call.wait_for(cost)
+                call.take(cost)
+                if room is None and LARGE <= end <= declared:
+                    room = _room(declared)
+                    room[:size], parts = b"".join(parts), []
+                elif room is not None and end > declared:  # case: a server that lets bodies be longer than declared
+                    parts, room = [bytes(room[:size])], None
                 if room is None:
                     parts.append(part)
                 else:
@@ -104,7 +114,7 @@ async def read(receive: Receive, declared: int, call: Call) -> Body:
 
 def inflated(body: Body, coding: str, call: Call) -> bytes:
     """Return what `body` was before it was compressed."""
-    limit, size, parts = call.settings.max_body_bytes, 0, []
+    limit, size, whole = call.settings.max_body_bytes, 0, BytesIO()
     try:
         for part in _unzipped(body) if coding == "gzip" else _unpacked(body):
             call.remaining()
@@ -112,25 +122,30 @@ def inflated(body: Body, coding: str, call: Call) -> bytes:
             if size > limit:
                 raise _too_large(limit, "inflated, ")
             call.take(FOOTPRINT * len(part))
-            parts.append(part)
+            whole.write(part)
     except (zlib.error, zstandard.ZstdError, EOFError) as error:
-        raise ServiceError("bad_request", f"the body is no {coding}: {error}; compress it anew") from None
-    return b"".join(parts)
+        raise ServiceError("bad_request", f"the body is no {coding}: {error}; compress it again") from None
+    return whole.getvalue()
 
 
 def _unzipped(body: Body) -> Iterator[bytes]:
-    inflater = zlib.decompressobj(wbits=16 + zlib.MAX_WBITS)
-    rest = bytes(memoryview(body))
-    while rest and not inflater.eof:  # bound: each turn takes bytes, or gives a whole part
-        yield inflater.decompress(rest, _STEP)
-        rest = inflater.unconsumed_tail
-    while not inflater.eof:
-        part = inflater.decompress(rest, _STEP)
+    """Yield what the members of a gzip body (RFC 1952, 2.2) hold, part by part."""
+    inflater = None
+    for start in range(0, len(body), _STEP_IN):
+        rest = body[start : start + _STEP_IN]
+        while rest:  # bound: each turn takes bytes, or gives a whole part
+            inflater = inflater or zlib.decompressobj(wbits=16 + zlib.MAX_WBITS)
+            yield inflater.decompress(rest, _STEP)
+            rest = inflater.unconsumed_tail
+            if inflater.eof:
+                rest, inflater = inflater.unused_data, None
+    while inflater is not None and not inflater.eof:  # bound: each turn gives a part
+        part = inflater.decompress(b"", _STEP)
         if not part:
-            raise EOFError("it ends too early")
+            break
         yield part
-    if inflater.unused_data:
-        raise EOFError("something follows its end")
+    if not len(body) or (inflater is not None and not inflater.eof):
+        raise EOFError("it ends too early")
 
 
 def _unpacked(body: Body) -> Iterator[bytes]:
@@ -149,7 +164,10 @@ def _room(size: int) -> bytearray | mmap.mmap:
     """Return so many bytes; untouched pages take no memory."""
     if not hasattr(mmap, "MADV_HUGEPAGE"):
         return bytearray(size)
-    room = mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+    try:
+        room = mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+    except OSError:  # the process may have no more
+        raise MemoryError from None
     with suppress(OSError):  # a kernel without large pages
         room.madvise(mmap.MADV_HUGEPAGE)
     return room

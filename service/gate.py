@@ -6,6 +6,7 @@ the framework's way to a route: where the path alone says which, the gate asks t
 
 from __future__ import annotations
 
+import asyncio
 import hashlib
 import hmac
 import logging
@@ -96,6 +97,10 @@ class Gate:
                 await self._app(scope, receive, send_on)
             else:
                 await (await answer(Request(scope, receive, send_on)))(scope, receive, send_on)
+        except asyncio.CancelledError:  # the drain is over; an answer that has begun ends with the connection
+            if not status:
+                ended = ServiceError("cancelled", "the service is shutting down; send the request again")
+                await problem(faults_of(ended), {"Connection": "close"})(scope, receive, send_on)
         finally:
             seconds = time.perf_counter() - before
             metrics.in_flight.dec()

@@ -9,9 +9,6 @@ from typing import Any
 
 import orjson
 
-# what the lines leave out need not be looked up for each of them: it takes as long as writing the line
-logging.logThreads = logging.logProcesses = logging.logMultiprocessing = False
-
 
 class JsonFormatter(logging.Formatter):
     """Writes time, level, logger and message, and the fields that a record brings along."""

@@ -1,32 +1,49 @@
-"""HTTP/1.1 over httptools, with offers to change the protocol declined rather than taken for the end of the request.
+"""HTTP/1.1 over httptools, one request after another: nothing a client sends ahead, or after its body, is taken in.
 
-A client may offer HTTP/2 with any request (`Upgrade: h2c`; Java's HttpClient does so by default) and a server may
-ignore it (RFC 9110, 7.8). httptools stops after the headers of such a request, and uvicorn then hands the application
-a request without its body. Here the headers are parsed again without the offer, and what follows them is the body.
+| what a client sends | what becomes of it |
+|---|---|
+| headers that do not arrive in time, or do not end | 408, 431, the connection is closed |
+| what is no HTTP/1.1 | 400, closed |
+| trailers | counted and dropped: they are no headers (RFC 9110, 6.5.1); 431 and closed where they do not end |
+| lines of chunks: sizes and extensions | as trailers, with 16 bytes a chunk and twice its data left out of the count |
+| a body whose answer was sent before it was whole | some of it is dropped (`_DROPPED`, `_LINGER`), then closed |
+| requests ahead of the answer to one before | stay as bytes, those of one read or two; the rest stays in the socket |
 
-Headers that do not arrive in time, or do not end, are answered with 408 or 431, what is no HTTP/1.1 with 400, and the
-connection is closed. A client that does not read its answer in time is dropped.
+A client that reads its answer too slowly is dropped: the next 200 kB by `write_seconds`, all of it by `answer_seconds`.
 """
 
 from __future__ import annotations
 
 import asyncio
 import secrets
-from contextlib import suppress
+from collections.abc import Callable
 from functools import cache
 from http import HTTPStatus
 from typing import Any, Final
 
-import httptools
 from uvicorn.protocols.http.flow_control import HIGH_WATER_LIMIT
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
 from service.errors import problem
+from service.offers import Parser
 from service.schemas.arrays import Fault
 from service.settings import Settings
 
 _MOST_HEADER_BYTES: Final = 2**16
-_OFFER: Final = (b"upgrade", b"http2-settings", b"connection")
+_MOST_OVERHEAD: Final = 2**14
+"""Bytes of a body's trailers and lines of chunks beyond what chunks are allowed."""
+_FREE_OF_CHUNK: Final = 16
+"""Bytes of each chunk's line that do not count, and `_FREE_OF_DATA` for each byte of its data, itself included."""
+_FREE_OF_DATA: Final = 3
+_STEP: Final = 2**11
+"""Bytes parsed at once where chunks or requests may end among them: a millisecond where chunks are of one byte."""
+_EVENTS: Final = 64
+"""Parts of a body after which a connection lets others take their turn."""
+_DROPPED: Final = 2**20
+_LINGER: Final = 2.0
+"""Bytes and seconds that a client may go on sending once it was answered: to close at once might cost it the answer."""
+_END: Final = b"\n\r\n"
+"""Ends headers, and a body in chunks."""
 
 
 @cache
@@ -36,88 +53,181 @@ def _settings() -> Settings:
 
 
 class Protocol(HttpToolsProtocol):
-    """uvicorn's protocol with a parser that reads on after an offer, and limits to what comes before a request."""
+    """uvicorn's protocol with a parser that reads on after an offer, and limits to all that surrounds bodies."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
-        self.parser: Any = _Parser(self)
-        self._timer: asyncio.TimerHandle | None = None  # runs while headers are waited for
-        self._header_bytes = 0
-        self._seconds = _settings().header_seconds
-        self._writing: asyncio.TimerHandle | None = None  # runs while the client has to read
-        self._is_refused = False
+        self.parser: Any = Parser(self)
+        self._timers: dict[str, asyncio.TimerHandle] = {}
+        """By what they wait for: headers, the client to read, it to have read a whole answer, its end."""
+        self._raw = b""  # received and not parsed yet
+        self._overhead = 0  # bytes of headers, trailers and lines of chunks
+        self._left = 0  # bytes of a body of declared length that are to come
+        self._is_chunked = self._is_in_message = self._is_in_body = False
+        self._keeps_alive = True
+        self.is_closing = self.is_full = False
+        self._n_events = self._n_dropped = 0
 
     def connection_made(self, transport: Any) -> None:
         """Start the clock for the first request."""
-        super().connection_made(transport)
-        self._start_clock()
+        self._real = transport
+        super().connection_made(_Transport(self, transport))  # type: ignore[arg-type]
+        self._start_headers()
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Stop the clocks."""
-        self._stop_clock()
-        self.resume_writing()
+        self.is_closing, self._raw = True, b""
+        self._stop(*self._timers)
         super().connection_lost(exc)
 
+    def close(self) -> None:
+        """Close the connection once the client has read what was written, which it must within some time."""
+        if self.is_closing:
+            return
+        self.is_closing, self._raw = True, b""
+        self._stop("headers")
+        cycle, transport = self.cycle, self._real
+        if cycle is not None and not cycle.response_complete:
+            cycle.disconnected = True  # what it writes would go to nobody
+            cycle.message_event.set()
+        if self._is_in_message:
+            self.is_full = False
+            transport.resume_reading()
+            if transport.can_write_eof():
+                transport.write_eof()
+            self._start("end", _LINGER, transport.abort)
+        else:
+            self._start("end", _settings().write_seconds, transport.abort)
+            transport.close()
+
+    def shutdown(self) -> None:
+        """End after the request under way."""
+        self._keeps_alive = False
+        super().shutdown()
+
+    def _start(self, name: str, seconds: float, function: Callable[..., object], *arguments: object) -> None:
+        self._timers[name] = self.loop.call_later(seconds, function, *arguments)
+
+    def _stop(self, *names: str) -> None:
+        for name in names:
+            if name in self._timers:
+                self._timers.pop(name).cancel()
+
     def pause_writing(self) -> None:
-        """Give the client some time to read what was written."""
+        """Give the client some time to read what was written, and some for the whole answer."""
         super().pause_writing()
-        if self._writing is None:
-            self._writing = self.loop.call_later(_settings().write_seconds, self.transport.abort)
+        for name, seconds in (("reading", _settings().write_seconds), ("answer", _settings().answer_seconds)):
+            if name not in self._timers:
+                self._start(name, seconds, self.transport.abort)
 
     def resume_writing(self) -> None:
         """Go on: the client has read nearly all."""
-        if self._writing is not None:
-            self._writing.cancel()
-            self._writing = None
+        self._stop("reading")
         super().resume_writing()
+        if self.cycle is None or self.cycle.response_complete:
+            self._stop("answer")
 
     def data_received(self, data: bytes) -> None:
-        """Parse `data`; headers without end are refused."""
-        super().data_received(data)
-        if self._timer is not None:
-            self._header_bytes += len(data)
-            if self._header_bytes > _MOST_HEADER_BYTES:
-                self._refuse("large_headers", f"the headers are longer than {_MOST_HEADER_BYTES} bytes; send fewer")
+        """Parse `data` as far as it belongs to the request under way."""
+        if self.is_closing:
+            self._n_dropped += len(data)
+            if self._n_dropped > _DROPPED:
+                self.transport.abort()
+            return
+        self._raw += data
+        self._parse()
+
+    def _parse(self) -> None:
+        """Parse what was received up to the end of one request; what stays makes reading pause."""
+        raw, start, self._n_events = memoryview(self._raw), 0, 0
+        while start < len(raw) and self._n_events < _EVENTS and not self._is_held():  # bound: each turn takes bytes
+            stop = self._end_of_piece(start)
+            if stop == start:
+                break
+            piece, start = raw[start:stop], stop
+            self._overhead += len(piece)
+            super().data_received(piece)  # type: ignore[arg-type]
+            self._check_overhead()
+            if self.is_closing:
+                return
+        self._raw = self._raw[start:]
+        is_waiting = self._is_held()
+        if not is_waiting and self._n_events >= _EVENTS and self._raw:
+            self.loop.call_soon(self._parse)
+            is_waiting = True
+        was_full, self.is_full = self.is_full, is_waiting and len(self._raw) > HIGH_WATER_LIMIT
+        if self.is_full:
+            self._real.pause_reading()
+        elif was_full and not self.flow.read_paused:
+            self._real.resume_reading()
+
+    def _is_held(self) -> bool:
+        """Tell whether nothing more is parsed now: a request came whole, and its answer is to be sent first."""
+        is_answered = self.cycle is None or self.cycle.response_complete
+        return self.is_closing or (not self._is_in_message and not is_answered)
+
+    def _end_of_piece(self, start: int) -> int:
+        """Return where to stop parsing `_raw`: at the end of headers or of a body at the latest."""
+        raw = self._raw
+        if self._left:
+            return min(len(raw), start + self._left)
+        found = raw.find(_END, start, start + _STEP)
+        if found >= 0:
+            return found + len(_END)
+        stop = min(len(raw), start + _STEP)
+        for _ in range(len(_END) - 1):  # what may be the first part of an end waits for the rest of it
+            stop -= stop > start and raw[stop - 1] in b"\r\n"
+        return stop
+
+    def _check_overhead(self) -> None:
+        self._overhead = max(0, self._overhead)
+        most = _MOST_OVERHEAD if self._is_in_body else _MOST_HEADER_BYTES
+        if self._overhead > most:
+            what = "trailers and lines of chunks" if self._is_in_body else "headers"
+            self._refuse("large_headers", f"the {what} are longer than {most} bytes; send fewer")
 
     def on_message_begin(self) -> None:
         """Start the clock for a later request on the same connection."""
         super().on_message_begin()
-        if self._timer is None:
-            self._start_clock()
+        self._is_in_message, self._is_in_body = True, False
+        if "headers" not in self._timers:
+            self._start_headers()
 
-    def _start_clock(self) -> None:
-        self._header_bytes = 0
-        seconds = self._seconds
+    def _start_headers(self) -> None:
+        self._overhead, seconds = 0, _settings().header_seconds
         detail = f"the headers did not arrive within {seconds:g} s; send them faster"
-        self._timer = self.loop.call_later(seconds, self._refuse, "slow_headers", detail)
-
-    def _stop_clock(self) -> None:
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer = None
+        self._start("headers", seconds, self._refuse, "slow_headers", detail)
 
     def _refuse(self, code: str, detail: str) -> None:
-        """Answer before there is a request, and close."""
-        self._stop_clock()
-        self._is_refused = True
-        if self.transport.is_closing():
-            return
-        answer = problem([Fault((), code, detail)], {"connection": "close", "x-request-id": secrets.token_hex(8)})
-        lines = [f"HTTP/1.1 {answer.status_code} {HTTPStatus(answer.status_code).phrase}".encode()]
-        lines += [name + b": " + value for name, value in answer.raw_headers]
-        self.transport.write(b"\r\n".join([*lines, b"", bytes(answer.body)]))
-        self.transport.close()
+        """Answer before there is a request, or while its body arrives, and close."""
+        is_begun = self._is_in_body and self.cycle.response_started
+        if not (self.is_closing or is_begun):
+            answer = problem([Fault((), code, detail)], {"connection": "close", "x-request-id": secrets.token_hex(8)})
+            lines = [f"HTTP/1.1 {answer.status_code} {HTTPStatus(answer.status_code).phrase}".encode()]
+            lines += [name + b": " + value for name, value in answer.raw_headers]
+            self.transport.write(b"\r\n".join([*lines, b"", bytes(answer.body)]))
+        self.close()
+
+    def on_header(self, name: bytes, value: bytes) -> None:
+        """Take a header; a trailer is dropped."""
+        if not self._is_in_body:
+            super().on_header(name, value)
 
     def on_headers_complete(self) -> None:
         """Start the request, unless its headers are to be parsed again."""
-        if self.parser.is_offer() or self._is_refused:
+        if self.parser.is_offer() or self.is_closing:
             return
         wrong = self._fault_of_headers()
         if wrong:
             self._refuse("bad_request", wrong)
-        else:
-            self._stop_clock()
-            super().on_headers_complete()
+            return
+        self._stop("headers")
+        super().on_headers_complete()
+        headers = dict(self.headers)
+        self._is_chunked = b"transfer-encoding" in headers
+        self._left = int(headers.get(b"content-length", b"").lstrip(b"0") or 0)
+        self._is_in_body, self._overhead = True, 0
+        self._keeps_alive, self.cycle.keep_alive = self.cycle.keep_alive, False  # should it be answered too early
 
     def _fault_of_headers(self) -> str:
         """Return what HTTP/1.1 forbids about the headers, and the parser lets pass."""
@@ -130,72 +240,57 @@ class Protocol(HttpToolsProtocol):
         return ""
 
     def send_400_response(self, msg: str) -> None:
-        """Answer what the parser refuses; where an answer is under way already, just close."""
-        if self.cycle is not None and self.cycle.response_started and not self.cycle.response_complete:
-            self.transport.close()
-        else:
-            self._refuse("bad_request", "this is no valid HTTP/1.1 request; correct its first line, headers or chunks")
+        """Answer what the parser refuses."""
+        self._refuse("bad_request", "this is no valid HTTP/1.1 request; correct its first line, headers or chunks")
 
     def on_body(self, body: bytes) -> None:
         """Hand a part of the body on as it is where no other waits: uvicorn copies it into a buffer and out of it."""
-        cycle = self.cycle
-        if self._is_refused:
+        if self.is_closing:
             return
-        if cycle.body or cycle.response_complete or self.parser.is_offer():
+        cycle, size = self.cycle, len(body)
+        self._n_events += 1
+        self._overhead -= _FREE_OF_CHUNK + _FREE_OF_DATA * size if self._is_chunked else size
+        self._left = max(0, self._left - size)
+        if not cycle.body:
+            cycle.body = body  # type: ignore[assignment]
+        else:
             if isinstance(cycle.body, bytes):
                 cycle.body = bytearray(cycle.body)
-            super().on_body(body)
-            return
-        cycle.body = body  # type: ignore[assignment]
-        if len(body) > HIGH_WATER_LIMIT:
+            cycle.body += body
+        if len(cycle.body) > HIGH_WATER_LIMIT:
             self.flow.pause_reading()
         cycle.message_event.set()
 
     def on_message_complete(self) -> None:
         """End the request, unless its headers are to be parsed again."""
-        if not (self.parser.is_offer() or self._is_refused):
-            super().on_message_complete()
+        if self.parser.is_offer() or self.is_closing:
+            return
+        self._is_in_message = self._is_in_body = False
+        self.cycle.keep_alive = self._keeps_alive
+        super().on_message_complete()
+
+    def on_response_complete(self) -> None:
+        """Go on with what the client has sent meanwhile."""
+        if not self.flow.write_paused:
+            self._stop("answer")
+        super().on_response_complete()
+        if self._raw:
+            self.loop.call_soon(self._parse)
 
 
-class _Parser:
-    """httptools' parser; after an offer a new one takes its place."""
+class _Transport:
+    """A transport that is closed in the protocol's way, and not read from while that has enough to parse."""
 
-    def __init__(self, protocol: Protocol) -> None:
-        self._protocol = protocol
-        self._parser = _new_parser(protocol)
+    def __init__(self, protocol: Protocol, real: Any) -> None:
+        self._protocol, self._real = protocol, real
+        self.write, self.close = real.write, protocol.close
+
+    def is_closing(self) -> bool:
+        return self._protocol.is_closing or self._real.is_closing()
+
+    def resume_reading(self) -> None:
+        if not self._protocol.is_full:
+            self._real.resume_reading()
 
     def __getattr__(self, name: str) -> Any:
-        return getattr(self._parser, name)
-
-    def is_offer(self) -> bool:
-        """Tell whether the request offers another protocol (CONNECT asks for nothing else, and is refused)."""
-        return self._parser.should_upgrade() and self._parser.get_method() != b"CONNECT"
-
-    def feed_data(self, data: bytes) -> None:
-        """Parse `data`; it may hold several requests, hence several offers."""
-        while True:  # bound: each turn but the last takes the headers of a request off `data`
-            try:
-                self._parser.feed_data(data)
-                return
-            except httptools.HttpParserUpgrade as offer:
-                if not self.is_offer():
-                    raise
-                data = data[offer.args[0] :]
-                self._parse_again()
-
-    def _parse_again(self) -> None:
-        protocol, method = self._protocol, self._parser.get_method()
-        lines = [method + b" " + protocol.url + b" HTTP/1.1"]
-        lines += [name + b": " + value for name, value in protocol.headers if name not in _OFFER]
-        if not self._parser.should_keep_alive():
-            lines.append(b"connection: close")
-        self._parser = _new_parser(protocol)
-        self._parser.feed_data(b"\r\n".join([*lines, b"", b""]))
-
-
-def _new_parser(protocol: Protocol) -> Any:
-    """Return a parser as uvicorn makes it."""
-    parser = httptools.HttpRequestParser(protocol)
-    with suppress(AttributeError):  # older httptools
-        parser.set_dangerous_leniencies(lenient_data_after_close=True)
-    return parser
+        return getattr(self._real, name)

@@ -16,6 +16,7 @@ from collections.abc import Callable, Coroutine, Iterable
 from typing import Any, Final
 
 import numpy as np
+from fastapi import routing
 from fastapi.routing import APIRoute, APIRouter
 from pydantic import TypeAdapter, ValidationError
 from starlette.requests import ClientDisconnect, Request
@@ -59,7 +60,11 @@ class GeometryRoute(APIRoute):
             for item in self.dependant.query_params
         }
 
+        guard = _guard_of(self)
+
         async def handle(request: Request) -> Response:
+            if guard is not None:
+                await guard(request)
             state = state_of(request.app)
             call = Call(state.settings, state.store, state.memory)
             response = None
@@ -89,6 +94,7 @@ class GeometryRoute(APIRoute):
                     if not is_small:
                         state.pool.check_room()
                     job.body = await body.read(request.receive, declared, call)
+                    call.start_clock()
                     state.metrics.bytes_in.inc(len(job.body))
                 if is_small and state.warm.is_set() and adapter is not None and job.coding is None:
                     job.decode()
@@ -105,6 +111,26 @@ class GeometryRoute(APIRoute):
                 return _failed(error, request)
 
         return handle
+
+
+def _guard_of(route: APIRoute) -> Answer | None:
+    """Return what solves the dependencies that an application gave to the router, None if there are none.
+
+    FastAPI's own handler would solve them. Newer versions do not copy them into the routes of an included router.
+    """
+    context = getattr(routing, "_effective_route_context_var", None)
+    effective = (context and context.get()) or route
+    if not effective.dependencies:
+        return None
+    provider = effective.dependency_overrides_provider
+    made = APIRoute(
+        effective.path, _nothing, dependencies=effective.dependencies, dependency_overrides_provider=provider
+    )
+    return made.get_route_handler()
+
+
+def _nothing() -> None:
+    """Stands for an endpoint behind dependencies."""
 
 
 def posts_of(routers: Iterable[APIRouter]) -> dict[str, Answer]:

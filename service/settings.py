@@ -50,8 +50,8 @@ class Settings(BaseSettings):
     port: Annotated[int, Field(ge=0, le=65535)] = 8000
     """Port to listen on; 0 takes a free port (it is printed)."""
     workers: Count = 1
-    """Processes; one uses all cores already, more of them help JSON decoding. Each has a memory of its own: without a
-    store folder they share a temporary one."""
+    """Processes. One reads and writes JSON on one core at a time, and computes on up to about 8: for many clients start
+    one for each core. Each has a memory of its own; without a store folder they share a temporary one."""
     log_level: Annotated[Literal["debug", "info", "warning", "error"], BeforeValidator(_lower)] = "info"
     """What is logged: debug, info, warning or error."""
     access_log: bool = True
@@ -100,10 +100,13 @@ class Settings(BaseSettings):
     """Time for the headers of a request to arrive, from the connection or their first byte."""
     write_seconds: Seconds = 10.0
     """Time for a client to read the next some 200 kB of an answer; one that does not is dropped."""
+    answer_seconds: Seconds = 300.0
+    """Time for a client to read a whole answer, however steadily it reads: meanwhile the answer holds its memory."""
     body_seconds: Seconds = 60.0
     """Time for a body to arrive: a slow sender must not hold its memory for ever."""
     drain_seconds: Seconds = 30.0
-    """Time for running requests after SIGTERM; Kubernetes kills 30 s after it by default, so lower it there."""
+    """Time for running requests after SIGTERM; the process ends 2 s later whatever runs. Kubernetes kills 30 s after
+    SIGTERM by default, so lower it there."""
     concurrency: Count = Field(default_factory=lambda: 4 * _cores())
     """Requests computed at once. More than cores: long calls run in chunks of 1-3 ms, so short ones slip between."""
     queue_length: Count = 64

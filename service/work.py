@@ -7,9 +7,6 @@ cut themselves into chunks of 1-3 ms over the engine's own pool, so short reques
 from __future__ import annotations
 
 import asyncio
-import ctypes
-import gc
-import os
 import threading
 import time
 from collections.abc import Callable, Sized
@@ -18,33 +15,15 @@ from typing import Annotated, Any, Final, TypeVar
 
 from fastapi import Depends
 
-import engine
 from engine import Accuracy, Cancel, CancelledError, DeadlineExceededError, EngineError
 from service.errors import ServiceError
+from service.memory import LATER, SMALL, Memory
 from service.metrics import Metrics
 from service.settings import Settings
 from service.store import Store
 
 T = TypeVar("T")
 Where = tuple[str | int, ...]
-FOOTPRINT: Final = 4
-"""Bytes held for each byte of a body, at most: itself, its numbers, a solid of them, the answer."""
-SMALL: Final = 2**16
-"""Bytes that a request is given whatever others hold: there are no more requests than fit into the queue."""
-_KEPT: Final = 16
-"""Of what requests may hold, one part in so many may have been freed before the system gets it back."""
-_LEAST: Final = 2**12
-"""Bytes that a request is taken to free at least."""
-_LATER: Final = 0.05
-"""Seconds after which what an answer was made of is gone."""
-_FEW: Final = 2**20
-"""Bytes held by requests under way up to which their objects are gone through in a few milliseconds."""
-_libc: Final = ctypes.CDLL(None) if os.name == "posix" else None
-_trim = getattr(_libc, "malloc_trim", None)
-"""glibc keeps what was freed in arenas of each thread, some hundred MB after a large request."""
-_OF_MALLOC: Final = {-8: 2, -1: 2**20, -3: 2**20}
-"""M_ARENA_MAX, M_TRIM_THRESHOLD and M_MMAP_THRESHOLD of mallopt(3): glibc raises the last two to 64 and 32 MB itself,
-and keeps that much at the end of each thread's arena: 256 MB given, 4 to 8 hostile clients took 320 and now 240."""
 _INSTEAD: Final = {
     "locate_scene": "ask for fewer points or bodies at once",
     "collide_scene": "split the scene, or name the pairs to look at in `only`",
@@ -62,60 +41,11 @@ _INSTEAD: Final = {
 PHASES: Final = ("decode", "prepare", "compute", "encode")
 
 
-def give_back_freed() -> None:
-    """Have glibc give back what is freed, in this whole process, before its threads have arenas."""
-    mallopt: Any = getattr(_libc, "mallopt", None)
-    if mallopt is not None:
-        for option, value in _OF_MALLOC.items():
-            mallopt(option, value)
-
-
-class Memory:
-    """Bytes that requests under way hold, or may come to hold; safe to share between threads."""
-
-    def __init__(self, limit: int) -> None:
-        self.limit = limit
-        self.taken = self.freed = self.leaving = 0
-        self.lock = threading.Lock()
-        self.has_left = threading.Condition(self.lock)
-
-    def free(self, taken: int, most: int) -> None:
-        """Count the end of a request that holds, or held at most, so much: it is free once the system has it back."""
-        with self.lock:
-            self.freed += max(most, _LEAST)
-            is_much = self.freed > self.limit // _KEPT
-            if is_much:
-                self.freed = 0
-                self.leaving += taken
-            else:
-                self.taken -= taken
-        if is_much:
-            threading.Thread(target=self._give_back, args=(taken,), daemon=True).start()
-
-    def _give_back(self, taken: int) -> None:
-        """Give freed memory back to the system; and what only cycles hold, while there are few objects to look at.
-
-        Python would look for cycles by itself, at all objects again and again while a large body becomes more and more
-        of them: that held up all threads for up to 0.46 s (app.py turns it off).
-        """
-        time.sleep(_LATER)
-        if self.taken - self.leaving <= _FEW:
-            gc.collect()
-        engine.release()
-        if _trim is not None:
-            _trim(0)
-        with self.lock:
-            self.taken -= taken
-            self.leaving -= taken
-            self.has_left.notify_all()
-
-    def refusal(self, size: int) -> ServiceError:
-        """Return what is said where there is no room for so many bytes more."""
-        detail = (
-            f"requests under way hold {self.taken} bytes, and {size} more would be too many; try again, send less at "
-            "once, or raise GEOMETRY_REQUEST_BYTES"
-        )
-        return ServiceError("out_of_memory", detail)
+THREADS: Final = "geometry-"
+"""Begins the names of threads that answer requests."""
+_LATE: Final = "late"
+GRACE: Final = 0.2
+"""Seconds that a request has after its deadline to say itself what it did not get done."""
 
 
 class _Phase:
@@ -140,8 +70,8 @@ class Call(Cancel):
     """
 
     __slots__ = (
-        "_answer", "_memory", "_most", "_taken", "coding", "end", "headers", "instead", "is_light", "may_wait",
-        "media_type", "seconds", "settings", "status", "store",
+        "_answer", "_is_over", "_is_running", "_memory", "_most", "_taken", "coding", "end", "headers", "instead",
+        "is_light", "may_wait", "media_type", "seconds", "settings", "status", "store",
     )  # fmt: skip
 
     def __init__(self, settings: Settings, store: Store, memory: Memory) -> None:
@@ -150,6 +80,7 @@ class Call(Cancel):
         self.store = store
         self._memory = memory
         self._taken = self._answer = self._most = 0
+        self._is_running = self._is_over = False
         self.media_type = "application/json"
         self.coding: str | None = None
         """How the answer is compressed."""
@@ -157,10 +88,14 @@ class Call(Cancel):
         """What to ask for where the answer would be too large, once it is asked for."""
         self.is_light = False  # then it ends before a deadline's timer could be started
         self.may_wait = False  # on the event loop it would hold up everybody
-        self.end = time.monotonic() + settings.deadline_seconds
+        self.start_clock()
         self.seconds = dict.fromkeys(PHASES, 0.0)
         self.status: int | None = None
         self.headers: dict[str, str] = {}
+
+    def start_clock(self) -> None:
+        """Count the time to the deadline from now on."""
+        self.end = time.monotonic() + self.settings.deadline_seconds
 
     def phase(self, name: str) -> _Phase:
         """Count the time spent inside under `name`."""
@@ -175,22 +110,26 @@ class Call(Cancel):
         """
         memory = self._memory
         with memory.lock:
-            if n_bytes > 0 and self._taken + n_bytes > SMALL:
-                if self._taken + n_bytes > memory.limit:
-                    raise self._too_large(memory.limit, "GEOMETRY_REQUEST_BYTES")
-                while self.may_wait and memory.leaving and memory.taken + n_bytes > memory.limit:  # bound: remaining()
-                    memory.has_left.wait(self.remaining())
-                if memory.taken + n_bytes > memory.limit:
-                    raise memory.refusal(n_bytes)
+            while self.may_wait and memory.leaving and memory.taken + n_bytes > memory.limit:  # bound: remaining()
+                memory.has_left.wait(self.remaining())
+            self._check(n_bytes)
             memory.taken += n_bytes
             self._taken += n_bytes
             self._most = max(self._most, self._taken)
 
     async def wait_for(self, n_bytes: int) -> None:
-        """Wait while there is no room for so many bytes only because others are about to give theirs back."""
+        """Raise as `take` would, without taking; wait while others are about to give back what is missing."""
         memory = self._memory
-        while memory.leaving and memory.taken - self._taken + n_bytes > memory.limit:  # bound: until they have
-            await asyncio.sleep(_LATER / 10)
+        while memory.leaving and memory.taken + n_bytes > memory.limit:  # bound: until they have
+            await asyncio.sleep(LATER / 10)
+        self._check(n_bytes)
+
+    def _check(self, n_bytes: int) -> None:
+        if n_bytes > 0 and self._taken + n_bytes > SMALL:
+            if self._taken + n_bytes > self._memory.limit:
+                raise self._too_large(self._memory.limit, "GEOMETRY_REQUEST_BYTES")
+            if self._memory.taken + n_bytes > self._memory.limit:
+                raise self._memory.refusal(n_bytes)
 
     def take_part(self, part: Sized) -> None:
         """Account for a part of the answer; `answer_too_large` beyond its limit."""
@@ -205,11 +144,26 @@ class Call(Cancel):
         detail = f"{what} would need more than {limit} bytes; {self.instead or 'send less at once'}, or raise {setting}"
         return ServiceError("body_too_large" if self.instead is None else "answer_too_large", detail)
 
+    def run(self, job: Callable[[], T]) -> T:
+        """Return what `job` returns, in a thread: what it holds is counted until it ends, though nobody waits."""
+        self.may_wait = self._is_running = True
+        try:
+            return job()
+        finally:
+            with self._memory.lock:
+                self._is_running = False
+            if self._is_over:
+                self.free()
+
     def free(self) -> None:
-        """Account for the end of the request."""
-        taken, self._taken = self._taken, 0
-        self._memory.free(taken, self._most)
-        self._most = 0
+        """Account for the end of the request, once no thread works on it."""
+        with self._memory.lock:
+            self._is_over = True
+            if self._is_running:
+                return
+            taken, most = self._taken, self._most
+            self._taken = self._most = 0
+        self._memory.free(taken, most)
 
     def remaining(self) -> float:
         """Return the seconds left; `deadline_exceeded` if there are none, `cancelled` if nobody waits any more."""
@@ -217,10 +171,11 @@ class Call(Cancel):
             raise CancelledError("the request was cancelled; send it again")
         left = self.end - time.monotonic()
         if left <= 0:
-            raise self._too_late()
+            raise self.too_late()
         return left
 
-    def _too_late(self) -> DeadlineExceededError:
+    def too_late(self) -> DeadlineExceededError:
+        """Return what is said once the deadline has passed."""
         seconds = self.settings.deadline_seconds
         return DeadlineExceededError(
             f"the deadline of {seconds} s passed before the answer was there; ask for less at once, or raise "
@@ -245,7 +200,7 @@ class Call(Cancel):
             try:
                 result, accuracy = function(*arguments, report=True, **options)
             except DeadlineExceededError:
-                raise self._too_late() from None
+                raise self.too_late() from None
             except EngineError as error:
                 if retold is not None:
                     retold(error)
@@ -268,7 +223,8 @@ class _Lane:
     """A few threads behind a queue of bounded length."""
 
     def __init__(self, settings: Settings, name: str) -> None:
-        self.executor = ThreadPoolExecutor(settings.concurrency, thread_name_prefix=name)
+        self.n_threads = settings.concurrency
+        self.executor = ThreadPoolExecutor(self.n_threads, thread_name_prefix=THREADS + name)
         self.room = settings.concurrency + settings.queue_length
         self.under_way: set[Call] = set()
 
@@ -290,43 +246,60 @@ class Pool:
         """Raise `queue_full` if another large question would not be taken now."""
         self._lanes[False].check_room()
 
+    def is_stuck(self) -> bool:
+        """Tell whether every thread for large questions works on one whose deadline has passed."""
+        lane, late = self._lanes[False], time.monotonic() - 2 * GRACE
+        with self._lock:
+            return sum(call.end < late for call in lane.under_way) >= lane.n_threads
+
     async def run(self, call: Call, job: Callable[[], T], is_small: bool) -> T:
-        """Run `job` in a thread; if this coroutine is cancelled, the call's switch is thrown."""
+        """Run `job` in a thread. If it does not end in time, or this coroutine is cancelled, the call's switch is
+        thrown; where it has not begun yet, it never does, and leaves its place at once."""
         lane = self._lanes[is_small]
         with self._lock:
             lane.check_room()
             lane.under_way.add(call)
-        metrics, before = self._metrics, time.perf_counter()
-        metrics.queued.inc()
+        metrics, before, waiting = self._metrics, time.perf_counter(), [job]
 
         def begin() -> T:
             metrics.queued.dec()
             metrics.waited.observe(time.perf_counter() - before)
-            call.may_wait = True
-            return job()
+            return call.run(waiting.pop())
 
+        metrics.queued.inc()
         try:
             future = lane.executor.submit(begin)
         except RuntimeError:  # closed between two steps of this request
-            self._forget(lane, call)
-            metrics.queued.dec()
+            self._forget(lane, call, never_began=True)
             raise ServiceError("queue_full", "the service is shutting down; try again") from None
         future.add_done_callback(lambda done: self._forget(lane, call, done.cancelled()))
+        result = asyncio.wrap_future(future)
+        left = max(0.0, call.end - time.monotonic()) + GRACE
+        timer = asyncio.get_running_loop().call_later(left, result.cancel, _LATE)
         try:
-            return await asyncio.wrap_future(future)
-        except asyncio.CancelledError:
+            return await result
+        except asyncio.CancelledError as cancelled:
             call.set()
+            if future.cancel():
+                waiting.clear()  # the executor lets go of it only when a thread comes to it
+            if cancelled.args == (_LATE,):
+                raise call.too_late() from None
             raise
+        finally:
+            timer.cancel()
 
-    def close(self) -> None:
-        """Cancel what still runs and let the threads end."""
+    def close(self, seconds: float = 0.0) -> None:
+        """Cancel what still runs, take nothing more, and wait some time for the end of it."""
         with self._lock:
             for call in [call for lane in self._lanes.values() for call in lane.under_way]:
                 call.set()
         for lane in self._lanes.values():
-            lane.executor.shutdown(wait=True, cancel_futures=True)
+            lane.executor.shutdown(wait=False, cancel_futures=True)
+        end = time.monotonic() + seconds
+        while any(lane.under_way for lane in self._lanes.values()) and time.monotonic() < end:
+            time.sleep(0.01)
 
-    def _forget(self, lane: _Lane, call: Call, never_began: bool = False) -> None:
+    def _forget(self, lane: _Lane, call: Call, never_began: bool) -> None:
         with self._lock:
             lane.under_way.discard(call)
         if never_began:

@@ -39,9 +39,12 @@ async def healthz() -> Response:
 async def readyz(request: Request) -> Response:
     """Ready: every kernel is compiled and no shutdown has begun."""
     state = state_of(request.app)
-    if state.warm.is_set():
-        return _ok()
-    return problem([Fault((), "not_ready", state.warm_error or _how_far(state))])
+    if not state.warm.is_set():
+        return problem([Fault((), "not_ready", state.warm_error or _how_far(state))])
+    if state.pool.is_stuck():
+        detail = "every thread for large requests works on one whose deadline has passed; ask another replica, or wait"
+        return problem([Fault((), "not_ready", detail)])
+    return _ok()
 
 
 @router.get("/metrics", operation_id="metrics", response_class=PlainTextResponse)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import gzip
 import json
+from collections.abc import AsyncIterator
 from typing import Any
 
 import httpx
@@ -128,6 +130,46 @@ async def test_bodies_may_be_compressed(client: httpx.AsyncClient, pack: Any) ->
     octets = {"Content-Encoding": headers["Content-Encoding"]}
     answer = await client.post(f"{stored}/contains", content=pack(np.zeros((5, 3)).tobytes()), headers=octets)
     assert answer.content == b"\1" * 5
+
+
+async def test_a_gzip_body_may_have_several_members(client: httpx.AsyncClient) -> None:
+    """RFC 1952, 2.2: as `cat a.gz b.gz` makes them, and tools that compress in blocks."""
+    headers = {**JSON, "Content-Encoding": "gzip"}
+    body = json.dumps({"solid": SPHERE, "points": [[0, 0, 0]] * 20_000}).encode()
+    members = [gzip.compress(body[start : start + 50_000]) for start in range(0, len(body), 50_000)]
+    members[1:1] = [gzip.compress(b"")] * 5_000
+    members += [gzip.compress(bytes([byte])) for byte in b" " * 5_000]
+    whole = b"".join(members)
+    answer = await client.post("/v1/contains", content=whole, headers=headers)
+    assert answer.json()["contained"] == [True] * 20_000
+    for wrong in (whole[:-5], whole + b"junk", whole + b"\x1f", whole + gzip.compress(b"")[:12]):
+        check_problem(await client.post("/v1/contains", content=wrong, headers=headers), 400, "bad_request")
+    bomb = gzip.compress(b" " * 2**18) * 2**6
+    check_problem(await client.post("/v1/contains", content=bomb, headers=headers), 413, "body_too_large")
+
+
+async def test_what_is_declared_is_not_taken(app: FastAPI, anyio_backend: str) -> None:
+    """Bodies are counted as they arrive, and refused before where they could never fit."""
+    arrived, large = asyncio.Event(), {"solid": SPHERE, "points": [[0, 0, 0]] * 10_000}
+
+    async def first_byte() -> AsyncIterator[bytes]:
+        yield b"{"
+        await arrived.wait()
+        yield b" " * (2**20 - 1)
+
+    headers = {**JSON, "Content-Length": str(2**20)}
+    async with client_of(limited(app, request_bytes=2**22 + 2**16)) as client:
+        waiting = [
+            asyncio.create_task(client.post("/v1/contains", content=first_byte(), headers=headers)) for _ in "abcd"
+        ]
+        await asyncio.sleep(0.2)
+        assert (await client.post("/v1/contains", json=large)).status_code == 200
+        arrived.set()
+        statuses = sorted([(await answer).status_code for answer in waiting])
+        assert set(statuses) == {400, 503}  # not all of them at once, since now they are there
+        limited(app, request_bytes=2**21)
+        answer = await client.post("/v1/contains", content=first_byte(), headers=headers)
+        check_problem(answer, 413, "body_too_large")
 
 
 async def test_other_codings_are_refused(client: httpx.AsyncClient) -> None:

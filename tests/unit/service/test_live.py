@@ -89,10 +89,10 @@ class Service:
         assert self.process.stderr is not None
         self.process.stderr.close()
 
-    def wait_until_in_flight(self, count: int) -> None:
+    def wait_until_in_flight(self, count: int, key: str = "") -> None:
         """Wait until so many requests are under way, the one that asks for it left out."""
         end, asked = time.monotonic() + 300, f"\ngeometry_requests_in_flight {count + 1}.0\n"
-        while asked not in httpx.get(f"{self.url}/metrics", timeout=120).text:
+        while asked not in httpx.get(f"{self.url}/metrics", headers={"X-API-Key": key}, timeout=120).text:
             assert time.monotonic() < end, "".join(self.log)
             time.sleep(0.05)
 

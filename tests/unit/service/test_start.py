@@ -18,7 +18,6 @@ from typing import Any
 
 import httpx
 import pytest
-from fastapi.testclient import TestClient
 
 import engine
 from service.app import create_app
@@ -186,7 +185,8 @@ def is_warming() -> bool:
     return any(thread.name == WARM_UP for thread in threading.enumerate())
 
 
-def test_the_warm_up_ends_with_the_service(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.anyio
+async def test_the_warm_up_ends_with_the_service(monkeypatch: pytest.MonkeyPatch, anyio_backend: str) -> None:
     """Python stops a thread that outlives it where it stands, which within the compiler's C++ aborts the process."""
 
     def warm(progress: Callable[[int], object], processes: int) -> None:
@@ -195,8 +195,10 @@ def test_the_warm_up_ends_with_the_service(monkeypatch: pytest.MonkeyPatch) -> N
             progress(0)
 
     monkeypatch.setattr(engine, "warm", warm)
-    with TestClient(create_app(Settings())) as client:
-        assert client.get("/readyz").status_code == 503
+    app = create_app(Settings())
+    async with app.router.lifespan_context(app):
+        async with httpx.AsyncClient(transport=httpx.ASGITransport(app=app), base_url="http://test") as client:
+            assert (await client.get("/readyz")).status_code == 503
         assert is_warming()
     assert not is_warming()
 

@@ -1,0 +1,120 @@
+"""A guest changes nothing of its host: process-wide switches, keys, and applications within applications."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from typing import Annotated, Any
+
+import httpx
+import pytest
+from fastapi import Depends, FastAPI, Header, HTTPException
+
+import engine
+import service
+from service.settings import Settings
+from tests.unit.service.asking import SPHERE, check_problem
+from tests.unit.service.test_live import ROOT
+
+pytestmark = pytest.mark.anyio
+
+HOST = """
+import asyncio, gc, json, logging, sys
+from fastapi import FastAPI
+import httpx
+
+def switches():
+    flags = logging.logThreads, logging.logProcesses, logging.logMultiprocessing
+    return [gc.isenabled(), gc.get_threshold(), gc.get_freeze_count(), sys.getswitchinterval(), flags]
+
+before = switches()
+import engine, service
+from service.memory import _libc
+calls = []
+if _libc is not None:
+    _libc.mallopt = lambda *arguments: calls.append(arguments)
+engine.warm = lambda **_: None
+app = FastAPI()
+app.include_router(service.router())
+
+async def main():
+    async with app.router.lifespan_context(app):
+        assert app.state.geometry.warm.wait(60)
+        client = httpx.AsyncClient(transport=httpx.ASGITransport(app=app), base_url="http://test")
+        body = {"solid": {"type": "sphere", "center": [0, 0], "radius": 1}, "points": [[0, 0]] * 5000}
+        assert (await client.post("/v1/contains", json=body)).status_code == 200
+        assert switches() == before, (before, switches())
+    assert switches() == before, (before, switches())
+    assert not calls, calls
+
+asyncio.run(main())
+"""
+
+
+def test_a_guest_leaves_the_process_as_it_is() -> None:
+    done = subprocess.run([sys.executable, "-c", HOST], cwd=ROOT, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.fixture
+def host(monkeypatch: pytest.MonkeyPatch) -> FastAPI:
+    monkeypatch.setattr(engine, "warm", lambda **_: None)
+    return FastAPI()
+
+
+def client_of(app: FastAPI) -> httpx.AsyncClient:
+    return httpx.AsyncClient(transport=httpx.ASGITransport(app=app), base_url="http://test")
+
+
+QUESTION = {"solid": SPHERE, "points": [[0, 0, 0], [9, 9, 9]]}
+
+
+async def test_keys_are_the_hosts_matter_and_it_is_said(
+    host: FastAPI, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, anyio_backend: str
+) -> None:
+    monkeypatch.setenv("GEOMETRY_API_KEYS", "secret")
+    host.include_router(service.router())
+    (line,) = [record.getMessage() for record in caplog.records if record.name == "service"]
+    assert "GEOMETRY_API_KEYS" in line
+    assert "dependencies=[Depends(" in line
+    assert "secret" not in line
+    async with host.router.lifespan_context(host):
+        assert (await client_of(host).post("/v1/contains", json=QUESTION)).status_code == 200
+
+
+async def test_dependencies_of_the_host_guard_every_call(host: FastAPI, anyio_backend: str) -> None:
+    def check(x_key: Annotated[str, Header()] = "") -> None:
+        if x_key != "right":
+            raise HTTPException(401, "no")
+
+    host.include_router(service.router(Settings()), prefix="/geometry", dependencies=[Depends(check)])
+    async with host.router.lifespan_context(host):
+        client = client_of(host)
+        for headers, status in (({}, 401), ({"x-key": "right"}, 200)):
+            assert (await client.get("/geometry/healthz", headers=headers)).status_code == status
+            answer = await client.post("/geometry/v1/contains", json=QUESTION, headers=headers)
+            assert answer.status_code == status
+        missing = f"/geometry/v1/solids/{'0' * 64}"
+        assert (await client.get(missing)).status_code == 401
+        check_problem(await client.get(missing, headers={"x-key": "right"}), 404, "unknown_solid")
+
+
+@pytest.mark.parametrize("path", ["/v1/contains", "/readyz", "/metrics"])
+async def test_a_mounted_application_starts_with_its_first_request(
+    host: FastAPI, anyio_backend: str, path: str
+) -> None:
+    """Starlette runs the lifespan of the outermost application only."""
+    below = FastAPI()
+    below.include_router(service.router(Settings(max_points=3)))
+    host.mount("/geometry", below)
+    async with host.router.lifespan_context(host):
+        client = client_of(host)
+        ask: Any = client.post("/geometry" + path, json=QUESTION) if path[1] == "v" else client.get("/geometry" + path)
+        assert (await ask).status_code in (200, 503)
+        assert below.state.geometry.warm.wait(60)
+        for _ in range(2):
+            answer = await client.post("/geometry/v1/contains", json=QUESTION)
+            assert answer.json()["contained"] == [True, False]
+        assert (await client.get("/geometry/readyz")).status_code == 200
+        assert "x-limit" not in json.dumps((await client.get("/geometry/openapi.json")).json())
