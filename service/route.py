@@ -174,7 +174,7 @@ class _Job:
             if self.adapter is None:
                 self.question = text
                 return
-            document = wire.decode_fast(text, self.call.take)
+            document = wire.decode_fast(text, self.call.take, self.call.remaining)
             if document is not None:
                 try:
                     self.question = self.adapter.validate_python(document, context=self.call)
@@ -209,8 +209,18 @@ class _Job:
                 call.media_type = body.OCTETS
                 parts = wire.cut(wire.octets(answer))
             else:
-                parts = wire.encoded(answer)
+                self._check_least(wire.least_of(answer))
+                parts = wire.encoded(answer, call.remaining)
             return self._gathered(parts)
+
+    def _check_least(self, n_bytes: int) -> None:
+        """Raise `answer_too_large` or `out_of_memory` at once where an answer of so many bytes would be refused."""
+        limit = self.call.settings.max_answer_bytes
+        if n_bytes > limit:
+            detail = f"the answer would need more than {limit} bytes; {self.call.instead}, or raise "
+            raise ServiceError("answer_too_large", detail + "GEOMETRY_MAX_ANSWER_BYTES")
+        self.call.take(n_bytes)
+        self.call.take(-n_bytes)
 
     def _gathered(self, parts: Iterable[Part]) -> list[Part]:
         """Return the parts of an answer, within its limits, compressed if that was asked for and is worth it."""
