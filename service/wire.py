@@ -74,6 +74,12 @@ class Series(NamedTuple):
         return bool(max(self.n, n_numbers) > PART)
 
 
+class Raw(NamedTuple):
+    """A part of an answer that is JSON already."""
+
+    text: bytes
+
+
 def series_of(array: Any) -> Any:
     """Return rows of numbers as they are written: in parts where they are many."""
     return array if array.size <= PART else Series(len(array), lambda start, stop: array[start:stop], len(array[0]))
@@ -128,10 +134,6 @@ def _refusal(body: pieces.Body, found: str) -> str:
         return "the body is UTF-16; send it as UTF-8"
     what = next((what for begun, what in _REMEDIES.items() if found.startswith(begun)), "correct it there")
     return f"the body is no JSON that is taken here: {found:.200}; {what}"
-
-
-raw = orjson.Fragment
-"""A part of an answer that is JSON already."""
 
 
 def encode(answer: Any, poll: Poll = no_poll) -> bytes:
@@ -234,6 +236,8 @@ def _plain(value: Any, poll: Poll = no_poll) -> Any:
         return {name: _in_parts(item, poll) for name, item in vars(value).items() if item is not None}
     if isinstance(value, Series):
         return _in_parts(value, poll) if value.is_long else value.make(0, value.n)
+    if isinstance(value, Raw):
+        return orjson.Fragment(value.text)
     if isinstance(value, np.ndarray):
         return np.ascontiguousarray(value) if value.size else value.tolist()
     raise TypeError(f"{type(value).__name__} has no place in an answer")

@@ -43,14 +43,14 @@ def from_features(found: Any, accuracy: engine.Accuracy, call: Call) -> layers.L
 
     def features(start: int, stop: int) -> list[Any]:
         return [
-            wire.raw(b'{"type":"Feature",%b,"geometry":%b}' % (found.members(row), _geometry(found, row, call)))
+            wire.Raw(b'{"type":"Feature",%b,"geometry":%b}' % (found.members(row), _geometry(found, row, call)))
             for row in range(start, stop)
         ]
 
     n_bytes = found.n_bytes
     return layers.LayersResponse.made(
         type="FeatureCollection",
-        crs=None if found.crs_text is None else wire.raw(found.crs_text),
+        crs=None if found.crs_text is None else wire.Raw(found.crs_text),
         features=Series(len(found), features, weight=10, offsets=n_bytes // _NUMBER_BYTES, least=int(n_bytes[-1])),
         collapsed=found.collapsed,
         accuracy=from_accuracy(accuracy),

@@ -14,6 +14,7 @@ from fastapi import FastAPI
 
 from service import tools
 from service.app import create_app
+from service.convert.summaries import summary
 from service.settings import Settings
 from tests.unit.service.asking import SPHERE, check_problem, examples
 from tests.unit.service.test_live import Service
@@ -102,7 +103,7 @@ def test_a_model_asks_about_a_stored_scene(service: Service) -> None:
 @pytest.mark.anyio
 async def test_tools_that_cannot_be_made_hold_nobody(client: httpx.AsyncClient, app: FastAPI) -> None:
     """Everybody who waits is answered, and the next one tries again."""
-    head = {"Accept": "application/json", "Content-Type": "application/json"}
+    head = {"Accept": "application/json", "Content-Type": "application/json", "Host": "localhost"}
     question = {"jsonrpc": "2.0", "id": 1, "method": "tools/list"}
     made = app.state.tools._made
     app.state.tools._made = lambda: {}["no such thing"]
@@ -160,7 +161,7 @@ async def test_where_the_library_is_absent(client: httpx.AsyncClient, monkeypatc
 
 def test_long_lists_are_cut_at_every_depth() -> None:
     rings = [[[float(i), 0.0] for i in range(100)]]
-    found = tools.summary({"pieces": [{"shell": rings[0], "holes": []}] * 7, "area": 1.0}, 2, 5)
+    found = summary({"pieces": [{"shell": rings[0], "holes": []}] * 7, "area": 1.0}, 2, 5)
     assert found["pieces"]["count"] == 7
     assert len(found["pieces"]["items"]) == 2
     assert found["pieces"]["items"][0]["shell"] == {"count": 100, "first": rings[0][:3]}
