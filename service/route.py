@@ -234,10 +234,11 @@ class _Job:
                 return self._gathered(self.finish(answer))
         except (EngineError, ServiceError) as error:
             error.where = existing(self.question, error.where)
+            _without_frames(error)
             raise
         finally:
+            document, self.document, self.question, self.arguments = self.document, None, None, {}
             if not call.is_light:
-                self.arguments, self.question, document, self.document = {}, None, self.document, None
                 pieces.let_go(document)
 
     def _encoded(self, answer: Any) -> Iterable[Part]:
@@ -320,11 +321,16 @@ def _faults_in(error: Exception, what: str) -> list[Fault]:
     faults = error.faults if isinstance(error, _InvalidBody) else faults_of(error)
     if faults[0].code == "internal":
         log.error("%s failed", what, exc_info=error)
+    _without_frames(error)
+    return faults
+
+
+def _without_frames(error: Exception) -> None:
+    """Forget the frames of an error and of those before it: they hold the body, and lead back to it."""
     known: BaseException | None = error
     while known is not None:  # bound: each is raised while the next was handled
-        known.with_traceback(None)  # its frames hold the body, and lead back to it
+        known.with_traceback(None)
         known = known.__context__
-    return faults
 
 
 def _coding_wanted(header: bytes) -> str | None:

@@ -39,6 +39,7 @@ _STEP: Final = 2**20
 """Bytes searched at once: some milliseconds."""
 _FREED: Final = 2**12
 """Items freed at once: some tenths of a millisecond."""
+_FLAT: Final = frozenset({str, int, float, bool, type(None)})
 _PLACE: Final = re.compile(r"(.*) at line (\d+) column (\d+)", re.DOTALL)
 _MARK: Final = secrets.token_hex(16)
 """The name, within a piece, of what an earlier piece began: none that a body could have by intent."""
@@ -83,12 +84,19 @@ def let_go(value: Any) -> None:
     waiting = [value]
     while waiting:  # bound: each container is emptied once
         container = waiting.pop()
-        while isinstance(container, list) and container:  # bound: each turn takes an item at least
-            waiting += [item for item in container[-_FREED:] if isinstance(item, (list, dict)) and item]
-            del container[-_FREED:]
         if isinstance(container, dict):
-            waiting += [item for item in container.values() if isinstance(item, (list, dict)) and item]
+            waiting += filter(_is_deep, container.values())
             container.clear()
+        while isinstance(container, list) and container:  # bound: each turn takes an item at least
+            waiting += filter(_is_deep, container[-_FREED:])
+            del container[-_FREED:]
+
+
+def _is_deep(value: Any) -> bool:
+    """Tell whether there may be too much in a value to free it at once."""
+    if type(value) is list:
+        return len(value) > _FREED or not _FLAT.issuperset(map(type, value))
+    return type(value) is dict and not _FLAT.issuperset(map(type, value.values()))
 
 
 def _cut(text: Body, start: int) -> tuple[int, bytes]:
