@@ -366,14 +366,15 @@ def _queried(request: Request, query: Query) -> dict[str, Any]:
 
 async def _run(pool: Pool, call: Call, job: Callable[[], list[Part]], receive: Receive, is_small: bool) -> list[Part]:
     """Run `job` in the pool and throw the call's cancel switch if the client goes away meanwhile."""
-    watcher = asyncio.create_task(_watch(call, receive))
+    watcher = asyncio.create_task(watch(call, receive))
     try:
         return await pool.run(call, job, is_small)
     finally:
         watcher.cancel()
 
 
-async def _watch(call: Call, receive: Receive) -> None:
+async def watch(call: Call, receive: Receive) -> None:
+    """Throw the call's switch when the client has gone away."""
     while (await receive())["type"] != "http.disconnect":
         pass
     call.set()

@@ -22,12 +22,13 @@ from starlette.requests import ClientDisconnect
 from starlette.routing import Route
 from starlette.types import Message, Receive, Scope, Send
 
+from engine import EngineError
 from service import wire
 from service.body import JSON, declared_length, read
 from service.convert.summaries import summary
 from service.decoding.pieces import Body
 from service.errors import ServiceError, faults_of, problem
-from service.route import GeometryRoute
+from service.route import GeometryRoute, watch
 from service.settings import Settings
 from service.work import Call
 
@@ -89,6 +90,7 @@ class Tools:
             check_origin(headers, self._settings)
             declared = declared_length(headers, self._settings.max_body_bytes)
             text = await read(receive, declared, call)
+            call.start_clock()
             text, arguments = await state.pool.run(call, lambda: _parted(text, call), is_small=True)
             if self._manager is None or (self._manager.done() and self._manager.exception()):  # the last start failed
                 self._manager = asyncio.get_running_loop().create_future()
@@ -97,13 +99,13 @@ class Tools:
             own = [header for header in scope["headers"] if header[0] not in (b"content-length", b"transfer-encoding")]
             own.append((b"content-length", str(len(text)).encode()))
             passed = {**scope, "headers": own, _ASKED: (call, arguments)}
-            gone = asyncio.create_task(_watch(call, receive))
+            gone = asyncio.create_task(watch(call, receive))
             try:
                 await manager.handle_request(passed, _replayed(text, gone), send)
             finally:
                 gone.cancel()
-        except ServiceError as error:
-            await problem(faults_of(error), error.headers)(scope, receive, send)
+        except (ServiceError, EngineError) as error:
+            await problem(faults_of(error))(scope, receive, send)
         except ClientDisconnect:
             pass
         finally:
@@ -218,6 +220,7 @@ def _is_loopback(name: str) -> bool:
 
 def _parted(text: Body, call: Call) -> tuple[bytes, dict[str, Any]]:
     """Return a request of the protocol as the library reads it, without the arguments of a tool, and these."""
+    call.remaining()  # it may have waited past its deadline
     call.take(wire.cost_of(text))
     message = wire.decode(text, call.remaining)
     arguments: Any = {}
@@ -245,13 +248,6 @@ def _replayed(text: bytes, gone: asyncio.Task[None]) -> Receive:
         return {"type": "http.disconnect"}
 
     return receive
-
-
-async def _watch(call: Call, receive: Receive) -> None:
-    """Throw the call's switch when the client has gone away."""
-    while (await receive())["type"] != "http.disconnect":
-        pass
-    call.set()
 
 
 def add_tools(app: FastAPI, settings: Settings, routers: Iterable[APIRouter]) -> Tools:

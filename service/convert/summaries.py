@@ -67,7 +67,7 @@ def _cut(value: Any, show: int) -> Any:
         return {name: _cut(item, show) for name, item in value.items()}
     if isinstance(value, str):
         return value if len(value) <= _LONG else {"count": len(value), "first": value[:_LONG]}
-    if isinstance(value, (list, tuple, np.ndarray)):
+    if isinstance(value, (list, tuple, np.ndarray)) and not isinstance(value, Series):
         value = Series(len(value), partial(_slice, value))
     if not isinstance(value, Series):
         return value
